@@ -17,6 +17,7 @@ sets:
   lint       packages that tests/run.sh --long needs in addition to these
   container  packages that tests/container.sh needs to build and run the image without a registry or a daemon
   runtime    libraries that locusd and locus need at run time; the image has nothing else
+  edge       the front of deploy/edge
 
   --list    print the names of the packages and do nothing
   --check   print the names of the missing packages; exit 1 if there is one
@@ -26,15 +27,16 @@ TEXT
 # The compiler and the libraries that find_package and pkg-config look for.
 build_packages="g++ cmake ninja-build pkg-config libgrpc++-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc
   libabsl-dev libspdlog-dev libcli11-dev nlohmann-json3-dev libassimp-dev libzip-dev libpng-dev libssl-dev
-  prometheus-cpp-dev libcivetweb-dev libcurl4-openssl-dev librocksdb-dev libxxhash-dev"
+  prometheus-cpp-dev libboost-dev zlib1g-dev libcurl4-openssl-dev librocksdb-dev libxxhash-dev librhonabwy-dev libjansson-dev
+  libseccomp-dev"
 python_packages="python3 python3-grpcio python3-protobuf"
-# ccache speeds up later builds; binutils provides nm for tests/house; prometheus-client and yaml read the metrics, alerts
-# and dashboards; zsh and fish run the completions; groff and mandoc format the manual; haproxy is the proxy between a
-# client and the daemon.
+# ccache speeds up later builds; binutils provides nm for tests/house; prometheus-client and yaml read the metrics,
+# alerts and dashboards; zsh and fish run the completions; groff and mandoc format the manual; tests run haproxy as a
+# proxy and as the front of deploy/edge; tests/attack speaks HTTP/2 by python3-h2 and makes certificates by openssl.
 test_packages="libgtest-dev libgmock-dev ccache clang-format git python3 binutils python3-numpy
-  python3-prometheus-client python3-yaml zsh fish mandoc groff-base haproxy"
+  python3-prometheus-client python3-yaml python3-h2 openssl zsh fish mandoc groff-base haproxy"
 # redis-tools contains the server too, without the service that redis-server would start.
-bench_packages="libembree-dev libbullet-dev libboost-dev libcgal-dev libnanoflann-dev redis-tools"
+bench_packages="libembree-dev libbullet-dev libcgal-dev libnanoflann-dev redis-tools"
 # The compiler of the asan preset, and the libraries of its sanitizers.
 clang_packages="clang-16 libclang-rt-16-dev"
 lint_packages="clang-tidy mypy"
@@ -42,7 +44,9 @@ lint_packages="clang-tidy mypy"
 container_packages="mmdebstrap buildah podman podman-compose runc iptables containernetworking-plugins systemd"
 # The libraries that the programs link directly; their dependencies follow.
 runtime_packages="libgrpc++1.51 libprotobuf32 libabsl20220623 libspdlog1.10 libassimp5 libzip4 libpng16-16 libssl3 libstdc++6
-  libprometheus-cpp-core1.0 libcivetweb1 libcurl4 librocksdb7.8 libxxhash0"
+  libprometheus-cpp-core1.0 zlib1g libcurl4 librocksdb7.8 libxxhash0 librhonabwy1.1 libjansson4 libseccomp2"
+# The front of deploy/edge.
+edge_packages="haproxy"
 
 action=install
 packages=
@@ -56,6 +60,7 @@ for argument in "$@"; do
     lint) packages="$packages $lint_packages" ;;
     container) packages="$packages $container_packages" ;;
     runtime) packages="$packages $runtime_packages" ;;
+    edge) packages="$packages $edge_packages" ;;
     --list) action=list ;;
     --check) action=check ;;
     -h | --help) usage; exit 0 ;;

@@ -1,5 +1,5 @@
 // locusd: reads its options and serves until SIGTERM or SIGINT, then drains and ends. `locusd check` and `locusd
-// repair` work on a data directory instead.
+// repair` verify or repair a data directory instead.
 
 #include <malloc.h>
 #include <pthread.h>
@@ -10,6 +10,7 @@
 #include <atomic>
 #include <cstdio>
 #include <cstdlib>
+#include <functional>
 #include <memory>
 #include <string>
 #include <thread>
@@ -17,6 +18,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "core/base/limits.h"
+#include "core/base/mutex.h"
 #include "core/index/bvh/kernels/dispatch.h"
 #include "server/config/server_config.h"
 #include "server/config/version.h"
@@ -24,7 +26,8 @@
 #include "server/rpc/library_logs.h"
 #include "server/scheduling/semaphore.h"
 #include "server/services/server.h"
-#include "server/storage/integrity/report_text.h"
+#include "server/storage/integrity/check.h"
+#include "server/storage/integrity/repair.h"
 #include "server/storage/rocksdb_log.h"
 
 namespace locus::server {
@@ -33,8 +36,8 @@ namespace {
 // Exit code after a second SIGTERM or SIGINT.
 constexpr int kEndedAtOnce = 130;
 
-// Makes glibc keep freed memory. By default it returns the memory of large messages to the kernel each time, which
-// halves throughput. Keeps at most 512 MiB, or an eighth of the memory limit if that is less.
+// Makes glibc keep freed memory. By default, glibc returns the memory of large messages to the kernel each time, which
+// halves throughput. With these settings glibc keeps at most 512 MiB, or an eighth of the memory limit if that is less.
 void keep_freed_memory(uint64_t memory_limit) {
   mallopt(M_MMAP_THRESHOLD, 64 << 20);
   mallopt(M_TRIM_THRESHOLD, static_cast<int>(std::min(uint64_t{512} << 20, memory_limit / 8)));
@@ -56,8 +59,8 @@ int wait_for_signal(const sigset_t& signals) {
   return signal;
 }
 
-// Thread that waits for SIGTERM and SIGINT. It starts before the server, whose start may take a while, and is never
-// destroyed. A second signal ends the process at once.
+// Thread that waits for SIGTERM and SIGINT. It starts before the server, so that a signal can also end a long start,
+// and is never destroyed. A second signal ends the process at once.
 class EndingSignals {
  public:
   static EndingSignals& listen() {
@@ -65,8 +68,13 @@ class EndingSignals {
     return *signals;
   }
 
-  // Returns a flag that becomes true with the first signal.
+  // Returns a flag that becomes true when the first signal arrives.
   const std::atomic<bool>& received() const { return received_; }
+  // Sets the function that is called on the thread after each SIGHUP; null: nothing happens.
+  void on_hangup(std::function<void()> reload) {
+    const MutexLock lock(mutex_);
+    reload_ = std::move(reload);
+  }
   // Waits for the first signal and returns its number.
   int wait() {
     first_.wait();
@@ -74,30 +82,42 @@ class EndingSignals {
   }
 
  private:
-  // Blocks the signals in the calling thread. It must run before any other thread starts, so that all threads inherit
-  // the mask and only the thread of this object receives the signals.
+  // Blocks the signals in the calling thread and starts the thread. Must be called before any other thread starts, so
+  // that all threads inherit the signal mask and only the thread of this object receives the signals.
   EndingSignals() {
     sigemptyset(&signals_);
     sigaddset(&signals_, SIGTERM);
     sigaddset(&signals_, SIGINT);
+    sigaddset(&signals_, SIGHUP);
     pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
     std::thread([this] {
-      signal_ = wait_for_signal(signals_);
+      signal_ = wait_for_ending();
       received_.store(true);
       first_.post();
-      wait_for_signal(signals_);
+      wait_for_ending();
       std::_Exit(kEndedAtOnce);
     }).detach();
   }
 
+  // Waits for SIGTERM or SIGINT and returns its number.
+  int wait_for_ending() {
+    for (int signal = wait_for_signal(signals_);; signal = wait_for_signal(signals_)) {
+      if (signal != SIGHUP) return signal;
+      const MutexLock lock(mutex_);
+      if (reload_ != nullptr) reload_();
+    }
+  }
+
   sigset_t signals_;
+  Mutex mutex_;
+  std::function<void()> reload_ LOCUS_GUARDED_BY(mutex_);
   int signal_ = 0;
   std::atomic<bool> received_{false};
   Semaphore first_;
 };
 
-// Writes the port to a file by renaming a temporary one, so that a reader never sees half a number. Does nothing if
-// `path` is empty. Logs the error and returns false if it fails.
+// Writes the port to a temporary file and renames that file to `path`, so that a reader never reads a part of the
+// number. Does nothing if `path` is empty. If writing fails, logs the error and returns false.
 bool write_port_file(const std::string& path, uint16_t port) {
   if (path.empty()) return true;
   const std::string temporary = absl::StrCat(path, ".tmp");
@@ -136,14 +156,14 @@ absl::StatusOr<std::unique_ptr<UpdateLog>> open_log(const ServerConfig& config) 
 
 int run(const ServerConfig& config) {
   start_logging(config.log_level, config.log_format);
-  // While the server starts, hide gRPC's errors: Server::start() reports why it failed in better words.
+  // While the server starts, log gRPC's errors at debug level only: Server::start() returns a clearer error.
   capture_library_logs(LogLevel::kDebug);
   if (const absl::Status chosen = use_instruction_set(config.instruction_set); !chosen.ok()) {
     log(LogLevel::kError, chosen.message());
     return EXIT_FAILURE;
   }
   EndingSignals& signals = EndingSignals::listen();
-  // Declared before the server, which writes to the log until the server is destroyed.
+  // The log is declared before the server, because the server writes to the log until it is destroyed.
   const absl::StatusOr<std::unique_ptr<UpdateLog>> update_log = open_log(config);
   if (!update_log.ok()) {
     log(LogLevel::kError, update_log.status().message());
@@ -160,7 +180,9 @@ int run(const ServerConfig& config) {
     return EXIT_FAILURE;
   capture_library_logs(LogLevel::kWarning);
   log_start(**server, config);
+  signals.on_hangup([&server = **server] { server.reload(); });
   const int signal = signals.wait();
+  signals.on_hangup(nullptr);
   log(LogLevel::kInfo, "draining", {{"signal", strsignal(signal)}, {"grace_s", absl::StrCat(config.drain_grace_s)}});
   (*server)->drain(std::chrono::seconds(config.drain_grace_s));
   log(LogLevel::kInfo, "ended");
@@ -177,8 +199,8 @@ int print(const absl::StatusOr<Report>& report) {
   return EXIT_SUCCESS;
 }
 
-// Runs `locusd check` or `locusd repair` and returns the exit code: 0 if check finds no damage, or if the directory can
-// be used after the repair.
+// Runs `locusd check` or `locusd repair` and returns the exit code: 0 if `check` finds no damage, or if the directory
+// can be used after `repair`.
 int maintain(const Maintenance& maintenance) {
   StorageOptions options;
   options.path = maintenance.directory;

@@ -6,7 +6,8 @@
 #   ./tests/container.sh            ends with: N passed, M failed, K skipped
 #   ./tests/container.sh --fresh    first removes the files of earlier runs
 #
-# Writes one line a check, passed, failed or skipped and its name, to build/container/results.txt, and `ended` last.
+# Writes one line for each check (passed, failed or skipped, and its name) to build/container/results.txt, and `ended`
+# as the last line.
 # shellcheck disable=SC2016,SC2317  # $(ORIGIN) is for apt-get; functions are called through check
 set -uo pipefail
 cd "$(dirname "$0")/.." || exit
@@ -58,7 +59,7 @@ check() {
 
 skip() { report skipped "$1"; echo "    SKIP: $2"; }
 
-# The later checks depend on this one.
+# Runs a check on which the later checks depend: ends the script if it fails.
 need() {
   local before
   before=$(grep -c ^failed "$results")
@@ -139,7 +140,7 @@ refuses_without_a_word() {
   output=$(podman run --rm "$image" 2>&1)
   code=$?
   printf '%s\n' "$output"
-  [ "$code" = 2 ] && grep -q LOCUS_INSECURE=1 <<< "$output" && grep -q "proxy in front that ends TLS" <<< "$output"
+  [ "$code" = 2 ] && grep -q LOCUS_INSECURE=1 <<< "$output" && grep -qF "listen on 127.0.0.1, [::1] or a unix socket" <<< "$output"
 }
 holds_no_tools() {
   podman run --rm --entrypoint sh "$image" -c '
@@ -189,16 +190,18 @@ compose_starts() {
   done
   return 1
 }
+# Checks a unit, with a program that is installed in place of its own.
 unit_is_correct() {
-  local output
-  sed 's#/usr/local/bin/locusd#/bin/true#' deploy/locusd.service > "$work/locusd.service"
-  # Its exit status is 0 even if it prints warnings.
-  output=$(systemd-analyze verify --man=no "$work/locusd.service" 2>&1) || return
+  local output unit
+  unit=$work/$(basename "$1")
+  sed -E 's#/usr/(local/bin/locusd|sbin/haproxy)#/bin/true#' "$1" > "$unit"
+  # systemd-analyze exits with 0 even if it prints warnings.
+  output=$(systemd-analyze verify --man=no "$unit" 2>&1) || return
   printf '%s' "$output"
   [ -z "$output" ]
 }
 # Maximum exposure in tenths: 0 is none, 100 is complete.
-unit_is_hardened() { systemd-analyze security --offline=true --threshold=15 deploy/locusd.service; }
+unit_is_hardened() { systemd-analyze security --offline=true --threshold=11 "$1"; }
 
 check_image() {
   check "the image holds no tools" holds_no_tools
@@ -233,8 +236,10 @@ if [ "$(id -u)" != 0 ]; then
   finish
 fi
 need "packages" ./deploy/packages.sh container
-check "the systemd unit is correct" unit_is_correct
-check "the systemd unit's exposure is at most 1.5 of 10" unit_is_hardened
+for unit in deploy/locusd.service deploy/edge/locus-edge.service; do
+  check "$(basename "$unit") is correct" unit_is_correct "$unit"
+  check "the exposure of $(basename "$unit") is at most 1.1 of 10" unit_is_hardened "$unit"
+done
 need "podman is set up" set_up_podman
 need "base image" make_base
 need "image" build_image

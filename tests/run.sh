@@ -2,9 +2,11 @@
 # Installs the packages that the tests need, builds, runs the suites and ends with: N passed, M failed, K skipped.
 #
 #   ./tests/run.sh                  a release build and its tests
-#   ./tests/run.sh --sanitizers     also the benchmarks' own tests, ThreadSanitizer, and AddressSanitizer with UBSan
+#   ./tests/run.sh --sanitizers     also the benchmarks' own tests, ThreadSanitizer, AddressSanitizer with UBSan, and
+#                                   each fuzz target for 5 s
 #   ./tests/run.sh --only asan      one suite: release, tsan or asan
-#   ./tests/run.sh --long           also the sanitizers, the tests labelled long, clang-tidy and the container
+#   ./tests/run.sh --long           also the sanitizers, the tests labelled long, clang-tidy and the container; each
+#                                   fuzz target for 60 s
 #   ./tests/run.sh --jobs 8         compile and test with 8 jobs (default: one a processor)
 #
 # Exits 0 only if nothing failed. A suite that cannot be installed, configured or built counts as one failure.
@@ -22,7 +24,7 @@ while [ $# -gt 0 ]; do
     --only) suites=${2-}; shift ;;
     --jobs) jobs=${2-}; shift ;;
     --long) suites="release tsan asan"; bench=yes; long=yes ;;
-    -h | --help) sed -n '2,10s/^# \{0,1\}//p' "$0"; exit 0 ;;
+    -h | --help) sed -n '2,12s/^# \{0,1\}//p' "$0"; exit 0 ;;
     *) echo "run.sh: unknown option $1; see --help" >&2; exit 2 ;;
   esac
   shift || true
@@ -58,7 +60,7 @@ finish() {
   exit
 }
 
-# Counts the lines on standard input: `passed`, `skipped` or `failed` and a name each.
+# Counts the results on standard input. Each line is `passed`, `skipped` or `failed`, and a name.
 count_lines() {
   local suite=$1 kind name
   while read -r kind name; do
@@ -81,6 +83,14 @@ run_container() {
   ./tests/container.sh || true
   if ! tail -n 1 build/container/results.txt | grep -q "^ended"; then fail "container: did not come to its end"; fi
   count_lines container < build/container/results.txt
+}
+
+# Runs each fuzz target for a number of seconds and counts the results.
+run_fuzz() {
+  say "fuzz"
+  ./tests/fuzz/run_targets.sh "$1" "$jobs" || true
+  if ! tail -n 1 build/fuzz/results.txt | grep -q "^ended"; then fail "fuzz: did not come to its end"; fi
+  count_lines fuzz < build/fuzz/results.txt
 }
 
 # ThreadSanitizer of GCC 12 fails if the kernel randomises more address bits than it supports.
@@ -120,6 +130,7 @@ if [ "$long" = yes ]; then sets+=(lint); fi
 
 export UBSAN_OPTIONS="print_stacktrace=1:${UBSAN_OPTIONS-}"
 for suite in $suites; do run_suite "$suite"; done
+case "$suites" in *" asan"*) run_fuzz "$([ "$long" = yes ] && echo 60 || echo 5)" ;; esac
 case "$long $suites" in
   "yes release"*)
     say "clang-tidy"

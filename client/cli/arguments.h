@@ -31,20 +31,22 @@ struct Number64 {
 std::istream& operator>>(std::istream& in, Triple& triple);
 std::istream& operator>>(std::istream& in, Quaternion& quaternion);
 std::istream& operator>>(std::istream& in, Number64& number);
-// Write a value in the form that is read, so that the help text can show an option's default.
+// Write a value in the form that operator>> reads, so that the help text can show an option's default.
 std::ostream& operator<<(std::ostream& out, const Triple& triple);
 std::ostream& operator<<(std::ostream& out, const Quaternion& quaternion);
 std::ostream& operator<<(std::ostream& out, const Number64& number);
 
 std::vector<uint64_t> values_of(const std::vector<Number64>& numbers);
-// Narrows values to 32 bits. Precondition: every value fits, which fits_32_bits() checks at parsing.
+// Converts numbers to 32 bits. Precondition: every number fits in 32 bits, which the validator fits_32_bits() checks
+// when the command line is parsed.
 std::vector<uint32_t> values32_of(const std::vector<Number64>& numbers);
 std::vector<float> floats_of(const std::vector<double>& numbers);
 std::vector<float> floats_of(const std::vector<Triple>& triples);
 std::vector<double> doubles_of(const std::vector<Triple>& triples);
 std::vector<float> floats_of(const std::vector<Quaternion>& quaternions);
 
-// Adds an option that may be repeated, one value each time, so that one command line can describe a batch.
+// Adds an option that may be given several times, with one value each time, so that one command line can describe a
+// batch.
 template <class T>
 CLI::Option* add_repeatable(CLI::App& command, const std::string& name, std::vector<T>& values, const std::string& type,
                             const std::string& description) {

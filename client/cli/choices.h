@@ -1,5 +1,6 @@
-// Options that accept only a few words. Used instead of CLI11's own checks, because their word lists cannot be read
-// back: shell completion, manual pages and error messages need the words, which choices_of() returns.
+// Options that accept only a few words. Used instead of CLI11's own checks, because a program cannot read the allowed
+// words out of those checks: shell completion, manual pages and error messages need the words, which choices_of()
+// returns.
 #ifndef LOCUS_CLIENT_CLI_CHOICES_H_
 #define LOCUS_CLIENT_CLI_CHOICES_H_
 
@@ -15,7 +16,7 @@ namespace locus::cli {
 // Returns a validator for Option::check() that accepts only these words. Its error message lists them all.
 CLI::Validator choices(const std::vector<std::string>& words);
 
-// Words, each with the enum value that it stands for. For Option::transform() of an option that stores an enum.
+// Allowed words, each paired with its enum value. For Option::transform() of an option that stores an enum.
 template <class Enum>
 using NamedValues = std::vector<std::pair<std::string, Enum>>;
 
@@ -33,7 +34,8 @@ CLI::Validator choices(const NamedValues<Enum>& values) {
   return translated_choices(words, texts);
 }
 
-// Returns the words that were passed to choices() for this option, in that order; empty if the option takes any value.
+// Returns the words that were passed to choices() for this option, in that order; empty if the option accepts any
+// value.
 std::vector<std::string> choices_of(CLI::Option& option);
 
 }  // namespace locus::cli

@@ -1,5 +1,6 @@
 // Commands and options of the command-line parser as plain data, from which shell completions and manual pages are
-// written. They are read from the parser itself, so that these texts always agree with the program. Throws nothing.
+// written. The data is read from the parser itself, so that completions and manual pages always agree with the program.
+// Throws nothing.
 #ifndef LOCUS_CLIENT_CLI_COMMAND_WORDS_H_
 #define LOCUS_CLIENT_CLI_COMMAND_WORDS_H_
 
@@ -10,12 +11,12 @@
 
 namespace locus::cli {
 
-// Kind of an option's value; decides how a shell completes it.
+// Kind of an option's value; determines how a shell completes the value.
 enum class ValueKind { kAnything, kChoice, kListOfChoices, kFile, kScene, kAddress };
 
 struct OptionWords {
-  std::vector<std::string> names = {};  // "-o", "--output"; a positional has none
-  std::string value = {};               // "FORMAT", a positional's own name; empty for a flag
+  std::vector<std::string> names = {};  // "-o", "--output"; empty for a positional argument
+  std::string value = {};               // name of the value in the help, such as "FORMAT"; empty for a flag
   ValueKind kind = ValueKind::kAnything;
   std::vector<std::string> choices = {};  // allowed words of kChoice and kListOfChoices
   std::string description = {};

@@ -1,5 +1,5 @@
-// Functions that add the commands to the parser. Each one adds a command's options, help and examples to `parent`, and
-// a callback that runs the command through `context` after the line was parsed. `context` must outlive the parser.
+// Functions that add the commands to the parser. Each function adds a command's options, help and examples to `parent`,
+// and a callback that runs the command through `context` after the line was parsed. `context` must outlive the parser.
 #ifndef LOCUS_CLIENT_CLI_COMMANDS_H_
 #define LOCUS_CLIENT_CLI_COMMANDS_H_
 
@@ -28,11 +28,15 @@ void add_run_command(CLI::App& parent, Context& context);
 void add_wait_command(CLI::App& parent, Context& context);
 void add_top_command(CLI::App& parent, Context& context);
 void add_limits_command(CLI::App& parent, Context& context);
+void add_quota_command(CLI::App& parent, Context& context);
 void add_health_command(CLI::App& parent, Context& context);
 void add_version_command(CLI::App& parent, Context& context);
 void add_completion_command(CLI::App& parent, Context& context);
+void add_context_command(CLI::App& parent, Context& context);
+void add_token_command(CLI::App& parent, Context& context);
+void add_cert_command(CLI::App& parent, Context& context);
 
-// Sets the parser callback of `command`, which CLI11 calls if the line chose this command: it runs `run(options,
+// Sets the parser callback of `command`, which CLI11 calls if the line contains this command: it runs `run(options,
 // context)`, which returns an absl::Status. While a script is only checked (Lines::kScriptCheck), the callback does
 // nothing.
 template <class Options, class Run>
@@ -43,8 +47,8 @@ void run_when_chosen(CLI::App& command, std::shared_ptr<Options> options, Contex
 }
 
 // Sets the callback like run_when_chosen(), for a command that has no side effects before Context::connect(). While a
-// script is only checked, `run` is called too. It then ends at connect(), which fails, so only usage errors (for
-// example options that exclude each other) are reported.
+// script is only checked, `run` is called too. Its call of connect() then fails, so only usage errors (for example
+// options that exclude each other) are reported.
 template <class Options, class Run>
 void run_or_check_when_chosen(CLI::App& command, std::shared_ptr<Options> options, Context& context, Run run) {
   command.callback([options, &context, run] {

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "client/cli/failure.h"
 
@@ -10,10 +11,12 @@ namespace locus::cli {
 absl::StatusOr<client::Client*> Context::connect() {
   if (lines_ == Lines::kScriptCheck) return absl::CancelledError("lines are only checked");
   if (pending_batch_) {
-    return usage_error("only lines that insert, move and remove stand between begin and commit");
+    return usage_error("only insert, move and remove are allowed between begin and commit");
   }
   if (client_) return client_.get();
+  if (!connection_mistake_.ok()) return connection_mistake_;
   client::ClientOptions options;
+  options.credentials = options_.connection.credentials;
   if (options_.timeout_seconds) {
     const absl::Duration timeout = absl::Seconds(*options_.timeout_seconds);
     options.connect_timeout = timeout;
@@ -21,10 +24,10 @@ absl::StatusOr<client::Client*> Context::connect() {
     options.long_deadline = timeout;
     options.backup_deadline = timeout;
   }
-  absl::StatusOr<std::unique_ptr<client::Client>> client = client::Client::connect(options_.address, options);
-  if (absl::IsUnavailable(client.status())) {
+  absl::StatusOr<std::unique_ptr<client::Client>> client = client::Client::connect(address(), options);
+  if (absl::IsUnavailable(client.status()) && absl::StrContains(client.status().message(), "nothing answers")) {
     return absl::UnavailableError(
-        absl::StrCat("nothing answers at ", options_.address, ": start one with `locusd`, or give --address"));
+        absl::StrCat("nothing answers at ", address(), ": start one with `locusd`, or give --address"));
   }
   if (!client.ok()) return client.status();
   client_ = *std::move(client);

@@ -12,6 +12,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "client/cli/connection_options.h"
 #include "client/cli/output.h"
 #include "client/cli/pending_batch.h"
 #include "client/lib/client.h"
@@ -20,8 +21,8 @@ namespace locus::cli {
 
 // Options that every command accepts.
 struct GlobalOptions {
-  std::string address = client::kDefaultAddress;
-  std::optional<double> timeout_seconds;  // none = the library's defaults, which give uploads more time
+  ConnectionOptions connection;
+  std::optional<double> timeout_seconds;  // none = the library's defaults, which are longer for uploads
   Format format = Format::kTable;
 };
 
@@ -43,9 +44,12 @@ class Context {
   std::ostream& err() { return err_; }
   Progress progress() const { return progress_; }
 
-  // Returns the connection to options().address; the first call opens it. Errors: UNAVAILABLE, with advice, if no
-  // server answers; a usage error while a batch is open, since no other request may be sent then; CANCELLED if lines
-  // are only checked.
+  // Returns the address of the server, after the context of the line was applied.
+  const std::string& address() const { return options_.connection.address; }
+
+  // Returns the connection to address(); the first call opens it. Errors: UNAVAILABLE, with advice, if no
+  // server answers; a usage error while a script's batch is open, since no other request may be sent before its
+  // `commit`; CANCELLED if lines are only checked.
   absl::StatusOr<client::Client*> connect();
 
   // Writes `report` to out() in the format of options().
@@ -54,26 +58,33 @@ class Context {
   // Makes write() store each report for take_report(). For scripts, which use the values of reports.
   void keep_reports() { keeps_reports_ = true; }
   bool keeps_reports() const { return keeps_reports_; }
-  // Returns the last report that write() stored, and releases it, so that the next call returns null. Null also if
-  // write() was not called since the previous call.
+  // Returns the report that write() stored last, and removes it from the context. Returns null if write() was not
+  // called since the previous call of take_report().
   std::shared_ptr<const Report> take_report() { return std::move(kept_); }
 
-  // Returns the scene used by lines that name none. If it is empty, every line must name its scene.
+  // Returns the scene used by lines that name no scene. If the default scene is empty, every line must name its scene.
   const std::string& default_scene() const { return default_scene_; }
   void use_scene(std::string scene) { default_scene_ = std::move(scene); }
 
-  // Returns the revision of the last acknowledged change that was made to `scene` through this context, or none before
-  // the first one. Queries without --at-least and --exactly ask for at least this revision, so that they see the
-  // changes of earlier lines.
+  // Returns the revision of the last acknowledged change that was made to `scene` through this context, or nullopt
+  // before the first such change. Queries without --at-least and --exactly require at least this revision, so that they
+  // see the changes of earlier lines.
   std::optional<client::Revision> own(const std::string& scene) const;
   void remember_own(const std::string& scene, client::Revision revision) { own_[scene] = revision; }
   void forget_own(const std::string& scene) { own_.erase(scene); }
 
+  // Returns the path of the file of named contexts; empty = there is none.
+  const std::string& contexts_path() const { return contexts_path_; }
+  void set_contexts_path(std::string path) { contexts_path_ = std::move(path); }
+  // Stores the error of the line's context, which connect() then returns. Commands that do not connect still work.
+  void set_connection_mistake(absl::Status mistake) { connection_mistake_ = std::move(mistake); }
+  const absl::Status& connection_mistake() const { return connection_mistake_; }
+
   Lines lines() const { return lines_; }
   void set_lines(Lines lines) { lines_ = lines; }
 
-  // Returns the batch that a script's `begin` opened, or none. While it is open, update commands add to it instead of
-  // sending a batch of their own.
+  // Returns the batch that a script's `begin` opened, or nullopt. While the batch is open, update commands add their
+  // changes to it instead of sending a batch of their own.
   std::optional<PendingBatch>& pending_batch() { return pending_batch_; }
 
   // Stores the result of the command that ran, for outcome().
@@ -85,6 +96,8 @@ class Context {
   std::ostream& err_;
   const Progress progress_;
   GlobalOptions options_;
+  std::string contexts_path_;
+  absl::Status connection_mistake_;
   std::unique_ptr<client::Client> client_;
   absl::Status outcome_;
   bool keeps_reports_ = false;

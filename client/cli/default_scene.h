@@ -15,7 +15,7 @@ namespace locus::cli {
 // the default scene directly after the command's name.
 CLI::Option& add_scene_argument(CLI::App& command, std::string& scene);
 
-// Returns `arguments` with `scene` inserted directly after the name of the command; none if that command has no
+// Returns `arguments` with `scene` inserted directly after the name of the command; nullopt if that command has no
 // argument SCENE.
 std::optional<std::vector<std::string>> with_scene(const CLI::App& app, const std::vector<std::string>& arguments,
                                                    const std::string& scene);

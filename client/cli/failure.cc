@@ -26,6 +26,7 @@ std::string hint_of_reason(v1::Reason reason, absl::string_view message) {
         return "`locus mesh list` shows what there is; `locus import FILE --scene SCENE` uploads one";
       return "`locus scene list` shows what there is; `locus scene create NAME` makes a scene";
     case v1::REASON_LIMIT:
+      if (absl::StrContains(message, "quota ")) return "`locus quota` shows your quotas and how much you use of each";
       return "`locus limits` lists every limit of this server";
     case v1::REASON_NOT_SERVED:
       return "`locus version --server` lists what this server serves";
@@ -51,6 +52,7 @@ std::string hint_of_code(absl::StatusCode code) {
     case absl::StatusCode::kUnavailable:
       return "`locus health` says whether the server answers; try again when it does";
     case absl::StatusCode::kUnauthenticated:
+      return "--token-file FILE gives a token, --cert and --key a certificate; `locus context set` keeps them";
     case absl::StatusCode::kPermissionDenied:
       return "ask the operator of the server for the right to do this";
     default:
@@ -61,9 +63,11 @@ std::string hint_of_code(absl::StatusCode code) {
 std::string hint_of(const absl::Status& status) {
   if (status.GetPayload(kUsagePayload)) return "--help shows the options and examples";
   if (absl::StrContains(status.message(), "nothing answers")) return "";
+  if (absl::StrContains(status.message(), "no connection to")) return "";
   const std::optional<v1::Error> error = client::error_of(status);
-  const std::string hint = error ? hint_of_reason(error->reason(), status.message()) : "";
-  return hint.empty() ? hint_of_code(status.code()) : hint;
+  std::string hint = error ? hint_of_reason(error->reason(), status.message()) : "";
+  if (hint.empty()) hint = hint_of_code(status.code());
+  return absl::StrContains(status.message(), hint) ? "" : hint;
 }
 
 Json failure_json(const absl::Status& status, const std::string& hint) {

@@ -39,8 +39,8 @@ ExitCode exit_code_of(const absl::Status& status);
 void write_failure(std::ostream& err, Format format, const absl::Status& status);
 
 // Returns OK if the server refused no item of the batch. Otherwise returns an error that contains the number of refused
-// items and the reason of the first one. The code is NOT_FOUND if all items that the ack lists have unknown ids, else
-// FAILED_PRECONDITION.
+// items and the reason of the first one. The code is NOT_FOUND if every refused item that the ack lists has an unknown
+// id, and FAILED_PRECONDITION otherwise.
 absl::Status refused_items(const v1::UpdateAck& ack);
 
 }  // namespace locus::cli

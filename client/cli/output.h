@@ -28,7 +28,7 @@ struct Report {
   std::vector<Json> rows;
   std::string no_rows = "nothing";  // text printed instead of a table that has no rows
   // Columns of a table and of csv. If empty, a table uses the keys of the first row, and csv uses the keys of all rows.
-  // Set it if the report may have no rows, so that csv still has its header.
+  // Set `keys` if the report may have no rows, so that csv output has a header even then.
   std::vector<std::string> keys = {};
 };
 

@@ -1,8 +1,9 @@
-// Update batch that collects the changes of several lines of a script, so that they become one revision. For `begin`
-// ... `commit` and the commands between them. Not thread-safe.
+// Update batch that collects the changes of several lines of a script, so that they become one revision. For the
+// commands `begin` and `commit` and the lines between them. Not thread-safe.
 //
 // Invariant: the batch has the same effect as running its lines one by one. The server applies removes, then inserts,
-// then moves, then relabels, so the lines about one object must come in that order; add() refuses others.
+// then moves, then relabels, so the lines that change one object must be in this order; add() refuses a line that is
+// not.
 #ifndef LOCUS_CLIENT_CLI_PENDING_BATCH_H_
 #define LOCUS_CLIENT_CLI_PENDING_BATCH_H_
 
@@ -24,7 +25,7 @@ class PendingBatch {
 
   // Adds the changes of one line of the script. Returns a usage error, and adds nothing, if the line names a scene
   // other than scene(), sets a tick, differs from earlier lines in `upsert`, has float positions relative to a frame,
-  // or has a change that the server would apply before one of an earlier line.
+  // or has a change that the server would apply before a change of an earlier line.
   absl::Status add(const std::string& scene, const v1::UpdateBatch& line);
 
   // Returns the scene that all lines name; empty before the first add().

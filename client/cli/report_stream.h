@@ -1,5 +1,6 @@
 // Writer of a report whose rows arrive one after another, in any format: facts known before the rows, the rows, and
-// facts known only after them. For answers too large to hold in memory; write_report() uses it, too. Not thread-safe.
+// facts known only after the last row. For answers too large to hold in memory; write_report() uses ReportStream, too.
+// Not thread-safe.
 //
 // Call order: begin() once, then add() for each row, then end() once.
 #ifndef LOCUS_CLIENT_CLI_REPORT_STREAM_H_
@@ -33,7 +34,7 @@ class ReportStream {
   // its rows, csv and ndjson omit them.
   void begin(const Json& head);
   void add(const Json& row);
-  // Ends the report. `tail` contains facts known only after the last row; they are written as those of `head`.
+  // Ends the report. `tail` contains facts known only after the last row; they are written like the facts in `head`.
   void end(const Json& tail = Json::object());
 
  private:

@@ -1,6 +1,7 @@
 #include "client/cli/run.h"
 
 #include <algorithm>
+#include <iterator>
 #include <optional>
 #include <sstream>
 #include <utility>
@@ -9,6 +10,7 @@
 #include "absl/strings/str_join.h"
 #include "client/cli/choices.h"
 #include "client/cli/commands.h"
+#include "client/cli/connection_options.h"
 #include "client/cli/default_scene.h"
 #include "client/cli/unknown_values.h"
 
@@ -30,7 +32,7 @@ constexpr char kExamples[] = R"(Examples:
   locus top
 
 Exit codes: 0 ok, 1 failed, 2 usage, 3 unreachable, 4 denied, 5 not found.
-LOCUS_SCENE names the scene of commands that are given none.
+LOCUS_SCENE names the scene of commands that are given none. `locus context` keeps addresses and credentials by name.
 `locus COMMAND --help` shows a command's options and examples. `source <(locus completion bash)` lets the shell complete
 lines of locus; zsh and fish have theirs.)";
 
@@ -44,8 +46,8 @@ struct Refusal {
   bool wrong_value = false;
 };
 
-// Parses one line and runs its command. Returns none if the command ran. CLI11 expects the arguments in reverse order
-// and reports errors by exceptions, which are caught here.
+// Parses one line and runs its command. Returns nullopt if the command ran. CLI11 expects the arguments in reverse
+// order and reports errors by exceptions, which are caught here.
 std::optional<Refusal> parse_and_run(CLI::App& app, const std::vector<std::string>& arguments) {
   std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
   try {
@@ -79,10 +81,12 @@ std::optional<Refusal> run_with_default_scene(const std::vector<std::string>& ar
   return parse_and_run(second, *longer);
 }
 
-// Makes the parser refuse --address and --timeout, and ignore their environment variables. For lines of a script: they
-// all use one connection, whose options are given on the command line of `locus`, before `run`.
+// Makes the parser refuse --timeout and the options of the connection, and ignore their environment variables. For
+// lines of a script, which all use one connection: its options are given on the command line of `locus`, before `run`.
 void restrict_to_script(CLI::App& app) {
-  for (const char* name : {"--address", "--timeout"}) {
+  std::vector<const char*> names(std::begin(kConnectionOptionNames), std::end(kConnectionOptionNames));
+  names.push_back("--timeout");
+  for (const char* name : names) {
     app.get_option(name)->envname("")->check([name](const std::string&) {
       return absl::StrCat("a script has one connection: give ", name, " before `run`");
     });
@@ -107,10 +111,7 @@ void build_cli(CLI::App& app, Context& context) {
   app.set_version_flag("--version", absl::StrCat("locus ", LOCUS_VERSION));
   app.require_subcommand(1);
   app.fallthrough();
-  app.add_option("-a,--address", options.address, "Where locusd listens: host:port or unix:/path")
-      ->envname("LOCUS_ADDRESS")
-      ->type_name("ADDRESS")
-      ->capture_default_str();
+  add_connection_options(app, options.connection);
   app.add_option("--timeout", options.timeout_seconds,
                  "Seconds for each call [10; 600 for uploads and changes of instances; a day for backups]")
       ->type_name("SECONDS")
@@ -123,7 +124,13 @@ void build_cli(CLI::App& app, Context& context) {
   if (context.lines() != Lines::kProgram) {
     restrict_to_script(app);
   } else {
+    app.parse_complete_callback([&app, &context] {
+      context.set_connection_mistake(complete_from_context(app, context.contexts_path(), context.options().connection));
+    });
     add_run_command(app, context);
+    add_context_command(app, context);
+    add_token_command(app, context);
+    add_cert_command(app, context);
   }
   add_scene_command(app, context);
   add_mesh_command(app, context);
@@ -142,6 +149,7 @@ void build_cli(CLI::App& app, Context& context) {
   add_demo_command(app, context);
   add_top_command(app, context);
   add_limits_command(app, context);
+  add_quota_command(app, context);
   add_health_command(app, context);
   add_version_command(app, context);
   add_completion_command(app, context);

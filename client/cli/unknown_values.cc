@@ -8,8 +8,8 @@
 namespace locus::cli {
 namespace {
 
-// Returns a value that `option` accepts: the first of its words, if it accepts only certain words; else a vector, if
-// the type name in the help is that of a vector; else a number.
+// Returns a value that `option` accepts. If the option accepts only certain words, the value is the first of them; if
+// its type name in the help is X,Y,Z or X,Y,Z,W, the value is a vector; otherwise it is a number.
 std::string suitable_value(CLI::Option& option) {
   const std::vector<std::string> words = choices_of(option);
   if (!words.empty()) return words.front();

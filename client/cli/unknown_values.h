@@ -1,6 +1,6 @@
-// Placeholders for unknown values. All lines of a script are checked before the first one runs. The values of its
-// variables are not known then, so each is replaced by a placeholder character that the parser accepts as a value of
-// any option. For the reader of scripts and run_script_line().
+// Placeholders for unknown values. All lines of a script are checked before the first line runs. The values of the
+// script's variables are not known then, so each value is replaced by a placeholder character that the parser accepts
+// as a value of any option. For the reader of scripts and run_script_line().
 #ifndef LOCUS_CLIENT_CLI_UNKNOWN_VALUES_H_
 #define LOCUS_CLIENT_CLI_UNKNOWN_VALUES_H_
 
@@ -16,8 +16,8 @@ inline constexpr char kNotKnownYet = '\x1a';
 
 bool has_unknown(const std::vector<std::string>& arguments);
 
-// Makes every option of `app` accept an argument that contains kNotKnownYet: before the option checks the argument, it
-// is replaced by some value that the option accepts.
+// Makes every option of `app` accept an argument that contains kNotKnownYet: before the option checks the argument, the
+// argument is replaced by some value that the option accepts.
 void accept_unknown_values(CLI::App& app);
 
 }  // namespace locus::cli

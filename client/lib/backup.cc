@@ -9,8 +9,8 @@
 namespace locus::client {
 namespace {
 
-// Returns whether a path may contain `byte`. All bytes of multi-byte UTF-8 characters are allowed. The backslash is
-// not, since checksum files would have to escape it.
+// Returns whether a path may contain `byte`. All bytes of multi-byte UTF-8 characters are allowed. The backslash is not
+// allowed, because checksum files would have to escape it.
 bool is_printable(char byte) {
   const auto code = static_cast<unsigned char>(byte);
   return code >= 0x20 && code != 0x7F && byte != '\\';
@@ -35,7 +35,7 @@ absl::Status BackupPaths::add(const std::string& path) {
   if (folders_.contains(path)) return absl::InvalidArgumentError("is a folder of another file");
   for (size_t slash = path.find('/'); slash != std::string::npos; slash = path.find('/', slash + 1)) {
     const std::string folder = path.substr(0, slash);
-    if (files_.contains(folder)) return absl::InvalidArgumentError("has another file for a folder");
+    if (files_.contains(folder)) return absl::InvalidArgumentError("is below a path that is a file");
     folders_.insert(folder);
     if (folders_.size() > kMaxBackupFiles) return absl::InvalidArgumentError("has more folders than a backup may have");
   }

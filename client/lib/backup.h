@@ -1,6 +1,6 @@
-// Interface of a receiver of a server's backup, and validation of the paths of its files. For callers of Client::backup
-// and for tools that read a stored backup. Paths are validated because receivers create files at them: a malicious
-// server must not be able to write outside the backup's directory.
+// Interface of a receiver of a server's backup, and validation of the paths of the backup's files. For callers of
+// Client::backup and for tools that read a stored backup. Paths are validated because receivers create files at them: a
+// malicious server must not be able to write outside the backup's directory.
 #ifndef LOCUS_CLIENT_LIB_BACKUP_H_
 #define LOCUS_CLIENT_LIB_BACKUP_H_
 
@@ -18,13 +18,13 @@ namespace locus::client {
 inline constexpr size_t kMaxBackupFiles = size_t{1} << 20;
 inline constexpr size_t kMaxBackupPathLength = 1024;
 
-// Size of a backup: the number of its files, and of the bytes in all of them.
+// Size of a backup: number of its files, and total number of their bytes.
 struct BackupSize {
   uint64_t files = 0;
   uint64_t bytes = 0;
 };
 
-// Completely received file of a backup: its path, its size in bytes, and its SHA-256, which equals the one that the
+// Completely received file of a backup: its path, its size in bytes, and its SHA-256, which equals the SHA-256 that the
 // server sent.
 struct BackupFile {
   std::string path;
@@ -32,18 +32,18 @@ struct BackupFile {
   Sha256 sha256 = {};
 };
 
-// Receiver of the files of a backup, implemented by the caller of Client::backup. Client::backup calls it in its
-// caller's thread: begin() once, then for each file begin_file(), add() any number of times, and end_file(). If a call
-// returns a status that is not OK, the backup ends with that status. The received files are a complete backup only
-// after Client::backup has returned OK.
+// Receiver of the files of a backup, implemented by the caller of Client::backup. Client::backup calls these functions
+// in its caller's thread: begin() once, then for each file begin_file(), add() any number of times, and end_file(). If
+// a function returns a status that is not OK, the backup ends with that status. The received files are a complete
+// backup only after Client::backup has returned OK.
 class BackupSink {
  public:
   virtual ~BackupSink() = default;
 
   // Begins the backup. `announced` is the size that the whole backup will have.
   virtual absl::Status begin(const BackupSize& announced) = 0;
-  // Begins a file. `path` was accepted by BackupPaths::add(): it is relative, differs from the paths of all files
-  // before, and is not a folder of one of them.
+  // Begins a file. `path` was accepted by BackupPaths::add(): it is relative, differs from the paths of all earlier
+  // files, and is neither a folder of an earlier file nor inside an earlier file.
   virtual absl::Status begin_file(const std::string& path) = 0;
   // Appends `bytes` to the current file.
   virtual absl::Status add(absl::string_view bytes) = 0;

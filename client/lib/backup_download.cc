@@ -1,11 +1,10 @@
-#include "client/lib/backup_download.h"
-
 #include <algorithm>
 #include <string>
 
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "client/lib/status.h"
+#include "client/lib/transfers.h"
 #include "core/base/status_macros.h"
 #include "grpcpp/client_context.h"
 
@@ -25,8 +24,8 @@ bool equal(const Sha256& hash, absl::string_view bytes) {
                     [](uint8_t a, char b) { return a == static_cast<uint8_t>(b); });
 }
 
-// Receiver of the messages of one backup. Passes the files on to the sink, and verifies their paths, their sizes and
-// hashes, and the announced total size.
+// Receiver of the messages of one backup. Passes the files to the sink, and verifies each file's path, size and hash,
+// and the announced number of files and bytes.
 class BackupReceiver {
  public:
   explicit BackupReceiver(BackupSink& sink) : sink_(sink) {}
@@ -92,7 +91,7 @@ class BackupReceiver {
   bool first_ = true;
   bool in_file_ = false;
   BackupSize announced_;
-  BackupSize received_;  // files: number of complete files
+  BackupSize received_;  // complete files, and bytes of all files including the current one
   BackupPaths paths_;
   BackupFile file_;
   Sha256Hasher hasher_;
@@ -101,9 +100,9 @@ class BackupReceiver {
 }  // namespace
 
 absl::StatusOr<BackupSize> download_backup(v1::ServerService::StubInterface& stub, BackupSink& sink,
-                                           absl::Time deadline) {
+                                           const CallHeader& header) {
   grpc::ClientContext context;
-  context.set_deadline(absl::ToChronoTime(deadline));
+  prepare(context, header);
   const auto reader = stub.Backup(&context, v1::BackupRequest());
   BackupReceiver receiver(sink);
   v1::BackupResponse message;

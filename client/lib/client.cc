@@ -7,13 +7,11 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
-#include "client/lib/backup_download.h"
-#include "client/lib/call_metadata.h"
+#include "client/lib/authorization.h"
 #include "client/lib/connection.h"
-#include "client/lib/mesh_download.h"
-#include "client/lib/mesh_upload.h"
 #include "client/lib/retry.h"
 #include "client/lib/status.h"
+#include "client/lib/transfers.h"
 #include "core/base/status_macros.h"
 #include "grpc/health/v1/health.grpc.pb.h"
 #include "grpcpp/channel.h"
@@ -27,8 +25,10 @@ namespace {
 
 enum class Repeat { kNever, kWhenUnavailable };
 
-// Parameters of a call besides its request: timeout, retries, and the name of its scene (empty if it has none).
+// Parameters of a call besides its request: token, timeout, retries, and the name of its scene (empty if the call
+// concerns no scene).
 struct CallPlan {
+  Authorization& authorization;
   absl::Duration deadline;
   RetryPolicy retry;
   Repeat repeat = Repeat::kNever;
@@ -40,14 +40,19 @@ absl::StatusOr<Response> call(Stub& stub, const CallPlan& plan, const Request& r
                               grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*)) {
   const absl::Time deadline = absl::Now() + plan.deadline;
   Response response;
+  uint64_t token = 0;
   const auto attempt = [&] {
     grpc::ClientContext context;
-    context.set_deadline(absl::ToChronoTime(deadline));
-    add_scene(context, plan.scene);
+    token = prepare(context, {plan.authorization, deadline, plan.scene});
     response.Clear();
     return to_absl_status((stub.*method)(&context, request, &response));
   };
-  const absl::Status status = plan.repeat == Repeat::kNever ? attempt() : with_retries(plan.retry, deadline, attempt);
+  const auto attempts = [&] {
+    return plan.repeat == Repeat::kNever ? attempt() : with_retries(plan.retry, deadline, attempt);
+  };
+  absl::Status status = attempts();
+  // A server that does not accept the token has done nothing, so every call may be repeated.
+  if (absl::IsUnauthenticated(status) && plan.authorization.has_newer(token)) status = attempts();
   if (!status.ok()) return status;
   return response;
 }
@@ -57,18 +62,25 @@ absl::StatusOr<Response> call(Stub& stub, const CallPlan& plan, const Request& r
 struct Client::Connection {
   std::string address;
   ClientOptions options;
-  std::shared_ptr<grpc::Channel> channel;  // Lane::kLatency, and unary calls
+  std::shared_ptr<Authorization> authorization;
+  std::shared_ptr<grpc::Channel> channel;  // connection for Lane::kLatency and unary calls
   std::shared_ptr<grpc::Channel> bulk;
   std::unique_ptr<v1::ServerService::StubInterface> servers;
   std::unique_ptr<v1::SceneService::StubInterface> scenes;
   std::unique_ptr<v1::UpdateService::StubInterface> updates;
   std::unique_ptr<v1::QueryService::StubInterface> queries;
-  std::unique_ptr<v1::SceneService::StubInterface> transfers;  // on `bulk`: uploads, downloads, dumps
+  std::unique_ptr<v1::SceneService::StubInterface> transfers;  // on `bulk`; for uploads, downloads and dumps
 
   const std::shared_ptr<grpc::Channel>& channel_of(Lane lane) const { return lane == Lane::kBulk ? bulk : channel; }
-  CallPlan once(absl::string_view scene = {}) const { return {options.deadline, options.retry, Repeat::kNever, scene}; }
+  CallPlan once(absl::string_view scene = {}) const {
+    return {*authorization, options.deadline, options.retry, Repeat::kNever, scene};
+  }
   CallPlan repeatable(absl::string_view scene = {}) const {
-    return {options.deadline, options.retry, Repeat::kWhenUnavailable, scene};
+    return {*authorization, options.deadline, options.retry, Repeat::kWhenUnavailable, scene};
+  }
+  // Returns the header of a call that ends `timeout` after now.
+  CallHeader header(absl::Duration timeout, absl::string_view scene = {}) const {
+    return {*authorization, absl::Now() + timeout, scene};
   }
 };
 
@@ -77,13 +89,16 @@ Client::~Client() = default;
 
 absl::StatusOr<std::unique_ptr<Client>> Client::connect(absl::string_view address, const ClientOptions& options) {
   ASSIGN_OR_RETURN(const std::string target, target_of(address));
-  std::shared_ptr<grpc::Channel> channel = open_channel(target, options);
-  const absl::Status connected = await_connection(*channel, target, options);
+  ASSIGN_OR_RETURN(std::shared_ptr<Authorization> authorization, Authorization::make(options.credentials, target));
+  ASSIGN_OR_RETURN(const auto credentials, channel_credentials(options.credentials));
+  std::shared_ptr<grpc::Channel> channel = open_channel(target, options, credentials);
+  const absl::Status connected = await_connection(channel, target, options);
   if (!connected.ok()) return connected;
-  std::shared_ptr<grpc::Channel> bulk = open_channel(target, options);
-  auto connection = std::make_unique<Connection>(Connection{
-      target, options, channel, bulk, v1::ServerService::NewStub(channel), v1::SceneService::NewStub(channel),
-      v1::UpdateService::NewStub(channel), v1::QueryService::NewStub(channel), v1::SceneService::NewStub(bulk)});
+  std::shared_ptr<grpc::Channel> bulk = open_channel(target, options, credentials);
+  auto connection = std::make_unique<Connection>(
+      Connection{target, options, std::move(authorization), channel, bulk, v1::ServerService::NewStub(channel),
+                 v1::SceneService::NewStub(channel), v1::UpdateService::NewStub(channel),
+                 v1::QueryService::NewStub(channel), v1::SceneService::NewStub(bulk)});
   return std::unique_ptr<Client>(new Client(std::move(connection)));
 }
 
@@ -92,6 +107,17 @@ const std::string& Client::address() const { return connection_->address; }
 absl::StatusOr<v1::GetServerResponse> Client::get_server() const {
   return call(*connection_->servers, connection_->repeatable(), v1::GetServerRequest(),
               &v1::ServerService::StubInterface::GetServer);
+}
+
+absl::StatusOr<std::vector<v1::IdentityQuotas>> Client::get_quotas(v1::GetQuotasRequest request) const {
+  std::vector<v1::IdentityQuotas> quotas;
+  do {
+    ASSIGN_OR_RETURN(v1::GetQuotasResponse page, call(*connection_->servers, connection_->repeatable(), request,
+                                                      &v1::ServerService::StubInterface::GetQuotas));
+    for (v1::IdentityQuotas& entry : *page.mutable_identities()) quotas.push_back(std::move(entry));
+    request.set_page_token(page.next_page_token());
+  } while (!request.page_token().empty());
+  return quotas;
 }
 
 absl::StatusOr<Health> Client::health(absl::string_view service) const {
@@ -107,7 +133,7 @@ absl::StatusOr<Health> Client::health(absl::string_view service) const {
 
 absl::StatusOr<BackupSize> Client::backup(BackupSink& sink) const {
   const std::unique_ptr<v1::ServerService::StubInterface> server = v1::ServerService::NewStub(connection_->bulk);
-  return download_backup(*server, sink, absl::Now() + connection_->options.backup_deadline);
+  return download_backup(*server, sink, connection_->header(connection_->options.backup_deadline));
 }
 
 absl::StatusOr<v1::Scene> Client::create_scene(const v1::CreateSceneRequest& request) const {
@@ -145,15 +171,15 @@ absl::Status Client::delete_scene(const v1::DeleteSceneRequest& request) const {
 
 absl::StatusOr<v1::UploadMeshResponse> Client::upload_mesh(const MeshColumns& mesh,
                                                            const UploadProgress& progress) const {
-  return locus::client::upload_mesh(*connection_->transfers, mesh, absl::Now() + connection_->options.long_deadline,
-                                    progress);
+  return locus::client::upload_mesh(*connection_->transfers, mesh,
+                                    connection_->header(connection_->options.long_deadline), progress);
 }
 
 absl::StatusOr<DownloadedMesh> Client::download_mesh(absl::string_view name, const DownloadProgress& progress) const {
-  const absl::Time deadline = absl::Now() + connection_->options.long_deadline;
+  const CallHeader header = connection_->header(connection_->options.long_deadline);
   absl::StatusOr<DownloadedMesh> mesh = absl::UnknownError("not asked yet");
-  with_retries(connection_->options.retry, deadline, [&] {
-    mesh = locus::client::download_mesh(*connection_->transfers, name, deadline, progress);
+  with_retries(connection_->options.retry, header.deadline, [&] {
+    mesh = locus::client::download_mesh(*connection_->transfers, name, header, progress);
     return mesh.status();
   }).IgnoreError();
   return mesh;
@@ -187,8 +213,7 @@ absl::StatusOr<v1::ChangeInstancesResponse> Client::change_instances(const v1::C
 absl::Status Client::dump(const v1::DumpSceneRequest& request,
                           const std::function<absl::Status(const v1::DumpSceneResponse&)>& on_message) const {
   grpc::ClientContext context;
-  context.set_deadline(absl::ToChronoTime(absl::Now() + connection_->options.long_deadline));
-  add_scene(context, request.scene());
+  prepare(context, connection_->header(connection_->options.long_deadline, request.scene()));
   const auto reader = connection_->transfers->DumpScene(&context, request);
   v1::DumpSceneResponse response;
   absl::Status accepted;
@@ -219,11 +244,13 @@ absl::StatusOr<v1::QueryResult> Client::query(absl::string_view scene, v1::Query
 }
 
 std::unique_ptr<UpdateStream> Client::update_stream(absl::string_view scene, const UpdateStreamOptions& options) const {
-  return std::make_unique<UpdateStream>(connection_->channel_of(options.lane), std::string(scene), options);
+  return std::make_unique<UpdateStream>(connection_->channel_of(options.lane), connection_->authorization,
+                                        std::string(scene), options);
 }
 
 std::unique_ptr<QueryStream> Client::query_stream(absl::string_view scene, const QueryStreamOptions& options) const {
-  return std::make_unique<QueryStream>(connection_->channel_of(options.lane), std::string(scene), options);
+  return std::make_unique<QueryStream>(connection_->channel_of(options.lane), connection_->authorization,
+                                       std::string(scene), options);
 }
 
 }  // namespace locus::client

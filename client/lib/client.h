@@ -43,20 +43,22 @@ inline constexpr char kDefaultAddress[] = "127.0.0.1:7575";
 // Health of a server or of one of its services, as reported by grpc.health.v1.
 enum class Health { kUnknown = 0, kServing = 1, kNotServing = 2, kServiceUnknown = 3 };
 
-// Callback after each message of an upload, with the number of bytes sent so far and in total.
+// Callback that is called after each message of an upload with the number of bytes sent so far and in total.
 using UploadProgress = std::function<void(uint64_t sent, uint64_t total)>;
 
-// Callback after each message of a download, with the number of bytes received so far and in total.
+// Callback that is called after each message of a download with the number of bytes received so far and in total.
 using DownloadProgress = std::function<void(uint64_t received, uint64_t total)>;
 
 // Connection to one server. Thread-safe: every method may be called from any number of threads at once. Streams share
 // ownership of the connections and may outlive the client. Each client has two connections of its own, so that small
-// calls do not wait behind large messages (see Lane); the second one is opened when it is first needed. Both reconnect
-// automatically.
+// calls do not wait behind large messages (see Lane); the second connection is opened when it is first needed. Both
+// connections reconnect automatically.
 class Client {
  public:
   // Connects to `address`: host:port, host alone (port 7575) or unix:/path. Blocks until the connection is established.
-  // Returns UNAVAILABLE naming the address if no server answers, or INVALID_ARGUMENT for an empty address.
+  // Returns UNAVAILABLE naming the address if no server answers or the TLS handshake fails, or INVALID_ARGUMENT for an
+  // empty address. Returns INVALID_ARGUMENT, NOT_FOUND or FAILED_PRECONDITION naming what is wrong if
+  // options.credentials contradict each other, name a file that cannot be used, or would reveal a token.
   static absl::StatusOr<std::unique_ptr<Client>> connect(absl::string_view address = kDefaultAddress,
                                                          const ClientOptions& options = {});
   ~Client();
@@ -68,37 +70,41 @@ class Client {
 
   // Returns the server's version, features and limits. Retried.
   absl::StatusOr<v1::GetServerResponse> get_server() const;
+  // Returns the quotas of this caller and how much of them is in use or, as `request` says, those of an identity or of
+  // all identities, read page by page. Retried.
+  absl::StatusOr<std::vector<v1::IdentityQuotas>> get_quotas(v1::GetQuotasRequest request = {}) const;
   // Returns the health of the whole server, or of one service given by its full name. Retried.
   absl::StatusOr<Health> health(absl::string_view service = "") const;
-  // Passes a consistent copy of the server's data directory to `sink`, in this thread, and returns its size. Not
-  // retried; to try again, call it with a new sink. Returns DATA_LOSS if the received files differ from the
-  // announcement (number, sizes, hashes) or a path leads out of the backup, and UNIMPLEMENTED if the server has no data
-  // directory.
+  // Passes a consistent copy of the server's data directory to `sink`, in this thread, and returns the copy's size. Not
+  // retried; to try again, call backup() with a new sink. Returns DATA_LOSS if the received files differ from what the
+  // server announced (number of files, sizes, hashes) or if a path leads out of the backup, and UNIMPLEMENTED if the
+  // server has no data directory.
   absl::StatusOr<BackupSize> backup(BackupSink& sink) const;
 
-  // Create, read, list and delete scenes. get_scene() and list_scenes() are retried, the others are not. list_scenes()
-  // reads all pages and returns every scene that has all of `labels`.
+  // Create, read, list and delete scenes. get_scene() and list_scenes() are retried; create_scene() and delete_scene()
+  // are not. list_scenes() reads all pages and returns every scene that has all of `labels`.
   absl::StatusOr<v1::Scene> create_scene(const v1::CreateSceneRequest& request) const;
   absl::StatusOr<v1::Scene> get_scene(absl::string_view name) const;
   absl::StatusOr<std::vector<v1::Scene>> list_scenes(const std::map<std::string, std::string>& labels = {}) const;
   absl::Status delete_scene(const v1::DeleteSceneRequest& request) const;
 
-  // Uploads a mesh in messages of at most 1 MiB. The first message carries its SHA-256, and the upload stops as soon as
-  // the server answers, so a mesh that the server already has is not sent again. Returns when the server has built the
-  // mesh's tree. Not retried; safe to call again. Returns INVALID_ARGUMENT, before anything is sent, if the length of a
-  // column is not a multiple of three or is too large.
+  // Uploads a mesh in messages of at most 1 MiB. The first message carries the mesh's SHA-256, and the upload stops as
+  // soon as the server answers, so a mesh that the server already has is not sent again. Returns when the server has
+  // built the mesh's tree. Not retried; safe to call again. Returns INVALID_ARGUMENT, before anything is sent, if the
+  // length of a column is not a multiple of three or is too large.
   absl::StatusOr<v1::UploadMeshResponse> upload_mesh(const MeshColumns& mesh,
                                                      const UploadProgress& progress = {}) const;
   // Downloads a mesh as the server stores it, completely into memory: 12 bytes per vertex and per triangle. Retried.
-  // Returns DATA_LOSS if the received mesh differs from the announcement (counts, hash) or is invalid (an index beyond
-  // the vertices, a vertex that is not finite, parts out of order). Never holds more data than was announced.
+  // Returns DATA_LOSS if the received mesh differs from what the server announced (counts, hash) or is invalid (an
+  // index beyond the vertices, a vertex that is not finite, parts out of order). Never holds more data than was
+  // announced.
   absl::StatusOr<DownloadedMesh> download_mesh(absl::string_view name, const DownloadProgress& progress = {}) const;
   // Returns all meshes of the server, read page by page. Retried.
   absl::StatusOr<std::vector<v1::Mesh>> list_meshes() const;
   // Deletes a mesh. Not retried.
   absl::Status delete_mesh(absl::string_view name) const;
-  // Applies one atomic change of a scene's instances. Returns when queries see the change, or, with request.no_wait, as
-  // soon as the server has accepted it. Not retried.
+  // Applies one atomic change of a scene's instances. Returns when queries see the change or, if request.no_wait is
+  // set, as soon as the server has accepted the change. Not retried.
   absl::StatusOr<v1::ChangeInstancesResponse> change_instances(const v1::ChangeInstancesRequest& request) const;
   // Passes the contents of a scene to `on_message`, message by message, in this thread. If `on_message` returns an
   // error, stops and returns that error. Not retried.

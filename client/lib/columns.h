@@ -1,6 +1,6 @@
 // Functions that fill columns row by row. Internal to the builders. The protocol allows a column to be absent if every
-// row has the default value, so a column stays empty until the first row differs, and is then filled with defaults up
-// to that row.
+// row has the default value, so a column stays empty until a row differs from the default, and is then filled with the
+// default up to that row.
 #ifndef LOCUS_CLIENT_LIB_COLUMNS_H_
 #define LOCUS_CLIENT_LIB_COLUMNS_H_
 
@@ -10,8 +10,8 @@
 
 namespace locus::client {
 
-// Appends `value` to a column of a block that had `rows_before` rows before. A column without entries stays so while
-// every value is `default_value`.
+// Appends `value` to a column of a block that had `rows_before` rows before. An empty column stays empty as long as
+// every appended value is `default_value`.
 template <class T>
 void append_row(google::protobuf::RepeatedField<T>& column, int rows_before, T value, T default_value) {
   if (column.empty()) {

@@ -2,9 +2,15 @@
 
 #include <algorithm>
 
+#include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
+#include "client/lib/advice.h"
+#include "client/lib/pem_file.h"
+#include "core/base/status_macros.h"
+#include "grpc/health/v1/health.grpc.pb.h"
+#include "grpcpp/client_context.h"
 #include "grpcpp/create_channel.h"
 #include "grpcpp/security/credentials.h"
 #include "grpcpp/support/channel_arguments.h"
@@ -14,12 +20,27 @@ namespace {
 
 constexpr char kDefaultPort[] = ":7575";
 
-bool is_local(absl::string_view target) {
-  return absl::StartsWith(target, "127.") || absl::StartsWith(target, "localhost") ||
-         absl::StartsWith(target, "[::1]") || absl::StartsWith(target, "unix:");
+void add_scene(grpc::ClientContext& context, absl::string_view scene) {
+  constexpr size_t kMaxSceneName = 63;
+  const bool legal =
+      !scene.empty() && scene.size() <= kMaxSceneName && std::all_of(scene.begin(), scene.end(), [](unsigned char c) {
+        return absl::ascii_islower(c) || absl::ascii_isdigit(c) || c == '-';
+      });
+  if (legal) context.AddMetadata("x-scene", std::string(scene));
 }
 
-absl::Status nothing_answers(const std::string& target, absl::string_view detail) {
+// Returns the error of a channel that does not connect. gRPC reports the cause only in the status of a call, so this
+// function makes a call, which ends at once if the last connection attempt has failed. `detail` follows the target in
+// the message.
+absl::Status failure_of(const std::shared_ptr<grpc::ChannelInterface>& channel, const std::string& target,
+                        absl::string_view detail) {
+  constexpr absl::Duration kMaxWait = absl::Milliseconds(200);
+  grpc::ClientContext context;
+  context.set_deadline(absl::ToChronoTime(absl::Now() + kMaxWait));
+  grpc::health::v1::HealthCheckResponse unused;
+  const grpc::Status status = grpc::health::v1::Health::NewStub(channel)->Check(&context, {}, &unused);
+  if (const std::string advice = advice_on_handshake(status.error_message()); !advice.empty())
+    return absl::UnavailableError(absl::StrCat("no connection to ", target, ": ", advice));
   return absl::UnavailableError(
       absl::StrCat("nothing answers at ", target, detail, ": start locusd there, or give its address"));
 }
@@ -34,7 +55,26 @@ absl::StatusOr<std::string> target_of(absl::string_view address) {
   return has_port ? std::string(address) : absl::StrCat(address, kDefaultPort);
 }
 
-std::shared_ptr<grpc::Channel> open_channel(const std::string& target, const ClientOptions& options) {
+absl::StatusOr<std::shared_ptr<grpc::ChannelCredentials>> channel_credentials(const CredentialOptions& options) {
+  if (options.certificate_file.empty() != options.key_file.empty())
+    return absl::InvalidArgumentError("a client's certificate and its key belong together: give both or neither");
+  if (!uses_tls(options)) return grpc::InsecureChannelCredentials();
+  grpc::SslCredentialsOptions files;
+  if (!options.ca_file.empty()) {
+    ASSIGN_OR_RETURN(files.pem_root_certs, read_small_file("ca_file", options.ca_file));
+    RETURN_IF_ERROR(check_certificates(options.ca_file, files.pem_root_certs));
+  }
+  if (!options.certificate_file.empty()) {
+    ASSIGN_OR_RETURN(files.pem_cert_chain, read_small_file("certificate_file", options.certificate_file));
+    RETURN_IF_ERROR(check_certificates(options.certificate_file, files.pem_cert_chain));
+    ASSIGN_OR_RETURN(files.pem_private_key, read_small_file("key_file", options.key_file));
+    RETURN_IF_ERROR(check_key(options.key_file, files.pem_private_key, files.pem_cert_chain));
+  }
+  return grpc::SslCredentials(files);
+}
+
+std::shared_ptr<grpc::Channel> open_channel(const std::string& target, const ClientOptions& options,
+                                            const std::shared_ptr<grpc::ChannelCredentials>& credentials) {
   constexpr int kFirstReconnectMs = 100;
   constexpr int kMaxReconnectMs = 2000;
   grpc::ChannelArguments arguments;
@@ -43,22 +83,31 @@ std::shared_ptr<grpc::Channel> open_channel(const std::string& target, const Cli
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, kFirstReconnectMs);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, kMaxReconnectMs);
-  // Ignores the proxy that environment variables may name: it cannot reach this machine's loopback interface.
-  if (is_local(target)) arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
-  return grpc::CreateCustomChannel(target, grpc::InsecureChannelCredentials(), arguments);
+  // Ignore a proxy set in the environment: it cannot reach this machine's loopback interface.
+  if (stays_on_this_machine(target)) arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
+  const std::string& server_name = options.credentials.server_name;
+  if (!server_name.empty()) arguments.SetSslTargetNameOverride(server_name);
+  return grpc::CreateCustomChannel(target, credentials, arguments);
 }
 
-absl::Status await_connection(grpc::Channel& channel, const std::string& target, const ClientOptions& options) {
+absl::Status await_connection(const std::shared_ptr<grpc::Channel>& channel, const std::string& target,
+                              const ClientOptions& options) {
   const absl::Time deadline = absl::Now() + options.connect_timeout;
-  grpc_connectivity_state state = channel.GetState(/*try_to_connect=*/true);
+  grpc_connectivity_state state = channel->GetState(/*try_to_connect=*/true);
   while (state != GRPC_CHANNEL_READY) {
-    if (state == GRPC_CHANNEL_TRANSIENT_FAILURE && !options.wait_for_server) return nothing_answers(target, "");
-    if (!channel.WaitForStateChange(state, absl::ToChronoTime(deadline))) {
-      return nothing_answers(target, absl::StrCat(" within ", absl::FormatDuration(options.connect_timeout)));
+    if (state == GRPC_CHANNEL_TRANSIENT_FAILURE && !options.wait_for_server) return failure_of(channel, target, "");
+    if (!channel->WaitForStateChange(state, absl::ToChronoTime(deadline))) {
+      return failure_of(channel, target, absl::StrCat(" within ", absl::FormatDuration(options.connect_timeout)));
     }
-    state = channel.GetState(/*try_to_connect=*/true);
+    state = channel->GetState(/*try_to_connect=*/true);
   }
   return absl::OkStatus();
+}
+
+uint64_t prepare(grpc::ClientContext& context, const CallHeader& header) {
+  if (header.deadline != absl::InfiniteFuture()) context.set_deadline(absl::ToChronoTime(header.deadline));
+  add_scene(context, header.scene);
+  return header.authorization.add_to(context);
 }
 
 }  // namespace locus::client

@@ -1,18 +1,24 @@
-// Functions that open a gRPC channel and report a wrong address at once, with a clear message. Internal to the library.
+// Functions that open a gRPC channel and report a wrong address or a failed TLS handshake at once, with a clear
+// message, and that prepare the calls on the channel. Internal to the library.
 #ifndef LOCUS_CLIENT_LIB_CONNECTION_H_
 #define LOCUS_CLIENT_LIB_CONNECTION_H_
 
+#include <cstdint>
 #include <memory>
 #include <string>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
+#include "absl/time/time.h"
+#include "client/lib/authorization.h"
 #include "client/lib/options.h"
 
 namespace grpc {
 class Channel;
-}
+class ChannelCredentials;
+class ClientContext;
+}  // namespace grpc
 
 namespace locus::client {
 
@@ -20,13 +26,33 @@ namespace locus::client {
 // if `address` is empty.
 absl::StatusOr<std::string> target_of(absl::string_view address);
 
-// Returns a channel to `target`, which does not connect yet. Its connection is not shared with any other channel of
-// this process, so that each channel of a client has its own socket.
-std::shared_ptr<grpc::Channel> open_channel(const std::string& target, const ClientOptions& options);
+// Returns the channel credentials for these options, after checking the files. Returns INVALID_ARGUMENT, NOT_FOUND or
+// FAILED_PRECONDITION naming the file if a file is missing, unreadable or malformed, or if a key has no certificate.
+absl::StatusOr<std::shared_ptr<grpc::ChannelCredentials>> channel_credentials(const CredentialOptions& options);
 
-// Waits until the channel is connected. Returns UNAVAILABLE naming `target` if the connection is refused (unless
-// `wait_for_server`) or connect_timeout has passed.
-absl::Status await_connection(grpc::Channel& channel, const std::string& target, const ClientOptions& options);
+// Returns a channel to `target`. The channel does not connect yet. It shares its connection with no other channel of
+// this process, so that each channel of a client has its own socket.
+std::shared_ptr<grpc::Channel> open_channel(const std::string& target, const ClientOptions& options,
+                                            const std::shared_ptr<grpc::ChannelCredentials>& credentials);
+
+// Waits until the channel is connected. Returns UNAVAILABLE naming `target` if options.connect_timeout has passed, or
+// if the connection is refused and options.wait_for_server is false. If a server answers but the TLS handshake fails,
+// the message names the cause and a remedy.
+absl::Status await_connection(const std::shared_ptr<grpc::Channel>& channel, const std::string& target,
+                              const ClientOptions& options);
+
+// Values that a call has besides its request.
+struct CallHeader {
+  Authorization& authorization;
+  absl::Time deadline = absl::InfiniteFuture();
+  absl::string_view scene = {};  // empty = the call concerns no scene
+};
+
+// Prepares the context of a call: sets its deadline, and adds the metadata entries `authorization` and `x-scene`, which
+// routers use to find the server of a scene. Adds no `x-scene` if the scene's name is invalid: gRPC would abort the
+// process for bytes that are illegal in metadata, whereas the server refuses the invalid name in the request with a
+// helpful message. Returns the number of the token (see Authorization::add_to).
+uint64_t prepare(grpc::ClientContext& context, const CallHeader& header);
 
 }  // namespace locus::client
 

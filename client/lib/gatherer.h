@@ -2,8 +2,8 @@
 // for the maximum delay. Internal to the library: base of QueryBatcher and MoveBatcher.
 //
 // Threads: add() and flush() may be called from any thread; the gatherer calls `send` in a thread of its own, one batch
-// after another, without a lock held, so `send` may block. While it blocks, add() blocks as soon as the next batch is
-// full. Invariant: at any time at most one batch is being gathered and at most one is being sent.
+// after another, without a lock held, so `send` may block. While `send` blocks, add() blocks as soon as the next batch
+// is full. Invariant: at any time at most one batch is being gathered and at most one batch is being sent.
 #ifndef LOCUS_CLIENT_LIB_GATHERER_H_
 #define LOCUS_CLIENT_LIB_GATHERER_H_
 
@@ -17,7 +17,7 @@
 #include <utility>
 
 #include "absl/time/time.h"
-#include "client/lib/gather_limits.h"
+#include "client/lib/options.h"
 
 namespace locus::client {
 
@@ -101,7 +101,7 @@ class Gatherer {
   uint64_t sent_ = 0;  // number of batches for which `send` has returned
   bool ending_ = false;
 
-  std::thread thread_;  // last: it uses everything above
+  std::thread thread_;  // declared last: the thread uses all members above
 };
 
 }  // namespace locus::client

@@ -1,5 +1,3 @@
-#include "client/lib/mesh_download.h"
-
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -7,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/lib/status.h"
+#include "client/lib/transfers.h"
 #include "grpcpp/client_context.h"
 
 namespace locus::client {
@@ -88,9 +87,9 @@ class MeshReceiver {
 }  // namespace
 
 absl::StatusOr<DownloadedMesh> download_mesh(v1::SceneService::StubInterface& stub, absl::string_view name,
-                                             absl::Time deadline, const DownloadProgress& progress) {
+                                             const CallHeader& header, const DownloadProgress& progress) {
   grpc::ClientContext context;
-  context.set_deadline(absl::ToChronoTime(deadline));
+  prepare(context, header);
   v1::DownloadMeshRequest request;
   request.set_mesh(std::string(name));
   const auto reader = stub.DownloadMesh(&context, request);

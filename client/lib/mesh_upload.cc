@@ -1,5 +1,3 @@
-#include "client/lib/mesh_upload.h"
-
 #include <algorithm>
 #include <limits>
 #include <memory>
@@ -7,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/lib/status.h"
+#include "client/lib/transfers.h"
 #include "grpcpp/client_context.h"
 
 namespace locus::client {
@@ -70,11 +69,11 @@ class Sender {
 }  // namespace
 
 absl::StatusOr<v1::UploadMeshResponse> upload_mesh(v1::SceneService::StubInterface& stub, const MeshColumns& mesh,
-                                                   absl::Time deadline, const UploadProgress& progress) {
+                                                   const CallHeader& header, const UploadProgress& progress) {
   const absl::Status checked = check(mesh);
   if (!checked.ok()) return checked;
   grpc::ClientContext context;
-  context.set_deadline(absl::ToChronoTime(deadline));
+  prepare(context, header);
   v1::UploadMeshResponse response;
   const std::unique_ptr<Writer> writer = stub.UploadMesh(&context, &response);
   Sender sender(*writer, mesh, progress);

@@ -31,7 +31,7 @@ class MoveBatcher::Impl {
 
   const std::unique_ptr<UpdateStream> stream_;
   const AckCallback on_ack_;
-  Gatherer<UpdateBuilder> gatherer_;  // last: its thread uses everything above
+  Gatherer<UpdateBuilder> gatherer_;  // declared last: its thread uses all members above
 };
 
 MoveBatcher::MoveBatcher(std::unique_ptr<UpdateStream> stream, const GatherLimits& limits, AckCallback on_ack)

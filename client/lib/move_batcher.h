@@ -12,18 +12,18 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "client/lib/gather_limits.h"
+#include "client/lib/options.h"
 #include "client/lib/update_stream.h"
 #include "client/lib/values.h"
 
 namespace locus::client {
 
-// Thread-safe: every method may be called from any thread. Moves of one caller are applied in order. If an object is
-// moved twice, the later move wins.
+// Thread-safe: every method may be called from any thread. Moves of one caller are applied in the order of its calls.
+// If an object is moved twice, the later move wins.
 class MoveBatcher {
  public:
-  // Callback for each message, with its ack, which lists refused moves (unknown ids), or with the error that ended the
-  // stream. Runs on a thread of the library: it must not block or call the batcher.
+  // Callback that is called once for each message, with the message's ack, which lists refused moves (unknown ids), or
+  // with the error that ended the stream. It runs on a thread of the library, and must not block or call the batcher.
   using AckCallback = std::function<void(const absl::StatusOr<v1::UpdateAck>&)>;
 
   explicit MoveBatcher(std::unique_ptr<UpdateStream> stream, const GatherLimits& limits = {}, AckCallback on_ack = {});

@@ -1,6 +1,10 @@
-// Options of connections, deadlines and retries. For callers of Client::connect and the streams. Plain data.
+// Options of connections, credentials, deadlines, retries and batchers. For callers of Client::connect, the streams and
+// the batchers. Plain data.
 #ifndef LOCUS_CLIENT_LIB_OPTIONS_H_
 #define LOCUS_CLIENT_LIB_OPTIONS_H_
+
+#include <cstddef>
+#include <string>
 
 #include "absl/time/time.h"
 
@@ -14,7 +18,7 @@ struct RetryPolicy {
   int max_attempts = 5;
   // Wait before the second attempt.
   absl::Duration first_backoff = absl::Milliseconds(100);
-  // Maximum wait before its random variation, unless the server requests a longer one.
+  // Maximum wait before its random variation, unless the server requests a longer wait.
   absl::Duration max_backoff = absl::Seconds(2);
 };
 
@@ -24,11 +28,36 @@ enum class Lane {
   kBulk,     // large messages: streams by default, uploads, downloads, dumps, backups
 };
 
+// Encryption of a connection, and proofs of the client's identity. Files are in PEM format and are read by connect().
+struct CredentialOptions {
+  // Encrypts the connection with TLS. Implied by ca_file, certificate_file and server_name.
+  bool tls = false;
+  // File with the certificates of the authorities that may have signed the server's certificate. Empty = the
+  // authorities that this machine trusts.
+  std::string ca_file = {};
+  // Files with the client's certificate chain and its private key, for servers that ask clients for a certificate
+  // (mutual TLS). Both or neither.
+  std::string certificate_file = {};
+  std::string key_file = {};
+  // Name that the server's certificate must contain. Empty = the host of the address.
+  std::string server_name = {};
+  // Bearer token that every call carries: the text itself (`token`) or a file that contains only the token
+  // (`token_file`), not both. The file is read again when it has changed, and when the server refuses the token. A
+  // unary call that was refused because of an old token is repeated once with the new one.
+  std::string token = {};
+  std::string token_file = {};
+  // True: the token is also sent to other machines without TLS, where everyone on the way can read it. False: connect()
+  // returns FAILED_PRECONDITION for such an address.
+  bool allow_token_without_tls = false;
+};
+
 struct ClientOptions {
+  // Encryption and identity. Default: neither.
+  CredentialOptions credentials;
   // Maximum duration of connect().
   absl::Duration connect_timeout = absl::Seconds(10);
-  // False: connect() fails as soon as an attempt is refused, so that a wrong address is reported at once. True: it
-  // retries until the timeout, for servers that are just starting.
+  // False: connect() fails as soon as an attempt is refused, so that a wrong address is reported at once. True:
+  // connect() retries until connect_timeout, for servers that are just starting.
   bool wait_for_server = false;
   // Maximum duration of a call including its retries. Raise it for large query batches on slow machines.
   absl::Duration deadline = absl::Seconds(10);
@@ -44,6 +73,16 @@ struct ClientOptions {
   // Retries of calls that change nothing, and of updates that carry `writer` and `batch`. No other call is ever
   // retried.
   RetryPolicy retry;
+};
+
+// Limits of the number of items that a QueryBatcher or MoveBatcher gathers into one message, and of the time for which
+// it gathers them.
+struct GatherLimits {
+  // Maximum number of items in a message, at least 1. A full message is sent at once.
+  size_t max_items = 1024;
+  // Maximum time for which the first item of a message waits for more items. 0 = a message is sent as soon as the
+  // previous message has been sent.
+  absl::Duration max_delay = absl::Microseconds(500);
 };
 
 }  // namespace locus::client

@@ -1,11 +1,11 @@
-// Pipelined stream: base of UpdateStream and QueryStream. Internal to the library. A bidirectional call whose responses
-// carry the sequence numbers of their requests, with a bounded number of requests in flight. After a broken connection
-// it reconnects and sends the unanswered requests again. A connection counts as broken if no response arrives for
-// Options::patience while requests are unanswered.
+// Pipelined stream: base of UpdateStream and QueryStream. Internal to the library. The stream is a bidirectional call
+// whose responses carry the sequence numbers of their requests, with a bounded number of requests in flight. After a
+// broken connection the stream reconnects and sends the unanswered requests again. A connection counts as broken if no
+// response arrives for Options::patience while requests are unanswered.
 //
 // Threads: each stream owns one thread, the supervisor, which starts one call after another and waits for the end of
-// each. Messages are read and written on gRPC's callback threads. send(), flush() and close() may be called from any
-// thread. Callbacks run one at a time, without the lock held.
+// each call. Messages are read and written on gRPC's callback threads. send(), flush() and close() may be called from
+// any thread. Callbacks run one at a time, without the lock held.
 //
 // Invariants: `items_` holds the requests that were accepted and not answered, in the order of sending; within a call
 // an item is written only after all items before it. After `ended_` is set, `items_` is and stays empty.
@@ -15,6 +15,7 @@
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>
+#include <cstdint>
 #include <deque>
 #include <functional>
 #include <memory>
@@ -26,8 +27,10 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
 #include "absl/time/time.h"
-#include "client/lib/call_metadata.h"
+#include "client/lib/authorization.h"
+#include "client/lib/connection.h"
 #include "client/lib/retry.h"
 #include "client/lib/status.h"
 #include "grpcpp/client_context.h"
@@ -48,9 +51,9 @@ class PipelinedStream {
   using Reactor = grpc::ClientBidiReactor<Request, Response>;
 
   struct Item {
-    std::shared_ptr<Request> request;  // a write may still use it, so it is replaced, never modified
+    std::shared_ptr<Request> request;  // replaced, never modified: a write in progress may still read the old request
     Callback done;
-    bool written = false;  // its write on the current call has begun
+    bool written = false;  // whether the request's write on the current call has begun
   };
   using Items = std::deque<Item>;
 
@@ -64,8 +67,8 @@ class PipelinedStream {
     virtual void number(Request& request) = 0;
     // Converts a response into the outcome of its request.
     virtual absl::StatusOr<Result> outcome_of(Response& response) = 0;
-    // Handles the outcome of an item that was at `position` and has been removed from `items`. May renumber the items
-    // behind it, which now begin at `position`. A returned error ends the stream.
+    // Handles the outcome of an item that was at `position` and has been removed from `items`. May renumber the later
+    // items, which now begin at `position`. A returned error ends the stream.
     virtual absl::Status answered(const absl::StatusOr<Result>& outcome, Items& items, size_t position) = 0;
   };
 
@@ -73,6 +76,7 @@ class PipelinedStream {
     int max_in_flight;
     RetryPolicy reconnect;
     absl::Duration patience;  // maximum time without any response while requests are unanswered
+    std::shared_ptr<Authorization> authorization;
   };
 
   // Starts the supervisor thread. `kind` must outlive the stream.
@@ -82,6 +86,7 @@ class PipelinedStream {
         max_in_flight_(static_cast<size_t>(std::max(1, options.max_in_flight))),
         patience_(absl::ToChronoNanoseconds(options.patience)),
         backoff_(options.reconnect),
+        authorization_(options.authorization),
         supervisor_([this] { supervise(); }) {}
 
   ~PipelinedStream() {
@@ -130,10 +135,10 @@ class PipelinedStream {
  private:
   using Clock = std::chrono::steady_clock;
 
-  // Maximum time for which close() waits until the server ends the call; then it cancels the call.
+  // Maximum time for which close() waits until the server ends the call. After this time close() cancels the call.
   static constexpr std::chrono::seconds kCloseTimeout{5};
-  // Maximum duration of one wait for a response: with an unlimited patience, the time at which the wait ends would
-  // overflow.
+  // Maximum duration of one wait for a response, after which wait_for_end() waits again. Without this maximum, the time
+  // at which the wait ends would overflow if the patience is unlimited.
   static constexpr std::chrono::hours kLongestWait{1};
 
   // One gRPC call. A hold (AddHold) prevents gRPC from finishing the call while other threads may still start writes;
@@ -141,7 +146,9 @@ class PipelinedStream {
   // `response_`, which only the read reactions use, one after another.
   class Attempt final : public Reactor {
    public:
-    Attempt(PipelinedStream& stream, const std::string& scene) : stream_(stream) { add_scene(context_, scene); }
+    explicit Attempt(PipelinedStream& stream)
+        : stream_(stream),
+          token_(prepare(context_, {.authorization = *stream.authorization_, .scene = stream.scene_})) {}
 
     void start() {
       stream_.kind_.start_call(&context_, this);
@@ -151,6 +158,7 @@ class PipelinedStream {
     }
     void cancel() { context_.TryCancel(); }
 
+    uint64_t token() const { return token_; }
     bool writable() const { return !broken_ && !writing_ && !writes_done_; }
     void write(std::shared_ptr<Request> request) {
       writing_ = std::move(request);
@@ -189,6 +197,7 @@ class PipelinedStream {
    private:
     PipelinedStream& stream_;
     grpc::ClientContext context_;
+    const uint64_t token_;  // number of the token that the call carries
     Response response_;
     std::shared_ptr<Request> writing_;
     bool broken_ = false;
@@ -209,8 +218,8 @@ class PipelinedStream {
     }
   }
 
-  // Completes the request that `response` answers. Ignores a response without a matching item: its request was
-  // renumbered in the meantime and is sent again.
+  // Completes the request that `response` answers. Ignores a response that matches no item: the request was renumbered
+  // in the meantime and is sent again.
   void receive(Response& response) {
     std::unique_lock lock(mutex_);
     const auto item = std::find_if(items_.begin(), items_.end(), [&](const Item& candidate) {
@@ -261,18 +270,22 @@ class PipelinedStream {
 
   absl::Status run_attempt(std::unique_lock<std::mutex>& lock) {
     for (Item& item : items_) item.written = false;
-    attempt_ = std::make_unique<Attempt>(*this, scene_);
+    attempt_ = std::make_unique<Attempt>(*this);
     attempt_->start();
     last_response_ = Clock::now();
     pump();
     const bool silent = !wait_for_end(lock);
     absl::Status end = *attempt_->end();
+    const uint64_t token = attempt_->token();
     attempt_.reset();
     if (!fatal_.ok()) return fatal_;
     if (broken_off_) return absl::CancelledError("the stream was broken off");
     if (closing_ && items_.empty()) return absl::OkStatus();
     if (silent) return absl::UnavailableError("the server answered nothing for as long as the stream is patient");
     if (end.ok()) return absl::UnavailableError("the server ended the stream before it had answered everything");
+    if (absl::IsUnauthenticated(end) && authorization_->has_newer(token)) {
+      return absl::UnavailableError(absl::StrCat("the token has changed: ", end.message()));
+    }
     return end;
   }
 
@@ -320,20 +333,21 @@ class PipelinedStream {
   std::mutex mutex_;
   std::condition_variable changed_;
   Backoff backoff_;
+  const std::shared_ptr<Authorization> authorization_;
   Items items_;
-  Clock::time_point last_response_;   // time of the last response, or since when one is awaited
+  Clock::time_point last_response_;   // time of the last response, or start of the wait for the first response
   std::unique_ptr<Attempt> attempt_;  // the call in progress
-  int running_callbacks_ = 0;         // number of running callbacks
+  int running_callbacks_ = 0;         // number of callbacks that have begun and not returned
   bool closing_ = false;
   bool broken_off_ = false;
   absl::Status fatal_;                 // error of Kind::answered(), which ends the stream
   std::optional<absl::Status> ended_;  // set once the stream has ended; OK = closed normally
 
-  std::thread supervisor_;  // last: it uses everything above
+  std::thread supervisor_;  // declared last: the thread uses all members above
 };
 
 // Calls `send` with a callback that sets a future, and returns the future. If `send` itself returns an error, the
-// future gets that error.
+// future receives this error.
 template <class Result, class Send>
 std::future<absl::StatusOr<Result>> send_for_future(const Send& send) {
   auto promise = std::make_shared<std::promise<absl::StatusOr<Result>>>();

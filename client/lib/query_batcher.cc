@@ -8,7 +8,8 @@
 namespace locus::client {
 namespace {
 
-// Queries of one message: rays in its first block, balls in its second; a block without queries is omitted.
+// Queries of one message. The message's first block has the rays, its second block the balls; a block without queries
+// is omitted.
 struct Gathered {
   std::vector<SingleRay> rays;
   std::vector<SingleBall> balls;
@@ -40,7 +41,7 @@ void fail(const Gathered& gathered, const absl::Status& status) {
 // an error.
 void deliver(const Gathered& gathered, const v1::QueryResult& result) {
   const int rays = gathered.rays.empty() ? 0 : 1, balls = gathered.balls.empty() ? 0 : 1;
-  const absl::Status wrong = absl::DataLossError("the server's answer does not fit what was asked");
+  const absl::Status wrong = absl::DataLossError("the server's answer does not match the queries");
   if (result.blocks_size() != rays + balls) return fail(gathered, wrong);
   const v1::BlockResult none;
   const auto hits = RayHits::of(rays == 1 ? result.blocks(0) : none);
@@ -67,7 +68,7 @@ class QueryBatcher::Impl {
   Gatherer<Gathered>& gatherer() { return gatherer_; }
   void flush() {
     gatherer_.flush();
-    stream_->flush().IgnoreError();  // each callback has received it
+    stream_->flush().IgnoreError();  // each callback has received the stream's error
   }
 
  private:
@@ -85,7 +86,7 @@ class QueryBatcher::Impl {
 
   const std::unique_ptr<QueryStream> stream_;
   const Double3 frame_;
-  Gatherer<Gathered> gatherer_;  // last: its thread uses everything above
+  Gatherer<Gathered> gatherer_;  // declared last: its thread uses all members above
 };
 
 QueryBatcher::QueryBatcher(std::unique_ptr<QueryStream> stream, const QueryBatcherOptions& options)

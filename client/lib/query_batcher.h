@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "client/lib/gather_limits.h"
+#include "client/lib/options.h"
 #include "client/lib/query_blocks.h"
 #include "client/lib/query_stream.h"
 #include "client/lib/result_rows.h"
@@ -23,8 +23,8 @@ namespace locus::client {
 // Query for the nearest hit of one ray. Positions of queries are relative to QueryBatcherOptions::frame.
 struct SingleRay {
   Float3 origin;
-  Float3 direction;                                      // t is a multiple of it; any length but zero
-  float t_max = std::numeric_limits<float>::infinity();  // inclusive
+  Float3 direction;                                      // any length except zero; this length is the unit of t
+  float t_max = std::numeric_limits<float>::infinity();  // maximum t, inclusive
   Filter filter = {};
 };
 

@@ -1,10 +1,10 @@
 // Builders of one block of a query batch: rays, balls, boxes, nearest or lookup, with the settings that all kinds
-// share. QueryBuilder returns these builders, which are valid until QueryBuilder::build(). They check nothing: the
-// server refuses an invalid batch as a whole, naming block, column and index. Not thread-safe.
+// share. QueryBuilder returns these builders, which are valid until QueryBuilder::build(). The builders check nothing:
+// the server refuses an invalid batch as a whole, naming block, column and index. Not thread-safe.
 //
-// A per-query column (t_max, max_distances, masks, ignored groups, rotations) is either filled row by row, or set as a
-// whole column with N entries, one entry for all queries, or no entries. Do not use both ways for one column of a
-// block.
+// Let N be the number of queries of a block. A per-query column (t_max, max_distances, masks, ignored groups,
+// rotations) is either filled row by row, or set as a whole column, which has N entries, one entry for all queries, or
+// no entries. Do not fill one column of a block both row by row and as a whole.
 #ifndef LOCUS_CLIENT_LIB_QUERY_BLOCKS_H_
 #define LOCUS_CLIENT_LIB_QUERY_BLOCKS_H_
 
@@ -22,15 +22,16 @@ inline constexpr uint32_t kEveryMask = 0xFFFFFFFFu;
 
 // Filter of one query by layers and group.
 struct Filter {
-  uint32_t mask = kEveryMask;  // finds only objects with (layers & mask) != 0
-  uint64_t ignore_group = 0;   // 0 = none
+  uint32_t mask = kEveryMask;  // finds only objects and instances with (layers & mask) != 0
+  uint64_t ignore_group = 0;   // group that the query does not find; 0 = no group is ignored
 };
 
-// Settings of every kind of block. Each function returns the block, so that calls can be chained.
+// Settings that every kind of block has. Each function returns the builder of the block, so that calls can be chained.
 template <class Derived>
 class BlockBuilder {
  public:
-  // Sets the frame: it is added to every position of the block, and positions in its result are relative to it.
+  // Sets the frame, which is added to every position of the block. Points in the block's result are relative to the
+  // frame; poses are absolute.
   Derived& frame(const Double3& origin) {
     v1::Vec3d& frame = *block_->mutable_frame();
     frame.set_x(origin.x);
@@ -69,19 +70,19 @@ class BlockBuilder {
     block_->set_max_results(rows);
     return derived();
   }
-  // Restricts the result to rows with ids above `id`. Serves to continue after a truncated result.
+  // Restricts the result to rows with ids above `id`, to continue after a truncated result.
   Derived& after_id(uint64_t id) {
     block_->set_after_id(id);
     return derived();
   }
-  // Sets the time of each query. `ticks` has N entries or one for all queries. `fractions` are fractions of the way
-  // from a tick to the next one: N entries, one for all queries, or none.
+  // Sets the time of each query. `ticks` has N entries or one for all queries. `fractions` contains fractions of the
+  // time from a query's tick to the next tick, at least 0 and less than 1: N entries, one for all queries, or none.
   Derived& as_of(absl::Span<const uint64_t> ticks, absl::Span<const float> fractions = {}) {
     assign(*block_->mutable_as_of_ticks(), ticks);
     assign(*block_->mutable_as_of_fractions(), fractions);
     return derived();
   }
-  // Sets the handling of times outside the history; they are refused by default.
+  // Sets the handling of times outside the history; by default the server refuses such times.
   Derived& outside_history(v1::OutsideHistory outside) {
     block_->set_outside_history(outside);
     return derived();
@@ -108,12 +109,12 @@ class RayBlock : public BlockBuilder<RayBlock> {
   RayBlock& mode(v1::RayMode mode);
   RayBlock& cull(v1::Cull cull);
   RayBlock& inside(v1::Inside inside);
-  // Appends one ray. t is a multiple of the direction, which may have any length but zero.
+  // Appends one ray. The direction may have any length except zero; this length is the unit of t.
   RayBlock& ray(const Float3& origin, const Float3& direction, float t_max = std::numeric_limits<float>::infinity(),
                 const Filter& filter = {});
   // Appends N rays: 3N floats each.
   RayBlock& rays(absl::Span<const float> origins, absl::Span<const float> directions);
-  // Sets the whole column of the largest t, inclusive: N entries, or one for all rays.
+  // Sets the whole column of the maximum t, inclusive: N entries, or one for all rays.
   RayBlock& t_max(absl::Span<const float> t_max);
 
  private:
@@ -126,8 +127,8 @@ class BallBlock : public BlockBuilder<BallBlock> {
 
   BallBlock& detail(v1::StaticDetail detail);
   BallBlock& ball(const Float3& center, float radius, const Filter& filter = {});
-  // Appends N balls: 3N floats of centers, and N radii. If this is the only call for the block, one radius for all
-  // balls suffices.
+  // Appends N balls: 3N floats of centers, and N radii. If this call adds all balls of the block, `radii` may instead
+  // contain one radius for all balls.
   BallBlock& balls(absl::Span<const float> centers, absl::Span<const float> radii);
 
  private:
@@ -141,8 +142,8 @@ class BoxBlock : public BlockBuilder<BoxBlock> {
   BoxBlock& detail(v1::StaticDetail detail);
   BoxBlock& box(const Float3& center, const Float3& half_extents, const Rotation& rotation = {},
                 const Filter& filter = {});
-  // Appends N boxes: 3N floats of centers, and 3N floats of half extents. If this is the only call for the block, three
-  // floats of half extents for all boxes suffice.
+  // Appends N boxes: 3N floats of centers, and 3N floats of half extents. If this call adds all boxes of the block,
+  // `half_extents` may instead contain three floats for all boxes.
   BoxBlock& boxes(absl::Span<const float> centers, absl::Span<const float> half_extents);
   // Sets the whole column of rotations: N quaternions (4N floats: x, y, z, w), or one for all boxes.
   BoxBlock& rotations(absl::Span<const float> rotations);
@@ -151,7 +152,8 @@ class BoxBlock : public BlockBuilder<BoxBlock> {
   v1::Boxes* boxes_;
 };
 
-// Nearest objects and instances to points. Rows are like those of rays of mode ALL; t is the distance.
+// Block that finds the objects and instances nearest to points. The rows of a query ascend by distance, which is in
+// column t.
 class NearestBlock : public BlockBuilder<NearestBlock> {
  public:
   explicit NearestBlock(v1::QueryBlock& block) : BlockBuilder(block), nearest_(block.mutable_nearest()) {}
@@ -171,7 +173,8 @@ class NearestBlock : public BlockBuilder<NearestBlock> {
   v1::Nearest* nearest_;
 };
 
-// Lookup by ids, with one row for each id in the order given, or by groups; one block cannot have both.
+// Block that looks up objects and instances either by ids, with one row for each id in the order of the ids, or by
+// groups.
 class LookupBlock : public BlockBuilder<LookupBlock> {
  public:
   explicit LookupBlock(v1::QueryBlock& block) : BlockBuilder(block), lookup_(block.mutable_lookup()) {}

@@ -1,5 +1,6 @@
 // Builder of a query batch: blocks of columns, which are answered together at one revision. For callers of
-// Client::query and QueryStream. Not thread-safe. build() resets the builder and invalidates the blocks returned by it.
+// Client::query and QueryStream. Not thread-safe. build() resets the builder and invalidates the block builders that it
+// has returned.
 #ifndef LOCUS_CLIENT_LIB_QUERY_BUILDER_H_
 #define LOCUS_CLIENT_LIB_QUERY_BUILDER_H_
 
@@ -13,19 +14,21 @@ namespace locus::client {
 
 class QueryBuilder {
  public:
-  // Requires an answer at `revision` or a later one, for example at that of an ack ("read your own writes"). The server
-  // waits until the scene has reached it. By default it answers at the latest revision without waiting.
+  // Requires an answer at `revision` or later. `revision` is for example that of an ack ("read your own writes"). The
+  // server waits until the scene has reached this revision. By default the server answers at the latest revision
+  // without waiting.
   QueryBuilder& at_least(const Revision& revision);
   // Requests exactly this revision. The query fails with OUT_OF_RANGE if the server no longer retains it.
   QueryBuilder& exactly(const Revision& revision);
-  // Sets the work budget of the batch, as a number of nodes, cells and tests together; 0 = no limit.
+  // Sets the maximum work for the batch: the number of visited tree nodes and grid cells and of tested triangles and
+  // objects, all added up; 0 = no limit.
   QueryBuilder& max_work(uint64_t work);
   // Requests a report of the work done for the batch.
   QueryBuilder& explain();
   // Sets the maximum size of the reply in bytes; 0 = the default of 4,000,000.
   QueryBuilder& max_reply_bytes(uint32_t bytes);
 
-  // Append a block to the batch, which may have at most 256.
+  // Append a block to the batch, which may have at most 256 blocks.
   RayBlock rays() { return RayBlock(*batch_.add_blocks()); }
   BallBlock balls() { return BallBlock(*batch_.add_blocks()); }
   BoxBlock boxes() { return BoxBlock(*batch_.add_blocks()); }

@@ -15,9 +15,11 @@ using Stream = PipelinedStream<v1::StreamQueriesRequest, v1::StreamQueriesRespon
 
 class QueryStream::Impl final : public Stream::Kind {
  public:
-  Impl(std::shared_ptr<grpc::ChannelInterface> channel, std::string scene, const QueryStreamOptions& options)
+  Impl(std::shared_ptr<grpc::ChannelInterface> channel, std::shared_ptr<Authorization> authorization, std::string scene,
+       const QueryStreamOptions& options)
       : stub_(v1::QueryService::NewStub(std::move(channel))),
-        stream_(*this, std::move(scene), {options.max_in_flight, options.reconnect, options.patience}) {}
+        stream_(*this, std::move(scene),
+                {options.max_in_flight, options.reconnect, options.patience, std::move(authorization)}) {}
 
   Stream& stream() { return stream_; }
 
@@ -37,12 +39,12 @@ class QueryStream::Impl final : public Stream::Kind {
  private:
   const std::unique_ptr<v1::QueryService::StubInterface> stub_;
   uint64_t sequence_ = 0;  // guarded by the stream's lock
-  Stream stream_;          // last: its thread uses everything above
+  Stream stream_;          // declared last: its thread uses all members above
 };
 
-QueryStream::QueryStream(std::shared_ptr<grpc::ChannelInterface> channel, std::string scene,
-                         const QueryStreamOptions& options)
-    : impl_(std::make_unique<Impl>(std::move(channel), std::move(scene), options)) {}
+QueryStream::QueryStream(std::shared_ptr<grpc::ChannelInterface> channel, std::shared_ptr<Authorization> authorization,
+                         std::string scene, const QueryStreamOptions& options)
+    : impl_(std::make_unique<Impl>(std::move(channel), std::move(authorization), std::move(scene), options)) {}
 
 QueryStream::~QueryStream() = default;
 

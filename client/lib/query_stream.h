@@ -1,6 +1,6 @@
 // Pipelined stream of query batches against one scene. Answers may arrive in any order and are matched by sequence
-// number. For callers that query every tick. After a broken connection, unanswered batches are sent again on a new one,
-// which is safe since queries change nothing.
+// number. For callers that query every tick. After a broken connection, unanswered batches are sent again on a new
+// connection, which is safe since queries change nothing.
 #ifndef LOCUS_CLIENT_LIB_QUERY_STREAM_H_
 #define LOCUS_CLIENT_LIB_QUERY_STREAM_H_
 
@@ -20,9 +20,11 @@ class ChannelInterface;
 
 namespace locus::client {
 
+class Authorization;
+
 struct QueryStreamOptions {
-  // Maximum number of unanswered batches, at least 1; send() blocks when it is reached. 8 batches of 1,024 queries, or
-  // 2 of 8,192, keep a local server busy.
+  // Maximum number of unanswered batches, at least 1; send() blocks when this number is reached. 8 batches of 1,024
+  // queries, or 2 batches of 8,192 queries, keep a local server busy.
   int max_in_flight = 8;
   // Reconnection after a broken connection. Every answer resets the count of attempts.
   RetryPolicy reconnect = {};
@@ -40,7 +42,8 @@ class QueryStream {
   using ResultCallback = std::function<void(absl::StatusOr<v1::QueryResult>)>;
 
   // Opens a stream on `channel`. Callers use Client::query_stream instead.
-  QueryStream(std::shared_ptr<grpc::ChannelInterface> channel, std::string scene, const QueryStreamOptions& options);
+  QueryStream(std::shared_ptr<grpc::ChannelInterface> channel, std::shared_ptr<Authorization> authorization,
+              std::string scene, const QueryStreamOptions& options);
   // Cancels the stream; unanswered batches get CANCELLED.
   ~QueryStream();
   QueryStream(const QueryStream&) = delete;
@@ -48,7 +51,7 @@ class QueryStream {
 
   // Sends a batch. Blocks while `max_in_flight` batches are unanswered. Returns OK if `on_result` will be called
   // exactly once, with the answer or the error of this batch; returns an error if the stream has ended, and then never
-  // calls it.
+  // calls `on_result`.
   absl::Status send(v1::QueryBatch batch, ResultCallback on_result);
   // Sends a batch and returns its future, which also receives the error of a stream that has ended.
   std::future<absl::StatusOr<v1::QueryResult>> send(v1::QueryBatch batch);

@@ -35,7 +35,7 @@ absl::Status contradiction(absl::string_view what) {
 }
 
 // Returns the number of rows of a block without row counts, derived from the first column that is present; 0 if no
-// column is.
+// column is present.
 size_t dense_rows(const std::vector<ColumnLength>& columns) {
   for (const ColumnLength& column : columns) {
     if (column.entries > 0) return static_cast<size_t>(column.entries / column.per_row);

@@ -1,9 +1,10 @@
-// Views of the columns of a query result, by query and row. For readers of v1::QueryResult. A view borrows its block
-// and copies no columns; it only stores the index of each query's first row. Immutable, so any number of threads may
-// read one.
+// Views that access the columns of a query result by query and row. For readers of v1::QueryResult. A view borrows its
+// block and copies no columns; it only stores the index of each query's first row. Views are immutable, so any number
+// of threads may read a view.
 //
 // of() checks the lengths of the columns once, and returns DATA_LOSS if they are inconsistent, so that no access runs
-// past their end, whatever the server sent. Indices of queries and rows are not checked, as in std::vector::operator[].
+// past the end of a column, whatever the server sent. Indices of queries and rows are not checked, as in
+// std::vector::operator[].
 #ifndef LOCUS_CLIENT_LIB_RESULT_ROWS_H_
 #define LOCUS_CLIENT_LIB_RESULT_ROWS_H_
 
@@ -26,7 +27,7 @@ struct RowRange {
   size_t size() const { return end - begin; }
 };
 
-// Rows of any block: the range of rows of each query, and the requested columns.
+// View of the rows of a block of any kind: the range of rows of each query, and the requested columns.
 class ResultRows {
  public:
   // Returns a view, or DATA_LOSS if the lengths of the columns are inconsistent.
@@ -41,7 +42,8 @@ class ResultRows {
   // Return the effective time of each query; empty for blocks without as_of().
   absl::Span<const uint64_t> resolved_ticks() const { return block_->resolved_ticks(); }
   absl::Span<const float> resolved_fractions() const { return block_->resolved_fractions(); }
-  // Returns whether the query asked for a time outside the history and got the nearest kept time.
+  // Returns whether the query's time was outside the recorded history, so that it was answered at the nearest recorded
+  // time.
   bool clamped(size_t query) const;
 
   // Return columns with one entry per row. A column that was not requested is empty.
@@ -51,8 +53,8 @@ class ResultRows {
   absl::Span<const uint64_t> groups() const { return block_->groups(); }
   absl::Span<const uint64_t> tags() const { return block_->tags(); }
   absl::Span<const uint32_t> layers() const { return block_->layers(); }
-  // Return columns with several values per row: 2 for uvs, 4 for rotations, 3 for the others. A column that was not
-  // requested is empty.
+  // Return columns with several values per row: 2 for uvs, 4 for rotations, 3 for normals, points and positions. A
+  // column that was not requested is empty.
   absl::Span<const float> uvs() const { return block_->uvs(); }
   absl::Span<const float> normals() const { return block_->normals(); }
   absl::Span<const float> points() const { return block_->points(); }
@@ -66,8 +68,8 @@ class ResultRows {
   std::vector<size_t> begins_;  // first row of each query, followed by the total number of rows
 };
 
-// Rows of rays of mode FIRST (one row per ray, a miss has id 0) and ALL (rows ascend by t), and of nearest queries
-// (rows ascend by distance). Needs the columns T and ID, which are returned by default.
+// View of the rows of rays of mode FIRST (one row per ray, a miss has id 0) and ALL (rows ascend by t), and of nearest
+// queries (rows ascend by distance). Needs the columns T and ID, which are returned by default.
 class RayHits {
  public:
   static absl::StatusOr<RayHits> of(const v1::BlockResult& block);
@@ -87,7 +89,7 @@ class RayHits {
   ResultRows rows_;
 };
 
-// Result of rays of mode ANY: one byte per ray.
+// View of the result of rays of mode ANY: one byte per ray.
 class AnyHits {
  public:
   static absl::StatusOr<AnyHits> of(const v1::BlockResult& block);
@@ -101,8 +103,8 @@ class AnyHits {
   const v1::BlockResult* block_;
 };
 
-// Rows of balls and boxes: for each query a span of ids, and of triangles if requested. Needs the column ID, which is
-// returned by default.
+// View of the rows of balls and boxes: for each query a span of ids, and of triangles if requested. Needs the column
+// ID, which is returned by default.
 class Overlaps {
  public:
   static absl::StatusOr<Overlaps> of(const v1::BlockResult& block);

@@ -11,7 +11,7 @@
 
 namespace locus::client {
 
-// Waits of one sequence of attempts. Not thread-safe.
+// Sequence of the waits between the attempts of one call. Not thread-safe.
 class Backoff {
  public:
   explicit Backoff(const RetryPolicy& policy) : policy_(policy) {}
@@ -19,7 +19,7 @@ class Backoff {
   // Counts a failure. Returns the wait before the next attempt, which is at least the wait that the server requested,
   // or nothing if all attempts of the policy are used up.
   std::optional<absl::Duration> after_failure(const absl::Status& failure);
-  // Resets the count of failures after a success, so that the next failure gets the shortest wait again.
+  // Resets the count of failures after a success, so that the wait after the next failure is first_backoff again.
   void reset() { failures_ = 0; }
 
  private:

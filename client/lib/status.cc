@@ -3,6 +3,8 @@
 #include <string>
 
 #include "absl/strings/cord.h"
+#include "absl/strings/str_cat.h"
+#include "client/lib/advice.h"
 #include "grpcpp/support/status.h"
 
 namespace locus::client {
@@ -13,6 +15,13 @@ constexpr int kLastCode = 16;  // UNAUTHENTICATED
 
 absl::StatusCode code_of(int code) {
   return code > 0 && code <= kLastCode ? static_cast<absl::StatusCode>(code) : absl::StatusCode::kUnknown;
+}
+
+// Converts a status without details, to whose message it adds advice.
+absl::Status with_advice(const grpc::Status& status) {
+  const absl::StatusCode code = code_of(status.error_code());
+  const std::string advice = advice_on(code, status.error_message());
+  return {code, absl::StrCat(status.error_message(), advice.empty() ? "" : ": ", advice)};
 }
 
 void attach(const v1::Error& error, absl::Status& status) {
@@ -40,9 +49,9 @@ bool refused_by_server(const absl::Status& status) {
 
 absl::Status to_absl_status(const grpc::Status& status) {
   if (status.ok()) return absl::OkStatus();
-  absl::Status result(code_of(status.error_code()), status.error_message());
   v1::Status details;
-  if (status.error_details().empty() || !details.ParseFromString(status.error_details())) return result;
+  if (status.error_details().empty() || !details.ParseFromString(status.error_details())) return with_advice(status);
+  absl::Status result(code_of(status.error_code()), status.error_message());
   for (const google::protobuf::Any& detail : details.details()) {
     v1::Error error;
     if (detail.Is<v1::Error>() && detail.UnpackTo(&error)) {

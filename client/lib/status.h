@@ -1,5 +1,6 @@
-// Conversions from gRPC errors to absl::Status, and from there to the server's structured error. For callers that act
-// on a reason, a field or a limit instead of the message. Functions without state; any thread.
+// Conversions from gRPC errors to absl::Status, and from absl::Status to the server's structured error. For callers
+// that act on a reason, a field or a limit instead of the message. The functions have no state and may be called from
+// any thread.
 #ifndef LOCUS_CLIENT_LIB_STATUS_H_
 #define LOCUS_CLIENT_LIB_STATUS_H_
 
@@ -19,14 +20,16 @@ namespace locus::client {
 // no connection or the deadline has expired.
 std::optional<v1::Error> error_of(const absl::Status& status);
 
-// Returns the wait that the server requests before the same request is sent again; zero if it requests none.
+// Returns the wait that the server requests before the same request is sent again; zero if it requests no wait.
 absl::Duration retry_after(const absl::Status& status);
 
-// Returns whether the server refused the request, so that nothing was changed. False also if the outcome is unknown.
+// Returns whether the server refused the request, so that nothing was changed. If the outcome is unknown, returns
+// false.
 bool refused_by_server(const absl::Status& status);
 
 // Converts a gRPC status: keeps code and message, and attaches the Error from `grpc-status-details-bin` for error_of().
-// Malformed details are dropped; code and message remain valid.
+// Malformed details are dropped; code and message remain valid. Without details, the message of UNAUTHENTICATED,
+// PERMISSION_DENIED and a failed TLS handshake also contains advice.
 absl::Status to_absl_status(const grpc::Status& status);
 
 // Converts the error with which a stream answered one request. An invalid code (0, or not a gRPC code) becomes UNKNOWN,

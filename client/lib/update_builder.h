@@ -1,11 +1,12 @@
-// Builder of an update batch, row by row or by whole columns. For callers that stream moving objects. Nothing is
-// checked here: the server checks each item, and the ack lists the refused ones. Not thread-safe. build() resets the
+// Builder of an update batch, row by row or by whole columns. For callers that stream moving objects. The builder
+// checks nothing: the server checks each item, and the ack lists the refused items. Not thread-safe. build() resets the
 // builder.
 //
 // Inserted rows with the same shape and kind of position (relative or absolute) share one Insert message, in the order
 // in which they were added. Moves stay in the order in which they were added, since the later of two moves of one
 // object wins: a move that needs other columns than the previous one (with or without rotation, relative or absolute
-// position), or another kind, begins a new Move message. Relabels do likewise, by which labels they set.
+// position), or is of another MoveKind, begins a new Move message. A relabel that sets other kinds of labels than the
+// previous relabel begins a new Relabel message.
 #ifndef LOCUS_CLIENT_LIB_UPDATE_BUILDER_H_
 #define LOCUS_CLIENT_LIB_UPDATE_BUILDER_H_
 
@@ -53,11 +54,11 @@ class UpdateBuilder {
   // Sets the frame of the batch: the origin to which float positions are relative.
   UpdateBuilder& frame(const Double3& origin);
   UpdateBuilder& tick(uint64_t tick);
-  // Makes an insert of a known id replace the object instead of being refused.
+  // Makes an insert with the id of an existing object replace that object, instead of being refused.
   UpdateBuilder& upsert();
-  // Makes one refused item refuse the whole batch.
+  // Makes the server refuse the whole batch if it would refuse any item of the batch.
   UpdateBuilder& all_or_nothing();
-  // Drops the history and takes the batch's tick even if it is lower than the scene's.
+  // Drops the scene's history and accepts the batch's tick even if it is lower than the scene's tick.
   UpdateBuilder& restart_ticks();
   // Removes all objects before the other changes of the batch.
   UpdateBuilder& clear();
@@ -99,9 +100,9 @@ class UpdateBuilder {
   v1::Insert& add_columns(const InsertColumns& columns);
 
   v1::UpdateBatch batch_;
-  bool move_takes_rows_ = false;  // move() may append rows to the last of batch_.moves
-  // Index of the entry of batch_.inserts that collects the rows of a form and kind of position; -1 = none yet. Each
-  // form has two elements: one for relative positions, then one for absolute positions.
+  bool move_takes_rows_ = false;  // move() may append rows to the last entry of batch_.moves
+  // For each form two indices into batch_.inserts: of the entry that collects the rows with relative positions, and of
+  // the entry that collects the rows with absolute positions; -1 = no such entry yet.
   std::array<int, 8> row_inserts_ = {-1, -1, -1, -1, -1, -1, -1, -1};
 };
 

@@ -20,9 +20,9 @@ uint64_t random_writer() {
   return writer;
 }
 
-// Returns whether the batch number of a failed batch can be used again, which is so after a refusal with a reason. The
-// exception is REASON_BATCH_GAP: the server has lost state of the writer. After an error without a reason it is unknown
-// whether the server used the number, and continuing could lose a batch silently.
+// Returns whether the batch number of a failed batch can be used again: true if the server refused the batch with a
+// reason other than REASON_BATCH_GAP, which means that the server has lost the state of the writer. After an error
+// without a reason it is unknown whether the server used the number, and continuing could lose a batch silently.
 bool batch_number_is_unused(const absl::Status& failure) {
   const std::optional<v1::Error> error = error_of(failure);
   return error && error->reason() != v1::REASON_UNSPECIFIED && error->reason() != v1::REASON_BATCH_GAP;
@@ -32,11 +32,13 @@ bool batch_number_is_unused(const absl::Status& failure) {
 
 class UpdateStream::Impl final : public UpdatePipeline::Kind {
  public:
-  Impl(std::shared_ptr<grpc::ChannelInterface> channel, std::string scene, const UpdateStreamOptions& options)
+  Impl(std::shared_ptr<grpc::ChannelInterface> channel, std::shared_ptr<Authorization> authorization, std::string scene,
+       const UpdateStreamOptions& options)
       : stub_(v1::UpdateService::NewStub(std::move(channel))),
         writer_(options.writer != 0 ? options.writer : random_writer()),
         next_batch_(options.next_batch),
-        stream_(*this, std::move(scene), {options.max_in_flight, options.reconnect, options.patience}) {}
+        stream_(*this, std::move(scene),
+                {options.max_in_flight, options.reconnect, options.patience, std::move(authorization)}) {}
 
   UpdatePipeline& stream() { return stream_; }
   uint64_t writer() const { return writer_; }
@@ -85,12 +87,13 @@ class UpdateStream::Impl final : public UpdatePipeline::Kind {
   uint64_t sequence_ = 0;  // guarded by the stream's lock
   mutable std::mutex ack_mutex_;
   std::optional<Revision> last_ack_;  // guarded by ack_mutex_
-  UpdatePipeline stream_;             // last: its thread uses everything above
+  UpdatePipeline stream_;             // declared last: its thread uses all members above
 };
 
-UpdateStream::UpdateStream(std::shared_ptr<grpc::ChannelInterface> channel, std::string scene,
+UpdateStream::UpdateStream(std::shared_ptr<grpc::ChannelInterface> channel,
+                           std::shared_ptr<Authorization> authorization, std::string scene,
                            const UpdateStreamOptions& options)
-    : impl_(std::make_unique<Impl>(std::move(channel), std::move(scene), options)) {}
+    : impl_(std::make_unique<Impl>(std::move(channel), std::move(authorization), std::move(scene), options)) {}
 
 UpdateStream::~UpdateStream() = default;
 

@@ -1,15 +1,16 @@
 // Pipelined stream of update batches into one scene; each batch is applied exactly once, even across broken
 // connections. For game servers that send one batch per tick.
 //
-// Each batch carries the stream's random `writer` number and a consecutive `batch` number. After a broken connection,
-// every batch without an ack is sent again, in order, on a new one; the server answers batches that it had already
-// applied with `duplicate`. A batch that the server refuses does not use up its number, so the stream renumbers the
-// batches behind it and sends them again: the caller gets one outcome for each batch, in the order sent.
+// Each batch carries the stream's random writer id (`writer`) and a consecutive batch number (`batch`). After a broken
+// connection, every batch without an ack is sent again, in order, on a new connection; the server answers batches that
+// it had already applied with `duplicate`. A batch that the server refuses does not use up its number, so the stream
+// renumbers the later batches and sends them again: the caller gets one outcome for each batch, in the order sent.
 //
 // The stream ends permanently if the server refuses the stream itself (for example because of the scene name or of
 // missing rights), if the server does not know the writer any more (the scene was restarted without its state), or if
-// reconnecting fails as often as the policy allows without an ack in between. Every unanswered batch and every later
-// send() gets that status. The outcome of the unanswered batches is unknown; acked batches stay applied.
+// as many attempts to reconnect as the policy allows fail without an ack between them. Every unanswered batch and every
+// later send() gets the status of this failure. The outcome of the unanswered batches is unknown; acked batches stay
+// applied.
 #ifndef LOCUS_CLIENT_LIB_UPDATE_STREAM_H_
 #define LOCUS_CLIENT_LIB_UPDATE_STREAM_H_
 
@@ -32,11 +33,14 @@ class ChannelInterface;
 
 namespace locus::client {
 
+class Authorization;
+
 struct UpdateStreamOptions {
-  // Maximum number of unanswered batches, at least 1. send() blocks when it is reached, which limits the caller to the
-  // rate of the server.
+  // Maximum number of unanswered batches, at least 1. send() blocks when this number is reached, which limits the
+  // caller to the rate of the server.
   int max_in_flight = 8;
-  // Writer number; 0 draws a random one. Set it, and `next_batch`, only to continue the writer of an earlier stream.
+  // Writer id; 0 = the stream generates a random id. `next_batch` is the number of the first batch. Set these two
+  // options only to continue the batch numbers of an earlier stream's writer.
   uint64_t writer = 0;
   uint64_t next_batch = 1;
   // Reconnection after a broken connection. Every ack resets the count of attempts.
@@ -55,15 +59,16 @@ class UpdateStream {
   using AckCallback = std::function<void(absl::StatusOr<v1::UpdateAck>)>;
 
   // Opens a stream on `channel`. Callers use Client::update_stream instead.
-  UpdateStream(std::shared_ptr<grpc::ChannelInterface> channel, std::string scene, const UpdateStreamOptions& options);
+  UpdateStream(std::shared_ptr<grpc::ChannelInterface> channel, std::shared_ptr<Authorization> authorization,
+               std::string scene, const UpdateStreamOptions& options);
   // Cancels the stream; unanswered batches get CANCELLED. To wait for their acks, call close() before the destructor.
   ~UpdateStream();
   UpdateStream(const UpdateStream&) = delete;
   UpdateStream& operator=(const UpdateStream&) = delete;
 
   // Sends a batch. Blocks while `max_in_flight` batches are unanswered. Returns OK if `on_ack` will be called exactly
-  // once; returns an error if the stream has ended, and then never calls it. Overwrites `writer` and `batch` of the
-  // batch.
+  // once; returns an error if the stream has ended, and then never calls `on_ack`. Overwrites `writer` and `batch` of
+  // the batch.
   absl::Status send(v1::UpdateBatch batch, AckCallback on_ack);
   // Sends a batch and returns its future, which also receives the error of a stream that has ended.
   std::future<absl::StatusOr<v1::UpdateAck>> send(v1::UpdateBatch batch);

@@ -1,5 +1,5 @@
-// Small plain values that the builders take by row: points, rotations, labels, revisions. For callers of the library;
-// plain data without invariants, except where a comment names one.
+// Small value types that UpdateBuilder and QueryBuilder accept for one row: points, rotations and labels; and Revision,
+// which identifies a state of a scene. For callers of the library. Plain data; the server checks the values.
 #ifndef LOCUS_CLIENT_LIB_VALUES_H_
 #define LOCUS_CLIENT_LIB_VALUES_H_
 
@@ -12,21 +12,21 @@ struct Float3 {
   float x = 0, y = 0, z = 0;
 };
 
-// Absolute position, or a frame.
+// Absolute position, also the frame of a batch or block.
 struct Double3 {
   double x = 0, y = 0, z = 0;
 };
 
-// Position of an object: a Float3 is relative to the batch's frame, a Double3 absolute.
+// Position of an object: a Float3 is relative to the batch's frame, a Double3 is absolute.
 struct Position {
   Position(const Float3& relative) : value{relative.x, relative.y, relative.z} {}  // NOLINT: meant to convert
   Position(const Double3& world) : value(world), absolute(true) {}                 // NOLINT: meant to convert
 
-  Double3 value;  // holds float and double positions exactly
+  Double3 value;  // a relative position is converted without rounding
   bool absolute = false;
 };
 
-// Unit quaternion; the server refuses one whose length differs from 1 by more than 1e-3.
+// Unit quaternion; the server refuses a quaternion whose length differs from 1 by more than 1e-3.
 struct Rotation {
   float x = 0, y = 0, z = 0, w = 1;
 
@@ -35,8 +35,8 @@ struct Rotation {
 
 // Labels by which queries filter and report an object. The defaults are those of the protocol.
 struct Labels {
-  uint32_t layers = 1;  // found iff (layers & mask) != 0; 0 = hidden
-  uint64_t group = 0;   // 0 = none
+  uint32_t layers = 1;  // a query finds the object iff (layers & mask of the query) != 0; 0 = hidden
+  uint64_t group = 0;   // 0 = no group
   uint64_t tag = 0;
 };
 

@@ -3,10 +3,10 @@
     make_schema.py DESCRIPTOR_SET SCHEMA ENUMS
 
 DESCRIPTOR_SET is the output of `protoc --include_imports --include_source_info --descriptor_set_out=` for the real
-files. SCHEMA receives the same files, but with every packed fixed-width column declared `bytes`: on the wire both are a
-length and little-endian numbers, so that Python reads and writes a column as one buffer instead of number by number.
-ENUMS gets a Python module with the protocol's enums and their comments. Run by the build; its output is not kept in the
-repository.
+files. SCHEMA receives the same files, but with every packed fixed-width column declared `bytes`. On the wire both types
+are a length and little-endian numbers; with `bytes`, Python reads and writes a column as one buffer instead of number
+by number. ENUMS receives a Python module with the protocol's enums and their comments. The build runs this script; its
+output is not in the repository.
 """
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-// Kinds of queries: each block of a query batch holds queries of one kind. The core answers by kind; the server counts
-// and logs by kind. Plain data.
+// Kinds of queries: each block of a query batch holds queries of one kind. The core has one implementation per kind;
+// the server counts and logs queries per kind. Plain data.
 #ifndef LOCUS_CORE_BASE_BLOCK_KIND_H_
 #define LOCUS_CORE_BASE_BLOCK_KIND_H_
 

@@ -35,9 +35,9 @@ template <class A, class B>
 #define LOCUS_CHECK_LE(a, b) LOCUS_CHECK_OP_(a, <=, b)
 #define LOCUS_CHECK_LT(a, b) LOCUS_CHECK_OP_(a, <, b)
 
-// True in debug and sanitizer builds, where LOCUS_DCHECK* and check_invariants() are evaluated. A class whose comment
-// names an invariant has a member check_invariants(), called at the end of each mutating public member. The body of
-// check_invariants() is inside `if constexpr (kDebugChecks)`, and its cost is at most that of the mutation.
+// True in debug and sanitizer builds, where LOCUS_DCHECK* are evaluated. A class whose comment names an invariant has a
+// member check_invariants(), which each mutating public member calls at its end through LOCUS_DCHECK_CALL. A check
+// costs at most as much as the mutation.
 namespace locus {
 #ifdef NDEBUG
 inline constexpr bool kDebugChecks = false;
@@ -61,5 +61,11 @@ inline constexpr bool kDebugChecks = true;
 #define LOCUS_DCHECK_LT(a, b) LOCUS_DCHECK_OP_(a, <, b)
 #define LOCUS_DCHECK_GE(a, b) LOCUS_DCHECK_OP_(a, >=, b)
 #define LOCUS_DCHECK_GT(a, b) LOCUS_DCHECK_OP_(a, >, b)
+
+// Calls a function that verifies invariants, for example LOCUS_DCHECK_CALL(check_invariants()).
+#define LOCUS_DCHECK_CALL(...)                        \
+  do {                                                \
+    if constexpr (::locus::kDebugChecks) __VA_ARGS__; \
+  } while (false)
 
 #endif  // LOCUS_CORE_BASE_CHECK_H_

@@ -1,5 +1,5 @@
 // Identifiers in a scene. Objects and instances share one id space per scene. The caller chooses the ids; 0 is never an
-// id. An instance that is placed without an id gets one with bit 63 set.
+// id. If the caller places an instance without an id, locus chooses an id with bit 63 set (kChosenIdBit).
 #ifndef LOCUS_CORE_BASE_IDS_H_
 #define LOCUS_CORE_BASE_IDS_H_
 
@@ -7,10 +7,10 @@
 
 namespace locus {
 
-using Id = uint64_t;      // object or instance
-using Group = uint64_t;   // such as a player or a vehicle; 0 = none
-using Tag = uint64_t;     // any value of the user, returned on request
-using Layers = uint32_t;  // bit mask, one bit per layer
+using Id = uint64_t;      // id of an object or instance; 0 = no id
+using Group = uint64_t;   // number that several objects share, such as a player; 0 = no group
+using Tag = uint64_t;     // any value that the caller stores with an object; returned on request
+using Layers = uint32_t;  // one bit per layer: the layers of an object, or those that a query searches
 
 inline constexpr Id kNoId = 0;
 inline constexpr Id kChosenIdBit = Id{1} << 63;

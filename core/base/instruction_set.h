@@ -1,5 +1,6 @@
-// Instruction set that the vector code of this process uses: the widest that the processor supports, unless the
-// configuration names another. It is chosen once at the start; query results do not depend on it.
+// Instruction set that the vector code of this process uses: the widest one that the processor supports, unless the
+// configuration names another. The process chooses the instruction set once, at the start; query results do not depend
+// on the choice.
 #ifndef LOCUS_CORE_BASE_INSTRUCTION_SET_H_
 #define LOCUS_CORE_BASE_INSTRUCTION_SET_H_
 
@@ -23,9 +24,9 @@ absl::string_view instruction_set_name(InstructionSet set);
 // Thread-safe.
 std::vector<std::string> instruction_sets();
 
-// Selects the instruction set `name`, or the widest supported one if `name` is empty. Returns INVALID_ARGUMENT, listing
-// the supported ones, if the processor does not support `name`. Call at the start of a program or in tests, never while
-// queries run.
+// Selects the instruction set `name`, or the widest supported instruction set if `name` is empty. Returns
+// INVALID_ARGUMENT, listing the supported names, if the processor does not support `name`. Not thread-safe: call at the
+// start of a program or in tests, never while queries run.
 absl::Status use_instruction_set(absl::string_view name);
 
 // Returns the instruction set in use. Thread-safe.

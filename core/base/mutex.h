@@ -42,8 +42,8 @@ class LOCUS_SCOPED_CAPABILITY MutexLock {
   Mutex& mutex_;
 };
 
-// Condition variable of a Mutex. A wait releases the mutex, which the caller holds by a MutexLock, and acquires it
-// again before it returns. Wake-ups may be spurious: wait in a loop.
+// Condition variable of a Mutex. The caller of a wait holds the mutex by a MutexLock; the wait releases the mutex and
+// acquires it again before returning. Wake-ups may be spurious: wait in a loop.
 class ConditionVariable {
  public:
   void wait(Mutex& mutex) LOCUS_REQUIRES(mutex) { condition_.wait(mutex); }

@@ -6,10 +6,11 @@
 // Threads: each array object is like a standard container. Arrays that share leaves are independent: a thread may
 // write, copy or destroy its own array while other threads read theirs.
 //
-// Invariants: a leaf or List that two arrays share is immutable. Each leaf and List stores an owner: the number that
-// its creator then had as its owner_. An array draws a new owner at its first write after snapshot(), and changes in
-// place only leaves and a List that store its current owner; so it never reads reference counts. The number of leaves
-// is the smallest that holds size() values. Source of the owners: Clojure's transient collections (Hickey).
+// Invariants: a leaf or List that two arrays share is immutable. Each leaf and List stores an owner: the value of
+// `owner_` of its array when it was created. At its first write after snapshot(), an array sets `owner_` to a new
+// number. An array changes in place only leaves and a List that store its current `owner_`, so it never reads reference
+// counts. The number of leaves is the smallest that holds size() values. Source of the owner numbers: Clojure's
+// transient collections (Hickey).
 #ifndef LOCUS_CORE_BASE_PERSISTENT_ARRAY_H_
 #define LOCUS_CORE_BASE_PERSISTENT_ARRAY_H_
 
@@ -52,19 +53,19 @@ class PersistentArray {
   // Returns a snapshot for readers. O(1).
   PersistentArray snapshot() {
     owner_ = internal::kNoOwner;
-    check_invariants();
+    LOCUS_DCHECK_CALL(check_invariants());
     return PersistentArray(list_);
   }
 
-  // Returns one more than the highest index that was ever set; 0 if none was.
+  // Returns one more than the highest index that was ever set; 0 if no index was ever set.
   size_t size() const { return list_->size; }
-  // Returns the value at `index`, or T() if it was never set. Precondition: index < size().
+  // Returns the value at `index`, or T() if that value was never set. Precondition: index < size().
   const T& operator[](size_t index) const {
     LOCUS_DCHECK_LT(index, size());
     return list_->leaves[index / kLeafSize]->values[index % kLeafSize];
   }
-  // Sets the value at `index`. If index >= size(), extends the array to index + 1 values, of which those in between are
-  // T(). O(1 + new leaves), plus the copies after a snapshot that are described above.
+  // Sets the value at `index`. If index >= size(), extends the array to index + 1 values; the new values before `index`
+  // are T(). O(1 + new leaves), plus the copies of the first writes after a snapshot (see the top of this file).
   void set(size_t index, T value);
 
   // Returns the size in bytes of the leaves, and of the array of leaf pointers, that this array does not share with
@@ -89,20 +90,18 @@ class PersistentArray {
   explicit PersistentArray(std::shared_ptr<List> list) : list_(std::move(list)) {}
   // Checks the number of leaves and the owner of list_. O(1).
   void check_invariants() const {
-    if constexpr (kDebugChecks) {
-      LOCUS_CHECK_EQ(list_->leaves.size(), (list_->size + kLeafSize - 1) / kLeafSize);
-      LOCUS_CHECK(owner_ == internal::kNoOwner || list_->owner == owner_);
-    }
+    LOCUS_CHECK_EQ(list_->leaves.size(), (list_->size + kLeafSize - 1) / kLeafSize);
+    LOCUS_CHECK(owner_ == internal::kNoOwner || list_->owner == owner_);
   }
-  // Draws a new owner if this array has none, and copies list_ if it stores another owner.
+  // Sets owner_ to a new number if it is kNoOwner, and replaces list_ by a copy if list_ stores another owner.
   void make_list_writable();
-  // Returns whether both arrays have the same leaf at leaf index `leaf`.
+  // Returns whether this array and `other` share the leaf at index `leaf` of their leaf arrays.
   bool shares_leaf(const PersistentArray& other, size_t leaf) const {
     return leaf < other.list_->leaves.size() && list_->leaves[leaf] == other.list_->leaves[leaf];
   }
 
   std::shared_ptr<List> list_;
-  uint64_t owner_ = internal::kNoOwner;  // owner of the leaves that may be changed in place
+  uint64_t owner_ = internal::kNoOwner;  // owner of the leaves and the List that may be changed in place
 };
 
 template <class T, size_t kLeafSize>
@@ -131,7 +130,7 @@ void PersistentArray<T, kLeafSize>::set(size_t index, T value) {
   LOCUS_DCHECK_EQ(leaf.use_count(), 1);
   leaf->values[index % kLeafSize] = std::move(value);
   LOCUS_DCHECK_LT(index, size());
-  check_invariants();
+  LOCUS_DCHECK_CALL(check_invariants());
 }
 
 template <class T, size_t kLeafSize>

@@ -2,15 +2,16 @@
 // share their leaves, and a write copies only the leaf that it changes. Used by the only writer of a scene, whose
 // readers keep snapshots of earlier revisions.
 //
-// Threads: each table is like a standard container: const members may run concurrently, others need exclusive access.
-// Tables that share leaves are independent of each other.
+// Threads: each table is like a standard container: const members may run concurrently, other members need exclusive
+// access. Tables that share leaves are independent: a thread may write its own table while other threads read theirs.
 //
-// Invariants: a bucket is one cache line. An id lies in the first bucket, from its home bucket on, that had a free slot
-// when the id was inserted. Each full bucket that an insertion skipped counts that id in `overflow`: a search ends at
-// the first bucket with an overflow of 0, and erase() decrements the counts, so no tombstones are needed. On average,
-// at most three of the five slots of a bucket are used. A leaf that two tables share is immutable: each leaf stores the
-// owner that created it, as in PersistentArray. Source: Knuth, The Art of Computer Programming 3, 6.4 (linear probing,
-// buckets); Bronson and Shi, Open-sourcing F14, 2019 (overflow counts).
+// Invariants: a bucket is one cache line. The hash of an id selects its home bucket. An id is stored in the first
+// bucket, from its home bucket on, that had a free slot when the id was inserted. Each full bucket that an insertion
+// skipped counts the inserted id in `overflow`: a search ends at the first bucket with an overflow of 0, and erase()
+// decrements the counts, so no tombstones are needed. On average, at most three of the five slots of a bucket are used.
+// A leaf that two tables share is immutable: each leaf stores the owner that created it, as in PersistentArray. Source:
+// Knuth, The Art of Computer Programming 3, 6.4 (linear probing, buckets); Bronson and Shi, Open-sourcing F14, 2019
+// (overflow counts).
 #ifndef LOCUS_CORE_BASE_PERSISTENT_ID_TABLE_H_
 #define LOCUS_CORE_BASE_PERSISTENT_ID_TABLE_H_
 
@@ -31,7 +32,8 @@
 
 namespace locus {
 
-// Persistent table of ids. `Hash()(id)` must return 64 bits; the upper ones choose the home bucket.
+// Persistent table of ids. `Hash()(id)` must return 64 bits; the upper bits choose the home bucket (see the top of this
+// file).
 template <class Hash = SeededHash>
 class PersistentIdTable {
  public:
@@ -43,7 +45,7 @@ class PersistentIdTable {
   // Returns a snapshot for readers. O(1).
   PersistentIdTable snapshot() {
     owner_ = internal::kNoOwner;
-    check_invariants();
+    LOCUS_DCHECK_CALL(check_invariants());
     return {leaves_.snapshot(), bucket_count_, size_, hash_};
   }
 
@@ -51,7 +53,7 @@ class PersistentIdTable {
   // Returns the value of `id`, or kNone if `id` is absent or kNoId. O(1).
   uint32_t find(Id id) const { return bucket_count_ == 0 ? kNone : find_from(bucket(home(id)), id); }
   // Writes the value of ids[i], or kNone if that id is absent, to values[i]. Precondition: values.size() >= ids.size().
-  // Faster than single calls, since it prefetches the buckets.
+  // Faster than one call per id, since it prefetches the buckets.
   void find(absl::Span<const Id> ids, absl::Span<uint32_t> values) const;
   // Prefetches the bucket that find(id) reads first. Always inlined, since GCC otherwise drops calls of functions that
   // only prefetch.
@@ -60,13 +62,14 @@ class PersistentIdTable {
   }
 
   // Inserts or replaces the value of `id`; returns true if the id is new. Preconditions: `id` is not kNoId, `value` is
-  // not kNone. O(1), plus copies of at most a few leaves after a snapshot; O(size) when the table is full and grows.
+  // not kNone. O(1), plus a copy of each leaf that is changed for the first time after a snapshot; O(size) if the table
+  // is full and grows.
   bool set(Id id, uint32_t value);
-  // Removes `id`; returns false if it is absent. O(1), plus copies of leaves as in set(). The table keeps its memory
-  // until fit() shrinks it.
+  // Removes `id`; returns false if the id is absent. O(1), plus copies of leaves as in set(). The table keeps its
+  // memory until fit() shrinks it.
   bool erase(Id id);
-  // Resizes the table for `ids` ids: grows if they do not fit; shrinks if they would fill at most a quarter of the
-  // capacity. Precondition: ids >= size(). O(size) if it resizes, else O(1).
+  // Resizes the table for `ids` ids: grows it if `ids` exceeds its capacity; shrinks it if `ids` is at most a quarter
+  // of its capacity. Precondition: ids >= size(). O(size) if it resizes, else O(1).
   void fit(size_t ids);
 
   // Returns the size in bytes of the leaves that this table has replaced since the last call, and resets the count.
@@ -78,8 +81,8 @@ class PersistentIdTable {
   size_t unshared_bytes(const PersistentIdTable& other) const;
 
  private:
-  static constexpr size_t kSlots = 5;         // per bucket
-  static constexpr size_t kIdsPerBucket = 3;  // on average in a full table
+  static constexpr size_t kSlots = 5;         // slots in a bucket
+  static constexpr size_t kIdsPerBucket = 3;  // average number of ids in a bucket of a full table
   static constexpr size_t kBucketsPerLeaf = 64;
   static constexpr size_t kIdsPerLeaf = kBucketsPerLeaf * kIdsPerBucket;
   static constexpr size_t kLeavesPerPage = 64;
@@ -102,7 +105,7 @@ class PersistentIdTable {
   using LeafArray = PersistentArray<std::shared_ptr<Leaf>, kLeavesPerPage>;
   struct Position {
     size_t bucket;
-    int slot;  // -1 = absent
+    int slot;  // slot in the bucket, -1 if the id is absent
   };
 
   PersistentIdTable(LeafArray leaves, size_t bucket_count, size_t size, const Hash& hash)
@@ -143,7 +146,7 @@ class PersistentIdTable {
   Bucket& writable_bucket(size_t index);
   // Inserts an absent id. Precondition: size() < capacity().
   void put(Id id, uint32_t value);
-  // Replaces the table by one of `leaf_count` leaves with the same ids and values.
+  // Replaces the leaves by `leaf_count` new leaves with the same ids and values.
   void rebuild(size_t leaf_count);
   // Checks that the numbers of ids, buckets and leaves agree. O(1).
   void check_invariants() const;
@@ -222,14 +225,14 @@ bool PersistentIdTable<Hash>::set(Id id, uint32_t value) {
   LOCUS_DCHECK_NE(value, kNone);
   if (const Position found = search(id); found.slot >= 0) {
     writable_bucket(found.bucket).values[static_cast<size_t>(found.slot)] = value;
-    check_invariants();
+    LOCUS_DCHECK_CALL(check_invariants());
     return false;
   }
   if (size_ == capacity()) fit(size_ + 1);
   put(id, value);
   ++size_;
-  if constexpr (kDebugChecks) check_bucket(search(id).bucket);
-  check_invariants();
+  LOCUS_DCHECK_CALL(check_bucket(search(id).bucket));
+  LOCUS_DCHECK_CALL(check_invariants());
   return true;
 }
 
@@ -247,8 +250,8 @@ bool PersistentIdTable<Hash>::erase(Id id) {
   bucket.values[static_cast<size_t>(found.slot)] = kNone;
   LOCUS_DCHECK_GT(size_, 0u);
   --size_;
-  if constexpr (kDebugChecks) check_bucket(found.bucket);
-  check_invariants();
+  LOCUS_DCHECK_CALL(check_bucket(found.bucket));
+  LOCUS_DCHECK_CALL(check_invariants());
   return true;
 }
 
@@ -258,7 +261,7 @@ void PersistentIdTable<Hash>::fit(size_t ids) {
   if (ids > capacity()) rebuild(std::max(leaves_for(ids), leaf_count() + leaf_count() / 2));
   if (ids * 4 <= capacity() && leaves_for(2 * ids) < leaf_count()) rebuild(leaves_for(2 * ids));
   LOCUS_DCHECK_GE(capacity(), ids);
-  check_invariants();
+  LOCUS_DCHECK_CALL(check_invariants());
 }
 
 template <class Hash>
@@ -273,43 +276,37 @@ void PersistentIdTable<Hash>::rebuild(size_t leaf_count) {
       for (size_t slot = 0; slot < kSlots; ++slot)
         if (bucket.ids[slot] != kNoId) put(bucket.ids[slot], bucket.values[slot]);
   }
-  check_all_buckets();
+  LOCUS_DCHECK_CALL(check_all_buckets());
 }
 
 template <class Hash>
 void PersistentIdTable<Hash>::check_invariants() const {
-  if constexpr (kDebugChecks) {
-    LOCUS_CHECK_LE(size_, capacity());
-    LOCUS_CHECK_EQ(bucket_count_ % kBucketsPerLeaf, 0u);
-    LOCUS_CHECK_EQ(leaves_.size(), leaf_count());
-  }
+  LOCUS_CHECK_LE(size_, capacity());
+  LOCUS_CHECK_EQ(bucket_count_ % kBucketsPerLeaf, 0u);
+  LOCUS_CHECK_EQ(leaves_.size(), leaf_count());
 }
 
 template <class Hash>
 void PersistentIdTable<Hash>::check_bucket(size_t index) const {
-  if constexpr (kDebugChecks) {
-    const Bucket& checked = bucket(index);
-    for (size_t slot = 0; slot < kSlots; ++slot) {
-      const Id id = checked.ids[slot];
-      LOCUS_CHECK_EQ(id == kNoId, checked.values[slot] == kNone);
-      if (id == kNoId) continue;
-      const Position found = search(id);
-      LOCUS_CHECK_EQ(found.slot, static_cast<int>(slot));
-      LOCUS_CHECK_EQ(found.bucket, index);
-    }
+  const Bucket& checked = bucket(index);
+  for (size_t slot = 0; slot < kSlots; ++slot) {
+    const Id id = checked.ids[slot];
+    LOCUS_CHECK_EQ(id == kNoId, checked.values[slot] == kNone);
+    if (id == kNoId) continue;
+    const Position found = search(id);
+    LOCUS_CHECK_EQ(found.slot, static_cast<int>(slot));
+    LOCUS_CHECK_EQ(found.bucket, index);
   }
 }
 
 template <class Hash>
 void PersistentIdTable<Hash>::check_all_buckets() const {
-  if constexpr (kDebugChecks) {
-    size_t ids = 0;
-    for (size_t index = 0; index < bucket_count_; ++index) {
-      check_bucket(index);
-      for (const Id id : bucket(index).ids) ids += id != kNoId ? 1 : 0;
-    }
-    LOCUS_CHECK_EQ(ids, size_);
+  size_t ids = 0;
+  for (size_t index = 0; index < bucket_count_; ++index) {
+    LOCUS_DCHECK_CALL(check_bucket(index));
+    for (const Id id : bucket(index).ids) ids += id != kNoId ? 1 : 0;
   }
+  LOCUS_CHECK_EQ(ids, size_);
 }
 
 template <class Hash>

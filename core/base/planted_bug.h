@@ -1,6 +1,6 @@
 // Mutation testing: known bugs that a test switches on to prove that the test suite detects them. Only the library that
-// is built for those tests defines LOCUS_PLANT_BUGS; elsewhere planted() is a constant false and costs nothing. Set
-// `planted_bug` while no other thread runs.
+// is built for those tests defines LOCUS_PLANT_BUGS; in all other builds planted() is a constant false and costs
+// nothing. Set `planted_bug` only while no other thread runs, because it is not synchronised.
 #ifndef LOCUS_CORE_BASE_PLANTED_BUG_H_
 #define LOCUS_CORE_BASE_PLANTED_BUG_H_
 
@@ -8,46 +8,48 @@ namespace locus {
 
 enum class PlantedBug {
   kNone,
-  kDropCell,           // the grid skips one occupied cell in the range of a query
-  kStrictTie,          // < instead of <= where touching or equal distances decide
+  kDropCell,           // the grid skips the first row of cells in each brick that a query scans
+  kStrictTie,          // tests that include equality (touching, equal distances) compare with < instead of <=
   kStaleSnapshot,      // a published snapshot has the objects of the previous revision
   kGhostAfterMove,     // a move across a cell border leaves the object in its old cell
   kUnsignedCellIndex,  // cell indices are truncated towards zero, not rounded down
-  kRewindReach,        // a query between two ticks searches only the positions at the first tick
-  kRewindFastBox,      // the box of an object that moved far leaves out its later, shorter moves of the tick
+  kRewindReach,        // a query at a time between two ticks searches the grid without the displacement bound
+  kRewindFastBox,      // an object that moved far is recorded without its later, shorter moves of the same tick
   kUnpaddedNear,       // the slab test of tree nodes does not pad the near side
-  kEdgeOnInDouble,     // nearly edge-on triangles are decided in double, like all others
-  kGridBallMargin,     // the grid culls balls in float without the error bound
-  kNearestLimit,       // a nearest query prunes boxes exactly as far as its farthest result
+  kEdgeOnInDouble,     // nearly edge-on triangles are tested only in double, like all other triangles
+  kGridBallMargin,     // the float culling of ball queries in the grid omits the error bound
+  kNearestLimit,       // a nearest query also prunes boxes at exactly the distance of its farthest result
   kNearestTreePad,     // distances to boxes of triangles are compared in float without the pad
-  kWidePlacedBounds,   // bounds of placed triangles are grown by the rounding of float
-  kPlacedBoundsAlone,  // conservative ball and box queries test only placed bounds and lose exact hits outside these
+  kWidePlacedBounds,   // world bounds of an instance's triangles are grown by a rounding error of float, not double
+  kPlacedBoundsAlone,  // CONSERVATIVE ball and box queries lose exact hits outside a triangle's world bounds
   // The ray kernels:
-  kKernelEdgeBound,         // edge functions are decided in float without the error bound
-  kKernelTBound,            // t is decided in float without the error bound
-  kKernelTreePad,           // boxes of nodes are not padded
-  kKernelEdgeOn,            // nearly edge-on triangles are dropped instead of decided in double
-  kKernelFloatAxis,         // the axis of projection is chosen in float, including ties
-  kKernelWinding,           // rays in the negative direction of their axis see the reversed winding
-  kKernelCull,              // culling treats every triangle as front-facing
-  kKernelLimit,             // a hit exactly at the limit is lost
-  kKernelTie,               // among equal hits the highest triangle number wins
-  kKernelPruneEqual,        // boxes that begin exactly at the best hit are pruned
-  kKernelRowTie,            // a hit as far as the last kept row does not replace it if its number is lower
-  kKernelHitAfterGivingUp,  // the last hit of a packet is returned for a ray that the packet left undecided
+  kKernelEdgeBound,   // the signs of edge functions are computed in float without an error bound
+  kKernelTBound,      // t is compared with the limit in float without an error bound
+  kKernelTreePad,     // boxes of nodes are not padded
+  kKernelEdgeOn,      // triangles that may be edge-on according to float are dropped instead of tested in double
+  kKernelFloatAxis,   // the axis of projection is chosen in float, even if two components are equal in float
+  kKernelWinding,     // front and back are exchanged for rays with a negative direction along the projection axis
+  kKernelCull,        // culling treats every triangle as front-facing
+  kKernelLimit,       // a hit exactly at the limit is lost
+  kKernelTie,         // among equal hits the highest triangle number wins
+  kKernelPruneEqual,  // boxes that the ray enters exactly at its best hit are pruned
+  // In a query for all hits, a hit at the same t as the highest stored row, with a lower triangle number, does not
+  // replace that row.
+  kKernelRowTie,
+  kKernelHitAfterGivingUp,  // a ray whose verdict is kUndecided in a packet of rays returns a later hit
   // The region kernels:
   kRegionReach,       // boxes of nodes are tested against the ball without a pad
-  kRegionInside,      // points inside the ball are decided in float without the error bound
-  kRegionBeyond,      // separation by a plane is decided in float without the error bound
-  kRegionNear,        // distances to edges are decided in float without the error bound
-  kRegionPlane,       // distances to planes are decided in float without the error bound
-  kRegionWeight,      // a projected point inside the triangle is decided in float without the error bound
-  kRegionOwnBounds,   // the test of the triangle's own bounds is skipped
-  kRegionFloor,       // squares and products that underflow are trusted
+  kRegionInside,      // vertices are tested against the ball in float without an error bound
+  kRegionBeyond,      // planes between a triangle and the ball are tested in float without an error bound
+  kRegionNear,        // distances to edges are compared with the radius in float without an error bound
+  kRegionPlane,       // distances to planes are compared with the radius in float without an error bound
+  kRegionWeight,      // the test that the ball's centre projects into a triangle omits the error bound
+  kRegionOwnBounds,   // error bounds that depend on the size of a single triangle are zero
+  kRegionFloor,       // squares and products that may underflow are compared without the pad for underflow
   kRegionHalf,        // half extents are used without their error bound
-  kRegionBoxPlane,    // projections on normals are decided in float without their error bound
-  kRegionEdgeScale,   // products of edge components may underflow
-  kRegionRange,       // coordinates whose products underflow are decided in float
+  kRegionBoxPlane,    // projections on normals are compared in float without their error bound
+  kRegionEdgeScale,   // edges are not scaled up, so that products of their components may underflow
+  kRegionRange,       // boxes and blocks so small that products of coordinates underflow are tested in float
   kRegionTurnedNode,  // boxes of nodes are tested against a rotated box without a pad
 };
 

@@ -32,7 +32,7 @@ std::string formatted(double value) {
   return absl::StrCat(value);
 }
 
-// Returns the prefix of a message: "field[index]: ".
+// Returns the prefix of a message: "field[index]: ", "field: " without an index, "" without a field.
 std::string location(const Refusal& refusal) {
   if (refusal.field.empty()) return "";
   if (!refusal.index) return absl::StrCat(refusal.field, ": ");
@@ -90,6 +90,13 @@ absl::Status refuse_limit(absl::string_view field, absl::string_view limit, doub
 absl::Status refuse_full(absl::string_view field, absl::string_view limit, double limit_value, double asked,
                          uint32_t retry_after_ms) {
   return over_limit(absl::StatusCode::kResourceExhausted, field, limit, limit_value, asked, retry_after_ms);
+}
+
+absl::Status no_scene(absl::string_view name) {
+  Refusal refusal;
+  refusal.reason = Reason::kNotFound;
+  refusal.field = "scene";
+  return refuse(absl::StatusCode::kNotFound, absl::StrCat("no scene is called '", name, "'; create it first"), refusal);
 }
 
 std::optional<Refusal> refusal_of(const absl::Status& status) {

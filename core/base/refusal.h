@@ -1,6 +1,6 @@
 // Structured errors that a program can act on: reason, field, item, limit and requested value. A Refusal is a payload
-// of absl::Status: intermediate layers pass it on unread, and the server converts it to the protocol's Error in one
-// place. Pure functions; any thread.
+// of absl::Status: intermediate layers return the status without reading the payload, and the server converts the
+// payload to the protocol's Error in one place. Pure functions; any thread.
 #ifndef LOCUS_CORE_BASE_REFUSAL_H_
 #define LOCUS_CORE_BASE_REFUSAL_H_
 
@@ -13,7 +13,7 @@
 
 namespace locus {
 
-// Reason of a refusal. The numeric values equal those of the protocol's Reason.
+// Reason of a refusal. The numeric values equal the values of the protocol's enum Reason.
 enum class Reason : uint8_t {
   kUnspecified = 0,
   kNotFinite = 1,
@@ -43,31 +43,35 @@ absl::string_view reason_name(Reason reason);
 struct Refusal {
   Reason reason = Reason::kUnspecified;
   std::string field;  // path of the field, such as blocks[2].rays.directions; empty = the request as a whole
-  std::optional<uint32_t> index;  // index of the item in the field
-  std::string limit;              // name of the exceeded limit; empty = none
+  std::optional<uint32_t> index;  // index of the item in a repeated field; nullopt = the whole field
+  std::string limit;              // name of the exceeded limit; empty = the reason is not a limit
   double limit_value = 0;
   double asked = 0;             // requested value
-  uint32_t retry_after_ms = 0;  // 0 = do not retry unchanged
+  uint32_t retry_after_ms = 0;  // 0 = repeating the same request does not help
 };
 
-// Returns a status of `code` that carries `refusal`. `message` should state what to do next; it is prefixed by
-// `field[index]: `.
+// Returns a status with the code `code` and `refusal` as payload. `message` should state what the caller can do next;
+// in the status, `field[index]: ` precedes `message`.
 absl::Status refuse(absl::StatusCode code, absl::string_view message, const Refusal& refusal);
 
-// Returns INVALID_ARGUMENT for `field`, or for its item `index` if one is given.
+// Returns INVALID_ARGUMENT for `field` or, if `index` is given, for the item of `field` at that index.
 absl::Status refuse_argument(Reason reason, absl::string_view field, std::optional<uint32_t> index,
                              absl::string_view message);
 
-// Returns INVALID_ARGUMENT naming the limit, its value and the requested value. For a request that exceeds the limit on
-// its own, whatever the load: repeating it cannot succeed.
+// Returns INVALID_ARGUMENT naming the limit, its value and the requested value `asked`. For a request that exceeds the
+// limit by itself, at any load of the server, so that repeating the request cannot succeed.
 absl::Status refuse_limit(absl::string_view field, absl::string_view limit, double limit_value, double asked);
 
-// Returns RESOURCE_EXHAUSTED naming the limit, its value and the requested value. For a server or scene that is full at
-// present: the same request may succeed later. `retry_after_ms` is 0 if waiting alone does not help.
+// Returns RESOURCE_EXHAUSTED naming the limit, its value and the requested value `asked`. For a request that the server
+// or the scene has no room for at present; the same request may succeed later. `retry_after_ms` is 0 if waiting alone
+// does not help.
 absl::Status refuse_full(absl::string_view field, absl::string_view limit, double limit_value, double asked,
                          uint32_t retry_after_ms);
 
-// Returns the refusal that refuse() attached to `status`; nullopt if there is none.
+// Returns NOT_FOUND for a scene that does not exist, or that the caller may not know of: both with the same text.
+absl::Status no_scene(absl::string_view name);
+
+// Returns the refusal that refuse() attached to `status`; nullopt if `status` has no refusal.
 std::optional<Refusal> refusal_of(const absl::Status& status);
 
 }  // namespace locus

@@ -1,5 +1,6 @@
-// Reusable buffers: a writer keeps them between batches, so that small batches allocate nothing. A buffer that grew
-// above kKeptScratch bytes is freed, so that an idle scene does not retain the memory of its largest batch. Any thread.
+// Reusable buffers: the writer of a scene keeps its buffers between batches, so that small batches allocate nothing. A
+// buffer that grew above kKeptScratch bytes is freed, so that an idle scene does not retain the memory of its largest
+// batch. Any thread.
 #ifndef LOCUS_CORE_BASE_SCRATCH_H_
 #define LOCUS_CORE_BASE_SCRATCH_H_
 

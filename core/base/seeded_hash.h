@@ -1,8 +1,9 @@
-// Fast hash of ids that clients choose. It is seeded at random in every process, so that clients cannot choose ids that
-// collide in a table. It differs between processes, so no query result may depend on it. A value type; any thread.
+// Fast hash of ids that clients choose. The hash is seeded at random in every process, so that clients cannot choose
+// ids that collide in a table. The hash of an id differs between processes, so no query result may depend on it. A
+// value type; any thread.
 //
-// The upper bits are distributed as well as the lower ones. Source: products folded into 64 bits as in Yi, wyhash; the
-// secret multiplier as in Dietzfelbinger et al., A Reliable Randomized Algorithm for the Closest-Pair Problem, 1997.
+// The upper bits of the hash are distributed as well as its lower bits. Sources: Yi, wyhash (products folded into 64
+// bits); Dietzfelbinger et al., A Reliable Randomized Algorithm for the Closest-Pair Problem, 1997 (random multiplier).
 #ifndef LOCUS_CORE_BASE_SEEDED_HASH_H_
 #define LOCUS_CORE_BASE_SEEDED_HASH_H_
 
@@ -26,8 +27,8 @@ class SeededHash {
   uint64_t operator()(uint64_t key) const { return folded_product(folded_product(key ^ mask_, multiplier_), kMixer); }
 
  private:
-  // Returns the exclusive or of the two 64-bit halves of a * b. The lower half loses the upper bits of the keys; the
-  // upper half preserves them.
+  // Returns the exclusive or of the two 64-bit halves of the product a * b. The lower half alone would not suffice: its
+  // low bits do not depend on the high bits of `a`.
   static uint64_t folded_product(uint64_t a, uint64_t b) {
     const absl::uint128 product = absl::uint128(a) * b;
     return absl::Uint128Low64(product) ^ absl::Uint128High64(product);
@@ -35,8 +36,8 @@ class SeededHash {
   // Returns the random seed of this process.
   static const Seed& process_seed();
 
-  // Odd constant without a regular bit pattern (fractional part of the golden ratio). Separates keys that an unlucky
-  // random multiplier left close to each other.
+  // Odd constant without a regular bit pattern (fractional part of the golden ratio). The second product, by this
+  // constant, separates the hashes of keys for which the first product, by the random multiplier, gives similar values.
   static constexpr uint64_t kMixer = 0x9E3779B97F4A7C15;
 
   uint64_t mask_;

@@ -1,5 +1,5 @@
-// Macros that return an error to the caller: RETURN_IF_ERROR and ASSIGN_OR_RETURN. Include this file in .cc files only,
-// so that its unprefixed macro names never spread.
+// Macros that return an error to the caller: RETURN_IF_ERROR and ASSIGN_OR_RETURN. The names have no prefix and could
+// collide with macros of users, so headers that are installed must not include this file.
 #ifndef LOCUS_CORE_BASE_STATUS_MACROS_H_
 #define LOCUS_CORE_BASE_STATUS_MACROS_H_
 
@@ -8,15 +8,15 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
-// Evaluates an expression of type absl::Status and returns it from the calling function unless it is OK.
+// Evaluates an expression of type absl::Status and returns the status from the calling function unless it is OK.
 #define RETURN_IF_ERROR(...)                                                                \
   do {                                                                                      \
     if (absl::Status locus_status = (__VA_ARGS__); !locus_status.ok()) return locus_status; \
   } while (false)
 
 // Evaluates an expression of type absl::StatusOr<T>; returns its status from the calling function unless it is OK, and
-// otherwise moves the value into `declaration`, as in ASSIGN_OR_RETURN(const Level level, read_level(path)). It expands
-// to several statements, so the body of an `if` or a loop needs braces around it.
+// otherwise moves the value into `declaration`, as in ASSIGN_OR_RETURN(const Level level, read_level(path)). The macro
+// expands to several statements, so put braces around it if it is the body of an `if` or a loop.
 #define ASSIGN_OR_RETURN(declaration, ...) \
   LOCUS_ASSIGN_OR_RETURN_(LOCUS_JOIN_(locus_status_or_, __LINE__), declaration, __VA_ARGS__)
 

@@ -68,16 +68,16 @@ S magnitude(const Aabb<S>& box) {
   return std::max(max_component(abs(box.min)), max_component(abs(box.max)));
 }
 
-// Returns the squared distance from `point` to the box, 0 inside. Each step rounds monotonically, so a superset of the
-// box never has a larger squared distance.
+// Returns the squared distance from `point` to the box; 0 if the box contains `point`. Each step rounds monotonically,
+// so a superset of the box never has a larger squared distance.
 template <class S>
 constexpr S squared_distance(Vec3<S> point, const Aabb<S>& box) {
   const Vec3<S> gap = max(max(box.min - point, point - box.max), Vec3<S>{});
   return squared_length(gap);
 }
 
-// Returns an upper bound of the squared_distance() values whose rounded square root is at most `distance`. Boxes at a
-// larger squared distance can be pruned.
+// Returns an upper bound of all squared_distance() values whose rounded square root is at most `distance`. Boxes whose
+// squared distance exceeds the bound can be pruned.
 inline double squared_limit(double distance) {
   LOCUS_DCHECK_GE(distance, 0.0);
   if (planted(PlantedBug::kNearestLimit)) return distance * distance * (1 - 0x1p-50);
@@ -90,7 +90,7 @@ constexpr Vec3<S> nearest_in(Vec3<S> point, const Aabb<S>& box) {
   return min(max(point, box.min), box.max);
 }
 
-// Returns the box with all six faces moved outwards by `by`.
+// Returns the box with all six faces moved outwards by the length `by`.
 template <class S>
 Aabb<S> grown(const Aabb<S>& box, S by) {
   const Vec3<S> offset{by, by, by};

@@ -19,18 +19,19 @@ struct Ball {
 using Ballf = Ball<float>;
 using Balld = Ball<double>;
 
-// Returns whether the ball and the box share a point. All culling of ball queries uses this test. It is computed in
-// double for both scalar types and is monotone: if it accepts a box, it accepts every superset of it. A primitive
-// overlaps a ball only if this test accepts the primitive's own bounds, so culling by any superset of these bounds
-// never changes a result.
+// Returns whether the ball and the box share a point. Culling of ball queries never drops a box that this test accepts.
+// The test is computed in double for both scalar types and is monotone: if it accepts a box, it accepts every superset
+// of that box. A primitive overlaps a ball only if this test accepts the primitive's own bounds, so culling by any
+// superset of these bounds never changes a result.
 template <class S>
 constexpr bool reaches(const Ball<S>& ball, const Aabb<S>& box) {
   const double radius = ball.radius;
   return squared_distance(to_double(ball.center), to_double(box)) <= radius * radius;
 }
 
-// Returns the bounds of the ball, grown by 2^-40 (double) or 2^-20 (float) of the largest |coordinate| of the centre
-// plus the radius. They overlap every box that reaches() accepts, except at gaps below 2^-537, whose squares underflow.
+// Returns the bounds of the ball, grown by 2^-40 (double) or 2^-20 (float) times the sum of the radius and the largest
+// |coordinate| of the centre. The bounds overlap every box that reaches() accepts, except boxes whose gaps to the
+// centre are below 2^-537, so that the squares of the gaps underflow.
 template <class S>
 Aabb<S> bounds_of(const Ball<S>& ball) {
   LOCUS_DCHECK_GE(ball.radius, S{0});

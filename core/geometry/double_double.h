@@ -1,10 +1,10 @@
 // Extended precision: a number of about 106 bits, stored as the sum of two doubles. Results are equal on all processors
-// with IEEE doubles, unlike those of long double. Used for the few decisions for which double is not precise enough.
-// Plain value; any thread; no overflow below 2^990.
+// with IEEE doubles, unlike the results of long double. Used for the few geometric tests for which double is not
+// precise enough. Plain value; any thread; no overflow below 2^990.
 //
 // Sources: Dekker, A Floating-Point Technique for Extending the Available Precision, 1971 (product and split); Knuth,
-// The Art of Computer Programming, volume 2 (sum). Both require that each operation is rounded separately: no fused
-// multiply-add.
+// The Art of Computer Programming, volume 2 (sum). Both methods require that each operation is rounded separately: no
+// fused multiply-add.
 #ifndef LOCUS_CORE_GEOMETRY_DOUBLE_DOUBLE_H_
 #define LOCUS_CORE_GEOMETRY_DOUBLE_DOUBLE_H_
 

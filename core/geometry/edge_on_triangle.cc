@@ -29,13 +29,13 @@ DoubleDouble squared_length(const Quaternion& q) {
 }
 
 // Corner of a triangle relative to the ray's origin, sheared so that the ray is the depth axis.
-struct Corner {
+struct EdgeOnCorner {
   DoubleDouble x, y;
   double depth;
 };
 
-// Projection of corners along the ray. Lengths are multiplied by unit(), so that no quotient is needed; x and y of a
-// corner are also multiplied by the direction's largest component.
+// Projection of a triangle's corners along the ray. All lengths are multiplied by unit(), so that no division is
+// needed; x and y of a corner are also multiplied by the direction's largest component.
 class Projection {
  public:
   explicit Projection(const StoredRay& ray)
@@ -46,11 +46,11 @@ class Projection {
     z_ = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
     x_ = (z_ + 1) % 3;
     y_ = (z_ + 2) % 3;
-    // Preserves the winding, as in TriangleRay.
+    // Preserves the orientation of front faces, as TriangleRay does.
     if (direction_[z_].sign() < 0) std::swap(x_, y_);
   }
 
-  Corner corner(Vec3f vertex) const {
+  EdgeOnCorner corner(Vec3f vertex) const {
     const Vec3x from = exactly(vertex) * unit_ - origin_;
     return {from[x_] * direction_[z_] - from[z_] * direction_[x_],
             from[y_] * direction_[z_] - from[z_] * direction_[y_], from[z_].rounded()};
@@ -65,19 +65,20 @@ class Projection {
   int x_, y_, z_;
 };
 
-DoubleDouble edge_function(const Corner& from, const Corner& to) { return from.x * to.y - from.y * to.x; }
+DoubleDouble edge_function(const EdgeOnCorner& from, const EdgeOnCorner& to) { return from.x * to.y - from.y * to.x; }
 
 bool culled(Cull cull, int side) { return (cull == Cull::kBack && side <= 0) || (cull == Cull::kFront && side >= 0); }
 
 // Point of an edge; `fraction` is 0 at the edge's first corner and 1 at the second.
 struct EdgePoint {
-  double squared_distance;  // from the ray
+  double squared_distance;  // squared distance of the point from the ray
   double t;
   double fraction;
 };
 
-// Returns the point of the edge nearest to the ray among those with t >= 0; nullopt if there is none.
-std::optional<EdgePoint> nearest_edge_point(const Corner& from, const Corner& to, double along) {
+// Returns the point of the edge nearest to the ray among the points with t >= 0; nullopt if the edge has no such point.
+// `along` is Projection::along().
+std::optional<EdgePoint> nearest_edge_point(const EdgeOnCorner& from, const EdgeOnCorner& to, double along) {
   const double x = from.x.rounded(), y = from.y.rounded();
   const double edge_x = (to.x - from.x).rounded(), edge_y = (to.y - from.y).rounded();
   const double t = from.depth / along, edge_t = to.depth / along - t;
@@ -90,8 +91,10 @@ std::optional<EdgePoint> nearest_edge_point(const Corner& from, const Corner& to
   return EdgePoint{distance_x * distance_x + distance_y * distance_y, std::max(t + fraction * edge_t, 0.0), fraction};
 }
 
-// Returns the point of the triangle's border nearest to the ray; nullopt if its squared distance exceeds `limit`.
-std::optional<EdgeOnHit> hit_at_border(const Corner& a, const Corner& b, const Corner& c, double along, double limit) {
+// Returns the point of the triangle's border nearest to the ray among the points with t >= 0; nullopt if its squared
+// distance from the ray exceeds `limit`.
+std::optional<EdgeOnHit> hit_at_border(const EdgeOnCorner& a, const EdgeOnCorner& b, const EdgeOnCorner& c,
+                                       double along, double limit) {
   std::optional<EdgeOnHit> hit;
   const auto offer = [&](const std::optional<EdgePoint>& point, auto weights_at) {
     if (!point || !(point->squared_distance <= limit)) return;
@@ -111,7 +114,8 @@ std::optional<EdgeOnHit> edge_on_hit(const StoredRay& ray, const Triangle& trian
                                      EdgeOnVerdict double_verdict) {
   LOCUS_DCHECK_GE(double_verdict.corner_error, 0.0);
   const Projection projection(ray);
-  const Corner a = projection.corner(triangle.a), b = projection.corner(triangle.b), c = projection.corner(triangle.c);
+  const EdgeOnCorner a = projection.corner(triangle.a), b = projection.corner(triangle.b),
+                     c = projection.corner(triangle.c);
   const DoubleDouble weight_a = edge_function(c, b), weight_b = edge_function(a, c), weight_c = edge_function(b, a);
   const DoubleDouble determinant = weight_a + weight_b + weight_c;
   const int side = determinant.sign();

@@ -1,17 +1,27 @@
 // Intersection of a ray with a triangle that is nearly edge-on to it. Rounding errors of the transform to mesh axes and
 // of the edge functions move such a hit by the error divided by the sine of the angle between ray and plane. At a sine
-// of 2^-28 this exceeds the allowed error of a hit (TriangleRay::hit()). So the test is repeated in DoubleDouble, from
-// the stored, unrounded values. It needs no quotient before t, and no square root. Pure functions; any thread.
+// of 2^-28 this displacement exceeds the allowed error of a hit (TriangleRay::hit()). So the test is repeated in
+// DoubleDouble, from the stored, unrounded values. The computation in DoubleDouble uses neither division nor square
+// root. Pure functions; any thread.
 #ifndef LOCUS_CORE_GEOMETRY_EDGE_ON_TRIANGLE_H_
 #define LOCUS_CORE_GEOMETRY_EDGE_ON_TRIANGLE_H_
 
 #include <optional>
 
 #include "core/geometry/ray.h"
-#include "core/geometry/stored_ray.h"
+#include "core/geometry/rotation.h"
 #include "core/geometry/triangle.h"
 
 namespace locus {
+
+// Ray in world axes and transform of the mesh: the unrounded input from which a ray in mesh axes is computed. world =
+// translation + scale * (rotation * mesh), with the rotation of quaternion / |quaternion|.
+struct StoredRay {
+  Vec3d origin, direction;  // in world axes
+  Vec3d translation;
+  Quaternion quaternion;
+  float scale = 1;
+};
 
 // Hit and its barycentric weights.
 struct EdgeOnHit {
@@ -29,10 +39,10 @@ struct EdgeOnVerdict {
 // as 0.
 //
 // If the ray misses in extended precision but hits in double, returns the point of the triangle's border nearest to the
-// ray among those with t >= 0, provided that its distance from the ray is at most the corner error. So a hit in double
-// stays a hit, and no ray leaks between this triangle and a neighbour that is decided in double because it is not
-// edge-on. Only the visible side, which decides culling, is never taken from double; a triangle that is exactly edge-on
-// has no visible side, so Cull::kBack and Cull::kFront both ignore it.
+// ray among the points with t >= 0, provided that its distance from the ray is at most corner_error. So a hit in double
+// stays a hit, and no ray leaks between this triangle and a neighbour that is not nearly edge-on and is therefore
+// tested in double. The visible side of the triangle, on which culling depends, is always computed in extended
+// precision; a triangle that is exactly edge-on has no visible side, so Cull::kBack and Cull::kFront both ignore it.
 //
 // Precondition: the largest component of the direction of `ray` in mesh axes lies within [0.5, 1).
 std::optional<EdgeOnHit> edge_on_hit(const StoredRay& ray, const Triangle& triangle, Cull cull,

@@ -9,7 +9,7 @@
 
 namespace locus {
 
-// Returns std::nextafter(value, infinity), bit for bit; a NaN for a NaN.
+// Returns std::nextafter(value, infinity), bit for bit. Returns a NaN if `value` is a NaN.
 inline float next_above(float value) {
   if (!(value < std::numeric_limits<float>::infinity())) return value;
   if (value == 0) return std::numeric_limits<float>::denorm_min();

@@ -1,5 +1,6 @@
-// Oriented boxes: centre, half extents along the box's own axes, and the rotation from these axes. A box is closed;
-// zero extents are legal. With the identity rotation it is exactly axis-aligned. Plain data; any thread.
+// Oriented boxes and the overlap test of two of them. A box has a centre, half extents along its own axes, and the
+// rotation of these axes. A box is closed: touching counts, and zero extents are legal. With the identity rotation a
+// box is exactly axis-aligned. Plain data and pure functions; any thread.
 #ifndef LOCUS_CORE_GEOMETRY_OBB_H_
 #define LOCUS_CORE_GEOMETRY_OBB_H_
 
@@ -18,10 +19,18 @@ struct Obb {
 using Obbf = Obb<float>;
 using Obbd = Obb<double>;
 
-// Returns axis-aligned bounds in double. If the box is rotated, they are grown by 2^-40 of the magnitudes of centre and
-// extent.
+// Returns axis-aligned bounds in double. If the box is rotated, the bounds are grown by 2^-40 of the sum of the
+// magnitudes of its centre and its extent.
 template <class S>
 Aabbd bounds_of(const Obb<S>& box);
+
+// Returns whether the boxes share a point: separating axis test over 15 axes. Two axis-aligned boxes are compared
+// without tolerance, so that touching is exact if the sums are exact; otherwise boxes closer than 2^-49 of the
+// magnitudes of their offset and half extents count as touching. Both boxes are projected on the same rounded axis. So
+// the rounding error of an axis, which is large for nearly parallel edges, can only make that axis fail to separate the
+// boxes; it never separates boxes that overlap. Source: Gottschalk, Lin, Manocha, OBBTree: A Hierarchical Structure for
+// Rapid Interference Detection, 1996.
+bool boxes_overlap(const Obbd& a, const Obbd& b);
 
 }  // namespace locus
 

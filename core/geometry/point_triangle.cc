@@ -21,8 +21,8 @@ Candidate on_edge(Vec3d point, Vec3d from, Vec3d to) {
   return {squared_length(cross(offset, edge)) / length, from + edge * (along / length)};
 }
 
-// Returns the projection of `point` on the triangle's plane if it lies within the triangle, else a candidate at
-// infinite distance.
+// Returns the projection of `point` on the triangle's plane if the projection lies within the triangle, else a
+// candidate at infinite distance.
 Candidate on_face(Vec3d point, Vec3d a, Vec3d b, Vec3d c) {
   const Vec3d ab = b - a, ac = c - a;
   const Vec3d offset = point - a;
@@ -35,8 +35,8 @@ Candidate on_face(Vec3d point, Vec3d a, Vec3d b, Vec3d c) {
   const double sum = weight_a + weight_b + weight_c;
   if (!(weight_a >= 0 && weight_b >= 0 && weight_c >= 0 && sum > 0)) return {};
   const Vec3d inward = ab * (weight_b / sum) + ac * (weight_c / sum);
-  // The normal of a sliver is too imprecise for a height above its plane. So use the distance to the projected point:
-  // it is a point of the triangle, so the result is never too small.
+  // The normal of a sliver is too imprecise to compute the height of `point` above the plane. So use the distance to
+  // the projection, a point of the triangle: this distance is never too small.
   constexpr double kSliver = 0x1p-40;  // squared sine of the angle at vertex a
   if (nn < kSliver * squared_length(ab) * squared_length(ac)) return {squared_length(offset - inward), a + inward};
   const double height = dot(offset, normal);

@@ -1,16 +1,19 @@
-// Requirements on the values of a spatial index, as C++20 concepts. Values need no base class and no member functions:
-// specialise PrimitiveTraits for any type, and every structure under core/index can store it. For a missing member the
-// compiler prints one error that names the concept's line. Pure functions; any thread.
+// Requirements on the values of a spatial index, as C++20 concepts. A value type needs no base class and no member
+// functions: specialise PrimitiveTraits for the type, and every structure under core/index can store its values. For a
+// missing member the compiler prints one error that names the concept's line. Pure functions; any thread.
 //
 //   Scalar     float or double: the type of bounds and distances
-//   RayQuery   a preprocessed ray: slabs() for culling, to_scaled(t) from distances to the slabs' unit, rounded up
-//   BallQuery, BoxQuery   query types of ball() and box()
-//   id         unique within one index; the lower id wins a tie, and remove() searches by id
-//   bounds     axis-aligned bounds; every test below requires the query to meet them, so any superset can cull
-//   position   point that selects the grid cell: any point within the bounds, fixed for the value
-//   ray        distance >= 0 of the first hit, also beyond the ray's t_max
-//   ball, box  whether the closed solids share a point
-//   distance   from a point, in double, 0 inside; needed for nearest queries only
+//   RayQuery   type of a preprocessed ray: slabs() returns its SlabRay for culling; to_scaled(t) converts t from units
+//              of the ray's direction to the unit of slabs(), rounded up
+//   BallQuery, BoxQuery   types of the query argument of ball() and box()
+//   id         unique within one index; among hits at equal distance the lower id wins; an index finds the value that
+//              remove() removes by its id
+//   bounds     axis-aligned bounds; every test below also requires that the query meets these bounds, so culling by any
+//              superset of them loses no result
+//   position   point that selects the cell of a grid: any point within the bounds, always the same for one value
+//   ray        distance >= 0 of the first hit on the value, even if it exceeds the ray's t_max
+//   ball, box  whether the value shares a point with the closed ball or box
+//   distance   distance from a point to the value, in double; 0 inside the value; needed for nearest queries only
 //
 // Source: Hughes et al., Computer Graphics: Principles and Practice, 3rd ed., 2013, ch. 37 (PrimitiveKeyTrait and
 // related traits).
@@ -21,8 +24,8 @@
 #include <cstdint>
 #include <optional>
 
-#include "core/geometry/point_shape.h"
 #include "core/geometry/ray_triangle.h"
+#include "core/geometry/shape.h"
 #include "core/geometry/triangle_overlap.h"
 
 namespace locus {

@@ -1,15 +1,18 @@
-// Rays and their slab test against boxes. All structures cull rays by this test, so its rounding is such that no hit is
-// missed:
+// Rays and their slab test against boxes. No index structure culls a box that this test accepts. The test computes:
 //
 //   near = max over axes of  lo * rd - (o * rd + p)      far = min over axes of  hi * rd - (o * rd - p)
-//   p = pad * (max |o| + max |box|) * |rd|               (lo and hi swapped where d is negative)
+//   p = pad * (max |o| + max |box|) * |rd|
+//
+// Here o is the origin, d the direction, rd = 1 / d, and lo and hi are the sides of the box, each on one axis; lo and
+// hi are swapped if d is negative. max |o| and max |box| are the largest |coordinates| of the origin and of the box,
+// and pad is a constant, such as kTrianglePad.
 //
 // Every rounding step is monotone in the box, so a superset of a box never has a larger near or a smaller far. A hit
 // requires that the slab test accepts the primitive's own box, so culling by any superset of that box never loses a
 // hit. The pads cover the rounding errors of the slab test itself, of the conversion of a ray to float, and of the
-// transform to mesh axes. A direction component of zero is replaced by 1e-18 of the largest one; within the world the
-// resulting displacement is smaller than the pad. Source: Kay and Kajiya, Ray Tracing Complex Scenes, 1986 (slabs);
-// Ize, Robust BVH Ray Traversal, 2013 (padding).
+// transform to mesh axes. A direction component below 1e-18 of the largest component is replaced by 1e-18 of that
+// component; within the world the resulting displacement is smaller than the pad. Source: Kay and Kajiya, Ray Tracing
+// Complex Scenes, 1986 (slabs); Ize, Robust BVH Ray Traversal, 2013 (padding).
 #ifndef LOCUS_CORE_GEOMETRY_RAY_H_
 #define LOCUS_CORE_GEOMETRY_RAY_H_
 
@@ -22,13 +25,14 @@
 
 namespace locus {
 
-// Side of a triangle that rays ignore. The vertices of a front face are counter-clockwise, in the uploaded winding.
+// Side of a triangle that rays ignore. A ray meets the front of a triangle if the vertices appear counter-clockwise, in
+// uploaded order; queries of a scene with clockwise winding exchange kBack and kFront.
 enum class Cull : uint8_t { kNone, kBack, kFront };
-// Treatment of a ray that starts inside a closed solid: it hits at t = 0 (kSolid), at its exit (kHollow) or not at all
-// (kSkip).
+// Treatment of a ray that starts inside a closed solid: the ray hits at t = 0 (kSolid), where it leaves the solid
+// (kHollow) or not at all (kSkip).
 enum class Inside : uint8_t { kSolid, kHollow, kSkip };
 
-// Ray: the points origin + t * direction for 0 <= t <= t_max, both included. t is in units of the direction as given,
+// Ray: the points origin + t * direction for 0 <= t <= t_max, both included. t is in units of the given direction,
 // which need not have length 1 but must not be zero.
 template <class S>
 struct Ray {
@@ -40,7 +44,7 @@ struct Ray {
 using Rayf = Ray<float>;
 using Rayd = Ray<double>;
 
-// Range of t in which a line is within a box; it may lie outside [0, t_max]. Empty if near > far.
+// Range of t in which a line is within a box; the range may lie outside [0, t_max]. Empty if near > far.
 template <class S>
 struct Interval {
   S near;
@@ -74,14 +78,14 @@ class SlabRay {
   const Vec3<S>& origin() const { return origin_; }
   const Vec3<S>& direction() const { return direction_; }
 
-  // Returns the distance by which the slab test widens a box of magnitude `box_magnitude`.
+  // Returns the distance by which the slab test widens a box whose largest |coordinate| is `box_magnitude`.
   S margin(S box_magnitude) const { return pad_ * (magnitude_ + box_magnitude); }
 
   // Returns the interval of the ray in the padded box.
   Interval<S> interval(const Aabb<S>& box) const { return interval(box, locus::magnitude(box)); }
 
-  // Returns the interval for a `box_magnitude` of at least magnitude(box), such as one value for all boxes of a tree. A
-  // larger magnitude never makes the interval smaller.
+  // Returns the interval of the ray in the box, padded for `box_magnitude` >= magnitude(box). A tree passes one
+  // magnitude for all its boxes; a larger magnitude never makes the interval smaller.
   Interval<S> interval(const Aabb<S>& box, S box_magnitude) const {
     const S margin = this->margin(box_magnitude);
     Interval<S> result{-std::numeric_limits<S>::infinity(), std::numeric_limits<S>::infinity()};

@@ -5,7 +5,6 @@
 
 #include "core/base/check.h"
 #include "core/base/planted_bug.h"
-#include "core/geometry/edge_on_triangle.h"
 #include "core/geometry/float_step.h"
 
 namespace locus {
@@ -44,13 +43,15 @@ TriangleHit hit_of(double t, double u, double v) {
 
 }  // namespace
 
-// Projection of a triangle along the ray, in double. Error bounds, with u = 2^-53 and R = max |origin| + max |vertex|:
+// Projection of a triangle along the ray, in double. Error bounds, with u = 2^-53, R = max |origin| + max |vertex|, S =
+// `size` and N = a bound of the error of an edge function:
 //
 // - The transform to mesh axes, including the rounding of the matrix, has a relative error below 74 u in origin and
-//   direction. So the error of a sheared coordinate is below 300 u R, and that of an edge function, two products of
-//   coordinates up to S, below N = 2^-42 R (S + 2^-44 R).
+//   direction. So the error of a sheared coordinate is below 300 u R. An edge function consists of two products of
+//   coordinates up to S, so its error is below N = 2^-42 R (S + 2^-44 R).
 // - The depth of a hit is the average of the corners' depths, weighted by the edge functions. If |determinant| > 8 N,
-//   its error is below 3 N depth_span / |determinant|, and the error of the hit below sqrt(3) times that.
+//   the error of the depth is below 3 N depth_span / |determinant|, and the error of the hit below sqrt(3) times the
+//   error of the depth.
 struct TriangleRay::Projected {
   Corner a, b, c;
   double weight_a, weight_b, weight_c;  // the edge functions
@@ -99,7 +100,7 @@ TriangleRay::TriangleRay(const StoredRay& stored, Vec3d origin, Vec3d direction,
   axis_z_ = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
   axis_x_ = (axis_z_ + 1) % 3;
   axis_y_ = (axis_z_ + 2) % 3;
-  // Preserves the winding: projected along the ray, the rotation from x to y always has the same sense.
+  // Swaps x and y for a negative direction, so that a front face has the same orientation in every projection.
   if (direction_[axis_z_] < 0) std::swap(axis_x_, axis_y_);
 }
 
@@ -119,9 +120,9 @@ float TriangleRay::to_scaled(float t) const {
   return next_above(static_cast<float>(scaled));
 }
 
-// Returns a bound of the error of `depth` in edge_test(). It covers two sums of rounding errors: below 264 * 2^-53 *
-// distance^3 from the computation with the vertices, and below 72 * 2^-51 * |origin| * distance^2 from the transform of
-// the origin to mesh axes.
+// Returns a bound of the error of the variable `depth` in edge_test(). The bound covers two sums of rounding errors:
+// below 264 * 2^-53 * distance^3 from the computation with the vertices, and below 72 * 2^-51 * |origin| * distance^2
+// from the transform of the origin to mesh axes.
 double TriangleRay::depth_error(const Triangle& triangle) const {
   double distance = 0;
   for (const Vec3f vertex : {triangle.a, triangle.b, triangle.c})
@@ -164,7 +165,7 @@ bool TriangleRay::is_exactly_edge_on(const Triangle& triangle) const {
   return false;
 }
 
-// Returns the hit on a nearly edge-on triangle, decided in extended precision.
+// Returns the hit on a nearly edge-on triangle, computed in extended precision.
 std::optional<TriangleHit> TriangleRay::edge_on_test(const Triangle& triangle, const Projected& projected) const {
   if (is_exactly_edge_on(triangle) || projected.is_clearly_outside()) return std::nullopt;
   // A triangle without area is never hit, but rounding errors of the projection may give it a nonzero determinant.

@@ -1,18 +1,18 @@
 // Watertight intersection of a ray and a triangle: a ray from inside a closed mesh always hits. The triangle is
-// projected along the ray; each of the three edge functions, two products and one difference, is then exactly
-// antisymmetric in its two vertices, so a shared edge has no gap whatever the rounding. Boxes are culled in float, but
-// a hit is decided in double: in float the error of t would be the rounding error divided by the sine of the angle
-// between ray and plane (measured: for 0.7 % of random rays the result is wrong by more than hit() allows, or a hit is
-// lost). If a triangle is so nearly edge-on that double is not precise enough either, edge_on_triangle.h decides.
-// Source: Woop, Benthin, Wald, Watertight Ray/Triangle Intersection, 2013; here without its divisions, so that results
-// on small integers are exact.
+// projected along the ray. Each of the three edge functions (the difference of two products) then changes only its sign
+// if its two vertices are exchanged, so a shared edge has no gap, whatever the rounding. Boxes are culled in float, but
+// hits are computed in double: in float the error of t would be the rounding error divided by the sine of the angle
+// between ray and plane (measured in float: for 0.7 % of random rays the result is wrong by more than hit() allows, or
+// a hit is lost). If a triangle is so nearly edge-on that double is not precise enough either, edge_on_hit() of
+// edge_on_triangle.h computes the hit. Source: Woop, Benthin, Wald, Watertight Ray/Triangle Intersection, 2013; here
+// without its divisions, so that results on small integers are exact.
 #ifndef LOCUS_CORE_GEOMETRY_RAY_TRIANGLE_H_
 #define LOCUS_CORE_GEOMETRY_RAY_TRIANGLE_H_
 
 #include <optional>
 
+#include "core/geometry/edge_on_triangle.h"
 #include "core/geometry/ray.h"
-#include "core/geometry/stored_ray.h"
 #include "core/geometry/transform.h"
 #include "core/geometry/triangle.h"
 
@@ -29,11 +29,11 @@ struct TriangleHit {
 // of the scaled direction. Immutable; cheap to copy.
 class TriangleRay {
  public:
-  // Takes `origin` and `direction` in mesh axes. The slab test rounds each component to float once; the padding of the
-  // slab test covers this error.
+  // Makes a ray from `origin` and `direction` in mesh axes. For the slab test each component is rounded to float once;
+  // the padding of the slab test covers this error.
   TriangleRay(Vec3d origin, Vec3d direction, Cull cull = Cull::kNone);
-  // Takes `origin` and `direction` in world axes, for a mesh placed by `transform`. The ray is transformed to mesh
-  // axes, which rounds it; nearly edge-on triangles are tested with the unrounded ray.
+  // Makes a ray from `origin` and `direction` in world axes, for a mesh placed by `transform`. The transform to mesh
+  // axes rounds the ray; nearly edge-on triangles are tested with the unrounded ray.
   TriangleRay(const Transform& transform, Vec3d origin, Vec3d direction, Cull cull = Cull::kNone);
 
   const SlabRay<float>& slabs() const { return slabs_; }
@@ -46,10 +46,10 @@ class TriangleRay {
   float to_scaled(float t) const;
 
   // Returns the hit, a pure function of ray and triangle, or nullopt. A hit requires that the watertight test accepts
-  // with t >= 0 (t is 0 if the origin lies on the triangle within the rounding error of the test) and that the slab
-  // test of the triangle's own box accepts. t is clamped to the interval of that slab test, so a tree, which culls by
-  // boxes, reports the same hits as a list. Triangles that are exactly edge-on or have no area are never hit. The error
-  // of a hit is at most 2^-21 of the magnitudes of hit and origin.
+  // the triangle with t >= 0 (t is 0 if the origin lies on the triangle within the rounding error of the test) and that
+  // the slab test accepts the triangle's own box. t is clamped to the interval of that slab test, so a tree, which
+  // culls by boxes, reports the same hits as a list. Triangles that are exactly edge-on or have no area are never hit.
+  // The error of a hit is at most 2^-21 of the magnitudes of hit and origin.
   std::optional<TriangleHit> hit(const Triangle& triangle) const;
 
  private:
@@ -69,7 +69,7 @@ class TriangleRay {
   double origin_magnitude_;  // largest |component| of the origin
   SlabRay<float> slabs_;
   Cull cull_;
-  int axis_x_, axis_y_, axis_z_;  // z = axis of the direction's largest component
+  int axis_x_, axis_y_, axis_z_;  // axes of the projection; axis_z_: axis of the direction's largest component
 };
 
 }  // namespace locus

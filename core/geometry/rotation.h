@@ -18,12 +18,12 @@ struct Quaternion {
 
 // Returns | |q| - 1 |, in double.
 double unit_deviation(const Quaternion& q);
-// Returns q scaled to unit length in double and rounded once. If q has unit length within float precision, returns it
-// bit for bit, so that normalising again changes nothing. q must not be zero.
+// Returns q scaled to unit length in double and rounded once. If q has unit length within float precision, returns q
+// unchanged, so that normalising a result again changes nothing. q must not be zero.
 Quaternion normalized(const Quaternion& q);
 
 // Interpolates between two unit quaternions on the shorter arc, with `weight` from 0 (`from`) to 1 (`to`): normalised
-// linear interpolation in double, rounded once. Returns `from`, bit for bit, if both are equal.
+// linear interpolation in double, rounded once. Returns `from`, bit for bit, if `from` equals `to`.
 Quaternion blended(const Quaternion& from, const Quaternion& to, double weight);
 
 // Rotation matrix by rows; `to_world` is matrix * vector, `to_local` its transpose * vector.
@@ -36,7 +36,8 @@ struct Rotation {
             row_x.z * v.x + row_y.z * v.y + row_z.z * v.z};
   }
   constexpr Vec3d column(int axis) const { return {row_x[axis], row_y[axis], row_z[axis]}; }
-  // Return the half extents of the axis-aligned bounds of a rotated box: the matrix of absolute values times `half`.
+  // Return the half extents, in world or local axes, of the axis-aligned bounds of a box with half extents `half` in
+  // the other axes: the absolute values of the matrix, or of its transpose, times `half`.
   Vec3d extent_to_world(Vec3d half) const;
   Vec3d extent_to_local(Vec3d half) const;
   friend constexpr bool operator==(const Rotation&, const Rotation&) = default;

@@ -6,7 +6,8 @@
 namespace locus {
 namespace {
 
-// Returns, for each coordinate of `point`, its signed distance from the box; 0 if it is within the box.
+// Returns, for each axis, the signed distance of the coordinate of `point` from the interval [-half, half] of the box;
+// 0 if the coordinate is in this interval.
 Vec3d gap_to_box(Vec3d point, Vec3d half) {
   Vec3d gap;
   for (int axis = 0; axis < 3; ++axis)
@@ -14,8 +15,10 @@ Vec3d gap_to_box(Vec3d point, Vec3d half) {
   return gap;
 }
 
-// Returns, ascending, the values of s at which a coordinate of the segment enters or leaves the box, and those of both
-// ends of the segment. Unused entries are 1, the second end.
+// Returns the breakpoints of the segment in ascending order. A breakpoint is a value of s, which selects the point
+// center + s * half_axis, -1 <= s <= 1. The breakpoints are -1 and 1, the ends of the segment, and for each axis the
+// two values of s at which the segment crosses the planes of the box's faces, clamped to -1 .. 1. For an axis to which
+// the segment is perpendicular, these two values are 1.
 std::array<double, 8> breakpoints_of(Vec3d center, Vec3d half_axis, Vec3d half) {
   std::array<double, 8> breakpoints;
   breakpoints.fill(1);
@@ -30,12 +33,13 @@ std::array<double, 8> breakpoints_of(Vec3d center, Vec3d half_axis, Vec3d half) 
   return breakpoints;
 }
 
-// Returns the minimum of the squared distance between the breakpoints `from` and `to` if it lies between them, else
-// infinity. Between two breakpoints the squared distance is a parabola in s: that of a line from a corner, edge or face
-// of the box. It is computed by a cross product and one division: exact if the result is a small integer.
+// Returns the minimum of the squared distance from the box over the values of s between the adjacent breakpoints `from`
+// and `to`. In this range the squared distance is a parabola in s: the squared distance of a line from one corner, edge
+// or face of the box. Returns infinity if the vertex of the parabola lies outside the range. The minimum is computed by
+// a cross product and one division: exact if the result is a small integer.
 double min_between(double from, double to, Vec3d center, Vec3d half_axis, Vec3d half) {
   const Vec3d gap = gap_to_box(center + half_axis * (0.5 * (from + to)), half);
-  Vec3d base, along;  // line in the coordinates that are outside the box
+  Vec3d base, along;  // the segment's line, restricted to the coordinates that are outside the box
   for (int axis = 0; axis < 3; ++axis) {
     if (gap[axis] == 0) continue;
     base[axis] = center[axis] - std::copysign(half[axis], gap[axis]);

@@ -1,5 +1,5 @@
-// Distances to and from a segment: the points s * half_axis, -1 <= s <= 1, relative to its midpoint. With a zero half
-// axis it is a point. Pure functions; any thread.
+// Distances to and from a segment: the points s * half_axis, -1 <= s <= 1, relative to the segment's midpoint. With a
+// zero half axis the segment is a point. `point` is relative to the midpoint too. Pure functions; any thread.
 #ifndef LOCUS_CORE_GEOMETRY_SEGMENT_H_
 #define LOCUS_CORE_GEOMETRY_SEGMENT_H_
 
@@ -11,17 +11,17 @@ namespace locus {
 Vec3d nearest_on_segment(Vec3d point, Vec3d half_axis);
 
 // Returns the squared distance from `point` to the segment. If the nearest point is not an end of the segment, the
-// distance is computed by a cross product and one division: exact if the result is a small integer, otherwise with an
-// error of a few roundings of |point|.
+// distance is computed by a cross product and one division: exact if the result is a small integer, otherwise the error
+// of the distance is a few roundings of |point|.
 double squared_distance_to_segment(Vec3d point, Vec3d half_axis);
 
-// Returns whether the segment around `center` meets the closed box of half extents `half` around the origin: separating
-// axis test over six axes, without division.
+// Returns whether the segment with midpoint `center` meets the closed box of half extents `half` around the origin:
+// separating axis test over six axes, without division.
 bool segment_meets_box(Vec3d center, Vec3d half_axis, Vec3d half);
 
-// Returns the squared distance between the segment around `center` and the box around the origin, as in
-// segment_meets_box(); 0 if they meet. As a function of s, the squared distance is convex and consists of at most seven
-// parabolas; the minimum of each is computed in closed form.
+// Returns the squared distance between the segment and the box, which are given as in segment_meets_box(); 0 if they
+// meet. As a function of s, the squared distance is convex and consists of at most seven parabolas; the minimum of each
+// is computed in closed form.
 double squared_distance_segment_box(Vec3d center, Vec3d half_axis, Vec3d half);
 
 }  // namespace locus

@@ -2,11 +2,7 @@
 
 #include "core/base/check.h"
 #include "core/base/planted_bug.h"
-#include "core/geometry/obb_obb.h"
-#include "core/geometry/point_shape.h"
-#include "core/geometry/ray_ball.h"
-#include "core/geometry/ray_capsule.h"
-#include "core/geometry/ray_obb.h"
+#include "core/geometry/ray_convex.h"
 #include "core/geometry/segment.h"
 
 namespace locus {
@@ -25,7 +21,7 @@ Aabbd capsule_bounds(const Shape& shape) {
 struct LocalRay {
   Line line;
   int exponent;       // given direction = line direction * 2^exponent, rotated to world
-  Rotation rotation;  // to world
+  Rotation rotation;  // rotates the solid's own axes to world axes
 };
 
 LocalRay local_ray(const Rayd& ray, const Shape& shape) {
@@ -79,11 +75,53 @@ std::optional<ShapeHit> solid_hit(const ObjectRay& ray, const Shape& shape) {
   if (inside && ray.inside() == Inside::kSkip) return std::nullopt;
   if (inside && ray.inside() == Inside::kSolid) return ShapeHit{0, Vec3d{} - normalized(ray.ray().direction)};
   const std::optional<Chord> chord = chord_of(shape, local.line);
-  // A ray that starts inside, but within rounding of the surface, may have no chord: it exits at t = 0.
+  // If the ray starts inside and within rounding of the surface, chord_of() may find no chord; the ray then exits at t
+  // = 0.
   if (inside) return chord ? hit_at(local, chord->far, chord->far_normal) : hit_at(local, 0, local.line.origin);
   if (!chord || chord->far < 0) return std::nullopt;
   return hit_at(local, chord->near, chord->near_normal);
 }
+
+// Returns the radius by which a shape extends beyond its core. The core of a ball is its centre, the core of a capsule
+// its inner segment. A box or a point is its own core, with a radius of 0.
+double core_radius(const Shape& shape) {
+  LOCUS_DCHECK(shape.radius >= 0 || shape.kind == ShapeKind::kPoint || shape.kind == ShapeKind::kBox);
+  return shape.kind == ShapeKind::kBall || shape.kind == ShapeKind::kCapsule ? shape.radius : 0;
+}
+
+// Returns the squared distance from `point` to the core of the shape; 0 if the core is a box that contains `point`.
+double squared_distance_to_core(Vec3d point, const Shape& shape) {
+  const Vec3d offset = point - shape.position;
+  const Vec3d size = to_double(shape.size);
+  switch (shape.kind) {
+    case ShapeKind::kPoint:
+    case ShapeKind::kBall:
+      return squared_length(offset);
+    case ShapeKind::kBox:
+      return squared_distance(rotation_of(shape.rotation).to_local(offset), Aabbd{-size, size});
+    case ShapeKind::kCapsule:
+      return squared_distance_to_segment(rotation_of(shape.rotation).to_local(offset), size);
+  }
+  return std::numeric_limits<double>::infinity();
+}
+
+// Returns the point of the core nearest to `local`, in the shape's own axes.
+Vec3d nearest_in_core(Vec3d local, const Shape& shape) {
+  const Vec3d size = to_double(shape.size);
+  switch (shape.kind) {
+    case ShapeKind::kPoint:
+    case ShapeKind::kBall:
+      return {};
+    case ShapeKind::kBox:
+      return nearest_in(local, Aabbd{-size, size});
+    case ShapeKind::kCapsule:
+      return nearest_on_segment(local, size);
+  }
+  return {};
+}
+
+// Returns max(a, sqrt(b)). Avoids the square root if `a` exceeds sqrt(b) by more than rounding errors.
+double max_with_root(double a, double b) { return a > 0 && a * a > b * (1 + 0x1p-50) ? a : std::max(a, std::sqrt(b)); }
 
 }  // namespace
 
@@ -116,8 +154,8 @@ bool ball_overlaps(const Balld& ball, const Shape& shape) {
   const bool meets =
       planted(PlantedBug::kStrictTie) ? distance < radius_sum * radius_sum : distance <= radius_sum * radius_sum;
   if (!meets) return false;
-  // Fast path: a ball or point that is nearer than the radius sum by more than rounding errors needs no reaches() test,
-  // since its bounds are never farther than the shape itself.
+  // Fast path: a round shape that is nearer than the radius sum by more than rounding errors needs no reaches() test,
+  // since its bounds are never farther away than the shape itself.
   const bool is_round = shape.kind == ShapeKind::kBall || shape.kind == ShapeKind::kPoint;
   if (is_round && distance < radius_sum * radius_sum * (1 - 0x1p-38) && radius_sum > 0x1p-256) return true;
   return reaches(ball, bounds_of(shape));
@@ -140,6 +178,27 @@ bool box_overlaps(const Obbd& box, const Shape& shape) {
     }
   }
   return false;
+}
+
+double distance(Vec3d point, const Shape& shape) {
+  if (shape.kind == ShapeKind::kBall) {  // Fast path with the same result as the general code below.
+    const double core_distance = std::sqrt(squared_length(point - shape.position));
+    return max_with_root(core_distance - shape.radius,
+                         squared_distance(point, bounds_of(Balld{shape.position, shape.radius})));
+  }
+  const double core_distance = std::sqrt(squared_distance_to_core(point, shape));
+  if (shape.kind == ShapeKind::kPoint) return core_distance;  // the bounds of a point are the point itself
+  return max_with_root(core_distance - core_radius(shape), squared_distance(point, bounds_of(shape)));
+}
+
+Vec3d nearest_on_shape(Vec3d point, const Shape& shape) {
+  const double core_distance = std::sqrt(squared_distance_to_core(point, shape));
+  const double radius = core_radius(shape);
+  if (core_distance <= radius) return point;
+  const Rotation rotation = shape.kind == ShapeKind::kBall ? Rotation{} : rotation_of(shape.rotation);
+  const Vec3d local = rotation.to_local(point - shape.position);
+  const Vec3d from = nearest_in_core(local, shape);
+  return shape.position + rotation.to_world(from + (local - from) * (radius / core_distance));
 }
 
 }  // namespace locus

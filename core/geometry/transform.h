@@ -10,7 +10,7 @@ namespace locus {
 
 struct Transform {
   Vec3d translation;
-  Quaternion quaternion;  // unit
+  Quaternion quaternion;  // rotation, of length 1
   float scale = 1;        // > 0
   Rotation rotation;      // matrix of `quaternion`
 
@@ -19,12 +19,13 @@ struct Transform {
   Vec3d point_to_world(Vec3d mesh) const { return translation + rotation.to_world(mesh) * double{scale}; }
 };
 
-// Returns the transform, including the rotation matrix. Preconditions: `quaternion` has unit length up to
-// limits::kMaxQuaternionDeviation; scale > 0.
+// Returns the transform with these members and the matrix of `quaternion`. Preconditions: `quaternion` has unit length
+// up to limits::kMaxQuaternionDeviation; scale > 0.
 Transform make_transform(Vec3d translation, const Quaternion& quaternion, float scale);
 
-// Returns the world bounds of a box in mesh axes, grown by 2^-40 of the magnitudes to cover the rounding errors of this
-// function. So the result for a part of a mesh may exceed the result for the mesh only by these errors.
+// Returns the world bounds of a box in mesh axes, grown by about 2^-40 of the magnitudes of the translation and of the
+// scaled box, to cover the rounding errors of this function. So the result for a part of a mesh may exceed the result
+// for the whole mesh only by these errors.
 Aabbd bounds_to_world(const Transform& transform, const Aabbf& mesh_box);
 
 }  // namespace locus

@@ -1,6 +1,6 @@
-// Mesh triangle: three float vertices in mesh axes and its number, the position in the uploaded index list. It is
-// stored as three vertices, never as a vertex and two edges: neighbours must have bitwise equal vertices, or rays leak
-// between them. Plain data; any thread.
+// Mesh triangle: three float vertices in mesh axes, and the triangle's number, its position in the uploaded index list.
+// A triangle is stored as three vertices, never as a vertex and two edges: neighbours must have bitwise equal vertices,
+// or rays leak between them. Plain data; any thread.
 #ifndef LOCUS_CORE_GEOMETRY_TRIANGLE_H_
 #define LOCUS_CORE_GEOMETRY_TRIANGLE_H_
 
@@ -19,8 +19,8 @@ struct Triangle {
 
 constexpr Aabbf bounds_of(const Triangle& t) { return {min(min(t.a, t.b), t.c), max(max(t.a, t.b), t.c)}; }
 
-// Returns the counter-clockwise normal, not normalised, in double from the stored floats; zero for a triangle without
-// area.
+// Returns the normal on the side from which the vertices appear counter-clockwise, not normalised, computed in double;
+// zero for a triangle without area.
 constexpr Vec3d area_normal(const Triangle& t) {
   return cross(to_double(t.b) - to_double(t.a), to_double(t.c) - to_double(t.a));
 }

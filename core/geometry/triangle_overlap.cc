@@ -5,17 +5,19 @@
 namespace locus {
 namespace {
 
-struct Range {
+struct ProjectedRange {
   double low, high;
 };
 
-Range range_of(double a, double b, double c) { return {std::min(a, std::min(b, c)), std::max(a, std::max(b, c))}; }
+ProjectedRange range_of(double a, double b, double c) {
+  return {std::min(a, std::min(b, c)), std::max(a, std::max(b, c))};
+}
 
 // Returns whether the projections of triangle and box on `axis` are disjoint. The box has half extents `half` around
-// the origin. All three vertices are projected on the same rounded axis, so an axis with cancellation errors can only
-// fail to separate; it never separates a triangle from a box that it meets.
+// the origin. All three vertices are projected on the same rounded axis, so an axis with cancellation errors may miss a
+// separation but never separates a triangle and a box that meet.
 bool separated_along(Vec3d axis, const Vec3d (&vertices)[3], Vec3d half) {
-  const Range range = range_of(dot(vertices[0], axis), dot(vertices[1], axis), dot(vertices[2], axis));
+  const ProjectedRange range = range_of(dot(vertices[0], axis), dot(vertices[1], axis), dot(vertices[2], axis));
   const double extent = dot(abs(axis), half);
   return range.low > extent || range.high < -extent;
 }

@@ -13,7 +13,7 @@ namespace locus {
 // the triangle's own bounds.
 bool ball_overlaps(const Ballf& ball, const Triangle& triangle);
 
-// Returns whether the triangle's own bounds overlap those of `box` and no axis separates triangle and box: separating
+// Returns whether the triangle's own bounds overlap bounds_of(box) and no axis separates triangle and box: separating
 // axis test over 13 axes, in the box's own axes. Source: Akenine-Moller, Fast 3D Triangle-Box Overlap Testing, 2001.
 bool box_overlaps(const Obbf& box, const Triangle& triangle);
 

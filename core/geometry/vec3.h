@@ -1,5 +1,5 @@
 // Vectors of three components: points and directions. Meshes store Vec3f, scenes store Vec3d. Plain values and pure
-// functions; any thread. No function rounds more than once per component and operation.
+// functions; any thread. Each sum, difference, product and quotient of components is rounded separately.
 #ifndef LOCUS_CORE_GEOMETRY_VEC3_H_
 #define LOCUS_CORE_GEOMETRY_VEC3_H_
 
@@ -23,6 +23,9 @@ struct Vec3 {
 
 using Vec3f = Vec3<float>;
 using Vec3d = Vec3<double>;
+
+// Returns the vector of the three numbers at `p`.
+constexpr Vec3d read_vec3d(const float* p) { return {p[0], p[1], p[2]}; }
 
 template <class S>
 constexpr S dot(Vec3<S> a, Vec3<S> b) {

@@ -1,6 +1,6 @@
-// Collectors: visitors that test the candidates of a structure and store the results: the nearest hit, any hit, the
-// nearest k hits of a ray, or the values whose bounds meet a ray or a region. They are separate from traversal, so that
-// every structure serves every kind of query. One object per query and thread; each borrows the query.
+// Collectors: visitors that test the candidates of a structure and store the results: the nearest hit of a ray, any
+// hit, the nearest few hits, or the values whose bounds meet a ray or a region. Collectors are separate from traversal,
+// so that every structure serves every kind of query. One object per query and thread; each object borrows its query.
 #ifndef LOCUS_CORE_INDEX_COLLECTORS_H_
 #define LOCUS_CORE_INDEX_COLLECTORS_H_
 
@@ -15,7 +15,8 @@
 
 namespace locus {
 
-// Collector of the nearest hit at a distance strictly less than a limit; at equal distance the lower id wins.
+// Collector of the nearest hit at a distance strictly less than `distance`; among hits at equal distance the lower id
+// wins.
 template <Primitive V>
 class NearestVisitor {
   using Traits = PrimitiveTraits<V>;
@@ -35,9 +36,9 @@ class NearestVisitor {
     return true;
   }
 
-  // Returns the nearest value that was hit, or nullopt if there was no hit before the limit.
+  // Returns the nearest value that was hit, or nullopt if there was no hit within the constructor's `distance`.
   const std::optional<V>& best() const { return best_; }
-  // Returns the distance of best(), or the limit given to the constructor if there was no hit.
+  // Returns the distance of best(), or the constructor's `distance` if there was no hit.
   S distance() const { return distance_; }
 
  private:
@@ -51,7 +52,7 @@ class NearestVisitor {
   std::optional<V> best_;
 };
 
-// Collector that checks for any hit at a distance strictly less than a limit. Ends the visit at the first hit.
+// Collector that checks for any hit at a distance strictly less than `distance`. Ends the visit at the first hit found.
 template <Primitive V>
 class AnyHitVisitor {
   using Traits = PrimitiveTraits<V>;
@@ -92,8 +93,8 @@ bool comes_before(const RayHit<V>& a, const RayHit<V>& b) {
   return PrimitiveTraits<V>::id(a.value) < PrimitiveTraits<V>::id(b.value);
 }
 
-// Collector of the nearest `max_hits` hits at distances strictly less than a limit, appended to `result`. Until
-// finish() the appended part is a heap whose top is its farthest hit, which a nearer hit replaces.
+// Collector of the nearest `max_hits` hits at distances strictly less than `distance`, appended to `result`. Until
+// finish() the appended part is a heap whose top is its farthest hit; a nearer hit replaces the top.
 template <Primitive V>
 class NearestFewVisitor {
   using Traits = PrimitiveTraits<V>;
@@ -146,7 +147,8 @@ class NearestFewVisitor {
   std::vector<RayHit<V>>& result_;
 };
 
-// Collector of the values whose bounds the ray meets at or before a limit, by the slab test alone. Appends to `result`.
+// Collector of the values whose bounds the ray meets at a distance of at most `distance`, by the slab test alone.
+// Appends these values to `result`.
 template <Primitive V>
 class BoundsOnRayVisitor {
   using Traits = PrimitiveTraits<V>;
@@ -169,9 +171,9 @@ class BoundsOnRayVisitor {
   std::vector<V>& result_;
 };
 
-// Collector of the values whose bounds overlap a region and for which test(value) returns true. Appends to `result`.
-// Because exact queries also require that the bounds overlap the region, their results are a subset of the conservative
-// ones, and both are the same for every structure.
+// Collector of the values whose bounds overlap `region` and for which test(value) returns true. Appends these values to
+// `result`. An exact query passes the exact predicate as `test`; a conservative query passes a test that is always
+// true. So exact results are a subset of conservative results, and both are the same for every structure.
 template <Bounded V, class Region, class Test>
 class RegionCollector {
   using Traits = PrimitiveTraits<V>;

@@ -4,8 +4,9 @@
 // results.
 //
 // A ray ends at the `distance` given here; its own t_max is ignored. Distances are in units of the ray's direction. If
-// `work` is not null, the cost is added to it. Cost: that of the structure's visit. Threads: as for the index.
-// Source: Hughes et al., Computer Graphics: Principles and Practice, 3rd ed., 2013, ch. 37 (the query interface).
+// `work` is not null, the query adds its cost to `*work`. Cost of a query: the cost of the structure's visit. Threads:
+// as for the index. Source: Hughes et al., Computer Graphics: Principles and Practice, 3rd ed., 2013, ch. 37 (the query
+// interface).
 #ifndef LOCUS_CORE_INDEX_INDEX_QUERIES_H_
 #define LOCUS_CORE_INDEX_INDEX_QUERIES_H_
 
@@ -24,7 +25,7 @@ template <class Index>
 using BoxQueryOf = typename PrimitiveTraits<typename Index::Value>::BoxQuery;
 
 namespace internal {
-// Reference to the counter of a query's cost: the caller's counter or, if the caller passed null, an internal one.
+// Reference to the counter of a query's cost: the caller's counter `work` or, if `work` is null, an internal counter.
 class CostCounter {
  public:
   explicit CostCounter(Work* work) : work_(work != nullptr ? *work : own_) {}
@@ -46,10 +47,10 @@ inline constexpr auto kBoundsDecide = [](const auto&) { return true; };
 }  // namespace internal
 
 // Finds the first hit among several indices of one value type. If there is a hit at a distance strictly less than
-// `distance`, sets `value` and `distance` to those of the nearest hit and returns true; otherwise leaves both unchanged
-// and returns false. Each index is queried with the distance found in the earlier indices as its limit. At equal
-// distance the lower id wins, also across indices. (Two calls of first_ray() joined by || would skip the second index,
-// which may hold the nearer hit.)
+// `distance`, sets `value` and `distance` to the value and distance of the nearest hit and returns true; otherwise
+// leaves `value` and `distance` unchanged and returns false. The limit for each index is the nearest distance found in
+// the indices before it. Among hits at equal distance the lower id wins, also across indices. (If the first of two
+// first_ray() calls joined by || finds a hit, the second index is skipped, although it may hold a nearer hit.)
 template <class V, SpatialIndex... Indices>
 bool first_ray_of(const typename PrimitiveTraits<V>::RayQuery& ray, V& value, ScalarOf<V>& distance, Work* work,
                   const Indices&... indices) {

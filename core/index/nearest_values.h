@@ -1,5 +1,5 @@
-// Query for the values nearest to a point, written once for every structure. It is exact: it compares the distances
-// that PrimitiveTraits computes in double. All structures give the same results.
+// Query for the values nearest to a point, written once for every structure. The query is exact: it compares the
+// distances that PrimitiveTraits computes in double. All structures give the same results.
 #ifndef LOCUS_CORE_INDEX_NEAREST_VALUES_H_
 #define LOCUS_CORE_INDEX_NEAREST_VALUES_H_
 
@@ -25,8 +25,8 @@ struct ValueAt {
   }
 };
 
-// Collector of nearest_values(). Until finish() the appended values are a heap whose top is the farthest one, which a
-// nearer value replaces. One object per query and thread.
+// Collector of nearest_values(). Until finish() the appended values are a heap whose top is the farthest value; a
+// nearer value replaces the top. One object per query and thread.
 template <Measurable V>
 class NearestValuesVisitor {
  public:
@@ -77,8 +77,8 @@ class NearestValuesVisitor {
 };
 
 // Appends the `max_values` values nearest to `point` at distances <= max_distance, sorted by distance, then by id. If
-// `work` is not null, the cost is added to it. Cost: that of the structure's visit_nearest(), and O(log max_values) for
-// each value that enters the heap.
+// `work` is not null, the query adds its cost to `*work`. Cost: the cost of the structure's visit_nearest(), plus O(log
+// max_values) for each value that enters the heap of results.
 template <SpatialIndex Index>
 void nearest_values(const Index& index, const Vec3d& point, double max_distance, size_t max_values,
                     std::vector<ValueAt<typename Index::Value>>& result, Work* work = nullptr) {

@@ -1,5 +1,6 @@
-// Regions: the culling part of ball and box queries, for the scalar type of an index. A region has axis-aligned bounds
-// and a test of overlap with boxes; decisions about values are left to visitors. Immutable; cheap to copy; any thread.
+// Regions: the culling tests of ball and box queries, in the scalar type S of an index. A region has axis-aligned
+// bounds and a test of overlap with boxes; the visitors apply the exact tests to values. Immutable; cheap to copy; any
+// thread.
 #ifndef LOCUS_CORE_INDEX_REGIONS_H_
 #define LOCUS_CORE_INDEX_REGIONS_H_
 
@@ -30,7 +31,7 @@ Aabb<S> rounded_outward(const Aabbd& box) {
 }
 }  // namespace internal
 
-// Region of a ball: overlaps the boxes for which reaches() holds.
+// Region of a ball: overlaps() returns true for the boxes that reaches() accepts.
 template <std::floating_point S>
 class BallRegion {
  public:
@@ -47,7 +48,8 @@ class BallRegion {
   Aabb<S> bounds_;
 };
 
-// Region of a box, which may be rotated: overlaps the boxes that overlap its axis-aligned bounds. Exact comparisons.
+// Region of a box, which may be rotated: overlaps() returns true for the boxes that overlap the axis-aligned bounds of
+// the box, compared exactly.
 template <std::floating_point S>
 class BoxRegion {
  public:

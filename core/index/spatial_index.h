@@ -1,6 +1,6 @@
-// Interface of every spatial structure, as concepts. A structure only culls: it passes candidates to a visitor, which
-// decides by the exact predicates of the values. Results therefore do not depend on the structure, and the list, which
-// culls no value, is the test oracle of the others.
+// Interface of every spatial structure, as concepts. A structure only culls: it passes candidates to a visitor, and the
+// visitor applies the exact predicates of the values. Results therefore do not depend on the structure, and ListIndex,
+// which culls no value, is the test oracle of the other structures.
 //
 // Threads: const members of one index may run concurrently; insert and remove need exclusive use.
 #ifndef LOCUS_CORE_INDEX_SPATIAL_INDEX_H_
@@ -14,19 +14,20 @@
 
 namespace locus {
 
-// Visitor of the candidates of a ray. limit() returns the largest near value of interest, in units of the slab test,
-// and may fall during the visit. Boxes whose near value exceeds it may be skipped; boxes whose near value equals it may
-// not, since they may hold a value with a lower id. visit() returns false to end the visit. The reference passed to
-// visit() is valid only during the call, unless the structure documents a longer lifetime.
+// Visitor of the candidates of a ray. The near value of a box is the start of the ray's interval in the padded box
+// (Interval::near). limit() returns the largest near value of interest, in units of the slab test, and may decrease
+// during the visit. A structure may skip a box whose near value exceeds limit(), but not a box whose near value equals
+// limit(), since that box may hold a value with a lower id. visit() returns false to end the visit. The reference
+// passed to visit() is valid only during the call, unless the structure documents a longer lifetime.
 template <class Visitor, class Value>
 concept RayVisitor = requires(Visitor& visitor, const Value& value) {
   { std::as_const(visitor).limit() } -> std::same_as<ScalarOf<Value>>;
   { visitor.visit(value) } -> std::same_as<bool>;
 };
 
-// Visitor of the candidates of a region. overlaps(box) returns false only if no value within the box can be a result;
-// it is monotone: if it returns true for a box, it does so for every superset. bounds() returns a box that overlaps the
-// bounds of every result. visit() returns false to end the visit.
+// Visitor of the candidates of a region. overlaps(box) returns false only if no value within the box can be a result.
+// overlaps() is monotone: if it returns true for a box, it returns true for every superset of that box. bounds()
+// returns a box that overlaps the bounds of every result. visit() returns false to end the visit.
 template <class Visitor, class Value>
 concept RegionVisitor = requires(Visitor& visitor, const Value& value, const Aabb<ScalarOf<Value>>& box) {
   { std::as_const(visitor).bounds() } -> std::same_as<Aabb<ScalarOf<Value>>>;
@@ -34,9 +35,9 @@ concept RegionVisitor = requires(Visitor& visitor, const Value& value, const Aab
   { visitor.visit(value) } -> std::same_as<bool>;
 };
 
-// Visitor of the candidates around a point. limit() returns the largest squared distance of interest and may fall
-// during the visit. Values whose bounds have a larger squared_distance() from the point may be skipped; values at a
-// squared distance equal to limit() may not. visit() returns false to end the visit.
+// Visitor of the candidates around a point. limit() returns the largest squared distance of interest and may decrease
+// during the visit. A structure may skip a value whose bounds have a larger squared_distance() from the point, but not
+// a value whose bounds are at a squared distance equal to limit(). visit() returns false to end the visit.
 template <class Visitor, class Value>
 concept PointVisitor = requires(Visitor& visitor, const Value& value) {
   { std::as_const(visitor).limit() } -> std::same_as<double>;
@@ -45,7 +46,7 @@ concept PointVisitor = requires(Visitor& visitor, const Value& value) {
 
 namespace internal {
 template <class Value>
-struct AnyVisitor {  // placeholder for every visitor in the concept below
+struct AnyVisitor {  // visitor type with which the concept SpatialIndex is checked
   ScalarOf<Value> limit() const { return 0; }
   Aabb<ScalarOf<Value>> bounds() const { return {}; }
   bool overlaps(const Aabb<ScalarOf<Value>>&) const { return false; }
@@ -59,10 +60,10 @@ struct AnyPointVisitor {
 }  // namespace internal
 
 // Structure that can be queried. visit_ray() passes to the visitor, exactly once each, all values whose bounds have an
-// interval on the ray with near <= far, far >= 0 and near <= limit(), roughly from near to far. It may pass further
-// values, at most once each. visit_region() does the same for all values with overlaps(bounds of the value), and
-// visit_nearest() for all values with squared_distance(point, bounds of the value) <= limit(), roughly from near to
-// far.
+// interval on the ray with near <= far, far >= 0 and near <= limit(), roughly from near to far. A structure may pass
+// further values, each at most once. visit_region() passes in this way all values whose bounds overlaps() accepts, and
+// visit_nearest() all values whose bounds have a squared_distance() of at most limit() from the point, roughly from
+// near to far.
 template <class Index>
 concept SpatialIndex = Bounded<typename Index::Value> &&
     requires(const Index& index, const SlabRay<ScalarOf<typename Index::Value>>& slabs,

@@ -1,5 +1,5 @@
-// Work counters: the cost of a query in units that do not depend on the machine. Plain data, one per query or batch. A
-// repeated query on the same structure gives the same counts.
+// Work counters: the cost of a query in units that do not depend on the machine. Plain data, one object per query or
+// batch. A repeated query on the same structure results in the same counts.
 #ifndef LOCUS_CORE_INDEX_WORK_H_
 #define LOCUS_CORE_INDEX_WORK_H_
 
@@ -9,7 +9,7 @@ namespace locus {
 
 struct Work {
   uint64_t nodes = 0;  // tree nodes opened
-  uint64_t cells = 0;  // grid bricks and cells visited
+  uint64_t cells = 0;  // grid bricks looked up and rows of their values scanned
   uint64_t tests = 0;  // values passed to a visitor
 
   Work& operator+=(const Work& other) {

@@ -8,7 +8,8 @@
 namespace locus {
 namespace {
 
-// Continuation bit of a variable-length integer: seven bits per byte, the lowest first.
+// Bit of a byte that is set if another byte of the same variable-length integer follows. A byte stores seven bits of
+// the integer, the lowest bits first.
 constexpr uint64_t kMore = 0x80;
 
 }  // namespace

@@ -1,6 +1,7 @@
-// Lossless compressed list of vertex indices. Each index is stored as its difference from one more than the largest
-// index so far. Most differences take one or two bytes if triangles that are close in the list use vertices that are
-// close in the vertex array. Immutable after creation; any thread. A Reader belongs to one thread.
+// Lossless compressed list of vertex indices. Each index is stored as its difference from the next unused index, which
+// is one more than the largest index before it in the list. Most differences take one or two bytes if triangles that
+// are close in the list use vertices that are close in the vertex array. Immutable after creation; any thread. A Reader
+// belongs to one thread.
 #ifndef LOCUS_CORE_MESH_PACKED_INDICES_H_
 #define LOCUS_CORE_MESH_PACKED_INDICES_H_
 

@@ -1,4 +1,5 @@
-// Array of unsigned integers, each in as many bytes as the largest one needs. Any thread may read it once it is filled.
+// Array of unsigned integers; each element occupies the number of bytes that the largest allowed value needs. Reads may
+// run on any threads, but not concurrently with set().
 #ifndef LOCUS_CORE_MESH_PACKED_NUMBERS_H_
 #define LOCUS_CORE_MESH_PACKED_NUMBERS_H_
 
@@ -14,11 +15,11 @@ namespace locus {
 class PackedNumbers {
  public:
   PackedNumbers() = default;
-  // Creates `count` elements of value 0; each can be set to 0 to `largest`.
+  // Creates `count` elements of value 0, each of which can hold the values 0 to `largest`.
   PackedNumbers(size_t count, uint32_t largest)
       : width_((static_cast<size_t>(std::bit_width(largest)) + 7) / 8), bytes_(count * width_) {}
 
-  // Sets an element. Precondition: `value` fits the bytes of `largest`.
+  // Sets an element. Precondition: `value` fits in the number of bytes that the constructor's `largest` needs.
   void set(size_t index, uint32_t value) {
     LOCUS_DCHECK_LE((index + 1) * width_, bytes_.size());
     LOCUS_DCHECK_LE(static_cast<size_t>(std::bit_width(value)), 8 * width_);
@@ -33,7 +34,7 @@ class PackedNumbers {
   size_t bytes() const { return bytes_.capacity(); }
 
  private:
-  size_t width_ = 0;  // bytes per element
+  size_t width_ = 0;  // number of bytes per element
   std::vector<uint8_t> bytes_;
 };
 

@@ -80,18 +80,16 @@ absl::StatusOr<TriangleMesh> TriangleMesh::create(std::vector<float> vertices, s
     mesh.bounds_ = merge(mesh.bounds_, bounds_of(triangle));
     if (area_normal(triangle) == Vec3d{}) ++mesh.zero_area_count_;
   }
-  mesh.check_invariants();
+  LOCUS_DCHECK_CALL(mesh.check_invariants());
   return mesh;
 }
 
 void TriangleMesh::check_invariants() const {
-  if constexpr (kDebugChecks) {
-    LOCUS_CHECK_EQ(vertices_.size() % 3, 0u);
-    LOCUS_CHECK_EQ(indices_.size() % 3, 0u);
-    LOCUS_CHECK_LT(0u, triangle_count());
-    LOCUS_CHECK_LE(zero_area_count_, triangle_count());
-    LOCUS_CHECK(!bounds_.empty());
-  }
+  LOCUS_CHECK_EQ(vertices_.size() % 3, 0u);
+  LOCUS_CHECK_EQ(indices_.size() % 3, 0u);
+  LOCUS_CHECK_LT(0u, triangle_count());
+  LOCUS_CHECK_LE(zero_area_count_, triangle_count());
+  LOCUS_CHECK(!bounds_.empty());
 }
 
 Triangle TriangleMesh::triangle(uint32_t index) const {

@@ -12,7 +12,7 @@
 
 namespace locus {
 
-// Named range of triangles, up to the first triangle of the next part.
+// Named range of triangles: from `first_triangle` to the first triangle of the next part, or to the end of the mesh.
 struct MeshPart {
   std::string name;
   uint32_t first_triangle = 0;
@@ -26,9 +26,9 @@ absl::Status check_parts(const std::vector<MeshPart>& parts, size_t triangles);
 
 class TriangleMesh {
  public:
-  // Creates a mesh from the coordinates of V vertices and the vertex indices of T triangles, three numbers each. The
-  // first part, if any, must begin at triangle 0. Returns INVALID_ARGUMENT naming `vertices` and the vertex, `indices`
-  // and the triangle, `parts` and the part, or the exceeded limit. O(V + T).
+  // Creates a mesh from the coordinates of V vertices and the vertex indices of T triangles, three numbers each.
+  // `parts` may be empty; otherwise the first part must begin at triangle 0. Returns INVALID_ARGUMENT naming `vertices`
+  // and the vertex, `indices` and the triangle, `parts` and the part, or the exceeded limit. O(V + T).
   static absl::StatusOr<TriangleMesh> create(std::vector<float> vertices, std::vector<uint32_t> indices,
                                              std::vector<MeshPart> parts);
 
@@ -40,7 +40,7 @@ class TriangleMesh {
   const std::vector<float>& vertices() const { return vertices_; }
   const std::vector<uint32_t>& indices() const { return indices_; }
   const std::vector<MeshPart>& parts() const { return parts_; }
-  // Returns a triangle; `index` < triangle_count().
+  // Returns the triangle with the number `index`. Precondition: `index` < triangle_count().
   Triangle triangle(uint32_t index) const;
   uint64_t bytes() const { return vertices_.size() * sizeof(float) + indices_.size() * sizeof(uint32_t); }
 

@@ -5,14 +5,15 @@
 namespace locus {
 namespace {
 
-// Upper bounds in bytes of the encoded field tags and lengths: for all columns of one block, and for the fields of the
-// reply outside its blocks.
+// Upper bounds in bytes of the encoded field tags and lengths: kBlockOverhead for all columns of one block,
+// kReplyOverhead for all fields of the reply outside its blocks.
 constexpr uint64_t kBlockOverhead = 256;
 constexpr uint64_t kReplyOverhead = 256;
-// Upper bounds of encoded bytes per query: its row count, its index in the list of truncated queries, and its time.
+// Upper bounds of encoded sizes for each query, in bytes: its row count, its index in the list of truncated queries,
+// and its effective time.
 constexpr uint64_t kCountBytes = 4;
 constexpr uint64_t kTruncatedBytes = 4;
-constexpr uint64_t kTimeBytes = 16;  // resolved tick, resolved fraction, and an entry of `clamped`
+constexpr uint64_t kTimeBytes = 16;  // tick, fraction, and the index of the query in the list of clamped queries
 
 struct ServedColumns {
   ColumnSet operator()(const RayColumns& rays) const {
@@ -88,6 +89,18 @@ uint64_t fixed_reply_bytes(const QueryBatch& batch) {
     bytes += kBlockOverhead + query_count(block) * (query_bytes + kTruncatedBytes + time_bytes);
   }
   return bytes;
+}
+
+uint64_t max_encoded_reply_bytes(const QueryBatch& batch) {
+  uint64_t bytes = fixed_reply_bytes(batch);
+  for (const QueryBlock& block : batch.blocks) {
+    if (row_layout(block) != RowLayout::kCounted) continue;
+    const uint64_t rows = block.max_results == 0 ? limits::kDefaultMaxResults : block.max_results;
+    const auto* const nearest = std::get_if<NearestColumns>(&block.kind);
+    bytes += query_count(block) * (nearest == nullptr ? rows : std::max(1u, nearest->count)) *
+             row_bytes(returned_columns(block));
+  }
+  return std::min(bytes, reply_limit(batch));
 }
 
 absl::Status check_reply_size(const QueryBatch& batch) {

@@ -1,9 +1,9 @@
 // Table of the result columns of a block: their names, element types and widths. Also defines which columns each kind
 // of query can return, and computes their size in a reply.
 //
-// To add a column: give it a number in Column (query_batch.h), an array in ColumnArrays and a row in kColumnNames and
-// kColumnArrays here, fill it in run/rows.cc, and map it to its protocol field in server/convert/result_columns.cc. All
-// code that allocates, copies or measures columns loops over the table.
+// To add a column: add a value to Column (query_batch.h), an array to ColumnArrays, a name to kColumnNames and a row to
+// kColumnArrays; write the values in run/rows.cc; and map the column to its protocol field in
+// server/convert/result_columns.cc. All code that allocates, copies or measures columns loops over kColumnArrays.
 #ifndef LOCUS_CORE_QUERY_COLUMNS_H_
 #define LOCUS_CORE_QUERY_COLUMNS_H_
 
@@ -16,8 +16,8 @@
 
 namespace locus {
 
-// Arrays of the result columns. Array<T> is a std::vector<T> where rows are collected, and a T* where rows are written
-// directly into the reply.
+// Arrays of the result columns. Array<T> is a std::vector<T> in CollectedRows, which owns rows, and a T* in RowSpans,
+// which points to rows in a reply or in CollectedRows.
 template <template <class> class Array>
 struct ColumnArrays {
   Array<float> t{};
@@ -33,7 +33,8 @@ struct ColumnArrays {
   Array<float> rotations{};
 };
 
-// One row of the table: `column` stores `width` values for each result row in the array that get() selects.
+// Entry of kColumnArrays: the result column `column` stores `width` values for each result row in the array that get()
+// returns.
 template <class Get>
 struct ColumnArray {
   Column column;
@@ -43,7 +44,8 @@ struct ColumnArray {
 template <class Get>
 ColumnArray(Column, uint32_t, Get) -> ColumnArray<Get>;
 
-// Rows of the table, one per array. Not formatted: clang-format 14 splits the lambdas and puts comments between them.
+// Table of the result columns, with one entry for each array of ColumnArrays. The table is exempt from formatting,
+// because clang-format 14 would split the lambdas.
 // clang-format off
 inline constexpr auto kColumnArrays = std::make_tuple(
     ColumnArray{Column::kT, 1, [](auto& arrays) -> auto& { return arrays.t; }},
@@ -64,7 +66,7 @@ inline constexpr std::array<absl::string_view, 11> kColumnNames = {
     "UNSPECIFIED", "T", "ID", "TRIANGLE", "UV", "NORMAL", "POINT", "GROUP", "TAG", "LAYERS", "POSE"};
 static_assert(kColumnNames.size() == static_cast<size_t>(kLastColumn) + 1);
 
-// Calls visit(ColumnArray) for each row of the table, in order.
+// Calls visit() with each entry of kColumnArrays, in the order of the table.
 template <class Visit>
 constexpr void for_each_column_array(const Visit& visit) {
   std::apply([&visit](const auto&... array) { (visit(array), ...); }, kColumnArrays);
@@ -96,21 +98,26 @@ static_assert(
     }(),
     "a column has no array");
 
-// Returns the columns that a block of this kind may request.
+// Returns the columns that `block` may request, which depend on the kind of the block.
 ColumnSet served_columns(const QueryBlock& block);
-// Returns the columns that the block returns: the requested ones, or the default ones of its kind if it requests none.
+// Returns the columns that the block returns: the requested columns, or the default columns of its kind if the block
+// requests no columns.
 ColumnSet returned_columns(const QueryBlock& block);
 
-// Layout of a block's result. Dense: one row per query, including misses. Bytes: one byte per query and no rows.
-// Counted: any number of rows per query, and a column with the number of rows of each query.
+// Layout of a block's result. kDense has one row per query, also for a miss. kBytes has one byte per query and no rows.
+// kCounted has any number of rows per query, and a column with the number of rows of each query.
 enum class RowLayout : uint8_t { kDense, kBytes, kCounted };
 RowLayout row_layout(const QueryBlock& block);
 
-// Returns an upper bound of the encoded size in bytes of a reply without its counted rows: dense rows, counts, resolved
-// times, lists of truncated queries and field headers.
+// Returns an upper bound of the encoded size of a reply in bytes, without the rows of kCounted blocks: dense rows, row
+// counts, effective times, lists of truncated queries, and field headers.
 uint64_t fixed_reply_bytes(const QueryBatch& batch);
 // Returns the batch's max_reply_bytes, or limits::kDefaultReplyBytes if it is 0.
 uint64_t reply_limit(const QueryBatch& batch);
+
+// Returns an upper bound of the encoded size of the reply in bytes, rows of kCounted blocks included; at most
+// reply_limit().
+uint64_t max_encoded_reply_bytes(const QueryBatch& batch);
 
 // Returns INVALID_ARGUMENT with reason LIMIT if fixed_reply_bytes() alone exceeds reply_limit().
 absl::Status check_reply_size(const QueryBatch& batch);

@@ -17,7 +17,7 @@ namespace {
 // Validation of one block. Every error names the invalid field, such as blocks[2].rays.directions.
 class BlockCheck {
  public:
-  BlockCheck(const QueryBlock& block, size_t index) : block_(block), field_(absl::StrCat("blocks[", index, "]")) {}
+  BlockCheck(const QueryBlock& block, size_t index) : block_(block), index_(index) {}
 
   absl::Status run() {
     n_ = query_count(block_);
@@ -27,7 +27,7 @@ class BlockCheck {
   }
 
  private:
-  std::string name(absl::string_view field) const { return absl::StrCat(field_, ".", field); }
+  std::string name(absl::string_view field) const { return ColumnName{"blocks", index_, field}.text(); }
 
   absl::Status check_common() const {
     if (!is_finite(block_.frame))
@@ -39,15 +39,15 @@ class BlockCheck {
                           static_cast<double>(block_.ignore_ids.size()));
     if (block_.max_results > limits::kMaxMaxResults)
       return refuse_limit(name("max_results"), "max_results", limits::kMaxMaxResults, block_.max_results);
-    RETURN_IF_ERROR(check_column(block_.masks.size(), 1, n_, ColumnNeed::kOptional, name("masks")));
-    RETURN_IF_ERROR(check_column(block_.ignore_groups.size(), 1, n_, ColumnNeed::kOptional, name("ignore_groups")));
+    RETURN_IF_ERROR(check_length(block_.masks.size(), 1, ColumnNeed::kOptional, "masks"));
+    RETURN_IF_ERROR(check_length(block_.ignore_groups.size(), 1, ColumnNeed::kOptional, "ignore_groups"));
     return check_as_of();
   }
 
   absl::Status check_as_of() const {
     const absl::Span<const float> fractions = block_.as_of_fractions;
-    RETURN_IF_ERROR(check_column(block_.as_of_ticks.size(), 1, n_, ColumnNeed::kOptional, name("as_of_ticks")));
-    RETURN_IF_ERROR(check_column(fractions.size(), 1, n_, ColumnNeed::kOptional, name("as_of_fractions")));
+    RETURN_IF_ERROR(check_length(block_.as_of_ticks.size(), 1, ColumnNeed::kOptional, "as_of_ticks"));
+    RETURN_IF_ERROR(check_length(fractions.size(), 1, ColumnNeed::kOptional, "as_of_fractions"));
     if (!fractions.empty() && block_.as_of_ticks.empty())
       return refuse_argument(Reason::kMalformed, name("as_of_fractions"), {},
                              "need as_of_ticks: give both columns, or neither");
@@ -69,11 +69,12 @@ class BlockCheck {
   }
 
   absl::Status check_length(size_t values, size_t width, ColumnNeed need, absl::string_view field) const {
-    return check_column(values, width, n_, need, name(field));
+    return check_column(values, width, n_, need, {"blocks", index_, field});
   }
 
-  // Returns whether all points, given relative to the frame, lie within the world. Has no branches per value, since
-  // nearly all batches are valid; check_points() searches for the invalid point only if this returns false.
+  // Returns whether all points, given relative to the frame, lie within the world: |coordinate| <= kMaxCoordinate. Has
+  // no branches per value, since nearly all batches are valid; check_points() searches for the invalid point only if
+  // this function returns false.
   bool all_within_world(absl::Span<const float> values) const {
     bool all = values.size() % 3 == 0;
     for (size_t i = 0; i + 2 < values.size(); i += 3)
@@ -196,7 +197,7 @@ class BlockCheck {
   }
 
   const QueryBlock& block_;
-  std::string field_;
+  const size_t index_;
   size_t n_ = 0;  // number of queries
 };
 

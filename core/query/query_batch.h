@@ -1,9 +1,10 @@
-// Batch of queries as borrowed columns: a list of blocks, each of one kind. For the service, which fills it from a
-// request without copying, and for run/, which answers it. Plain data; any number of threads may read it.
+// Batch of queries as borrowed columns: a list of blocks, each of one kind. The service points the columns at the data
+// of a request without copying, and run/ answers the batch. Plain data; any number of threads may read it.
 //
-// The caller keeps the columns alive while the batch is in use. A column has N entries, or one entry for all queries,
-// or no entries. Brackets such as [+inf] show the default of a column without entries, or of a field that is 0. N is
-// the number of queries of the block, which is the length of the first column of its kind.
+// The caller keeps the columns alive while the batch is in use. Let N be the number of queries of a block, which is the
+// number of entries of the first column of its kind. An entry of a column has 1, 3 or 4 values. Unless stated
+// otherwise, a column has N entries, one entry for all queries, or no entries. The default applies to a column without
+// entries.
 #ifndef LOCUS_CORE_QUERY_QUERY_BATCH_H_
 #define LOCUS_CORE_QUERY_QUERY_BATCH_H_
 
@@ -27,7 +28,7 @@ enum class OutsideHistory : uint8_t { kReject, kClamp };
 enum class RayMode : uint8_t { kFirst, kAny, kAll };
 enum class StaticDetail : uint8_t { kInstances, kTriangles, kTrianglesSorted };
 
-// Result columns that a block may request. Values equal those of the protocol's Column.
+// Result columns that a block may request. The values equal those of the protocol's enum Column.
 enum class Column : uint8_t {
   kT = 1,
   kId = 2,
@@ -58,35 +59,36 @@ class ColumnSet {
 };
 
 struct RayColumns {
-  absl::Span<const float> origins;     // 3N, relative to the frame
-  absl::Span<const float> directions;  // 3N or 3, not zero
-  absl::Span<const float> t_max;       // [+inf], >= 0
+  absl::Span<const float> origins;     // N entries x y z, relative to the frame
+  absl::Span<const float> directions;  // N entries x y z, or one for all rays; no entry is the zero vector
+  absl::Span<const float> t_max;       // maximum t of a hit, >= 0; default: +inf
   RayMode mode = RayMode::kFirst;
   Cull cull = Cull::kNone;
   Inside inside = Inside::kSolid;
 };
 
 struct BallColumns {
-  absl::Span<const float> centers;  // 3N
-  absl::Span<const float> radii;    // N or 1, >= 0
+  absl::Span<const float> centers;  // N entries x y z, relative to the frame
+  absl::Span<const float> radii;    // N entries, or one for all balls; >= 0
   StaticDetail detail = StaticDetail::kInstances;
 };
 
 struct BoxColumns {
-  absl::Span<const float> centers;       // 3N
-  absl::Span<const float> half_extents;  // 3N or 3, >= 0
-  absl::Span<const float> rotations;     // [identity], 4N or 4: x y z w
+  absl::Span<const float> centers;       // N entries x y z, relative to the frame
+  absl::Span<const float> half_extents;  // N entries x y z, or one for all boxes; >= 0
+  absl::Span<const float> rotations;     // quaternions x y z w; default: no rotation
   StaticDetail detail = StaticDetail::kInstances;
 };
 
 struct NearestColumns {
-  absl::Span<const float> points;         // 3N
-  absl::Span<const float> max_distances;  // [+inf], >= 0
-  uint32_t count = 0;                     // maximum number of rows per query [1]
+  absl::Span<const float> points;         // N entries x y z, relative to the frame
+  absl::Span<const float> max_distances;  // maximum distance of a row, >= 0; default: +inf
+  uint32_t count = 0;                     // maximum number of rows per query; 0 means 1
   StaticDetail detail = StaticDetail::kInstances;
 };
 
-// Lookup by ids (one row per id) or by groups (a count per group, and that many rows); exactly one of them is given.
+// Lookup by id or by group. Each id has one result row. Each group has a row count, and one result row for each of its
+// members. Exactly one of the two columns has entries.
 struct LookupColumns {
   absl::Span<const uint64_t> ids;
   absl::Span<const uint64_t> groups;
@@ -96,20 +98,20 @@ struct QueryBlock {
   Vec3d frame;
   Source source = Source::kBoth;
   Precision precision = Precision::kExact;
-  ColumnSet columns;                         // [default columns of the kind]
-  absl::Span<const uint32_t> masks;          // [all layers]
-  absl::Span<const uint64_t> ignore_groups;  // [0 = none]
-  absl::Span<const uint64_t> ignore_ids;     // for the whole block
-  uint32_t max_results = 0;                  // [limits::kDefaultMaxResults]
-  Id after_id = kNoId;                       // balls, boxes and groups: return only ids above this
-  absl::Span<const uint64_t> as_of_ticks;    // [now]
-  absl::Span<const float> as_of_fractions;   // [0], 0 <= f < 1; only with as_of_ticks
+  ColumnSet columns;                         // requested result columns; if empty, the default columns of the kind
+  absl::Span<const uint32_t> masks;          // layer mask of each query; default: all layers
+  absl::Span<const uint64_t> ignore_groups;  // group that each query ignores; default: 0, no group
+  absl::Span<const uint64_t> ignore_ids;     // at most limits::kMaxIgnoredIds ids that every query of the block ignores
+  uint32_t max_results = 0;                  // maximum number of rows per query; 0: limits::kDefaultMaxResults
+  Id after_id = kNoId;                       // lower bound, exclusive, of the ids returned for balls, boxes and groups
+  absl::Span<const uint64_t> as_of_ticks;    // tick of each query; default: the snapshot's latest state
+  absl::Span<const float> as_of_fractions;   // fraction of the way to the next tick, >= 0 and < 1; default: 0
   OutsideHistory outside = OutsideHistory::kReject;
   std::variant<RayColumns, BallColumns, BoxColumns, LookupColumns, NearestColumns> kind;
 };
 
-// Returns the kind of the block. The values of BlockKind equal the indices of the variant's alternatives, as asserted
-// below.
+// Returns the kind of the block. The value of a BlockKind is the index of its alternative in QueryBlock::kind, as
+// asserted below.
 constexpr BlockKind block_kind(const QueryBlock& block) { return static_cast<BlockKind>(block.kind.index()); }
 template <BlockKind kKind>
 using ColumnsOf = std::variant_alternative_t<static_cast<size_t>(kKind), decltype(QueryBlock::kind)>;
@@ -122,15 +124,15 @@ static_assert(std::variant_size_v<decltype(QueryBlock::kind)> == kBlockKinds);
 
 struct QueryBatch {
   std::vector<QueryBlock> blocks;
-  uint64_t max_work = 0;         // nodes, cells and primitive tests of the whole batch [no limit]
-  uint32_t max_reply_bytes = 0;  // [limits::kDefaultReplyBytes]
+  uint64_t max_work = 0;         // maximum number of nodes, cells and primitive tests of the batch; 0: no limit
+  uint32_t max_reply_bytes = 0;  // maximum encoded size of the reply in bytes; 0: limits::kDefaultReplyBytes
 };
 
 // Returns the number of queries of a block.
 size_t query_count(const QueryBlock& block);
 
-// Checks untrusted columns completely: lengths, limits and every value. Returns INVALID_ARGUMENT (or RESOURCE_EXHAUSTED
-// for a limit) that names the field, such as blocks[2].rays.directions, and the index of the query.
+// Checks untrusted columns completely: lengths, limits and every value. Returns INVALID_ARGUMENT for the first invalid
+// value or exceeded limit. The error names the field, such as blocks[2].rays.directions, and the index of the query.
 absl::Status check_batch(const QueryBatch& batch);
 
 }  // namespace locus

@@ -27,13 +27,13 @@ std::string hex(const Sha256& sha256) {
   return absl::BytesToHexString(absl::string_view(reinterpret_cast<const char*>(sha256.data()), sha256.size()));
 }
 
-// Returns `status` with `what` in front of its message; OK stays OK.
+// Returns `status` with `what` added at the beginning of its message; returns OK if `status` is OK.
 absl::Status named(absl::string_view what, const absl::Status& status) {
   return status.ok() ? status : absl::Status(status.code(), absl::StrCat(what, ": ", status.message()));
 }
 
-// Lookup of meshes during replay. Returns a placeholder for a missing mesh, which may have been deleted after a later
-// record removed its instances. check() reports a placeholder that is still in use after the replay.
+// Lookup of meshes during replay. Returns a placeholder for a missing mesh, because the mesh may have been deleted
+// after a later record removed its instances. check() reports a placeholder that is still in use after the replay.
 class Meshes {
  public:
   explicit Meshes(const FindMesh& find) : find_(find) {}
@@ -51,7 +51,7 @@ class Meshes {
       if (statics.uses(mesh.get()) > 0)
         return data_loss(absl::StrCat("the mesh of content ", hex(mesh->sha256()),
                                       mesh->name().empty() ? "" : " named ", mesh->name(),
-                                      " is not there, but instances use it"));
+                                      " is missing, but instances use it"));
     return absl::OkStatus();
   }
 
@@ -103,7 +103,7 @@ class Replay {
     return last_ - stored_.snapshot_sequence;
   }
 
-  // Starts `epoch` unless it is the current one. DATA_LOSS if it is 0 or an earlier epoch of the scene.
+  // Starts `epoch` unless it is the current epoch. DATA_LOSS if `epoch` is 0 or an earlier epoch of the scene.
   absl::Status enter_epoch(uint64_t epoch) {
     if (epoch == writer_.epoch()) return absl::OkStatus();
     ended_epochs_.insert(writer_.epoch());
@@ -177,8 +177,8 @@ absl::StatusOr<ScenePtr> recover(UpdateLog& log, const StoredScene& stored, cons
   return std::make_shared<Scene>(stored.name, *std::move(spec), std::move(writer), on);
 }
 
-// Returns the mesh with the tree of the cached topology. Returns null if no topology is cached or it does not fit the
-// mesh: then the caller builds the tree.
+// Returns the mesh with the tree of the cached topology. Returns null if no topology is cached or if the cached
+// topology is not usable for the mesh; the caller then builds the tree.
 MeshPtr restore_mesh(const UpdateLog& log, const StoredMesh& stored, const TriangleMesh& columns,
                      const BvhOptions& options) {
   const std::optional<std::string> kept = log.read_outline(stored.sha256);
@@ -222,9 +222,10 @@ absl::StatusOr<MeshPtr> recover_name(const UpdateLog& log, const StoredMesh& sto
   PartsReader reader;
   absl::Status status = log.read_parts(stored.name, [&reader](absl::string_view chunk) { return reader.add(chunk); });
   if (!status.ok()) return named(name, status);
+  const std::string creator = reader.creator();
   absl::StatusOr<std::vector<MeshPart>> parts = std::move(reader).finish(content->triangle_count());
   if (!parts.ok()) return named(name, parts.status());
-  return StaticMesh::share(stored.name, *std::move(parts), *content);
+  return StaticMesh::share(stored.name, *std::move(parts), *content, creator);
 }
 
 FindMesh find_restored_meshes(const UpdateLog& log, const Registry& registry) {

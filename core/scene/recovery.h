@@ -1,8 +1,8 @@
 // Restores scenes and meshes from a log: reads the snapshot of a scene and replays every later record. DATA_LOSS names
 // the damaged scene or mesh and describes the damage; other errors are the log's.
 //
-// History is not part of a snapshot: the history of a restored scene begins at its snapshot. Plain functions; any
-// thread, several scenes at the same time.
+// History is not part of a snapshot: the history of a restored scene begins at its snapshot. Any thread may call the
+// functions; several scenes may be restored at the same time.
 #ifndef LOCUS_CORE_SCENE_RECOVERY_H_
 #define LOCUS_CORE_SCENE_RECOVERY_H_
 
@@ -17,8 +17,8 @@
 
 namespace locus {
 
-// Function that is called at regular intervals with the number of records applied so far and the number of all records
-// to apply.
+// Function that is called after every 64 records, and after the last record, with the number of records applied so far
+// and the number of all records to apply.
 using RecoveryProgress = std::function<void(uint64_t applied, uint64_t of)>;
 
 // Returns the scene in the state after its last record, in the epoch stored.epoch. The scene appends to `log`, which
@@ -32,19 +32,20 @@ struct RecoveredMesh {
   bool built = false;  // true: the tree was built; false: it was restored from the cached topology
 };
 
-// Returns the mesh that is stored under stored.name, with its tree from the cached topology. If that is not possible,
-// builds the tree and stores the topology in the log's cache for the next recovery. Does not read the parts that are
-// stored for the name: recover_name() does.
+// Returns the mesh that is stored under stored.name, with its tree from the cached topology. If no usable topology is
+// cached, builds the tree and stores the topology in the log's cache for the next recovery. Does not read the parts
+// that are stored for the name: recover_name() does.
 absl::StatusOr<RecoveredMesh> recover_mesh(UpdateLog& log, const StoredMesh& stored, const BvhOptions& options = {});
 
-// Returns the mesh of the name stored.name, with the parts that are stored for this name. The mesh shares the bytes and
-// the tree of `content`, which recover_mesh() returned for any name of the same content.
+// Returns the mesh of the name stored.name, with the parts and the creator that are stored for this name. The mesh
+// shares the bytes and the tree of `content`, which recover_mesh() returned for any name of the same content.
 absl::StatusOr<MeshPtr> recover_name(const UpdateLog& log, const StoredMesh& stored, const MeshPtr& content);
 
 // Returns a function that finds the meshes which `registry` restored from `log`; both outlive the function. Records of
-// format 1 identify a mesh by its content hash alone. For them the function chooses among the names of this content
-// that were stored in format 1: it returns the mesh of the name that sorts first. Every recovery makes the same choice
-// for an existing instance, because a name cannot be deleted while instances use it.
+// data format 1, the oldest one, identify a mesh by its content hash alone. For such a record
+// the function returns the mesh of the name that sorts first among the names of this content that were stored in format
+// 1. Every recovery makes the same choice for an existing instance, because a name cannot be deleted while instances
+// use it.
 FindMesh find_restored_meshes(const UpdateLog& log, const Registry& registry);
 
 }  // namespace locus

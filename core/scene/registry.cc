@@ -1,12 +1,13 @@
 #include "core/scene/registry.h"
 
 #include <algorithm>
+#include <set>
 #include <utility>
 
-#include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include "core/base/check.h"
 #include "core/base/limits.h"
+#include "core/base/names.h"
 #include "core/base/refusal.h"
 #include "core/base/status_macros.h"
 #include "core/scene/log/mesh_codec.h"
@@ -24,8 +25,6 @@ absl::Status refuse_name(absl::StatusCode code, Reason reason, absl::string_view
   return refuse(code, message, refusal);
 }
 
-bool name_character(char c) { return absl::ascii_islower(c) || absl::ascii_isdigit(c); }
-
 // Returns the first entry with a key above `after`, or the first of all entries if `after` is empty.
 template <class Map>
 auto after_key(const Map& map, const std::string& after) {
@@ -33,22 +32,6 @@ auto after_key(const Map& map, const std::string& after) {
 }
 
 }  // namespace
-
-absl::Status check_scene_name(absl::string_view name, absl::string_view field) {
-  bool good = !name.empty() && name.size() <= limits::kMaxNameLength && absl::ascii_islower(name.front()) &&
-              name_character(name.back());
-  for (const char c : name) good = good && (name_character(c) || c == '-');
-  if (good) return absl::OkStatus();
-  return refuse_argument(Reason::kMalformed, field, {},
-                         "a scene's name has 1 to 63 of a-z, 0-9 and -, starts with a letter, does not end with -");
-}
-
-absl::Status check_mesh_name(absl::string_view name, absl::string_view field) {
-  bool good = !name.empty() && name.size() <= limits::kMaxNameLength;
-  for (const char c : name) good = good && absl::ascii_isgraph(c);
-  if (good) return absl::OkStatus();
-  return refuse_argument(Reason::kMalformed, field, {}, "a mesh's name has 1 to 63 printable characters, no spaces");
-}
 
 absl::StatusOr<Registry::Beginning> Registry::begin_scene(const std::string& name, const std::string& static_from,
                                                           bool if_absent) const {
@@ -65,9 +48,7 @@ absl::StatusOr<Registry::Beginning> Registry::begin_scene(const std::string& nam
   if (const auto damaged = damaged_scenes_.find(static_from); damaged != damaged_scenes_.end())
     return damaged->second.damage;
   const auto source = scenes_.find(static_from);
-  if (source == scenes_.end())
-    return refuse_name(absl::StatusCode::kNotFound, Reason::kNotFound, "spec.static_from",
-                       absl::StrCat("no scene is called ", static_from));
+  if (source == scenes_.end()) return no_source(static_from);
   return Beginning{nullptr, source->second->latest()->statics};
 }
 
@@ -86,7 +67,7 @@ absl::StatusOr<ScenePtr> Registry::log_scene(const std::string& name, const Scen
   return std::make_shared<Scene>(name, spec, std::move(writer), on);
 }
 
-// Holds changes_mutex_ throughout, so that meanwhile no scene of the same name is created and no mesh that
+// Holds changes_mutex_ during the whole call, so that meanwhile no scene of the same name is created and no mesh that
 // `static_from` uses is deleted.
 absl::StatusOr<Registry::CreatedScene> Registry::create_scene(const std::string& name, const SceneSpec& spec,
                                                               uint64_t epoch, const std::string& static_from,
@@ -105,6 +86,66 @@ void Registry::put_in(const ScenePtr& scene) {
   const MutexLock lock(mutex_);
   LOCUS_DCHECK(!scenes_.contains(scene->name()) && !damaged_scenes_.contains(scene->name()));
   scenes_.emplace(scene->name(), scene);
+  add_to_creator(*scene);
+}
+
+void Registry::add_to_creator(Scene& scene) {
+  const SceneSpec& spec = scene.spec();
+  if (spec.creator.empty()) return;
+  Creator& creator = creators_[spec.creator];
+  ++creator.use.scenes;
+  creator.use.history_bytes += spec.history.bytes;
+  scene.count_objects_in(creator.objects);
+}
+
+void Registry::add_to_creator(const StaticMesh& mesh) {
+  if (mesh.creator().empty()) return;
+  Creator& creator = creators_[mesh.creator()];
+  ++creator.meshes;
+  creator.use.mesh_bytes += mesh.bytes();
+}
+
+void Registry::take_from_creator(const Scene& scene) {
+  const SceneSpec& spec = scene.spec();
+  if (spec.creator.empty()) return;
+  CreatorUse& use = creators_[spec.creator].use;
+  LOCUS_DCHECK_GT(use.scenes, uint64_t{0});
+  --use.scenes;
+  use.history_bytes -= spec.history.bytes;
+  forget_unused_creator(spec.creator);
+}
+
+void Registry::take_from_creator(const StaticMesh& mesh) {
+  if (mesh.creator().empty()) return;
+  Creator& creator = creators_[mesh.creator()];
+  LOCUS_DCHECK_GT(creator.meshes, uint64_t{0});
+  --creator.meshes;
+  creator.use.mesh_bytes -= mesh.bytes();
+  forget_unused_creator(mesh.creator());
+}
+
+void Registry::forget_unused_creator(const std::string& creator) {
+  const auto known = creators_.find(creator);
+  if (known->second.use.scenes == 0 && known->second.meshes == 0) creators_.erase(known);
+}
+
+CreatorUse Registry::creator_use(const std::string& creator) const {
+  const MutexLock lock(mutex_);
+  const auto known = creators_.find(creator);
+  if (known == creators_.end()) return CreatorUse();
+  CreatorUse use = known->second.use;
+  use.objects = known->second.objects->load();
+  return use;
+}
+
+std::map<std::string, CreatorUse> Registry::creator_uses() const {
+  const MutexLock lock(mutex_);
+  std::map<std::string, CreatorUse> uses;
+  for (const auto& [name, creator] : creators_) {
+    CreatorUse& use = uses[name] = creator.use;
+    use.objects = creator.objects->load();
+  }
+  return uses;
 }
 
 absl::StatusOr<ScenePtr> Registry::find_scene(const std::string& name) const {
@@ -112,8 +153,12 @@ absl::StatusOr<ScenePtr> Registry::find_scene(const std::string& name) const {
   const auto known = scenes_.find(name);
   if (known != scenes_.end()) return known->second;
   if (const auto damaged = damaged_scenes_.find(name); damaged != damaged_scenes_.end()) return damaged->second.damage;
-  return refuse_name(absl::StatusCode::kNotFound, Reason::kNotFound, "scene",
-                     absl::StrCat("no scene is called '", name, "'; create it first"));
+  return no_scene(name);
+}
+
+absl::Status Registry::no_source(const std::string& static_from) {
+  return refuse_name(absl::StatusCode::kNotFound, Reason::kNotFound, "spec.static_from",
+                     absl::StrCat("no scene is called ", static_from));
 }
 
 std::optional<SceneKey> Registry::damaged_scene(const std::string& name) const {
@@ -140,6 +185,7 @@ absl::Status Registry::delete_scene(const std::string& name) {
   RETURN_IF_ERROR((*scene)->remove());
   const MutexLock lock(mutex_);
   scenes_.erase(name);
+  take_from_creator(**scene);
   return absl::OkStatus();
 }
 
@@ -209,7 +255,7 @@ absl::StatusOr<MeshPtr> Registry::begin_mesh(const std::string& name, MeshPtr& m
 MeshPtr Registry::to_keep(const std::string& name, MeshPtr mesh) const {
   const MeshPtr equal = content(mesh->sha256());
   if (equal == nullptr && mesh->name() == name) return mesh;
-  return StaticMesh::share(name, mesh->parts(), equal == nullptr ? *mesh : *equal);
+  return StaticMesh::share(name, mesh->parts(), equal == nullptr ? *mesh : *equal, mesh->creator());
 }
 
 absl::StatusOr<MeshPtr> Registry::add_mesh(const std::string& name, MeshPtr mesh) {
@@ -230,6 +276,7 @@ absl::StatusOr<MeshPtr> Registry::add_mesh(const std::string& name, MeshPtr mesh
   }
   const MutexLock lock(mutex_);
   meshes_.emplace(name, mesh);
+  add_to_creator(*mesh);
   return mesh;
 }
 
@@ -262,6 +309,7 @@ absl::StatusOr<MeshPtr> Registry::take_mesh(const std::string& name) {
   }
   MeshPtr taken = std::move(known->second);
   meshes_.erase(known);
+  take_from_creator(*taken);
   return taken;
 }
 
@@ -274,7 +322,9 @@ absl::Status Registry::delete_mesh(const std::string& name) {
   const absl::Status status = log_ == nullptr ? absl::OkStatus() : log_->delete_mesh(name);
   const MutexLock lock(mutex_);
   if (taken == nullptr && status.ok()) damaged_meshes_.erase(name);
-  if (taken != nullptr && !status.ok()) meshes_.emplace(name, std::move(taken));
+  if (taken == nullptr || status.ok()) return status;
+  add_to_creator(*taken);
+  meshes_.emplace(name, std::move(taken));
   return status;
 }
 
@@ -289,7 +339,7 @@ void Registry::restore_scene(const ScenePtr& scene) { put_in(scene); }
 void Registry::restore_mesh(const std::string& name, MeshPtr mesh) {
   const MutexLock lock(mutex_);
   mesh = to_keep(name, std::move(mesh));
-  meshes_.emplace(name, std::move(mesh));
+  if (meshes_.emplace(name, mesh).second) add_to_creator(*mesh);
 }
 
 void Registry::restore_damaged_scene(const std::string& name, SceneKey key, const absl::Status& damage) {
@@ -315,6 +365,20 @@ std::vector<Registry::NamedMesh> Registry::list_meshes(const std::string& after,
 uint32_t Registry::mesh_uses(const StaticMesh* mesh) const {
   const MutexLock lock(mutex_);
   return count_uses(mesh);
+}
+
+uint64_t Registry::mesh_bytes() const {
+  std::vector<MeshPtr> meshes;  // counted after the lock is released
+  {
+    const MutexLock lock(mutex_);
+    meshes.reserve(meshes_.size());
+    for (const auto& [name, mesh] : meshes_) meshes.push_back(mesh);
+  }
+  uint64_t bytes = 0;
+  std::set<const TriangleBvh*> counted;
+  for (const MeshPtr& mesh : meshes)
+    bytes += mesh->bytes() - (counted.insert(&mesh->tree()).second ? 0 : mesh->shared_bytes());
+  return bytes;
 }
 
 size_t Registry::mesh_count() const {

@@ -4,12 +4,14 @@
 //
 // Threads: every member may be called from any thread. Changes of scenes run one at a time and wait for the log.
 // Changes of meshes run one at a time, too, and may take seconds to write a mesh. delete_scene() also waits for a batch
-// that is being applied, and delete_mesh() for running changes of scenes and of meshes. All other members never wait.
+// that is being applied. delete_mesh() waits for running changes of scenes and of meshes. All other members never wait.
 // Lock order: mesh_changes_mutex_, changes_mutex_, then the locks of a scene. mutex_ is held only for a lookup or an
 // insertion; while it is held, only Scene::mutex_ may be locked.
 #ifndef LOCUS_CORE_SCENE_REGISTRY_H_
 #define LOCUS_CORE_SCENE_REGISTRY_H_
 
+#include <atomic>
+#include <cstdint>
 #include <map>
 #include <memory>
 #include <optional>
@@ -24,31 +26,37 @@ namespace locus {
 using ScenePtr = std::shared_ptr<Scene>;
 using MeshPtr = std::shared_ptr<const StaticMesh>;
 
-// Returns OK if `name` matches ^[a-z]([a-z0-9-]{0,61}[a-z0-9])?$, otherwise INVALID_ARGUMENT naming `field`.
-absl::Status check_scene_name(absl::string_view name, absl::string_view field);
-// Returns OK if `name` has 1 to 63 printable ASCII characters and no space, otherwise INVALID_ARGUMENT naming `field`.
-absl::Status check_mesh_name(absl::string_view name, absl::string_view field);
+// Sums over the scenes and meshes of one creator.
+struct CreatorUse {
+  uint64_t scenes = 0;
+  uint64_t objects = 0;        // objects in the latest revisions
+  uint64_t history_bytes = 0;  // sum of HistoryOptions::bytes, the most that the histories may take
+  uint64_t mesh_bytes = 0;     // sum of StaticMesh::bytes(), also where several names share a content
+};
 
 class Registry {
  public:
   // `log` may be null; otherwise it outlives the registry and its scenes. The registry outlives every call of
-  // Scene::change_instances() of its scenes, which asks the registry whether a mesh is still registered.
+  // Scene::change_instances() of its scenes, which check with the registry that a mesh is still registered.
   explicit Registry(UpdateLog* log = nullptr) : log_(log) {}
 
   struct CreatedScene {
     ScenePtr scene;
     bool existed = false;
   };
-  // Creates a scene. It begins with the instances of the scene `static_from`, or without instances if `static_from` is
-  // empty. If the name is taken, returns the existing scene if `if_absent` is true, else ALREADY_EXISTS. NOT_FOUND if
-  // `static_from` does not exist; DATA_LOSS if `name` or `static_from` names a damaged scene; or the log's error.
+  // Creates a scene. The scene begins with the instances of the scene `static_from`, or without instances if
+  // `static_from` is empty. If the name is taken, returns the existing scene if `if_absent` is true, else
+  // ALREADY_EXISTS. NOT_FOUND if `static_from` does not exist; DATA_LOSS if `name` or `static_from` names a damaged
+  // scene; or the log's error.
   absl::StatusOr<CreatedScene> create_scene(const std::string& name, const SceneSpec& spec, uint64_t epoch,
                                             const std::string& static_from, bool if_absent)
       LOCUS_EXCLUDES(changes_mutex_, mutex_);
-  // Returns the scene of this name. NOT_FOUND if there is none; DATA_LOSS if it is damaged.
+  // Returns the error of create_scene() for a `static_from` that no scene has.
+  static absl::Status no_source(const std::string& static_from);
+  // Returns the scene of this name. NOT_FOUND if no scene has the name; DATA_LOSS if the scene is damaged.
   absl::StatusOr<ScenePtr> find_scene(const std::string& name) const LOCUS_EXCLUDES(mutex_);
-  // Deletes a scene, damaged or not, and closes it: its waiters get NOT_FOUND. If the log fails, returns its error, and
-  // the scene stays open.
+  // Deletes a scene, damaged or not, and closes it: its waiters get NOT_FOUND. If the log fails, returns the log's
+  // error, and the scene stays open.
   absl::Status delete_scene(const std::string& name) LOCUS_EXCLUDES(changes_mutex_, mutex_);
   // Returns at most `limit` scenes in name order, beginning after the name `after`.
   std::vector<ScenePtr> list_scenes(const std::string& after, size_t limit) const LOCUS_EXCLUDES(mutex_);
@@ -64,17 +72,18 @@ class Registry {
   // name that sorts first.
   MeshPtr find_content(const Sha256& sha256) const LOCUS_EXCLUDES(mutex_);
   // Returns the mesh that is registered under key.name if its content has the hash key.sha256, else null. If key.name
-  // is empty (data format 1), returns find_content(key.sha256).
+  // is empty, because the key was stored in data format 1, returns find_content(key.sha256).
   MeshPtr find_stored(const MeshKey& key) const LOCUS_EXCLUDES(mutex_);
-  // Returns the mesh of this name. NOT_FOUND, naming `field`, if there is none; DATA_LOSS if it is damaged.
+  // Returns the mesh of this name. NOT_FOUND, naming `field`, if no mesh has the name; DATA_LOSS if the mesh is
+  // damaged.
   absl::StatusOr<MeshPtr> find_mesh(const std::string& name, absl::string_view field) const LOCUS_EXCLUDES(mutex_);
   // Adds `mesh` under `name` and returns the registered mesh, which has this name and the parts of `mesh`. If a
-  // registered mesh has equal content, both share it, so that equal content is in memory once. If the name is
-  // registered with equal content and equal parts, returns the registered mesh. ALREADY_EXISTS if the name has other
-  // content or other parts.
+  // registered mesh has equal content, both meshes share the content, so that equal content is in memory once. If the
+  // name is registered with equal content and equal parts, returns the registered mesh. ALREADY_EXISTS if the name has
+  // other content or other parts.
   absl::StatusOr<MeshPtr> add_mesh(const std::string& name, MeshPtr mesh) LOCUS_EXCLUDES(mesh_changes_mutex_, mutex_);
   // Deletes a mesh, damaged or not. FAILED_PRECONDITION IN_USE, naming the number of its instances, if a scene has
-  // instances placed under this name or a pending change places some.
+  // instances that were placed under this name, or if a pending change places such instances.
   absl::Status delete_mesh(const std::string& name) LOCUS_EXCLUDES(mesh_changes_mutex_, changes_mutex_, mutex_);
   struct NamedMesh {
     std::string name;
@@ -83,16 +92,23 @@ class Registry {
   };
   std::vector<NamedMesh> list_meshes(const std::string& after, size_t limit) const LOCUS_EXCLUDES(mutex_);
   size_t mesh_count() const LOCUS_EXCLUDES(mutex_);
+  // Returns the memory of all meshes in bytes; a content that several names share counts once. O(meshes).
+  uint64_t mesh_bytes() const LOCUS_EXCLUDES(mutex_);
   // Returns the number of instances of `mesh` in the latest revisions of all scenes. Instances of an equal mesh under
   // another name are not counted.
   uint32_t mesh_uses(const StaticMesh* mesh) const LOCUS_EXCLUDES(mutex_);
 
+  // Return the sums over all scenes and meshes that this creator created, and over those of each creator, in the order
+  // of names. Scenes and meshes without a creator, and damaged ones, count for nobody.
+  CreatorUse creator_use(const std::string& creator) const LOCUS_EXCLUDES(mutex_);
+  std::map<std::string, CreatorUse> creator_uses() const LOCUS_EXCLUDES(mutex_);
+
   // Add a scene or mesh that was recovered from the log: see core/scene/recovery.h. Call once for each name. Add all
   // meshes before scenes are recovered, because recover_scene() looks meshes up with find_stored(). Meshes of equal
-  // content share it.
+  // content share one content.
   void restore_scene(const ScenePtr& scene) LOCUS_EXCLUDES(mutex_);
   void restore_mesh(const std::string& name, MeshPtr mesh) LOCUS_EXCLUDES(mutex_);
-  // Add a damaged scene or mesh: lookups of its name return `damage` (DATA_LOSS) until it is deleted.
+  // Add a damaged scene or mesh: lookups of its name return `damage` (DATA_LOSS) until the scene or mesh is deleted.
   void restore_damaged_scene(const std::string& name, SceneKey key, const absl::Status& damage) LOCUS_EXCLUDES(mutex_);
   void restore_damaged_mesh(const std::string& name, const absl::Status& damage) LOCUS_EXCLUDES(mutex_);
 
@@ -101,7 +117,13 @@ class Registry {
     SceneKey key;
     absl::Status damage;
   };
-  // Result of begin_scene(): the instances that the new scene begins with, or the existing scene of that name.
+  // Sums of one creator, who has at least one scene or mesh.
+  struct Creator {
+    CreatorUse use;  // without `objects`
+    uint64_t meshes = 0;
+    Scene::ObjectCount objects = std::make_shared<std::atomic<uint64_t>>(0);
+  };
+  // Result of begin_scene(): the instances that the new scene begins with, or the existing scene of the same name.
   struct Beginning {
     ScenePtr existing;
     std::shared_ptr<const StaticSet> statics;
@@ -111,23 +133,29 @@ class Registry {
   absl::StatusOr<ScenePtr> log_scene(const std::string& name, const SceneSpec& spec, uint64_t epoch,
                                      std::shared_ptr<const StaticSet> statics) LOCUS_REQUIRES(changes_mutex_);
   void put_in(const ScenePtr& scene) LOCUS_EXCLUDES(mutex_);
-  // Returns the key of the damaged scene of that name, or nullopt.
+  // Returns the key of the damaged scene of this name, or nullopt if there is no such scene.
   std::optional<SceneKey> damaged_scene(const std::string& name) const LOCUS_EXCLUDES(mutex_);
   absl::Status delete_damaged_scene(const std::string& name, SceneKey key) LOCUS_REQUIRES(changes_mutex_)
       LOCUS_EXCLUDES(mutex_);
   // Checks whether `mesh` may be added under `name`. If the name is registered with equal content and parts, returns
   // the registered mesh. If the name is free, returns null and replaces `mesh` by to_keep(name, mesh).
   absl::StatusOr<MeshPtr> begin_mesh(const std::string& name, MeshPtr& mesh) const LOCUS_EXCLUDES(mutex_);
-  // Returns a mesh with the name `name` and the parts of `mesh`. It shares the content of a registered mesh of equal
-  // content if there is one, else the content of `mesh`.
+  // Returns a mesh with the name `name` and the parts of `mesh`. The returned mesh shares the content of a registered
+  // mesh of equal content, or the content of `mesh` if no such mesh is registered.
   MeshPtr to_keep(const std::string& name, MeshPtr mesh) const LOCUS_REQUIRES(mutex_);
-  // Removes the mesh `name` from meshes_ and returns it. FAILED_PRECONDITION IN_USE if it is in use. Returns null for a
-  // damaged mesh, which it does not remove.
+  // Removes the mesh `name` from meshes_ and returns it. FAILED_PRECONDITION IN_USE if the mesh is in use. For a
+  // damaged mesh, returns null and removes nothing.
   absl::StatusOr<MeshPtr> take_mesh(const std::string& name) LOCUS_EXCLUDES(mutex_);
   // Returns true if `mesh` is the mesh that is registered under its name.
   bool is_kept(const StaticMesh* mesh) const LOCUS_EXCLUDES(mutex_);
   uint32_t count_uses(const StaticMesh* mesh) const LOCUS_REQUIRES(mutex_);
-  // Returns find_content(sha256).
+  // Adds a scene or mesh to the sums of its creator, or subtracts it.
+  void add_to_creator(Scene& scene) LOCUS_REQUIRES(mutex_);
+  void add_to_creator(const StaticMesh& mesh) LOCUS_REQUIRES(mutex_);
+  void take_from_creator(const Scene& scene) LOCUS_REQUIRES(mutex_);
+  void take_from_creator(const StaticMesh& mesh) LOCUS_REQUIRES(mutex_);
+  void forget_unused_creator(const std::string& creator) LOCUS_REQUIRES(mutex_);
+  // Returns the same mesh as find_content(), which locks mutex_ and calls this function.
   MeshPtr content(const Sha256& sha256) const LOCUS_REQUIRES(mutex_);
 
   UpdateLog* const log_;
@@ -138,6 +166,7 @@ class Registry {
   std::map<std::string, DamagedScene> damaged_scenes_ LOCUS_GUARDED_BY(mutex_);
   std::map<std::string, MeshPtr> meshes_ LOCUS_GUARDED_BY(mutex_);
   std::map<std::string, absl::Status> damaged_meshes_ LOCUS_GUARDED_BY(mutex_);
+  std::map<std::string, Creator> creators_ LOCUS_GUARDED_BY(mutex_);
 };
 
 }  // namespace locus

@@ -10,7 +10,6 @@
 #include "core/base/limits.h"
 #include "core/base/refusal.h"
 #include "core/base/status_macros.h"
-#include "core/scene/snapshot/snapshot_bytes.h"
 
 namespace locus {
 namespace {
@@ -21,7 +20,7 @@ absl::Status restarted(uint64_t now, uint64_t asked) {
   refusal.field = "view.epoch";
   return refuse(absl::StatusCode::kFailedPrecondition,
                 absl::StrCat("the scene's epoch is ", now, ", not ", asked,
-                             ": it was made anew; forget what you knew of its revisions and ask for the latest"),
+                             ": it was created again or lost updates; drop its old revisions and query the latest"),
                 refusal);
 }
 
@@ -33,7 +32,8 @@ absl::Status outside_recent(uint64_t oldest, uint64_t newest, uint64_t asked) {
   refusal.limit_value = limits::kRecentRevisions;
   refusal.asked = static_cast<double>(asked);
   return refuse(absl::StatusCode::kOutOfRange,
-                absl::StrCat("revision ", asked, " is not held; revisions ", oldest, " to ", newest, " are"), refusal);
+                absl::StrCat("revision ", asked, " is not retained; revisions ", oldest, " to ", newest, " are"),
+                refusal);
 }
 
 absl::Status too_late(uint64_t newest, uint64_t asked) {
@@ -52,13 +52,13 @@ absl::Status readers_too_slow(uint64_t budget) {
   refusal.limit_value = static_cast<double>(budget);
   return refuse(
       absl::StatusCode::kDeadlineExceeded,
-      absl::StrCat("limit pinned_bytes is ", budget, "; readers that hold more were told to end and have not; ",
+      absl::StrCat("limit pinned_bytes is ", budget, "; readers that hold more were cancelled but have not ended; ",
                    "nothing was applied, so send the batch again"),
       refusal);
 }
 
-// Returns the refusal of a change because an object took the id `id` meanwhile. `position` is the index of the id among
-// all placed ids of the change; the refusal names the placement that contains this index.
+// Returns the refusal of a change because an object took the id `id` while the change was built. `position` is the
+// index of the id among all placed ids of the change; the refusal names the placement that contains this index.
 absl::Status taken_meanwhile(const StaticChange& change, size_t position, Id id) {
   size_t list = 0;
   while (position >= change.place[list].count()) position -= change.place[list++].count();
@@ -128,9 +128,11 @@ absl::StatusOr<UpdateAck> Scene::apply(const UpdateBatch& batch, Deadline until)
   return std::move(acks.front());
 }
 
-// Skips leading batches that are not new: the writer table answers them without a change. All batches from the first
-// new one on are logged, because applying one may make a later batch of the same writer new.
+// Does not log the leading batches that are not new, because the writer table returns their acks without a change of
+// the scene. Logs all batches from the first new batch on, because applying a batch may make a later batch of the same
+// writer new.
 absl::Status Scene::log_each(absl::Span<const UpdateBatch* const> batches) {
+  if (!journal_.on()) return absl::OkStatus();
   const WriterTable& writers = writer_.writers();
   while (!batches.empty() && !writers.is_new(batches.front()->writer, batches.front()->batch)) batches.remove_prefix(1);
   return journal_.append_each(writer_.epoch(), batches);
@@ -145,7 +147,7 @@ absl::StatusOr<Scene::Acks> Scene::apply_each(absl::Span<const UpdateBatch* cons
     RETURN_IF_ERROR(wait_for_readers(until));
     const MutexLock lock(writer_mutex_);
     RETURN_IF_ERROR(check_open());
-    if (pins_->over_budget()) continue;  // another batch exceeded the budget meanwhile
+    if (pins_->over_budget()) continue;  // another batch exceeded the budget after the wait
     RETURN_IF_ERROR(log_each(good));
     // Logged batches must be applied, so there is no error return after this point.
     auto next = good.begin();
@@ -163,7 +165,8 @@ absl::StatusOr<Scene::Acks> Scene::apply_each(absl::Span<const UpdateBatch* cons
 }
 
 absl::Status Scene::log_joined(absl::Span<const UpdateBatch* const> batches) {
-  // If none of the batches is new, none will be applied, and nothing needs to be logged.
+  if (!journal_.on()) return absl::OkStatus();
+  // If none of the batches is new, no batch will be applied, and nothing needs to be logged.
   const bool any_new = std::any_of(batches.begin(), batches.end(), [this](const UpdateBatch* batch) {
     return writer_.writers().is_new(batch->writer, batch->batch);
   });
@@ -204,7 +207,7 @@ absl::Status Scene::admit_change(const StaticChange& change) {
     return refuse_full("scene", "pending_changes", limits::kMaxPendingChanges, pending_changes_ + 1.0, 100);
   ++pending_changes_;
   for (const PlacementColumns& place : change.place) meshes_to_place_.push_back(place.mesh.get());
-  check_invariants();
+  LOCUS_DCHECK_CALL(check_invariants());
   return absl::OkStatus();
 }
 
@@ -218,7 +221,14 @@ void Scene::leave_change(const StaticChange& change, const absl::Status& result)
     meshes_to_place_.erase(found);
   }
   if (!result.ok()) last_build_error_ = std::string(result.message());
-  check_invariants();
+  LOCUS_DCHECK_CALL(check_invariants());
+}
+
+void Scene::count_objects_in(ObjectCount count) {
+  const MutexLock lock(mutex_);
+  LOCUS_DCHECK(object_count_ == nullptr && !closed_);
+  count->fetch_add(latest_->objects.size());
+  object_count_ = std::move(count);
 }
 
 bool Scene::in_use(const StaticMesh* mesh) const {
@@ -248,8 +258,8 @@ absl::StatusOr<InstanceChange> Scene::change_instances(const StaticChange& chang
 
 absl::StatusOr<InstanceChange> Scene::build_and_publish(const StaticChange& change) {
   RETURN_IF_ERROR(wait_for_readers(ReaderTracker::kNever));
-  // Building the tree takes long. Meanwhile keep only the instances of this revision alive, not its objects;
-  // is_object() therefore asks the latest revision each time.
+  // Building the tree takes long. During this time, hold only the instances of the current revision, not its objects;
+  // is_object() therefore searches the objects of the revision that is the latest at each call.
   const auto is_object = [this](Id id) { return static_cast<bool>(latest()->objects.find_ref(id)); };
   const std::shared_ptr<const StaticSet> statics = latest()->statics;
   ASSIGN_OR_RETURN(StaticSet::Changed changed, statics->apply(change, is_object, latest()->revision << 24));
@@ -266,24 +276,25 @@ absl::StatusOr<InstanceChange> Scene::build_and_publish(const StaticChange& chan
 }
 
 void Scene::check_invariants() const {
-  if constexpr (kDebugChecks) {
-    LOCUS_CHECK(latest_ != nullptr && latest_->statics != nullptr);
-    LOCUS_CHECK_LE(latest_->oldest_tick(), latest_->tick);
-    LOCUS_CHECK(!recent_.empty() && recent_.back() == latest_);
-    LOCUS_CHECK_LE(recent_.size(), size_t{limits::kRecentRevisions});
-    LOCUS_CHECK_EQ(recent_.front()->revision + recent_.size() - 1, latest_->revision);
-    LOCUS_CHECK(watches_.empty() || (!closed_ && watches_.begin()->first > latest_->revision));
-    LOCUS_CHECK(pending_changes_ > 0 || meshes_to_place_.empty());
-  }
+  LOCUS_CHECK(latest_ != nullptr && latest_->statics != nullptr);
+  LOCUS_CHECK_LE(latest_->oldest_tick(), latest_->tick);
+  LOCUS_CHECK(!recent_.empty() && recent_.back() == latest_);
+  LOCUS_CHECK_LE(recent_.size(), size_t{limits::kRecentRevisions});
+  LOCUS_CHECK_EQ(recent_.front()->revision + recent_.size() - 1, latest_->revision);
+  LOCUS_CHECK(watches_.empty() || (!closed_ && watches_.begin()->first > latest_->revision));
+  LOCUS_CHECK(pending_changes_ > 0 || meshes_to_place_.empty());
 }
 
 void Scene::publish(const SnapshotPtr& snapshot) {
-  std::vector<SnapshotPtr> retired;  // freed after the lock is released, because that takes long
+  std::vector<SnapshotPtr> retired;  // freed after the lock is released, because freeing takes long
   {
     const MutexLock lock(mutex_);
     LOCUS_DCHECK_EQ(snapshot->revision, latest_->revision + 1);
     LOCUS_DCHECK_EQ(snapshot->epoch, latest_->epoch);
     LOCUS_DCHECK_GE(snapshot->replaced_bytes, latest_->replaced_bytes);
+    // The difference of unsigned numbers may be negative; the sum is right again modulo 2^64.
+    if (object_count_ != nullptr && !closed_)
+      object_count_->fetch_add(uint64_t{snapshot->objects.size()} - uint64_t{latest_->objects.size()});
     latest_ = snapshot;
     recent_.push_back(snapshot);
     const auto too_much = [&] {
@@ -296,7 +307,7 @@ void Scene::publish(const SnapshotPtr& snapshot) {
     }
     published_.notify_all();
     notify_watches(snapshot->revision);
-    check_invariants();
+    LOCUS_DCHECK_CALL(check_invariants());
   }
   pins_->enforce_budget(*snapshot);
 }
@@ -358,24 +369,46 @@ absl::StatusOr<SnapshotPin> Scene::pin(const View& view, Deadline deadline) cons
 }
 
 void Scene::forget_recent() {
-  std::deque<SnapshotPtr> forgotten;  // freed after the lock is released, as in publish()
+  std::deque<SnapshotPtr> forgotten;  // freed after the lock is released, because freeing takes long
   const MutexLock lock(mutex_);
   forgotten.swap(recent_);
   recent_.push_back(latest_);
-  check_invariants();
+  LOCUS_DCHECK_CALL(check_invariants());
+}
+
+uint64_t Scene::revoke_readers(uint64_t bytes) {
+  const uint64_t revoked = pins_->revoke_beyond(*latest(), bytes);
+  pins_->revoke_overdue();
+  return revoked;
+}
+
+uint64_t Scene::trim_history(uint64_t bytes) {
+  std::deque<SnapshotPtr> forgotten;  // freed after the locks are released, because freeing takes long
+  const MutexLock writer_lock(writer_mutex_);
+  const SnapshotPtr trimmed = writer_.trim_history(bytes);
+  if (trimmed == nullptr) return 0;
+  const MutexLock lock(mutex_);
+  LOCUS_DCHECK_EQ(trimmed->revision, latest_->revision);
+  const uint64_t before = latest_->history->bytes;
+  forgotten.swap(recent_);
+  latest_ = trimmed;
+  recent_.push_back(trimmed);
+  LOCUS_DCHECK_CALL(check_invariants());
+  return before - (trimmed->history == nullptr ? 0 : trimmed->history->bytes);
 }
 
 void Scene::close() {
   const MutexLock lock(mutex_);
+  if (object_count_ != nullptr && !closed_) object_count_->fetch_sub(latest_->objects.size());
   closed_ = true;
   pins_->close();
   published_.notify_all();
   notify_watches(std::numeric_limits<uint64_t>::max());
-  check_invariants();
+  LOCUS_DCHECK_CALL(check_invariants());
 }
 
 absl::Status Scene::remove() {
-  const MutexLock lock(writer_mutex_);  // nothing is logged or acknowledged after the deletion
+  const MutexLock lock(writer_mutex_);  // held so that nothing is logged or acknowledged after the deletion
   RETURN_IF_ERROR(check_open());
   RETURN_IF_ERROR(journal_.remove());
   close();
@@ -407,6 +440,24 @@ SceneStatus Scene::status() const {
     status.recorded_ticks = static_cast<uint32_t>(snapshot->history->records.size());
   }
   return status;
+}
+
+std::optional<SceneSummary> Scene::known_summary() const {
+  const MutexLock lock(mutex_);
+  return summary_ && summary_->revision == latest_->revision ? summary_ : std::nullopt;
+}
+
+SceneSummary Scene::summary() const {
+  const uint64_t asked = latest()->revision;
+  const MutexLock summarizing(summarizing_mutex_);
+  {
+    const MutexLock lock(mutex_);
+    if (summary_ && summary_->revision >= asked) return *summary_;
+  }
+  const SceneSummary made = summarize(*latest());
+  const MutexLock lock(mutex_);
+  summary_ = made;
+  return made;
 }
 
 }  // namespace locus

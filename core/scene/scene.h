@@ -6,18 +6,21 @@
 // refused.
 //
 // Threads: every member may be called from any thread. Calls of apply...() and change_instances() wait for each other
-// and for the log. latest() and view() never wait for the writer or the log, unless view() is asked for a future
-// revision: they hold a lock only to copy a pointer, and the writer holds that lock only to publish a revision.
-// Invariants: the revisions of a scene are published in order and without gaps, each once it is complete, with the
-// writer's epoch; ticks never decrease unless a batch restarts them; a published snapshot never changes; no change is
-// published or acknowledged before it is logged.
+// and for the log. latest() and view() hold a lock only to copy a pointer, and the writer holds this lock only to
+// publish a revision. So latest() and view() never wait for the writer or the log, unless view() is called for a future
+// revision. Invariants: the revisions of a scene are published in order and without gaps, each only when it is
+// complete, and with the writer's epoch; ticks never decrease unless a batch restarts them; a published snapshot never
+// changes; no change is published or acknowledged before it is logged.
 #ifndef LOCUS_CORE_SCENE_SCENE_H_
 #define LOCUS_CORE_SCENE_SCENE_H_
 
+#include <atomic>
 #include <chrono>
 #include <deque>
 #include <functional>
 #include <map>
+#include <memory>
+#include <optional>
 #include <string>
 
 #include "core/base/mutex.h"
@@ -26,6 +29,7 @@
 #include "core/scene/readers/reader_tracker.h"
 #include "core/scene/scene_writer.h"
 #include "core/scene/snapshot/scene_snapshot.h"
+#include "core/scene/snapshot/scene_summary.h"
 #include "core/scene/updates/update_batch.h"
 
 namespace locus {
@@ -39,7 +43,7 @@ enum class OverloadPolicy : uint8_t {
 // Durability of an update at the time of its acknowledgement, for a scene with a log.
 enum class Durability : uint8_t {
   kLocal,   // synced to this machine's disk
-  kMemory,  // not synced yet, but soon: a crash of the machine may lose the latest updates
+  kMemory,  // synced soon after the ack: a crash of the machine may lose the latest updates
 };
 
 constexpr AckLevel ack_level(Durability durability) {
@@ -50,12 +54,14 @@ struct SceneSpec {
   std::map<std::string, std::string> labels;
   Winding winding = Winding::kCounterClockwise;
   HistoryOptions history = {};
-  uint64_t pinned_bytes = 0;  // memory budget of readers in bytes; 0 = the default of ReaderTracker
+  uint64_t pinned_bytes = 0;  // memory budget of readers in bytes; 0: the default of ReaderTracker
   OverloadPolicy overload = OverloadPolicy::kEveryBatch;
   Durability durability = Durability::kLocal;
+  std::string creator;  // caller who created the scene and to whom it is counted; empty: nobody
 };
 
-// Revision that a caller asks for. kLatest ignores `revision`. Epoch 0 matches every epoch.
+// Revision that a caller requests: the latest revision (kLatest ignores `revision`), `revision` or any later revision
+// (kAtLeast), or exactly `revision`. Epoch 0 matches every epoch.
 struct View {
   enum class Kind : uint8_t { kLatest, kAtLeast, kExactly };
   Kind kind = Kind::kLatest;
@@ -82,8 +88,8 @@ struct SceneStatus {
 
 class Scene {
  public:
-  // Creates a scene without a log. `epoch` is not 0 and no earlier scene of this name had it. `statics` may be shared
-  // with another scene.
+  // Creates a scene without a log. `epoch` is not 0 and differs from the epochs of all earlier scenes of this name.
+  // `statics` may be shared with another scene.
   Scene(std::string name, SceneSpec spec, uint64_t epoch, std::shared_ptr<const StaticSet> statics);
   // Creates a scene that continues from the state of `writer`, which is the state after the last record in `log`.
   Scene(std::string name, SceneSpec spec, SceneWriter writer, const SceneLog& log);
@@ -94,59 +100,72 @@ class Scene {
   using Deadline = std::chrono::steady_clock::time_point;
 
   // Applies one batch as one revision; makes no revision if the batch changes nothing. Waits while readers exceed their
-  // memory budget: see ReaderTracker. An error means that nothing changed: the error of check_form();
-  // FAILED_PRECONDITION BATCH_GAP; the first refused item if `all_or_nothing` is set; RESOURCE_EXHAUSTED for too many
-  // objects; DEADLINE_EXCEEDED if readers still exceed their budget at `until`; NOT_FOUND if the scene is closed; or
-  // the log's error.
+  // memory budget: see ReaderTracker. After an error, nothing has changed. The errors are: the error of check_form();
+  // FAILED_PRECONDITION BATCH_GAP if an earlier batch of the writer is missing; the first refused item if
+  // `all_or_nothing` is set; RESOURCE_EXHAUSTED for too many objects; DEADLINE_EXCEEDED if readers still exceed their
+  // budget at `until`; NOT_FOUND if the scene is closed; or the log's error.
   absl::StatusOr<UpdateAck> apply(const UpdateBatch& batch, Deadline until = ReaderTracker::kNever)
       LOCUS_EXCLUDES(writer_mutex_, mutex_);
 
   using Acks = std::vector<absl::StatusOr<UpdateAck>>;
 
   // Applies several batches like successive calls of apply(), but logs them with a single sync. Returns one ack or
-  // error for each batch. If the call itself fails, with an error of apply(), no batch was applied.
+  // error for each batch. If apply_each() itself returns an error, which is one of the errors of apply(), no batch was
+  // applied.
   absl::StatusOr<Acks> apply_each(absl::Span<const UpdateBatch* const> batches, Deadline until = ReaderTracker::kNever)
       LOCUS_EXCLUDES(writer_mutex_, mutex_);
 
-  // Applies several batches together, as one revision. Precondition: the batches satisfy may_join().
-  // Returns one ack or error for each batch. If the call itself fails, with an error of apply(), no batch was applied.
+  // Applies several batches together, as one revision. Precondition: the batches satisfy may_join(). Returns one ack or
+  // error for each batch. If apply_joined() itself returns an error, which is one of the errors of apply(), no batch
+  // was applied.
   absl::StatusOr<Acks> apply_joined(absl::Span<const UpdateBatch* const> batches,
                                     Deadline until = ReaderTracker::kNever) LOCUS_EXCLUDES(writer_mutex_, mutex_);
 
-  // Removes instances and places new ones, as one revision. Builds the new tree of instances, one change at a time,
-  // without blocking update batches. Waits like apply() while readers exceed their budget, but without a deadline.
-  // NOT_FOUND if a placed mesh was deleted: see check_meshes().
+  // Removes instances and places new instances, as one revision. Builds the new tree of instances, one change at a
+  // time, without blocking update batches. Waits like apply() while readers exceed their budget, but without a
+  // deadline. NOT_FOUND if a placed mesh was deleted: see check_meshes().
   absl::StatusOr<InstanceChange> change_instances(const StaticChange& change) LOCUS_EXCLUDES(writer_mutex_, mutex_);
 
   using IsKept = std::function<bool(const StaticMesh*)>;
   // Sets the check that a mesh is still registered: from now on change_instances() refuses to place a mesh for which
-  // `is_kept` returns false. Call before other threads use the scene. For a mesh to be placed, in_use() returns true
-  // from before the call of `is_kept` until the change has ended, so that the mesh cannot be deleted in between.
+  // `is_kept` returns false. Call before other threads use the scene. For a mesh that a change places, in_use() returns
+  // true before `is_kept` is called and until the change has ended, so that the mesh cannot be deleted between the
+  // check and the placement.
   void check_meshes(IsKept is_kept) { is_kept_ = std::move(is_kept); }
-  // Returns true if the scene contains instances of the mesh, or a pending change places some.
+
+  using ObjectCount = std::shared_ptr<std::atomic<uint64_t>>;
+  // Adds the scene's objects to `count`, and from now on every change of their number, until the scene is closed. Call
+  // before other threads use the scene.
+  void count_objects_in(ObjectCount count) LOCUS_EXCLUDES(mutex_);
+  // Returns the count to which count_objects_in() adds this scene's objects; 0 if there is none.
+  uint64_t counted_objects() const { return object_count_ == nullptr ? 0 : object_count_->load(); }
+
+  // Returns true if the scene contains instances of the mesh, or if a pending change places instances of the mesh.
   bool in_use(const StaticMesh* mesh) const LOCUS_EXCLUDES(mutex_);
 
   SnapshotPtr latest() const LOCUS_EXCLUDES(mutex_);
 
-  // Returns the snapshot of the revision that `view` asks for. kAtLeast waits for the revision until `deadline`, then
+  // Returns the snapshot of the revision that `view` requests. kAtLeast waits for the revision until `deadline`, then
   // returns DEADLINE_EXCEEDED. FAILED_PRECONDITION SCENE_RESTARTED if the scene has another epoch; OUT_OF_RANGE if
-  // kExactly asks for a revision that is not among the recent ones; NOT_FOUND if the scene is closed.
+  // kExactly requests a revision that is not among the recent revisions; NOT_FOUND if the scene is closed.
   absl::StatusOr<SnapshotPtr> view(const View& view, Deadline deadline) const LOCUS_EXCLUDES(mutex_);
 
-  // Returns the snapshot of view() with a pin that registers the reader. For readers that take long: they must poll
-  // SnapshotPin::status().
+  // Returns the snapshot of view() with a pin that registers the reader. Used by readers that hold the snapshot for a
+  // long time. These readers must poll SnapshotPin::status().
   absl::StatusOr<SnapshotPin> pin(const View& view, Deadline deadline) const LOCUS_EXCLUDES(mutex_);
   // Waits until all revoked pins are released or the scene is closed. DEADLINE_EXCEEDED, naming the limit pinned_bytes,
-  // if that takes longer than `until`.
+  // if a revoked pin is still not released at `until`.
   absl::Status wait_for_readers(Deadline until) const LOCUS_EXCLUDES(mutex_);
-  // Calls the on_revoke() callbacks of revoked pins that are not released. For a writer that has waited too long.
+  // Calls the on_revoke() callbacks of revoked pins that are not released. Used if a writer has waited too long for
+  // readers.
   void revoke_overdue_readers() { pins_->revoke_overdue(); }
 
   // Registration for one notification that the scene has reached a revision or was closed, for callers that must not
-  // block in view(). `notify` is called once: by the constructor if this is already so, otherwise by the thread that
-  // publishes the revision or closes the scene. The call holds the scene's lock: `notify` must be quick, must not call
-  // the scene, and must not take a lock that is held while a Watch is created or destroyed. It is not called after the
-  // destructor, which waits for a running call. The scene outlives the Watch.
+  // block in view(). `notify` is called once: by the constructor if the scene has already reached the revision or is
+  // closed, otherwise by the thread that publishes the revision or closes the scene. The scene's lock is held during
+  // the call: `notify` must be quick, must not call the scene, and must not take a lock that is held while a Watch is
+  // created or destroyed. The destructor waits for a running call of `notify`. After the destructor has returned,
+  // `notify` is not called. The scene outlives the Watch.
   class Watch {
    public:
     Watch(const Scene& scene, uint64_t revision, std::function<void()> notify);
@@ -164,13 +183,20 @@ class Scene {
     bool notified_ = false;
   };
 
+  // Drops the oldest ticks of the history until the rest takes at most `bytes`, and the revisions that are retained for
+  // kExactly views, except the latest one. The latest revision keeps its number. Waits for a batch that is being
+  // applied. Returns the bytes by which the history became smaller. Called when memory is short.
+  uint64_t trim_history(uint64_t bytes) LOCUS_EXCLUDES(writer_mutex_, mutex_);
+  // Revokes the pins of the oldest revisions until pinned revisions hold at most `bytes`: their readers are cancelled.
+  // Called when memory is short. Returns the bytes that become free once these readers have ended.
+  uint64_t revoke_readers(uint64_t bytes) LOCUS_EXCLUDES(mutex_);
   // Drops the revisions that are retained for kExactly views, except the latest one. Called when memory is short.
   void forget_recent() LOCUS_EXCLUDES(mutex_);
 
-  // Closes the scene after its deletion: wakes all waiters, and refuses later calls of view() and of the
-  // members that change the scene with NOT_FOUND.
+  // Closes the scene after its deletion: wakes all waiters. Later calls of view() and of the members that change the
+  // scene return NOT_FOUND.
   void close() LOCUS_EXCLUDES(mutex_);
-  // Deletes the scene from its log and closes it. If the log fails, returns its error, and the scene stays open.
+  // Deletes the scene from its log and closes it. If the log fails, returns the log's error, and the scene stays open.
   absl::Status remove() LOCUS_EXCLUDES(writer_mutex_, mutex_);
 
   // Returns the state to be written as the log's next snapshot: the latest revision and the sequence number of its
@@ -186,13 +212,19 @@ class Scene {
 
   SceneStatus status() const LOCUS_EXCLUDES(mutex_);
 
+  // Returns a summary of the latest revision, or of a revision that was published during the call. O(objects) once for
+  // each revision; callers at the same time wait for one of them and share its result.
+  SceneSummary summary() const LOCUS_EXCLUDES(summarizing_mutex_, mutex_);
+  // Returns summary() if it takes O(1).
+  std::optional<SceneSummary> known_summary() const LOCUS_EXCLUDES(mutex_);
+
  private:
   // Checks that latest_, recent_ and watches_ are consistent. O(1).
   void check_invariants() const LOCUS_REQUIRES(mutex_);
   // Makes `snapshot` the latest revision: wakes the threads that wait in view(), notifies the Watches that wait for
   // this revision, and then enforces the readers' memory budget.
   void publish(const SnapshotPtr& snapshot) LOCUS_EXCLUDES(mutex_);
-  // Notifies and removes the Watches that wait for `revision` or an earlier one.
+  // Notifies and removes the Watches that wait for `revision` or for an earlier revision.
   void notify_watches(uint64_t revision) LOCUS_REQUIRES(mutex_);
   absl::Status closed_status() const;
   absl::Status check_open() const LOCUS_EXCLUDES(mutex_);
@@ -211,13 +243,17 @@ class Scene {
   Mutex change_mutex_;  // held during a static change; locked before writer_mutex_
   Mutex writer_mutex_;  // locked before mutex_
   SceneWriter writer_ LOCUS_GUARDED_BY(writer_mutex_);
-  SceneJournal journal_;  // appends only under writer_mutex_
-  IsKept is_kept_;        // null: every mesh may be placed
+  SceneJournal journal_;             // records are appended only under writer_mutex_
+  IsKept is_kept_;                   // null: every mesh may be placed
+  ObjectCount object_count_;         // may be null
+  mutable Mutex summarizing_mutex_;  // held while a summary is made; locked before mutex_
   mutable Mutex mutex_;
   mutable ConditionVariable published_;
+  mutable std::optional<SceneSummary> summary_ LOCUS_GUARDED_BY(mutex_);  // the last one that was made
   SnapshotPtr latest_ LOCUS_GUARDED_BY(mutex_);
-  std::deque<SnapshotPtr> recent_ LOCUS_GUARDED_BY(mutex_);                   // oldest first, latest_ last
-  mutable std::multimap<uint64_t, Watch*> watches_ LOCUS_GUARDED_BY(mutex_);  // not notified yet, by awaited revision
+  std::deque<SnapshotPtr> recent_ LOCUS_GUARDED_BY(mutex_);  // retained snapshots, oldest first; back() is latest_
+  // Watches that are not notified yet. The key is the awaited revision.
+  mutable std::multimap<uint64_t, Watch*> watches_ LOCUS_GUARDED_BY(mutex_);
   uint32_t pending_changes_ LOCUS_GUARDED_BY(mutex_) = 0;
   std::vector<const StaticMesh*> meshes_to_place_ LOCUS_GUARDED_BY(mutex_);  // meshes of pending changes
   std::string last_build_error_ LOCUS_GUARDED_BY(mutex_);

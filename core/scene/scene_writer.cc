@@ -19,35 +19,33 @@ SceneWriter::SceneWriter(uint64_t epoch, Winding winding, std::shared_ptr<const 
   LOCUS_DCHECK_NE(epoch_, uint64_t{0});
   if (recorder_.on()) objects_.track_lifetimes();
   published_ = freeze();
-  check_invariants();
+  LOCUS_DCHECK_CALL(check_invariants());
 }
 
 void SceneWriter::check_invariants() const {
-  if constexpr (kDebugChecks) {
-    LOCUS_CHECK(published_ != nullptr || defer_snapshots());
-    if (published_ != nullptr) {
-      LOCUS_CHECK_EQ(published_->revision, revision_);
-      LOCUS_CHECK_EQ(published_->tick, tick_);
-      LOCUS_CHECK(replaying_ || published_->epoch == epoch_);
-      LOCUS_CHECK(published_->statics == statics_);
-    }
-    LOCUS_CHECK(coalesced_moves_.empty() || defer_snapshots());
+  LOCUS_CHECK(published_ != nullptr || defer_snapshots());
+  if (published_ != nullptr) {
+    LOCUS_CHECK_EQ(published_->revision, revision_);
+    LOCUS_CHECK_EQ(published_->tick, tick_);
+    LOCUS_CHECK(replaying_ || published_->epoch == epoch_);
+    LOCUS_CHECK(published_->statics == statics_);
   }
+  LOCUS_CHECK(coalesced_moves_.empty() || defer_snapshots());
 }
 
 absl::StatusOr<SceneWriter> SceneWriter::restore(SceneState state, Winding winding, const HistoryOptions& history) {
   SceneWriter writer(state.epoch, winding, std::move(state.statics), limits::kMaxObjects, history);
   if (!writer.objects_.fill(std::move(state.objects), state.cell_size))
-    return absl::DataLossError("two objects have one id");
+    return absl::DataLossError("two objects have the same id");
   for (const Instance& instance : writer.statics_->tree().values())
     if (writer.is_object(instance.id))
-      return absl::DataLossError(absl::StrCat("the id ", instance.id, " is an object's and an instance's"));
+      return absl::DataLossError(absl::StrCat("the id ", instance.id, " belongs to an object and to an instance"));
   writer.revision_ = state.revision;
   writer.tick_ = state.tick;
   writer.writers_ = std::move(state.writers);
   writer.recorder_.restore(state.has_past);
   writer.published_ = writer.freeze();
-  writer.check_invariants();
+  LOCUS_DCHECK_CALL(writer.check_invariants());
   return writer;
 }
 
@@ -56,14 +54,14 @@ void SceneWriter::end_replay() {
   flush_coalesced_moves();
   replaying_ = false;
   published_ = freeze();
-  check_invariants();
+  LOCUS_DCHECK_CALL(check_invariants());
 }
 
 void SceneWriter::restart(uint64_t epoch) {
   LOCUS_DCHECK_NE(epoch, uint64_t{0});
   epoch_ = epoch;
   if (!replaying_) published_ = freeze();
-  check_invariants();
+  LOCUS_DCHECK_CALL(check_invariants());
 }
 
 SnapshotPtr SceneWriter::freeze() {
@@ -81,12 +79,19 @@ SnapshotPtr SceneWriter::next_revision() {
   return published_;
 }
 
+SnapshotPtr SceneWriter::trim_history(uint64_t bytes) {
+  if (replaying_ || !recorder_.trim(bytes)) return nullptr;
+  published_ = freeze();
+  LOCUS_DCHECK_CALL(check_invariants());
+  return published_;
+}
+
 SnapshotPtr SceneWriter::replace_statics(std::shared_ptr<const StaticSet> statics) {
   LOCUS_DCHECK(statics != nullptr);
   replaced_bytes_ += statics_->bytes();
   statics_ = std::move(statics);
   SnapshotPtr snapshot = next_revision();
-  check_invariants();
+  LOCUS_DCHECK_CALL(check_invariants());
   return snapshot;
 }
 
@@ -101,12 +106,12 @@ UpdateAck SceneWriter::ack_now() const {
 absl::StatusOr<SceneWriter::Applied> SceneWriter::apply(const UpdateBatch& batch) {
   LOCUS_DCHECK(check_form(batch).ok());
   ASSIGN_OR_RETURN(std::optional<UpdateAck> known, writers_.admit(batch.writer, batch.batch));
-  if (known) return Applied{old_ack(batch), nullptr};
+  if (known) return Applied{old_ack(*std::move(known)), nullptr};
   const bool teleports = recorder_.on() && std::any_of(batch.moves.begin(), batch.moves.end(),
                                                        [](const MoveColumns& move) { return move.teleport; });
   absl::StatusOr<Applied> result = MoveApplier::serves(batch) && !teleports ? apply_moves(batch) : apply_changes(batch);
   if (result.ok()) writers_.record(batch.writer, batch.batch, result->ack);
-  check_invariants();
+  LOCUS_DCHECK_CALL(check_invariants());
   return result;
 }
 
@@ -117,9 +122,10 @@ absl::Status SceneWriter::fill_ack(const UpdateBatch& batch, Applier& applier, A
   result.ack.errors = std::move(applier.errors());
   if (!batch.all_or_nothing || result.ack.refused == 0) return absl::OkStatus();
   const ItemError& first = result.ack.errors.front();
-  return refuse_argument(first.reason, first.field, first.index,
-                         absl::StrCat(reason_name(first.reason), ", id ", first.id, "; all_or_nothing refuses all ",
-                                      result.ack.refused, " wrong items and the batch with them"));
+  return refuse_argument(
+      first.reason, first.field, first.index,
+      absl::StrCat(reason_name(first.reason), ", id ", first.id, "; all_or_nothing refuses the batch because of ",
+                   result.ack.refused, " refused items"));
 }
 
 absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_moves(const UpdateBatch& batch) {
@@ -168,7 +174,8 @@ SceneWriter::Joined SceneWriter::apply_joined(absl::Span<const UpdateBatch* cons
     ack.applied = moves_.applied();
     ack.refused = moves_.refused();
     ack.errors = std::move(moves_.errors());
-    // Record the ack now: a later batch of `batches` may be the next one of this writer, or a duplicate.
+    // Record the ack now: a later batch in `batches` may be the next batch of this writer, or a duplicate of this
+    // batch.
     writers_.record(batch->writer, batch->batch, ack);
   }
   moves_.finish(objects_);
@@ -176,8 +183,9 @@ SceneWriter::Joined SceneWriter::apply_joined(absl::Span<const UpdateBatch* cons
   for (size_t i = 0; i < batches.size(); ++i)
     if (is_new[i]) record_ack(*batches[i], *joined.acks[i]);
   for (size_t i = 0; i < batches.size(); ++i)
-    if (!is_new[i] && joined.acks[i].ok()) joined.acks[i] = old_ack(*batches[i]);
-  check_invariants();
+    if (!is_new[i] && joined.acks[i].ok())  // this batch may repeat one of `batches`, whose ack is complete only now
+      joined.acks[i] = old_ack(**writers_.admit(batches[i]->writer, batches[i]->batch));
+  LOCUS_DCHECK_CALL(check_invariants());
   return joined;
 }
 
@@ -208,10 +216,9 @@ void SceneWriter::record_ack(const UpdateBatch& batch, UpdateAck& ack) {
   writers_.record(batch.writer, batch.batch, ack);
 }
 
-UpdateAck SceneWriter::old_ack(const UpdateBatch& batch) const {
-  UpdateAck ack = **writers_.admit(batch.writer, batch.batch);
-  if (ack.epoch != 0) return ack;
-  ack = ack_now();
+UpdateAck SceneWriter::old_ack(UpdateAck known) const {
+  if (known.epoch != 0) return known;
+  UpdateAck ack = ack_now();
   ack.duplicate = true;
   return ack;
 }
@@ -228,7 +235,7 @@ void SceneWriter::start_tick(const UpdateBatch& batch) {
     recorder_.drop();
     return objects_.start_tick(tick, std::numeric_limits<uint64_t>::max());
   }
-  LOCUS_DCHECK(published_ != nullptr);  // snapshots are never deferred with history
+  LOCUS_DCHECK(published_ != nullptr);  // a scene with history never defers snapshots
   recorder_.close(tick_, published_->objects, objects_.displacement(), tick);
   objects_.start_tick(tick, recorder_.oldest_tick(tick));
 }

@@ -35,24 +35,28 @@ class SceneWriter {
     UpdateAck ack;
     SnapshotPtr snapshot;  // null when nothing changed
   };
-  // Applies one batch. Precondition: it has passed check_form(). The ack lists refused items; with all_or_nothing, one
-  // refused item refuses the whole batch. RESOURCE_EXHAUSTED if the scene would have too many objects;
-  // FAILED_PRECONDITION BATCH_GAP if an earlier batch of the writer is missing.
+  // Applies one batch. Precondition: the batch has passed check_form(). The ack lists refused items; with
+  // all_or_nothing, one refused item refuses the whole batch. RESOURCE_EXHAUSTED if the scene would have too many
+  // objects; FAILED_PRECONDITION BATCH_GAP if an earlier batch of the writer is missing.
   absl::StatusOr<Applied> apply(const UpdateBatch& batch);
 
   struct Joined {
     std::vector<absl::StatusOr<UpdateAck>> acks;  // one entry for each batch
     SnapshotPtr snapshot;                         // null when nothing changed
   };
-  // Applies the batches in order, as one revision. Preconditions: each batch has passed check_form(), and each
-  // may_join() the first.
+  // Applies the batches in order, as one revision. Preconditions: each batch has passed check_form(), and may_join() is
+  // true for the first batch and each other batch.
   Joined apply_joined(absl::Span<const UpdateBatch* const> batches);
 
   // Makes the next revision, which has the instances `statics`, and returns its snapshot.
   SnapshotPtr replace_statics(std::shared_ptr<const StaticSet> statics);
 
-  // Begins replay. If the scene has no history, no snapshots are built until end_replay(): then apply(), apply_joined()
-  // and replace_statics() return null snapshots, and published() must not be called.
+  // Drops the oldest records of the history until the rest takes at most `bytes`. Returns a snapshot of the current
+  // revision with the shorter history, or null if no record was dropped.
+  SnapshotPtr trim_history(uint64_t bytes);
+
+  // Begins replay. If the scene has no history, no snapshots are built until end_replay(). Until then, apply(),
+  // apply_joined() and replace_statics() return null snapshots. published() must not be called during any replay.
   void begin_replay() {
     LOCUS_DCHECK(!replaying_);
     replaying_ = true;
@@ -69,8 +73,8 @@ class SceneWriter {
   }
   uint64_t epoch() const { return epoch_; }
   const WriterTable& writers() const { return writers_; }
-  // Returns true if a batch with restart_ticks would end a history. Such a batch makes a revision even if it changes
-  // nothing else.
+  // Returns true if a batch with restart_ticks would end the scene's history: see HistoryRecorder::has_past(). Such a
+  // batch makes a revision even if it changes nothing else.
   bool has_past() const { return recorder_.has_past(); }
 
   bool is_object(Id id) const { return objects_.handle(id) != ObjectStore::kNoHandle; }
@@ -82,8 +86,8 @@ class SceneWriter {
   SnapshotPtr freeze();
   SnapshotPtr next_revision();
   UpdateAck ack_now() const;
-  // Moves the counts and errors of `applier` into the ack of `result`. Returns the refusal of the batch if the batch is
-  // all_or_nothing and an item was refused.
+  // Moves the counts and errors of `applier` into the ack of `result`. Returns an error if the batch is all_or_nothing
+  // and an item was refused.
   template <class Applier>
   static absl::Status fill_ack(const UpdateBatch& batch, Applier& applier, Applied& result);
   // Applies a batch for which MoveApplier::serves() returns true.
@@ -91,25 +95,27 @@ class SceneWriter {
   // Applies the moves that moves_ has read, at the tick of `batch`. Returns the new snapshot, or null if nothing
   // changed.
   SnapshotPtr publish_moves(const UpdateBatch& batch);
-  // Returns true during a replay that builds no snapshots. A scene with history builds them during replay, too, because
-  // history records are made from them.
+  // Returns true during a replay that builds no snapshots. A scene with history builds snapshots during replay, too,
+  // because history records are made from snapshots.
   bool defer_snapshots() const { return replaying_ && !recorder_.on(); }
   // Applies the moves in moves_ to objects_, or adds them to coalesced_moves_ if snapshots are deferred. Returns true
-  // if they change an object.
+  // if the moves change an object.
   bool apply_staged_moves();
   // Applies coalesced_moves_ to objects_ and clears them.
   void flush_coalesced_moves();
-  // Stamps the current epoch, revision and tick on the ack of an applied batch and stores it in the writer table.
+  // Sets the epoch, revision and tick of the ack of an applied batch to the current values, and stores the ack in the
+  // writer table.
   void record_ack(const UpdateBatch& batch, UpdateAck& ack);
-  // Returns the stored ack of a duplicate batch; if it was dropped, an ack with the current revision.
-  UpdateAck old_ack(const UpdateBatch& batch) const;
+  // Returns the ack of a duplicate batch: `known`, which the writer table returned, or, if the table has dropped the
+  // ack, an ack with the current revision.
+  UpdateAck old_ack(UpdateAck known) const;
   // Applies a batch of any kind with BatchApplier.
   absl::StatusOr<Applied> apply_changes(const UpdateBatch& batch);
   // Returns true if the batch drops history.
   bool drops_history(const UpdateBatch& batch) const { return batch.restart_ticks && has_past(); }
   // Returns the scene's tick once the batch is applied.
   uint64_t tick_of(const UpdateBatch& batch) const;
-  // Ends the current tick if the batch begins another one: adds the state at the end of the current tick to the
+  // Ends the current tick if the batch begins another tick: adds the state at the end of the current tick to the
   // history, or drops the history if the batch restarts ticks. Does nothing for a scene without history. Call before
   // the batch is applied.
   void start_tick(const UpdateBatch& batch);
@@ -128,7 +134,7 @@ class SceneWriter {
   CoalescedMoves coalesced_moves_;  // not yet applied to objects_; empty unless defer_snapshots()
   WriterTable writers_;
   HistoryRecorder recorder_;
-  uint64_t replaced_bytes_ = 0;  // memory of objects and statics replaced so far
+  uint64_t replaced_bytes_ = 0;  // bytes of objects and instances that revisions have replaced so far
   bool replaying_ = false;
   SnapshotPtr published_;
 };

@@ -27,7 +27,7 @@ void read_labels(ByteReader& reader, SceneSpec& spec) {
 std::string encode_spec(const SceneSpec& spec) {
   std::string bytes;
   ByteWriter writer(bytes);
-  write_kind(writer, BytesKind::kSceneSpec);
+  write_kind(writer, spec.creator.empty() ? BytesKind::kSceneSpec : BytesKind::kOwnedSpec);
   writer.number(static_cast<uint64_t>(spec.winding));
   writer.number(uint64_t{spec.history.ticks});
   writer.number(spec.history.bytes);
@@ -39,6 +39,7 @@ std::string encode_spec(const SceneSpec& spec) {
     writer.text(key);
     writer.text(value);
   }
+  if (!spec.creator.empty()) writer.text(spec.creator);
   return bytes;
 }
 
@@ -46,14 +47,17 @@ absl::StatusOr<SceneSpec> decode_spec(absl::string_view bytes) {
   const AlignedBytes aligned(bytes);
   ByteReader reader(aligned.bytes());
   SceneSpec spec;
-  if (read_kind(reader) != BytesKind::kSceneSpec) reader.fail("the kind of a specification", "is not known");
+  const BytesKind kind = read_kind(reader);
+  if (kind != BytesKind::kSceneSpec && kind != BytesKind::kOwnedSpec)
+    reader.fail("the kind of a specification", "is not known");
   spec.winding = read_enum(reader, Winding::kClockwise, "the winding");
-  spec.history.ticks = static_cast<uint32_t>(reader.number_upto(limits::kMaxHistoryTicks, "the ticks of the past"));
-  spec.history.bytes = reader.number_upto(limits::kMaxHistoryBytes, "the bytes of the past");
+  spec.history.ticks = static_cast<uint32_t>(reader.number_upto(limits::kMaxHistoryTicks, "the ticks of the history"));
+  spec.history.bytes = reader.number_upto(limits::kMaxHistoryBytes, "the bytes of the history");
   spec.pinned_bytes = reader.number("pinned_bytes");
   spec.overload = read_enum(reader, OverloadPolicy::kLatestWins, "the overload policy");
   spec.durability = read_enum(reader, Durability::kMemory, "the durability");
   read_labels(reader, spec);
+  if (kind == BytesKind::kOwnedSpec) spec.creator = std::string(reader.text(limits::kMaxCreatorLength, "the creator"));
   reader.end("a specification");
   if (!reader.good()) return reader.status();
   return spec;

@@ -1,5 +1,5 @@
 // Generates manual pages from a parser's texts: one for a program and one for each of its commands. Exit statuses and
-// environment variables, which the parser does not have, are given as a Manual. Used by write_manual.cc.
+// environment variables, which are not in the parser, are passed as a Manual. Used by write_manual.cc.
 #ifndef LOCUS_DEPLOY_MANUAL_MANUAL_PAGE_H_
 #define LOCUS_DEPLOY_MANUAL_MANUAL_PAGE_H_
 

@@ -12,7 +12,7 @@ std::string escaped(const std::string& text) {
   std::string roff;
   bool line_begins = true;
   for (const char c : text) {
-    // roff takes a line that begins with one of these characters as a command.
+    // roff interprets a line that begins with one of these characters as a command.
     if (line_begins && (c == '.' || c == '\'')) absl::StrAppend(&roff, "\\&");
     switch (c) {
       case '\\':

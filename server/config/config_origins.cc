@@ -17,7 +17,7 @@ namespace locus::server {
 namespace {
 
 // Returns the numbers of the lines in the file `path` that set the option `name`, as text such as "3" or "3,7"; empty
-// if no line does.
+// if no line sets the option.
 std::string lines_that_set(const std::string& path, const std::string& name) {
   std::ifstream file(path);
   std::string lines;
@@ -32,7 +32,8 @@ std::string lines_that_set(const std::string& path, const std::string& name) {
 // Returns the option's value as text. The parser was built over `config`, which holds the values in use, so CLI11 shows
 // these values as the defaults of the options.
 std::string value_of(const CLI::Option& option, const ServerConfig& config) {
-  if (option.get_expected_max() == 0) return config.insecure ? "true" : "false";  // the only flag without a value
+  // --insecure is the only flag without a value.
+  if (option.get_expected_max() == 0) return config.insecure ? "true" : "false";
   const std::string text = option.get_default_str();
   absl::string_view list = text;  // CLI11 prints several values as a list in brackets
   if (absl::ConsumePrefix(&list, "[") && absl::ConsumeSuffix(&list, "]")) return std::string(list);
@@ -51,7 +52,7 @@ Given read_flags(const std::vector<std::string>& arguments, const Environment& e
   Given given;
   CLI::App app;
   build_parser(app, ignored);
-  app.set_config();  // do not read the file
+  app.set_config();  // a config file is not read
   app.add_option("--config", given.file);
   std::optional<Maintenance> ignored_command;
   add_maintenance(app, ignored_command);

@@ -1,5 +1,5 @@
-// Lists the options that the daemon would run with, and the origin of each value, without running it. For operators who
-// ask why a daemon behaves as it does. Functions without state; any thread.
+// Lists the options that the daemon would run with, and the origin of each value, without running the daemon. The list
+// shows operators why a daemon behaves as it does. Functions without state; any thread.
 #ifndef LOCUS_SERVER_CONFIG_CONFIG_ORIGINS_H_
 #define LOCUS_SERVER_CONFIG_CONFIG_ORIGINS_H_
 
@@ -19,20 +19,21 @@ struct ConfigValue {
   std::string name;   // name of the option, without dashes
   std::string value;  // value in use, also for defaults that are computed from the machine
   Origin origin = Origin::kDefault;
-  std::string place;  // the flag, the variable, path:line, or empty for a default
+  std::string place;  // where the value is set: the flag, the variable, or path:line of the file; empty for a default
 };
 
-// Returns every option, in the order of the help. `arguments` are as for read_invocation(). If the daemon would refuse
-// to run, returns INVALID_ARGUMENT with the text that it would print.
+// Returns every option, in the order of the help. `arguments` are those of the command line, without the program's
+// name. If the daemon would refuse to run, returns INVALID_ARGUMENT with the text that the daemon would print.
 absl::StatusOr<std::vector<ConfigValue>> config_origins(const std::vector<std::string>& arguments,
                                                         const Environment& environment);
 
-// Returns every option, as config_origins() does, for options that have already been read and checked: `config` is the
-// result of reading `arguments` and `environment`. Ignores a command among the arguments.
+// Returns every option, in the order of the help, with its value in `config`, which must be the result of
+// read_invocation() for `arguments` and `environment`. Ignores a command among the arguments, such as `config`.
 std::vector<ConfigValue> config_values(const std::vector<std::string>& arguments, const Environment& environment,
                                        const ServerConfig& config);
 
-// Returns a table with one option a line or, as JSON, one object {"options": [{"option", "value", "origin", "place"}]}.
+// Returns `values` as a table with one option a line or, if `json` is true, as the JSON object
+// {"options": [{"option", "value", "origin", "place"}]}.
 std::string print_config(const std::vector<ConfigValue>& values, bool json);
 
 }  // namespace locus::server

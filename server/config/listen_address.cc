@@ -68,4 +68,15 @@ std::string to_string(const ListenAddress& address, uint16_t port) {
   return absl::StrCat(address.host, ":", port);
 }
 
+absl::StatusOr<uint32_t> parse_unix_mode(absl::string_view text) {
+  uint32_t mode = 0;
+  bool good = text.size() == 3 || (text.size() == 4 && text.front() == '0');
+  for (const char digit : text) {
+    good = good && digit >= '0' && digit <= '7';
+    mode = mode * 8 + static_cast<uint32_t>(digit - '0');
+  }
+  if (good) return mode;
+  return absl::InvalidArgumentError(absl::StrCat("--unix-mode `", text, "` is not octal; write for example 0660"));
+}
+
 }  // namespace locus::server

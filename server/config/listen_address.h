@@ -1,5 +1,5 @@
-// Address that the daemon listens on, as an operator writes it: a TCP address or the path of a unix socket. Plain data,
-// made by parse_listen_address() only.
+// Address that the daemon listens on, as an operator writes it: a TCP address or the path of a unix socket. Plain data;
+// only parse_listen_address() constructs it.
 #ifndef LOCUS_SERVER_CONFIG_LISTEN_ADDRESS_H_
 #define LOCUS_SERVER_CONFIG_LISTEN_ADDRESS_H_
 
@@ -14,18 +14,21 @@ namespace locus::server {
 struct ListenAddress {
   enum class Kind : uint8_t { kTcp, kUnix };
   Kind kind = Kind::kTcp;
-  std::string host;   // without brackets; empty for unix
+  std::string host;   // without brackets; empty for a unix socket
   uint16_t port = 0;  // 0 = any free port
-  std::string path;   // unix sockets only
-  bool local = true;  // reachable from this machine only: a loopback address or a unix socket
+  std::string path;   // path of a unix socket; empty for TCP
+  bool local = true;  // whether only this machine can reach the address: a loopback address or a unix socket
 };
 
 // Parses `host:port`, `[v6]:port` or `unix:/path`. A host name other than localhost is not local, because it may
-// resolve to another address later. Returns INVALID_ARGUMENT with the reason and an example.
+// resolve to another address later. For an invalid text returns INVALID_ARGUMENT with the reason and an example.
 absl::StatusOr<ListenAddress> parse_listen_address(absl::string_view text);
 
 // Returns the address in the form that parse_listen_address() reads, with `port` instead of the address's own port.
 std::string to_string(const ListenAddress& address, uint16_t port);
+
+// Parses the permissions of a unix socket, three or four octal digits. Returns INVALID_ARGUMENT for others.
+absl::StatusOr<uint32_t> parse_unix_mode(absl::string_view text);
 
 }  // namespace locus::server
 

@@ -23,7 +23,7 @@ constexpr const char* kGroups = "/sys/fs/cgroup";
 // Maximum nesting depth of control groups. More deeply nested groups are not read.
 constexpr int kMaxDepth = 64;
 
-// Returns the words of a file's first line; none if it cannot be read.
+// Returns the words of a file's first line; no words if the file cannot be read.
 std::vector<std::string> first_line(const std::string& path) {
   std::string line;
   std::ifstream file(path);
@@ -51,7 +51,7 @@ std::optional<uint32_t> cores_of(std::optional<uint64_t> quota, std::optional<ui
 // Calls `visit` with the folder of the control group `group` below `top`, then with the folder of each group above it,
 // ending with `top`.
 void climb(const std::string& top, std::string group, const std::function<void(const std::string&)>& visit) {
-  if (absl::StrContains(group, "..")) group.clear();  // it lies outside of the groups that this process sees
+  if (absl::StrContains(group, "..")) group.clear();  // the group is outside of the groups that this process sees
   for (int depth = 0; depth < kMaxDepth && group.size() > 1; ++depth) {
     visit(absl::StrCat(top, group));
     group.resize(std::min(group.find_last_of('/'), group.size() - 1));

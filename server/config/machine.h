@@ -1,6 +1,6 @@
 // Processor cores and memory that this process may use, limited by its affinity and by the control groups (version 1 or
-// 2) that it runs in. For the defaults of an operator's options. Plain data, read once; the functions may be called
-// from any thread.
+// 2) that it runs in. The defaults of the options `threads` and `memory-limit` are derived from these numbers. Plain
+// data, read once; the functions may be called from any thread.
 #ifndef LOCUS_SERVER_CONFIG_MACHINE_H_
 #define LOCUS_SERVER_CONFIG_MACHINE_H_
 
@@ -10,14 +10,15 @@
 
 namespace locus::server {
 
+// Limits of the control groups of this process; no value if no group sets the limit.
 struct CgroupLimits {
-  std::optional<uint32_t> cores;         // CPU quota / period, rounded up to whole cores, at least 1
-  std::optional<uint64_t> memory_bytes;  // minimum over the group and all groups above it
+  std::optional<uint32_t> cores;         // CPU quota divided by its period, rounded up to whole cores, at least 1
+  std::optional<uint64_t> memory_bytes;  // minimum of the limits of the group and all groups above it
 };
 
-// Returns the limits of the groups that `root`/proc/self/cgroup names, read from `root`/sys/fs/cgroup. If a group is
-// missing there, as in a container that sees its own group as the topmost, the groups above it are used. A file that
-// cannot be read sets no limit. `root` is empty for the machine itself.
+// Returns the limits of the groups that the file `root`/proc/self/cgroup lists, read from `root`/sys/fs/cgroup. `root`
+// is empty for this machine; tests pass a folder. If the folder of a group is missing, uses the groups above it: this
+// happens in a container, which sees its own group as the topmost group. A file that cannot be read sets no limit.
 CgroupLimits read_cgroup_limits(const std::string& root);
 
 struct Machine {
@@ -25,7 +26,8 @@ struct Machine {
   uint64_t memory_bytes = 0;  // memory of the machine, or of the control group if that is less
 };
 
-// Returns the number of cores in the affinity mask, but at most the cores of the control group's quota, and the memory.
+// Returns the number of cores and the memory that this process may use. The number of cores is the number in the
+// affinity mask or the control group's quota, whichever is less.
 Machine read_machine();
 
 }  // namespace locus::server

@@ -10,10 +10,12 @@
 #include "absl/strings/ascii.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "absl/strings/str_replace.h"
 #include "core/base/check.h"
 #include "core/base/status_macros.h"
 #include "server/config/config_origins.h"
+#include "server/config/connection_limits.h"
 #include "server/config/listen_address.h"
 #include "server/config/machine.h"
 #include "server/config/observability_limits.h"
@@ -23,11 +25,13 @@
 namespace locus::server {
 namespace {
 
+constexpr absl::string_view kListen = "--listen";
+
 constexpr const char* kDescription =
     "locusd hosts scenes of static meshes and moving objects, and answers exact batched\n"
     "ray, ball and box queries over gRPC (locus.v1) while updates stream in.\n"
-    "With --data-dir scenes outlive it, every acknowledged update included; without,\n"
-    "they live in memory and are gone when the daemon ends.";
+    "With --data-dir, scenes and every acknowledged update survive a restart; without it,\n"
+    "scenes are in memory only and are lost when the daemon ends.";
 
 constexpr const char* kFooter = R"(Every option can also be set by the environment or by the file that --config
 names: --drain-grace-s 5, LOCUS_DRAIN_GRACE_S=5 and the line `drain-grace-s = 5`
@@ -38,13 +42,16 @@ Examples:
   locusd --listen unix:/run/locus/locus.sock  serve this machine over a unix socket
   locusd --listen 127.0.0.1:0 --port-file p   take a free port and write it to the file p
   locusd --data-dir /var/lib/locus            keep scenes, and every acknowledged update
-  locusd check /var/lib/locus                 say whether what is kept there is sound
+  locusd --listen 0.0.0.0:7575 --tls-cert server.crt --tls-key server.key \
+    --access-file access.conf                 serve other machines
+  locusd check /var/lib/locus                 verify the data directory
   locusd config --config /etc/locus/locusd.conf   print the options in use, and their origin
   locusd --config /etc/locus/locusd.conf --log-format json
 
 Try it: locus health; locus limits; locus scene create demo; locus top
-/metrics, /healthz and /readyz are served on 127.0.0.1:7576. What it would run with
-and why: locusd config
+/metrics, /healthz and /readyz are served on 127.0.0.1:7576, over TLS with --tls-cert;
+with access control, /metrics needs a token or certificate with the right `metrics`.
+What it would run with and why: locusd config
 It ends on SIGTERM or SIGINT once calls in work are done, with exit code 0; a
 second signal ends it at once.)";
 
@@ -55,28 +62,66 @@ std::string name_of(const std::map<std::string, T>& names, T value) {
   return "";
 }
 
-// Returns whether `text` is 0 or in min .. max. CLI11 has already converted a size such as 16MiB to a plain number.
-bool is_size(const std::string& text, uint64_t min, uint64_t max) {
-  LOCUS_DCHECK_LE(min, max);
-  uint64_t bytes = 0;
-  return absl::SimpleAtoi(text, &bytes) && (bytes == 0 || (bytes >= min && bytes <= max));
+enum class ZeroBytes : uint8_t { kAllowed, kRefused };
+
+// Returns a validator of sizes from `min` bytes to limits::kMaxMemory, and 0 if it is allowed. `min_text` is `min` in
+// the error. CLI11 has already converted a size such as 16MiB to a plain number.
+CLI::Validator size_from(uint64_t min, const char* min_text, ZeroBytes zero) {
+  const auto check = [min, min_text, zero](const std::string& text) -> std::string {
+    uint64_t bytes = 0;
+    const bool is_number = absl::SimpleAtoi(text, &bytes);
+    if (is_number && bytes >= min && bytes <= limits::kMaxMemory) return "";
+    if (zero == ZeroBytes::kRefused) return absl::StrCat(text, " bytes is not in ", min_text, " .. 1PiB");
+    return is_number && bytes == 0 ? "" : absl::StrCat(text, " bytes is neither 0 nor in ", min_text, " .. 1PiB");
+  };
+  return CLI::Validator(check, "");
 }
 
-std::string check_memory(const std::string& text) {
-  const bool good = is_size(text, limits::kMinMemory, limits::kMaxMemory);
-  return good ? "" : absl::StrCat(text, " bytes is neither 0 nor in 64MiB .. 1PiB");
+void add_connection_options(CLI::App& app, ServerConfig& config) {
+  app.add_option("--unix-mode", config.unix_mode, "Permissions of unix sockets, in octal")->capture_default_str();
+  app.add_option("--unix-owner", config.unix_owner, "Owner of unix sockets: user or user:group")->capture_default_str();
+  app.add_option("--max-connections", config.max_connections,
+                 "Maximum number of connections; 0 = 4096, or fewer if few files may be open")
+      ->check(CLI::Range(0u, kMaxConnections))
+      ->capture_default_str();
+  app.add_option("--max-connections-per-address", config.max_connections_per_address,
+                 "Maximum number of connections from one address, or from one user of a unix socket")
+      ->check(CLI::Range(1u, kMaxConnections))
+      ->capture_default_str();
+  app.add_option("--max-new-connections", config.max_new_connections,
+                 "Maximum number of new connections a second from one address")
+      ->check(CLI::Range(1u, kMaxNewConnections))
+      ->capture_default_str();
+  app.add_option("--handshake-timeout-s", config.handshake_timeout_s,
+                 "Seconds that a client may take to begin TLS and HTTP/2")
+      ->check(CLI::Range(1u, kMaxTimeoutS))
+      ->capture_default_str();
+  app.add_option("--idle-timeout-s", config.idle_timeout_s,
+                 "Seconds after which a connection without open calls is closed; 0 = never")
+      ->check(CLI::Range(0u, kMaxTimeoutS))
+      ->capture_default_str();
 }
 
-std::string check_pinned(const std::string& text) {
-  const bool good = is_size(text, limits::kMinPinnedBytes, limits::kMaxMemory);
-  return good ? "" : absl::StrCat(text, " bytes is neither 0 nor in 1MiB .. 1PiB");
-}
-
-std::string check_snapshot_after(const std::string& text) {
-  uint64_t bytes = 0;
-  const bool good =
-      absl::SimpleAtoi(text, &bytes) && bytes >= limits::kMinSnapshotAfterBytes && bytes <= limits::kMaxMemory;
-  return good ? "" : absl::StrCat(text, " bytes is not in 64KiB .. 1PiB");
+void add_security_options(CLI::App& app, ServerConfig& config) {
+  const auto add_text = [&app](const char* name, std::string& value, const char* what) {
+    app.add_option(name, value, what)->capture_default_str();
+  };
+  add_text("--tls-cert", config.tls_cert,
+           "File of the server's certificate chain (PEM); with it, TCP connections use TLS");
+  add_text("--tls-key", config.tls_key, "File of the certificate's key (PEM)");
+  add_text("--tls-client-ca", config.tls_client_ca,
+           "File of CA certificates (PEM); every client needs a certificate that one of them signed");
+  add_text("--access-file", config.access_file, "File that says who may call what");
+  add_text("--token-file", config.token_file, "File of the tokens that identify clients");
+  add_text("--jwks-file", config.jwks_file, "File of the keys (JWKS) that sign clients' tokens (JWT)");
+  add_text("--jwt-audience", config.jwt_audience, "Value that the claim aud of a JWT must have");
+  add_text("--jwt-issuer", config.jwt_issuer, "Value that the claim iss of a JWT must have");
+  add_text("--audit-file", config.audit_file,
+           "File to write changing calls to, as JSON lines; refused calls are written to FILE.refused");
+  app.add_option("--audit-bytes", config.audit_bytes, "Size at which a new audit file is begun, such as 64MiB")
+      ->transform(CLI::AsSizeValue(false).description("SIZE"))
+      ->check(size_from(kMinAuditBytes, "64KiB", ZeroBytes::kRefused))
+      ->capture_default_str();
 }
 
 // Adds all options to the parser, which keeps pointers into `config` and writes the parsed values there.
@@ -98,9 +143,10 @@ void add_options(CLI::App& app, ServerConfig& config) {
   app.add_option("--snapshot-after", config.snapshot_after,
                  "Size of a scene's log after which a snapshot replaces it, such as 16MiB")
       ->transform(CLI::AsSizeValue(false).description("SIZE"))
-      ->check(CLI::Validator(check_snapshot_after, ""))
+      ->check(size_from(limits::kMinSnapshotAfterBytes, "64KiB", ZeroBytes::kRefused))
       ->capture_default_str();
-  app.add_option("--threads", config.threads, "Threads that may work on one batch; 0 = the cores it may use")
+  app.add_option("--threads", config.threads,
+                 "Threads that may work on one batch; 0 = the cores that the process may use")
       ->check(CLI::Range(0u, limits::kMaxThreads))
       ->capture_default_str();
   const std::map<std::string, BatchPriority> priorities = {{"nice", BatchPriority::kNice},
@@ -110,7 +156,7 @@ void add_options(CLI::App& app, ServerConfig& config) {
       ->transform(CLI::CheckedTransformer(priorities).description(""))
       ->default_str(name_of(priorities, config.batch_priority));
   app.add_option("--instruction-set", config.instruction_set,
-                 "Vector instructions of queries: avx2, sse4 or portable [the widest there are]")
+                 "Vector instructions of queries: avx2, sse4 or portable [the widest of the processor]")
       ->capture_default_str();
   const std::map<std::string, LogLevel> levels = {{"debug", LogLevel::kDebug},
                                                   {"info", LogLevel::kInfo},
@@ -131,24 +177,30 @@ void add_options(CLI::App& app, ServerConfig& config) {
     app.add_option(name, value, what)->check(CLI::Range(1u, value))->capture_default_str();
   };
   add_limit("--max-receive-bytes", config.max_receive_bytes, "Largest message that is received");
+  app.add_flag("--accept-compression", config.accept_compression,
+               "Accept messages that are compressed with gzip, inflated up to --max-receive-bytes");
   add_limit("--max-scenes", config.max_scenes, "Maximum number of scenes");
   add_limit("--max-meshes", config.max_meshes, "Maximum number of meshes");
-  add_limit("--max-streams", config.max_streams, "Maximum number of open update and query streams");
-  add_limit("--max-calls", config.max_calls, "Maximum number of calls at once, without streams");
+  add_limit("--max-streams", config.max_streams,
+            "Maximum number of open streams of one client; all together may have a third more");
+  add_limit("--max-calls", config.max_calls,
+            "Maximum number of calls of one client at once, without streams; all together may have a third more");
   app.add_option("--memory-limit", config.memory_limit,
-                 "Memory to hold before more is refused, such as 512MiB; 0 = 3/4 of what there is")
+                 "Memory in use before uploads and inserts are refused, such as 512MiB; 0 = 3/4 of all")
       ->transform(CLI::AsSizeValue(false).description("SIZE"))
-      ->check(CLI::Validator(check_memory, ""))
+      ->check(size_from(limits::kMinMemory, "64MiB", ZeroBytes::kAllowed))
       ->capture_default_str();
   app.add_option("--pinned-limit", config.pinned_limit,
-                 "Replaced memory that readers may hold, per scene; 0 = 256MiB or 4 times the scene")
+                 "Replaced data that readers may keep, per scene; 0 = 256MiB or 4 times the scene")
       ->transform(CLI::AsSizeValue(false).description("SIZE"))
-      ->check(CLI::Validator(check_pinned, ""))
+      ->check(size_from(limits::kMinPinnedBytes, "1MiB", ZeroBytes::kAllowed))
       ->capture_default_str();
-  app.add_option("--drain-grace-s", config.drain_grace_s, "Seconds that calls in work may take after SIGTERM")
+  app.add_option("--drain-grace-s", config.drain_grace_s, "Seconds that running calls may take after SIGTERM")
       ->check(CLI::Range(0u, limits::kMaxDrainGraceS))
       ->capture_default_str();
-  app.add_flag("--insecure", config.insecure, "Listen beyond this machine without encryption or passwords");
+  add_connection_options(app, config);
+  add_security_options(app, config);
+  app.add_flag("--insecure", config.insecure, "Listen beyond this machine without encryption or access control");
 }
 
 void describe(CLI::App& app) {
@@ -166,8 +218,8 @@ void parse(CLI::App& app, std::vector<std::string> arguments) {
 }
 
 // Returns `arguments` with options of the environment added as flags. In CLI11 the file wins over the environment; here
-// the environment must win. So this parses the flags alone, and adds every option that the environment sets and no flag
-// does; the file then only sets the remaining options.
+// the environment must win. So this function parses the flags alone, and adds every option that the environment sets
+// but no flag sets. The file then sets only the remaining options.
 std::vector<std::string> with_environment(const std::vector<std::string>& arguments, const Environment& environment) {
   ServerConfig ignored;
   std::string ignored_file;
@@ -199,14 +251,36 @@ void follow_machine(ServerConfig& config) {
   LOCUS_DCHECK_LE(config.threads, limits::kMaxThreads);
 }
 
-absl::Status reachable_from_outside(absl::string_view address) {
+// Returns an error unless `config` has all that an address needs that other machines can reach. `option` is the option
+// of the address, `exposed` says what anyone there could do.
+absl::Status check_protected(const ServerConfig& config, absl::string_view option, absl::string_view address,
+                             absl::string_view exposed) {
+  std::vector<std::string> missing;
+  std::string command = absl::StrCat("locusd ", option, " ", address);
+  const auto need = [&](const char* flag, const std::string& value, const char* example) {
+    absl::StrAppend(&command, " ", flag, " ", value.empty() ? example : value);
+    if (value.empty()) missing.emplace_back(flag);
+  };
+  need("--tls-cert", config.tls_cert, "server.crt");
+  need("--tls-key", config.tls_key, "server.key");
+  need("--access-file", config.access_file, "access.conf");
+  if (missing.empty()) return absl::OkStatus();
   return absl::InvalidArgumentError(absl::StrCat(
-      "`", address,
-      "` can be reached from other machines, but this version has neither TLS nor passwords: anyone there could read ",
-      "and change every scene. There are two ways out:\n",
+      "`", address, "` can be reached from other machines, so it needs TLS and an access file; missing: ",
+      absl::StrJoin(missing, ", "), ". For example:\n  ", command, "\nWithout them anyone there could ", exposed,
+      ". There are two other ways:\n",
       "  1. Where only trusted machines reach it, such as a container whose port is published on its host's 127.0.0.1 ",
-      "only, say so with LOCUS_INSECURE=1 or --insecure.\n",
-      "  2. Otherwise listen on 127.0.0.1, [::1] or a unix socket, and put a proxy in front that ends TLS."));
+      "only, say so with LOCUS_INSECURE=1 or --insecure.\n", "  2. Otherwise listen on ",
+      option == kListen ? "127.0.0.1, [::1] or a unix socket." : "127.0.0.1 or [::1]."));
+}
+
+absl::Status check_tls(const ServerConfig& config) {
+  if (config.tls_cert.empty() != config.tls_key.empty())
+    return absl::InvalidArgumentError("--tls-cert and --tls-key belong together; give both or none");
+  if (!config.tls_client_ca.empty() && config.tls_cert.empty())
+    return absl::InvalidArgumentError(
+        "--tls-client-ca needs --tls-cert and --tls-key, because only TLS has certificates");
+  return absl::OkStatus();
 }
 
 absl::Status check_http(const ServerConfig& config) {
@@ -216,9 +290,9 @@ absl::Status check_http(const ServerConfig& config) {
   }
   ASSIGN_OR_RETURN(const ListenAddress address, parse_listen_address(config.http_listen));
   if (address.kind != ListenAddress::Kind::kTcp)
-    return absl::InvalidArgumentError("--http-listen takes host:port or [v6]:port, for scrapers speak TCP");
-  if (!address.local && !config.insecure) return reachable_from_outside(config.http_listen);
-  return absl::OkStatus();
+    return absl::InvalidArgumentError("--http-listen takes host:port or [v6]:port, because scrapers use TCP");
+  if (address.local || config.insecure) return absl::OkStatus();
+  return check_protected(config, "--http-listen", config.http_listen, "read the names of scenes and how they are used");
 }
 
 Invocation mistake(absl::string_view message) {
@@ -228,9 +302,8 @@ Invocation mistake(absl::string_view message) {
   return invocation;
 }
 
-// Parses and checks the command line. May throw CLI11's errors.
-Invocation parse_all(const std::vector<std::string>& arguments, const Environment& environment) {
-  Invocation invocation;
+// Parses and checks the command line into `invocation`. May throw CLI11's errors.
+void parse_all(const std::vector<std::string>& arguments, const Environment& environment, Invocation& invocation) {
   ServerConfig config;
   CLI::App app;
   build_parser(app, config);
@@ -240,17 +313,20 @@ Invocation parse_all(const std::vector<std::string>& arguments, const Environmen
   if (invocation.maintenance && !show_config) {
     std::string& directory = invocation.maintenance->directory;
     if (directory.empty()) directory = config.data_dir;
-    return directory.empty() ? mistake("which directory? Name it after the command, or with --data-dir") : invocation;
+    if (directory.empty()) invocation = mistake("no data directory: name it after the command, or with --data-dir");
+    return;
   }
-  if (const absl::Status status = check_config(config); !status.ok()) return mistake(status.message());
+  if (const absl::Status status = check_config(config); !status.ok()) {
+    invocation = mistake(status.message());
+    return;
+  }
   follow_machine(config);
   if (show_config) {
     invocation.text = print_config(config_values(arguments, environment, config), invocation.maintenance->json);
     invocation.maintenance.reset();
-    return invocation;
+    return;
   }
   invocation.config = std::move(config);
-  return invocation;
 }
 
 Invocation help(const std::vector<std::string>& arguments) {
@@ -284,19 +360,20 @@ void add_maintenance(CLI::App& app, std::optional<Maintenance>& chosen) {
   };
   constexpr Command kCommands[] = {
       {"check", Maintenance::Task::kCheck,
-       "Say whether everything in a data directory is sound, scene by scene. Changes\nnothing; no daemon may use the "
-       "directory meanwhile. Exits 0 if all is sound.",
+       "Verify everything in a data directory, scene by scene. Changes\nnothing; no daemon may use the "
+       "directory meanwhile. Exits 0 if all is intact.",
        "Examples:\n  locusd check /var/lib/locus"},
       {"repair", Maintenance::Task::kRepair,
-       "Make a damaged data directory usable again, and say what is lost. Sound scenes\nare left as they are; what is "
-       "changed is kept beside the directory. Where there is\na backup, `locus restore` loses less.",
+       "Make a damaged data directory usable again, and report what is lost. Intact scenes\nare not changed; the old "
+       "database is kept in the folder before-repair-N of the directory.\nIf there is a backup, `locus restore` loses "
+       "less.",
        "Examples:\n  locusd check /var/lib/locus\n  locusd repair /var/lib/locus"}};
   for (const Command& command : kCommands) {
     CLI::App& added = *app.add_subcommand(command.name, command.description);
     added.footer(command.footer);
     added.fallthrough();
     const auto directory = std::make_shared<std::string>();
-    added.add_option("DIRECTORY", *directory, "The data directory [what --data-dir says]");
+    added.add_option("DIRECTORY", *directory, "The data directory [that of --data-dir]");
     added.callback([&chosen, directory, task = command.task] { chosen = Maintenance{task, *directory}; });
   }
   CLI::App& config =
@@ -329,7 +406,9 @@ std::optional<std::string> process_environment(const std::string& name) {
 
 Invocation read_invocation(const std::vector<std::string>& arguments, const Environment& environment) {
   try {
-    return parse_all(arguments, environment);
+    Invocation invocation;
+    parse_all(arguments, environment, invocation);
+    return invocation;
   } catch (const CLI::CallForHelp&) {
     return help(arguments);
   } catch (const CLI::CallForVersion& version) {
@@ -345,10 +424,13 @@ absl::Status check_config(const ServerConfig& config) {
   if (config.listen.empty()) return absl::InvalidArgumentError("no address to listen on; give --listen");
   if (config.listen.size() > limits::kMaxListenAddresses)
     return absl::InvalidArgumentError(absl::StrCat("more than ", limits::kMaxListenAddresses, " listen addresses"));
+  RETURN_IF_ERROR(parse_unix_mode(config.unix_mode).status());
+  RETURN_IF_ERROR(check_tls(config));
   bool tcp = false;
   for (const std::string& text : config.listen) {
     ASSIGN_OR_RETURN(const ListenAddress address, parse_listen_address(text));
-    if (!address.local && !config.insecure) return reachable_from_outside(text);
+    if (!address.local && !config.insecure)
+      RETURN_IF_ERROR(check_protected(config, kListen, text, "read and change every scene"));
     tcp = tcp || address.kind == ListenAddress::Kind::kTcp;
   }
   if (!config.port_file.empty() && !tcp)

@@ -22,45 +22,52 @@ enum class BatchPriority : uint8_t { kNice, kIdle };
 inline constexpr const char* kDefaultHttpListen = "127.0.0.1:7576";
 
 struct ServerConfig {
-  // Addresses to listen on, one or more: `host:port`, `[v6]:port` or `unix:/path`; port 0 takes a free port. Change it
-  // to serve other machines, which also needs `insecure`.
+  // Addresses to listen on, one or more: `host:port`, `[v6]:port` or `unix:/path`; port 0 means any free port. Change
+  // this option to serve other machines; that also needs `tls_cert` and `access_file`, or `insecure`.
   std::vector<std::string> listen = {"127.0.0.1:7575"};
 
-  // File to write the port of the first TCP address to, once the daemon answers. It is written atomically. Empty = not
-  // written. For scripts that start the daemon on port 0.
+  // Permissions of the files of unix sockets, in octal, and their owner: `user` or `user:group`, empty = the user of
+  // the daemon. Change them to admit processes of other users, who need write permission to connect.
+  std::string unix_mode = "0600";
+  std::string unix_owner;
+
+  // File to write the port of the first TCP address to, once the daemon answers; empty = no file. The file is written
+  // atomically. Use it in scripts that start the daemon on port 0.
   std::string port_file;
 
-  // Address of the HTTP pages: /metrics for Prometheus, /healthz, /readyz. `host:port` or `[v6]:port`; port 0 takes a
+  // Address of the HTTP pages: /metrics for Prometheus, /healthz, /readyz. `host:port` or `[v6]:port`; port 0 means any
   // free port; empty = no pages. If the default address is in use, the daemon logs a warning and runs without the
-  // pages; any other address that is in use is an error. Change it to admit a scraper on another machine, which also
-  // needs `insecure`: every reader of the pages learns the names of scenes and how they are used.
+  // pages; any other address that is in use is an error. With `tls_cert`, the pages use TLS as the other TCP
+  // connections do. With access control, /metrics needs the right `metrics`, because it has the names of scenes and how
+  // they are used; /healthz and /readyz are for everybody. Change it so that a scraper on another machine can read the
+  // pages; that also needs `tls_cert` and `access_file`, or `insecure`.
   std::string http_listen = kDefaultHttpListen;
 
-  // File to write the HTTP port to, like `port_file`; empty = not written.
+  // File to write the port of the HTTP pages to, once they are served; empty = no file.
   std::string http_port_file;
 
-  // Directory in which scenes and meshes are stored, so that they outlive the daemon. It is created if missing, and
-  // used by one daemon at a time. Empty = memory only. Give it a disk of its own if there are many updates: every
-  // acknowledged update waits for that disk.
+  // Directory in which scenes and meshes are stored, so that they outlive the daemon; empty = memory only. The
+  // directory is created if it is missing, and only one daemon at a time can use it. If there are many updates, put the
+  // directory on a disk of its own, because updates wait for that disk before they are acknowledged.
   std::string data_dir;
 
-  // Size in bytes of a scene's updates in the log after which a snapshot of the scene replaces them. For a scene larger
-  // than this, the size of the scene is used instead. Lower it for a faster start and a smaller directory; raise it if
-  // the updates leave the disk little bandwidth for snapshots.
+  // Size in bytes of a scene's updates in the log at which a snapshot of the scene replaces these updates. For a scene
+  // that is larger than this value, the size of the scene is used instead. Lower the value for a faster start and a
+  // smaller directory; raise it if the log of updates uses most of the disk's bandwidth.
   uint64_t snapshot_after = limits::kSnapshotAfterBytes;
 
-  // Threads that may work on one query batch, the caller's own included; 0 = one for each core that this process may
-  // use by its affinity and its control group. Answers do not depend on it. Lower it to leave cores to others.
+  // Number of threads that may work on one query batch; 0 = one for each core that this process may use by its affinity
+  // and its control group. Answers do not depend on the number. Lower it to leave cores to other processes.
   uint32_t threads = 0;
 
   // Priority of the threads that work on large query batches, relative to the threads that talk to clients and apply
-  // updates: `nice` is 10 nice levels lower; `idle` runs only on cores that are otherwise idle. `idle` halves the wait
-  // of small calls beside large ones, but starves if other processes use the whole machine.
+  // updates: `nice` is 10 nice levels lower; `idle` runs only on cores that are otherwise idle. With `idle`, small
+  // calls wait half as long while large batches run, but large batches stop if other processes use all cores.
   BatchPriority batch_priority = BatchPriority::kNice;
 
   // Vector instructions that queries use: a name that `locusd` logs at its start, or portable for none; empty = the
-  // widest that the processor has. Answers do not depend on it. Change it to compare, or to rule out a fault of the
-  // processor.
+  // widest that the processor has. Answers do not depend on the choice. Change it to compare instruction sets, or to
+  // rule out a fault of the processor.
   std::string instruction_set;
 
   // Lowest level that is logged to standard error. `debug` adds a line for each refused call.
@@ -70,40 +77,90 @@ struct ServerConfig {
   LogFormat log_format = LogFormat::kText;
 
   // Milliseconds after which a query batch is logged as slow, measured from when its revision is available until its
-  // answer. At most a few warnings a second; 0 = none. Lower it to find out what makes a server slow.
+  // answer; 0 = no batch is logged. At most a few warnings a second are logged. Lower the value to find out what makes
+  // a server slow.
   uint32_t slow_query_ms = 1000;
 
-  // Limits that may be lowered, never raised; a refusal names them. Lower them if memory is short or there are many
-  // callers.
-  uint32_t max_receive_bytes = limits::kReceiveBytes;  // one message
+  // Limits that may be lowered but not raised above their defaults; the refusal of a call names the exceeded limit.
+  // Lower them if memory is short or there are many callers.
+  uint32_t max_receive_bytes = limits::kReceiveBytes;  // maximum size of one message
   uint32_t max_scenes = limits::kMaxScenes;
   uint32_t max_meshes = limits::kMaxMeshes;
-  uint32_t max_streams = limits::kMaxStreams;  // open update and query streams
-  uint32_t max_calls = limits::kMaxCalls;      // calls at once, not counting streams
+  uint32_t max_streams = limits::kMaxStreams;  // maximum number of open update and query streams of one client
+  uint32_t max_calls = limits::kMaxCalls;      // maximum number of concurrent calls of one client, not counting streams
 
-  // Bytes of memory that the process may use before uploads, inserts and placements are refused; 0 = three quarters of
-  // the memory of the machine or its control group. The rest is for messages, answers and moves, which are not refused.
-  // Lower it to leave memory to other processes; above the default the kernel may kill the process.
+  // Accepts messages that are compressed with gzip; they may inflate to `max_receive_bytes`. Off: they are refused. Set
+  // it if the network is slower than gzip, which takes 3 ms for each MiB; strangers can use up processor time with it.
+  bool accept_compression = false;
+
+  // Limits on connections: in all, 0 = 4096 or fewer if the process may open few files; from one address, which for
+  // unix sockets is a user; and new ones a second from one address, with a burst of twice as many. Excess connections
+  // are closed at once. Raise the last two if many clients share one address, as behind a proxy.
+  uint32_t max_connections = 0;
+  uint32_t max_connections_per_address = 1024;
+  uint32_t max_new_connections = 200;
+
+  // Seconds after which a connection is closed that has not begun HTTP/2, over TLS if there is TLS. Raise it for
+  // clients on very slow lines.
+  uint32_t handshake_timeout_s = 10;
+
+  // Seconds after which a connection without an open call is closed; 0 = never. Clients open a new one with their next
+  // call. Set it if clients leave many connections behind.
+  uint32_t idle_timeout_s = 0;
+
+  // Bytes of memory that the process may use; 0 = three quarters of the memory of the machine or its control group. As
+  // memory runs short, histories lose their oldest ticks first. Then uploads, dumps, inserts and placements are refused
+  // when 7/8 of the limit are in use, moves when 15/16 are, and queries at the limit. A reserve beyond that admits
+  // small messages and answers, and removals are never refused. Lower it to leave memory to other processes. With a
+  // value above the default, the kernel may kill the process.
   uint64_t memory_limit = 0;
 
-  // Bytes of replaced data per scene that batches and dumps may keep alive by reading older revisions. Beyond that the
-  // oldest readers are cancelled and updates wait for them. 0 = 256 MiB, or four times the size of the scene if that is
-  // more. Lower it if memory is short; batches that run for several ticks are then cancelled sooner.
+  // Bytes of replaced data per scene that batches and dumps may keep alive by reading older revisions; 0 = 256 MiB, or
+  // four times the size of the scene if that is more. If the readers keep more bytes alive, the oldest readers are
+  // cancelled, and updates wait until these readers have ended. Lower the value if memory is short; batches that run
+  // for several ticks are then cancelled sooner.
   uint64_t pinned_limit = 0;
 
   // Seconds that running calls may take to finish after SIGTERM. Raise it if batches run long; keep it below the time
   // after which the service manager kills the process.
   uint32_t drain_grace_s = 10;
 
-  // Permits addresses that other machines can reach, although there is no encryption and no authentication. Use it only
-  // behind a proxy or in a network where every machine is trusted.
+  // Files of the server's certificate chain and its key, in PEM; both or none. With them, all TCP connections use
+  // TLS 1.2 or 1.3, those of the HTTP pages too. The files are read again when they change.
+  std::string tls_cert;
+  std::string tls_key;
+
+  // File of certificates in PEM that must have signed the certificate of every client. Empty = clients need no
+  // certificate. Set it to admit only machines that hold a certificate.
+  std::string tls_client_ca;
+
+  // File that says who may call what. Empty = every client may call everything.
+  std::string access_file;
+
+  // File of tokens, and file of keys (JWKS) that sign tokens (JWT), by which clients name themselves; empty = none.
+  std::string token_file;
+  std::string jwks_file;
+
+  // Values that the claims `aud` and `iss` of a JWT must have; empty = not checked.
+  std::string jwt_audience;
+  std::string jwt_issuer;
+
+  // File to which changing calls are written, one JSON object a line; empty = none. Refused calls are written to the
+  // file with `.refused` after its name. Each file is replaced by a new one when it is larger than `audit_bytes`; four
+  // older ones are kept.
+  std::string audit_file;
+  uint64_t audit_bytes = uint64_t{64} << 20;
+
+  // Permits addresses that other machines can reach without encryption and authentication. Use it only behind a proxy
+  // or in a network where every machine is trusted.
   bool insecure = false;
 };
 
 // Function that returns the value of an environment variable, or nullopt if the variable is not set.
 using Environment = std::function<std::optional<std::string>(const std::string&)>;
 
-// Returns the value of a variable in the environment of this process. An Environment.
+// Returns the value of a variable in the environment of this process, or nullopt if it is not set. Can be passed as an
+// Environment.
 std::optional<std::string> process_environment(const std::string& name);
 
 // Command that runs instead of the server: `locusd check` or `locusd repair`, for a data directory that no daemon is
@@ -115,8 +172,9 @@ struct Maintenance {
   bool json = false;      // whether to print JSON, for config
 };
 
-// Parsed command line: run with `config`, do `maintenance`, or, if neither is set, print `text` and end with
-// `exit_code` (0 after --help, --version and the command config, 2 after a mistake, which `text` explains).
+// Parsed command line. If `config` is set, main() runs the server; if `maintenance` is set, main() runs that command;
+// otherwise main() prints `text` and ends with `exit_code`. The exit code is 0 after --help, --version and the command
+// `config`, and 2 after a mistake, which `text` explains.
 struct Invocation {
   std::optional<ServerConfig> config;
   std::optional<Maintenance> maintenance;
@@ -125,10 +183,11 @@ struct Invocation {
 };
 
 // Parses `arguments` (without the program's name), the environment and the file of --config. Never ends the process.
-// The returned config is checked, and `threads` and `memory_limit` are not 0.
+// The returned config has passed check_config(), and its `threads` and `memory_limit` are not 0.
 Invocation read_invocation(const std::vector<std::string>& arguments, const Environment& environment);
 
-// Returns INVALID_ARGUMENT if an address cannot be parsed, or needs `insecure` because other machines can reach it.
+// Returns INVALID_ARGUMENT if an address cannot be parsed, or if other machines can reach it and `config` has neither
+// TLS with an access file nor `insecure`.
 absl::Status check_config(const ServerConfig& config);
 
 }  // namespace locus::server

@@ -1,6 +1,6 @@
 // The only conversions between the protocol's messages and the core's types. Columns are borrowed: the results point
-// into the message, which must outlive them. Refuses errors that only a protocol message can have (unknown enum
-// numbers, fields that exclude each other, kinds that are not served); the core checks lengths and values.
+// into the message, which must outlive them. The functions refuse errors that only a protocol message can have (unknown
+// enum numbers, fields that exclude each other, kinds that are not served); the core checks lengths and values.
 //
 // Pure functions. Errors name the field as the protocol spells it.
 #ifndef LOCUS_SERVER_CONVERT_CONVERT_H_
@@ -21,7 +21,7 @@
 
 namespace locus::server {
 
-// Returns a view of a repeated field; no copy.
+// Returns a span over a repeated field, without a copy.
 template <class Repeated>
 auto span_of(const Repeated& column) {
   return absl::MakeConstSpan(column.data(), static_cast<size_t>(column.size()));
@@ -44,7 +44,8 @@ v1::Work to_proto(const Work& work, uint64_t nanoseconds);
 // Converts the specification of a scene, except `static_from`, which the registry resolves.
 absl::StatusOr<SceneSpec> to_spec(const v1::SceneSpec& spec);
 absl::Status check_labels(const google::protobuf::Map<std::string, std::string>& labels, const std::string& field);
-v1::Scene to_proto(const Scene& scene);
+// Returns the description of a scene with `summary`, the scene's summary.
+v1::Scene to_proto(const Scene& scene, const SceneSummary& summary);
 v1::Mesh to_proto(const Registry::NamedMesh& mesh);
 
 }  // namespace locus::server

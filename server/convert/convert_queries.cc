@@ -9,7 +9,7 @@
 namespace locus::server {
 namespace {
 
-// Tables from the number of a protocol enum to the core's value; number 0 is the default.
+// Tables from the number of a protocol enum to the core's value; number 0 maps to the default.
 constexpr std::array kSources = {Source::kBoth, Source::kBoth, Source::kStatic, Source::kDynamic};
 constexpr std::array kPrecisions = {Precision::kExact, Precision::kExact, Precision::kConservative};
 constexpr std::array kRayModes = {RayMode::kFirst, RayMode::kFirst, RayMode::kAny, RayMode::kAll};
@@ -75,7 +75,7 @@ absl::Status read_kind(const v1::Nearest& nearest, const std::string& field, Que
 
 absl::Status read_kind(const v1::Lookup& lookup, const std::string& field, QueryBlock* out) {
   if (lookup.ids().empty() == lookup.groups().empty())
-    return refuse_argument(Reason::kMalformed, field + ".lookup", {}, "give ids or groups, one of the two");
+    return refuse_argument(Reason::kMalformed, field + ".lookup", {}, "give either ids or groups");
   out->kind = LookupColumns{span_of(lookup.ids()), span_of(lookup.groups())};
   return absl::OkStatus();
 }
@@ -103,7 +103,8 @@ absl::Status read_kind(const v1::QueryBlock& block, const std::string& field, Qu
     case v1::QueryBlock::KIND_NOT_SET:
       break;
   }
-  return refuse_argument(Reason::kMalformed, field, {}, "say what is asked: rays, balls, boxes, lookup or nearest");
+  return refuse_argument(Reason::kMalformed, field, {},
+                         "a block needs one kind of query: rays, balls, boxes, lookup or nearest");
 }
 
 absl::Status read_columns(const v1::QueryBlock& block, const std::string& field, ColumnSet* out) {

@@ -7,13 +7,6 @@
 namespace locus::server {
 namespace {
 
-// Returns the bounds of all objects and instances at one revision. O(objects), so it is for descriptions only.
-Aabbd bounds_of_all(const SceneSnapshot& snapshot) {
-  Aabbd bounds = snapshot.statics->tree().bounds();
-  snapshot.objects.for_each([&bounds](const Object& object) { bounds = merge(bounds, bounds_of(object.shape)); });
-  return bounds;
-}
-
 v1::SceneSpec spec_to_proto(const SceneSpec& spec) {
   v1::SceneSpec out;
   for (const auto& [key, value] : spec.labels) (*out.mutable_labels())[key] = value;
@@ -42,7 +35,7 @@ absl::StatusOr<HistoryOptions> to_history(const v1::SceneSpec& spec) {
   if (spec.history_ticks() == 0) {
     if (spec.history_bytes() == 0) return HistoryOptions();
     return refuse_argument(Reason::kMalformed, "spec.history_bytes", {},
-                           "goes with history_ticks: say how many ticks are to be kept, or leave both at 0");
+                           "needs history_ticks, the number of ticks to be kept; or leave both at 0");
   }
   return HistoryOptions{spec.history_ticks(),
                         spec.history_bytes() == 0 ? limits::kDefaultHistoryBytes : spec.history_bytes()};
@@ -97,8 +90,7 @@ absl::StatusOr<SceneSpec> to_spec(const v1::SceneSpec& spec) {
   return out;
 }
 
-v1::Scene to_proto(const Scene& scene) {
-  const SnapshotPtr snapshot = scene.latest();
+v1::Scene to_proto(const Scene& scene, const SceneSummary& summary) {
   const SceneStatus status = scene.status();
   v1::Scene out;
   out.set_name(scene.name());
@@ -106,25 +98,24 @@ v1::Scene to_proto(const Scene& scene) {
   const bool local = scene.log_key() != 0 && scene.spec().durability == Durability::kLocal;
   out.mutable_spec()->set_durability(local ? v1::DURABILITY_LOCAL : v1::DURABILITY_MEMORY);
   out.set_state(status.pending_changes > 0 ? v1::SCENE_STATE_BUILDING : v1::SCENE_STATE_READY);
-  out.set_epoch(snapshot->epoch);
-  out.set_revision(snapshot->revision);
-  out.set_tick(snapshot->tick);
-  out.set_oldest_tick(snapshot->oldest_tick());
+  out.set_epoch(summary.epoch);
+  out.set_revision(summary.revision);
+  out.set_tick(summary.tick);
+  out.set_oldest_tick(summary.oldest_tick);
   out.set_recorded_ticks(status.recorded_ticks);
   out.set_history_bytes(status.history_bytes);
   out.set_pinned_bytes(status.pinned_bytes);
   out.set_max_pinned_bytes(status.max_pinned_bytes);
-  out.set_objects(snapshot->objects.size());
-  out.set_instances(snapshot->statics->size());
-  out.set_triangles(snapshot->statics->triangle_count());
+  out.set_objects(summary.objects);
+  out.set_instances(summary.instances);
+  out.set_triangles(summary.triangles);
   out.set_memory_bytes(status.memory_bytes);
   out.set_pending_changes(status.pending_changes);
   out.set_joined_updates(status.joined_updates);
   out.set_last_build_error(status.last_build_error);
-  const Aabbd bounds = bounds_of_all(*snapshot);
-  if (!bounds.empty()) {
-    *out.mutable_min() = vec_to_proto(bounds.min);
-    *out.mutable_max() = vec_to_proto(bounds.max);
+  if (!summary.bounds.empty()) {
+    *out.mutable_min() = vec_to_proto(summary.bounds.min);
+    *out.mutable_max() = vec_to_proto(summary.bounds.max);
   }
   return out;
 }

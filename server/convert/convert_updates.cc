@@ -85,9 +85,9 @@ absl::Status check_batch_form(const v1::UpdateBatch& batch) {
   if (lists > limits::kMaxUpdateLists)
     return refuse_limit("", "update_lists", limits::kMaxUpdateLists, static_cast<double>(lists));
   if (batch.writer() == 0 && batch.batch() != 0)
-    return malformed_update("writer", "goes with batch: a random number that is not 0");
+    return malformed_update("writer", "must be a random number other than 0, because batch is given");
   if (batch.writer() != 0 && batch.batch() == 0)
-    return malformed_update("batch", "goes with writer: 1 for its first batch, then 2, 3 and so on");
+    return malformed_update("batch", "must be given with writer: 1 for its first batch, then 2, 3 and so on");
   return absl::OkStatus();
 }
 

@@ -39,7 +39,7 @@ void for_each_field(const Visit& visit) {
 }  // namespace
 
 ResultColumns::ResultColumns(v1::QueryResult& result, size_t blocks) : result_(result) {
-  // Protobuf keeps cleared blocks, and add_blocks() reuses them.
+  // Protobuf keeps the memory of cleared blocks, and add_blocks() reuses it.
   result.clear_blocks();
   for (size_t i = 0; i < blocks; ++i) result.add_blocks();
 }

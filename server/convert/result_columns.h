@@ -1,5 +1,5 @@
 // Sink that writes the answer of a query batch directly into the columns of its reply: each column is allocated once,
-// and no value is copied again. For one thread at a time.
+// and no value is copied again. Threads: only one thread at a time may use it.
 #ifndef LOCUS_SERVER_CONVERT_RESULT_COLUMNS_H_
 #define LOCUS_SERVER_CONVERT_RESULT_COLUMNS_H_
 
@@ -10,8 +10,8 @@ namespace locus::server {
 
 class ResultColumns final : public AnswerSink {
  public:
-  // Replaces the blocks of `result`, which is borrowed, by `blocks` empty ones. Their columns reuse the memory of the
-  // previous blocks.
+  // Replaces the blocks of `result`, which is borrowed, by `blocks` empty blocks. The columns of the empty blocks reuse
+  // the memory of the previous blocks.
   ResultColumns(v1::QueryResult& result, size_t blocks);
 
   RowSpans add_rows(size_t block, ColumnSet columns, size_t rows) override;

@@ -60,13 +60,14 @@ absl::Status not_served(absl::string_view field) {
   Refusal refusal;
   refusal.reason = Reason::kNotServed;
   refusal.field = std::string(field);
-  return refuse(absl::StatusCode::kUnimplemented, "not served by this build; GetServer lists what is", refusal);
+  return refuse(absl::StatusCode::kUnimplemented, "not served by this build; GetServer lists the features that are",
+                refusal);
 }
 
 absl::Status unknown_enum(absl::string_view field, int number) {
   return refuse_argument(
       Reason::kMalformed, field, {},
-      absl::StrCat("this build knows no number ", number, " here; see the schema for those it does"));
+      absl::StrCat("this build does not know the number ", number, " here; the schema lists the numbers"));
 }
 
 absl::Status draining() {
@@ -80,8 +81,8 @@ absl::Status recovering() {
   Refusal refusal;
   refusal.reason = Reason::kRecovering;
   refusal.retry_after_ms = kRecoveryRetryMs;
-  return refuse(absl::StatusCode::kUnavailable, "the server still reads back what it keeps; try again in a moment",
-                refusal);
+  return refuse(absl::StatusCode::kUnavailable,
+                "the server is still recovering its scenes from the disk; try again in a moment", refusal);
 }
 
 }  // namespace locus::server

@@ -1,5 +1,5 @@
-// The only conversion from the server's errors (absl::Status with a Refusal) to the protocol's (grpc::Status with a
-// locus.v1.Error in its details), and the errors that the server itself returns. Pure functions.
+// The only conversion from the server's errors (absl::Status with a Refusal) to the protocol's errors (grpc::Status
+// with a locus.v1.Error in its details), and the errors that the server itself returns. Pure functions.
 #ifndef LOCUS_SERVER_CONVERT_STATUS_H_
 #define LOCUS_SERVER_CONVERT_STATUS_H_
 
@@ -16,7 +16,8 @@ namespace locus::server {
 // of the caller, are cut to 1,024 bytes, so that they fit into metadata.
 v1::Error to_error(const absl::Status& status);
 
-// Returns the status of a refused call, with details that hold a locus.v1.Status with one Error; OK for OK.
+// Returns the status of a refused call. Its details contain a locus.v1.Status with one Error. If `status` is OK,
+// returns OK.
 grpc::Status to_grpc(const absl::Status& status);
 
 // Returns UNIMPLEMENTED, REASON_NOT_SERVED: `field` is in the schema, but this build does not serve it.

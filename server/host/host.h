@@ -1,46 +1,48 @@
-// The state that all services of one server share: scenes, thread pools, limits, metrics and the drain. The members are
-// thread-safe on their own; their order is the order of construction, so threads end before the scenes they use.
+// The state that all services of one server share: the state of its calls, its scenes, thread pools and limits. Each
+// member is thread-safe on its own. Members are destroyed in reverse order, so threads end before the scenes that they
+// use.
 #ifndef LOCUS_SERVER_HOST_HOST_H_
 #define LOCUS_SERVER_HOST_HOST_H_
 
 #include <algorithm>
-#include <atomic>
 
+#include "core/base/mutex.h"
 #include "core/scene/log/update_log.h"
 #include "core/scene/registry.h"
 #include "server/config/observability_limits.h"
 #include "server/config/server_config.h"
+#include "server/host/memory_keeper.h"
 #include "server/host/memory_use.h"
-#include "server/observability/metrics.h"
+#include "server/observability/process_figures.h"
 #include "server/observability/slow_queries.h"
+#include "server/rpc/rpc_state.h"
 #include "server/scheduling/admission_limiter.h"
 #include "server/scheduling/change_queue.h"
 #include "server/scheduling/clocks.h"
 #include "server/scheduling/cost_estimates.h"
-#include "server/scheduling/drain.h"
-#include "server/scheduling/memory_budget.h"
 #include "server/scheduling/query_scheduler.h"
 #include "server/scheduling/snapshotter.h"
+#include "server/scheduling/turns.h"
 #include "server/scheduling/update_queue.h"
 #include "server/scheduling/worker_pool.h"
 
 namespace locus::server {
 
-struct Host {
-  // `with_log` is borrowed; null keeps scenes in memory only.
+struct Host : RpcState {
+  // `with_log` is the durable log, borrowed; if it is null, scenes are stored in memory only.
   Host(const ServerConfig& with, UpdateLog* with_log)
-      : config(with),
+      : RpcState(with.max_calls, with.max_streams, with.memory_limit, resident_bytes),
+        config(with),
         log(with_log),
         slow_queries(with.slow_query_ms),
         registry(with_log),
-        memory(with.memory_limit, process_memory(registry)),
         pool(with.threads),
         scheduler(scheduler_options(with)),
-        updates(queue_options(with, with_log)),
-        calls(with.max_calls),
-        streams(with.max_streams) {}
+        updates(queue_options(with, with_log)) {}
 
   static constexpr uint32_t kChangeThreads = 2;
+  // Bytes that a connection must have claimed, or sent within the interval of the memory keeper, to be closed.
+  static constexpr uint64_t kMinShedBytes = 128u << 10;
   static constexpr uint32_t kLoggingThreads = 8;
 
   static SchedulerOptions scheduler_options(const ServerConfig& config) {
@@ -50,8 +52,8 @@ struct Host {
     options.clock = &thread_nanoseconds;
     return options;
   }
-  // Returns the options of the update queue. With a log it has more threads than cores, because they mostly wait for
-  // the disk, and batches that wait at the same time share one sync.
+  // Returns the options of the update queue. If there is a log, the queue has more threads than cores, because these
+  // threads mostly wait for the disk, and batches that wait at the same time share one sync.
   static UpdateQueueOptions queue_options(const ServerConfig& config, const UpdateLog* log) {
     UpdateQueueOptions options;
     options.threads = log == nullptr ? config.threads : std::max(config.threads, kLoggingThreads);
@@ -59,24 +61,34 @@ struct Host {
   }
   static SnapshotterOptions snapshotter_options(const ServerConfig& config);
 
+  // Returns the memory budget in bytes of the readers of a scene; 0: the default of ReaderTracker, unless the memory
+  // limit is too small for it.
+  uint64_t pinned_limit() const {
+    const uint64_t share = config.memory_limit / 4;
+    if (config.pinned_limit != 0 || share >= limits::kPinnedBytes) return config.pinned_limit;
+    return std::max(share, limits::kMinPinnedBytes);
+  }
+
   const ServerConfig config;
   UpdateLog* const log;
-  CallMetrics metrics;
   SlowQueries slow_queries;
   Registry registry;
-  MemoryBudget memory;
+  Mutex create_mutex;  // makes counting the scenes and adding one a single step
   WorkerPool pool;
   CostEstimates costs;
   QueryScheduler scheduler;
   UpdateQueue updates;
   Snapshotter snapshots{registry, log, snapshotter_options(config)};
   ChangeQueue changes{kChangeThreads, limits::kMaxPendingChanges};
-  AdmissionLimiter calls;    // running calls, except streams
-  AdmissionLimiter streams;  // open streams
-  AdmissionLimiter health_watchers{kMaxHealthWatchers};
+  MemoryKeeper memory_keeper{memory, registry, [this](bool close) {
+                               return connections.shed_heaviest(close, kMinShedBytes, "memory is nearly full");
+                             }};
+  // Calls that visit all objects of a scene, to describe or dump it, occupy at most half of the cores.
+  Turns scene_visits{std::max(1u, config.threads / 2)};
+  AdmissionLimiter health_watchers{kMaxHealthWatchers, Sharing::kFair};
+  AdmissionLimiter health_checks{kMaxHealthChecks, Sharing::kFair};
+  AdmissionLimiter reflections{kMaxReflections, Sharing::kFair};
   AdmissionLimiter backups{limits::kMaxBackups};
-  Drain drain;
-  std::atomic<bool> recovering{false};  // true while the scenes of the log are being recovered
 };
 
 }  // namespace locus::server

@@ -1,6 +1,6 @@
-// Estimates of the memory that a piece of work needs, and a measurement of the process's memory, for the limit
-// memory_bytes. An estimate is the peak, measured on this version and rounded up. It need not be exact, because the
-// memory of the process itself is measured repeatedly.
+// Estimates of the memory that a piece of work needs, for the limit memory_bytes. An estimate is the peak memory of the
+// work, measured on this version and rounded up. It need not be exact, because the memory of the whole process is
+// measured repeatedly.
 //
 // Threads: every function may be called from any thread.
 #ifndef LOCUS_SERVER_HOST_MEMORY_USE_H_
@@ -8,31 +8,36 @@
 
 #include <cstdint>
 
-#include "core/scene/registry.h"
-#include "core/scene/statics/static_set.h"
+#include "core/scene/statics/static_mesh.h"
 #include "core/scene/updates/update_batch.h"
-#include "server/scheduling/memory_budget.h"
 
 namespace locus::server {
 
-// Returns a meter of the process's resident memory. Its release_memory() drops the revisions that scenes keep besides
-// their latest, and returns the allocator's free memory to the kernel. `registry` must outlive the meter.
-MemoryBudget::Meter process_memory(const Registry& registry);
-
-// Memory in bytes that applying a batch needs, and whether the batch may be refused for it because it inserts objects.
+// Memory in bytes that applying a batch needs, and what the batch does to the memory of its scene.
 struct UpdateCost {
+  enum class Kind : uint8_t {
+    kRemoves,  // the batch only removes objects
+    kMoves,    // the batch changes objects, and inserts none
+    kInserts,  // the batch inserts objects
+  };
   uint64_t bytes = 0;
-  bool inserts = false;
+  Kind kind = Kind::kRemoves;
 };
+// Returns the number of the batch's items that insert, move or relabel an object, or remove one by its id.
+uint64_t item_count(const UpdateBatch& batch);
 // Returns the cost of a batch whose form is not checked yet: its lists may have any length.
 UpdateCost cost_of(const UpdateBatch& batch);
 
-// Returns the peak memory in bytes of an upload, from its first column to the built tree.
+// Returns the peak memory in bytes of an upload's columns, and that of building its tree.
 uint64_t upload_cost(uint32_t vertices, uint32_t triangles);
+uint64_t tree_cost(uint32_t triangles);
 
-// Returns the size in bytes of the new set of instances that results from applying `change` to `statics`. Returns 0 for
-// a change without placements, which is never refused.
-uint64_t change_cost(const StaticSet& statics, const StaticChange& change);
+// Returns the memory in bytes that a mesh name needs for its parts; the content may be shared with other names.
+uint64_t parts_cost(absl::Span<const MeshPart> parts);
+
+// Returns the peak memory in bytes of a change that places `placed` instances in a scene that has `present` ones, from
+// the check of the placements to the new set. Returns 0 for a change without placements, which is never refused.
+uint64_t change_cost(uint64_t present, uint64_t placed);
 
 }  // namespace locus::server
 

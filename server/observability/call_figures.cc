@@ -11,7 +11,7 @@ std::string kind_of(size_t kind) { return std::string(block_kind_name(static_cas
 
 void add_calls(const MetricCounts& counts, MetricPage& page) {
   page.begin("locus_calls_total",
-             "Calls answered, by rpc and status code; of streams the messages, each with the status of its answer.",
+             "Answered calls, by rpc and status code; each message of a stream counts as one call.",
              MetricKind::kCounter);
   for (size_t rpc = 0; rpc < kRpcs; ++rpc)
     for (size_t code = 0; code < kStatusCodes; ++code)
@@ -37,7 +37,7 @@ void add_queries(const MetricCounts& counts, MetricPage& page) {
   for (size_t kind = 0; kind < kBlockKinds; ++kind)
     page.add({{"kind", kind_of(kind)}}, static_cast<double>(counts.queries[kind].queries));
   page.begin("locus_query_work_total",
-             "What queries did, by kind: tree nodes opened, grid cells looked into, triangles and objects tested.",
+             "Work of queries, by kind: tree nodes opened, grid cells visited, triangles and objects tested.",
              MetricKind::kCounter);
   for (size_t kind = 0; kind < kBlockKinds; ++kind) {
     const Work& work = counts.queries[kind].work;
@@ -46,7 +46,7 @@ void add_queries(const MetricCounts& counts, MetricPage& page) {
     page.add({{"kind", kind_of(kind)}, {"unit", "tests"}}, static_cast<double>(work.tests));
   }
   page.begin("locus_query_block_seconds",
-             "Time that answering a block of queries of one kind took, all threads together, in seconds.",
+             "Processor time of answering a block of queries, by kind, summed over all threads, in seconds.",
              MetricKind::kHistogram);
   for (size_t kind = 0; kind < kBlockKinds; ++kind)
     if (counts.queries[kind].latency.count() > 0) page.add({{"kind", kind_of(kind)}}, counts.queries[kind].latency);

@@ -7,8 +7,8 @@
 
 namespace locus::server {
 
-// Adds all call metrics to the page, each metric name once. For an rpc that was never called it adds only the count of
-// OK calls, which is 0, so that rates start at 0 and the page stays short.
+// Adds all call metrics to the page, each metric name once. For an rpc that was never called, adds only the count of
+// its OK calls, which is 0, so that rates start at 0 and the page stays short.
 void add_call_figures(const MetricCounts& counts, MetricPage& page);
 
 }  // namespace locus::server

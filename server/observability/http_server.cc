@@ -1,126 +1,120 @@
 #include "server/observability/http_server.h"
 
-#include <civetweb.h>
+#include <sys/socket.h>
 
-#include <array>
+#include <algorithm>
+#include <boost/asio/dispatch.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/strand.hpp>
 #include <chrono>
-#include <future>
+#include <thread>
 #include <utility>
 #include <vector>
 
-#include "absl/strings/str_cat.h"
-#include "absl/strings/string_view.h"
 #include "core/base/check.h"
+#include "core/base/status_macros.h"
 #include "server/config/observability_limits.h"
-#include "server/observability/log.h"
+#include "server/connections/listening_socket.h"
+#include "server/observability/http_session.h"
+#include "server/observability/http_tls.h"
 
 namespace locus::server {
 namespace {
 
-// Initialises civetweb for the lifetime of this object. Several objects may exist, because civetweb counts its
-// initialisations.
-class Library {
+namespace asio = boost::asio;
+using asio::ip::tcp;
+using boost::system::error_code;
+
+// Pause after accept() has failed, for example because the process has no free descriptor.
+constexpr std::chrono::milliseconds kAcceptPause{100};
+
+tcp protocol_of(int descriptor) {
+  sockaddr_storage address{};
+  socklen_t size = sizeof address;
+  const bool known = ::getsockname(descriptor, reinterpret_cast<sockaddr*>(&address), &size) == 0;
+  return known && address.ss_family == AF_INET6 ? tcp::v6() : tcp::v4();
+}
+
+// Accepts and serves connections of a listening socket, at most kMaxHttpConnections at once: when one ends, the next is
+// accepted. The operations on the socket run one at a time, on its strand. `socket` must outlive the listener.
+class HttpListener {
  public:
-  Library() { mg_init_library(MG_FEATURES_DEFAULT); }
-  ~Library() { mg_exit_library(); }
-  Library(const Library&) = delete;
-  Library& operator=(const Library&) = delete;
+  HttpListener(asio::io_context& io, const ListeningSocket& socket, const HttpPages& pages, HttpTls* tls)
+      : io_(io), strand_(asio::make_strand(io)), acceptor_(io), pages_(pages), tls_(tls) {
+    error_code error;
+    acceptor_.assign(protocol_of(socket.descriptor()), socket.descriptor(), error);
+    LOCUS_CHECK(!error);  // the descriptor is open and listens
+    for (uint32_t i = 0; i < kMaxHttpConnections; ++i) accept_next();
+  }
+  ~HttpListener() {
+    error_code ignored;
+    acceptor_.release(ignored);  // `socket` closes the descriptor
+  }
+  HttpListener(const HttpListener&) = delete;
+  HttpListener& operator=(const HttpListener&) = delete;
+
+ private:
+  void accept_next() {
+    asio::dispatch(strand_, [this] {
+      acceptor_.async_accept(asio::make_strand(io_), [this](const error_code& error, tcp::socket socket) {
+        accepted(error, std::move(socket));
+      });
+    });
+  }
+
+  void accepted(const error_code& error, tcp::socket socket) {
+    if (!error) return serve_http(std::move(socket), tls_, pages_, [this] { accept_next(); });
+    const auto timer = std::make_shared<asio::steady_timer>(io_, kAcceptPause);
+    timer->async_wait([this, timer](const error_code& stopped) {
+      if (!stopped) accept_next();
+    });
+  }
+
+  asio::io_context& io_;
+  asio::strand<asio::io_context::executor_type> strand_;
+  tcp::acceptor acceptor_;
+  const HttpPages& pages_;
+  HttpTls* const tls_;  // null without TLS
 };
-
-bool is_head(const mg_request_info& request) { return absl::string_view(request.request_method) == "HEAD"; }
-
-HttpReply reply_to(const mg_request_info& request, const HttpServer::Pages& pages) {
-  if (!is_head(request) && absl::string_view(request.request_method) != "GET")
-    return {.code = 405, .body = "only GET and HEAD are answered here\n"};
-  const char* path = request.local_uri;
-  const auto page = pages.find(path == nullptr ? "" : path);
-  if (page != pages.end()) return page->second();
-  HttpReply reply{.code = 404, .body = "no such page; there are:\n"};
-  for (const auto& [name, make] : pages) absl::StrAppend(&reply.body, name, "\n");
-  return reply;
-}
-
-// Answers every request, whatever its path, so that civetweb itself serves nothing.
-int answer(mg_connection* connection) {
-  const mg_request_info& request = *mg_get_request_info(connection);
-  const HttpReply reply = reply_to(request, *static_cast<const HttpServer::Pages*>(request.user_data));
-  mg_response_header_start(connection, reply.code);
-  mg_response_header_add(connection, "Content-Type", reply.content_type.c_str(), -1);
-  mg_response_header_add(connection, "Content-Length", absl::StrCat(reply.body.size()).c_str(), -1);
-  mg_response_header_add(connection, "Cache-Control", "no-store", -1);
-  mg_response_header_add(connection, "X-Content-Type-Options", "nosniff", -1);
-  if (reply.code == 405) mg_response_header_add(connection, "Allow", "GET, HEAD", -1);
-  mg_response_header_add(connection, "Connection", "close", -1);
-  mg_response_header_send(connection);
-  if (!is_head(request)) mg_write(connection, reply.body.data(), reply.body.size());
-  return reply.code;
-}
-
-int log_message(const mg_connection*, const char* message) {
-  log(LogLevel::kDebug, "http", {{"text", message}});
-  return 1;
-}
 
 }  // namespace
 
-struct HttpServer::Context {
-  ~Context() {
-    if (running != nullptr) stop();
+class HttpServer::Parts {
+ public:
+  Parts(std::vector<ListeningSocket> sockets, HttpPages pages, Certificates certificates)
+      : sockets_(std::move(sockets)), pages_(std::move(pages)) {
+    if (certificates) tls_ = std::make_unique<HttpTls>(std::move(certificates));
+    for (const ListeningSocket& socket : sockets_)
+      listeners_.push_back(std::make_unique<HttpListener>(io_, socket, pages_, tls_.get()));
+    for (uint32_t i = 0; i < kHttpThreads; ++i) threads_.emplace_back([this] { io_.run(); });
+  }
+  ~Parts() {
+    io_.stop();
+    for (std::thread& thread : threads_) thread.join();
   }
 
-  // Ends civetweb's threads. They check whether they must end only every two seconds and after each connection, so this
-  // opens connections until all threads have ended.
-  void stop() {
-    const std::future<void> stopped = std::async(std::launch::async, mg_stop, running);
-    while (stopped.wait_for(std::chrono::milliseconds(5)) != std::future_status::ready) {
-      std::array<char, 64> error{};
-      mg_connection* connection = mg_connect_client(host.c_str(), port, 0, error.data(), error.size());
-      if (connection != nullptr) mg_close_connection(connection);
-    }
-  }
-
-  Library library;
-  mg_callbacks callbacks{};
-  mg_context* running = nullptr;
-  std::string host;
-  int port = 0;
+ private:
+  const std::vector<ListeningSocket> sockets_;
+  const HttpPages pages_;
+  std::unique_ptr<HttpTls> tls_;
+  asio::io_context io_;
+  std::vector<std::unique_ptr<HttpListener>> listeners_;
+  std::vector<std::thread> threads_;
 };
 
-HttpServer::HttpServer(Pages pages) : pages_(std::move(pages)), context_(std::make_unique<Context>()) {
-  context_->callbacks.begin_request = answer;
-  context_->callbacks.log_message = log_message;
-}
+HttpServer::HttpServer(std::unique_ptr<Parts> parts, uint16_t port) : parts_(std::move(parts)), port_(port) {}
 
 HttpServer::~HttpServer() = default;
 
-absl::StatusOr<std::unique_ptr<HttpServer>> HttpServer::start(const ListenAddress& address, Pages pages) {
+absl::StatusOr<std::unique_ptr<HttpServer>> HttpServer::start(const ListenAddress& address, HttpPages pages,
+                                                              Certificates certificates) {
   LOCUS_DCHECK(address.kind == ListenAddress::Kind::kTcp);
-  std::unique_ptr<HttpServer> server(new HttpServer(std::move(pages)));
-  const std::vector<std::pair<const char*, std::string>> settings = {
-      {"listening_ports", to_string(address, address.port)},
-      {"num_threads", absl::StrCat(kHttpThreads)},
-      {"connection_queue", absl::StrCat(kMaxHttpWaiting)},
-      {"listen_backlog", absl::StrCat(kMaxHttpWaiting)},
-      {"max_request_size", absl::StrCat(kMaxHttpRequestBytes)},
-      {"request_timeout_ms", absl::StrCat(kHttpTimeoutMs)},
-      {"enable_keep_alive", "no"},
-      {"enable_directory_listing", "no"}};
-  std::vector<const char*> options;
-  for (const auto& [name, value] : settings) options.insert(options.end(), {name, value.c_str()});
-  options.push_back(nullptr);
-  std::array<char, 256> text{};
-  unsigned code = 0;
-  mg_error_data error{&code, text.data(), text.size()};
-  // civetweb takes a pointer to non-const user data; answer() only reads it.
-  mg_init_data init{&server->context_->callbacks, const_cast<Pages*>(&server->pages_), options.data()};
-  server->context_->running = mg_start2(&init, &error);
-  if (server->context_->running == nullptr) return absl::UnavailableError(text.data());
-  mg_server_port port{};
-  mg_get_server_ports(server->context_->running, 1, &port);
-  server->context_->host = address.host;
-  server->context_->port = port.port;
-  server->port_ = static_cast<uint16_t>(port.port);
-  return server;
+  ASSIGN_OR_RETURN(std::vector<ListeningSocket> sockets, listen_on(address, {}));
+  const uint16_t port = sockets.front().port();
+  auto parts = std::make_unique<Parts>(std::move(sockets), std::move(pages), std::move(certificates));
+  return std::unique_ptr<HttpServer>(new HttpServer(std::move(parts), port));
 }
 
 }  // namespace locus::server

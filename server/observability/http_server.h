@@ -1,53 +1,49 @@
-// The daemon's HTTP port: a fixed set of pages without parameters, for scrapers and probes. The only place that
-// includes civetweb, which is used for parsing requests only: no file, form, script or socket upgrade is served.
+// The daemon's HTTP port: a fixed set of pages without parameters, for scrapers and probes, over TLS if there are
+// certificates. HTTP and TLS are Boost.Beast's and OpenSSL's; no file, form, script or socket upgrade is served.
 //
-// Bounded: observability_limits.h has the maximum number of connections that are answered and that wait, the maximum
-// size of a request and its timeout; a connection carries one request. Only GET and HEAD are served; other methods are
-// answered with 405 and other paths with 404.
+// The server's resources are bounded: observability_limits.h defines how many connections are served at a time, the
+// maximum size of a request, and the timeouts. Further connections wait in the kernel. Each connection serves one
+// request. Only GET and HEAD are served; other methods are answered with 405 and unknown paths with 404.
 //
-// Threads: the page functions are called on threads of the HTTP server, several at once.
+// Threads: the page functions and the function of certificates are called on threads of the HTTP server, several at
+// once.
 #ifndef LOCUS_SERVER_OBSERVABILITY_HTTP_SERVER_H_
 #define LOCUS_SERVER_OBSERVABILITY_HTTP_SERVER_H_
 
 #include <cstdint>
 #include <functional>
-#include <map>
 #include <memory>
-#include <string>
 
 #include "absl/status/statusor.h"
 #include "server/config/listen_address.h"
+#include "server/observability/http_page.h"
+#include "server/security/tls_files.h"
 
 namespace locus::server {
 
-struct HttpReply {
-  int code = 200;
-  std::string content_type = "text/plain; charset=utf-8";
-  std::string body;
-};
-
 class HttpServer {
  public:
-  // Functions that make the pages, by path, such as "/metrics".
-  using Pages = std::map<std::string, std::function<HttpReply()>>;
+  // Function that returns the checked certificates that new connections use; if it is empty, there is no TLS. If the
+  // contents have a client CA, only clients with a certificate of it are served.
+  using Certificates = std::function<TlsContents()>;
 
-  // Starts serving. `address` must be a TCP address. Returns UNAVAILABLE if it cannot be listened on.
-  static absl::StatusOr<std::unique_ptr<HttpServer>> start(const ListenAddress& address, Pages pages);
-  // Ends the server at once, after waiting for pages that are being made.
+  // Starts serving. `address` must be a TCP address. Returns UNAVAILABLE if the server cannot listen on it.
+  static absl::StatusOr<std::unique_ptr<HttpServer>> start(const ListenAddress& address, HttpPages pages,
+                                                           Certificates certificates = {});
+  // Ends the server as soon as all page functions in progress have returned.
   ~HttpServer();
   HttpServer(const HttpServer&) = delete;
   HttpServer& operator=(const HttpServer&) = delete;
 
-  // Returns the bound port, also if the address asked for any.
+  // Returns the bound port, also if the address has port 0.
   uint16_t port() const { return port_; }
 
  private:
-  struct Context;
-  explicit HttpServer(Pages pages);
+  class Parts;
+  HttpServer(std::unique_ptr<Parts> parts, uint16_t port);
 
-  const Pages pages_;
-  std::unique_ptr<Context> context_;
-  uint16_t port_ = 0;
+  std::unique_ptr<Parts> parts_;
+  const uint16_t port_;
 };
 
 }  // namespace locus::server

@@ -1,8 +1,8 @@
-// Histogram of durations: two ranges for each power of two nanoseconds, from a microsecond to 17 seconds, so that the
-// relative error of a quantile read from it is below one half.
+// Histogram of durations: two ranges between consecutive powers of two, from 2^10 ns (a microsecond) to 2^34 ns (17 s),
+// so that the relative error of a quantile that is computed from the histogram is below one half.
 //
-// Threads: record() from any thread, at the cost of two relaxed additions, without a lock or an allocation; add_to()
-// from any thread at any time.
+// Threads: any thread may call any member at any time. record() costs two relaxed additions, without a lock or an
+// allocation.
 #ifndef LOCUS_SERVER_OBSERVABILITY_LATENCY_HISTOGRAM_H_
 #define LOCUS_SERVER_OBSERVABILITY_LATENCY_HISTOGRAM_H_
 
@@ -19,7 +19,7 @@ namespace locus::server {
 
 inline constexpr uint32_t kLowestOctave = 10;   // 2^10 ns, a microsecond
 inline constexpr uint32_t kHighestOctave = 34;  // 2^34 ns, 17 s
-// Number of ranges that have an upper bound. One more range has none.
+// Number of ranges that have an upper bound. One more range has no upper bound.
 inline constexpr size_t kLatencyBounds = 2 * (kHighestOctave - kLowestOctave) + 1;
 
 // Returns the upper bound of a range, in nanoseconds: 2^k, 1.5 * 2^k, 2^(k+1) ... Precondition: `range` <
@@ -30,7 +30,8 @@ constexpr uint64_t latency_bound(size_t range) {
   return range % 2 == 0 ? octave : octave + octave / 2;
 }
 
-// Returns the range of a duration: the first whose latency_bound() is not below it, or kLatencyBounds if there is none.
+// Returns the range of a duration: the first range whose latency_bound() is not below the duration, or kLatencyBounds
+// if there is no such range.
 constexpr size_t latency_range(uint64_t nanoseconds) {
   if (nanoseconds <= latency_bound(0)) return 0;
   const uint64_t below = nanoseconds - 1;  // a duration equal to a bound belongs to the range below that bound
@@ -39,7 +40,8 @@ constexpr size_t latency_range(uint64_t nanoseconds) {
   return std::min<size_t>(kLatencyBounds, 2 * (octave - kLowestOctave) + half + 1);
 }
 
-// Counts of a histogram, or sums of several, read at one moment.
+// Counts of one histogram, or sums over several histograms: the number of durations in each range, and the sum of all
+// durations in nanoseconds.
 struct LatencyCounts {
   std::array<uint64_t, kLatencyBounds + 1> ranges{};
   uint64_t nanoseconds = 0;

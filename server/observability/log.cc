@@ -14,7 +14,7 @@
 namespace locus::server {
 namespace {
 
-// Maximum size in bytes of a field's value. Longer values are cut, because callers choose some of them.
+// Maximum size in bytes of a field's value. Longer values are cut, because callers choose some of the values.
 constexpr size_t kMaxValue = 1024;
 
 std::atomic<LogFormat> log_format{LogFormat::kText};
@@ -44,8 +44,8 @@ spdlog::logger& logger() {
   return *instance;
 }
 
-// Appends `text` to `out` with JSON escapes. The text format uses them too, because the characters that JSON escapes
-// would break a line of text.
+// Appends `text` to `out` with JSON escapes. The text format uses these escapes too, because an unescaped line break or
+// quote would break a line of text.
 void append_escaped(std::string& out, absl::string_view text) {
   constexpr absl::string_view kHex = "0123456789abcdef";
   for (const char c : text.substr(0, kMaxValue)) {

@@ -1,7 +1,8 @@
-// The daemon's log on standard error: one line an event, as text or JSON. The only place that includes the logging
+// The daemon's log on standard error: one line for each event, as text or JSON. Only log.cc includes the logging
 // library.
 //
-// Threads: start_logging() once, before anything is logged; all else from any thread. Lines are written atomically.
+// Threads: call start_logging() once, before other threads log. Any thread may call every other function. Lines are
+// written atomically.
 #ifndef LOCUS_SERVER_OBSERVABILITY_LOG_H_
 #define LOCUS_SERVER_OBSERVABILITY_LOG_H_
 
@@ -20,18 +21,19 @@ struct LogField {
   std::string value;
 };
 
-// Sets the level and the format. Before this is called, events of level `warning` and above are written as text.
+// Sets the level and the format. Before this call, events of level `warning` and above are written as text.
 void start_logging(LogLevel level, LogFormat format);
 
 // Returns whether events of this level are written.
 bool logs(LogLevel level);
 
-// Writes an event. `message` names the kind of event and is a constant text; `fields` hold the details. Control
+// Writes an event. `message` names the kind of event and is a constant text; `fields` contain the details. Control
 // characters, which may come from callers, are escaped, and values longer than 1,024 bytes are cut.
 void log(LogLevel level, absl::string_view message, std::initializer_list<LogField> fields = {});
 
-// Names the call that this thread is working on: while the scope lives, every line that the thread logs has the fields
-// request_id and, if there is one, traceparent. Scopes may be nested; the innermost one is used.
+// Scope that names the call this thread is working on: during the scope's lifetime, every line that the thread logs has
+// the field request_id and, if the caller sent a traceparent, the field traceparent. Scopes may be nested; the ids of
+// the innermost scope are logged.
 class LogScope {
  public:
   explicit LogScope(TraceContext trace);
@@ -39,8 +41,8 @@ class LogScope {
   LogScope(const LogScope&) = delete;
   LogScope& operator=(const LogScope&) = delete;
 
-  // Returns the ids of this thread's innermost scope, for passing them to another thread. They are empty without a
-  // scope.
+  // Returns the ids of this thread's innermost scope, for passing them to another thread. The ids are empty if the
+  // thread has no scope.
   static TraceContext current();
 
  private:

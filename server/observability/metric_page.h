@@ -1,7 +1,7 @@
-// A page of metrics for one scrape, and its text in Prometheus's exposition format. The only place that includes
+// A page of metrics for one scrape, and its text in Prometheus's exposition format. Only metric_page.cc includes
 // prometheus-cpp, which writes the format and escapes values. Not thread-safe.
 //
-// Invariant: each metric name is begun once, and has a HELP text with its meaning and unit.
+// Invariant: begin() is called once for each metric name, with a HELP text that says the metric's meaning and unit.
 #ifndef LOCUS_SERVER_OBSERVABILITY_METRIC_PAGE_H_
 #define LOCUS_SERVER_OBSERVABILITY_METRIC_PAGE_H_
 
@@ -29,7 +29,8 @@ class MetricPage {
   MetricPage(const MetricPage&) = delete;
   MetricPage& operator=(const MetricPage&) = delete;
 
-  // Begins the metric `name`; later add() calls belong to it. Precondition: `name` was not begun before.
+  // Begins the metric `name`: later calls of add() add samples to this metric. Precondition: no earlier call of begin()
+  // had this name.
   void begin(const std::string& name, const std::string& help, MetricKind kind);
   // Adds a sample to the current metric, which must be a counter or gauge.
   void add(const MetricLabels& labels, double value);

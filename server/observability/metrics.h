@@ -1,15 +1,15 @@
 // Counters of the daemon's calls, for /metrics. Code that serves calls must record:
 //
-// - every unary call when its answer is known, and every message of a stream when its answer is known:
-//   record_call(rpc, code, nanoseconds since it arrived); serve() and HotCall do it for their calls;
+// - every unary call, and every message of a stream, when its answer is known: record_call(rpc, code, nanoseconds since
+//   the call or message arrived); serve() and HotCall record the calls that they run;
 // - every answered block of queries: record_block();
 // - every published batch of updates: record_update();
 // - every refused call or message: record_refusal();
-// - every stream: an OpenStream while it is open.
+// - every open stream: an OpenStream that lives as long as the stream.
 //
 // Threads: every member may be called from any thread. Recording takes no lock and allocates nothing, except in
 // record_refusal(). Counters are split into stripes, so that threads rarely share a cache line. read() adds the stripes
-// while other threads count: each number is correct, but two numbers may be of slightly different moments.
+// while other threads count: each number is correct, but two numbers may have been read at slightly different times.
 #ifndef LOCUS_SERVER_OBSERVABILITY_METRICS_H_
 #define LOCUS_SERVER_OBSERVABILITY_METRICS_H_
 
@@ -32,6 +32,7 @@ namespace locus::server {
 
 enum class Rpc : uint8_t {
   kGetServer,
+  kGetQuotas,
   kBackup,
   kCreateScene,
   kGetScene,
@@ -48,7 +49,7 @@ enum class Rpc : uint8_t {
   kQuery,
   kStreamQueries,
 };
-inline constexpr size_t kRpcs = 16;
+inline constexpr size_t kRpcs = 17;
 // Returns the rpc's name in the protocol, such as "StreamQueries".
 absl::string_view rpc_name(Rpc rpc);
 
@@ -66,7 +67,7 @@ struct QueryCounts {
   LatencyCounts latency;  // processor time of each block
 };
 
-// Reason of a refusal and the limit that it names; the limit may be empty.
+// Reason of a refusal, and name of the exceeded limit; the limit is empty if the refusal names no limit.
 using RefusalName = std::pair<std::string, std::string>;
 
 struct MetricCounts {
@@ -87,12 +88,12 @@ class CallMetrics {
   void record_block(BlockKind kind, uint64_t queries, uint64_t nanoseconds, const Work& work);
   // Records a batch of updates. `nanoseconds` is the time from its arrival to the publication of its revision.
   void record_update(uint64_t items, uint64_t nanoseconds);
-  // Records how long building a mesh's tree took.
+  // Records the time that building a mesh's tree took.
   void record_mesh_build(uint64_t nanoseconds);
   // Records a change of instances. `nanoseconds` is the time from the request to the publication of its revision.
   void record_instance_change(uint64_t nanoseconds);
   // Records a status that is not OK, under its reason, or under the name of its code if it has no reason. At most
-  // kMaxRefusalNames names are counted separately, the rest as "_other". Takes a lock briefly.
+  // kMaxRefusalNames names are counted separately, all further names together as "_other". Takes a lock briefly.
   void record_refusal(const absl::Status& status) LOCUS_EXCLUDES(mutex_);
 
   MetricCounts read() const LOCUS_EXCLUDES(mutex_);
@@ -128,7 +129,7 @@ class CallMetrics {
   std::map<RefusalName, uint64_t> refusals_ LOCUS_GUARDED_BY(mutex_);
 };
 
-// Counts a stream as open during its lifetime. Must not outlive the metrics.
+// Scope during which a stream is counted as open. Must not outlive the metrics.
 class OpenStream {
  public:
   OpenStream(CallMetrics& metrics, Rpc rpc) : open_(metrics.open_streams_[static_cast<size_t>(rpc)]) {

@@ -4,6 +4,7 @@
 #include <netinet/in.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <sys/un.h>
 #include <unistd.h>
 
@@ -60,20 +61,23 @@ bool is_connection(int fd, const Ends& ends) {
 void count_files(const Ends& ends, ProcessFigures& process) {
   const std::unique_ptr<DIR, int (*)(DIR*)> folder(opendir("/proc/self/fd"), closedir);
   if (folder == nullptr) return;
+  std::set<ino_t> connections;  // a connection may have several descriptors, but only one inode
   while (const dirent* entry = readdir(folder.get())) {
     int fd = 0;
     if (!absl::SimpleAtoi(entry->d_name, &fd) || fd == dirfd(folder.get())) continue;
     ++process.open_files;
-    process.connections += is_connection(fd, ends) ? 1 : 0;
+    struct stat file {};
+    if (is_connection(fd, ends) && fstat(fd, &file) == 0) connections.insert(file.st_ino);
   }
+  process.connections = connections.size();
 }
 
 double seconds(const timeval& time) {
   return static_cast<double>(time.tv_sec) + static_cast<double>(time.tv_usec) * 1e-6;
 }
 
-// Returns the fields of /proc/self/stat after the process's name. The name may contain spaces and brackets, but no
-// bracket follows it.
+// Returns the fields of /proc/self/stat after the process's name. The name may contain spaces and brackets, so the
+// fields begin after the last bracket of the line.
 std::vector<std::string> fields_after_name() {
   std::string line;
   std::getline(std::ifstream("/proc/self/stat"), line);
@@ -100,7 +104,7 @@ double number_at(const std::vector<std::string>& fields, size_t at) {
 }  // namespace
 
 uint64_t resident_bytes() {
-  // Both in pages: the whole address space, and the part of it that is in memory.
+  // Sizes in pages: `mapped` of the whole address space, `resident` of the part that is in memory.
   uint64_t mapped = 0;
   uint64_t resident = 0;
   std::ifstream("/proc/self/statm") >> mapped >> resident;

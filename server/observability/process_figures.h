@@ -1,5 +1,5 @@
-// Measurements of this process, read from the system for /metrics: the measurements that all of Prometheus's client
-// libraries have, and the number of open connections. Functions without state; any thread.
+// Measurements of this process, read from the system for /metrics: the measurements that all client libraries of
+// Prometheus report, and the number of open connections. Functions without state; any thread.
 #ifndef LOCUS_SERVER_OBSERVABILITY_PROCESS_FIGURES_H_
 #define LOCUS_SERVER_OBSERVABILITY_PROCESS_FIGURES_H_
 
@@ -12,20 +12,20 @@
 namespace locus::server {
 
 struct ProcessFigures {
-  double cpu_seconds = 0;  // user and system
+  double cpu_seconds = 0;  // user and system time
   uint64_t resident_bytes = 0;
   uint64_t threads = 0;
   uint64_t open_files = 0;
   uint64_t max_files = 0;
-  uint64_t connections = 0;  // connections that clients opened to the given addresses
-  double start_seconds = 0;  // since 1970
+  uint64_t connections = 0;  // open connections from clients to the addresses given to read_process()
+  double start_seconds = 0;  // start of the process, in seconds since 1970
 };
 
 // Returns the process's resident memory in bytes. Costs one read of /proc.
 uint64_t resident_bytes();
 
 // Reads all figures. `addresses` are the addresses whose connections are counted, as texts for parse_listen_address();
-// invalid ones are ignored. A figure that cannot be read is 0. O(open files), two system calls each.
+// invalid texts are ignored. A figure that cannot be read is 0. Costs two system calls for each open file.
 ProcessFigures read_process(const std::vector<std::string>& addresses);
 
 // Adds the figures to the page.

@@ -35,7 +35,7 @@ constexpr Figure kFigures[] = {
     {"locus_scene_triangles", "Triangles of the scene's placed meshes.", &SceneFigures::triangles},
     {"locus_scene_memory_bytes", "Memory of the scene's latest revision without meshes, in bytes.",
      &SceneFigures::memory_bytes},
-    {"locus_scene_history_bytes", "Memory of the scene's past beyond its latest revision, in bytes.",
+    {"locus_scene_history_bytes", "Memory of the scene's history beyond its latest revision, in bytes.",
      &SceneFigures::history_bytes},
     {"locus_scene_history_ticks", "Ticks of the past that queries may ask about.", &SceneFigures::history_ticks},
     {"locus_scene_pinned_bytes", "Memory of older revisions of the scene that are still being read, in bytes.",
@@ -69,16 +69,14 @@ std::vector<SceneFigures> SceneLabels::label(const std::vector<SceneFigures>& sc
     }
   }
   if (!other.name.empty()) shown.push_back(other);
-  LOCUS_DCHECK_LE(shown.size(), max_ + 1);  // one more for the sum of the others
-  check_invariants();
+  LOCUS_DCHECK_LE(shown.size(), max_ + 1);  // one more for the sum over the scenes without a label
+  LOCUS_DCHECK_CALL(check_invariants());
   return shown;
 }
 
 void SceneLabels::check_invariants() const {
-  if constexpr (kDebugChecks) {
-    LOCUS_DCHECK_LE(labelled_.size(), max_);
-    LOCUS_DCHECK(!labelled_.contains(kOther));
-  }
+  LOCUS_DCHECK_LE(labelled_.size(), max_);
+  LOCUS_DCHECK(!labelled_.contains(kOther));
 }
 
 void add_scene_figures(const std::vector<SceneFigures>& scenes, MetricPage& page) {

@@ -1,8 +1,8 @@
 // Metrics of each scene, labelled with the scene's name. The number of labels is bounded, because scrapers keep every
-// label they have seen: kMaxLabelledScenes scenes have their own label, and the others are summed under "_other", which
-// is not a valid name of a scene.
+// label they have seen: kMaxLabelledScenes scenes have their own label, and all other scenes are summed under the label
+// "_other", which is not a valid name of a scene.
 //
-// Threads: SceneLabels is for one thread at a time.
+// Threads: only one thread at a time may use a SceneLabels.
 #ifndef LOCUS_SERVER_OBSERVABILITY_SCENE_FIGURES_H_
 #define LOCUS_SERVER_OBSERVABILITY_SCENE_FIGURES_H_
 
@@ -16,7 +16,7 @@
 
 namespace locus::server {
 
-// Figures of one scene, or the sum of several.
+// Figures of one scene, or their sums over several scenes.
 struct SceneFigures {
   std::string name;
   uint64_t revision = 0;
@@ -31,8 +31,9 @@ struct SceneFigures {
   uint64_t pending_changes = 0;
 };
 
-// The set of scenes that have a label. Invariant: at most `max` scenes. A scene keeps its label until it is deleted, so
-// that its time series continues. A free label goes to the scene without a label whose name sorts first.
+// The set of scenes that have a label. Invariant: at most `max` scenes have a label. A scene keeps its label until the
+// scene is deleted, so that its time series continues. A free label is given to the scene whose name sorts first among
+// the scenes without a label.
 class SceneLabels {
  public:
   static constexpr const char* kOther = "_other";

@@ -1,6 +1,4 @@
 // One call as the services see it: its metadata, its deadline, and whether its caller still waits for an answer.
-// serve() is the frame around every call on gRPC's synchronous threads: it admits the call, checks that the server is
-// serving, converts the error, counts and logs.
 //
 // Threads: a Caller may be used from any thread while the call lasts, except trace().
 #ifndef LOCUS_SERVER_RPC_CALL_H_
@@ -8,15 +6,19 @@
 
 #include <grpcpp/server_context.h>
 
+#include <array>
 #include <atomic>
 #include <chrono>
-#include <functional>
+#include <memory>
 #include <string>
 
 #include "absl/status/statusor.h"
-#include "core/scene/scene.h"
-#include "server/host/host.h"
+#include "absl/strings/string_view.h"
+#include "server/connections/connection.h"
 #include "server/observability/trace_context.h"
+#include "server/rpc/call_memory.h"
+#include "server/rpc/rpc_state.h"
+#include "server/security/rights.h"
 
 namespace locus::server {
 
@@ -25,25 +27,85 @@ using SteadyTime = std::chrono::steady_clock::time_point;
 // Returns the nanoseconds from `start` to now on the steady clock.
 uint64_t nanoseconds_since(SteadyTime start);
 
-// The caller's side of one call. Refers to `context`, which must outlive it.
+// The caller's side of one call. Borrows `context`, which must outlive the Caller.
 class Caller {
  public:
-  // `gone`, if not null, becomes true when the caller gives up. Calls on completion queues must pass it, because
-  // IsCancelled() of their `context` may not be called.
-  Caller(const Host& host, const grpc::ServerContextBase& context, const std::atomic<bool>* gone = nullptr);
+  // `gone` becomes true when the caller gives up.
+  Caller(RpcState& state, const grpc::ServerContextBase& context, const std::atomic<bool>& gone);
 
   // Returns OK while the call should continue; otherwise CANCELLED, DEADLINE_EXCEEDED, or UNAVAILABLE (DRAINING) when
   // the drain's grace period has passed.
   absl::Status stop() const;
 
-  // Returns the call's deadline; a year from now for a call without one.
+  // Returns the call's deadline; for a call without a deadline, the time a year after the call began.
   SteadyTime deadline() const { return deadline_; }
   // Returns the time until which this call may wait for a revision: its deadline, or limits::kDefaultWaitMs from now if
-  // it has none. A message of a stream waits until the deadline too, but never longer than limits::kDefaultWaitMs.
+  // the call has no deadline. A message of a stream waits until the deadline too, but never longer than
+  // limits::kDefaultWaitMs.
   SteadyTime wait_until(bool stream) const;
 
   // Returns INVALID_ARGUMENT (MALFORMED) if the metadata `x-scene` is present and names another scene.
   absl::Status check_scene(const std::string& scene) const;
+
+  // Counts the call and its metadata for its connection. Call it once, when the call was accepted.
+  void count_call() const;
+
+  // Finds out who calls, and checks that the caller may call the method `path` of this server. UNAUTHENTICATED if the
+  // caller's credentials are not accepted, or if a caller without credentials may do nothing here; PERMISSION_DENIED if
+  // the caller lacks a right to the server that the method needs. Call it before the other functions on rights.
+  absl::Status authorize(absl::string_view path);
+  // Returns whether the caller has a right, for rights to scenes to the scene `scene`.
+  bool may(Right right, absl::string_view scene) const;
+  // Returns whether the caller may administer every scene.
+  bool administers_all() const;
+  // Returns OK if the caller has the right to the scene that the method needs. NOT_FOUND, as for a scene that does not
+  // exist, if the caller may not read the scene; PERMISSION_DENIED if the caller may read it, but lacks the right.
+  absl::Status check_right(const std::string& scene) const;
+  // Returns PERMISSION_DENIED, which says that the caller lacks the right to the scene.
+  absl::Status lacks_right(Right right, absl::string_view scene) const;
+  // Returns OK while the caller may go on with the call, which serves the scene `scene`, or none if that is empty.
+  // UNAUTHENTICATED if the credentials were revoked or have expired since the call began; otherwise the errors of
+  // authorize() and check_right() for the rights that the caller has now.
+  absl::Status recheck(const std::string& scene) const;
+  // Returns the identity; that of callers without credentials before authorize(), and in servers without access
+  // control.
+  const Identity& identity() const { return *identity_; }
+
+  // Returns an id of the client: of its identity if it has one, otherwise of its connection. The same for all calls of
+  // the client, and different for other clients.
+  uint64_t client() const;
+
+  // Returns the names under which the quotas of the caller's identity and connection are counted.
+  std::array<std::string, 2> quota_subjects() const;
+  // Takes `amount` from a quota of the caller's identity and of its connection: see Quotas.
+  absl::Status take_quota(QuotaKind kind, double amount) const;
+  // Charges both with work that was done already.
+  void charge_quota(QuotaKind kind, double amount) const;
+  // Takes `amount` of a quota for as long as the result lives.
+  absl::StatusOr<QuotaHold> hold_quota(QuotaKind kind, double amount) const;
+
+  // Claims `bytes` on a line of the server's memory, of the quotas bytes_in_flight of the caller's identity and
+  // connection and, for moves, requests and replies, of the share of its connection. RESOURCE_EXHAUSTED names the limit
+  // or quota that does not suffice: see MemoryBudget and Quotas.
+  absl::StatusOr<CallMemory> claim(MemoryLine line, absl::string_view field, uint64_t bytes) const;
+  // Claims `bytes` for work that is never refused, because it frees memory.
+  CallMemory claim_anyway(MemoryLine line, uint64_t bytes) const;
+
+  // Remembers the scene or mesh that a blocking call is about, for the audit log. Call it on the call's own thread.
+  void set_subject(absl::string_view subject) const { subject_ = std::string(subject); }
+  const std::string& subject() const { return subject_; }
+  // Appends a line to the audit log, if there is one: what the call changed in `subject`, a scene or mesh, or why it
+  // was refused.
+  void audit(absl::string_view subject, const absl::Status& status) const;
+  // Appends a line for a call about a scene that the caller may not read, whether it exists or not, unless the line of
+  // the call's answer says it too.
+  void audit_hidden(absl::string_view scene) const;
+  // Promises that audit() is called with the answer of this call, whatever it is.
+  void promise_audit() { is_answer_audited_ = true; }
+  // Counts an update of a scene, for the audit log's line a minute. `items` is the number of objects that it changed.
+  void audit_update(const std::string& scene, uint64_t items) const;
+  // Returns whether the refusal `status` belongs into the audit log.
+  static bool is_audited(const absl::Status& status);
 
   // Cancels the call at once, even while it is blocked in a read or write.
   void cancel() const { context_.TryCancel(); }
@@ -52,46 +114,41 @@ class Caller {
   // otherwise a generated request id. Call it on the call's own thread only.
   TraceContext trace() const;
 
-  const Host& host() const { return host_; }
+  const RpcState& state() const { return state_; }
+  MemoryBudget& memory() const { return state_.memory; }
+  // Returns the connection that the call came on.
+  Connection& connection() const { return *connection_; }
 
  private:
-  const Host& host_;
+  bool has_quotas() const;
+  // Returns UNAUTHENTICATED, and closes the connection, if the caller's certificate has expired since it connected.
+  absl::Status check_certificate() const;
+  // Returns whether the method needs a right that must be checked.
+  bool needs_right() const;
+  // Checks the rights that do not depend on a scene.
+  absl::Status check_grants() const;
+
+  RpcState& state_;
   const grpc::ServerContextBase& context_;
-  const std::atomic<bool>* const gone_;
+  const std::atomic<bool>& gone_;
+  const std::shared_ptr<Connection> connection_;
   SteadyTime deadline_;
+  const RpcRight* rpc_right_ = nullptr;  // row of the method; null before authorize()
+  IdentityPtr identity_ = anonymous_identity();
+  std::array<std::string, 2> quota_subjects_;  // of quota_subjects(); set by authorize() with access control
+  mutable std::string subject_;
+  bool is_answer_audited_ = false;
   const uint64_t number_ = next_request_number();
 };
 
 // Metadata key of the request id, in the caller's metadata and in the trailing metadata of the reply.
 inline constexpr const char* kRequestIdMetadata = "x-request-id";
 
-// Checks the scene's name and the metadata x-scene, then returns the scene. Errors name `field`.
-absl::StatusOr<ScenePtr> find_scene(const Caller& caller, const std::string& name, absl::string_view field);
-
-// Waits until `until` at most for the revision that `view` names, and pins its snapshot. Wakes up at once when the
-// revision is published or the scene is deleted, and within 50 ms when the call ends or the server drains (then
-// UNAVAILABLE, DRAINING).
-absl::StatusOr<SnapshotPin> wait_for(const Scene& scene, const View& view, SteadyTime until, const Caller& caller);
-
-// Waits until every reader whose snapshot of the scene was revoked has released it. Calls
-// Scene::revoke_overdue_readers() repeatedly once that has taken longer than a second. Polls `stop` every 50 ms and
-// returns its status if it is not OK; but instead of DEADLINE_EXCEEDED it returns the error of the scene, which names
-// the limit pinned_bytes.
-absl::Status wait_for_readers(Scene& scene, const std::function<absl::Status()>& stop);
-
 // Returns UNAVAILABLE while the server recovers its scenes from the disk, or drains.
-absl::Status check_serving(const Host& host);
-// Treatment of a call that arrives while check_serving() fails.
-enum class WhileClosed { kRefuse, kServe };
+absl::Status check_serving(const RpcState& state);
 
-// Runs `body`, converts its status to the call's status, and counts the call. Log lines of the call carry its request
-// id, which is also returned to the caller in the trailing metadata.
-grpc::Status serve(Host& host, grpc::ServerContextBase& context, Rpc rpc,
-                   const std::function<absl::Status(const Caller&)>& body,
-                   WhileClosed while_closed = WhileClosed::kRefuse);
-
-// Returns whether `status`, of a refused message, must end the whole stream: because the caller ended the call, its
-// deadline passed, or the server drains.
+// Returns whether `status`, the error of one message, must end the whole stream: true if the caller ended the call, the
+// call's deadline passed, or the server drains.
 bool ends_stream(const Caller& caller, const absl::Status& status);
 
 // Counts a call, or one message of a stream, that was answered with `status`. Logs a line at debug level if `status` is

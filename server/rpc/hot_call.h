@@ -1,17 +1,18 @@
 // The state machine of the frequent calls (queries and updates, unary or streams) on a completion queue. A Method names
 // the types of a call and starts the work on its messages; HotCall implements the exchange with gRPC for all Methods.
 //
-// Lifetime: a call belongs to its IO loop and is used only there, so it has no locks. It waits for a caller, and lives
-// from accepted() until three conditions hold: its status was sent (finished_), gRPC has reported the end of the call
-// (gone_), and no read, no write and no message is pending. Then it deletes itself at the end of advance(). Work on a
-// message may run on any thread, but returns to the IO loop exactly once, through answered(). When the caller gives up
-// or the server drains, give_up() asks the work to answer soon. A Slot holds a message, its answer and the work on it.
-// Slots outlive calls and are reused, so that steady traffic allocates no columns.
+// Lifetime: a call belongs to its IO loop and is used only on that loop, so it has no locks. A HotCall first waits for
+// a caller. From accepted() on, it lives until three conditions hold: its status was sent (finished_), gRPC has
+// reported the end of the call (gone_), and no read, no write and no message is pending. Then the call deletes itself
+// at the end of advance(). Work on a message may run on any thread, but calls answered() exactly once, on the IO loop.
+// When the caller gives up or the server drains, give_up() asks the work to answer soon. A Slot contains a message, its
+// answer and the work on the message. Slots outlive calls and are reused, so that steady traffic allocates no columns.
 //
-// A stream has at most kSlots messages that are being processed or wait to be written. It reads the next message when
-// an answer was written, so a caller who does not read its answers can only use bounded memory. Reads, one write and
-// the work on several messages proceed concurrently. Answers are written as they complete, or in the order of the
-// messages if Method::kInOrder.
+// A stream has at most kSlots messages that are being processed or whose answers wait to be written. The stream reads
+// the next message when an answer has been written, so a caller that does not read its answers can use only bounded
+// memory; a call whose answer is not taken within RpcState::stall_limit is cancelled. Reads, one write and the work on
+// several messages proceed concurrently. If Method::kInOrder is true, answers are written in the order of the messages,
+// otherwise as they complete.
 #ifndef LOCUS_SERVER_RPC_HOT_CALL_H_
 #define LOCUS_SERVER_RPC_HOT_CALL_H_
 
@@ -23,7 +24,6 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -32,12 +32,13 @@
 #include <vector>
 
 #include "core/base/check.h"
+#include "core/base/refusal.h"
 #include "core/base/status_macros.h"
 #include "server/convert/status.h"
-#include "server/host/host.h"
 #include "server/rpc/call.h"
 #include "server/rpc/call_slot.h"
 #include "server/rpc/io_threads.h"
+#include "server/rpc/receive.h"
 #include "server/rpc/scene_binding.h"
 
 namespace locus::server {
@@ -45,15 +46,15 @@ namespace locus::server {
 template <class Method>
 class HotCall;
 
-// Accepts the calls of one rpc on one IO loop, and keeps their slots for reuse. Outlives the loop's calls.
+// Acceptor of the calls of one rpc on one IO loop; keeps the slots of ended calls for reuse. Outlives the loop's calls.
 //
-// A Method has the types Request, Response and Work; the constants kRpc, kStream and kInOrder; listen(), which requests
-// the next call from gRPC; and begin(), which begins the work on a message. A Work is constructed from a CallSlot and
-// has give_up(), which asks it to answer soon if it has not answered yet.
+// A Method has the types Request, Response and Work; the constants kRpc, kPath, kStream and kInOrder; listen(), which
+// requests the next call from gRPC; make_work(), which returns the Work of a CallSlot; and begin(), which begins the
+// work on a message. Work::give_up() asks the work to answer soon if it has not answered yet.
 template <class Method>
 class Listener {
  public:
-  Listener(Host& host, const Method& rpc, IoLoop& io) : host_(host), rpc_(rpc), io_(io) {}
+  Listener(RpcState& state, const Method& rpc, IoLoop& io) : state_(state), rpc_(rpc), io_(io) {}
 
   // Requests the first calls from gRPC. Call it once, after the server and before the IO threads have started.
   void listen() {
@@ -64,11 +65,11 @@ class Listener {
   friend class HotCall<Method>;
   using Slot = typename HotCall<Method>::Slot;
 
-  static constexpr int kWaiting = 4;         // calls requested from gRPC that still wait for a caller
+  static constexpr int kWaiting = 4;         // number of calls that are requested from gRPC and wait for a caller
   static constexpr size_t kSpareSlots = 16;  // maximum number of unused slots kept for later messages
 
   std::unique_ptr<Slot> take_slot() {
-    if (spare_.empty()) return std::make_unique<Slot>(host_);
+    if (spare_.empty()) return std::make_unique<Slot>(rpc_);
     std::unique_ptr<Slot> slot = std::move(spare_.back());
     spare_.pop_back();
     return slot;
@@ -77,13 +78,13 @@ class Listener {
     if (spare_.size() < kSpareSlots && slot->fit_to_keep()) spare_.push_back(std::move(slot));
   }
 
-  Host& host_;
+  RpcState& state_;
   const Method rpc_;
   IoLoop& io_;
   std::vector<std::unique_ptr<Slot>> spare_;
 };
 
-// One call of `Method`: waiting to be accepted, or accepted and not yet over.
+// One call of `Method`: waiting to be accepted, or accepted and not yet ended.
 template <class Method>
 class HotCall final : private IoLoop::ActiveCall {
  public:
@@ -93,17 +94,21 @@ class HotCall final : private IoLoop::ActiveCall {
   // A message of a call, from its arrival until its answer is written.
   class Slot final : public CallSlot {
    public:
-    explicit Slot(Host& host) : CallSlot(host), work_(*this) {}
+    explicit Slot(const Method& rpc) : work_(rpc.make_work(*this)) {}
 
     const Caller& caller() const override { return *call_->caller_; }
     IoLoop& io() const override { return call_->listener_.io_; }
-    uint64_t client() const override { return call_->client(); }
+    uint64_t client() const override { return call_->caller_->client(); }
     bool stream() const override { return Method::kStream; }
+    absl::Status claim_answer(uint64_t bytes) override {
+      ASSIGN_OR_RETURN(answer_claim_, call_->caller_->claim(MemoryLine::kReplies, "", bytes * kAnswerCopies));
+      return absl::OkStatus();
+    }
     void hold() override { holds_ = true; }
     void answered(absl::Status status) override { call_->answered(*this, std::move(status)); }
 
-    // Returns whether the slot may be kept for reuse: its messages hold at most kMaxKept bytes of memory. Measures this
-    // only once every kLookEvery bytes of messages, because measuring is slow; in between, returns true.
+    // Returns whether the slot may be kept for reuse: its messages use at most kMaxKept bytes of memory. Measures the
+    // memory only once every kLookEvery bytes of messages, because measuring is slow; in between, returns true.
     bool fit_to_keep() {
       if (bytes_since_look_ < kLookEvery) return true;
       bytes_since_look_ = 0;
@@ -114,11 +119,15 @@ class HotCall final : private IoLoop::ActiveCall {
     friend class HotCall;
     static constexpr size_t kLookEvery = 1u << 20;
     static constexpr size_t kMaxKept = 1u << 20;
+    // Number of copies of an answer: a message, whose columns double their capacity as they grow, and its bytes.
+    static constexpr uint64_t kAnswerCopies = 3;
 
     HotCall* call_ = nullptr;
     Request request_;
     Response response_;
     typename Method::Work work_;
+    CallMemory request_claim_;  // until the slot is released
+    CallMemory answer_claim_;   // until the answer is written
     bool answered_ = false;
     bool holds_ = false;  // the work called hold(): read no message before this one is answered
     SteadyTime arrived_;
@@ -147,6 +156,7 @@ class HotCall final : private IoLoop::ActiveCall {
 
   explicit HotCall(Listener<Method>& listener) : listener_(listener) {}
   ~HotCall() {
+    if (caller_) caller_->connection().call_ended();
     if (active_call_)
       listener_.io_.leave(*active_call_);
     else
@@ -181,7 +191,8 @@ class HotCall final : private IoLoop::ActiveCall {
     listen(listener_);
     active_call_ = listener_.io_.enter(*this);
     arrived_ = std::chrono::steady_clock::now();
-    caller_.emplace(listener_.host_, context_, &stopped_);
+    caller_.emplace(listener_.state_, context_, stopped_);
+    caller_->count_call();
     act([this] {
       if (absl::Status status = admit(); !status.ok()) {
         refuse(std::move(status));
@@ -193,13 +204,17 @@ class HotCall final : private IoLoop::ActiveCall {
   }
 
   absl::Status admit() {
-    Host& host = listener_.host_;
-    AdmissionLimiter& limiter = Method::kStream ? host.streams : host.calls;
-    permit_ = limiter.enter();
+    RpcState& state = listener_.state_;
+    RETURN_IF_ERROR(caller_->authorize(Method::kPath));
+    AdmissionLimiter& limiter = Method::kStream ? state.streams : state.calls;
+    permit_ = limiter.enter(caller_->client());
     if (!permit_)
       return refuse_full("", Method::kStream ? "streams" : "calls", limiter.max(), limiter.max() + 1.0, kRetryAfterMs);
-    RETURN_IF_ERROR(check_serving(host));
-    if (Method::kStream) open_.emplace(host.metrics, Method::kRpc);
+    RETURN_IF_ERROR(check_serving(state));
+    if (Method::kStream) {
+      ASSIGN_OR_RETURN(open_quota_, caller_->hold_quota(QuotaKind::kOpenStreams, 1));
+      open_.emplace(state.metrics, Method::kRpc);
+    }
     return absl::OkStatus();
   }
 
@@ -216,7 +231,7 @@ class HotCall final : private IoLoop::ActiveCall {
   void read(bool ok) {
     act([this, ok] {
       reading_ = false;
-      if (no_more_) return;  // this message was read too late: drop it
+      if (no_more_) return;  // the call already stopped reading: drop this message
       if (!ok) {
         no_more_ = true;
         return;
@@ -229,9 +244,13 @@ class HotCall final : private IoLoop::ActiveCall {
 
   void take(Bytes& bytes) {
     std::unique_ptr<Slot> slot = listener_.take_slot();
-    slot->bytes_since_look_ += bytes.Valid() ? bytes.Length() : 0;
-    if (!bytes.Valid() || !grpc::SerializationTraits<Request>::Deserialize(&bytes, &slot->request_).ok())
-      return refuse(refuse_argument(Reason::kMalformed, "", {}, "the bytes are no message of this call's type"));
+    const size_t length = bytes.Valid() ? bytes.Length() : 0;
+    caller_->connection().message_read(length);
+    slot->bytes_since_look_ += length;
+    absl::StatusOr<CallMemory> claim = parse_request(*caller_, wire_plan<Request>(), bytes, slot->request_);
+    absl::Status refused = claim.status();
+    if (refused.ok()) slot->request_claim_ = *std::move(claim);
+    if (!refused.ok() && !can_answer(refused, bytes, slot->request_)) return refuse(std::move(refused));
     if constexpr (Method::kStream)
       if (absl::Status status = scene_.bind(*caller_, slot->request_.scene()); !status.ok())
         return refuse(std::move(status));
@@ -239,14 +258,23 @@ class HotCall final : private IoLoop::ActiveCall {
     slot->answered_ = false;
     slot->arrived_ = std::chrono::steady_clock::now();
     slots_.push_back(std::move(slot));
-    begin(*slots_.back());
+    begin(*slots_.back(), std::move(refused));
   }
 
-  void begin(Slot& slot) {
+  // Returns whether a message that was refused before it was parsed can be answered, so that its stream continues:
+  // whether its bytes are a message and name its sequence. Parses the rest of `request` only as far as needed for this.
+  static bool can_answer(const absl::Status& refused, const Bytes& bytes, Request& request) {
+    const std::optional<Refusal> refusal = refusal_of(refused);
+    return Method::kStream && refusal && refusal->reason != Reason::kMalformed && parse_envelope(bytes, request);
+  }
+
+  // Begins the work on a message, or answers it with the error `status` with which it was refused already.
+  void begin(Slot& slot, absl::Status status) {
     if constexpr (Method::kStream) {
       read_next();  // the next message may arrive while this one is processed
       slot.response_.set_sequence(slot.request_.sequence());
-      if (absl::Status status = scene_.check(slot.request_.scene()); !status.ok()) return slot.answered(status);
+      status.Update(scene_.check(slot.request_.scene()));
+      if (!status.ok()) return slot.answered(std::move(status));
       listener_.rpc_.begin(slot.work_, scene_.scene(), slot.request_, slot.response_);
     } else {
       listener_.rpc_.begin(slot.work_, slot.request_.scene(), slot.request_, slot.response_);
@@ -258,8 +286,8 @@ class HotCall final : private IoLoop::ActiveCall {
       LOCUS_CHECK(!slot.answered_);
       slot.answered_ = true;
       slot.holds_ = false;
-      record_answer(listener_.host_.metrics, *caller_, Method::kRpc, status, slot.arrived_);
-      if (stopping_ || status.ok()) return;
+      record_answer(listener_.state_.metrics, *caller_, Method::kRpc, status, slot.arrived_);
+      if (stopping_ || status.ok()) return shrink_claim(slot);
       if constexpr (Method::kStream) {
         if (ends_stream(*caller_, status)) return stop(std::move(status));
         *slot.response_.mutable_error() = to_error(status);
@@ -269,7 +297,14 @@ class HotCall final : private IoLoop::ActiveCall {
     });
   }
 
-  // Returns whether only the status remains to be sent; a unary call sends its answer together with it.
+  // Reduces the claim of a slot to the size of its answer.
+  void shrink_claim(Slot& slot) {
+    constexpr uint64_t kWorthwhile = 64u << 10;
+    if (slot.answer_claim_.bytes() > kWorthwhile)
+      slot.answer_claim_.shrink(Slot::kAnswerCopies * slot.response_.ByteSizeLong());
+  }
+
+  // Returns whether only the status remains to be sent. A unary call sends its answer together with the status.
   bool all_done() const { return slots_.empty() || (!Method::kStream && slots_.front()->answered_); }
 
   void write_next() {
@@ -279,6 +314,7 @@ class HotCall final : private IoLoop::ActiveCall {
       const auto next = std::find_if(slots_.begin(), last, [](const auto& slot) { return slot->answered_; });
       if (next == last) return;
       writing_ = next->get();
+      writing_since_ = std::chrono::steady_clock::now();
       serialize(*writing_);
       wire_.Write(outgoing_, &written_tag_);
     }
@@ -292,11 +328,9 @@ class HotCall final : private IoLoop::ActiveCall {
   }
 
   void serialize(Slot& slot) {
-    bool own = false;
-    outgoing_.Clear();
-    const grpc::Status status = grpc::SerializationTraits<Response>::Serialize(slot.response_, &outgoing_, &own);
-    LOCUS_CHECK(status.ok());  // replies are far below the maximum size of a message
+    outgoing_ = to_bytes(slot.response_);
     slot.bytes_since_look_ += outgoing_.Length();
+    caller_->connection().written(outgoing_.Length());
   }
 
   void release(Slot& slot) {
@@ -304,12 +338,14 @@ class HotCall final : private IoLoop::ActiveCall {
         std::find_if(slots_.begin(), slots_.end(), [&](const auto& entry) { return entry.get() == &slot; });
     std::unique_ptr<Slot> owned = std::move(*position);
     slots_.erase(position);
+    owned->request_claim_.release();
+    owned->answer_claim_.release();
     listener_.give_back(std::move(owned));
   }
 
   // Ends the call with an error that is not the answer to a message.
   void refuse(absl::Status status) {
-    record_answer(listener_.host_.metrics, *caller_, Method::kRpc, status, arrived_);
+    record_answer(listener_.state_.metrics, *caller_, Method::kRpc, status, arrived_);
     end(std::move(status));
   }
 
@@ -340,16 +376,20 @@ class HotCall final : private IoLoop::ActiveCall {
 
   void finish() {
     finishing_ = true;
-    // Release the permit first: a caller that has its answer may call again at once, and must be admitted.
+    writing_since_ = std::chrono::steady_clock::now();
+    // Release the permit and the quota first: a caller that has its answer may call again at once, and must be
+    // admitted.
     permit_ = AdmissionLimiter::Permit();
-    // Only failed calls return the request id, with which a caller can ask about the failure. Other calls save the
-    // bytes.
+    open_quota_.shrink(0);
+    // Return the request id of a failed call only, so that the caller can refer to the failure. In successful calls it
+    // would only cost bytes.
     if (!end_status_.ok()) context_.AddTrailingMetadata(kRequestIdMetadata, caller_->trace().request_id);
     if constexpr (Method::kStream) {
       wire_.Finish(to_grpc(end_status_), &finished_tag_);
     } else {
       if (end_status_.ok() && !slots_.empty()) {
         serialize(*slots_.front());
+        answer_claim_ = std::move(slots_.front()->answer_claim_);
         wire_.Finish(outgoing_, grpc::Status::OK, &finished_tag_);
       } else {
         wire_.FinishWithError(to_grpc(end_status_), &finished_tag_);
@@ -362,11 +402,12 @@ class HotCall final : private IoLoop::ActiveCall {
     act([this] { finished_ = true; });
   }
 
-  // Handles gRPC's report that the call is over. If it comes before finish(), the caller gave up or the deadline
-  // passed.
+  // Handles gRPC's report that the call is over. If the report arrives before finish() was called, the caller gave up
+  // or the deadline passed.
   void gone(bool) {
     act([this] {
       gone_ = true;
+      if (context_.IsCancelled()) caller_->connection().call_cancelled();
       if (!finishing_) stop(absl::CancelledError("the caller gave up"));
     });
   }
@@ -378,22 +419,28 @@ class HotCall final : private IoLoop::ActiveCall {
     });
   }
 
-  // Returns an id of the connection. All connections to a unix socket have the same peer name, so there each stream
-  // counts as a client of its own.
-  uint64_t client() {
-    if (!client_) {
-      const std::string peer = context_.peer();
-      client_ = std::hash<std::string>{}(peer);
-      if (Method::kStream && peer.rfind("unix", 0) == 0) *client_ ^= reinterpret_cast<uintptr_t>(this);
-    }
-    return *client_;
+  // Ends a call whose caller may no longer make it.
+  void recheck() override {
+    if (finishing_ || stopping_) return;
+    const std::string scene = Method::kStream || slots_.empty() ? scene_.scene() : slots_.front()->request_.scene();
+    absl::Status status = caller_->recheck(scene);
+    if (status.ok()) return;
+    caller_->audit(scene, status);
+    act([&] { stop(std::move(status)); });
+  }
+
+  // Ends a call whose caller does not take its answer: unread answers keep their claims of memory.
+  void end_if_stalled(SteadyTime now) override {
+    const bool is_writing = writing_ != nullptr || (finishing_ && !finished_);
+    if (is_writing && now - writing_since_ > listener_.state_.stall_limit) context_.TryCancel();
   }
 
   Listener<Method>& listener_;
   grpc::ServerContext context_;
   Wire wire_{&context_};
-  Bytes incoming_;  // owned by gRPC while reading_
-  Bytes outgoing_;  // owned by gRPC while writing_
+  Bytes incoming_;           // owned by gRPC while reading_
+  Bytes outgoing_;           // owned by gRPC while writing_
+  CallMemory answer_claim_;  // claim of a unary call's answer, while it is sent with the status
   Tag accepted_tag_{*this, &HotCall::accepted};
   Tag read_tag_{*this, &HotCall::read};
   Tag written_tag_{*this, &HotCall::written};
@@ -401,23 +448,24 @@ class HotCall final : private IoLoop::ActiveCall {
   Tag gone_tag_{*this, &HotCall::gone};
 
   std::optional<IoLoop::ActiveCalls::iterator> active_call_;
-  std::atomic<bool> stopped_{false};  // tells work on other threads that the caller no longer waits for answers
+  std::atomic<bool> stopped_{false};  // true once the caller no longer waits for answers; polled by work on any thread
   SteadyTime arrived_;
   std::optional<OpenStream> open_;
+  QuotaHold open_quota_;  // of a stream
   std::optional<Caller> caller_;
-  std::optional<uint64_t> client_;
   AdmissionLimiter::Permit permit_;
   SceneBinding scene_;
-  Slots slots_;              // in the order of arrival
-  Slot* writing_ = nullptr;  // slot whose answer is being written
-  absl::Status end_status_;  // status that the call ends with
-  int acting_ = 0;           // nesting depth of act()
-  bool reading_ = false;     // a read is pending
-  bool no_more_ = false;     // no further message is accepted
-  bool stopping_ = false;    // answers are dropped
-  bool finishing_ = false;   // the status is being sent
-  bool finished_ = false;    // the status was sent
-  bool gone_ = false;        // gRPC has reported the end of the call
+  Slots slots_;               // in the order of arrival
+  Slot* writing_ = nullptr;   // slot whose answer is being written
+  SteadyTime writing_since_;  // start of the last write, or of sending the status
+  absl::Status end_status_;   // status that the call ends with
+  int acting_ = 0;            // nesting depth of act()
+  bool reading_ = false;      // a read is pending
+  bool no_more_ = false;      // no further message is accepted
+  bool stopping_ = false;     // answers are dropped
+  bool finishing_ = false;    // the status is being sent
+  bool finished_ = false;     // the status was sent
+  bool gone_ = false;         // gRPC has reported the end of the call
 };
 
 }  // namespace locus::server

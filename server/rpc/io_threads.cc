@@ -12,20 +12,25 @@
 namespace locus::server {
 namespace {
 
+using std::chrono::steady_clock;
 using std::chrono::system_clock;
 
 constexpr uint32_t kMaxThreads = 16;
+// Interval between two checks for stalled calls.
+constexpr std::chrono::seconds kStallCheck{1};
 
 }  // namespace
 
-// Thread that sets an alarm on request, which makes the loop's completion queue return.
+// Thread that sets the alarm of a loop on request. The alarm is an event, so the wait on the loop's completion queue
+// returns.
 class IoWaker {
  public:
   void watch(IoLoop& loop) { loops_.push_back(&loop); }
   void start() {
     thread_ = std::thread([this] { run(); });
   }
-  // Sets the alarms of the loops that have called interrupt(), soon. Safe to call from any thread; takes no lock.
+  // Makes the thread set the alarms of all loops that have called interrupt(). Safe to call from any thread; takes no
+  // lock.
   void wake() { calls_.post(); }
   // Ends the thread. No alarm is set afterwards.
   void stop() {
@@ -79,6 +84,11 @@ void IoLoop::interrupt() {
 
 void IoLoop::woken(bool) { alarm_set_.store(false); }
 
+IoLoop::ActiveCalls::iterator IoLoop::enter(ActiveCall& call) {
+  if (!std::exchange(stall_timer_set_, true)) at(steady_clock::now() + kStallCheck, [this] { check_stalled_calls(); });
+  return active_calls_.insert(active_calls_.end(), &call);
+}
+
 void IoLoop::leave(ActiveCalls::iterator call) {
   active_calls_.erase(call);
   release();
@@ -97,10 +107,23 @@ void IoLoop::wait_until_empty(bool running) {
       turn();
 }
 
-// Calls drain() of every active call. Advances the iterator before each call, because drain() may remove it from the
-// list.
+// Calls drain() of every active call. Advances the iterator first, because drain() may remove the call from the list.
 void IoLoop::drain_active_calls(bool) {
   for (auto active_call = active_calls_.begin(); active_call != active_calls_.end();) (*active_call++)->drain();
+}
+
+void IoLoop::recheck_active_calls(bool) {
+  recheck_posted_.store(false);
+  for (auto active_call = active_calls_.begin(); active_call != active_calls_.end();) (*active_call++)->recheck();
+}
+
+// Sets the timer again while there are active calls. A timer that is set although no call is left fires once.
+void IoLoop::check_stalled_calls() {
+  const Time now = steady_clock::now();
+  for (auto active_call = active_calls_.begin(); active_call != active_calls_.end();)
+    (*active_call++)->end_if_stalled(now);
+  stall_timer_set_ = !active_calls_.empty();
+  if (stall_timer_set_) at(now + kStallCheck, [this] { check_stalled_calls(); });
 }
 
 uint32_t IoThreads::count_for(uint32_t cores) {
@@ -131,6 +154,11 @@ void IoThreads::start() {
 
 void IoThreads::drain() {
   for (const auto& loop : loops_) loop->post(loop->drain_);
+}
+
+void IoThreads::recheck() {
+  for (const auto& loop : loops_)
+    if (!loop->recheck_posted_.exchange(true)) loop->post(loop->recheck_);
 }
 
 void IoThreads::stop() {

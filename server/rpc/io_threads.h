@@ -1,10 +1,13 @@
-// IO loops with one completion queue each, on which the frequent calls live, and the threads that serve them. A call
-// lives on one loop and is only changed under that loop's lock, so it needs no lock of its own. Handlers may do short
-// work; they defer longer work, and never block.
+// IO loops: event loops over one gRPC completion queue each, for the frequent calls (queries and updates), and the
+// threads that run the loops. A call belongs to one loop and is only changed under that loop's lock, so the call needs
+// no lock of its own. Event handlers may do short work; they defer longer work, and never block.
 //
-// One thread of a loop at a time waits in gRPC: if several did, gRPC would make each wake the next for every event.
-// Threads: as in server/scheduling/event_loop.h. post() does not call gRPC; a separate thread, the waker, sets a gRPC
-// alarm if a sleeping loop must be woken. Lifetime: call stop() after the server has ended; it waits for the last call.
+// Only one thread of a loop at a time waits in gRPC: if several threads waited, gRPC would make each waiting thread
+// wake the next thread for every event.
+//
+// Threads: any thread may call IoLoop::post(). It does not call gRPC; a separate thread, the waker, sets a gRPC alarm
+// if a sleeping loop must be woken. Lifetime: call IoThreads::stop() after the server has ended; stop() waits for the
+// last call.
 #ifndef LOCUS_SERVER_RPC_IO_THREADS_H_
 #define LOCUS_SERVER_RPC_IO_THREADS_H_
 
@@ -23,7 +26,7 @@
 
 namespace locus::server {
 
-// Thread that wakes loops which sleep in gRPC, for threads that must not call gRPC themselves.
+// Thread that wakes loops which sleep in gRPC, on behalf of threads that must not call gRPC themselves.
 class IoWaker;
 
 // One event loop over one completion queue, with the list of its calls.
@@ -34,6 +37,10 @@ class IoLoop final : private EventSource, public EventLoop {
    public:
     // Called on the loop when the server begins to drain.
     virtual void drain() = 0;
+    // Called on the loop when rights may have changed: ends the call if its caller may no longer make it.
+    virtual void recheck() = 0;
+    // Called on the loop about once a second: ends the call if it has waited for its caller for too long.
+    virtual void end_if_stalled(EventLoop::Time now) = 0;
 
    protected:
     ~ActiveCall() = default;
@@ -48,13 +55,15 @@ class IoLoop final : private EventSource, public EventLoop {
   // that gRPC reports as never accepted.
   void acquire() { expected_or_active_.fetch_add(1); }
   void release();
-  // Adds an accepted call to the list of active calls, or removes it when it ends. Only handlers may call them.
-  ActiveCalls::iterator enter(ActiveCall& call) { return active_calls_.insert(active_calls_.end(), &call); }
+  // Add an accepted call to the list of active calls, and remove it when the call ends. Only event handlers may call
+  // enter() and leave().
+  ActiveCalls::iterator enter(ActiveCall& call);
   void leave(ActiveCalls::iterator call);
 
-  // Returns whether no accepted call lives on this loop. Only handlers may call it.
+  // Returns whether no accepted call belongs to this loop. Only event handlers may call idle().
   bool idle() const { return active_calls_.empty(); }
-  // Returns whether there is no accepted call and no requested one. Safe to call from any thread.
+  // Returns whether this loop has no accepted call and no call that was requested from gRPC. Safe to call from any
+  // thread.
   bool empty() const { return expected_or_active_.load() == 0; }
 
  private:
@@ -64,10 +73,13 @@ class IoLoop final : private EventSource, public EventLoop {
   Next next(std::chrono::steady_clock::duration wait, EventTag** tag, bool* ok) override;
   void interrupt() override;
 
-  // Blocks until empty(). `running` says whether threads serve the loop; if not, calls turn() on the calling thread.
+  // Blocks until empty() returns true. `running` says whether threads run the loop; if not, calls turn() on the calling
+  // thread.
   void wait_until_empty(bool running);
   void woken(bool ok);
   void drain_active_calls(bool ok);
+  void recheck_active_calls(bool ok);
+  void check_stalled_calls();
 
   const std::unique_ptr<grpc::ServerCompletionQueue> queue_;
   IoWaker& waker_;
@@ -77,7 +89,10 @@ class IoLoop final : private EventSource, public EventLoop {
   grpc::Alarm alarm_;                            // used by the waker only
   MemberTag<IoLoop> woken_{*this, &IoLoop::woken};
   MemberTag<IoLoop> drain_{*this, &IoLoop::drain_active_calls};
+  std::atomic<bool> recheck_posted_{false};
+  MemberTag<IoLoop> recheck_{*this, &IoLoop::recheck_active_calls};
   ActiveCalls active_calls_;
+  bool stall_timer_set_ = false;  // set whenever there are active calls
 };
 
 // The IO loops of a server and their threads.
@@ -88,8 +103,8 @@ class IoThreads {
   static uint32_t count_for(uint32_t cores);
   static constexpr uint32_t kThreadsOfALoop = 2;
 
-  // Creates the loops for `count` threads, kThreadsOfALoop threads each, at least one loop. Call it before `builder`
-  // starts the server. The threads run from start() on.
+  // Creates one loop for each kThreadsOfALoop of the `count` threads, but at least one loop. Call it before `builder`
+  // starts the server. start() starts the threads.
   IoThreads(grpc::ServerBuilder& builder, uint32_t count);
   ~IoThreads();
   IoThreads(const IoThreads&) = delete;
@@ -99,9 +114,11 @@ class IoThreads {
   IoLoop& loop(size_t i) { return *loops_[i]; }
 
   void start();
-  // Calls drain() of every active call, on its loop. Call it once, from any thread.
+  // Calls ActiveCall::drain() of every active call, on the call's loop. Call it once, from any thread.
   void drain();
-  // Waits until every call has left, including calls accepted just before the server's end, then ends the threads. The
+  // Calls recheck() of every active call, on its loop. Any thread; not after stop().
+  void recheck();
+  // Waits until every call has ended, including calls accepted just before the server's end, then ends the threads. The
   // server must be shut down already.
   void stop();
 

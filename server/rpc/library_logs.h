@@ -6,8 +6,9 @@
 
 namespace locus::server {
 
-// Logs gRPC's errors at level `errors` and all other messages at debug, because any caller can cause them. Applies to
-// the whole process. May be called again, from any thread.
+// Logs gRPC's errors at level `errors`, and all other messages of gRPC and protobuf at level debug, because any caller
+// can cause such messages. Errors beyond kMaxLibraryLines a second are only counted. Applies to the whole process. May
+// be called again, from any thread.
 void capture_library_logs(LogLevel errors);
 
 }  // namespace locus::server

@@ -1,13 +1,13 @@
-// The scene that a stream serves. Its first message must name it; later messages may leave the name out. For one
-// thread at a time: the stream's IO loop.
+// The scene that a stream serves. The first message of the stream must name the scene; later messages may leave the
+// name out. Threads: the stream's IO loop only.
 #ifndef LOCUS_SERVER_RPC_SCENE_BINDING_H_
 #define LOCUS_SERVER_RPC_SCENE_BINDING_H_
 
 #include <string>
 
+#include "core/base/names.h"
 #include "core/base/refusal.h"
 #include "core/base/status_macros.h"
-#include "core/scene/registry.h"
 #include "server/rpc/call.h"
 
 namespace locus::server {
@@ -15,8 +15,8 @@ namespace locus::server {
 // Invariant: the scene never changes once it is set.
 class SceneBinding {
  public:
-  // Sets the scene from the first message; later calls change nothing. Call it for every message. An error ends the
-  // stream.
+  // Sets the scene to `scene`, the name in the first message. Call bind() for every message; for later messages it does
+  // nothing. After an error the stream must end.
   absl::Status bind(const Caller& caller, const std::string& scene) {
     if (!scene_.empty()) return absl::OkStatus();
     RETURN_IF_ERROR(check_scene_name(scene, "scene"));
@@ -24,12 +24,12 @@ class SceneBinding {
     scene_ = scene;
     return absl::OkStatus();
   }
-  // Refuses a message that names another scene. Call it for every message, after bind(). An error is the answer to this
-  // message only.
+  // Refuses a message that names another scene. Call it for every message, after bind(). An error is the answer to that
+  // message; the stream continues.
   absl::Status check(const std::string& scene) const {
     if (scene.empty() || scene == scene_) return absl::OkStatus();
     return refuse_argument(Reason::kMalformed, "scene", {},
-                           "this stream serves the scene its first message named; open another one");
+                           "this stream serves the scene that its first message named; open another stream");
   }
   const std::string& scene() const { return scene_; }
 

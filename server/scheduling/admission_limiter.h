@@ -1,6 +1,13 @@
-// Limits the number of calls in progress: each call holds a Permit until it ends, and at most max() permits exist.
+// Limits the number of calls in progress: each call holds a Permit until it ends. Permits belong to owners, such as the
+// identities or the connections of callers: one owner holds at most max() permits, and all owners together hold at most
+// max_in_all().
 //
-// Threads: every member may be called from any thread. Invariant: used() permits exist, and used() <= max().
+// A fair limiter keeps a third more permits than one owner may hold for owners that hold few: while max() or more
+// permits are used, only owners that hold less than 1 / kSmallShare of this reserve get another one. So an owner that
+// is alone gets max() permits, and one that keeps them all does not shut others out.
+//
+// Threads: every member may be called from any thread. Invariants: used() permits exist, used() <= max_in_all(), and no
+// owner holds more than max() permits.
 #ifndef LOCUS_SERVER_SCHEDULING_ADMISSION_LIMITER_H_
 #define LOCUS_SERVER_SCHEDULING_ADMISSION_LIMITER_H_
 
@@ -8,42 +15,56 @@
 #include <cstdint>
 #include <utility>
 
+#include "absl/container/flat_hash_map.h"
 #include "core/base/check.h"
 #include "core/base/mutex.h"
 
 namespace locus::server {
 
+// Defines how owners share the permits of a limiter.
+enum class Sharing : uint8_t {
+  kFirstCome,  // max() permits in all, for whichever owner asks first
+  kFair,       // max() permits for one owner, and a third more for owners that hold few
+};
+
 class AdmissionLimiter {
  public:
-  // Right to proceed; releases its place in the limiter when destroyed. Must not outlive the limiter.
+  // Right of one call to be in progress; the destructor releases it. Must not outlive the limiter.
   class Permit {
    public:
     Permit() = default;
-    explicit Permit(AdmissionLimiter* limiter) : limiter_(limiter) {}
-    Permit(Permit&& other) noexcept : limiter_(std::exchange(other.limiter_, nullptr)) {}
+    Permit(Permit&& other) noexcept : limiter_(std::exchange(other.limiter_, nullptr)), owner_(other.owner_) {}
     Permit& operator=(Permit&& other) noexcept {
       std::swap(limiter_, other.limiter_);
+      std::swap(owner_, other.owner_);
       return *this;
     }
     ~Permit() {
-      if (limiter_ != nullptr) limiter_->release();
+      if (limiter_ != nullptr) limiter_->release(owner_);
     }
-    // Returns false if the limiter was full.
+    // Returns whether this object holds a permit. enter() returns an empty Permit if the limiter is full.
     explicit operator bool() const { return limiter_ != nullptr; }
 
    private:
+    friend class AdmissionLimiter;
+    Permit(AdmissionLimiter& limiter, uint64_t owner) : limiter_(&limiter), owner_(owner) {}
+
     AdmissionLimiter* limiter_ = nullptr;
+    uint64_t owner_ = 0;
   };
 
-  explicit AdmissionLimiter(uint32_t max) : max_(max) {}
+  explicit AdmissionLimiter(uint32_t max, Sharing sharing = Sharing::kFirstCome)
+      : max_(max), reserve_(sharing == Sharing::kFair ? (max + 2) / 3 : 0) {}
 
-  // Returns a permit, which is empty if the limiter is full. Never waits.
-  Permit enter() LOCUS_EXCLUDES(mutex_) {
+  // Returns a permit for `owner`; an empty one if the limiter is full, or if the owner has its share. Never waits.
+  Permit enter(uint64_t owner = 0) LOCUS_EXCLUDES(mutex_) {
     MutexLock lock(mutex_);
-    if (used_ >= max_) return Permit();
+    const auto found = held_.find(owner);
+    if (!admits(found == held_.end() ? 0 : found->second)) return Permit();
     ++used_;
-    check_invariants();
-    return Permit(this);
+    ++held_[owner];
+    LOCUS_DCHECK_CALL(check_invariants());
+    return Permit(*this, owner);
   }
 
   uint32_t used() const LOCUS_EXCLUDES(mutex_) {
@@ -51,8 +72,9 @@ class AdmissionLimiter {
     return used_;
   }
   uint32_t max() const { return max_; }
+  uint32_t max_in_all() const { return max_ + reserve_; }
 
-  // Waits until no permit is held; returns false if one still is at `deadline`.
+  // Waits until no permit is held. Returns false if a permit is still held at `deadline`.
   bool wait_until_empty(std::chrono::steady_clock::time_point deadline) LOCUS_EXCLUDES(mutex_) {
     MutexLock lock(mutex_);
     while (used_ > 0)
@@ -61,18 +83,37 @@ class AdmissionLimiter {
   }
 
  private:
-  void release() LOCUS_EXCLUDES(mutex_) {
-    MutexLock lock(mutex_);
-    LOCUS_DCHECK_LT(0u, used_);
-    if (--used_ == 0) emptied_.notify_all();
-    check_invariants();
+  static constexpr uint32_t kSmallShare = 8;
+
+  // Returns whether an owner that holds `held` permits may get another one.
+  bool admits(uint32_t held) const LOCUS_REQUIRES(mutex_) {
+    if (used_ < max_) return true;
+    return used_ < max_in_all() && held < (reserve_ + kSmallShare - 1) / kSmallShare;
   }
-  void check_invariants() const LOCUS_REQUIRES(mutex_) { LOCUS_DCHECK_LE(used_, max_); }
+  void release(uint64_t owner) LOCUS_EXCLUDES(mutex_) {
+    MutexLock lock(mutex_);
+    const auto held = held_.find(owner);
+    LOCUS_DCHECK(held != held_.end());
+    if (--held->second == 0) held_.erase(held);
+    if (--used_ == 0) emptied_.notify_all();
+    LOCUS_DCHECK_CALL(check_invariants());
+  }
+  void check_invariants() const LOCUS_REQUIRES(mutex_) {
+    uint32_t sum = 0;
+    for (const auto& [owner, held] : held_) {
+      LOCUS_CHECK_LE(held, max_);
+      sum += held;
+    }
+    LOCUS_CHECK_EQ(sum, used_);
+    LOCUS_CHECK_LE(used_, max_in_all());
+  }
 
   const uint32_t max_;
+  const uint32_t reserve_;
   mutable Mutex mutex_;
   ConditionVariable emptied_;
   uint32_t used_ LOCUS_GUARDED_BY(mutex_) = 0;
+  absl::flat_hash_map<uint64_t, uint32_t> held_ LOCUS_GUARDED_BY(mutex_);  // permits of each owner that has any
 };
 
 }  // namespace locus::server

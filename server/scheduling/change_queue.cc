@@ -8,7 +8,7 @@
 namespace locus::server {
 namespace {
 
-constexpr uint32_t kRetryAfterMs = 1000;
+constexpr uint32_t kFullChangesRetryMs = 1000;
 
 }  // namespace
 
@@ -31,14 +31,14 @@ absl::StatusOr<uint64_t> ChangeQueue::submit(uint64_t key, Job job) {
   KeyQueue& queue = queues_[key];
   const size_t pending = queue.waiting.size() + (queue.running ? 1 : 0);
   if (pending >= max_waiting_)
-    return refuse_full("", "pending_changes", max_waiting_, static_cast<double>(pending + 1), kRetryAfterMs);
+    return refuse_full("", "pending_changes", max_waiting_, static_cast<double>(pending + 1), kFullChangesRetryMs);
   if (!queue.running && queue.waiting.empty()) {
     ready_.push_back(key);
     work_.notify_one();
   }
   queue.waiting.push_back(std::move(job));
   ++queue.last_number;
-  check_invariants(key);
+  LOCUS_DCHECK_CALL(check_invariants(key));
   return queue.last_number;
 }
 
@@ -74,7 +74,7 @@ void ChangeQueue::run() {
       job = std::move(queue.waiting.front());
       queue.waiting.pop_front();
       queue.running = true;
-      check_invariants(key);
+      LOCUS_DCHECK_CALL(check_invariants(key));
     }
     job(number);
     job = nullptr;
@@ -93,18 +93,16 @@ void ChangeQueue::finish(uint64_t key) {
   } else if (queue->second.forgotten) {
     queues_.erase(queue);
   }
-  check_invariants(key);
+  LOCUS_DCHECK_CALL(check_invariants(key));
 }
 
 void ChangeQueue::check_invariants(uint64_t key) const {
-  if constexpr (kDebugChecks) {
-    LOCUS_CHECK_LE(ready_.size(), queues_.size());
-    const auto found = queues_.find(key);
-    if (found == queues_.end()) return;
-    const KeyQueue& queue = found->second;
-    LOCUS_CHECK_LE(queue.waiting.size() + (queue.running ? 1 : 0), max_waiting_);
-    LOCUS_CHECK_LE(queue.waiting.size() + (queue.running ? 1 : 0), queue.last_number);
-  }
+  LOCUS_CHECK_LE(ready_.size(), queues_.size());
+  const auto found = queues_.find(key);
+  if (found == queues_.end()) return;
+  const KeyQueue& queue = found->second;
+  LOCUS_CHECK_LE(queue.waiting.size() + (queue.running ? 1 : 0), max_waiting_);
+  LOCUS_CHECK_LE(queue.waiting.size() + (queue.running ? 1 : 0), queue.last_number);
 }
 
 }  // namespace locus::server

@@ -22,21 +22,22 @@ class ChangeQueue {
  public:
   using Job = std::function<void(uint64_t number)>;
 
-  // Starts `threads` threads. Each key may have `max_waiting` jobs, the running one included.
+  // Starts `threads` threads. Each key may have `max_waiting` jobs, including its running job.
   ChangeQueue(uint32_t threads, uint32_t max_waiting);
-  // Waits for running jobs and drops all others.
+  // Waits for running jobs and drops all waiting jobs.
   ~ChangeQueue();
   ChangeQueue(const ChangeQueue&) = delete;
   ChangeQueue& operator=(const ChangeQueue&) = delete;
 
-  // Queues the job and returns its number within the key, counted from 1. RESOURCE_EXHAUSTED naming pending_changes if
-  // the key's queue is full.
+  // Queues the job and returns its number within the key, counted from 1. RESOURCE_EXHAUSTED, naming the limit
+  // pending_changes, if the key has `max_waiting` jobs.
   absl::StatusOr<uint64_t> submit(uint64_t key, Job job) LOCUS_EXCLUDES(mutex_);
 
   // Returns the number of waiting and running jobs of the key.
   uint32_t pending(uint64_t key) const LOCUS_EXCLUDES(mutex_);
 
-  // Drops the counter of the key's job numbers once its jobs have ended. For keys that are never used again.
+  // Deletes the counter of the key's job numbers once the key's jobs have ended. Call it for keys that are never used
+  // again.
   void forget(uint64_t key) LOCUS_EXCLUDES(mutex_);
 
  private:
@@ -44,7 +45,7 @@ class ChangeQueue {
     uint64_t last_number = 0;
     bool running = false;
     bool forgotten = false;
-    std::deque<Job> waiting;  // the last one has number last_number
+    std::deque<Job> waiting;  // jobs that have not started; the last job has the number last_number
   };
 
   void run() LOCUS_EXCLUDES(mutex_);
@@ -55,7 +56,7 @@ class ChangeQueue {
   mutable Mutex mutex_;
   ConditionVariable work_;
   absl::flat_hash_map<uint64_t, KeyQueue> queues_ LOCUS_GUARDED_BY(mutex_);
-  std::deque<uint64_t> ready_ LOCUS_GUARDED_BY(mutex_);  // keys with waiting jobs and none running, each once
+  std::deque<uint64_t> ready_ LOCUS_GUARDED_BY(mutex_);  // keys with waiting jobs and no running job, each key once
   bool ended_ LOCUS_GUARDED_BY(mutex_) = false;
   std::vector<std::thread> threads_;
 };

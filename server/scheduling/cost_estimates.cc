@@ -9,10 +9,10 @@
 namespace locus::server {
 namespace {
 
-// Fixed cost of a block, in nanoseconds, in addition to its queries.
+// Fixed cost of a block, in nanoseconds, in addition to the cost of its queries.
 constexpr double kBlockNanoseconds = 500;
-// Nanoseconds of a query before the first measurement, indexed by CostKind. From scenes of 100,000 triangles and 10,000
-// objects.
+// Estimated nanoseconds of a query before the first measurement, indexed by CostKind. Measured on scenes of 100,000
+// triangles and 10,000 objects.
 constexpr std::array<double, 8> kFirstGuess = {300, 200, 1000, 1000, 1000, 2000, 100, 20'000};
 constexpr double kMin = 1, kMax = 1e12;
 constexpr size_t kProbes = 8;

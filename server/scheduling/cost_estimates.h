@@ -1,9 +1,9 @@
 // Estimated cost of a query by scene and kind, in nanoseconds of one thread, learned from finished work. Estimates
 // decide where and when a batch runs and whether it is admitted; they never change an answer.
 //
-// Threads: every member may be called from any thread and none takes a lock. If two threads learn at once, one of the
-// two measurements may be lost. Memory is fixed: the entry of one scene may be replaced by that of another scene; the
-// next estimate for the replaced scene is then the default.
+// Threads: every member may be called from any thread, and no member takes a lock. If two threads call learn() at once,
+// one of their measurements may be lost. Memory is fixed: the entry of one scene may be replaced by that of another
+// scene; the next estimate for the replaced scene is then the default.
 #ifndef LOCUS_SERVER_SCHEDULING_COST_ESTIMATES_H_
 #define LOCUS_SERVER_SCHEDULING_COST_ESTIMATES_H_
 
@@ -35,16 +35,17 @@ class CostEstimates {
   void learn(uint64_t scene, const QueryBlock& block, uint64_t nanoseconds);
 
  private:
+  // Position of an estimate in the hash table: the first entry to search, and the tag that marks the estimate.
   struct Slot {
     size_t first;
     uint32_t tag;
   };
   static Slot slot_of(uint64_t scene, const QueryBlock& block);
-  // Returns the index of the slot's entry. If there is none, returns the index of the entry that learn() may replace,
-  // so the caller must compare the entry's tag.
+  // Returns the index of the slot's entry. If the slot has no entry, returns the index of the entry that learn() may
+  // replace; the caller recognizes this case because the entry has another tag than the slot.
   size_t find(const Slot& slot) const;
 
-  // Entries of a hash table: a tag in the upper 32 bits, nanoseconds as a float in the lower 32 bits; 0 = empty.
+  // Entries of a hash table: a tag in the upper 32 bits, nanoseconds as a float in the lower 32 bits; 0: no entry.
   std::array<std::atomic<uint64_t>, kEntries> entries_{};
 };
 

@@ -1,8 +1,8 @@
 // State of a shutdown: first draining (no new work is accepted), then, after the grace period, ended (all work stops).
 // Listeners are called when draining begins, so that blocked threads can wake up.
 //
-// Threads: every member may be called from any thread; begin() and end() not from a listener. Invariant: a listener is
-// called at most once, and never after its Subscription is destroyed.
+// Threads: every member may be called from any thread, but begin() and end() must not be called from a listener.
+// Invariant: a listener is called at most once, and never after its Subscription is destroyed.
 #ifndef LOCUS_SERVER_SCHEDULING_DRAIN_H_
 #define LOCUS_SERVER_SCHEDULING_DRAIN_H_
 
@@ -18,7 +18,7 @@ class Drain {
  public:
   using Listener = std::function<void()>;
 
-  // Subscription of a listener. The destructor ends it and waits for a call of the listener in progress.
+  // Subscription of a listener. The destructor ends the subscription and waits for a running call of the listener.
   class Subscription {
    public:
     Subscription(Drain& drain, Listener listener) : drain_(drain), position_(drain.add(std::move(listener))) {}

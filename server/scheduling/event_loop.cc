@@ -10,7 +10,7 @@ namespace {
 
 using std::chrono::steady_clock;
 
-// Maximum time that a thread sleeps, also without a timer. Small enough that a source's clock conversions cannot
+// Maximum time that the leader sleeps, even if no timer is set. Small enough that a source's clock conversions cannot
 // overflow.
 constexpr std::chrono::hours kLongest{1};
 
@@ -62,7 +62,7 @@ std::optional<steady_clock::duration> EventLoop::acquire_lead() {
   if (ended_) return std::nullopt;
   LOCUS_DCHECK(!led_);
   led_ = true;
-  asleep_.store(true);  // set before mutex_ is released: from now on at() interrupts
+  asleep_.store(true);  // set before mutex_ is released, so that at() interrupts this thread from now on
   if (timers_.empty()) return kLongest;
   return std::clamp<steady_clock::duration>(timers_.begin()->first - steady_clock::now(), {}, kLongest);
 }
@@ -112,7 +112,7 @@ void EventLoop::run_timers() {
 }
 
 // Runs the deferred tasks. Hands the lead to another thread before the first long task. If there is no long task,
-// releases the lead without waking a thread, because this thread takes the lead again in its next turn.
+// releases the lead without waking a thread, because this thread acquires the lead again in its next turn.
 void EventLoop::run_deferred() {
   bool leads = true;
   while (!deferred_.empty()) {

@@ -1,13 +1,14 @@
 // Fair queue: entries of many clients, served so that every waiting client gets an equal share of the work, however
-// many entries it has. The next entry is the first one of the client that was served the least work so far. The virtual
-// time is the work that this client had received. A client that is new or returns starts at the virtual time, so it
-// gains no share by being absent. A client that received more than that is remembered while it is idle, and returns
-// with its own amount. Source: Goyal, Vin, Cheng, Start-time Fair Queueing, 1996.
+// many entries it has. next() returns the first entry of the waiting client that has received the least work so far,
+// and sets the virtual time to this amount of work. A client that is new, or has entries again after being idle, starts
+// at the virtual time, so that it gets no additional share for the time without entries. Exception: if an idle client
+// has received more work than the virtual time, the queue remembers this amount of work, and the client starts at this
+// amount when it has entries again. Source: Goyal, Vin, Cheng, Start-time Fair Queueing, 1996.
 //
 // Threads: one thread at a time. Every operation costs O(log clients), remove() also O(entries of the client). Memory:
-// one record for each waiting client and up to kMaxIdleClients more. Invariants: every client is in exactly one of two
-// sets, `waiting_` if it has entries, else `idle_`, both ordered by the work served to the client; virtual_time_ never
-// decreases.
+// one record for each waiting client, and for at most kMaxIdleClients idle clients. Invariants: every client is in
+// exactly one of two sets, `waiting_` if it has entries, else `idle_`, both ordered by the work served to the client;
+// virtual_time_ never decreases.
 #ifndef LOCUS_SERVER_SCHEDULING_FAIR_QUEUE_H_
 #define LOCUS_SERVER_SCHEDULING_FAIR_QUEUE_H_
 
@@ -31,21 +32,22 @@ class FairQueue {
   static constexpr size_t kMaxIdleClients = 4096;
 
   bool empty() const { return waiting_.empty(); }
-  // Returns the number of clients that wait or are remembered.
+  // Returns the number of waiting clients and remembered idle clients.
   size_t clients() const { return queues_.size(); }
 
   void push_back(uint64_t client, Entry entry) {
     activate(client).entries.push_back(std::move(entry));
-    check_invariants(client);
+    LOCUS_DCHECK_CALL(check_invariants(client));
   }
   // Adds an entry ahead of the client's other entries.
   void push_front(uint64_t client, Entry entry) {
     activate(client).entries.push_front(std::move(entry));
-    check_invariants(client);
+    LOCUS_DCHECK_CALL(check_invariants(client));
   }
 
   // Returns the next entry to serve, without removing it, and charges `cost` to its client, so that the following call
-  // may return another client's entry. Correct the estimate later by charge(). Precondition: the queue is not empty.
+  // may return another client's entry. `cost` is an estimate of the entry's work; correct it later by charge().
+  // Precondition: the queue is not empty.
   Entry next(uint64_t cost) {
     LOCUS_DCHECK(!waiting_.empty());
     const auto [spent, client] = *waiting_.begin();
@@ -56,7 +58,7 @@ class FairQueue {
     return entry;
   }
 
-  // Adds `cost` to the work served to a client; negative to refund. Ignores unknown clients.
+  // Adds `cost` to the work served to a client; a negative `cost` is a refund. Ignores unknown clients.
   void charge(uint64_t client, int64_t cost) {
     const auto found = queues_.find(client);
     if (found == queues_.end()) return;
@@ -65,7 +67,7 @@ class FairQueue {
     ranks.erase({queue.spent, client});
     queue.spent += static_cast<uint64_t>(cost);  // a negative cost wraps around to a subtraction
     ranks.insert({queue.spent, client});
-    check_invariants(client);
+    LOCUS_DCHECK_CALL(check_invariants(client));
   }
 
   // Removes an entry; returns false if the client has no such entry.
@@ -77,7 +79,7 @@ class FairQueue {
     if (position == queue.entries.end()) return false;
     queue.entries.erase(position);
     if (queue.entries.empty()) deactivate(client, queue);
-    check_invariants(client);
+    LOCUS_DCHECK_CALL(check_invariants(client));
     return true;
   }
 
@@ -96,17 +98,15 @@ class FairQueue {
     return taken;
   }
 
-  // Checks the invariants, in debug builds only. Costs O(log clients): checks `client`, which need not be in the queue.
+  // Checks the numbers of clients, and the invariants for `client`, which need not be in the queue. O(log clients).
   void check_invariants(uint64_t client) const {
-    if constexpr (kDebugChecks) {
-      LOCUS_CHECK_EQ(waiting_.size() + idle_.size(), queues_.size());
-      LOCUS_CHECK_LE(idle_.size(), kMaxIdleClients);
-      const auto found = queues_.find(client);
-      if (found == queues_.end()) return;
-      const bool waits = !found->second.entries.empty();
-      LOCUS_CHECK_EQ(waiting_.contains({found->second.spent, client}), waits);
-      LOCUS_CHECK_EQ(idle_.contains({found->second.spent, client}), !waits);
-    }
+    LOCUS_CHECK_EQ(waiting_.size() + idle_.size(), queues_.size());
+    LOCUS_CHECK_LE(idle_.size(), kMaxIdleClients);
+    const auto found = queues_.find(client);
+    if (found == queues_.end()) return;
+    const bool waits = !found->second.entries.empty();
+    LOCUS_CHECK_EQ(waiting_.contains({found->second.spent, client}), waits);
+    LOCUS_CHECK_EQ(idle_.contains({found->second.spent, client}), !waits);
   }
 
  private:
@@ -144,7 +144,7 @@ class FairQueue {
   absl::flat_hash_map<uint64_t, ClientQueue> queues_;  // waiting and remembered clients
   std::set<Rank> waiting_;                             // clients with entries
   std::set<Rank> idle_;                                // clients without entries
-  uint64_t virtual_time_ = 0;                          // most work that a client had received when next() chose it
+  uint64_t virtual_time_ = 0;                          // largest work served to a client when next() chose the client
 };
 
 }  // namespace locus::server

@@ -1,77 +1,168 @@
 #include "server/scheduling/memory_budget.h"
 
+#include <algorithm>
+
 #include "absl/strings/str_cat.h"
-#include "core/base/check.h"
 #include "core/base/refusal.h"
 
 namespace locus::server {
+namespace {
+
+constexpr uint32_t kMemoryRetryMs = 200;
+// Shares of the limit that are kept free for the lines that are refused later: growth leaves 1/8, moves leave 3/32.
+constexpr uint64_t kShareKeptFromGrowth = 8;
+constexpr uint64_t kShareKeptFromMoves = 32;
+constexpr uint64_t kPartsKeptFromMoves = 3;
+
+// Share of the limit that is the reserve of small claims, and its bounds in bytes. One owner may use 1 /
+// kReserveOwners.
+constexpr uint64_t kReserveShare = 16;
+constexpr uint64_t kMinReserve = 4u << 20;
+constexpr uint64_t kMaxReserve = 64u << 20;
+constexpr uint64_t kReserveOwners = 4;
+
+constexpr std::array<absl::string_view, kMemoryLines> kLineNames = {"uploads", "builds", "dumps",    "backups",
+                                                                    "inserts", "moves",  "requests", "replies"};
+
+}  // namespace
+
+absl::string_view memory_line_name(MemoryLine line) { return kLineNames[static_cast<size_t>(line)]; }
 
 MemoryBudget::MemoryBudget(uint64_t limit, Meter meter) : limit_(limit), meter_(std::move(meter)) {
   MutexLock lock(mutex_);
   measure();
 }
 
-void MemoryBudget::measure() {
-  measured_ = meter_.used();
-  ended_since_ = 0;
-}
-
-// Returns whether `bytes` more fit within the limit. Overestimates the memory in use, because memory that work in
-// progress has already allocated is counted twice: as measured and as claimed.
-bool MemoryBudget::fits(uint64_t bytes) const {
-  const uint64_t taken = measured_ + ended_since_ + claimed_;
-  return taken <= limit_ && bytes <= limit_ - taken;
-}
-
-bool MemoryBudget::make_room(uint64_t bytes) {
-  if (!fits(bytes) || ended_since_ > limit_ / kStepShare) measure();
-  if (fits(bytes)) return true;
-  // The work alone exceeds the limit, so releasing memory cannot help.
-  if (bytes > limit_) return false;
-  meter_.release_memory();
-  measure();
-  return fits(bytes);
-}
-
-absl::StatusOr<MemoryBudget::Claim> MemoryBudget::claim(absl::string_view field, uint64_t bytes) {
-  MutexLock lock(mutex_);
-  if (make_room(bytes)) {
-    claimed_ += bytes;
-    LOCUS_DCHECK_LE(measured_ + ended_since_ + claimed_, limit_);
-    return Claim(this, bytes);
+uint64_t MemoryBudget::ceiling(MemoryLine line) const {
+  switch (line) {
+    case MemoryLine::kUploads:
+    case MemoryLine::kBuilds:
+    case MemoryLine::kDumps:
+    case MemoryLine::kBackups:
+    case MemoryLine::kInserts:
+      return limit_ - limit_ / kShareKeptFromGrowth;
+    case MemoryLine::kMoves:
+      return limit_ - kPartsKeptFromMoves * (limit_ / kShareKeptFromMoves);
+    case MemoryLine::kRequests:
+    case MemoryLine::kReplies:
+      return limit_ - std::min(limit_ / kReserveShare, kMaxReserve);
   }
+  return limit_;
+}
+
+// Counts claims that end during the measurement twice rather than not at all: an overestimate is safe.
+void MemoryBudget::measure() {
+  const uint64_t ended = ended_since_.load();
+  claimed_then_.store(claimed_.load());
+  measured_.store(meter_());
+  ended_since_.fetch_sub(ended);
+}
+
+// Returns whether `bytes` more fit on `line`. Overestimates the memory in use, because memory that work in progress has
+// already allocated is counted twice: as measured and as claimed.
+bool MemoryBudget::fits(MemoryLine line, uint64_t bytes) const {
+  const uint64_t sum = taken(), most = ceiling(line);
+  return sum <= most && bytes <= most - sum;
+}
+
+// Claims first and checks then, so that two claims at once cannot both take the last room. Both may fail, though.
+bool MemoryBudget::try_claim(MemoryLine line, uint64_t bytes) {
+  if (bytes > limit_) return false;
+  claimed_.fetch_add(bytes);
+  if (fits(line, 0)) {
+    lines_[static_cast<size_t>(line)].fetch_add(bytes);
+    return true;
+  }
+  claimed_.fetch_sub(bytes);
+  return false;
+}
+
+// Subtracts the claims at the last measurement from the measured memory, so that claims do not make the share smaller.
+uint64_t MemoryBudget::connection_share() const {
+  const uint64_t measured = measured_.load();
+  const uint64_t unclaimed = measured - std::min(measured, claimed_then_.load());
+  return std::max(limit_ - std::min(limit_, unclaimed), reserve()) / 2;
+}
+
+uint64_t MemoryBudget::reserve() const { return std::clamp(limit_ / kReserveShare, kMinReserve, kMaxReserve); }
+
+// Compares the reserve only with claims that use it: other claims, however many, do not fill it.
+bool MemoryBudget::try_reserve(MemoryLine line, uint64_t bytes, uint64_t owner) {
+  if (line < MemoryLine::kMoves || bytes > kSmallClaim) return false;
+  const auto found = reserved_.find(owner);
+  const uint64_t of_owner = bytes + (found == reserved_.end() ? 0 : found->second);
+  if (reserved_in_all_ + bytes > reserve() || of_owner > reserve() / kReserveOwners) return false;
+  reserved_[owner] = of_owner;
+  reserved_in_all_ += bytes;
+  claimed_.fetch_add(bytes);
+  lines_[static_cast<size_t>(line)].fetch_add(bytes);
+  return true;
+}
+
+absl::Status MemoryBudget::refusal(MemoryLine line, absl::string_view field, uint64_t bytes) {
+  refused_[static_cast<size_t>(line)].fetch_add(1);
+  const uint64_t sum = measured_.load() + claimed_.load(), most = ceiling(line);
   Refusal refusal;
   refusal.reason = Reason::kLimit;
   refusal.field = std::string(field);
   refusal.limit = "memory_bytes";
   refusal.limit_value = static_cast<double>(limit_);
-  refusal.asked = static_cast<double>(measured_ + claimed_ + bytes);
-  return refuse(
-      absl::StatusCode::kResourceExhausted,
-      absl::StrCat("limit memory_bytes is ", limit_, ", of which ", measured_ + claimed_, " are taken; this may need ",
-                   bytes, " more. Delete scenes or meshes, remove objects, send smaller batches, or start locusd ",
-                   "with a larger --memory-limit"),
-      refusal);
+  refusal.asked = static_cast<double>(sum + bytes);
+  if (bytes <= most) refusal.retry_after_ms = kMemoryRetryMs;
+  return refuse(absl::StatusCode::kResourceExhausted,
+                absl::StrCat("limit memory_bytes is ", limit_, ", of which ", sum, " are taken; this may need ", bytes,
+                             " more, and ", memory_line_name(line), " may fill ", most,
+                             ". Delete scenes or meshes, remove objects, send smaller batches, or start locusd ",
+                             "with a larger --memory-limit"),
+                refusal);
 }
 
-MemoryBudget::Claim MemoryBudget::claim_anyway(uint64_t bytes) {
+absl::StatusOr<MemoryBudget::Claim> MemoryBudget::claim(MemoryLine line, absl::string_view field, uint64_t bytes,
+                                                        uint64_t owner) {
+  if (ended_since_.load() <= limit_ / kStepShare && try_claim(line, bytes)) return Claim(*this, line, bytes);
   MutexLock lock(mutex_);
-  // A claim of this kind is never refused, so memory is measured only after work of 1 / kStepShare of the limit ended.
-  if (ended_since_ > limit_ / kStepShare) make_room(bytes);
-  claimed_ += bytes;
-  return Claim(this, bytes);
+  if (ended_since_.load() > limit_ / kStepShare) measure();
+  if (try_claim(line, bytes)) return Claim(*this, line, bytes);
+  if (try_reserve(line, bytes, owner)) return Claim(*this, line, bytes, owner);
+  if (bytes <= ceiling(line)) {
+    measure();
+    if (try_claim(line, bytes)) return Claim(*this, line, bytes);
+    shortage_.store(true);
+  }
+  return refusal(line, field, bytes);
+}
+
+MemoryBudget::Claim MemoryBudget::claim_anyway(MemoryLine line, uint64_t bytes) {
+  if (ended_since_.load() > limit_ / kStepShare) {
+    MutexLock lock(mutex_);
+    measure();
+  }
+  claimed_.fetch_add(bytes);
+  lines_[static_cast<size_t>(line)].fetch_add(bytes);
+  return Claim(*this, line, bytes);
+}
+
+void MemoryBudget::refresh() {
+  MutexLock lock(mutex_);
+  measure();
 }
 
 uint64_t MemoryBudget::used() const {
   MutexLock lock(mutex_);
-  return meter_.used();
+  return meter_();
 }
 
-void MemoryBudget::end(uint64_t bytes) {
+// Counts the bytes as ended before they are no longer claimed, so that taken() never misses them.
+void MemoryBudget::end(MemoryLine line, Owner reserve_owner, uint64_t bytes) {
+  LOCUS_DCHECK_LE(bytes, lines_[static_cast<size_t>(line)].load());
+  ended_since_.fetch_add(bytes);
+  lines_[static_cast<size_t>(line)].fetch_sub(bytes);
+  claimed_.fetch_sub(bytes);
+  if (!reserve_owner) return;
   MutexLock lock(mutex_);
-  LOCUS_DCHECK_LE(bytes, claimed_);
-  claimed_ -= bytes;
-  ended_since_ += bytes;
+  reserved_in_all_ -= bytes;
+  const auto reserved = reserved_.find(*reserve_owner);
+  if ((reserved->second -= bytes) == 0) reserved_.erase(reserved);
 }
 
 }  // namespace locus::server

@@ -1,73 +1,163 @@
 // Enforces the memory limit of the process. Work that would exceed the limit is refused, so that the kernel does not
-// kill the process, and with it all scenes. The budget counts the memory that the process holds (including messages,
-// old revisions and the allocator's free memory) plus the bytes claimed by work in progress.
+// kill the process, and with it all scenes. The budget counts the memory that the process uses (including messages in
+// transit, old revisions, history and the allocator's free memory) plus the bytes claimed by work in progress. A claim
+// is made before the memory exists.
 //
-// Threads: every member may be called from any thread; the functions of the Meter are called by one thread at a time.
-// Cost: the process is measured only when a claim does not seem to fit, or when the claims that ended since the last
-// measurement exceed 1 / kStepShare of the limit. Invariant: claimed_ is the sum of the live claims.
+// Each claim belongs to a line. Lines have different ceilings, so that work that makes scenes grow is refused first,
+// then updates, and queries last. Between the highest ceiling and the limit is a reserve for small claims of moves,
+// requests and replies that do not fit below their ceilings. Each client may use a quarter of it, so that a caller can
+// always ask what fills the memory, and delete it.
+//
+// Threads: every member may be called from any thread; the Meter is called by one thread at a time. No member frees
+// memory, which takes long: claims are refused with a delay, during which the owner of the budget frees memory if
+// take_shortage() says so. Cost: claims that fit take no lock. The process is measured only when a claim does not seem
+// to fit, by refresh(), and when the claims that ended since the last measurement exceed 1 / kStepShare of the limit.
+// Invariants: claimed_ is the sum of the live claims; when a claim succeeds, measured memory plus live claims is at
+// most the ceiling of its line, or the live claims that use the reserve are at most the reserve.
 #ifndef LOCUS_SERVER_SCHEDULING_MEMORY_BUDGET_H_
 #define LOCUS_SERVER_SCHEDULING_MEMORY_BUDGET_H_
 
+#include <array>
+#include <atomic>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <utility>
 
+#include "absl/container/flat_hash_map.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
+#include "core/base/check.h"
 #include "core/base/mutex.h"
 
 namespace locus::server {
 
-class MemoryBudget {
- public:
-  struct Meter {
-    std::function<uint64_t()> used;        // returns the bytes that the process holds
-    std::function<void()> release_memory;  // frees old revisions and returns free memory to the kernel; slow
-  };
+// Purpose of a claim, in the order in which claims are refused as memory runs short: those up to kInserts first, then
+// kMoves, then kRequests and kReplies.
+enum class MemoryLine : uint8_t {
+  kUploads,   // columns of meshes that are uploaded
+  kBuilds,    // trees of meshes and sets of instances that are built
+  kDumps,     // dumps, downloads of meshes, and long lists
+  kBackups,   // pieces of backups
+  kInserts,   // update batches that insert objects
+  kMoves,     // other update batches
+  kRequests,  // parsed messages of callers
+  kReplies,   // responses, until they are written to the network
+};
+inline constexpr size_t kMemoryLines = 8;
+// Returns the line's name, such as "uploads".
+absl::string_view memory_line_name(MemoryLine line);
 
-  // Claim of memory by work in progress; released when destroyed. Must not outlive the budget.
+class MemoryBudget {
+  using Owner = std::optional<uint64_t>;  // of a claim that uses the reserve
+
+ public:
+  // Function that returns the bytes that the process uses.
+  using Meter = std::function<uint64_t()>;
+
+  // Claim of memory by work in progress; released when destroyed. An empty Claim claims nothing. Must not outlive the
+  // budget.
   class Claim {
    public:
-    Claim(MemoryBudget* budget, uint64_t bytes) : budget_(budget), bytes_(bytes) {}
-    Claim(Claim&& other) noexcept : budget_(std::exchange(other.budget_, nullptr)), bytes_(other.bytes_) {}
-    Claim& operator=(Claim&&) = delete;
-    ~Claim() {
-      if (budget_ != nullptr) budget_->end(bytes_);
+    Claim() = default;
+    Claim(Claim&& other) noexcept
+        : budget_(std::exchange(other.budget_, nullptr)),
+          line_(other.line_),
+          reserve_owner_(other.reserve_owner_),
+          bytes_(std::exchange(other.bytes_, 0)) {}
+    Claim& operator=(Claim&& other) noexcept {
+      std::swap(budget_, other.budget_);
+      std::swap(line_, other.line_);
+      std::swap(reserve_owner_, other.reserve_owner_);
+      std::swap(bytes_, other.bytes_);
+      return *this;
+    }
+    ~Claim() { release(); }
+
+    uint64_t bytes() const { return bytes_; }
+    // Reduces the claim to `bytes`, once the work knows that it needs no more. Does nothing if the claim is smaller.
+    void shrink(uint64_t bytes) {
+      if (budget_ == nullptr || bytes >= bytes_) return;
+      budget_->end(line_, reserve_owner_, bytes_ - bytes);
+      bytes_ = bytes;
+    }
+    void release() {
+      if (budget_ != nullptr && bytes_ > 0) budget_->end(line_, reserve_owner_, std::exchange(bytes_, 0));
     }
 
    private:
-    MemoryBudget* budget_;
-    uint64_t bytes_;
+    friend class MemoryBudget;
+    Claim(MemoryBudget& budget, MemoryLine line, uint64_t bytes, Owner reserve_owner = std::nullopt)
+        : budget_(&budget), line_(line), reserve_owner_(reserve_owner), bytes_(bytes) {}
+
+    MemoryBudget* budget_ = nullptr;
+    MemoryLine line_ = MemoryLine::kRequests;
+    Owner reserve_owner_;
+    uint64_t bytes_ = 0;
   };
 
   MemoryBudget(uint64_t limit, Meter meter);
+  MemoryBudget(const MemoryBudget&) = delete;
+  MemoryBudget& operator=(const MemoryBudget&) = delete;
 
   // Claims `bytes`, the most memory that the work may add at any time. Returns RESOURCE_EXHAUSTED, naming `field` and
-  // the limit memory_bytes, if that would exceed the limit even after release_memory().
-  absl::StatusOr<Claim> claim(absl::string_view field, uint64_t bytes) LOCUS_EXCLUDES(mutex_);
-  // Claims `bytes` for work that is never refused because it only changes existing objects. Now and then checks the
-  // limit, and calls release_memory() if the claim would exceed it.
-  Claim claim_anyway(uint64_t bytes) LOCUS_EXCLUDES(mutex_);
+  // the limit memory_bytes, if that would exceed the ceiling of `line`. The refusal has a delay after which to retry,
+  // unless `bytes` alone exceed the ceiling. `owner` is an id of the client for which the
+  // work is done, such as Caller::client().
+  absl::StatusOr<Claim> claim(MemoryLine line, absl::string_view field, uint64_t bytes, uint64_t owner = 0)
+      LOCUS_EXCLUDES(mutex_);
+  // Claims `bytes` for work that is never refused, because it frees memory.
+  Claim claim_anyway(MemoryLine line, uint64_t bytes) LOCUS_EXCLUDES(mutex_);
+
+  // Measures the process. Call it periodically.
+  void refresh() LOCUS_EXCLUDES(mutex_);
+  // Returns whether a claim was refused since the last call that may succeed when memory is freed.
+  bool take_shortage() { return shortage_.exchange(false); }
 
   uint64_t limit() const { return limit_; }
-  // Returns the bytes that the process holds now.
+  // Returns the largest sum of measured memory and claims at which claims of `line` succeed.
+  uint64_t ceiling(MemoryLine line) const;
+  // Returns the bytes that the process uses now.
   uint64_t used() const LOCUS_EXCLUDES(mutex_);
+  // Returns an upper bound of the memory in use: the last measurement plus all claims that it may lack.
+  uint64_t taken() const { return measured_.load() + ended_since_.load() + claimed_.load(); }
+  // Returns the result of the last measurement.
+  uint64_t measured() const { return measured_.load(); }
+  // Returns the bytes that are claimed on `line`, and the number of claims of the line that were refused so far.
+  uint64_t claimed(MemoryLine line) const { return lines_[static_cast<size_t>(line)].load(); }
+  uint64_t refused(MemoryLine line) const { return refused_[static_cast<size_t>(line)].load(); }
+  // Returns the largest sum of claims of moves, requests and replies that one connection may hold: half of the memory
+  // that is left for claims, so that one client leaves room for all others.
+  uint64_t connection_share() const;
 
  private:
   // The process is measured again when claims of more than limit / kStepShare bytes have ended.
   static constexpr uint64_t kStepShare = 32;
 
-  bool make_room(uint64_t bytes) LOCUS_REQUIRES(mutex_);
-  bool fits(uint64_t bytes) const LOCUS_REQUIRES(mutex_);
+  // Claims of at most this many bytes may use the reserve.
+  static constexpr uint64_t kSmallClaim = 64u << 10;
+
+  bool try_claim(MemoryLine line, uint64_t bytes);
+  bool try_reserve(MemoryLine line, uint64_t bytes, uint64_t owner) LOCUS_REQUIRES(mutex_);
+  uint64_t reserve() const;
+  bool fits(MemoryLine line, uint64_t bytes) const;
   void measure() LOCUS_REQUIRES(mutex_);
-  void end(uint64_t bytes) LOCUS_EXCLUDES(mutex_);
+  void end(MemoryLine line, Owner reserve_owner, uint64_t bytes);
+  absl::Status refusal(MemoryLine line, absl::string_view field, uint64_t bytes);
 
   const uint64_t limit_;
   const Meter meter_;
+  std::atomic<uint64_t> measured_{0};
+  std::atomic<uint64_t> claimed_then_{0};  // claimed_ at the last measurement
+  std::atomic<uint64_t> ended_since_{0};   // bytes of claims that ended since the last measurement
+  std::atomic<uint64_t> claimed_{0};       // bytes claimed by work in progress
+  std::array<std::atomic<uint64_t>, kMemoryLines> lines_{};
+  std::array<std::atomic<uint64_t>, kMemoryLines> refused_{};
+  std::atomic<bool> shortage_{false};
   mutable Mutex mutex_;
-  uint64_t measured_ LOCUS_GUARDED_BY(mutex_) = 0;
-  uint64_t ended_since_ LOCUS_GUARDED_BY(mutex_) = 0;  // bytes of claims that ended since the last measurement
-  uint64_t claimed_ LOCUS_GUARDED_BY(mutex_) = 0;      // bytes claimed by work in progress
+  // Bytes of the live claims that use the reserve, by owner; owners without such claims are absent.
+  absl::flat_hash_map<uint64_t, uint64_t> reserved_ LOCUS_GUARDED_BY(mutex_);
+  uint64_t reserved_in_all_ LOCUS_GUARDED_BY(mutex_) = 0;
 };
 
 }  // namespace locus::server

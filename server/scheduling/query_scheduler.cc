@@ -15,9 +15,10 @@ namespace {
 
 constexpr double kNanosecondsPerMs = 1e6;
 constexpr uint32_t kMaxRetryMs = 10'000;
-// While jobs of both classes wait, one turn in this many is given to a large job.
+// While jobs of both classes wait, about one of kLargeShare turns is given to a large job.
 constexpr uint64_t kLargeShare = 5;
-// Maximum number of withdrawn tickets that stay queued until their turn. If there are more, all of them are removed.
+// Maximum number of withdrawn tickets that stay queued until their turn. If more withdrawn tickets are queued, all
+// withdrawn tickets are removed.
 constexpr uint32_t kMaxTombstones = 256;
 
 constexpr const char* kJobLimits[kJobClasses] = {"small_batches", "large_batches"};
@@ -37,8 +38,8 @@ class QueryScheduler::Ticket {
   Ticket(QueryJob& of, uint64_t whose, uint64_t estimated, JobClass as)
       : job(of), client(whose), nanoseconds(estimated), admitted_as(as), job_class(as) {}
 
-  // Counts this thread among those that work on the job; returns false if the ticket was withdrawn. `state_` holds the
-  // number of these threads and two bits, for withdrawn and finished.
+  // Adds this thread to the threads that work on the job; returns false if the ticket was withdrawn. `state_` contains
+  // the number of these threads and two flags, kWithdrawn and kFinished.
   bool begin_work() {
     uint32_t state = state_.load(std::memory_order_relaxed);
     LOCUS_DCHECK_LT(state & kWorkers, kWorkers);
@@ -47,7 +48,8 @@ class QueryScheduler::Ticket {
     return false;
   }
   void finish() { state_.fetch_or(kFinished, std::memory_order_relaxed); }
-  // Subtracts this thread from those that work on the job. Returns true if it was the last one and the job is finished.
+  // Removes this thread from the threads that work on the job. Returns true if this was the last thread and the job is
+  // finished.
   bool end_work() {
     const uint32_t before = state_.fetch_sub(1, std::memory_order_acq_rel);
     LOCUS_DCHECK_LT(0u, before & kWorkers);
@@ -288,7 +290,7 @@ bool QueryScheduler::end_turn(Ticket& ticket, Progress progress, uint64_t spent)
 // Queues the job again, or removes it from its queue, after a turn that returned `progress`. kBegun means that no chunk
 // may be started now, so the job leaves the queue until one of the threads working on it returns kMore. The last of
 // these threads queues an unfinished job again even if it returns kBegun, because another thread's kMore may have been
-// processed before this kBegun. A small job that took too long continues as a large one.
+// processed before this kBegun. A small job that took too long continues as a large job.
 void QueryScheduler::requeue(Ticket& ticket, Progress progress) {
   const bool waits = !ticket.finished() && (progress == Progress::kMore || ticket.alone());
   const bool grown = ticket.job_class == JobClass::kSmall && ticket.spent > 2 * options_.small_nanoseconds;

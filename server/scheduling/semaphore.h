@@ -1,9 +1,14 @@
-// Counting semaphore (sem_t). Poster and waiter share no lock, so post() never waits for a waiter that lost its core.
-// Not std::counting_semaphore, because libstdc++ 12's may miss a wake-up. Thread-safe.
+// Counting semaphore (sem_t). post() and wait() share no lock, so post() never waits for a thread that was preempted in
+// wait(). Does not use std::counting_semaphore, because its implementation in libstdc++ 12 may miss a wake-up.
+// Thread-safe.
 #ifndef LOCUS_SERVER_SCHEDULING_SEMAPHORE_H_
 #define LOCUS_SERVER_SCHEDULING_SEMAPHORE_H_
 
 #include <semaphore.h>
+#include <time.h>
+
+#include <cerrno>
+#include <chrono>
 
 #include "core/base/check.h"
 
@@ -21,6 +26,17 @@ class Semaphore {
   void wait() {
     while (sem_wait(&semaphore_) != 0) {  // interrupted by a signal handler: wait again
     }
+  }
+  // Waits at most `time`. Returns false if the count stayed 0 for so long.
+  bool wait_for(std::chrono::nanoseconds time) {
+    timespec end;
+    clock_gettime(CLOCK_MONOTONIC, &end);
+    const std::chrono::nanoseconds sum = time + std::chrono::nanoseconds(end.tv_nsec);
+    end.tv_sec += std::chrono::duration_cast<std::chrono::seconds>(sum).count();
+    end.tv_nsec = (sum % std::chrono::seconds(1)).count();
+    while (sem_clockwait(&semaphore_, CLOCK_MONOTONIC, &end) != 0)
+      if (errno == ETIMEDOUT) return false;
+    return true;
   }
 
  private:

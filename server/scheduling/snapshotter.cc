@@ -68,7 +68,7 @@ bool Snapshotter::snapshot_due_scenes() {
       if (ended()) return true;
       if (!due(*scene)) continue;
       const absl::StatusOr<uint64_t> bytes = write(*scene);
-      // A scene that was deleted meanwhile needs no snapshot.
+      // The scene was deleted while its snapshot was written, and so needs no snapshot.
       if (ended() || absl::IsNotFound(bytes.status())) return true;
       if (options_.on_snapshot) options_.on_snapshot(*scene, bytes);
       const MutexLock lock(mutex_);

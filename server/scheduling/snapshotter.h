@@ -1,8 +1,8 @@
 // Writes a snapshot of a scene when its log has grown long; the snapshot replaces the log's records. So a restart
-// replays few records, and the disk holds little more than the scenes themselves.
+// replays few records, and the data directory is little larger than the scenes themselves.
 //
-// Threads: runs a thread of low priority; stats() may be called from any thread. Updates and queries never wait for it:
-// a scene continues to change while its snapshot is written.
+// Threads: runs a thread of low priority; stats() may be called from any thread. Updates and queries never wait for a
+// snapshot: a scene continues to change while its snapshot is written.
 #ifndef LOCUS_SERVER_SCHEDULING_SNAPSHOTTER_H_
 #define LOCUS_SERVER_SCHEDULING_SNAPSHOTTER_H_
 
@@ -20,8 +20,8 @@
 namespace locus::server {
 
 struct SnapshotterOptions {
-  // Bytes of log records after which a scene is snapshotted again: at least this, and at least the size of the scene
-  // itself, so that snapshots never write more than the log. Lower it for a faster restart.
+  // Bytes of log records after which a scene is snapshotted again. If the scene itself is larger, the size of the scene
+  // is used instead, so that snapshots never write more bytes than the log. A smaller value makes a restart faster.
   uint64_t log_bytes = limits::kSnapshotAfterBytes;
   // Time between two checks of all scenes.
   std::chrono::milliseconds poll_interval{250};
@@ -41,7 +41,7 @@ class Snapshotter {
  public:
   // Starts the thread. `registry` and `log` must outlive the snapshotter. Does nothing if `log` is null.
   Snapshotter(const Registry& registry, UpdateLog* log, SnapshotterOptions options);
-  // Abandons a snapshot in progress; the previous one stays valid.
+  // Abandons a snapshot in progress; the previous snapshot stays valid.
   ~Snapshotter();
   Snapshotter(const Snapshotter&) = delete;
   Snapshotter& operator=(const Snapshotter&) = delete;

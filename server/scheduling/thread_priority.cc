@@ -15,7 +15,7 @@ constexpr int kSteps = 10;
 constexpr int kLowest = 19;
 constexpr uint64_t kSliceNanoseconds = 100'000;
 
-// Linux's sched_attr, which this C library does not declare.
+// Copy of Linux's struct sched_attr, which this C library does not declare.
 struct SchedulingAttributes {
   uint32_t size;
   uint32_t policy;

@@ -14,13 +14,13 @@ using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 
 // Estimated nanoseconds to apply one item, before the first measurement.
-constexpr double kFirstGuess = 100;
+constexpr double kFirstNanosecondsPerItem = 100;
 // Fixed cost of a batch in nanoseconds: publishing its revision.
 constexpr uint64_t kBatchNanoseconds = 5'000;
 constexpr double kForget = 0.1;
-constexpr uint32_t kRetryAfterMs = 5;
-// Maximum number of items logged with one sync. Applying so many takes many times as long as the sync, so a larger
-// group would gain little.
+constexpr uint32_t kFullQueueRetryMs = 5;
+// Maximum number of items logged with one sync. Applying so many items takes many times as long as the sync, so a
+// larger group would gain little.
 constexpr uint64_t kMaxItemsPerSync = uint64_t{1} << 15;
 // Interval at which the queue checks whether a scene's readers have released their snapshots, and the time after which
 // overdue readers are revoked.
@@ -37,8 +37,8 @@ uint64_t items_of(const UpdateBatch& batch) {
 
 bool coalesces(const Scene& scene) { return scene.spec().overload == OverloadPolicy::kLatestWins; }
 
-// Returns whether the scene's acks wait for the disk. Its waiting batches are then logged together, because a sync
-// costs the same for one batch as for many.
+// Returns whether the scene's acks wait for the disk. The queue logs the waiting batches of such a scene together,
+// because a sync costs the same for one batch as for many.
 bool waits_for_disk(const Scene& scene) {
   return scene.log_key() != 0 && scene.spec().durability == Durability::kLocal;
 }
@@ -51,7 +51,8 @@ absl::StatusOr<Scene::Acks> apply_all(Scene& scene, absl::Span<const UpdateBatch
 
 }  // namespace
 
-UpdateQueue::UpdateQueue(const UpdateQueueOptions& options) : options_(options), nanoseconds_per_item_(kFirstGuess) {
+UpdateQueue::UpdateQueue(const UpdateQueueOptions& options)
+    : options_(options), nanoseconds_per_item_(kFirstNanosecondsPerItem) {
   LOCUS_CHECK_LE(1u, options.threads);
   LOCUS_CHECK_LE(options.threads, limits::kMaxThreads);
   for (uint32_t i = 0; i < options.threads; ++i) threads_.emplace_back([this] { run(); });
@@ -83,7 +84,7 @@ bool UpdateQueue::full(const SceneQueue& scene_queue, uint64_t items) const {
 absl::Status UpdateQueue::refuse(const SceneQueue& scene_queue, uint64_t items) const {
   const double nanoseconds = nanoseconds_per_item_.load(std::memory_order_relaxed);
   const double drain = static_cast<double>(scene_queue.items) * nanoseconds / 2 / 1e6;
-  const auto retry = static_cast<uint32_t>(std::clamp(drain, double{kRetryAfterMs}, 1000.0));
+  const auto retry = static_cast<uint32_t>(std::clamp(drain, double{kFullQueueRetryMs}, 1000.0));
   if (scene_queue.waiting.size() >= options_.max_updates)
     return refuse_full("", "waiting_updates", options_.max_updates, static_cast<double>(scene_queue.waiting.size() + 1),
                        retry);
@@ -123,7 +124,7 @@ absl::StatusOr<Posted> UpdateQueue::post(const ScenePtr& scene, PendingUpdate& u
       ++stats_.updates;
       stats_.items += items;
       stats_.held += is_full ? 1 : 0;
-      check_invariants(scene_queue);
+      LOCUS_DCHECK_CALL(check_invariants(scene_queue));
       return is_full ? Posted::kFull : Posted::kTaken;
     }
   }
@@ -212,12 +213,12 @@ UpdateQueue::Group UpdateQueue::take_group(SceneQueue& scene_queue) {
   scene_queue.items -= items;
   stats_.items -= items;
   stats_.updates -= group.size();
-  check_invariants(scene_queue);
+  LOCUS_DCHECK_CALL(check_invariants(scene_queue));
   return group;
 }
 
 // Completes and removes the batches of the group that were cancelled or whose deadline has passed. If a deadline passed
-// during a stall, the batch gets the error of the stall, which names what the readers hold.
+// during a stall, done() receives the error of the stall, which names the limit that the readers exceed.
 void UpdateQueue::drop_stopped(const SceneQueue& scene_queue, Group& group) {
   const auto stopped = [&scene_queue](PendingUpdate* update) {
     absl::Status status = update->stop();
@@ -235,7 +236,8 @@ bool UpdateQueue::apply(SceneQueue& scene_queue, Group& group) {
   if (group.empty()) return true;
   std::vector<const UpdateBatch*> batches;
   for (const PendingUpdate* update : group) batches.push_back(&update->batch());
-  // This returns DEADLINE_EXCEEDED instead of waiting for readers, because they may take long.
+  // apply_all() returns DEADLINE_EXCEEDED instead of waiting for readers, because readers may hold their snapshots for
+  // a long time.
   absl::StatusOr<Scene::Acks> acks = apply_all(*scene_queue.scene, batches);
   if (acks.status().code() == absl::StatusCode::kDeadlineExceeded) {
     scene_queue.late = acks.status();
@@ -285,7 +287,7 @@ void UpdateQueue::requeue(SceneQueue& scene_queue, const Group& group) {
     stats_.items += items;
     ++stats_.updates;
   }
-  check_invariants(scene_queue);
+  LOCUS_DCHECK_CALL(check_invariants(scene_queue));
 }
 
 std::unique_ptr<UpdateQueue::SceneQueue> UpdateQueue::finish(SceneQueue& scene_queue) {
@@ -300,7 +302,7 @@ std::unique_ptr<UpdateQueue::SceneQueue> UpdateQueue::finish(SceneQueue& scene_q
   const auto found = scene_queues_.find(scene_queue.scene.get());
   std::unique_ptr<SceneQueue> empty = std::move(found->second);
   scene_queues_.erase(found);
-  check_invariants(*empty);
+  LOCUS_DCHECK_CALL(check_invariants(*empty));
   if (ended_) work_.notify_all();
   return empty;
 }
@@ -310,20 +312,18 @@ void UpdateQueue::learn(uint64_t items, SteadyTime start) {
   const auto spent = std::chrono::duration_cast<std::chrono::nanoseconds>(steady_clock::now() - start).count();
   const double per_item = static_cast<double>(spent) / static_cast<double>(items);
   const double known = nanoseconds_per_item_.load(std::memory_order_relaxed);
-  // A batch of few items says little about the cost of one item, because of the fixed cost of a batch.
+  // The time of a batch with few items is mostly the fixed cost of a batch, so it is not used as the cost of an item.
   const double weight = items < 64 ? 0 : kForget;
   nanoseconds_per_item_.store(known + (per_item - known) * weight, std::memory_order_relaxed);
 }
 
 // Compares the counts of one SceneQueue with the totals. O(1).
 void UpdateQueue::check_invariants(const SceneQueue& scene_queue) const {
-  if constexpr (kDebugChecks) {
-    LOCUS_CHECK_LE(scene_queue.waiting.size(), stats_.updates);
-    LOCUS_CHECK_LE(scene_queue.items, stats_.items);
-    if (scene_queue.waiting.empty()) LOCUS_CHECK_EQ(scene_queue.items, 0u);
-    LOCUS_CHECK_LE(ready_.size() + stalled_.size(), scene_queues_.size());
-    if (scene_queues_.empty()) LOCUS_CHECK_EQ(stats_.updates + stats_.items, 0u);
-  }
+  LOCUS_CHECK_LE(scene_queue.waiting.size(), stats_.updates);
+  LOCUS_CHECK_LE(scene_queue.items, stats_.items);
+  if (scene_queue.waiting.empty()) LOCUS_CHECK_EQ(scene_queue.items, 0u);
+  LOCUS_CHECK_LE(ready_.size() + stalled_.size(), scene_queues_.size());
+  if (scene_queues_.empty()) LOCUS_CHECK_EQ(stats_.updates + stats_.items, 0u);
 }
 
 UpdateQueueStats UpdateQueue::stats() const {

@@ -1,7 +1,7 @@
 // Queue of update batches: one bounded SceneQueue for each scene, emptied in order of arrival by one thread at a time.
-// So threads that serve clients never wait for a scene's writer or its readers. A small batch for an idle scene is
-// applied by its caller, unless its ack waits for the disk. Such batches are queued, and the waiting batches of a scene
-// share one sync.
+// Therefore threads that serve clients never wait for a scene's writer or its readers. A small batch for an idle scene
+// is applied by its caller, unless its ack waits for the disk. Batches whose ack waits for the disk are always queued,
+// and the waiting batches of a scene share one sync.
 //
 // Threads: every member may be called from any thread; post() takes a lock that is held only briefly. Invariants: at
 // most one group of batches of a scene is being applied, and batches of a scene never overtake each other; the counts
@@ -32,8 +32,8 @@ class PendingUpdate {
 
   virtual const UpdateBatch& batch() const = 0;
 
-  // Returns OK while the batch should be applied. Any error (cancelled, deadline passed) goes to done() instead, and
-  // the scene is not changed.
+  // Returns OK while the batch should be applied. If stop() returns an error (cancelled, deadline passed), the queue
+  // passes the error to done() and does not apply the batch.
   virtual absl::Status stop() const = 0;
 
   // Receives the result. Called once, on any thread, perhaps within post(); must not block. The queue does not use the
@@ -44,7 +44,7 @@ class PendingUpdate {
 // Handling of a batch for a full SceneQueue.
 enum class WhenFull : uint8_t {
   kRefuse,  // RESOURCE_EXHAUSTED with a retry delay; for single calls
-  kHold,    // accept it and return kFull; for streams, which then stop reading until it is done
+  kHold,    // accept the batch and return kFull; for streams, which then stop reading until the batch is done
 };
 
 // Result of post().
@@ -55,12 +55,12 @@ enum class Posted : uint8_t {
 
 struct UpdateQueueOptions {
   uint32_t threads = 1;
-  uint32_t max_updates = 256;              // maximum of batches waiting for one scene
-  uint64_t max_items = uint64_t{1} << 20;  // maximum of the items of these batches; one batch alone is always accepted
+  uint32_t max_updates = 256;              // maximum number of batches waiting for one scene
+  uint64_t max_items = uint64_t{1} << 20;  // limit of items waiting for one scene; one batch alone is always accepted
   uint64_t inline_nanoseconds = 100'000;   // maximum estimated work of a batch that is applied by its caller
 };
 
-// Counters. All but the first two never decrease.
+// Counters of the queue. All counters except `updates` and `items` never decrease.
 struct UpdateQueueStats {
   uint64_t updates = 0;         // batches waiting for all scenes
   uint64_t items = 0;           // items of these batches
@@ -68,7 +68,7 @@ struct UpdateQueueStats {
   uint64_t applied_inline = 0;  // batches applied by their caller
   uint64_t refused = 0;         // batches refused because the scene's queue was full
   uint64_t held = 0;            // batches accepted with kFull
-  uint64_t coalesced = 0;       // batches that share the revision of a later one
+  uint64_t coalesced = 0;       // batches that share the revision of a later batch
   uint64_t stalls = 0;          // times that a scene waited for its readers to release memory
 };
 
@@ -90,6 +90,7 @@ class UpdateQueue {
  private:
   using SteadyTime = std::chrono::steady_clock::time_point;
 
+  // Batches that wait for one scene. A scene is stalled while its readers hold more memory than their budget.
   struct SceneQueue {
     ScenePtr scene;
     std::deque<PendingUpdate*> waiting;
@@ -97,7 +98,7 @@ class UpdateQueue {
     bool busy = false;           // a thread is applying batches
     SteadyTime retry_at = {};    // time of the next attempt, while readers stall the scene
     SteadyTime stalled_at = {};  // start of the stall
-    absl::Status late;           // error that names what the readers hold; used by the busy thread only
+    absl::Status late;           // error that began the stall, OK if there is no stall; used by the busy thread only
   };
   using Group = std::vector<PendingUpdate*>;
 
@@ -128,8 +129,8 @@ class UpdateQueue {
   mutable Mutex mutex_;
   ConditionVariable work_;
   absl::flat_hash_map<const Scene*, std::unique_ptr<SceneQueue>> scene_queues_ LOCUS_GUARDED_BY(mutex_);
-  std::deque<SceneQueue*> ready_ LOCUS_GUARDED_BY(mutex_);     // not busy, with waiting batches; each once
-  std::vector<SceneQueue*> stalled_ LOCUS_GUARDED_BY(mutex_);  // like ready_, but waiting for retry_at
+  std::deque<SceneQueue*> ready_ LOCUS_GUARDED_BY(mutex_);     // not busy, with waiting batches; each queue once
+  std::vector<SceneQueue*> stalled_ LOCUS_GUARDED_BY(mutex_);  // like ready_, but stalled until retry_at
   UpdateQueueStats stats_ LOCUS_GUARDED_BY(mutex_);
   bool ended_ LOCUS_GUARDED_BY(mutex_) = false;
   std::atomic<double> nanoseconds_per_item_;

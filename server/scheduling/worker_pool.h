@@ -1,5 +1,5 @@
-// Thread pool for parallel_for(), used for building trees. The caller takes part, so its loop ends even if every helper
-// is busy or the queue is full.
+// Thread pool for parallel_for(), used for building trees. The calling thread runs a part of the loop itself, so the
+// loop ends even if every helper is busy or the queue is full.
 //
 // Threads: parallel_for() may be called from any number of threads at once, also from within its own loop body.
 // Invariant: fn is called exactly once for each index below n, and all calls have returned when parallel_for() returns.
@@ -29,7 +29,7 @@ class WorkerPool {
   uint32_t threads() const { return static_cast<uint32_t>(helpers_.size()) + 1; }
 
   // Calls fn(0) .. fn(n - 1), in any order, on this thread and on free helpers; returns when all calls have returned.
-  // Their writes are visible to the caller afterwards. `fn` must not throw.
+  // The writes of fn are then visible to the caller. `fn` must not throw.
   void parallel_for(size_t n, const std::function<void(size_t)>& fn) LOCUS_EXCLUDES(mutex_);
 
  private:
@@ -40,7 +40,7 @@ class WorkerPool {
 
   Mutex mutex_;
   ConditionVariable work_;
-  std::deque<std::shared_ptr<Batch>> waiting_ LOCUS_GUARDED_BY(mutex_);  // one entry for each helper a batch could use
+  std::deque<std::shared_ptr<Batch>> waiting_ LOCUS_GUARDED_BY(mutex_);  // each Batch once for each helper it may use
   bool ended_ LOCUS_GUARDED_BY(mutex_) = false;
   std::vector<std::thread> helpers_;
 };

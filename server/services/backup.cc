@@ -1,11 +1,9 @@
 #include "server/services/backup.h"
 
 #include <fcntl.h>
-#include <openssl/evp.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
@@ -21,8 +19,11 @@
 #include "core/base/limits.h"
 #include "core/base/refusal.h"
 #include "core/base/status_macros.h"
+#include "locus/v1/server_service.pb.h"
 #include "server/observability/log.h"
 #include "server/scheduling/thread_priority.h"
+#include "server/services/scene_access.h"
+#include "server/services/sha256.h"
 
 namespace locus::server {
 namespace {
@@ -30,16 +31,17 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr uint32_t kBackupRetryMs = 5000;
-constexpr size_t kSha256Bytes = 32;
-// Name of the copy's directory inside kBackupDirectory. The copy has a parent directory of its own, so that files that
-// the log leaves beside the copy are removed with that parent.
+// Name of the copy's directory inside kBackupDirectory. kBackupDirectory is used by the copy alone, so that removing
+// it also removes files that the log leaves beside the copy.
 constexpr const char* kCopy = "copy";
+// Number of copies of a piece that exist at once: its data, the message and the bytes that are sent.
+constexpr uint64_t kCopies = 4;
 
 // Function that writes a piece to the caller; returns false to end the backup.
 using TakeBackupPiece = std::function<bool(const v1::BackupResponse&)>;
 
 struct File {
-  std::string path;  // relative to the copy
+  std::string path;  // relative to the copy's directory
   uint64_t bytes = 0;
 };
 
@@ -47,7 +49,7 @@ fs::path directory_of(const Host& host) { return fs::path(host.config.data_dir) 
 
 absl::Status unreadable(absl::string_view path, absl::string_view why) {
   return absl::DataLossError(absl::StrCat("the copy's file ", path, " cannot be read: ", why,
-                                          "; look after the server's disk, and ask `locusd check` about its data"));
+                                          "; check the server's disk, and its data with `locusd check`"));
 }
 
 // Returns the status for a directory that could not be created: RESOURCE_EXHAUSTED if the disk is full, otherwise
@@ -56,7 +58,7 @@ absl::Status not_made(const fs::path& path, const std::error_code& why) {
   const bool full = why == std::errc::no_space_on_device;
   return absl::Status(full ? absl::StatusCode::kResourceExhausted : absl::StatusCode::kUnavailable,
                       absl::StrCat("cannot make ", path.string(), ": ", why.message(),
-                                   full ? "; free some of the server's disk" : "; look after the server's disk"));
+                                   full ? "; free some of the server's disk" : "; check the server's disk"));
 }
 
 // Removes the directory with its contents. Logs a warning if that fails.
@@ -64,7 +66,7 @@ void remove_tree(const fs::path& directory) {
   std::error_code why;
   fs::remove_all(directory, why);
   if (!why) return;
-  log(LogLevel::kWarning, "cannot remove the copy of a backup, which keeps old files from being freed",
+  log(LogLevel::kWarning, "cannot remove the copy of a backup, so replaced files still occupy disk space",
       {{"path", directory.string()}, {"text", why.message()}, {"hint", "remove it by hand"}});
 }
 
@@ -139,8 +141,7 @@ class OpenFile {
 absl::StatusOr<bool> send_file(const fs::path& copy, const File& file, const TakeBackupPiece& take) {
   const OpenFile from(copy / file.path);
   if (!from.is_open()) return unreadable(file.path, std::strerror(errno));
-  const std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> hash(EVP_MD_CTX_new(), &EVP_MD_CTX_free);
-  EVP_DigestInit_ex(hash.get(), EVP_sha256(), nullptr);
+  Sha256Hasher hasher;
   v1::BackupResponse piece;
   piece.set_path(file.path);
   uint64_t left = file.bytes;
@@ -150,14 +151,13 @@ absl::StatusOr<bool> send_file(const fs::path& copy, const File& file, const Tak
     const ssize_t got = from.read(data.data(), data.size());
     if (got < 0) return unreadable(file.path, std::strerror(errno));
     if (static_cast<size_t>(got) < data.size()) return unreadable(file.path, "it became shorter meanwhile");
-    EVP_DigestUpdate(hash.get(), data.data(), data.size());
+    hasher.add(data.data(), data.size());
     left -= data.size();
     if (left == 0) break;
     if (!take(piece)) return false;
     piece.clear_path();
   }
-  std::array<uint8_t, kSha256Bytes> sha256{};
-  EVP_DigestFinal_ex(hash.get(), sha256.data(), nullptr);
+  ASSIGN_OR_RETURN(const Sha256 sha256, hasher.finish());
   piece.mutable_end()->set_bytes(file.bytes);
   piece.mutable_end()->set_sha256(sha256.data(), sha256.size());
   return take(piece);
@@ -193,16 +193,18 @@ bool can_back_up(const Host& host) { return host.log != nullptr && !host.config.
 
 void remove_leftover_backup(const Host& host) { remove_tree(directory_of(host)); }
 
-absl::Status back_up(Host& host, const Caller& caller, grpc::ServerWriter<v1::BackupResponse>& writer) {
+absl::Status back_up(Host& host, const Caller& caller, MessageStream& stream) {
   if (!can_back_up(host)) return no_data_directory();
   const AdmissionLimiter::Permit permit = host.backups.enter();
   if (!permit) return refuse_full("", "backups", host.backups.max(), host.backups.max() + 1.0, kBackupRetryMs);
+  ASSIGN_OR_RETURN(const CallMemory claim,
+                   claim_copy(caller, kCopies * limits::kBackupPieceBytes, MemoryLine::kBackups));
   const fs::path path = directory_of(host);
   const Directory directory(path);
   RETURN_IF_ERROR(directory.make());
   RETURN_IF_ERROR(host.log->back_up((path / kCopy).string()));
   const TakeBackupPiece take = [&](const v1::BackupResponse& piece) {
-    return caller.stop().ok() && writer.Write(piece);
+    return caller.stop().ok() && stream.write(piece);
   };
   absl::StatusOr<bool> sent = false;
   std::thread([&] {

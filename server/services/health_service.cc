@@ -6,7 +6,6 @@
 #include <optional>
 #include <string>
 
-#include "core/base/refusal.h"
 #include "server/config/observability_limits.h"
 #include "server/convert/status.h"
 
@@ -17,7 +16,6 @@ constexpr std::array kServices = {"", "locus.v1.ServerService", "locus.v1.SceneS
                                   "locus.v1.QueryService"};
 // Interval at which a watcher's thread checks whether its call was cancelled.
 constexpr std::chrono::milliseconds kCancellationPoll{100};
-constexpr uint32_t kRetryAfterMs = 1000;
 
 bool is_known(const std::string& service) {
   return std::find(kServices.begin(), kServices.end(), service) != kServices.end();
@@ -29,33 +27,49 @@ HealthService::Response::ServingStatus HealthService::status_of(State state) {
   return state == State::kServing ? Response::SERVING : Response::NOT_SERVING;
 }
 
-grpc::Status HealthService::Check(grpc::ServerContext*, const Request* request, Response* response) {
-  if (!is_known(request->service()))
-    return grpc::Status(grpc::StatusCode::NOT_FOUND, "there is no service of this name");
-  response->set_status(status_of(state()));
-  return grpc::Status::OK;
+std::vector<BlockingMethod> HealthService::methods() {
+  BlockingMethod check_method;
+  check_method.path = "/grpc.health.v1.Health/Check";
+  check_method.limiter = &host_.health_checks;
+  check_method.limit = "health_checks";
+  check_method.while_closed = WhileClosed::kServe;
+  check_method.body = unary_body<Request, Response>(
+      [this](const Caller&, const Request& request, Response& response) { return check(request, response); });
+  BlockingMethod watch_method;
+  watch_method.path = "/grpc.health.v1.Health/Watch";
+  watch_method.limiter = &host_.health_watchers;
+  watch_method.limit = "health_watchers";
+  watch_method.while_closed = WhileClosed::kServe;
+  watch_method.body = streaming_body<Request>([this](const Caller& caller, const Request& request,
+                                                     MessageStream& stream) { return watch(caller, request, stream); });
+  return {check_method, watch_method};
 }
 
-grpc::Status HealthService::Watch(grpc::ServerContext* context, const Request* request,
-                                  grpc::ServerWriter<Response>* writer) {
-  const AdmissionLimiter::Permit permit = host_.health_watchers.enter();
-  if (!permit)
-    return to_grpc(refuse_full("", "health_watchers", kMaxHealthWatchers, kMaxHealthWatchers + 1.0, kRetryAfterMs));
-  const bool known = is_known(request->service());
+absl::Status HealthService::check(const Request& request, Response& response) const {
+  if (!is_known(request.service())) return absl::NotFoundError("there is no service of this name");
+  response.set_status(status_of(state()));
+  return absl::OkStatus();
+}
+
+absl::Status HealthService::watch(const Caller& caller, const Request& request, MessageStream& stream) {
+  const bool known = is_known(request.service());
   std::optional<Response::ServingStatus> sent;
-  for (State now = state(); !context->IsCancelled(); now = wait(*context, now)) {
+  State now = state();
+  while (true) {
     Response response;
     response.set_status(known ? status_of(now) : Response::SERVICE_UNKNOWN);
-    if (response.status() != sent && !writer->Write(response)) break;
+    if (response.status() != sent && !stream.write(response)) break;
     sent = response.status();
-    if (now == State::kEnded) break;
+    const State next = wait(caller, now);
+    if (now == State::kEnded || next == now) break;  // the server ended, or the caller gave up
+    now = next;
   }
-  return to_grpc(draining());
+  return draining();
 }
 
-HealthService::State HealthService::wait(const grpc::ServerContext& context, State known) {
+HealthService::State HealthService::wait(const Caller& caller, State known) {
   const MutexLock lock(mutex_);
-  while (state_ == known && !context.IsCancelled())
+  while (state_ == known && state_ != State::kEnded && caller.stop().ok())
     changed_.wait_until(mutex_, std::chrono::steady_clock::now() + kCancellationPoll);
   return state_;
 }

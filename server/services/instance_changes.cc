@@ -1,22 +1,29 @@
-#include "server/services/instance_changes.h"
-
 #include <algorithm>
 #include <memory>
 #include <optional>
 #include <random>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/names.h"
 #include "core/base/status_macros.h"
 #include "server/convert/convert.h"
 #include "server/observability/log.h"
+#include "server/services/scene_access.h"
+#include "server/services/scene_calls.h"
 
 namespace locus::server {
 namespace {
 
+// Size in bytes up to which a change that only removes instances is never refused for lack of memory.
+constexpr uint64_t kSmallChangeBytes = 64u << 10;
+
+// Most memory in bytes of one id in the response: in the results of the change, in the message, and in its bytes.
+constexpr uint64_t kReplyBytesAPlacement = 40;
+
 // Interval at which a waiting call checks whether its caller has given up.
 constexpr std::chrono::milliseconds kCancellationCheck{50};
 
-// Result of a background change, handed to the call that waits for it. The call may have ended before the result comes.
+// Result of a background change, for the call that waits for it. The call may end before the result is set.
 class Outcome {
  public:
   void set(absl::StatusOr<InstanceChange> change) LOCUS_EXCLUDES(mutex_) {
@@ -25,7 +32,7 @@ class Outcome {
     known_.notify_all();
   }
 
-  // Returns the result of the change, or the status that ended the call. In the latter case the change continues.
+  // Returns the result of the change, or the status that ended the call. If the call has ended, the change continues.
   absl::StatusOr<InstanceChange> wait(const Caller& caller) LOCUS_EXCLUDES(mutex_) {
     MutexLock lock(mutex_);
     while (!change_) {
@@ -67,13 +74,20 @@ absl::StatusOr<PlacementColumns> to_placement(const Registry& registry, const v1
   return columns;
 }
 
-// Chooses ids for placements without ids. With no_wait the reply carries the ids before the change is built, so they
-// are drawn here: kChosenIdBit and 63 random bits below it.
+uint64_t placed_count(const v1::ChangeInstancesRequest& request) {
+  uint64_t placed = 0;
+  for (const v1::Placement& placement : request.place()) placed += placement_count(placement);
+  return placed;
+}
+
+// Chooses ids for placements without ids. With `no_wait` the reply contains the ids although the change is not built
+// yet, so the ids are drawn here: kChosenIdBit and 63 random bits below it.
 void choose_ids(v1::ChangeInstancesRequest& request) {
   std::random_device device;
   for (v1::Placement& placement : *request.mutable_place()) {
     if (!placement.ids().empty()) continue;
     const size_t n = placement_count(placement);
+    placement.mutable_ids()->Reserve(static_cast<int>(n));
     for (size_t i = 0; i < n; ++i) placement.add_ids(kChosenIdBit | uint64_t{device()} << 32 | device());
   }
 }
@@ -93,25 +107,19 @@ absl::StatusOr<std::shared_ptr<OwnedChange>> read_change(const Registry& registr
   return owned;
 }
 
-// Checks the placements of a change before the changes queued ahead of it are applied, so only as far as that is
-// possible: applies the placements to an empty set of instances.
-absl::Status check_placements(const StaticChange& change) {
-  StaticChange placements_only;
-  placements_only.place = change.place;
-  return StaticSet::empty()
-      ->apply(
-          placements_only, [](Id) { return false; }, 0)
-      .status();
-}
+using SharedClaim = std::shared_ptr<const CallMemory>;
 
-using SharedClaim = std::shared_ptr<const MemoryBudget::Claim>;
-
-// Claims memory for building the new set of instances. A change that only removes instances is never refused.
-absl::StatusOr<SharedClaim> make_room(Host& host, const Scene& scene, const StaticChange& change) {
-  const uint64_t cost = change_cost(*scene.latest()->statics, change);
-  if (cost == 0) return nullptr;
-  ASSIGN_OR_RETURN(MemoryBudget::Claim claim, host.memory.claim("place", cost));
-  return std::make_shared<const MemoryBudget::Claim>(std::move(claim));
+// Claims memory for the change before anything is allocated for it: for its copy while it is queued, for checking it,
+// and for building the new set of instances. A small change that only removes instances is never refused.
+absl::StatusOr<SharedClaim> make_room(const Caller& caller, const Scene& scene,
+                                      const v1::ChangeInstancesRequest& request) {
+  const uint64_t placed = placed_count(request);
+  const uint64_t cost = change_cost(scene.latest()->statics->size(), placed);
+  const uint64_t queued = request.SpaceUsedLong() + placed * sizeof(Id);
+  if (cost == 0 && queued <= kSmallChangeBytes)
+    return std::make_shared<const CallMemory>(caller.claim_anyway(MemoryLine::kBuilds, queued));
+  ASSIGN_OR_RETURN(CallMemory claim, caller.claim(MemoryLine::kBuilds, "place", cost + queued));
+  return std::make_shared<const CallMemory>(std::move(claim));
 }
 
 void log_failure(const Scene& scene, uint64_t number, const absl::StatusOr<InstanceChange>& change) {
@@ -120,52 +128,50 @@ void log_failure(const Scene& scene, uint64_t number, const absl::StatusOr<Insta
       {{"scene", scene.name()}, {"change", absl::StrCat(number)}, {"text", std::string(change.status().message())}});
 }
 
-}  // namespace
-
-absl::Status change_instances(Host& host, const Caller& caller, const v1::ChangeInstancesRequest& request,
-                              v1::ChangeInstancesResponse* response) {
-  const absl::StatusOr<ScenePtr> scene = find_scene(caller, request.scene(), "scene");
-  if (!scene.ok()) return scene.status();
-  absl::StatusOr<std::shared_ptr<OwnedChange>> owned = read_change(host.registry, request);
-  if (!owned.ok()) return owned.status();
-  if (request.no_wait()) RETURN_IF_ERROR(check_placements((*owned)->change));
-  const absl::StatusOr<SharedClaim> room = make_room(host, **scene, (*owned)->change);
-  if (!room.ok()) return room.status();
-  const auto outcome = std::make_shared<Outcome>();
-  const uint64_t epoch = (*scene)->latest()->epoch;
-  ASSIGN_OR_RETURN(
-      const uint64_t number,
-      host.changes.submit(epoch, [&host, arrived = SteadyTime::clock::now(), scene = *scene, owned = *owned, outcome,
-                                  room = *room, trace = LogScope::current()](uint64_t change_number) {
+// Queues the change, and with it the claim of its memory. Returns its number.
+absl::StatusOr<uint64_t> submit(Host& host, const ScenePtr& scene, uint64_t epoch, std::shared_ptr<OwnedChange> owned,
+                                SharedClaim room, std::shared_ptr<Outcome> outcome) {
+  return host.changes.submit(
+      epoch, [&host, arrived = SteadyTime::clock::now(), scene, owned = std::move(owned), room = std::move(room),
+              outcome = std::move(outcome), trace = LogScope::current()](uint64_t number) {
         const LogScope scope(trace);
-        // Wait without a deadline: the change runs even if its caller has given up, and readers release their snapshots
-        // in any case.
+        // Wait without a deadline: the change runs even if its caller has given up, and revoked readers release their
+        // snapshots in any case.
         (void)wait_for_readers(*scene, [] { return absl::OkStatus(); });
         absl::StatusOr<InstanceChange> change = scene->change_instances(owned->change);
         if (change.ok()) host.metrics.record_instance_change(nanoseconds_since(arrived));
-        log_failure(*scene, change_number, change);
+        log_failure(*scene, number, change);
         outcome->set(std::move(change));
-      }));
-  response->set_change(number);
-  response->set_epoch(epoch);
-  if (request.no_wait()) {
-    for (const v1::Placement& placement : (*owned)->request.place())
-      response->mutable_ids()->MergeFrom(placement.ids());
-    return absl::OkStatus();
-  }
-  ASSIGN_OR_RETURN(const InstanceChange change, outcome->wait(caller));
-  response->mutable_ids()->Add(change.placed.begin(), change.placed.end());
-  response->set_revision(change.revision);
-  return absl::OkStatus();
+      });
 }
 
-v1::Scene describe(const Host& host, const Scene& scene) {
-  v1::Scene out = to_proto(scene);
-  // The queue's count includes the change that the scene is building now.
-  const uint32_t pending = std::max(out.pending_changes(), host.changes.pending(out.epoch()));
-  out.set_pending_changes(pending);
-  out.set_state(pending > 0 ? v1::SCENE_STATE_BUILDING : v1::SCENE_STATE_READY);
-  return out;
+}  // namespace
+
+absl::Status change_instances(Host& host, const Caller& caller, const v1::ChangeInstancesRequest& request,
+                              MessageStream& stream) {
+  caller.set_subject(request.scene());
+  ASSIGN_OR_RETURN(const ScenePtr scene, find_scene(host, caller, request.scene(), "scene"));
+  ASSIGN_OR_RETURN(SharedClaim room, make_room(caller, *scene, request));
+  // Held until the response is written.
+  ASSIGN_OR_RETURN(const CallMemory reply, claim_copy(caller, placed_count(request) * kReplyBytesAPlacement));
+  ASSIGN_OR_RETURN(const std::shared_ptr<OwnedChange> owned, read_change(host.registry, request));
+  // The scene's instances are not used, because changes that were queued earlier may still alter them.
+  if (request.no_wait()) RETURN_IF_ERROR(StaticSet::check_placements(owned->change.place));
+  const auto outcome = std::make_shared<Outcome>();
+  const uint64_t epoch = scene->latest()->epoch;
+  ASSIGN_OR_RETURN(const uint64_t number, submit(host, scene, epoch, owned, std::move(room), outcome));
+  v1::ChangeInstancesResponse response;
+  response.set_change(number);
+  response.set_epoch(epoch);
+  if (request.no_wait()) {
+    for (const v1::Placement& placement : owned->request.place()) response.mutable_ids()->MergeFrom(placement.ids());
+  } else {
+    ASSIGN_OR_RETURN(const InstanceChange change, outcome->wait(caller));
+    response.mutable_ids()->Add(change.placed.begin(), change.placed.end());
+    response.set_revision(change.revision);
+  }
+  stream.write(response);
+  return absl::OkStatus();
 }
 
 }  // namespace locus::server

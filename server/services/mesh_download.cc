@@ -1,29 +1,34 @@
-#include "server/services/mesh_download.h"
-
 #include <algorithm>
+#include <functional>
 #include <string>
 #include <vector>
 
 #include "absl/types/span.h"
 #include "core/base/limits.h"
+#include "core/base/names.h"
 #include "core/base/status_macros.h"
+#include "core/scene/registry.h"
 #include "server/convert/convert.h"
+#include "server/services/scene_calls.h"
 
 namespace locus::server {
 namespace {
 
-// Upper bound of the size in bytes of a piece's tags, lengths and description.
+// Upper bound of the size in bytes of a piece's protobuf tags and lengths, and of its description of the mesh.
 constexpr size_t kFrameBytes = 1024;
 static_assert(limits::kMaxNameLength + sizeof(Sha256) + 64 < kFrameBytes);
 constexpr size_t kRoom = limits::kDefaultReplyBytes - kFrameBytes;
 // Bytes of a vertex or a triangle: three numbers of four bytes.
 constexpr size_t kTripleBytes = 12;
-// Upper bound of the size in bytes of a part: its name, its first triangle, and the tags and lengths of both and of the
-// part.
+// Upper bound of the size in bytes of a part: its name and its first triangle, and the protobuf tags and lengths of
+// these two fields and of the part.
 constexpr size_t kMaxPartBytes = limits::kMaxLabelLength + 16;
 static_assert(kMaxPartBytes <= kRoom);
 // Number of indices that are unpacked at a time.
 constexpr uint64_t kIndicesAtOnce = 3 << 14;
+
+// Function that writes a piece to the caller; returns false to end the download.
+using TakeMeshPiece = std::function<bool(const v1::DownloadMeshResponse&)>;
 
 // Builder of the pieces of a download. Passes each piece to `take` when the piece is full.
 class Pieces {
@@ -75,8 +80,8 @@ class Pieces {
   bool taken_ = true;
 };
 
-}  // namespace
-
+// Sends the description, then parts, vertices and indices. Sends at least one piece; every piece except the last one is
+// full. Returns false if `take` ended the download.
 bool send_mesh(const Registry::NamedMesh& mesh, const TakeMeshPiece& take) {
   const StaticMesh& from = *mesh.mesh;
   Pieces pieces(mesh, take);
@@ -92,15 +97,24 @@ bool send_mesh(const Registry::NamedMesh& mesh, const TakeMeshPiece& take) {
   return pieces.finish();
 }
 
+// Returns the most memory in bytes that a download needs at any time: a copy of the vertices, into which they are
+// unpacked, and one piece as a message, whose columns double as they grow, and as bytes.
+uint64_t download_cost(const StaticMesh& mesh) {
+  const uint64_t columns =
+      uint64_t{kTripleBytes} * mesh.vertex_count() + uint64_t{kTripleBytes} * mesh.triangle_count();
+  return uint64_t{kTripleBytes} * mesh.vertex_count() +
+         3 * std::min<uint64_t>(columns + parts_cost(mesh.parts()), limits::kDefaultReplyBytes);
+}
+
+}  // namespace
+
 absl::Status download_mesh(Host& host, const Caller& caller, const v1::DownloadMeshRequest& request,
-                           grpc::ServerWriter<v1::DownloadMeshResponse>& writer) {
+                           MessageStream& stream) {
   RETURN_IF_ERROR(check_mesh_name(request.mesh(), "mesh"));
   ASSIGN_OR_RETURN(MeshPtr mesh, host.registry.find_mesh(request.mesh(), "mesh"));
-  // Claim memory for a copy of the vertices, into which they are unpacked.
-  ASSIGN_OR_RETURN(const MemoryBudget::Claim claim,
-                   host.memory.claim("mesh", uint64_t{kTripleBytes} * mesh->vertex_count()));
+  ASSIGN_OR_RETURN(const CallMemory claim, claim_copy(caller, download_cost(*mesh)));
   const uint32_t uses = host.registry.mesh_uses(mesh.get());
-  const auto take = [&](const v1::DownloadMeshResponse& piece) { return caller.stop().ok() && writer.Write(piece); };
+  const auto take = [&](const v1::DownloadMeshResponse& piece) { return caller.stop().ok() && stream.write(piece); };
   if (send_mesh({request.mesh(), std::move(mesh), uses}, take)) return absl::OkStatus();
   const absl::Status status = caller.stop();
   return status.ok() ? absl::CancelledError("the caller stopped reading") : status;

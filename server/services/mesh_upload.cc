@@ -1,29 +1,33 @@
-#include "server/services/mesh_upload.h"
-
-#include <openssl/evp.h>
-
-#include <bit>
+#include <algorithm>
 #include <memory>
+#include <optional>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "core/base/check.h"
 #include "core/base/limits.h"
+#include "core/base/names.h"
 #include "core/base/status_macros.h"
+#include "core/scene/statics/static_mesh.h"
 #include "server/convert/convert.h"
 #include "server/observability/log.h"
+#include "server/services/creator_quotas.h"
+#include "server/services/scene_calls.h"
+#include "server/services/sha256.h"
 
 namespace locus::server {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "columns are hashed as they lie in memory");
+// Bytes that each triangle of a mesh takes at least: its tree stores three corners of three coordinates.
+constexpr uint64_t kMinTriangleBytes = 9 * sizeof(float);
 
 absl::Status malformed_upload(absl::string_view field, absl::string_view message) {
   return refuse_argument(Reason::kMalformed, field, {}, message);
 }
 
 absl::Status check_count(uint32_t count, uint32_t limit, absl::string_view field, absl::string_view limit_name) {
-  if (count == 0) return malformed_upload(field, "a mesh has at least one triangle; say how many come");
+  if (count == 0) return malformed_upload(field, "a mesh has at least one triangle; announce their number");
   if (count > limit) return refuse_limit(field, limit_name, limit, count);
   return absl::OkStatus();
 }
@@ -36,7 +40,7 @@ absl::Status check_parts(const v1::UploadMeshRequest& first) {
     const bool in_order = i == 0 ? begin == 0 : begin > first.parts(i - 1).first_triangle();
     if (!in_order || begin >= first.triangle_count())
       return refuse_argument(Reason::kMalformed, "parts", static_cast<uint32_t>(i),
-                             "parts begin at triangle 0, ascend and lie within the mesh");
+                             "the first part must begin at triangle 0, and parts must ascend and lie within the mesh");
     if (first.parts(i).name().size() > limits::kMaxLabelLength)
       return refuse_limit(absl::StrCat("parts[", i, "].name"), "label_length", limits::kMaxLabelLength,
                           static_cast<double>(first.parts(i).name().size()));
@@ -69,73 +73,43 @@ absl::Status check_length(size_t numbers, size_t announced, absl::string_view fi
                          absl::StrCat(numbers, " numbers came, ", announced, " were announced"));
 }
 
-// Returns the description of a mesh under `name`, with the number of its uses.
-v1::Mesh describe_mesh(const Registry& registry, const std::string& name, MeshPtr mesh) {
-  const uint32_t uses = registry.mesh_uses(mesh.get());
-  return to_proto(Registry::NamedMesh{name, std::move(mesh), uses});
-}
+// A mesh that arrives in pieces. Invariant: its columns never contain more numbers than the first message announced.
+// Only one thread at a time may use it.
+class MeshUpload {
+ public:
+  // Checks the first message's form and limits before anything is allocated.
+  static absl::StatusOr<MeshUpload> begin(const v1::UploadMeshRequest& first);
 
-// Answers the upload of a mesh whose content is already known: registers the content of `known` under `name` with
-// `parts`.
-absl::Status reuse(Host& host, const std::string& name, const std::vector<MeshPart>& parts, const StaticMesh& known,
-                   v1::UploadMeshResponse* response) {
-  ASSIGN_OR_RETURN(MeshPtr mesh, host.registry.add_mesh(name, StaticMesh::share(name, parts, known)));
-  response->set_already_known(true);
-  *response->mutable_mesh() = describe_mesh(host.registry, name, std::move(mesh));
-  return absl::OkStatus();
-}
+  // Appends the columns of `message`, which may be the first message or a later one.
+  absl::Status append(const v1::UploadMeshRequest& message);
+  // Appends the second or a later message of the upload. Such a message may contain only columns.
+  absl::Status append_later(const v1::UploadMeshRequest& message);
 
-// Refuses or answers the upload before its columns are read, if that is possible. Returns true if it has been answered.
-absl::StatusOr<bool> answer_early(Host& host, const MeshUpload& upload, v1::UploadMeshResponse* response) {
-  const absl::StatusOr<MeshPtr> named = host.registry.find_mesh(upload.name(), "mesh");
-  const size_t meshes = host.registry.mesh_count();
-  if (!named.ok() && meshes >= host.config.max_meshes)
-    return refuse_full("mesh", "meshes", host.config.max_meshes, static_cast<double>(meshes + 1), 0);
-  if (!upload.announced()) return false;
-  const MeshPtr known = host.registry.find_content(*upload.announced());
-  if (known != nullptr && upload.has_counts_of(*known)) {
-    const absl::Status status = reuse(host, upload.name(), upload.parts(), *known, response);
-    if (!status.ok()) return status;
-    return true;
-  }
-  if (named.ok()) {
-    Refusal refusal;
-    refusal.reason = Reason::kAlreadyExists;
-    refusal.field = "mesh";
-    return refuse(absl::StatusCode::kAlreadyExists, "the name is taken by other bytes; choose another", refusal);
-  }
-  return false;
-}
+  const std::string& name() const { return name_; }
+  const std::optional<Sha256>& announced() const { return announced_; }
+  // Returns the announced parts; an empty list after finish().
+  const std::vector<MeshPart>& parts() const { return parts_; }
+  // Returns whether `mesh` has as many vertices and triangles as were announced.
+  bool has_counts_of(const StaticMesh& mesh) const;
 
-absl::StatusOr<MeshPtr> build(Host& host, const std::string& name, MeshUpload::Complete complete) {
-  const SteadyTime start = SteadyTime::clock::now();
-  BvhOptions options;
-  options.cancel = host.drain.ended_flag();
-  options.parallel_for = [&host](size_t n, const std::function<void(size_t)>& work) {
-    host.pool.parallel_for(n, work);
+  struct Complete {
+    Sha256 sha256;
+    TriangleMesh mesh;
   };
-  absl::StatusOr<MeshPtr> built = StaticMesh::build(name, complete.sha256, std::move(complete.mesh), options);
-  if (built.ok()) host.metrics.record_mesh_build(nanoseconds_since(start));
-  return built;
-}
+  // Checks that the upload is complete and correct, and returns the mesh with its hash. Leaves the upload empty.
+  absl::StatusOr<Complete> finish();
 
-}  // namespace
+ private:
+  MeshUpload() = default;
 
-Sha256 mesh_hash(absl::Span<const float> vertices, absl::Span<const uint32_t> indices) {
-  const std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context(EVP_MD_CTX_new(), &EVP_MD_CTX_free);
-  const std::array<uint32_t, 2> counts = {static_cast<uint32_t>(vertices.size() / 3),
-                                          static_cast<uint32_t>(indices.size() / 3)};
-  Sha256 hash{};
-  unsigned length = 0;
-  const bool done = EVP_DigestInit_ex(context.get(), EVP_sha256(), nullptr) == 1 &&
-                    EVP_DigestUpdate(context.get(), counts.data(), sizeof counts) == 1 &&
-                    EVP_DigestUpdate(context.get(), vertices.data(), vertices.size() * sizeof(float)) == 1 &&
-                    EVP_DigestUpdate(context.get(), indices.data(), indices.size() * sizeof(uint32_t)) == 1 &&
-                    EVP_DigestFinal_ex(context.get(), hash.data(), &length) == 1;
-  LOCUS_CHECK(done);
-  LOCUS_CHECK_EQ(length, hash.size());
-  return hash;
-}
+  std::string name_;
+  std::optional<Sha256> announced_;
+  size_t vertex_numbers_ = 0;  // announced length of the column `vertices`, three numbers a vertex
+  size_t index_numbers_ = 0;   // announced length of the column `indices`, three numbers a triangle
+  std::vector<MeshPart> parts_;
+  std::vector<float> vertices_;
+  std::vector<uint32_t> indices_;
+};
 
 absl::StatusOr<MeshUpload> MeshUpload::begin(const v1::UploadMeshRequest& first) {
   RETURN_IF_ERROR(check_first(first));
@@ -174,35 +148,119 @@ bool MeshUpload::has_counts_of(const StaticMesh& mesh) const {
 absl::StatusOr<MeshUpload::Complete> MeshUpload::finish() {
   RETURN_IF_ERROR(check_length(vertices_.size(), vertex_numbers_, "vertices"));
   RETURN_IF_ERROR(check_length(indices_.size(), index_numbers_, "indices"));
-  const Sha256 hash = mesh_hash(vertices_, indices_);
+  ASSIGN_OR_RETURN(const Sha256 hash, mesh_hash(vertices_, indices_));
   if (announced_ && *announced_ != hash)
     return refuse_argument(Reason::kHashMismatch, "sha256", {},
-                           "the bytes that came have another SHA-256; upload them again");
+                           "the received bytes have another SHA-256; upload them again");
   ASSIGN_OR_RETURN(TriangleMesh mesh,
                    TriangleMesh::create(std::move(vertices_), std::move(indices_), std::move(parts_)));
   return Complete{hash, std::move(mesh)};
 }
 
-absl::Status upload_mesh(Host& host, const Caller& caller, grpc::ServerReader<v1::UploadMeshRequest>& reader,
-                         v1::UploadMeshResponse* response) {
-  v1::UploadMeshRequest message;
-  if (!reader.Read(&message)) return malformed_upload("", "an upload has at least one message, which says what comes");
-  ASSIGN_OR_RETURN(MeshUpload upload, MeshUpload::begin(message));
-  const absl::StatusOr<bool> answered = answer_early(host, upload, response);
-  if (!answered.ok() || *answered) return answered.status();
-  ASSIGN_OR_RETURN(const MemoryBudget::Claim room,
-                   host.memory.claim("triangle_count", upload_cost(message.vertex_count(), message.triangle_count())));
-  absl::Status status = upload.append(message);
-  while (status.ok() && reader.Read(&message)) status = upload.append_later(message);
-  if (status.ok()) status = caller.stop();
-  if (!status.ok()) return status;
+// Returns the description of a mesh under `name`, with the number of its uses.
+v1::Mesh describe_mesh(const Registry& registry, const std::string& name, MeshPtr mesh) {
+  const uint32_t uses = registry.mesh_uses(mesh.get());
+  return to_proto(Registry::NamedMesh{name, std::move(mesh), uses});
+}
+
+// Answers the upload of a mesh whose content is already known: registers the content of `known` under `name` with
+// `parts`.
+absl::Status reuse(Host& host, const Caller& caller, const std::string& name, const std::vector<MeshPart>& parts,
+                   const StaticMesh& known, v1::UploadMeshResponse& response) {
+  const MeshPtr shared = StaticMesh::share(name, parts, known, creator_name(caller));
+  CallMemory room;  // both are empty if `name` is known too, because then nothing new is stored
+  QuotaHold quota;
+  if (!host.registry.find_mesh(name, "mesh").ok()) {
+    ASSIGN_OR_RETURN(quota, hold_mesh_bytes(host, shared->creator(), shared->bytes()));
+    ASSIGN_OR_RETURN(room, caller.claim(MemoryLine::kUploads, "parts", parts_cost(parts)));
+  }
+  ASSIGN_OR_RETURN(MeshPtr mesh, host.registry.add_mesh(name, shared));
+  response.set_already_known(true);
+  *response.mutable_mesh() = describe_mesh(host.registry, name, std::move(mesh));
+  return absl::OkStatus();
+}
+
+// Refuses or answers the upload before its columns are read, if the first message suffices for that. Returns true if
+// the upload has been answered.
+absl::StatusOr<bool> answer_early(Host& host, const Caller& caller, const MeshUpload& upload,
+                                  v1::UploadMeshResponse& response) {
+  const absl::StatusOr<MeshPtr> named = host.registry.find_mesh(upload.name(), "mesh");
+  const size_t meshes = host.registry.mesh_count();
+  if (!named.ok() && meshes >= host.config.max_meshes)
+    return refuse_full("mesh", "meshes", host.config.max_meshes, static_cast<double>(meshes + 1), 0);
+  if (!upload.announced()) return false;
+  const MeshPtr known = host.registry.find_content(*upload.announced());
+  if (known != nullptr && upload.has_counts_of(*known)) {
+    const absl::Status status = reuse(host, caller, upload.name(), upload.parts(), *known, response);
+    if (!status.ok()) return status;
+    return true;
+  }
+  if (named.ok()) {
+    Refusal refusal;
+    refusal.reason = Reason::kAlreadyExists;
+    refusal.field = "mesh";
+    return refuse(absl::StatusCode::kAlreadyExists, "a mesh of other content has this name; choose another name",
+                  refusal);
+  }
+  return false;
+}
+
+absl::StatusOr<MeshPtr> build(Host& host, const std::string& name, MeshUpload::Complete complete) {
+  const SteadyTime start = SteadyTime::clock::now();
+  BvhOptions options;
+  options.cancel = host.drain.ended_flag();
+  options.parallel_for = [&host](size_t n, const std::function<void(size_t)>& work) {
+    host.pool.parallel_for(n, work);
+  };
+  absl::StatusOr<MeshPtr> built = StaticMesh::build(name, complete.sha256, std::move(complete.mesh), options);
+  if (built.ok()) host.metrics.record_mesh_build(nanoseconds_since(start));
+  return built;
+}
+
+// Answers the upload of a mesh that is complete: builds its tree, unless its content is known, and registers it.
+absl::Status add_mesh(Host& host, const Caller& caller, MeshUpload& upload, v1::UploadMeshResponse& response) {
   ASSIGN_OR_RETURN(MeshUpload::Complete complete, upload.finish());
   if (const MeshPtr known = host.registry.find_content(complete.sha256); known != nullptr)
-    return reuse(host, upload.name(), complete.mesh.parts(), *known, response);
+    return reuse(host, caller, upload.name(), complete.mesh.parts(), *known, response);
   ASSIGN_OR_RETURN(MeshPtr built, build(host, upload.name(), std::move(complete)));
+  built = StaticMesh::share(upload.name(), built->parts(), *built, creator_name(caller));
+  ASSIGN_OR_RETURN(const QuotaHold quota, hold_mesh_bytes(host, built->creator(), built->bytes()));
   ASSIGN_OR_RETURN(MeshPtr added, host.registry.add_mesh(upload.name(), std::move(built)));
   log(LogLevel::kInfo, "mesh uploaded", {{"mesh", upload.name()}});
-  *response->mutable_mesh() = describe_mesh(host.registry, upload.name(), std::move(added));
+  *response.mutable_mesh() = describe_mesh(host.registry, upload.name(), std::move(added));
+  return absl::OkStatus();
+}
+
+absl::Status receive_mesh(Host& host, const Caller& caller, MessageStream& stream, v1::UploadMeshResponse& response) {
+  v1::UploadMeshRequest message;
+  ASSIGN_OR_RETURN(bool more, stream.read(message));
+  if (!more) return malformed_upload("", "an upload needs at least one message, which announces the mesh");
+  ASSIGN_OR_RETURN(MeshUpload upload, MeshUpload::begin(message));
+  caller.set_subject(upload.name());
+  ASSIGN_OR_RETURN(const bool answered, answer_early(host, caller, upload, response));
+  if (answered) return absl::OkStatus();
+  const uint64_t columns = upload_cost(message.vertex_count(), message.triangle_count()) + parts_cost(upload.parts());
+  const uint64_t tree = tree_cost(message.triangle_count());
+  RETURN_IF_ERROR(hold_mesh_bytes(host, creator_name(caller), kMinTriangleBytes * message.triangle_count()).status());
+  // Both are claimed now, so that a mesh that has arrived can be built.
+  ASSIGN_OR_RETURN(const CallMemory room, caller.claim(MemoryLine::kUploads, "triangle_count", columns));
+  ASSIGN_OR_RETURN(const CallMemory build_room, caller.claim(MemoryLine::kBuilds, "triangle_count", tree));
+  RETURN_IF_ERROR(upload.append(message));
+  while (true) {
+    ASSIGN_OR_RETURN(more, stream.read(message));
+    if (!more) break;
+    RETURN_IF_ERROR(upload.append_later(message));
+  }
+  RETURN_IF_ERROR(caller.stop());
+  return add_mesh(host, caller, upload, response);
+}
+
+}  // namespace
+
+absl::Status upload_mesh(Host& host, const Caller& caller, MessageStream& stream) {
+  v1::UploadMeshResponse response;
+  RETURN_IF_ERROR(receive_mesh(host, caller, stream, response));
+  stream.answer(response);
   return absl::OkStatus();
 }
 

@@ -14,6 +14,7 @@ struct QueryMethod {
   using Response = v1::QueryResponse;
   using Work = QueryWork;
   static constexpr Rpc kRpc = Rpc::kQuery;
+  static constexpr const char* kPath = "/locus.v1.QueryService/Query";
   static constexpr bool kStream = false;
   static constexpr bool kInOrder = false;
 
@@ -22,11 +23,13 @@ struct QueryMethod {
               void* tag) const {
     service->RequestQuery(context, request, wire, queue, queue, tag);
   }
+  Work make_work(CallSlot& slot) const { return Work(*host, slot); }
   void begin(Work& work, const std::string& scene, const Request& request, Response& response) const {
     work.begin(scene, request.batch(), *response.mutable_result());
   }
 
   QueryService* service;
+  Host* host;
 };
 
 // Method of StreamQueries for HotCall. It writes answers as they complete, in any order.
@@ -35,6 +38,7 @@ struct StreamQueriesMethod {
   using Response = v1::StreamQueriesResponse;
   using Work = QueryWork;
   static constexpr Rpc kRpc = Rpc::kStreamQueries;
+  static constexpr const char* kPath = "/locus.v1.QueryService/StreamQueries";
   static constexpr bool kStream = true;
   static constexpr bool kInOrder = false;
 
@@ -42,11 +46,13 @@ struct StreamQueriesMethod {
               grpc::ServerCompletionQueue* queue, void* tag) const {
     service->RequestStreamQueries(context, wire, queue, queue, tag);
   }
+  Work make_work(CallSlot& slot) const { return Work(*host, slot); }
   void begin(Work& work, const std::string& scene, const Request& request, Response& response) const {
     work.begin(scene, request.batch(), *response.mutable_result());
   }
 
   QueryService* service;
+  Host* host;
 };
 
 }  // namespace
@@ -61,8 +67,8 @@ QueryService::~QueryService() = default;
 
 void QueryService::listen(IoThreads& threads) {
   for (size_t i = 0; i < threads.loops(); ++i) {
-    listeners_->query.emplace_back(host_, QueryMethod{this}, threads.loop(i)).listen();
-    listeners_->stream.emplace_back(host_, StreamQueriesMethod{this}, threads.loop(i)).listen();
+    listeners_->query.emplace_back(host_, QueryMethod{this, &host_}, threads.loop(i)).listen();
+    listeners_->stream.emplace_back(host_, StreamQueriesMethod{this, &host_}, threads.loop(i)).listen();
   }
 }
 

@@ -1,5 +1,5 @@
-// QueryService over the scenes of a host: Query takes one batch a call, StreamQueries a stream of them. Both live on IO
-// loops.
+// QueryService over the scenes of a host: a Query call has one batch, a StreamQueries call has a stream of batches.
+// Both kinds of calls are served on IO loops.
 #ifndef LOCUS_SERVER_SERVICES_QUERY_SERVICE_H_
 #define LOCUS_SERVER_SERVICES_QUERY_SERVICE_H_
 

@@ -1,15 +1,18 @@
 #include "server/services/query_work.h"
 
+#include <algorithm>
 #include <chrono>
 #include <set>
 #include <utility>
 
 #include "absl/strings/str_join.h"
 #include "core/base/status_macros.h"
+#include "core/query/columns.h"
 #include "server/convert/convert.h"
 #include "server/convert/status.h"
 #include "server/observability/log.h"
 #include "server/scheduling/clocks.h"
+#include "server/services/scene_access.h"
 
 namespace locus::server {
 
@@ -17,13 +20,14 @@ using std::chrono::steady_clock;
 
 namespace {
 
-// Estimated work below which a query batch does not hand the lead of its IO loop to another thread, because waking that
-// thread to wait for events would cost more.
+// Estimated work below which a query batch runs while its IO loop handles no other event. For more work, another thread
+// is woken to handle the loop's events; waking it would cost more than such short work.
 constexpr uint64_t kShortNanoseconds = 30'000;
 
 }  // namespace
 
 void QueryWork::begin(const std::string& scene, const v1::QueryBatch& batch, v1::QueryResult& result) {
+  change({State::kIdle}, State::kReading);
   message_ = &batch;
   result_ = &result;
   result_->Clear();
@@ -33,19 +37,30 @@ void QueryWork::begin(const std::string& scene, const v1::QueryBatch& batch, v1:
 }
 
 absl::Status QueryWork::read(const std::string& scene, const v1::QueryBatch& batch) {
-  ASSIGN_OR_RETURN(ScenePtr found, find_scene(slot_.caller(), scene, "scene"));
+  ASSIGN_OR_RETURN(ScenePtr found, find_scene(host_, slot_.caller(), scene, "scene"));
   scene_ = std::move(found);
   ASSIGN_OR_RETURN(QueryBatch queries, to_queries(batch));
   batch_ = std::move(queries);
   view_ = to_view(batch.view());
-  return check_batch(batch_);
+  RETURN_IF_ERROR(check_batch(batch_));
+  return take_quotas();
 }
 
+absl::Status QueryWork::take_quotas() const {
+  double queries = 0;
+  for (const QueryBlock& block : batch_.blocks) queries += static_cast<double>(query_count(block));
+  RETURN_IF_ERROR(slot_.caller().take_quota(QuotaKind::kQueries, queries));
+  return slot_.caller().take_quota(QuotaKind::kWork, 0);  // refused while the rate is overdrawn
+}
+
+// Charges the work of queries that failed or were given up too, as it was done.
 void QueryWork::answer(absl::Status status) {
   ticket_.reset();
+  if (run_ != nullptr) slot_.caller().charge_quota(QuotaKind::kWork, static_cast<double>(run_->work_done()));
   run_.reset();
   pin_.reset();
   scene_.reset();
+  change({State::kReading, State::kParked, State::kDeferred, State::kQueued}, State::kIdle);
   slot_.answered(std::move(status));
 }
 
@@ -57,13 +72,13 @@ void QueryWork::look() {
   }
   const bool may_come = pin.status().code() == absl::StatusCode::kDeadlineExceeded && steady_clock::now() < until_;
   if (!may_come) return answer(pin.status());
-  if (slot_.host().drain.draining()) return answer(no_longer());
+  if (host_.drain.draining()) return answer(no_longer());
   wait();
 }
 
 // Returns the error for a batch whose revision will not be published any more, because the call has ended or because a
-// draining server accepts no updates. A draining server ends a stream only after all its messages are answered, so
-// there each message gets an error of its own.
+// draining server accepts no updates. A draining server ends a stream only after all messages of the stream are
+// answered, so on a stream this is the error of one message only.
 absl::Status QueryWork::no_longer() const {
   RETURN_IF_ERROR(slot_.caller().stop());
   if (!slot_.stream()) return draining();
@@ -71,10 +86,11 @@ absl::Status QueryWork::no_longer() const {
 }
 
 void QueryWork::wait() {
+  change({State::kReading}, State::kParked);
   notified_.store(false);
   timer_ = slot_.io().at(until_, [this] {
     timer_.reset();
-    if (end_wait()) look();
+    if (end_wait()) resume();
   });
   watch_.emplace(*scene_, view_.revision, [this, &io = slot_.io()] {
     notified_.store(true);
@@ -91,16 +107,24 @@ bool QueryWork::end_wait() {
 
 void QueryWork::woken(bool) {
   end_wait();
+  resume();
+}
+
+void QueryWork::resume() {
+  change({State::kParked}, State::kReading);
   look();
 }
 
 void QueryWork::give_up() {
-  if (watch_ && end_wait()) return answer(no_longer());
-  if (!ticket_ || slot_.caller().stop().ok() || !slot_.host().scheduler.withdraw(*ticket_)) return;
+  if (state_ == State::kParked && end_wait()) return answer(no_longer());
+  if (state_ != State::kQueued || slot_.caller().stop().ok() || !host_.scheduler.withdraw(*ticket_)) return;
   answer(slot_.caller().stop());
 }
 
+// Claims the memory of the answer only now, so that parked batches keep none from others.
 void QueryWork::run() {
+  if (absl::Status status = slot_.claim_answer(max_encoded_reply_bytes(batch_)); !status.ok())
+    return answer(std::move(status));
   started_ = steady_clock::now();
   RunOptions options;
   options.stop = [this] {
@@ -115,20 +139,22 @@ void QueryWork::run() {
   absl::StatusOr<std::unique_ptr<BatchRun>> run = BatchRun::prepare(**pin_, batch_, std::move(options), *columns_);
   if (!run.ok()) return answer(run.status());
   run_ = *std::move(run);
-  const uint64_t cost = slot_.host().costs.nanoseconds((*pin_)->epoch, batch_);
-  if (!slot_.host().scheduler.runs_inline(cost)) return submit(cost);
+  const uint64_t cost = host_.costs.nanoseconds((*pin_)->epoch, batch_);
+  if (!host_.scheduler.runs_inline(cost)) return submit(cost);
+  change({State::kReading}, State::kDeferred);
   slot_.io().defer(*this, cost < kShortNanoseconds ? TaskLength::kShort : TaskLength::kLong);
 }
 
-void QueryWork::run_deferred() { progress_ = slot_.host().scheduler.run_inline(*this); }
+void QueryWork::run_deferred() { progress_ = host_.scheduler.run_inline(*this); }
 
 void QueryWork::on_deferred_done() {
   if (progress_ == Progress::kDone) return finished(true);
-  submit(slot_.host().scheduler.options().inline_nanoseconds);  // run_inline() has used up this budget already
+  submit(host_.scheduler.options().inline_nanoseconds);  // run_inline() has used up this budget already
 }
 
 void QueryWork::submit(uint64_t nanoseconds) {
-  absl::StatusOr<QueryScheduler::TicketPtr> ticket = slot_.host().scheduler.submit(*this, slot_.client(), nanoseconds);
+  change({State::kReading, State::kDeferred}, State::kQueued);
+  absl::StatusOr<QueryScheduler::TicketPtr> ticket = host_.scheduler.submit(*this, slot_.client(), nanoseconds);
   if (!ticket.ok()) return answer(ticket.status());
   ticket_ = *std::move(ticket);
 }
@@ -136,6 +162,7 @@ void QueryWork::submit(uint64_t nanoseconds) {
 void QueryWork::done() { slot_.io().post(finished_); }
 
 void QueryWork::finished(bool) {
+  LOCUS_DCHECK(state_ == State::kDeferred || state_ == State::kQueued);
   if (absl::Status status = run_->status(); !status.ok()) return answer(std::move(status));
   result_->set_epoch((*pin_)->epoch);
   result_->set_revision((*pin_)->revision);
@@ -147,8 +174,8 @@ void QueryWork::finished(bool) {
 }
 
 void QueryWork::learn(const QueryBlock& block, const QueryCost& cost) {
-  slot_.host().costs.learn((*pin_)->epoch, block, cost.nanoseconds);
-  slot_.host().metrics.record_block(block_kind(block), query_count(block), cost.nanoseconds, cost.work);
+  host_.costs.learn((*pin_)->epoch, block, cost.nanoseconds);
+  host_.metrics.record_block(block_kind(block), query_count(block), cost.nanoseconds, cost.work);
 }
 
 void QueryWork::explain() {
@@ -161,7 +188,7 @@ void QueryWork::explain() {
 
 void QueryWork::note_if_slow() {
   const uint64_t nanoseconds = nanoseconds_since(started_);
-  SlowQueries& slow = slot_.host().slow_queries;
+  SlowQueries& slow = host_.slow_queries;
   if (!slow.is_slow(nanoseconds)) return;
   const QueryCost cost = run_->cost();
   SlowQuery query;

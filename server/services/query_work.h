@@ -1,7 +1,9 @@
-// One query batch, from its message to the columns of its reply: conversion and checks, the revision that it asks for,
-// the queries, the answer. It never blocks the IO loop: while the revision is not published it is parked, short work is
-// deferred until the handler has returned, and long work goes to the query scheduler.
+// Work on one query batch, from its message to the columns of its reply: converts and checks the batch, pins the
+// revision that it names, runs the queries and answers. The work never blocks the IO loop: a batch whose revision is
+// not published yet is parked, short work is deferred until the handler has returned, and long work is submitted to the
+// query scheduler.
 //
+//   READING
 //   begin() --> read() --error------------------------------------------------> done
 //                 |
 //                 v      the revision may still be published, and no drain
@@ -11,7 +13,7 @@
 //                 +--error: epoch, range, deadline, deleted, draining ---------> done
 //                 | pinned
 //                 v
-//               run() --error of BatchRun::prepare() --------------------------> done
+//               run() --no memory, or error of BatchRun::prepare() ------------> done
 //                 |  \ estimate >= inline_nanoseconds
 //                 |   \-----------------------+
 //                 v                           v
@@ -25,24 +27,29 @@
 //                 |
 //                 +--> columns, metrics, or the error of the run --------------> done
 //
-// `done` in the drawing is answer(), which frees everything and calls CallSlot::answered() once. give_up() acts in
-// PARKED and QUEUED only: elsewhere the run checks Caller::stop() itself.
+// The words in capitals are values of State. `done` means answer(), which frees the work's data, calls
+// CallSlot::answered() once and sets the state to IDLE. give_up() has an effect in PARKED and QUEUED only: in the other
+// states the running code checks Caller::stop() itself.
 //
 // Threads: all members run on the call's IO loop, except run_deferred() (a thread of the loop, without its lock), and
 // work() and done() (pool threads, work() on several at once).
 #ifndef LOCUS_SERVER_SERVICES_QUERY_WORK_H_
 #define LOCUS_SERVER_SERVICES_QUERY_WORK_H_
 
+#include <algorithm>
 #include <atomic>
+#include <initializer_list>
 #include <memory>
 #include <optional>
 #include <string>
 
+#include "core/base/check.h"
 #include "core/query/query_batch.h"
 #include "core/query/run/batch_run.h"
 #include "core/scene/registry.h"
 #include "locus/v1/query_service.pb.h"
 #include "server/convert/result_columns.h"
+#include "server/host/host.h"
 #include "server/rpc/call_slot.h"
 #include "server/rpc/io_threads.h"
 #include "server/scheduling/query_scheduler.h"
@@ -51,33 +58,42 @@ namespace locus::server {
 
 class QueryWork final : private QueryJob, private DeferredTask {
  public:
-  explicit QueryWork(CallSlot& slot) : slot_(slot) {}
+  QueryWork(Host& host, CallSlot& slot) : host_(host), slot_(slot) {}
 
   // Begins the work. `batch` and `result` are borrowed until the slot is answered.
   void begin(const std::string& scene, const v1::QueryBatch& batch, v1::QueryResult& result);
-  // Asks for an answer soon: ends the wait for a revision, and withdraws a queued run if the caller has given up. A run
-  // in progress is not interrupted here, because it polls Caller::stop() itself.
+  // Makes the work answer soon: ends the wait for a revision, and withdraws a queued run if the caller has given up. A
+  // run in progress is not interrupted here, because it polls Caller::stop() itself.
   void give_up();
 
  private:
+  enum class State : uint8_t { kIdle, kReading, kParked, kDeferred, kQueued };
+
+  // Changes the state, which must be one of `from`.
+  void change([[maybe_unused]] std::initializer_list<State> from, State to) {
+    LOCUS_DCHECK(std::find(from.begin(), from.end(), state_) != from.end());
+    state_ = to;
+  }
+  absl::Status take_quotas() const;
   absl::Status read(const std::string& scene, const v1::QueryBatch& batch);
   void answer(absl::Status status);
 
   // Pins the revision that the view names and calls run(), or parks the batch until that revision is published.
   void look();
   void wait();
-  // Removes the timer and the watch. Returns whether the wait is over; false if woken() was already posted and will
-  // run.
+  // Removes the timer and the watch. Returns true if the wait is over. Returns false if woken() was already posted: the
+  // state then stays PARKED until woken() runs.
   bool end_wait();
   void woken(bool);
-  // Returns the status of a parked batch that is given up: its revision will not be published any more.
+  void resume();
+  // Returns the status with which a parked batch is answered when the wait for its revision is given up.
   absl::Status no_longer() const;
 
   void run();
-  // Works on the batch for about the inline budget of the scheduler, without the loop's lock.
+  // Works on the batch for about SchedulerOptions::inline_nanoseconds, without the loop's lock.
   void run_deferred() override;
   void on_deferred_done() override;
-  // Queues the batch, or the rest of it, at the query scheduler; `nanoseconds` is the estimate of its work.
+  // Submits the batch, or the unfinished part of it, to the query scheduler; `nanoseconds` is its estimated work.
   void submit(uint64_t nanoseconds);
   Progress work(uint64_t nanoseconds) override { return run_->work(nanoseconds); }
   void done() override;
@@ -86,19 +102,21 @@ class QueryWork final : private QueryJob, private DeferredTask {
   void explain();
   void note_if_slow();
 
+  Host& host_;
   CallSlot& slot_;
+  State state_ = State::kIdle;
   const v1::QueryBatch* message_ = nullptr;
   v1::QueryResult* result_ = nullptr;
   ScenePtr scene_;
   View view_;
   QueryBatch batch_;
   SteadyTime until_;
-  SteadyTime started_;  // start of run(): after the wait for a revision, if any
+  SteadyTime started_;  // time at which run() began, which is after the wait for a revision
 
   // Used while the batch is parked.
   std::optional<IoLoop::Timers::iterator> timer_;
   std::optional<Scene::Watch> watch_;
-  std::atomic<bool> notified_{false};  // woken() was posted
+  std::atomic<bool> notified_{false};  // whether woken() was posted
   MemberTag<QueryWork> woken_{*this, &QueryWork::woken};
 
   std::optional<SnapshotPin> pin_;

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <map>
+#include <random>
 #include <string>
 #include <utility>
 #include <vector>
@@ -14,7 +15,6 @@
 #include "core/scene/recovery.h"
 #include "core/scene/spec_codec.h"
 #include "server/observability/log.h"
-#include "server/services/epochs.h"
 
 namespace locus::server {
 namespace {
@@ -125,9 +125,9 @@ class Recovery {
   absl::StatusOr<ScenePtr> recover_sound(StoredScene stored) {
     if (!stored.damage.ok()) return stored.damage;
     ASSIGN_OR_RETURN(SceneSpec spec, decode_spec(stored.spec));
-    // Overwrite the stored limit on pinned memory, which is that of the daemon that created the scene, by the option of
+    // The stored limit on pinned memory is the option of the daemon that created the scene. Replace it by the option of
     // this daemon.
-    spec.pinned_bytes = host_.config.pinned_limit;
+    spec.pinned_bytes = host_.pinned_limit();
     stored.spec = encode_spec(spec);
     if (stored.copied || (spec.durability == Durability::kMemory && !log_.closed_in_order())) {
       stored.epoch = new_epoch();
@@ -181,6 +181,13 @@ void log_snapshot(const Scene& scene, const absl::StatusOr<uint64_t>& bytes) {
 }
 
 }  // namespace
+
+uint64_t new_epoch() {
+  std::random_device device;
+  uint64_t epoch = 0;
+  while (epoch == 0) epoch = uint64_t{device()} << 32 | device();
+  return epoch;
+}
 
 absl::Status recover_all(Host& host, const std::atomic<bool>& stop) { return Recovery(host, stop).run(); }
 

@@ -1,17 +1,20 @@
-#include "server/services/scene_dump.h"
-
 #include <algorithm>
+#include <functional>
+#include <optional>
 #include <vector>
 
 #include "core/base/limits.h"
 #include "core/base/status_macros.h"
+#include "core/scene/snapshot/scene_snapshot.h"
 #include "server/convert/convert.h"
+#include "server/services/scene_access.h"
+#include "server/services/scene_calls.h"
 
 namespace locus::server {
 namespace {
 
-// Maximum number of things (objects and instances) in a piece, and maximum size in bytes of a thing: its columns, the
-// frame of a new run, and a mesh's name.
+// Maximum number of things (objects and instances) in a piece, and maximum size in bytes of a thing: its entries in the
+// columns, the protobuf tags and lengths of a new run, and a mesh's name.
 constexpr size_t kThingsPerPiece = 16384;
 constexpr size_t kMaxBytesPerThing = 8 + 24 + 16 + 16 + 4 + 8 + 8 + 64 + limits::kMaxNameLength;
 static_assert(kThingsPerPiece * kMaxBytesPerThing <= limits::kDefaultReplyBytes);
@@ -62,8 +65,11 @@ void add_shape(const Shape& shape, v1::Insert* to) {
   }
 }
 
-// Builder of the pieces of a dump. Passes each piece to `take` when the piece is full. Consecutive things of equal
-// shape or mesh share a run of columns.
+// Function that writes a piece to the caller; returns false to end the dump.
+using TakeDumpPiece = std::function<bool(const v1::DumpSceneResponse&)>;
+
+// Builder of the pieces of a dump. Passes each piece to `take` when the piece is full. Consecutive objects with the
+// same kind of shape, or instances of the same mesh, share a run of columns.
 class Dump {
  public:
   Dump(const SceneSnapshot& snapshot, const TakeDumpPiece& take) : snapshot_(snapshot), take_(take) { start_piece(); }
@@ -99,8 +105,8 @@ class Dump {
   }
 
  private:
-  // Counts one more thing of the piece, after passing the piece on if it is full. Returns false once `take` has ended
-  // the dump.
+  // Counts one more object or instance of the piece. If the piece is full, first passes it to `take` and begins a new
+  // piece. Returns false once `take` has ended the dump.
   bool make_room() {
     if (taken_ && things_ == kThingsPerPiece) {
       taken_ = take_(piece_);
@@ -128,10 +134,15 @@ class Dump {
   const StaticMesh* last_mesh_ = nullptr;
 };
 
-}  // namespace
-
-bool dump_snapshot(const SceneSnapshot& snapshot, const TakeDumpPiece& take) {
+// All objects and instances of a snapshot, in ascending order of ids.
+struct DumpOrder {
   std::vector<GridRef> objects;
+  std::vector<const Instance*> instances;
+};
+
+DumpOrder order_of(const SceneSnapshot& snapshot) {
+  DumpOrder order;
+  auto& [objects, instances] = order;
   objects.reserve(snapshot.objects.size());
   snapshot.objects.grid().for_each([&objects](const GridRef& object) {
     objects.push_back(object);
@@ -139,25 +150,49 @@ bool dump_snapshot(const SceneSnapshot& snapshot, const TakeDumpPiece& take) {
   });
   std::sort(objects.begin(), objects.end(),
             [](const GridRef& a, const GridRef& b) { return a.entry().id < b.entry().id; });
-  std::vector<const Instance*> instances;
+  instances.reserve(snapshot.statics->size());
   for (const Instance& instance : snapshot.statics->tree().values()) instances.push_back(&instance);
   std::sort(instances.begin(), instances.end(), [](const Instance* a, const Instance* b) { return a->id < b->id; });
+  return order;
+}
+
+// Sends objects, then instances, in one or more pieces. Returns false if `take` ended the dump.
+bool dump_snapshot(const SceneSnapshot& snapshot, const DumpOrder& order, const TakeDumpPiece& take) {
   Dump dump(snapshot, take);
-  for (const GridRef& object : objects) dump.add(object_of(object));
-  for (const Instance* instance : instances) dump.add(*instance);
+  for (const GridRef& object : order.objects) dump.add(object_of(object));
+  for (const Instance* instance : order.instances) dump.add(*instance);
   return dump.finish();
 }
 
-absl::Status dump_scene(const Caller& caller, const v1::DumpSceneRequest& request,
-                        grpc::ServerWriter<v1::DumpSceneResponse>& writer) {
-  ASSIGN_OR_RETURN(const ScenePtr scene, find_scene(caller, request.scene(), "scene"));
+// Returns the most memory in bytes that a dump of the snapshot needs at any time: the sorted lists of its objects and
+// instances, and one piece as a message, whose columns double as they grow, and as bytes.
+uint64_t dump_cost(const SceneSnapshot& snapshot) {
+  const uint64_t things = snapshot.objects.size() + snapshot.statics->size();
+  return things * sizeof(GridRef) + 3 * std::min<uint64_t>(things, kThingsPerPiece) * kMaxBytesPerThing;
+}
+
+}  // namespace
+
+absl::Status dump_scene(Host& host, const Caller& caller, const v1::DumpSceneRequest& request, MessageStream& stream) {
+  ASSIGN_OR_RETURN(const ScenePtr scene, find_scene(host, caller, request.scene(), "scene"));
+  RETURN_IF_ERROR(check_work(caller));
   ASSIGN_OR_RETURN(SnapshotPin snapshot, wait_for(*scene, to_view(request.view()), caller.wait_until(false), caller));
-  // A caller that reads slowly could hold the snapshot for any time. So if the pin is revoked, the call is cancelled.
+  ASSIGN_OR_RETURN(const CallMemory claim, claim_copy(caller, dump_cost(*snapshot)));
+  // A caller that reads slowly could keep the snapshot pinned for any time. Therefore the call is cancelled when the
+  // pin is revoked.
   snapshot.on_revoke([&caller] { caller.cancel(); });
   const auto take = [&](const v1::DumpSceneResponse& piece) {
-    return snapshot.status().ok() && caller.stop().ok() && writer.Write(piece);
+    return snapshot.status().ok() && caller.stop().ok() && stream.write(piece);
   };
-  if (dump_snapshot(*snapshot, take)) return absl::OkStatus();
+  std::optional<DumpOrder> order;
+  {
+    const Turns::Turn turn(host.scene_visits);
+    RETURN_IF_ERROR(snapshot.status());
+    RETURN_IF_ERROR(caller.stop());
+    order.emplace(order_of(*snapshot));
+  }
+  caller.charge_quota(QuotaKind::kWork, static_cast<double>(order->objects.size() + order->instances.size()));
+  if (dump_snapshot(*snapshot, *order, take)) return absl::OkStatus();
   RETURN_IF_ERROR(snapshot.status());
   const absl::Status status = caller.stop();
   return status.ok() ? absl::CancelledError("the caller stopped reading") : status;

@@ -1,24 +1,29 @@
 #include "server/services/scene_service.h"
 
 #include <algorithm>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "core/base/limits.h"
+#include "core/base/names.h"
 #include "core/base/status_macros.h"
 #include "server/convert/convert.h"
 #include "server/convert/status.h"
 #include "server/observability/log.h"
 #include "server/rpc/call.h"
-#include "server/services/epochs.h"
-#include "server/services/instance_changes.h"
-#include "server/services/mesh_download.h"
-#include "server/services/mesh_upload.h"
-#include "server/services/scene_dump.h"
+#include "server/services/creator_quotas.h"
+#include "server/services/recovery.h"
+#include "server/services/scene_access.h"
+#include "server/services/scene_calls.h"
 
 namespace locus::server {
 namespace {
+
+// Maximum size in bytes of a page of meshes, which leaves room for the page token. A page has at least one mesh.
+constexpr size_t kMaxPageBytes = 3'900'000;
+static_assert(kMaxPageBytes + limits::kMaxNameLength + 16 <= limits::kDefaultReplyBytes);
 
 absl::StatusOr<size_t> read_page_size(uint32_t asked) {
   if (asked > limits::kMaxPageSize) return refuse_limit("page_size", "page_size", limits::kMaxPageSize, asked);
@@ -30,7 +35,7 @@ absl::StatusOr<size_t> read_page_size(uint32_t asked) {
 absl::Status check_page_token(const absl::Status& name_status) {
   if (name_status.ok()) return name_status;
   return refuse_argument(Reason::kMalformed, "page_token", {},
-                         "this server did not give that token; pass next_page_token as it came, or none");
+                         "this is no page token of this server; pass next_page_token unchanged, or none");
 }
 
 bool has_labels(const Scene& scene, const google::protobuf::Map<std::string, std::string>& labels) {
@@ -48,18 +53,20 @@ struct Listed {
   absl::Status damage;
 };
 
-// Returns the damaged scenes whose names follow `after`; none if the request filters by labels, because the labels of
-// damaged scenes are not known.
-std::vector<Listed> damaged_after(const Host& host, const std::string& after, const v1::ListScenesRequest& request) {
+// Returns the damaged scenes whose names follow `after`; no scene if the request filters by labels, because the labels
+// of damaged scenes are not known.
+std::vector<Listed> damaged_after(const Caller& caller, const Host& host, const std::string& after,
+                                  const v1::ListScenesRequest& request) {
   std::vector<Listed> result;
   if (!request.labels().empty()) return result;
   for (const Registry::Damaged& scene : host.registry.damaged_scenes())
-    if (scene.name > after) result.push_back({scene.name, nullptr, scene.damage});
+    if (scene.name > after && caller.may(Right::kRead, scene.name))
+      result.push_back({scene.name, nullptr, scene.damage});
   return result;
 }
 
-v1::Scene describe(const Host& host, const Listed& listed) {
-  if (listed.scene != nullptr) return describe(host, *listed.scene);
+v1::Scene describe(Host& host, const Caller& caller, const Listed& listed) {
+  if (listed.scene != nullptr) return describe(host, caller, *listed.scene);
   v1::Scene scene;
   scene.set_name(listed.name);
   scene.set_state(v1::SCENE_STATE_DAMAGED);
@@ -67,38 +74,62 @@ v1::Scene describe(const Host& host, const Listed& listed) {
   return scene;
 }
 
-absl::Status list_scenes(const Host& host, const v1::ListScenesRequest& request, v1::ListScenesResponse* response) {
+// Upper bound in bytes of the memory of a described scene: its labels and the message.
+constexpr uint64_t kDescribedSceneBytes = 1024 + limits::kMaxLabels * (2 * limits::kMaxLabelLength + 128);
+// Number of copies of a page that exist at once: the message and its bytes.
+constexpr uint64_t kPageCopies = 2;
+
+absl::Status list_scenes(const Caller& caller, Host& host, const v1::ListScenesRequest& request,
+                         v1::ListScenesResponse& response) {
+  RETURN_IF_ERROR(check_work(caller));
   ASSIGN_OR_RETURN(const size_t page_size, read_page_size(request.page_size()));
   RETURN_IF_ERROR(check_labels(request.labels(), "labels"));
   std::string after = request.page_token();
   if (!after.empty()) RETURN_IF_ERROR(check_page_token(check_scene_name(after, "page_token")));
-  std::vector<Listed> all = damaged_after(host, after, request);
+  const size_t most = std::min(page_size, host.registry.scene_count());
+  ASSIGN_OR_RETURN(const CallMemory claim, claim_copy(caller, kPageCopies * most * kDescribedSceneBytes));
+  std::vector<Listed> all = damaged_after(caller, host, after, request);
   while (true) {
     const std::vector<ScenePtr> scenes = host.registry.list_scenes(after, limits::kMaxPageSize);
     for (const ScenePtr& scene : scenes) {
       after = scene->name();
-      if (has_labels(*scene, request.labels())) all.push_back({after, scene, absl::OkStatus()});
+      if (caller.may(Right::kRead, after) && has_labels(*scene, request.labels()))
+        all.push_back({after, scene, absl::OkStatus()});
     }
     if (scenes.size() < limits::kMaxPageSize) break;
   }
   std::sort(all.begin(), all.end(), [](const Listed& a, const Listed& b) { return a.name < b.name; });
-  for (size_t i = 0; i < std::min(all.size(), page_size); ++i) *response->add_scenes() = describe(host, all[i]);
-  if (all.size() > page_size) response->set_next_page_token(all[page_size - 1].name);
+  for (size_t i = 0; i < std::min(all.size(), page_size); ++i) {
+    RETURN_IF_ERROR(caller.stop());
+    *response.add_scenes() = describe(host, caller, all[i]);
+  }
+  if (all.size() > page_size) response.set_next_page_token(all[page_size - 1].name);
   return absl::OkStatus();
 }
 
-absl::Status list_meshes(const Host& host, const v1::ListMeshesRequest& request, v1::ListMeshesResponse* response) {
+absl::Status list_meshes(const Caller& caller, Host& host, const v1::ListMeshesRequest& request,
+                         v1::ListMeshesResponse& response) {
   ASSIGN_OR_RETURN(const size_t page_size, read_page_size(request.page_size()));
   if (!request.page_token().empty())
     RETURN_IF_ERROR(check_page_token(check_mesh_name(request.page_token(), "page_token")));
   const std::vector<Registry::NamedMesh> meshes = host.registry.list_meshes(request.page_token(), page_size + 1);
-  for (size_t i = 0; i < std::min(meshes.size(), page_size); ++i) *response->add_meshes() = to_proto(meshes[i]);
-  if (meshes.size() > page_size) response->set_next_page_token(meshes[page_size - 1].name);
+  uint64_t most = 0;
+  for (const Registry::NamedMesh& mesh : meshes) most += parts_cost(mesh.mesh->parts());
+  ASSIGN_OR_RETURN(const CallMemory claim, claim_copy(caller, kPageCopies * most));
+  size_t listed = 0, bytes = 0;
+  for (; listed < std::min(meshes.size(), page_size); ++listed) {
+    v1::Mesh mesh = to_proto(meshes[listed]);
+    bytes += mesh.ByteSizeLong();
+    if (listed > 0 && bytes > kMaxPageBytes) break;
+    *response.add_meshes() = std::move(mesh);
+  }
+  if (listed < meshes.size()) response.set_next_page_token(meshes[listed - 1].name);
   return absl::OkStatus();
 }
 
 absl::Status delete_scene(const Caller& caller, Host& host, const v1::DeleteSceneRequest& request) {
-  const absl::StatusOr<ScenePtr> scene = find_scene(caller, request.name(), "name");
+  caller.set_subject(request.name());
+  const absl::StatusOr<ScenePtr> scene = find_scene(host, caller, request.name(), "name");
   absl::Status status = scene.status();
   // A damaged scene can still be deleted.
   if (status.ok() || absl::IsDataLoss(status)) status = host.registry.delete_scene(request.name());
@@ -109,93 +140,174 @@ absl::Status delete_scene(const Caller& caller, Host& host, const v1::DeleteScen
   return absl::OkStatus();
 }
 
-}  // namespace
+// Checks the scene whose instances a new scene copies. A scene that the caller may not read is treated as missing.
+absl::Status check_source(const Host& host, const Caller& caller, const std::string& source) {
+  RETURN_IF_ERROR(check_scene_name(source, "spec.static_from"));
+  if (caller.may(Right::kRead, source)) return absl::OkStatus();
+  caller.audit_hidden(source);
+  return host.registry.no_source(source);
+}
 
-absl::Status SceneService::create(const Caller& caller, const v1::CreateSceneRequest& request,
-                                  v1::CreateSceneResponse* response) {
+// Adds the scene, or returns an existing one if the request permits it.
+absl::StatusOr<Registry::CreatedScene> add_scene(Host& host, const v1::CreateSceneRequest& request,
+                                                 const SceneSpec& spec) {
+  const MutexLock lock(host.create_mutex);
+  const size_t scenes = host.registry.scene_count();
+  if (scenes >= host.config.max_scenes && !host.registry.find_scene(request.name()).ok())
+    return refuse_full("name", "scenes", host.config.max_scenes, static_cast<double>(scenes + 1), 0);
+  std::vector<QuotaHold> quotas;  // until the registry counts the scene
+  if (absl::IsNotFound(host.registry.find_scene(request.name()).status())) {
+    ASSIGN_OR_RETURN(quotas, hold_scene(host, spec));
+  }
+  return host.registry.create_scene(request.name(), spec, new_epoch(), request.spec().static_from(),
+                                    request.if_absent());
+}
+
+absl::Status create_scene(const Caller& caller, Host& host, const v1::CreateSceneRequest& request,
+                          v1::CreateSceneResponse& response) {
   RETURN_IF_ERROR(check_scene_name(request.name(), "name"));
   RETURN_IF_ERROR(caller.check_scene(request.name()));
+  caller.set_subject(request.name());
+  if (!caller.may(Right::kAdmin, request.name())) return caller.lacks_right(Right::kAdmin, request.name());
   ASSIGN_OR_RETURN(SceneSpec spec, to_spec(request.spec()));
-  if (request.spec().durability() == v1::DURABILITY_LOCAL && host_.log == nullptr) return not_served("spec.durability");
-  spec.pinned_bytes = host_.config.pinned_limit;
+  if (request.spec().durability() == v1::DURABILITY_LOCAL && host.log == nullptr) return not_served("spec.durability");
+  spec.pinned_bytes = host.pinned_limit();
+  spec.creator = creator_name(caller);
   const std::string& static_from = request.spec().static_from();
-  if (!static_from.empty()) RETURN_IF_ERROR(check_scene_name(static_from, "spec.static_from"));
-  MutexLock lock(create_mutex_);
-  const size_t scenes = host_.registry.scene_count();
-  if (scenes >= host_.config.max_scenes && !host_.registry.find_scene(request.name()).ok())
-    return refuse_full("name", "scenes", host_.config.max_scenes, static_cast<double>(scenes + 1), 0);
-  ASSIGN_OR_RETURN(const Registry::CreatedScene created,
-                   host_.registry.create_scene(request.name(), spec, new_epoch(), static_from, request.if_absent()));
+  if (!static_from.empty()) RETURN_IF_ERROR(check_source(host, caller, static_from));
+  ASSIGN_OR_RETURN(const Registry::CreatedScene created, add_scene(host, request, spec));
   if (!created.existed) log(LogLevel::kInfo, "scene created", {{"scene", request.name()}});
-  *response->mutable_scene() = describe(host_, *created.scene);
+  *response.mutable_scene() = describe(host, caller, *created.scene);
   return absl::OkStatus();
 }
 
-grpc::Status SceneService::CreateScene(grpc::ServerContext* context, const v1::CreateSceneRequest* request,
-                                       v1::CreateSceneResponse* response) {
-  return serve(host_, *context, Rpc::kCreateScene,
-               [&](const Caller& caller) { return create(caller, *request, response); });
+absl::Status get_scene(const Caller& caller, Host& host, const v1::GetSceneRequest& request,
+                       v1::GetSceneResponse& response) {
+  ASSIGN_OR_RETURN(const ScenePtr scene, find_scene(host, caller, request.name(), "name"));
+  RETURN_IF_ERROR(check_work(caller));
+  *response.mutable_scene() = describe(host, caller, *scene);
+  return absl::OkStatus();
 }
 
-grpc::Status SceneService::GetScene(grpc::ServerContext* context, const v1::GetSceneRequest* request,
-                                    v1::GetSceneResponse* response) {
-  return serve(host_, *context, Rpc::kGetScene, [&](const Caller& caller) {
-    const absl::StatusOr<ScenePtr> scene = find_scene(caller, request->name(), "name");
-    if (scene.ok()) *response->mutable_scene() = describe(host_, **scene);
-    return scene.status();
-  });
+absl::Status delete_mesh(const Caller& caller, Host& host, const v1::DeleteMeshRequest& request) {
+  RETURN_IF_ERROR(check_mesh_name(request.mesh(), "mesh"));
+  caller.set_subject(request.mesh());
+  RETURN_IF_ERROR(host.registry.delete_mesh(request.mesh()));
+  log(LogLevel::kInfo, "mesh deleted", {{"mesh", request.mesh()}});
+  return absl::OkStatus();
 }
 
-grpc::Status SceneService::ListScenes(grpc::ServerContext* context, const v1::ListScenesRequest* request,
-                                      v1::ListScenesResponse* response) {
-  return serve(host_, *context, Rpc::kListScenes,
-               [&](const Caller&) { return list_scenes(host_, *request, response); });
+using Body = std::function<absl::Status(const Caller&, MessageStream&)>;
+
+BlockingMethod method(const char* name, Rpc rpc, Body body) {
+  BlockingMethod made;
+  made.path = absl::StrCat("/locus.v1.SceneService/", name);
+  made.rpc = rpc;
+  made.body = std::move(body);
+  return made;
 }
 
-grpc::Status SceneService::DeleteScene(grpc::ServerContext* context, const v1::DeleteSceneRequest* request,
-                                       v1::DeleteSceneResponse*) {
-  return serve(host_, *context, Rpc::kDeleteScene,
-               [&](const Caller& caller) { return delete_scene(caller, host_, *request); });
+BlockingMethod change(const char* name, Rpc rpc, Body body) {
+  BlockingMethod made = method(name, rpc, std::move(body));
+  made.is_change = true;
+  return made;
 }
 
-grpc::Status SceneService::UploadMesh(grpc::ServerContext* context, grpc::ServerReader<v1::UploadMeshRequest>* reader,
-                                      v1::UploadMeshResponse* response) {
-  return serve(host_, *context, Rpc::kUploadMesh,
-               [&](const Caller& caller) { return upload_mesh(host_, caller, *reader, response); });
+Body create_body(Host& host) {
+  return unary_body<v1::CreateSceneRequest, v1::CreateSceneResponse>(
+      [&host](const Caller& caller, const auto& request, auto& response) {
+        return create_scene(caller, host, request, response);
+      });
 }
 
-grpc::Status SceneService::ListMeshes(grpc::ServerContext* context, const v1::ListMeshesRequest* request,
-                                      v1::ListMeshesResponse* response) {
-  return serve(host_, *context, Rpc::kListMeshes,
-               [&](const Caller&) { return list_meshes(host_, *request, response); });
+Body get_body(Host& host) {
+  return unary_body<v1::GetSceneRequest, v1::GetSceneResponse>(
+      [&host](const Caller& caller, const auto& request, auto& response) {
+        return get_scene(caller, host, request, response);
+      });
 }
 
-grpc::Status SceneService::DeleteMesh(grpc::ServerContext* context, const v1::DeleteMeshRequest* request,
-                                      v1::DeleteMeshResponse*) {
-  return serve(host_, *context, Rpc::kDeleteMesh, [&](const Caller&) -> absl::Status {
-    RETURN_IF_ERROR(check_mesh_name(request->mesh(), "mesh"));
-    RETURN_IF_ERROR(host_.registry.delete_mesh(request->mesh()));
-    log(LogLevel::kInfo, "mesh deleted", {{"mesh", request->mesh()}});
-    return absl::OkStatus();
-  });
+Body list_body(Host& host) {
+  return unary_body<v1::ListScenesRequest, v1::ListScenesResponse>(
+      [&host](const Caller& caller, const auto& request, auto& response) {
+        return list_scenes(caller, host, request, response);
+      });
 }
 
-grpc::Status SceneService::DownloadMesh(grpc::ServerContext* context, const v1::DownloadMeshRequest* request,
-                                        grpc::ServerWriter<v1::DownloadMeshResponse>* writer) {
-  return serve(host_, *context, Rpc::kDownloadMesh,
-               [&](const Caller& caller) { return download_mesh(host_, caller, *request, *writer); });
+Body delete_body(Host& host) {
+  return unary_body<v1::DeleteSceneRequest, v1::DeleteSceneResponse>(
+      [&host](const Caller& caller, const auto& request, auto&) { return delete_scene(caller, host, request); });
 }
 
-grpc::Status SceneService::ChangeInstances(grpc::ServerContext* context, const v1::ChangeInstancesRequest* request,
-                                           v1::ChangeInstancesResponse* response) {
-  return serve(host_, *context, Rpc::kChangeInstances,
-               [&](const Caller& caller) { return change_instances(host_, caller, *request, response); });
+Body list_meshes_body(Host& host) {
+  return unary_body<v1::ListMeshesRequest, v1::ListMeshesResponse>(
+      [&host](const Caller& caller, const auto& request, auto& response) {
+        return list_meshes(caller, host, request, response);
+      });
 }
 
-grpc::Status SceneService::DumpScene(grpc::ServerContext* context, const v1::DumpSceneRequest* request,
-                                     grpc::ServerWriter<v1::DumpSceneResponse>* writer) {
-  return serve(host_, *context, Rpc::kDumpScene,
-               [&](const Caller& caller) { return dump_scene(caller, *request, *writer); });
+Body delete_mesh_body(Host& host) {
+  return unary_body<v1::DeleteMeshRequest, v1::DeleteMeshResponse>(
+      [&host](const Caller& caller, const auto& request, auto&) { return delete_mesh(caller, host, request); });
+}
+
+Body download_body(Host& host) {
+  return streaming_body<v1::DownloadMeshRequest>(
+      [&host](const Caller& caller, const auto& request, MessageStream& stream) {
+        return download_mesh(host, caller, request, stream);
+      });
+}
+
+Body change_body(Host& host) {
+  return streaming_body<v1::ChangeInstancesRequest>(
+      [&host](const Caller& caller, const auto& request, MessageStream& stream) {
+        return change_instances(host, caller, request, stream);
+      });
+}
+
+Body dump_body(Host& host) {
+  return streaming_body<v1::DumpSceneRequest>(
+      [&host](const Caller& caller, const auto& request, MessageStream& stream) {
+        return dump_scene(host, caller, request, stream);
+      });
+}
+
+}  // namespace
+
+absl::Status check_work(const Caller& caller) { return caller.take_quota(QuotaKind::kWork, 0); }
+
+v1::Scene describe(Host& host, const Caller& caller, const Scene& scene) {
+  std::optional<SceneSummary> summary = scene.known_summary();
+  if (!summary) {
+    const Turns::Turn turn(host.scene_visits);
+    summary = scene.known_summary();  // another call may have made it while this one waited
+    if (!summary) {
+      summary = scene.summary();
+      caller.charge_quota(QuotaKind::kWork, static_cast<double>(summary->objects));
+    }
+  }
+  v1::Scene out = to_proto(scene, *summary);
+  // The queue's count includes the change that the scene is building now.
+  const uint32_t pending = std::max(out.pending_changes(), host.changes.pending(out.epoch()));
+  out.set_pending_changes(pending);
+  out.set_state(pending > 0 ? v1::SCENE_STATE_BUILDING : v1::SCENE_STATE_READY);
+  return out;
+}
+
+std::vector<BlockingMethod> scene_methods(Host& host) {
+  return {
+      change("CreateScene", Rpc::kCreateScene, create_body(host)),
+      method("GetScene", Rpc::kGetScene, get_body(host)),
+      method("ListScenes", Rpc::kListScenes, list_body(host)),
+      change("DeleteScene", Rpc::kDeleteScene, delete_body(host)),
+      change("UploadMesh", Rpc::kUploadMesh,
+             [&host](const Caller& caller, MessageStream& stream) { return upload_mesh(host, caller, stream); }),
+      method("ListMeshes", Rpc::kListMeshes, list_meshes_body(host)),
+      change("DeleteMesh", Rpc::kDeleteMesh, delete_mesh_body(host)),
+      method("DownloadMesh", Rpc::kDownloadMesh, download_body(host)),
+      change("ChangeInstances", Rpc::kChangeInstances, change_body(host)),
+      method("DumpScene", Rpc::kDumpScene, dump_body(host)),
+  };
 }
 
 }  // namespace locus::server

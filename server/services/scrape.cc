@@ -4,13 +4,21 @@
 #include <limits>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
 #include "core/index/bvh/kernels/dispatch.h"
 #include "server/config/version.h"
+#include "server/host/memory_lines.h"
 #include "server/observability/call_figures.h"
 #include "server/observability/process_figures.h"
+#include "server/scheduling/clocks.h"
+#include "server/security/access_control.h"
+#include "server/security/rights.h"
+#include "server/services/quota_report.h"
 
 namespace locus::server {
 namespace {
+
+constexpr const char* kMetricsPage = "/metrics";
 
 SceneFigures figures_of(const Host& host, const Scene& scene) {
   const SnapshotPtr snapshot = scene.latest();
@@ -54,12 +62,12 @@ void add_queues(const Host& host, MetricPage& page) {
   constexpr auto kSmall = static_cast<size_t>(JobClass::kSmall);
   constexpr auto kLarge = static_cast<size_t>(JobClass::kLarge);
   page.begin("locus_queue_depth",
-             "Batches that wait or are in work: small and large ones of queries by estimated cost, and updates.",
+             "Waiting and running batches: queries, small and large by estimated cost, and updates.",
              MetricKind::kGauge);
   page.add({{"class", "small_queries"}}, static_cast<double>(queries.jobs[kSmall]));
   page.add({{"class", "large_queries"}}, static_cast<double>(queries.jobs[kLarge]));
   page.add({{"class", "updates"}}, static_cast<double>(updates.updates));
-  page.begin("locus_queue_seconds", "Estimated processor time of the queries that wait or are in work, in seconds.",
+  page.begin("locus_queue_seconds", "Estimated processor time of the waiting and running queries, in seconds.",
              MetricKind::kGauge);
   page.add({{"class", "small_queries"}}, static_cast<double>(queries.nanoseconds[kSmall]) * 1e-9);
   page.add({{"class", "large_queries"}}, static_cast<double>(queries.nanoseconds[kLarge]) * 1e-9);
@@ -69,14 +77,75 @@ void add_queues(const Host& host, MetricPage& page) {
                MetricKind::kCounter, static_cast<double>(host.slow_queries.count()));
 }
 
+void add_memory(const Host& host, MetricPage& page) {
+  const std::vector<MemoryLineUse> lines = memory_lines(host.memory, host.registry, host.log);
+  page.begin("locus_memory_bytes", "Memory by what it is used for: claimed by work in progress, or measured.",
+             MetricKind::kGauge);
+  for (const MemoryLineUse& line : lines)
+    page.add({{"line", line.name}, {"counted", line.claimed ? "claimed" : "measured"}}, static_cast<double>(line.used));
+  page.begin("locus_memory_ceiling_bytes", "Memory at which a line gives way or is refused.", MetricKind::kGauge);
+  for (const MemoryLineUse& line : lines) page.add({{"line", line.name}}, static_cast<double>(line.ceiling));
+  page.begin("locus_memory_refusals_total", "Claims of memory that were refused.", MetricKind::kCounter);
+  for (size_t i = 0; i < kMemoryLines; ++i) {
+    const auto line = static_cast<MemoryLine>(i);
+    page.add({{"line", std::string(memory_line_name(line))}}, static_cast<double>(host.memory.refused(line)));
+  }
+  page.add_one("locus_memory_trimmed_bytes_total", "Bytes by which histories were shortened as memory ran short.",
+               MetricKind::kCounter, static_cast<double>(host.memory_keeper.trimmed_bytes()));
+  page.add_one("locus_memory_revoked_bytes_total", "Bytes held by readers that were cancelled as memory ran short.",
+               MetricKind::kCounter, static_cast<double>(host.memory_keeper.revoked_bytes()));
+}
+
+void add_quotas(const Host& host, MetricPage& page) {
+  page.begin("locus_quota_max_use",
+             "Largest share of a quota that an identity or connection uses; `locus quota --all` lists them.",
+             MetricKind::kGauge);
+  for (const auto& [quota, share] : largest_quota_shares(host)) page.add({{"quota", quota}}, share);
+}
+
 void add_storage(const Host& host, MetricPage& page) {
   const SnapshotterStats snapshots = host.snapshots.stats();
-  page.add_one("locus_snapshots_total", "Snapshots that took the place of a scene's log.", MetricKind::kCounter,
+  page.add_one("locus_snapshots_total", "Snapshots that replaced a scene's log.", MetricKind::kCounter,
                static_cast<double>(snapshots.written));
   page.add_one("locus_snapshot_failures_total", "Snapshots that could not be written.", MetricKind::kCounter,
                static_cast<double>(snapshots.failed));
-  page.add_one("locus_scenes_damaged", "Scenes that are not served because what the disk has of them is damaged.",
+  page.add_one("locus_scenes_damaged", "Scenes that are not served because their stored data is damaged.",
                MetricKind::kGauge, static_cast<double>(host.registry.damaged_scenes().size()));
+}
+
+void audit_refusal(const Host& host, const HttpRequest& reader, const Identity& identity, const absl::Status& status) {
+  if (host.access->audit() == nullptr) return;
+  AuditEntry entry;
+  entry.unix_ms = unix_milliseconds();
+  entry.principal = identity.principal;
+  entry.peer = reader.peer;
+  entry.address = reader.address;
+  entry.rpc = kMetricsPage;
+  entry.code = status.code();
+  entry.text = std::string(status.message());
+  host.access->audit()->write(std::move(entry));
+}
+
+// Returns OK if the reader may read /metrics. Otherwise returns UNAUTHENTICATED if the credentials are missing or not
+// accepted, or PERMISSION_DENIED.
+absl::Status check_reader(const Host& host, const HttpRequest& reader) {
+  if (host.access == nullptr || !host.access->enabled()) return absl::OkStatus();
+  Credentials credentials;
+  credentials.bearer = bearer_of_header(reader.authorization);
+  credentials.certificate_name = reader.certificate_name;
+  const absl::StatusOr<IdentityPtr> identity = host.access->authenticate(credentials);
+  if (identity.ok() && host.access->rules()->allows(**identity, kMetricsPageRight)) return absl::OkStatus();
+  const Identity& reader_identity = identity.ok() ? **identity : *anonymous_identity();
+  absl::Status status = identity.status();
+  if (status.ok() && reader_identity.kind == IdentityKind::kAnonymous)
+    status = absl::UnauthenticatedError(
+        "this page needs the right metrics: send a token as header `Authorization: Bearer TOKEN`");
+  if (status.ok())
+    status = absl::PermissionDeniedError(
+        absl::StrCat(reader_identity.principal, " lacks the right metrics; ask the operator for a line `grant` in the ",
+                     "access file"));
+  audit_refusal(host, reader, reader_identity, status);
+  return status;
 }
 
 }  // namespace
@@ -94,10 +163,18 @@ HttpReply Scrape::readiness() const {
   return {.body = "ready\n"};
 }
 
-HttpServer::Pages Scrape::pages() {
-  return {{"/healthz", [] { return HttpReply{.body = "alive\n"}; }},
-          {"/metrics", [this] { return HttpReply{.content_type = MetricPage::kContentType, .body = metrics()}; }},
-          {"/readyz", [this] { return readiness(); }}};
+HttpPages Scrape::pages() {
+  return {{"/healthz", [](const HttpRequest&) { return HttpReply{.body = "alive\n"}; }},
+          {kMetricsPage, [this](const HttpRequest& reader) { return metrics_for(reader); }},
+          {"/readyz", [this](const HttpRequest&) { return readiness(); }}};
+}
+
+HttpReply Scrape::metrics_for(const HttpRequest& reader) {
+  if (const absl::Status status = check_reader(host_, reader); !status.ok()) {
+    const int code = absl::IsUnauthenticated(status) ? 401 : 403;
+    return {.code = code, .body = absl::StrCat(status.message(), "\n")};
+  }
+  return {.content_type = MetricPage::kContentType, .body = metrics()};
 }
 
 std::string Scrape::metrics() {
@@ -105,6 +182,8 @@ std::string Scrape::metrics() {
   MetricPage page;
   add_server(host_, readiness().code == 200, page);
   add_queues(host_, page);
+  add_memory(host_, page);
+  add_quotas(host_, page);
   add_storage(host_, page);
   add_call_figures(host_.metrics.read(), page);
   std::vector<SceneFigures> scenes;

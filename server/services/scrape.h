@@ -1,5 +1,5 @@
-// The pages of the HTTP port: /metrics, made of the counters and of the host's current state; /healthz, which reports
-// that the process is alive; /readyz, which reports whether calls are served.
+// The pages of the HTTP port: /metrics, with the counters and the host's current state; /healthz, which reports that
+// the process is alive; /readyz, which reports whether calls are served.
 //
 // Threads: every member may be called from any thread; scrapes are serialised. A scrape reads the status of every
 // scene, as GetScene does: O(objects).
@@ -13,7 +13,7 @@
 #include "core/base/mutex.h"
 #include "server/config/observability_limits.h"
 #include "server/host/host.h"
-#include "server/observability/http_server.h"
+#include "server/observability/http_page.h"
 #include "server/observability/scene_figures.h"
 
 namespace locus::server {
@@ -23,16 +23,18 @@ class Scrape {
   // `host` must outlive the scrape.
   explicit Scrape(const Host& host) : host_(host) {}
 
-  // Marks the server as ready. `addresses` are counted in locus_connections_open.
+  // Marks the server as ready. Connections to `addresses` are counted in the metric locus_connections_open.
   void serving(std::vector<std::string> addresses) LOCUS_EXCLUDES(mutex_);
 
-  // Returns the pages, which refer to this object.
-  HttpServer::Pages pages();
+  // Returns the pages, which refer to this object. With access control, /metrics needs the right `metrics`; the other
+  // pages are for everybody.
+  HttpPages pages();
 
   std::string metrics() LOCUS_EXCLUDES(mutex_);
 
  private:
   HttpReply readiness() const;
+  HttpReply metrics_for(const HttpRequest& reader);
 
   const Host& host_;
   std::atomic<bool> serving_{false};

@@ -1,6 +1,5 @@
 #include "server/services/server.h"
 
-#include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/resource_quota.h>
 #include <grpcpp/server.h>
 #include <grpcpp/server_builder.h>
@@ -12,14 +11,18 @@
 #include "core/base/status_macros.h"
 #include "server/config/listen_address.h"
 #include "server/host/host.h"
+#include "server/host/memory_lines.h"
 #include "server/observability/http_server.h"
 #include "server/observability/log.h"
+#include "server/rpc/blocking_calls.h"
 #include "server/rpc/io_threads.h"
-#include "server/rpc/listening.h"
+#include "server/services/access.h"
 #include "server/services/backup.h"
+#include "server/services/connections.h"
 #include "server/services/health_service.h"
 #include "server/services/query_service.h"
 #include "server/services/recovery.h"
+#include "server/services/reflection.h"
 #include "server/services/scene_service.h"
 #include "server/services/scrape.h"
 #include "server/services/server_service.h"
@@ -32,72 +35,63 @@ using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 using std::chrono::system_clock;
 
-// Threads for gRPC itself, and for calls that are refused because the limit on calls is reached.
-constexpr int kSpareThreads = 64;
-// gRPC's buffers may use 1 / kNetworkShare of the memory limit, but at least kMinNetworkBytes, which is enough for a
-// few of the largest messages.
-constexpr uint64_t kNetworkShare = 8;
-constexpr size_t kMinNetworkBytes = size_t{256} << 20;
-// Interval in milliseconds between keepalive pings to clients, and maximum delay of the answer. The pings detect
-// clients whose machine is unreachable, whose streams would otherwise stay open for ever.
+// Calls of the health and reflection services of one connection. These services have limits of their own.
+constexpr uint32_t kOtherCalls = kMaxHealthWatchers + kMaxHealthChecks + kMaxReflections;
+// Maximum number of bytes that gRPC reads from a connection at once.
+constexpr int kReadBytes = 32 << 10;
+// Interval in milliseconds between keepalive pings to clients, and maximum delay of the answer to a ping. The pings
+// detect clients whose machine is unreachable. The streams of such clients would otherwise stay open for ever.
 constexpr int kPingEveryMs = 30'000;
 constexpr int kPingAnswerMs = 10'000;
-// Minimum interval in milliseconds between keepalive pings of a client, with which it detects that this server is
-// unreachable.
+// Minimum interval in milliseconds between keepalive pings from a client. With these pings a client detects that this
+// server is unreachable.
 constexpr int kMinPingIntervalMs = 5'000;
-// Time that gRPC has, after all calls have finished, to send the last statuses and to end the health watchers.
+// Maximum time in which gRPC, after all calls have finished, sends the last statuses and ends the health watchers.
 constexpr milliseconds kLastWords{500};
 
-absl::StatusOr<std::vector<ListenAddress>> read_addresses(const ServerConfig& config) {
-  std::vector<ListenAddress> addresses;
-  for (const std::string& text : config.listen) {
-    ASSIGN_OR_RETURN(ListenAddress address, parse_listen_address(text));
-    if (absl::Status status = check_free(address); !status.ok())
-      return absl::Status(status.code(), absl::StrCat("cannot listen on ", text, ": ", status.message()));
-    addresses.push_back(std::move(address));
-  }
-  return addresses;
-}
-
-// Starts the HTTP pages. Returns null if no HTTP port is wanted, or if the default address is in use.
-absl::StatusOr<std::unique_ptr<HttpServer>> start_http(const ServerConfig& config, Scrape& scrape) {
+// Starts serving the HTTP pages, over TLS if `tls` is not null. Returns null if the config turns them off, or if the
+// default address is in use.
+absl::StatusOr<std::unique_ptr<HttpServer>> start_http(const ServerConfig& config, const TlsCredentials* tls,
+                                                       Scrape& scrape) {
   if (config.http_listen.empty()) return nullptr;
   ASSIGN_OR_RETURN(const ListenAddress address, parse_listen_address(config.http_listen));
-  absl::StatusOr<std::unique_ptr<HttpServer>> http = HttpServer::start(address, scrape.pages());
+  HttpServer::Certificates certificates;
+  if (tls != nullptr) certificates = [tls] { return tls->contents(); };
+  absl::StatusOr<std::unique_ptr<HttpServer>> http = HttpServer::start(address, scrape.pages(), certificates);
   if (http.ok()) return http;
   const std::string text =
-      absl::StrCat("cannot listen on ", config.http_listen, " for metrics and health pages: ", why_not(address));
+      absl::StrCat("cannot listen on ", config.http_listen, " for metrics and health pages: ", http.status().message());
   if (config.http_listen != kDefaultHttpListen) return absl::UnavailableError(text);
   log(LogLevel::kWarning, text, {{"hint", "choose another address with --http-listen, or none by leaving it empty"}});
   return nullptr;
 }
 
-// Registers server reflection, once for the process. Call it before the first ServerBuilder is constructed.
-void enable_extras() {
-  static const bool kDone = [] {
-    grpc::reflection::InitProtoReflectionServerBuilderPlugin();
-    return true;
-  }();
-  static_cast<void>(kDone);
+// Returns the maximum number of calls that may block a thread each.
+uint32_t max_blocking_calls(const Host& host) {
+  return host.calls.max_in_all() + host.health_watchers.max_in_all() + host.health_checks.max_in_all() +
+         host.reflections.max_in_all();
 }
 
 void set_limits(const ServerConfig& config, grpc::ServerBuilder& builder) {
   grpc::ResourceQuota quota("locusd");
-  const int calls = static_cast<int>(config.max_calls);
-  quota.SetMaxThreads(2 * calls + kSpareThreads);
-  // Bounds the memory of messages in transit. When it is used up, gRPC closes connections of callers that never read.
-  quota.Resize(std::max(kMinNetworkBytes, static_cast<size_t>(config.memory_limit / kNetworkShare)));
+  // Bound the memory of messages in transit. When the quota is used up, gRPC closes connections of callers that never
+  // read.
+  quota.Resize(network_ceiling(config.memory_limit));
   builder.SetResourceQuota(quota);
   builder.SetMaxReceiveMessageSize(static_cast<int>(config.max_receive_bytes));
   builder.SetMaxSendMessageSize(-1);
-  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS,
-                             static_cast<int>(config.max_streams) + calls + kSpareThreads);
+  // A compressed message of a few megabytes could inflate to gigabytes: gRPC refuses it, or leaves it as it is.
+  builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_GZIP, config.accept_compression);
+  builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_DEFLATE, false);
+  builder.AddChannelArgument(GRPC_ARG_ENABLE_PER_MESSAGE_DECOMPRESSION, 0);
+  // gRPC handles all frames of a read before it reports the first call. With reads of up to 4 MiB, its default, a flood
+  // of calls that are cancelled at once took a gigabyte in a single read.
+  builder.AddChannelArgument(GRPC_ARG_TCP_READ_CHUNK_SIZE, kReadBytes);
+  builder.AddChannelArgument(GRPC_ARG_TCP_MAX_READ_CHUNK_SIZE, kReadBytes);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kPingEveryMs);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kPingAnswerMs);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, kMinPingIntervalMs);
-  // By default, two daemons could listen on one port and would share its calls at random. Make the second daemon fail.
-  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
 }
 
 }  // namespace
@@ -107,25 +101,28 @@ struct Server::Parts {
       : host(config, log),
         scrape(host),
         health_service(host),
-        server_service(host),
-        scene_service(host),
         update_service(host),
-        query_service(host) {}
-
-  std::vector<grpc::Service*> services() {
-    return {&health_service, &server_service, &scene_service, &update_service, &query_service};
+        query_service(host),
+        blocking_calls(host, max_blocking_calls(host)) {
+    if (config.accept_compression) host.max_inflated_bytes = config.max_receive_bytes;
+    blocking_calls.add(health_service.methods());
+    blocking_calls.add(server_methods(host));
+    blocking_calls.add(scene_methods(host));
+    blocking_calls.add(reflection_method(host));
   }
 
-  std::unique_ptr<IoThreads> io;  // declared first, so destroyed last: work that ends with `host` may post to it
+  // Declared first and so destroyed last, because work that ends while `host` is destroyed may post to the loops.
+  std::unique_ptr<IoThreads> io;
   Host host;
+  std::unique_ptr<Access> access;
   Scrape scrape;
   HealthService health_service;
-  ServerService server_service;
-  SceneService scene_service;
   UpdateService update_service;
   QueryService query_service;
+  BlockingCalls blocking_calls;
+  std::unique_ptr<Connections> connections;  // destroyed after the gRPC server, which reads from them
   std::unique_ptr<grpc::Server> grpc;
-  std::unique_ptr<HttpServer> http;  // runs from before the first call until after the last
+  std::unique_ptr<HttpServer> http;  // started before the first call is served, ended after the last call
   bool ended = false;
 };
 
@@ -137,55 +134,63 @@ Server::~Server() {
 
 absl::StatusOr<std::unique_ptr<Server>> Server::start(const ServerConfig& config, UpdateLog* log,
                                                       const std::atomic<bool>& stop) {
-  ASSIGN_OR_RETURN(const std::vector<ListenAddress> addresses, read_addresses(config));
-  enable_extras();
   auto parts = std::make_unique<Parts>(config, log);
+  ASSIGN_OR_RETURN(parts->access, Access::open(config, parts->host));
+  ASSIGN_OR_RETURN(parts->connections, Connections::listen(config, parts->host.connections));
   if (can_back_up(parts->host)) remove_leftover_backup(parts->host);
   parts->host.recovering = log != nullptr;
-  ASSIGN_OR_RETURN(std::unique_ptr<HttpServer> http, start_http(config, parts->scrape));
+  ASSIGN_OR_RETURN(std::unique_ptr<HttpServer> http, start_http(config, parts->connections->tls(), parts->scrape));
   parts->http = std::move(http);
   grpc::ServerBuilder builder;
   set_limits(config, builder);
-  std::vector<int> ports(addresses.size(), 0);
-  for (size_t i = 0; i < addresses.size(); ++i)
-    builder.AddListeningPort(config.listen[i], grpc::InsecureServerCredentials(), &ports[i]);
-  for (grpc::Service* service : parts->services()) builder.RegisterService(service);
+  parts->connections->add_to(builder, config.max_streams + config.max_calls + kOtherCalls);
+  builder.RegisterService(&parts->update_service);
+  builder.RegisterService(&parts->query_service);
+  builder.RegisterAsyncGenericService(&parts->blocking_calls.service());
   parts->io = std::make_unique<IoThreads>(builder, IoThreads::count_for(config.threads));
   parts->grpc = builder.BuildAndStart();
   if (parts->grpc == nullptr) {
     parts->ended = true;
-    const size_t failed = static_cast<size_t>(std::find(ports.begin(), ports.end(), 0) - ports.begin());
-    if (failed == ports.size()) return absl::InternalError("gRPC could not start the server");
-    return absl::UnavailableError(
-        absl::StrCat("cannot listen on ", config.listen[failed], ": ", why_not(addresses[failed])));
+    return absl::InternalError("gRPC could not start the server");
   }
   parts->update_service.listen(*parts->io);
   parts->query_service.listen(*parts->io);
+  parts->blocking_calls.listen(*parts->io);
   parts->io->start();
+  parts->access->start([&io = *parts->io] { io.recheck(); });
+  parts->connections->start(*parts->grpc);
   std::unique_ptr<Server> server(new Server(std::move(parts)));
-  for (size_t i = 0; i < addresses.size(); ++i) {
-    const auto port = static_cast<uint16_t>(ports[i]);
-    server->addresses_.push_back(to_string(addresses[i], port));
-    const bool tcp = addresses[i].kind == ListenAddress::Kind::kTcp;
-    if (tcp && server->port_ == 0) server->port_ = port;
-  }
   Host& host = server->parts_->host;
   if (log != nullptr) RETURN_IF_ERROR(recover_all(host, stop));
   host.recovering = false;
   server->parts_->health_service.serving();
-  server->parts_->scrape.serving(server->addresses_);
+  server->parts_->scrape.serving(server->addresses());
   return server;
 }
 
+const std::vector<std::string>& Server::addresses() const { return parts_->connections->addresses(); }
+
+uint16_t Server::port() const { return parts_->connections->port(); }
+
 uint16_t Server::http_port() const { return parts_->http == nullptr ? 0 : parts_->http->port(); }
+
+bool Server::reload_tls() { return parts_->connections->reload_tls(); }
+
+void Server::reload() {
+  parts_->access->reload();
+  reload_tls();
+}
 
 void Server::drain(milliseconds grace) {
   const steady_clock::time_point deadline = steady_clock::now() + grace;
   Host& host = parts_->host;
+  // New connections are accepted until the end, so that probes hear that the server is not serving.
   parts_->health_service.not_serving();
   host.drain.begin();
+  parts_->access->stop();
   parts_->io->drain();
   const bool idle = host.streams.wait_until_empty(deadline) && host.calls.wait_until_empty(deadline);
+  parts_->connections->stop_accepting();
   host.drain.end();
   parts_->health_service.end();
   parts_->grpc->Shutdown(system_clock::now() + (idle ? kLastWords : milliseconds(0)));

@@ -1,7 +1,7 @@
-// The complete server: builds the services, listens on the addresses, and shuts down in order. Run by main(), and by
-// tests inside their own process.
+// The complete server: builds the services, listens on the addresses, and shuts down in order. main() runs it, and
+// tests run it inside their own process.
 //
-// Threads: addresses() and port() from any thread; drain() once, from one thread.
+// Threads: any thread may call addresses(), port() and http_port(). Call drain() at most once.
 #ifndef LOCUS_SERVER_SERVICES_SERVER_H_
 #define LOCUS_SERVER_SERVICES_SERVER_H_
 
@@ -20,10 +20,10 @@ namespace locus::server {
 
 class Server {
  public:
-  // Starts a server that listens on all addresses of `config`; otherwise returns an error that names the address and
-  // the reason. Scenes are stored in `log`, which must outlive the server, or in memory only if `log` is null. The
-  // scenes of the log are recovered before this returns; meanwhile calls are answered with REASON_RECOVERING. Returns
-  // CANCELLED soon after `stop` becomes true during recovery.
+  // Starts a server that listens on all addresses of `config`. If it cannot listen on an address, returns an error that
+  // names the address and the reason. Scenes are stored in `log`, which must outlive the server; if `log` is null,
+  // scenes are stored in memory only. The scenes of the log are recovered before start() returns; meanwhile calls are
+  // answered with REASON_RECOVERING. Returns CANCELLED soon after `stop` becomes true during recovery.
   static absl::StatusOr<std::unique_ptr<Server>> start(const ServerConfig& config, UpdateLog* log = nullptr,
                                                        const std::atomic<bool>& stop = kNever);
 
@@ -33,11 +33,16 @@ class Server {
   Server& operator=(const Server&) = delete;
 
   // Returns the addresses as clients write them, with the bound ports, in the order of the config.
-  const std::vector<std::string>& addresses() const { return addresses_; }
-  // Returns the port of the first TCP address; 0 without one.
-  uint16_t port() const { return port_; }
-  // Returns the port of the HTTP pages; 0 without one.
+  const std::vector<std::string>& addresses() const;
+  // Returns the port of the first TCP address; 0 if there is no TCP address.
+  uint16_t port() const;
+  // Returns the port of the HTTP pages; 0 if they are not served.
   uint16_t http_port() const;
+
+  // Reads the files of TLS at once, as the server does each second. Returns whether they have changed and are in use.
+  bool reload_tls();
+  // Reads all files of access control and TLS again. A file with a mistake is logged, and the old content stays in use.
+  void reload();
 
   // Shuts down: health reports NOT_SERVING, streams and new calls end with REASON_DRAINING, running calls may finish
   // within `grace` and are cancelled after it. Returns when no call runs any more.
@@ -49,8 +54,6 @@ class Server {
   explicit Server(std::unique_ptr<Parts> parts);
 
   std::unique_ptr<Parts> parts_;
-  std::vector<std::string> addresses_;
-  uint16_t port_ = 0;
 };
 
 }  // namespace locus::server

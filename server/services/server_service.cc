@@ -1,14 +1,19 @@
 #include "server/services/server_service.h"
 
 #include <algorithm>
+#include <string>
 #include <vector>
 
 #include "core/base/instruction_set.h"
 #include "core/base/limits.h"
+#include "locus/v1/server_service.pb.h"
 #include "server/config/observability_limits.h"
 #include "server/config/version.h"
+#include "server/host/memory_lines.h"
 #include "server/rpc/call.h"
+#include "server/rpc/wire_plan.h"
 #include "server/services/backup.h"
+#include "server/services/quota_report.h"
 
 namespace locus::server {
 namespace {
@@ -19,13 +24,13 @@ bool serves(const Host& host, absl::string_view feature) {
 }
 
 struct NamedLimit {
-  const char* name;
+  std::string name;
   double value;
   double used = 0;
 };
 
-// Adds the two limits of a queue to `all`: the number of jobs that wait or run, and the sum of their estimated work in
-// milliseconds of all threads together.
+// Adds the two limits of a queue to `all`: the maximum number of jobs that wait or run, and the maximum sum of their
+// estimated work in milliseconds. `limit.nanoseconds` is the maximum for each thread, so it is multiplied by `threads`.
 void add_queue(const char* jobs_name, const char* work_name, const QueueLimit& limit, uint32_t threads, uint64_t jobs,
                uint64_t nanoseconds, std::vector<NamedLimit>& all) {
   constexpr double kNanosecondsAMs = 1e6;
@@ -42,7 +47,7 @@ void add_queues(const Host& host, std::vector<NamedLimit>& all) {
   add_queue("large_batches", "large_batch_work_ms", options.limits[1], threads, now.jobs[1], now.nanoseconds[1], all);
   add_queue("batches", "batch_work_ms", options.limit, threads, now.jobs[0] + now.jobs[1],
             now.nanoseconds[0] + now.nanoseconds[1], all);
-  // The limits hold for each scene; the used values are the sums over all scenes.
+  // The limits apply to each scene separately; the used values are the sums over all scenes.
   const UpdateQueueStats updates = host.updates.stats();
   all.push_back({"waiting_updates", static_cast<double>(host.updates.options().max_updates),
                  static_cast<double>(updates.updates)});
@@ -50,18 +55,25 @@ void add_queues(const Host& host, std::vector<NamedLimit>& all) {
                  static_cast<double>(updates.items)});
 }
 
-// Returns every limit under the name that refusals use, in ascending order.
+void add_memory_lines(const Host& host, std::vector<NamedLimit>& all) {
+  for (const MemoryLineUse& line : memory_lines(host.memory, host.registry, host.log))
+    all.push_back({"memory_" + line.name, static_cast<double>(line.ceiling), static_cast<double>(line.used)});
+}
+
+// Returns every limit under the name that refusals use, in ascending order of names.
 std::vector<NamedLimit> limits_of(const Host& host) {
   std::vector<NamedLimit> all = {
       {"backup_files", limits::kMaxBackupFiles},
       {"backups", static_cast<double>(host.backups.max()), static_cast<double>(host.backups.used())},
       {"blocks", limits::kMaxBlocks},
       {"calls", static_cast<double>(host.calls.max()), static_cast<double>(host.calls.used())},
+      {"connection_memory_bytes", static_cast<double>(host.memory.connection_share())},
       {"coordinate", limits::kMaxCoordinate},
+      {"health_checks", kMaxHealthChecks, static_cast<double>(host.health_checks.used())},
       {"health_watchers", kMaxHealthWatchers, static_cast<double>(host.health_watchers.used())},
       {"history_bytes", static_cast<double>(limits::kMaxHistoryBytes)},
       {"history_ticks", limits::kMaxHistoryTicks},
-      {"http_connections", kHttpThreads + kMaxHttpWaiting},
+      {"http_connections", kMaxHttpConnections},
       {"http_request_bytes", kMaxHttpRequestBytes},
       {"ignored_ids", limits::kMaxIgnoredIds},
       {"instances", limits::kMaxInstances},
@@ -69,6 +81,8 @@ std::vector<NamedLimit> limits_of(const Host& host) {
       {"labelled_scenes", kMaxLabelledScenes},
       {"labels", limits::kMaxLabels},
       {"listed_item_errors", limits::kMaxListedItemErrors},
+      {"reflection_request_bytes", kMaxReflectionRequestBytes},
+      {"reflections", kMaxReflections, static_cast<double>(host.reflections.used())},
       {"reply_bytes", limits::kMaxReplyBytes},
       {"max_results", limits::kMaxMaxResults},
       {"memory_bytes", static_cast<double>(host.memory.limit()), static_cast<double>(host.memory.used())},
@@ -91,41 +105,65 @@ std::vector<NamedLimit> limits_of(const Host& host) {
       {"slow_query_lines", kMaxSlowQueryLines},
       {"streams", static_cast<double>(host.streams.max()), static_cast<double>(host.streams.used())},
       {"threads", static_cast<double>(host.pool.threads())},
+      {"unknown_fields", kMaxUnknownFields},
       {"update_items", limits::kMaxUpdateItems},
       {"update_lists", limits::kMaxUpdateLists},
       {"wait_ms", limits::kDefaultWaitMs},
+      {"wire_fields", kMaxWireFields},
       {"writers", limits::kMaxWriters},
   };
   add_queues(host, all);
-  std::sort(all.begin(), all.end(),
-            [](const NamedLimit& a, const NamedLimit& b) { return absl::string_view(a.name) < b.name; });
+  add_memory_lines(host, all);
+  std::sort(all.begin(), all.end(), [](const NamedLimit& a, const NamedLimit& b) { return a.name < b.name; });
   return all;
+}
+
+void get_server(Host& host, v1::GetServerResponse& response) {
+  response.set_version(kVersion);
+  response.set_instruction_set(std::string(instruction_set()));
+  for (const absl::string_view feature : {"as_of", "backup", "balls", "boxes", "download_mesh", "durability_local",
+                                          "history", "latest_wins", "lookup", "nearest", "rays", "static_from"})
+    if (serves(host, feature)) response.add_features(std::string(feature));
+  for (const NamedLimit& limit : limits_of(host)) {
+    v1::Limit* out = response.add_limits();
+    out->set_name(limit.name);
+    out->set_value(limit.value);
+    out->set_used(limit.used);
+  }
 }
 
 }  // namespace
 
-grpc::Status ServerService::GetServer(grpc::ServerContext* context, const v1::GetServerRequest*,
-                                      v1::GetServerResponse* response) {
-  const auto body = [&](const Caller&) {
-    response->set_version(kVersion);
-    response->set_instruction_set(std::string(instruction_set()));
-    for (const absl::string_view feature : {"as_of", "backup", "balls", "boxes", "download_mesh", "durability_local",
-                                            "history", "latest_wins", "lookup", "nearest", "rays", "static_from"})
-      if (serves(host_, feature)) response->add_features(std::string(feature));
-    for (const NamedLimit& limit : limits_of(host_)) {
-      v1::Limit* out = response->add_limits();
-      out->set_name(limit.name);
-      out->set_value(limit.value);
-      out->set_used(limit.used);
-    }
-    return absl::OkStatus();
-  };
-  return serve(host_, *context, Rpc::kGetServer, body, WhileClosed::kServe);
-}
-
-grpc::Status ServerService::Backup(grpc::ServerContext* context, const v1::BackupRequest*,
-                                   grpc::ServerWriter<v1::BackupResponse>* writer) {
-  return serve(host_, *context, Rpc::kBackup, [&](const Caller& caller) { return back_up(host_, caller, *writer); });
+std::vector<BlockingMethod> server_methods(Host& host) {
+  BlockingMethod get;
+  get.path = "/locus.v1.ServerService/GetServer";
+  get.rpc = Rpc::kGetServer;
+  get.while_closed = WhileClosed::kServe;
+  get.body = unary_body<v1::GetServerRequest, v1::GetServerResponse>(
+      [&host](const Caller&, const v1::GetServerRequest&, v1::GetServerResponse& response) {
+        get_server(host, response);
+        return absl::OkStatus();
+      });
+  BlockingMethod quotas;
+  quotas.path = "/locus.v1.ServerService/GetQuotas";
+  quotas.rpc = Rpc::kGetQuotas;
+  quotas.body = unary_body<v1::GetQuotasRequest, v1::GetQuotasResponse>(
+      [&host](const Caller& caller, const v1::GetQuotasRequest& request, v1::GetQuotasResponse& response) {
+        return get_quotas(host, caller, request, response);
+      });
+  BlockingMethod backup;
+  backup.path = "/locus.v1.ServerService/Backup";
+  backup.rpc = Rpc::kBackup;
+  backup.is_change = true;  // a copy of all data is audited like a change
+  backup.body =
+      streaming_body<v1::BackupRequest>([&host](const Caller& caller, const v1::BackupRequest&, MessageStream& stream) {
+        return back_up(host, caller, stream);
+      });
+  std::vector<BlockingMethod> methods;
+  methods.push_back(std::move(get));
+  methods.push_back(std::move(quotas));
+  methods.push_back(std::move(backup));
+  return methods;
 }
 
 }  // namespace locus::server

@@ -14,6 +14,7 @@ struct ApplyUpdatesMethod {
   using Response = v1::ApplyUpdatesResponse;
   using Work = UpdateWork;
   static constexpr Rpc kRpc = Rpc::kApplyUpdates;
+  static constexpr const char* kPath = "/locus.v1.UpdateService/ApplyUpdates";
   static constexpr bool kStream = false;
   static constexpr bool kInOrder = true;
 
@@ -22,11 +23,13 @@ struct ApplyUpdatesMethod {
               void* tag) const {
     service->RequestApplyUpdates(context, request, wire, queue, queue, tag);
   }
+  Work make_work(CallSlot& slot) const { return Work(*host, slot); }
   void begin(Work& work, const std::string& scene, const Request& request, Response& response) const {
     work.begin(scene, request.batch(), *response.mutable_ack());
   }
 
   UpdateService* service;
+  Host* host;
 };
 
 // Method of StreamUpdates for HotCall. It writes answers in the order of the messages, which is also the order in which
@@ -36,6 +39,7 @@ struct StreamUpdatesMethod {
   using Response = v1::StreamUpdatesResponse;
   using Work = UpdateWork;
   static constexpr Rpc kRpc = Rpc::kStreamUpdates;
+  static constexpr const char* kPath = "/locus.v1.UpdateService/StreamUpdates";
   static constexpr bool kStream = true;
   static constexpr bool kInOrder = true;
 
@@ -43,11 +47,13 @@ struct StreamUpdatesMethod {
               grpc::ServerCompletionQueue* queue, void* tag) const {
     service->RequestStreamUpdates(context, wire, queue, queue, tag);
   }
+  Work make_work(CallSlot& slot) const { return Work(*host, slot); }
   void begin(Work& work, const std::string& scene, const Request& request, Response& response) const {
     work.begin(scene, request.batch(), *response.mutable_ack());
   }
 
   UpdateService* service;
+  Host* host;
 };
 
 }  // namespace
@@ -62,8 +68,8 @@ UpdateService::~UpdateService() = default;
 
 void UpdateService::listen(IoThreads& threads) {
   for (size_t i = 0; i < threads.loops(); ++i) {
-    listeners_->apply.emplace_back(host_, ApplyUpdatesMethod{this}, threads.loop(i)).listen();
-    listeners_->stream.emplace_back(host_, StreamUpdatesMethod{this}, threads.loop(i)).listen();
+    listeners_->apply.emplace_back(host_, ApplyUpdatesMethod{this, &host_}, threads.loop(i)).listen();
+    listeners_->stream.emplace_back(host_, StreamUpdatesMethod{this, &host_}, threads.loop(i)).listen();
   }
 }
 

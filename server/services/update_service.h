@@ -1,5 +1,5 @@
-// UpdateService over the scenes of a host: ApplyUpdates takes one batch a call, StreamUpdates a stream of them. Both
-// live on IO loops.
+// UpdateService over the scenes of a host: an ApplyUpdates call has one batch, a StreamUpdates call has a stream of
+// batches. Both kinds of calls are served on IO loops.
 #ifndef LOCUS_SERVER_SERVICES_UPDATE_SERVICE_H_
 #define LOCUS_SERVER_SERVICES_UPDATE_SERVICE_H_
 

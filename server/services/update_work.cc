@@ -1,21 +1,41 @@
 #include "server/services/update_work.h"
 
+#include <algorithm>
 #include <chrono>
 #include <utility>
 
+#include "core/base/limits.h"
 #include "core/base/status_macros.h"
 #include "server/convert/convert.h"
 #include "server/host/memory_use.h"
+#include "server/services/creator_quotas.h"
+#include "server/services/scene_access.h"
 
 namespace locus::server {
 namespace {
 
-// Claims the memory that the batch needs while it is applied. Only a batch with inserts can be refused; moves change
-// existing objects, and removes free memory.
-absl::StatusOr<MemoryBudget::Claim> make_room(Host& host, const UpdateBatch& batch) {
+// Bytes of a listed item error in an ack, its text included.
+constexpr uint64_t kBytesAnItemError = 192;
+constexpr uint64_t kBytesAnAck = 256;
+
+// Claims the memory that the batch needs while it is applied. A batch that only removes objects is never refused,
+// because it frees memory.
+absl::StatusOr<CallMemory> make_room(const Caller& caller, const UpdateBatch& batch) {
   const UpdateCost cost = cost_of(batch);
-  if (cost.inserts) return host.memory.claim("inserts", cost.bytes);
-  return host.memory.claim_anyway(cost.bytes);
+  switch (cost.kind) {
+    case UpdateCost::Kind::kInserts:
+      return caller.claim(MemoryLine::kInserts, "inserts", cost.bytes);
+    case UpdateCost::Kind::kMoves:
+      return caller.claim(MemoryLine::kMoves, "moves", cost.bytes);
+    case UpdateCost::Kind::kRemoves:
+      return caller.claim_anyway(MemoryLine::kMoves, cost.bytes);
+  }
+  return caller.claim_anyway(MemoryLine::kMoves, cost.bytes);
+}
+
+// Returns an upper bound of the size of the batch's ack, in bytes.
+uint64_t ack_bytes(const UpdateBatch& batch) {
+  return kBytesAnAck + kBytesAnItemError * std::min<uint64_t>(item_count(batch), limits::kMaxListedItemErrors);
 }
 
 }  // namespace
@@ -24,34 +44,44 @@ void UpdateWork::begin(const std::string& scene, const v1::UpdateBatch& batch, v
   arrived_ = std::chrono::steady_clock::now();
   ack_ = &ack;
   if (absl::Status status = post(scene, batch); !status.ok()) {
-    claim_.reset();
+    release();
+    scene_.reset();
     slot_.answered(std::move(status));
   }
 }
 
 absl::Status UpdateWork::post(const std::string& scene_name, const v1::UpdateBatch& batch) {
-  ASSIGN_OR_RETURN(const ScenePtr scene, find_scene(slot_.caller(), scene_name, "scene"));
+  ASSIGN_OR_RETURN(scene_, find_scene(host_, slot_.caller(), scene_name, "scene"));
   ASSIGN_OR_RETURN(UpdateBatch updates, to_updates(batch));
   batch_ = std::move(updates);
-  ASSIGN_OR_RETURN(MemoryBudget::Claim claim, make_room(slot_.host(), batch_));
-  claim_.emplace(std::move(claim));
+  RETURN_IF_ERROR(slot_.caller().take_quota(QuotaKind::kUpdateItems, static_cast<double>(item_count(batch_))));
+  RETURN_IF_ERROR(slot_.claim_answer(ack_bytes(batch_)));
+  ASSIGN_OR_RETURN(objects_, hold_objects(host_, *scene_, batch_));
+  ASSIGN_OR_RETURN(claim_, make_room(slot_.caller(), batch_));
   const WhenFull when_full = slot_.stream() ? WhenFull::kHold : WhenFull::kRefuse;
-  const absl::StatusOr<Posted> posted = slot_.host().updates.post(scene, *this, when_full);
+  const absl::StatusOr<Posted> posted = host_.updates.post(scene_, *this, when_full);
   if (posted.ok() && *posted == Posted::kFull) slot_.hold();
   return posted.status();
 }
 
-// Posts applied() with the outcome. The update queue may call this before its post() has returned; applied() runs after
-// that, as a later event of the loop.
+// Stores the outcome and posts applied(). The update queue may call done() before UpdateQueue::post() has returned;
+// applied() runs after post() has returned, as a later event of the loop.
 void UpdateWork::done(absl::StatusOr<UpdateAck> ack) {
   outcome_ = std::move(ack);
   slot_.io().post(applied_);
 }
 
+void UpdateWork::release() {
+  claim_.release();
+  objects_.shrink(0);
+}
+
 void UpdateWork::applied(bool) {
-  claim_.reset();
+  release();
+  const ScenePtr scene = std::exchange(scene_, nullptr);
   if (outcome_.ok()) {
-    slot_.host().metrics.record_update(outcome_->applied, nanoseconds_since(arrived_));
+    slot_.caller().audit_update(scene->name(), outcome_->applied);
+    host_.metrics.record_update(outcome_->applied, nanoseconds_since(arrived_));
     *ack_ = to_proto(*outcome_);
   }
   slot_.answered(outcome_.status());

@@ -1,28 +1,29 @@
-// One update batch, from its message to its ack: conversion, the memory budget, and the scene's update queue.
+// Work on one update batch, from its message to its ack: converts the batch, claims memory from the budget, and posts
+// the batch to the update queue.
 //
 // Threads: members run on the call's IO loop, except stop() and done(), which the update queue calls on any thread.
 #ifndef LOCUS_SERVER_SERVICES_UPDATE_WORK_H_
 #define LOCUS_SERVER_SERVICES_UPDATE_WORK_H_
 
-#include <optional>
 #include <string>
 
 #include "core/scene/updates/update_batch.h"
 #include "locus/v1/update_service.pb.h"
+#include "server/host/host.h"
 #include "server/rpc/call_slot.h"
 #include "server/rpc/io_threads.h"
-#include "server/scheduling/memory_budget.h"
 #include "server/scheduling/update_queue.h"
 
 namespace locus::server {
 
 class UpdateWork final : private PendingUpdate {
  public:
-  explicit UpdateWork(CallSlot& slot) : slot_(slot) {}
+  UpdateWork(Host& host, CallSlot& slot) : host_(host), slot_(slot) {}
 
   // Begins the work. `batch` and `ack` are borrowed until the slot is answered.
   void begin(const std::string& scene, const v1::UpdateBatch& batch, v1::UpdateAck& ack);
-  // Does nothing: the update queue calls stop() before it applies a batch, and answers at once if that fails.
+  // Does nothing: the update queue calls stop() before it applies a batch, and answers at once if stop() returns an
+  // error.
   void give_up() {}
 
  private:
@@ -32,12 +33,16 @@ class UpdateWork final : private PendingUpdate {
   absl::Status stop() const override { return slot_.caller().stop(); }
   void done(absl::StatusOr<UpdateAck> ack) override;
   void applied(bool);
+  void release();
 
+  Host& host_;
   CallSlot& slot_;
   UpdateBatch batch_;
+  ScenePtr scene_;  // null until the scene is found
   SteadyTime arrived_;
   v1::UpdateAck* ack_ = nullptr;
-  std::optional<MemoryBudget::Claim> claim_;
+  CallMemory claim_;
+  QuotaHold objects_;  // objects that the batch adds, until it is applied
   absl::StatusOr<UpdateAck> outcome_;
   MemberTag<UpdateWork> applied_{*this, &UpdateWork::applied};
 };

@@ -8,17 +8,16 @@
 #include "core/base/refusal.h"
 #include "core/base/status_macros.h"
 #include "rocksdb/utilities/checkpoint.h"
-#include "server/storage/rocksdb/bytes.h"
 #include "server/storage/rocksdb/errors.h"
 #include "server/storage/rocksdb/reading.h"
+#include "server/storage/rocksdb/row_codec.h"
 
 namespace locus::server {
 namespace {
 
 constexpr auto kPollInterval = std::chrono::milliseconds(100);
-constexpr uint64_t kBatchOverhead = 128;                    // bytes that RocksDB adds to each record of a batch
-constexpr uint64_t kBytesBetweenPolls = uint64_t{8} << 20;  // bytes written between two polls of free space
-constexpr uint64_t kRecoveryBytes = uint64_t{1} << 20;      // disk space that a recovery needs beside the memory tables
+constexpr uint64_t kBatchOverhead = 128;  // bytes reserved for each record of a write batch, in addition to its payload
+constexpr uint64_t kBytesBetweenPolls = uint64_t{8} << 20;  // maximum bytes written between two polls of free space
 
 absl::Status too_large(uint64_t bytes) {
   return refuse_limit("entries", "record_bytes", static_cast<double>(UpdateLog::kMaxRecordBytes),
@@ -82,7 +81,8 @@ void RocksdbLog::list_stored() {
     log_state->copied = stored.copied = found.copied;
     log_state->written = {found.last, found.running_checksum};
     log_state->synced = log_state->written;  // open_directory() synced the log before reading it
-    // If records are missing, keep the sequence number that the marker expects, so that the next marker expects it too.
+    // If the last records are missing, keep the sequence number in the durable marker, so that the next marker contains
+    // this number too and the loss stays visible.
     if (found.last < found.expected_sequence)
       log_state->synced.sequence = log_state->written.sequence = found.expected_sequence;
     scenes_.add(std::move(log_state));
@@ -119,14 +119,14 @@ absl::Status RocksdbLog::finish_opening() {
         LOCUS_CHECK(batch.DeleteRange(family, key.substr(1), end_of(key.substr(1))).ok());
       }
       if (key[0] == kPendingSnapshotTag)
-        next_scene_ = std::max(next_scene_, ByteReader(absl::string_view(key).substr(1)).big_u64() + 1);
+        next_scene_ = std::max(next_scene_, RowReader(absl::string_view(key).substr(1)).big_u64() + 1);
       LOCUS_CHECK(batch.Delete(database_->meta(), key).ok());
     }
-    // Older programs must not open the directory after this, because they cannot read the records that follow.
+    // Store the new format number: older versions of locusd must no longer open the directory, because they cannot read
+    // rows that this version writes.
     if (damage_report_.format < kFormat)
       LOCUS_CHECK(
-          batch
-              .Put(database_->meta(), slice_of(kFormatKey), with_checksum(kFormatKey, ByteWriter().u32(kFormat).view()))
+          batch.Put(database_->meta(), slice_of(kFormatKey), with_checksum(kFormatKey, RowWriter().u32(kFormat).view()))
               .ok());
     const bool consistent = stored.generation == catalogue_.totals().generation &&
                             stored.scene_sum == catalogue_.totals().scene_sum &&
@@ -177,7 +177,7 @@ absl::StatusOr<uint64_t> RocksdbLog::append(SceneKey key, absl::Span<const LogEn
     const std::string record_key = log_key(key, ++at.sequence);
     const std::string head = record_head(entry);
     at.running_checksum = record_checksum(record_key, head, entry.bytes, at.running_checksum);
-    const std::string checksum_bytes = ByteWriter().u64(at.running_checksum).take();
+    const std::string checksum_bytes = RowWriter().u64(at.running_checksum).take();
     const rocksdb::Slice key_part(record_key);
     const rocksdb::Slice parts[] = {head, slice_of(entry.bytes), checksum_bytes};
     LOCUS_CHECK(batch.Put(database_->log(), rocksdb::SliceParts(&key_part, 1), rocksdb::SliceParts(parts, 3)).ok());
@@ -243,13 +243,14 @@ absl::Status RocksdbLog::back_up(const std::string& path) {
   MutexLock lock(catalogue_mutex_);
   DurableMarker durable_marker;
   {
-    // Fill the marker before making the copy, so that it never names more than the copy holds. Sync before filling it,
-    // so that it does not name much less.
+    // Fill the marker before making the copy, so that the marker names only data that the copy contains. Sync before
+    // filling the marker, because a marker names only synced records.
     const auto written = scenes_.written();
     RETURN_IF_ERROR(database_->sync());
     scenes_.mark_synced(written);
     scenes_.fill_marker(0, durable_marker);
-    // The original scenes continue in this directory, so new records in the copy belong to another history.
+    // Mark the scenes as copied, so that they get a new epoch when the copy is opened: the original scenes continue in
+    // this directory with the old epoch, and the two sequences of revisions differ.
     for (SceneMarker& scene_marker : durable_marker.scene_markers) scene_marker.copied = true;
   }
   {
@@ -272,10 +273,11 @@ absl::Status RocksdbLog::check_free_space(absl::string_view what, uint64_t bytes
   if (written_bytes_ + bytes > kBytesBetweenPolls) poll_free_space();
   const uint64_t free = free_bytes_;
   if (free < *options_.reserve_bytes || free - *options_.reserve_bytes < bytes)
-    return refuse_full_disk(what, *options_.reserve_bytes, free);
+    return refuse_full_disk(what, bytes, *options_.reserve_bytes, free);
   if (marker_failed_)
-    return absl::UnavailableError(absl::StrCat(options_.path, "/", DurableMarkerFile::kName,
-                                               " cannot be written; the log accepts records again when it can"));
+    return absl::UnavailableError(
+        absl::StrCat(options_.path, "/", DurableMarkerFile::kName,
+                     " cannot be written; the log accepts records again once it can be written"));
   return absl::OkStatus();
 }
 
@@ -342,10 +344,8 @@ void RocksdbLog::run_background() {
 void RocksdbLog::poll_disk() {
   poll_free_space();
   if (!database_->needs_recovery()) return;
-  // Recovery flushes all memory tables, so it needs disk space for them.
-  if (free_bytes_ < database_->buffered_bytes() + kRecoveryBytes) return;
   const auto written = scenes_.written();
-  if (!database_->recover().ok()) return;  // every write still fails with this error
+  if (!database_->recover(free_bytes_).ok()) return;  // writes fail until a later poll succeeds
   scenes_.mark_synced(written);
   write_durable_marker(false);
 }

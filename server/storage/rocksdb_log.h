@@ -1,9 +1,9 @@
-// UpdateLog on RocksDB: the durable log of one machine. README.md in this folder describes the data directory, the
-// damage that is detected and the repair.
+// UpdateLog on RocksDB: stores scenes, their records and meshes in a data directory of this machine. README.md in this
+// folder describes the files, the damage that is detected, and the repair.
 //
-// Threads: any thread may call any member, as UpdateLog says. A background thread syncs records of AckLevel::kMemory,
-// rewrites the durable marker (file HIGH_WATER), polls the free disk space, and resumes the database within a second
-// after disk errors end.
+// Threads: any thread may call any member, but append() for a scene only from one thread at a time. A background thread
+// syncs records that were appended with AckLevel::kMemory, rewrites the durable marker (file HIGH_WATER), polls the
+// free disk space, and resumes the database within a second after disk errors end.
 #ifndef LOCUS_SERVER_STORAGE_ROCKSDB_LOG_H_
 #define LOCUS_SERVER_STORAGE_ROCKSDB_LOG_H_
 
@@ -30,12 +30,13 @@ namespace locus::server {
 
 class RocksdbLog final : public UpdateLog {
  public:
-  // Opens the data directory; creates it if it is missing or empty. Damaged scenes and meshes are listed among the
-  // stored ones with their damage. Errors: FAILED_PRECONDITION if another process has the directory open or another
-  // version of locusd wrote it, DATA_LOSS if nothing in it is readable, UNAVAILABLE or RESOURCE_EXHAUSTED for an error
-  // of the disk.
+  // Opens the data directory; creates it if it is missing or empty. stored_scenes() and stored_meshes() also list
+  // damaged scenes and meshes, with their damage. Errors: FAILED_PRECONDITION if a process has the directory open, if
+  // this version of locusd does not know the directory's format, or if a repair was interrupted; DATA_LOSS if the
+  // directory is too damaged to be opened; RESOURCE_EXHAUSTED if the disk is full; UNAVAILABLE if the disk fails
+  // otherwise.
   static absl::StatusOr<std::unique_ptr<RocksdbLog>> open(const StorageOptions& options);
-  // Closes in order: syncs every record and writes a durable marker with `closed` set.
+  // Syncs every record, then writes a durable marker. The marker's member `closed` is true if the sync succeeded.
   ~RocksdbLog() override;
   RocksdbLog(const RocksdbLog&) = delete;
   RocksdbLog& operator=(const RocksdbLog&) = delete;
@@ -67,36 +68,39 @@ class RocksdbLog final : public UpdateLog {
   void keep_outline(const std::array<uint8_t, 32>& sha256, absl::string_view bytes) override;
   std::optional<std::string> read_outline(const std::array<uint8_t, 32>& sha256) const override;
 
+  uint64_t cache_bytes() const override;
   absl::Status back_up(const std::string& path) override LOCUS_EXCLUDES(catalogue_mutex_);
 
  private:
   using SteadyTime = std::chrono::steady_clock::time_point;
 
   RocksdbLog(const StorageOptions& options, OpenedDirectory opened);
-  // Finishes opening: lists the stored scenes and meshes, corrects the catalogue's row, deletes unfinished chunks, and
-  // starts the background thread.
+  // Finishes opening: lists the stored scenes and meshes, rewrites the row with the catalogue's generation and sums if
+  // it is wrong, deletes the chunks of unfinished snapshots and meshes, and starts the background thread.
   absl::Status finish_opening() LOCUS_EXCLUDES(catalogue_mutex_);
   void list_stored();
 
-  // Writes the chunks of `source` under `prefix` and, before them, the row `pending` in meta, which marks them as
-  // unfinished until a commit() deletes it. Does not sync. After an error the chunks are deleted.
+  // Writes the chunks that `source` returns into `family`, under keys that begin with `prefix`, and returns the summary
+  // of the chunks. Before the chunks, writes the row with the key `pending` into the family meta: it marks the chunks
+  // as unfinished until a commit() deletes the row. Does not sync. After an error deletes the chunks again.
   absl::StatusOr<ChunkList> put_chunks(rocksdb::ColumnFamilyHandle* family, const std::string& pending,
                                        const std::string& prefix, ChunkSource source);
   void drop_chunks(rocksdb::ColumnFamilyHandle* family, const std::string& pending, const std::string& prefix);
-  // Adds the change of the catalogue to `batch` and writes the batch, synced.
+  // Adds the rows of `change` to `batch`, writes the batch and syncs it.
   absl::Status commit(const CatalogueChange& change, rocksdb::WriteBatch& batch) LOCUS_REQUIRES(catalogue_mutex_);
   absl::StatusOr<SceneRow> row_of(SceneKey scene) const LOCUS_REQUIRES(catalogue_mutex_);
   uint64_t row_checksum_of(SceneKey scene) const LOCUS_REQUIRES(catalogue_mutex_);
   absl::StatusOr<uint64_t> running_checksum_at(const SceneRow& row, uint64_t sequence) const;
-  // Commits `snapshot` and deletes the snapshot `replaced_id` and the records up to `sequence`, which it replaces.
-  // ABORTED if another snapshot was committed meanwhile.
+  // Commits `snapshot`, which includes the records up to `sequence`. Deletes these records and the scene's previous
+  // snapshot, whose content id is `replaced_id`. ABORTED if another snapshot was committed meanwhile.
   absl::Status put_snapshot(const SceneLogStatePtr& log_state, uint64_t replaced_id, uint64_t sequence,
                             const ContentRow& snapshot) LOCUS_EXCLUDES(catalogue_mutex_);
-  // Returns whether the chunks that the row `pending` marks as unfinished belong to a committed snapshot or mesh.
+  // Returns whether the chunks that the row with the key `pending` marks as unfinished belong to a committed snapshot
+  // or mesh.
   bool in_use(absl::string_view pending) const LOCUS_REQUIRES(catalogue_mutex_);
-  // Returns the row of the mesh's name; nothing if there is none.
+  // Returns the row of the mesh `name`; no value if the catalogue has no intact row of this name.
   std::optional<MeshRow> mesh_row(absl::string_view name) const LOCUS_REQUIRES(catalogue_mutex_);
-  // Returns whether a mesh name whose content has the hash `sha256` has parts with the content id `number`.
+  // Returns whether `number` is the content id of the parts of a mesh whose content has the hash `sha256` (32 bytes).
   bool parts_in_use(absl::string_view sha256, uint64_t number) const LOCUS_REQUIRES(catalogue_mutex_);
   absl::Status read_mesh_chunks(const Sha256& sha256, const ContentRow& row, ChunkSink sink) const;
   std::set<Sha256> content_hashes() const LOCUS_REQUIRES(catalogue_mutex_);
@@ -105,17 +109,18 @@ class RocksdbLog final : public UpdateLog {
   absl::Status check_free_space(absl::string_view what, uint64_t bytes);
   void poll_free_space();
 
-  // Writes the durable marker for the current synced positions. An error sets marker_failed_, which stops appending.
+  // Writes the durable marker with the last synced record of each scene. `closed` is true for the last marker of a
+  // clean shutdown. After an error, marker_failed_ is true and append() fails until a marker can be written.
   void write_durable_marker(bool closed) LOCUS_EXCLUDES(marker_mutex_);
   void run_background() LOCUS_EXCLUDES(background_mutex_);
   void poll_disk();
-  // Schedules the work that follows a write: a new durable marker if it was synced, else a sync.
+  // Schedules the background work after a write: a new durable marker if the write was synced, otherwise a sync.
   void wake_background(bool synced) LOCUS_EXCLUDES(background_mutex_);
 
   const StorageOptions options_;
   const std::unique_ptr<DirectoryLock> lock_;
   const std::unique_ptr<Database> database_;
-  DamageReport damage_report_;  // empty once finish_opening() has returned
+  DamageReport damage_report_;  // result of verifying the directory; empty once finish_opening() has returned
   std::vector<StoredScene> stored_scenes_;
   std::vector<StoredMesh> stored_meshes_;
   absl::Status catalogue_damage_;
@@ -123,10 +128,14 @@ class RocksdbLog final : public UpdateLog {
 
   TopologyFiles topologies_;
   SceneTable scenes_;
-  mutable Mutex catalogue_mutex_;  // held while the catalogue is changed; locked before marker_mutex_
+  mutable Mutex catalogue_mutex_;  // held while the catalogue is changed; lock it before marker_mutex_
   Catalogue catalogue_ LOCUS_GUARDED_BY(catalogue_mutex_);
   SceneKey next_scene_ LOCUS_GUARDED_BY(catalogue_mutex_) = 1;
-  Mutex adding_mesh_;  // serializes changes of meshes, so that content is written once; locked before catalogue_mutex_
+  // Hashes of mesh contents that read_mesh() found damaged. The next add_mesh() of such a content stores it again.
+  mutable std::set<Sha256> damaged_contents_ LOCUS_GUARDED_BY(catalogue_mutex_);
+  // Serializes add_mesh() and delete_mesh(), so that equal content is written only once. Lock it before
+  // catalogue_mutex_.
+  Mutex adding_mesh_;
 
   Mutex marker_mutex_;
   std::unique_ptr<DurableMarkerFile> durable_marker_file_ LOCUS_GUARDED_BY(marker_mutex_);
@@ -134,7 +143,7 @@ class RocksdbLog final : public UpdateLog {
   std::atomic<bool> marker_failed_ = false;
 
   std::atomic<uint64_t> free_bytes_ = ~uint64_t{0};
-  std::atomic<uint64_t> written_bytes_ = 0;  // bytes written since free_bytes_ was read
+  std::atomic<uint64_t> written_bytes_ = 0;  // bytes written since the last poll of free_bytes_
 
   Mutex background_mutex_;
   ConditionVariable background_wakeup_;

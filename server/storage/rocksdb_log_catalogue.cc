@@ -1,4 +1,5 @@
-// RocksdbLog: changes of the catalogue, and the chunks of snapshots and meshes.
+// Members of RocksdbLog that change the catalogue (the rows of scenes and meshes), or write and read the chunks of
+// snapshots and meshes.
 #include <random>
 #include <utility>
 
@@ -7,19 +8,19 @@
 #include "core/base/limits.h"
 #include "core/base/refusal.h"
 #include "core/base/status_macros.h"
-#include "server/storage/rocksdb/bytes.h"
 #include "server/storage/rocksdb/errors.h"
 #include "server/storage/rocksdb/reading.h"
+#include "server/storage/rocksdb/row_codec.h"
 #include "server/storage/rocksdb_log.h"
 
 namespace locus::server {
 namespace {
 
-// Maximum size in bytes of the chunks in one write: small enough that a concurrent append waits only briefly for the
-// disk.
+// Minimum size in bytes of a full batch of chunks, which is then written. A larger batch would make concurrent appends
+// wait longer for the disk.
 constexpr size_t kChunkBatchBytes = size_t{2} << 20;
-// Minimum size in bytes of the memory tables for which a flush after a snapshot is worthwhile. The flush lets log files
-// be deleted.
+// Minimum total size in bytes of RocksDB's memory tables for which write_snapshot() starts a flush. After the flush
+// RocksDB deletes old log files.
 constexpr uint64_t kBufferedWorthFlushing = uint64_t{8} << 20;
 
 absl::Status already_stored(absl::string_view field, absl::string_view what) {
@@ -89,7 +90,7 @@ absl::StatusOr<ChunkList> RocksdbLog::put_chunks(rocksdb::ColumnFamilyHandle* fa
     }
     if (*chunk && batch.GetDataSize() < kChunkBatchBytes) continue;
     database_->wait_for_buffers(family);
-    // No sync: the commit() that makes these chunks part of the catalogue follows in the same log and is synced.
+    // Do not sync: the later commit() that adds these chunks to the catalogue syncs the same RocksDB log.
     status = database_->write(batch, false);
     batch.Clear();
     if (status.ok() && !*chunk) return list;
@@ -103,7 +104,7 @@ void RocksdbLog::drop_chunks(rocksdb::ColumnFamilyHandle* family, const std::str
   rocksdb::WriteBatch batch;
   LOCUS_CHECK(batch.Delete(database_->meta(), pending).ok());
   LOCUS_CHECK(batch.DeleteRange(family, prefix, end_of(prefix)).ok());
-  // If this write fails, the next opening deletes the chunks.
+  // If this write fails, the row `pending` remains, and the next opening deletes the chunks.
   database_->write(batch, false).IgnoreError();
 }
 
@@ -248,7 +249,7 @@ absl::Status RocksdbLog::read_snapshot(SceneKey key, ChunkSink sink) const {
 }
 
 bool RocksdbLog::in_use(absl::string_view pending) const {
-  ByteReader in(pending.substr(1));
+  RowReader in(pending.substr(1));
   if (pending[0] == kPendingSnapshotTag) {
     const absl::StatusOr<SceneRow> row = row_of(in.big_u64());
     return row.ok() && row->snapshot_id == in.big_u64();
@@ -291,7 +292,8 @@ absl::Status RocksdbLog::add_mesh(absl::string_view name, const Sha256& sha256, 
                                   ChunkSource parts) {
   MutexLock adding(adding_mesh_);
   RETURN_IF_ERROR(check_free_space("a new mesh", 0));
-  bool known = false;
+  std::optional<std::string> stored;  // encoded row of the content; no value if the content is not stored yet
+  bool damaged = false;
   {
     MutexLock lock(catalogue_mutex_);
     const std::optional<MeshRow> there = mesh_row(name);
@@ -300,7 +302,8 @@ absl::Status RocksdbLog::add_mesh(absl::string_view name, const Sha256& sha256, 
       return already_stored("name", absl::StrCat("a mesh '", name,
                                                  "' of other content is stored already: delete it or "
                                                  "choose another name"));
-    known = catalogue_.find(content_key(sha256)).has_value();
+    if (const auto row = catalogue_.find(content_key(sha256))) stored = std::string(*row);
+    damaged = damaged_contents_.contains(sha256);
   }
   CatalogueChange change;
   rocksdb::WriteBatch batch;
@@ -318,9 +321,13 @@ absl::Status RocksdbLog::add_mesh(absl::string_view name, const Sha256& sha256, 
     LOCUS_CHECK(batch.Delete(database_->meta(), pending).ok());
     return ContentRow{number, chunks};
   };
-  if (!known) {
+  if (!stored || damaged) {
     ASSIGN_OR_RETURN(const ContentRow row, put(content));
     change.rows.push_back({content_key(sha256), encode(row)});
+    if (const std::optional<ContentRow> replaced = stored ? decode_content(*stored) : std::nullopt) {
+      const std::string prefix = mesh_prefix(sha256, replaced->content_id);
+      LOCUS_CHECK(batch.DeleteRange(database_->mesh(), prefix, end_of(prefix)).ok());
+    }
   }
   const absl::StatusOr<ContentRow> row = put(parts);
   if (!row.ok()) {
@@ -333,6 +340,7 @@ absl::Status RocksdbLog::add_mesh(absl::string_view name, const Sha256& sha256, 
     drop();
     return status;
   }
+  damaged_contents_.erase(sha256);
   scenes_.set_catalogue(catalogue_.totals());
   write_durable_marker(false);
   return absl::OkStatus();
@@ -368,7 +376,12 @@ absl::Status RocksdbLog::read_mesh(const Sha256& sha256, ChunkSink sink) const {
     if (bytes) row = decode_content(*bytes);
   }
   if (!row) return not_stored("the log has no mesh of this content");
-  return read_mesh_chunks(sha256, *row, sink);
+  absl::Status status = read_mesh_chunks(sha256, *row, sink);
+  if (absl::IsDataLoss(status)) {
+    MutexLock lock(catalogue_mutex_);
+    damaged_contents_.insert(sha256);
+  }
+  return status;
 }
 
 absl::Status RocksdbLog::read_parts(absl::string_view name, ChunkSink sink) const {
@@ -393,6 +406,8 @@ void RocksdbLog::keep_outline(const Sha256& sha256, absl::string_view bytes) {
   topologies_.keep(sha256, bytes);
   written_bytes_ += bytes.size();
 }
+
+uint64_t RocksdbLog::cache_bytes() const { return database_->buffered_bytes() + database_->block_cache_bytes(); }
 
 std::optional<std::string> RocksdbLog::read_outline(const Sha256& sha256) const { return topologies_.read(sha256); }
 

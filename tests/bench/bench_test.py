@@ -24,7 +24,7 @@ CASES = {"ray/incoherent/first": RAYS, "ray/incoherent/any": ANY, "ray/short/fir
          "ball/2": BALLS, "ball/10": BALLS, "box/0.5": BOXES, "box/2": BOXES, "box/10": BOXES,
          "build": {"embree": {"embree_medium"}}, "memory": {"embree": {"embree_medium"}}}
 
-# The suite dynamic; cases below "ours" need no package.
+# Peers of the suite dynamic, by library. The peers in "ours" need no library.
 DYNAMIC_PEERS = {"bullet": {"bullet"}, "boost": {"boost_rtree"}, "nanoflann": {"nanoflann"},
                  "ours": {"flat_hash_map", "sorted_rebuild"}}
 ONE_SIZE_ONLY = {"boost_rtree", "nanoflann", "flat_hash_map"}
@@ -32,7 +32,7 @@ NOT_ASKED = {"box": {"nanoflann"}, "ray": {"nanoflann", "boost_rtree"}, "nearest
              "reinsert": {"nanoflann", "sorted_rebuild"}}
 KINDS = ("uniform", "clustered", "far", "onecell", "border", "giant", "mixed")
 
-# The suite serving.
+# Expected cells of the suite serving: (case, peer).
 SERVING = {(f"rays/{cost}/{size}", "in_process") for cost in ("90ns", "270ns") for size in (1024, 8192)}
 SERVING |= {(f"one_stream/{size}", "two_streams") for size in (1024, 8192)}
 SERVING |= {(f"{case}/{size}", "raw_tcp") for size in (1024, 8192) for case in ("echo", "empty")}
@@ -42,6 +42,7 @@ SERVING |= {("mixed_p50/16", "idle"), ("mixed_p99/16", "idle"), ("overload/10x/a
             ("overload/10x/at_once", "peak"), ("silent_reader/1", "idle"), ("silent_reader/8", "idle"),
             ("churn/50", "idle"), ("deadline/1ms", "whole_job"), ("cancel/1000", "whole_job")}
 SERVING |= {("durable/256", "memory_acks"), ("durable_queries/256", "beside_memory_acks"), ("restart/1M", "bar")}
+SERVING |= {(f"tls/{case}", "plain") for case in ("8192", "16", "handshake", "mutual_handshake")}
 LOG = {(f"commit/{size}", peer) for size in (16, 256, 4096) for peer in ("append", "overwrite")}
 LOG |= {(f"writers/8/{size}", "one_writer") for size in (16, 256, 4096)}
 LOG |= {("mesh/2M", "built")}
@@ -149,7 +150,7 @@ class BenchTest(unittest.TestCase):
 
 
 class SuiteRun:
-    """Makes one quick run of SUITE, which must have the cells of expected()."""
+    """Makes one quick run of SUITE, whose cells must be those of expected()."""
 
     @classmethod
     def setUpClass(cls):

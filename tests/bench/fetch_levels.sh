@@ -4,7 +4,7 @@
 #
 #   ./tests/bench/fetch_levels.sh
 #
-# Exits 1 if one of them is not available; locus-bench then runs without it and adds a note.
+# Exits 1 if a level is not available; locus-bench then runs without that level and adds a note.
 set -uo pipefail
 cd "$(dirname "$0")/../.." || exit
 levels=build/levels

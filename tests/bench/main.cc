@@ -21,7 +21,7 @@
 namespace locus::bench {
 namespace {
 
-// Returns all suites. Each has one line here and one folder beside this file.
+// Returns all suites. Each suite has one line in this function and one folder beside this file.
 std::vector<Suite> suites() {
   return {
       {"static", "rays, balls, boxes, builds and memory of one level, compared with Embree and others",

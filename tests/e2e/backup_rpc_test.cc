@@ -17,7 +17,8 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::SizeIs;
 
-// Far more than a connection buffers, so that a server cannot send all of it to a caller that does not read.
+// Size of a large file: far more than a connection buffers, so a server cannot send the whole file to a caller that
+// does not read.
 constexpr size_t kLargeBytes = size_t{64} << 20;
 
 std::string bytes_of(size_t count) {
@@ -27,7 +28,7 @@ std::string bytes_of(size_t count) {
   return bytes;
 }
 
-// A server with a data directory, over a fake log that only makes backups.
+// A server with a data directory, whose log is a fake that only makes backups.
 class BackupRpcTest : public ::testing::Test {
  protected:
   BackupRpcTest() { log_.files = {{"CURRENT", "MANIFEST-1\n"}, {"empty", ""}, {"tables/000007.sst", "seven"}}; }
@@ -39,7 +40,7 @@ class BackupRpcTest : public ::testing::Test {
     return *running_;
   }
 
-  // Appends all pieces and returns the status of the call.
+  // Makes a Backup call, appends its pieces to `pieces` and returns the status of the call.
   static grpc::Status back_up(Stubs& stubs, std::vector<v1::BackupResponse>* pieces) {
     grpc::ClientContext context;
     set_timeout(context);
@@ -48,7 +49,7 @@ class BackupRpcTest : public ::testing::Test {
     return reader->Finish();
   }
 
-  // Returns whether the data directory is empty, after the server has ended all calls.
+  // Drains the server, so that all calls have ended. Returns whether the data directory is empty then.
   bool nothing_is_left() {
     running_->server().drain(kCallTimeout);
     return std::filesystem::is_empty(folder_.path());

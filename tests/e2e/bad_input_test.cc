@@ -8,13 +8,14 @@ namespace locus::test {
 namespace {
 
 constexpr std::array kMethods = {
-    "/locus.v1.ServerService/GetServer",      "/locus.v1.SceneService/CreateScene",
-    "/locus.v1.SceneService/GetScene",        "/locus.v1.SceneService/ListScenes",
-    "/locus.v1.SceneService/DeleteScene",     "/locus.v1.SceneService/UploadMesh",
-    "/locus.v1.SceneService/ListMeshes",      "/locus.v1.SceneService/DeleteMesh",
-    "/locus.v1.SceneService/ChangeInstances", "/locus.v1.SceneService/DumpScene",
-    "/locus.v1.UpdateService/ApplyUpdates",   "/locus.v1.UpdateService/StreamUpdates",
-    "/locus.v1.QueryService/Query",           "/locus.v1.QueryService/StreamQueries",
+    "/locus.v1.ServerService/GetServer",     "/locus.v1.ServerService/GetQuotas",
+    "/locus.v1.SceneService/CreateScene",    "/locus.v1.SceneService/GetScene",
+    "/locus.v1.SceneService/ListScenes",     "/locus.v1.SceneService/DeleteScene",
+    "/locus.v1.SceneService/UploadMesh",     "/locus.v1.SceneService/ListMeshes",
+    "/locus.v1.SceneService/DeleteMesh",     "/locus.v1.SceneService/ChangeInstances",
+    "/locus.v1.SceneService/DumpScene",      "/locus.v1.UpdateService/ApplyUpdates",
+    "/locus.v1.UpdateService/StreamUpdates", "/locus.v1.QueryService/Query",
+    "/locus.v1.QueryService/StreamQueries",
 };
 
 // Deadline of a call, far above the time of any call that is answered. Some requests wait for revisions that are never
@@ -30,7 +31,8 @@ class BadInputTest : public RpcTest {
     ASSERT_TRUE(apply(insert_balls(1, 5)).ok());
   }
 
-  // Sends a request. Expects a refused call to leave the scene as in `state`; sets `state` after an accepted one.
+  // Sends a request. If it is refused, expects that the scene still equals `state`; if it is accepted, sets `state` to
+  // the new scene.
   void send(const std::string& method, const std::string& bytes, std::string* state) {
     const RawReply reply = raw_call(stubs().channel, method, bytes, kRequestTimeout);
     if (reply.status.ok()) {
@@ -42,7 +44,8 @@ class BadInputTest : public RpcTest {
     EXPECT_EQ(dump(), *state) << method << ": " << reply.status.error_message();
   }
 
-  // Sets `state` to the scene after all its changes are published. Creates the scene again if it was deleted.
+  // Waits until all changes of the scene are published, and sets `state` to a dump of the scene. Creates the scene
+  // again if it was deleted.
   void settle(std::string* state) {
     ASSERT_TRUE(create("world", {}, nullptr, true).ok());
     while (get("world").pending_changes() > 0) {

@@ -1,4 +1,4 @@
-// Log lines of calls: request ids, from the caller or generated, traceparents, and slow queries.
+// Log lines of calls: request ids that the caller sent or the daemon generated, traceparents, and slow queries.
 #include "tests/support/daemon_process.h"
 #include "tests/support/rpc_test.h"
 

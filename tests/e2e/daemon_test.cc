@@ -68,7 +68,7 @@ TEST_F(DaemonTest, DrainingEndsStreamsRetryablyAndRunningCallsAreAnswered) {
   v1::StreamUpdatesResponse response;
   ASSERT_TRUE(stream->Write(request));
   ASSERT_TRUE(stream->Read(&response));
-  // The upload runs until its caller has sent all of it.
+  // The upload runs until its caller has sent the whole mesh.
   grpc::ClientContext upload_context;
   set_timeout(upload_context);
   v1::UploadMeshResponse uploaded;
@@ -90,8 +90,10 @@ TEST_F(DaemonTest, DrainingEndsStreamsRetryablyAndRunningCallsAreAnswered) {
   daemon.signal(SIGTERM);
   EXPECT_FALSE(stream->Read(&response));
   expect_refused(stream->Finish(), {grpc::StatusCode::UNAVAILABLE, v1::REASON_DRAINING, ""});
-  // Health and GetServer are still answered; new work is refused.
+  // A draining server still answers Health and GetServer, and refuses new work.
   EXPECT_EQ(raw_call(stubs.channel, "/grpc.health.v1.Health/Check", "").bytes, "\x08\x02");
+  Stubs probe(address());  // a connection of its own
+  EXPECT_EQ(raw_call(probe.channel, "/grpc.health.v1.Health/Check", "").bytes, "\x08\x02");
   EXPECT_EQ(calls_in_work(), 2);
   grpc::ClientContext new_context;
   set_timeout(new_context);

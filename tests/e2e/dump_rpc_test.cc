@@ -27,7 +27,7 @@ class DumpRpcTest : public RpcTest {
   }
 };
 
-// Returns a batch with objects of all shapes, mixed in the order of ids.
+// Returns a batch that inserts `count` objects; each id gets a randomly chosen shape.
 v1::UpdateBatch mixed_objects(Random& random, uint64_t count) {
   v1::UpdateBatch batch;
   for (int kind = 0; kind < 4; ++kind) batch.add_inserts();

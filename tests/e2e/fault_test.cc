@@ -1,5 +1,6 @@
-// Callers that cancel, that do not read, that connect and disconnect by the thousand: all resources must be released,
-// and a well-behaved caller must still be answered. The suites named Long... do the same more often.
+// Callers that cancel, callers that do not read, and thousands of callers that connect and disconnect: all resources
+// must be released, and a well-behaved caller must still be answered. The suites named Long... repeat these tests more
+// often.
 #include <dirent.h>
 #include <sys/resource.h>
 
@@ -20,7 +21,7 @@ class FaultTest : public RpcTest {
   explicit FaultTest(const server::ServerConfig& config = test_config()) : RpcTest(config) {}
 
   static constexpr uint64_t kObjects = 2'000;
-  // Pause between two polls. Polling without a pause would take a core from the threads that are waited for.
+  // Pause between two polls. Polling without a pause would occupy a core that the polled threads need.
   static constexpr std::chrono::milliseconds kPatience{2};
   // Deadline of streams that stay open during a test, long enough for a busy machine.
   static constexpr std::chrono::hours kNoHurry{1};
@@ -33,7 +34,7 @@ class FaultTest : public RpcTest {
     ASSERT_TRUE(apply(heap).ok());
   }
 
-  // Returns a batch whose queries test every object: seconds of work if there are many.
+  // Returns a batch whose queries test every object: seconds of work if the scene has many objects.
   static v1::QueryBatch heavy_batch(int queries = limits::kMaxQueries) {
     v1::QueryBatch batch;
     v1::QueryBlock* block = batch.add_blocks();
@@ -68,7 +69,7 @@ class FaultTest : public RpcTest {
     return 0;
   }
 
-  // The limit's use includes the call that reads it.
+  // Waits until the server has no calls or streams. used("calls") counts the call that reads it, so it is at least 1.
   void wait_until_nothing_is_in_work() {
     while (used("calls") > 1 || used("streams") > 0) std::this_thread::sleep_for(kPatience);
   }
@@ -131,7 +132,7 @@ void FaultTest::give_up_calls(int count) {
 TEST_F(FaultTest, CancelledCallsReleaseTheirResources) { give_up_calls(static_cast<int>(scaled_count(200))); }
 
 TEST_F(FaultTest, ACallerThatDoesNotReadIsNotReadFromAndOthersAreAnswered) {
-  constexpr uint64_t kMessages = 200;  // 64 MB, of which sockets hold some 10
+  constexpr uint64_t kMessages = 200;  // 64 MB of requests, of which sockets buffer about 10 MB
   grpc::ClientContext context;
   set_timeout(context, kNoHurry);
   const std::unique_ptr<QueryStream> stream = stubs().queries->StreamQueries(&context);
@@ -143,7 +144,7 @@ TEST_F(FaultTest, ACallerThatDoesNotReadIsNotReadFromAndOthersAreAnswered) {
     }
     stream->WritesDone();
   });
-  // Wait until no more messages are written. If the server continued to read, all would be written.
+  // Wait until no more messages are written. If the server continued to read, all messages would be written.
   uint64_t before = 0;
   do {
     before = written;

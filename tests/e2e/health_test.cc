@@ -1,4 +1,4 @@
-// Watchers of the standard health service: the states they receive, and when.
+// Watchers of the standard health service: which states they receive, and when.
 #include <gtest/gtest.h>
 
 #include <future>
@@ -26,7 +26,7 @@ class Watcher {
     reader_ = stub_->Watch(&context_, request);
   }
 
-  // Returns the next state; kNothing at the end of the stream.
+  // Returns the next state that the watcher receives; kNothing at the end of the stream.
   uint64_t next() {
     HealthCheckResponse response;
     return reader_->Read(&response) ? static_cast<uint64_t>(response.status()) : kNothing;

@@ -123,7 +123,7 @@ TEST_F(InstanceRpcTest, AFailedBackgroundChangeIsReportedByTheScene) {
   request.set_no_wait(true);
   ASSERT_TRUE(change(request).ok());
   EXPECT_THAT(get_when_settled().last_build_error(), ::testing::HasSubstr("12345"));
-  // The error is that of the latest failed change, so a change that succeeds keeps it.
+  // last_build_error is the error of the latest failed change, so a change that succeeds does not clear it.
   ASSERT_TRUE(change(place_one("cube", 1)).ok());
   EXPECT_THAT(get("world").last_build_error(), ::testing::HasSubstr("12345"));
 }

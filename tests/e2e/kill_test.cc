@@ -1,5 +1,5 @@
-// A daemon that is killed at random moments under load recovers every batch that it acknowledged, none twice, none out
-// of order. The suite named Long... kills it 100 times, or LOCUS_FAULT_RUNS times.
+// A daemon that is killed at random moments under load recovers every batch that it acknowledged. No batch is applied
+// twice or out of order. The suite named Long... kills it 100 times, or LOCUS_FAULT_RUNS times.
 #include <atomic>
 #include <cstdlib>
 #include <random>
@@ -18,8 +18,8 @@ constexpr uint64_t kKept = 50;    // number of latest batches whose points are i
 std::string scene_name(uint64_t writer) { return "arena-" + std::to_string(writer % kScenes); }
 uint64_t id_of(uint64_t writer, uint64_t batch) { return writer << 32 | batch; }
 
-// A writer whose applied batches can be read from the scene: each inserts a point of its own, removes that of the batch
-// kKept before, and moves a counter point to x = its number.
+// A writer whose applied batches can be read from the scene: each batch inserts a point of its own, removes the point
+// of the batch that is kKept batches older, and moves a counter point to x = the batch's number.
 class Writer {
  public:
   explicit Writer(uint64_t number) : number_(number) {}
@@ -49,7 +49,7 @@ class Writer {
     return batch;
   }
 
-  // Returns the points of this writer in the scene if batch `k` is the last one applied.
+  // Returns the points of this writer that the scene must contain if batch `k` was the last one that was applied.
   std::map<uint64_t, PlacedPoint> model(uint64_t k) const {
     std::map<uint64_t, PlacedPoint> points;
     if (k > 0) points[id_of(number_, 0)] = {static_cast<double>(k), static_cast<double>(number_), 1};
@@ -58,7 +58,7 @@ class Writer {
     return points;
   }
 
-  // Sends batches from the first one that is not acknowledged, until the connection breaks or batch `enough` is
+  // Sends batches, beginning with the first that is not acknowledged, until the connection breaks or batch `enough` is
   // acknowledged.
   void write(Stubs& stubs, uint64_t enough) {
     grpc::ClientContext context;
@@ -82,7 +82,8 @@ class Writer {
     stream->WritesDone();
   }
 
-  // Checks the scene after a restart, and sets known_applied_ to the last applied batch.
+  // Verifies this writer's points in `scene` after a restart, and sets known_applied_ to the number of its last applied
+  // batch.
   void check(const std::map<uint64_t, PlacedPoint>& scene) {
     std::map<uint64_t, PlacedPoint> own;
     for (const auto& [id, point] : scene)
@@ -101,7 +102,7 @@ class Writer {
     ASSERT_EQ(response.sequence(), acknowledged_ + 1) << "out of order";
     ASSERT_FALSE(response.has_error()) << response.ShortDebugString();
     EXPECT_EQ(response.ack().refused(), 0u) << "batch " << response.sequence() << " was applied before";
-    // A batch that was applied before the kill, but not acknowledged, is a duplicate.
+    // If a batch was applied before the kill but not acknowledged, the daemon acknowledges it as a duplicate.
     EXPECT_EQ(response.ack().duplicate(), response.sequence() <= known_applied_);
     ++acknowledged_;
   }

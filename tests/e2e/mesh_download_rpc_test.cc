@@ -1,6 +1,6 @@
 #include "core/base/limits.h"
 #include "server/convert/convert.h"
-#include "server/services/mesh_upload.h"
+#include "server/services/sha256.h"
 #include "tests/support/rpc_test.h"
 
 namespace locus::test {
@@ -82,14 +82,14 @@ TEST_F(MeshDownloadRpcTest, ALargeMeshWithManyPartsIsSentInBoundedPiecesWithItsH
   }
   const v1::DownloadMeshResponse all = joined(pieces);
   EXPECT_EQ(all.parts_size(), static_cast<int>(kParts));
-  const Sha256 hash = server::mesh_hash(server::span_of(all.vertices()), server::span_of(all.indices()));
+  const Sha256 hash = server::mesh_hash(server::span_of(all.vertices()), server::span_of(all.indices())).value();
   EXPECT_EQ(std::string(hash.begin(), hash.end()), uploaded.mesh().sha256());
 }
 
 TEST_F(MeshDownloadRpcTest, APieceIsFullBeforeTheNextBegins) {
   ASSERT_TRUE(upload({whole_mesh("large", large_mesh())}).ok());
   const std::vector<v1::DownloadMeshResponse> pieces = pieces_of("large");
-  EXPECT_EQ(pieces.size(), 3u);  // 10.8 MB
+  EXPECT_EQ(pieces.size(), 3u);  // the mesh has 10.8 MB
   for (size_t i = 0; i + 1 < pieces.size(); ++i) EXPECT_GT(pieces[i].ByteSizeLong(), kMaxPiece - 2048);
 }
 

@@ -2,14 +2,14 @@
 #include <limits>
 
 #include "core/base/limits.h"
-#include "server/services/mesh_upload.h"
+#include "server/services/sha256.h"
 #include "tests/support/rpc_test.h"
 
 namespace locus::test {
 namespace {
 
 std::string hash_of(const CubeMesh& mesh) {
-  const Sha256 hash = server::mesh_hash(mesh.vertices, mesh.indices);
+  const Sha256 hash = server::mesh_hash(mesh.vertices, mesh.indices).value();
   return std::string(hash.begin(), hash.end());
 }
 
@@ -35,7 +35,7 @@ class MeshRpcTest : public RpcTest {
     return call(*stubs().scenes, &v1::SceneService::Stub::DeleteMesh, request, &response);
   }
 
-  // The cube with one part from triangle 0 and another from `second` on.
+  // Returns an upload of the cube with two parts: one begins at triangle 0, the other at triangle `second`.
   static v1::UploadMeshRequest cube_of_parts(const std::string& name, const std::string& part, uint32_t second) {
     v1::UploadMeshRequest request = whole_mesh(name);
     request.add_parts()->set_name(part + " 0");
@@ -44,7 +44,7 @@ class MeshRpcTest : public RpcTest {
     return request;
   }
 
-  // After any refused upload.
+  // Expects that no mesh is registered, as after a refused upload.
   void expect_nothing_kept() { EXPECT_TRUE(list().empty()); }
 };
 
@@ -102,7 +102,7 @@ TEST_F(MeshRpcTest, AMeshWithAKnownHashNeedsNoColumns) {
   v1::UploadMeshResponse response;
   const auto writer = stubs().scenes->UploadMesh(&context, &response);
   ASSERT_TRUE(writer->Write(request));
-  // The call is answered although the caller has not closed its side.
+  // The server ends the call although the caller has not closed its side of the stream.
   const grpc::Status status = writer->Finish();
   ASSERT_TRUE(status.ok()) << status.error_message();
   EXPECT_TRUE(response.already_known());
@@ -124,6 +124,27 @@ TEST_F(MeshRpcTest, ANameAcceptsTheSameBytesAgainAndRefusesOthers) {
   with_hash.set_sha256(hash_of(other));
   expect_refused(upload({with_hash}), taken);
   EXPECT_EQ(list()[0].sha256(), hash_of({}));
+}
+
+TEST_F(MeshRpcTest, APageOfMeshesEndsBeforeAReplyThatClientsRefuse) {
+  CubeMesh large;
+  for (int i = 0; i < 700; ++i)
+    for (int j = 0; j < 36; ++j) large.indices.push_back(large.indices[static_cast<size_t>(j)]);
+  for (const std::string name : {"a", "b", "c"}) {
+    v1::UploadMeshRequest request = whole_mesh(name, large);
+    for (uint32_t part = 0; part < 8000; ++part) {
+      request.add_parts()->set_name(std::string(limits::kMaxLabelLength, name[0]));
+      request.mutable_parts(static_cast<int>(part))->set_first_triangle(part);
+    }
+    ASSERT_TRUE(upload({request}).ok());
+  }
+  v1::ListMeshesResponse page;
+  ASSERT_TRUE(call(*stubs().scenes, &v1::SceneService::Stub::ListMeshes, v1::ListMeshesRequest(), &page).ok());
+  EXPECT_EQ(page.meshes_size(), 1);
+  EXPECT_EQ(page.next_page_token(), "a");
+  const std::vector<v1::Mesh> meshes = list();
+  ASSERT_EQ(meshes.size(), 3u);
+  for (const v1::Mesh& mesh : meshes) EXPECT_EQ(mesh.parts_size(), 8000) << mesh.name();
 }
 
 TEST_F(MeshRpcTest, OtherPartsUnderAKnownNameAreRefused) {
@@ -172,7 +193,7 @@ TEST_F(MeshRpcTest, NamesOfEqualBytesKeepTheirOwnPartsAndUses) {
   for (const v1::Placement& run : pieces[0].instances()) placed.push_back(run.mesh());
   EXPECT_EQ(placed, (std::vector<std::string>{"b", "c", "b"})) << "one run for each neighbour of another name";
 
-  // A ray from x = 0 hits the near side of each cube, in the part of the cube's own mesh name that has the triangle.
+  // A ray from x = 0 hits two sides of each cube. It hits the near side of all three cubes in the same triangle.
   v1::QueryBatch ray = ray_along_x();
   fill(ray.mutable_blocks(0)->mutable_rays()->mutable_origins(), {0.f, 0.25f, 0.f});
   ray.mutable_blocks(0)->mutable_rays()->set_mode(v1::RAY_MODE_ALL);

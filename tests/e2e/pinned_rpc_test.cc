@@ -1,4 +1,5 @@
-// Readers that pin more memory of a scene than permitted: they are cancelled, and updates wait only until they end.
+// Readers that pin more memory of a scene than permitted: the server cancels the readers, and updates wait only until
+// the cancelled readers have ended.
 #include <algorithm>
 #include <atomic>
 #include <thread>
@@ -79,7 +80,9 @@ TEST_F(PinnedRpcTest, ADumpThatIsNotReadIsCancelledAndUpdatesContinue) {
   ASSERT_TRUE(apply(move_heap(kObjects, 3)).ok());
   while (reader->Read(&piece)) {
   }
-  EXPECT_EQ(reader->Finish().error_code(), grpc::StatusCode::CANCELLED);
+  // The call notices the revoked pin by itself if it happens to write at that time; otherwise it is cancelled.
+  EXPECT_THAT(reader->Finish().error_code(),
+              testing::AnyOf(grpc::StatusCode::CANCELLED, grpc::StatusCode::RESOURCE_EXHAUSTED));
 }
 
 TEST_F(PinnedRpcTest, TheLimitIsListedAndASceneReportsItsOwn) {

@@ -1,5 +1,5 @@
-// Updates through a proxy that repeats a call if it gets no answer: each numbered batch is applied once. HAProxy is the
-// proxy; the network behind it loses answers of the daemon.
+// Updates through a proxy, HAProxy, that repeats a call if it gets no answer: each numbered batch is applied once. The
+// network between the proxy and the daemon loses answers of the daemon.
 #include <unistd.h>
 
 #include <chrono>
@@ -100,7 +100,7 @@ TEST_F(ProxyTest, ANumberedBatchIsAppliedOnce) {
   EXPECT_EQ(points_of(daemon_.stubs(), "arena").size(), 20u);
 }
 
-// The client library's stream resends batches itself after broken connections and after a kill of the daemon.
+// The client library's stream resends unacknowledged batches after a connection breaks and after the daemon is killed.
 TEST_F(ProxyTest, AStreamAppliesEachBatchOnceDespiteBrokenConnectionsAndKills) {
   constexpr uint64_t kBatches = 400;
   auto client = client::Client::connect("unix:" + socket());
@@ -123,7 +123,8 @@ TEST_F(ProxyTest, AStreamAppliesEachBatchOnceDespiteBrokenConnectionsAndKills) {
     const absl::StatusOr<v1::UpdateAck> ack = acks[number - 1].get();
     ASSERT_TRUE(ack.ok()) << number << ": " << ack.status();
     EXPECT_EQ(ack->refused(), 0u) << number;
-    // The ack of a batch that was applied before is a duplicate with the scene's current revision.
+    // If a batch is sent again after it was applied, its ack is a duplicate with the scene's current revision, so the
+    // revision may be higher than `number`.
     EXPECT_GE(ack->revision(), number);
     EXPECT_TRUE(ack->duplicate() || ack->revision() == number) << number;
   }

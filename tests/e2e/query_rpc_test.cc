@@ -83,7 +83,8 @@ TEST_F(QueryRpcTest, RaysFindTheFirstAnyAndAllHits) {
   EXPECT_THAT(result.blocks(0).normals(), IsEmpty());
   EXPECT_EQ(result.blocks(1).hits(), std::string(1, '\1'));
   EXPECT_THAT(result.blocks(1).ids(), IsEmpty());
-  // The ray hits the cube's front at x = 9, on the diagonal of two triangles or in one of them, and its back at 11.
+  // The ray hits the cube's front at x = 9, on the diagonal of two triangles or in one of them, and the cube's back at
+  // x = 11.
   const v1::BlockResult& all = result.blocks(2);
   EXPECT_THAT(all.counts(), ElementsAre(static_cast<uint32_t>(all.ids_size())));
   EXPECT_TRUE(std::is_sorted(all.t().begin(), all.t().end()));

@@ -18,7 +18,7 @@ v1::SceneSpec history(uint32_t ticks, uint64_t bytes = 0) {
   return spec;
 }
 
-// Scene that keeps ten ticks, with ball 1 at x = 3 + 10 tick, up to tick 30.
+// Scene at tick 30 that keeps a history of ten ticks. At each tick, ball 1 is at x = 3 + 10 * tick.
 class RewindRpcTest : public RpcTest {
  protected:
   void SetUp() override {
@@ -80,7 +80,7 @@ TEST_F(RewindRpcTest, RaysAndBallsFindObjectsAtTheirPastPositions) {
 TEST_F(RewindRpcTest, TimesOutsideHistoryAreRefusedWithItsRange) {
   const grpc::Status too_old = query(where_at({25, 19}, {0, 0.5f}));
   expect_refused(too_old, {grpc::StatusCode::OUT_OF_RANGE, v1::REASON_OUT_OF_RANGE, "blocks[0].as_of_ticks", 1});
-  EXPECT_THAT(too_old.error_message(), HasSubstr("ticks 20 to 30"));
+  EXPECT_THAT(too_old.error_message(), HasSubstr("ticks are 20 to 30"));
   expect_refused(query(where_at({31})),
                  {grpc::StatusCode::OUT_OF_RANGE, v1::REASON_OUT_OF_RANGE, "blocks[0].as_of_ticks", 0});
 }

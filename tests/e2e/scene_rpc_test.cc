@@ -267,7 +267,7 @@ TEST_F(FullServerTest, CallsBeyondTheLimitAreRefusedAndMayBeRetried) {
   const auto first = stubs().scenes->UploadMesh(&context, &uploaded);
   ASSERT_TRUE(first->Write(whole_mesh("cube")));
   grpc::Status status;
-  // Calls are admitted until the server has begun the upload.
+  // Repeats the call: it is admitted until the server has begun the upload, and then refused.
   do status = create("second", {}, nullptr, true);
   while (status.ok());
   const v1::Error error = error_of(status);

@@ -84,5 +84,25 @@ TEST_F(ServerRpcTest, ReflectionListsEveryService) {
     EXPECT_THAT(reply.bytes, ::testing::HasSubstr(service));
 }
 
+// Returns the bytes of ServerReflectionRequest{file_containing_symbol = 4: symbol}.
+std::string symbol_question(const std::string& symbol) {
+  const size_t n = symbol.size();
+  return std::string({'\x22', static_cast<char>(0x80 | (n & 0x7F)), static_cast<char>(n >> 7)}) + symbol;
+}
+
+TEST_F(ServerRpcTest, LongReflectionQuestionsAreRefusedBeforeTheyAreLookedUp) {
+  constexpr const char* kReflect = "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo";
+  const RawReply asked = raw_call(stubs().channel, kReflect, symbol_question(std::string(500, '.')));
+  EXPECT_TRUE(asked.status.ok()) << asked.status.error_message();
+  EXPECT_THAT(asked.bytes, ::testing::HasSubstr("the schema has no ...."));
+  std::string unknown = "\xca\x3e";  // field 1001, which the schema does not have; of 512 bytes
+  unknown += "\x80\x04" + std::string(512, 'x');
+  for (const std::string& question : {symbol_question(std::string(10'000, '.')), unknown}) {
+    const RawReply refused = raw_call(stubs().channel, kReflect, question);
+    expect_refused(refused.status, {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_LIMIT, ""});
+    EXPECT_THAT(refused.status.error_message(), ::testing::HasSubstr("reflection_request_bytes"));
+  }
+}
+
 }  // namespace
 }  // namespace locus::test

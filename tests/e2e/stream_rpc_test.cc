@@ -177,7 +177,7 @@ TEST_F(StreamRpcTest, StreamsInterleaveAndEveryBatchOfEachIsAppliedOnce) {
         v1::UpdateBatch batch = insert_balls(id, id);
         batch.set_writer(s + 1);
         batch.set_batch(i);
-        // Send every batch twice; the second one is a duplicate.
+        // Sends every batch twice; the server treats the second copy as a duplicate.
         for (int time = 0; time < 2; ++time) {
           ASSERT_TRUE(stream->Write(update("world", i, batch)));
           v1::StreamUpdatesResponse response;
@@ -218,7 +218,7 @@ TEST_F(StreamRpcTest, ACancelledStreamReleasesItsResources) {
     set_timeout(context);
     const auto stream = stubs().updates->StreamUpdates(&context);
     ASSERT_TRUE(stream->Write(update("world", 1, insert_balls(1, 2))));
-    // After the first answer the server has accepted the stream.
+    // Reads the first answer, which proves that the server has accepted the stream.
     v1::StreamUpdatesResponse response;
     ASSERT_TRUE(stream->Read(&response));
     if (i % 2 == 0) stream->Write(update("world", 2, insert_balls(3, 4)));

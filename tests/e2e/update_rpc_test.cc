@@ -26,8 +26,8 @@ class UpdateRpcTest : public RpcTest {
     EXPECT_EQ(dump(), before);
   }
 
-  // Expects the only item of the batch to be refused and the scene to be unchanged; with all_or_nothing, expects the
-  // batch to be refused.
+  // Expects that the only item of the batch is refused and the scene is unchanged; and that the whole batch is refused
+  // if all_or_nothing is set.
   void expect_item_refused(v1::UpdateBatch batch, const std::string& field, uint32_t index, uint64_t id,
                            v1::Reason reason) {
     const std::string before = dump();

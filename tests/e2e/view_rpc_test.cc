@@ -29,7 +29,7 @@ class ViewRpcTest : public RpcTest {
     return status;
   }
 
-  // Starts a query on its own thread that waits for a revision which is not published yet.
+  // Starts a query on a thread of its own. The query waits for `revision`, which is not published yet.
   std::future<grpc::Status> waiting_query(uint64_t revision) {
     return std::async(std::launch::async, [this, revision] {
       return query_within(seen([revision](v1::View* view) { view->set_at_least(revision); }),
@@ -130,7 +130,7 @@ TEST_F(ViewRpcTest, AViewOfTheOldEpochIsRefusedAfterTheSceneIsRecreated) {
 }
 
 TEST_F(ViewRpcTest, EveryReplyIsOfOneRevisionWhileAWriterRuns) {
-  // Each batch moves both balls, so both are on the same side in every revision.
+  // Each batch moves both balls, so both balls are on the same side in every revision.
   ASSERT_TRUE(apply(insert_balls(1, 2)).ok());
   std::thread writer([this] {
     for (int i = 0; i < 200; ++i) {

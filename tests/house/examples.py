@@ -1,4 +1,4 @@
-"""Small example trees: each breaks one rule, and one keeps all rules. None stands for a removed file."""
+"""Small example trees: one that keeps all rules, and others that each break one rule. None as text removes a file."""
 import language_rules
 
 HEADER = """// Three numbers: a position or a direction in world units, for all rooms. Plain data, so threads share it freely.
@@ -60,8 +60,8 @@ GOOD_EXAMPLE = {
     "tests/client/python/locus/thing_test.py": '"""Tests of things."""\n',
     **{room + "/README.md": README for room in ("proto", "server", "client", "core", "deploy", "tests")},
     **{path: "content\n" for path in language_rules.PAGES},
-    **{path: "content\n" for path in ("README.md", "CMakeLists.txt", "LICENSE", "CMakePresets.json", ".ci/run",
-                                      ".clang-format", ".clang-tidy", ".gitignore")},
+    **{path: "content\n" for path in ("README.md", "SECURITY.md", "CMakeLists.txt", "LICENSE", "CMakePresets.json",
+                                      ".ci/run", ".clang-format", ".clang-tidy", ".gitignore")},
 }
 
 LONG_FUNCTION = "void walk() {\n" + lines(79) + "}\n"

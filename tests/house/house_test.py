@@ -27,7 +27,7 @@ TREE_RULES = {**include_rules.RULES, **shape_rules.RULES, **language_rules.RULES
 
 
 def failures_of_the_rule_itself(name, rule):
-    """Returns defects of a rule: examples that break it but pass, or the good example refused."""
+    """Returns defects of a rule: examples that break the rule but pass, or the good example if it is refused."""
     problems = [f"the rule refuses a good example: {problem}" for problem in rule(Tree(GOOD_EXAMPLE))]
     examples = BAD_EXAMPLES.get(name, [])
     if not examples:

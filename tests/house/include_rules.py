@@ -6,8 +6,8 @@ from source_tree import includes, quoted_includes
 
 INDEX_STRUCTURES = ("list", "bvh", "hash_grid", "kd_tree", "octree", "bsp_tree", "sphere_tree", "grid")
 
-# Folders that the sources of a folder may include in addition to their own. A name without a final "/*" means only that
-# folder, with it also the folders below it. "proto" stands for the code generated from the protocol.
+# Folders that the sources of a folder may include in addition to their own folder. A name that ends with "/*" allows
+# the folder and all folders below it, another name only the folder. "proto" is the code generated from the protocol.
 ALLOWED = {
     "core/base": [],
     "core/geometry": ["core/base"],
@@ -31,16 +31,20 @@ ALLOWED = {
     "server/storage/rocksdb": ["core/*"],
     "server/storage/integrity": ["server/storage/rocksdb", "core/*"],
     "server/storage": ["server/storage/*", "core/*"],
+    "server/connections": ["server/config", "core/base"],
     "server/security": ["server/config", "core/base"],
-    "server/observability": ["server/config", "core/index", "core/base"],
-    "server/host": ["server/scheduling", "server/observability", "server/config", "core/*"],
+    "server/observability": ["server/connections", "server/security", "server/config", "core/index", "core/base"],
     "server/convert": ["core/*", "proto"],
-    "server/rpc": ["server/host", "server/convert", "server/scheduling", "server/observability", "server/config", "core/*",
-                   "proto"],
-    "server/services": ["server/rpc", "server/host", "server/convert", "server/scheduling", "server/storage",
-                        "server/security", "server/observability", "server/config", "core/*", "proto"],
-    "client/lib": ["proto", "core/base/status_macros.h"],  # only this file, in sources: it is not installed
-    "client/cli": ["client/lib", "core/base"],
+    "server/rpc": ["server/convert", "server/connections", "server/security", "server/scheduling", "server/observability",
+                   "server/config", "core/base", "proto"],
+    "server/host": ["server/rpc", "server/connections", "server/scheduling", "server/observability", "server/config",
+                    "core/*"],
+    "server/services": ["server/rpc", "server/host", "server/connections", "server/convert", "server/scheduling",
+                        "server/storage", "server/security", "server/observability", "server/config", "core/*", "proto"],
+    # Of core, only status_macros.h, and only in sources, because it is not installed.
+    "client/lib": ["proto", "core/base/status_macros.h"],
+    "client/cli": ["client/cli/security", "client/lib", "core/base"],
+    "client/cli/security": ["client/lib", "core/base"],
     "client/cli/commands": ["client/cli/*", "client/lib", "core/geometry", "core/base"],
     "client/cli/rows": ["client/cli", "client/cli/rows/bulk", "client/lib", "core/base"],
     "client/cli/rows/bulk": ["core/base"],
@@ -52,7 +56,7 @@ ALLOWED = {
                                  "core/base"],
     "client/cli/extras/demo": ["client/cli", "client/cli/levels/*", "client/lib", "core/geometry", "core/base"],
     "client/cli/extras/completion": ["client/cli"],
-    "client/cli/extras/top": ["client/cli"],
+    "client/cli/extras/top": ["client/cli", "client/lib", "core/base"],
     "client/cli/extras/render": ["client/cli", "client/lib", "core/geometry", "core/base"],
     "client/cli/backup": ["client/cli", "client/lib", "core/base"],
     "client/cli/script": ["client/cli", "client/cli/rows", "core/base"],
@@ -64,33 +68,37 @@ ALLOWED["core/index/hash_grid/kernels"] = ["core/base"]
 ALLOWED.update({"core/index/" + name: ["core/index", "core/geometry", "core/base"] for name in INDEX_STRUCTURES})
 ALLOWED["core/index/hash_grid"].append("core/index/hash_grid/kernels")
 
-# Third-party headers by prefix, and the folders (with those below) that may include them. Tests may include all.
+# Prefixes of third-party headers, and the folders whose files, and those in folders below, may include such headers.
+# Tests may include all headers.
 THIRD_PARTY = {
     "grpc": ["server/rpc", "server/services", "server/convert", "server/observability", "client/lib"],
     "google/protobuf/": ["server/rpc", "server/services", "server/convert", "client/lib"],
     "spdlog/": ["server/observability"],
+    "zlib.h": ["server/rpc"],
     "prometheus/": ["server/observability"],
-    "civetweb.h": ["server/observability"],
     "rocksdb/": ["server/storage"],
     "xxhash.h": ["server/storage"],
     "curl/": ["client/cli/extras/top"],
     "CLI/": ["server/config", "client/cli", "deploy/manual"],
-    "nlohmann/": ["server/config", "client/cli"],
+    "nlohmann/": ["server/config", "server/rpc", "client/cli"],
     "assimp/": ["client/cli/levels/import"],
     "zip.h": ["client/cli/levels/import"],
-    "openssl/": ["server/services", "server/security", "client/lib", "client/cli/extras/render"],
+    "seccomp.h": ["client/cli/levels/import"],
+    "openssl/": ["server/services", "server/security", "server/observability", "client/lib", "client/cli/security"],
+    "rhonabwy.h": ["server/security"],
+    "jansson.h": ["server/security"],
     "png.h": ["client/cli/extras/render"],
     "embree3/": ["tests/bench"],
     "btBulletCollisionCommon.h": ["tests/bench"],
     "BulletCollision/": ["tests/bench"],
-    "boost/": ["tests/bench"],
+    "boost/": ["server/observability", "tests/bench"],
     "CGAL/": ["tests/bench"],
     "nanoflann.hpp": ["tests/bench"],
 }
 FORBIDDEN_IN_CORE = {"iostream", "fstream", "filesystem"}
 INTRINSICS = "immintrin.h"
 KERNELS = ("core/index/bvh/kernels/", "core/index/hash_grid/kernels/")
-# madvise() for large pages: it changes no value.
+# This file may call madvise(), for large pages, because madvise() changes no value.
 MEMORY_ADVICE = {"core/base/large_array.h": "sys/mman.h"}
 CLOCK_FILES = re.compile(r"core/base/mutex\.h|core/scene/(?:scene|readers/reader_tracker)\.(h|cc)")
 

@@ -2,13 +2,13 @@
 import posixpath
 import re
 
-# A comment that begins so has no verb and leaves the reader to guess what it is about.
+# Beginnings of comments without a verb, which leave the reader to guess what the comment is about.
 FRAGMENT = re.compile(r"(Of|What|Whether|The same|As|Nothing|Who|Whose|Whoever|Where|Nobody|None)\b")
 COMMENT = re.compile(r"[ \t]*// ?(.*)")
 
 
 def first_lines_of_comments(text):
-    """(line number, text) of the first line of each run of lines that are comments and nothing else."""
+    """Returns (line number, text) of the first line of each run of lines that are comments and nothing else."""
     found, inside = [], False
     for number, line in enumerate(text.split("\n"), 1):
         comment = COMMENT.fullmatch(line)
@@ -31,7 +31,7 @@ def limits_are_named_max_and_min(tree):
             for number, line in enumerate(tree.files[path].split("\n"), 1) for match in OLD_LIMIT.finditer(line)]
 
 
-# Written in pieces, so that this file does not contain what it forbids.
+# Written in pieces, so that this file does not contain the words that it forbids.
 BANNED = re.compile(r"\b(who" + r"ever|tells " + r"who|the ho" + r"use)\b", re.IGNORECASE)
 
 
@@ -61,7 +61,7 @@ LINK = re.compile(r"\]\(([^)#\s]+)(?:#[^)]*)?\)")
 
 
 def links_lead_somewhere(tree):
-    """Links in pages to files of the project exist."""
+    """Checks that links in pages to files of the project lead to existing files."""
     folders = {posixpath.dirname(path) for path in tree.files}
     problems = []
     for path, text in sorted(tree.files.items()):

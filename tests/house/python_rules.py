@@ -1,4 +1,4 @@
-"""Rules of Python files: every file has a docstring; the product's are also documented and typed."""
+"""Rules of Python files: every file has a docstring; public names of the product are also documented and typed."""
 import ast
 
 MAX_FUNCTION_LINES = 80
@@ -71,7 +71,7 @@ def python_names_are_documented(tree):
 
 
 def python_tests_mirror_the_sources(tree):
-    """Checks that each test has the path of a module, with its name."""
+    """Checks that the path and name of each test mirror those of a module."""
     return [f"{path}: there is no source of that name to test" for path, _ in python_files(tree, TESTS)
             if path.endswith("_test.py") and PRODUCT + path[len(TESTS):-len("_test.py")] + ".py" not in tree.files]
 

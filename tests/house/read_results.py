@@ -1,7 +1,8 @@
-"""Prints one line a test of a JUnit file written by ctest: its outcome (passed, failed, skipped) and its name.
+"""Prints one line for each test of a JUnit file written by ctest: its outcome (passed, failed, skipped) and its name.
 
-ctest files a test whose program is missing, or whose fixture failed, under "not run", like one that skipped itself. Here
-only the second kind is a skip. What Python's unittest skipped within a test that passed gets a line, too.
+ctest reports a test as "not run" if its program is missing, if its fixture failed, or if it skipped itself; only the
+last is a skip here. A test that Python's unittest skipped within a passing test gets its own line, and so does each
+attack that a passing group skipped.
 """
 import re
 import sys
@@ -21,10 +22,16 @@ def skipped_within(case):
     return re.findall(r"^(\w+) \(.*\) \.\.\. skipped ", case.findtext("system-out") or "", re.MULTILINE)
 
 
+def left_out(case):
+    return re.findall(r"^skipped: ([\w-]+): not survived yet", case.findtext("system-out") or "", re.MULTILINE)
+
+
 def main(path):
     for case in ElementTree.parse(path).getroot().iter("testcase"):
         print(outcome(case), case.get("name"))
         for name in skipped_within(case):
+            print("skipped", case.get("name") + "." + name)
+        for name in left_out(case):
             print("skipped", case.get("name") + "." + name)
 
 

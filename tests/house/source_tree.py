@@ -1,6 +1,6 @@
 """The project's files for the repository rules: a map from path to text, and helpers that parse C++ files.
 
-Rules take a Tree, so that each of them is also run over small examples that never were on a disk.
+Rules take a Tree, so that tests can run them on small examples that exist only in memory.
 """
 import os
 import re
@@ -18,11 +18,11 @@ class Tree:
         self.sizes = dict(sizes or {})
 
     def size(self, path):
-        """Returns the bytes on the disk; for an example, those of its text."""
+        """Returns the bytes of a file on the disk; for a file of an example, the bytes of its text."""
         return self.sizes.get(path, len(self.files[path].encode()))
 
     def code(self, *rooms):
-        """Returns the paths of headers and sources: all, or those below one of the given folders."""
+        """Returns the paths of all headers and sources; if folders are given, only of files below one of them."""
         return [path for path in sorted(self.files)
                 if path.endswith(CODE_ENDINGS) and (not rooms or path.startswith(tuple(room + "/" for room in rooms)))]
 
@@ -83,7 +83,7 @@ def without_comments(text):
 
 
 def without_comments_and_literals(text):
-    """Replaces also string and character literals by blanks, so that every remaining brace is code."""
+    """Replaces comments and literals of strings and characters by blanks, so that every remaining brace is code."""
     return COMMENT_OR_LITERAL.sub(lambda m: blank(m.group()), text)
 
 
@@ -93,7 +93,7 @@ ACCESS = re.compile(r"^(\s*(public|private|protected)\s*:)+")
 
 
 def after_template(declaration):
-    """Returns the declaration without leading template<...>, whose `class` does not tell its kind."""
+    """Returns the declaration without leading template<...>, whose word `class` would be mistaken."""
     declaration = ACCESS.sub("", declaration).strip()
     while re.match(r"template\s*<", declaration):
         position, depth = declaration.index("<"), 0
@@ -120,8 +120,8 @@ def kind_of_brace(declaration):
 def functions(text):
     """Returns (first line, number of lines) of each function with a body; a lambda counts in its function.
 
-    A reading of formatted code by its braces, not a parser: a brace that touches the word before it is a value, like the
-    initialiser of a member.
+    Finds functions by the braces of formatted code, without a parser: a brace directly after a word begins a value, such
+    as the initialiser of a member.
     """
     code = PREPROCESSOR.sub(lambda m: blank(m.group()), without_comments_and_literals(text))
     found, open_braces, start, line = [], [], 0, 1

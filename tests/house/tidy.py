@@ -1,7 +1,7 @@
 """Runs clang-tidy over the product's sources as a build folder compiles them: tidy.py BUILD [--jobs N] [--part PATH_PART].
 
 Prints a line for each file, and its findings; exits 1 if there is one. Leaves out the targets with planted bugs, which
-compile the same files. First checks a bad example, which reveals a configuration that finds nothing.
+compile the same files. First checks a bad example, to detect a configuration that finds nothing.
 """
 import argparse
 import concurrent.futures

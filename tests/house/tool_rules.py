@@ -4,7 +4,7 @@ import shutil
 import subprocess
 
 FORMATTED_ENDINGS = (".h", ".cc")
-PURE_LIBRARIES = ("core/liblocus_core.a", "server/liblocus_server_core.a")
+PURE_LIBRARIES = ("core/liblocus_core.a", "server/liblocus_server_core.a", "server/liblocus_security.a")
 FILES_A_CALL = 50
 
 

@@ -1,5 +1,5 @@
-// No ray leaves a closed mesh: tens of thousands of rays aimed at corners and edges in each run, and a million for each
-// scale and distance in the long run.
+// No ray leaves a closed mesh: tens of thousands of rays from inside are aimed at corners and edges in each run, and a
+// million rays for each scale and distance in the long run.
 #include "tests/support/proof/leak_proof.h"
 
 #include <gtest/gtest.h>
@@ -40,8 +40,8 @@ TEST(LeakProofTest, NoRayLeavesAClosedMesh) { expect_no_leak(0, scaled_count(8'0
 
 TEST(LongLeakProofTest, NoRayLeavesAClosedMesh) { expect_no_leak(1, 1'000'000); }
 
-// Preconditions of the proof: each edge belongs to two triangles, once in each direction, and no triangle meets the
-// ball from which rays start.
+// Verifies the preconditions of the proof: each edge belongs to two triangles, once in each direction, and the middle
+// of each edge is outside the ball in which rays start.
 TEST(LeakProofTest, ItsMeshesAreClosedAroundTheirInside) {
   for (const ClosedMesh& mesh :
        {icosphere(3, 0.1, 0, kSeed), icosphere(3, 0.02, 0x1p-12, kSeed), small_blob(5'000, kSeed)}) {
@@ -59,7 +59,7 @@ TEST(LeakProofTest, ItsMeshesAreClosedAroundTheirInside) {
   }
 }
 
-// Rays leave a mesh without one triangle, and the proof reports them.
+// Verifies that the proof reports rays that leave a mesh from which five triangles were removed.
 TEST(LeakProofTest, AHoleIsFound) {
   ClosedMesh sphere = icosphere(3, 0.01, 0, kSeed);
   sphere.triangles.resize(sphere.triangles.size() - 5);

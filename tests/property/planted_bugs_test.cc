@@ -1,6 +1,7 @@
-// Proves that the suite catches known bugs (mutation testing): each bug is enabled in turn in a library built for that,
-// and the comparisons that find no difference in the random tests must find one. A new bug needs a name in
-// core/base/planted_bug.h, code that checks planted(), and a row below.
+// Proves that the suite catches known bugs (mutation testing): each planted bug is enabled in turn, in a library that
+// is built with the bugs. The comparison in the bug's row, which finds no difference in the random tests without the
+// bug, must find one. A new bug needs a name in core/base/planted_bug.h, code that checks planted(), and a row in the
+// table of this file.
 #include <gtest/gtest.h>
 
 #include "core/base/planted_bug.h"
@@ -19,7 +20,7 @@
 namespace locus::test {
 namespace {
 
-// Returns the first difference, or an empty string.
+// Function that returns the first difference; an empty string if there is none.
 using Comparison = std::string (*)();
 
 std::string compare_trees_with_list() { return search_all_scenes<Triangle>(200, 200, tree_difference<Triangle>); }
@@ -61,7 +62,7 @@ std::string compare_conservative_answers_with_bounds() { return search_placed_sc
 std::string compare_conservative_overlaps_with_exact() { return search_placed_scenes(touching_scene, superset_fault); }
 
 #ifdef LOCUS_X86_KERNELS
-// One instruction set stands for all of them: they are compiled from one source.
+// Tests only one instruction set, because the kernels of all instruction sets are compiled from one source.
 std::string compare_kernels_with_list() {
   static const std::vector<KernelTrial>* const kTrials = new std::vector<KernelTrial>(all_kernel_trials());
   for (const KernelTrial& trial : *kTrials)

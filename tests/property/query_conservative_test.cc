@@ -1,5 +1,6 @@
-// CONSERVATIVE finds everything that EXACT finds, at the same distance or nearer. For instances, every other row is
-// explained by the bounds of a placed triangle, also far from the world's origin.
+// A query of precision CONSERVATIVE finds everything that the same query of precision EXACT finds, at the same distance
+// or nearer. If it finds further triangles of instances, it meets the bounds of each of them in world axes, also far
+// from the origin.
 #include <gtest/gtest.h>
 
 #include "tests/support/conservative_answers.h"
@@ -9,7 +10,7 @@
 namespace locus::test {
 namespace {
 
-// Draws `count` scenes, one for each seed, and expects CONSERVATIVE to find all that EXACT finds in each of them.
+// Generates `count` scenes, one for each seed, and expects that CONSERVATIVE finds all that EXACT finds in each scene.
 template <class Draw>
 void expect_supersets(uint64_t count, const Draw& draw) {
   for (uint64_t seed = 0; seed < scaled_count(count); ++seed) {
@@ -19,7 +20,7 @@ void expect_supersets(uint64_t count, const Draw& draw) {
   }
 }
 
-// Returns a function that draws scenes by `draw`, whatever the seed.
+// Returns a function that ignores its seed and calls `draw`.
 auto drawn_by(QueryScene (*draw)(Random&)) {
   return [draw](Random& random, uint64_t) { return draw(random); };
 }

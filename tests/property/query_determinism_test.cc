@@ -35,7 +35,7 @@ ParallelFor scrambled(size_t threads, uint64_t seed) {
   };
 }
 
-// Returns the blocks with every query repeated `times` times, so that they are several chunks long.
+// Returns the blocks with every query repeated `times` times, so that each block is several chunks long.
 std::vector<OwnedBlock> lengthened(const std::vector<OwnedBlock>& blocks, size_t times) {
   std::vector<OwnedBlock> result = blocks;
   for (OwnedBlock& block : result) {
@@ -160,7 +160,8 @@ TEST(QueryDeterminismTest, ADistantFrameGivesTheHitsOfTheSceneAtTheOrigin) {
       BatchResult result = answer(*snapshot_of(far.world), far.blocks, {});
       for (size_t b = 0; b < result.blocks.size(); ++b) {
         result.blocks[b].positions = near.blocks[b].positions;
-        // Distances are never less than those to bounds, which grow with the magnitude of coordinates.
+        // The results of nearest queries are not compared. Their distances may differ, because the distance to a value
+        // is at least the distance to its bounds, and bounds are wider at large coordinates.
         if (std::holds_alternative<NearestColumns>(far.blocks[b].settings.kind)) result.blocks[b] = near.blocks[b];
       }
       ASSERT_EQ(difference(result, near), "") << "shift " << shift << ", seed " << seed;

@@ -1,5 +1,5 @@
-// Every column of every result equals, bit for bit, the column computed by a plain loop over all triangles and objects,
-// and the column of the brute-force mode.
+// Every column of every result equals, bit for bit, the column that a plain loop over all triangles and objects
+// computes, and the column that a query returns if RunOptions::brute_force is set.
 #include <gtest/gtest.h>
 
 #include "tests/support/placed_scenes.h"
@@ -10,7 +10,7 @@
 namespace locus::test {
 namespace {
 
-// Returns the first difference, or an empty string.
+// Returns the first difference; an empty string if there is none.
 std::string oracle_difference(const QueryScene& scene, const SceneSnapshot& snapshot) {
   const QueryBatch batch = batch_of(scene.blocks);
   if (const absl::Status status = check_batch(batch); !status.ok()) return status.ToString();

@@ -1,6 +1,6 @@
-// No misses, as the product defines them: if a reference in long double hits a triangle that it still hits when the
-// triangle is shrunk by e = 2^-20 (|origin in mesh axes| + mesh extent), the query reports a hit no later than that
-// plus e / |direction|, both in mesh axes.
+// Tests that queries miss no hit. Definition of a miss: let e be 2^-20 (|origin in mesh axes| + mesh extent). If a
+// reference in long double hits a triangle at t, and the hit is at least e inside the triangle's edges, the query must
+// report a hit at no more than t + e / |direction|. e and |direction| are lengths in mesh axes.
 #include <gtest/gtest.h>
 
 #include <optional>
@@ -40,8 +40,8 @@ struct MissCount {
   uint64_t misses = 0;
 };
 
-// Counts hits of the reference and misses of the query for the rays of `block`; `triangles` are those of the only
-// instance.
+// Counts hits of the reference and misses of the query for the rays of `block`; `triangles` are the triangles of the
+// scene's only instance.
 MissCount count_misses(const SceneSnapshot& snapshot, const OwnedBlock& block, const std::vector<Triangle>& triangles) {
   const Instance& instance = snapshot.statics->tree().values()[0];
   const Transform& transform = instance.transform;

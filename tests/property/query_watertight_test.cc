@@ -1,5 +1,5 @@
-// Every ray from inside a closed mesh hits, through the complete query path: for placed, rotated, scaled and distant
-// instances, for meshes in two halves, and for modes FIRST and ANY.
+// Every ray from inside a closed mesh hits the mesh, if it runs as a query of a batch: for placed, rotated, scaled and
+// distant instances, for meshes in two halves, and for modes FIRST and ANY.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -72,7 +72,8 @@ TEST(QueryWatertightTest, NoRayLeaksFromAPlacedMesh) {
   }
 }
 
-// Odd and even triangles belong to different instances, so edges between them are edges between instances.
+// The odd triangles belong to one instance and the even triangles to another, so edges of the mesh are edges between
+// instances.
 TEST(QueryWatertightTest, NoRayLeaksBetweenInstancesOfEqualTransform) {
   for (uint64_t seed = 0; seed < scaled_count(6); ++seed) {
     const std::vector<Triangle> sphere = bumpy_sphere(16, 0.1, seed);
@@ -94,7 +95,7 @@ TEST(QueryWatertightTest, NoRayLeaksBetweenInstancesOfEqualTransform) {
   }
 }
 
-// Vertices lie far from the mesh's own origin, and the translation cancels that offset.
+// The vertices are far from the origin of the mesh axes, and the instance's translation cancels that offset.
 TEST(QueryWatertightTest, NoRayLeaksFromAMeshFarFromItsOwnOrigin) {
   constexpr uint64_t kSeed = 71;
   for (const double offset : {1e3, 1e5}) {

@@ -1,5 +1,5 @@
-// Tests of the checker of the ray proof: its tree is compared with the plain list of triangles, and it must report
-// answers that were corrupted on purpose.
+// Tests of the checker of the ray proof: the tree of the checker is compared with a plain list of triangles, and the
+// checker must report answers that were corrupted on purpose.
 #include <gtest/gtest.h>
 
 #include "tests/support/proof/ray_proof.h"
@@ -59,7 +59,7 @@ class CorruptedAnswersTest : public ::testing::Test {
   CorruptedAnswersTest() : scene_(proof_scenes(12)[6]), random_(12), block_(proof_rays(scene_, 4'000, random_)) {
     answer_ = run_block(*scene_.snapshot, block_);
   }
-  // Corrupts every hit.
+  // Calls `corrupt` with a copy of the answers and the index of each hit, and returns the checker's tally of the copy.
   template <class Corrupt>
   RayTally check_corrupted(Corrupt corrupt) {
     BlockResult corrupted = answer_;
@@ -92,7 +92,7 @@ TEST_F(CorruptedAnswersTest, ALostHitIsAMiss) {
 
 TEST_F(CorruptedAnswersTest, AHitInFrontOfItsTriangleIsFalseAndAHitBehindItIsAMiss) {
   const auto move = [](float factor) { return [factor](BlockResult& result, size_t i) { result.t[i] *= factor; }; };
-  // Hits at 0 stay at 0.
+  // Fewer than all hits are false, since multiplication does not change a hit at t = 0.
   EXPECT_GT(check_corrupted(move(0.99f)).false_hits, most_hits() * 8 / 10);
   EXPECT_GT(check_corrupted(move(1.01f)).misses, most_hits() / 2);
 }
@@ -108,7 +108,7 @@ TEST_F(CorruptedAnswersTest, AHitBeyondTheLimitIsFalse) {
   EXPECT_GT(check_corrupted([](BlockResult&, size_t) {}).false_hits, most_hits() * 8 / 10);
 }
 
-// The checker culls one side of the triangles, but the answers were computed without culling.
+// The answers are computed without culling, but the checker expects answers in which front sides are culled.
 TEST_F(CorruptedAnswersTest, AHitOfTheCulledSideIsFalse) {
   rays_of(block_).cull = Cull::kNone;
   block_.extras.assign(block_.extras.size(), std::numeric_limits<float>::infinity());
@@ -122,7 +122,7 @@ TEST_F(CorruptedAnswersTest, AHitMissingFromAllIsAMiss) {
   BlockResult all = run_block(*scene_.snapshot, block_);
   EXPECT_TRUE(judge_all_hits(scene_, block_, all).clean());
   EXPECT_GT(all.t.size(), all.counts.size());
-  // The last row of each ray now names the first one's triangle.
+  // Copies the first row of each ray to its last row, so that the triangle of the last row is missing.
   uint64_t corrupted = 0;
   for (size_t i = 0, row = 0; i < all.counts.size(); row += all.counts[i++]) {
     if (all.counts[i] < 2) continue;

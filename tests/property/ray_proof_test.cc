@@ -1,6 +1,6 @@
-// No misses and no false hits: query results are compared with a reference in long double, on a million rays in each
-// run and on a hundred million in the long run. LOCUS_PROOF_RAYS and LOCUS_PROOF_SEED change the number and the seed of
-// the long run.
+// No misses and no false hits: query results are compared with a reference in long double, for a million rays in each
+// run and for a hundred million rays in the long run. LOCUS_PROOF_RAYS and LOCUS_PROOF_SEED set the number of rays and
+// the seed of the long run.
 #include "tests/support/proof/ray_proof.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// Queries about the history of scenes with random updates, compared with a model that keeps every tick completely.
+// Queries about the history of scenes with random updates, compared with a model that stores all objects at every tick.
 #include <gtest/gtest.h>
 
 #include "tests/support/rewind_lockstep.h"

@@ -1,4 +1,5 @@
-// Thousands of random batches applied to scenes and to a model that applies one item after another to a std::map.
+// Thousands of random batches, applied to scenes and to a model, a std::map to which one item after another is applied:
+// both must have equal contents.
 #include <gtest/gtest.h>
 
 #include "tests/support/scene_lockstep.h"

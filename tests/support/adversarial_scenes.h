@@ -1,5 +1,5 @@
-// Families of scenes that are known to break spatial indexes, and ordinary random ones. Each function draws one scene
-// from a generator; equal generator states give equal scenes.
+// Families of scenes that are known to break spatial indexes, and a family of ordinary random scenes. Each function
+// generates one scene at random; equal states of the random generator result in equal scenes.
 #ifndef LOCUS_TESTS_SUPPORT_ADVERSARIAL_SCENES_H_
 #define LOCUS_TESTS_SUPPORT_ADVERSARIAL_SCENES_H_
 
@@ -10,7 +10,7 @@
 
 namespace locus::test {
 
-// Draws one of the 26 directions along axes and diagonals.
+// Returns a random one of the 26 directions along axes and diagonals.
 inline Vec3d lattice_direction(Random& random) {
   Vec3d direction;
   while (direction == Vec3d{}) direction = random.whole_vector(1);
@@ -26,7 +26,7 @@ inline std::array<Vec3d, 26> lattice_directions() {
   return directions;
 }
 
-// Draws a corner, the middle of an edge or of a face, or the centre.
+// Returns a random notable point of the placement's box: a corner, the middle of an edge or of a face, or the centre.
 inline Vec3d notable_point(const Placement& placement, Random& random) {
   const Vec3d sides = random.whole_vector(1);
   const Vec3d local = {sides.x * placement.half.x, sides.y * placement.half.y, sides.z * placement.half.z};
@@ -44,8 +44,8 @@ inline Obbd random_box(Vec3d center, double size, Random& random) {
   return box;
 }
 
-// Adds `count` queries of each kind around the placements, with sizes up to `size`: aimed at notable points or at
-// random.
+// Adds `count` rays, balls and boxes near the placements. The balls and boxes have sizes up to `size`. Most rays are
+// aimed at notable points, the other rays have random directions.
 inline void add_queries(SceneSketch& sketch, int count, double size, Random& random) {
   for (int i = 0; i < count; ++i) {
     const Vec3d target = notable_point(sketch, random);
@@ -70,8 +70,9 @@ inline SceneSketch random_scene(Random& random) {
   return sketch;
 }
 
-// Draws walls on the planes of a lattice, rays from its points and half points in all 26 directions, and balls and
-// boxes that just touch. `step` is the spacing of the lattice, `corner` its origin.
+// Generates walls on the planes of a lattice, and rays in all 26 directions from the lattice's points and from points
+// half-way between them. The balls and boxes just touch the walls. `step` is the spacing of the lattice, `corner` its
+// origin.
 inline SceneSketch lattice_scene(std::string family, double step, Vec3d corner, Random& random) {
   SceneSketch sketch{std::move(family), {}, {}, {}, {}};
   const auto point = [&](int parts) { return corner + random.whole_vector(2 * parts) * (step / parts); };
@@ -107,7 +108,7 @@ inline SceneSketch far_lattice(Random& random) {
   return lattice_scene("far lattice", random.chance(0.5) ? 1 : 64, {offset, -offset / 2, offset / 8}, random);
 }
 
-// Draws rays that graze triangles: exactly at corners and edges, and along edges.
+// Generates rays that graze boxes exactly at corners and edges, or run along edges.
 inline SceneSketch edges_and_corners(Random& random) {
   SceneSketch sketch{"edges and corners", {}, {}, {}, {}};
   for (int i = 0; i < 24; ++i) {
@@ -129,7 +130,7 @@ inline SceneSketch edges_and_corners(Random& random) {
   return sketch;
 }
 
-// Draws rays that start exactly on surfaces, edges and corners, or inside solids.
+// Generates rays that start exactly on surfaces, edges and corners, or inside solids.
 inline SceneSketch on_and_inside_solids(Random& random) {
   SceneSketch sketch{"on and inside solids", {}, {}, {}, {}};
   for (int i = 0; i < 20; ++i) {
@@ -143,7 +144,7 @@ inline SceneSketch on_and_inside_solids(Random& random) {
   return sketch;
 }
 
-// Draws the same few values many times, with different ids.
+// Generates many copies of a few placements. The copies become values with different ids.
 inline SceneSketch coincident(Random& random) {
   SceneSketch sketch{"coincident", {}, {}, {}, {}};
   for (uint64_t i = random.below(3) + 1; i > 0; --i) {
@@ -158,7 +159,7 @@ inline SceneSketch coincident(Random& random) {
   return sketch;
 }
 
-// Draws points, lines, and slivers a million times longer than wide.
+// Generates points, lines, and slivers millions of times longer than wide.
 inline SceneSketch degenerate_and_slivers(Random& random) {
   SceneSketch sketch{"degenerate and slivers", {}, {}, {}, {}};
   for (int i = 0; i < 32; ++i) {
@@ -176,7 +177,7 @@ inline SceneSketch degenerate_and_slivers(Random& random) {
   return sketch;
 }
 
-// Draws values of a centimetre beside values of ten kilometres.
+// Generates placements of about a centimetre beside placements of about ten kilometres.
 inline SceneSketch tiny_beside_huge(Random& random) {
   SceneSketch sketch{"1 cm beside 10 km", {}, {}, {}, {}};
   for (int i = 0; i < 32; ++i) {
@@ -198,7 +199,7 @@ inline SceneSketch all_in_one_cell(Random& random) {
   return sketch;
 }
 
-// Draws an ordinary scene far from the origin, where neighbouring floats are far apart.
+// Generates an ordinary scene far from the origin, where neighbouring floats are far apart.
 inline SceneSketch far_out(Random& random) {
   SceneSketch sketch = random_scene(random);
   sketch.family = "far out";
@@ -220,7 +221,7 @@ inline SceneSketch long_and_short_directions(Random& random) {
   return sketch;
 }
 
-// Draws values at distances that double, so that any split leaves nearly all on one side.
+// Generates placements at distances that double, so that any split leaves nearly all of them on one side.
 inline SceneSketch doubling_distances(Random& random) {
   SceneSketch sketch{"doubling distances", {}, {}, {}, {}};
   const Vec3d direction = random.chance(0.5) ? lattice_direction(random) : random.unit_vector();
@@ -242,7 +243,7 @@ inline constexpr SceneFamily kAdversarialFamilies[] = {
     degenerate_and_slivers, doubling_distances,   long_and_short_directions,
 };
 
-// Draws scene `seed`: the families alternate.
+// Generates the scene of `seed`; successive seeds select the families in turn.
 inline SceneSketch adversarial_scene(uint64_t seed, Random& random) {
   return kAdversarialFamilies[seed % std::size(kAdversarialFamilies)](random);
 }

@@ -10,7 +10,8 @@
 
 namespace locus::test {
 
-// Returns whether the segment has a point in the box grown by `grown`, which may be negative.
+// Returns whether the segment has a point in the box around the origin with half extents `half` + `grown`; `grown` may
+// be negative.
 inline bool clipped_segment_remains(Vec3r from, Vec3r to, Vec3r half, Real grown) {
   Real low = 0, high = 1;
   for (int axis = 0; axis < 3; ++axis) {
@@ -27,8 +28,8 @@ inline bool clipped_segment_remains(Vec3r from, Vec3r to, Vec3r half, Real grown
   return low <= high;
 }
 
-// Returns whether any part of the polygon lies within the grown box. Source: Sutherland and Hodgman, Reentrant Polygon
-// Clipping, 1974.
+// Returns whether any part of the polygon lies within the box around the origin with half extents `half` + `grown`.
+// Source: Sutherland and Hodgman, Reentrant Polygon Clipping, 1974.
 inline bool clipped_polygon_remains(std::vector<Vec3r> polygon, Vec3r half, Real grown) {
   for (int side = 0; side < 6; ++side) {
     const int axis = side / 2;
@@ -88,7 +89,8 @@ inline bool any_edge_meets(const RealBox& edges, const RealBox& solid, Real grow
   return false;
 }
 
-// Returns whether two boxes share a point: they do if and only if an edge of one meets the other.
+// Returns whether two boxes share a point: they do if and only if an edge of one box meets the other box. `grown` is
+// added to the half extents of the box that the edge meets.
 inline bool boxes_share_a_point(const RealBox& a, const RealBox& b, Real grown) {
   return any_edge_meets(a, b, grown) || any_edge_meets(b, a, grown);
 }

@@ -1,5 +1,5 @@
-// Paths of the programs of this build, which lie beside the tests. No path is compiled in, so that the compiler cache
-// serves every checkout.
+// Paths of the programs of this build, which are in the folder of the running test. No path is compiled in, so that the
+// compiler cache serves every checkout.
 #ifndef LOCUS_TESTS_SUPPORT_BUILT_PROGRAM_H_
 #define LOCUS_TESTS_SUPPORT_BUILT_PROGRAM_H_
 

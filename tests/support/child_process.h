@@ -1,4 +1,4 @@
-// A program in a process of its own, which ends with the test.
+// A program that runs in a process of its own. The destructor kills the process.
 #ifndef LOCUS_TESTS_SUPPORT_CHILD_PROCESS_H_
 #define LOCUS_TESTS_SUPPORT_CHILD_PROCESS_H_
 
@@ -46,8 +46,8 @@ class ChildProcess {
   }
 
  private:
-  // Runs between fork() and exec(), so it neither allocates nor locks. The kernel ends the program if the test is
-  // killed.
+  // Replaces the forked process by the program. Neither allocates nor locks, since only async-signal-safe calls are
+  // allowed between fork() and exec(). The kernel kills the program if the test is killed.
   [[noreturn]] static void become(const std::vector<char*>& argv, const std::string& log) {
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     const int file = open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);

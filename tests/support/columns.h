@@ -1,5 +1,5 @@
-// Memory for the columns that batches borrow, so that a test can write a batch as literals. Spans are valid as long as
-// the Columns that returned them.
+// Memory for the columns that batches borrow, so that a test can write a batch as literals. A span is valid as long as
+// the Columns object that returned it.
 #ifndef LOCUS_TESTS_SUPPORT_COLUMNS_H_
 #define LOCUS_TESTS_SUPPORT_COLUMNS_H_
 

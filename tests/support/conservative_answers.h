@@ -1,5 +1,5 @@
-// Verification of conservative answers: compared with exact ones, which they must contain, and with bounds of placed
-// triangles in long double, which share no arithmetic with the product.
+// Verification of conservative answers. A conservative answer is compared with the exact answer, which it must contain,
+// and with bounds of placed triangles that are computed in long double without the arithmetic of the product.
 #ifndef LOCUS_TESTS_SUPPORT_CONSERVATIVE_ANSWERS_H_
 #define LOCUS_TESTS_SUPPORT_CONSERVATIVE_ANSWERS_H_
 
@@ -20,13 +20,14 @@ namespace internal {
 
 struct FoundRow {
   float t = 0;
-  Vec3f point;  // of the nearest point, relative to the frame
+  Vec3f point;  // nearest point of the triangle, relative to the frame; nearest queries only
 };
 using Found = std::map<std::pair<Id, uint32_t>, FoundRow>;  // key: id and triangle
 
 inline bool is_lookup(const OwnedBlock& block) { return std::holds_alternative<LookupColumns>(block.settings.kind); }
 
-// Returns every found triangle, whatever number of rows the block asks for.
+// Returns the rows of each query at `precision`, with detail kTriangles for nearest queries and mode kAll for rays.
+// Raises the maximum number of results, so that no answer is truncated.
 inline std::vector<Found> found_by(const SceneSnapshot& snapshot, OwnedBlock block, Precision precision) {
   block.settings.precision = precision;
   block.settings.max_results = limits::kMaxMaxResults;
@@ -89,7 +90,8 @@ class RealQuery {
     if (std::holds_alternative<BoxColumns>(block.settings.kind)) half_ = half_bounds(block, i);
   }
 
-  // Returns the distance to the box, or the t along the ray; nothing if the query does not meet the box.
+  // Returns nullopt if the query does not meet the box. Otherwise returns the t at which a ray enters the box, the
+  // distance of a point from the box, or 0 for a ball or box.
   std::optional<Real> meets(const BoxReal& box) const {
     if (direction_) return entered(box);
     const Vec3r gap = max(max(box.min - at_, at_ - box.max), Vec3r{});
@@ -99,7 +101,7 @@ class RealQuery {
     return length(gap);
   }
   bool is_point() const { return !direction_ && !half_ && !radius_; }
-  // Returns the largest coordinate involved.
+  // Returns the largest |coordinate| of the query's origin or centre plus the largest size of its ball or box.
   Real magnitude() const {
     const Real size = half_ ? max_component(*half_) : radius_.value_or(0);
     return max_component(abs(at_)) + size;
@@ -143,7 +145,8 @@ class RealQuery {
   std::optional<Real> radius_;
 };
 
-// Describes the first error in the answer of one query about one triangle; empty if it is right.
+// Returns a description of the error in the conservative answer of one query about one triangle; empty if there is
+// none.
 inline std::string triangle_fault(const RealQuery& query, const PlacedMesh& placed, uint32_t number, const Found& exact,
                                   const Found& conservative) {
   const std::pair<Id, uint32_t> key{placed.id, number};
@@ -164,7 +167,7 @@ inline std::string triangle_fault(const RealQuery& query, const PlacedMesh& plac
   return "";
 }
 
-// Describes a point that is not at the reported distance; empty if it is.
+// Returns a description of the error if the point of the row is not at the row's distance; otherwise an empty string.
 inline std::string point_fault(const OwnedBlock& block, size_t i, const FoundRow& row) {
   const Vec3r from = {block.points[3 * i], block.points[3 * i + 1], block.points[3 * i + 2]};
   const Real away = length(to_real(row.point) - from);
@@ -203,16 +206,19 @@ std::string conservative_fault(const QueryScene& scene, const Fault& fault) {
 
 }  // namespace internal
 
-// Describes the first exact row that the conservative rows lack, or have at a greater t; empty if there is none.
+// Returns a description of the first row of the exact answers that the conservative answers do not contain or contain
+// with a greater t; empty if there is no such row.
 inline std::string superset_fault(const QueryScene& scene) {
   return internal::conservative_fault(
       scene, [](const OwnedBlock& /*block*/, size_t /*query*/, const internal::Found& exact,
                 const internal::Found& conservative) { return internal::lacking(exact, conservative); });
 }
 
-// Describes the first conservative row whose triangle's bounds, grown by 2^-38 of the magnitudes, the query does not
-// meet, or the first missing row whose bounds it meets; empty if there is none. For scenes of instances only, and
-// queries without filters, limits and culling.
+// Returns a description of the first error in the conservative answers; empty if there is none. An error is a missing
+// row whose query meets the bounds of its triangle, or a row whose query does not meet these bounds after they are
+// grown by a tolerance: 2^-38 of the largest |coordinates| of the placed mesh and the query. Another error is a t that
+// differs from the t of the bounds and of the exact row, or from the distance of the row's point. Use it only for
+// scenes of instances, and for queries without filters, limits and culling.
 inline std::string placed_bounds_fault(const QueryScene& scene) {
   return internal::conservative_fault(
       scene, [&](const OwnedBlock& block, size_t i, const internal::Found& exact, const internal::Found& conservative) {

@@ -1,6 +1,6 @@
 // References for closed convex solids in long double, by search instead of formulas: a solid is the set where a convex
-// function, its gauge, is at most zero. Gauges grow by at most the distance moved, so that `gauge <= e` contains all
-// points within e of the solid and `gauge <= -e` only points that stay inside when moved by e.
+// function, its gauge, is at most zero. If a point moves by e, its gauge changes by at most e. So `gauge <= e` holds
+// for all points within e of the solid, and `gauge <= -e` only for points that stay inside when moved by e.
 #ifndef LOCUS_TESTS_SUPPORT_CONVEX_REFERENCE_H_
 #define LOCUS_TESTS_SUPPORT_CONVEX_REFERENCE_H_
 
@@ -36,7 +36,8 @@ Real argmin(const Function& f, Real low, Real high) {
   return 0.5L * (low + high);
 }
 
-// Returns the point where a monotone predicate changes from false at `no` to true at `yes`.
+// Returns the argument between `no` and `yes` where a monotone predicate changes from false (at `no`) to true (at
+// `yes`).
 template <class Predicate>
 Real turning_point(const Predicate& holds, Real no, Real yes) {
   for (int step = 0; step < 90; ++step) {
@@ -50,7 +51,7 @@ struct RealInterval {
   Real near, far;
 };
 
-// Solid of a shape, in axes around its centre: without the position no digits are lost far from the origin.
+// Solid of a shape, in coordinates relative to its centre: far from the origin, absolute coordinates would lose digits.
 class SolidReference {
  public:
   explicit SolidReference(const Shape& shape) : shape_(shape) {}

@@ -1,4 +1,4 @@
-// The real locusd in a process of its own, on a free port, which ends with the test.
+// The real locusd in a process of its own, which listens on a free port. The destructor kills the process.
 #ifndef LOCUS_TESTS_SUPPORT_DAEMON_PROCESS_H_
 #define LOCUS_TESTS_SUPPORT_DAEMON_PROCESS_H_
 
@@ -30,7 +30,8 @@ class DaemonProcess : public ChildProcess {
   DaemonProcess(std::vector<std::string> arguments, const std::string& log)
       : ChildProcess(built_program("locusd"), std::move(arguments), log) {}
 
-  // Returns the port that the daemon writes to its port file; fails the test and returns 0 if it writes none in time.
+  // Returns the port that the daemon writes to its port file. If the daemon writes no port within a minute, fails the
+  // test and returns 0.
   static int wait_for_port(const std::string& port_file) {
     for (int i = 0; i < 3000; ++i) {
       if (const std::string text = text_of(port_file); !text.empty()) return std::atoi(text.c_str());

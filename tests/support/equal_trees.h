@@ -19,7 +19,7 @@ bool equal_bytes(const T* a, const T* b, size_t count) {
 
 }  // namespace internal
 
-// Expects equal bytes. Neither tree may be empty.
+// Expects that the arrays of both trees are equal byte for byte. Neither tree may be empty.
 inline void expect_equal_bytes(const TriangleBvh& a, const TriangleBvh& b) {
   ASSERT_EQ(a.node_count(), b.node_count());
   ASSERT_EQ(a.block_count(), b.block_count());

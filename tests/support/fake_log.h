@@ -1,5 +1,5 @@
-// A log that stores nothing and whose backups are a few files that a test has chosen: for tests of the code that
-// handles a backup after the log has made it.
+// A log that stores nothing and whose backups contain the files that a test has set. For tests of the code that handles
+// a backup after the log has made it.
 //
 // Threads: back_up() from any thread; a test sets the members before the server starts.
 #ifndef LOCUS_TESTS_SUPPORT_FAKE_LOG_H_
@@ -44,7 +44,7 @@ class FakeLog final : public UpdateLog {
   void keep_outline(const std::array<uint8_t, 32>&, absl::string_view) override {}
   std::optional<std::string> read_outline(const std::array<uint8_t, 32>&) const override { return std::nullopt; }
 
-  // Writes `files` below the new directory, then runs the action that the test has set.
+  // Writes `files` below the new directory `path`, then calls the function that the test has set.
   absl::Status back_up(const std::string& path) override {
     std::error_code why;
     if (!std::filesystem::create_directory(path, why)) return absl::UnavailableError("the directory is not new");
@@ -56,7 +56,7 @@ class FakeLog final : public UpdateLog {
     return afterwards ? afterwards(path) : absl::OkStatus();
   }
 
-  std::map<std::string, std::string> files;  // key: path
+  std::map<std::string, std::string> files;  // content of each file of the backup, by path
   std::function<absl::Status(const std::string&)> afterwards;
 
  private:

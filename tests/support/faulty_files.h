@@ -1,7 +1,7 @@
-// The machine's file system with injected disk faults: it tracks synced data, so that a test can get the state after a
-// power loss, and fails on request. It does not sync anything itself, which makes tests fast. A power loss preserves
-// for each file the bytes before its last sync, and for each folder the entries at its last sync; a removed or replaced
-// file is back if its folder was not synced since.
+// The machine's file system with injected disk faults: it tracks which data is synced, so that a test can get the state
+// after a power loss, and returns errors on request. It never syncs files itself, which makes tests fast. A power loss
+// preserves for each file the bytes written before the file's last sync, and for each folder the entries at the
+// folder's last sync; a removed or replaced file exists again if its folder was not synced after the change.
 //
 // Threads: any, as RocksDB uses it.
 #ifndef LOCUS_TESTS_SUPPORT_FAULTY_FILES_H_
@@ -37,32 +37,47 @@ inline void write_file_bytes(const std::string& path, const std::string& bytes) 
   LOCUS_CHECK(out.good());
 }
 
+// Flips a bit of `text` in the only file below `folder` that contains `text`.
+inline void flip_bit_of(const std::string& text, const std::string& folder) {
+  size_t found = 0;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
+    if (!entry.is_regular_file()) continue;
+    std::string bytes = file_bytes(entry.path().string());
+    const size_t at = bytes.find(text);
+    if (at == std::string::npos) continue;
+    ++found;
+    bytes[at] = static_cast<char>(bytes[at] ^ 1);
+    write_file_bytes(entry.path().string(), bytes);
+  }
+  EXPECT_EQ(found, 1u);
+}
+
 class FaultyFiles final : public rocksdb::FileSystemWrapper {
  public:
   using Status = rocksdb::IOStatus;
 
-  // Tracks everything below `root`, which exists; `graveyard` is a folder for removed files.
+  // Tracks all files below the existing folder `root`. `graveyard` is a folder to which removed files are moved.
   FaultyFiles(std::string root, std::string graveyard)
       : FileSystemWrapper(rocksdb::FileSystem::Default()), root_(std::move(root)), graveyard_(std::move(graveyard)) {
     std::filesystem::create_directories(graveyard_);
   }
   const char* Name() const override { return "FaultyFiles"; }
 
-  // Simulates a power loss before change `change` from now on, counted from 0: no later change takes effect.
+  // Simulates a power loss before a later change: the next `change` changes take effect, all changes after them fail.
   void stop_before(uint64_t change) { changes_left_ = change; }
-  // Continues after a process restart without power loss: all written data is there, synced or not.
+  // Ends the simulated power loss as if only the process had restarted: all written data remains, synced or not.
   void go_on() { changes_left_ = kForEver; }
   bool stopped() const { return changes_left_ == 0; }
   uint64_t changes() const { return changes_; }
-  // Makes the next `count` syncs or writes of RocksDB's log files fail; other files are excluded, since their
-  // concurrent writes would consume faults at random. A negative number fails all, for any file.
+  // Make the next `count` syncs or writes of RocksDB's log files (*.log) fail. Other files are excluded, since their
+  // concurrent writes would consume faults at random. If `count` is negative, all syncs or writes of all files fail.
   void fail_syncs(int64_t count) { failing_syncs_ = count; }
   void fail_writes(int64_t count) { failing_writes_ = count; }
-  // Makes every write fail for lack of space while `full`; the free space is then 0.
+  // If `full` is true, makes every write fail because the disk is full, and GetFreeSpace() return 0, until fill(false).
   void fill(bool full) { full_ = full; }
 
-  // Writes the files that a power loss leaves below `to`. If `torn`, each file also keeps a random part from the start
-  // of its unsynced bytes.
+  // Writes the files that remain after a power loss into the folder `to`. If `torn`, each file also keeps a random part
+  // from the start of its unsynced bytes.
   void lose_power(const std::string& to, Random& random, bool torn) {
     const std::lock_guard lock(mutex_);
     std::filesystem::create_directories(to);
@@ -144,9 +159,9 @@ class FaultyFiles final : public rocksdb::FileSystemWrapper {
   static constexpr uint64_t kForEver = ~uint64_t{0};
 
   struct File {
-    std::string place;                // path of its bytes now
-    uint64_t synced = 0;              // number of its first bytes that are on the disk ...
-    std::optional<std::string> held;  // ... or these bytes, if some of them were overwritten since
+    std::string place;                // current path of the file's bytes
+    uint64_t synced = 0;              // number of bytes, from the start of the file, that are synced
+    std::optional<std::string> held;  // synced content, if some of its bytes were overwritten since the sync
   };
 
   class Written final : public rocksdb::FSWritableFileOwnerWrapper {
@@ -158,7 +173,7 @@ class FaultyFiles final : public rocksdb::FileSystemWrapper {
                   rocksdb::IODebugContext* debug) override {
       Status status = files_.write(*state_);
       if (status.ok()) return FSWritableFileOwnerWrapper::Append(data, options, debug);
-      // A disk that becomes full during a write keeps a part of it.
+      // If the disk becomes full during a write, a part of the data is written.
       if (!files_.stopped())
         FSWritableFileOwnerWrapper::Append({data.data(), data.size() / 2}, options, debug).PermitUncheckedError();
       return status;
@@ -178,7 +193,7 @@ class FaultyFiles final : public rocksdb::FileSystemWrapper {
     Status Sync(const rocksdb::IOOptions&, rocksdb::IODebugContext*) override { return files_.sync(*state_); }
     Status Fsync(const rocksdb::IOOptions&, rocksdb::IODebugContext*) override { return files_.sync(*state_); }
     Status RangeSync(uint64_t, uint64_t, const rocksdb::IOOptions&, rocksdb::IODebugContext*) override {
-      return Status::OK();  // guarantees nothing
+      return Status::OK();  // a range sync does not guarantee that data survives a power loss
     }
     Status Allocate(uint64_t, uint64_t, const rocksdb::IOOptions&, rocksdb::IODebugContext*) override {
       return Status::OK();
@@ -278,7 +293,7 @@ class FaultyFiles final : public rocksdb::FileSystemWrapper {
     }
     return file;
   }
-  // Removes the file at `path` in such a way that it can be back after a power loss.
+  // Removes the file at `path`, but keeps its bytes in the graveyard, because the file exists again after a power loss.
   void bury(const std::string& path) {
     const std::lock_guard lock(mutex_);
     const auto file = now_.find(path);

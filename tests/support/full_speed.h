@@ -1,4 +1,5 @@
-// Runs a scheduled scene: its writer at full speed in the calling thread, readers beside it.
+// Runs a scheduled scene (scene_schedule.h): the calling thread applies updates at full speed, and each reader has its
+// own thread.
 #ifndef LOCUS_TESTS_SUPPORT_FULL_SPEED_H_
 #define LOCUS_TESTS_SUPPORT_FULL_SPEED_H_
 
@@ -25,7 +26,7 @@ struct FullSpeedResult {
   std::string difference;  // first difference that a reader found
 };
 
-// Runs until go_on(revisions so far) is false, or a reader finds a difference.
+// Runs until go_on(result so far) returns false or a reader finds a difference. `go_on` is called before each update.
 template <class GoOn>
 FullSpeedResult run_at_full_speed(const FullSpeedOptions& options, const GoOn& go_on) {
   const SceneSchedule schedule(options.objects);

@@ -1,5 +1,5 @@
-// Meshes with the shape of real ones, made from a seed: a closed bumpy sphere and a city of boxes. Triangle numbers are
-// positions in the vector.
+// Meshes that resemble real ones, made from a seed: a closed bumpy sphere and a city of boxes. The number of a triangle
+// is its index in the returned vector.
 #ifndef LOCUS_TESTS_SUPPORT_GENERATED_MESHES_H_
 #define LOCUS_TESTS_SUPPORT_GENERATED_MESHES_H_
 
@@ -15,8 +15,9 @@ inline void number_in_order(std::vector<Triangle>& triangles) {
   for (size_t i = 0; i < triangles.size(); ++i) triangles[i].number = static_cast<uint32_t>(i);
 }
 
-// Returns a closed mesh that is visible from the origin everywhere: every ray from there hits it. Radius 1 plus or
-// minus `noise`; 4 * rings * (rings - 1) triangles; neighbours have bitwise equal vertices.
+// Returns a closed mesh around the origin, such that every ray from the origin hits it. The distances of the vertices
+// from the origin are 1 plus or minus `noise`. The mesh has 4 * rings * (rings - 1) triangles; neighbouring triangles
+// have bitwise equal vertices.
 inline std::vector<Triangle> bumpy_sphere(int rings, double noise, uint64_t seed) {
   Random random(seed);
   const int sectors = 2 * rings;

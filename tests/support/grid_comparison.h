@@ -1,5 +1,6 @@
-// Compares hash grids with the list, for the random tests, which expect no difference, and for the tests of planted
-// bugs, which expect one. Every function draws from the given generator only.
+// Comparison of hash grids with a list (ListIndex, which tests every value). For the random tests, which expect no
+// difference, and for the tests of planted bugs, which expect a difference. Every function takes all random numbers
+// from its parameter `random`.
 #ifndef LOCUS_TESTS_SUPPORT_GRID_COMPARISON_H_
 #define LOCUS_TESTS_SUPPORT_GRID_COMPARISON_H_
 
@@ -25,7 +26,8 @@ inline HashGridOptions random_grid_options(Random& random) {
   return options;
 }
 
-// Compares with the list: the same values inserted in one batch at the given cell size, and one by one at another.
+// Compares two grids with a list of the same objects. The objects are inserted into the first grid in one batch, and
+// one by one into the second grid, which has another cell size.
 inline std::string grid_difference(const ObjectScene& scene, Random& random) {
   const ObjectList list = make_list(scene.values);
   ObjectGrid bulk(random_grid_options(random));
@@ -37,7 +39,9 @@ inline std::string grid_difference(const ObjectScene& scene, Random& random) {
   return "";
 }
 
-// Compares queries by balls, not by their bounds: the balls of a scene, and balls that just touch some of its values.
+// Compares the objects that a grid passes for a ball with tests of all objects: for the ball alone, for the ball in a
+// RegionWalk, and for a RegionWalk with the ball's bounds only. Uses the balls of the scene and balls that just touch
+// some of its objects.
 inline std::string grid_ball_difference(const ObjectScene& scene, Random& random) {
   ObjectGrid grid(random_grid_options(random));
   grid.apply({}, scene.values);
@@ -74,7 +78,8 @@ inline std::string grid_ball_difference(const ObjectScene& scene, Random& random
   return "";
 }
 
-// Moves an object to the position of another one, so that it suits the queries of the scene, or slightly beside it.
+// Returns `object` moved to the position of another object or slightly beside that position, so that queries of the
+// scene find the moved object.
 inline Object moved(const Object& object, const std::vector<Object>& objects, Random& random) {
   Object result = object;
   result.shape.position = random.pick(objects).shape.position;
@@ -83,8 +88,8 @@ inline Object moved(const Object& object, const std::vector<Object>& objects, Ra
   return result;
 }
 
-// Random batches of inserts, moves and removes, applied to a grid and the list in lockstep. Snapshots kept along the
-// way must still give the list's answers from the time when they were taken.
+// Random batches of inserts, moves and removes, applied to a grid and a list in lockstep. A snapshot of the grid kept
+// during the run must still give the answers of the list's copy that was made at the same time.
 class GridLockstep {
  public:
   GridLockstep(const ObjectScene& scene, Random& random)
@@ -153,7 +158,7 @@ class GridLockstep {
   ObjectList list_;
 };
 
-// Compares a grid after each of a dozen batches over a scene of any family.
+// Applies a dozen random batches of the scene's objects to a grid and compares the grid with a list after each batch.
 inline std::string moving_grid_difference(const ObjectScene& scene, Random& random) {
   ObjectScene shorter = scene;
   while (shorter.rays.size() > 12) shorter.rays.pop_back();
@@ -173,7 +178,7 @@ std::string search_grid_scenes(uint64_t count, const Draw& draw, const Compare& 
   return "";
 }
 
-// Draws a scene of the families of both kinds alternately.
+// Generates the scene of `seed`, alternately from the adversarial families and from the families for grids.
 inline SceneSketch any_adversarial_scene(uint64_t seed, Random& random) {
   return seed % 2 == 0 ? adversarial_scene(seed / 2, random) : grid_scene(seed / 2, random);
 }

@@ -1,5 +1,5 @@
-// Families of scenes built to break grids, in addition to those of adversarial_scenes.h: values on cell borders of
-// every level, on both sides of zero, at the world's edge, or larger than all cells.
+// Families of scenes built to break grids, in addition to the families of adversarial_scenes.h: placements on cell
+// borders of every level, on both sides of zero, at the world's edge, or larger than all cells.
 #ifndef LOCUS_TESTS_SUPPORT_GRID_SCENES_H_
 #define LOCUS_TESTS_SUPPORT_GRID_SCENES_H_
 
@@ -8,14 +8,15 @@
 
 namespace locus::test {
 
-// Adds rays from lattice planes in all 26 directions, from positions in `sketch` and without limit.
+// Adds a ray in each of the 26 directions along axes and diagonals. The ray passes through a notable point of `sketch`
+// and starts 0 to 3 times direction * `step` before this point.
 inline void add_lattice_rays(SceneSketch& sketch, double step, Random& random) {
   for (const Vec3d direction : lattice_directions()) {
     sketch.rays.push_back({notable_point(sketch, random) - direction * (step * random.whole(0, 3)), direction});
   }
 }
 
-// Draws one value, or a few, larger than the world of all others.
+// Generates at most three placements larger than the region of all other placements.
 inline SceneSketch giants_among_small(Random& random) {
   SceneSketch sketch{"giants among small ones", {}, {}, {}, {}};
   for (int i = 0; i < 40; ++i) {
@@ -27,7 +28,7 @@ inline SceneSketch giants_among_small(Random& random) {
   return sketch;
 }
 
-// Draws points, and shapes without extent, exactly on borders of cells of several sizes.
+// Generates points, and shapes without extent, exactly on borders of cells of several sizes.
 inline SceneSketch points_on_borders(Random& random) {
   SceneSketch sketch{"points on borders", {}, {}, {}, {}};
   const double step = std::exp2(random.whole(-3, 6));
@@ -42,8 +43,8 @@ inline SceneSketch points_on_borders(Random& random) {
   return sketch;
 }
 
-// Draws values whose diameter is exactly the edge of a level's cell, or greater by a rounding, on the borders of that
-// level.
+// Generates placements whose side is exactly the cell size of a level, or greater by 2^-22 of it. Their centres are on
+// cell borders of that level.
 inline SceneSketch sizes_between_levels(Random& random) {
   SceneSketch sketch{"sizes between levels", {}, {}, {}, {}};
   for (int i = 0; i < 40; ++i) {
@@ -56,7 +57,7 @@ inline SceneSketch sizes_between_levels(Random& random) {
   return sketch;
 }
 
-// Draws values less than a cell from zero on both sides, where indices that truncate would coincide.
+// Generates placements near zero on both sides, where cell indices would be equal if they were truncated towards zero.
 inline SceneSketch around_zero(Random& random) {
   SceneSketch sketch{"around zero", {}, {}, {}, {}};
   const double size = random.magnitude(-10, 3);
@@ -73,7 +74,7 @@ inline SceneSketch around_zero(Random& random) {
   return sketch;
 }
 
-// Draws values at the corners of the world, with rays across it.
+// Generates placements at the corners, edges and faces of the world, with rays across the world.
 inline SceneSketch world_edges(Random& random) {
   constexpr double kEdge = limits::kMaxCoordinate;
   SceneSketch sketch{"world edges", {}, {}, {}, {}};

@@ -1,6 +1,7 @@
-// Verifier of spatial indexes: asks an index and an oracle every kind of query and compares the answers bit for bit in
-// (t, id). Also checks the contract of an index: it passes every value whose interval or bounds qualify to the visitor
-// exactly once. Unit tests, random tests and tests of planted bugs share it.
+// Verifier of spatial indexes: runs every kind of query on an index and on an oracle and compares the answers, (t, id),
+// bit for bit. Also checks the contract of an index: the index passes to the visitor, exactly once, every value whose
+// ray interval or bounds satisfy the query's limit. Unit tests, random tests and tests of planted bugs share this
+// verifier.
 #ifndef LOCUS_TESTS_SUPPORT_INDEX_JUDGE_H_
 #define LOCUS_TESTS_SUPPORT_INDEX_JUDGE_H_
 
@@ -24,7 +25,7 @@ ListIndex<V> make_list(const std::vector<V>& values) {
   return list;
 }
 
-// Each function returns the first difference, or an empty string.
+// Comparison of one index with an oracle. Each function returns the first difference, or an empty string.
 template <SpatialIndex Index>
 class IndexJudge {
  public:
@@ -33,7 +34,7 @@ class IndexJudge {
   using S = ScalarOf<Value>;
   using Hits = std::vector<RayHit<Value>>;
 
-  // Borrows both, which must hold the same values.
+  // Borrows both arguments, which must hold the same values.
   IndexJudge(const Index& index, const ListIndex<Value>& oracle) : index_(index), oracle_(oracle) {}
 
   std::string difference(const TestScene<Value>& scene) const {
@@ -43,7 +44,7 @@ class IndexJudge {
     }
     for (size_t i = 0; i < scene.balls.size(); ++i) {
       if (std::string what = ball_difference(scene.balls[i]); !what.empty()) return label(scene, "ball", i) + what;
-      // Moves every other centre by less than the resolution of float.
+      // Move every second centre by less than the resolution of float.
       const Vec3d center = to_double(scene.balls[i].center) * (i % 2 == 0 ? 1 : 1 + 0x1p-25);
       if (std::string what = point_difference(center); !what.empty()) return label(scene, "centre of ball", i) + what;
     }
@@ -53,8 +54,9 @@ class IndexJudge {
     return "";
   }
 
-  // Compares first, any and all hits and the bounds at limits up to each hit, just beyond it, halfway, and without
-  // limit. `turn` varies which values the contract is checked for.
+  // Compares the first hit, any hit, all hits and the conservative results of a ray. The limits are infinity and, for
+  // the first two hits, the t of the hit, the next greater float and half of t. `turn` selects the values for which the
+  // contract of visit_ray() is checked.
   std::string ray_difference(const typename Traits::RayQuery& ray, size_t turn) const {
     constexpr S kInfinity = std::numeric_limits<S>::infinity();
     Hits hits;
@@ -76,7 +78,8 @@ class IndexJudge {
     return overlap_difference(exact, conservative);
   }
 
-  // Compares the nearest one and several nearest: without limit, up to the distance of one of them, and just below it.
+  // Compares the nearest value and the 200 nearest values. The limits are infinity, the distance of one value, and the
+  // next smaller double.
   std::string point_difference(const Vec3d& point) const {
     constexpr double kInfinity = std::numeric_limits<double>::infinity();
     std::vector<ValueAt<Value>> all;
@@ -104,7 +107,7 @@ class IndexJudge {
   }
 
  private:
-  // Collects the ids that it is given; accepts boxes up to a fixed limit.
+  // Visitor that collects the ids of all visited values, with a fixed limit.
   template <class Limit>
   class Recorder {
    public:
@@ -189,7 +192,9 @@ class IndexJudge {
     return list_difference(sorted_ids(got), sorted_ids(expected));
   }
 
-  // Returns a violation: the index must pass the values whose interval starts at or before the limit, and no others.
+  // Returns the first violation of the contract of visit_ray(); empty if there is none. The index must pass every value
+  // whose interval starts at or before the limit, pass no value twice, and count one test for each value that it
+  // passes.
   std::string broken_ray_contract(const typename Traits::RayQuery& ray, size_t turn) const {
     const auto values = oracle_.values();
     for (size_t i = 0; i < std::min<size_t>(values.size(), 4); ++i) {
@@ -223,7 +228,9 @@ class IndexJudge {
     return "";
   }
 
-  // Returns a violation: the index must pass the values whose bounds are at most `limit` away, and no others.
+  // Returns the first violation of the contract of visit_nearest(); empty if there is none. The index must pass every
+  // value whose bounds have a squared distance of at most `limit`, pass no value twice, and count one test for each
+  // value that it passes.
   std::string broken_point_contract(const Vec3d& point, double limit) const {
     Recorder<double> recorder(limit);
     Work work;

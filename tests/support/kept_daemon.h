@@ -1,4 +1,4 @@
-// A real locusd with a data directory that can be stopped, killed and started again, with stubs to call it.
+// A real locusd with a data directory, and stubs to call it. A test can stop or kill the process and start it again.
 #ifndef LOCUS_TESTS_SUPPORT_KEPT_DAEMON_H_
 #define LOCUS_TESTS_SUPPORT_KEPT_DAEMON_H_
 
@@ -19,14 +19,14 @@ namespace locus::test {
 
 class KeptDaemon {
  public:
-  // Adds `options` to those for its address and its directory.
+  // Starts no process yet. `options` are passed to locusd in addition to the address and the data directory.
   explicit KeptDaemon(std::vector<std::string> options = {}) : options_(std::move(options)) {}
   ~KeptDaemon() {
     process_.reset();
     std::filesystem::remove_all(directory());
   }
 
-  // Takes effect at the next start.
+  // Replaces the options that were passed to the constructor; takes effect at the next start.
   void set_options(std::vector<std::string> options) { options_ = std::move(options); }
 
   std::string directory() const { return folder_.file("data"); }
@@ -55,7 +55,7 @@ class KeptDaemon {
   Stubs& stubs() { return *stubs_; }
   int port() const { return port_; }  // port of the latest start
 
-  // Runs `locusd check` or `repair` and returns its exit code; printed() has its output.
+  // Runs `locusd` with the task `check` or `repair` and returns its exit code; printed() returns its output.
   int maintain(const std::string& task) const {
     DaemonProcess process({task, directory()}, folder_.file("second"));
     return process.wait();
@@ -102,7 +102,7 @@ inline v1::Scene get_scene(Stubs& stubs, const std::string& name) {
   return response.scene();
 }
 
-// Returns everything in the scene as text to compare, chunk after chunk.
+// Returns the complete dump of a scene as text, for comparisons.
 inline std::string dump_of(Stubs& stubs, const std::string& name) {
   grpc::ClientContext context;
   set_timeout(context);
@@ -117,7 +117,7 @@ inline std::string dump_of(Stubs& stubs, const std::string& name) {
   return text;
 }
 
-// Positions of points.
+// Position of a point object in a scene.
 struct PlacedPoint {
   double x, y, z;
   friend bool operator==(const PlacedPoint&, const PlacedPoint&) = default;

@@ -1,5 +1,6 @@
-// Rays for the kernels, and their verification: every answer of an instruction set's kernels is compared with a test of
-// all triangles, bit for bit. For the tests of the kernels and for tests of planted bugs in them.
+// Queries for the ray kernels, and verification of the answers: every answer of an instruction set's kernels is
+// compared with a test of all triangles, bit for bit. For the tests of the kernels and for tests of planted bugs in the
+// kernels.
 #ifndef LOCUS_TESTS_SUPPORT_KERNEL_JUDGE_H_
 #define LOCUS_TESTS_SUPPORT_KERNEL_JUDGE_H_
 
@@ -29,7 +30,7 @@ struct KernelQuestion {
   Cull cull = Cull::kNone;
 };
 
-// Rows of all hits, the lowest first.
+// Rows of all hits in ascending order of t, then of triangle number.
 using KernelAnswer = std::vector<KernelRow>;
 
 inline void sort_rows(absl::Span<KernelRow> rows) {
@@ -59,13 +60,13 @@ inline KernelRay kernel_ray(const KernelQuestion& question) {
           true};
 }
 
-// A mesh, and queries on it with their answers; each query that has a hit is repeated with a limit at, just behind and
-// just before the nearest. Immutable.
+// A mesh, queries on it, and the expected answers. Each query that has a hit is repeated with three limits: the t of
+// the nearest hit, the next greater float and the next smaller float. Immutable.
 class KernelTrial {
  public:
   KernelTrial(std::string name, const std::vector<Triangle>& triangles, const std::vector<KernelQuestion>& questions)
       : KernelTrial(std::move(name), triangles, questions, *TriangleBvh::build(triangles)) {}
-  // Queries `tree`, which must be built from those triangles.
+  // Queries `tree`, which must be a tree of `triangles`, instead of a tree built from `triangles`.
   KernelTrial(std::string name, const std::vector<Triangle>& triangles, const std::vector<KernelQuestion>& questions,
               TriangleBvh tree)
       : name_(std::move(name)), tree_(std::move(tree)) {
@@ -82,7 +83,8 @@ class KernelTrial {
     }
   }
 
-  // Returns the first wrong answer, empty if there is none; asks all queries at once, and one by one.
+  // Runs all queries in one call and each query in a call of its own. Returns the first wrong answer; empty if there is
+  // none.
   std::string difference(const RayKernels& kernels) const {
     std::vector<KernelHit> first(rays_.size()), any(rays_.size());
     kernels.first(tree_.tree(), rays_.data(), first.data(), rays_.size());
@@ -100,8 +102,8 @@ class KernelTrial {
     return "";
   }
 
-  // Returns the share of undecided answers to the queries, asked one by one. Kernels may leave hard ones undecided, but
-  // few.
+  // Runs each query in a call of its own and returns the share of undecided answers. Kernels may leave only few queries
+  // undecided.
   double undecided_share(const RayKernels& kernels) const {
     size_t undecided = 0;
     for (const KernelRay& ray : rays_) {
@@ -116,7 +118,7 @@ class KernelTrial {
   }
 
  private:
-  // Returns the error in the answer to query `i`; empty if it is right.
+  // Returns the error in the answer to query `i`; empty if the answer is right.
   std::string wrong_verdict(const KernelHit& hit, size_t i) const {
     if (hit.verdict == KernelVerdict::kUndecided) return "";
     if ((hit.verdict == KernelVerdict::kHit) == !answers_[i].empty()) return "";
@@ -134,7 +136,8 @@ class KernelTrial {
     return hit.number == expected.number ? "" : absl::StrCat("first: ", hit.number, " is hit, not ", expected.number);
   }
 
-  // Likewise for all hits, up to `most` per query.
+  // Runs RayKernels::all with at most `most` rows per query, for all queries in one call and for each query in a call
+  // of its own. Returns the first wrong answer; empty if there is none.
   std::string difference_of_all(const RayKernels& kernels, uint32_t most) const {
     std::vector<KernelHit> hits(rays_.size());
     std::vector<KernelRow> rows(rays_.size() * most), rows_alone(most);
@@ -163,7 +166,7 @@ class KernelTrial {
     return "";
   }
 
-  // Adds a query. `answer` is computed with the query's own limit or without.
+  // Adds a query. `answer` may contain hits beyond the limit of the query, which are removed.
   void add(const KernelQuestion& question, KernelAnswer answer) {
     while (!answer.empty() && answer.back().t > question.limit) answer.pop_back();
     rays_.push_back(kernel_ray(question));

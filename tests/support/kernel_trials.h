@@ -1,4 +1,5 @@
-// Families of rays for testing kernels: each is known to reveal one kind of mistake. Made from seeds.
+// Families of rays for testing kernels: each family is known to reveal one kind of error. The rays are generated from
+// seeds.
 #ifndef LOCUS_TESTS_SUPPORT_KERNEL_TRIALS_H_
 #define LOCUS_TESTS_SUPPORT_KERNEL_TRIALS_H_
 
@@ -30,7 +31,8 @@ inline Vec3d place_within(const Triangle& triangle, Random& random) {
 
 }  // namespace internal
 
-// Draws queries: half of them short, a third of them culling.
+// Generates random queries: half of them have a limit of about a fifth of the mesh's size, and about a third of them
+// cull.
 inline std::vector<KernelQuestion> random_questions(const std::vector<Triangle>& mesh, size_t count, uint64_t seed) {
   Random random(seed);
   const Aabbf bounds = internal::bounds_of_all(mesh);
@@ -63,7 +65,7 @@ inline std::vector<KernelTrial> ordinary_trials() {
   return trials;
 }
 
-// Makes trials far from the origin, where float rounding is coarse and double decides.
+// Makes trials far from the origin, where most tests in float are too imprecise and are repeated in double.
 inline std::vector<KernelTrial> far_trials() {
   std::vector<KernelTrial> trials;
   for (const float distance : {1e3f, 1e5f, 1e7f})
@@ -74,8 +76,8 @@ inline std::vector<KernelTrial> far_trials() {
   return trials;
 }
 
-// Makes runs of rays in nearly equal directions, as cameras and sensors send them: from one position, from positions
-// close together, or side by side along an axis. Limits and culls differ within a run.
+// Makes runs of rays in nearly equal directions, as cameras and sensors generate them: from one position, from
+// positions close together, or side by side along an axis. Limits and culls differ within a run.
 inline KernelTrial beam_trial(std::string name, const std::vector<Triangle>& mesh, uint64_t seed) {
   Random random(seed);
   const Aabbf bounds = internal::bounds_of_all(mesh);
@@ -101,8 +103,8 @@ inline KernelTrial beam_trial(std::string name, const std::vector<Triangle>& mes
   return KernelTrial(std::move(name), mesh, questions);
 }
 
-// Makes runs of rays that pass together along a triangle that they see nearly edge-on, which stays undecided, while
-// they hit others of its block.
+// Makes runs of rays that are nearly parallel to a triangle and close to it. A kernel leaves these rays undecided for
+// that triangle, although they hit other triangles of the same block.
 inline KernelTrial edge_on_beam_trial() {
   Random random(15);
   const std::vector<Triangle> city = box_city(6, 1);
@@ -135,7 +137,8 @@ inline std::vector<KernelTrial> beam_trials() {
   return trials;
 }
 
-// Makes rays along axes and diagonals from corners, edges and walls, where many triangles are edge-on or equally near.
+// Makes rays along axes and diagonals from corners, edges and walls of houses. Many triangles are edge-on to such a ray
+// or equally near.
 inline KernelTrial lattice_trial() {
   Random random(4);
   std::vector<KernelQuestion> questions;
@@ -150,8 +153,9 @@ inline KernelTrial lattice_trial() {
   return KernelTrial("lattice", box_city(5, 1), questions);
 }
 
-// Makes rays whose components differ in double only. From just off the surface, the axis chosen for projection shows in
-// t.
+// Makes rays nearly along axes and diagonals: the direction's components are -1, 0 or 1 in float, but differ slightly
+// from these numbers in double. The rays start so close to the surface that t depends on the axis chosen for the
+// projection.
 inline KernelTrial near_diagonal_trial() {
   const std::vector<Triangle> sphere = bumpy_sphere(14, 0.1, 1);
   Random random(9);
@@ -212,7 +216,7 @@ inline KernelTrial sliver_trial() {
   return KernelTrial("slivers", slivers, questions);
 }
 
-// Makes each triangle five times: of equal hits the lowest number wins.
+// Makes a mesh that contains each triangle five times: among equal hits the lowest triangle number wins.
 inline KernelTrial copies_trial() {
   std::vector<Triangle> copies;
   for (int copy = 0; copy < 5; ++copy)

@@ -1,7 +1,7 @@
-// A network that loses replies: a port that forwards connections to a gRPC server and cuts them on request, after the
-// server has done its work and before the client receives the reply.
+// A network that loses replies: a port that forwards connections to a gRPC server and closes them on request, after the
+// server has processed the request and before the client receives the reply.
 //
-// Threads: every member from any thread. Source of the frame format: RFC 9113, HTTP/2, section 4.1.
+// Threads: every member may be called from any thread. Source of the frame format: RFC 9113, HTTP/2, section 4.1.
 #ifndef LOCUS_TESTS_SUPPORT_LOSSY_RELAY_H_
 #define LOCUS_TESTS_SUPPORT_LOSSY_RELAY_H_
 
@@ -45,9 +45,9 @@ class LossyRelay {
   int port() const { return port_; }
   // Sets the port to which new connections are forwarded from now on.
   void set_server(int port) { server_port_ = port; }
-  // Makes every `frames`-th frame of the replies get lost, and its connection with it; 0 loses none.
+  // Drops every `frames`-th frame of the replies and closes its connection; 0 drops none.
   void lose_every(uint64_t frames) { lose_every_ = frames; }
-  // Makes only the next frame get lost.
+  // Drops only the next frame of the replies and closes its connection.
   void lose_one() { lose_one_ = true; }
   uint64_t lost() const { return lost_; }
 
@@ -100,7 +100,8 @@ class LossyRelay {
     }
   }
 
-  // Forwards complete frames; returns false if one of them is to be lost.
+  // Forwards the complete frames in `answers`. Returns false, and stops forwarding, at a frame to be dropped or if
+  // sending fails.
   bool pass_frames(std::string& answers, int client) {
     while (answers.size() >= kFrameHead) {
       const auto byte = [&answers](size_t at) { return static_cast<uint8_t>(answers[at]); };
@@ -135,7 +136,7 @@ class LossyRelay {
   std::atomic<bool> lose_one_ = false, ended_ = false;
   int listener_ = -1;
   int port_ = 0;
-  std::vector<std::thread> connections_;  // used by the acceptor until it has ended
+  std::vector<std::thread> connections_;  // accessed only by acceptor_ until that thread has ended
   std::thread acceptor_;
 };
 

@@ -1,5 +1,5 @@
 // An update log without a disk: keeps everything in memory and tracks synced records, so that a test can simulate a
-// crash. Calls fail or take long on request. Checks that callers keep the rules of the interface.
+// crash. A test can make calls fail or wait. Checks that callers obey the rules of the interface.
 #ifndef LOCUS_TESTS_SUPPORT_MEMORY_LOG_H_
 #define LOCUS_TESTS_SUPPORT_MEMORY_LOG_H_
 
@@ -33,15 +33,15 @@ class MemoryLog : public UpdateLog {
     uint64_t snapshot_sequence = 0;
     std::vector<Bytes> snapshot;
     std::vector<Record> records;    // records after the snapshot
-    uint64_t synced = 0;            // sequence number of the last record that is on the disk
-    std::vector<Record> left_over;  // records of a failed append: may be there after a crash
+    uint64_t synced = 0;            // sequence number of the last synced record
+    std::vector<Record> left_over;  // records of a failed append, which may be in the log after a crash
     uint64_t last() const { return snapshot_sequence + records.size(); }
   };
   struct Kept {
     std::map<SceneKey, KeptScene> scenes;
     std::map<std::string, std::array<uint8_t, 32>> meshes;
     std::map<std::array<uint8_t, 32>, std::vector<Bytes>> contents;
-    std::map<std::string, std::vector<Bytes>> parts;  // by name; empty for a mesh of format 1
+    std::map<std::string, std::vector<Bytes>> parts;  // parts of each mesh, by name; empty for a mesh of format 1
     std::map<std::array<uint8_t, 32>, std::string> topologies;
     SceneKey last_key = 0;
   };
@@ -49,8 +49,9 @@ class MemoryLog : public UpdateLog {
   MemoryLog() = default;
   explicit MemoryLog(const Kept& kept) : kept_(kept) { list_stored(kept); }
 
-  // Returns the data that is left if the machine stops now: in addition to synced records, the first `unsynced` of the
-  // others, and the first `left_over` of a scene's last append that failed.
+  // Returns the data that remains if the machine stops now. A scene keeps its synced records and the first `unsynced`
+  // of its unsynced records. If these are all of its records, the scene also keeps the first `left_over` records of its
+  // last append that failed.
   Kept crash(uint64_t unsynced = 0, uint64_t left_over = 0) const {
     const MutexLock lock(mutex_);
     Kept kept = kept_;
@@ -64,12 +65,12 @@ class MemoryLog : public UpdateLog {
     }
     return kept;
   }
-  // Makes calls that write fail with `status` until the next fail_with().
+  // Makes every call that writes fail with `status` until the next call of fail_with(); OK ends the failures.
   void fail_with(const absl::Status& status) {
     const MutexLock lock(mutex_);
     failure_ = status;
   }
-  // Makes calls that write wait from hold() until release().
+  // Makes calls that write wait until release().
   void hold() {
     const MutexLock lock(mutex_);
     held_ = true;
@@ -79,12 +80,12 @@ class MemoryLog : public UpdateLog {
     held_ = false;
     released_.notify_all();
   }
-  // Waits until such a call waits.
+  // Waits until a call that writes is blocked by hold().
   void wait_for_writer() {
     const MutexLock lock(mutex_);
     while (waiting_ == 0) released_.wait(mutex_);
   }
-  // Sets the duration of an append.
+  // Sets the time that each append takes.
   void take(std::chrono::microseconds duration) { duration_ = duration.count(); }
   uint64_t appends() const { return appends_; }
 

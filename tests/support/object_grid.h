@@ -1,5 +1,5 @@
-// Objects in a hash grid with the interface of the other indexes, for tests that compare indexes. Every query goes to
-// an ObjectSet, as readers get it.
+// Objects in a hash grid behind the interface of the other indexes, for tests that compare indexes. Every query runs on
+// the ObjectSet that readers of a scene use.
 #ifndef LOCUS_TESTS_SUPPORT_OBJECT_GRID_H_
 #define LOCUS_TESTS_SUPPORT_OBJECT_GRID_H_
 
@@ -14,7 +14,7 @@ class ObjectGrid {
   ObjectGrid() : ObjectGrid(HashGridOptions()) {}
   explicit ObjectGrid(const HashGridOptions& options) : store_(options), set_(store_.snapshot()) {}
 
-  // Returns the result of ObjectStore::apply().
+  // Applies a batch and updates the ObjectSet. Returns the result of ObjectStore::apply().
   size_t apply(absl::Span<const Object> removed, absl::Span<const Object> inserted) {
     const size_t replaced = store_.apply(removed, inserted);
     set_ = store_.snapshot();

@@ -12,13 +12,14 @@
 
 namespace locus::test {
 
-// `settings` holds everything but columns; its kind determines which of the columns below are used.
+// Block that owns its columns. `settings` holds all other members of the block; its kind determines which of the
+// columns are used.
 struct OwnedBlock {
   QueryBlock settings;
-  std::vector<float> points;  // origins, centres or points
-  std::vector<float> sizes;   // directions, radii or half extents
-  std::vector<float> extras;  // t_max, rotations or greatest distances
-  std::vector<uint64_t> ids;  // of lookups
+  std::vector<float> points;  // origins of rays, centres of balls and boxes, or points of nearest queries
+  std::vector<float> sizes;   // directions of rays, radii of balls, or half extents of boxes
+  std::vector<float> extras;  // t_max of rays, rotations of boxes, or maximum distances of nearest queries
+  std::vector<uint64_t> ids;  // ids of lookups
   std::vector<uint64_t> groups;
   std::vector<uint32_t> masks;
   std::vector<uint64_t> ignore_groups;
@@ -26,7 +27,7 @@ struct OwnedBlock {
   std::vector<uint64_t> as_of_ticks;
   std::vector<float> as_of_fractions;
 
-  // Returns a block that borrows from this one.
+  // Returns a block that borrows from this block.
   QueryBlock view() const {
     QueryBlock block = settings;
     block.masks = masks;
@@ -38,7 +39,7 @@ struct OwnedBlock {
     return block;
   }
 
-  // Returns the queries begin to end (exclusive). Columns with one entry for all queries stay as they are.
+  // Returns a block of the queries `begin` to `end` - 1. Columns with one entry for all queries are copied unchanged.
   OwnedBlock part(size_t begin, size_t end) const {
     const size_t n = query_count(view());
     const auto width_of_sizes = std::holds_alternative<BallColumns>(settings.kind) ? size_t{1} : size_t{3};
@@ -87,7 +88,8 @@ struct OwnedBlock {
   }
 };
 
-// Borrows from `blocks`, which must therefore outlive it: a temporary list is refused.
+// Returns a batch that borrows from `blocks`. `blocks` must outlive the batch, so a temporary vector is rejected at
+// compile time.
 QueryBatch batch_of(std::vector<OwnedBlock>&& blocks) = delete;
 inline QueryBatch batch_of(const std::vector<OwnedBlock>& blocks) {
   QueryBatch batch;
@@ -95,7 +97,7 @@ inline QueryBatch batch_of(const std::vector<OwnedBlock>& blocks) {
   return batch;
 }
 
-// Runs a block, which must be valid.
+// Runs a block as a batch and returns its result. Precondition: check_batch() accepts the block.
 inline BlockResult run_block(const SceneSnapshot& snapshot, const OwnedBlock& block, const RunOptions& options = {}) {
   QueryBatch batch;
   batch.blocks = {block.view()};
@@ -119,8 +121,8 @@ std::string column_difference(const char* name, const Column& got, const Column&
 }
 }  // namespace internal
 
-// Returns the first column and the first index at which two results differ in any bit; empty if they are equal. Ignores
-// work.
+// Returns the first column and the first index at which two results differ in any bit; empty if they are equal. Does
+// not compare the work.
 inline std::string difference(const BlockResult& got, const BlockResult& expected) {
   using internal::column_difference;
   for (std::string what :

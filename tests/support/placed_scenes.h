@@ -1,5 +1,6 @@
-// Random scenes in which the placement of meshes is the difficulty: far from the world's origin, far from their own, or
-// rotated into planes of the world. Queries are of all kinds that bounds of placed triangles can decide.
+// Random scenes in which the placement of meshes is the difficulty: far from the world's origin, with vertices far from
+// the mesh's own origin, or rotated into planes of the world. The queries are of those kinds whose conservative answers
+// depend on the bounds of placed triangles.
 #ifndef LOCUS_TESTS_SUPPORT_PLACED_SCENES_H_
 #define LOCUS_TESTS_SUPPORT_PLACED_SCENES_H_
 
@@ -13,7 +14,7 @@ using QueryKind = decltype(QueryBlock::kind);
 
 namespace internal {
 
-// Draws triangles, some in a plane across an axis, so that their own bounds are flat.
+// Generates triangles, some in a plane perpendicular to an axis, so that their own bounds are flat.
 inline StaticMeshPtr far_mesh(Random& random) {
   std::vector<Triangle> triangles;
   for (int i = random.whole(1, 6); i > 0; --i) {
@@ -63,8 +64,8 @@ inline OwnedBlock far_block(const PlacedMesh& placed, QueryKind kind, Random& ra
 
 }  // namespace internal
 
-// Draws small meshes near to and far from the world's origin, rotated and scaled, and queries around them without
-// filters and limits. No objects.
+// Generates small meshes, all near or all far from the world's origin, rotated and scaled, and queries around them
+// without filters and limits. The scene has no objects.
 inline QueryScene far_scene(Random& random) {
   constexpr double kDistances[] = {0, 1e3, 1e6, 1e6, 9e8};
   QueryScene scene;
@@ -81,8 +82,9 @@ inline QueryScene far_scene(Random& random) {
   return scene;
 }
 
-// Draws a random scene and, at the same position, a mesh with vertices a million units from its own origin, moved back
-// by the translation. Queries are rounded there to the mesh's floats; placed triangles are not.
+// Generates a random scene and another mesh at the same position. The vertices of this mesh are about a million units
+// from the mesh's own origin, and its translation moves them back. The transform to mesh axes rounds queries to floats
+// at this large distance, while placed triangles are not rounded.
 inline QueryScene brought_back_scene(Random& random) {
   SceneSketch sketch = random_scene(random);
   for (int i = 0; i < 40; ++i) sketch.balls.push_back({random.vector(5), random.between(0, 1)});
@@ -98,7 +100,7 @@ inline QueryScene brought_back_scene(Random& random) {
   return scene;
 }
 
-// Draws rays in the plane of a rotated floor, where the signs of edge functions are rounding noise.
+// Generates rays in the plane of a rotated floor, where the signs of edge functions are rounding noise.
 inline QueryScene turned_floor_scene(Random& random) {
   QueryScene scene;
   scene.world.name = "turned floor";
@@ -106,7 +108,7 @@ inline QueryScene turned_floor_scene(Random& random) {
   floor.id = 1;
   floor.rotation = random.rotation();
   const Transform transform = make_transform({}, floor.rotation, 1);
-  std::vector<Triangle> triangles;  // level in world axes, up to rounding
+  std::vector<Triangle> triangles;  // horizontal in world axes, up to rounding
   const auto vertex = [&] {
     return to_float(transform.point_to_mesh({double(random.whole(-4, 4)), double(random.whole(-4, 4)), 1}));
   };
@@ -123,8 +125,8 @@ inline QueryScene turned_floor_scene(Random& random) {
   return scene;
 }
 
-// Draws balls and boxes whose distance from a wall of the world is zero or less than the resolution of float. Rounding
-// to mesh axes makes other ones touch than placing the wall in the world.
+// Generates balls and boxes whose distance from a wall is zero or less than the resolution of float. Because of
+// rounding, a test in mesh axes and a test in world axes find different balls and boxes that touch the wall.
 inline QueryScene touching_scene(Random& random) {
   QueryScene scene;
   scene.world.name = "touching";
@@ -150,15 +152,16 @@ inline QueryScene touching_scene(Random& random) {
   return scene;
 }
 
-// Draws rays that graze triangles at the corner where they enter the triangles' bounds: there the t of an exact hit is
-// less certain than the bounds.
+// Generates rays that graze triangles at the corner where they enter the triangles' bounds: at such a corner the error
+// of the t of an exact hit is larger than the error of the bounds.
 inline QueryScene grazing_scene(Random& random) {
   QueryScene scene;
   scene.world.name = "grazing";
   PlacedMesh placed;
   placed.id = 1;
   placed.rotation = random.rotation();
-  placed.translation = random.vector(1000);  // moves the mesh back that lies far from its own origin
+  // Move the mesh, whose vertices are far from its own origin, back to the world's origin.
+  placed.translation = random.vector(1000);
   const Transform transform = make_transform(placed.translation, placed.rotation, 1);
   std::vector<Triangle> triangles;
   for (int i = 0; i < 20; ++i) {

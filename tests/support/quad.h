@@ -17,10 +17,11 @@ Vec3q to_quad(Vec3<S> v) {
   return {v.x, v.y, v.z};
 }
 
-// Returns the length. Its root is as precise as long double.
+// Returns the length of `v`. The square root, and so the length, is only as precise as long double.
 inline Quad length(Vec3q v) { return std::sqrt(static_cast<long double>(dot(v, v))); }
 
-// Returns a position or, without the translation, a direction in mesh axes, computed from the stored values.
+// Returns `v` in mesh axes, computed from the stored values. For a position, the caller must subtract the translation
+// from `v`.
 inline Vec3q turned_to_mesh(const Transform& transform, Vec3q v) {
   const Quaternion& q = transform.quaternion;
   const Quad x = q.x, y = q.y, z = q.z, w = q.w;
@@ -29,7 +30,8 @@ inline Vec3q turned_to_mesh(const Transform& transform, Vec3q v) {
   return (v + (c * w + cross(u, c)) * (2 / (x * x + y * y + z * z + w * w))) * (1 / Quad{transform.scale});
 }
 
-// Point where a line meets the plane of a triangle, and its distance from the nearest edge: negative outside.
+// Point where a line meets the plane of a triangle. `inset` is the point's distance from the nearest edge, negative
+// outside of the triangle.
 struct QuadMeeting {
   Quad slope;  // direction . unit normal
   Quad t, inset;
@@ -41,7 +43,8 @@ class QuadTriangle {
       : corners_{to_quad(triangle.a), to_quad(triangle.b), to_quad(triangle.c)},
         normal_(cross(corners_[1] - corners_[0], corners_[2] - corners_[0])) {}
 
-  // Requires a triangle that is not exactly edge-on and has area.
+  // Returns the point where the line meets the triangle's plane. Precondition: the triangle has area and is not exactly
+  // edge-on.
   QuadMeeting meet(Vec3q origin, Vec3q direction) const {
     const Quad speed = dot(normal_, direction);
     QuadMeeting meeting{speed / length(normal_), dot(normal_, corners_[0] - origin) / speed, 0};

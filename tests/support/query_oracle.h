@@ -1,5 +1,6 @@
-// Answers blocks of queries in the slow and simple way: tests every object and every triangle by the geometry's
-// predicates, collects one list, sorts it and cuts it. Shares with core/query only the definition of placed bounds.
+// Oracle that answers blocks of queries in the slow and simple way: tests every object and every triangle by the
+// predicates of core/geometry, collects the results in one list, sorts the list and truncates it. Shares with
+// core/query only the definition of the bounds of placed triangles.
 #ifndef LOCUS_TESTS_SUPPORT_QUERY_ORACLE_H_
 #define LOCUS_TESTS_SUPPORT_QUERY_ORACLE_H_
 
@@ -28,7 +29,7 @@ class QueryOracle {
     }
     snapshot.objects.for_each([this](const Object& object) { objects_.push_back(object); });
   }
-  // Replaces the snapshot's objects by those of another time.
+  // Makes an oracle that uses `objects`, the objects of another time, instead of the objects of the snapshot.
   QueryOracle(const SceneSnapshot& snapshot, std::vector<Object> objects) : QueryOracle(snapshot) {
     objects_ = std::move(objects);
   }
@@ -51,7 +52,7 @@ class QueryOracle {
     const Object* object = nullptr;
     const Instance* instance = nullptr;
     float u = 0, v = 0;
-    Vec3d normal;  // direction to the nearest point, of nearest queries
+    Vec3d normal;  // nearest queries only: vector to the nearest point
   };
   using Rows = std::vector<Row>;
 
@@ -120,7 +121,7 @@ class QueryOracle {
     }
   }
 
-  // Returns infinity if the ray misses the bounds.
+  // Returns the t at which the ray enters the bounds of a placed triangle; infinity if it misses the bounds.
   static float entry_of_bounds(const Instance& instance, const Triangle& triangle, const Question& question) {
     const SlabRay<double> slabs(Rayd{question.origin, question.direction}, kObjectPad);
     return entry_of(slabs, PlacedTriangles(instance).bounds_of_triangle(triangle)).value_or(kInfinity);
@@ -289,7 +290,8 @@ class QueryOracle {
     }
   }
 
-  // Returns the squared distance of an instance's triangle, and the direction to its nearest point.
+  // Returns the squared distance from `point` to a triangle of an instance, and the vector to the nearest point of the
+  // triangle. If `conservative` is true, both results refer to the triangle's bounds instead of the triangle.
   static std::pair<double, Vec3d> way_to(Vec3d point, const Instance& instance, const Triangle& triangle,
                                          bool conservative) {
     const Aabbd bounds = PlacedTriangles(instance).bounds_of_triangle(triangle);

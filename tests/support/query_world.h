@@ -1,5 +1,5 @@
-// Content of a scene as plain values, and functions that make a snapshot of it: with inserts in a given or a shuffled
-// order, after unrelated history or none. For tests of queries.
+// Content of a scene as plain values, and functions that make a snapshot of this content. The content is inserted in a
+// given or a shuffled order, and optionally after other content was inserted and removed. For tests of queries.
 #ifndef LOCUS_TESTS_SUPPORT_QUERY_WORLD_H_
 #define LOCUS_TESTS_SUPPORT_QUERY_WORLD_H_
 
@@ -34,7 +34,7 @@ struct QueryWorld {
   std::vector<Object> objects;
 };
 
-// Makes a mesh whose triangle numbers are positions in the vector.
+// Makes a mesh in which the number of a triangle is its index in `triangles`.
 inline StaticMeshPtr mesh_of(const std::vector<Triangle>& triangles) {
   std::vector<float> vertices;
   std::vector<uint32_t> indices;
@@ -91,7 +91,7 @@ inline void insert(Scene& scene, const std::vector<Object>& objects) {
   apply_whole(scene, batch);
 }
 
-// Inserts, moves and removes objects and instances. None of the world's own content is at its position afterwards.
+// Inserts, moves and removes objects and instances that do not belong to `world`. The scene is empty again afterwards.
 inline void live_through_history(Scene& scene, const QueryWorld& world, Random& random) {
   std::vector<Object> strangers = world.objects;
   for (Object& object : strangers) {
@@ -122,17 +122,25 @@ inline void live_through_history(Scene& scene, const QueryWorld& world, Random& 
 
 }  // namespace internal
 
-// Makes a snapshot, which borrows nothing of `world`.
+// Returns the spec of a scene for `world`.
+inline SceneSpec spec_of(const QueryWorld& world) {
+  SceneSpec spec;
+  spec.winding = world.winding;
+  return spec;
+}
+
+// Makes a snapshot of a scene with the content of `world`. The snapshot borrows nothing.
 inline SnapshotPtr snapshot_of(const QueryWorld& world) {
-  Scene scene("world", {{}, world.winding}, 1, StaticSet::empty());
+  Scene scene("world", spec_of(world), 1, StaticSet::empty());
   if (!world.instances.empty()) internal::place(scene, world.instances);
   if (!world.objects.empty()) internal::insert(scene, world.objects);
   return scene.latest();
 }
 
-// Makes a snapshot of the same world in another way: other orders of insertion, several batches, and a past.
+// Makes a snapshot of the same content as snapshot_of(). Before this content is inserted, other content was inserted
+// and removed; the order of insertion differs, and there are several batches.
 inline SnapshotPtr snapshot_after_history(QueryWorld world, Random& random) {
-  Scene scene("world", {{}, world.winding}, 1, StaticSet::empty());
+  Scene scene("world", spec_of(world), 1, StaticSet::empty());
   internal::live_through_history(scene, world, random);
   random.shuffle(world.instances);
   random.shuffle(world.objects);

@@ -1,4 +1,5 @@
-// Seeded random geometry for tests: the same numbers on every machine. One thread at a time.
+// Generator of random numbers and geometry for tests: equal seeds give equal results on every machine. One thread at a
+// time.
 #ifndef LOCUS_TESTS_SUPPORT_RANDOM_H_
 #define LOCUS_TESTS_SUPPORT_RANDOM_H_
 
@@ -24,11 +25,11 @@ class Random {
   }
   uint64_t below(uint64_t n) { return next() % n; }
   bool chance(double probability) { return unit() < probability; }
-  // Draws from [0, 1).
+  // Returns a random number in [0, 1).
   double unit() { return static_cast<double>(next() >> 11) * 0x1p-53; }
   double between(double low, double high) { return low + (high - low) * unit(); }
   float float_between(double low, double high) { return static_cast<float>(between(low, high)); }
-  // Draws a magnitude from 2^low to 2^high, uniform in its logarithm.
+  // Returns a random magnitude from 2^low to 2^high, whose logarithm is uniformly distributed.
   double magnitude(double low, double high) { return std::exp2(between(low, high)); }
   int whole(int low, int high) { return low + static_cast<int>(below(static_cast<uint64_t>(high - low + 1))); }
 
@@ -45,7 +46,7 @@ class Random {
       if (length > 1e-4 && length <= 1) return locus::normalized(v);
     }
   }
-  // Draws an element of an array or vector that is not empty.
+  // Returns a random element of an array or vector that is not empty.
   template <class Range>
   const auto& pick(const Range& from) {
     return from[below(std::size(from))];

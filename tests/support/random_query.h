@@ -1,5 +1,6 @@
 // Random worlds of instances and objects, and random batches of queries about them, made from the sketches of
-// adversarial_scenes.h and grid_scenes.h, so that difficult scenes of one index are tested with all indexes together.
+// adversarial_scenes.h and grid_scenes.h, so that scenes that are difficult for one index are tested with all indexes
+// together.
 #ifndef LOCUS_TESTS_SUPPORT_RANDOM_QUERY_H_
 #define LOCUS_TESTS_SUPPORT_RANDOM_QUERY_H_
 
@@ -27,7 +28,8 @@ inline Layers random_layers(Random& random) {
   return random.pick(kLayers);
 }
 
-// Draws a placement near the sketch's vertices, rotated and scaled, possibly far from the mesh's own origin.
+// Generates a placement: unchanged, or moved to `near`, sometimes up to a million units farther, and rotated and
+// scaled.
 inline PlacedMesh random_placement(Vec3d near, Random& random) {
   PlacedMesh placed;
   if (random.chance(0.4)) return placed;
@@ -38,8 +40,8 @@ inline PlacedMesh random_placement(Vec3d near, Random& random) {
   return placed;
 }
 
-// Returns `triangles` in mesh axes, so that the placement puts them back, unless their coordinates exceed those allowed
-// in a mesh.
+// Returns `triangles` in mesh axes, so that the placement transforms them to their original positions. Coordinates
+// beyond the limit of a mesh are clamped.
 inline std::vector<Triangle> in_mesh_axes(const std::vector<Triangle>& triangles, const PlacedMesh& placed) {
   const Transform transform = make_transform(placed.translation, placed.rotation, placed.scale);
   constexpr Vec3d kEdge = {limits::kMaxCoordinate, limits::kMaxCoordinate, limits::kMaxCoordinate};
@@ -79,7 +81,8 @@ inline void add_objects(const SceneSketch& sketch, Random& random, QueryWorld& w
   world.objects = make_scene<Object>(part, random).values;
 }
 
-// Assigns ids of one shuffled range to instances and objects, some with bit 63 set.
+// Assigns ids, groups, tags and layers to all instances and objects. The ids are from one shuffled range, and some have
+// bit 63 set.
 inline void label(Random& random, QueryWorld& world) {
   const std::vector<uint32_t> ids = shuffled_ids(world.instances.size() + world.objects.size(), random);
   size_t next = 0;
@@ -96,7 +99,8 @@ inline void label(Random& random, QueryWorld& world) {
 
 inline void append(std::vector<float>& column, Vec3f v) { column.insert(column.end(), {v.x, v.y, v.z}); }
 
-// Appends the offset from the frame, kept inside the world.
+// Appends `world`, a position in world coordinates, as an offset from the frame of the block. The position is clamped
+// to the bounds of the world.
 inline void append_point(OwnedBlock& block, Vec3d world) {
   Vec3d clamped = world;
   for (int axis = 0; axis < 3; ++axis)
@@ -259,7 +263,8 @@ inline QueryScene query_scene(const SceneSketch& sketch, Random& random) {
 
 inline SceneSketch random_sketch(uint64_t, Random& random) { return random_scene(random); }
 
-// Draws from the families made against trees and against grids alternately.
+// Generates the sketch of `seed`: every third one from the families for grids, the others from the adversarial
+// families.
 inline SceneSketch troublesome_sketch(uint64_t seed, Random& random) {
   return seed % 3 == 0 ? grid_scene(seed / 3, random) : adversarial_scene(seed, random);
 }

@@ -1,5 +1,5 @@
-// Random balls and boxes around and on a mesh's triangles, of sizes from zero to the whole mesh, and some that touch a
-// triangle: for the tests of the region kernels and for tests of planted bugs in them.
+// Random balls and boxes on and near the triangles of a mesh, of sizes from zero to the whole mesh; some of them only
+// touch a triangle. For the tests of the region kernels and for tests of planted bugs in the kernels.
 #ifndef LOCUS_TESTS_SUPPORT_RANDOM_REGION_H_
 #define LOCUS_TESTS_SUPPORT_RANDOM_REGION_H_
 
@@ -19,7 +19,7 @@ inline std::vector<Triangle> moved(std::vector<Triangle> triangles, float scale,
   return triangles;
 }
 
-// Returns the factor of the half extents of a box at which it touches a triangle.
+// Returns the factor by which the half extents of a box must be multiplied so that the box just touches the triangle.
 inline double touching_scale(const Obbf& box, const Triangle& triangle) {
   const Rotation& r = box.rotation;
   const Vec3d center = to_double(box.center), half = to_double(box.half);
@@ -38,7 +38,7 @@ inline double touching_scale(const Obbf& box, const Triangle& triangle) {
   return scale;
 }
 
-// Borrows the mesh, which must outlive it.
+// Generator of regions for one mesh. Borrows the triangles, which must outlive the generator.
 class RandomRegions {
  public:
   RandomRegions(const std::vector<Triangle>& triangles, uint64_t seed) : triangles_(triangles), random_(seed) {
@@ -51,7 +51,8 @@ class RandomRegions {
     if (turned) box.rotation = rotation_of(random_.rotation());
     return box;
   }
-  // Draws a ball that touches: its radius is the distance of a triangle in float precision, plus or minus a few units.
+  // Generates a ball that touches a triangle: the ball's radius is the distance of the triangle, rounded to float and
+  // changed by at most two units in the last place.
   Ballf touching_ball() {
     Ballf ball{center(), 0};
     ball.radius = static_cast<float>(std::sqrt(squared_distance(to_double(ball.center), random_.pick(triangles_))));
@@ -59,7 +60,7 @@ class RandomRegions {
     for (int steps = random_.whole(0, 2); steps > 0; --steps) ball.radius = std::nextafter(ball.radius, toward);
     return ball;
   }
-  // Draws a box that touches a triangle, plus or minus a few units.
+  // Generates a box that touches a triangle, up to a few units in the last place of its half extents.
   Obbf touching_box(bool turned) {
     Obbf box = this->box(turned);
     const auto scale = static_cast<float>(touching_scale(box, random_.pick(triangles_)));

@@ -1,12 +1,17 @@
-// Random shapes and rays for the tests of object predicates: general ones and ones on a lattice of small whole numbers,
-// where touching is frequent and every verdict must be exactly right.
+// Random shapes and rays for the tests of object predicates: general shapes, and shapes on a lattice of small whole
+// numbers, where touching is frequent and every test must give the exact result.
 #ifndef LOCUS_TESTS_SUPPORT_RANDOM_SHAPE_H_
 #define LOCUS_TESTS_SUPPORT_RANDOM_SHAPE_H_
+
+#include <array>
 
 #include "core/geometry/shape.h"
 #include "tests/support/random.h"
 
 namespace locus::test {
+
+inline constexpr std::array<ShapeKind, 4> kShapeKinds = {ShapeKind::kPoint, ShapeKind::kBall, ShapeKind::kBox,
+                                                         ShapeKind::kCapsule};
 
 inline ObjectRay ray_from(Vec3d origin, Vec3d direction, Inside inside = Inside::kSolid) {
   Rayd ray;
@@ -15,7 +20,7 @@ inline ObjectRay ray_from(Vec3d origin, Vec3d direction, Inside inside = Inside:
   return ObjectRay(ray, inside);
 }
 
-// Draws a shape of any size from a centimetre to ten kilometres, thin and flat ones included.
+// Generates a shape of any size from a centimetre to ten kilometres, thin and flat ones included.
 inline Shape random_shape(Random& random, ShapeKind kind, double position_size) {
   Shape shape;
   shape.kind = kind;
@@ -30,8 +35,8 @@ inline Shape random_shape(Random& random, ShapeKind kind, double position_size) 
   return shape;
 }
 
-// Draws an unrotated shape. Its position is whole and at most `reach` on each axis; its size and radius are small whole
-// numbers.
+// Generates an unrotated shape. Its position is whole and at most `reach` on each axis; its size and radius are small
+// whole numbers.
 inline Shape lattice_shape(Random& random, ShapeKind kind, int reach) {
   Shape shape;
   shape.kind = kind;
@@ -41,8 +46,9 @@ inline Shape lattice_shape(Random& random, ShapeKind kind, int reach) {
   return shape;
 }
 
-// Draws a tangent to the ball of the shape's radius, which is set to 5, around its centre: it has a 3-4-5 point of the
-// surface and a whole direction at right angles to it.
+// Sets the shape's radius to 5 and generates a tangent to the ball of this radius around the shape's centre. Relative
+// to the centre, the tangent touches the ball at the coordinates 3 and 4 or -4 on two axes; its direction has whole
+// components.
 inline Rayd tangent_ray(Random& random, Shape& shape) {
   shape.radius = 5;
   const int x = random.whole(0, 2), y = (x + random.whole(1, 2)) % 3, z = 3 - x - y;
@@ -57,7 +63,7 @@ inline Rayd tangent_ray(Random& random, Shape& shape) {
   return {shape.position + surface - direction * static_cast<double>(random.whole(0, 4)), direction};
 }
 
-// Draws a ray aimed at or just beside the shape, from near or far.
+// Generates a ray aimed at or just beside the shape, from near or far.
 inline Rayd random_ray(Random& random, const Shape& shape, double size) {
   const double away = size * random.magnitude(-2, 6);
   const Vec3d origin = shape.position + random.unit_vector() * away;

@@ -1,5 +1,5 @@
-// Topologies of trees that no builder makes, for a given number of triangles: any triangles share a block, any blocks a
-// node. A data directory could hold such a topology, which is unusual but fits the mesh.
+// Random tree topologies for a given number of triangles: the triangles of a block and the blocks of a node are chosen
+// at random. No builder makes such a topology, but it fits the mesh, so a data directory could contain it.
 #ifndef LOCUS_TESTS_SUPPORT_RANDOM_TOPOLOGY_H_
 #define LOCUS_TESTS_SUPPORT_RANDOM_TOPOLOGY_H_
 
@@ -14,7 +14,7 @@ namespace locus::test {
 
 class RandomOutline {
  public:
-  // `triangles` is at least one.
+  // Makes a random topology of `triangles` triangles, at least one.
   RandomOutline(uint32_t triangles, Random& random) : numbers_(triangles) {
     std::iota(numbers_.begin(), numbers_.end(), 0);
     random.shuffle(numbers_);
@@ -29,8 +29,8 @@ class RandomOutline {
   const TreeTopology& topology() const { return outline_; }
 
  private:
-  // Adds a node with `blocks` blocks in its subtree, and that subtree. At most half of them go to one child, so that
-  // the tree stays shallow.
+  // Adds a node and its subtree, which contains `blocks` blocks in total. At most half of the blocks are below one
+  // child, so that the tree stays shallow.
   void add_node(uint32_t blocks, Random& random) {
     const uint32_t most = std::min<uint32_t>(blocks, kTreeWidth);
     const uint32_t children = blocks == 1 ? 1 : 2 + static_cast<uint32_t>(random.below(most - 1));

@@ -1,5 +1,5 @@
-// Random update batches of valid form, with every kind of wrong item now and then. Ids, groups and writers come from
-// small pools, so that duplicates, unknown ids and repeated batches are frequent.
+// Random update batches of valid form, which sometimes contain wrong items of every kind. Ids, groups and writers come
+// from small pools, so that duplicates, unknown ids and repeated batches are frequent.
 #ifndef LOCUS_TESTS_SUPPORT_RANDOM_UPDATES_H_
 #define LOCUS_TESTS_SUPPORT_RANDOM_UPDATES_H_
 
@@ -15,10 +15,10 @@ namespace locus::test {
 
 class RandomUpdates {
  public:
-  // Draws ids from 0 to `ids` - 1.
+  // Makes a generator whose ids are below `ids`.
   RandomUpdates(Random& random, uint64_t ids) : random_(random), ids_(ids) {}
 
-  // Draws lists of at most `items` entries, whose columns live in `columns`.
+  // Generates a batch with lists of at most `items` entries. The batch borrows its columns from `columns`.
   UpdateBatch draw(Columns& columns, size_t items) {
     UpdateBatch batch;
     batch.frame = random_.pick(kFrames);
@@ -52,7 +52,7 @@ class RandomUpdates {
     return labels;
   }
 
-  // Draws one value for each of n items or one for all.
+  // Generates one value for each of n items, or one value for all items.
   template <class T, class Draw>
   std::vector<T> draw_column(size_t n, const Draw& draw) {
     std::vector<T> numbers;
@@ -71,7 +71,7 @@ class RandomUpdates {
     return random_.pick(kBad);
   }
 
-  // Draws a position, often one where an object already is.
+  // Generates a position, often one that other objects have too.
   std::vector<double> draw_position() {
     const Vec3d p = random_.chance(0.7) ? random_.whole_vector(3) * 8 : random_.vector(random_.magnitude(0, 12));
     return {p.x, p.y, p.z};
@@ -132,8 +132,9 @@ class RandomUpdates {
     return relabel;
   }
 
-  // Sets the writer's batch number: usually the next, else one before or after it. A refused batch can leave a
-  // permanent gap, so writers change.
+  // Sets the writer id and the batch number: usually the writer's next number, sometimes a lower or a higher one. A
+  // refused batch can leave a gap in a writer's numbers, which is permanent, so the writers are replaced from time to
+  // time.
   void number(UpdateBatch& batch) {
     batch.writer = 1 + random_.below(3) + 3 * (drawn_++ / 100);
     uint64_t& next = next_numbers_[batch.writer];

@@ -1,4 +1,4 @@
-// A call with bytes instead of messages: for requests that none of the project's clients would send.
+// A gRPC call that sends bytes instead of a message: for requests that none of the project's clients would send.
 #ifndef LOCUS_TESTS_SUPPORT_RAW_CALL_H_
 #define LOCUS_TESTS_SUPPORT_RAW_CALL_H_
 
@@ -17,11 +17,14 @@ struct RawReply {
   std::string bytes;
 };
 
-// Sends exactly one message to `method`, which may be a streaming method, and reads at most one.
+// Sends exactly one message to `method`, which may be a streaming method, and reads at most one reply. `token`, if not
+// empty, is sent as a bearer token.
 inline RawReply raw_call(const std::shared_ptr<grpc::Channel>& channel, const std::string& method,
-                         const std::string& bytes, std::chrono::milliseconds timeout = kCallTimeout) {
+                         const std::string& bytes, std::chrono::milliseconds timeout = kCallTimeout,
+                         const std::string& token = "") {
   grpc::ClientContext context;
   set_timeout(context, timeout);
+  if (!token.empty()) context.AddMetadata("authorization", "Bearer " + token);
   grpc::CompletionQueue queue;
   grpc::GenericStub stub(channel);
   const grpc::Slice slice(bytes);

@@ -1,6 +1,7 @@
-// A scene with a log beside a model without one, put through every event that can happen to a scene: random batches
-// alone, joined and in groups, static changes, snapshots, a full disk, and crashes, after which it is restored from its
-// log. The model is a scene that applied exactly the logged changes, one call after another.
+// Comparison of a scene that has a log with a model, a scene without a log. The test applies to the scene every kind of
+// event: random batches one at a time, several by apply_joined() or apply_each(), static changes, snapshots, a full
+// disk, and crashes, after which the scene is restored from its log. The model applies exactly the changes that were
+// logged, one call after another.
 #ifndef LOCUS_TESTS_SUPPORT_RECOVERY_LOCKSTEP_H_
 #define LOCUS_TESTS_SUPPORT_RECOVERY_LOCKSTEP_H_
 
@@ -51,15 +52,15 @@ class RecoveryLockstep {
   static constexpr uint64_t kIds = 60;
   static constexpr uint64_t kEpoch = 5;
 
-  // Content of one record.
+  // Change of instances: the instance to remove and the instance to place.
   struct Change {
     Id removed = kNoId;
-    std::optional<Id> placed;  // kNoId: the scene chooses
+    std::optional<Id> placed;  // id of the placed instance; kNoId if the scene chooses it
     size_t mesh = 0;
     Vec3d translation;
   };
   struct Deed {
-    std::vector<UpdateBatch> batches;  // one, unless several were joined
+    std::vector<UpdateBatch> batches;  // one batch; several if joined; none for a change
     bool joined = false;
     std::optional<Change> change;
   };
@@ -93,8 +94,9 @@ class RecoveryLockstep {
     return apply_one();
   }
 
-  // Processes the result of a call of the scene: the log has `deeds`, or had no space for them, or was not called.
-  // Returns whether to apply them to the model too.
+  // Handles the result of a call of the scene. `deeds` are the changes that the call should log, and `before` is the
+  // last sequence number before the call. Stores the deeds that were logged, or all deeds as tentative if the disk was
+  // full. Sets `what` to a description of an error. Returns whether the model must apply the changes, too.
   bool logged(const absl::Status& status, std::vector<Deed> deeds, uint64_t before, std::string& what) {
     const uint64_t records = scene_->log_position().sequence - before;
     if (absl::IsResourceExhausted(status)) {
@@ -104,7 +106,7 @@ class RecoveryLockstep {
     }
     if (records > deeds.size()) what = "more records than deeds";
     if (records > 0) tentative_.clear();
-    // Calls that were not logged come first.
+    // Drop deeds that were not logged; they are at the front.
     deeds.erase(deeds.begin(), deeds.end() - static_cast<std::ptrdiff_t>(std::min<uint64_t>(records, deeds.size())));
     for (Deed& deed : deeds) deeds_.push_back(std::move(deed));
     return what.empty();
@@ -225,7 +227,8 @@ class RecoveryLockstep {
     snapshot_.reset();
   }
 
-  // Crashes and restores the scene: acknowledged changes must be there if the ack level guaranteed that.
+  // Simulates a crash and restores the scene. With durability kLocal, the restored scene must contain every
+  // acknowledged change.
   std::string crash() {
     ++crashes_;
     snapshot_.reset();
@@ -269,8 +272,8 @@ class RecoveryLockstep {
   std::unique_ptr<MemoryLog> log_;
   ScenePtr scene_;
   std::unique_ptr<Scene> model_;
-  std::vector<Deed> deeds_;      // one for each record
-  std::vector<Deed> tentative_;  // those of the last append, if it failed
+  std::vector<Deed> deeds_;      // deeds (changes of the scene), one for each record of the log
+  std::vector<Deed> tentative_;  // deeds of the last append, if it failed
   std::optional<StateWriter> snapshot_;
   uint64_t frozen_sequence_ = 0;
   uint64_t frozen_bytes_ = 0;

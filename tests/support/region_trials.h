@@ -1,5 +1,5 @@
-// Families of balls and boxes for testing the region kernels: each is known to reveal one kind of mistake. Made from
-// seeds. For the tests of planted bugs in the kernels.
+// Families of balls and boxes for testing the region kernels: each family is known to reveal one kind of error. The
+// regions are generated from seeds. For the tests of planted bugs in the region kernels.
 #ifndef LOCUS_TESTS_SUPPORT_REGION_TRIALS_H_
 #define LOCUS_TESTS_SUPPORT_REGION_TRIALS_H_
 
@@ -15,7 +15,8 @@
 
 namespace locus::test {
 
-// A mesh, and balls and boxes with the numbers of all triangles that overlap them by the predicates. Immutable.
+// A mesh, balls and boxes, and the expected answers: for each ball and box, the numbers of the triangles that overlap
+// it according to the predicates of core/geometry. Immutable.
 class RegionTrial {
  public:
   RegionTrial(std::string name, const std::vector<Triangle>& triangles, std::vector<Ballf> balls,
@@ -29,7 +30,7 @@ class RegionTrial {
       answers_.push_back(answer([&](const Triangle& triangle) { return box_overlaps(box, triangle); }));
   }
 
-  // Returns the first wrong answer, empty if there is none.
+  // Returns the first wrong answer; empty if there is none.
   std::string difference(const RegionKernels& kernels) const {
     for (size_t i = 0; i < balls_.size(); ++i)
       if (found(kernels.ball, balls_[i]) != answers_[i]) return absl::StrCat(name_, ", ball ", i);
@@ -65,10 +66,10 @@ class RegionTrial {
   TriangleBvh tree_;
   std::vector<Ballf> balls_;
   std::vector<Obbf> boxes_;
-  std::vector<std::vector<uint32_t>> answers_;  // to the balls, then to the boxes
+  std::vector<std::vector<uint32_t>> answers_;  // answers for the balls, then for the boxes
 };
 
-// Makes `count` regions of every kind, for a tree of that mesh.
+// Makes `count` regions of every kind. `tree` must be a tree of `mesh`.
 inline RegionTrial random_region_trial(std::string name, const std::vector<Triangle>& mesh, TriangleBvh tree,
                                        size_t count, uint64_t seed) {
   RandomRegions regions(mesh, seed);
@@ -94,7 +95,7 @@ inline std::vector<RegionTrial> ordinary_region_trials() {
   return trials;
 }
 
-// Makes small and large triangles side by side, so that the bounds in a block differ greatly.
+// Makes small and large triangles side by side, so that the triangles of a block differ greatly in size.
 inline RegionTrial mixed_region_trial() {
   Random random(10);
   std::vector<Triangle> mixed;
@@ -107,7 +108,7 @@ inline RegionTrial mixed_region_trial() {
   return random_region_trial("triangles of many sizes", mixed, scaled_count(4'000), 11);
 }
 
-// Makes trials at decreasing scales, at which squares and products of more lengths underflow one after the other.
+// Makes trials at many scales: the smaller the scale, the more squares and products of lengths underflow.
 inline std::vector<RegionTrial> small_region_trials() {
   std::vector<RegionTrial> trials;
   const std::vector<Triangle> sphere = bumpy_sphere(4, 0.1, 1);
@@ -118,7 +119,7 @@ inline std::vector<RegionTrial> small_region_trials() {
   return trials;
 }
 
-// Makes single points, whose boxes have no extent: only the padding of nodes lets regions reach them.
+// Makes meshes of one point, whose box has no extent: a region that touches the point meets only the padded box.
 inline std::vector<RegionTrial> point_region_trials() {
   Random random(20);
   std::vector<RegionTrial> trials;
@@ -139,8 +140,8 @@ inline std::vector<RegionTrial> point_region_trials() {
   return trials;
 }
 
-// Makes slivers that an edge of a box touches in the middle, with an edge so short that products with it underflow. All
-// coordinates are whole multiples of a small unit, so that the computation is exact.
+// Makes slivers that an edge of a box touches in the middle. One edge of each sliver is so short that products with its
+// length underflow. All coordinates are whole multiples of a small unit, so that the computation is exact.
 inline std::vector<RegionTrial> short_edge_region_trials() {
   Random random(21);
   std::vector<RegionTrial> trials;

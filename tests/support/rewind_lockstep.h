@@ -1,8 +1,8 @@
-// Inserts, moves, teleports, changes and removes objects of a scene with history at random, and compares queries at any
-// time with a model that keeps every tick in full: every column, bit for bit, by every instruction set, on one and two
-// threads, and by brute force. A tick has one batch or several, in which the same object can go far and come back, be
-// replaced, teleport, be removed and be inserted again. For the random tests, which expect no difference, and for
-// planted bugs.
+// Comparison of a scene with history with a model that keeps every tick in full. Inserts, moves, teleports, relabels
+// and removes objects at random, and queries the scene at random times. Compares every column of the answers bit for
+// bit, with every instruction set, on one and two threads, and in the brute-force mode. A tick has one batch or several
+// batches, in which the same object can move far and back, be replaced, teleport, be removed and be inserted again. For
+// the random tests, which expect no difference, and for planted bugs.
 #ifndef LOCUS_TESTS_SUPPORT_REWIND_LOCKSTEP_H_
 #define LOCUS_TESTS_SUPPORT_REWIND_LOCKSTEP_H_
 
@@ -30,7 +30,7 @@ void append_column(const Column& from, Column& to) {
   to.insert(to.end(), from.begin(), from.end());
 }
 
-// Appends the answer to one query to those of the queries before it.
+// Appends `from`, the answer to query `query`, to `to`, which contains the answers to all queries before this query.
 inline void append_answer(const BlockResult& from, uint32_t query, BlockResult& to) {
   append_column(from.counts, to.counts);
   for (size_t i = 0; i < from.truncated.size(); ++i) to.truncated.push_back(query);
@@ -52,8 +52,8 @@ inline void append_answer(const BlockResult& from, uint32_t query, BlockResult& 
 
 class RewindLockstep {
  public:
-  // Objects move about `step` a batch and stay within `world` of the origin; sometimes one goes much farther. A batch
-  // begins a tick with the probability `new_tick`.
+  // Makes a scene whose objects move about `step` per batch and stay within `world` of the origin; sometimes an object
+  // moves much farther. A batch begins a tick with the probability `new_tick`.
   RewindLockstep(uint64_t seed, double world, double step, double new_tick)
       : random_(seed),
         world_(world),
@@ -139,7 +139,7 @@ class RewindLockstep {
     return insert;
   }
 
-  // Draws a batch. Most batches only contain moves, and most of those move every object.
+  // Generates a batch. Most batches contain only moves, and most of these batches move every object.
   UpdateBatch draw() {
     UpdateBatch batch;
     if (random_.chance(new_tick_)) batch.tick = model_.tick() + (random_.chance(0.2) ? random_.below(6) : 1);
@@ -177,7 +177,8 @@ class RewindLockstep {
     return "";
   }
 
-  // Returns any object, or one of those that moved far recently, which searches treat separately.
+  // Returns a random object, often one that moved far recently, because queries search separately for objects that
+  // moved far.
   const Object& some_object(const std::vector<Object>& objects) {
     const Id far = random_.pick(far_ids_);
     const auto at =
@@ -185,7 +186,7 @@ class RewindLockstep {
     return at == objects.end() || random_.chance(0.3) ? random_.pick(objects) : *at;
   }
 
-  // Returns a position near a current object, or near one at the time of query `i` of the block.
+  // Returns a position near an object, either a current object or an object at the time of query `i` of the block.
   Vec3d place(const OwnedBlock& block, size_t i) {
     if (model_.objects().empty()) return {};
     if (random_.chance(0.5)) {
@@ -234,7 +235,7 @@ class RewindLockstep {
     if (kind == 5) block.settings.columns.add(Column::kPoint);
   }
 
-  // Draws one time for all `n` queries, or one for each.
+  // Generates one time for all `n` queries, or one time for each query.
   void draw_times(size_t n, OwnedBlock& block) {
     block.settings.outside = OutsideHistory::kClamp;
     const uint64_t oldest = model_.oldest_tick(), ticks = model_.tick() - oldest;
@@ -291,17 +292,18 @@ class RewindLockstep {
   Random random_;
   double world_, step_, new_tick_;
   uint64_t history_ticks_;
-  std::array<Id, 32> far_ids_{};  // of the objects that moved far most recently
+  std::array<Id, 32> far_ids_{};  // ids of the objects that moved far most recently
   size_t next_far_ = 0;
   SceneModel model_;
   Scene scene_;
   Columns columns_;
 };
 
-// Probabilities that a batch begins a tick, for ticks of mostly one batch and of mostly several.
+// Probabilities that a batch begins a tick: with kTicksOfOneBatch most ticks have one batch, with kTicksOfManyBatches
+// most ticks have several batches.
 constexpr double kTicksOfOneBatch = 0.7, kTicksOfManyBatches = 0.25;
 
-// Returns the first difference over `count` scenes of `batches` batches each, empty if there is none.
+// Returns the first difference over `count` scenes of `batches` batches each; empty if there is none.
 inline std::string search_rewind_lockstep(uint64_t count, int batches, double new_tick = kTicksOfOneBatch) {
   for (uint64_t seed = 0; seed < count; ++seed) {
     const double step = std::exp2(static_cast<double>(seed % 7) - 3);

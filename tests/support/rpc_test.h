@@ -1,5 +1,5 @@
-// A fixture for tests that call a server: each test has a server with an empty scene named world; helpers for calls,
-// and matchers for refusals.
+// Fixture for tests that call a server, with helpers for calls and matchers for refusals. Each test has a server of its
+// own with an empty scene named world.
 #ifndef LOCUS_TESTS_SUPPORT_RPC_TEST_H_
 #define LOCUS_TESTS_SUPPORT_RPC_TEST_H_
 
@@ -15,7 +15,7 @@
 
 namespace locus::test {
 
-// Returns the Error in a status's details; fails the test and returns an empty one if there is none.
+// Returns the Error in the details of `status`. If there is none, fails the test and returns an empty Error.
 inline v1::Error error_of(const grpc::Status& status) {
   v1::Status details;
   v1::Error error;
@@ -58,14 +58,14 @@ void fill(Repeated* column, std::initializer_list<T> values) {
   for (const T value : values) column->Add(value);
 }
 
-// Twelve triangles around -1 .. 1.
+// Cube from -1 to 1 on each axis: twelve triangles.
 struct CubeMesh {
   std::vector<float> vertices = {-1, -1, -1, 1, -1, -1, 1, 1, -1, -1, 1, -1, -1, -1, 1, 1, -1, 1, 1, 1, 1, -1, 1, 1};
   std::vector<uint32_t> indices = {0, 2, 1, 0, 3, 2, 4, 5, 6, 4, 6, 7, 0, 1, 5, 0, 5, 4,
                                    2, 3, 7, 2, 7, 6, 0, 4, 7, 0, 7, 3, 1, 2, 6, 1, 6, 5};
 };
 
-// Returns an upload's first and only message.
+// Returns the only message of an upload that consists of one message.
 inline v1::UploadMeshRequest whole_mesh(const std::string& name, const CubeMesh& mesh = {}) {
   v1::UploadMeshRequest request;
   request.set_mesh(name);
@@ -84,7 +84,7 @@ class RpcTest : public ::testing::Test {
 
   Stubs& stubs() { return running_.stubs(); }
 
-  // Makes a unary call of a stub's method, with the suite's timeout.
+  // Makes a unary call of a stub's method, with the timeout kCallTimeout.
   template <class Stub, class Request, class Response>
   grpc::Status call(Stub& stub, grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*),
                     const Request& request, Response* response) {
@@ -141,7 +141,7 @@ class RpcTest : public ::testing::Test {
     return status;
   }
 
-  // Sends all messages, whether or not the server still reads them.
+  // Uploads a mesh in the form of `messages`. Stops sending if the server ends the call early.
   grpc::Status upload(const std::vector<v1::UploadMeshRequest>& messages, v1::UploadMeshResponse* response = nullptr) {
     grpc::ClientContext context;
     set_timeout(context);
@@ -171,7 +171,7 @@ class RpcTest : public ::testing::Test {
     return reader->Finish();
   }
 
-  // Returns everything in a scene, its revision included, as text for comparisons.
+  // Returns the complete dump of a scene, including its revision, as text for comparisons.
   std::string dump(const std::string& scene = "world") {
     std::vector<v1::DumpSceneResponse> pieces;
     const grpc::Status status = dump(scene, &pieces);
@@ -184,7 +184,8 @@ class RpcTest : public ::testing::Test {
   RunningServer running_;
 };
 
-// Returns inserts of balls of radius 1 on a line: id i at (3 i, 0, 0).
+// Returns a batch that inserts balls of radius 1 with the ids `first_id` to `last_id`: the ball with id i is at (3 i,
+// 0, 0).
 inline v1::UpdateBatch insert_balls(uint64_t first_id, uint64_t last_id) {
   v1::UpdateBatch batch;
   v1::Insert* insert = batch.add_inserts();
@@ -198,7 +199,7 @@ inline v1::UpdateBatch insert_balls(uint64_t first_id, uint64_t last_id) {
   return batch;
 }
 
-// Returns a batch with one ray along +x from the origin.
+// Returns a batch with one ray from the origin in the direction +x.
 inline v1::QueryBatch ray_along_x() {
   v1::QueryBatch batch;
   v1::Rays* rays = batch.add_blocks()->mutable_rays();
@@ -207,7 +208,7 @@ inline v1::QueryBatch ray_along_x() {
   return batch;
 }
 
-// Returns a change that places one mesh once.
+// Returns a change that places one instance of a mesh. If `id` is 0, the server chooses the id.
 inline v1::ChangeInstancesRequest place_one(const std::string& mesh, uint64_t id, const std::string& scene = "world") {
   v1::ChangeInstancesRequest request;
   request.set_scene(scene);

@@ -1,5 +1,5 @@
-// Answers a batch synchronously, into columns that the result owns. The server uses BatchRun with the columns of its
-// reply. Threads: any number of calls may run at once on one snapshot.
+// Function that answers a batch synchronously, into columns that the result owns. The server uses BatchRun with the
+// columns of its reply instead. Threads: any number of calls may run at once on one snapshot.
 #ifndef LOCUS_TESTS_SUPPORT_RUN_BATCH_H_
 #define LOCUS_TESTS_SUPPORT_RUN_BATCH_H_
 
@@ -18,17 +18,17 @@
 
 namespace locus::test {
 
-// Rows of one block, as BlockResult of the protocol has them.
+// Rows of one block, with the members of the protocol's BlockResult.
 struct BlockResult : CollectedRows {
-  std::string hits;  // ANY: one byte per query, 0 or 1
-  // Blocks with as_of_ticks: the effective time of each query, and the indices, ascending, of queries that asked for a
-  // time outside the history and got the nearest kept time.
+  std::string hits;  // mode ANY only: one byte per query, 0 or 1
+  // Set only for blocks with as_of_ticks: the effective time of each query, and in `clamped` the ascending indices of
+  // the queries whose time was outside the history, so that the nearest recorded time was used.
   std::vector<uint64_t> resolved_ticks;
   std::vector<float> resolved_fractions;
   std::vector<uint32_t> clamped;
-  // Cost, which may differ between equal results: work depends on the index structures.
+  // Cost of the block. It may differ between equal results, because it depends on the index structures.
   Work work;
-  uint64_t nanoseconds = 0;  // by RunOptions::work_clock, all threads together
+  uint64_t nanoseconds = 0;  // measured by RunOptions::work_clock, summed over all threads
 };
 
 struct BatchResult {
@@ -37,7 +37,7 @@ struct BatchResult {
   uint64_t nanoseconds = 0;
 };
 
-// Appends `entries` entries and returns the first of them.
+// Appends `entries` entries and returns a pointer to the first of them.
 template <class Values>
 auto* grow(Values& values, size_t entries) {
   values.resize(values.size() + entries);
@@ -70,9 +70,9 @@ class BatchResultSink final : public AnswerSink {
   BatchResult& result_;
 };
 
-// Answers `batch`, which has passed check_batch(), at `snapshot`, by calls of BatchRun::work() that `parallel_for`
-// distributes over threads. [one call on this thread] Returns OUT_OF_RANGE for a time outside the history unless its
-// block clamps, or the status of RunOptions::stop.
+// Answers `batch`, which has passed check_batch(), at `snapshot`. `parallel_for` distributes calls of BatchRun::work()
+// over threads; if it is empty, this thread makes one call. Returns OUT_OF_RANGE for a time outside the history unless
+// the block's option `outside` is kClamp, or returns the status of RunOptions::stop.
 inline absl::StatusOr<BatchResult> run_batch(const SceneSnapshot& snapshot, const QueryBatch& batch,
                                              const RunOptions& options, const ParallelFor& parallel_for = {}) {
   BatchResult result;
@@ -84,7 +84,8 @@ inline absl::StatusOr<BatchResult> run_batch(const SceneSnapshot& snapshot, cons
     while ((*run)->work(std::numeric_limits<uint64_t>::max()) == Progress::kMore) {
     }
   };
-  // A thread that finds no chunk to start may leave: the threads still working continue until the batch is done.
+  // A thread that finds no chunk to start may return from work(): the other threads continue until the batch is
+  // complete.
   if (parallel_for)
     parallel_for(BatchRun::kMaxChunks, work);
   else

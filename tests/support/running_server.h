@@ -23,7 +23,7 @@
 
 namespace locus::test {
 
-// Far longer than any call takes, so that a hang fails a test instead of stopping the suite.
+// Timeout of a call: far longer than any call takes, so that a hang fails a test instead of stopping the suite.
 inline constexpr std::chrono::seconds kCallTimeout{60};
 
 inline void set_timeout(grpc::ClientContext& context, std::chrono::milliseconds timeout = kCallTimeout) {
@@ -31,7 +31,7 @@ inline void set_timeout(grpc::ClientContext& context, std::chrono::milliseconds 
 }
 
 struct Stubs {
-  // Opens a connection of its own: gRPC would share one between channels with equal arguments.
+  // Opens a new connection; by default gRPC would share one connection between channels with equal arguments.
   explicit Stubs(const std::string& address) {
     grpc::ChannelArguments arguments;
     arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
@@ -63,7 +63,7 @@ inline server::ServerConfig test_config() {
 
 class RunningServer {
  public:
-  // `log` must outlive the server.
+  // Starts the server. `log`, which may be null, must outlive the server.
   explicit RunningServer(const server::ServerConfig& config = test_config(), UpdateLog* log = nullptr) {
     server::start_logging(config.log_level, config.log_format);
     server::capture_library_logs(config.log_level);

@@ -13,7 +13,7 @@
 
 namespace locus::test {
 
-// Returns the first difference, empty if there is none, as do all functions below.
+// Returns the first difference; empty if there is none. All functions in this file return a difference in this way.
 inline std::string ack_difference(const UpdateAck& a, const UpdateAck& b) {
   if (a.epoch != b.epoch) return "epoch of the ack";
   if (a.revision != b.revision || a.tick != b.tick) return "revision or tick of the ack";
@@ -66,7 +66,7 @@ inline std::vector<Object> sorted_objects(const ObjectSet& set) {
   return objects;
 }
 
-// Compares by id, by iterating over the grid and by querying it.
+// Compares two sets of objects: the sorted objects of both sets, the lookup of each id, and the objects in a ball.
 inline std::string objects_difference(const ObjectSet& a, const ObjectSet& b, Random& random) {
   if (a.size() != b.size()) return "number of objects";
   const std::vector<Object> objects = sorted_objects(a);
@@ -83,7 +83,7 @@ inline std::string objects_difference(const ObjectSet& a, const ObjectSet& b, Ra
   return found_in(a) == found_in(b) ? "" : "objects that a ball finds";
 }
 
-// Compares at one time that both have kept, possibly between ticks.
+// Compares the objects of both snapshots at one random time, possibly between ticks, that the history of both contains.
 inline std::string past_difference(const SceneSnapshot& a, const SceneSnapshot& b, Random& random) {
   const uint64_t oldest = std::max(a.oldest_tick(), b.oldest_tick());
   if (oldest > a.tick) return "the past";

@@ -1,4 +1,5 @@
-// A scene with short ways to change it: batches and placements as literals, expectations about refusals.
+// Fixture with a scene, and short functions that change the scene by literals of batches and placements and that check
+// refusals.
 #ifndef LOCUS_TESTS_SUPPORT_SCENE_FIXTURE_H_
 #define LOCUS_TESTS_SUPPORT_SCENE_FIXTURE_H_
 
@@ -15,7 +16,7 @@
 
 namespace locus::test {
 
-// Checks every part of a refusal that a program can read.
+// Checks the status code, and the reason, field and index of the refusal.
 inline void expect_refusal(const absl::Status& status, absl::StatusCode code, Reason reason, const std::string& field,
                            std::optional<uint32_t> index = {}) {
   EXPECT_EQ(status.code(), code) << status;

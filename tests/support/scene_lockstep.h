@@ -1,6 +1,6 @@
 // Applies random update batches and static changes to a scene and to its model and compares all visible state: acks and
-// refusals, objects, the grid's content and answers, instances, and snapshots kept along the way. For the random tests,
-// which expect no difference, and for the tests of planted bugs, which expect one.
+// refusals, objects, the grid's content and answers, instances, and snapshots kept during the run. For the random
+// tests, which expect no difference, and for the tests of planted bugs, which expect one.
 #ifndef LOCUS_TESTS_SUPPORT_SCENE_LOCKSTEP_H_
 #define LOCUS_TESTS_SUPPORT_SCENE_LOCKSTEP_H_
 
@@ -77,7 +77,7 @@ class SceneLockstep {
     return difference(error, expected.error);
   }
 
-  // Compares the objects in a ball according to the grid with those in the model.
+  // Compares the objects that the grid finds in a random ball with the objects of the model in this ball.
   std::string ball_difference(const SceneSnapshot& snapshot, const SceneModel& model) {
     const Balld ball{random_.whole_vector(3) * 8, random_.between(0, 20)};
     std::vector<Object> found;
@@ -134,7 +134,7 @@ class SceneLockstep {
   std::vector<std::pair<SnapshotPtr, SceneModel>> kept_;
 };
 
-// Returns the first difference over `count` scenes of `batches` batches each, empty if there is none.
+// Returns the first difference over `count` scenes of `batches` batches each; empty if there is none.
 inline std::string search_scene_lockstep(uint64_t count, int batches) {
   for (uint64_t seed = 0; seed < count; ++seed) {
     const std::string what = SceneLockstep(seed).run(batches);

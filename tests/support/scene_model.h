@@ -1,5 +1,6 @@
-// Reference of the random tests for the semantics of update batches: a std::map and one item after the other. Has no
-// index, no sharing and no differences. For a scene with history it keeps every tick in full.
+// Reference of the random tests for the semantics of update batches: applies one item after the other to a std::map.
+// The reference has no index and shares no data between states. For a scene with history it keeps a complete copy of
+// every tick.
 #ifndef LOCUS_TESTS_SUPPORT_SCENE_MODEL_H_
 #define LOCUS_TESTS_SUPPORT_SCENE_MODEL_H_
 
@@ -23,18 +24,19 @@ class SceneModel {
 
   struct Outcome {
     absl::StatusCode code = absl::StatusCode::kOk;
-    UpdateAck ack;    // when OK
+    UpdateAck ack;    // ack, if `code` is OK
     ItemError error;  // reason, field and index of a refusal
   };
 
-  // `history_ticks` has the meaning of HistoryOptions.
+  // Makes an empty model. `history_ticks` has the meaning of HistoryOptions::ticks.
   explicit SceneModel(uint64_t history_ticks = 0) : history_ticks_(history_ticks) {}
 
   const Objects& objects() const { return objects_; }
   uint64_t tick() const { return tick_; }
   uint64_t oldest_tick() const { return past_.empty() ? tick_ : past_.begin()->first; }
   size_t recorded_ticks() const { return past_.size(); }
-  // Returns the objects at that time; nothing for a time that is not kept.
+  // Returns the objects at the given time, interpolated between ticks; nullopt if the history does not contain this
+  // time.
   std::optional<std::vector<Object>> objects_at(uint64_t tick, float fraction) const {
     std::vector<Object> objects;
     if (tick == tick_ && fraction == 0) {
@@ -61,7 +63,7 @@ class SceneModel {
     }
     return objects;
   }
-  // Returns the position of an object when the last recorded tick ended; nothing if it was not there.
+  // Returns the position of an object at the end of the last recorded tick; nullopt if the object did not exist.
   std::optional<Vec3d> position_at_last_tick(Id id) const {
     if (past_.empty()) return std::nullopt;
     const Objects& objects = past_.rbegin()->second.objects;
@@ -70,7 +72,8 @@ class SceneModel {
   }
   const std::set<Id>& instances() const { return instances_; }
 
-  // Removes an instance if `removed` is not 0, and places one as `placed`. Returns false if that is refused.
+  // Removes the instance `removed` (kNoId = removes none) and places an instance with the id `placed`. Returns false
+  // and changes nothing if the change is refused.
   bool change_instances(Id removed, Id placed) {
     std::set<Id> next = instances_;
     if (removed != kNoId && next.erase(removed) == 0) return false;
@@ -80,7 +83,7 @@ class SceneModel {
     return true;
   }
 
-  // Applies a batch of valid form.
+  // Applies a batch of valid form and returns its expected outcome.
   Outcome apply(const UpdateBatch& batch) {
     if (batch.writer != 0) {
       const auto& [number, last] = writers_[batch.writer];
@@ -178,7 +181,7 @@ class SceneModel {
     return Reason::kUnspecified;
   }
 
-  // The wrong field, empty if there is none, and the reason.
+  // Path of the field that is wrong (empty if no field is wrong), and the reason of the refusal.
   using Fault = std::pair<std::string, Reason>;
 
   template <class T>
@@ -262,14 +265,14 @@ class SceneModel {
     count(Reason::kUnspecified, field, i, columns.ids[i]);
   }
 
-  using Lives = std::map<Id, uint64_t>;  // unique number of each life
+  using Lives = std::map<Id, uint64_t>;  // unique number of the current life of each object
   struct Then {
     Objects objects;
     Lives lives;
   };
 
   uint64_t history_ticks_;
-  std::map<uint64_t, Then> past_;  // by tick
+  std::map<uint64_t, Then> past_;  // recorded states, by tick
   Lives lives_, next_lives_;
   uint64_t last_life_ = 0;
   std::set<Id> instances_;
@@ -278,7 +281,7 @@ class SceneModel {
   UpdateAck ack_;
   uint64_t revision_ = 0;
   uint64_t tick_ = 0;
-  std::map<uint64_t, std::pair<uint64_t, UpdateAck>> writers_;  // last number and its ack
+  std::map<uint64_t, std::pair<uint64_t, UpdateAck>> writers_;  // by writer id: number of the last batch and its ack
 };
 
 }  // namespace locus::test

@@ -1,6 +1,7 @@
-// A scene whose state at every revision can be computed: which objects revision r changes, and how, is a function of r
-// and of the object's id alone. So readers can check the objects at the revision of their snapshot, however fast the
-// writer continues. Objects move, teleport, are removed and are inserted again; every tick has several revisions.
+// A scene whose state at every revision can be computed: whether and how revision r changes an object depends only on r
+// and the object's id. So readers can check the objects at the revision of their snapshot while the writer continues.
+// Objects move, teleport, are removed and are inserted again; every tick has several revisions. The turn of an object
+// is the revision of its last change.
 #ifndef LOCUS_TESTS_SUPPORT_SCENE_SCHEDULE_H_
 #define LOCUS_TESTS_SUPPORT_SCENE_SCHEDULE_H_
 
@@ -15,8 +16,10 @@ namespace locus::test {
 
 class SceneSchedule {
  public:
-  static constexpr uint64_t kTurns = 8;             // each object changes at every kTurns-th revision
-  static constexpr uint64_t kRevisionsPerTick = 5;  // so that ticks end at all stages of the round
+  static constexpr uint64_t kTurns = 8;  // number of revisions between two changes of an object
+  // Number of revisions in a tick. It has no common factor with kTurns, so that the last revisions of successive ticks
+  // change different objects.
+  static constexpr uint64_t kRevisionsPerTick = 5;
   static constexpr float kRadius = 0.5f;
 
   explicit SceneSchedule(uint64_t objects) : objects_(objects) {}
@@ -25,14 +28,15 @@ class SceneSchedule {
   static uint64_t tick_of(uint64_t revision) { return revision / kRevisionsPerTick; }
   static uint64_t last_revision_of(uint64_t tick) { return tick * kRevisionsPerTick + kRevisionsPerTick - 1; }
 
-  // Returns the last revision up to `revision` that changed the object; 0 is the beginning, when all objects exist.
+  // Returns the last revision up to `revision` that changed the object; 0 if the object has not changed since begin(),
+  // which inserts all objects.
   static uint64_t turn_of(Id id, uint64_t revision) {
     const uint64_t back = (revision + kTurns - id % kTurns) % kTurns;
     return revision >= back ? revision - back : 0;
   }
   static bool is_there(Id id, uint64_t turn) { return turn == 0 || mixed(id, turn) % 8 != 0; }
-  // Returns a position of a walk about the object's home, sometimes far from it. Whole eighths, so that float32 holds
-  // them exactly.
+  // Returns the position of the object after its change at revision `turn`: near the object's home position, sometimes
+  // far from the home position. Coordinates are multiples of 1/8, which floats represent exactly.
   static Vec3d position(Id id, uint64_t turn) {
     const uint64_t bits = mixed(id, turn + 77);
     const double far = bits % 64 == 0 ? 300 : 0;
@@ -41,20 +45,21 @@ class SceneSchedule {
     return {home(13) + part(8) + far, home(29) + part(16), home(41) / 4 + part(24)};
   }
 
-  // Returns the object's position at a revision; nothing while it is removed.
+  // Returns the object's position at a revision; nullopt if the object does not exist at this revision.
   static std::optional<Vec3d> at(Id id, uint64_t revision) {
     const uint64_t turn = turn_of(id, revision);
     return is_there(id, turn) ? std::optional<Vec3d>(position(id, turn)) : std::nullopt;
   }
 
-  // Inserts all objects into an empty scene: revision 0 of the schedule is the scene's first.
+  // Inserts all objects into an empty scene. Revision 0 of the schedule is the scene's first revision, 1.
   void begin(Scene& scene) const {
     std::vector<uint64_t> ids(objects_);
     for (uint64_t i = 0; i < objects_; ++i) ids[i] = i + 1;
     apply(scene, 0, {}, ids, {});
   }
 
-  // Applies the changes of `revision` to the objects whose turn it is, as one batch. Always changes something.
+  // Applies the changes of revision `revision` of the schedule as one batch. Each revision changes at least one object.
+  // Precondition: the scene is at the previous revision.
   void advance(Scene& scene, uint64_t revision) const {
     std::vector<uint64_t> gone, come, move;
     for (Id id = 1 + (revision + kTurns - 1) % kTurns; id <= objects_; id += kTurns) {

@@ -1,5 +1,5 @@
-// Searches many seeded scenes for one on which a comparison finds a difference. The random tests expect none; the tests
-// of planted bugs expect one.
+// Search of many seeded scenes for a scene on which a comparison finds a difference. The random tests expect no
+// difference; the tests of planted bugs expect one.
 #ifndef LOCUS_TESTS_SUPPORT_SCENE_SEARCH_H_
 #define LOCUS_TESTS_SUPPORT_SCENE_SEARCH_H_
 
@@ -14,7 +14,7 @@
 namespace locus::test {
 
 // Returns the first difference found in the scenes of seeds 0 to count - 1, with its seed; empty if there is none.
-// `draw` makes the sketch of a seed, `difference` takes a TestScene<V>.
+// `draw` generates the sketch of a seed; `difference` compares for one TestScene<V>.
 template <Primitive V, class Draw, class Difference>
 std::string search_scenes(uint64_t count, const Draw& draw, const Difference& difference) {
   for (uint64_t seed = 0; seed < count; ++seed) {
@@ -25,7 +25,7 @@ std::string search_scenes(uint64_t count, const Draw& draw, const Difference& di
   return "";
 }
 
-// Searches ordinary scenes first, then the adversarial families.
+// Returns the first difference found in ordinary scenes or, if there is none, in the adversarial families.
 template <Primitive V, class Difference>
 std::string search_all_scenes(uint64_t random_count, uint64_t adversarial_count, const Difference& difference) {
   const auto draw_random = [](uint64_t, Random& random) { return random_scene(random); };
@@ -33,7 +33,8 @@ std::string search_all_scenes(uint64_t random_count, uint64_t adversarial_count,
   return what.empty() ? search_scenes<V>(adversarial_count, adversarial_scene, difference) : what;
 }
 
-// Returns the first difference between the list and trees built with many bins, few and two.
+// Returns the first difference between a list of the values and trees built with 32, 4 and 2 bins; empty if there is
+// none.
 template <Primitive V>
 std::string tree_difference(const TestScene<V>& scene) {
   const auto list = make_list(scene.values);
@@ -48,7 +49,8 @@ std::string tree_difference(const TestScene<V>& scene) {
   return "";
 }
 
-// Likewise for the tree over a mesh's triangles.
+// Returns the first difference between a list of the triangles and a TriangleBvh with the default number of bins; empty
+// if there is none.
 inline std::string triangle_tree_difference(const TestScene<Triangle>& scene) {
   const absl::StatusOr<TriangleBvh> tree = TriangleBvh::build(scene.values);
   return tree.ok() ? first_difference(*tree, scene) : tree.status().ToString();

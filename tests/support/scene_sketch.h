@@ -1,5 +1,5 @@
-// A small scene and queries on it, in double and independent of the value type; make_scene() converts it into triangles
-// or into objects, so that every index is tested on the same situations.
+// A small scene and queries on it, in double and independent of the type of the indexed values. make_scene() converts a
+// sketch into triangles or into objects, so that every index is tested on the same situations.
 #ifndef LOCUS_TESTS_SUPPORT_SCENE_SKETCH_H_
 #define LOCUS_TESTS_SUPPORT_SCENE_SKETCH_H_
 
@@ -13,7 +13,8 @@
 
 namespace locus::test {
 
-// Position and size of a value. Zero half extents make walls, lines and points.
+// Position, half extents and rotation of one item of a sketch, which becomes an object or a few triangles. Walls, lines
+// and points have half extents of zero on one, two or three axes.
 struct Placement {
   Vec3d center;
   Vec3d half;
@@ -23,7 +24,7 @@ struct Placement {
 struct SceneSketch {
   std::string family;
   std::vector<Placement> placements;
-  std::vector<Rayd> rays;  // t_max unused
+  std::vector<Rayd> rays;  // their t_max is not used
   std::vector<Balld> balls;
   std::vector<Obbd> boxes;
 };
@@ -33,7 +34,7 @@ struct TestScene {
   using Traits = PrimitiveTraits<V>;
 
   std::string name;
-  std::vector<V> values;  // unique ids, unsorted
+  std::vector<V> values;  // values with unique ids, in any order
   std::vector<typename Traits::RayQuery> rays;
   std::vector<typename Traits::BallQuery> balls;
   std::vector<typename Traits::BoxQuery> boxes;
@@ -46,7 +47,8 @@ inline void append_quad(std::vector<Triangle>& triangles, Vec3d a, Vec3d b, Vec3
   triangles.push_back({to_float(a), to_float(c), to_float(d)});
 }
 
-// Appends the rectangle through `center` spanned by the two axes other than `axis`.
+// Appends two triangles that form a rectangle. `center` is the rectangle's centre and `axis` is perpendicular to the
+// rectangle; both refer to the axes of the placement.
 inline void append_wall(std::vector<Triangle>& triangles, const Placement& placement, Vec3d center, int axis) {
   const Rotation rotation = rotation_of(placement.rotation);
   Vec3d u, v;
@@ -65,8 +67,8 @@ inline void append_closed_box(std::vector<Triangle>& triangles, const Placement&
   }
 }
 
-// Appends rectangles of two triangles, or triangles without area, for flat placements; a closed box or a single
-// triangle within it for solid ones.
+// Appends the triangles of a placement. A flat placement becomes a rectangle of two triangles, which may have no area.
+// Any other placement becomes a closed box or a single triangle within it.
 inline void append_triangles(std::vector<Triangle>& triangles, const Placement& placement, Random& random) {
   const Vec3d h = placement.half;
   if (h.x == 0 || h.y == 0 || h.z == 0) {
@@ -144,7 +146,7 @@ inline void fill(const SceneSketch& sketch, Random& random, TestScene<Object>& s
 
 }  // namespace internal
 
-// V is Triangle or Object.
+// Converts a sketch into a scene of values of type V, Triangle or Object.
 template <Primitive V>
 TestScene<V> make_scene(const SceneSketch& sketch, Random& random) {
   TestScene<V> scene;

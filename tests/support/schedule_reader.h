@@ -1,5 +1,5 @@
-// A reader of a scheduled scene: queries the latest snapshot, and random times of its past, and compares with the
-// schedule. One thread for each reader.
+// Reader of a scheduled scene (scene_schedule.h): queries the latest snapshot and random times of its history, and
+// compares the answers with the schedule. Each reader belongs to one thread.
 #ifndef LOCUS_TESTS_SUPPORT_SCHEDULE_READER_H_
 #define LOCUS_TESTS_SUPPORT_SCHEDULE_READER_H_
 
@@ -19,12 +19,12 @@ class ScheduleReader {
   ScheduleReader(const Scene& scene, const SceneSchedule& schedule, uint64_t seed)
       : scene_(scene), schedule_(schedule), random_(seed) {}
 
-  // Checks the scene once; returns the error, or an empty string.
+  // Checks the latest snapshot of the scene. Returns a description of the error, or an empty string.
   std::string look() {
     const SnapshotPtr snapshot = scene_.latest();
     if (snapshot->revision < last_) return "revision " + std::to_string(snapshot->revision) + " after a later one";
     last_ = snapshot->revision;
-    const uint64_t now = snapshot->revision - 1;  // of the schedule
+    const uint64_t now = snapshot->revision - 1;  // revision of the schedule
     ++looks_;
     if (std::string what = compare(*snapshot, now, {}); !what.empty()) return what;
     const uint64_t tick = SceneSchedule::tick_of(now);

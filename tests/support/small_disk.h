@@ -1,5 +1,5 @@
-// A disk of a few MiB, in memory, mounted on a folder: for tests that fill it or make it read-only. Needs root;
-// mounted() returns whether mounting succeeded. The destructor unmounts it.
+// File system of a few MiB in memory, mounted on a folder: for tests that fill the disk or make it read-only. Needs
+// root; mounted() returns whether mounting succeeded. The destructor unmounts it.
 #ifndef LOCUS_TESTS_SUPPORT_SMALL_DISK_H_
 #define LOCUS_TESTS_SUPPORT_SMALL_DISK_H_
 
@@ -25,7 +25,7 @@ class SmallDisk {
   SmallDisk& operator=(const SmallDisk&) = delete;
 
   bool mounted() const { return mounted_; }
-  // Fails, returning false, while a file is open for writing.
+  // Makes the file system read-only. Fails and returns false while a file on it is open for writing.
   bool make_read_only() { return mount("", path_.c_str(), "", MS_REMOUNT | MS_RDONLY, "") == 0; }
 
  private:

@@ -1,4 +1,5 @@
-// A few triangles and objects at whole numbers, with answers that are easy to derive. For tests of queries.
+// A few triangles and objects with whole coordinates, so that the answers to queries are easy to derive. For tests of
+// queries.
 #ifndef LOCUS_TESTS_SUPPORT_SMALL_WORLD_H_
 #define LOCUS_TESTS_SUPPORT_SMALL_WORLD_H_
 
@@ -27,7 +28,7 @@ inline Object box_object(Id id, Vec3d position, Vec3f half = {1, 1, 1}) {
   return object;
 }
 
-// Returns a triangle in the plane x, around the x axis, with its front towards +x.
+// Returns a triangle perpendicular to the x axis at `x`, which the axis passes through. The triangle's front faces +x.
 inline Triangle wall_triangle(float x) { return {{x, -8, -8}, {x, 8, -8}, {x, 0, 8}}; }
 inline Triangle turned_over(const Triangle& triangle) { return {triangle.a, triangle.c, triangle.b, triangle.number}; }
 
@@ -39,10 +40,10 @@ inline PlacedMesh placed(Id id, StaticMeshPtr mesh, Vec3d translation = {}) {
   return result;
 }
 
-// Returns a wall at x = 0 of its own axes.
+// Returns a mesh of one wall_triangle() at x = 0 in mesh axes.
 inline StaticMeshPtr wall_mesh() { return mesh_of({wall_triangle(0)}); }
 
-// Returns a cube from -1 to 1 in its own axes: six faces of two triangles each.
+// Returns the mesh of a cube from -1 to 1 in mesh axes: six faces of two triangles each.
 inline StaticMeshPtr cube_mesh() {
   std::vector<Triangle> triangles;
   for (int axis = 0; axis < 3; ++axis)
@@ -60,7 +61,7 @@ inline StaticMeshPtr cube_mesh() {
   return mesh_of(triangles);
 }
 
-// Returns rays of equal mode from `origins` along the x axis.
+// Returns rays of mode `mode` from `origins` in the direction of the x axis.
 inline OwnedBlock rays_along_x(RayMode mode, std::vector<float> origins = {0, 0, 0}) {
   OwnedBlock block;
   RayColumns rays;

@@ -1,6 +1,6 @@
-// A data directory of a test, its log, and its expected content: appends records and writes snapshots whose bytes
-// follow from their sequence numbers, and describes differences when everything is read back. One thread at a time for
-// each scene.
+// Functions for tests of a log and its data directory: they append records and write snapshots whose bytes are computed
+// from the sequence numbers, read all data back and describe differences from the expected content. One thread at a
+// time for each scene.
 #ifndef LOCUS_TESTS_SUPPORT_STORED_LOG_H_
 #define LOCUS_TESTS_SUPPORT_STORED_LOG_H_
 
@@ -21,7 +21,7 @@
 
 namespace locus::test {
 
-// Returns bytes that follow from a seed; every length up to `most` occurs.
+// Returns at most `most` bytes, whose number and values are determined by `seed`.
 inline std::string bytes_of(uint64_t seed, size_t most) {
   Random random(seed);
   std::string bytes(random.below(most + 1), '\0');
@@ -29,7 +29,7 @@ inline std::string bytes_of(uint64_t seed, size_t most) {
   return bytes;
 }
 
-// A ChunkSource over a list.
+// ChunkSource that returns the elements of a vector.
 class ChunksFrom {
  public:
   explicit ChunksFrom(std::vector<std::string> chunks) : chunks_(std::move(chunks)) {}
@@ -41,10 +41,10 @@ class ChunksFrom {
 
  private:
   const std::vector<std::string> chunks_;
-  mutable size_t next_ = 0;  // mutable, because a FunctionRef calls a const function
+  mutable size_t next_ = 0;  // mutable, because the caller's FunctionRef calls the const operator()
 };
 
-// Returns the content of a scene's record `sequence`, and of its snapshot up to there, in tests that set no other.
+// Return the default content of a scene's record `sequence`, and of its snapshot at this sequence number.
 inline std::string record_bytes(SceneKey scene, uint64_t sequence, size_t most = 200) {
   return bytes_of(scene * 1'000'003 + sequence, most);
 }
@@ -63,7 +63,7 @@ inline LogEntry entry_of(uint64_t epoch, uint64_t sequence, const std::string& b
   return entry;
 }
 
-// Appends the scene's next `count` records, one call each.
+// Appends the scene's next `count` records, each record by a separate call.
 inline absl::Status append_records(UpdateLog& log, SceneKey scene, uint64_t epoch, uint64_t count,
                                    AckLevel level = AckLevel::kLocal, size_t most = 200) {
   for (uint64_t i = 0; i < count; ++i) {
@@ -78,8 +78,8 @@ inline absl::Status append_records(UpdateLog& log, SceneKey scene, uint64_t epoc
   return absl::OkStatus();
 }
 
-// Describes the first of the scene's records from `from` to its end that differs from those of append_records(); empty
-// if there is none. Sets `last` to the last sequence number read.
+// Reads the scene's records from sequence number `from` to the last one. Returns a description of a record that differs
+// from the record that append_records() writes; empty if there is none. Sets `last` to the last sequence number read.
 inline std::string record_difference(const UpdateLog& log, SceneKey scene, uint64_t from, uint64_t& last,
                                      size_t most = 200) {
   std::string difference;
@@ -132,8 +132,8 @@ inline std::array<uint8_t, 32> hash_of(uint8_t number) {
   return sha256;
 }
 
-// Creates a scene whose snapshot is snapshot_chunks() of its key at 0. Keys are assigned in order, from 1 in a new
-// directory.
+// Creates a scene whose snapshot is snapshot_chunks(expected, 0). `expected` must be the key that the log will assign:
+// keys are assigned in ascending order, from 1 in a new directory.
 inline absl::StatusOr<SceneKey> create_scene(UpdateLog& log, const std::string& name, SceneKey expected,
                                              uint64_t epoch = 7) {
   ChunksFrom state(snapshot_chunks(expected, 0));

@@ -1,5 +1,6 @@
-// Acknowledged operations of a log that a test used, and the check after it is opened again following a fault: every
-// acknowledged change and record must be there, in order, and nothing that was never requested. One thread.
+// Model of a log that a test uses: it stores which operations the log acknowledged. When the log is opened again after
+// a fault, the model checks that the log contains every acknowledged change and record, in order, and nothing that was
+// never requested. One thread.
 #ifndef LOCUS_TESTS_SUPPORT_STORED_MODEL_H_
 #define LOCUS_TESTS_SUPPORT_STORED_MODEL_H_
 
@@ -15,12 +16,12 @@
 
 namespace locus::test {
 
-// Policy for damage that the log reports: whether that is accepted as an answer.
+// Policy for damage that the log reports: kNone treats it as a difference, kAllowed accepts it.
 enum class Refusals : uint8_t { kNone, kAllowed };
 
 class StoredModel {
  public:
-  // Makes one random step and notes the acknowledged result.
+  // Makes one random change of the log and stores the acknowledged result in the model.
   void step(UpdateLog& log, Random& random) {
     const uint64_t kind = random.below(100);
     if (scenes_.empty() || kind < 4) {
@@ -38,7 +39,8 @@ class StoredModel {
     }
   }
 
-  // Describes an element that the log lacks and must have, or has and must not have; empty if there is none.
+  // Returns a description of an element that is missing in the log or that the log must not contain; empty if there is
+  // no such element.
   std::string difference(const UpdateLog& log, Refusals refusals) const {
     if (!log.catalogue_damage().ok() && refusals == Refusals::kNone)
       return std::string(log.catalogue_damage().message());
@@ -65,9 +67,9 @@ class StoredModel {
     SceneKey key = 0;
     uint64_t epoch = 7;
     uint64_t tried_epoch = 7;
-    uint64_t last = 0;      // acknowledged, on the disk
-    uint64_t tried = 0;     // last requested
-    uint64_t snapshot = 0;  // acknowledged
+    uint64_t last = 0;      // sequence number of the last record whose append to the disk was acknowledged
+    uint64_t tried = 0;     // sequence number of the last record that was requested
+    uint64_t snapshot = 0;  // sequence number of the last acknowledged snapshot
     uint64_t tried_snapshot = 0;
   };
 
@@ -76,7 +78,7 @@ class StoredModel {
     Scene& scene = scenes_[name];
     ChunksFrom state(snapshot_chunks(next_name_, 0));
     const absl::StatusOr<SceneKey> key = log.create_scene(name, "spec", 7, state);
-    scene.key = next_name_;  // seed of the bytes
+    scene.key = next_name_;  // determines the bytes of the scene's records
     keys_[name] = key.ok() ? *key : 0;
     scene.state = key.ok() ? kThere : kUnknown;
   }
@@ -102,7 +104,7 @@ class StoredModel {
     if (log.restart_scene(keys_[name], scene->tried_epoch).ok()) {
       scene->epoch = scene->tried_epoch;
     } else {
-      scene->state = kUnknown;  // the epoch is unknown
+      scene->state = kUnknown;  // it is unknown which of the two epochs the log has stored
     }
   }
   void snapshot(UpdateLog& log, Random& random) {
@@ -162,7 +164,7 @@ class StoredModel {
     if (stored->snapshot_sequence < scene.snapshot) return "an older snapshot";
     if (stored->snapshot_sequence > std::max(scene.snapshot, scene.tried_snapshot)) return "a newer snapshot";
     const auto chunks = read_snapshot(log, stored->key);
-    if (absl::IsDataLoss(chunks.status())) return "";  // refused at the first read
+    if (absl::IsDataLoss(chunks.status())) return "";  // the damage was detected by this read, which returned an error
     if (!chunks.ok()) return std::string(chunks.status().message());
     if (*chunks != snapshot_chunks(scene.key, stored->snapshot_sequence)) return "another snapshot";
     uint64_t last = stored->snapshot_sequence;
@@ -184,7 +186,7 @@ class StoredModel {
     std::map<std::string, const StoredMesh*> stored;
     for (const StoredMesh& mesh : log.stored_meshes()) {
       if (!mesh.damage.ok() && refusals == Refusals::kNone) return std::string(mesh.damage.message());
-      // If the catalogue of meshes is damaged, no mesh is expected and none is trusted.
+      // Verify no mesh after damage: a damaged catalogue may lack meshes, and its entries are not trusted.
       if (!mesh.damage.ok() || !log.catalogue_damage().ok()) return "";
       stored[mesh.name] = &mesh;
       const auto known = meshes_.find(mesh.name);

@@ -1,4 +1,4 @@
-// A folder of a test's own, removed at its end with its content.
+// Folder for one test. The destructor removes the folder with its content.
 #ifndef LOCUS_TESTS_SUPPORT_TEMPORARY_FOLDER_H_
 #define LOCUS_TESTS_SUPPORT_TEMPORARY_FOLDER_H_
 

@@ -1,4 +1,4 @@
-// Scale of long random tests: all of the steps, or a part of them in sanitizer and debug builds, which are slow.
+// Scale of long random tests: all of the steps, or a tenth of the steps in sanitizer and debug builds, which are slow.
 #ifndef LOCUS_TESTS_SUPPORT_TEST_SCALE_H_
 #define LOCUS_TESTS_SUPPORT_TEST_SCALE_H_
 

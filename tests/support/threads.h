@@ -1,5 +1,5 @@
-// BvhOptions::parallel_for and run_batch() on a given number of threads, which start and end with each
-// call.
+// Functions that distribute calls over a given number of threads, for BvhOptions::parallel_for and run_batch(). The
+// threads start and end with each call.
 #ifndef LOCUS_TESTS_SUPPORT_THREADS_H_
 #define LOCUS_TESTS_SUPPORT_THREADS_H_
 
@@ -25,7 +25,8 @@ inline ParallelFor on_threads(size_t threads) {
   };
 }
 
-// Runs the calls in falling order, since callers must not depend on an order.
+// Returns a function that makes the calls in descending order of their arguments, since the callers' results must not
+// depend on the order.
 inline ParallelFor backwards() {
   return [](size_t count, const std::function<void(size_t)>& work) {
     while (count-- > 0) work(count);

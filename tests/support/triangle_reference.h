@@ -1,5 +1,5 @@
-// Triangles of every kind, slivers and ones without area among them, and their distance from a point by search in long
-// double. For tests.
+// Random triangles of every kind, including slivers and triangles without area, and their distance from a point,
+// computed by search in long double. For tests.
 #ifndef LOCUS_TESTS_SUPPORT_TRIANGLE_REFERENCE_H_
 #define LOCUS_TESTS_SUPPORT_TRIANGLE_REFERENCE_H_
 
@@ -13,7 +13,7 @@
 
 namespace locus::test {
 
-// General triangles, slivers, segments and points, of any size.
+// Returns a general triangle, a sliver, a segment or a point, of any size.
 inline Triangle random_triangle(Random& random) {
   const Vec3d place = random.vector(random.magnitude(0, 10));
   const double size = random.magnitude(-6, 6);
@@ -30,7 +30,8 @@ inline Triangle random_triangle(Random& random) {
 
 inline double size_of(const Triangle& t) { return std::sqrt(squared_length(to_double(bounds_of(t)).extent())); }
 
-// Returns the smallest distance over all weights, by search within search: it is convex in each.
+// Returns the distance of a point from a triangle: the minimum over all barycentric weights u and v, found by nested
+// searches, since the distance is convex in each weight.
 inline Real reference_distance(Vec3r point, const Triangle& t) {
   const Vec3r a = to_real(t.a) - point, ab = to_real(t.b) - to_real(t.a), ac = to_real(t.c) - to_real(t.a);
   const auto nearest_v = [&](Real u) {
@@ -41,8 +42,8 @@ inline Real reference_distance(Vec3r point, const Triangle& t) {
   return std::min(nearest_v(argmin(nearest_v, 0, 1)), std::min(nearest_v(0), nearest_v(1)));
 }
 
-// Draws vertices of whole numbers whose cross product is 1, and a third beside the origin: as thin as floats allow,
-// with a normal of which only a few bits are significant.
+// Generates a triangle as thin as floats allow: two vertices have whole coordinates, and their x and y components have
+// a cross product of 1; the third vertex is near the origin. Only a few bits of its normal are significant.
 inline Triangle hairline(Random& random) {
   constexpr int64_t kLargest = 1 << 21;
   int64_t p = random.whole(1, kLargest), q = random.whole(1, kLargest);

@@ -18,7 +18,7 @@ absl::Status BackupWriter::begin(const client::BackupSize& announced) {
 absl::Status BackupWriter::begin_file(const std::string& path) {
   if (path == kChecksumFile)
     return absl::DataLossError(
-        absl::StrCat("the server sent a file ", path, ", which a backup has for itself; is this a locus server?"));
+        absl::StrCat("the server sent a file ", path, ", a name that the backup itself uses; is this a locus server?"));
   return directory_.open_file(path);
 }
 

@@ -16,12 +16,12 @@
 
 namespace locus::cli {
 
-// Callback for progress; receives the number of bytes done so far and the total.
+// Callback for progress; receives the number of bytes processed so far and the total number of bytes.
 using BackupProgress = std::function<void(uint64_t done, uint64_t total)>;
 
 class BackupWriter final : public client::BackupSink {
  public:
-  // Borrows the directory. Precondition: PartialDirectory::make() was not called on it; begin() calls it.
+  // Borrows `directory`. Precondition: PartialDirectory::make() was not called on `directory`, since begin() calls it.
   BackupWriter(PartialDirectory& directory, BackupProgress progress);
 
   absl::Status begin(const client::BackupSize& announced) override;
@@ -29,7 +29,7 @@ class BackupWriter final : public client::BackupSink {
   absl::Status add(absl::string_view bytes) override;
   absl::Status end_file(const client::BackupFile& file) override;
 
-  // Adds SHA256SUMS and renames the directory to its final name. Call it after the last end_file().
+  // Adds SHA256SUMS and renames the directory to its final name. Precondition: end_file() was called for the last file.
   absl::Status finish();
 
  private:

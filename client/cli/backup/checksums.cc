@@ -13,6 +13,7 @@ namespace {
 
 constexpr size_t kHexDigits = 64;
 constexpr absl::string_view kBetween = "  ";
+constexpr size_t kShownPathBytes = 200;  // length of a path in a message
 
 bool is_hex_digit(char c) { return absl::ascii_isdigit(static_cast<unsigned char>(c)) || (c >= 'a' && c <= 'f'); }
 
@@ -50,8 +51,10 @@ absl::StatusOr<std::vector<Checksum>> parse_checksums(absl::string_view text) {
     const size_t end = text.find('\n');
     if (end == absl::string_view::npos) return damaged(line, "it does not end");
     ASSIGN_OR_RETURN(Checksum one, parse_line(text.substr(0, end), line));
-    if (absl::Status fit = paths.add(one.path); !fit.ok())
-      return damaged(line, absl::StrCat("the path \"", absl::CEscape(one.path), "\" ", fit.message()));
+    if (absl::Status fit = paths.add(one.path); !fit.ok()) {
+      const std::string shown = absl::CEscape(one.path.substr(0, kShownPathBytes));
+      return damaged(line, absl::StrCat("the path \"", shown, "\" ", fit.message()));
+    }
     checksums.push_back(std::move(one));
     text.remove_prefix(end + 1);
   }

@@ -21,11 +21,12 @@ struct Checksum {
   bool operator==(const Checksum&) const = default;
 };
 
-// Returns one line per file: its hash in lower case hexadecimal, two spaces, its path.
+// Returns one line per file: the file's SHA-256 in lower case hexadecimal, two spaces, the file's path.
 std::string checksum_text(const std::vector<Checksum>& checksums);
 
-// Parses only texts in exactly the format of checksum_text(), so that any changed byte of the file is noticed. Returns
-// DATA_LOSS that names the line for any other text, for a path that leads out of the backup, and for a repeated path.
+// Parses a text in the format of checksum_text(). Returns DATA_LOSS, with the number of the line, for any deviation
+// from this format, so that a changed byte of SHA256SUMS is detected, and for a path that is repeated or leads out of
+// the backup.
 absl::StatusOr<std::vector<Checksum>> parse_checksums(absl::string_view text);
 
 }  // namespace locus::cli

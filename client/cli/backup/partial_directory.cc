@@ -6,11 +6,11 @@
 
 #include <cerrno>
 #include <cstdio>
+#include <cstring>
 #include <filesystem>
 #include <system_error>
 
 #include "absl/strings/str_cat.h"
-#include "client/cli/backup/file_error.h"
 #include "core/base/check.h"
 #include "core/base/status_macros.h"
 
@@ -44,7 +44,42 @@ absl::Status make_folder(const std::string& path) {
   return mkdir(path.c_str(), kFolderMode) == 0 ? absl::OkStatus() : file_error("make", path, errno);
 }
 
+absl::StatusCode code_of(int error) {
+  switch (error) {
+    case ENOENT:
+      return absl::StatusCode::kNotFound;
+    case ENOSPC:
+    case EDQUOT:
+      return absl::StatusCode::kResourceExhausted;
+    default:
+      return absl::StatusCode::kFailedPrecondition;
+  }
+}
+
+absl::string_view advice_of(int error) {
+  switch (error) {
+    case ENOENT:
+      return "; check the path";
+    case ENOSPC:
+    case EDQUOT:
+      return "; free some of that disk, or choose another";
+    case EACCES:
+    case EPERM:
+      return "; run as the user whom it belongs to";
+    case EBUSY:
+    case EXDEV:
+      return "; a mount point cannot be replaced: choose a new directory within it";
+    default:
+      return "";
+  }
+}
+
 }  // namespace
+
+absl::Status file_error(absl::string_view doing, const std::string& path, int error) {
+  return absl::Status(code_of(error),
+                      absl::StrCat("cannot ", doing, " ", path, ": ", std::strerror(error), advice_of(error)));
+}
 
 PartialDirectory::PartialDirectory(const std::string& target, TargetRule rule)
     : target_(absolute(target)), partial_(target_ + ".partial"), rule_(rule) {}
@@ -60,10 +95,10 @@ absl::Status PartialDirectory::check() const {
   const fs::file_status there = fs::symlink_status(target_, why);
   if (fs::exists(there)) {
     if (rule_ == TargetRule::kNothing)
-      return absl::FailedPreconditionError(absl::StrCat(target_, " is there already: choose another directory"));
+      return absl::FailedPreconditionError(absl::StrCat(target_, " exists already: choose another directory"));
     if (!fs::is_directory(there) || !fs::is_empty(target_, why) || why)
       return absl::FailedPreconditionError(absl::StrCat(
-          target_, " is no empty directory, and nothing is overwritten: choose another, or move this one away"));
+          target_, " is not an empty directory, and nothing is overwritten: choose another, or move this one away"));
   }
   if (fs::exists(fs::symlink_status(partial_, why)))
     return absl::FailedPreconditionError(

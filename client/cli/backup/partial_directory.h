@@ -1,5 +1,6 @@
-// Directory that appears either complete or not at all. It is created and filled as TARGET.partial, and renamed to
-// TARGET after all its files were synced to disk. For backups and restored data directories. Not thread-safe.
+// Directory that appears either complete or not at all. The directory is created and filled as TARGET.partial, and
+// renamed to TARGET after all its files were synced to disk. For backups and restored data directories. Not
+// thread-safe. Also file_error(), which makes the errors of file operations in client/cli/backup.
 //
 // Invariant: TARGET does not change before keep(). The destructor removes TARGET.partial unless keep() has renamed it;
 // a process that is killed leaves TARGET.partial behind.
@@ -15,7 +16,13 @@
 
 namespace locus::cli {
 
-// Rule for what may exist at the target beforehand: nothing, or at most an empty directory.
+// Returns the error "cannot DOING PATH: ...", with advice for common causes. `error` is the errno of the failed call.
+// The code is NOT_FOUND for ENOENT, RESOURCE_EXHAUSTED for a full disk, and FAILED_PRECONDITION for any other errno. A
+// missing file permission does not give PERMISSION_DENIED, because that code is reserved for denials by the server.
+absl::Status file_error(absl::string_view doing, const std::string& path, int error);
+
+// Rule for the target before the directory is made: kNothing requires that the target does not exist, kNothingOrEmpty
+// also allows an empty directory.
 enum class TargetRule { kNothing, kNothingOrEmpty };
 
 class PartialDirectory {
@@ -26,11 +33,11 @@ class PartialDirectory {
   PartialDirectory(const PartialDirectory&) = delete;
   PartialDirectory& operator=(const PartialDirectory&) = delete;
 
-  // Return absolute paths.
+  // Return the absolute paths of TARGET and TARGET.partial.
   const std::string& target() const { return target_; }
   const std::string& partial() const { return partial_; }
 
-  // Returns FAILED_PRECONDITION if what exists at the target violates the rule, or if TARGET.partial exists.
+  // Returns FAILED_PRECONDITION if the rule forbids the file or directory at the target, or if TARGET.partial exists.
   absl::Status check() const;
   // Calls check() and creates TARGET.partial, accessible to its owner only. Returns RESOURCE_EXHAUSTED if less than
   // `bytes` bytes are free on the disk.

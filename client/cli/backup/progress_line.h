@@ -1,4 +1,4 @@
-// Progress line of a backup or a restore; written only if the context's progress is live.
+// Progress line of a backup or a restore; written only if Context::progress() is Progress::kLive.
 #ifndef LOCUS_CLIENT_CLI_BACKUP_PROGRESS_LINE_H_
 #define LOCUS_CLIENT_CLI_BACKUP_PROGRESS_LINE_H_
 
@@ -17,7 +17,7 @@ class ProgressLine {
  public:
   ProgressLine(std::string doing, Context& context) : doing_(std::move(doing)), context_(context) {}
 
-  // Returns the callback that rewrites the line, or an empty function if progress is not live.
+  // Returns the callback that rewrites the line, or an empty function if Context::progress() is not Progress::kLive.
   BackupProgress progress() const {
     if (context_.progress() != Progress::kLive) return {};
     return [this](uint64_t done, uint64_t total) {

@@ -14,7 +14,6 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "client/cli/backup/checksums.h"
-#include "client/cli/backup/file_error.h"
 #include "client/lib/sha256.h"
 #include "core/base/status_macros.h"
 
@@ -49,14 +48,15 @@ class Problems {
   size_t count_ = 0;
 };
 
-// Reads a file in chunks and passes each chunk to `take`, until the file ends or `take` returns an error.
+// Reads a file buffer by buffer and calls `take` with the contents of each buffer, until the file ends or `take`
+// returns an error.
 absl::Status read_file(const std::string& path, absl::FunctionRef<absl::Status(absl::string_view)> take) {
   const int file = open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC);
   if (file < 0) return file_error("read", path, errno);
   std::string buffer(kReadBytes, '\0');
   absl::Status status;
   while (status.ok()) {
-    const ssize_t some = read(file, buffer.data(), buffer.size());
+    const ssize_t some = ::read(file, buffer.data(), buffer.size());
     if (some < 0 && errno == EINTR) continue;
     if (some < 0) status = file_error("read", path, errno);
     if (some <= 0) break;
@@ -96,7 +96,7 @@ absl::StatusOr<std::map<std::string, uint64_t>> list_files(const std::string& ba
     if (why) break;
     if (fs::is_directory(status) || path == kChecksumFile) continue;
     if (sizes.size() > client::kMaxBackupFiles) {
-      problems.add(path, "is one file too many");
+      problems.add(path, "exceeds the maximum number of files");
       break;
     }
     if (fs::is_regular_file(status)) {
@@ -160,7 +160,7 @@ absl::StatusOr<client::BackupSize> read_backup(const std::string& backup, Partia
     RETURN_IF_ERROR(read_file(absl::StrCat(backup, "/", one.path), take));
     ++done.files;
     if (hasher.finish() != one.sha256)
-      problems.add(one.path, absl::StrCat("has other bytes than ", kChecksumFile, " says"));
+      problems.add(one.path, absl::StrCat("does not match its checksum in ", kChecksumFile));
     if (copy == nullptr) continue;
     RETURN_IF_ERROR(problems.status(backup));
     RETURN_IF_ERROR(copy->close_file());

@@ -11,10 +11,10 @@
 
 namespace locus::cli {
 
-// Reads every file of the directory `backup` once and verifies its hash. If `copy` is not null, writes all files except
-// SHA256SUMS to it; the caller must not have called make() on it, and calls keep() afterwards. Returns DATA_LOSS that
-// names the first few files that are missing, changed or not listed; with `copy`, reading ends at the first such file.
-// Returns NOT_FOUND if there is no backup.
+// Reads every file of the directory `backup` once and verifies its hash. If `copy` is not null, calls copy->make() and
+// writes all files except SHA256SUMS to `copy`; the caller calls copy->keep() afterwards. Returns DATA_LOSS, with the
+// names of the first few files that are missing, changed or not listed in SHA256SUMS; with `copy`, reading ends at the
+// first such file. Returns NOT_FOUND if there is no backup.
 absl::StatusOr<client::BackupSize> read_backup(const std::string& backup, PartialDirectory* copy,
                                                const BackupProgress& progress);
 

@@ -37,7 +37,7 @@ absl::Status back_up(const BackupOptions& options, Context& context) {
 void add_backup_command(CLI::App& parent, Context& context) {
   const auto options = std::make_shared<BackupOptions>();
   CLI::App& command = *parent.add_subcommand(
-      "backup", "Copy everything on the server's disk, as it is at one moment, while the server goes on");
+      "backup", "Copy the server's data directory as of one moment, while the server keeps running");
   command.footer(R"(Examples:
   locus backup arena-backup
   locus -a 10.0.0.5:7575 backup backups/$(date +%F)

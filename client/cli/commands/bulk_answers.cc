@@ -10,10 +10,10 @@
 namespace locus::cli {
 namespace {
 
-constexpr size_t kWidthRows = 1000;          // rows from which a table computes its column widths
+constexpr size_t kAnswerWidthRows = 1000;    // column widths of a table are computed from this many first rows
 constexpr uint64_t kListedTruncated = 1000;  // maximum number of row indices in the report
 
-absl::Status no_fit() { return absl::DataLossError("the server's answer does not fit the question"); }
+absl::Status no_fit() { return absl::DataLossError("the server's answer does not match the query"); }
 
 }  // namespace
 
@@ -24,7 +24,7 @@ BulkAnswers::BulkAnswers(const BulkQuery& query, bool follow, Context& context)
       report_(context.out(), context.options().format,
               {.rows_name = query.rows_name,
                .keys = query.any ? std::vector<std::string>{query.layout.query, "hit"} : row_keys(query.layout),
-               .width_rows = kWidthRows}) {}
+               .width_rows = kAnswerWidthRows}) {}
 
 absl::Status BulkAnswers::write(const v1::QueryResult& result, const SentRows& sent,
                                 const std::vector<client::Double3>& frames) {

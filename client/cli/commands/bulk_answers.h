@@ -20,18 +20,19 @@ struct BulkQuery;
 
 class BulkAnswers {
  public:
-  // Borrows `query` and `context`. With `follow`, answers may have different revisions, and the report shows the first
-  // and the newest one.
+  // Borrows `query` and `context`. With `follow`, answers may have different revisions, and the report contains the
+  // first and the newest revision.
   BulkAnswers(const BulkQuery& query, bool follow, Context& context);
 
-  // Appends the rows of `result`, the answer to the message whose rows are `sent` and whose blocks have the frames
-  // `frames`. Returns DATA_LOSS if the answer does not match the query, UNKNOWN if the output cannot be written.
+  // Appends the rows of `result`, the answer to one query message. `sent` contains the input rows of this message, and
+  // `frames` the frame of each of its blocks. Returns DATA_LOSS if the answer does not match the message, UNKNOWN if
+  // the output cannot be written.
   absl::Status write(const v1::QueryResult& result, const SentRows& sent, const std::vector<client::Double3>& frames);
 
   // Completes the report. Does nothing if no answer was written.
   void end();
 
-  // Returns the newest revision among the answers; none before the first answer.
+  // Returns the newest revision among the answers; nullopt before the first answer.
   std::optional<client::Revision> revision() const { return revision_; }
   // Returns the number of input rows that were answered so far.
   uint64_t rows() const { return rows_; }

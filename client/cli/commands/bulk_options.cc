@@ -17,8 +17,9 @@ void add_bulk_options(CLI::App& command, BulkOptions& options) {
       .add_option("--from-ndjson", options.ndjson, "Rows from a file with a JSON object a line; - is standard input")
       ->type_name("FILE");
   command
-      .add_option("--batch", options.batch,
-                  absl::StrCat("Most rows sent in one batch, up to ", kMaxBulkBatch, " [", kDefaultBulkBatch, "]"))
+      .add_option(
+          "--batch", options.batch,
+          absl::StrCat("Maximum number of rows in one batch, up to ", kMaxBulkBatch, " [", kDefaultBulkBatch, "]"))
       ->type_name("ROWS")
       ->check(CLI::Range(uint32_t{1}, kMaxBulkBatch).description(""));
 }
@@ -26,18 +27,18 @@ void add_bulk_options(CLI::App& command, BulkOptions& options) {
 void add_bulk_query_options(CLI::App& command, BulkOptions& options) {
   add_bulk_options(command, options);
   command.add_flag("--follow", options.follow,
-                   "With an input: ask each batch at the newest revision [all at the one that answered the first]");
+                   "With an input: query each batch at the newest revision [all at the revision of the first answer]");
 }
 
 absl::Status check(const BulkOptions& options) {
   if (options.csv && options.ndjson) return usage_error("give --from-csv or --from-ndjson, not both");
-  if (options.batch && !options.given()) return usage_error("--batch goes with --from-csv or --from-ndjson");
-  if (options.follow && !options.given()) return usage_error("--follow goes with --from-csv or --from-ndjson");
+  if (options.batch && !options.given()) return usage_error("--batch needs --from-csv or --from-ndjson");
+  if (options.follow && !options.given()) return usage_error("--follow needs --from-csv or --from-ndjson");
   return absl::OkStatus();
 }
 
 absl::Status several_values(const std::string& option) {
-  return usage_error(absl::StrCat("beside an input give ", option, " once, for all rows, or make it a column"));
+  return usage_error(absl::StrCat("with an input, give ", option, " once, for all rows, or make it a column"));
 }
 
 absl::StatusOr<std::unique_ptr<RowReader>> open_rows(const BulkOptions& options, RowSchema schema) {

@@ -21,10 +21,11 @@ namespace locus::cli {
 
 inline constexpr uint32_t kDefaultBulkBatch = 8192;
 inline constexpr uint32_t kMaxBulkBatch = 65536;
-// Maximum number of batches in flight. Bounds the memory of a run, together with the batch that the reader is filling.
+// Maximum number of batches that are sent and not yet answered. Memory holds at most these batches and the batch that
+// the reader is filling.
 inline constexpr size_t kBulkWindow = 4;
-// Deadline of one batch if --timeout is not given, in seconds. Longer than for a single call, since a batch waits for
-// the batches before it.
+// Deadline of one batch if --timeout is not given, in seconds. It is longer than the deadline of a single call, since a
+// batch waits for the batches before it.
 inline constexpr double kBulkAnswerSeconds = 60;
 
 struct BulkOptions {
@@ -40,11 +41,11 @@ struct BulkOptions {
 void add_bulk_options(CLI::App& command, BulkOptions& options);
 void add_bulk_query_options(CLI::App& command, BulkOptions& options);
 
-// Returns a usage error if bulk options exclude each other, or if one of them requires another that is not given.
+// Returns a usage error if bulk options exclude each other, or if --batch or --follow is given without an input.
 absl::Status check(const BulkOptions& options);
 
-// Returns `field` for a schema. If `values`, the values of the option `option`, is not empty, the option sets this
-// field for all rows, so the input must not have the column.
+// Returns `field` for use in a schema. `values` are the values of the command-line option named `option`. If `values`
+// is not empty, the option sets this field for all rows, so the input must not have the column.
 template <class T>
 Field column_or_option(Field field, const std::vector<T>& values, const std::string& option) {
   if (values.empty()) return field;
@@ -53,8 +54,10 @@ Field column_or_option(Field field, const std::vector<T>& values, const std::str
   return field;
 }
 
-// Return a usage error if an option has several values: with bulk input, an option's one value applies to all rows.
+// Returns the usage error for an option with several values: with bulk input, the single value of an option applies to
+// all rows.
 absl::Status several_values(const std::string& option);
+// Returns several_values(option) if `values` has more than one value, otherwise OK.
 template <class T>
 absl::Status at_most_one(const std::vector<T>& values, const std::string& option) {
   return values.size() <= 1 ? absl::OkStatus() : several_values(option);
@@ -69,9 +72,9 @@ struct RowSpan {
   size_t end = 0;
 };
 
-// Return the values of `column` for these rows, in the form in which they are sent. A row without a value gets `absent`
-// (one value, or one for each part of a vector). If no row of the batch has a value, returns `otherwise`, usually the
-// option's value or nothing.
+// Return the values of `column` for `rows` in the types of the protocol. A row without a value gets `absent` (one
+// value, or one for each part of a vector). If no row of the whole batch has a value, return `otherwise`, which is
+// usually the value of the option of the same name, or empty.
 std::vector<float> float_column(const RowColumn& column, RowSpan rows, const std::vector<float>& absent,
                                 std::vector<float> otherwise);
 std::vector<uint64_t> id_column(const RowColumn& column, RowSpan rows, uint64_t absent,
@@ -80,14 +83,15 @@ std::vector<uint32_t> bits_column(const RowColumn& column, RowSpan rows, uint32_
                                   std::vector<uint32_t> otherwise);
 std::vector<double> positions_of(const RowColumn& column, RowSpan rows);
 
-// Returns `status` with its message replaced; code and payloads are kept.
+// Returns `status` with its message replaced by `message`; code and payloads are kept.
 absl::Status in_words(const absl::Status& status, const std::string& message);
 
-// Returns the server's error about a batch with the input's name and line prepended: the line of the item that the
-// error names, else the range of all lines of the batch.
+// Returns `status`, the server's error about the batch `sent`, with "INPUT:LINE: " prepended. LINE is the line of the
+// item that the error names. If the error names no item, LINE is the range of the batch's lines.
 absl::Status refused_rows(const absl::Status& status, const std::string& input, const SentRows& sent);
 
-// Write and clear the progress line "12345 WHAT" on the error stream. Do nothing if progress is not live.
+// Write and clear the progress line "12345 WHAT" on the error stream. Do nothing if Context::progress() is not
+// Progress::kLive.
 void show_rows(Context& context, const char* what, uint64_t rows);
 void hide_rows(Context& context);
 

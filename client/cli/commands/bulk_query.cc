@@ -18,7 +18,7 @@ namespace {
 
 constexpr double kFrameGrid = 16384;
 
-bool is_float(double value) { return static_cast<double>(static_cast<float>(value)) == value; }
+bool is_exact_float(double value) { return static_cast<double>(static_cast<float>(value)) == value; }
 
 std::vector<float> offsets_of(const RowColumn& positions, RowSpan rows, const client::Double3& frame) {
   std::vector<float> offsets;
@@ -43,8 +43,8 @@ class BulkQueryRun {
       : query_(query), options_(options), bulk_(bulk), context_(context), answers_(query, bulk.follow, context) {}
 
   absl::Status run() {
-    // While a script is only checked, do not open the input: an earlier line may create the file, and a pipe can be
-    // read only once.
+    // While a script is only checked, do not open the input: an earlier line of the script may create the file, and a
+    // pipe can be read only once.
     if (context_.lines() == Lines::kScriptCheck) return absl::OkStatus();
     ASSIGN_OR_RETURN(const std::unique_ptr<RowReader> reader, open_rows(bulk_, query_.schema));
     ASSIGN_OR_RETURN(client::Client* const client, context_.connect());
@@ -52,7 +52,7 @@ class BulkQueryRun {
     stream_ = client->query_stream(options_.scene, {.max_in_flight = static_cast<int>(kBulkWindow), .reconnect = {}});
     absl::Status status = ask_all();
     // After an error of the input, still wait for the answers to the batches already sent. After an error of the
-    // server, do not: only answers before an error are written.
+    // server, do not wait: only the answers before the error are written.
     while (!refused_ && !in_flight_.empty()) status.Update(write_front());
     answers_.end();
     hide_rows(context_);
@@ -132,8 +132,8 @@ class BulkQueryRun {
     return begin;
   }
 
-  // Writes the answers at the front of the queue that have arrived. If the input has no more data for now, waits for
-  // all answers instead, so that a pipe gets them.
+  // Writes the answers at the front of the queue that have arrived. If the input has no data ready or has ended, waits
+  // for all answers instead, so that a process that feeds a pipe row by row receives the answers to its rows.
   absl::Status write_answers(BatchEnd end) {
     while (!in_flight_.empty()) {
       if (end == BatchEnd::kFull &&
@@ -184,7 +184,7 @@ class BulkQueryRun {
 }  // namespace
 
 client::Double3 frame_of(double x, double y, double z) {
-  if (is_float(x) && is_float(y) && is_float(z)) return {};
+  if (is_exact_float(x) && is_exact_float(y) && is_exact_float(z)) return {};
   return {std::round(x / kFrameGrid) * kFrameGrid, std::round(y / kFrameGrid) * kFrameGrid,
           std::round(z / kFrameGrid) * kFrameGrid};
 }
@@ -202,7 +202,7 @@ absl::Status check(const QueryOptions& options, const BulkOptions& bulk) {
   status.Update(at_most_one(options.ignore_groups, "--ignore-group"));
   status.Update(at_most_one(options.past.as_of, "--as-of"));
   if (status.ok() && options.after_id.value != 0)
-    return usage_error("--after-id goes on after one cut answer, not beside an input of many");
+    return usage_error("--after-id continues one truncated answer; it cannot be combined with an input");
   if (status.ok() && bulk.follow && options.exactly) return usage_error("give --exactly or --follow, not both");
   return status;
 }

@@ -1,14 +1,15 @@
-// Runner of queries whose rows are read from a file or a pipe: sends them in batches and writes the answers in the
+// Runner of queries whose rows are read from a file or a pipe: sends the rows in batches and writes the answers in the
 // order of the input. For the query commands. Holds at most kBulkWindow batches and their answers in memory, however
 // long the input is.
 //
-// Without `follow`, all rows are answered at one revision: the first batch has the view that the options select, and
-// every later batch asks `exactly` for the revision of the first answer. The server retains a bounded number of
-// revisions; when it drops this one, the run ends with OUT_OF_RANGE after the answers received so far. With `follow`,
-// each batch is answered at the newest revision, at least the newest one received so far.
+// Without `follow`, all rows are answered at one revision: the options select the revision of the first batch, and
+// every later batch requests exactly the revision of the first answer. The server retains a bounded number of
+// revisions; when the server drops that revision, the run ends with OUT_OF_RANGE after the answers received so far.
+// With `follow`, each batch is answered at the scene's newest revision, which is at least the newest revision among the
+// earlier answers.
 //
-// The answer to a row does not depend on the other rows of its batch, because the row's frame is a function of its own
-// position (frame_of).
+// The answer to a row does not depend on the other rows of its batch, because the row's frame is a function of the
+// row's position only (frame_of).
 #ifndef LOCUS_CLIENT_CLI_COMMANDS_BULK_QUERY_H_
 #define LOCUS_CLIENT_CLI_COMMANDS_BULK_QUERY_H_
 
@@ -41,8 +42,8 @@ struct BulkQuery {
   std::function<void(const BlockRows& rows, client::QueryBuilder& builder)> add_block;
 };
 
-// Returns the frame to use for a position. It is the origin if every coordinate is exactly representable as a float.
-// Otherwise it is the nearest point of a grid of spacing 16,384, so that rounding the offset to float moves the
+// Returns the frame to use for a position. The frame is the origin if every coordinate is exactly representable as a
+// float. Otherwise it is the nearest point of a grid of spacing 16,384, so that rounding the offset to float moves the
 // position by less than 0.0005.
 client::Double3 frame_of(double x, double y, double z);
 
@@ -59,8 +60,9 @@ void apply_filter_columns(const QueryOptions& options, const BlockRows& rows, si
 // Returns a usage error for query options that cannot be combined with rows from an input.
 absl::Status check(const QueryOptions& options, const BulkOptions& bulk);
 
-// Reads rows, sends queries and writes answers until the input ends. The message of an input error names its line.
-// After any error, the answers before it have been written, and the message contains the number of answered rows.
+// Reads rows, sends queries and writes answers until the input ends. The message of an error in the input names the
+// line of the input. After any error, the answers that precede the error have been written; if there are any, the
+// error's message contains the number of answered rows.
 absl::Status run_bulk_query(const BulkQuery& query, const QueryOptions& options, const BulkOptions& bulk,
                             Context& context);
 

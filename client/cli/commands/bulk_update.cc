@@ -36,8 +36,8 @@ class BulkUpdateRun {
       : update_(update), scene_(scene), bulk_(bulk), context_(context) {}
 
   absl::Status run() {
-    // While a script is only checked, do not open the input: an earlier line may create the file, and a pipe can be
-    // read only once.
+    // While a script is only checked, do not open the input: an earlier line of the script may create the file, and a
+    // pipe can be read only once.
     if (context_.lines() == Lines::kScriptCheck) return absl::OkStatus();
     ASSIGN_OR_RETURN(const std::unique_ptr<RowReader> reader, open_rows(bulk_, update_.schema));
     const absl::StatusOr<client::Client*> client = context_.connect();
@@ -172,7 +172,7 @@ class BulkUpdateRun {
   RowReader* reader_ = nullptr;
   std::unique_ptr<client::UpdateStream> stream_;
   std::deque<InFlight> in_flight_;
-  bool timed_out_ = false;  // an ack did not arrive in time, so other acks are not waited for
+  bool timed_out_ = false;  // an ack did not arrive in time; the run does not wait for other acks
   std::optional<ReportStream> errors_;
   std::string first_refused_;
   bool all_unknown_ = true;

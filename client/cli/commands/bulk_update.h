@@ -1,11 +1,11 @@
 // Runner of updates whose rows are read from a file or a pipe: sends them in batches, which are applied in the order of
 // the input. For insert, move and remove. Holds at most kBulkWindow batches in memory, however long the input is.
 //
-// Each batch becomes one revision. A batch ends after --batch rows, or when the input has no data for a moment: if a
-// pipe writes the moves of one time step and then waits, they are applied as one revision. A row that the server
-// refuses is listed in the report, and the rest of its batch is applied. A malformed row (text instead of a number, a
-// missing column) ends the run: no row of its batch is sent, and the message contains the number of rows applied
-// before.
+// Each batch becomes one revision. A batch ends after --batch rows, or when the input has no data ready (see
+// kRowPause): if a process writes the moves of one time step to a pipe and then waits, these moves are applied as one
+// revision. A row that the server refuses is listed in the report, and the rest of its batch is applied. A malformed
+// row (text instead of a number, a missing column) ends the run: no row of its batch is sent, and the message contains
+// the number of rows applied before that batch.
 #ifndef LOCUS_CLIENT_CLI_COMMANDS_BULK_UPDATE_H_
 #define LOCUS_CLIENT_CLI_COMMANDS_BULK_UPDATE_H_
 
@@ -30,8 +30,9 @@ struct BulkUpdate {
 };
 
 // Reads rows and sends updates until the input ends, and writes one report. As soon as an ack arrives, its refused
-// items are written as rows (line, id, reason); applied, refused, batches, revision, tick and epoch follow at the end.
-// Returns the first error. If there was none, returns an error as refused_items() does if items were refused, else OK.
+// items are written as rows (line, id, reason); the keys applied, refused, batches, revision, tick and epoch follow at
+// the end. Returns the first error. Without such an error, returns the error of refused_items() if the server refused
+// items, otherwise OK.
 absl::Status run_bulk_update(const BulkUpdate& update, const std::string& scene, const BulkOptions& bulk,
                              Context& context);
 

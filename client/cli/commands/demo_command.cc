@@ -58,7 +58,7 @@ class DemoTable {
     wrong_ += wrong;
     all_wrong_ += wrong;
   }
-  // Adds a row for a check that has no load figures.
+  // Adds a row for a check that measures no rate and no latency.
   void add_check(const std::string& what, uint64_t checked, uint64_t wrong) {
     all_wrong_ += wrong;
     add(what, {{"rate_per_s", nullptr},
@@ -114,7 +114,7 @@ absl::StatusOr<uint64_t> count_leaks(const client::Client& client, const std::st
         .rays(origins, directions);
     ASSIGN_OR_RETURN(const v1::QueryResult result, client.query(scene, builder.build()));
     ASSIGN_OR_RETURN(const client::RayHits hits, client::RayHits::of(result.blocks(0)));
-    if (hits.size() != count) return absl::DataLossError("an answer does not hold one row a ray");
+    if (hits.size() != count) return absl::DataLossError("an answer does not have one row for each ray");
     for (size_t i = 0; i < count; ++i)
       if (!(hits.t(i) <= 1 + kEdgeAllowance)) ++leaks;
   }
@@ -145,7 +145,7 @@ v1::QueryBatch mixed_batch(const DemoWorld& world, uint64_t seed) {
 }
 
 // Builds the same scene on the server options.compare and sends both servers the same batch. At the same tick, the
-// answers of both must be equal byte for byte.
+// answers of the two servers must be equal byte for byte.
 absl::Status check_other(const client::Client& client, const DemoOptions& options, const ImportedLevel& level,
                          const DemoWorld& world, uint64_t tick, DemoTable& table) {
   ASSIGN_OR_RETURN(const std::unique_ptr<client::Client> other, client::Client::connect(options.compare));
@@ -188,7 +188,7 @@ absl::Status demo(const DemoOptions& options, Context& context) {
   const DemoWorld world(placed.bounds, options.objects, options.seed);
   RETURN_IF_ERROR(client->apply(options.scene, world.inserts()).status());
   context.err() << "moving " << options.objects << " objects " << options.rate << " times a second for "
-                << options.seconds << " s while clients ask ...\n";
+                << options.seconds << " s while clients query ...\n";
   const LoadOptions load_options{options.scene, static_cast<uint64_t>(options.seconds * options.rate), options.rate,
                                  options.seed};
   ASSIGN_OR_RETURN(LoadResult load, run_load(*client, world, load_options));
@@ -210,23 +210,23 @@ absl::Status demo(const DemoOptions& options, Context& context) {
 void add_demo_command(CLI::App& parent, Context& context) {
   const auto options = std::make_shared<DemoOptions>();
   CLI::App& command = *parent.add_subcommand(
-      "demo", "Load a level, move objects through it, ask meanwhile, and check the answers by brute force");
+      "demo", "Load a level, move objects through it while clients query it, and check the answers by brute force");
   command.footer(
       "Every answer kept for checking is compared bit for bit with the state of its own tick. Exits 1 on any "
       "difference.\nExamples:\n  locus demo\n  locus demo pak1-maps.pk3 --entry maps/delta.bsp --seconds 10\n"
       "  locus demo level.glb --objects 50000 --compare 127.0.0.1:7777");
   command.add_option("FILE", options->file, "Level to import [a generated city]")->check(CLI::ExistingFile);
   command.add_option("--entry", options->import.entry, "Level inside a .pk3");
-  command.add_option("--scene", options->scene, "Scene to make anew")->capture_default_str();
+  command.add_option("--scene", options->scene, "Scene to delete and create again")->capture_default_str();
   command.add_option("--objects", options->objects, "Moving objects")->check(CLI::Range(1, 1'000'000));
   command.add_option("--seconds", options->seconds, "How long to move them")->check(CLI::Range(0.1, 3600.0));
   command.add_option("--rate", options->rate, "Ticks a second")->check(CLI::Range(1.0, 1000.0));
   command.add_option("--checks", options->checks, "Answers of each kind to check")->check(CLI::Range(1, 1'000'000));
   command.add_option("--edge-rays", options->edge_rays, "Rays to aim at shared edges")
       ->check(CLI::Range(1, 10'000'000));
-  command.add_option("--triangles", options->city_triangles, "Of the generated city")
+  command.add_option("--triangles", options->city_triangles, "Triangles of the generated city")
       ->check(CLI::Range(12, 10'000'000));
-  command.add_option("--seed", options->seed, "Of all that is random");
+  command.add_option("--seed", options->seed, "Seed of all random numbers");
   command.add_option("--compare", options->compare, "A second server that must answer with the same bytes");
   run_when_chosen(command, options, context, demo);
 }

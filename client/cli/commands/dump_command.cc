@@ -14,15 +14,15 @@ namespace locus::cli {
 namespace {
 
 constexpr char kRowsName[] = "things";
-constexpr size_t kWidthRows = 1000;  // rows from which a table computes its column widths
+constexpr size_t kDumpWidthRows = 1000;  // column widths of a table are computed from this many first rows
 
 struct DumpOptions {
   std::string scene;
   ViewOptions view;
 };
 
-// Dumps a scene. Rows are written as they arrive. In a script whose later lines can use them
-// (Context::keeps_reports()), they are collected in one report instead.
+// Dumps a scene. Rows are written as they arrive. In a script (Context::keeps_reports()), whose later lines can use the
+// rows, the rows are collected in one report instead.
 absl::Status dump(const DumpOptions& options, Context& context) {
   RETURN_IF_ERROR(check(options.view));
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());
@@ -34,7 +34,7 @@ absl::Status dump(const DumpOptions& options, Context& context) {
   kept.keys = thing_keys(things);
   ReportStream stream(
       context.out(), context.options().format,
-      {.rows_name = kRowsName, .keys = thing_keys(things), .no_rows = kNoRows, .width_rows = kWidthRows});
+      {.rows_name = kRowsName, .keys = thing_keys(things), .no_rows = kNoRows, .width_rows = kDumpWidthRows});
   bool begun = false;
   const auto take = [&](const v1::DumpSceneResponse& message) {
     const Json head = {{"scene", options.scene}, {"epoch", id_json(message.epoch())}, {"revision", message.revision()}};

@@ -33,7 +33,7 @@ absl::Status check(const ExportOptions& options) {
 }
 
 // Returns the translation that recentres the scene, computed from its current bounds. The dump that follows may have a
-// newer revision; it is then centred only approximately.
+// newer revision; the exported scene is then centred only approximately.
 absl::StatusOr<std::array<double, 3>> find_recentre(const ExportOptions& options, client::Client& client) {
   ASSIGN_OR_RETURN(const v1::Scene scene, client.get_scene(options.scene));
   if (!scene.has_min() || !scene.has_max()) return std::array<double, 3>{};
@@ -41,8 +41,8 @@ absl::StatusOr<std::array<double, 3>> find_recentre(const ExportOptions& options
                      {scene.max().x(), scene.max().y(), scene.max().z()});
 }
 
-// Reads the scene and adds each object and instance to export to `file`. Returns the head of the report: file, scene,
-// epoch and revision.
+// Reads the scene and adds to `file` the objects and instances that the options select. Returns the head of the report:
+// file, scene, epoch and revision.
 absl::StatusOr<Json> read_scene(const ExportOptions& options, SceneExport& file, client::Client& client,
                                 Context& context) {
   Json head = {{"file", options.out}, {"scene", options.scene}};
@@ -105,7 +105,7 @@ void add_export_command(CLI::App& parent, Context& context) {
   add_scene_argument(command, options->scene);
   command.add_option("OUT", options->out, "The file, ending in .glb")->required();
   const NamedValues<UpAxis> axes = {{"y", UpAxis::kY}, {"z", UpAxis::kZ}};
-  command.add_option("--up", options->up, "What is up in the scene: y (as in the file), z (turned to y) [y]")
+  command.add_option("--up", options->up, "Axis that points up in the scene: y (as in the file), z (rotated to y) [y]")
       ->type_name("AXIS")
       ->transform(choices(axes));
   add_view_options(command, options->view);

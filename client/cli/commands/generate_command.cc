@@ -63,7 +63,7 @@ void add_kind(CLI::App& parent, Context& context, const Kind& kind) {
   command.footer(absl::StrCat("Examples:\n  locus generate ", kind.name,
                               " --triangles 100000 --seed 1 --scene arena --create\n  locus generate ", kind.name,
                               " --triangles 5000 --seed 7 --out ", kind.name, ".obj"));
-  command.add_option("--triangles", options->triangles, "The largest mesh with at most so many [100000]")
+  command.add_option("--triangles", options->triangles, "Maximum number of triangles [100000]")
       ->type_name("N")
       ->check(CLI::Range(kind.min_triangles, kind.max_triangles).description(""));
   command.add_option("--seed", options->seed, kind.seed_help)->type_name("N");

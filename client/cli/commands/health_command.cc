@@ -32,11 +32,11 @@ absl::Status health(const HealthOptions& options, Context& context) {
   if (!client.ok()) return client.status();
   ASSIGN_OR_RETURN(const client::Health health, (*client)->health(options.service));
   Report report;
-  report.head = {{"address", context.options().address}, {"status", name_of(health)}};
+  report.head = {{"address", context.address()}, {"status", name_of(health)}};
   context.write(report);
   if (health == client::Health::kServing) return absl::OkStatus();
   return absl::FailedPreconditionError(
-      absl::StrCat("the server at ", context.options().address, " answers, but is ", name_of(health)));
+      absl::StrCat("the server at ", context.address(), " answers, but is ", name_of(health)));
 }
 
 }  // namespace

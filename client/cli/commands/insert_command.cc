@@ -34,8 +34,8 @@ struct InsertOptions {
   bool upsert = false;
 };
 
-// Returns a usage error unless exactly the measures of the shape are given, since the parser treats all measures as
-// optional.
+// Returns a usage error unless exactly the measures of the shape are given: --radius of a ball or capsule, --half of a
+// box, --axis of a capsule. The parser cannot check this, since all measures are optional to it.
 absl::Status check_measures(const InsertOptions& options) {
   struct Measure {
     const char* name;
@@ -134,7 +134,7 @@ absl::Status check_row(const InsertOptions& options, const RowBatch& batch, size
   return absl::OkStatus();
 }
 
-// Adds these rows, which have the same shape, to the update as one Insert.
+// Adds `rows` of `batch`, which all have the same shape, to the update as one Insert.
 void add_rows(const InsertOptions& options, const RowBatch& batch, RowSpan rows, client::UpdateBuilder& builder) {
   const std::vector<RowColumn>& columns = batch.columns;
   const std::vector<uint64_t> ids = id_column(columns[kId], rows, 0, {});
@@ -230,9 +230,10 @@ mixed rows have a column shape; an option given once stands for a column. Each b
   add_repeatable(command, "--axis", options->half_axes, "X,Y,Z",
                  "Capsule: from the centre to one end of the inner segment, in its own axes");
   add_repeatable(command, "--rotation", options->rotations, "X,Y,Z,W", "Unit quaternion [0,0,0,1]");
-  add_repeatable(command, "--layers", options->layers, "BITS", "What queries' masks look at [1]; 0 hides it")
+  add_repeatable(command, "--layers", options->layers, "BITS",
+                 "Layer bits, matched with the masks of queries [1]; 0 hides it")
       ->check(fits_32_bits());
-  add_repeatable(command, "--group", options->groups, "GROUP", "What it is part of [0: nothing]");
+  add_repeatable(command, "--group", options->groups, "GROUP", "Its group [0: none]");
   add_repeatable(command, "--tag", options->tags, "TAG", "A number of your own [0]");
   add_bulk_options(command, options->bulk);
   command.add_option("--tick", options->tick, "The time step [the scene's]")->type_name("TICK");

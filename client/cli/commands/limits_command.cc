@@ -10,8 +10,8 @@ namespace {
 
 struct NoOptions {};
 
-// Returns a limit's value as a JSON integer if it is integral, so that counts are printed without a decimal point, else
-// as a double.
+// Returns a limit's value as a JSON integer if the value is integral, so that counts are printed without a decimal
+// point. Returns any other value as a double.
 Json number_json(double value) {
   constexpr double kExactIntegers = 9007199254740992.0;
   if (value < 0 || value > kExactIntegers || value != static_cast<double>(static_cast<uint64_t>(value))) return value;
@@ -35,7 +35,12 @@ absl::Status limits(const NoOptions&, Context& context) {
 
 void add_limits_command(CLI::App& parent, Context& context) {
   CLI::App& command = *parent.add_subcommand("limits", "List every limit of the server, and how much is in use");
-  command.footer("Examples:\n  locus limits\n  locus -o json limits");
+  command.footer(
+      "The limits memory_... are what memory_bytes is used for. memory_history, memory_pinned, memory_scenes,\n"
+      "memory_meshes, memory_caches and memory_network are measured, the others claimed by work in progress. Of\n"
+      "pinned, caches and network, the value is the most that they may take; of the others, the use of the whole\n"
+      "process at which they give way or are refused.\n"
+      "Examples:\n  locus limits\n  locus -o json limits");
   run_when_chosen(command, std::make_shared<NoOptions>(), context, limits);
 }
 

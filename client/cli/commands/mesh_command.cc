@@ -20,14 +20,14 @@ struct MeshOptions {
   std::string out;
 };
 
-Json summary_of(const v1::Mesh& mesh) {
+Json mesh_summary(const v1::Mesh& mesh) {
   return {{"name", mesh.name()},         {"triangles", mesh.triangles()},
           {"vertices", mesh.vertices()}, {"uses", mesh.uses()},
           {"parts", mesh.parts_size()},  {"zero_area_triangles", mesh.zero_area_triangles()},
           {"bytes", mesh.bytes()},       {"sha256", absl::BytesToHexString(mesh.sha256())}};
 }
 
-absl::Status list(const MeshOptions&, Context& context) {
+absl::Status list_meshes(const MeshOptions&, Context& context) {
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());
   ASSIGN_OR_RETURN(const std::vector<v1::Mesh> meshes, client->list_meshes());
   Report report;
@@ -35,7 +35,7 @@ absl::Status list(const MeshOptions&, Context& context) {
   report.no_rows = "no meshes";
   report.keys = {"name", "triangles", "vertices", "uses", "parts", "zero_area_triangles", "bytes"};
   for (const v1::Mesh& mesh : meshes) {
-    Json row = summary_of(mesh);
+    Json row = mesh_summary(mesh);
     row.erase("sha256");
     report.rows.push_back(std::move(row));
   }
@@ -49,7 +49,7 @@ absl::Status show(const MeshOptions& options, Context& context) {
   for (const v1::Mesh& mesh : meshes) {
     if (mesh.name() != options.name) continue;
     Report report;
-    report.head = summary_of(mesh);
+    report.head = mesh_summary(mesh);
     report.rows_name = "parts";
     report.no_rows = "no parts";
     report.keys = {"part", "first_triangle", "triangles"};
@@ -78,7 +78,7 @@ absl::Status download(const MeshOptions& options, Context& context) {
   return absl::OkStatus();
 }
 
-absl::Status remove(const MeshOptions& options, Context& context) {
+absl::Status delete_mesh(const MeshOptions& options, Context& context) {
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());
   const absl::Status deleted = client->delete_mesh(options.name);
   if (!deleted.ok()) return deleted;
@@ -109,13 +109,13 @@ void add_mesh_command(CLI::App& parent, Context& context) {
   const auto options = std::make_shared<MeshOptions>();
   CLI::App& lister = *command.add_subcommand("list", "List the meshes of the server, which all scenes share");
   lister.footer("Examples:\n  locus mesh list\n  locus -o ndjson mesh list");
-  run_when_chosen(lister, options, context, list);
+  run_when_chosen(lister, options, context, list_meshes);
   add_one(command, context, "show", "Show a mesh and its parts", options, show)
       .footer("Examples:\n  locus mesh show city-5000-1\n  locus -o json mesh show city-5000-1");
   CLI::App& downloader = add_one(command, context, "download", "Write a mesh to an OBJ file", options, download);
   downloader.footer("Examples:\n  locus mesh download city-5000-1 --out city.obj");
   downloader.add_option("--out", options->out, "The file")->required()->type_name("FILE");
-  add_one(command, context, "delete", "Delete a mesh that no scene uses", options, remove)
+  add_one(command, context, "delete", "Delete a mesh that no scene uses", options, delete_mesh)
       .footer("Examples:\n  locus mesh delete city-5000-1");
 }
 

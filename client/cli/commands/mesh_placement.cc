@@ -66,11 +66,11 @@ void add_placement_options(CLI::App& command, PlacementOptions& options) {
   command.add_option("--mesh", options.mesh, "The mesh's name on the server [the level's]")->type_name("NAME");
   command.add_option("--at", options.at, "Where its origin goes [0,0,0]")->type_name("X,Y,Z");
   command.add_option("--id", options.id, "The instance's id [chosen by the server]")->type_name("ID");
-  command.add_option("--layers", options.layers, "What queries' masks look at [1]")
+  command.add_option("--layers", options.layers, "Layer bits, matched with the masks of queries [1]")
       ->type_name("BITS")
       ->expected(1)
       ->check(fits_32_bits());
-  command.add_option("--group", options.groups, "What it is part of [0: nothing]")->type_name("GROUP")->expected(1);
+  command.add_option("--group", options.groups, "Its group [0: none]")->type_name("GROUP")->expected(1);
 }
 
 absl::Status upload_and_place(const PlacementOptions& options, const ImportedLevel& level, Context& context) {

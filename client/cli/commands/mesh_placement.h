@@ -17,18 +17,19 @@ namespace locus::cli {
 struct PlacementOptions {
   std::string scene;
   bool create = false;
-  std::string mesh;  // name for the uploaded mesh; empty = the names in the level
+  std::string mesh;  // name of a single mesh, prefix of the names of several; empty = names in the level
   Triple at;
-  Number64 id;  // id of the first instance, the next ones get the following ids; 0 = the server chooses
+  Number64 id;  // id of the first instance; other instances get the following ids; 0 = the server chooses
   std::vector<Number64> layers;
   std::vector<Number64> groups;
 };
 
-// Adds the options that both commands have. Does not add SCENE.
+// Adds the options shared by the import and generate commands. Does not add the argument SCENE.
 void add_placement_options(CLI::App& command, PlacementOptions& options);
 
-// Uploads all meshes, then places an instance of each in one atomic change, at the level's recentre translation plus
-// `at`. Writes a report with a row per mesh, and progress to the context's error stream if progress is live.
+// Uploads all meshes, then places an instance of each mesh in one atomic change, at the level's recentre translation
+// plus `at`. Writes a report with a row per mesh. Writes progress to the error stream if Context::progress() is
+// Progress::kLive.
 absl::Status upload_and_place(const PlacementOptions& options, const ImportedLevel& level, Context& context);
 
 }  // namespace locus::cli

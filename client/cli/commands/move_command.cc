@@ -30,22 +30,22 @@ client::MoveKind kind_of(const MoveOptions& options) {
 }
 
 // Indices of the fields in the schema of bulk rows.
-enum MoveField : size_t { kId, kTo, kRotation };
+enum MoveField : size_t { kMoveId, kMoveTo, kMoveRotation };
 
 // Returns the update for the rows of `batch`. Rows with a rotation and rows without one go to different Moves, since a
 // Move has rotations either for all of its objects or for none.
 v1::UpdateBatch batch_of_rows(const MoveOptions& options, const RowBatch& batch) {
   client::UpdateBuilder builder;
   if (options.tick) builder.tick(*options.tick);
-  const std::vector<uint8_t>& has_rotation = batch.columns[kRotation].given;
+  const std::vector<uint8_t>& has_rotation = batch.columns[kMoveRotation].given;
   for (size_t begin = 0, end = 0; begin < batch.rows(); begin = end) {
     end = begin + 1;
     while (end < batch.rows() && has_rotation[end] == has_rotation[begin]) ++end;
     const RowSpan rows = {begin, end};
-    const std::vector<uint64_t> ids = id_column(batch.columns[kId], rows, 0, {});
-    const std::vector<double> positions = positions_of(batch.columns[kTo], rows);
+    const std::vector<uint64_t> ids = id_column(batch.columns[kMoveId], rows, 0, {});
+    const std::vector<double> positions = positions_of(batch.columns[kMoveTo], rows);
     std::vector<float> rotations = floats_of(options.rotations);
-    if (has_rotation[begin] != 0) rotations = float_column(batch.columns[kRotation], rows, {0, 0, 0, 1}, {});
+    if (has_rotation[begin] != 0) rotations = float_column(batch.columns[kMoveRotation], rows, {0, 0, 0, 1}, {});
     builder.moves({.ids = ids, .positions_f64 = positions, .rotations = rotations}, kind_of(options));
   }
   return builder.build();
@@ -105,7 +105,7 @@ revision, and ends when it is full or the input pauses.)");
   add_repeatable(command, "--rotation", options->rotations, "X,Y,Z,W", "Its new rotation [kept]");
   add_bulk_options(command, options->bulk);
   command.add_option("--tick", options->tick, "The time step [the scene's]")->type_name("TICK");
-  command.add_flag("--teleport", options->teleport, "It jumped: it was never in between");
+  command.add_flag("--teleport", options->teleport, "It jumped: queries about the past do not interpolate this move");
   run_or_check_when_chosen(command, options, context, move);
 }
 

@@ -21,8 +21,8 @@ void add_query_nearest(CLI::App& parent, Context& context);
 // Sends a batch of one block and returns the result. Returns DATA_LOSS if the result does not have exactly one block.
 absl::StatusOr<v1::QueryResult> ask_block(const QueryOptions& options, client::QueryBuilder& builder, Context& context);
 
-// Sends a batch of one block and writes the rows of its result in this layout. `rows_name` is the key of the list of
-// rows in JSON.
+// Sends a batch of one block and writes the rows of its result in the given layout. `rows_name` is the key of the list
+// of rows in JSON.
 absl::Status ask_and_report(const QueryOptions& options, client::QueryBuilder& builder, const RowLayout& layout,
                             const std::string& rows_name, Context& context);
 

@@ -36,7 +36,7 @@ void apply_to_points(const NearestOptions& options, const RowLayout& layout, con
   block.frame(frame).columns(layout.columns).k(options.k).detail(options.detail);
 }
 
-enum NearestField : size_t { kAt, kMaxDistance, kFilter };
+enum NearestField : size_t { kNearestAt, kNearestMaxDistance, kNearestFilter };
 
 absl::Status query_points_of_input(const NearestOptions& options, Context& context) {
   absl::Status checked = check(options.query, options.bulk);
@@ -54,9 +54,9 @@ absl::Status query_points_of_input(const NearestOptions& options, Context& conte
     client::NearestBlock block = builder.nearest();
     apply_to_points(options, query.layout, rows.frame, block);
     block.points(rows.offsets);
-    block.max_distances(
-        float_column(rows.batch.columns[kMaxDistance], rows.rows, {kInfinity}, floats_of(options.max_distances)));
-    apply_filter_columns(options.query, rows, kFilter, block);
+    block.max_distances(float_column(rows.batch.columns[kNearestMaxDistance], rows.rows, {kInfinity},
+                                     floats_of(options.max_distances)));
+    apply_filter_columns(options.query, rows, kNearestFilter, block);
   };
   return run_bulk_query(query, options.query, options.bulk, context);
 }
@@ -91,7 +91,7 @@ ignore_group] or {"at": [0,0,0]}; an option given once stands for a column. All 
 --follow.)");
   add_repeatable(command, "--at", options->at, "X,Y,Z", "Where to measure from; repeat for more points");
   command.add_option("--k", options->k, "How many to find for each [1]")->type_name("K");
-  add_repeatable(command, "--max-distance", options->max_distances, "D", "How far to look, that included [inf]");
+  add_repeatable(command, "--max-distance", options->max_distances, "D", "Maximum distance, inclusive [inf]");
   add_detail_option(command, options->detail);
   add_bulk_query_options(command, options->bulk);
   add_query_options(command, options->query);

@@ -19,32 +19,32 @@ const NamedValues<v1::Column>& column_names() {
   return names;
 }
 
-// Returns whether `value` is exactly representable as a float. Also returns true for NaN and infinity: they are then
-// sent as a position and not as the frame, so that the server's error names the position.
+// Returns whether `value` is exactly representable as a float. Positions with other values are sent as the frame. Also
+// returns true for NaN and infinity, so that they are sent as a position, which the server's error then names.
 bool is_float(double value) { return !std::isfinite(value) || static_cast<double>(static_cast<float>(value)) == value; }
 
 void add_filter_options(CLI::App& command, QueryOptions& options) {
   const NamedValues<v1::Source> sources = {
       {"both", v1::SOURCE_BOTH}, {"static", v1::SOURCE_STATIC}, {"dynamic", v1::SOURCE_DYNAMIC}};
-  command.add_option("--source", options.source, "Where to look: both, static, dynamic [both]")
+  command.add_option("--source", options.source, "Search both, static (instances) or dynamic (objects) [both]")
       ->type_name("SOURCE")
       ->transform(choices(sources));
   const NamedValues<v1::Precision> precisions = {{"exact", v1::PRECISION_EXACT},
                                                  {"conservative", v1::PRECISION_CONSERVATIVE}};
-  command.add_option("--precision", options.precision, "What decides: exact, conservative (bounds) [exact]")
+  command.add_option("--precision", options.precision, "Geometry to test: exact, conservative (bounds) [exact]")
       ->type_name("PRECISION")
       ->transform(choices(precisions));
   add_repeatable(command, "--mask", options.masks, "BITS", "Find only what has one of these layers [all]")
       ->check(fits_32_bits());
   add_repeatable(command, "--ignore-group", options.ignore_groups, "GROUP",
-                 "Pass over a group, one a query or for all");
-  add_repeatable(command, "--ignore-id", options.ignore_ids, "ID", "Pass over an id, at most 64");
+                 "Ignore a group; one for each query, or one for all");
+  add_repeatable(command, "--ignore-id", options.ignore_ids, "ID", "Ignore an id; at most 64");
 }
 
 void add_view_options(CLI::App& command, QueryOptions& options) {
   command.add_option("--at-least", options.at_least, "Wait for this revision")->type_name("REVISION");
-  command.add_option("--exactly", options.exactly, "Ask at this revision")->type_name("REVISION");
-  command.add_option("--epoch", options.epoch, "The epoch the revision counts in")->type_name("EPOCH");
+  command.add_option("--exactly", options.exactly, "Query exactly this revision")->type_name("REVISION");
+  command.add_option("--epoch", options.epoch, "Epoch of the revision")->type_name("EPOCH");
   command.add_option("--max-work", options.max_work, "Budget in nodes, cells and tests [none]")->type_name("WORK");
   command.add_flag("--explain", options.explain, "Report the work done");
 }
@@ -54,7 +54,8 @@ void add_view_options(CLI::App& command, QueryOptions& options) {
 void add_query_options(CLI::App& command, QueryOptions& options) {
   add_scene_argument(command, options.scene);
   add_filter_options(command, options);
-  command.add_option("--max-results", options.max_results, "Most rows a query [1024]")->type_name("ROWS");
+  command.add_option("--max-results", options.max_results, "Maximum number of rows for each query [1024]")
+      ->type_name("ROWS");
   command
       .add_option("--columns", options.columns,
                   "What to show: t, id, triangle, uv, normal, point, group, tag, layers, pose")

@@ -42,15 +42,15 @@ void add_detail_option(CLI::App& command, v1::StaticDetail& detail);
 // Returns a usage error if options exclude each other.
 absl::Status check(const QueryOptions& options);
 
-// Makes the batch ask for at least the last revision of `scene` that was acknowledged through this context, if any, so
-// that it sees the caller's own changes.
+// Makes the batch require at least the last revision of `scene` that was acknowledged through this context, so that the
+// batch sees the caller's own changes. Does nothing if no change was acknowledged.
 void see_own(const std::string& scene, const Context& context, client::QueryBuilder& builder);
 
-// Sets the batch's view, work budget and explain flag from the options. Without --at-least and --exactly, calls
+// Sets the batch's revision, work budget and explain flag from the options. Without --at-least and --exactly, calls
 // see_own().
 void apply_to_batch(const QueryOptions& options, const Context& context, client::QueryBuilder& builder);
 
-// Sets the options of a block that every kind of query has. The caller sets the block's kind and columns.
+// Sets those options of a block that all kinds of query share. The caller sets the block's kind and columns.
 template <class Block>
 void apply_to_block(const QueryOptions& options, Block& block) {
   block.source(options.source)

@@ -39,10 +39,10 @@ std::vector<v1::Column> columns_of(const QueryOptions& options, v1::StaticDetail
   return columns;
 }
 
-// Indices of the fields in the schemas of bulk rows. kBallFilter and kBoxFilter are the first of the fields shared by
-// all queries (add_filter_fields).
-enum BallField : size_t { kBallAt, kRadius, kBallFilter };
-enum BoxField : size_t { kBoxAt, kHalf, kRotation, kBoxFilter };
+// Indices of the fields in the schemas of bulk rows. kBallFilter and kBoxFilter are each the index of the first field
+// that add_filter_fields() appends.
+enum BallField : size_t { kBallAt, kBallRadius, kBallFilter };
+enum BoxField : size_t { kBoxAt, kBoxHalf, kBoxRotation, kBoxFilter };
 
 Field at_field() {
   return {.name = "at", .kind = FieldKind::kCoordinate, .parts = "xyz", .aliases = {"position"}, .required = true};
@@ -74,7 +74,7 @@ absl::Status query_balls_of_input(const BallOptions& options, Context& context) 
     client::BallBlock block = builder.balls();
     apply_to_block(options.query, block);
     block.frame(rows.frame).columns(query.layout.columns).detail(options.detail);
-    block.balls(rows.offsets, float_column(rows.batch.columns[kRadius], rows.rows, {0}, floats_of(options.radii)));
+    block.balls(rows.offsets, float_column(rows.batch.columns[kBallRadius], rows.rows, {0}, floats_of(options.radii)));
     apply_filter_columns(options.query, rows, kBallFilter, block);
   };
   return run_bulk_query(query, options.query, options.bulk, context);
@@ -95,8 +95,8 @@ absl::Status query_boxes_of_input(const BoxOptions& options, Context& context) {
     client::BoxBlock block = builder.boxes();
     apply_to_block(options.query, block);
     block.frame(rows.frame).columns(query.layout.columns).detail(options.detail);
-    block.boxes(rows.offsets, float_column(columns[kHalf], rows.rows, {0, 0, 0}, floats_of(options.half_extents)));
-    block.rotations(float_column(columns[kRotation], rows.rows, {0, 0, 0, 1}, floats_of(options.rotations)));
+    block.boxes(rows.offsets, float_column(columns[kBoxHalf], rows.rows, {0, 0, 0}, floats_of(options.half_extents)));
+    block.rotations(float_column(columns[kBoxRotation], rows.rows, {0, 0, 0, 1}, floats_of(options.rotations)));
     apply_filter_columns(options.query, rows, kBoxFilter, block);
   };
   return run_bulk_query(query, options.query, options.bulk, context);
@@ -134,11 +134,12 @@ absl::Status query_box(const BoxOptions& options, Context& context) {
   return ask_and_report(options.query, builder, layout, "found", context);
 }
 
-// Adds the options of an overlap query: --detail, --after-id, and those of all queries.
+// Adds the options of an overlap query: --detail, --after-id, and the options that all queries have.
 template <class Options>
 void add_overlap_options(CLI::App& command, Options& options) {
   add_detail_option(command, options.detail);
-  command.add_option("--after-id", options.query.after_id, "Only higher ids: goes on after a cut")->type_name("ID");
+  command.add_option("--after-id", options.query.after_id, "Return only higher ids, to continue a truncated answer")
+      ->type_name("ID");
   add_bulk_query_options(command, options.bulk);
   add_query_options(command, options.query);
 }
@@ -164,7 +165,7 @@ column. All rows are answered at one revision; see --follow.)");
 
 void add_query_box(CLI::App& parent, Context& context) {
   const auto options = std::make_shared<BoxOptions>();
-  CLI::App& command = *parent.add_subcommand("box", "Ask what boxes touch, turned ones too");
+  CLI::App& command = *parent.add_subcommand("box", "Ask what boxes touch, rotated or not");
   command.footer(R"(Examples:
   locus query box arena --at 0,0,0 --half 5,5,5
   locus query box arena --at 0,0,0 --half 5,1,1 --rotation 0,0,0.3826834,0.9238795

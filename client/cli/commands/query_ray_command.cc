@@ -57,7 +57,7 @@ void apply_to_rays(const RayOptions& options, const RowLayout& layout, const cli
   if (options.mode != v1::RAY_MODE_ANY) block.columns(layout.columns);
 }
 
-enum RayField : size_t { kFrom, kDir, kMaxT, kFilter };
+enum RayField : size_t { kRayFrom, kRayDir, kRayMaxT, kRayFilter };
 
 absl::Status query_rays_of_input(const RayOptions& options, Context& context) {
   absl::Status checked = check(options.query, options.bulk);
@@ -78,9 +78,9 @@ absl::Status query_rays_of_input(const RayOptions& options, Context& context) {
     constexpr float kInfinity = std::numeric_limits<float>::infinity();
     client::RayBlock block = builder.rays();
     apply_to_rays(options, query.layout, rows.frame, block);
-    block.rays(rows.offsets, float_column(columns[kDir], rows.rows, {0, 0, 0}, floats_of(options.directions)));
-    block.t_max(float_column(columns[kMaxT], rows.rows, {kInfinity}, floats_of(options.t_max)));
-    apply_filter_columns(options.query, rows, kFilter, block);
+    block.rays(rows.offsets, float_column(columns[kRayDir], rows.rows, {0, 0, 0}, floats_of(options.directions)));
+    block.t_max(float_column(columns[kRayMaxT], rows.rows, {kInfinity}, floats_of(options.t_max)));
+    apply_filter_columns(options.query, rows, kRayFilter, block);
   };
   return run_bulk_query(query, options.query, options.bulk, context);
 }
@@ -102,7 +102,7 @@ absl::Status query_ray(const RayOptions& options, Context& context) {
   return ask_and_report(options.query, builder, layout, "hits", context);
 }
 
-void add_ray_options(CLI::App& command, RayOptions& options) {
+void add_query_ray_options(CLI::App& command, RayOptions& options) {
   add_repeatable(command, "--from", options.from, "X,Y,Z", "Where it starts; repeat --from and --dir for more rays");
   add_repeatable(command, "--dir", options.directions, "X,Y,Z",
                  "Where it goes, any length but zero; t counts in this length; one for each or one for all");
@@ -141,7 +141,7 @@ void add_query_ray(CLI::App& parent, Context& context) {
 
 Rows: from.x,from.y,from.z,dir.x,dir.y,dir.z[,max_t,mask,ignore_group] or {"from": [0,1,0], "dir": [0,0,-1]};
 an option given once stands for a column. All rows are answered at one revision; see --follow.)");
-  add_ray_options(command, *options);
+  add_query_ray_options(command, *options);
   add_bulk_query_options(command, options->bulk);
   add_query_options(command, options->query);
   run_or_check_when_chosen(command, options, context, query_ray);

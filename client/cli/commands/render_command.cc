@@ -13,7 +13,7 @@
 #include "client/cli/extras/render/camera_options.h"
 #include "client/cli/extras/render/cast_rays.h"
 #include "client/cli/extras/render/paint.h"
-#include "client/cli/extras/render/png_file.h"
+#include "client/cli/extras/render/picture.h"
 #include "client/cli/extras/render/thing_bounds.h"
 #include "client/cli/failure.h"
 #include "core/base/status_macros.h"
@@ -21,9 +21,9 @@
 namespace locus::cli {
 namespace {
 
-constexpr uint64_t kMaxRenderRays = uint64_t{1} << 24;  // memory: 28 bytes per ray, 52 with its work
+constexpr uint64_t kMaxRenderRays = uint64_t{1} << 24;  // limits the memory: 28 bytes per ray, 52 if work is reported
 constexpr ImageSize kDefaultSize = {960, 540};
-constexpr ImageSize kDefaultHeatSize = {480, 270};  // smaller: reporting its work makes a ray several times slower
+constexpr ImageSize kDefaultHeatSize = {480, 270};  // smaller, since reporting the work of a ray makes it slower
 
 enum class Show { kShaded, kDepth, kNormals, kIds };
 enum class Heat { kNone, kWork, kNodes, kCells, kTests };
@@ -41,7 +41,7 @@ struct RenderOptions {
   CastOptions cast;
 };
 
-// Returns the number of rays along each side of a pixel: a pixel has the square of it.
+// Returns the number n of rays along each side of a pixel; a pixel has n * n rays.
 uint32_t rays_a_side(const RenderOptions& options) { return options.samples == Samples::kFour ? 2 : 1; }
 
 ImageSize picture_size(const RenderOptions& options) {
@@ -186,7 +186,7 @@ void add_what_options(CLI::App& command, RenderOptions& options) {
   command.add_option("--size", options.size, "Pixels; at most 16777216 rays [960x540; 480x270 with --heat]")
       ->type_name("WxH");
   const NamedValues<Samples> samples = {{"1", Samples::kOne}, {"4", Samples::kFour}};
-  command.add_option("--samples", options.samples, "Rays a pixel, averaged: 1, 4 [1]")
+  command.add_option("--samples", options.samples, "Rays for each pixel, averaged: 1, 4 [1]")
       ->type_name("N")
       ->transform(choices(samples));
   const NamedValues<Show> shows = {
@@ -205,7 +205,7 @@ void add_what_options(CLI::App& command, RenderOptions& options) {
       ->excludes(show);
 }
 
-void add_ray_options(CLI::App& command, RenderOptions& options) {
+void add_view_ray_options(CLI::App& command, RenderOptions& options) {
   const NamedValues<v1::Cull> culls = {{"none", v1::CULL_NONE}, {"back", v1::CULL_BACK}, {"front", v1::CULL_FRONT}};
   options.cast.cull = v1::CULL_BACK;
   command
@@ -216,14 +216,14 @@ void add_ray_options(CLI::App& command, RenderOptions& options) {
       ->transform(choices(culls));
   const NamedValues<v1::Source> sources = {
       {"both", v1::SOURCE_BOTH}, {"static", v1::SOURCE_STATIC}, {"dynamic", v1::SOURCE_DYNAMIC}};
-  command.add_option("--source", options.cast.source, "What to see: both, static, dynamic [both]")
+  command.add_option("--source", options.cast.source, "What to show: both, static, dynamic [both]")
       ->type_name("SOURCE")
       ->transform(choices(sources));
-  command.add_option("--mask", options.mask, "See only what has one of these layers [all]")
+  command.add_option("--mask", options.mask, "Show only things with one of these layers [all]")
       ->type_name("BITS")
       ->check(fits_32_bits());
   command.add_flag("--live", options.live,
-                   "Let each batch of rays see the latest revision, not all the same: for scenes that change a lot");
+                   "Answer each batch of rays at the latest revision, not all at one: for scenes that change fast");
 }
 
 }  // namespace
@@ -244,7 +244,7 @@ Examples:
   command.add_option("OUT", options->out, "The picture, a .png file")->required();
   add_what_options(command, *options);
   add_camera_options(command, options->camera);
-  add_ray_options(command, *options);
+  add_view_ray_options(command, *options);
   run_when_chosen(command, options, context, render);
 }
 

@@ -61,7 +61,7 @@ void add_restore_command(CLI::App& parent, Context& context) {
 Every file is proven by SHA256SUMS. DATA_DIR must be new or empty, and appears once everything in it is on the disk.)");
   command.add_option("BACKUP", options->backup, "A directory that `locus backup` made")->required();
   command.add_option("DATA_DIR", options->data_dir, "The data directory to make");
-  command.add_flag("--verify-only", options->verify_only, "Only prove that the backup is whole");
+  command.add_flag("--verify-only", options->verify_only, "Only verify that the backup is complete");
   run_when_chosen(command, options, context, restore);
 }
 

@@ -58,7 +58,7 @@ std::string state_name(v1::SceneState state) {
   return absl::AsciiStrToLower(absl::StripPrefix(v1::SceneState_Name(state), "SCENE_STATE_"));
 }
 
-Json summary_of(const v1::Scene& scene) {
+Json scene_summary(const v1::Scene& scene) {
   return {{"name", scene.name()},           {"state", state_name(scene.state())},  {"revision", scene.revision()},
           {"tick", scene.tick()},           {"objects", scene.objects()},          {"instances", scene.instances()},
           {"triangles", scene.triangles()}, {"memory_bytes", scene.memory_bytes()}};
@@ -70,7 +70,7 @@ Json corner_of(bool present, const v1::Vec3d& corner) {
 
 Report description_of(const v1::Scene& scene) {
   Report report;
-  report.head = summary_of(scene);
+  report.head = scene_summary(scene);
   report.head["epoch"] = id_json(scene.epoch());
   report.head["min"] = corner_of(scene.has_min(), scene.min());
   report.head["max"] = corner_of(scene.has_max(), scene.max());
@@ -114,7 +114,7 @@ absl::Status create(const CreateOptions& options, Context& context) {
   return absl::OkStatus();
 }
 
-absl::Status list(const ListOptions& options, Context& context) {
+absl::Status list_scenes(const ListOptions& options, Context& context) {
   const auto labels = parse_labels(options.labels);
   if (!labels.ok()) return labels.status();
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());
@@ -122,21 +122,21 @@ absl::Status list(const ListOptions& options, Context& context) {
   Report report;
   report.rows_name = "scenes";
   report.no_rows = "no scenes";
-  const Json columns = summary_of({});
+  const Json columns = scene_summary({});
   for (const auto& [key, value] : columns.items()) report.keys.push_back(key);
-  for (const v1::Scene& scene : scenes) report.rows.push_back(summary_of(scene));
+  for (const v1::Scene& scene : scenes) report.rows.push_back(scene_summary(scene));
   context.write(report);
   return absl::OkStatus();
 }
 
-absl::Status describe(const DescribeOptions& options, Context& context) {
+absl::Status describe_scene(const DescribeOptions& options, Context& context) {
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());
   ASSIGN_OR_RETURN(const v1::Scene scene, client->get_scene(options.name));
   context.write(description_of(scene));
   return absl::OkStatus();
 }
 
-absl::Status remove(const DeleteOptions& options, Context& context) {
+absl::Status delete_scene(const DeleteOptions& options, Context& context) {
   v1::DeleteSceneRequest request;
   request.set_name(options.name);
   request.set_if_present(options.if_present);
@@ -160,22 +160,22 @@ void add_create(CLI::App& parent, Context& context) {
   locus scene create arena-copy --static-from arena)");
   command.add_option("NAME", options->name, "Lower case letters, digits and dashes, at most 63")->required();
   command.add_flag("--if-absent", options->if_absent, "Accept a scene of that name as it is");
-  add_repeatable(command, "--label", options->labels, "KEY=VALUE", "Words of your own about the scene");
+  add_repeatable(command, "--label", options->labels, "KEY=VALUE", "Your own label, by which `scene list` can filter");
   const NamedValues<v1::Winding> windings = {{"ccw", v1::WINDING_COUNTER_CLOCKWISE}, {"cw", v1::WINDING_CLOCKWISE}};
   command.add_option("--winding", options->winding, "Order of vertices seen from a triangle's front: ccw, cw [ccw]")
       ->type_name("ORDER")
       ->transform(choices(windings));
   command.add_option("--static-from", options->static_from, "Start with the instances of this scene")
       ->type_name("SCENE");
-  command.add_option("--history-ticks", options->history_ticks, "For how many ticks the past can be asked about [0]")
+  command.add_option("--history-ticks", options->history_ticks, "Number of past ticks that can be queried [0]")
       ->type_name("TICKS");
-  command.add_option("--history-bytes", options->history_bytes, "Memory the past may take [256 MiB]")
+  command.add_option("--history-bytes", options->history_bytes, "Maximum memory of the history [256 MiB]")
       ->type_name("BYTES");
   const NamedValues<v1::OverloadPolicy> policies = {{"every-batch", v1::OVERLOAD_POLICY_EVERY_BATCH},
                                                     {"latest-wins", v1::OVERLOAD_POLICY_LATEST_WINS}};
   command
       .add_option("--overload", options->overload,
-                  "Moves that come too fast: a revision for every-batch, or one for all, latest-wins [every-batch]")
+                  "Batches that arrive too fast: one revision each (every-batch) or joined (latest-wins) [every-batch]")
       ->type_name("POLICY")
       ->transform(choices(policies));
   run_when_chosen(command, options, context, create);
@@ -186,7 +186,7 @@ void add_list(CLI::App& parent, Context& context) {
   CLI::App& command = *parent.add_subcommand("list", "List the scenes of the server");
   command.footer("Examples:\n  locus scene list\n  locus -o ndjson scene list --label mode=ctf");
   add_repeatable(command, "--label", options->labels, "KEY=VALUE", "Only scenes with this label");
-  run_when_chosen(command, options, context, list);
+  run_when_chosen(command, options, context, list_scenes);
 }
 
 void add_describe(CLI::App& parent, Context& context) {
@@ -194,7 +194,7 @@ void add_describe(CLI::App& parent, Context& context) {
   CLI::App& command = *parent.add_subcommand("describe", "Show everything about a scene");
   command.footer("Examples:\n  locus scene describe arena\n  locus -o json scene describe arena");
   add_scene_argument(command, options->name);
-  run_when_chosen(command, options, context, describe);
+  run_when_chosen(command, options, context, describe_scene);
 }
 
 void add_delete(CLI::App& parent, Context& context) {
@@ -202,8 +202,8 @@ void add_delete(CLI::App& parent, Context& context) {
   CLI::App& command = *parent.add_subcommand("delete", "Delete a scene with its objects and instances; meshes stay");
   command.footer("Examples:\n  locus scene delete arena\n  locus scene delete arena --if-present");
   command.add_option("NAME", options->name, "The scene")->required();
-  command.add_flag("--if-present", options->if_present, "Accept that there is none");
-  run_when_chosen(command, options, context, remove);
+  command.add_flag("--if-present", options->if_present, "Succeed if no scene has the name");
+  run_when_chosen(command, options, context, delete_scene);
 }
 
 }  // namespace

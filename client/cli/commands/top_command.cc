@@ -35,8 +35,9 @@ struct Scraped {
   std::vector<MetricSample> samples;
 };
 
-absl::StatusOr<Scraped> scrape(const TopOptions& options) {
-  ASSIGN_OR_RETURN(const std::string text, http_get(options.address, "/metrics", kTimeout));
+absl::StatusOr<Scraped> scrape(const TopOptions& options, Context& context) {
+  ASSIGN_OR_RETURN(const std::string text,
+                   http_get(options.address, "/metrics", context.options().connection.credentials, kTimeout));
   ASSIGN_OR_RETURN(std::vector<MetricSample> samples, parse_metrics(text));
   return Scraped{steady_clock::now(), std::move(samples)};
 }
@@ -95,13 +96,14 @@ void write(Context& context, const TopFigures& figures) {
 }
 
 absl::Status top(const TopOptions& options, Context& context) {
+  RETURN_IF_ERROR(context.connection_mistake());
   if (options.json) context.options().format = Format::kJson;
   const bool live = !options.once && isatty(STDOUT_FILENO) == 1 && context.options().format == Format::kTable;
   const EndSignals end_signals;
-  absl::StatusOr<Scraped> before = scrape(options);
+  absl::StatusOr<Scraped> before = scrape(options, context);
   if (!before.ok()) return before.status();
   while (end_signals.wait(options.interval)) {
-    absl::StatusOr<Scraped> now = scrape(options);
+    absl::StatusOr<Scraped> now = scrape(options, context);
     if (!now.ok()) return now.status();
     if (live) context.out() << kClearScreen;
     write(context,
@@ -117,19 +119,19 @@ absl::Status top(const TopOptions& options, Context& context) {
 
 void add_top_command(CLI::App& parent, Context& context) {
   const auto options = std::make_shared<TopOptions>();
-  CLI::App& command = *parent.add_subcommand("top", "Show what a server does, from its metrics, again and again");
+  CLI::App& command = *parent.add_subcommand("top", "Show the load of a server from its metrics, updated periodically");
   command.footer(R"(Rates and quantiles are those of the last interval. Ctrl-C ends it, with exit code 0.
 
 Examples:
   locus top
-  locus top --metrics-address 10.0.0.7:7576 --interval 5
+  locus top --metrics-address 10.0.0.7:7576 --ca ca.pem --token-file metrics.token
   locus top --once --json
   locus -o csv top --once --interval 10)");
   command.add_option("--metrics-address", options->address, "locusd's HTTP port (its --http-listen): host:port")
       ->envname("LOCUS_METRICS_ADDRESS")
       ->type_name("ADDRESS")
       ->capture_default_str();
-  command.add_option("--interval", options->interval, "Seconds between two looks, 0.1 to 3600 [2]")
+  command.add_option("--interval", options->interval, "Seconds between two updates, 0.1 to 3600 [2]")
       ->type_name("SECONDS")
       ->check(CLI::Range(0.1, 3600.0).description(""));
   command.add_flag("--once", options->once, "Show one interval and end");

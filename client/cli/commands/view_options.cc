@@ -9,7 +9,7 @@ void add_view_options(CLI::App& command, ViewOptions& options) {
   command.add_flag("--instances", options.instances, "Only instances");
   command.add_option("--at-least", options.at_least, "Wait for this revision")->type_name("REVISION");
   command.add_option("--exactly", options.exactly, "Read this revision, if it is still kept")->type_name("REVISION");
-  command.add_option("--epoch", options.epoch, "The epoch the revision counts in")->type_name("EPOCH");
+  command.add_option("--epoch", options.epoch, "Epoch of the revision")->type_name("EPOCH");
 }
 
 Things things_of(const ViewOptions& options) {

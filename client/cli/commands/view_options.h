@@ -26,14 +26,15 @@ struct ViewOptions {
 // Adds the options --objects, --instances, --at-least, --exactly and --epoch.
 void add_view_options(CLI::App& command, ViewOptions& options);
 
-// Returns which things to read: both kinds if both flags or neither is given.
+// Returns the kinds of things to read: objects and instances if --objects and --instances are both given or both
+// absent.
 Things things_of(const ViewOptions& options);
 
 // Returns a usage error if options exclude each other.
 absl::Status check(const ViewOptions& options);
 
-// Returns a request to dump the whole scene. Without --at-least and --exactly, the revision is at least that of the
-// last change acknowledged through this context.
+// Returns a request to dump the whole scene. Without --at-least and --exactly, the request requires at least the
+// revision of the last change acknowledged through this context.
 v1::DumpSceneRequest dump_request(const std::string& scene, const ViewOptions& options, const Context& context);
 
 }  // namespace locus::cli

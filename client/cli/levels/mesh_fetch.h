@@ -11,8 +11,8 @@
 
 namespace locus::cli {
 
-// Downloads the mesh `name` with all its parts. Prints progress to the context's error stream if progress is live.
-// Errors are those of the connection and of the download.
+// Downloads the mesh `name` with all its parts. Writes progress to the error stream if Context::progress() is
+// Progress::kLive. Returns the errors of Context::connect() and of the download.
 absl::StatusOr<ImportedMesh> fetch_mesh(const std::string& name, Context& context);
 
 }  // namespace locus::cli

@@ -27,14 +27,12 @@ std::ostream& operator<<(std::ostream& out, const AsOf& time) {
 }
 
 void add_past_options(CLI::App& command, PastOptions& options) {
-  add_repeatable(
-      command, "--as-of", options.as_of, "TICK[+FRACTION]",
-      "Ask about objects as they were when that tick ended, or on the way to the next; one a query or for all");
+  add_repeatable(command, "--as-of", options.as_of, "TICK[+FRACTION]",
+                 "Query objects as of the end of a tick, or a fraction later; one for each query, or one for all");
   const NamedValues<v1::OutsideHistory> outsides = {{"reject", v1::OUTSIDE_HISTORY_REJECT},
                                                     {"clamp", v1::OUTSIDE_HISTORY_CLAMP}};
   command
-      .add_option("--outside", options.outside,
-                  "What to do about times that are not kept: reject, clamp (take the nearest) [reject]")
+      .add_option("--outside", options.outside, "Times outside the history: reject, clamp (use the nearest) [reject]")
       ->type_name("WHAT")
       ->transform(choices(outsides));
 }

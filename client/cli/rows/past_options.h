@@ -14,7 +14,7 @@
 
 namespace locus::cli {
 
-// Time given as "12" or "12+0.5": a tick, and a fraction of the way to the next tick. operator>> sets failbit for any
+// Time given as "12" or "12+0.5": a tick, and a fraction of the time to the next tick. operator>> sets failbit for any
 // other text.
 struct AsOf {
   uint64_t tick = 0;
@@ -40,8 +40,8 @@ void apply_to_block(const PastOptions& options, Block& block) {
   block.as_of(ticks_of(options.as_of), fractions_of(options.as_of)).outside_history(options.outside);
 }
 
-// Returns the time at which each query was answered, in the form of --as-of. It differs from the requested time if that
-// was clamped.
+// Returns the time at which each query was answered, in the form of --as-of. This time differs from the requested time
+// if the requested time was clamped to the recorded history.
 Json resolved_json(const v1::BlockResult& block);
 
 }  // namespace locus::cli

@@ -13,15 +13,15 @@
 namespace locus::cli {
 
 struct RowLayout {
-  std::string query = {};                // rows' key for the index of their query: "ray", "ball"; empty = no such key
+  std::string query = {};                // key of each row's query index: "ray", "ball"; empty = no such key
   std::vector<v1::Column> columns = {};  // requested columns, in the order of the output
   client::Double3 frame = {};            // frame of the block, which is added to the points of the answer
   uint64_t first_query = 0;              // index of the block's first query in the whole input
   bool dense = false;                    // each query has one row, with `hit` false for a miss
 };
 
-// Returns the rows of one block, with those of the keys t, id, triangle, uv, normal, point, group, tag, layers,
-// position, rotation that `layout` requests. In the row of a miss all of them are null.
+// Returns the rows of one block. `layout` selects their keys among t, id, triangle, uv, normal, point, group, tag,
+// layers, position and rotation. In the row of a miss all these keys are null.
 absl::StatusOr<std::vector<Json>> rows_json(const v1::BlockResult& block, const RowLayout& layout);
 
 // Returns the keys of rows_json() for this layout, in their order.
@@ -30,7 +30,8 @@ std::vector<std::string> row_keys(const RowLayout& layout);
 Json work_json(const v1::Work& work);
 
 // Returns the head of a report: epoch, revision and tick; the indices of truncated queries; for queries about the past,
-// their effective times and the indices of clamped ones; and the work, if the server reported it.
+// their effective times and the indices of the queries whose times were clamped; and the work, if the server reported
+// it.
 Json result_head(const v1::QueryResult& result);
 
 }  // namespace locus::cli

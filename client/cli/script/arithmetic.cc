@@ -23,7 +23,7 @@ absl::StatusOr<Number> of_numbers(char sign, const Number& x, const Number& y) {
   }
 }
 
-// Each part of two vectors, or of a vector and a number.
+// Calculates part by part, for two vectors or for a vector and a number.
 Answer by_parts(char sign, const Operand& a, const Operand& b) {
   const auto part = [](const Operand& operand, size_t i) {
     const Vector* const vector = std::get_if<Vector>(&operand);
@@ -54,8 +54,8 @@ absl::StatusOr<Value> calculate(char sign, const Value& left, const Value& right
   if (scales || moves) return by_parts(sign, a, b);
   return absl::InvalidArgumentError(absl::StrCat("`", std::string(1, sign), "` does not go with ", shown(left), " and ",
                                                  shown(right),
-                                                 ": for vectors there are + - between two of them, "
-                                                 "* / with a number, dot() and cross()"));
+                                                 ": two vectors can be combined by + and -, "
+                                                 "dot() and cross(), a vector and a number by * and /"));
 }
 
 }  // namespace locus::cli

@@ -1,4 +1,4 @@
-// + - * / % of values. For expressions. A function without state.
+// Calculation of + - * / % on values. For expressions. A function without state.
 #ifndef LOCUS_CLIENT_CLI_SCRIPT_ARITHMETIC_H_
 #define LOCUS_CLIENT_CLI_SCRIPT_ARITHMETIC_H_
 
@@ -8,8 +8,8 @@
 namespace locus::cli {
 
 // Applies any operator to two numbers, + and - to two vectors, * and / to a vector and a number. The result is unknown
-// if an operand is. INVALID_ARGUMENT naming the values for other pairs, OUT_OF_RANGE for division by zero and results
-// that are not finite or leave 64 bits.
+// if an operand is unknown. Returns INVALID_ARGUMENT naming the values for any other pair, OUT_OF_RANGE for division by
+// zero and for results that are not finite or do not fit 64 bits.
 absl::StatusOr<Value> calculate(char sign, const Value& left, const Value& right);
 
 }  // namespace locus::cli

@@ -1,5 +1,5 @@
-// A place in a line of a script that several readers move on. For the readers of expressions and words. Borrows the
-// text. Reading is the only thing that moves it, so a reader that fails leaves it where the trouble is.
+// Reading position in a line of a script, shared by the functions that parse expressions and words. Borrows the text.
+// Only reading advances the cursor, so after an error it stands at the text that could not be parsed.
 #ifndef LOCUS_CLIENT_CLI_SCRIPT_CURSOR_H_
 #define LOCUS_CLIENT_CLI_SCRIPT_CURSOR_H_
 
@@ -21,26 +21,26 @@ class Cursor {
   size_t at() const { return at_; }
   void move_to(size_t at) { at_ = at; }
   bool ended() const { return at_ >= text_.size(); }
-  // The next character; 0 at the end, which no line holds.
+  // Returns the next character, or 0 at the end. No line contains a character 0.
   char peek(size_t ahead = 0) const { return at_ + ahead < text_.size() ? text_[at_ + ahead] : '\0'; }
   char next() { return text_[at_++]; }
   absl::string_view rest() const { return text_.substr(at_); }
   absl::string_view since(size_t begin) const { return text_.substr(begin, at_ - begin); }
 
-  // Moves over `token` if it is next.
+  // Advances past `token` if it comes next. Returns whether it did.
   bool accept(absl::string_view token) {
     const bool found = absl::StartsWith(rest(), token);
     if (found) at_ += token.size();
     return found;
   }
 
-  // The line ends where a comment begins.
+  // Skips blanks. A comment that follows is removed, so that the line ends where the comment begins.
   void skip_blanks() {
     while (peek() == ' ' || peek() == '\t') ++at_;
     if (peek() == '#') text_ = text_.substr(0, at_);
   }
 
-  // Empty if none is next.
+  // Reads a name. Returns an empty string if no name comes next.
   std::string read_name() {
     const size_t begin = at_;
     if (begins_name(peek())) {
@@ -54,7 +54,7 @@ class Cursor {
     return ended() ? "the end of the line" : absl::StrCat("`", rest().substr(0, kShownBytes), "`");
   }
 
-  // Counts what is open, so that recursion is bounded by kMaxExpressionDepth.
+  // Counts open brackets and quotes, so that recursion is bounded by kMaxExpressionDepth. Call close() for each open().
   absl::Status open() {
     if (++depth_ <= kMaxExpressionDepth) return absl::OkStatus();
     return absl::InvalidArgumentError(absl::StrCat("nested deeper than ", kMaxExpressionDepth));

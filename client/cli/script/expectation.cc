@@ -60,10 +60,10 @@ absl::StatusOr<bool> contains(const Json& whole, const Json& part) {
   return equal(whole, part);  // a column of one row
 }
 
-// Vectors part by part.
+// Compares two numbers, or two vectors part by part.
 absl::StatusOr<bool> near(const Value& left, const Value& right, const Value& tolerance) {
   ASSIGN_OR_RETURN(const Number bound, number_of(tolerance));
-  if (real(bound) < 0) return absl::InvalidArgumentError("a tolerance is not negative");
+  if (real(bound) < 0) return absl::InvalidArgumentError("a tolerance must not be negative");
   if (const absl::StatusOr<Number> x = number_of(left), y = number_of(right); x.ok() && y.ok()) {
     const absl::StatusOr<Number> difference = subtract(*x, *y);
     return difference.ok() ? std::abs(real(*difference)) <= real(bound) : absl::StatusOr<bool>(false);
@@ -110,7 +110,7 @@ absl::StatusOr<Expectation> read_expectation(absl::string_view text, const Varia
   if (!cursor.ended()) {
     return absl::InvalidArgumentError(absl::StrCat("expected the end of the line, found ", cursor.found()));
   }
-  if (tolerance && comparison != "==") return absl::InvalidArgumentError("`within` goes with == only");
+  if (tolerance && comparison != "==") return absl::InvalidArgumentError("`within` is allowed only with ==");
   expectation.left = std::move(left);
   expectation.comparison = std::move(comparison);
   expectation.right = std::move(right);

@@ -14,7 +14,7 @@
 namespace locus::cli {
 
 struct Expectation {
-  std::string text;  // as written, without comment
+  std::string text;  // text as written, without the comment
   Value left;
   std::string comparison;
   Value right;
@@ -22,11 +22,12 @@ struct Expectation {
   std::optional<Value> tolerance;
 };
 
-// INVALID_ARGUMENT for a wrong form, the errors of expressions for their values.
+// Parses an `expect` line. Returns INVALID_ARGUMENT for a line of another form, and the errors of its expressions.
 absl::StatusOr<Expectation> read_expectation(absl::string_view text, const Variables& variables);
 
-// FAILED_PRECONDITION saying what was expected and what the left side is. Ids compare exactly; texts that read as
-// numbers compare as numbers; a column of several rows compares as a list. Every value must be known.
+// Checks the expectation. Returns FAILED_PRECONDITION with the expected and the actual value if it is not met. Ids
+// compare exactly; texts that are numbers compare as numbers; a column of several rows compares as a list.
+// Precondition: no value is unknown.
 absl::Status judge(const Expectation& expectation);
 
 }  // namespace locus::cli

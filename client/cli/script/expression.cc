@@ -37,11 +37,11 @@ absl::StatusOr<Number> read_number(Cursor& cursor) {
   }
   const std::optional<Number> number = parse_number(cursor.since(begin));
   if (number) return *number;
-  return absl::InvalidArgumentError(absl::StrCat("`", cursor.since(begin), "` is no number of at most 64 bits"));
+  return absl::InvalidArgumentError(absl::StrCat("`", cursor.since(begin), "` is not a number of at most 64 bits"));
 }
 
-// A number, or three or more with commas and without blanks: a list, kept exact. Of two the first stands alone, as in
-// min(1,2).
+// Reads a number, or a list of three or more numbers separated by commas without blanks, whose integers stay exact. Of
+// two numbers only the first is read, since the comma may separate arguments, as in min(1,2).
 Answer read_numbers(Cursor& cursor) {
   Json numbers = Json::array();
   size_t behind_first = 0;
@@ -57,7 +57,7 @@ Answer read_numbers(Cursor& cursor) {
   return Value::of(std::move(numbers[0]));
 }
 
-// Sums with commas between them, up to `end`, which is read.
+// Reads values separated by commas up to the character `end`, and reads `end` too.
 absl::StatusOr<std::vector<Value>> read_arguments(Cursor& cursor, const Variables& variables, char end) {
   std::vector<Value> values;
   cursor.skip_blanks();
@@ -79,7 +79,7 @@ Answer read_call(Cursor& cursor, const Variables& variables, const std::string& 
   return arguments.ok() ? call_function(name, *arguments) : Answer(arguments.status());
 }
 
-// true, false, null, a call, or a text without quotes.
+// Reads true, false, null, a function call, or a text without quotes.
 Answer read_bare(Cursor& cursor, const Variables& variables) {
   const std::string name = cursor.read_name();
   if (name == "true" || name == "false") return Value::of(Json(name == "true"));
@@ -92,7 +92,7 @@ Answer read_bare(Cursor& cursor, const Variables& variables) {
   return value;
 }
 
-// One value as it is; several as a list of numbers.
+// Returns the only value unchanged, or several values as a list of numbers.
 Answer list_of(std::vector<Value> values) {
   if (values.size() == 1) return std::move(values.front());
   Json list = Json::array();
@@ -115,7 +115,7 @@ Answer read_list(Cursor& cursor, const Variables& variables) {
   return list_of(std::move(values));
 }
 
-// The cursor stands on the opening bracket.
+// Reads an expression in brackets. Precondition: the cursor is at the opening bracket.
 Answer read_enclosed(Cursor& cursor, const Variables& variables) {
   const absl::string_view end = cursor.next() == '(' ? ")" : "}";
   const absl::Status opened = cursor.open();
@@ -150,7 +150,7 @@ Answer read_unary(Cursor& cursor, const Variables& variables) {
   return calculate('*', Value::of(Json(-1)), *value);
 }
 
-// Reads operands with `read`, separated by any of `signs`, and calculates from left to right.
+// Reads operands with `read`, separated by any of `signs`, and applies these operators from left to right.
 template <class Read>
 Answer read_chain(Cursor& cursor, const Variables& variables, absl::string_view signs, Read read) {
   Answer left = read(cursor, variables);
@@ -173,7 +173,7 @@ Answer read_sum(Cursor& cursor, const Variables& variables) {
   return read_chain(cursor, variables, "+-", read_product);
 }
 
-// `[index]`; the cursor stands behind the bracket.
+// Reads the rest of `[index]` and applies it to `value`. Precondition: the cursor is behind the opening bracket.
 Answer read_entry(Cursor& cursor, const Variables& variables, const Value& value) {
   const absl::Status opened = cursor.open();
   if (!opened.ok()) return opened;
@@ -192,7 +192,7 @@ absl::Status not_defined(const std::string& name) {
       absl::StrCat("$", name, " is not defined: set it with let, `-> ", name, "` or --set ", name, "=VALUE"));
 }
 
-// `.field` and `[index]`, as often as they follow.
+// Reads any number of `.field` and `[index]`, and applies them to `value`.
 Answer read_path(Cursor& cursor, const Variables& variables, Value value) {
   while (true) {
     Answer part = value;
@@ -209,14 +209,14 @@ Answer read_path(Cursor& cursor, const Variables& variables, Value value) {
   }
 }
 
-// Returns whether a default replaces the value: null, or a column without rows.
+// Returns whether a default replaces the value: whether it is null or a column without rows.
 bool is_missing(const Value& value) {
   if (value.kind == Value::Kind::kColumn && value.result->rows.empty()) return true;
   const absl::StatusOr<Json> json = value.known() ? plain(value) : Json(0);
   return json.ok() && json->is_null();
 }
 
-// `{name.path:-default}`; the cursor stands behind the brace.
+// Reads `name.path:-default}`. Precondition: the cursor is behind the opening brace.
 Answer read_braced_variable(Cursor& cursor, const Variables& variables) {
   const std::string name = cursor.read_name();
   if (name.empty()) return expected("a name behind `${`", cursor);

@@ -1,4 +1,4 @@
-// Reads an expression of a script and gives its value at once:
+// Parser of script expressions, which also evaluates them:
 //
 //   list    = sum {"," sum}                          numbers only where there are several
 //   sum     = product {("+" | "-") product}
@@ -7,8 +7,8 @@
 //   primary = number | number,number,number | text | true | false | null | variable | function "(" [sum {"," sum}] ")"
 //           | "(" list ")" | "{" list "}"
 //
-// Three numbers with commas and without blanks are one vector, before anything is done with them. For statements and
-// words. Functions without state. Values not known yet make whatever they enter unknown.
+// Three numbers separated by commas without blanks are one vector, which is formed before any operator is applied. For
+// statements and words. Functions without state. The result of an expression with an unknown value is unknown.
 #ifndef LOCUS_CLIENT_CLI_SCRIPT_EXPRESSION_H_
 #define LOCUS_CLIENT_CLI_SCRIPT_EXPRESSION_H_
 
@@ -19,15 +19,16 @@
 
 namespace locus::cli {
 
-// Stops at the first thing that does not go on the expression. INVALID_ARGUMENT naming what was found where an operand
-// should be; the errors of number.h and value.h for what cannot be calculated. Time linear in the text.
+// Reads and evaluates an expression; stops at the first text that cannot continue it. Returns INVALID_ARGUMENT with the
+// text found in place of an operand, or the errors of number.h and value.h for operations that are not possible. Cost:
+// linear in the text.
 absl::StatusOr<Value> read_expression(Cursor& cursor, const Variables& variables);
 
-// The cursor stands on "{": the list between braces.
+// Reads `{list}`. Precondition: the cursor is at the opening brace.
 absl::StatusOr<Value> read_braces(Cursor& cursor, const Variables& variables);
 
-// The cursor stands behind the "$": `name.field[0]`, or `{name.field:-default}`, which is the default where the
-// variable, or the value, is not there.
+// Reads `name.field[0]` or `{name.field:-default}`. The default is used if the variable does not exist, or its value is
+// null or a column without rows. Precondition: the cursor is behind the "$".
 absl::StatusOr<Value> read_variable(Cursor& cursor, const Variables& variables);
 
 }  // namespace locus::cli

@@ -22,14 +22,14 @@ Answer value_of(const absl::StatusOr<Number>& number) {
 
 double dot_of(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-// A function of one number in doubles.
+// Applies a function of one number, computed in double.
 template <class Function>
 Answer of_real(const Value& value, Function function) {
   const absl::StatusOr<Number> number = number_of(value);
   return number.ok() ? value_of(finite(function(real(*number)))) : number.status();
 }
 
-// A function of one vector.
+// Applies a function of one vector.
 template <class Function>
 Answer of_vector(const Value& value, Function function) {
   const absl::StatusOr<Vector> vector = vector_of(value);
@@ -59,7 +59,7 @@ Answer absolute(const Value& value) {
   return compare(number, absl::int128(0)) < 0 ? value_of(subtract(absl::int128(0), number)) : Answer(Value::of(number));
 }
 
-// To an integer, so that it serves as an index or an id; what has no fraction is left as it is.
+// Converts a number to an integer by `function`, so that it can be an index or an id. Integers are returned unchanged.
 template <class Function>
 Answer to_integer(const Value& value, Function function) {
   ASSIGN_OR_RETURN(const Number number, number_of(value));
@@ -69,7 +69,7 @@ Answer to_integer(const Value& value, Function function) {
   return Value::of(Number(absl::int128(whole)));
 }
 
-// The parts of a vector count one by one. `sign` -1 = the least, 1 = the greatest.
+// Returns the smallest (`sign` -1) or largest (`sign` 1) of all numbers and of all parts of vectors.
 Answer extreme(const Arguments& arguments, int sign) {
   std::vector<Number> numbers;
   for (const Value& argument : arguments) {
@@ -96,7 +96,7 @@ Answer cross(const Vector& a, const Vector& b) {
 }
 
 struct Function {
-  size_t least = 1;  // arguments
+  size_t least = 1;  // minimum number of arguments
   size_t most = 1;
   Answer (*call)(const Arguments& arguments) = nullptr;
 };
@@ -142,7 +142,7 @@ absl::StatusOr<Value> call_function(const std::string& name, const std::vector<V
   const auto found = functions().find(name);
   if (found == functions().end()) {
     return absl::NotFoundError(absl::StrCat(
-        "there is no function ", name, "; there are ",
+        "there is no function ", name, "; the functions are ",
         absl::StrJoin(functions(), ", ", [](std::string* text, const auto& entry) { *text += entry.first; })));
   }
   const Function& function = found->second;

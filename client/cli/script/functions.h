@@ -1,4 +1,4 @@
-// The functions that expressions know. Functions without state.
+// Built-in functions of expressions. Functions without state.
 #ifndef LOCUS_CLIENT_CLI_SCRIPT_FUNCTIONS_H_
 #define LOCUS_CLIENT_CLI_SCRIPT_FUNCTIONS_H_
 
@@ -10,8 +10,9 @@
 
 namespace locus::cli {
 
-// `length(vector)`, `min(1, 2)` and so on. NOT_FOUND listing the functions there are; INVALID_ARGUMENT for a wrong
-// number or kind of arguments; OUT_OF_RANGE where there is no finite result. Unknown arguments give an unknown value.
+// Calls a built-in function, such as `length(vector)` or `min(1, 2)`. Returns NOT_FOUND with the names of all
+// functions, INVALID_ARGUMENT for a wrong number or kind of arguments, OUT_OF_RANGE if the result is not finite. The
+// result is unknown if an argument is unknown.
 absl::StatusOr<Value> call_function(const std::string& name, const std::vector<Value>& arguments);
 
 }  // namespace locus::cli

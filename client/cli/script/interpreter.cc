@@ -31,12 +31,12 @@ std::vector<std::string> texts_of(const std::vector<Word>& words) {
   return texts;
 }
 
-// Takes `-> NAME` off the end; empty if there is none.
+// Removes `-> NAME` from the end of `words` and returns the name; empty if there is none.
 absl::StatusOr<std::string> take_target(std::vector<Word>& words) {
   for (size_t i = 0; i < words.size(); ++i) {
     if (!words[i].bare || words[i].text != "->") continue;
     if (i + 2 != words.size() || !is_name(words[i + 1].text)) {
-      return absl::InvalidArgumentError("`-> NAME` keeps a result and ends the line");
+      return absl::InvalidArgumentError("`-> NAME` stores a result and must end the line");
     }
     std::string name = words[i + 1].text;
     words.resize(i);
@@ -83,7 +83,7 @@ absl::Status Interpreter::execute(const Statement& statement) {
     case Verb::kEnd:
       break;
   }
-  return absl::InternalError("repeat and end belong to the runner");
+  return absl::InternalError("the runner must handle repeat and end");
 }
 
 absl::Status Interpreter::mistake(const absl::Status& status) const {
@@ -207,7 +207,7 @@ absl::Status Interpreter::command(const Statement& statement) {
   const absl::StatusOr<std::string> target = take_target(*words);
   if (!target.ok()) return mistake(target.status());
   if (!target->empty() && (!statement.reason.empty() || in_batch_)) {
-    return mistake(absl::InvalidArgumentError("there is no result to keep: write `-> NAME` behind commit, not here"));
+    return mistake(absl::InvalidArgumentError("there is no result to store: write `-> NAME` behind commit, not here"));
   }
   context_.take_report();
   const absl::Status outcome = run_script_line(texts_of(*words), context_);
@@ -219,7 +219,7 @@ absl::Status Interpreter::command(const Statement& statement) {
 absl::Status Interpreter::keep_result(const std::string& name) {
   if (checks_only()) return set(name, Value::unknown());
   std::shared_ptr<const Report> report = context_.take_report();
-  if (report == nullptr) return absl::InvalidArgumentError("this command has no result to keep");
+  if (report == nullptr) return absl::InvalidArgumentError("this command has no result to store");
   return set(name, Value::of(std::move(report)));
 }
 

@@ -1,5 +1,5 @@
-// Runs one statement of a script, or checks it without running it. For the runner, which decides which comes next. Not
-// thread-safe.
+// Interpreter of single statements: runs a statement, or checks it without running it. The runner chooses the
+// statements. Not thread-safe.
 #ifndef LOCUS_CLIENT_CLI_SCRIPT_INTERPRETER_H_
 #define LOCUS_CLIENT_CLI_SCRIPT_INTERPRETER_H_
 
@@ -17,25 +17,27 @@
 
 namespace locus::cli {
 
-// The head of a `repeat`.
+// Parsed first line of a `repeat` block.
 struct Repetition {
-  std::optional<uint64_t> times;  // none while it is not known
-  std::string counter;            // the variable that counts from 0; empty = none
+  std::optional<uint64_t> times;  // nullopt: unknown, because the script is only checked
+  std::string counter;            // variable that counts the rounds from 0; empty = none
 };
 
 class Interpreter {
  public:
-  // context.lines() tells running from checking: then nothing is sent, written or waited for, and results are unknown.
+  // If context.lines() is Lines::kScriptCheck, statements are only checked: nothing is sent or written, there are no
+  // waits, and results are unknown.
   Interpreter(Context& context, Variables variables);
 
-  // Any statement but repeat and end. A command that fails gives its own failure; a line that cannot be read or
-  // calculated a usage error while checking, else FAILED_PRECONDITION.
+  // Runs or checks any statement except repeat and end. Returns the error of a failed command. For a line that cannot
+  // be parsed or calculated, returns a usage error while checking and FAILED_PRECONDITION while running.
   absl::Status execute(const Statement& statement);
 
   absl::StatusOr<Repetition> read_repetition(const Statement& statement) const;
   absl::Status set(const std::string& name, Value value);
 
-  // While checking: what is set between the two is unknown from then on, since a loop may set it again.
+  // Variables set between enter_loop() and leave_loop() are unknown while checking, because a later round of the loop
+  // may set them again.
   void enter_loop() { ++loops_; }
   void leave_loop() { --loops_; }
 
@@ -51,7 +53,7 @@ class Interpreter {
   absl::Status keep_result(const std::string& name);
   absl::Status judge_failure(const std::string& reason, const absl::Status& outcome) const;
   absl::StatusOr<Value> read_value(const std::string& text) const;
-  // A mistake in the script itself.
+  // Returns the error for a mistake in the script itself: see execute().
   absl::Status mistake(const absl::Status& status) const;
   bool checks_only() const { return context_.lines() == Lines::kScriptCheck; }
 

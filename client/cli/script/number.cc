@@ -31,7 +31,8 @@ int order(T a, T b) {
   return a < b ? -1 : (a > b ? 1 : 0);
 }
 
-// The double is split, so that nothing is rounded: its whole part fits, unless it is beyond every integer here.
+// Compares without rounding: splits `b` into its integer part, which fits 128 bits after the range check, and its
+// fraction.
 int compare_exactly(absl::int128 a, double b) {
   if (std::abs(b) >= 0x1p65) return b > 0 ? -1 : 1;
   const double whole = std::trunc(b);
@@ -101,7 +102,7 @@ absl::StatusOr<Number> subtract(const Number& a, const Number& b) {
 
 absl::StatusOr<Number> multiply(const Number& a, const Number& b) {
   if (!are_integers(a, b)) return finite(real(a) * real(b));
-  // Beyond this the product would not fit 128 bits either.
+  // Refuse early: a product beyond this limit may not even fit 128 bits.
   if (std::abs(real(a) * real(b)) > 0x1p65) return absl::OutOfRangeError("the result needs more than 64 bits");
   return in_range(integer(a) * integer(b));
 }
@@ -113,7 +114,7 @@ absl::StatusOr<Number> divide(const Number& a, const Number& b) {
 }
 
 absl::StatusOr<Number> modulo(const Number& a, const Number& b) {
-  if (!are_integers(a, b)) return absl::OutOfRangeError("% is for integers");
+  if (!are_integers(a, b)) return absl::OutOfRangeError("% requires integers");
   if (integer(b) == 0) return absl::OutOfRangeError("division by zero");
   const absl::int128 rest = integer(a) % integer(b);
   return Number(rest != 0 && (rest < 0) != (integer(b) < 0) ? rest + integer(b) : rest);

@@ -1,6 +1,6 @@
-// Numbers of scripts: integers exact over all 64-bit ids, or doubles. For values and expressions. Plain values and
-// functions without state. A Number is always finite, an integer from -2^63 to 2^64 - 1: what would leave that range is
-// refused with OUT_OF_RANGE, never rounded.
+// Numbers of scripts: exact integers, which cover all 64-bit ids, or doubles. For values and expressions. Plain values
+// and functions without state. Invariant: a Number is finite, and an integer is within -2^63 .. 2^64 - 1. Results
+// outside this range are refused with OUT_OF_RANGE, never rounded.
 #ifndef LOCUS_CLIENT_CLI_SCRIPT_NUMBER_H_
 #define LOCUS_CLIENT_CLI_SCRIPT_NUMBER_H_
 
@@ -17,20 +17,20 @@ namespace locus::cli {
 
 using Number = std::variant<absl::int128, double>;
 
-// The whole text as a number: decimal, 0x hexadecimal, or with point or exponent. Nothing for anything else, "inf" and
-// integers beyond 64 bits included.
+// Parses the whole text as a decimal or hexadecimal (0x) integer, or as a double with a point or an exponent. Returns
+// nullopt for any other text, also for "inf" and for integers that do not fit 64 bits.
 std::optional<Number> parse_number(absl::string_view text);
 // Returns the number, or nullopt if the JSON value is not a number.
 std::optional<Number> number_from(const Json& json);
 Json json_of(const Number& number);
-// Reads back as the same number; doubles in the fewest digits.
+// Returns a text that parses to the same number; a double has as few digits as possible.
 std::string text_of(const Number& number);
-// The nearest double.
+// Returns the number as the nearest double.
 double real(const Number& number);
-// Refuses what is not finite.
+// Returns `value`, or OUT_OF_RANGE if it is not finite.
 absl::StatusOr<Number> finite(double value);
 
-// Two integers stay integers wherever the result is one, division included.
+// Calculate a result. The result of two integers is an integer whenever it is integral, also for divide().
 absl::StatusOr<Number> add(const Number& a, const Number& b);
 absl::StatusOr<Number> subtract(const Number& a, const Number& b);
 absl::StatusOr<Number> multiply(const Number& a, const Number& b);
@@ -38,7 +38,7 @@ absl::StatusOr<Number> divide(const Number& a, const Number& b);
 // Returns the remainder of two integers, with the sign of `b`.
 absl::StatusOr<Number> modulo(const Number& a, const Number& b);
 
-// Below 0, 0 or above 0 as a < b, a == b, a > b; exact also between an integer and a double.
+// Returns a value below, equal to or above 0 for a < b, a == b or a > b. Exact, also between an integer and a double.
 int compare(const Number& a, const Number& b);
 
 }  // namespace locus::cli

@@ -22,7 +22,7 @@ absl::StatusOr<Value> read_single_quoted(Cursor& cursor) {
   return Value::of(Json(std::move(text)));
 }
 
-// The cursor stands behind the backslash.
+// Reads the rest of an escape sequence. Precondition: the cursor is behind the backslash.
 absl::Status read_escape(Cursor& cursor, std::string& text) {
   if (cursor.ended()) return not_closed('"');
   const char c = cursor.next();
@@ -32,7 +32,7 @@ absl::Status read_escape(Cursor& cursor, std::string& text) {
   }
   if (!absl::StrContains("\"\\${}", c)) {
     return absl::InvalidArgumentError(
-        absl::StrCat("\\", std::string(1, c), " means nothing between double quotes: write \\\\ for a backslash"));
+        absl::StrCat("\\", std::string(1, c), " is not an escape sequence: write \\\\ for a backslash"));
   }
   text += c;
   return absl::OkStatus();
@@ -68,7 +68,7 @@ absl::Status append_value(std::string& text, const Value& value) {
   }
   ASSIGN_OR_RETURN(const std::string more, text_of(value));
   if (text.size() + more.size() > kMaxTextBytes) {
-    return absl::ResourceExhaustedError(absl::StrCat("a text gets longer than ", kMaxTextBytes, " bytes"));
+    return absl::ResourceExhaustedError(absl::StrCat("a text is longer than ", kMaxTextBytes, " bytes"));
   }
   text += more;
   return absl::OkStatus();

@@ -1,4 +1,5 @@
-// Reads a quoted text of a script, and fills values into texts. For expressions and words. Functions without state.
+// Parser of quoted texts in scripts, which substitutes values in them. For expressions and words. Functions without
+// state.
 #ifndef LOCUS_CLIENT_CLI_SCRIPT_QUOTED_TEXT_H_
 #define LOCUS_CLIENT_CLI_SCRIPT_QUOTED_TEXT_H_
 
@@ -11,13 +12,13 @@
 
 namespace locus::cli {
 
-// Appends the value's text, or the mark of one that is not known yet. RESOURCE_EXHAUSTED where that gets longer than
+// Appends the value as text, or kNotKnownYet for an unknown value. Returns RESOURCE_EXHAUSTED if `text` would exceed
 // kMaxTextBytes.
 absl::Status append_value(std::string& text, const Value& value);
 
-// The cursor stands on a quote. Between single quotes everything is as it stands. Between double quotes `$name` and
-// `{expression}` are filled in, and \" \\ \$ \{ \n \t are what they say. INVALID_ARGUMENT where the quote is not
-// closed.
+// Reads a quoted text. Precondition: the cursor is at the opening quote. Text in single quotes is taken literally. In
+// double quotes `$name` and `{expression}` are substituted, and \" \\ \$ \{ \n \t are escape sequences. Returns
+// INVALID_ARGUMENT if the closing quote is missing.
 absl::StatusOr<Value> read_quoted_text(Cursor& cursor, const Variables& variables);
 
 }  // namespace locus::cli

@@ -15,7 +15,7 @@ namespace {
 
 bool is_expectation(const Statement& statement) { return statement.verb == Verb::kExpect || !statement.reason.empty(); }
 
-// Goes through the statements, loops included.
+// Runner of all statements of a script, with loops.
 class Runner {
  public:
   Runner(const Script& script, const Variables& variables, AfterFailure after, Context& context, ScriptCounts& counts)
@@ -38,13 +38,13 @@ class Runner {
 
  private:
   struct Loop {
-    size_t begin;  // the repeat
+    size_t begin;  // index of the repeat statement
     uint64_t done = 0;
     uint64_t times = 0;
     std::string counter;
   };
 
-  // Runs one statement; the place of the next.
+  // Runs the statement at index `place`. Returns the index of the next statement.
   absl::StatusOr<size_t> step(size_t place) {
     const Statement& statement = script_.statements[place];
     if (statement.verb == Verb::kRepeat) return enter(place);
@@ -53,7 +53,8 @@ class Runner {
     return status.ok() ? absl::StatusOr<size_t>(place + 1) : status;
   }
 
-  // A block whose first line failed is passed over whole.
+  // Returns the index of the statement that follows the failed one. If the failed statement opens a block, skips the
+  // block.
   size_t behind_failed(size_t place) const {
     const Statement& statement = script_.statements[place];
     const bool opens = statement.verb == Verb::kRepeat || statement.verb == Verb::kBegin;
@@ -64,7 +65,7 @@ class Runner {
     const Statement& statement = script_.statements[place];
     ASSIGN_OR_RETURN(Repetition repetition, interpreter_.read_repetition(statement));
     const bool checks_only = context_.lines() == Lines::kScriptCheck;
-    // A check goes once through every loop.
+    // A check runs every loop once.
     Loop loop{.begin = place, .times = checks_only ? 1 : *repetition.times, .counter = repetition.counter};
     if (loop.times == 0) return statement.partner + 1;
     interpreter_.enter_loop();
@@ -93,7 +94,7 @@ class Runner {
     return interpreter_.set(loop.counter, Value::of(Json(loop.done)));
   }
 
-  // Tells what failed; the failure again where the run ends with it.
+  // Counts the result of a statement and prints an error. Returns the error if the run must end.
   absl::Status count(const Statement& statement, const absl::Status& status) {
     if (is_expectation(statement)) ++(status.ok() ? counts_.passed : counts_.failed);
     if (status.ok()) return status;

@@ -25,7 +25,7 @@ const std::map<std::string, Verb>& verbs() {
   return table;
 }
 
-// The text up to the first blank, which is taken off `text` with the blanks behind it.
+// Removes the first word, and the blanks behind it, from `text`. Returns the word.
 std::string take_first_word(absl::string_view& text) {
   const size_t end = std::min(text.find_first_of(" \t"), text.size());
   std::string word(text.substr(0, end));
@@ -51,9 +51,9 @@ absl::StatusOr<Statement> parse_expect_error(absl::string_view rest) {
   Statement statement;
   statement.reason = take_first_word(rest);
   if (!is_failure_name(statement.reason)) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("`", statement.reason, "` names no failure: take a reason as in UNKNOWN_ID, a status code as in ",
-                     "DEADLINE_EXCEEDED, or USAGE"));
+    return absl::InvalidArgumentError(absl::StrCat(
+        "`", statement.reason, "` is not a failure: give a reason such as UNKNOWN_ID, a status code such as ",
+        "DEADLINE_EXCEEDED, or USAGE"));
   }
   statement.text = std::string(rest);
   const std::string word = take_first_word(rest);
@@ -61,7 +61,7 @@ absl::StatusOr<Statement> parse_expect_error(absl::string_view rest) {
     statement.verb = Verb::kCommit;
     statement.text = std::string(rest);
   } else if (word.empty() || word.front() == '#' || word == kExpectError || verbs().count(word) > 0) {
-    return absl::InvalidArgumentError("expect-error REASON stands before a command or commit");
+    return absl::InvalidArgumentError("expect-error REASON must be followed by a command or commit");
   }
   return statement;
 }
@@ -88,7 +88,8 @@ bool fits_in_batch(const Statement& statement) {
   return word == "insert" || word == "move" || word == "remove";
 }
 
-// Keeps the blocks that are open. begin and repeat may hold each other, a batch no other batch.
+// Matcher of the begin and end of blocks; stores the open blocks. A batch may contain repeat blocks, and a repeat block
+// may contain batches, but a batch contains no batch.
 class Blocks {
  public:
   explicit Blocks(std::vector<Statement>& statements) : statements_(statements) {}
@@ -117,19 +118,19 @@ class Blocks {
     }
   }
 
-  // The statement whose block was never closed.
+  // Returns the index of the last statement whose block is open; nullopt if all blocks are closed.
   std::optional<size_t> left_open() const { return open_.empty() ? std::nullopt : std::optional<size_t>(open_.back()); }
 
  private:
   absl::Status in_batch(absl::string_view what) const {
     return absl::InvalidArgumentError(
-        absl::StrCat(what, " cannot stand in the batch that begins in line ", batch_line_,
-                     ": it holds only insert, move, remove, let, repeat, expect, echo and sleep, up to commit"));
+        absl::StrCat(what, " is not allowed in the batch that begins in line ", batch_line_,
+                     ": until commit, only insert, move, remove, let, repeat, expect, echo and sleep are allowed"));
   }
 
   absl::Status open(size_t place) {
     if (open_.size() >= kMaxBlockNesting) {
-      return absl::InvalidArgumentError(absl::StrCat("more than ", kMaxBlockNesting, " blocks within each other"));
+      return absl::InvalidArgumentError(absl::StrCat("more than ", kMaxBlockNesting, " nested blocks"));
     }
     open_.push_back(place);
     return absl::OkStatus();
@@ -150,7 +151,7 @@ class Blocks {
 
   std::vector<Statement>& statements_;
   std::vector<size_t> open_;
-  size_t batch_line_ = 0;  // where the open batch begins; 0 = none is open
+  size_t batch_line_ = 0;  // line of the open batch's begin; 0 = no batch is open
 };
 
 absl::Status wrong(const std::string& name, size_t line, const absl::Status& status) {

@@ -1,4 +1,4 @@
-// A script taken apart into statements, its blocks matched. For the runner. Plain data and a function without state.
+// Script parsed into statements, with matched blocks. For the runner. Plain data and a function without state.
 #ifndef LOCUS_CLIENT_CLI_SCRIPT_SCRIPT_H_
 #define LOCUS_CLIENT_CLI_SCRIPT_SCRIPT_H_
 
@@ -14,23 +14,23 @@ enum class Verb { kCommand, kLet, kUse, kBegin, kCommit, kRepeat, kEnd, kExpect,
 
 struct Statement {
   Verb verb = Verb::kCommand;
-  size_t line = 0;     // from 1
-  std::string text;    // behind the verb; of a command all of it
-  std::string reason;  // of `expect-error`: the name of the failure that its command or commit is to have
-  size_t partner = 0;  // of begin, commit, repeat, end: the other end of the block
+  size_t line = 0;     // line number, from 1
+  std::string text;    // text after the verb; for a command the whole line
+  std::string reason;  // expect-error only: name of the expected failure of the command or commit
+  size_t partner = 0;  // begin, commit, repeat and end only: index of the other end of the block
 };
 
 struct Script {
-  std::string name;  // for messages
+  std::string name;  // name of the script in messages
   std::vector<Statement> statements;
 };
 
-// Usage errors begin with name:line: blocks that are not closed or cross, a command that cannot stand in a batch, an
-// unknown failure after expect-error, control characters, and whatever is over a limit of script_limits.h. What the
-// statements hold is not read yet. Time linear in the text.
+// Parses a script. Returns a usage error that begins with name:line for an unclosed or overlapping block, a command
+// that is not allowed in a batch, an unknown failure after expect-error, a control character, or an exceeded limit of
+// script_limits.h. Does not parse the text of the statements. Cost: linear in the text.
 absl::StatusOr<Script> parse_script(const std::string& name, absl::string_view text);
 
-// "name:line".
+// Returns the statement's place as "name:line".
 std::string place_of(const Script& script, const Statement& statement);
 
 }  // namespace locus::cli

@@ -1,4 +1,5 @@
-// How large a script and what it does may get. For the reader and the runner of scripts; a refusal names the limit.
+// Limits of the size of a script and of its work. For the parser and the runner of scripts. Errors name the limit's
+// value.
 #ifndef LOCUS_CLIENT_CLI_SCRIPT_SCRIPT_LIMITS_H_
 #define LOCUS_CLIENT_CLI_SCRIPT_SCRIPT_LIMITS_H_
 
@@ -12,7 +13,7 @@ inline constexpr size_t kMaxScriptLines = 100'000;
 inline constexpr size_t kMaxLineBytes = 65'536;
 inline constexpr size_t kMaxBlockNesting = 16;
 inline constexpr uint64_t kMaxRepeats = 100'000;
-// Lines run in all, those in loops each time.
+// Maximum number of lines that run; a line in a loop counts each time.
 inline constexpr uint64_t kMaxLinesRun = 1'000'000;
 inline constexpr size_t kMaxVariables = 1'000;
 // Maximum size of a word or text after substitution.

@@ -36,7 +36,7 @@ absl::StatusOr<Value> field_of_result(const Value& value, const std::string& nam
   if (!report.rows_name.empty()) {
     if (name == report.rows_name) return Value::of(Json(report.rows));
     if (name == "count") return Value::of(Json(report.rows.size()));
-    // Rows would have had it: nothing was found, which is an empty column.
+    // Without rows the report does not list its columns, so treat the name as an empty column.
     if (report.rows.empty()) return Value{.kind = Value::Kind::kColumn, .result = value.result, .column = name};
   }
   return absl::NotFoundError(absl::StrCat("there is no field ", name, "; there are ", fields_of(report)));
@@ -77,7 +77,8 @@ absl::Status is_something_else(const Value& value, absl::string_view wanted) {
   return absl::InvalidArgumentError(absl::StrCat(shown(value), " is not ", wanted));
 }
 
-// A column of one row is its entry; of another number of rows there is no telling which is meant.
+// Returns the entry of a column with exactly one row, or plain() of another value. Refuses other columns: it is not
+// clear which row is meant.
 absl::StatusOr<Json> single(const Value& value) {
   if (value.kind == Value::Kind::kColumn && value.result->rows.size() != 1) {
     return absl::InvalidArgumentError(absl::StrCat(value.column, " has ", value.result->rows.size(),
@@ -125,7 +126,7 @@ absl::StatusOr<Json> plain(const Value& value) {
   if (value.kind == Value::Kind::kPlain) return value.data;
   if (value.kind == Value::Kind::kResult) {
     return absl::InvalidArgumentError(
-        absl::StrCat("a whole result is no value: name one of its fields: ", fields_of(*value.result)));
+        absl::StrCat("a result has several fields: name one of them: ", fields_of(*value.result)));
   }
   const std::vector<Json>& rows = value.result->rows;
   if (rows.size() == 1) return cell(rows.front(), value.column);
@@ -159,7 +160,7 @@ absl::StatusOr<std::string> text_of(const Value& value) {
 }
 
 std::string shown(const Value& value) {
-  if (!value.known()) return "a value not known yet";
+  if (!value.known()) return "an unknown value";
   absl::StatusOr<std::string> text = text_of(value);
   if (!text.ok()) return "a whole result";
   if (value.kind == Value::Kind::kColumn && value.result->rows.empty()) return "empty: there are no rows";

@@ -1,5 +1,5 @@
 // Value of a script's variable: a number, a text, a list, a result of a command, or a column of its rows. For
-// expressions. Plain values; functions without state. Texts that read as numbers, as ids in answers do, count as
+// expressions. Plain values; functions without state. Texts that are numbers, such as ids in answers, are treated as
 // numbers.
 #ifndef LOCUS_CLIENT_CLI_SCRIPT_VALUE_H_
 #define LOCUS_CLIENT_CLI_SCRIPT_VALUE_H_
@@ -17,15 +17,15 @@
 
 namespace locus::cli {
 
-// A vector's parts.
+// Three parts of a vector: x, y, z.
 using Vector = std::array<double, 3>;
 
 struct Value {
   enum class Kind {
-    kUnknown,  // known only when the script runs: while it is checked
+    kUnknown,  // unknown, because the script is only checked
     kPlain,    // `data`
     kResult,   // `result`
-    kColumn    // `column` of the rows of `result`; one row counts as its entry
+    kColumn    // `column` of the rows of `result`; a column with one row is treated as the entry of this row
   };
 
   static Value unknown() { return {.kind = Kind::kUnknown}; }
@@ -41,18 +41,18 @@ struct Value {
   std::string column = {};
 };
 
-// A fact of a result's head, a column of its rows, their `count`, or the rows themselves under their name; an entry of
-// a record. NOT_FOUND naming what there is instead.
+// Returns a field of a result (an entry of its head, a column of its rows, `count`, or all rows under their name) or of
+// a record. Returns NOT_FOUND with the existing names.
 absl::StatusOr<Value> field_of(const Value& value, const std::string& name);
-// Entry of a list or row of a column, from 0. OUT_OF_RANGE beyond its end.
+// Returns an entry of a list or a row of a column, counted from 0. Returns OUT_OF_RANGE beyond the end.
 absl::StatusOr<Value> entry_of(const Value& value, const Number& index);
-// Number of entries of a list or rows of a column, bytes of a text.
+// Returns the number of entries of a list, of rows of a column, or of bytes of a text.
 absl::StatusOr<uint64_t> size_of(const Value& value);
 
-// A column of one row as its entry, another one as a list. INVALID_ARGUMENT for a whole result.
+// Returns a column with one row as its entry, any other column as a list. Returns INVALID_ARGUMENT for a whole result.
 absl::StatusOr<Json> plain(const Value& value);
 
-// Operand of a calculation. The conversions return INVALID_ARGUMENT naming the value's kind if it is another one.
+// Operand of a calculation. The conversions return INVALID_ARGUMENT, with a description of the value, for other values.
 using Operand = std::variant<Number, Vector>;
 absl::StatusOr<Operand> operand_of(const Value& value);
 absl::StatusOr<Number> number_of(const Value& value);
@@ -60,7 +60,7 @@ absl::StatusOr<Vector> vector_of(const Value& value);
 
 // Returns the value as a word of a line: lists with commas, doubles in the fewest digits, null as "null".
 absl::StatusOr<std::string> text_of(const Value& value);
-// For messages: the same, cut to a readable length; never fails.
+// Returns text_of(), truncated to a readable length, for messages; never fails.
 std::string shown(const Value& value);
 
 }  // namespace locus::cli

@@ -19,7 +19,7 @@ bool is_name(absl::string_view text) {
 absl::Status Variables::set(const std::string& name, Value value) {
   if (!is_name(name)) {
     return absl::InvalidArgumentError(
-        absl::StrCat("`", name, "` is no name: take letters, digits and _, no digit first"));
+        absl::StrCat("`", name, "` is not a name: use letters, digits and _, and begin with no digit"));
   }
   const auto found = values_.find(name);
   if (found == values_.end() && values_.size() >= kMaxVariables) {

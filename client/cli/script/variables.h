@@ -1,4 +1,4 @@
-// The variables of a running script, by name. For expressions and statements. Not thread-safe.
+// Variables of a running script, by name. For expressions and statements. Not thread-safe.
 #ifndef LOCUS_CLIENT_CLI_SCRIPT_VARIABLES_H_
 #define LOCUS_CLIENT_CLI_SCRIPT_VARIABLES_H_
 
@@ -11,16 +11,16 @@
 
 namespace locus::cli {
 
-// A letter or an underscore, then letters, digits and underscores.
+// Returns whether `text` is a letter or an underscore, followed by letters, digits and underscores.
 bool is_name(absl::string_view text);
 bool begins_name(char c);
 bool continues_name(char c);
 
 class Variables {
  public:
-  // INVALID_ARGUMENT for what is no name, RESOURCE_EXHAUSTED for one more than kMaxVariables.
+  // Sets a variable. Returns INVALID_ARGUMENT for an invalid name, RESOURCE_EXHAUSTED beyond kMaxVariables.
   absl::Status set(const std::string& name, Value value);
-  // Null if there is none.
+  // Returns the value, or null if the variable does not exist.
   const Value* find(const std::string& name) const;
 
  private:

@@ -29,7 +29,8 @@ absl::StatusOr<Word> read_word(Cursor& cursor, const Variables& variables) {
       continue;
     }
     if (cursor.accept("\\")) {
-      if (cursor.ended()) return absl::InvalidArgumentError("nothing follows the last backslash: a line stands alone");
+      if (cursor.ended())
+        return absl::InvalidArgumentError("nothing follows the last backslash: a line cannot be continued");
       word.bare = false;
     }
     word.text += cursor.next();

@@ -1,4 +1,4 @@
-// Divides a line of a script into words as a shell does, with variables and expressions filled in. For statements.
+// Splits a line of a script into words as a shell does, and substitutes variables and expressions. For statements.
 // Functions without state.
 #ifndef LOCUS_CLIENT_CLI_SCRIPT_WORDS_H_
 #define LOCUS_CLIENT_CLI_SCRIPT_WORDS_H_
@@ -14,13 +14,13 @@ namespace locus::cli {
 
 struct Word {
   std::string text;
-  bool bare = true;  // as it stands in the line: nothing quoted, nothing filled in
+  bool bare = true;  // literal: nothing was quoted or substituted
 };
 
-// Words end at blanks; quotes and a backslash keep blanks; `#` where a word would begin starts a comment.
-// `$name.field`,
-// `${name:-default}` and `{expression}` are filled in and never divide a word. INVALID_ARGUMENT for what is not closed,
-// the errors of expressions, RESOURCE_EXHAUSTED for a word beyond kMaxTextBytes.
+// Splits a line at blanks; quotes and a backslash preserve blanks, and `#` at the beginning of a word begins a comment.
+// `$name.field`, `${name:-default}` and `{expression}` are substituted, and the result never splits a word. Returns
+// INVALID_ARGUMENT for an unclosed quote or brace, the errors of expressions, and RESOURCE_EXHAUSTED for a word of more
+// than kMaxTextBytes.
 absl::StatusOr<std::vector<Word>> read_words(absl::string_view line, const Variables& variables);
 
 }  // namespace locus::cli

@@ -2,8 +2,8 @@
 
     PYTHONPATH=build/release/python /usr/bin/python3 client/python/examples/game_tick.py --address 127.0.0.1:7575
 
-Creates a scene of its own and deletes it at the end. Players walk on circles around a wall. Each tick queries the
-players in reach of each player (balls) and whether each player sees the next one (a ray to it).
+Creates a scene of its own and deletes it at the end. Players walk on circles around a wall. Each tick queries which
+players are in reach of each player (with a ball), and whether each player sees the next player (with a ray to it).
 """
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ class Game:
 
 
 def run(client: locus.Client, scene: str, players: int, ticks: int, rate: float) -> List[Tick]:
-    """Runs `ticks` ticks at `rate` a second; ticks are late if one takes longer than 1 / rate seconds."""
+    """Runs `ticks` ticks at `rate` per second. A tick that takes longer than 1 / rate seconds delays the next one."""
     game = Game(client, scene, players)
     done = []
     due = time.perf_counter()

@@ -5,7 +5,8 @@ arrays, or array.array if numpy is not installed.
 """
 import pkgutil
 
-# Modules that protoc generates from the protocol are in a folder `locus/v1`. Allow both to be imported together.
+# Modules that protoc generates from the protocol are in another folder `locus`, as `locus/v1`. Extend the path of this
+# package, so that this package and those modules can be imported in the same process.
 __path__ = pkgutil.extend_path(__path__, __name__)
 
 from .client import DEFAULT_ADDRESS, Client, connect
@@ -20,12 +21,12 @@ from .query_stream import QueryStream
 from .results import NO_TRIANGLE, BlockResult, QueryResult
 from .update_stream import UpdateStream
 from .updates import UpdateBatch
-from .values import Ack, ItemError, Limit, Mesh, MeshPart, Revision, Scene, Server, Work
+from .values import Ack, ItemError, Limit, Mesh, MeshPart, Quota, Revision, Scene, Server, Work
 
 __all__ = [
     "Ack", "Block", "BlockResult", "Client", "Column", "ColumnLike", "Cull", "DEFAULT_ADDRESS", "Inside",
     "InstanceChange", "ItemError", "Limit", "LocusError", "Mesh", "MeshColumns", "MeshPart", "NO_TRIANGLE",
     "OutsideHistory", "OverloadPolicy", "PlacedInstances", "Precision", "QueryBatch", "QueryResult", "QueryStream",
-    "RayMode", "Reason", "Retry", "Revision", "Scene", "SceneState", "Server", "Source", "StaticDetail",
+    "Quota", "RayMode", "Reason", "Retry", "Revision", "Scene", "SceneState", "Server", "Source", "StaticDetail",
     "UpdateBatch", "UpdateStream", "Values", "Winding", "Work", "connect",
 ]

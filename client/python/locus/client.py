@@ -17,16 +17,17 @@ from typing import Any, Dict, Iterator, List, Mapping, Optional, Sequence
 import grpc
 
 from . import columns, meshes, schema
-from .connection import Connection, Retry, scene_metadata
+from .connection import Connection, Retry
+from .credentials import Credentials
 from .enums import OverloadPolicy, Winding
-from .errors import LocusError, from_call, parsed
+from .errors import LocusError, from_call, handshake_advice, parsed
 from .meshes import InstanceChange, MeshColumns, PlacedInstances
 from .queries import QueryBatch
 from .query_stream import QueryStream
 from .results import QueryResult
 from .update_stream import UpdateStream
 from .updates import UpdateBatch
-from .values import Ack, Mesh, MeshPart, Scene, Server
+from .values import Ack, Mesh, MeshPart, Quota, Scene, Server
 
 DEFAULT_ADDRESS = "127.0.0.1:7575"
 _HEALTH = schema.method("grpc.health.v1.Health", "Check")
@@ -39,16 +40,31 @@ def _rpc(service: str, name: str) -> schema.Method:
 
 def connect(address: str = DEFAULT_ADDRESS, *, timeout: float = 10.0, long_timeout: float = 600.0,
             wait_for_server: bool = False, max_send_bytes: int = 32 << 20, max_receive_bytes: int = 64 << 20,
-            retry: Retry = Retry()) -> "Client":
-    """Connects to a locusd at `host:port` (the port may be left out: 7575) or `unix:/path`.
+            retry: Retry = Retry(), tls: bool = False, ca: str = "", cert: str = "", key: str = "",
+            server_name: str = "", token: str = "", token_file: str = "",
+            allow_token_without_tls: bool = False) -> "Client":
+    """Connects to a locusd at `host:port`, `host` (port 7575) or `unix:/path`.
 
-    `timeout`: maximum duration of a call in seconds, including retries; `long_timeout`: likewise for mesh uploads and
-    changes of instances. With `wait_for_server` connect() retries until `timeout`; without it, a refused connection
-    fails at once with LocusError UNAVAILABLE, which names the address. `max_send_bytes`, `max_receive_bytes`: maximum
-    message sizes; the server accepts 32 MiB by default, and an answer may have up to the batch's `max_reply_bytes`.
+    `timeout`: maximum duration of a call in seconds, including retries; `long_timeout`: maximum duration, in seconds,
+    of mesh transfers and changes of instances. With `wait_for_server`, connect() retries until `timeout`; without it, a
+    refused connection fails at once with LocusError UNAVAILABLE, which names the address. `max_send_bytes`,
+    `max_receive_bytes`: maximum message sizes; the server accepts 32 MiB by default, and an answer may have up to the
+    batch's `max_reply_bytes`.
+
+    `tls` encrypts the connection; `ca`, `cert` and `server_name` imply it. `ca`: file with the certificates of the
+    authorities that the server's certificate may come from, default those that gRPC trusts; `cert`, `key`: files with
+    the client's certificate chain and its key, for mutual TLS; `server_name`: name in the server's certificate if it is
+    not the host of the address. All files are in PEM format and are read once.
+
+    `token`: bearer token that every call carries; `token_file`: file that contains only the token, read again when it
+    has changed and when the server refuses the token. A token is sent only over TLS, to loopback addresses and to unix
+    sockets, unless `allow_token_without_tls`. Raises ValueError for options that contradict each other or would reveal
+    a token, OSError for a file that cannot be read.
     """
+    credentials = Credentials(tls=tls, ca=ca, cert=cert, key=key, server_name=server_name, token=token,
+                              token_file=token_file, allow_token_without_tls=allow_token_without_tls)
     client = Client(Connection(address, timeout=timeout, long_timeout=long_timeout, max_send_bytes=max_send_bytes,
-                               max_receive_bytes=max_receive_bytes, retry=retry))
+                               max_receive_bytes=max_receive_bytes, retry=retry, credentials=credentials))
     try:
         client._greet(wait_for_server)
     except BaseException:
@@ -83,6 +99,14 @@ class Client:
         """Returns the version, features and limits of the server."""
         rpc = _rpc("Server", "GetServer")
         return Server.of(self._unary(rpc, rpc.request(), repeat=True))
+
+    def quotas(self, identity: str = "", *, everybody: bool = False) -> Dict[str, Dict[str, Quota]]:
+        """Returns the quotas and their use, by identity and by name: of this caller and its connection, of `identity`,
+        or of `everybody`. Those of others are for callers that administer all scenes.
+        """
+        fields = {"identity": identity, "all": everybody}
+        return {entry.identity: {quota.name: Quota.of(quota) for quota in entry.quotas}
+                for page in self._pages(_rpc("Server", "GetQuotas"), **fields) for entry in page.identities}
 
     def healthy(self, service: str = "") -> bool:
         """Returns True if the server, or the service of this full name, reports that it is serving."""
@@ -126,7 +150,9 @@ class Client:
 
     def upload_mesh(self, name: str, vertices: columns.ColumnLike, indices: columns.ColumnLike,
                     parts: Sequence[MeshPart] = (), progress: Optional[meshes.Progress] = None) -> Mesh:
-        """Uploads a mesh: 3V float32 `vertices` x, y, z and 3T uint32 `indices`; returns when its tree is built.
+        """Uploads a mesh of V vertices and T triangles. Returns when the mesh's tree is built.
+
+        `vertices`: 3V float32, x, y, z of each vertex; `indices`: 3T uint32, three vertex indices per triangle.
 
         A mesh whose content the server already has is not sent again. Safe to repeat.
         """
@@ -134,18 +160,21 @@ class Client:
         messages = meshes.upload_messages(name, vertices, indices, parts, progress)
         call = self._connection.channel.stream_unary(rpc.path, rpc.request.SerializeToString)
         try:
-            raw = call(messages, timeout=self._connection.long_timeout)
+            _, metadata = self._connection.metadata()
+            raw = call(messages, timeout=self._connection.long_timeout, metadata=metadata)
         except grpc.RpcError as failure:
             raise from_call(failure) from None
         return Mesh.of(parsed(rpc.response, raw).mesh)
 
     def download_mesh(self, name: str) -> MeshColumns:
-        """Returns an uploaded mesh as stored: 3V float32 vertices and 3T uint32 indices."""
+        """Returns an uploaded mesh with its columns, as the server stores it."""
         rpc = _rpc("Scene", "DownloadMesh")
         call = self._connection.channel.unary_stream(rpc.path)
         try:
-            pieces = [parsed(rpc.response, raw) for raw in
-                      call(rpc.request(mesh=name).SerializeToString(), timeout=self._connection.long_timeout)]
+            _, metadata = self._connection.metadata()
+            answers = call(rpc.request(mesh=name).SerializeToString(), timeout=self._connection.long_timeout,
+                           metadata=metadata)
+            pieces = [parsed(rpc.response, raw) for raw in answers]
         except grpc.RpcError as failure:
             raise from_call(failure) from None
         return MeshColumns.of(pieces)
@@ -160,7 +189,9 @@ class Client:
         self._unary(rpc, rpc.request(mesh=name))
 
     def change_instances(self, scene: str, change: InstanceChange, *, no_wait: bool = False) -> PlacedInstances:
-        """Removes and places instances as one revision; returns when it is visible, or at once with `no_wait`."""
+        """Removes and places instances as one revision. Returns when queries see the change, or, with `no_wait`, as
+        soon as the server has accepted it.
+        """
         rpc = _rpc("Scene", "ChangeInstances")
         request = rpc.request()
         request.CopyFrom(change.message)
@@ -181,21 +212,22 @@ class Client:
         return QueryResult.from_bytes(self.query_bytes(scene, batch.request_bytes(scene)))
 
     def query_bytes(self, scene: str, request: bytes) -> bytes:
-        """Runs an encoded batch: takes the bytes of QueryBatch.request_bytes() and returns those of the response, for
-        QueryResult.from_bytes().
+        """Runs an encoded batch. `request` are the bytes from QueryBatch.request_bytes(). Returns the bytes of the
+        response, for QueryResult.from_bytes().
 
         For callers that reuse requests, or measure the cost of encoding and decoding.
         """
         return self._connection.unary_bytes(_rpc("Query", "Query").path, request, scene=scene, repeat=True)
 
     def update_stream(self, scene: str, *, max_in_flight: int = 8, reconnect: Retry = Retry(attempts=10)) -> UpdateStream:
-        """Returns a pipelined stream of update batches to one scene, each applied exactly once. It connects when the
-        first batch is sent.
+        """Returns a pipelined stream of update batches to one scene, each applied exactly once. The stream connects
+        when the first batch is sent.
         """
         return UpdateStream(self._connection, scene, max_in_flight, reconnect)
 
     def query_stream(self, scene: str, *, max_in_flight: int = 8, reconnect: Retry = Retry()) -> QueryStream:
-        """Returns a pipelined stream of query batches to one scene. It connects when the first batch is sent."""
+        """Returns a pipelined stream of query batches to one scene. The stream connects when the first batch is sent.
+        """
         return QueryStream(self._connection, scene, max_in_flight, reconnect)
 
     def _pages(self, rpc: schema.Method, **fields: Any) -> Iterator[Any]:
@@ -214,10 +246,14 @@ class Client:
         rpc = _rpc("Server", "GetServer")
         call = self._connection.channel.unary_unary(rpc.path)
         try:
-            call(b"", timeout=self._connection.timeout, wait_for_ready=wait_for_server)
+            _, metadata = self._connection.metadata()
+            call(b"", timeout=self._connection.timeout, wait_for_ready=wait_for_server, metadata=metadata)
         except grpc.RpcError as failure:
             error = from_call(failure)
-            if error.refused or error.code not in (grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.DEADLINE_EXCEEDED):
+            if error.code == grpc.StatusCode.PERMISSION_DENIED:  # the server answers; other calls may be permitted
+                return
+            silent = error.code in (grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.DEADLINE_EXCEEDED)
+            if error.refused or handshake_advice(error.message) or not silent:
                 raise error from None
             message = f"nothing answers at {self.address}: start locusd there, or give its address"
             raise LocusError(grpc.StatusCode.UNAVAILABLE, message) from None

@@ -72,7 +72,7 @@ def _name_of(view: memoryview) -> str:
 
 
 def _from_buffer(path: str, view: memoryview, kind: Kind) -> Raw:
-    """Returns the numbers' bytes in C order: borrowed from `view` if it is contiguous, else copied."""
+    """Returns the bytes of the numbers in `view`, in C order: borrowed if `view` is contiguous, else copied."""
     format = view.format
     if view.itemsize != kind.size or (format not in kind.formats and format.lstrip("@=<") not in kind.formats):
         raise TypeError(f"{path}: holds {_name_of(view)}, but {kind.name} is wanted: convert it, "
@@ -101,8 +101,8 @@ def borrow(path: str, value: ColumnLike, kind: Kind, width: int = 1) -> Raw:
     """Returns the encoded column, empty for None. A contiguous buffer is borrowed, not copied, so it must not change
     until the request was sent.
 
-    `path` names the column in errors. TypeError for numbers of another type, ValueError if the count of numbers is not
-    a multiple of `width`. Cost: linear for lists and for arrays that are not contiguous, else constant.
+    `path` names the column in errors. Raises TypeError for numbers of another type, ValueError if the count of numbers
+    is not a multiple of `width`. Cost: linear for lists and for arrays that are not contiguous, else constant.
     """
     if value is None:
         return b""
@@ -130,7 +130,7 @@ def entries(raw: Raw, kind: Kind, width: int = 1) -> int:
 
 
 def borrow_for(path: str, value: ColumnLike, kind: Kind, count: int, width: int = 1) -> Raw:
-    """Returns the column like borrow(). ValueError unless it has `count` entries, one entry for all, or none."""
+    """Returns the encoded column like borrow(). Raises ValueError unless it has `count` entries, one entry or none."""
     raw = borrow(path, value, kind, width)
     found = entries(raw, kind, width)
     if found not in (0, 1, count):

@@ -10,11 +10,11 @@ from typing import Any, Callable, List, Optional, Tuple, TypeVar
 import grpc
 
 from . import schema
+from .credentials import Credentials, Metadata, Token, stays_on_this_machine
 from .errors import LocusError, from_call, parsed
 
 DEFAULT_PORT = 7575
 _LEGAL_SCENE = re.compile(r"[a-z0-9-]{1,63}")
-_LOCAL = ("127.", "localhost", "[::1]", "unix:")
 _Answer = TypeVar("_Answer")
 
 
@@ -32,7 +32,7 @@ class Retry:
     max_wait: float = 2.0
 
     def wait_after(self, failures: int, error: LocusError) -> Optional[float]:
-        """Returns the seconds to wait after this many consecutive failures, or None if no attempt is left."""
+        """Returns the seconds to wait after `failures` consecutive failures, or None if no attempt is left."""
         if failures >= self.attempts:
             return None
         wait = min(self.first_wait * 2.0 ** min(failures - 1, 20), self.max_wait)
@@ -48,8 +48,8 @@ def target_of(address: str) -> str:
 
 
 def scene_metadata(scene: str) -> List[Tuple[str, str]]:
-    """Returns the `x-scene` header, by which routers choose a server. A name that is not a legal header value is left
-    out; the server refuses such a name in the request.
+    """Returns the `x-scene` header, by which routers choose a server. Returns no header for an invalid scene name; the
+    server refuses such a name in the request.
     """
     return [("x-scene", scene)] if _LEGAL_SCENE.fullmatch(scene) else []
 
@@ -58,22 +58,28 @@ class Connection:
     """Owner of one gRPC channel. Thread-safe."""
 
     def __init__(self, address: str, *, timeout: float, long_timeout: float, max_send_bytes: int,
-                 max_receive_bytes: int, retry: Retry) -> None:
+                 max_receive_bytes: int, retry: Retry, credentials: Credentials = Credentials()) -> None:
         self.address = target_of(address)
+        self.token = Token(credentials, self.address)
         self.timeout = timeout
         self.long_timeout = long_timeout
         self.retry = retry
-        options = [("grpc.max_send_message_length", max_send_bytes),
-                   ("grpc.max_receive_message_length", max_receive_bytes),
-                   ("grpc.use_local_subchannel_pool", 1),
-                   ("grpc.initial_reconnect_backoff_ms", 100), ("grpc.max_reconnect_backoff_ms", 2000)]
-        if self.address.startswith(_LOCAL):  # a proxy set in the environment cannot reach this host's loopback
+        options: List[Tuple[str, object]] = [
+            ("grpc.max_send_message_length", max_send_bytes), ("grpc.max_receive_message_length", max_receive_bytes),
+            ("grpc.use_local_subchannel_pool", 1),
+            ("grpc.initial_reconnect_backoff_ms", 100), ("grpc.max_reconnect_backoff_ms", 2000)]
+        if stays_on_this_machine(self.address):  # a proxy set in the environment cannot reach this host's loopback
             options.append(("grpc.enable_http_proxy", 0))
-        self.channel = grpc.insecure_channel(self.address, options)
+        self.channel = credentials.channel(self.address, options)
 
     def close(self) -> None:
         """Closes the channel and cancels every call on it."""
         self.channel.close()
+
+    def metadata(self, scene: str = "") -> Tuple[int, Metadata]:
+        """Returns the number of the token and the metadata of a call: the token and the scene."""
+        number, authorization = self.token.metadata()
+        return number, authorization + scene_metadata(scene)
 
     def unary(self, rpc: schema.Method, request: Any, *, scene: str = "", repeat: bool = False,
               timeout: Optional[float] = None) -> Any:
@@ -89,10 +95,19 @@ class Connection:
         call = self.channel.unary_unary(path)
         deadline = time.monotonic() + (self.timeout if timeout is None else timeout)
 
+        used = 0
+
         def attempt() -> bytes:
-            metadata = scene_metadata(scene)
+            nonlocal used
+            used, metadata = self.metadata(scene)
             return bytes(call(request, timeout=max(0.0, deadline - time.monotonic()), metadata=metadata))
 
+        try:
+            return self._attempts(attempt, deadline if repeat else None)
+        except LocusError as error:
+            # A server that does not accept the token has done nothing, so every call may be repeated.
+            if error.code != grpc.StatusCode.UNAUTHENTICATED or not self.token.has_newer(used):
+                raise
         return self._attempts(attempt, deadline if repeat else None)
 
     def _attempts(self, attempt: Callable[[], _Answer], deadline: Optional[float]) -> _Answer:

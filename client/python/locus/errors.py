@@ -12,17 +12,37 @@ _Status, _Error = schema.message("Status"), schema.message("Error")
 _CODES = {code.value[0]: code for code in grpc.StatusCode}
 _ERROR_TYPE = "type.googleapis.com/locus.v1.Error"
 
-# Hints for errors that did not come from the server. Messages of the server need none, since they already suggest a
-# remedy.
+# Hints for errors that did not come from the server. Error messages of the server need no hint, since they already
+# suggest a remedy.
 _HINTS = {
     grpc.StatusCode.UNAVAILABLE: "try again when the server answers",
     grpc.StatusCode.DEADLINE_EXCEEDED: "give it more time (timeout); a change may have been made all the same",
     grpc.StatusCode.RESOURCE_EXHAUSTED: "a message is larger than its receiver takes: split the batch, or raise "
                                         "max_receive_bytes",
     grpc.StatusCode.UNIMPLEMENTED: "is this a locus server, and new enough? Client.server() says which",
-    grpc.StatusCode.UNAUTHENTICATED: "ask the operator of the server for the right to do this",
+    grpc.StatusCode.UNAUTHENTICATED: "give a valid token (token, token_file) or a client certificate (cert, key)",
     grpc.StatusCode.PERMISSION_DENIED: "ask the operator of the server for the right to do this",
 }
+
+# Parts of gRPC's messages for connections that end during their establishment, each with advice; the first match is
+# used.
+_ON_HANDSHAKES = (
+    (": Permission denied", "permission denied: the socket's file admits other users only; the server's operator can set "
+                            "--unix-mode and --unix-owner"),
+    ("wrong version number", "the server does not use TLS: connect without it"),
+    ("certificate verify failed", "the server's certificate does not come from a known authority, or has expired: give "
+                                  "the CA file of the server's operator (ca)"),
+    ("is not in peer certificate", "the server's certificate is for other names: use the name in the certificate as "
+                                   "address or as server_name"),
+    ("Ssl handshake failed", "the server and this client do not agree on TLS: compare their certificates and CA files"),
+    ("failed to connect to all addresses; last error: UNAVAILABLE", "the server ended the connection at once: it may "
+     "require TLS, or a client certificate that it knows"),
+)
+
+
+def handshake_advice(message: str) -> str:
+    """Returns advice for a connection that was not permitted or whose TLS failed; empty for other messages."""
+    return next((remedy for symptom, remedy in _ON_HANDSHAKES if symptom in message), "")
 
 
 class LocusError(Exception):
@@ -51,10 +71,11 @@ class LocusError(Exception):
 
     @property
     def hint(self) -> str:
-        """Suggested remedy; empty if the message already contains one or none is known."""
+        """Suggested remedy; empty if the message already contains a remedy, or if no remedy is known."""
         if self.refused or "nothing answers" in self.message:
             return ""
-        return _HINTS.get(self.code, "")
+        advice = handshake_advice(self.message) if self.code == grpc.StatusCode.UNAVAILABLE else ""
+        return advice or _HINTS.get(self.code, "")
 
     @property
     def refused(self) -> bool:

@@ -21,8 +21,8 @@ Progress = Callable[[int, int], None]
 
 
 class InstanceChange:
-    """Instances to remove and to place, as one atomic revision; removes come first. Methods return the change, so that
-    calls chain.
+    """Instances to remove and to place, as one atomic revision; removes are applied before placements. Methods return
+    the change, so that calls can be chained.
     """
 
     def __init__(self) -> None:
@@ -43,9 +43,10 @@ class InstanceChange:
               groups: ColumnLike = None, tags: ColumnLike = None) -> "InstanceChange":
         """Places an uploaded mesh N times: world = translation + scale * (rotation * mesh).
 
-        N is the number of `ids` (uint64, not 0), or of `translations` if the server chooses the ids. `translations`:
-        3N float64 or three; `rotations`: 4N float32 or four, unit quaternions x, y, z, w, none = identity; `scales`: N
-        float32 or one, none = 1; `layers` N uint32 (none = bit 0), `groups` and `tags` N uint64 (none = 0).
+        N is the number of `ids` (uint64, not 0), or, without `ids`, the number of `translations`; the server then
+        chooses the ids. Every other column has N entries or one entry for all instances. `translations`: 3N float64;
+        `rotations`: 4N float32, unit quaternions x, y, z, w, none = identity; `scales`: N float32, none = 1; `layers`:
+        N uint32, none = bit 0; `groups`, `tags`: N uint64, none = 0.
         """
         path = f"place[{len(self.message.place)}]."
         with self._new_placement() as message:
@@ -72,7 +73,8 @@ class InstanceChange:
 
 @dataclasses.dataclass(frozen=True)
 class PlacedInstances:
-    """Result of a change of instances: visible at `revision`, or, with `no_wait`, only accepted (`revision` is None).
+    """Result of a change of instances. `revision` is the first revision that contains the change; with `no_wait` the
+    change is only accepted, and `revision` is None.
 
     `ids`: uint64, one for each placed instance in the order of the request. `change` is the sequence number of the
     change within the epoch, from 1.
@@ -92,7 +94,9 @@ class PlacedInstances:
 
 @dataclasses.dataclass(frozen=True)
 class MeshColumns:
-    """Mesh with its columns: `vertices` 3V float32 in mesh axes, `indices` 3T uint32, both as uploaded."""
+    """Mesh of V vertices and T triangles with its columns, as uploaded: `vertices` 3V float32 in mesh axes, `indices`
+    3T uint32.
+    """
 
     mesh: Mesh
     vertices: Values
@@ -100,7 +104,9 @@ class MeshColumns:
 
     @classmethod
     def of(cls, pieces: Sequence[Any]) -> "MeshColumns":
-        """Joins all messages of a download. LocusError DATA_LOSS if the content does not match the mesh's SHA-256."""
+        """Joins all messages of a download. Raises LocusError DATA_LOSS if their content does not have the mesh's
+        SHA-256.
+        """
         vertices = b"".join(piece.vertices for piece in pieces)
         indices = b"".join(piece.indices for piece in pieces)
         mesh = Mesh.of(pieces[0].mesh) if pieces else None
@@ -110,7 +116,9 @@ class MeshColumns:
 
 
 def mesh_sha256(vertices: bytes, indices: bytes) -> bytes:
-    """Returns a mesh's content hash: SHA-256 of both counts as uint32, the float32 vertices and the uint32 indices."""
+    """Returns a mesh's content hash: the SHA-256 of the numbers of vertices and of triangles as uint32, the float32
+    vertices and the uint32 indices, in this order.
+    """
     digest = hashlib.sha256(struct.pack("<II", len(vertices) // 12, len(indices) // 12))
     digest.update(vertices)
     digest.update(indices)
@@ -119,7 +127,8 @@ def mesh_sha256(vertices: bytes, indices: bytes) -> bytes:
 
 def upload_messages(name: str, vertices: ColumnLike, indices: ColumnLike, parts: Sequence[MeshPart],
                     progress: Optional[Progress]) -> Iterator[Any]:
-    """Yields the messages of UploadMesh: an opening with counts and hash, then the columns in chunks below 1 MiB."""
+    """Yields the messages of UploadMesh: a first message with counts and hash, then the columns in parts below 1 MiB.
+    """
     columns_: Tuple[Tuple[str, bytes], ...] = (("vertices", columns.encode("vertices", vertices, FLOAT32, 3)),
                                                ("indices", columns.encode("indices", indices, UINT32, 3)))
     raw = dict(columns_)

@@ -1,10 +1,10 @@
 """Base class of UpdateStream and QueryStream: a bidirectional call with a bounded number of messages in flight, whose
-responses are matched by sequence number. After a broken connection it opens a new call and sends the unanswered
+responses are matched by sequence number. After a broken connection the stream opens a new call and sends the unanswered
 messages again. Internal to the package.
 
 One thread per stream opens the calls, one after another, and reads the responses; gRPC's thread writes the messages.
-Invariants: `_items` holds the messages that were accepted and not answered, in the order of sending. After `_ended` is
-set no message is accepted, and `_abandon()` empties `_items`.
+Invariants: `_items` contains the messages that were accepted and not answered, in the order of sending. After `_ended`
+is set no message is accepted, and `_abandon()` empties `_items`.
 """
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from typing import Any, Generic, Iterator, List, Optional, Tuple, TypeVar
 
 import grpc
 
-from .connection import Connection, Retry, scene_metadata
+from .connection import Connection, Retry
 from .errors import LocusError, from_call
 
 Result = TypeVar("Result")
@@ -35,7 +35,7 @@ class Item(Generic[Result]):
 
 
 class PipelinedStream(Generic[Result]):
-    """Common part of both kinds of stream. Thread-safe.
+    """Common part of UpdateStream and QueryStream. Thread-safe.
 
     Use as a context manager: leaving it waits for all answers, or cancels the stream after an exception.
     """
@@ -77,8 +77,8 @@ class PipelinedStream(Generic[Result]):
         raise NotImplementedError
 
     def _answered(self, outcome: Any, position: int) -> None:
-        """Handles `outcome`, a result or a LocusError. Called after the answered item was removed from `_items` at
-        `position`.
+        """Handles `outcome`, the result or LocusError of an item. Called after the item was removed from position
+        `position` of `_items`.
         """
 
     def _send(self, batch: bytes) -> "Future[Result]":
@@ -98,9 +98,10 @@ class PipelinedStream(Generic[Result]):
         return item.future
 
     def sync(self, timeout: Optional[float] = None) -> None:
-        """Blocks until every sent batch has been answered. Does not raise errors of single batches: their futures do.
+        """Blocks until every sent batch has been answered. Errors of single batches are raised only by the futures of
+        these batches.
 
-        LocusError if the stream ended with an error; TimeoutError after `timeout` seconds.
+        Raises LocusError if the stream ended with an error, TimeoutError after `timeout` seconds.
         """
         with self._changed:
             if not self._changed.wait_for(lambda: not self._items and not self._handing_over, timeout):
@@ -167,7 +168,8 @@ class PipelinedStream(Generic[Result]):
             with self._changed:
                 for item in self._items:
                     item.written = False
-                self._call = call = method(self._requests(over), metadata=scene_metadata(self._scene))
+                used, metadata = self._connection.metadata(self._scene)
+                self._call = call = method(self._requests(over), metadata=metadata)
                 if self._broken_off:
                     call.cancel()
             for response in call:
@@ -177,7 +179,10 @@ class PipelinedStream(Generic[Result]):
             call.cancel()
             return unreadable
         except grpc.RpcError as failure:
-            return from_call(failure)
+            error = from_call(failure)
+            if error.code == grpc.StatusCode.UNAUTHENTICATED and self._connection.token.has_newer(used):
+                return LocusError(grpc.StatusCode.UNAVAILABLE, f"the token has changed: {error.message}")
+            return error
         except ValueError as failure:  # raised by gRPC for a closed channel
             return LocusError(grpc.StatusCode.FAILED_PRECONDITION, f"the client was closed: open a new one ({failure})")
         finally:

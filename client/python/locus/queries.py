@@ -14,20 +14,22 @@ _KINDS = {name: schema.numbers(name.capitalize()) for name in ("rays", "balls", 
 
 
 class Block(NamedTuple):
-    """Settings common to all kinds of block, for N queries. All are optional.
+    """Settings common to all kinds of block, for N queries. All settings are optional. Of a setting with N numbers or
+    one, the one number applies to all queries.
 
-    - `frame`: three floats, added to every position of the block; positions in its result are relative to it.
+    - `frame`: three floats, added to every position of the block. Column POINT of the result is relative to the frame,
+      column POSE is absolute.
     - `source`: search static instances, moving objects or both; `precision`: exact shapes or their bounds.
     - `columns`: columns to return for each row, by default T, ID and TRIANGLE for rays and nearest queries, ID for balls
       and boxes (TRIANGLE too if their detail is triangles), ID and POSE for lookups.
     - `masks`: N uint32 or one; only objects and instances with (layers & mask) != 0 are found.
-    - `ignore_groups`: N uint64 or one; objects and instances of that group are ignored.
+    - `ignore_groups`: N uint64 or one; the query ignores objects and instances of this group.
     - `ignore_ids`: at most 64 uint64 ids to ignore, for the whole block.
     - `max_results`: maximum number of rows a query, 0 = 1,024.
     - `after_id`: return only rows with a higher id, to continue after a truncated result.
-    - `as_of_ticks`: N uint64 or one; the queries see objects as they were at the end of that tick. `as_of_fractions`: N
-      float32 or one, 0 <= f < 1, only with `as_of_ticks`: fraction of the way to the next tick. `outside_history`:
-      handling of times that are not in the history; they are refused by default.
+    - `as_of_ticks`: N uint64 or one; the query sees objects as they were at the end of this tick. `as_of_fractions`: N
+      float32 or one, 0 <= f < 1, only with `as_of_ticks`: fraction f of the time from that tick to the next one.
+      `outside_history`: handling of times that are not in the history; they are refused by default.
     """
 
     frame: Optional[ColumnLike] = None
@@ -76,17 +78,19 @@ class Block(NamedTuple):
 class QueryBatch:
     """Blocks of queries for one scene, answered at one revision, in order.
 
-    N, the number of queries of a block, comes from its first column; other columns hold N entries, one for all, or none
-    for their default. Positions and lengths are float32 in the caller's unit, relative to the block's frame.
+    N, the number of queries of a block, is the number of entries of its first column; every other column has N entries,
+    one entry for all queries, or none for its default. Positions are float32, relative to the block's frame; positions
+    and lengths are in the caller's unit.
 
     `at_least`: the minimum revision, for example an Ack ("read your own writes"); `exactly`: exactly this revision, if
-    the server still keeps it. The default is the latest revision. Both raise LocusError with Reason.SCENE_RESTARTED if
-    the scene's epoch differs from the revision's. `max_work`: maximum number of nodes, cells and tests for the batch;
-    `explain`: report the work done; `max_reply_bytes`: the maximum size of the answer, 0 = 4,000,000.
+    the server still retains it. The default is the latest revision. With `at_least` or `exactly`, the query raises
+    LocusError with Reason.SCENE_RESTARTED if the scene's epoch differs from the epoch of the given revision.
+    `max_work`: maximum total number of visited nodes and cells and of tests for the batch; `explain`: report the work
+    done; `max_reply_bytes`: the maximum size of the answer, 0 = 4,000,000.
 
     Columns are checked for type and length here (TypeError and ValueError name the column), values by the server. Buffers
     are borrowed: leave them unchanged until the batch was sent. A batch may be sent several times. Methods return the
-    batch, so that calls chain. Not thread-safe.
+    batch, so that calls can be chained. Not thread-safe.
     """
 
     def __init__(self, *, at_least: Optional[Revision] = None, exactly: Optional[Revision] = None, max_work: int = 0,
@@ -111,9 +115,9 @@ class QueryBatch:
     def rays(self, origins: ColumnLike, directions: ColumnLike, *, t_max: ColumnLike = None,
              mode: RayMode = RayMode.FIRST, cull: Cull = Cull.NONE, inside: Inside = Inside.SOLID,
              block: Block = Block()) -> "QueryBatch":
-        """Adds a block of N rays. `origins`: 3N float32; `directions`: 3N float32 or three, of any length but zero.
-        They are not normalized: t is in units of the direction's length. `t_max`: N float32 or one, inclusive,
-        +infinity by default.
+        """Adds a block of N rays. `origins`: 3N float32; `directions`: 3N float32 or three, vectors of any length but
+        zero. Directions are not normalized: the unit of t is the length of the direction. `t_max`: N float32 or one,
+        the maximum t, inclusive, +infinity by default.
         """
         new = _NewBlock(self._blocks, "rays")
         new.first("origins", origins, FLOAT32, 3)
@@ -150,9 +154,9 @@ class QueryBatch:
     def nearest(self, points: ColumnLike, *, k: int = 1, max_distances: ColumnLike = None,
                 detail: StaticDetail = StaticDetail.INSTANCES, block: Block = Block()) -> "QueryBatch":
         """Adds a block of N points, to find the nearest objects and instances. `points`: 3N float32; `k`: maximum
-        number of rows a point, by ascending distance. Column T contains the distance: 0 inside an object; for a mesh
+        number of rows per point, by ascending distance. Column T contains the distance: 0 inside an object; for a mesh
         always the distance to its surface. `max_distances`: N float32 or one, inclusive, +infinity by default;
-        `detail`: INSTANCES returns an instance once, by its nearest triangle.
+        `detail`: INSTANCES returns one row per instance, for its nearest triangle.
         """
         new = _NewBlock(self._blocks, "nearest")
         new.first("points", points, FLOAT32, 3)
@@ -161,26 +165,30 @@ class QueryBatch:
         return self._add(new, block)
 
     def lookup(self, ids: ColumnLike, *, block: Block = Block()) -> "QueryBatch":
-        """Adds a lookup of objects and instances. N uint64 ids: one row each, in this order, with id 0 if unknown."""
+        """Adds a lookup of objects and instances by N uint64 ids. Each id has one row, in the order of `ids`; the row
+        of an unknown id has id 0.
+        """
         new = _NewBlock(self._blocks, "lookup")
         new.first("ids", ids, UINT64)
         return self._add(new, block)
 
     def lookup_groups(self, groups: ColumnLike, *, block: Block = Block()) -> "QueryBatch":
-        """Adds a lookup of N uint64 groups, not 0: returns all their objects and instances, ascending by id."""
+        """Adds a lookup of N uint64 groups, not 0. Each group has one row for each of its objects and instances,
+        ascending by id.
+        """
         new = _NewBlock(self._blocks, "lookup")
         new.first("groups", groups, UINT64)
         return self._add(new, block)
 
     def request_bytes(self, scene: str) -> bytes:
-        """Returns the encoded request for Query. Borrowed columns are read now, and may be changed afterwards."""
+        """Returns the encoded request for Query. Copies the borrowed columns, which may be changed afterwards."""
         request = wire.Parts()
         request.add(_REQUEST["scene"], scene.encode())
         request.add_parts(_REQUEST["batch"], self._parts)
         return b"".join(request.pieces)
 
     def batch_bytes(self) -> bytes:
-        """Returns the encoded QueryBatch. Borrowed columns are read now, and may be changed afterwards."""
+        """Returns the encoded QueryBatch. Copies the borrowed columns, which may be changed afterwards."""
         return b"".join(self._parts.pieces)
 
     def _add(self, new: _NewBlock, settings: Block) -> QueryBatch:

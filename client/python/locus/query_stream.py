@@ -21,7 +21,7 @@ _SEQUENCE, _RESULT, _ERROR = (_METHOD.response.DESCRIPTOR.fields_by_name[name].n
 
 class QueryStream(PipelinedStream[QueryResult]):
     """Stream returned by Client.query_stream(). Thread-safe. After a broken connection, unanswered batches are sent
-    again on a new one, since queries change nothing.
+    again on a new connection, which is safe since queries change nothing.
     """
 
     def __init__(self, connection: Connection, scene: str, max_in_flight: int, retry: Retry) -> None:
@@ -30,9 +30,9 @@ class QueryStream(PipelinedStream[QueryResult]):
     def send(self, batch: QueryBatch) -> "Future[QueryResult]":
         """Sends a batch. Blocks while `max_in_flight` batches are unanswered.
 
-        The future gets the result, or the LocusError of this batch. The batch is read now and may be used again.
-        LocusError if the stream has ended. To keep a local server busy, 8 batches of 1,024 queries in flight are
-        enough, or 2 of 8,192.
+        The future receives the result, or the LocusError of this batch. The batch is encoded before send() returns and
+        may be used again. Raises LocusError if the stream has ended. To keep a local server busy, 8 batches of 1,024
+        queries in flight are enough, or 2 batches of 8,192.
         """
         return self._send(batch.batch_bytes())
 

@@ -70,19 +70,21 @@ class BlockResult:
         self._fields = wire.fields(message)
         self._rows: Optional[int] = None
 
-    counts = _Column("Rows of each query: N uint32; empty where each has one (rays FIRST, lookups of ids) or none (rays ANY).",
-                     UINT32, by_row=False)
-    truncated = _Column("Indices of the queries that found more rows than they return: uint32, ascending.",
+    counts = _Column("Number of rows of each query: N uint32; empty if every query has one row (rays FIRST, lookups of "
+                     "ids) or none (rays ANY).", UINT32, by_row=False)
+    truncated = _Column("Indices of the queries that have more rows than are reported: uint32, ascending.",
                         UINT32, by_row=False)
-    hits = _Column("Rays ANY: N uint8, 1 where something is hit, else 0.", UINT8, by_row=False)
-    t = _Column("R float32, in lengths of the ray's direction; +infinity for a miss.", FLOAT32)
+    hits = _Column("Rays ANY: N uint8, 1 if the ray has a hit, else 0.", UINT8, by_row=False)
+    t = _Column("R float32. Rays: t, whose unit is the length of the ray's direction; +infinity for a miss. Nearest: "
+                "the distance.", FLOAT32)
     ids = _Column("R uint64 ids of objects and instances; 0 for a miss.", UINT64)
-    triangles = _Column("R uint32 positions in the mesh's index list; NO_TRIANGLE for a miss, an object, or the row of a "
-                        "whole instance.", UINT32)
+    triangles = _Column("R uint32 indices of triangles in the mesh's uploaded list; NO_TRIANGLE for a miss, an object, "
+                        "or the row of a whole instance.", UINT32)
     uvs = _Column("2R float32: the weights of the triangle's second and third vertex at the hit.", FLOAT32, 2)
     normals = _Column("3R float32: the unit normal at the hit, in world axes.", FLOAT32, 3)
-    points = _Column("3R float32: where the hit is, relative to the block's frame.", FLOAT32, 3)
-    groups = _Column("R uint64 groups; 0 for none and for a miss.", UINT64)
+    points = _Column("3R float32: position of the hit, or the nearest point, relative to the block's frame.",
+                     FLOAT32, 3)
+    groups = _Column("R uint64 groups; 0 for no group and for a miss.", UINT64)
     tags = _Column("R uint64 tags; 0 for a miss.", UINT64)
     layers = _Column("R uint32 sets of layer bits; 0 for a miss.", UINT32)
     positions = _Column("3R float64: an object's centre or an instance's translation, absolute; 0 for a miss.",
@@ -144,7 +146,7 @@ class QueryResult(Revision):
 
     @classmethod
     def of(cls, message: memoryview) -> "QueryResult":
-        """Decodes the protocol's QueryResult. Columns are views, so the bytes are kept as long as any column."""
+        """Decodes the protocol's QueryResult. Columns are views, so `message` stays in memory as long as any column."""
         found = wire.fields(message)
         result = cls.__new__(cls)
         # Set all attributes by one update() of the dictionary: it is measurably faster than object.__setattr__() for

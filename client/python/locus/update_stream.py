@@ -22,12 +22,12 @@ _BATCH = _METHOD.request.DESCRIPTOR.fields_by_name["batch"].number
 class UpdateStream(PipelinedStream[Ack]):
     """Stream returned by Client.update_stream(). Thread-safe.
 
-    Each batch carries the stream's random `writer` and a batch number that counts up from 1 without gaps. After a
-    broken connection every batch without an ack is sent again, in order; the ack of a batch that the server had already
-    applied has `duplicate` set. A refused batch does not consume its number: the batches after it are renumbered and
-    sent again. The stream ends if the server refuses it, if the server no longer knows the writer (the scene has a new
-    epoch), or if reconnecting fails too often: then every unanswered batch gets that LocusError, and their outcome is
-    unknown.
+    Each batch carries the stream's random writer id, `writer`, and a batch number that counts up from 1 without gaps.
+    After a broken connection every batch without an ack is sent again, in order; the ack of a batch that the server had
+    already applied has `duplicate` set. A refused batch does not consume its number: the batches after it are
+    renumbered and sent again. The stream ends if the server refuses the stream itself, if the server no longer knows
+    the writer (the scene has a new epoch), or if reconnecting fails as often as `reconnect` allows. The future of every
+    unanswered batch then raises the LocusError with which the stream ended; the outcome of these batches is unknown.
     """
 
     def __init__(self, connection: Connection, scene: str, max_in_flight: int, retry: Retry) -> None:
@@ -40,14 +40,14 @@ class UpdateStream(PipelinedStream[Ack]):
         """Sends a batch. Blocks while `max_in_flight` batches are unanswered, so a caller that is faster than the
         server is slowed down.
 
-        The future gets the Ack, or the LocusError of this batch. The batch is copied and may be used again; its own
-        writer and number are ignored. LocusError if the stream has ended.
+        The future receives the Ack, or the LocusError of this batch. The batch is copied and may be used again; the
+        stream replaces its `writer` and `number`. Raises LocusError if the stream has ended.
         """
         return self._send(batch.message.SerializeToString())
 
     @property
     def last_ack(self) -> Optional[Revision]:
-        """Revision of the latest ack, None before the first: a query with `at_least` this revision sees every batch
+        """Revision of the latest ack; None before the first ack. A query with `at_least=last_ack` sees every batch
         acked so far.
         """
         with self._changed:
@@ -60,7 +60,7 @@ class UpdateStream(PipelinedStream[Ack]):
 
     def _request_of(self, item: Item[Ack]) -> bytes:
         # Write the field `batch` twice: first with the columns, then with writer and batch number. Parsers of protobuf
-        # merge both.
+        # merge the two occurrences of the field.
         numbers = _METHOD.request(scene=self._scene, sequence=item.sequence)
         numbers.batch.writer, numbers.batch.batch = self.writer, item.number
         return b"".join((wire.head(_BATCH, len(item.batch)), item.batch, numbers.SerializeToString()))
@@ -76,8 +76,8 @@ class UpdateStream(PipelinedStream[Ack]):
         if not isinstance(outcome, LocusError):
             self._last_ack = outcome
         elif not outcome.refused or outcome.reason == Reason.BATCH_GAP:
-            # End the stream: either it is unknown whether the number was consumed, or the server does not know the
-            # writer, so continuing could lose a batch.
+            # End the stream: either it is unknown whether the server consumed the batch number, or the server does not
+            # know the writer. In both cases continuing could lose a batch.
             self._fatal = outcome
         else:
             self._next_batch -= len(self._items) - position + 1

@@ -13,20 +13,23 @@ _Request = schema.message("ApplyUpdatesRequest")
 class UpdateBatch:
     """Changes that are applied as one revision, in this order: clear, removes, inserts, moves, relabels.
 
-    N is the number of ids of a call. Another column holds N entries, one for all, or none for its default. `positions`
-    are 3N float32 relative to `frame` (three floats, the origin by default); `positions_f64` are 3N float64, absolute;
-    give exactly one of them. `rotations` are 4N float32, unit quaternions x, y, z, w; none = identity in inserts, kept
-    in moves. `layers` are N uint32 (none = bit 0; 0 hides), `groups` and `tags` N uint64 (none = 0). Ids are uint64,
-    chosen by the caller, never 0. Lengths and angles are in the caller's units.
+    N is the number of ids of a call. Every other column has N entries, one entry for all ids, or none for its default.
+    `positions` are 3N float32 relative to `frame` (three floats, the origin by default); `positions_f64` are 3N
+    float64, absolute; give exactly one of these two columns. `rotations` are 4N float32, unit quaternions x, y, z, w;
+    without them, inserted objects have the identity, and moved objects keep their rotations. `layers` are N uint32
+    (none = bit 0; the value 0 hides the object), `groups` and `tags` N uint64 (none = 0). Ids are uint64, chosen by the
+    caller, never 0. Lengths are in the caller's unit.
 
-    Columns are checked for type and length here (TypeError and ValueError name the column), values by the server: it
-    refuses wrong items individually and lists them in Ack.errors, or refuses the whole batch with `all_or_nothing`.
+    Columns are checked for type and length here (TypeError and ValueError name the column). Values are checked by the
+    server, which refuses wrong items individually and lists them in Ack.errors, or, with `all_or_nothing`, refuses the
+    whole batch.
 
     Settings: `tick` is the caller's time step; `clear` removes every object first; with `upsert` an insert of a known
-    id replaces the object; `restart_ticks` accepts a `tick` lower than the scene's; `writer` (random, not 0) and
-    `number` (1, 2, 3 ...) let the server recognize a repeated batch and apply it once. Streams set them automatically.
+    id replaces the object; `restart_ticks` drops the scene's history and accepts a `tick` lower than the scene's;
+    `writer` (random, not 0) and `number` (1, 2, 3 ...) let the server recognize a repeated batch and apply it once.
+    Streams set `writer` and `number` automatically.
 
-    Methods return the batch, so that calls chain. Not thread-safe.
+    Methods return the batch, so that calls can be chained. Not thread-safe.
     """
 
     def __init__(self, *, frame: Optional[ColumnLike] = None, tick: Optional[int] = None, clear: bool = False,
@@ -44,7 +47,7 @@ class UpdateBatch:
             origin.x, origin.y, origin.z = columns.vector("frame", frame)
 
     def remove(self, ids: ColumnLike) -> "UpdateBatch":
-        """Removes objects: N uint64 ids, appended to those of earlier calls."""
+        """Removes objects: N uint64 ids, appended to the ids of earlier calls."""
         self.message.remove_ids += columns.encode("remove_ids", ids, UINT64)
         return self
 
@@ -56,7 +59,7 @@ class UpdateBatch:
     def insert_points(self, ids: ColumnLike, positions: ColumnLike = None, *, positions_f64: ColumnLike = None,
                       rotations: ColumnLike = None, layers: ColumnLike = None, groups: ColumnLike = None,
                       tags: ColumnLike = None) -> "UpdateBatch":
-        """Inserts N points: found by overlap queries and lookups, never hit by a ray."""
+        """Inserts N points, which overlap queries, nearest queries and lookups find, and which no ray hits."""
         with _new_entry(self.message.inserts, "inserts", ids) as insert:
             insert.message.point.SetInParent()
             insert.pose(positions, positions_f64, rotations)
@@ -88,8 +91,8 @@ class UpdateBatch:
     def insert_capsules(self, ids: ColumnLike, positions: ColumnLike = None, half_axes: ColumnLike = None,
                         radii: ColumnLike = None, *, positions_f64: ColumnLike = None, rotations: ColumnLike = None,
                         layers: ColumnLike = None, groups: ColumnLike = None, tags: ColumnLike = None) -> "UpdateBatch":
-        """Inserts N solid capsules. `half_axes`: 3N float32 or three, from the centre to one end of the inner segment,
-        in the object's own axes; `radii`: N float32 or one, 0 .. 1e9.
+        """Inserts N solid capsules. `half_axes`: 3N float32 or three, vectors from the centre to one end of the inner
+        segment, in the object's own axes; `radii`: N float32 or one, 0 .. 1e9.
         """
         with _new_entry(self.message.inserts, "inserts", ids) as insert:
             insert.message.capsule.SetInParent()
@@ -102,7 +105,7 @@ class UpdateBatch:
     def move(self, ids: ColumnLike, positions: ColumnLike = None, *, positions_f64: ColumnLike = None,
              rotations: ColumnLike = None, teleport: bool = False) -> "UpdateBatch":
         """Moves N objects: sets their centres and, if `rotations` is given, their rotations. With `teleport`, queries
-        of a time between this tick and the one before do not interpolate the movement.
+        of a time between the previous tick and this one do not interpolate the movement.
         """
         with _new_entry(self.message.moves, "moves", ids) as entry:
             entry.pose(positions, positions_f64, rotations)
@@ -111,7 +114,7 @@ class UpdateBatch:
 
     def relabel(self, ids: ColumnLike, *, layers: ColumnLike = None, groups: ColumnLike = None,
                 tags: ColumnLike = None) -> "UpdateBatch":
-        """Sets labels (layers, groups, tags) of N objects. A label whose column is not given is kept."""
+        """Sets labels (layers, groups, tags) of N objects. A label whose column is not given does not change."""
         with _new_entry(self.message.relabels, "relabels", ids) as entry:
             entry.labels(layers, groups, tags)
         return self
@@ -149,7 +152,8 @@ class _Entry:
 
 @contextlib.contextmanager
 def _new_entry(entries: Any, name: str, ids: ColumnLike) -> Iterator[_Entry]:
-    """Adds an entry to `entries` and yields it to be filled by the caller; removes it again if that raises an error."""
+    """Adds an entry to `entries` and yields it to the caller, which fills it. Removes the entry if the caller raises.
+    """
     path = f"{name}[{len(entries)}]."
     message = entries.add()
     try:

@@ -1,5 +1,4 @@
-"""Plain result types: scenes, meshes, acks and so on. Immutable. Each is converted from the message of the same name in
-the protocol.
+"""Plain result types: scenes, meshes, acks and so on. Immutable. Each type is converted from a message of the protocol.
 """
 from __future__ import annotations
 
@@ -21,7 +20,9 @@ class Revision:
 
 @dataclasses.dataclass(frozen=True)
 class ItemError:
-    """Item that was refused while the rest of its batch was applied: `field` is the column, `index` the entry in it."""
+    """Item that was refused while the rest of its batch was applied. `field` is the path of the column at fault,
+    `index` the index of the item within its list.
+    """
 
     field: str
     index: int
@@ -55,10 +56,10 @@ class Ack(Revision):
 class Scene(Revision):
     """Description of a scene at the time of the call.
 
-    `objects`, `instances` and `triangles` are counts, `memory_bytes` an estimate without meshes. `bounds` holds the
-    lower and upper corner, each x, y, z in the caller's unit, possibly somewhat too wide; None in an empty scene.
-    `history_ticks` is the maximum length of the history; it now holds `recorded_ticks` ticks, beginning with
-    `oldest_tick`, in `history_bytes` bytes.
+    `objects`, `instances` and `triangles` are counts, `memory_bytes` an estimate without meshes. `bounds` is the lower
+    and the upper corner of the bounds of all objects and instances, each x, y, z in the caller's unit; None in an empty
+    scene. The bounds may be somewhat too large. `history_ticks` is the maximum number of ticks in the history, which
+    now contains `recorded_ticks` ticks, beginning with `oldest_tick`, in `history_bytes` bytes.
     """
 
     name: str
@@ -123,10 +124,28 @@ class Mesh:
 
 @dataclasses.dataclass(frozen=True)
 class Limit:
-    """Maximum of the server; `used` is the current use, 0 for limits of one request or scene."""
+    """Limit of the server. `value` is the maximum, `used` the amount in use now (0 for limits of one request or scene).
+    """
 
     value: float
     used: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Quota:
+    """Quota of an identity or connection, and its use. `used` is the amount in use now or, for names that end in
+    `_per_s`, the mean rate; `available` may be used at once now. `limit` and `available` are None if unlimited.
+    """
+
+    limit: Optional[float]
+    used: float
+    available: Optional[float]
+
+    @classmethod
+    def of(cls, message: Any) -> "Quota":
+        """Converts the protocol's QuotaUse."""
+        limited = message.HasField("limit")
+        return cls(message.limit if limited else None, message.used, message.available if limited else None)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -147,7 +166,9 @@ class Server:
 
 @dataclasses.dataclass(frozen=True)
 class Work:
-    """Work of a query: nodes and cells visited, triangles and objects tested, summed time of all threads."""
+    """Work of a batch or a block: numbers of visited tree nodes (`nodes`) and grid cells (`cells`) and of tested
+    triangles and objects (`tests`), and the time summed over all threads.
+    """
 
     nodes: int
     cells: int

@@ -39,7 +39,8 @@ def fields(data: memoryview) -> Fields:
     """Returns the fields of a message by number. A field is the list of its occurrences: ints for varints, views for
     other types.
 
-    Linear in the number of fields, independent of their size. LocusError DATA_LOSS if the bytes are not a message.
+    Cost: linear in the number of fields, independent of their size. Raises LocusError DATA_LOSS if `data` is not a
+    message.
     """
     found: Fields = {}
     position = 0
@@ -69,8 +70,8 @@ def fields(data: memoryview) -> Fields:
 
 
 def column(found: Fields, number: int) -> memoryview:
-    """Returns a column's bytes, empty if the field is absent. Joins a column sent in several chunks, as protobuf
-    allows.
+    """Returns the bytes of the column in field `number`, empty if the field is absent. Joins the parts of a column that
+    was sent as several occurrences of the field, as protobuf allows.
     """
     pieces = views(found, number)
     if not pieces:
@@ -126,8 +127,8 @@ class Parts:
         self.size = 0
 
     def add(self, number: int, content: Raw) -> None:
-        """Appends field `number` with this content. Appends nothing if it is empty: an empty column equals an absent
-        one.
+        """Appends field `number` with this content. Appends nothing if `content` is empty, since an empty column equals
+        an absent column.
         """
         size = len(content)
         if size:
@@ -143,15 +144,15 @@ class Parts:
         self.size += len(before) + parts.size
 
     def add_fixed64(self, number: int, value: int) -> None:
-        """Appends field `number`, a fixed64. OverflowError if the value is out of range."""
+        """Appends field `number`, a fixed64. Raises OverflowError if the value is out of range."""
         self._put(_encoded(number << 3 | _FIXED64) + value.to_bytes(8, "little"))
 
     def add_fixed32(self, number: int, value: int) -> None:
-        """Appends field `number`, a fixed32. OverflowError if the value is out of range."""
+        """Appends field `number`, a fixed32. Raises OverflowError if the value is out of range."""
         self._put(_encoded(number << 3 | _FIXED32) + value.to_bytes(4, "little"))
 
     def add_varint(self, number: int, value: int) -> None:
-        """Appends field `number`, a bool, an enum or a uint32. OverflowError if the value is out of range."""
+        """Appends field `number`, a bool, an enum or a uint32. Raises OverflowError if the value is out of range."""
         if not 0 <= value < 1 << 32:
             raise OverflowError(f"{value} is no uint32")
         self._put(_encoded(number << 3 | _VARINT) + _encoded(value))

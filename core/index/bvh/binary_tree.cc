@@ -11,12 +11,12 @@
 namespace locus {
 namespace {
 
-// Maximum number of references in a subtree that one thread builds as one task. A constant, so that the tree does not
-// depend on the number of threads.
+// Maximum number of references in a subtree that one thread builds as one task. The number is a constant, so that the
+// tree does not depend on the number of threads.
 constexpr uint32_t kSubtreeReferences = 4096;
-constexpr size_t kChunkReferences = 1u << 16;  // number of references whose extent one task computes
-// Sum of the fixed costs of all nodes of a tree that has one node for each block, relative to the area of the root. A
-// node's fixed cost is this value divided by the number of blocks (see measure_costs()).
+constexpr size_t kChunkReferences = 1u << 16;  // number of references whose Extent one task computes
+// Numerator of the fixed cost of a node: the fixed cost is kNodeCost divided by the minimum number of blocks of the
+// whole tree (see measure_costs()). The cost of a node is its fixed cost plus the ratio of its area to the root's area.
 constexpr double kNodeCost = 4;
 
 }  // namespace
@@ -27,7 +27,7 @@ class BinaryBuilder {
   BinaryBuilder(BinaryTree<S>& tree, uint32_t count, const BvhOptions& options)
       : tree_(tree), references_(tree.references_.get(), count), options_(options), splitter_(options) {}
 
-  // Builds the tree. Returns false if it was cancelled.
+  // Builds the tree. Returns false if the build was cancelled.
   bool build() {
     const Extent<S> total = total_extent();
     const auto count = static_cast<uint32_t>(references_.size());
@@ -39,14 +39,15 @@ class BinaryBuilder {
     for_each(options_, subtrees.size(), [&](size_t i) { build_subtree(subtrees[i], tree_.nodes_[1 + i]); });
     if (cancelled(options_)) return false;
     choose_upwards(top);
-    check_invariants();
+    LOCUS_DCHECK_CALL(check_invariants());
     return true;
   }
 
  private:
   using Nodes = typename BinaryTree<S>::Nodes;
 
-  // Node that has no children yet, with its extent and its depth (1 for the root).
+  // Node that is still to be split. `extent` holds the bounds of the node's references and of their centres; `depth` is
+  // the number of nodes from the root to this node, 1 for the root.
   struct Part {
     BinaryNode<S>* node;
     Extent<S> extent;
@@ -73,8 +74,8 @@ class BinaryBuilder {
     return node;
   }
 
-  // Splits nodes that are too large for one task, level by level. Returns the nodes whose subtrees one task each can
-  // build.
+  // Splits, level by level, the nodes with more than kSubtreeReferences references. Returns the roots of the remaining
+  // subtrees; one task builds each subtree.
   std::vector<Part> split_top(const Part& root, Nodes& nodes) const {
     std::vector<Part> small, level, next;
     const auto enqueue = [&](const Part& part) {
@@ -128,7 +129,8 @@ class BinaryBuilder {
     node_cost_ = static_cast<float>(kNodeCost / blocks_for(count));
   }
 
-  // Computes node.choice, which determines how the node is collapsed. The choices of its children must be known.
+  // Computes node.choice, which determines how the node is collapsed. Precondition: the choices of its children are
+  // computed.
   void choose(BinaryNode<S>& node) const {
     if (node.is_leaf()) {
       LOCUS_DCHECK_LE(node.count, kBvhLeafSize);
@@ -146,11 +148,9 @@ class BinaryBuilder {
   // Verifies, in debug builds, that the two children of each inner node partition the node's references, and that the
   // node's bounds are the box around its children's bounds. O(nodes).
   void check_invariants() const {
-    if constexpr (kDebugChecks) {
-      for (const Nodes& nodes : tree_.nodes_)
-        for (const std::array<BinaryNode<S>, 2>& pair : nodes)
-          for (const BinaryNode<S>& node : pair) check_node(node);
-    }
+    for (const Nodes& nodes : tree_.nodes_)
+      for (const std::array<BinaryNode<S>, 2>& pair : nodes)
+        for (const BinaryNode<S>& node : pair) LOCUS_DCHECK_CALL(check_node(node));
   }
 
   static void check_node(const BinaryNode<S>& node) {

@@ -1,7 +1,8 @@
-// Binary tree over boxes with leaves of up to kBvhLeafSize boxes: the intermediate result of a build, which is
-// collapsed to nodes of up to eight children. Equal references and options result in an equal tree, whatever threads
-// and order BvhOptions::parallel_for chooses. Immutable after build(). Invariants: the two children of a node partition
-// its references; a node's bounds are exactly the box around its references. Internal to this folder.
+// Binary tree over boxes with leaves of up to kBvhLeafSize boxes: the intermediate result of a build, before the tree
+// is collapsed to nodes of up to eight children. Equal references and options result in an equal tree, on whatever
+// threads and in whatever order BvhOptions::parallel_for runs the tasks. Immutable after build(). Invariants: the two
+// children of a node partition its references (BoxReference); a node's bounds are exactly the box around its
+// references. Internal to this folder.
 #ifndef LOCUS_CORE_INDEX_BVH_BINARY_TREE_H_
 #define LOCUS_CORE_INDEX_BVH_BINARY_TREE_H_
 
@@ -20,19 +21,20 @@ namespace locus {
 template <class S>
 struct BinaryNode {
   Aabb<S> bounds;
-  uint32_t first = 0, count = 0;   // range of references, in the tree's order
+  uint32_t first = 0, count = 0;   // range of the node's references in the tree's order
   BinaryNode* children = nullptr;  // left and right child, adjacent; null for a leaf
   WideChoice choice;
 
   bool is_leaf() const { return children == nullptr; }
 };
 
-// Owner of the nodes and the reordered references. Their addresses stay valid when the tree is moved.
+// Owner of the nodes and the reordered references. The addresses of nodes and references stay valid when the tree is
+// moved.
 template <class S>
 class BinaryTree {
  public:
-  // Builds a tree of the `count` elements of `references`, at least one, and reorders them. Returns CANCELLED if the
-  // cancel flag was set.
+  // Builds a tree of the `count` elements of `references` and reorders these elements. Precondition: count >= 1.
+  // Returns CANCELLED if the cancel flag was set.
   static absl::StatusOr<BinaryTree> build(std::unique_ptr<BoxReference<S>[]> references, uint32_t count,
                                           const BvhOptions& options);
 

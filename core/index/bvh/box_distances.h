@@ -23,9 +23,9 @@ class BoxDistances {
         // Rounding the point to float moves it by less than 2^-24 sqrt(3) times its largest coordinate.
         pad_(planted(PlantedBug::kNearestTreePad) ? 0 : 0x1p-23 * max_component(abs(point))) {}
 
-  // Returns the limit to which float distances must be compared if `squared` is the limit of the exact squared
-  // distances. It is raised by the error of the float distances: rounding of gaps, squares and sums changes a distance
-  // by less than 2^-22 of its value.
+  // Returns the limit with which float squared distances must be compared if `squared` is the limit of the exact
+  // squared distances. The returned limit exceeds `squared` by the error of the float values: rounding of gaps, squares
+  // and sums changes a distance by less than 2^-22 of its value.
   float limit(double squared) const {
     LOCUS_DCHECK(!std::isnan(squared));
     const double raised = std::sqrt(squared) * (1 + kRounding) + pad_;
@@ -35,14 +35,14 @@ class BoxDistances {
     return result > kMax ? std::numeric_limits<float>::infinity() : static_cast<float>(std::max(result, kMin));
   }
 
-  // Writes the squared distance from the point to each of eight boxes, given as in TriangleNode::bounds.
+  // Writes the squared distance from the point to each of eight boxes, laid out as in TriangleNode::bounds.
   void to_boxes(const float (&bounds)[6][kTreeWidth], float (&distances)[kTreeWidth]) const {
     for (int i = 0; i < kTreeWidth; ++i)
       distances[i] = squared(gap(x_, bounds[0][i], bounds[3][i]), gap(y_, bounds[1][i], bounds[4][i]),
                              gap(z_, bounds[2][i], bounds[5][i]));
   }
 
-  // Writes the squared distance from the point to the box around each of eight triangles, given as in
+  // Writes the squared distance from the point to the box around each of eight triangles, laid out as in
   // TriangleBlock::vertices.
   void to_triangles(const float (&v)[9][kTreeWidth], float (&distances)[kTreeWidth]) const {
     for (int i = 0; i < kTreeWidth; ++i)

@@ -1,5 +1,5 @@
-// Element that the builder sorts in place of a value: the value's box and index, as small as vector instructions allow.
-// Plain data.
+// Element that the builder sorts instead of the value itself: the value's box and index, with no more padding than
+// vector instructions require. Plain data.
 #ifndef LOCUS_CORE_INDEX_BVH_BOX_REFERENCE_H_
 #define LOCUS_CORE_INDEX_BVH_BOX_REFERENCE_H_
 
@@ -13,8 +13,8 @@
 
 namespace locus {
 
-// Box and index of a value; the index is stored in the spare lane of `min`. It has no default member initializers, so
-// that allocating a large array writes no element: the threads that fill the array write first.
+// Box and index of a value; the index is stored in the spare lane of `min`. No default member initializers, so that
+// allocating a large array writes no element: each element is first written by the thread that fills it.
 template <class S>
 struct BoxReference {
   Quad<S> min, max;
@@ -23,7 +23,8 @@ struct BoxReference {
   static BoxReference of(const QuadBox<S>& box, uint32_t index);
   uint32_t index() const;
   QuadBox<S> box() const { return {min, max}; }
-  // Returns twice the centre of the box. The factor does no harm, because centres are compared only with each other.
+  // Returns twice the centre of the box. The factor has no effect, because the builder compares centres only with each
+  // other.
   Quad<S> center() const { return min + max; }
 };
 

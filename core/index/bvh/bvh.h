@@ -1,13 +1,13 @@
-// Bounding volume hierarchy for values that do not move: a tree of boxes with eight children a node and up to eight
-// values a leaf, built once by the surface area heuristic. Serves the instances of a scene; meshes have TriangleBvh.
+// Bounding volume hierarchy for values that do not move: a tree of boxes with up to eight children per node and up to
+// eight values per leaf, built once by the surface area heuristic. Stores the instances of a scene; TriangleBvh stores
+// the triangles of a mesh.
 //
-// Threads: immutable after build(); every member may run concurrently.
-// Invariants: a node's box contains the bounds of every value below it. The slab test is monotone: a ray that hits a
-// box also hits every larger box. It therefore never culls a value that a ListIndex, which tests every value, would
-// report; the depth is at most limits::kMaxBvhDepth, which sizes the fixed stack of a visit; nodes and values are
-// stored in depth-first order.
-// Source: Kay and Kajiya, Ray Tracing Complex Scenes, 1986; Wald, Benthin, Boulos, Getting Rid of Packets, 2008 (wide
-// nodes).
+// Threads: immutable after build(); every member may run concurrently. Invariants: a node's box contains the bounds of
+// every value below it. The slab test is monotone: a ray that hits a box also hits every larger box. The tree therefore
+// never culls a value that a ListIndex, which tests every value, would report. The depth is at most
+// limits::kMaxBvhDepth, which sets the size of the fixed stack of a visit. Nodes and values are stored in depth-first
+// order. Source: Kay and Kajiya, Ray Tracing Complex Scenes, 1986; Wald, Benthin, Boulos, Getting Rid of Packets, 2008
+// (wide nodes).
 #ifndef LOCUS_CORE_INDEX_BVH_BVH_H_
 #define LOCUS_CORE_INDEX_BVH_BVH_H_
 
@@ -38,7 +38,7 @@ class Bvh {
   Bvh() = default;
 
   // Builds a tree of `values`, whose ids must be unique; an empty vector is legal. Returns the errors of
-  // build_bvh_layout(); an error about one value names the field "values" and the value's index.
+  // build_bvh_layout(); an error caused by one value names the field "values" and the value's index.
   static absl::StatusOr<Bvh> build(std::vector<V> values, const BvhOptions& options = {}) {
     std::vector<Aabb<S>> boxes;
     boxes.reserve(values.size());
@@ -48,7 +48,7 @@ class Bvh {
   }
 
   size_t size() const { return values_.size(); }
-  // Returns all values in storage order: the order is depth-first, and depends only on the input and the options of the
+  // Returns all values in storage order. This order is depth-first and depends only on the input and the options of the
   // build.
   absl::Span<const V> values() const { return values_; }
   // Returns the box around all values; an empty box for an empty tree.
@@ -58,7 +58,8 @@ class Bvh {
   size_t bytes() const { return nodes_.size() * sizeof(BvhNode<S>) + values_.size() * sizeof(V); }
 
   // Returns the expected number of nodes and leaves opened by a random ray that hits bounds(): 1 for the root plus, for
-  // each node and leaf below it, its surface area divided by that of bounds(). Returns 0 for an empty tree. O(nodes).
+  // each node and leaf below the root, its surface area divided by the surface area of bounds(). Returns 0 for an empty
+  // tree. O(nodes).
   double sah_cost() const;
 
   // Passes candidates to `visitor` roughly in the order in which the ray enters their leaves: the children of each node
@@ -66,7 +67,7 @@ class Bvh {
   template <RayVisitor<V> Visitor>
   void visit_ray(const SlabRay<S>& slabs, Visitor& visitor, Work& work) const;
 
-  // Passes to `visitor` the values whose own bounds overlap its region, in storage order. Allocates no memory.
+  // Passes to `visitor` the values whose own bounds visitor.overlaps() accepts, in storage order. Allocates no memory.
   template <RegionVisitor<V> Visitor>
   void visit_region(Visitor& visitor, Work& work) const;
 
@@ -75,8 +76,8 @@ class Bvh {
   template <PointVisitor<V> Visitor>
   void visit_nearest(const Vec3d& point, Visitor& visitor, Work& work) const;
 
-  // Resumable traversal of a ray: next() returns one candidate a call, so that the caller can process the candidates of
-  // many rays together. Borrows the tree. Must be used by one thread at a time.
+  // Resumable traversal of a tree along a ray: each call of next() returns one candidate, so that the caller can
+  // process the candidates of many rays together. Borrows the tree. One thread at a time.
   class RayWalk {
    public:
     RayWalk(const Bvh& tree, const SlabRay<S>& slabs)
@@ -85,8 +86,8 @@ class Bvh {
           pending_(tree.nodes_.empty() ? 0 : 1, Pending{{0, 0}, -std::numeric_limits<S>::infinity()}) {}
 
     const SlabRay<S>& slabs() const { return slabs_; }
-    // Returns the next value in the order of visit_ray(), or null after the last one. `limit` may decrease from call to
-    // call, but not increase.
+    // Returns the next value in the order of visit_ray(), or null after the last value. `limit` is the largest near
+    // value of interest, as RayVisitor::limit(); it may decrease from call to call, but not increase.
     const V* next(S limit, Work& work);
 
    private:
@@ -95,8 +96,8 @@ class Bvh {
       S near;
     };
 
-    // Pushes the children of `node` that the ray may hit at t <= `limit`, the nearest one last, so that it is popped
-    // first.
+    // Pushes the children of `node` that the ray may hit at t <= `limit`. The nearest child is pushed last, so that it
+    // is popped first.
     void push_hit(const BvhNode<S>& node, S limit);
 
     const Bvh* tree_;
@@ -119,14 +120,14 @@ class Bvh {
     values_.reserve(values.size());
     for (const uint32_t index : layout.order) values_.push_back(std::move(values[index]));
     LOCUS_DCHECK_EQ(values_.size(), values.size());
-    check_invariants();
+    LOCUS_DCHECK_CALL(check_invariants());
   }
 
   // Verifies, in debug builds, the bounds and ranges of all leaves, the order of nodes, and the depth. O(n).
   void check_invariants() const;
 
-  // Returns whether a box that the ray enters at `near` can be skipped. It cannot if `near` equals `limit`: the box may
-  // hold a hit at the same t with a lower id, which is preferred.
+  // Returns whether a box that the ray enters at `near` can be skipped. A box with `near` equal to `limit` cannot be
+  // skipped: it may hold a hit at the same t with a lower id, which is preferred.
   static bool beyond(S near, S limit) { return planted(PlantedBug::kStrictTie) ? near >= limit : near > limit; }
 
   Interval<S> node_interval(const SlabRay<S>& slabs, const Aabb<S>& box) const {
@@ -157,27 +158,25 @@ double Bvh<V>::sah_cost() const {
 
 template <Bounded V>
 void Bvh<V>::check_invariants() const {
-  if constexpr (kDebugChecks) {
-    LOCUS_DCHECK_LE(depth_, limits::kMaxBvhDepth);
-    size_t leaf_values = 0;
-    for (uint32_t index = 0; index < nodes_.size(); ++index) {
-      const BvhNode<S>& node = nodes_[index];
-      LOCUS_DCHECK_LE(node.child_count, kBvhWidth);
-      for (uint32_t slot = 0; slot < node.child_count; ++slot) {
-        const BvhChild child = node.children[slot];
-        LOCUS_DCHECK(contains(bounds_, node.bounds[slot]));
-        if (!child.is_leaf()) {
-          LOCUS_DCHECK(index < child.first && child.first < nodes_.size());
-          continue;
-        }
-        LOCUS_DCHECK_LE(size_t{child.first} + child.count, values_.size());
-        for (const V& value : values().subspan(child.first, child.count))
-          LOCUS_DCHECK(contains(node.bounds[slot], Traits::bounds(value)));
-        leaf_values += child.count;
+  LOCUS_DCHECK_LE(depth_, limits::kMaxBvhDepth);
+  size_t leaf_values = 0;
+  for (uint32_t index = 0; index < nodes_.size(); ++index) {
+    const BvhNode<S>& node = nodes_[index];
+    LOCUS_DCHECK_LE(node.child_count, kBvhWidth);
+    for (uint32_t slot = 0; slot < node.child_count; ++slot) {
+      const BvhChild child = node.children[slot];
+      LOCUS_DCHECK(contains(bounds_, node.bounds[slot]));
+      if (!child.is_leaf()) {
+        LOCUS_DCHECK(index < child.first && child.first < nodes_.size());
+        continue;
       }
+      LOCUS_DCHECK_LE(size_t{child.first} + child.count, values_.size());
+      for (const V& value : values().subspan(child.first, child.count))
+        LOCUS_DCHECK(contains(node.bounds[slot], Traits::bounds(value)));
+      leaf_values += child.count;
     }
-    LOCUS_DCHECK_EQ(leaf_values, values_.size());
   }
+  LOCUS_DCHECK_EQ(leaf_values, values_.size());
 }
 
 template <Bounded V>

@@ -20,7 +20,7 @@ template <class S>
 void collapse(const BinaryTree<S>& tree, BvhLayout<S>& layout) {
   struct Pending {
     const BinaryNode<S>* root;
-    uint32_t parent, slot;  // child slot that gets the index of the new node
+    uint32_t parent, slot;  // node and child slot in which the index of the new node is stored
     uint32_t depth;
   };
   std::vector<Pending> pending = {{&tree.root(), 0, 0, 1}};
@@ -49,37 +49,35 @@ void collapse(const BinaryTree<S>& tree, BvhLayout<S>& layout) {
 // Verifies the invariants of BvhLayout in debug builds: depth-first order, nested bounds, sizes and depth. O(n).
 template <class S>
 void check_layout(const BvhLayout<S>& layout, absl::Span<const Aabb<S>> boxes) {
-  if constexpr (kDebugChecks) {
-    struct Pending {
-      BvhChild child;
-      Aabb<S> bounds;
-      uint32_t depth;
-    };
-    std::vector<Pending> pending = {{{0, 0}, layout.bounds, 1}};
-    uint32_t next_node = 0, next_position = 0, depth = 0;
-    while (!pending.empty()) {
-      const Pending now = pending.back();
-      pending.pop_back();
-      if (now.child.is_leaf()) {
-        LOCUS_DCHECK_EQ(now.child.first, next_position);
-        LOCUS_DCHECK_LE(now.child.count, kBvhLeafSize);
-        for (; next_position < now.child.first + now.child.count; ++next_position)
-          LOCUS_DCHECK(contains(now.bounds, boxes[layout.order[next_position]]));
-        continue;
-      }
-      LOCUS_DCHECK_EQ(now.child.first, next_node);
-      depth = std::max(depth, now.depth);
-      const BvhNode<S>& node = layout.nodes[next_node++];
-      LOCUS_DCHECK(0 < node.child_count && node.child_count <= kBvhWidth);
-      for (uint32_t slot = node.child_count; slot-- > 0;) {
-        LOCUS_DCHECK(contains(now.bounds, node.bounds[slot]));
-        pending.push_back({node.children[slot], node.bounds[slot], now.depth + 1});
-      }
+  struct Pending {
+    BvhChild child;
+    Aabb<S> bounds;
+    uint32_t depth;
+  };
+  std::vector<Pending> pending = {{{0, 0}, layout.bounds, 1}};
+  uint32_t next_node = 0, next_position = 0, depth = 0;
+  while (!pending.empty()) {
+    const Pending now = pending.back();
+    pending.pop_back();
+    if (now.child.is_leaf()) {
+      LOCUS_DCHECK_EQ(now.child.first, next_position);
+      LOCUS_DCHECK_LE(now.child.count, kBvhLeafSize);
+      for (; next_position < now.child.first + now.child.count; ++next_position)
+        LOCUS_DCHECK(contains(now.bounds, boxes[layout.order[next_position]]));
+      continue;
     }
-    LOCUS_DCHECK_EQ(next_node, layout.nodes.size());
-    LOCUS_DCHECK_EQ(next_position, boxes.size());
-    LOCUS_DCHECK_EQ(depth, layout.depth);
+    LOCUS_DCHECK_EQ(now.child.first, next_node);
+    depth = std::max(depth, now.depth);
+    const BvhNode<S>& node = layout.nodes[next_node++];
+    LOCUS_DCHECK(0 < node.child_count && node.child_count <= kBvhWidth);
+    for (uint32_t slot = node.child_count; slot-- > 0;) {
+      LOCUS_DCHECK(contains(now.bounds, node.bounds[slot]));
+      pending.push_back({node.children[slot], node.bounds[slot], now.depth + 1});
+    }
   }
+  LOCUS_DCHECK_EQ(next_node, layout.nodes.size());
+  LOCUS_DCHECK_EQ(next_position, boxes.size());
+  LOCUS_DCHECK_EQ(depth, layout.depth);
 }
 
 }  // namespace

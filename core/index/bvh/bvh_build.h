@@ -1,7 +1,7 @@
-// Builds the layout of a bounding volume hierarchy from boxes. A binary tree is built using the binned surface area
-// heuristic, and then collapsed to nodes of up to eight children at minimum cost. Any finite input results in a tree
-// within the depth limit and with fewer than two nodes per value. Equal input and options result in an equal tree, on
-// any number of threads. Pure functions: may run concurrently. Sources: binary_tree.h, wide_choice.h.
+// Builds the layout of a bounding volume hierarchy from boxes. The build makes a binary tree using the binned surface
+// area heuristic, and then collapses this tree to nodes of up to eight children at minimum cost. Any finite input
+// results in a tree within the depth limit and with fewer than two nodes per value. Equal input and options result in
+// an equal tree, on any number of threads. Pure functions: may run concurrently. Sources: binary_tree.h, wide_choice.h.
 #ifndef LOCUS_CORE_INDEX_BVH_BVH_BUILD_H_
 #define LOCUS_CORE_INDEX_BVH_BVH_BUILD_H_
 
@@ -22,12 +22,12 @@ struct BvhOptions {
   // Number of bins on each axis, 2 to limits::kMaxBvhBins; each border between two bins is a candidate for a split.
   // More bins result in slightly better trees and longer builds; answers to queries do not depend on the number.
   int bins = 32;
-  // Cancel flag, null if the build cannot be cancelled. When the flag becomes true, the build ends soon with CANCELLED;
-  // it must not become false again. Must outlive the build.
+  // Cancel flag, null if the build cannot be cancelled. When the flag becomes true, the build ends soon with CANCELLED.
+  // The flag must not become false again and must outlive the build.
   const std::atomic<bool>* cancel = nullptr;
   // Function that calls its second argument with each index below its first argument, on any threads, and returns when
-  // all calls have returned. The resulting tree does not depend on the threads or their order. [default: calls in order
-  // on this thread]
+  // all calls have returned. The resulting tree does not depend on the threads or their order. If empty, the build
+  // makes the calls in order on its own thread.
   std::function<void(size_t, const std::function<void(size_t)>&)> parallel_for;
 };
 
@@ -36,7 +36,7 @@ inline bool cancelled(const BvhOptions& options) {
   return options.cancel != nullptr && options.cancel->load(std::memory_order_relaxed);
 }
 
-// Calls work(0) .. work(count - 1) using options.parallel_for, or in order on this thread if it is not set.
+// Calls work(0) .. work(count - 1) using options.parallel_for, or in order on this thread if parallel_for is empty.
 inline void for_each(const BvhOptions& options, size_t count, const std::function<void(size_t)>& work) {
   if (options.parallel_for) {
     options.parallel_for(count, work);
@@ -45,16 +45,16 @@ inline void for_each(const BvhOptions& options, size_t count, const std::functio
   }
 }
 
-// Verifies the arguments of a build of `values` values. Errors: INVALID_ARGUMENT for options out of range;
-// RESOURCE_EXHAUSTED for more than limits::kMaxBvhValues values.
+// Verifies the arguments of a build of `values` values. Returns INVALID_ARGUMENT if options.bins is out of range or
+// there are more than limits::kMaxBvhValues values.
 absl::Status check_build(size_t values, const BvhOptions& options);
 // Returns the error CANCELLED for a build whose cancel flag was set.
 absl::Status cancelled_build();
 // Returns INVALID_ARGUMENT for the value at `index`, whose bounds are not finite.
 absl::Status refuse_bounds(size_t index);
 
-// Builds a tree over `boxes`. Errors: INVALID_ARGUMENT for an empty box, a box that is not finite, or bins out of
-// range; RESOURCE_EXHAUSTED for more than limits::kMaxBvhValues boxes; CANCELLED. Cost: typically O(n log n); in the
+// Builds a tree over `boxes`. Errors: INVALID_ARGUMENT for an empty box, a box that is not finite, bins out of range,
+// or more than limits::kMaxBvhValues boxes; CANCELLED if the cancel flag was set. Cost: typically O(n log n); in the
 // worst case O(n * kMaxBvhDepth). Defined for float and double.
 template <class S>
 absl::StatusOr<BvhLayout<S>> build_bvh_layout(absl::Span<const Aabb<S>> boxes, const BvhOptions& options);

@@ -1,5 +1,5 @@
-// Memory layout of a bounding volume hierarchy. Plain data, shared by the builder, which knows only boxes, and by Bvh,
-// which knows the values.
+// Memory layout of a bounding volume hierarchy. Plain data, shared by the builder, which reads only boxes, and by Bvh,
+// which stores the values.
 #ifndef LOCUS_CORE_INDEX_BVH_BVH_NODE_H_
 #define LOCUS_CORE_INDEX_BVH_BVH_NODE_H_
 
@@ -11,12 +11,12 @@
 
 namespace locus {
 
-inline constexpr uint32_t kBvhWidth = 8;     // children of a node
+inline constexpr uint32_t kBvhWidth = 8;     // maximum number of children of a node
 inline constexpr uint32_t kBvhLeafSize = 8;  // maximum number of values in a leaf
 
 // Content of a child slot. A leaf (count > 0) holds the values at positions first .. first + count - 1; an inner child
-// (count == 0) is node `first`. It has no default member initializers, so that a visit need not initialize its stack
-// array.
+// (count == 0) is the node at index `first`. No default member initializers, so that a visit need not initialize its
+// stack array.
 struct BvhChild {
   uint32_t first;
   uint32_t count;
@@ -32,15 +32,15 @@ struct BvhNode {
   uint32_t child_count = 0;
 };
 
-// Whole tree over boxes. Node 0 is the root. Nodes and values are stored in depth-first order: position i of the tree
-// holds the value at index order[i] of the input, and the values of a subtree have contiguous positions. If there are
-// no values, both vectors and `bounds` are empty.
+// Tree over boxes, as the builder returns it. Node 0 is the root. Nodes and values are stored in depth-first order:
+// position i of the tree holds the value at index order[i] of the input, and the values of a subtree have contiguous
+// positions. For an input without values, `nodes`, `order` and `bounds` are empty.
 template <class S>
 struct BvhLayout {
   std::vector<BvhNode<S>> nodes;
   std::vector<uint32_t> order;
   Aabb<S> bounds;
-  uint32_t depth = 0;  // levels of nodes, at most limits::kMaxBvhDepth
+  uint32_t depth = 0;  // number of levels of nodes, at most limits::kMaxBvhDepth
 };
 
 }  // namespace locus

@@ -85,8 +85,8 @@ struct Quad<double> {
   }
 };
 
-// Box whose corners are quads; the spare lanes are ignored. It has no default member initializers, because the splitter
-// declares arrays of boxes of which it uses only a part.
+// Box whose corners are quads; the spare lanes are ignored. No default member initializers, because the splitter
+// declares arrays of boxes and uses only a part of each array.
 template <class S>
 struct QuadBox {
   Quad<S> min, max;

@@ -11,11 +11,11 @@ namespace {
 
 using limits::kMaxBvhBins;
 
-// Maximum number of references that are sorted instead of binned.
+// Maximum number of references in a range that is sorted instead of binned.
 constexpr size_t kMaxSorted = 32;
 // References processed between two checks of the cancel flag.
 constexpr size_t kReferencesBetweenChecks = 1u << 16;
-// Cost of a reference relative to the cost of a block. It makes a difference between cuts that need equally many
+// Cost of a reference relative to the cost of a block. This cost distinguishes cuts whose parts need equally many
 // blocks: the cut that leaves fewer references in large boxes costs less. A much larger value would result in blocks
 // with fewer references, which wastes memory.
 constexpr double kReferenceCost = 1.0 / 128;
@@ -31,8 +31,8 @@ bool for_each_chunk(BoxReferences<S> references, const BvhOptions& options, Each
   return true;
 }
 
-// Mapping of centres to bins along all axes at once. All centres are in bin 0 of an axis if they coincide along it, or
-// if the scale from centres to bins overflows or underflows.
+// Mapping of centres to bins along all axes at once. If all centres coincide along an axis, or if the scale from
+// centres to bins overflows or underflows, all centres are in bin 0 of that axis.
 template <class S>
 class Binning {
  public:
@@ -74,11 +74,13 @@ struct Split {
   int axis = -1;     // -1 if no cut was found
   uint32_t bin = 0;  // first bin of the right part
   S cost = std::numeric_limits<S>::infinity();
-  uint32_t imbalance = 0;  // sorted ranges: difference of the parts' lengths; the lower one wins at equal cost
+  // Difference of the lengths of the two parts. At equal cost the cut with the lower difference wins. Used for sorted
+  // ranges only.
+  uint32_t imbalance = 0;
 };
 
-// Sweeps the bins of one axis from both sides. Replaces `best` by the cheapest cut between two bins if that costs less.
-// `total` is the number of references in all bins.
+// Sweeps the bins of one axis from both sides. Replaces `best` by the cheapest cut between two bins if this cut costs
+// less than `best`. `total` is the number of references in all bins.
 template <class S>
 void find_cheapest_cut(const Bins<S>& bins, size_t axis, uint32_t bin_count, uint32_t total, Split<S>& best) {
   std::array<S, kMaxBvhBins> right_cost;
@@ -100,7 +102,8 @@ void find_cheapest_cut(const Bins<S>& bins, size_t axis, uint32_t bin_count, uin
   }
 }
 
-// Orders of up to kMaxSorted references, one for each axis: sorted by centre; equal centres keep their order.
+// Orders of up to kMaxSorted references by their centres, one order for each axis. References with equal centres keep
+// their relative order.
 template <class S>
 class Orders {
  public:
@@ -138,8 +141,9 @@ class Orders {
   std::array<std::array<uint8_t, kMaxSorted>, 3> order_;
 };
 
-// Sweeps the sorted references of one axis from both sides. Replaces `best` by the cheapest cut if that is better. In
-// such a cut, `bin` is the length of the left part.
+// Sweeps the references, sorted along one axis, from both sides. Replaces `best` by the cheapest cut if this cut costs
+// less than `best`, or costs the same with a lower imbalance. Here the member `bin` of a cut is the length of its left
+// part.
 template <class S>
 void find_cheapest_cut(BoxReferences<S> references, const Orders<S>& orders, size_t axis, Split<S>& best) {
   const size_t count = references.size();
@@ -180,8 +184,8 @@ void fill_bins(BoxReferences<S> references, const Binning<S>& binning, uint32_t 
 }
 
 // Moves the references of the left part to the front, and computes the bounds of the centres of each part in the same
-// loop. Every reference is swapped, also one of the right part, because a branch here would be mispredicted half of the
-// time.
+// loop. Every reference is swapped, even a reference of the right part, because a branch would be mispredicted half of
+// the time.
 template <class S>
 Halves<S> partition(BoxReferences<S> references, const Binning<S>& binning, const Split<S>& split,
                     const BvhOptions& options) {
@@ -211,8 +215,7 @@ Halves<S> partition(BoxReferences<S> references, const Binning<S>& binning, cons
   return halves;
 }
 
-// Splits at the cheapest border between two bins of any axis. Returns left_count 0 if there is no such cut of finite
-// cost.
+// Splits at the cheapest border between two bins of any axis. Returns left_count 0 if no border has a finite cost.
 template <class S>
 Halves<S> split_binned(BoxReferences<S> references, const Extent<S>& extent, const BvhOptions& options) {
   const auto count = static_cast<uint32_t>(references.size());
@@ -243,7 +246,7 @@ Halves<S> split_sorted(BoxReferences<S> references) {
   return {best.bin, {extent_of<S>(references.subspan(0, best.bin)), extent_of<S>(references.subspan(best.bin))}};
 }
 
-// Splits at the median centre along the axis of the largest spread.
+// Splits at the median centre along the axis on which the centres spread most.
 template <class S>
 Halves<S> halve(BoxReferences<S> references, const QuadBox<S>& centers) {
   const Vec3<S> spread = centers.box().extent();
@@ -280,23 +283,21 @@ Halves<S> Splitter<S>::split(BoxReferences<S> references, const Extent<S>& exten
   const bool found = halves.left_count != 0;
   if (!found || balanced_levels(std::max(halves.left_count, count - halves.left_count)) > levels)
     halves = halve(references, extent.centers);
-  check_halves(references, extent, levels, halves);
+  LOCUS_DCHECK_CALL(check_halves(references, extent, levels, halves));
   return halves;
 }
 
 template <class S>
 void Splitter<S>::check_halves(BoxReferences<S> references, const Extent<S>& extent, uint32_t levels,
                                const Halves<S>& halves) const {
-  if constexpr (kDebugChecks) {
-    if (cancelled(options_)) return;
-    const auto count = static_cast<uint32_t>(references.size()), left_count = halves.left_count;
-    LOCUS_DCHECK_LT(0u, left_count);
-    LOCUS_DCHECK_LT(left_count, count);
-    LOCUS_DCHECK_LE(balanced_levels(std::max(left_count, count - left_count)), levels);
-    LOCUS_DCHECK(extent_of(references.subspan(0, left_count)).bounds.box() == halves.parts[0].bounds.box());
-    LOCUS_DCHECK(extent_of(references.subspan(left_count)).bounds.box() == halves.parts[1].bounds.box());
-    LOCUS_DCHECK(merge(halves.parts[0].bounds.box(), halves.parts[1].bounds.box()) == extent.bounds.box());
-  }
+  if (cancelled(options_)) return;
+  const auto count = static_cast<uint32_t>(references.size()), left_count = halves.left_count;
+  LOCUS_DCHECK_LT(0u, left_count);
+  LOCUS_DCHECK_LT(left_count, count);
+  LOCUS_DCHECK_LE(balanced_levels(std::max(left_count, count - left_count)), levels);
+  LOCUS_DCHECK(extent_of(references.subspan(0, left_count)).bounds.box() == halves.parts[0].bounds.box());
+  LOCUS_DCHECK(extent_of(references.subspan(left_count)).bounds.box() == halves.parts[1].bounds.box());
+  LOCUS_DCHECK(merge(halves.parts[0].bounds.box(), halves.parts[1].bounds.box()) == extent.bounds.box());
 }
 
 template Extent<float> extent_of(BoxReferences<float>);

@@ -1,8 +1,8 @@
-// Splits a range of boxes into two parts by the surface area heuristic: a large range between two of its bins, a small
-// range at the best of all cuts of the boxes sorted by centre. If the heuristic finds no cut, the range is halved at
-// the median centre. The cost of a part is its surface area times (the minimum number of leaves for its boxes + a small
-// term for each box). Internal to this folder. Pure functions. Source: Wald, On fast Construction of SAH-based Bounding
-// Volume Hierarchies, 2007.
+// Splits a range of boxes into two parts by the surface area heuristic. A large range is distributed to bins and split
+// between two bins; a small range is sorted by centre and split at the best of all cuts. If the heuristic finds no cut,
+// the range is halved at the median centre. The cost of a part is its surface area times (the minimum number of leaves
+// for its boxes + a small term for each box). Internal to this folder. Pure functions. Source: Wald, On fast
+// Construction of SAH-based Bounding Volume Hierarchies, 2007.
 #ifndef LOCUS_CORE_INDEX_BVH_SPLITTER_H_
 #define LOCUS_CORE_INDEX_BVH_SPLITTER_H_
 
@@ -46,16 +46,16 @@ struct Halves {
   std::array<Extent<S>, 2> parts;
 };
 
-// Splitter of ranges for one build. Borrows the options.
+// Splitter of ranges of references for one build. Borrows the options.
 template <class S>
 class Splitter {
  public:
   explicit Splitter(const BvhOptions& options) : options_(options) {}
 
-  // Splits `references`, which must be more than kBvhLeafSize, and reorders them so that the left part precedes the
-  // right part. Neither part is empty. `extent` is the extent of `references`, and `levels` the number of tree levels
-  // available below the two parts. If the best cut leaves a part that cannot be halved into leaves within `levels`
-  // levels, `references` are halved at the median centre instead. The result is undefined if the build was cancelled.
+  // Splits `references`, more than kBvhLeafSize elements, and reorders them so that the left part precedes the right
+  // part. Neither part is empty. `extent` is extent_of(references), and `levels` is the number of tree levels available
+  // below the two parts. If the best cut leaves a part that cannot be halved into leaves within `levels` levels,
+  // `references` are halved at the median centre instead. The result is undefined if the build was cancelled.
   Halves<S> split(BoxReferences<S> references, const Extent<S>& extent, uint32_t levels) const;
 
  private:

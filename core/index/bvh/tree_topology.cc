@@ -90,8 +90,8 @@ class Restorer {
     return absl::OkStatus();
   }
 
-  // Sets the children of each node, and the storage position of the first triangle below it. Verifies that the nodes
-  // and blocks form one tree within the depth limit.
+  // Sets the children of each node, and the storage position of the first triangle below the node. Verifies that the
+  // nodes and blocks form one tree within the depth limit.
   absl::Status link_nodes() {
     uint32_t next_block = 0;
     std::vector<Pending> pending = {{0, 0, 1}};
@@ -108,8 +108,8 @@ class Restorer {
         return mismatch("invalid children of a node");
       if (arrays_.block_count - next_block < static_cast<uint32_t>(std::popcount(children.blocks)))
         return mismatch("too few blocks");
-      // If no block is left, this node has only nodes as children, and the topology is refused later: a node below this
-      // one has too few blocks, or nodes are missing. The position set here is then never used.
+      // If no block is left, this node has only nodes as children, and a later check refuses the topology: a node below
+      // has too few blocks, or nodes are missing. The position set here is then never used.
       arrays_.ranges[index].first =
           next_block < arrays_.block_count ? arrays_.blocks[next_block].first : arrays_.triangle_count;
       TriangleNode& node = arrays_.nodes[index];

@@ -1,8 +1,8 @@
-// Topology of a triangle tree: which triangles form a block, and which blocks and nodes are the children of a node. It
-// holds no coordinates and takes five bytes a triangle. restore_arrays() restores the tree from it in a fraction of the
-// time of a build; the result equals the original byte for byte, except for the signs of zeros in boxes. Boxes are
-// computed from the triangles themselves, so any topology that fits the mesh results in correct answers; a bad topology
-// only makes queries slow.
+// Topology of a triangle tree: which triangles form a block, and which blocks and nodes are the children of a node. A
+// topology holds no coordinates and takes about five bytes per triangle. restore_arrays() restores the tree from its
+// topology in a fraction of the time of a build; the result equals the original tree byte for byte, except for the
+// signs of zeros in boxes. Boxes are computed from the triangles themselves, so any topology that fits the mesh results
+// in correct answers; a bad topology only makes queries slow.
 //
 // Plain data; free functions, any thread.
 #ifndef LOCUS_CORE_INDEX_BVH_TREE_TOPOLOGY_H_
@@ -21,8 +21,8 @@
 
 namespace locus {
 
-// Kinds of the children of one node. Bit k of `blocks` is set if slot k holds a block, bit k of `nodes` if it holds a
-// node. Used slots are contiguous from slot 0 on.
+// Kinds of the children of one node. Bit k of `blocks` is set if slot k holds a block, bit k of `nodes` if slot k holds
+// a node. Used slots are contiguous from slot 0 on.
 struct NodeOutline {
   uint8_t blocks = 0;
   uint8_t nodes = 0;
@@ -34,16 +34,17 @@ struct NodeOutline {
 // it.
 struct TreeTopology {
   absl::Span<const uint32_t> numbers;  // triangle number at each storage position; borrowed
-  std::vector<uint8_t> block_sizes;    // triangles of each block, 1 to kTreeWidth
+  std::vector<uint8_t> block_sizes;    // number of triangles of each block, 1 to kTreeWidth
   std::vector<NodeOutline> nodes;
 };
 
-// Returns the topology of the tree in `arrays`, which must not be empty. Borrows the triangle numbers from `arrays`.
+// Returns the topology of the tree in `arrays`. Precondition: the tree is not empty. Borrows the triangle numbers from
+// `arrays`.
 TreeTopology topology_of(const TriangleArrays& arrays);
 
-// Restores the tree that `topology` describes. Calls `triangle` once for each number below `triangle_count`, on any
-// threads; the vertices it returns must be finite. Errors: INVALID_ARGUMENT if `topology` does not describe a tree of
-// `triangle_count` triangles within the depth limit; CANCELLED. O(n).
+// Restores the tree that `topology` describes. Calls triangle(number) once for each number below `triangle_count`, on
+// any threads; the returned vertices must be finite. Errors: INVALID_ARGUMENT if `topology` does not describe a tree of
+// `triangle_count` triangles within the depth limit; CANCELLED if the cancel flag of `options` was set. O(n).
 absl::StatusOr<TriangleArrays> restore_arrays(const TreeTopology& topology, uint32_t triangle_count,
                                               absl::FunctionRef<Triangle(uint32_t)> triangle,
                                               const BvhOptions& options);

@@ -31,8 +31,8 @@ bool make_reference(const Triangle& triangle, uint32_t index, BoxReference<float
   return difference[0] + difference[1] + difference[2] == 0;
 }
 
-// Writes the BoxReference of each triangle to `references`. Errors: INVALID_ARGUMENT for the first triangle that is not
-// finite; CANCELLED.
+// Writes the BoxReference of each triangle to `references`. Errors: INVALID_ARGUMENT for the first triangle with a
+// vertex that is not finite; CANCELLED if the cancel flag was set.
 absl::Status make_references(absl::Span<const Triangle> triangles, const BvhOptions& options,
                              BoxReference<float>* references) {
   std::vector<size_t> bad((triangles.size() + kChunkTriangles - 1) / kChunkTriangles, triangles.size());
@@ -60,7 +60,7 @@ absl::StatusOr<TriangleBvh> TriangleBvh::build(absl::Span<const Triangle> triang
   built.arrays_ = TriangleWriter(triangles, tree, options).write();
   if (cancelled(options)) return cancelled_build();
   built.set_bounds(tree.root().bounds);
-  built.check_invariants();
+  LOCUS_DCHECK_CALL(built.check_invariants());
   LOCUS_CHECK_EQ(built.size(), triangles.size());
   LOCUS_CHECK_LE(built.depth(), limits::kMaxBvhDepth);
   return built;
@@ -76,7 +76,7 @@ absl::StatusOr<TriangleBvh> TriangleBvh::restore(const TreeTopology& topology, u
   Aabbf bounds;
   for (int slot = 0; slot < kTreeWidth && root.child[slot] != kNoChild; ++slot) bounds = merge(bounds, box(root, slot));
   restored.set_bounds(bounds);
-  restored.check_invariants();
+  LOCUS_DCHECK_CALL(restored.check_invariants());
   return restored;
 }
 
@@ -86,63 +86,59 @@ void TriangleBvh::set_bounds(const Aabbf& bounds) {
 }
 
 void TriangleBvh::check_invariants() const {
-  if constexpr (kDebugChecks) {
-    LOCUS_DCHECK_LE(depth(), limits::kMaxBvhDepth);
-    std::vector<uint32_t> pending = {0};
-    uint32_t next_node = 0, next_block = 0, next_position = 0;
-    while (!pending.empty()) {
-      const uint32_t index = pending.back();
-      pending.pop_back();
-      LOCUS_DCHECK_EQ(index, next_node);
-      ++next_node;
-      LOCUS_DCHECK_EQ(arrays_.ranges[index].first, next_position);
-      check_node(index);
-      const absl::Span<const uint32_t> children(arrays_.nodes[index].child);
-      for (const uint32_t child : children) {
-        if (child == kNoChild || (child & kBlockBit) == 0) continue;
-        LOCUS_DCHECK_EQ(child & ~kBlockBit, next_block);
-        ++next_block;
-        LOCUS_DCHECK_EQ(arrays_.blocks[child & ~kBlockBit].first, next_position);
-        next_position += arrays_.blocks[child & ~kBlockBit].count;
-      }
-      for (size_t slot = children.size(); slot-- > 0;)
-        if ((children[slot] & kBlockBit) == 0) pending.push_back(children[slot]);
+  LOCUS_DCHECK_LE(depth(), limits::kMaxBvhDepth);
+  std::vector<uint32_t> pending = {0};
+  uint32_t next_node = 0, next_block = 0, next_position = 0;
+  while (!pending.empty()) {
+    const uint32_t index = pending.back();
+    pending.pop_back();
+    LOCUS_DCHECK_EQ(index, next_node);
+    ++next_node;
+    LOCUS_DCHECK_EQ(arrays_.ranges[index].first, next_position);
+    LOCUS_DCHECK_CALL(check_node(index));
+    const absl::Span<const uint32_t> children(arrays_.nodes[index].child);
+    for (const uint32_t child : children) {
+      if (child == kNoChild || (child & kBlockBit) == 0) continue;
+      LOCUS_DCHECK_EQ(child & ~kBlockBit, next_block);
+      ++next_block;
+      LOCUS_DCHECK_EQ(arrays_.blocks[child & ~kBlockBit].first, next_position);
+      next_position += arrays_.blocks[child & ~kBlockBit].count;
     }
-    LOCUS_DCHECK_EQ(next_node, arrays_.node_count);
-    LOCUS_DCHECK_EQ(next_block, arrays_.block_count);
-    LOCUS_DCHECK_EQ(next_position, arrays_.triangle_count);
+    for (size_t slot = children.size(); slot-- > 0;)
+      if ((children[slot] & kBlockBit) == 0) pending.push_back(children[slot]);
   }
+  LOCUS_DCHECK_EQ(next_node, arrays_.node_count);
+  LOCUS_DCHECK_EQ(next_block, arrays_.block_count);
+  LOCUS_DCHECK_EQ(next_position, arrays_.triangle_count);
 }
 
 // Verifies one node: its used slots are contiguous, each of its orders contains every slot once, its boxes contain the
-// boxes or triangles below them, and its range has the length of its children's ranges together.
+// boxes or triangles below them, and the length of its range is the number of triangles below it.
 void TriangleBvh::check_node(uint32_t index) const {
-  if constexpr (kDebugChecks) {
-    const TriangleNode& node = arrays_.nodes[index];
-    uint32_t count = 0;
-    for (int slot = 0; slot < kTreeWidth; ++slot) {
-      const uint32_t child = node.child[slot];
-      LOCUS_DCHECK(child == kNoChild || slot == 0 || node.child[slot - 1] != kNoChild);
-      uint32_t slots_in_order = 0;
-      for (int rank = 0; rank < kTreeWidth; ++rank) slots_in_order |= 1u << (node.order[slot] >> (3 * rank) & 7u);
-      LOCUS_DCHECK_EQ(slots_in_order, 0xFFu);
-      if (child == kNoChild) continue;
-      if ((child & kBlockBit) == 0) {
-        const TriangleNode& below = arrays_.nodes[child];
-        for (int i = 0; i < kTreeWidth && below.child[i] != kNoChild; ++i)
-          LOCUS_DCHECK(contains(box(node, slot), box(below, i)));
-        count += arrays_.ranges[child].count;
-      } else {
-        const TriangleBlock& block = arrays_.blocks[child & ~kBlockBit];
-        LOCUS_DCHECK(0 < block.count && block.count <= kTreeWidth);
-        for (uint32_t lane = 0; lane < block.count; ++lane)
-          LOCUS_DCHECK(contains(box(node, slot), bounds_of(triangle(block, lane))));
-        count += block.count;
-      }
+  const TriangleNode& node = arrays_.nodes[index];
+  uint32_t count = 0;
+  for (int slot = 0; slot < kTreeWidth; ++slot) {
+    const uint32_t child = node.child[slot];
+    LOCUS_DCHECK(child == kNoChild || slot == 0 || node.child[slot - 1] != kNoChild);
+    uint32_t slots_in_order = 0;
+    for (int rank = 0; rank < kTreeWidth; ++rank) slots_in_order |= 1u << (node.order[slot] >> (3 * rank) & 7u);
+    LOCUS_DCHECK_EQ(slots_in_order, 0xFFu);
+    if (child == kNoChild) continue;
+    if ((child & kBlockBit) == 0) {
+      const TriangleNode& below = arrays_.nodes[child];
+      for (int i = 0; i < kTreeWidth && below.child[i] != kNoChild; ++i)
+        LOCUS_DCHECK(contains(box(node, slot), box(below, i)));
+      count += arrays_.ranges[child].count;
+    } else {
+      const TriangleBlock& block = arrays_.blocks[child & ~kBlockBit];
+      LOCUS_DCHECK(0 < block.count && block.count <= kTreeWidth);
+      for (uint32_t lane = 0; lane < block.count; ++lane)
+        LOCUS_DCHECK(contains(box(node, slot), bounds_of(triangle(block, lane))));
+      count += block.count;
     }
-    LOCUS_DCHECK_LT(0u, count);
-    LOCUS_DCHECK_EQ(count, arrays_.ranges[index].count);
   }
+  LOCUS_DCHECK_LT(0u, count);
+  LOCUS_DCHECK_EQ(count, arrays_.ranges[index].count);
 }
 
 Triangle TriangleBvh::at(size_t position) const {

@@ -1,6 +1,6 @@
-// Bounding volume hierarchy over the triangles of one mesh, in the layout that the vector kernels read. It has the same
-// visits as Bvh, which pass triangles to visitors (spatial_index.h). Callers that need no visitor pass tree() to the
-// faster kernels of ray_kernels.h and region_kernels.h.
+// Bounding volume hierarchy over the triangles of one mesh, in the layout that the vector kernels read. TriangleBvh has
+// the same visits as Bvh, which pass triangles to visitors (spatial_index.h). Callers that need no visitor pass tree()
+// to the faster kernels of ray_kernels.h and region_kernels.h.
 //
 // Threads: immutable after build() or restore(); every member may run concurrently.
 // Invariants: the box of a child slot contains all triangles below it; the depth is at most limits::kMaxBvhDepth;
@@ -34,16 +34,17 @@ class TriangleBvh {
   // Builds a tree of `triangles`, whose triangle numbers must be unique; an empty span is legal. Returns the errors of
   // build_bvh_layout().
   static absl::StatusOr<TriangleBvh> build(absl::Span<const Triangle> triangles, const BvhOptions& options = {});
-  // Restores a tree from its topology(). `triangle` returns the triangle of each number below `triangle_count`; its
-  // vertices must be finite. O(n), several times faster than build(). The topology of any other tree with that many
-  // triangles is legal too: answers stay correct, but queries may be slower. Returns the errors of restore_arrays().
+  // Restores a tree from its topology(). `triangle` returns the triangle of each number below `triangle_count`; the
+  // vertices must be finite. O(n), several times faster than build(). The topology of any other tree with
+  // `triangle_count` triangles is legal too: answers stay correct, but queries may be slower. Returns the errors of
+  // restore_arrays().
   static absl::StatusOr<TriangleBvh> restore(const TreeTopology& topology, uint32_t triangle_count,
                                              absl::FunctionRef<Triangle(uint32_t)> triangle,
                                              const BvhOptions& options = {});
 
   size_t size() const { return arrays_.triangle_count; }
-  // Returns the triangle at `position` in the storage order, which is determined by the input and options of the build,
-  // or by the topology. Precondition: `position` < size(). O(log n).
+  // Returns the triangle at `position` in storage order. The input and options of the build, or the topology, determine
+  // this order. Precondition: `position` < size(). O(log n).
   Triangle at(size_t position) const;
   // Returns the box around all triangles; an empty box for an empty tree.
   const Aabbf& bounds() const { return bounds_; }
@@ -74,7 +75,8 @@ class TriangleBvh {
   template <RayVisitor<Triangle> Visitor>
   void visit_ray(const SlabRay<float>& slabs, Visitor& visitor, Work& work) const;
 
-  // Passes to `visitor` the triangles whose own bounds overlap its region, in storage order. Allocates no memory.
+  // Passes to `visitor` the triangles whose own bounds visitor.overlaps() accepts, in storage order. Allocates no
+  // memory.
   template <RegionVisitor<Triangle> Visitor>
   void visit_region(Visitor& visitor, Work& work) const;
 
@@ -99,18 +101,19 @@ class TriangleBvh {
   // of all nodes. O(size).
   void check_invariants() const;
   void check_node(uint32_t index) const;
-  // Returns whether a box that the ray enters at `near` can be skipped. It cannot if `near` equals `limit`: the box may
-  // hold a hit at the same t with a lower triangle number, which is preferred.
+  // Returns whether a box that the ray enters at `near` can be skipped. A box with `near` equal to `limit` cannot be
+  // skipped: it may hold a hit at the same t with a lower triangle number, which is preferred.
   static bool beyond(float near, float limit) { return planted(PlantedBug::kStrictTie) ? near >= limit : near > limit; }
   static Aabbf box(const TriangleNode& node, int slot) {
     return {{node.bounds[0][slot], node.bounds[1][slot], node.bounds[2][slot]},
             {node.bounds[3][slot], node.bounds[4][slot], node.bounds[5][slot]}};
   }
   Interval<float> node_interval(const SlabRay<float>& slabs, const Aabbf& box) const;
-  // Pushes the children whose squared distance, given by slot, is at most `limit`. The nearest child is pushed last, so
-  // that it is popped first. Returns the new top of the stack.
+  // Pushes the children whose squared distance from the point is at most `limit`; distances[slot] is the squared
+  // distance of the child in `slot`. The nearest child is pushed last, so that it is popped first. Returns the new top
+  // of the stack.
   static Pending* push_near(const TriangleNode& node, const float (&distances)[kTreeWidth], float limit, Pending* top);
-  // Pushes the children that the ray may hit at t <= `limit`, the nearest one last. Returns the new top of the stack.
+  // Pushes the children that the ray may hit at t <= `limit`, the nearest child last. Returns the new top of the stack.
   Pending* push_hit(const TriangleNode& node, const SlabRay<float>& slabs, float limit, Pending* top) const;
 
   absl::Span<const TriangleNode> nodes() const { return {arrays_.nodes.get(), arrays_.node_count}; }

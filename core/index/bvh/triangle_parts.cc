@@ -13,11 +13,10 @@ namespace {
 // Bound of the boxes of unused slots, which no test hits: min = +kUnusedBound, max = -kUnusedBound.
 constexpr float kUnusedBound = 1e30f;
 
-using Orders = std::array<uint32_t, 8>;  // TriangleNode::order: one element for each octant of ray directions
+using OctantOrders = std::array<uint32_t, 8>;  // TriangleNode::order: one element for each octant of ray directions
 
-// Returns, for each octant of ray directions, the distance of the box's nearest corner along the octant's diagonal.
-// Distances are scaled, and only comparable with each other: a quarter of each coordinate is added, so that sums stay
-// finite.
+// Returns, for each octant of ray directions, the distance of the box's nearest corner along the octant's diagonal. All
+// distances are scaled by the same factor, chosen so that the sum of three coordinates stays finite.
 std::array<float, 8> corner_distances(const Aabbf& box) {
   std::array<float, 8> result;
   for (uint32_t octant = 0; octant < 8; ++octant) {
@@ -31,9 +30,9 @@ std::array<float, 8> corner_distances(const Aabbf& box) {
 // Returns, for each octant, the order of slots from far to near along the octant's diagonal. Unused slots come first;
 // slots at equal distances are in increasing order. A slot's rank is the number of slots before it; the ranks for all
 // octants are computed at once, without a branch.
-Orders orders_of(absl::Span<const Aabbf> boxes) {
+OctantOrders orders_of(absl::Span<const Aabbf> boxes) {
   std::array<std::array<float, 8>, kTreeWidth> distances;
-  std::array<Orders, kTreeWidth> ranks{};
+  std::array<OctantOrders, kTreeWidth> ranks{};
   const auto used = static_cast<uint32_t>(boxes.size());
   for (uint32_t slot = 0; slot < used; ++slot) {
     distances[slot] = corner_distances(boxes[slot]);
@@ -45,7 +44,7 @@ Orders orders_of(absl::Span<const Aabbf> boxes) {
       }
     }
   }
-  Orders orders{};
+  OctantOrders orders{};
   for (uint32_t slot = 0; slot < kTreeWidth; ++slot) {
     const uint32_t unused_count = kTreeWidth - used;
     for (size_t octant = 0; octant < 8; ++octant) {
@@ -74,7 +73,7 @@ void fill_boxes(absl::Span<const Aabbf> boxes, TriangleNode& node) {
       node.bounds[3 + axis][slot] = used ? boxes[slot].max[axis] : -kUnusedBound;
     }
   }
-  const Orders orders = orders_of(boxes);
+  const OctantOrders orders = orders_of(boxes);
   std::copy(orders.begin(), orders.end(), node.order);
 }
 

@@ -9,8 +9,8 @@
 
 namespace locus {
 
-// Sets the bounds and orders of a node from the boxes of its children, 1 to kTreeWidth, by slot. Slots without a box
-// get a box that no test hits. Leaves `child` unchanged.
+// Sets `bounds` and `order` of a node; boxes[i] is the box of the child in slot i. Precondition: 1 to kTreeWidth boxes.
+// Slots without a box get a box that no test hits. Leaves `child` unchanged.
 void fill_boxes(absl::Span<const Aabbf> boxes, TriangleNode& node);
 
 // Sets all members of a block from 1 to kTreeWidth triangles and the box around them. `first` is the storage position

@@ -13,8 +13,9 @@ static_assert(kBvhWidth == kTreeWidth && kBvhLeafSize == kTreeWidth);
 
 namespace {
 
-// Maximum number of triangles in a subtree that is written as one chunk. The resulting tree does not depend on it.
-constexpr uint32_t kChunkTriangles = 8192;
+// Maximum number of triangles in a subtree that is written as one chunk. The resulting tree does not depend on this
+// number.
+constexpr uint32_t kMaxSubtreeTriangles = 8192;
 
 // Returns the children of a wide node in order of increasing area.
 WideChildren<float> children_by_area(const BinaryNode<float>& root) {
@@ -50,7 +51,7 @@ TriangleArrays TriangleWriter::write() {
   return std::move(arrays_);
 }
 
-// Pushes the children in reverse order, so that the first child is popped next, which results in depth-first order.
+// Pushes the children in reverse order, so that the first child is popped next: the pops are in depth-first order.
 // Leaves are popped before inner nodes.
 void TriangleWriter::push_children(const WideChildren<float>& children, uint32_t parent, uint32_t depth,
                                    std::vector<Pending>& pending) {
@@ -68,7 +69,7 @@ std::vector<TriangleWriter::Chunk> TriangleWriter::split_into_chunks() const {
     pending.pop_back();
     const auto index = static_cast<uint32_t>(chunks.size());
     LOCUS_DCHECK(index == 0 || now.parent < index);
-    const bool is_subtree = now.node->count <= kChunkTriangles;
+    const bool is_subtree = now.node->count <= kMaxSubtreeTriangles;
     chunks.push_back({now.node, is_subtree, now.parent, now.slot, now.depth, {}});
     if (is_subtree) continue;
     const WideChildren<float> children = children_by_area(*now.node);
@@ -102,8 +103,8 @@ TriangleWriter::Offsets TriangleWriter::count(Chunk& chunk) const {
   return size;
 }
 
-// Writes the nodes of the tree's top, and stores each chunk's root in the child slot of its parent. Chunk::start must
-// be set in all chunks.
+// Writes the nodes of the tree's top, and stores the index of each chunk's root in the child slot of its parent.
+// Chunk::start must be set in all chunks.
 void TriangleWriter::write_top(const std::vector<Chunk>& chunks) {
   for (const Chunk& chunk : chunks)
     if (!chunk.is_subtree)

@@ -1,8 +1,8 @@
 // Converts a binary tree over triangles to the nodes and blocks of a TriangleBvh. The children of a node are in order
-// of increasing area; nodes and blocks are stored depth-first, the blocks of a node before its child nodes. The tree is
-// divided into chunks. A first pass counts the nodes, blocks and triangles of each chunk, from which the chunk's
-// offsets in the output arrays follow; a second pass writes the chunks. Both passes process chunks in parallel.
-// Internal to this folder.
+// of increasing area; nodes and blocks are stored depth-first, the blocks of a node before its child nodes. The writer
+// divides the tree into chunks: the single nodes of the tree's top, and the subtrees below them. A first pass counts
+// the nodes, blocks and triangles of each chunk, from which the chunk's offsets in the output arrays follow; a second
+// pass writes the chunks. Both passes process chunks in parallel. Internal to this folder.
 #ifndef LOCUS_CORE_INDEX_BVH_TRIANGLE_WRITER_H_
 #define LOCUS_CORE_INDEX_BVH_TRIANGLE_WRITER_H_
 
@@ -17,14 +17,14 @@
 
 namespace locus {
 
-// Owner of the arrays of a TriangleTree, each of exactly the length needed.
+// Owner of the arrays of a TriangleTree.
 struct TriangleArrays {
   LargeArray<TriangleNode> nodes;
   LargeArray<NodeRange> ranges;
   LargeArray<TriangleBlock> blocks;
   LargeArray<uint32_t> numbers;
   uint32_t node_count = 0, block_count = 0, triangle_count = 0;
-  uint32_t depth = 0;  // levels of nodes
+  uint32_t depth = 0;  // number of levels of nodes
 };
 
 // Writer of one tree. Borrows the constructor's arguments. write() must be called only once.
@@ -37,8 +37,8 @@ class TriangleWriter {
   TriangleArrays write();
 
  private:
-  // Offsets of the next element in the arrays `nodes`, `blocks` and `numbers` of TriangleArrays. As the result of
-  // count(): the numbers of nodes, blocks and triangles in a chunk.
+  // Indices of the next element in the arrays `nodes`, `blocks` and `numbers` of TriangleArrays. In the result of
+  // count(), the members are the numbers of nodes, blocks and triangles of a chunk.
   struct Offsets {
     uint32_t node = 0, block = 0, position = 0;
   };
@@ -51,8 +51,8 @@ class TriangleWriter {
     uint32_t depth;  // levels of nodes from the tree's root to the chunk's root; count() extends it to the deepest node
     Offsets start;
   };
-  // Child of a wide node that was not visited yet. `parent` is the index of the parent: that of its chunk in
-  // split_into_chunks(), that of its node in write_subtree().
+  // Child of a wide node that was not visited yet. In split_into_chunks(), `parent` is the index of the chunk that
+  // contains the parent; in write_subtree(), `parent` is the index of the parent in TriangleArrays::nodes.
   struct Pending {
     const BinaryNode<float>* node;
     uint32_t parent, slot;

@@ -1,5 +1,6 @@
-// Children of one wide node: the up to eight binary nodes that are reached from the wide node's root in the binary tree
-// by opening binary nodes according to their WideChoice. Borrows the binary tree.
+// Children of one wide node (a node of up to eight children). The wide node replaces a binary node, its root, and some
+// inner nodes below the root; its children are the binary nodes next below these, as WideChoice determines. Borrows the
+// binary tree.
 #ifndef LOCUS_CORE_INDEX_BVH_WIDE_CHILDREN_H_
 #define LOCUS_CORE_INDEX_BVH_WIDE_CHILDREN_H_
 
@@ -34,7 +35,7 @@ class WideChildren {
       }
       LOCUS_DCHECK_LE(pending_count + size_, size_t{kBvhWidth});
     }
-    check_children(root);
+    LOCUS_DCHECK_CALL(check_children(root));
   }
 
   uint32_t size() const { return size_; }
@@ -62,14 +63,12 @@ class WideChildren {
  private:
   // Verifies, in debug builds, that the children, from left to right, partition the references of `root`.
   void check_children(const BinaryNode<S>& root) const {
-    if constexpr (kDebugChecks) {
-      uint32_t next = root.first;
-      for (uint32_t i = 0; i < size_; ++i) {
-        LOCUS_DCHECK_EQ(nodes_[i]->first, next);
-        next += nodes_[i]->count;
-      }
-      LOCUS_DCHECK_EQ(next, root.first + root.count);
+    uint32_t next = root.first;
+    for (uint32_t i = 0; i < size_; ++i) {
+      LOCUS_DCHECK_EQ(nodes_[i]->first, next);
+      next += nodes_[i]->count;
     }
+    LOCUS_DCHECK_EQ(next, root.first + root.count);
   }
 
   std::array<const BinaryNode<S>*, kBvhWidth> nodes_;

@@ -38,24 +38,22 @@ bool BrickGeometry::cell_nearly_holds(int cell, Vec3d position) const {
 }
 
 void Brick::check_invariants() const {
-  if constexpr (kDebugChecks) {
-    LOCUS_DCHECK(sorted != nullptr);
-    LOCUS_DCHECK_EQ(recent == nullptr, recent_count == 0);
-    LOCUS_DCHECK_LE(recent_count, kMaxRecent);
-    if (recent != nullptr) LOCUS_DCHECK_LE(recent_count, recent->count());
-    LOCUS_DCHECK_LE(recent_dead_count, recent_count);
-    LOCUS_DCHECK_LE(dead_count, sorted->count());
-    LOCUS_DCHECK(dead.empty() || dead.size() * 64 >= size_t{sorted->count()} + 64);
-    const auto count_bits = [](const auto& words) {
-      uint32_t bits = 0;
-      for (const uint64_t word : words) bits += static_cast<uint32_t>(std::popcount(word));
-      return bits;
-    };
-    LOCUS_DCHECK_EQ(count_bits(dead), dead_count);
-    LOCUS_DCHECK_EQ(count_bits(recent_dead), recent_dead_count);
-    LOCUS_DCHECK_GT(size(), 0u);
-    LOCUS_DCHECK_GE(max_extent, 0.0f);
-  }
+  LOCUS_DCHECK(sorted != nullptr);
+  LOCUS_DCHECK_EQ(recent == nullptr, recent_count == 0);
+  LOCUS_DCHECK_LE(recent_count, kMaxRecent);
+  if (recent != nullptr) LOCUS_DCHECK_LE(recent_count, recent->count());
+  LOCUS_DCHECK_LE(recent_dead_count, recent_count);
+  LOCUS_DCHECK_LE(dead_count, sorted->count());
+  LOCUS_DCHECK(dead.empty() || dead.size() * 64 >= size_t{sorted->count()} + 64);
+  const auto count_bits = [](const auto& words) {
+    uint32_t bits = 0;
+    for (const uint64_t word : words) bits += static_cast<uint32_t>(std::popcount(word));
+    return bits;
+  };
+  LOCUS_DCHECK_EQ(count_bits(dead), dead_count);
+  LOCUS_DCHECK_EQ(count_bits(recent_dead), recent_dead_count);
+  LOCUS_DCHECK_GT(size(), 0u);
+  LOCUS_DCHECK_GE(max_extent, 0.0f);
 }
 
 }  // namespace locus::internal

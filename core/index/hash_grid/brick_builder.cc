@@ -8,13 +8,14 @@
 namespace locus::internal {
 namespace {
 
-// Min number of sorted values for a log: sorting a smaller brick again costs no more than appending to a log.
+// Minimum number of sorted values of a brick for which changes are appended to its log. A smaller brick is sorted
+// again, which costs no more.
 constexpr uint32_t kMinSorted = 48;
-constexpr uint32_t kSortedPerChange = 8;  // min ratio of sorted values to changes of one batch, for a log
-constexpr uint32_t kSortedPerDead = 4;    // min ratio of sorted values to dead ones, for a log
-constexpr size_t kAhead = 16;             // prefetch distance in values
+constexpr uint32_t kSortedPerChange = 8;  // min ratio of sorted values to changes for appending to the log
+constexpr uint32_t kSortedPerDead = 4;    // min ratio of sorted values to dead values for appending
+constexpr size_t kPrefetchValues = 16;    // number of values between a prefetch and its use
 
-// Mark of an unchanged value in sorted_changes_ and recent_changes_. All move indices are smaller.
+// Mark of an unchanged value in sorted_changes_ and recent_changes_, larger than every index of a move.
 constexpr uint32_t kStays = ~0u - 1;
 
 bool arrives(const BrickChange& change) { return change.slot == BrickChange::kArrives; }
@@ -32,7 +33,7 @@ void BrickBuilder::begin(const BatchParts& parts, std::vector<GridSlot>& slots) 
 BrickPtr BrickBuilder::apply(const Brick* old, const BrickGeometry& geometry, uint32_t index,
                              absl::Span<const BrickChange> changes) {
   LOCUS_DCHECK(slots_ != nullptr);
-  check_changes(old, changes);
+  LOCUS_DCHECK_CALL(check_changes(old, changes));
   geometry_ = &geometry;
   index_ = index;
   max_extent_ = old == nullptr ? 0 : old->max_extent;
@@ -50,7 +51,7 @@ BrickPtr BrickBuilder::build(const Brick* old, const BrickGeometry& geometry, ui
   max_extent_ = old == nullptr ? 0 : old->max_extent;
   LOCUS_DCHECK(slots_ != nullptr);
   LOCUS_DCHECK(std::all_of(changes.begin(), changes.end(), arrives));
-  check_changes(old, changes);
+  LOCUS_DCHECK_CALL(check_changes(old, changes));
   if (changes.empty()) return sorted_by_cell(old, sources);
   sources_.assign(sources.begin(), sources.end());
   add_arrivals(changes);
@@ -60,20 +61,18 @@ BrickPtr BrickBuilder::build(const Brick* old, const BrickGeometry& geometry, ui
 // Checks that each change refers to an existing arrival, or to a live slot of `old` and, unless the value leaves, to an
 // existing move. O(changes).
 void BrickBuilder::check_changes(const Brick* old, absl::Span<const BrickChange> changes) const {
-  if constexpr (kDebugChecks) {
-    for (const BrickChange& change : changes) {
-      if (arrives(change)) {
-        LOCUS_DCHECK_LT(change.index, parts_.arrivals.size());
-        continue;
-      }
-      LOCUS_DCHECK(old != nullptr);
-      if (change.index != BrickChange::kLeaves) LOCUS_DCHECK_LT(change.index, parts_.moves.moves.size());
-      const uint32_t slot = change.slot & ~GridSlot::kRecent;
-      const bool recent = (change.slot & GridSlot::kRecent) != 0;
-      LOCUS_DCHECK_LT(slot, recent ? old->recent_count : old->sorted->count());
-      const bool dead = recent ? old->is_recent_dead(slot) : old->is_dead(slot);
-      LOCUS_DCHECK(!dead || planted(PlantedBug::kGhostAfterMove));
+  for (const BrickChange& change : changes) {
+    if (arrives(change)) {
+      LOCUS_DCHECK_LT(change.index, parts_.arrivals.size());
+      continue;
     }
+    LOCUS_DCHECK(old != nullptr);
+    if (change.index != BrickChange::kLeaves) LOCUS_DCHECK_LT(change.index, parts_.moves.moves.size());
+    const uint32_t slot = change.slot & ~GridSlot::kRecent;
+    const bool recent = (change.slot & GridSlot::kRecent) != 0;
+    LOCUS_DCHECK_LT(slot, recent ? old->recent_count : old->sorted->count());
+    const bool dead = recent ? old->is_recent_dead(slot) : old->is_dead(slot);
+    LOCUS_DCHECK(!dead || planted(PlantedBug::kGhostAfterMove));
   }
 }
 
@@ -81,39 +80,35 @@ void BrickBuilder::check_changes(const Brick* old, absl::Span<const BrickChange>
 void BrickBuilder::check_value(const Brick& brick, const GridBlock& block, uint32_t slot, uint32_t flag) const {
   LOCUS_DCHECK_LT(block.handle(slot), slots_->size());
   LOCUS_DCHECK_LE(block.extent(slot), brick.max_extent);
-  if (planted(PlantedBug::kGhostAfterMove)) return;  // a handle then has several slots
+  if (planted(PlantedBug::kGhostAfterMove)) return;  // with this bug a handle has several slots
   const GridSlot& location = (*slots_)[block.handle(slot)];
   LOCUS_DCHECK_EQ(location.brick, index_);
   LOCUS_DCHECK_EQ(location.slot, slot | flag);
 }
 
-// Checks a version whose values have all been sorted. O(values), like sorting them.
+// Checks a version whose values have all been sorted. O(values).
 void BrickBuilder::check_sorted(const Brick& brick) const {
-  if constexpr (kDebugChecks) {
-    brick.check_invariants();
-    const GridBlock& sorted = *brick.sorted;
-    sorted.check_invariants();
-    for (int cell = 0; cell < kBrickCells; ++cell) {
-      const auto begin = static_cast<size_t>(cell);
-      for (uint32_t slot = sorted.offsets()[begin]; slot < sorted.offsets()[begin + 1]; ++slot) {
-        check_value(brick, sorted, slot, 0);
-        LOCUS_DCHECK(planted(PlantedBug::kUnsignedCellIndex) ||
-                     brick.geometry.cell_nearly_holds(cell, sorted.entry(slot).position));
-      }
+  LOCUS_DCHECK_CALL(brick.check_invariants());
+  const GridBlock& sorted = *brick.sorted;
+  LOCUS_DCHECK_CALL(sorted.check_invariants());
+  for (int cell = 0; cell < kBrickCells; ++cell) {
+    const auto begin = static_cast<size_t>(cell);
+    for (uint32_t slot = sorted.offsets()[begin]; slot < sorted.offsets()[begin + 1]; ++slot) {
+      check_value(brick, sorted, slot, 0);
+      LOCUS_DCHECK(planted(PlantedBug::kUnsignedCellIndex) ||
+                   brick.geometry.cell_nearly_holds(cell, sorted.entry(slot).position));
     }
   }
 }
 
 // Checks a version whose log has new values from slot `begin` on. O(new values + words of dead bits).
 void BrickBuilder::check_recent(const Brick& brick, uint32_t begin) const {
-  if constexpr (kDebugChecks) {
-    brick.check_invariants();
-    for (uint32_t slot = begin; slot < brick.recent_count; ++slot) {
-      check_value(brick, *brick.recent, slot, GridSlot::kRecent);
-      LOCUS_DCHECK(!brick.is_recent_dead(slot));
-      LOCUS_DCHECK(planted(PlantedBug::kUnsignedCellIndex) ||
-                   brick.geometry.nearly_holds(brick.recent->entry(slot).position));
-    }
+  LOCUS_DCHECK_CALL(brick.check_invariants());
+  for (uint32_t slot = begin; slot < brick.recent_count; ++slot) {
+    check_value(brick, *brick.recent, slot, GridSlot::kRecent);
+    LOCUS_DCHECK(!brick.is_recent_dead(slot));
+    LOCUS_DCHECK(planted(PlantedBug::kUnsignedCellIndex) ||
+                 brick.geometry.nearly_holds(brick.recent->entry(slot).position));
   }
 }
 
@@ -174,14 +169,14 @@ bool BrickBuilder::any_form_arrives(absl::Span<const BrickChange> changes) const
 
 bool BrickBuilder::any_form(const Brick* old, absl::Span<const BrickSource> sources) const {
   if (!parts_.moves.rotations.empty() || (old != nullptr && old->sorted->has_forms())) return true;
-  // The arrivals are the last sources.
+  // The sources of arrivals follow all other sources.
   for (size_t i = sources.size(); i != 0 && (sources[i - 1].origin & BrickSource::kArrival) != 0; --i)
     if (!(parts_.arrivals[sources[i - 1].origin & ~BrickSource::kArrival].form == GridForm())) return true;
   return false;
 }
 
-// Prefetches the memory that write() needs for a source. from[0] and from[1] point to the values of the old brick's
-// sorted block and log.
+// Prefetches the memory that write() needs for `source`. from[0] and from[1] are the values of the old brick's sorted
+// block and log.
 inline void BrickBuilder::prefetch(const GridBlock::Values* from, const BrickSource& source) const {
   if (source.move != BrickSource::kNoMove) __builtin_prefetch(&parts_.moves.moves[source.move]);
   if ((source.origin & BrickSource::kArrival) != 0) return;
@@ -197,7 +192,8 @@ template <class SlotOf>
 inline void BrickBuilder::write(GridBlock& block, uint32_t flag, const Brick* old,
                                 absl::Span<const BrickSource> sources, const SlotOf& slot_of) {
   const GridBlock::Places places(block, geometry_->center);
-  // If the old brick or its log does not exist, another block stands in for it; no source refers to that block.
+  // If the old brick or its log does not exist, `from` contains pointers to another block instead; no source refers to
+  // them.
   const GridBlock& sorted = old == nullptr ? block : *old->sorted;
   const GridBlock::Values from[2] = {
       GridBlock::Values(sorted), GridBlock::Values(old == nullptr || old->recent == nullptr ? sorted : *old->recent)};
@@ -207,7 +203,7 @@ inline void BrickBuilder::write(GridBlock& block, uint32_t flag, const Brick* ol
   const bool has_forms = block.has_forms();
   float max_extent = max_extent_;
   for (size_t i = 0; i < sources.size(); ++i) {
-    if (i + kAhead < sources.size()) prefetch(from, sources[i + kAhead]);
+    if (i + kPrefetchValues < sources.size()) prefetch(from, sources[i + kPrefetchValues]);
     const BrickSource source = sources[i];
     const uint32_t slot = slot_of(source);
     LOCUS_DCHECK_LT(slot, block.count());
@@ -261,7 +257,7 @@ BrickPtr BrickBuilder::sorted_by_cell(const Brick* old, absl::Span<const BrickSo
   brick->index = index_;
   brick->sorted = block;
   brick->max_extent = max_extent_;
-  check_sorted(*brick);
+  LOCUS_DCHECK_CALL(check_sorted(*brick));
   return brick;
 }
 
@@ -287,7 +283,7 @@ BrickPtr BrickBuilder::change_few(const Brick& old, absl::Span<const BrickChange
   brick->max_extent = max_extent_;
   if (brick->recent_count == 0) brick->recent = nullptr;
   if (brick->size() == 0) return nullptr;
-  check_recent(*brick, old.recent_count);
+  LOCUS_DCHECK_CALL(check_recent(*brick, old.recent_count));
   return brick;
 }
 

@@ -1,5 +1,5 @@
 // Builder of brick versions: makes the next version of a brick from its present version and the changes of one batch.
-// The writer of a grid has one builder, for all bricks. The builder keeps its buffers between bricks. One thread at a
+// The writer of a grid uses one builder for all bricks, so that the buffers of the builder are reused. One thread at a
 // time.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_BRICK_BUILDER_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_BRICK_BUILDER_H_
@@ -17,11 +17,11 @@ struct BrickChange {
   static constexpr uint32_t kArrives = ~0u;
   static constexpr uint32_t kLeaves = ~0u;
 
-  uint32_t slot;   // present slot of the value, encoded as GridSlot::slot; kArrives if it arrives
-  uint32_t index;  // index in BatchParts::arrivals if the value arrives, in the moves if it moves; or kLeaves
+  uint32_t slot;   // present slot, encoded as in GridSlot::slot, or kArrives
+  uint32_t index;  // index in BatchParts::arrivals if the value arrives, in BatchParts::moves if it moves, or kLeaves
 };
 
-// Arrays to which BrickChange::index refers. All borrowed.
+// Arrays to which BrickChange::index refers. Borrows all arrays.
 struct BatchParts {
   GridMoves moves;
   absl::Span<const GridItem> arrivals;
@@ -35,14 +35,15 @@ class BrickBuilder {
   // Ends the batch and frees large buffers.
   void end() { clear_scratch(sources_); }
 
-  // Returns the next version of the brick, null if no value remains. `old` is the present version, null for a brick
-  // that was empty. `index` is the index of the brick. A value occurs at most once in `changes`, except that a value
-  // that leaves may also arrive. O(values of the brick) or, for few changes, O(changes).
+  // Returns the next version of the brick, or null if no value remains. `old` is the present version, null for a brick
+  // that was empty. `index` is the index of the brick in the grid's array. A value occurs at most once in `changes`,
+  // except that a value that leaves may also arrive. O(values of the brick) or, for few changes, O(changes).
   BrickPtr apply(const Brick* old, const BrickGeometry& geometry, uint32_t index,
                  absl::Span<const BrickChange> changes);
 
-  // Returns the next version of the brick, null if no value remains. Sorts all values anew: `sources`, the values of
-  // `old` that stay in the brick, and `changes`, which must all be arrivals.
+  // Returns the next version of the brick, or null if no value remains. Sorts all values again: the values of `old`
+  // that stay in the brick, given by `sources`, and the values that arrive, given by `changes`. Precondition: all
+  // `changes` are arrivals.
   BrickPtr build(const Brick* old, const BrickGeometry& geometry, uint32_t index, absl::Span<const BrickSource> sources,
                  absl::Span<const BrickChange> changes);
 
@@ -72,7 +73,7 @@ class BrickBuilder {
   std::vector<GridSlot>* slots_ = nullptr;
   std::vector<uint32_t> sorted_changes_, recent_changes_;  // indexed by slot: move index, kLeaves or kStays
   std::vector<BrickSource> sources_;
-  float max_extent_ = 0;  // bound for the version that is built
+  float max_extent_ = 0;  // upper bound of the extents of values in the version being built
 };
 
 }  // namespace locus::internal

@@ -1,5 +1,5 @@
 // Functions that scan the values of one brick, or of some of its cells: float kernels test eight values at a time and
-// drop those that cannot satisfy the query; the other values are passed to a visitor. Plain functions; any thread.
+// drop the values that cannot satisfy the query; the other values are passed to a visitor. Plain functions; any thread.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_BRICK_SCAN_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_BRICK_SCAN_H_
 
@@ -18,7 +18,7 @@
 
 namespace locus {
 
-// Reference to a value of the grid, or an empty reference. Valid as long as the snapshot it came from exists.
+// Reference to a value of the grid, or an empty reference. Valid as long as the snapshot that returned it exists.
 // Precondition of the accessors: the reference is not empty.
 class GridRef {
  public:
@@ -47,15 +47,15 @@ class GridRef {
 
 namespace internal {
 
-// Rounding allowance, as a factor of the magnitudes involved. The bounds of a value may exceed its extent by 2^-40 of
-// the magnitudes (see bounds_of() in core/geometry/shape.h). This factor covers that excess and the rounding of the
-// sums in core/index/hash_grid.
+// Rounding allowance, relative to the magnitudes of coordinates and extents. The bounds of a value may exceed its
+// extent by 2^-40 of these magnitudes (see bounds_of() in core/geometry/shape.h). The factor 2^-38 covers this excess
+// and the rounding of the sums in core/index/hash_grid.
 inline constexpr double kBoundsGrowth = 0x1p-38;
 
 inline constexpr KeyRange kAllCells{{0, 0, 0}, {3, 3, 3}};
 
-// Returns the epsilon for culling values of `brick` in float. It covers the rounding of the float columns and the
-// amount by which the bounds of a value may exceed its extent.
+// Returns the epsilon of the float tests that cull the values of `brick`. The epsilon covers the rounding of the
+// float columns, and the excess of a value's bounds over its extent.
 inline double cull_epsilon(const Brick& brick) {
   const double coordinate = brick.geometry.edge;  // twice the largest coordinate in the float columns
   const double extent = brick.max_extent;
@@ -63,7 +63,8 @@ inline double cull_epsilon(const Brick& brick) {
   return double{kCullEpsilon} * (coordinate + extent) + kBoundsGrowth * (magnitude + extent);
 }
 
-// Returns a box that contains the bounds of every value of the brick. Precondition: no extent exceeds `max_extent`.
+// Returns a box that contains the bounds of every value of the brick. Precondition: no value's extent exceeds
+// `max_extent`.
 inline Aabbd box_of_values(const Brick& brick, double max_extent) {
   const BrickGeometry& geometry = brick.geometry;
   const double half = geometry.edge / 2 + max_extent;
@@ -71,7 +72,8 @@ inline Aabbd box_of_values(const Brick& brick, double max_extent) {
                half + kBoundsGrowth * (max_component(abs(geometry.center)) + half));
 }
 
-// Returns `region` relative to the brick, widened so that float culling keeps every value whose bounds overlap it.
+// Returns `region` relative to the brick's centre, widened so that float culling keeps every value whose bounds overlap
+// the region.
 inline GridBox cull_box_of(const Brick& brick, const Aabbd& region) {
   const double epsilon = cull_epsilon(brick);
   GridBox box;
@@ -84,7 +86,8 @@ inline GridBox cull_box_of(const Brick& brick, const Aabbd& region) {
   return box;
 }
 
-// Returns `ball` relative to the brick, widened so that float culling keeps every value that shares a point with it.
+// Returns `ball` relative to the brick's centre, widened so that float culling keeps every value that shares a point
+// with the ball.
 inline GridBall cull_ball_of(const Brick& brick, const Balld& ball) {
   const Vec3d center = ball.center - brick.geometry.center;
   const double magnitude = max_component(abs(center)) + brick.geometry.edge + ball.radius + brick.max_extent;
@@ -98,11 +101,12 @@ inline GridBall cull_ball_of(const Brick& brick, const Balld& ball) {
   return cull;
 }
 
-// Ray relative to a brick, as input of float culling: a line, given by its point nearest to the centre of the brick and
-// its direction. Starting from that point keeps the float coordinates small.
+// Ray relative to a brick's centre, as input of float culling: a line, given by its direction and its point nearest to
+// the centre of the brick. This choice of the point keeps the float coordinates small.
 class CullRay {
  public:
-  // `ray_radius`: displacement bound of the values plus the padding of the slab test.
+  // Makes the line of `ray` relative to `brick`. `ray_radius` is the displacement bound of the values plus the padding
+  // of the slab test.
   CullRay(const Brick& brick, const SlabRay<double>& ray, double ray_radius) {
     const double longest = max_component(abs(ray.direction()));
     const Vec3d direction = ray.direction() * (1 / longest);
@@ -117,8 +121,9 @@ class CullRay {
       line_.point[axis] = static_cast<float>(point[axis]);
       line_.direction[axis] = static_cast<float>(toward[axis]);
     }
-    // Rounding of its direction and point moves the line, within the brick, by a few times 2^-24 of the coordinates of
-    // the point and of the brick's edge, plus 2^-50 of the distance to the origin of the ray. The radius covers this.
+    // Rounding of the line's direction and point moves the line, within the brick, by a few times 2^-24 of the
+    // coordinates of the point and of the brick's edge, plus 2^-50 of the distance to the origin of the ray. The radius
+    // covers this displacement.
     line_.radius =
         static_cast<float>((cull_epsilon(brick) + ray_radius + 0x1p-46 * far +
                             4 * double{kCullEpsilon} * (max_component(abs(point)) + 2 * brick.geometry.edge)) *
@@ -139,12 +144,12 @@ class CullRay {
   static constexpr double kFar = 0x1p120;
 
   GridLine line_;
-  double start_;  // position of the ray's origin along the line
+  double start_;  // signed distance along the line from its point to the ray's origin
   double speed_;  // length of the ray's direction
 };
 
-// Factories of culling functions for a box and for a ball. Called with a brick, a factory returns a function (rows,
-// slots) that runs the kernel. The region or ball must outlive the factory.
+// Factories of culling functions for a box and for a ball. A factory, called with a brick, returns a function (rows,
+// slots) that runs the kernel on values of the brick. The region or ball must outlive the factory and its functions.
 class BoxCull {
  public:
   explicit BoxCull(const Aabbd& region) : region_(&region) {}
@@ -169,7 +174,7 @@ class BallCull {
 };
 
 // Returns the rows of consecutive slots that hold the values of `cells` in the sorted block; `cells` is relative to the
-// brick. Leaves out empty rows and joins adjacent ones.
+// brick. Omits empty rows; cells that are adjacent in storage form one row.
 inline GridRows rows_of(const Brick& brick, const KeyRange& cells) {
   static_assert(GridRows::kMax == 1 << (2 * kBrickBits));
   const GridBlock& sorted = *brick.sorted;
@@ -205,8 +210,8 @@ inline GridRows rows_of(const Brick& brick, const KeyRange& cells) {
   return rows;
 }
 
-// Calls fn(rows) once if the rows hold at most kMaxValues values, else once for each part of at most kMaxValues values.
-// Stops and returns false if a call of fn() returns false.
+// Calls fn(rows) if the rows hold at most kMaxValues values; otherwise splits the rows into parts of at most kMaxValues
+// values and calls fn(part) for each part. Stops and returns false if a call of fn() returns false.
 template <class Fn>
 bool for_each_part(const GridRows& rows, const Fn& fn) {
   uint32_t values = 0;

@@ -19,19 +19,19 @@ struct alignas(32) GridMove {
   uint32_t rotation = kKeeps;  // index in GridMoves::rotations; kKeeps = unchanged
 };
 
-// Moves of a batch. All borrowed.
+// Moves of a batch. Borrows all arrays.
 struct GridMoves {
-  absl::Span<const GridMove> moves;  // of distinct handles
+  absl::Span<const GridMove> moves;  // one move for each moved handle
   absl::Span<const Quaternion> rotations = {};
-  // Index in `moves` of the move of each handle; optional, but it reduces the cost of a batch that moves nearly all
-  // values. The entry of a handle without a move may be any number, so a reader must compare moves[i].handle with the
+  // For each handle, the index in `moves` of its move. Optional; reduces the cost of a batch that moves nearly all
+  // values. The entry of a handle without a move may be any number i, so a reader must compare moves[i].handle with the
   // handle.
   absl::Span<const uint32_t> by_handle = {};
 };
 
 namespace internal {
 
-// Location of a value in the grid, for the writer.
+// Location of a value in the grid, used by the writer only.
 struct GridSlot {
   static constexpr uint32_t kRecent = 1u << 31;  // bit of `slot`: set for Brick::recent, clear for Brick::sorted
 
@@ -44,9 +44,9 @@ struct BrickSource {
   static constexpr uint32_t kArrival = 1u << 30;  // bit of `origin`: set for the index of an arrival
   static constexpr uint32_t kNoMove = ~0u;
 
-  uint32_t origin;  // with kArrival the index of an arrival, else the present slot, as GridSlot::slot
-  uint32_t move;    // index of the move; kNoMove if the value is unchanged
-  uint32_t cell;    // new cell; unused for values that go to the log
+  uint32_t origin;  // index of an arrival with bit kArrival set, or present slot, encoded as in GridSlot::slot
+  uint32_t move;    // index in GridMoves::moves; kNoMove if the value is unchanged or arrives
+  uint32_t cell;    // new cell; unused if the value is appended to the log
 };
 
 // Lookup of moves by handle. Precondition: the batch has moves, and GridMoves::by_handle is given.
@@ -70,11 +70,11 @@ class MoveFinder {
   absl::Span<const uint32_t> index_by_handle_;
 };
 
-// Writes to `out` a source for each of the first `count` values of a block that stays in the brick, whether it moves or
-// not. Returns the end of the written sources. Skips slots for which is_dead(slot) returns true. Calls leave(block,
-// slot, move) for each value that moves out of the brick. Adds to `moved` the number of values that move, within the
-// brick or out of it. `flag` is GridSlot::kRecent if the block is a log, else 0. `out` must have room for `count`
-// sources.
+// Writes to `out` a source for each value in the first `count` slots of a block that stays in the brick, including
+// values that move within the brick. Returns the end of the written sources. Skips slots for which is_dead(slot)
+// returns true. Calls leave(block, slot, move) for each value that moves out of the brick. Adds to `moved` the number
+// of values that move, within the brick or out of the brick. `flag` is GridSlot::kRecent if the block is a log, else 0.
+// `out` must have room for `count` sources.
 template <class IsDead, class Leave>
 BrickSource* gather_block(const BrickGeometry& geometry, const GridBlock& block, uint32_t count, uint32_t flag,
                           const MoveFinder& moves, BrickSource* out, size_t& moved, const IsDead& is_dead,

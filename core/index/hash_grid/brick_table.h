@@ -2,8 +2,8 @@
 // full. An entry stores the index and part of the hash but no key, so the caller of find() compares the key with that
 // of the brick. A value type; threads as for a standard container.
 //
-// Invariant: size_ entries are occupied, at most half of all entries; no free entry lies between an occupied entry and
-// the slot of its hash.
+// Invariant: size_ slots are occupied, at most half of all slots; no slot between the home slot of an entry's hash and
+// the slot of the entry is free.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_BRICK_TABLE_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_BRICK_TABLE_H_
 
@@ -20,8 +20,8 @@ class BrickTable {
   static constexpr uint32_t kNone = ~0u;
 
   size_t size() const { return size_; }
-  // Returns the brick for which has_key(brick) is true, kNone if there is none. Calls has_key() only for bricks with
-  // the hash of `key`.
+  // Returns the brick for which has_key(brick) is true, or kNone if no brick has the key. Calls has_key() only for
+  // bricks with the hash of `key`.
   template <class HasKey>
   uint32_t find(const GridKey& key, const HasKey& has_key) const {
     const uint32_t hash = hash_of(key);
@@ -52,8 +52,8 @@ class BrickTable {
   static uint32_t hash_of(const GridKey& key) { return static_cast<uint32_t>(GridKeyHash()(key)); }
   size_t mask() const { return slots_.size() - 1; }
   void put(const Slot& slot);
-  // Checks the load factor, and that find() returns `brick` for `key` if `expected` is true, else kNone. O(length of
-  // the probe).
+  // Checks the load factor, and that the table contains `brick` under `key` if and only if `expected` is true. O(length
+  // of the probe).
   void check_invariants(const GridKey& key, uint32_t brick, bool expected) const;
 
   std::vector<Slot> slots_ = std::vector<Slot>(8);

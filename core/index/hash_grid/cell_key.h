@@ -1,6 +1,6 @@
-// Keys of cells and bricks: a cell of one level has an edge of 2^exponent and is named by a 64-bit integer per axis; a
+// Keys of cells and bricks: a cell of one level has an edge of 2^exponent, and its key is a 64-bit integer per axis; a
 // brick is 4x4x4 cells. Plain functions without state; any thread. Cell edges are powers of two, so scaling a
-// coordinate is exact; every index is monotone in its coordinate.
+// coordinate is exact, and a larger coordinate never has a smaller index.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_CELL_KEY_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_CELL_KEY_H_
 
@@ -16,11 +16,12 @@
 
 namespace locus::internal {
 
-inline constexpr int kMinCellExponent = -20;      // of the base level; about a micrometre if the unit is a metre
-inline constexpr int kMaxBaseExponent = 31;       // of the base level: one cell holds the world
-inline constexpr int kMaxCellExponent = 40;       // of any level; still larger values are stored there too
-inline constexpr int kBrickBits = 2;              // a brick is 2^kBrickBits cells wide
-inline constexpr double kMaxCellIndex = 0x1p+62;  // far outside the world; keeps every cast defined
+inline constexpr int kMinCellExponent = -20;  // min for the base level; about a micrometre if the unit is a metre
+inline constexpr int kMaxBaseExponent = 31;   // max for the base level; such a cell is wider than the world
+inline constexpr int kMaxCellExponent = 40;   // max for any level; this level also stores values wider than its cells
+inline constexpr int kBrickBits = 2;          // a brick is 2^kBrickBits cells wide
+inline constexpr double kMaxCellIndex =
+    0x1p+62;  // limit of indices, far outside the world, so that every cast is defined
 
 // Integer coordinates of a cell or a brick of one level.
 struct GridKey {
@@ -31,7 +32,8 @@ struct GridKey {
   friend constexpr auto operator<=>(const GridKey&, const GridKey&) = default;
 };
 
-// Hash of a key: equal in every process, which makes visiting order and work counters reproducible.
+// Hash of a key. The hash of a key is equal in every process, so the order of visits and the work counters are
+// reproducible.
 struct GridKeyHash {
   static constexpr uint64_t mix(uint64_t h) {
     h = (h ^ (h >> 30)) * 0xBF58476D1CE4E5B9u;
@@ -48,7 +50,7 @@ inline int64_t to_cell_index(double scaled) {
   return static_cast<int64_t>(std::clamp(scaled, -kMaxCellIndex, kMaxCellIndex));
 }
 
-// Returns the inverse of the cell edge, which is exact. The functions below take it as `per_unit`.
+// Returns the inverse of the cell edge, exactly. The parameter `per_unit` of the functions below is this value.
 inline double cells_per_unit(int exponent) { return std::ldexp(1.0, -exponent); }
 
 // Returns the index of the cell that contains `coordinate` on one axis. Does not use std::floor(), which is a library
@@ -76,7 +78,8 @@ inline GridKey brick_of(const GridKey& cell) {
   return {cell.x >> kBrickBits, cell.y >> kBrickBits, cell.z >> kBrickBits};
 }
 
-// Returns the index of a cell within its brick: 0 to 63; z is the most significant part.
+// Returns the index of a cell within its brick, 0 to 63: x + 4 y + 16 z for the coordinates 0 to 3 of the cell in the
+// brick.
 inline int index_in_brick(const GridKey& cell) {
   constexpr int64_t kMask = (int64_t{1} << kBrickBits) - 1;
   return static_cast<int>((cell.x & kMask) | (cell.y & kMask) << kBrickBits | (cell.z & kMask) << (2 * kBrickBits));
@@ -96,12 +99,12 @@ inline double extent_of(const Aabbd& bounds, Vec3d position) {
   return std::max(max_component(position - bounds.min), max_component(bounds.max - position));
 }
 
-// Box of keys of bricks or cells, from `lo` to `hi`, both included.
+// Box of keys of bricks or cells: on each axis from `lo` to `hi`, both included.
 struct KeyRange {
   GridKey lo, hi;
 
   bool empty() const { return lo.x > hi.x || lo.y > hi.y || lo.z > hi.z; }
-  double count() const {  // in double, since it may exceed 64 bits
+  double count() const {  // in double, since the count may exceed 64 bits
     return (static_cast<double>(hi.x - lo.x) + 1) * (static_cast<double>(hi.y - lo.y) + 1) *
            (static_cast<double>(hi.z - lo.z) + 1);
   }

@@ -27,13 +27,13 @@ int exponent_of_all(absl::Span<const SampledValue> sample) {
     high = max(high, value.position);
   }
   const double width = max_component(high - low), magnitude = max_component(max(abs(low), abs(high)));
-  // If all values coincide, `width` is zero. The term with the magnitude then prevents tiny cells, which the values
-  // would leave with every move.
+  // If all values coincide, `width` is zero. The term with the magnitude then prevents tiny cells: a value would leave
+  // a tiny cell with every move.
   return exponent_covering(std::max(4 * width, 0x1p-16 * magnitude), kMinCellExponent, kMaxBaseExponent);
 }
 
-// Returns the expected number of other values in the cell of a random value. The fraction of the sample's pairs of
-// values that share a cell estimates this fraction for the population, so the sample size does not bias the estimate.
+// Returns the expected number of other values in the cell of a random value. The fraction of pairs of values that share
+// a cell is estimated by this fraction in the sample, so the sample size does not bias the result.
 double mean_others_per_cell(absl::Span<const SampledValue> sample, size_t population, int exponent) {
   if (sample.size() < 2) return 0;
   std::vector<GridKey> cells;

@@ -19,7 +19,8 @@ inline constexpr size_t kCellSizeSample = 2048;
 // or, if larger, kMaxAddedPerCell more than the mean at the smallest cell size considered.
 inline constexpr double kMaxMeanPerCell = 24;
 inline constexpr double kMaxAddedPerCell = 12;
-// Range of that mean within which cell_exponent_fits() accepts a cell size that was chosen earlier.
+// Range for cell_exponent_fits(): the function accepts a cell size that was chosen earlier if the mean number of other
+// values in the cell of a random value lies within this range.
 inline constexpr double kMinOthersPerCell = 6;
 inline constexpr double kMaxOthersPerCell = 64;
 
@@ -28,20 +29,21 @@ struct SampledValue {
   double diameter = 0;
 };
 
-// Returns the exponent of the largest cell edge, at least the median diameter, at which a random value shares its cell
-// with at most kMaxMeanPerCell others on average. The mean is estimated for `population` values, of which `sample` is
-// an even selection. Values that share a cell at every cell size raise the limit, so they do not prevent larger cells.
-// Unless the median diameter requires it, no cell is much wider than the bounds of all values. Preconditions: `sample`
-// is not empty, population >= sample.size(). Cost: at most about fifty sorts of the sample.
+// Returns the exponent e of the largest cell edge 2^e at which a random value shares its cell with at most
+// kMaxMeanPerCell other values on average. The edge is at least the median diameter of the values and, unless this
+// diameter requires it, not much larger than the bounds of all values. The mean is estimated for `population` values,
+// of which `sample` is an even selection. Values that share a cell at every cell size raise the limit (see
+// kMaxAddedPerCell), so they do not prevent larger cells. Preconditions: `sample` is not empty, population >=
+// sample.size(). Cost: at most about fifty sorts of the sample.
 int choose_cell_exponent(absl::Span<const SampledValue> sample, size_t population);
 
 // Returns true if cells with an edge of 2^exponent are still suitable: a random value shares its cell with
-// kMinOthersPerCell to kMaxOthersPerCell others on average. Costs one sort of the sample, much less than
+// kMinOthersPerCell to kMaxOthersPerCell other values on average. Costs one sort of the sample, much less than
 // choose_cell_exponent().
 bool cell_exponent_fits(absl::Span<const SampledValue> sample, size_t population, int exponent);
 
-// Even selection among `population` values, which are offered one by one. Selects all of them if they are fewer than
-// kCellSizeSample, else kCellSizeSample to 2 * kCellSizeSample of them.
+// Even selection among `population` values, which are offered one by one. Selects all values if `population` is less
+// than kCellSizeSample, else kCellSizeSample to 2 * kCellSizeSample values.
 class EvenSample {
  public:
   explicit EvenSample(size_t population) : stride_(std::max<size_t>(1, population / kCellSizeSample)) {}

@@ -5,8 +5,8 @@
 namespace locus::internal {
 
 GridBlock::GridBlock(uint32_t count, bool has_forms) : count_(count), stride_((count + kLanes - 1) / kLanes * kLanes) {
-  // A vector load at the last value of the last float column reads beyond the column, but ends within the handles or
-  // entries and so within memory_.
+  // A vector load that starts at the last value of the last float column reads beyond this column. The bytes behind the
+  // column are the handles and entries, so the load does not read beyond memory_.
   const size_t floats = size_t{4} * stride_ * sizeof(float);
   const size_t handles = size_t{stride_} * sizeof(uint32_t);
   const size_t entries = count * sizeof(GridEntry);
@@ -22,14 +22,12 @@ GridBlock::GridBlock(uint32_t count, bool has_forms) : count_(count), stride_((c
 }
 
 void GridBlock::check_invariants() const {
-  if constexpr (kDebugChecks) {
-    LOCUS_DCHECK_EQ(offsets_[0], 0u);
-    LOCUS_DCHECK_EQ(offsets_[kBrickCells], count_);
-    for (size_t cell = 0; cell < kBrickCells; ++cell) LOCUS_DCHECK_LE(offsets_[cell], offsets_[cell + 1]);
-    LOCUS_DCHECK_EQ(stride_ % kLanes, 0u);
-    for (uint32_t slot = count_; slot < stride_; ++slot)
-      for (int axis = 0; axis < 4; ++axis) LOCUS_DCHECK_EQ(column(axis)[slot], 0.0f);
-  }
+  LOCUS_DCHECK_EQ(offsets_[0], 0u);
+  LOCUS_DCHECK_EQ(offsets_[kBrickCells], count_);
+  for (size_t cell = 0; cell < kBrickCells; ++cell) LOCUS_DCHECK_LE(offsets_[cell], offsets_[cell + 1]);
+  LOCUS_DCHECK_EQ(stride_ % kLanes, 0u);
+  for (uint32_t slot = count_; slot < stride_; ++slot)
+    for (int axis = 0; axis < 4; ++axis) LOCUS_DCHECK_EQ(column(axis)[slot], 0.0f);
 }
 
 uint32_t GridBlock::find(uint32_t handle) const {
@@ -54,7 +52,7 @@ uint32_t GridBlock::find_near(uint32_t handle, uint32_t slot) const {
   constexpr uint32_t kSlots = 2 * kLanes;
   if (stride_ < kSlots) return find(handle);
   const uint32_t begin = std::min(slot < kLanes ? 0 : slot - kLanes, stride_ - kSlots);
-  uint32_t position_plus_one = 0;  // 0 if not found; a handle occurs at most once
+  uint32_t position_plus_one = 0;  // 0 if `handle` is not found; a handle occurs at most once
   for (uint32_t i = 0; i < kSlots; ++i) position_plus_one |= handles_[begin + i] == handle ? i + 1 : 0;
   return position_plus_one == 0 ? count_ : begin + position_plus_one - 1;
 }

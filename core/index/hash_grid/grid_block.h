@@ -1,12 +1,13 @@
-// Block: values of one brick of the hash grid, in columns. Float columns, relative to the centre of the brick, serve
-// culling of eight values at a time; the exact values in double are one entry each.
+// Block: values of one brick of the hash grid, in columns. Float columns, relative to the centre of the brick, are used
+// to cull eight values at a time. The exact position in double and the other members of a value are stored as one
+// entry.
 //
 // Threads: immutable once shared; any thread. A log is the exception: its single writer appends values behind the slots
-// that earlier versions use, while the readers of these versions read the same memory.
+// that earlier versions of the brick use, while readers of these versions read the same memory.
 //
 // Invariants: in a sorted block values are ordered by cell, and those of cell c occupy the slots offsets[c] to
-// offsets[c + 1] - 1; in a log they are in order of arrival. Float columns are padded with zeros to whole vectors, and
-// a vector load may start at any value.
+// offsets[c + 1] - 1; in a log they are in order of arrival. Float columns are padded with zeros to whole vectors of
+// eight floats, and a vector load may start at any value.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_GRID_BLOCK_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_GRID_BLOCK_H_
 
@@ -21,7 +22,7 @@
 
 namespace locus {
 
-// Value as the grid stores it, without its form, its extent and its handle, which have columns of their own.
+// Value as the grid stores it, without its form (GridForm), its extent and its handle, which have columns of their own.
 struct GridEntry {
   Vec3d position;
   Id id = kNoId;
@@ -32,18 +33,19 @@ struct GridEntry {
 };
 static_assert(sizeof(GridEntry) == 56);
 
-// Rotation, size and radius of a shape, as in Shape. Most values have the default form, so a block may omit the forms.
+// Rotation, size and radius of a shape, as in Shape. Most values have the default form, so a block may omit the forms
+// if all its values have the default form.
 struct GridForm {
   Quaternion rotation;
   Vec3f size;
-  float radius = 0;  // 0 for balls: their radius is their extent
+  float radius = 0;  // 0 for balls, whose radius is their extent
 
   friend constexpr bool operator==(const GridForm&, const GridForm&) = default;
 };
 
-// Value with all its parts, for example to be inserted. `handle` is the identifier that the caller assigned. `reach` is
-// the extent of the value: an upper bound of the distance from its position to its bounds along any axis and under any
-// rotation, not including the growth of bounds_of() by rounding; for balls the exact radius.
+// Value with all its parts, for example as the argument of an insertion. `handle` is the identifier that the caller
+// assigned. `reach` is the extent of the value: an upper bound of the distance from its position to its bounds along
+// any axis and under any rotation, not including the growth of bounds_of() by rounding; for balls the exact radius.
 struct GridItem {
   GridEntry entry;
   uint32_t handle = 0;
@@ -65,7 +67,7 @@ class GridBlock {
 
   uint32_t count() const { return count_; }
   bool has_forms() const { return forms_ != nullptr; }
-  // Returns a column: 0 to 2 = x, y, z relative to the centre of the brick, 3 = extent.
+  // Returns a float column. Columns 0 to 2 are x, y and z relative to the centre of the brick; column 3 is the extent.
   const float* column(int index) const {
     LOCUS_DCHECK(0 <= index && index < 4);
     return floats_ + size_t{stride_} * static_cast<size_t>(index);
@@ -90,7 +92,8 @@ class GridBlock {
   GridItem item(uint32_t slot) const { return {entry(slot), handle(slot), extent(slot), form(slot)}; }
   // Returns the slot of `handle`, or count() if the block does not contain it. O(count), a vector at a time.
   uint32_t find(uint32_t handle) const;
-  // Returns the last slot of `handle` among the first `count` slots of a log, or `count` if there is none.
+  // Returns the last slot of `handle` among the first `count` slots of a log, or `count` if these slots do not contain
+  // the handle.
   uint32_t find_last(uint32_t handle, uint32_t count) const;
   // Returns the slot of `handle` if it is one of the 16 slots around `slot`, else count(). A block of at most one
   // vector is searched completely.
@@ -116,7 +119,7 @@ class GridBlock {
     prefetch_value(slot);
   }
 
-  // Pointers to the columns of a block for reading, which a loop can keep in registers.
+  // Pointers to the columns of a block for reading. A loop can keep these pointers in registers.
   struct Values {
     explicit Values(const GridBlock& block)
         : entries(block.entries_), handles(block.handles_), extents(block.column(3)) {}
@@ -137,7 +140,7 @@ class GridBlock {
           entries_(block.entries_),
           center_(center) {}
 
-    // Writes one slot: `entry` with its position replaced by `position`.
+    // Writes one slot: all members of `entry` except its position, and the given position, handle and extent.
     void put(uint32_t slot, const GridEntry& entry, Vec3d position, uint32_t handle, float extent) const {
       x_[slot] = static_cast<float>(position.x - center_.x);
       y_[slot] = static_cast<float>(position.y - center_.y);

@@ -11,8 +11,8 @@ namespace locus {
 namespace internal {
 
 KeyRange cells_near(const GridLevel& level, const Aabbd& region) {
-  // The position of every value lies within the bounds of the level, so clipping to these loses no value, and it keeps
-  // the cell indices in range. max_extent is already rounded up, so no further allowance is needed.
+  // The position of every value lies within the bounds of the level, so clipping the region to these bounds loses no
+  // value. Clipping also keeps the cell indices in range. max_extent includes an allowance for rounding.
   const Aabbd& bounds = level.geometry.bounds;
   const Aabbd near = grown(region, level.geometry.max_extent);
   const Aabbd inside{max(near.min, bounds.min), min(near.max, bounds.max)};
@@ -40,23 +40,21 @@ GridSnapshot::GridSnapshot(std::vector<internal::GridLevel> levels, internal::Br
       bricks_by_handle_(std::move(bricks_by_handle)),
       cell_size_(cell_size) {
   for (const internal::GridLevel& level : levels_) size_ += level.size;
-  check_invariants();
+  LOCUS_DCHECK_CALL(check_invariants());
 }
 
 void GridSnapshot::check_invariants() const {
-  if constexpr (kDebugChecks) {
-    for (size_t i = 0; i < levels_.size(); ++i) {
-      const internal::GridLevel& level = levels_[i];
-      if (i != 0) LOCUS_DCHECK_GT(levels_[i - 1].exponent, level.exponent);
-      LOCUS_DCHECK_GT(level.size, 0u);
-      LOCUS_DCHECK(level.table != nullptr);
-      LOCUS_DCHECK_LE(level.table->size(), level.size);
-      LOCUS_DCHECK(!level.geometry.bounds.empty());
-      LOCUS_DCHECK_GE(level.geometry.max_extent, 0.0);
-      LOCUS_DCHECK_EQ(level.geometry.cells_per_unit, internal::cells_per_unit(level.exponent));
-    }
-    LOCUS_DCHECK(size_ <= bricks_by_handle_.size() || planted(PlantedBug::kGhostAfterMove));
+  for (size_t i = 0; i < levels_.size(); ++i) {
+    const internal::GridLevel& level = levels_[i];
+    if (i != 0) LOCUS_DCHECK_GT(levels_[i - 1].exponent, level.exponent);
+    LOCUS_DCHECK_GT(level.size, 0u);
+    LOCUS_DCHECK(level.table != nullptr);
+    LOCUS_DCHECK_LE(level.table->size(), level.size);
+    LOCUS_DCHECK(!level.geometry.bounds.empty());
+    LOCUS_DCHECK_GE(level.geometry.max_extent, 0.0);
+    LOCUS_DCHECK_EQ(level.geometry.cells_per_unit, internal::cells_per_unit(level.exponent));
   }
+  LOCUS_DCHECK(size_ <= bricks_by_handle_.size() || planted(PlantedBug::kGhostAfterMove));
 }
 
 GridRef GridSnapshot::find_in(const internal::Brick& brick, uint32_t handle) {
@@ -76,7 +74,7 @@ GridRef GridSnapshot::at(uint32_t handle) const {
 
 GridRef GridSnapshot::find(uint32_t handle) const {
   if (handle >= bricks_by_handle_.size()) return {};
-  const uint32_t index = bricks_by_handle_[handle];  // stale if the handle is not in use
+  const uint32_t index = bricks_by_handle_[handle];  // index of an earlier brick if the handle is not in use
   if (index >= bricks_.size() || bricks_[index] == nullptr) return {};
   return find_in(*bricks_[index], handle);
 }

@@ -1,13 +1,13 @@
-// Snapshot of the hash grid: the structure that readers query. Immutable, copied in O(1), any thread. It only culls:
-// each value that may satisfy a query is passed to the caller once, and the caller decides by the exact predicate of
-// the value in double.
+// Snapshot of the hash grid: the structure that readers query. Immutable; copied in O(1); any thread. A snapshot only
+// culls: it passes each value that may satisfy a query to the caller once, and the caller applies the exact predicate
+// of the value in double.
 //
 // A value is stored in the one cell that contains its position, on the level whose cells are at least as wide as the
-// value. A query therefore widens its range on each level by the largest extent of that level, which is at most half a
-// cell unless a value is wider than the cells of the coarsest possible level. So it misses no value, and a large value
-// does not widen the lookups on other levels. Levels are visited coarse to fine, so that a hit on a large near value
-// shortens a ray before the many small values are tested. Source: Ericson, Real-Time Collision Detection, 2005, 7.2
-// (one cell per value); Schornbaum, Hierarchical Hash Grids for Coupled Particle Simulations, 2009.
+// value. A query therefore widens its range on each level by the largest extent of that level, so it misses no value.
+// This extent is at most half a cell, unless a value is wider than the cells of the coarsest possible level. A large
+// value does not widen the range on other levels. Levels are visited from coarse to fine, so that a hit on a large near
+// value shortens a ray before the many small values are tested. Source: Ericson, Real-Time Collision Detection, 2005,
+// 7.2 (one cell per value); Schornbaum, Hierarchical Hash Grids for Coupled Particle Simulations, 2009.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_GRID_SNAPSHOT_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_GRID_SNAPSHOT_H_
 
@@ -41,23 +41,23 @@ using BrickIndices = PersistentArray<uint32_t, 1024>;
 
 struct GridLevel {
   int exponent = 0;        // cell edge = 2^exponent
-  LevelGeometry geometry;  // covers every value; does not shrink until the level is empty
+  LevelGeometry geometry;  // geometry around all values; does not shrink until the level is empty
   size_t size = 0;         // number of values
   std::shared_ptr<const BrickTable> table;
 };
 
 // Returns the cells of `level` in which a value whose bounds overlap `region` may be stored.
 KeyRange cells_near(const GridLevel& level, const Aabbd& region);
-// Returns the part of the cell range `range` that lies in the brick with the key `brick`, relative to that brick:
-// coordinates 0 to 3.
+// Returns the part of the range of cells `range` that lies in the brick with the key `brick`, in coordinates relative
+// to that brick, 0 to 3.
 KeyRange within_brick(const KeyRange& range, const GridKey& brick);
 
 }  // namespace internal
 
-// Position of an iteration over a snapshot by for_each_from(). Valid for that snapshot only.
+// Position of an iteration over a snapshot by for_each_from(). Valid only for this snapshot.
 struct GridCursor {
   size_t brick = 0;
-  size_t values = 0;  // values of that brick that have been visited
+  size_t values = 0;  // number of values of the brick at `brick` that have been visited
 };
 
 class GridSnapshot {
@@ -70,13 +70,13 @@ class GridSnapshot {
   // Returns the cell edge of the base level.
   double cell_size() const { return cell_size_; }
 
-  // Calls visit(GridRef) for every value whose bounds overlap `region`, and for some others near it. Ends if visit()
-  // returns false.
+  // Calls visit(GridRef) for every value whose bounds overlap `region`, and for some other values near the region. Ends
+  // if visit() returns false.
   template <class Visit>
   void visit_region(const Aabbd& region, Work& work, const Visit& visit) const;
-  // Calls visit(GridRef) for every value that shares a point with the ball, and for some others near it. Ends if
-  // visit() returns false. `bounds` are the bounds of the ball. Visits fewer values than visit_region(bounds): a value
-  // whose bounds overlap `bounds` may still be culled.
+  // Calls visit(GridRef) for every value that shares a point with the ball, and for some other values near the ball.
+  // Ends if visit() returns false. `bounds` are the bounds of the ball. Visits fewer values than visit_region(bounds):
+  // a value whose bounds overlap `bounds` may still be culled.
   template <class Visit>
   void visit_ball(const Balld& ball, const Aabbd& bounds, Work& work, const Visit& visit) const;
   // Calls fn(brick, cells) for each brick that visit_region(region) would scan; `cells` are the cells to scan, relative
@@ -84,18 +84,19 @@ class GridSnapshot {
   template <class Fn>
   bool for_few_bricks(const Aabbd& region, size_t max_bricks, Work& work, const Fn& fn) const;
 
-  // Calls visit(GridRef) for every value whose bounds have an interval on the ray with near <= far, far >= 0 and
-  // near <= limit(), and for some others near the ray; roughly near to far on each level. limit() may fall during the
-  // visit. Ends if visit() returns false. `displacement_bound` is an upper bound of the distance between the true and
-  // the stored position of a value.
+  // Calls visit(GridRef) for every value whose bounds have an interval on the ray with near <= far, far >= 0 and near
+  // <= limit(), and for some other values near the ray; roughly from near to far on each level. limit() may decrease
+  // during the visit. Ends if visit() returns false. `displacement_bound` is an upper bound of the distance between the
+  // true and the stored position of a value.
   template <class Limit, class Visit>
   void visit_ray(const SlabRay<double>& ray, const Limit& limit, Work& work, const Visit& visit,
                  double displacement_bound = 0) const;
 
   // Calls visit(GridRef) for every value whose bounds have a squared_distance() of at most limit() from `point`, and
-  // for some others near it; roughly near to far on each level. limit() may fall during the visit. Ends if visit()
-  // returns false. Cost on each level: proportional to the cells within the final limit() and their values. If these
-  // cells lie in more bricks than the level has, each brick of the level is tested once instead.
+  // for some other values near the point; roughly from near to far on each level. limit() may decrease during the
+  // visit. Ends if visit() returns false. Cost on each level: proportional to the number of cells within the final
+  // limit() and of their values. If the range of these cells has more bricks than the level, each brick of the level is
+  // tested once instead.
   template <class Limit, class Visit>
   void visit_nearest(const Vec3d& point, const Limit& limit, Work& work, const Visit& visit) const;
 
@@ -104,7 +105,7 @@ class GridSnapshot {
   bool for_each(const Visit& visit) const;
   // Continues an iteration over all values at `cursor`: calls visit(GridRef) for each further value until visit()
   // returns false, and advances the cursor past each visited value. So a long iteration can be split into steps.
-  // Returns false if visit() did. O(visited values + values of the brick at the cursor).
+  // Returns false if visit() returned false. O(visited values + values of the brick at the cursor).
   template <class Visit>
   bool for_each_from(GridCursor& cursor, const Visit& visit) const;
 
@@ -113,8 +114,8 @@ class GridSnapshot {
   // Returns the value of a handle, or an empty reference if the handle is not in use in this snapshot. O(values in a
   // brick).
   GridRef find(uint32_t handle) const;
-  // Returns find(value.handle()) for a value of another snapshot of the same grid. Faster than find() if the value has
-  // about the same slot in this snapshot.
+  // Returns find(value.handle()) for a value of another snapshot of the same grid. Faster than find() if the slot of
+  // the value in this snapshot is close to its slot in the other snapshot.
   GridRef find_like(const GridRef& value) const;
 
   // Returns counts and memory of this snapshot. O(values).
@@ -128,8 +129,9 @@ class GridSnapshot {
   void check_invariants() const;
   const internal::Brick* find_brick(const internal::GridLevel& level, const internal::GridKey& key) const;
   static GridRef find_in(const internal::Brick& brick, uint32_t handle);
-  // Calls fn(brick) for the existing bricks of a range of keys. Stops and returns false if fn() returns false. Looks up
-  // each key or, if the level has fewer bricks than the range has keys, iterates over the bricks of the level.
+  // Calls fn(brick) for the existing bricks in the range `bricks` of keys. Stops and returns false if fn() returns
+  // false. Looks up each key or, if the level has fewer bricks than the range has keys, iterates over the bricks of the
+  // level.
   template <class Fn>
   bool for_each_brick(const internal::GridLevel& level, const internal::KeyRange& bricks, Work& work,
                       const Fn& fn) const;
@@ -137,24 +139,24 @@ class GridSnapshot {
   // scan_rows()).
   template <class CullOf, class Visit>
   void visit_cells(const Aabbd& region, Work& work, const CullOf& cull_of, const Visit& visit) const;
-  // Visits the bricks of one level slab by slab. Returns false if visit() did.
+  // Visits the bricks of one level slab by slab. Returns false if visit() returned false.
   template <class Limit, class Visit>
   bool march(const internal::GridLevel& level, const internal::SlabMarch& slabs, double ray_radius,
              const SlabRay<double>& ray, const Limit& limit, Work& work, const Visit& visit) const;
   // Returns the estimated number of values per cell of `level` near `point`.
   double values_per_cell(const internal::GridLevel& level, const Vec3d& point) const;
-  // Visits the values of the present shell and all later ones brick by brick, from near to far. Used if the range of a
-  // shell has more keys than the level has bricks. Returns false if visit() did.
+  // Visits the values of the present shell and of all later shells brick by brick, from near to far. Used if the range
+  // of a shell has more keys than the level has bricks. Returns false if visit() returned false.
   template <class Limit, class Visit>
   bool visit_nearest_bricks(const internal::GridLevel& level, const internal::NearestShells& shells, const Vec3d& point,
                             const Limit& limit, Work& work, const Visit& visit) const;
   // Visits all bricks of a level that the ray meets, from near to far. Used if march() would look up more keys than the
-  // level has bricks. Returns false if visit() did.
+  // level has bricks. Returns false if visit() returned false.
   template <class Limit, class Visit>
   bool visit_by_distance(const internal::GridLevel& level, double max_extent, double ray_radius,
                          const SlabRay<double>& ray, const Limit& limit, Work& work, const Visit& visit) const;
 
-  std::vector<internal::GridLevel> levels_;  // coarse to fine
+  std::vector<internal::GridLevel> levels_;  // levels from coarse to fine
   internal::BrickArray bricks_;
   internal::BrickIndices bricks_by_handle_;
   size_t size_ = 0;

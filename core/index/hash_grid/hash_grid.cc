@@ -38,35 +38,31 @@ GridRef HashGrid::at(uint32_t handle) const {
   return {recent ? *brick.recent : *brick.sorted, slot.slot & ~GridSlot::kRecent, slot.brick};
 }
 
-// Checks that the location of a handle is a slot with that handle in an existing brick. O(1).
+// Checks that slots_[handle] is the location of a slot with this handle in an existing brick. O(1).
 void HashGrid::check_in_use(uint32_t handle) const {
-  if constexpr (kDebugChecks) {
-    if (planted(PlantedBug::kGhostAfterMove)) return;  // a handle then has several slots
-    LOCUS_DCHECK_LT(handle, slots_.size());
-    LOCUS_DCHECK_LT(slots_[handle].brick, bricks_.size());
-    LOCUS_DCHECK(bricks_[slots_[handle].brick] != nullptr);
-    LOCUS_DCHECK_EQ(at(handle).handle(), handle);
-  }
+  if (planted(PlantedBug::kGhostAfterMove)) return;  // with this bug a handle has several slots
+  LOCUS_DCHECK_LT(handle, slots_.size());
+  LOCUS_DCHECK_LT(slots_[handle].brick, bricks_.size());
+  LOCUS_DCHECK(bricks_[slots_[handle].brick] != nullptr);
+  LOCUS_DCHECK_EQ(at(handle).handle(), handle);
 }
 
 // Checks the invariants of the class for the levels and for the bricks and values that the batch has changed. O(changes
 // + levels).
 void HashGrid::check_invariants(const GridBatch& batch) const {
-  if constexpr (kDebugChecks) {
-    size_t values = 0, bricks = 0;
-    for (size_t i = 0; i < levels_.size(); ++i) {
-      if (i != 0) LOCUS_DCHECK_GT(levels_[i - 1]->exponent, levels_[i]->exponent);
-      LOCUS_DCHECK_GT(levels_[i]->size, 0u);
-      LOCUS_DCHECK_GT(levels_[i]->table->size(), 0u);
-      values += levels_[i]->size;
-      bricks += levels_[i]->table->size();
-    }
-    LOCUS_DCHECK_EQ(values, size_);
-    LOCUS_DCHECK_EQ(bricks, brick_info_.size() - free_bricks_.size());
-    LOCUS_DCHECK_EQ(touched_indices_.size(), brick_info_.size());
-    for (const uint32_t brick : touched_) check_brick(brick);
-    check_locations(batch);
+  size_t values = 0, bricks = 0;
+  for (size_t i = 0; i < levels_.size(); ++i) {
+    if (i != 0) LOCUS_DCHECK_GT(levels_[i - 1]->exponent, levels_[i]->exponent);
+    LOCUS_DCHECK_GT(levels_[i]->size, 0u);
+    LOCUS_DCHECK_GT(levels_[i]->table->size(), 0u);
+    values += levels_[i]->size;
+    bricks += levels_[i]->table->size();
   }
+  LOCUS_DCHECK_EQ(values, size_);
+  LOCUS_DCHECK_EQ(bricks, brick_info_.size() - free_bricks_.size());
+  LOCUS_DCHECK_EQ(touched_indices_.size(), brick_info_.size());
+  for (const uint32_t brick : touched_) check_brick(brick);
+  check_locations(batch);
 }
 
 // Checks that the version of a brick agrees with its entry in brick_info_ and with its level. Skips a dropped brick,
@@ -86,9 +82,9 @@ void HashGrid::check_brick(uint32_t brick) const {
 
 // Checks the locations of the values that the batch has moved or inserted. O(changes).
 void HashGrid::check_locations(const GridBatch& batch) const {
-  if (planted(PlantedBug::kGhostAfterMove)) return;  // a handle then has several slots
+  if (planted(PlantedBug::kGhostAfterMove)) return;  // with this bug a handle has several slots
   const auto check = [this](uint32_t handle, Vec3d position) {
-    check_in_use(handle);
+    LOCUS_DCHECK_CALL(check_in_use(handle));
     LOCUS_DCHECK(at(handle).entry().position == position);
     LOCUS_DCHECK_EQ(bricks_by_handle_[handle], slots_[handle].brick);
   };
@@ -134,9 +130,8 @@ uint32_t HashGrid::brick_for(Level& level, const GridKey& key) {
   return brick;
 }
 
-// Returns the index of `brick` in touched_, appending it if necessary. A brick is touched if touched_ holds it at its
-// index in touched_indices_. An index left by an earlier batch fails this test, so touched_indices_ needs no clearing
-// between batches.
+// Finds `brick` in touched_ at the index touched_indices_[brick]. If an earlier batch wrote this index, touched_ has no
+// entry or another brick there, so touched_indices_ need not be cleared between batches.
 inline uint32_t HashGrid::touch(uint32_t brick) {
   const uint32_t known_index = touched_indices_[brick];
   if (known_index < touched_.size() && touched_[known_index] == brick) return known_index;
@@ -154,7 +149,7 @@ void HashGrid::change(uint32_t brick, const BrickChange& change) {
 
 void HashGrid::remove(uint32_t handle) {
   LOCUS_CHECK_LT(handle, slots_.size());
-  check_in_use(handle);
+  LOCUS_DCHECK_CALL(check_in_use(handle));
   const GridSlot slot = slots_[handle];
   --brick_info_[slot.brick].level->size;
   --size_;
@@ -182,7 +177,7 @@ void HashGrid::move_to_other_brick(const GridMove& move, const GridMoves& moves)
   insert_moved(item, move, moves);
 }
 
-// Inserts the value `before` with the pose of `move`.
+// Inserts the value `before` with the position of `move` and, if `move` has one, with its rotation.
 void HashGrid::insert_moved(const GridItem& before, const GridMove& move, const GridMoves& moves) {
   GridItem item = before;
   item.entry.position = move.position;
@@ -198,7 +193,7 @@ void HashGrid::move_all(const GridMoves& batch) {
   leaving_moves_.clear();
   for (size_t i = 0; i < moves.size(); ++i) {
     const GridMove& move = moves[i];
-    check_in_use(move.handle);
+    LOCUS_DCHECK_CALL(check_in_use(move.handle));
     const GridSlot slot = slots_[move.handle];
     if (!brick_info_[slot.brick].geometry.holds(move.position)) {
       leaving_moves_.push_back(static_cast<uint32_t>(i));
@@ -260,7 +255,7 @@ absl::Span<const BrickChange> HashGrid::changes_of(size_t touched) const {
 }
 
 // Prefetches the memory of bricks that follow touched_[touched]. Scattered changes miss the caches, so the memory of
-// the next bricks is requested while earlier ones are processed.
+// the next bricks is requested while earlier bricks are processed.
 void HashGrid::prefetch_changes(size_t touched) const {
   constexpr size_t kBrickAhead = 12, kBlocksAhead = 8, kValuesAhead = 4;
   const auto brick_at = [this](size_t index) {
@@ -298,7 +293,7 @@ void HashGrid::apply_to_bricks(const GridBatch& batch) {
   rebuild_bricks(batch.moves);
   clear_batch();
   std::erase_if(levels_, [](const std::unique_ptr<Level>& level) { return level->size == 0; });
-  check_invariants(batch);
+  LOCUS_DCHECK_CALL(check_invariants(batch));
 }
 
 void HashGrid::clear_batch() {
@@ -317,10 +312,11 @@ bool HashGrid::moves_nearly_all(const GridBatch& batch) const {
 }
 
 // Replaces move_all() if at least half of all values move: iterates over the bricks and looks up the move of each
-// value. Values of a brick are adjacent in memory and most stay in their cell, so moves need not be grouped by brick.
+// value. The values of a brick are adjacent in memory, so the moves need not be grouped by brick.
 void HashGrid::gather_all(const GridMoves& moves) {
   const internal::MoveFinder finder(moves);
-  const auto bricks = static_cast<uint32_t>(brick_info_.size());  // later bricks are new and hold arrivals only
+  const auto bricks =
+      static_cast<uint32_t>(brick_info_.size());  // bricks that insert_moved() creates hold arrivals only
   sources_.resize(size_);
   internal::BrickSource* next = sources_.data();
   for (uint32_t index = 0; index < bricks; ++index) {
@@ -346,7 +342,8 @@ void HashGrid::gather_all(const GridMoves& moves) {
 
 size_t HashGrid::apply(const GridBatch& batch) {
   replaced_bytes_ = 0;
-  if (size_ == 0 && batch.inserted.size() >= first_choice_) {  // files a bulk load only once
+  if (size_ == 0 &&
+      batch.inserted.size() >= first_choice_) {  // choose before a bulk load, so that it stores each value once
     internal::EvenSample sample(batch.inserted.size());
     for (const GridItem& item : batch.inserted) sample.offer(item.entry.position, 2.0 * double{item.reach});
     base_exponent_ = internal::choose_cell_exponent(sample.values(), batch.inserted.size());
@@ -388,8 +385,8 @@ void HashGrid::choose_cell_size() {
   if (exponent != base_exponent_) start_refiling(exponent);
 }
 
-// Adds all bricks to stale_bricks_, sorted so that neighbours follow each other, since their values move to the same
-// new bricks. The order is reversed, since refile() takes bricks from the end.
+// Adds all bricks to stale_bricks_, sorted so that neighbouring bricks are adjacent, because their values move to the
+// same new bricks. The sort order is descending, because refile() removes bricks from the end of stale_bricks_.
 void HashGrid::start_refiling(int base_exponent) {
   base_exponent_ = base_exponent;
   for (uint32_t brick = 0; brick < brick_info_.size(); ++brick)
@@ -402,8 +399,8 @@ void HashGrid::start_refiling(int base_exponent) {
   std::sort(stale_bricks_.begin(), stale_bricks_.end(), [&](uint32_t a, uint32_t b) { return order(b) < order(a); });
 }
 
-// Moves values from stale bricks to the levels of the new base cell, a whole brick at a time, until at least
-// `max_values` values have moved or no stale brick remains.
+// Moves values from the bricks in stale_bricks_ to the levels of the new base cell, a whole brick at a time, until at
+// least `max_values` values have moved or stale_bricks_ is empty.
 void HashGrid::refile(size_t max_values) {
   std::vector<uint32_t> leaving;
   std::vector<GridItem> items;

@@ -1,14 +1,16 @@
-// Hash grid: an index of moving values of any size in an unbounded world. Only occupied bricks of cells are stored.
-// This class is the writer's side: it applies batches of changes and makes snapshots for readers. The grid and its
-// snapshots share all bricks and blocks that did not change in between. README.md shows the structure in a picture.
+// Hash grid: an index of moving values of any size in an unbounded world. Only occupied bricks of cells are stored. The
+// writer of a scene uses HashGrid to apply batches of changes and to make snapshots for readers. The grid and a
+// snapshot share all bricks and blocks that have not changed since the snapshot was made. README.md shows the structure
+// in a picture.
 //
 // Threads: one writer. Snapshots are immutable, may be used by any thread and outlive the grid. Values are identified
 // by handles, small integers that the caller assigns; a handle identifies one value at a time.
 //
-// The cell size affects only the cost of a query, never its result. The base cell is chosen again from a sample of the
-// values if their number has doubled since the last choice or has fallen to an eighth, and checked after each value has
-// changed 64 times on average. The values are then moved to the new cells a few thousand per batch, which bounds the
-// time of a batch; until all have moved, levels of the old and the new size exist side by side.
+// The cell size affects only the cost of a query, never its result. The grid chooses the size of the base cell again,
+// from a sample of the values, if the number of values has doubled since the last choice or has fallen to an eighth.
+// The grid also checks the size after each value has changed 64 times on average. If the size changes, the grid moves
+// the values to the new cells, a few thousand values per batch, which bounds the time of a batch; until all values have
+// moved, levels of the old and the new size exist side by side.
 //
 // Invariants: every value is stored in the brick that contains its position, on a level whose cells are at least as
 // wide as the value; no brick is empty; slots_ holds the location of each value. |position| <= limits::kMaxCoordinate
@@ -30,13 +32,14 @@ struct HashGridOptions {
   // Edge of the cells of the base level until the grid chooses the cell size itself for the first time. Rounded up to a
   // power of two between 2^-20 and 2^31.
   double cell_size = 8;
-  // Number of values at which the grid chooses the cell size for the first time; the maximum of size_t means never.
-  // With up to about a thousand values the choice results in one brick, which works like a list in columns.
+  // Number of values at which the grid chooses the cell size for the first time; the maximum of size_t means never. For
+  // up to about a thousand values the choice results in one brick, which a query scans like a list.
   size_t first_choice = 8;
 };
 
-// Changes of one batch, applied in the order of the members. No handle occurs twice in `removed` and `moves` together,
-// nor twice in `inserted`. A handle may occur in both `removed` and `inserted`, which replaces its value.
+// Changes of one batch, applied in the order of the members. Borrows all arrays. No handle occurs twice in `removed`
+// and `moves` together, nor twice in `inserted`. A handle may occur in both `removed` and `inserted`, which replaces
+// its value.
 struct GridBatch {
   absl::Span<const uint32_t> removed;
   GridMoves moves;
@@ -53,16 +56,16 @@ class HashGrid {
   GridRef at(uint32_t handle) const;
   // Prefetches the memory that at() reads first.
   [[gnu::always_inline]] void prefetch_slot(uint32_t handle) const { __builtin_prefetch(&slots_[handle]); }
-  // Applies a batch. Returns the size in bytes of the data that the batch replaced: earlier snapshots still hold it,
-  // later ones will not. Cost: O(changes), plus for each touched brick O(changes of the brick) or O(values of the
-  // brick).
+  // Applies a batch. Returns the size in bytes of the data that the batch replaced: snapshots made before the batch
+  // still use this data, later snapshots do not. Cost: O(changes), plus for each touched brick O(changes of the brick)
+  // or O(values of the brick).
   size_t apply(const GridBatch& batch);
 
-  // Fills an empty grid with `items`. `cell_size` is the cell_size() of another grid that held the same values, so it
-  // is not chosen again until the rules above require it.
+  // Fills an empty grid with `items`. `cell_size` is the cell_size() of another grid that held the same values. The
+  // grid uses this size until the rules at the top of this file require another choice.
   void fill(absl::Span<const GridItem> items, double cell_size);
 
-  // Calls visit(GridRef) for each value, until it returns false. O(size).
+  // Calls visit(GridRef) for each value, until visit() returns false. O(size).
   template <class Visit>
   void for_each(const Visit& visit) const {
     for (const std::unique_ptr<Level>& level : levels_) {
@@ -90,7 +93,7 @@ class HashGrid {
     std::shared_ptr<internal::BrickTable> table = std::make_shared<internal::BrickTable>();
     bool table_is_shared = false;  // true after a snapshot: the next change copies the table
   };
-  // Writer's record of a brick. The index of a dropped brick is reused.
+  // Writer's record of a brick. The index of a dropped brick (one whose last value has left) is reused.
   struct BrickInfo {
     internal::BrickGeometry geometry;
     Level* level = nullptr;
@@ -102,12 +105,12 @@ class HashGrid {
   void insert(const GridItem& item);
   // Returns the exponent of the level for values of extent `extent`.
   int exponent_for(float extent) const;
-  // Returns the level for values of extent `extent`; creates it if it does not exist.
+  // Returns the level for values of extent `extent`; creates the level if it does not exist.
   Level& level_for(float extent);
-  // Returns the index of the brick with key `key`. If there is none, creates its entries in brick_info_ and the level's
-  // table; its version in bricks_ is null until the batch is built.
+  // Returns the index of the brick with key `key`. If the brick does not exist, creates its entries in brick_info_ and
+  // in the level's table; its version in bricks_ is null until rebuild_bricks().
   uint32_t brick_for(Level& level, const internal::GridKey& key);
-  // Returns the index of `brick` in touched_; appends it if this batch has not touched it before.
+  // Returns the index of `brick` in touched_; appends `brick` if touched_ does not contain it.
   uint32_t touch(uint32_t brick);
   void change(uint32_t brick, const internal::BrickChange& change);
   void group_changes();
@@ -137,33 +140,35 @@ class HashGrid {
   size_t changes_since_choice_ = 0;
   size_t size_ = 0;
   size_t replaced_bytes_ = 0;                   // size in bytes of the data that the current batch has replaced
-  std::vector<std::unique_ptr<Level>> levels_;  // coarse to fine
-  std::vector<BrickInfo> brick_info_;           // indexed by brick
+  std::vector<std::unique_ptr<Level>> levels_;  // levels from coarse to fine
+  std::vector<BrickInfo> brick_info_;           // records of all bricks, indexed by brick
   std::vector<uint32_t> free_bricks_;
-  std::vector<uint32_t> stale_bricks_;     // bricks that may hold values filed by the previous base cell
-  std::vector<uint32_t> touched_indices_;  // indexed by brick: index in touched_, valid only if touched_ confirms it
+  std::vector<uint32_t> stale_bricks_;     // bricks with values that may have to move to cells of the new size
+  std::vector<uint32_t> touched_indices_;  // indexed by brick: index in touched_, if touched_ has the brick there
   internal::BrickArray bricks_;
-  std::vector<internal::GridSlot> slots_;  // indexed by handle
+  std::vector<internal::GridSlot> slots_;  // locations of all values, indexed by handle
   internal::BrickIndices bricks_by_handle_;
 
-  // State of the current batch.
+  // Change of one value in the current batch, and the brick that it changes.
   struct Change {
     uint32_t touched;  // index in touched_
     internal::BrickChange change;
   };
-  std::vector<uint32_t> touched_;        // bricks
-  std::vector<uint32_t> change_counts_;  // indexed as touched_; after group_changes() the ends of ranges in grouped_
+  std::vector<uint32_t> touched_;  // bricks that the current batch changes
+  // For each brick in touched_, at the same index: its number of changes; after group_changes(), the end of its range
+  // in grouped_.
+  std::vector<uint32_t> change_counts_;
   std::vector<Change> changes_;
-  std::vector<uint32_t> leaving_moves_;         // indices of moves to other bricks
-  std::vector<internal::BrickChange> grouped_;  // changes in the order of touched_
+  std::vector<uint32_t> leaving_moves_;         // indices of the moves of values to other bricks
+  std::vector<internal::BrickChange> grouped_;  // changes, grouped by brick in the order of touched_
   std::vector<GridItem> arrivals_;
   internal::BrickBuilder builder_;
   // Values of a brick that the current update neither removes nor moves to another brick, collected by gather_all().
   struct GatheredBrick {
-    bool is_gathered = false;  // false: the next version of the brick follows from its changes alone
+    bool is_gathered = false;  // false: `sources` is unused, and the next version is made from the changes
     absl::Span<const internal::BrickSource> sources;
   };
-  std::vector<GatheredBrick> gathered_;  // indexed as touched_
+  std::vector<GatheredBrick> gathered_;  // for each brick in touched_, at the same index
   std::vector<internal::BrickSource> sources_;
 };
 

@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kFirstShellValues = 12;  // target number of values in the first shell
 constexpr uint32_t kMinForEstimate = 4;   // min number of values for an estimate of the density
-constexpr double kShellGrowth = 1.6;      // factor of the width from shell to shell
+constexpr double kShellGrowth = 1.6;      // ratio of shell_width_ to its value for the previous shell
 
 // Returns the input of the kernel collect_near() for a shell, relative to the brick.
 GridNear near_of(const Brick& brick, const Vec3d& point, float above, float up_to) {
@@ -36,7 +36,8 @@ double epsilon_of(const Vec3d& point, const LevelGeometry& level) {
 float key_limit(double limit) {
   constexpr double kLargest = std::numeric_limits<float>::max();
   if (limit >= kLargest / 2) return std::numeric_limits<float>::infinity();
-  return static_cast<float>(limit * (1 + double{kCullEpsilon})) + 0x1p-120f;  // the sum covers keys that underflow
+  // the added constant covers keys that underflow
+  return static_cast<float>(limit * (1 + double{kCullEpsilon})) + 0x1p-120f;
 }
 
 double values_per_cell(const Brick& brick, const Vec3d& point) {
@@ -115,7 +116,7 @@ void NearCandidates::collect_recent(const Brick& brick, const GridNear& near, Wo
     next = 0;
     return kernels.collect_near(rows, near, slots, keys);
   };
-  Work collected;  // tests are counted later, by visit()
+  Work collected;  // its `tests` are ignored: visit() counts the tests
   scan_recent(brick, collected, cull, [&](const GridRef& value) {
     candidates_.push_back({keys[next++], value.slot(), source});
     return true;
@@ -153,8 +154,8 @@ void NearCandidates::sort() {
     std::sort(candidates_.begin(), candidates_.end(), before);
     return;
   }
-  // Sorts integers instead of floats: keys are not negative, so their bits have the same order. The lowest bits of each
-  // key are replaced by the index of its candidate.
+  // Sorts integers instead of floats: keys are not negative, so their bits, read as integers, have the same order. The
+  // lowest bits of each key are replaced by the index of its candidate.
   int32_t packed[kMaxSorted];
   Candidate given[kMaxSorted];
   for (uint32_t i = 0; i < count; ++i) {

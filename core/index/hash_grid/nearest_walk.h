@@ -1,11 +1,11 @@
-// Nearest-value search of the hash grid: visits shells around a point, each a little wider than the one before. The
-// values of a shell are collected by their distance in float and visited from near to far. So few values are visited
-// that are not among the nearest, even if many values surround the point. For GridSnapshot; one object per query and
+// Nearest-value search of the hash grid: visits shells around a point, each wider than the shell before. The values of
+// a shell are collected by their distance in float and visited from near to far. So the search visits few values
+// besides the nearest ones, even if many values surround the point. Used by GridSnapshot; one object per query and
 // thread.
 //
 // The key of a value is the squared distance of its bounds from the point, in float and never greater than the exact
-// squared distance; it is the same for every shell. A shell is a range of keys (above, up_to], so each value lies in
-// exactly one shell.
+// squared distance; the key is the same for every shell. A shell is a range of keys (above, up_to], so each value lies
+// in exactly one shell.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_NEAREST_WALK_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_NEAREST_WALK_H_
 
@@ -21,8 +21,8 @@ namespace locus::internal {
 // Returns an upper bound of the keys of all values whose squared distance is at most `limit`.
 float key_limit(double limit);
 
-// Returns the estimated number of values per cell near `point`, which lies in the brick; 0 if the brick has too few
-// values for an estimate.
+// Returns the estimated number of values per cell near `point`, a point in the brick; 0 if the brick has too few values
+// for an estimate.
 double values_per_cell(const Brick& brick, const Vec3d& point);
 // Returns the mean number of values per cell of a level with `values` values.
 double values_per_cell(const LevelGeometry& level, size_t values);
@@ -30,7 +30,8 @@ double values_per_cell(const LevelGeometry& level, size_t values);
 // Sequence of shells around a point on one level.
 class NearestShells {
  public:
-  // `per_cell` is the estimated number of values per cell near the point; it affects only cost. Borrows the level.
+  // `per_cell` is the estimated number of values per cell near the point; the estimate affects only cost. Borrows
+  // `level`.
   NearestShells(const Vec3d& point, const LevelGeometry& level, double per_cell);
   NearestShells(const Vec3d& point, const LevelGeometry&& level, double per_cell) = delete;
 
@@ -38,7 +39,7 @@ class NearestShells {
   bool next(double limit);
   float above() const { return above_; }
   float up_to() const { return up_to_; }
-  // Returns a box that overlaps the bounds of every value of this shell.
+  // Returns a box that overlaps the bounds of every value of the present shell.
   const Aabbd& region() const { return region_; }
   // Returns a box that overlaps the bounds of every value whose squared distance is at most `limit`.
   Aabbd region_within(double limit) const;
@@ -54,15 +55,16 @@ class NearestShells {
   Aabbd region_;
 };
 
-// Candidates of one shell: values of some bricks, to be visited from near to far.
+// Candidates of one shell: values that are collected from several bricks and then visited from near to far.
 class NearCandidates {
  public:
-  // Adds the values of the brick whose key is in (above, up_to]: those of `cells`, which are relative to the brick, and
-  // those of its log.
+  // Adds the values with a key in (above, up_to]: values in `cells` of the brick's sorted block, and all such values of
+  // its log. `cells` is relative to the brick.
   void collect(const Brick& brick, const KeyRange& cells, const Vec3d& point, float above, float up_to, Work& work);
 
-  // Calls visit(GridRef) for each candidate within limit(), the nearest first, until visit() returns false; limit() may
-  // fall during the visit. Returns false if visit() did. Removes all candidates.
+  // Calls visit(GridRef) for each candidate within the squared distance limit(), the nearest first, until visit()
+  // returns false; limit() may decrease during the visit. Returns false if visit() returned false. Removes all
+  // candidates.
   template <class Limit, class Visit>
   bool visit(const Limit& limit, Work& work, const Visit& visit);
 
@@ -84,7 +86,7 @@ class NearCandidates {
   }
   void collect_rows(const GridBlock& block, uint32_t brick, const GridRows& rows, const GridNear& near);
   void collect_recent(const Brick& brick, const GridNear& near, Work& work);
-  // Adds `count` candidates of the block sources_.back().
+  // Adds `count` candidates with the given slots and keys; sources_.back() is their block.
   void add(const uint32_t* slots, const float* keys, uint32_t count);
   // Sorts the candidates by key. May lower each key by a few units in the last place; the keys stay sorted.
   void sort();

@@ -1,10 +1,11 @@
-// Region walk: visits the values near each of many regions. It works in steps, so that the memory of the next few
-// regions is prefetched while one is visited. In a grid of a million values, which does not fit the caches, each step
-// of a query waits for memory whose address the step before has read; in a walk only the first query waits.
+// Region walk: visits the values near each of many regions. A walk divides the query of each region into steps, so that
+// the memory for the next few regions is prefetched while one region is visited. In a grid of a million values, which
+// does not fit the caches, each step of a query waits for memory whose address the previous step has read; in a walk
+// only the first query waits.
 //
 // A walk belongs to one thread and borrows the grids. It visits for each region the same values as the visits of
-// GridSnapshot. Regions of more than a few bricks or values are passed to GridSnapshot, since waiting is a small part
-// of their cost. Source: Chen, Ailamaki, Gibbons, Mowry, Improving Hash Join Performance through Prefetching, 2004
+// GridSnapshot. A walk passes regions with more than a few bricks or values to GridSnapshot, since waiting is a small
+// part of their cost. Source: Chen, Ailamaki, Gibbons, Mowry, Improving Hash Join Performance through Prefetching, 2004
 // (software pipelining of dependent lookups).
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_REGION_WALK_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_REGION_WALK_H_
@@ -19,15 +20,13 @@
 
 namespace locus {
 
-// Region of a query on one grid: the ball if it is given, with `bounds` as the bounds of the ball; else the box
-// `bounds`.
+// Region of a query on one grid: `ball`, with `bounds` as its bounds, if `ball` is set; otherwise the box `bounds`.
 struct GridRegion {
   const GridSnapshot* grid = nullptr;
   Aabbd bounds;
   std::optional<Balld> ball;
 
-  // Calls visit(GridRef) as GridSnapshot::visit_ball() does if `ball` is given, else as GridSnapshot::visit_region()
-  // does.
+  // Calls GridSnapshot::visit_ball() if `ball` is set, otherwise GridSnapshot::visit_region().
   template <class Visit>
   void visit(Work& work, const Visit& visit) const {
     if (ball) return grid->visit_ball(*ball, bounds, work, visit);
@@ -37,8 +36,8 @@ struct GridRegion {
 
 namespace internal {
 
-// State of one region between the steps of its query. The find functions must be called in the order of their
-// declaration, then visit(). Each prefetches memory for the next, so other work should be done in between.
+// State of one region between the steps of its query. Call the find functions in the order of their declaration, then
+// visit(). Each call prefetches memory for the next call, so the caller should do other work between two calls.
 class RegionSteps {
  public:
   void find_bricks(const GridRegion& region);
@@ -58,7 +57,8 @@ class RegionSteps {
     const Brick* brick;
     KeyRange cells;
     GridRows rows;
-    uint32_t sorted_end, recent_end;  // ends in slots_: of the sorted block's slots, then of the log's
+    // Ends of two ranges in slots_: the found slots of the sorted block, then the found slots of the log.
+    uint32_t sorted_end, recent_end;
   };
 
   template <class CullOf>
@@ -97,8 +97,9 @@ void RegionSteps::visit(Work& work, const Visit& visit) const {
 
 class RegionWalk {
  public:
-  // Returns true if a walk through `grid` is faster than separate visits, which holds from about 30 MB of values on.
-  // Measured: equal at 100,000 values, 1.5 to 2 times as fast at a million, a third slower if the grid fits the caches.
+  // Returns true if a walk through `grid` is faster than separate visits: from about 30 MB of values on. Measured: a
+  // walk is equally fast at 100,000 values, 1.5 to 2 times as fast at a million, and a third slower if the grid fits
+  // the caches.
   static bool pays(const GridSnapshot& grid) { return grid.size() >= 250'000; }
 
   // Prepares a walk over region_of(begin) to region_of(end - 1). region_of() is called in this order, up to kAhead
@@ -115,10 +116,10 @@ class RegionWalk {
   }
 
  private:
-  static constexpr size_t kAhead = 4;  // number of steps before a visit
+  static constexpr size_t kAhead = 4;  // number of steps before a visit, and number of regions in progress after next_
 
-  // Runs one step for each of the kAhead regions after region next_: the last step for the nearest of them, the first
-  // step for the farthest.
+  // Runs one step for each of the kAhead regions after region next_: the last step for region next_ + 1, the first step
+  // for region next_ + kAhead.
   void take_steps();
   void take_step(size_t region, size_t step);
 

@@ -1,7 +1,8 @@
-// March of a ray through one level of the hash grid: slabs of bricks perpendicular to the ray's dominant axis, from
-// near to far, each with the rectangle of bricks whose values the ray can meet in it. Immutable; any thread.
+// March of a ray through one level of the hash grid: lists slabs of bricks perpendicular to the ray's dominant axis
+// (the axis of the direction's largest component), from near to far, each with the rectangle of bricks whose values the
+// ray can meet in that slab. Immutable; any thread.
 //
-// Every bound is computed from the integer index of the slab, never accumulated along the ray, and widened by the
+// The bounds of every slab are computed from its integer index, never accumulated along the ray, and widened by the
 // largest extent of the level, the padding of the slab test and the rounding of the bounds themselves. Therefore a
 // value that passes the slab test is always stored in a brick that a slab lists, and each brick is listed at most once.
 // Compare Amanatides and Woo, A Fast Voxel Traversal Algorithm for Ray Tracing, 1987, whose accumulated steps miss
@@ -14,9 +15,9 @@
 
 namespace locus::internal {
 
-// Geometry of a level, as queries need it.
+// Geometry of a level of the grid, as input of queries.
 struct LevelGeometry {
-  Aabbd bounds;           // bounds of all its values; not empty
+  Aabbd bounds;           // bounds of all values of the level; not empty
   double max_extent = 0;  // upper bound of the distance from a value's position to its bounds along any axis
   double cells_per_unit = 1;
 };
@@ -24,35 +25,35 @@ struct LevelGeometry {
 class SlabMarch {
  public:
   struct Slab {
-    double near;      // lower bound of the near values of this slab and all later ones
-    KeyRange bricks;  // may be empty
+    double near;      // lower bound of the near values of the bounds of values in this or a later slab
+    KeyRange bricks;  // keys of the bricks; may be empty
   };
 
-  // Prepares a march along the part of the ray up to `limit`, which is in units of the slab test.
+  // Prepares a march along the part of the ray with t <= `limit`, in units of the ray's direction.
   SlabMarch(const SlabRay<double>& ray, const LevelGeometry& level, double limit);
 
   // Returns the number of slabs; 0 if the ray misses the level.
   int64_t slabs() const { return slabs_; }
-  // Returns the approximate number of brick keys that all slabs list for the limit of the constructor. Infinite if a
-  // bound overflows: slab() and layer() must then not be called.
+  // Returns the approximate number of brick keys that all slabs together list for the constructor's `limit`. Infinite
+  // if a bound overflows: slab() and layer() must then not be called.
   double bricks() const { return bricks_; }
-  // Returns slab `n`, counted from the near end, for the part of the ray up to `limit`. Preconditions: 0 <= n <
-  // slabs(), and `limit` is at most the limit of the constructor.
+  // Returns slab `n`, counted from the near end, for the part of the ray with t <= `limit`. Preconditions: 0 <= n <
+  // slabs(), and `limit` is at most the constructor's `limit`.
   Slab slab(int64_t n, double limit) const;
 
   // Layer of cells within a slab, one cell thick; the four layers of a slab are counted from the near end.
   struct Layer {
     double near;
-    KeyRange cells;  // may be empty
+    KeyRange cells;  // keys of the cells that the ray may meet in the layer; may be empty
   };
   Layer layer(int64_t n, int layer_index, double limit) const;
 
  private:
-  // Part of the ray up to `limit` between the planes at `index` * `edge` and (`index` + 1) * `edge` on the dominant
-  // axis: its near value, as in Slab, and the bounds of the positions of values that the ray can meet there.
+  // Part of the ray with t <= `limit` between the planes at `index` * `edge` and (`index` + 1) * `edge` on the dominant
+  // axis: its near value, as in Slab, and the bounds of the positions of values that this part can meet.
   struct Crossing {
     double near;
-    Aabbd positions;  // may be empty
+    Aabbd positions;  // bounds of the positions of these values; may be empty
   };
   Crossing cross(double index, double edge, double limit) const;
   Vec3d point_at(double t) const { return origin_ + direction_ * t; }
@@ -61,7 +62,7 @@ class SlabMarch {
   Aabbd bounds_;
   double per_unit_;
   double slab_edge_;
-  double tube_radius_ = 0;  // upper bound of the distance from the ray to the position of a value it can meet
+  double tube_radius_ = 0;  // upper bound of the distance from the ray to the position of a value that the ray meets
   Interval<double> part_{0, 0};
   int axis_ = 0;
   int64_t first_ = 0;

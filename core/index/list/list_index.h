@@ -1,5 +1,5 @@
-// List: an array that culls no value and passes every value to the visitor. It is the test oracle of every other
-// structure, and the fastest structure for a handful of values.
+// List: an array that culls no value and passes every value to the visitor. The list is the test oracle of every other
+// structure, and the fastest structure for a few values.
 //
 // Threads: const members may run concurrently; insert and remove need exclusive use.
 // Invariant: slots_ maps the id of each value in the list to its slot in values_, and has no other entries.
@@ -31,11 +31,11 @@ class ListIndex {
     const bool added = slots_.try_emplace(Traits::id(value), values_.size()).second;
     LOCUS_CHECK(added);
     values_.push_back(value);
-    check_invariants(values_.size() - 1);
+    LOCUS_DCHECK_CALL(check_invariants(values_.size() - 1));
   }
 
-  // Removes the value with the id of `value`. If there is none, returns false and changes nothing. O(1): the last value
-  // moves to the free slot, so the order of values is not preserved.
+  // Removes the value with the id of `value`. Returns false and changes nothing if the list has no value with this id.
+  // O(1): the last value moves to the free slot, so the order of values is not preserved.
   bool remove(const V& value) {
     const auto found = slots_.find(Traits::id(value));
     if (found == slots_.end()) return false;
@@ -46,7 +46,7 @@ class ListIndex {
       slots_[Traits::id(values_[slot])] = slot;
     }
     values_.pop_back();
-    check_invariants(slot);
+    LOCUS_DCHECK_CALL(check_invariants(slot));
     return true;
   }
 
@@ -70,16 +70,14 @@ class ListIndex {
   }
 
  private:
-  // Checks that the array and the map have the same size and, if `slot` exists, that the map has its entry. Call it
-  // with the slot that has changed. O(1).
+  // Checks that the array and the map have the same size and, if the array contains `slot`, that the map has the entry
+  // of its value. The argument is the slot that has just changed. O(1).
   void check_invariants(size_t slot) const {
-    if constexpr (kDebugChecks) {
-      LOCUS_DCHECK_EQ(values_.size(), slots_.size());
-      if (slot >= values_.size()) return;
-      const auto found = slots_.find(Traits::id(values_[slot]));
-      LOCUS_DCHECK(found != slots_.end());
-      LOCUS_DCHECK_EQ(found->second, slot);
-    }
+    LOCUS_DCHECK_EQ(values_.size(), slots_.size());
+    if (slot >= values_.size()) return;
+    const auto found = slots_.find(Traits::id(values_[slot]));
+    LOCUS_DCHECK(found != slots_.end());
+    LOCUS_DCHECK_EQ(found->second, slot);
   }
 
   template <class Visitor>

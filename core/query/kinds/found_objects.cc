@@ -12,7 +12,7 @@ namespace {
 
 bool lower_id(const FoundObject& a, const FoundObject& b) { return a.id < b.id; }
 
-// Sorts by insertion, which is fast for few objects and for almost sorted ones.
+// Sorts `found` by id with an insertion sort, which is fast for few objects and for almost sorted objects.
 void insertion_sort(std::vector<FoundObject>& found) {
   for (size_t i = 1; i < found.size(); ++i) {
     if (!lower_id(found[i], found[i - 1])) continue;
@@ -25,11 +25,12 @@ void insertion_sort(std::vector<FoundObject>& found) {
 
 // Maximum number of objects that are sorted by insertion without buckets.
 constexpr size_t kFew = 12;
-// Maximum number of objects for the bucket sort: with evenly distributed ids, each of the 256 buckets gets about four
-// of them.
+// Maximum number of objects for the bucket sort: if their ids are evenly distributed, each of the 256 buckets contains
+// about four of them.
 constexpr size_t kMaxBucketed = 1024;
 constexpr int kBucketBits = 8;
-// Maximum number of objects in one bucket. With more, the ids are unevenly distributed and std::sort() is used.
+// Maximum number of objects in one bucket. If a bucket has more objects, the ids are unevenly distributed, and
+// std::sort() is used.
 constexpr uint32_t kMaxPerBucket = 16;
 
 }  // namespace
@@ -38,7 +39,7 @@ void FoundObjects::restart(size_t max_count) {
   max_count_ = max_count;
   truncated_ = false;
   clear_scratch(found_);
-  check_invariants();
+  LOCUS_DCHECK_CALL(check_invariants());
 }
 
 absl::Span<const FoundObject> FoundObjects::finish() {
@@ -56,11 +57,12 @@ void FoundObjects::keep_lowest() {
   truncated_ = true;
   std::nth_element(found_.begin(), found_.begin() + static_cast<std::ptrdiff_t>(max_count_), found_.end(), lower_id);
   found_.resize(max_count_);
-  check_invariants();
+  LOCUS_DCHECK_CALL(check_invariants());
 }
 
-// Sorts by id, through buckets if possible: filling buckets needs no comparisons, whose branches are mispredicted half
-// of the time for ids in random order, and leaves the objects almost sorted for insertion_sort().
+// Sorts found_ by id, with sort_by_bucket() if possible. Distributing objects to buckets needs no comparisons of ids,
+// whose branches would be mispredicted half of the time for ids in random order. The distribution leaves the objects
+// almost sorted, so that insertion_sort() is fast.
 void FoundObjects::sort() {
   if (found_.size() <= kFew || (found_.size() <= kMaxBucketed && sort_by_bucket())) return insertion_sort(found_);
   std::sort(found_.begin(), found_.end(), lower_id);

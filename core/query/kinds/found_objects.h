@@ -1,6 +1,6 @@
-// Collector of the objects that one ball or box query finds: retains those with the lowest ids, up to a given number,
-// and returns them ascending by id. A QueryTask reuses one collector for all queries of a chunk, so that memory is
-// allocated once. A collector belongs to one thread.
+// Collector of the objects that one ball or box query finds: retains the objects with the lowest ids, up to a given
+// number, and returns these objects ascending by id. A QueryTask reuses one collector for all queries of a chunk, so
+// that memory is allocated once. A collector belongs to one thread.
 #ifndef LOCUS_CORE_QUERY_KINDS_FOUND_OBJECTS_H_
 #define LOCUS_CORE_QUERY_KINDS_FOUND_OBJECTS_H_
 
@@ -30,7 +30,7 @@ class FoundObjects {
     LOCUS_DCHECK_NE(object.entry().id, kNoId);
     found_.push_back({object.entry().id, object});
     if (found_.size() > 2 * max_count_) keep_lowest();
-    check_invariants();
+    LOCUS_DCHECK_CALL(check_invariants());
   }
   // Returns the retained objects, ascending by id. The span is valid until the next call of restart() or offer().
   absl::Span<const FoundObject> finish();
@@ -42,14 +42,14 @@ class FoundObjects {
   // Drops all objects except the max_count_ objects with the lowest ids.
   void keep_lowest();
   void sort();
-  // Orders found_ by buckets of ids, but not within a bucket. Returns false and leaves found_ unchanged if the ids are
-  // too unevenly distributed.
+  // Orders found_ by bucket, where each bucket is a range of ids; objects of the same bucket stay unsorted. Returns
+  // false and leaves found_ unchanged if the ids are too unevenly distributed.
   bool sort_by_bucket();
 
   size_t max_count_ = 0;
   bool truncated_ = false;
   std::vector<FoundObject> found_;
-  std::vector<FoundObject> bucketed_;  // scratch of sort_by_bucket()
+  std::vector<FoundObject> bucketed_;  // temporary memory of sort_by_bucket()
 };
 
 }  // namespace locus

@@ -15,11 +15,11 @@ namespace locus {
 
 // One row of a result; a default-constructed hit is a miss.
 struct Hit {
-  float t = std::numeric_limits<float>::infinity();  // ray: in multiples of its direction; nearest: distance
-  Id id = kNoId;                                     // 0 = a miss
+  float t = std::numeric_limits<float>::infinity();  // ray: multiple of the direction; nearest: distance; otherwise 0
+  Id id = kNoId;                                     // id of the object or instance; 0: the hit is a miss
   uint32_t triangle = kNoTriangle;                   // index of the triangle in the uploaded mesh
-  GridRef object;                                    // a hit has an object or an instance, a miss neither
-  const Instance* instance = nullptr;
+  GridRef object;                                    // null for an instance and for a miss
+  const Instance* instance = nullptr;                // null for an object and for a miss
   const SceneAtTime* moment = nullptr;  // time at which the object was found; null: the snapshot's latest state
 
   // Returns the object's shape at the time at which it was found. Precondition: the hit is on an object.
@@ -29,8 +29,8 @@ struct Hit {
   }
 };
 
-// Return a hit at `t`: on an object in the snapshot's latest state, on an object at the time `moment`, which the hit
-// borrows, or on an instance.
+// Return a hit at `t`: the first function on an object in the snapshot's latest state, the second on an object at the
+// time `moment`, which the hit borrows, the third on an instance.
 inline Hit hit_on(const GridRef& object, float t) { return {t, object.entry().id, kNoTriangle, object}; }
 inline Hit hit_on(const GridRef& object, float t, const SceneAtTime& moment) {
   return {t, object.entry().id, kNoTriangle, object, nullptr, &moment};

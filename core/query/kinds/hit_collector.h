@@ -1,5 +1,5 @@
 // Collector of the best hits of one ray. Its limit(), the largest t at which a hit may still be retained, decreases as
-// hits are found, so that ray searches skip everything beyond it. A collector belongs to one thread.
+// hits are found, so that ray searches skip everything beyond this limit. A collector belongs to one thread.
 #ifndef LOCUS_CORE_QUERY_KINDS_HIT_COLLECTOR_H_
 #define LOCUS_CORE_QUERY_KINDS_HIT_COLLECTOR_H_
 
@@ -17,9 +17,9 @@
 
 namespace locus {
 
-// Bounded set of the first hits in the order of nearer(). Invariants: it has at most capacity_ hits. Once it is full,
-// the hits form a heap whose front is the last hit in that order, and limit_ is the t of the front. limit_ never
-// increases.
+// Bounded set of the first hits in the order of nearer(). Invariants: the collector has at most capacity_ hits. Once
+// the collector has capacity_ hits, the hits form a heap whose front is the last hit in the order of nearer(), and
+// limit_ is the t of the front. limit_ never increases.
 class HitCollector {
  public:
   explicit HitCollector(const RayRequest& request)
@@ -29,11 +29,12 @@ class HitCollector {
         capacity_(request.mode == RayMode::kAll ? size_t{request.max_results} + 1 : 1),
         limit_(request.t_max) {}
 
-  // Returns the largest t at which a hit may still be retained. Once the collector is full, a hit at exactly this t
-  // replaces the last one only if its id or triangle is lower.
+  // Returns the largest t at which a hit may still be retained. Once the collector is full, a hit at exactly this t is
+  // retained only if it precedes the last retained hit in the order of nearer().
   float limit() const { return limit_; }
 
-  // Adds `hit` if it is among the best so far. Returns false if the search can stop, because a kAny ray has its hit.
+  // Adds `hit` if it is among the first capacity_ hits so far in the order of nearer(). Returns false for a kAny ray if
+  // `hit` was added: one hit is enough, so the search can stop.
   bool offer(const Hit& hit) {
     LOCUS_DCHECK_NE(hit.id, kNoId);
     LOCUS_DCHECK(!(hit.t < 0));
@@ -54,16 +55,16 @@ class HitCollector {
       LOCUS_DCHECK_LE(answer_.hits.front().t, limit_);
       limit_ = answer_.hits.front().t;
     }
-    check_invariants();
+    LOCUS_DCHECK_CALL(check_invariants());
     return mode_ != RayMode::kAny;
   }
 
-  // Returns true if the search can stop, because a kAny ray has its hit.
+  // Returns true if the search can stop because the mode is kAny and a hit was found.
   bool done() const { return mode_ == RayMode::kAny && !answer_.hits.empty(); }
 
   // Returns the hits in the order of nearer(), at most the requested number. Empties the collector; call it once.
   RayAnswer finish() {
-    check_invariants();
+    LOCUS_DCHECK_CALL(check_invariants());
     std::sort(answer_.hits.begin(), answer_.hits.end(), nearer);
     answer_.truncated = mode_ == RayMode::kAll && answer_.hits.size() == capacity_;
     if (answer_.truncated) answer_.hits.pop_back();
@@ -72,17 +73,15 @@ class HitCollector {
 
  private:
   void check_invariants() const {
-    if constexpr (kDebugChecks) {
-      const auto& hits = answer_.hits;
-      LOCUS_DCHECK_LE(hits.size(), capacity_);
-      LOCUS_DCHECK_EQ(is_heap_, hits.size() == capacity_);
-      if (!is_heap_) return;
-      LOCUS_DCHECK_EQ(limit_, hits.front().t);
-      // Checks only the children of the front and the last element: checking the whole heap would cost more than
-      // offer() itself.
-      for (const size_t child : {size_t{1}, size_t{2}, hits.size() - 1})
-        if (child < hits.size()) LOCUS_DCHECK(!nearer(hits.front(), hits[child]));
-    }
+    const auto& hits = answer_.hits;
+    LOCUS_DCHECK_LE(hits.size(), capacity_);
+    LOCUS_DCHECK_EQ(is_heap_, hits.size() == capacity_);
+    if (!is_heap_) return;
+    LOCUS_DCHECK_EQ(limit_, hits.front().t);
+    // Checks only the children of the front and the last element: checking the whole heap would cost more than
+    // offer() itself.
+    for (const size_t child : {size_t{1}, size_t{2}, hits.size() - 1})
+      if (child < hits.size()) LOCUS_DCHECK(!nearer(hits.front(), hits[child]));
   }
 
   const RayMode mode_;
@@ -99,14 +98,16 @@ inline float rounded_distance(double t) {
   return static_cast<float>(std::min(t, kMaxFloat)) + 0.0f;
 }
 
-// Returns the t at which a ray enters `bounds`, 0 if it starts inside, or nothing if it misses them.
+// Returns the t at which a ray enters `bounds`, 0 if the ray starts inside `bounds`, or nullopt if the ray misses
+// `bounds`.
 inline std::optional<float> entry(const SlabRay<double>& slabs, const Aabbd& bounds) {
   const Interval<double> interval = slabs.interval(bounds);
   if (!(interval.near <= interval.far) || interval.far < 0) return std::nullopt;
   return rounded_distance(std::max(interval.near, 0.0));
 }
 
-// Returns a limit for distances in double: every distance that rounds to a float of at most `limit` is below it.
+// Returns `limit` as a double, raised to the next float: every double that rounds to a float of at most `limit` is
+// below the result.
 inline double raised(float limit) { return double{next_above(limit)}; }
 
 }  // namespace locus

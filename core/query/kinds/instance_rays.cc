@@ -10,11 +10,11 @@ namespace locus {
 namespace {
 
 // Exact test of one ray against single triangles of one instance.
-class ExactTest {
+class ExactRayTest {
  public:
   // `slabs` is the same ray in world axes, prepared for tests against boxes. `nearest` is the t at which the ray enters
   // the instance's bounds; hit() returns no lower t.
-  ExactTest(const TriangleRay& ray, const SlabRay<double>& slabs, const Instance& instance, float nearest)
+  ExactRayTest(const TriangleRay& ray, const SlabRay<double>& slabs, const Instance& instance, float nearest)
       : ray_(ray), slabs_(slabs), placed_(instance), nearest_(nearest) {}
 
   const TriangleRay& ray() const { return ray_; }
@@ -42,7 +42,7 @@ bool offer(const Instance& instance, const Triangle& triangle, float t, HitColle
 // Visitor of the triangles of one instance for EXACT rays: tests the triangles themselves.
 class TriangleVisitor {
  public:
-  TriangleVisitor(QueryTask& task, const ExactTest& exact, const Instance& instance, HitCollector& collector)
+  TriangleVisitor(QueryTask& task, const ExactRayTest& exact, const Instance& instance, HitCollector& collector)
       : task_(task), exact_(exact), instance_(instance), collector_(collector) {}
 
   float limit() const { return exact_.ray().to_scaled(collector_.limit()); }
@@ -54,17 +54,17 @@ class TriangleVisitor {
 
  private:
   QueryTask& task_;
-  const ExactTest& exact_;
+  const ExactRayTest& exact_;
   const Instance& instance_;
   HitCollector& collector_;
 };
 
 // Visitor of the triangles of one instance for CONSERVATIVE rays: tests the bounds of each triangle in world axes.
 // Because of rounding, the exact test may hit a triangle whose bounds the ray misses or enters later. Such a hit is
-// reported at its exact t, so that a CONSERVATIVE ray finds every exact hit at the same t or a lower one.
+// reported at its exact t, so that a CONSERVATIVE ray finds every exact hit at the same or a lower t.
 class PlacedBoundsVisitor {
  public:
-  PlacedBoundsVisitor(QueryTask& task, const RayRequest& request, const ExactTest& exact, const Instance& instance,
+  PlacedBoundsVisitor(QueryTask& task, const RayRequest& request, const ExactRayTest& exact, const Instance& instance,
                       HitCollector& collector)
       : task_(task),
         slabs_(Rayd{request.origin, request.direction}, kObjectPad),
@@ -95,7 +95,7 @@ class PlacedBoundsVisitor {
 
   QueryTask& task_;
   const SlabRay<double> slabs_;
-  const ExactTest& exact_;
+  const ExactRayTest& exact_;
   const Instance& instance_;
   const PlacedTriangles placed_;
   HitCollector& collector_;
@@ -109,7 +109,7 @@ void trace_instance(QueryTask& task, const RayRequest& request, const SlabRay<do
   const bool conservative = request.precision == Precision::kConservative;
   const TriangleRay ray(instance.transform, request.origin, request.direction,
                         conservative ? Cull::kNone : request.cull);
-  const ExactTest exact(ray, slabs, instance, nearest);
+  const ExactRayTest exact(ray, slabs, instance, nearest);
   if (conservative) {
     PlacedBoundsVisitor visitor(task, request, exact, instance, collector);
     task.visit_region(instance.mesh->tree(), visitor);

@@ -15,7 +15,7 @@ namespace {
 // that may have more hits is traced triangle by triangle instead.
 constexpr uint32_t kMaxRows = 128;
 
-// Pair of a ray and an instance that the ray has reached: the kernels have yet to test the ray against it.
+// Pair of a ray and an instance that the ray has reached, but against whose triangles the ray is not tested yet.
 struct Stop {
   uint32_t ray;   // index in Rounds::rays_
   float nearest;  // t at which the ray enters the bounds of the instance
@@ -23,7 +23,7 @@ struct Stop {
 };
 
 // Traversal of all rays of one trace_meshes() call. Each round traces all rays that wait at a stop, then advances each
-// of them to its next stop. Invariant: between rounds each ray has at most one stop.
+// of these rays to its next stop. Invariant: between rounds each ray has at most one stop.
 class Rounds {
   using InstanceWalk = Bvh<Instance>::RayWalk;
 
@@ -41,7 +41,8 @@ class Rounds {
       for (const SlabRay<double>& slabs : slabs_) walks_.emplace_back(instances, slabs);
     stops_.reserve(rays.size());
     if (mode() != RayMode::kAll) return;
-    max_rows_ = std::min(kMaxRows, rays.front().request.max_results + 1);  // one hit more reveals truncation
+    // One row more than requested shows that the result is truncated.
+    max_rows_ = std::min(kMaxRows, rays.front().request.max_results + 1);
     rows_ = std::make_unique_for_overwrite<KernelRow[]>(rays.size() * max_rows_);
   }
 
@@ -66,8 +67,8 @@ class Rounds {
  private:
   RayMode mode() const { return rays_.front().request.mode; }
 
-  // Advances ray `index` to the next instance that its filter accepts and whose bounds it enters within its collector's
-  // limit. Adds a stop there, or no stop if there is no such instance.
+  // Advances ray `index` to the next instance that the ray's filter accepts and whose bounds the ray enters within the
+  // limit of the ray's collector. Adds a stop at this instance, or adds no stop if no such instance is left.
   void walk_on(uint32_t index) {
     PendingRay& ray = rays_[index];
     InstanceWalk& walk = walks_[index];
@@ -76,15 +77,17 @@ class Rounds {
       if (instance == nullptr) return;
       if (!task_.count_test()) return;
       if (!ray.filter.accepts(*instance)) continue;
-      // A ray hits an instance only if it enters the instance's bounds, and no hit has a lower t than this entry: the
-      // tree over instances may cull by these bounds, so the result must include their test.
+      // A ray hits an instance only if the ray enters the instance's bounds, and no hit has a lower t than the entry.
+      // This test is repeated here because the tree over instances may or may not cull by these bounds, and the result
+      // must not depend on culling.
       const std::optional<float> nearest = entry(slabs_[index], instance->bounds);
       if (!nearest || *nearest > ray.collector.limit()) continue;
       return stops_.push_back({index, *nearest, instance});
     }
   }
 
-  // Adds a stop of ray `index` at the only instance of the scene if the ray meets its bounds and its filter accepts it.
+  // Adds a stop of ray `index` at the only instance of the scene if the ray enters the instance's bounds and the ray's
+  // filter accepts the instance.
   void walk_to_only(uint32_t index) {
     PendingRay& ray = rays_[index];
     if (task_.ended()) return;
@@ -103,8 +106,8 @@ class Rounds {
                      [&](const Stop& a, const Stop& b) { return std::less<const TriangleBvh*>()(tree(a), tree(b)); });
   }
 
-  // Traces the rays of all stops whose instance has the same tree as that of stop `first`; meshes with equal contents
-  // share one tree. Returns the index of the first stop with another tree.
+  // Traces the rays of stop `first` and of the stops after it whose instances have the same tree as the instance of
+  // stop `first`; meshes with equal contents share one tree. Returns the index of the first stop with another tree.
   size_t trace_tree(size_t first) {
     const TriangleBvh& tree = current_[first].instance->mesh->tree();
     kernel_rays_.clear();
@@ -177,8 +180,8 @@ class Rounds {
     trace_instance(task_, ray.request, slabs_[stop.ray], *stop.instance, stop.nearest, ray.collector);
   }
 
-  // Returns the ray in mesh axes, or nothing if its direction or coordinates lie outside the range that the kernels
-  // support.
+  // Returns the ray of `stop` in mesh axes, or nullopt if the direction or the coordinates lie outside the range that
+  // the kernels support.
   std::optional<KernelRay> kernel_ray(const Stop& stop) const {
     const PendingRay& ray = rays_[stop.ray];
     const Transform& transform = stop.instance->transform;
@@ -198,9 +201,9 @@ class Rounds {
   std::vector<SlabRay<double>> slabs_;  // one per ray
   const Instance* only_ = nullptr;      // the only instance of the scene, if there is exactly one
   std::vector<InstanceWalk> walks_;     // one per ray, if there are several instances
-  std::vector<Stop> stops_, current_;   // stops of the next round and of the current one
+  std::vector<Stop> stops_, current_;   // stops_: stops of the next round; current_: stops of the current round
   std::vector<KernelRay> kernel_rays_;
-  std::vector<size_t> kernel_stops_;  // stop of each of kernel_rays_, as an index in current_
+  std::vector<size_t> kernel_stops_;  // for each of kernel_rays_, the index of its stop in current_
   std::vector<KernelHit> hits_;
   uint32_t max_rows_ = 0;  // kAll: number of entries in rows_ for each of kernel_rays_
   std::unique_ptr<KernelRow[]> rows_;

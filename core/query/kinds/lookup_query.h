@@ -8,13 +8,13 @@
 
 namespace locus {
 
-// Returns a hit with t = 0 on the object of `moment` that has this id, or else on the instance of `snapshot` that has
-// it; a miss if neither exists. The hit borrows from `moment` and `snapshot`.
+// Returns a hit with t = 0 on the object or instance with this id: an object of `moment`, or else an instance of
+// `snapshot`. Returns a miss if the id is unknown. The hit borrows from `moment` and `snapshot`.
 Hit look_up(const SceneSnapshot& snapshot, const SceneAtTime& moment, Id id);
 
-// Returns for each group its objects at `moment` and its instances: those with ids above options.after_id, ascending by
-// id, at most options.max_results rows. A group that occurs several times in `groups` has one entry in the result.
-// Cost: O(all objects and instances), independent of the number of groups.
+// Returns for each group its objects at `moment` and its instances, one row for each. The ids of the rows are above
+// options.after_id and ascending; there are at most options.max_results rows. A group that occurs several times in
+// `groups` has one entry in the result. Cost: O(all objects and instances), independent of the number of groups.
 absl::flat_hash_map<Group, OverlapAnswer> look_up_groups(QueryTask& task, const SceneAtTime& moment,
                                                          absl::Span<const uint64_t> groups,
                                                          const OverlapOptions& options);

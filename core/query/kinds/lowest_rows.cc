@@ -8,7 +8,7 @@
 namespace locus {
 namespace {
 
-bool lower_id(const RowRun& a, const RowRun& b) { return a.row.id < b.row.id; }
+bool lower_run_id(const RowRun& a, const RowRun& b) { return a.row.id < b.row.id; }
 
 }  // namespace
 
@@ -17,7 +17,7 @@ void LowestRows::offer(const Hit& row) {
   answer_.runs.push_back({row});
   ++rows_;
   if (rows_ > 2 * max_results_) keep_lowest();
-  check_invariants();
+  LOCUS_DCHECK_CALL(check_invariants());
 }
 
 void LowestRows::offer(const Hit& row, absl::Span<const uint32_t> triangles) {
@@ -29,45 +29,41 @@ void LowestRows::offer(const Hit& row, absl::Span<const uint32_t> triangles) {
   answer_.triangles.insert(answer_.triangles.end(), triangles.begin(), triangles.end());
   rows_ += triangles.size();
   if (rows_ > 2 * max_results_) keep_lowest();
-  check_invariants();
+  LOCUS_DCHECK_CALL(check_invariants());
 }
 
 void LowestRows::check_invariants() const {
-  if constexpr (kDebugChecks) {
-    LOCUS_DCHECK_LE(rows_, 2 * max_results_);
-    LOCUS_DCHECK_LE(answer_.runs.size(), rows_);
-    LOCUS_DCHECK_LE(answer_.triangles.size(), rows_);
-    if (answer_.runs.empty() || answer_.runs.back().triangle_count == 0) return;
-    LOCUS_DCHECK_EQ(answer_.runs.back().first_triangle + answer_.runs.back().triangle_count, answer_.triangles.size());
-  }
+  LOCUS_DCHECK_LE(rows_, 2 * max_results_);
+  LOCUS_DCHECK_LE(answer_.runs.size(), rows_);
+  LOCUS_DCHECK_LE(answer_.triangles.size(), rows_);
+  if (answer_.runs.empty() || answer_.runs.back().triangle_count == 0) return;
+  LOCUS_DCHECK_EQ(answer_.runs.back().first_triangle + answer_.runs.back().triangle_count, answer_.triangles.size());
 }
 
 void LowestRows::check_runs() const {
-  if constexpr (kDebugChecks) {
-    LOCUS_DCHECK_LE(rows_, max_results_);
-    LOCUS_DCHECK(std::is_sorted(answer_.runs.begin(), answer_.runs.end(), lower_id));
-    size_t rows = 0, triangles = 0;
-    for (const RowRun& run : answer_.runs) {
-      if (run.triangle_count != 0) LOCUS_DCHECK_EQ(run.first_triangle, triangles);
-      triangles += run.triangle_count;
-      rows += run.rows();
-    }
-    LOCUS_DCHECK_EQ(rows, rows_);
-    LOCUS_DCHECK_EQ(triangles, answer_.triangles.size());
+  LOCUS_DCHECK_LE(rows_, max_results_);
+  LOCUS_DCHECK(std::is_sorted(answer_.runs.begin(), answer_.runs.end(), lower_run_id));
+  size_t rows = 0, triangles = 0;
+  for (const RowRun& run : answer_.runs) {
+    if (run.triangle_count != 0) LOCUS_DCHECK_EQ(run.first_triangle, triangles);
+    triangles += run.triangle_count;
+    rows += run.rows();
   }
+  LOCUS_DCHECK_EQ(rows, rows_);
+  LOCUS_DCHECK_EQ(triangles, answer_.triangles.size());
 }
 
 bool LowestRows::in_order() const {
-  return !sorted_triangles_ && std::is_sorted(answer_.runs.begin(), answer_.runs.end(), lower_id);
+  return !sorted_triangles_ && std::is_sorted(answer_.runs.begin(), answer_.runs.end(), lower_run_id);
 }
 
 void LowestRows::keep_lowest() {
   if (rows_ <= max_results_ && in_order()) return;
   const OverlapAnswer all = std::exchange(answer_, {{}, {}, {}, answer_.truncated || rows_ > max_results_});
   std::vector<RowRun> runs = all.runs;
-  // An instance may have two runs: one that an earlier call merged, and one with the triangles added since. The stable
-  // sort preserves their order.
-  std::stable_sort(runs.begin(), runs.end(), lower_id);
+  // An instance may have two runs: a run that an earlier call merged, and a run with the triangles added since this
+  // call. The stable sort preserves their order.
+  std::stable_sort(runs.begin(), runs.end(), lower_run_id);
   rows_ = 0;
   for (size_t i = 0; i < runs.size() && rows_ < max_results_;) {
     RowRun& kept = answer_.runs.emplace_back(runs[i]);
@@ -86,7 +82,7 @@ void LowestRows::keep_lowest() {
 
 OverlapAnswer LowestRows::finish() {
   keep_lowest();
-  check_runs();
+  LOCUS_DCHECK_CALL(check_runs());
   return std::move(answer_);
 }
 

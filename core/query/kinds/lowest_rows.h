@@ -15,7 +15,7 @@ namespace locus {
 // Single row, or consecutive rows of one instance that differ only in the triangle.
 struct RowRun {
   Hit row;                    // t is 0; triangle is not set
-  size_t first_triangle = 0;  // index of the first one in OverlapAnswer::triangles
+  size_t first_triangle = 0;  // index of the run's first triangle in OverlapAnswer::triangles
   size_t triangle_count = 0;  // 0: a single row without a triangle
 
   size_t rows() const { return triangle_count == 0 ? 1 : triangle_count; }
@@ -25,8 +25,9 @@ struct RowRun {
 struct OverlapAnswer {
   std::vector<RowRun> runs;
   std::vector<uint32_t> triangles;
-  // If only objects were found: these objects, ascending by id, while `runs` is empty. The memory belongs to the
-  // QueryTask and is valid until its next query.
+  // Found objects, ascending by id, if a ball or box query found no instances; `runs` is then empty. In all other cases
+  // `objects` is empty, and `runs` contains the rows of objects, too. The memory belongs to the QueryTask and is valid
+  // until the next query of the task.
   absl::Span<const FoundObject> objects;
   bool truncated = false;  // more rows were found than are returned
 
@@ -35,9 +36,10 @@ struct OverlapAnswer {
   }
 };
 
-// Bounded collection of the rows with the lowest ids. Within an instance, the triangles are in storage order, or
-// ascending with `sorted_triangles`. Invariants: rows_ is the number of rows of all runs; after keep_lowest() it is at
-// most max_results_ and the runs ascend by id. Memory: twice max_results_ rows plus the rows of one offer().
+// Bounded collection of the rows with the lowest ids. The triangles of an instance are in storage order, or ascending
+// by index if `sorted_triangles` is true. Invariants: rows_ is the number of rows of all runs; after keep_lowest()
+// rows_ is at most max_results_, and the runs ascend by id. Memory: twice max_results_ rows plus the rows of one
+// offer().
 class LowestRows {
  public:
   explicit LowestRows(uint32_t max_results, bool sorted_triangles)
@@ -48,16 +50,16 @@ class LowestRows {
   // Adds one row for each of `triangles` of the instance of `row`. Several calls for one instance must pass its
   // triangles in storage order.
   void offer(const Hit& row, absl::Span<const uint32_t> triangles);
-  // Returns the retained rows in order and empties the collector. Call it once.
+  // Returns the retained rows, ascending by id, and empties the collector. Call it once.
   OverlapAnswer finish();
 
  private:
-  // Checks the invariants of the counts and of the last run, the only one that offer() changes.
+  // Checks the invariants of the counts and of the last run, which is the only run that offer() changes.
   void check_invariants() const;
   // Checks the invariants of all runs after keep_lowest().
   void check_runs() const;
   bool in_order() const;
-  // Sorts the runs, merges those of one instance, and drops rows beyond max_results_.
+  // Sorts the runs by id, merges the runs of each instance, and drops the rows after the first max_results_ rows.
   void keep_lowest();
 
   const size_t max_results_;

@@ -13,7 +13,8 @@
 namespace locus {
 namespace {
 
-// Returns a limit for squared distances in double: the root of any larger value rounds to a float above `farthest`.
+// Returns a limit for squared distances in double: the square root of any larger value rounds to a float above
+// `farthest`.
 double squared_limit_of(float farthest) { return squared_limit(raised(farthest)); }
 
 // Collector of the nearest rows. Invariant: rows_ has at most count_ rows, which are sorted if in_order_, and otherwise
@@ -30,9 +31,10 @@ class NearestRows {
   }
 
   // Returns the largest distance at which a row may still be retained. Once there are count_ rows, a row at exactly
-  // this distance replaces the last one only if its id or triangle is lower.
+  // this distance is retained only if it precedes the last row in the order of nearer().
   float farthest() const { return farthest_; }
-  // Returns the limit of squared distances in world axes. A box beyond it has no row that would be retained.
+  // Returns the limit of squared distances in world axes. If the squared distance from the query's point to a box
+  // exceeds this limit, no row is retained for anything in the box.
   double limit() const { return limit_; }
 
   void offer(const Hit& row) {
@@ -49,7 +51,7 @@ class NearestRows {
       farthest_ = last().t;
       limit_ = squared_limit_of(farthest_);
     }
-    check_invariants();
+    LOCUS_DCHECK_CALL(check_invariants());
   }
 
   std::vector<Hit> finish() {
@@ -64,12 +66,10 @@ class NearestRows {
   static constexpr size_t kMaxInOrder = 32;
 
   void check_invariants() const {
-    if constexpr (kDebugChecks) {
-      LOCUS_DCHECK_LE(rows_.size(), count_);
-      if (rows_.empty()) return;
-      LOCUS_DCHECK_LE(last().t, farthest_);
-      LOCUS_DCHECK(!nearer(last(), in_order_ ? rows_.front() : rows_.back()));
-    }
+    LOCUS_DCHECK_LE(rows_.size(), count_);
+    if (rows_.empty()) return;
+    LOCUS_DCHECK_LE(last().t, farthest_);
+    LOCUS_DCHECK(!nearer(last(), in_order_ ? rows_.front() : rows_.back()));
   }
 
   const Hit& last() const { return in_order_ ? rows_.back() : rows_.front(); }
@@ -88,7 +88,7 @@ class NearestRows {
   std::vector<Hit> rows_;
 };
 
-// Visitor of moving objects.
+// Visitor of the moving objects that may be nearest to the point of one query.
 class ObjectsNear {
  public:
   ObjectsNear(QueryTask& task, const SceneAtTime& moment, const NearestRequest& request, const Filter& filter,
@@ -115,10 +115,11 @@ class ObjectsNear {
   NearestRows& rows_;
 };
 
-// Collector of the rows of one instance: one row per triangle, or one row for its nearest triangle.
-class InstanceRows {
+// Collector of the rows of one instance: one row for each triangle, or one row for the nearest triangle of the
+// instance.
+class NearestInstanceRows {
  public:
-  InstanceRows(const NearestRequest& request, const Instance& instance, NearestRows& rows)
+  NearestInstanceRows(const NearestRequest& request, const Instance& instance, NearestRows& rows)
       : request_(request),
         instance_(instance),
         rows_(rows),
@@ -126,13 +127,13 @@ class InstanceRows {
         farthest_(rows.farthest()),
         limit_(rows.limit()) {}
 
-  // Return limits like those of NearestRows. They are lower if the instance gets only one row and a nearer triangle of
-  // it was already found.
+  // Return limits like those of NearestRows. Without `every_triangle`, the instance has only one row, and the limits
+  // decrease to the distance of the nearest triangle found so far.
   float farthest() const { return farthest_; }
   double limit() const { return limit_; }
 
   // Offers a triangle at the squared distance `squared`. The reported distance is at least the distance to the
-  // instance's bounds, because the tree over instances may cull by that distance.
+  // instance's bounds, because the tree over instances may cull by the distance to these bounds.
   void offer(const Triangle& triangle, double squared) {
     Hit row = hit_on(instance_, rounded_distance(std::sqrt(std::max(squared, squared_bounds_distance_))));
     row.triangle = triangle.number;
@@ -168,7 +169,7 @@ class InstanceRows {
 // Visitor of the triangles of one instance for EXACT queries: computes the distance to each triangle in world axes.
 class TrianglesNear {
  public:
-  TrianglesNear(QueryTask& task, const NearestRequest& request, const Instance& instance, InstanceRows& rows)
+  TrianglesNear(QueryTask& task, const NearestRequest& request, const Instance& instance, NearestInstanceRows& rows)
       : task_(task),
         point_(request.point),
         transform_(instance.transform),
@@ -194,9 +195,10 @@ class TrianglesNear {
   }
 
  private:
-  // Returns an upper bound of the difference between a distance in world axes and the scaled distance in mesh axes. It
-  // covers the rounding errors of the transformations, which are relative to the magnitudes of their operands, and
-  // those of the distance to a triangle, which are at most 2^-30 of the triangle's size (the worst case is a sliver).
+  // Returns an upper bound of the difference between a distance in world axes and the scaled distance in mesh axes. The
+  // bound covers the rounding errors of the transformations, which are relative to the magnitudes of their operands,
+  // and the rounding error of the distance to a triangle, which is at most 2^-30 of the triangle's size (the worst case
+  // is a very thin triangle).
   static double epsilon(const NearestRequest& request, const Instance& instance) {
     const Transform& transform = instance.transform;
     return 0x1p-26 * (max_component(abs(request.point)) + max_component(abs(transform.translation)) +
@@ -207,7 +209,7 @@ class TrianglesNear {
   const Vec3d point_;
   const Transform& transform_;
   const PlacedTriangles placed_;
-  InstanceRows& rows_;
+  NearestInstanceRows& rows_;
   const double epsilon_;
   mutable float farthest_ = -1;  // value of rows_.farthest() from which limit_ was computed
   mutable double limit_ = 0;
@@ -217,7 +219,7 @@ class TrianglesNear {
 // triangle in world axes.
 class PlacedBoundsNear {
  public:
-  PlacedBoundsNear(QueryTask& task, const NearestRequest& request, const Instance& instance, InstanceRows& rows)
+  PlacedBoundsNear(QueryTask& task, const NearestRequest& request, const Instance& instance, NearestInstanceRows& rows)
       : task_(task), point_(request.point), mesh_(*instance.mesh), placed_(instance), rows_(rows) {}
 
   Aabbf bounds() const { return mesh_.bounds(); }
@@ -235,10 +237,10 @@ class PlacedBoundsNear {
   const Vec3d point_;
   const StaticMesh& mesh_;
   const PlacedTriangles placed_;
-  InstanceRows& rows_;
+  NearestInstanceRows& rows_;
 };
 
-// Visitor of instances.
+// Visitor of the instances that may be nearest to the point of one query.
 class InstancesNear {
  public:
   InstancesNear(QueryTask& task, const NearestRequest& request, const Filter& filter, NearestRows& rows)
@@ -248,7 +250,7 @@ class InstancesNear {
   bool visit(const Instance& instance) {
     if (!task_.count_test()) return false;
     if (!filter_.accepts(instance)) return true;
-    InstanceRows rows(request_, instance, rows_);
+    NearestInstanceRows rows(request_, instance, rows_);
     const TriangleBvh& tree = instance.mesh->tree();
     if (request_.precision == Precision::kConservative) {
       PlacedBoundsNear visitor(task_, request_, instance, rows);
@@ -298,10 +300,10 @@ std::vector<Hit> run_nearest(QueryTask& task, const SceneAtTime& moment, const N
 Vec3d nearest_offset(const NearestRequest& request, const Hit& row) {
   const Vec3d point = request.point;
   const bool conservative = request.precision == Precision::kConservative;
-  // Computes with coordinates relative to `point`, which avoids cancellation far from the world's origin.
   if (row.object) {
     Shape shape = row.object_shape();
     if (conservative) return nearest_in(point, bounds_of(shape)) - point;
+    // Compute with coordinates relative to `point`, which avoids cancellation far from the world's origin.
     shape.position = shape.position - point;
     return nearest_on_shape({}, shape);
   }

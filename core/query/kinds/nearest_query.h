@@ -1,10 +1,10 @@
 // Search for the objects and instances, or triangles of instances, that are nearest to one point, ascending by
 // (distance, id, triangle). Free functions; any thread may call them with a QueryTask of its own.
 //
-// An EXACT distance is computed in double and in world axes, from the point to the stored solid or to the triangle. It
-// is never less than the distance to the bounds by which index structures cull, and is rounded to float once. The order
-// of rows and the comparison with max_distance use the rounded distance. A search through index structures and a test
-// of all values therefore return the same rows.
+// An EXACT distance is computed in double and in world axes, from the point to the object's shape or to the triangle.
+// The distance is never less than the distance to the bounds by which index structures cull, and it is rounded to float
+// once. The order of rows and the comparison with max_distance use the rounded distance. A search through index
+// structures and a test of all values therefore return the same rows.
 #ifndef LOCUS_CORE_QUERY_KINDS_NEAREST_QUERY_H_
 #define LOCUS_CORE_QUERY_KINDS_NEAREST_QUERY_H_
 
@@ -17,7 +17,7 @@ namespace locus {
 
 struct NearestRequest {
   Vec3d point;
-  float max_distance;   // inclusive
+  float max_distance;   // largest distance of a row, inclusive; may be +inf
   uint32_t count;       // maximum number of rows, at least 1
   bool every_triangle;  // true: one row per triangle; false: one row per instance, for its nearest triangle
   Source source;
@@ -28,14 +28,14 @@ struct NearestRequest {
 NearestRequest nearest_request(const QueryBlock& block, const NearestColumns& nearest, size_t i);
 
 // Returns the nearest rows in order. Hit::t is the distance, and Hit::triangle the nearest triangle of an instance
-// (with every_triangle, the row's triangle). Objects are searched as of `moment`, which the rows borrow. Cost: the
-// nodes and cells that are no farther than the last row, and O(log count) for each row inserted.
+// (with every_triangle, the row's triangle). Objects are searched as of `moment`, which the rows borrow. Cost: visits
+// of the nodes and cells that are no farther than the last row, and O(log count) for each row inserted.
 std::vector<Hit> run_nearest(QueryTask& task, const SceneAtTime& moment, const NearestRequest& request,
                              const Filter& filter);
 
-// Returns the vector from request.point to the nearest point of the row's object or triangle, or, with kConservative,
-// of its bounds. The vector is zero if request.point lies inside. Recomputes it from the stored object or triangle,
-// since a Hit does not store it.
+// Returns the vector from request.point to the nearest point of the row's object or triangle, or, for a CONSERVATIVE
+// query, to the nearest point of the bounds of this object or triangle. The vector is zero if request.point lies
+// inside. The vector is computed again from the stored object or triangle, since a Hit does not store it.
 Vec3d nearest_offset(const NearestRequest& request, const Hit& row);
 
 }  // namespace locus

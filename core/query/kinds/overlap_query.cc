@@ -14,10 +14,10 @@ namespace {
 // Result of a test that uses only an object's stored position and bounds. kUndecided: the exact shape must be tested.
 enum class Verdict { kOverlaps, kDisjoint, kUndecided };
 
-// Bounds of an object's solid. The solid extends at most `extent` from the object's true position and contains the ball
-// of radius `inner_radius` around the true position. The true position is at most `displacement_bound` away from
-// `position`. The displacement bound includes an epsilon for rounding in the exact tests and in the comparisons with
-// these bounds.
+// Bounds of an object's solid at the time of the query. Let c be the object's position at this time. The solid extends
+// at most `extent` from c and contains the ball of radius `inner_radius` around c. The distance from c to the stored
+// position, `position`, is at most `displacement_bound`, which includes an epsilon for rounding in the exact tests and
+// in the comparisons with these bounds.
 struct ObjectBounds {
   Vec3d position;
   double inner_radius;
@@ -89,12 +89,12 @@ struct BoxShape {
 template <class Kind>
 GridRegion search_region(const SceneAtTime& moment, const typename Kind::World& shape, const OverlapOptions& options) {
   const typename Kind::WorldRegion region(shape);
-  // Only an EXACT ball allows a search of the ball alone. A CONSERVATIVE query also finds objects of which it meets
-  // only the bounds, and a box is searched by its bounds.
+  // The search can be restricted to the ball only for an EXACT ball query. A CONSERVATIVE query also finds objects if
+  // it overlaps only their bounds, and for a box query the region is the axis-aligned bounds of the box.
   return moment.region(region.bounds(), options.precision == Precision::kExact ? Kind::as_ball(shape) : std::nullopt);
 }
 
-// Visitor of moving objects.
+// Visitor of the moving objects that one ball or box may overlap.
 template <class Kind>
 class ObjectRows {
  public:
@@ -116,7 +116,7 @@ class ObjectRows {
  private:
   bool overlaps(const GridRef& object) const {
     const bool exact = options_.precision == Precision::kExact;
-    if (exact) {  // decides most objects without computing their shape at this time
+    if (exact) {  // avoids computing the shape of most objects at the time of the query
       const Verdict verdict = Kind::verdict(shape_, object_bounds(object, moment_.displacement_bound(object)));
       if (verdict != Verdict::kUndecided) return verdict == Verdict::kOverlaps;
     }
@@ -134,9 +134,9 @@ class ObjectRows {
 
 // Adapter that adds the rows of one instance to a LowestRows: one row, or one row per triangle found. Triangles must be
 // offered in storage order.
-class InstanceRows {
+class OverlapRows {
  public:
-  InstanceRows(const Instance& instance, const OverlapOptions& options, LowestRows& rows)
+  OverlapRows(const Instance& instance, const OverlapOptions& options, LowestRows& rows)
       : instance_(instance), detail_(options.detail), max_results_(options.max_results), rows_(rows) {}
 
   // Offers triangles that overlap the query. Returns false if the search of this instance can stop, because later
@@ -163,9 +163,9 @@ class InstanceRows {
 
 // Exact test of one ball or box against single triangles of one instance.
 template <class Kind>
-class ExactTest {
+class ExactOverlapTest {
  public:
-  ExactTest(const typename Kind::World& world_shape, const Instance& instance)
+  ExactOverlapTest(const typename Kind::World& world_shape, const Instance& instance)
       : shape_(Kind::to_mesh(world_shape, instance.transform)),
         world_shape_(world_shape),
         placed_(instance, Kind::extent(world_shape)) {}
@@ -187,7 +187,7 @@ class ExactTest {
 template <class Kind>
 class ExactTriangles {
  public:
-  ExactTriangles(QueryTask& task, const ExactTest<Kind>& exact, InstanceRows rows)
+  ExactTriangles(QueryTask& task, const ExactOverlapTest<Kind>& exact, OverlapRows rows)
       : task_(task), region_(exact.mesh_shape()), exact_(exact), rows_(rows) {}
 
   Aabbf bounds() const { return region_.bounds(); }
@@ -200,17 +200,17 @@ class ExactTriangles {
  private:
   QueryTask& task_;
   const typename Kind::MeshRegion region_;
-  const ExactTest<Kind>& exact_;
-  InstanceRows rows_;
+  const ExactOverlapTest<Kind>& exact_;
+  OverlapRows rows_;
 };
 
 // Visitor of the triangles of one instance for CONSERVATIVE queries: tests the bounds of each triangle in world axes.
-// Because the exact test rounds to floats in mesh axes, it may find a triangle whose bounds the shape misses. Such a
-// triangle is reported as well, so that a CONSERVATIVE result contains every EXACT row.
+// Because the exact test rounds to floats in mesh axes, the exact test may find a triangle whose bounds the shape
+// misses. Such a triangle is reported as well, so that a CONSERVATIVE result contains every EXACT row.
 template <class Kind>
 class PlacedBounds {
  public:
-  PlacedBounds(QueryTask& task, const typename Kind::World& shape, const Instance& instance, InstanceRows rows)
+  PlacedBounds(QueryTask& task, const typename Kind::World& shape, const Instance& instance, OverlapRows rows)
       : task_(task),
         shape_(shape),
         region_(shape),
@@ -237,12 +237,12 @@ class PlacedBounds {
   const typename Kind::WorldRegion region_;
   const StaticMesh& mesh_;
   const PlacedTriangles placed_;
-  const ExactTest<Kind> exact_;
+  const ExactOverlapTest<Kind> exact_;
   const typename Kind::MeshRegion mesh_region_;
-  InstanceRows rows_;
+  OverlapRows rows_;
 };
 
-// Visitor of instances.
+// Visitor of the instances that one ball or box may overlap.
 template <class Kind>
 class InstanceSearch {
  public:
@@ -255,10 +255,10 @@ class InstanceSearch {
   bool visit(const Instance& instance) {
     if (!task_.count_test()) return false;
     if (instance.id <= options_.after_id || !filter_.accepts(instance)) return true;
-    // A shape overlaps an instance only if it overlaps the instance's bounds: the tree over instances may cull by these
-    // bounds, so the result must include their test.
+    // A shape overlaps an instance only if the shape overlaps the instance's bounds. This test is repeated here because
+    // the tree over instances may or may not cull by these bounds, and the result must not depend on culling.
     if (!region_.overlaps(instance.bounds)) return true;
-    InstanceRows rows(instance, options_, rows_);
+    OverlapRows rows(instance, options_, rows_);
     if (options_.precision == Precision::kConservative) {
       PlacedBounds<Kind> visitor(task_, shape_, instance, rows);
       task_.visit_region(instance.mesh->tree(), visitor);
@@ -269,9 +269,9 @@ class InstanceSearch {
   }
 
  private:
-  void visit_exactly(const Instance& instance, InstanceRows& rows) {
+  void visit_exactly(const Instance& instance, OverlapRows& rows) {
     const TriangleBvh& tree = instance.mesh->tree();
-    const ExactTest<Kind> exact(shape_, instance);
+    const ExactOverlapTest<Kind> exact(shape_, instance);
     const typename Kind::Mesh& shape = exact.mesh_shape();
     if (task_.uses_region_kernels() && TriangleSearch<typename Kind::Mesh>::served(tree, shape) &&
         exact.placed().bounds_follow(to_double(shape.center), Kind::size(shape)))
@@ -280,7 +280,7 @@ class InstanceSearch {
     task_.visit_region(tree, visitor);
   }
 
-  void search(const TriangleBvh& tree, const typename Kind::Mesh& shape, InstanceRows& rows) {
+  void search(const TriangleBvh& tree, const typename Kind::Mesh& shape, OverlapRows& rows) {
     TriangleSearch<typename Kind::Mesh> search(tree, shape);
     uint32_t triangles[kTrianglesPerStep];
     const size_t room = options_.detail == StaticDetail::kInstances ? kMinRegionRoom : kTrianglesPerStep;
@@ -290,8 +290,8 @@ class InstanceSearch {
       task_.work().nodes += search.nodes();
       task_.work().tests += search.tests();
       more = rows.offer({triangles, found});
-      // Also counts the triangles of subtrees inside the region, which are found without a test, so that the stop is
-      // polled often enough.
+      // Also counts the triangles of subtrees inside the region, which are found without a test, so that
+      // RunOptions::stop is called often enough.
       more = task_.count_tests(search.tests() + found) && more;
     }
   }
@@ -306,7 +306,7 @@ class InstanceSearch {
   LowestRows& rows_;
 };
 
-// Merges the rows of instances with the found objects: ascending by id, at most options.max_results rows.
+// Merges the rows of instances with the found objects. Returns at most options.max_results rows, ascending by id.
 OverlapAnswer with_objects(OverlapAnswer instances, FoundObjects& found, const SceneAtTime& moment,
                            const OverlapOptions& options) {
   const absl::Span<const FoundObject> objects = found.finish();
@@ -346,8 +346,6 @@ OverlapAnswer run_overlap(QueryTask& task, const SceneAtTime& moment, const type
   return rows.finish();
 }
 
-Vec3d point(const float* p) { return {p[0], p[1], p[2]}; }
-
 }  // namespace
 
 OverlapOptions overlap_options(const QueryBlock& block, StaticDetail detail) {
@@ -375,14 +373,14 @@ GridRegion box_region(const SceneAtTime& moment, const Obbd& box, const OverlapO
 
 Balld ball_of(const QueryBlock& block, const BallColumns& balls, size_t i) {
   LOCUS_DCHECK_LT(3 * i, balls.centers.size());
-  return {block.frame + point(ColumnReader<float>(balls.centers, 3).entry(i)),
+  return {block.frame + read_vec3d(ColumnReader<float>(balls.centers, 3).entry(i)),
           ColumnReader<float>(balls.radii, 1).value(i, 0)};
 }
 
 Obbd box_of(const QueryBlock& block, const BoxColumns& boxes, size_t i) {
   LOCUS_DCHECK_LT(3 * i, boxes.centers.size());
-  Obbd box{block.frame + point(ColumnReader<float>(boxes.centers, 3).entry(i)),
-           point(ColumnReader<float>(boxes.half_extents, 3).entry(i)),
+  Obbd box{block.frame + read_vec3d(ColumnReader<float>(boxes.centers, 3).entry(i)),
+           read_vec3d(ColumnReader<float>(boxes.half_extents, 3).entry(i)),
            {}};
   const ColumnReader<float> rotations(boxes.rotations, 4);
   if (!rotations.given()) return box;

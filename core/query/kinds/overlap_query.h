@@ -22,9 +22,9 @@ struct OverlapOptions {
 // Returns the options of a block. A max_results of 0 becomes limits::kDefaultMaxResults.
 OverlapOptions overlap_options(const QueryBlock& block, StaticDetail detail);
 
-// Answer one ball or box query, given in world axes. Objects are searched as of `moment`, which the answer borrows.
-// OverlapAnswer::objects belongs to `task` and is valid until its next query. Cost: the nodes, cells and primitives
-// that meet the region, and the sorting of the rows.
+// Answer one ball or box query, given in world axes. Objects are searched as of `moment`, which the answer borrows. The
+// memory of OverlapAnswer::objects belongs to `task` and is valid until the next query of the task. Cost: visits of the
+// nodes, cells and primitives that overlap the ball or box, and the sorting of the rows.
 OverlapAnswer run_ball(QueryTask& task, const SceneAtTime& moment, const Balld& ball, const OverlapOptions& options,
                        const Filter& filter);
 OverlapAnswer run_box(QueryTask& task, const SceneAtTime& moment, const Obbd& box, const OverlapOptions& options,

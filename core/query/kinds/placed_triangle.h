@@ -1,7 +1,7 @@
 // Axis-aligned bounds of an instance's triangles in world axes. CONSERVATIVE queries test the bounds of
-// PlacedTriangles. EXACT rays, balls and boxes must also meet the wider bounds of LoosePlacedTriangles: the exact tests
-// run in mesh axes and in floats, and without this condition they could report a triangle far from its position in the
-// world.
+// PlacedTriangles. EXACT rays, balls and boxes find a triangle only if they also meet its wider bounds of
+// LoosePlacedTriangles: the exact tests run in mesh axes and in floats, and without this condition they could report a
+// triangle that is far away in the world.
 //
 // Both classes are immutable and borrow the instance; any number of threads may share one object.
 #ifndef LOCUS_CORE_QUERY_KINDS_PLACED_TRIANGLE_H_
@@ -32,10 +32,12 @@ inline Aabbd grown_around(const Corners& corners, double epsilon) {
   return grown(bounds, epsilon);
 }
 
-// Tight bounds: the box around the corners, which are transformed to world axes in double, grown by about 2^-40 of the
-// sum of the magnitudes of the translation and of the scaled mesh. The sum covers a mesh far from its own origin, whose
-// offset the translation cancels. The bounds lie within Instance::bounds, which are grown by twice as much. So the t,
-// distance and point of a CONSERVATIVE row depend only on the triangle's bounds, not on those of the instance.
+// Tight bounds of the triangles of an instance. The bounds of a triangle are the box around its corners in world axes,
+// grown by an epsilon that covers the rounding of the corners, which are transformed in double. The epsilon is about
+// 2^-40 times the magnitude of the translation plus that of the scaled mesh, since a mesh may be far from its own
+// origin while the translation cancels the offset. The bounds of each triangle lie within Instance::bounds, which are
+// grown by twice as much. So the t, distance and point of a CONSERVATIVE row depend only on the triangle's bounds, not
+// on the instance's bounds.
 class PlacedTriangles {
  public:
   explicit PlacedTriangles(const Instance& instance)
@@ -50,7 +52,7 @@ class PlacedTriangles {
   Aabbd bounds_of_corners(const Corners& corners) const { return grown_around(corners, epsilon_); }
 
   // Returns bounds in world axes that contain bounds_of_triangle() of every triangle within `box`, which is in mesh
-  // axes. They are grown by twice the epsilon of a triangle's bounds.
+  // axes. The result is grown by twice the epsilon of a triangle's bounds.
   Aabbd bounds_of_box(const Aabbf& box) const { return grown(bounds_to_world(transform_, box), 2 * epsilon_); }
 
  private:
@@ -60,12 +62,13 @@ class PlacedTriangles {
   double epsilon_;
 };
 
-// Wide bounds: the box around the corners in world axes, grown by an epsilon that covers all rounding errors of the
-// exact tests, including the transformation into mesh axes and one rounding to float there.
+// Wide bounds of the triangles of an instance. The bounds of a triangle are the box around its corners in world axes,
+// grown by an epsilon that covers all rounding errors of the exact tests, including the transformation into mesh axes
+// and one rounding to float in mesh axes.
 class LoosePlacedTriangles {
  public:
-  // `query_extent` is the largest coordinate or length of the query that is tested against the bounds. It increases the
-  // epsilon. Pass 0 if that test grows the bounds itself.
+  // `query_extent` is an upper bound of the largest |coordinate| that the query reaches; a larger value enlarges the
+  // epsilon. Pass 0 if the caller's test grows the bounds itself.
   explicit LoosePlacedTriangles(const Instance& instance, double query_extent = 0)
       : transform_(instance.transform),
         extent_(magnitude(instance.bounds) + query_extent),
@@ -77,11 +80,11 @@ class LoosePlacedTriangles {
     return grown_around(corners_of(transform_, triangle), epsilon_);
   }
 
-  // Returns whether the test of bounds_of_triangle() can be omitted: whether a query of `size` around `center`, in mesh
-  // axes, that overlaps a triangle is certain to overlap the triangle's bounds in world axes. Rounding center and size
-  // to float moves the query by less than 2^-24 sqrt(3) of their magnitude. If this magnitude, scaled to world axes, is
-  // at most 2 * extent_, the error is at most half of epsilon_. The other half covers the transformation back to world
-  // axes.
+  // Returns true if the test against bounds_of_triangle() can be omitted for a query of `size` around `center`, both in
+  // mesh axes: a query that overlaps a triangle in mesh axes then also overlaps the triangle's bounds in world axes.
+  // Rounding center and size to float moves the query by less than 2^-24 * sqrt(3) times their magnitude. If this
+  // magnitude, scaled to world axes, is at most 2 * extent_, the error is at most half of epsilon_. The other half
+  // covers the transformation back to world axes.
   bool bounds_follow(Vec3d center, double size) const {
     return transform_.scale * (max_component(abs(center)) + size) <= 2 * extent_;
   }
@@ -90,8 +93,9 @@ class LoosePlacedTriangles {
   static constexpr double kRelativeEpsilon = 0x1p-21;
   static constexpr double kPlacementEpsilon = 0x1p-40;
 
-  // Returns the magnitude to which the rounding error of a vertex's transformation to world axes is relative. It is
-  // much larger than the result if the translation cancels the offset of a mesh that lies far from its own origin.
+  // Returns the magnitude to which the rounding error of a vertex's transformation to world axes is relative. This
+  // magnitude is much larger than that of the transformed vertex if the translation cancels the offset of a mesh that
+  // is far from its own origin.
   static double placement_magnitude(const Instance& instance) {
     return max_component(abs(instance.transform.translation)) +
            double{instance.transform.scale} * magnitude(instance.mesh->bounds());

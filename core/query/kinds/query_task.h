@@ -1,9 +1,9 @@
 // Context in which the queries of one chunk run: the snapshot, searches of its indexes, filters, and the work budget
-// and cancellation of the batch. For the implementations of all kinds of queries.
+// and cancellation of the batch. All kinds of queries use this context.
 //
 // Threads: a QueryTask belongs to one thread; the tasks of a batch share one BatchControl, which is thread-safe.
-// Invariants: once true, ended() and BatchControl::stopped() stay true; a task has reported at most the work that it
-// counted.
+// Invariants: once true, ended() and BatchControl::stopped() stay true; a task has reported at most as much work as it
+// has counted.
 #ifndef LOCUS_CORE_QUERY_KINDS_QUERY_TASK_H_
 #define LOCUS_CORE_QUERY_KINDS_QUERY_TASK_H_
 
@@ -48,11 +48,12 @@ class Filter {
 // Work budget and cancellation of one batch, shared by all threads that work on it. Thread-safe.
 class BatchControl {
  public:
-  // `max_work` 0 = no limit. `stop` may be empty; a status from it that is not OK stops the batch.
+  // `max_work` is the maximum number of nodes, cells and primitive tests; 0: no limit. `stop` may be empty; if it
+  // returns a status that is not OK, the batch stops with this status.
   BatchControl(uint64_t max_work, std::function<absl::Status()> stop) : max_work_(max_work), stop_(std::move(stop)) {}
 
-  // Adds `work` to the work done and calls `stop`. Returns false if the batch must end, because it was stopped or its
-  // work budget is used up.
+  // Adds `work` to the work done and calls `stop`. Returns false if the batch must end, because `stop` returned an
+  // error or the work budget is used up.
   bool report_work(uint64_t work);
   // Returns whether the work budget is used up.
   bool out_of_work() const { return max_work_ != 0 && done_.load(std::memory_order_relaxed) >= max_work_; }
@@ -85,13 +86,14 @@ class QueryTask {
     if (++tests_ % limits::kTestsBetweenChecks != 0) return !ended_;
     return check();
   }
-  // Counts `tests` primitive tests at once. Returns the same as count_test().
+  // Counts `tests` primitive tests at once. Returns false if the query must end now, like count_test().
   bool count_tests(uint64_t tests) {
     const uint64_t before = tests_ / limits::kTestsBetweenChecks;
     tests_ += tests;
     return tests_ / limits::kTestsBetweenChecks == before ? !ended_ : check();
   }
-  // Reports the work since the last report to the BatchControl, which checks budget and stop. Returns !ended().
+  // Reports the work since the last check() to the BatchControl, which checks the budget and calls `stop`. Returns
+  // !ended().
   bool check();
   bool ended() const { return ended_; }
 
@@ -105,8 +107,8 @@ class QueryTask {
   // Returns whether ball and box queries may use the vector kernels.
   bool uses_region_kernels() const { return !brute_force_; }
 
-  // Call the visitor for every value of `index` that may match: the values that the index structure finds, or, with
-  // brute force, all values.
+  // Call the visitor for every value of `index` that may match the query: the values that the index structure finds,
+  // or, with brute force, all values.
   template <class Index, class Visitor>
   void visit_ray(const Index& index, const SlabRay<ScalarOf<typename Index::Value>>& slabs, Visitor& visitor) {
     if (brute_force_)
@@ -129,7 +131,7 @@ class QueryTask {
       index.visit_nearest(point, visitor, work_);
   }
 
-  // Call the visitor for every object at `moment` that may match, or, with brute force, for all objects.
+  // Call the visitor for every object at `moment` that may match the query, or, with brute force, for all objects.
   template <class Visitor>
   void visit_objects_on_ray(const SceneAtTime& moment, const SlabRay<double>& slabs, Visitor& visitor) {
     const auto visit = [&visitor](const GridRef& object) { return visitor.visit(object); };
@@ -162,9 +164,10 @@ class QueryTask {
     };
     moment.visit_asked(bounds, work_, search, visit);
   }
-  // Starts a RegionWalk over the grid regions of queries [begin, end). From then on, visit_objects_in_region() must be
-  // called once for each of these queries, in order, and takes its region from the walk instead of the visitor. While
-  // one region is visited, the walk prefetches the memory of the following ones.
+  // Starts a RegionWalk over the grid regions of queries [begin, end). After this call, visit_objects_in_region() must
+  // be called once for each of these queries, in order. visit_objects_in_region() then searches the region of the walk
+  // instead of the region of the visitor. While one region is visited, the walk prefetches the memory of the following
+  // regions.
   void walk_regions(size_t begin, size_t end, const std::function<GridRegion(size_t)>& region_of) {
     LOCUS_DCHECK_LT(begin, end);
     walk_.emplace(begin, end, region_of);
@@ -188,7 +191,7 @@ class QueryTask {
   Work work_;
   std::optional<RegionWalk> walk_;  // set by walk_regions()
   FoundObjects found_objects_;
-  uint64_t tests_ = 0;          // counted by count_test() and count_tests()
+  uint64_t tests_ = 0;          // number of primitive tests counted by count_test() and count_tests()
   uint64_t reported_work_ = 0;  // part of work_ that was reported to control_
   bool ended_ = false;
 };

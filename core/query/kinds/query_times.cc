@@ -7,27 +7,31 @@
 namespace locus {
 namespace {
 
-// Returns why the history begins at its oldest tick, and advice for the caller.
+// Returns the part of the error message that explains why the history begins at its oldest tick and advises the caller.
 std::string explanation(const SceneSnapshot& snapshot) {
   switch (snapshot.past_limit) {
     case PastLimit::kOff:
-      return "the scene keeps no past. Ask about now, clamp, or create the scene with history_ticks";
+      return "the scene has no history. Query the current tick, clamp, or create the scene with history_ticks";
     case PastLimit::kBegan:
-      return "the scene's ticks began there. Ask about one of those, or clamp";
+      return "the scene's ticks began there. Query one of these ticks, or clamp";
     case PastLimit::kTicks:
-      return "older ones are beyond history_ticks. Ask about one of those, clamp, or create the scene with a larger "
+      return "older ticks are beyond history_ticks. Query one of these ticks, clamp, or create the scene with a larger "
              "history_ticks";
     case PastLimit::kBytes:
-      return "older ones did not fit into history_bytes. Ask about one of those, clamp, or create the scene with a "
+      return "older ticks did not fit into history_bytes. Query one of these ticks, clamp, or create the scene with a "
              "larger history_bytes";
+    case PastLimit::kMemory:
+      return "older ticks were dropped because the server was short of memory. Query one of these ticks, clamp, or "
+             "give the server a larger --memory-limit";
     case PastLimit::kRestored:
-      return "the server has restarted since, and on disk a scene has no past before its last snapshot. Ask about one "
-             "of those, or clamp";
+      return "the server has restarted, and the disk has no history from before the scene's last snapshot. Query "
+             "one of these ticks, or clamp";
   }
   return "";
 }
 
-// Returns the error for a time outside the history. `entry` is its index in the as_of columns of `field`.
+// Returns the error for `time`, which is outside the history. `field` is the name of the block in the error, and
+// `entry` is the index of the time in the block's as_of columns.
 absl::Status not_kept(const SceneSnapshot& snapshot, const AsOf& time, const std::string& field, size_t entry) {
   Refusal refusal;
   refusal.reason = Reason::kOutOfRange;
@@ -36,11 +40,11 @@ absl::Status not_kept(const SceneSnapshot& snapshot, const AsOf& time, const std
   refusal.asked = static_cast<double>(time.tick) + double{time.fraction};
   const std::string fraction = time.fraction == 0 ? "" : absl::StrCat(" and a fraction of ", time.fraction);
   const std::string asked = absl::StrCat("tick ", time.tick, fraction);
-  const std::string kept = absl::StrCat("ticks ", snapshot.oldest_tick(), " to ", snapshot.tick, " are");
+  const std::string kept = absl::StrCat("the recorded ticks are ", snapshot.oldest_tick(), " to ", snapshot.tick);
   const std::string message =
       time.tick < snapshot.oldest_tick()
-          ? absl::StrCat(asked, " is not kept; ", kept, ": ", explanation(snapshot))
-          : absl::StrCat(asked, " has not come yet; ", kept, " kept. Ask about one of those, or clamp");
+          ? absl::StrCat(asked, " is too old; ", kept, ": ", explanation(snapshot))
+          : absl::StrCat(asked, " is in the future; ", kept, ". Query one of these ticks, or clamp");
   return refuse(absl::StatusCode::kOutOfRange, message, refusal);
 }
 
@@ -52,7 +56,7 @@ absl::StatusOr<QueryTimes> QueryTimes::resolve(const SceneSnapshot& snapshot, co
   const size_t n = query_count(block);
   if (block.as_of_ticks.empty() || n == 0) {
     result.scenes_.emplace_back(snapshot.objects);
-    result.check_invariants(n);
+    LOCUS_DCHECK_CALL(result.check_invariants(n));
     return result;
   }
   const ColumnReader<uint64_t> ticks(block.as_of_ticks, 1);
@@ -68,7 +72,7 @@ absl::StatusOr<QueryTimes> QueryTimes::resolve(const SceneSnapshot& snapshot, co
     result.times_.push_back(time);
     result.clamped_.push_back(time == asked ? 0 : 1);
   }
-  result.check_invariants(n);
+  LOCUS_DCHECK_CALL(result.check_invariants(n));
   return result;
 }
 

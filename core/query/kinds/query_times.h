@@ -1,5 +1,5 @@
-// Effective times of the queries of a block: its as_of columns, resolved in the history that the snapshot retains.
-// Immutable, so any thread may use it; borrows from the snapshot.
+// Effective times of the queries of a block, at which the queries are evaluated: the block's as_of columns, resolved in
+// the history that the snapshot retains. Immutable, so any thread may use it; borrows from the snapshot.
 #ifndef LOCUS_CORE_QUERY_KINDS_QUERY_TIMES_H_
 #define LOCUS_CORE_QUERY_KINDS_QUERY_TIMES_H_
 
@@ -14,12 +14,12 @@
 namespace locus {
 
 // Invariant: scenes_ has one entry per query, or one entry for all queries; times_ and clamped_ have the same number of
-// entries, or none if the block has no as_of_ticks.
+// entries as scenes_, or no entries if the block has no as_of_ticks.
 class QueryTimes {
  public:
   // Resolves the times of `block`, which has passed check_batch(). `field` is the block's name in errors. Returns
-  // OUT_OF_RANGE for a time outside the history unless the block clamps; the error names `field`.as_of_ticks, the index
-  // of the entry and the retained ticks.
+  // OUT_OF_RANGE for a time outside the history unless the block has OutsideHistory::kClamp; the error names
+  // `field`.as_of_ticks, the index of the entry and the retained ticks.
   static absl::StatusOr<QueryTimes> resolve(const SceneSnapshot& snapshot, const QueryBlock& block,
                                             const std::string& field);
 
@@ -32,7 +32,7 @@ class QueryTimes {
   }
   // Returns whether the block has queries and as_of_ticks. If not, all queries see the snapshot's latest state.
   bool asks_past() const { return !times_.empty(); }
-  // Returns whether a query asked for a time outside the history. Precondition: asks_past().
+  // Returns whether a query requested a time outside the history. Precondition: asks_past().
   bool clamped(size_t query) const {
     LOCUS_DCHECK(asks_past());
     return clamped_[entry_of(query)] != 0;

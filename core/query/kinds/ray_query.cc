@@ -12,7 +12,7 @@
 namespace locus {
 namespace {
 
-// Visitor of moving objects.
+// Visitor of the moving objects that one ray may hit.
 class ObjectVisitor {
  public:
   ObjectVisitor(QueryTask& task, const SceneAtTime& moment, const RayRequest& request, const Filter& filter,
@@ -64,8 +64,9 @@ class InstanceVisitor {
   bool visit(const Instance& instance) {
     if (!task_.count_test()) return false;
     if (!filter_.accepts(instance)) return true;
-    // A ray hits an instance only if it enters the instance's bounds, and no hit has a lower t than this entry: the
-    // tree over instances may cull by these bounds, so the result must include their test.
+    // A ray hits an instance only if the ray enters the instance's bounds, and no hit has a lower t than the entry.
+    // This test is repeated here because the tree over instances may or may not cull by these bounds, and the result
+    // must not depend on culling.
     const std::optional<float> nearest = entry(slabs_, instance.bounds);
     if (!nearest) return true;
     trace_instance(task_, request_, slabs_, instance, *nearest, collector_);
@@ -85,8 +86,6 @@ bool uses_kernels(const QueryTask& task, const QueryBlock& block) {
   return block.precision == Precision::kExact && block.source != Source::kDynamic && task.ray_kernels() != nullptr;
 }
 
-Vec3d point(const float* p) { return {p[0], p[1], p[2]}; }
-
 // Converts `cull` from the scene's `winding` to the counter-clockwise winding in which triangles are stored.
 Cull stored_cull(Cull cull, Winding winding) {
   if (winding == Winding::kCounterClockwise || cull == Cull::kNone) return cull;
@@ -98,8 +97,8 @@ Cull stored_cull(Cull cull, Winding winding) {
 RayRequest ray_request(const QueryBlock& block, const RayColumns& rays, Winding winding, size_t i) {
   LOCUS_DCHECK_LT(3 * i, rays.origins.size());
   RayRequest request;
-  request.origin = block.frame + point(ColumnReader<float>(rays.origins, 3).entry(i));
-  request.direction = point(ColumnReader<float>(rays.directions, 3).entry(i));
+  request.origin = block.frame + read_vec3d(ColumnReader<float>(rays.origins, 3).entry(i));
+  request.direction = read_vec3d(ColumnReader<float>(rays.directions, 3).entry(i));
   request.t_max = ColumnReader<float>(rays.t_max, 1).value(i, std::numeric_limits<float>::infinity());
   request.mode = rays.mode;
   request.cull = stored_cull(rays.cull, winding);

@@ -17,7 +17,7 @@ struct RayRequest {
   Vec3d direction;
   float t_max;
   RayMode mode;
-  Cull cull;  // relative to the stored winding
+  Cull cull;  // side of the triangles to ignore, for the stored winding
   Inside inside;
   Source source;
   Precision precision;
@@ -30,7 +30,7 @@ RayRequest ray_request(const QueryBlock& block, const RayColumns& rays, Winding 
 
 struct RayAnswer {
   absl::InlinedVector<Hit, 1> hits;  // kFirst and kAny: at most one; kAll: in the order of nearer()
-  bool truncated = false;            // kAll: more hits exist; any mode: the batch ended before the search
+  bool truncated = false;            // kAll: more hits exist; any mode: the batch ended during the search
 };
 using RayAnswers = std::vector<RayAnswer>;
 

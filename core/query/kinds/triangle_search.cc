@@ -27,11 +27,11 @@ void copy(Vec3f from, float* to) {
   for (int axis = 0; axis < 3; ++axis) to[axis] = from[axis];
 }
 
-// Returns an upper bound of the rounding error of `value`, a double rounded to float.
+// Returns an upper bound of the rounding error of `value`, which was rounded from double to float.
 float epsilon(float value) { return std::abs(value) * 0x1p-22f + std::numeric_limits<float>::min(); }
 
-// Visitor that writes the indices of overlapping triangles to an array, until one does not fit. For regions that no
-// kernel supports.
+// Visitor that writes the indices of overlapping triangles to an array, until an index does not fit. Used for regions
+// that no kernel supports.
 template <class Shape>
 class Collector {
  public:

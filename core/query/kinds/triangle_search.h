@@ -1,7 +1,7 @@
 // Search by the vector kernels for the triangles of a mesh that overlap a ball or a box in mesh axes. Returns indices
 // of triangles in the uploaded mesh, in storage order. The results equal those of ball_overlaps() and box_overlaps().
 // find_triangles() answers many regions in one call. TriangleSearch answers one region in steps, so that the caller can
-// stop in between:
+// stop between two steps:
 //
 //   if (TriangleSearch<Ballf>::served(tree, ball)) {
 //     TriangleSearch<Ballf> search(tree, ball);
@@ -26,8 +26,8 @@ namespace locus {
 KernelBall kernel_region(const Ballf& ball);
 KernelBox kernel_region(const Obbf& box);
 
-// Return the overlap test of a region in double, which the kernels call for triangles that they cannot decide in float.
-// Borrows the region.
+// Return the overlap test of a region in double, which the kernels call for triangles whose overlap they cannot
+// determine in float. The test borrows the region.
 RegionJudge judge_of(const Ballf& ball);
 RegionJudge judge_of(const Obbf& box);
 
@@ -65,7 +65,8 @@ class TriangleSearch {
   bool over() const { return visit_.over(); }
   // Writes the next triangle indices to `triangles` and returns their number. Each call stops after about
   // kMaxRegionTests tests, so a number below `room`, even 0, does not mean that the search is over. `room` is the
-  // length of `triangles`, at least kMinRegionRoom; entries behind the returned ones may be overwritten.
+  // length of `triangles`, at least kMinRegionRoom; entries of `triangles` after the returned number may be
+  // overwritten.
   size_t next(uint32_t* triangles, size_t room) {
     LOCUS_DCHECK(!over());
     LOCUS_DCHECK_GE(room, size_t{kMinRegionRoom});
@@ -75,8 +76,8 @@ class TriangleSearch {
     LOCUS_DCHECK_LE(visit_.found, room);
     return visit_.found;
   }
-  // Return the cost of the last next(): nodes opened, triangles tested, and the number of these that were decided in
-  // double.
+  // Return the cost of the last call of next(): the number of nodes opened, of triangles tested, and of triangles
+  // tested in double because the test in float was not conclusive.
   uint32_t nodes() const { return visit_.nodes; }
   uint32_t tests() const { return visit_.tests; }
   uint32_t judged() const { return visit_.judged; }
@@ -89,7 +90,7 @@ class TriangleSearch {
 };
 
 // Finds the triangles of many regions, answered in order, with or without kernels. Writes the number of triangles of
-// each region to `counts`, and their indices to `triangles`, one region behind another. Returns the number of regions
+// each region to `counts`, and their indices to `triangles`, one region after another. Returns the number of regions
 // answered: all of them unless `triangles` is too short. A length of tree.size() + kMinRegionRoom per region is always
 // sufficient. `counts` has one entry per region.
 size_t find_triangles(const TriangleBvh& tree, absl::Span<const Ballf> balls, absl::Span<uint32_t> counts,

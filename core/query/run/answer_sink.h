@@ -1,7 +1,7 @@
 // Destination of a batch's result columns. The caller of a batch implements it, for example over the fields of a reply,
-// so that each value is written once, at its final position. Columns that the batch did not request are never touched.
+// so that each value is written once, at its final position. The batch never writes columns that it does not return.
 //
-// Threads: one thread at a time calls a sink, but not always the same one. Several threads may write at once to the
+// Threads: one thread at a time calls a sink, but not always the same thread. Several threads may write at once to the
 // memory that a sink returned, each to its own rows.
 #ifndef LOCUS_CORE_QUERY_RUN_ANSWER_SINK_H_
 #define LOCUS_CORE_QUERY_RUN_ANSWER_SINK_H_
@@ -27,16 +27,18 @@ class AnswerSink {
   // first of them. The pointers stay valid until more rows of the same block are added. The caller writes all rows
   // unless the batch ends with an error.
   virtual RowSpans add_rows(size_t block, ColumnSet columns, size_t rows) = 0;
-  // Appends one byte per query, in which the caller writes 1 for a hit and 0 for a miss.
+  // Appends one byte for each query of the block. The caller writes 1 for a hit and 0 for a miss.
   virtual char* add_hits(size_t block, size_t queries) = 0;
-  // Appends one entry per query, in which the caller writes the number of rows of the query.
+  // Appends `queries` entries to the row counts of the block. The caller writes the number of rows of each query.
   virtual uint32_t* add_counts(size_t block, size_t queries) = 0;
-  // Appends entries in which the caller writes the indices of truncated queries, ascending.
+  // Appends `queries` entries to the list of truncated queries of the block. The caller writes their indices in the
+  // block, ascending.
   virtual uint32_t* add_truncated(size_t block, size_t queries) = 0;
-  // Appends entries in which the caller writes the effective time of each query.
+  // Appends `queries` entries to the effective times of the block. The caller writes the time at which each query is
+  // evaluated.
   virtual TimeSpans add_times(size_t block, size_t queries) = 0;
-  // Appends entries in which the caller writes the indices, ascending, of queries that asked for a time outside the
-  // history and got the nearest retained time.
+  // Appends `queries` entries to the list of clamped queries of the block: queries that requested a time outside the
+  // history and are answered at the nearest retained time. The caller writes their indices in the block, ascending.
   virtual uint32_t* add_clamped(size_t block, size_t queries) = 0;
 };
 

@@ -53,7 +53,7 @@ absl::StatusOr<std::unique_ptr<BatchRun>> BatchRun::prepare(const SceneSnapshot&
   const MutexLock lock(run->mutex_);
   LOCUS_DCHECK_EQ(run->blocks_.size(), batch.blocks.size());
   run->skip_empty_blocks();
-  run->check_invariants();
+  LOCUS_DCHECK_CALL(run->check_invariants());
   return run;
 }
 
@@ -99,15 +99,15 @@ Progress BatchRun::work(uint64_t nanoseconds) {
   const uint64_t work_time_before = timing.start;
   while (true) {
     end_chunk(chunk, run(*chunk));
-    // Both wall time and CPU time must have reached the limit: a thread that was preempted has not yet worked for its
-    // share of time.
+    // Both wall time and CPU time must have reached the limit: a thread that was preempted has worked for less than the
+    // wall time.
     const bool time_is_up =
         !options_.clock || (now() - start >= nanoseconds && work_time() - work_time_before >= nanoseconds);
     const MutexLock lock(mutex_);
     LOCUS_DCHECK_GT(active_threads_, 0u);
     --active_threads_;
     const Progress reached = progress();
-    check_invariants();
+    LOCUS_DCHECK_CALL(check_invariants());
     const bool leave = reached != Progress::kMore || time_is_up;
     if (!leave) chunk = begin_chunk();
     if (leave || chunk->block != timing.block) end_timing(timing);
@@ -116,9 +116,9 @@ Progress BatchRun::work(uint64_t nanoseconds) {
   }
 }
 
-// Limits the number of chunks, and so the memory of rows that wait to be written out: a new chunk may begin below
-// kMaxChunks chunks, the remainder of a split chunk below twice as many. The first chunk in batch order may always
-// begin, since all others are written out after it.
+// Limits the number of chunks, and so the memory of rows that wait to be written out: a new chunk may begin if there
+// are fewer than kMaxChunks chunks, and the remainder of a split chunk may begin if there are fewer than 2 * kMaxChunks
+// chunks. The first chunk in batch order may always begin, since all other chunks are written out after it.
 bool BatchRun::can_begin() const {
   if (control_.stopped()) return false;
   if (!unstarted_.empty()) return chunks_.size() < 2 * kMaxChunks || unstarted_.front() == chunks_.begin();
@@ -138,7 +138,7 @@ BatchRun::Chunks::iterator BatchRun::begin_chunk() {
     next_query_ = 0;
     skip_empty_blocks();
   }
-  check_invariants();
+  LOCUS_DCHECK_CALL(check_invariants());
   return std::prev(chunks_.end());
 }
 
@@ -146,7 +146,7 @@ BatchRun::Chunks::iterator BatchRun::pop_unstarted() {
   LOCUS_DCHECK(!unstarted_.empty());
   const Chunks::iterator chunk = unstarted_.front();
   unstarted_.erase(unstarted_.begin());
-  check_invariants();
+  LOCUS_DCHECK_CALL(check_invariants());
   return chunk;
 }
 
@@ -162,6 +162,7 @@ size_t BatchRun::run(Chunk& chunk) {
   const size_t reached = runner.run(chunk.begin, chunk.end);
   chunk.rows = runner.take_rows();
   chunk.work = task.work();
+  work_done_.fetch_add(chunk.work.nodes + chunk.work.cells + chunk.work.tests, std::memory_order_relaxed);
   return reached;
 }
 
@@ -186,7 +187,7 @@ void BatchRun::split(Chunks::iterator chunk, size_t reached) {
     return std::tie(a->block, a->begin) < std::tie(b->block, b->begin);
   };
   unstarted_.insert(std::upper_bound(unstarted_.begin(), unstarted_.end(), rest, before), rest);
-  check_invariants();
+  LOCUS_DCHECK_CALL(check_invariants());
 }
 
 void BatchRun::write_out() {
@@ -200,7 +201,7 @@ void BatchRun::write_out() {
       ready.splice(ready.end(), chunks_, chunks_.begin(), first_open);
       if (ready.empty()) {
         writing_ = false;
-        check_invariants();
+        LOCUS_DCHECK_CALL(check_invariants());
         return;
       }
     }
@@ -259,40 +260,36 @@ Progress BatchRun::progress() {
 }
 
 void BatchRun::check_invariants() const {
-  if constexpr (kDebugChecks) {
-    size_t open = 0;
-    const Chunk* before = nullptr;
-    for (const Chunk& chunk : chunks_) {
-      LOCUS_DCHECK_LT(chunk.begin, chunk.end);
-      LOCUS_DCHECK_LE(chunk.end, blocks_[chunk.block].queries);
-      if (before != nullptr) check_adjacent(before->block, before->end, chunk.block, chunk.begin);
-      open += chunk.done ? 0 : 1;
-      before = &chunk;
-    }
-    if (before != nullptr) check_adjacent(before->block, before->end, next_block_, next_query_);
-    LOCUS_DCHECK_LE(next_block_, blocks_.size());
-    LOCUS_DCHECK(next_block_ == blocks_.size() ? next_query_ == 0 : next_query_ < blocks_[next_block_].queries);
-    LOCUS_DCHECK_LE(unstarted_.size(), open);
-    LOCUS_DCHECK_LE(open - unstarted_.size(), size_t{active_threads_});
-    for (size_t i = 0; i < unstarted_.size(); ++i) {
-      LOCUS_DCHECK(!unstarted_[i]->done);
-      if (i == 0) continue;
-      const Chunk &a = *unstarted_[i - 1], &b = *unstarted_[i];
-      LOCUS_DCHECK(std::tie(a.block, a.begin) < std::tie(b.block, b.begin));
-    }
-    LOCUS_DCHECK(!done_ || active_threads_ == 0);
-    LOCUS_DCHECK(!done_ || chunks_.empty() || control_.stopped());
+  size_t open = 0;
+  const Chunk* before = nullptr;
+  for (const Chunk& chunk : chunks_) {
+    LOCUS_DCHECK_LT(chunk.begin, chunk.end);
+    LOCUS_DCHECK_LE(chunk.end, blocks_[chunk.block].queries);
+    if (before != nullptr) LOCUS_DCHECK_CALL(check_adjacent(before->block, before->end, chunk.block, chunk.begin));
+    open += chunk.done ? 0 : 1;
+    before = &chunk;
   }
+  if (before != nullptr) LOCUS_DCHECK_CALL(check_adjacent(before->block, before->end, next_block_, next_query_));
+  LOCUS_DCHECK_LE(next_block_, blocks_.size());
+  LOCUS_DCHECK(next_block_ == blocks_.size() ? next_query_ == 0 : next_query_ < blocks_[next_block_].queries);
+  LOCUS_DCHECK_LE(unstarted_.size(), open);
+  LOCUS_DCHECK_LE(open - unstarted_.size(), size_t{active_threads_});
+  for (size_t i = 0; i < unstarted_.size(); ++i) {
+    LOCUS_DCHECK(!unstarted_[i]->done);
+    if (i == 0) continue;
+    const Chunk &a = *unstarted_[i - 1], &b = *unstarted_[i];
+    LOCUS_DCHECK(std::tie(a.block, a.begin) < std::tie(b.block, b.begin));
+  }
+  LOCUS_DCHECK(!done_ || active_threads_ == 0);
+  LOCUS_DCHECK(!done_ || chunks_.empty() || control_.stopped());
 }
 
 void BatchRun::check_adjacent(size_t before, size_t end, size_t block, size_t begin) const {
-  if constexpr (kDebugChecks) {
-    if (before == block) return LOCUS_CHECK(end == begin);
-    LOCUS_DCHECK_LT(before, block);
-    LOCUS_DCHECK_EQ(end, blocks_[before].queries);
-    LOCUS_DCHECK_EQ(begin, size_t{0});
-    for (size_t i = before + 1; i < block; ++i) LOCUS_DCHECK_EQ(blocks_[i].queries, size_t{0});
-  }
+  if (before == block) return LOCUS_CHECK(end == begin);
+  LOCUS_DCHECK_LT(before, block);
+  LOCUS_DCHECK_EQ(end, blocks_[before].queries);
+  LOCUS_DCHECK_EQ(begin, size_t{0});
+  for (size_t i = before + 1; i < block; ++i) LOCUS_DCHECK_EQ(blocks_[i].queries, size_t{0});
 }
 
 }  // namespace locus

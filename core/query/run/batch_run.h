@@ -1,7 +1,7 @@
-// Execution of a checked batch against one snapshot, in chunks that any threads may take. For the scheduler, which
-// decides how long each thread works on which batch. The result depends only on the snapshot and the batch: the sizes
-// of chunks, their assignment to threads and the order in which they finish do not change any byte of it, unless
-// max_work ends the batch.
+// Execution of a checked batch against one snapshot, in chunks that any thread may run. Used by the scheduler, which
+// assigns threads to batches and limits the time of each thread. The result depends only on the snapshot and the batch:
+// the sizes of chunks, their assignment to threads and the order in which chunks finish do not change any byte of the
+// result. Exception: max_work ends the batch early.
 //
 // Threads: any number of threads may call work() at once. All other members may be called only before the first or
 // after the last call of work(). Memory: at most about 2 * kMaxChunks chunks have rows that wait to be written out in
@@ -9,7 +9,8 @@
 //
 // Invariants: chunks_ covers consecutive queries in batch order, from the first query that is not written out to
 // (next_block_, next_query_). Every chunk is unstarted, running or done; active_threads_ is the number of running
-// chunks plus the number of threads about to leave work(). One thread at a time writes out. kDone is returned once.
+// chunks plus the number of threads about to leave work(). One thread at a time runs write_out(). work() returns kDone
+// once.
 #ifndef LOCUS_CORE_QUERY_RUN_BATCH_RUN_H_
 #define LOCUS_CORE_QUERY_RUN_BATCH_RUN_H_
 
@@ -35,21 +36,22 @@
 namespace locus {
 
 struct RunOptions {
-  // Polled every limits::kTestsBetweenChecks primitive tests, from any thread. A status that is not OK ends the batch
-  // with that status. If empty, the batch is never stopped.
+  // Function that is called every limits::kTestsBetweenChecks primitive tests, on any thread. If it returns a status
+  // that is not OK, the batch ends with this status. If `stop` is empty, the batch is never stopped.
   std::function<absl::Status()> stop;
-  // Wall clock in nanoseconds with any origin, read before and after each chunk, from any thread. If empty, each call
-  // of work() runs one chunk.
+  // Wall clock in nanoseconds with any origin, read before and after each chunk, on any thread. If `clock` is empty,
+  // each call of work() runs one chunk.
   std::function<uint64_t()> clock;
-  // CPU time of the calling thread in nanoseconds. May be expensive: it is read about twice for each call of work() and
-  // for each block that the call works on. If empty, `clock` is used instead; without both, all times are 0.
+  // CPU time of the calling thread in nanoseconds. `work_clock` may be slow, because it is called only about twice for
+  // each call of work() and for each block that this call works on. If `work_clock` is empty, `clock` is used instead;
+  // if both clocks are empty, all times are 0.
   std::function<uint64_t()> work_clock;
-  // Makes queries test every value instead of searching the index structures. Serves to verify the structures: the
-  // results must be the same, only the cost differs.
+  // Makes queries test every value instead of searching the index structures. Used to verify the index structures: the
+  // results must be the same, and only the cost may differ.
   bool brute_force = false;
 };
 
-// Cost of queries, summed over all threads. Not part of the result.
+// Cost of queries, summed over all threads. The cost is not part of the result.
 struct QueryCost {
   Work work;
   uint64_t nanoseconds = 0;  // measured by RunOptions::work_clock
@@ -61,9 +63,9 @@ class BatchRun {
   // remainders of split chunks count as well, and may raise the number to twice this maximum.
   static constexpr size_t kMaxChunks = 16;
 
-  // Prepares the execution of `batch`, which has passed check_batch(): resolves its times and allocates dense rows in
-  // `answer`. All of `snapshot`, `batch` and `answer` are borrowed. Returns OUT_OF_RANGE for a time outside the history
-  // unless its block clamps.
+  // Prepares the execution of `batch`, which has passed check_batch(): resolves the as_of times of its queries and
+  // allocates dense rows in `answer`. Borrows `snapshot`, `batch` and `answer`. Returns OUT_OF_RANGE for a time outside
+  // the history unless the block of the query has OutsideHistory::kClamp.
   static absl::StatusOr<std::unique_ptr<BatchRun>> prepare(const SceneSnapshot& snapshot, const QueryBatch& batch,
                                                            RunOptions options, AnswerSink& answer);
 
@@ -71,15 +73,19 @@ class BatchRun {
   // AnswerSink in batch order, up to the first chunk that is not finished.
   Progress work(uint64_t nanoseconds) LOCUS_EXCLUDES(mutex_);
 
-  // Returns OK, or the status of RunOptions::stop, in which case `answer` must be discarded. Valid once work() has
-  // returned kDone.
+  // Returns OK, or the status with which RunOptions::stop ended the batch; the caller must then discard `answer`. Valid
+  // once work() has returned kDone.
   absl::Status status() const { return control_.stopped() ? control_.status() : absl::OkStatus(); }
-  // Returns the cost of one block, or of the batch. Valid once work() has returned kDone.
+  // Return the cost of the block with the index `block`, and the cost of the whole batch. Valid once work() has
+  // returned kDone.
   const QueryCost& cost(size_t block) const {
     LOCUS_DCHECK_LT(block, blocks_.size());
     return blocks_[block].cost;
   }
   QueryCost cost() const;
+  // Returns the number of nodes, cells and tests of all chunks that ran, also of those that a stop kept from the
+  // answer.
+  uint64_t work_done() const { return work_done_.load(std::memory_order_relaxed); }
 
  private:
   struct Block {
@@ -90,14 +96,14 @@ class BatchRun {
     const size_t queries;
     const size_t max_chunk_queries;
     BlockOutput output;
-    QueryCost cost;  // work: of chunks written out; nanoseconds: of all chunks
+    QueryCost cost;  // `work` counts only the chunks written out, `nanoseconds` counts all chunks
   };
   // Consecutive queries of one block: [begin, end).
   struct Chunk {
     size_t block;
     size_t begin, end;
     bool done = false;
-    CollectedRows rows = {};  // rows of counted blocks, and truncated queries of any block
+    CollectedRows rows = {};  // counts and rows of a kCounted block; truncated queries of any block
     Work work = {};
   };
   using Chunks = std::list<Chunk>;
@@ -122,16 +128,16 @@ class BatchRun {
   // Precondition: can_begin().
   Chunks::iterator begin_chunk() LOCUS_REQUIRES(mutex_);
   Chunks::iterator pop_unstarted() LOCUS_REQUIRES(mutex_);
-  // Moves the queries of `chunk` from `reached` on into a new, unstarted chunk directly behind it.
+  // Moves the queries of `chunk` from `reached` on into a new, unstarted chunk directly after `chunk`.
   void split(Chunks::iterator chunk, size_t reached) LOCUS_REQUIRES(mutex_);
   void skip_empty_blocks() LOCUS_REQUIRES(mutex_);
-  // Answers the queries of `chunk` in order, and stops early if they turn out to be expensive. Returns the index of the
-  // first query that is not answered.
+  // Answers the queries of `chunk` in order, and stops early if the queries turn out to be expensive. Returns the index
+  // of the first query that is not answered.
   size_t run(Chunk& chunk);
-  // Marks a chunk as done; queries from `reached` on, if any, become a new chunk. Then calls write_out() if the first
-  // chunk is done and no other thread writes.
+  // Marks `chunk` as done and moves its queries from `reached` on, which are not answered, into a new chunk. Then calls
+  // write_out() if the first chunk of chunks_ is done and no other thread is in write_out().
   void end_chunk(Chunks::iterator chunk, size_t reached) LOCUS_EXCLUDES(mutex_);
-  // Removes chunks from the front of chunks_ and writes them to the AnswerSink, up to the first one that is not done.
+  // Removes chunks from the front of chunks_ and writes them to the AnswerSink, up to the first chunk that is not done.
   void write_out() LOCUS_EXCLUDES(mutex_);
   void write(const Chunk& chunk);
   void write_counted(const Chunk& chunk);
@@ -152,17 +158,17 @@ class BatchRun {
   AnswerSink& answer_;
   BatchControl control_;
   std::deque<Block> blocks_;
-  std::atomic<uint64_t>
-      free_bytes_;  // bytes of counted rows that still fit the reply; set by the thread that writes out
+  std::atomic<uint64_t> work_done_{0};
+  std::atomic<uint64_t> free_bytes_;  // reply bytes left for counted rows; set by write_out()
 
   Mutex mutex_;
-  Chunks chunks_ LOCUS_GUARDED_BY(mutex_);                            // in batch order, from the first not written out
+  Chunks chunks_ LOCUS_GUARDED_BY(mutex_);                            // in batch order; write_out() removes chunks
   std::vector<Chunks::iterator> unstarted_ LOCUS_GUARDED_BY(mutex_);  // unstarted elements of chunks_, in batch order
   size_t next_block_ LOCUS_GUARDED_BY(mutex_) = 0;                    // block of the first query that is in no chunk
-  size_t next_query_ LOCUS_GUARDED_BY(mutex_) = 0;                    // index of that query in its block
-  uint32_t active_threads_ LOCUS_GUARDED_BY(mutex_) = 0;              // threads that run a chunk or write out
-  bool writing_ LOCUS_GUARDED_BY(mutex_) = false;                     // a thread is in write_out()
-  bool done_ LOCUS_GUARDED_BY(mutex_) = false;                        // kDone was returned
+  size_t next_query_ LOCUS_GUARDED_BY(mutex_) = 0;        // index in its block of the first query that is in no chunk
+  uint32_t active_threads_ LOCUS_GUARDED_BY(mutex_) = 0;  // number of threads that run a chunk or write_out()
+  bool writing_ LOCUS_GUARDED_BY(mutex_) = false;         // a thread is in write_out()
+  bool done_ LOCUS_GUARDED_BY(mutex_) = false;            // kDone was returned
 };
 
 }  // namespace locus

@@ -10,9 +10,10 @@
 namespace locus {
 namespace {
 
-// Work, in units of work_done(), after which a chunk is split; takes about 0.1 ms.
+// Work, in units of work_done(), after which a chunk is split. This work takes about 0.1 ms.
 constexpr uint64_t kChunkWork = 16'384;
-// Target work of one call of the ray kernels, in units of work_done(). Limited because a call cannot be interrupted.
+// Target work of one call of the ray kernels, in units of work_done(). The target is limited because a call cannot be
+// interrupted.
 constexpr uint64_t kCallWork = 65'536;
 // Limits of the number of rays per call of the ray kernels. The maxima bound the duration of a call whose rays are
 // unexpectedly expensive: with 4,096 triangle tests per ray, a call with the maximum number of rays takes 3 ms, or 6 ms
@@ -37,21 +38,19 @@ size_t BlockRunner::run(size_t begin, size_t end) {
   LOCUS_DCHECK_LE(end, query_count(block_));
   task_.check();
   const size_t reached = std::visit([&](const auto& kind) { return run_queries(kind, begin, end); }, block_.kind);
-  task_.check();  // reports the remaining work, so that small chunks use up the budget as well
+  task_.check();  // reports the work since the last check(), so that the budget also counts the work of small chunks
   LOCUS_DCHECK_LT(begin, reached);
   LOCUS_DCHECK_LE(reached, end);
-  check_invariants(begin, reached);
+  LOCUS_DCHECK_CALL(check_invariants(begin, reached));
   return reached;
 }
 
 void BlockRunner::check_invariants(size_t begin, size_t reached) const {
-  if constexpr (kDebugChecks) {
-    LOCUS_DCHECK_LE(rows_, max_rows_);
-    LOCUS_DCHECK_EQ(result_.counts.size(), row_layout(block_) == RowLayout::kCounted ? reached - begin : size_t{0});
-    const std::vector<uint32_t>& cut = result_.truncated;
-    for (size_t i = 1; i < cut.size(); ++i) LOCUS_DCHECK_LT(cut[i - 1], cut[i]);
-    if (!cut.empty()) LOCUS_DCHECK(cut.front() >= begin && cut.back() < reached);
-  }
+  LOCUS_DCHECK_LE(rows_, max_rows_);
+  LOCUS_DCHECK_EQ(result_.counts.size(), row_layout(block_) == RowLayout::kCounted ? reached - begin : size_t{0});
+  const std::vector<uint32_t>& cut = result_.truncated;
+  for (size_t i = 1; i < cut.size(); ++i) LOCUS_DCHECK_LT(cut[i - 1], cut[i]);
+  if (!cut.empty()) LOCUS_DCHECK(cut.front() >= begin && cut.back() < reached);
 }
 
 uint64_t BlockRunner::work_done() const {
@@ -89,14 +88,14 @@ size_t BlockRunner::run_queries(const Columns& columns, size_t begin, size_t end
   return end;
 }
 
-// Writes the hits of query `i` to the columns `to`, from row `row` on. Computes surfaces only if the block returns a
-// column that needs them, which is rare.
+// Writes the hits of query `i` to the columns `to`, beginning at row `row`. Computes the surface columns (uv, normal
+// and point) only if the block returns one of them, which is rare.
 void BlockRunner::write_hits(const RayColumns& rays, absl::Span<const Hit> hits, size_t i, const RowSpans& to,
                              size_t row) {
   for (size_t k = 0; k < hits.size(); ++k) write_row(hits[k], to, row + k);
   if (to.uvs == nullptr && to.normals == nullptr && to.points == nullptr) return;
   const Winding winding = task_.snapshot().winding;
-  // The surface columns of a miss are zero, so its request is not needed.
+  // The surface columns of a miss are zero, so the request of the ray is not needed.
   const bool is_miss = hits.empty() || hits.front().id == kNoId;
   const RayRequest request = is_miss ? RayRequest() : ray_request(block_, rays, winding, i);
   for (size_t k = 0; k < hits.size(); ++k) write_surface(request, block_.frame, hits[k], winding, to, row + k);
@@ -153,8 +152,8 @@ size_t BlockRunner::run_queries(const RayColumns& rays, size_t begin, size_t end
   return end;
 }
 
-// Sets the number of rays of the next kernel call so that the call takes about kCallWork, assuming the same work per
-// ray as in the last call, in which `rays` rays took `work`. The number grows at most fourfold.
+// Sets the number of rays of the next kernel call so that the call needs about kCallWork, assuming the same work per
+// ray as in the last call. The new number is at most 4 * rays.
 void BlockRunner::adapt_rays_per_call(size_t rays, uint64_t work) {
   LOCUS_DCHECK_GT(rays, size_t{0});
   const bool many_hits = std::get<RayColumns>(block_.kind).mode == RayMode::kAll;

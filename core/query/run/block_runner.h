@@ -20,21 +20,22 @@ namespace locus {
 
 // Output columns of a block, and the state that its chunks share.
 struct BlockOutput {
-  RowSpans rows;         // dense blocks: rows of all queries
-  char* hits = nullptr;  // byte blocks: one byte per query of the block
-  // Number of rays for the next call of the kernels. Throughput grows with it, but a call cannot be interrupted.
+  RowSpans rows;         // kDense blocks: rows of all queries
+  char* hits = nullptr;  // kBytes blocks: one byte per query; otherwise null
+  // Number of rays for the next call of the kernels. More rays per call increase the throughput, but a call cannot be
+  // interrupted.
   std::atomic<uint32_t> rays_per_call{64};
 };
 
 class BlockRunner {
  public:
-  // Borrows all arguments. `max_bytes` is the free space of the reply: counted rows that exceed it could not be written
-  // out, so they are dropped and their queries listed as truncated.
+  // Borrows all arguments. `max_bytes` is the free space of the reply in bytes: counted rows that exceed this space
+  // could not be written out, so the runner drops them and lists their queries as truncated.
   BlockRunner(QueryTask& task, const QueryBlock& block, const QueryTimes& times, BlockOutput& output,
               uint64_t max_bytes);
 
-  // Answers queries [begin, end) in order, or fewer if they turn out to be expensive, but at least one. Returns the
-  // index of the first query that is not answered. Precondition: begin < end. Call it once.
+  // Answers queries [begin, end) in order. Stops early, but after at least one query, if the queries turn out to be
+  // expensive. Returns the index of the first query that is not answered. Precondition: begin < end. Call it once.
   size_t run(size_t begin, size_t end);
 
   // Returns the row counts and rows of a counted block, and, for any block, the indices of truncated queries in the
@@ -63,9 +64,9 @@ class BlockRunner {
   // Returns the work so far as the number of nodes, cells, tests and rows, which does not depend on the speed of the
   // machine.
   uint64_t work_done() const;
-  // Returns whether the remaining queries should become a chunk of their own.
+  // Returns true if the chunk has done so much work that its remaining queries should become a new chunk.
   bool should_split() const;
-  // Adapts rays_per_call to the work that the last call took.
+  // Sets rays_per_call from the work of the last call, in which `rays` rays needed `work`, in units of work_done().
   void adapt_rays_per_call(size_t rays, uint64_t work);
 
   QueryTask& task_;

@@ -12,14 +12,14 @@ namespace locus {
 template <class T>
 using ColumnVector = std::vector<T>;
 
-// Rows of some queries of one block, concatenated in query order; columns that were not requested stay empty.
+// Rows of some queries of one block, concatenated in query order; columns that the block does not return stay empty.
 struct CollectedRows : ColumnArrays<ColumnVector> {
-  std::vector<uint32_t> counts;     // rows per query; empty for dense results, which have one row each
-  std::vector<uint32_t> truncated;  // indices of truncated queries, ascending
+  std::vector<uint32_t> counts;     // number of rows of each query of a kCounted block; otherwise empty
+  std::vector<uint32_t> truncated;  // indices of truncated queries in the block, ascending
 };
 
 // Appends `rows` uninitialized rows to each column of `columns`, and returns pointers to the first of them. The
-// pointers stay valid until the next call.
+// pointers stay valid until the next call for the same `collected`.
 inline RowSpans add_rows(CollectedRows& collected, ColumnSet columns, size_t rows) {
   RowSpans spans;
   for_each_column_array([&](const auto& array) {

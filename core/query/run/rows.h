@@ -14,11 +14,13 @@ namespace locus {
 
 // Writes the columns of row `row` that are common to all kinds of queries. A default-constructed hit is a miss.
 void write_row(const Hit& hit, const RowSpans& to, size_t row);
-// Writes one row for each of `triangles`, starting at row `row`. All other columns have the values of `hit`.
+// Writes one row of a ball or box query for each of `triangles`, starting at row `row`. All columns except the triangle
+// have the values of `hit`.
 void write_triangle_rows(const Hit& hit, absl::Span<const uint32_t> triangles, const RowSpans& to, size_t row);
-// Writes one row per object, with its pose at `moment`, starting at row 0.
+// Writes one row per object, starting at row 0. The pose of an object is its pose at `moment`.
 void write_object_rows(absl::Span<const FoundObject> objects, const SceneAtTime& moment, const RowSpans& to);
-// Writes the columns uv, normal and point of a ray's hit. The point is relative to `frame`.
+// Writes those of the columns uv, normal and point that the block returns, for a hit of a ray. The point is relative to
+// `frame`.
 void write_surface(const RayRequest& request, Vec3d frame, const Hit& hit, Winding winding, const RowSpans& to,
                    size_t row);
 

@@ -14,8 +14,8 @@ void ByteReader::fail(absl::string_view what, absl::string_view how) {
 BytesKind read_kind(ByteReader& reader) {
   const ByteReader::Pair pair = reader.pair("the kind");
   if (reader.good() && pair.second != kBytesVersion)
-    reader.fail(absl::StrCat("version ", pair.second),
-                absl::StrCat("is not known, ", kBytesVersion, " is: written by a later program, or damaged"));
+    reader.fail(absl::StrCat("version ", pair.second), absl::StrCat("is not the known version ", kBytesVersion,
+                                                                    ": a later program wrote it, or it is damaged"));
   return static_cast<BytesKind>(pair.first);
 }
 

@@ -1,9 +1,9 @@
 // Binary encoding of everything that a scene writes to its log: little-endian numbers of 8 bytes, and columns aligned
-// to 8 bytes, which are read in place: the result is a span of the encoded bytes. Used by the codecs of records, state
-// and meshes in this folder; FORMAT.md describes the formats. One thread at a time.
+// to 8 bytes. A column is read in place: the result is a span of the encoded bytes. Used by the codecs of records,
+// state and meshes in this folder; FORMAT.md describes the formats. One thread at a time.
 //
-// A reader validates everything, because a disk may damage the bytes. After the first error it returns zeros and empty
-// columns, and status() describes the error.
+// A reader validates everything, because a disk may damage the bytes. After the first error the reader returns zeros
+// and empty columns, and status() describes the error.
 #ifndef LOCUS_CORE_SCENE_LOG_BYTE_CODEC_H_
 #define LOCUS_CORE_SCENE_LOG_BYTE_CODEC_H_
 
@@ -42,8 +42,8 @@ class ByteWriter {
     append(values.data(), values.size() * sizeof(T));
     to_.append((kAlignment - to_.size() % kAlignment) % kAlignment, '\0');
   }
-  // Writes a column whose entries have `width` values each. If all entries are equal bit for bit, writes only one of
-  // them.
+  // Writes a column whose entries have `width` values each. If all entries are equal bit for bit, writes only one
+  // entry.
   template <class T>
   void shared_column(absl::Span<const T> values, size_t width) {
     LOCUS_DCHECK(width > 0 && values.size() % width == 0);
@@ -54,7 +54,7 @@ class ByteWriter {
  private:
   template <class T>
   static bool all_same(absl::Span<const T> values, size_t width) {
-    // Compares each entry with the next one: the column with itself, shifted by one entry.
+    // Compares each entry with the next entry, by comparing the column with itself shifted by one entry.
     return values.size() > width &&
            std::memcmp(values.data(), values.data() + width, (values.size() - width) * sizeof(T)) == 0;
   }
@@ -95,7 +95,8 @@ class ByteReader {
     fail(what, "is out of range");
     return 0;
   }
-  // Reads the number of items that follow, each of at least `min_bytes`; fails if the remaining bytes cannot hold them.
+  // Reads the number of items that follow, each of at least `min_bytes`; fails if the remaining bytes cannot hold so
+  // many items.
   uint64_t count(size_t min_bytes, const char* what) {
     LOCUS_DCHECK_GT(min_bytes, 0u);
     return number_upto(left_.size() / min_bytes, what);
@@ -115,7 +116,7 @@ class ByteReader {
     return {first, values};
   }
   // Reads a column that ByteWriter::shared_column() wrote: `entries` entries of `width` values each, or a single entry
-  // that applies to all.
+  // that applies to all items.
   template <class T>
   absl::Span<const T> shared_column(size_t entries, size_t width, const char* what) {
     const absl::Span<const T> values = column<T>(what);
@@ -130,7 +131,7 @@ class ByteReader {
   }
   // Fails if any bytes remain.
   void end(const char* what) {
-    if (!left_.empty()) fail(what, "has bytes too many");
+    if (!left_.empty()) fail(what, "has surplus bytes");
   }
 
   bool good() const { return status_.ok(); }
@@ -177,12 +178,13 @@ class AlignedBytes {
 enum class BytesKind : uint32_t {
   kBatch = 0x4842'534c,
   kJoinedBatches = 0x4a42'534c,
-  kStaticChange = 0x4353'534c,  // format 1, names meshes by content hash; read, never written
+  kStaticChange = 0x4353'534c,  // data format 1: identifies meshes by content hash; decoded, but never written
   kNamedChange = 0x434e'534c,
   kSceneSpec = 0x5053'534c,
+  kOwnedSpec = 0x534f'534c,
   kStateHeader = 0x4854'534c,
   kStateWriters = 0x5754'534c,
-  kStateInstances = 0x4954'534c,  // format 1, names meshes by content hash; read, never written
+  kStateInstances = 0x4954'534c,  // data format 1: identifies meshes by content hash; decoded, but never written
   kNamedInstances = 0x494e'534c,
   kStateObjects = 0x4f54'534c,
   kMeshHeader = 0x484d'534c,
@@ -190,6 +192,7 @@ enum class BytesKind : uint32_t {
   kMeshIndices = 0x494d'534c,
   kMeshParts = 0x504d'534c,
   kPartsHeader = 0x4850'534c,
+  kMeshCreator = 0x434d'534c,
   kTreeOutline = 0x5254'534c,
 };
 inline constexpr uint32_t kBytesVersion = 1;

@@ -11,9 +11,9 @@
 namespace locus {
 namespace {
 
-constexpr size_t kNumbersPerChunk = 3 * 65536;  // coordinates or vertex indices
+constexpr size_t kNumbersPerChunk = 3 * 65536;  // maximum number of coordinates or vertex indices in a chunk
 static_assert(kNumbersPerChunk * sizeof(float) + 64 <= UpdateLog::kMaxChunkBytes);
-// Size in bytes above which a chunk of parts ends. Its last part may exceed this size.
+// Size in bytes after which no further part is added to a chunk. The last part of a chunk may exceed this size.
 constexpr size_t kPartsChunk = UpdateLog::kMaxChunkBytes / 2;
 static_assert(kPartsChunk + limits::kMaxLabelLength + 64 <= UpdateLog::kMaxChunkBytes);
 constexpr size_t kMinPart = 2 * 8;  // encoded size of a part with an empty name
@@ -56,7 +56,7 @@ std::string MeshWriter::header() const {
   write_kind(writer, BytesKind::kMeshHeader);
   writer.number(uint64_t{vertices_.size()});
   writer.number(uint64_t{3} * mesh_->triangle_count());
-  writer.number(uint64_t{0});  // number of parts: only format 1 stores parts in the content
+  writer.number(uint64_t{0});  // number of parts: only data format 1 stores parts in the content
   return chunk;
 }
 
@@ -83,7 +83,6 @@ std::string MeshWriter::next_indices() {
 
 absl::StatusOr<std::optional<std::string>> PartsWriter::next() {
   const std::vector<MeshPart>& parts = mesh_->parts();
-  if (begun_ && next_part_ == parts.size()) return std::optional<std::string>();
   std::string chunk;
   ByteWriter writer(chunk);
   if (!std::exchange(begun_, true)) {
@@ -91,6 +90,12 @@ absl::StatusOr<std::optional<std::string>> PartsWriter::next() {
     writer.number(uint64_t{parts.size()});
     return std::optional<std::string>(std::move(chunk));
   }
+  if (!std::exchange(creator_written_, true) && !mesh_->creator().empty()) {
+    write_kind(writer, BytesKind::kMeshCreator);
+    writer.text(mesh_->creator());
+    return std::optional<std::string>(std::move(chunk));
+  }
+  if (next_part_ == parts.size()) return std::optional<std::string>();
   write_kind(writer, BytesKind::kMeshParts);
   for (; next_part_ < parts.size() && chunk.size() < kPartsChunk; ++next_part_) {
     writer.number(uint64_t{parts[next_part_].first_triangle});
@@ -119,7 +124,7 @@ absl::Status MeshReader::add(absl::string_view chunk) {
     reader.fail("the kind of a chunk", "is not known");
   }
   if (vertices_.size() > vertex_numbers_ || indices_.size() > index_numbers_ || parts_.size() > part_count_)
-    reader.fail("a chunk", "is one too many");
+    reader.fail("a chunk", "is surplus");
   reader.end("a chunk");
   return reader.status();
 }
@@ -132,14 +137,14 @@ void MeshReader::read_header(ByteReader& reader) {
 }
 
 absl::StatusOr<TriangleMesh> MeshReader::finish() && {
-  if (!begun_) return data_loss("the header is not there");
+  if (!begun_) return data_loss("the header is missing");
   if (vertices_.size() != vertex_numbers_ || indices_.size() != index_numbers_ || parts_.size() != part_count_)
     return data_loss(absl::StrCat("of ", vertex_numbers_, " coordinates, ", index_numbers_, " indices and ",
                                   part_count_, " parts ", vertices_.size(), ", ", indices_.size(), " and ",
                                   parts_.size(), " are there"));
   absl::StatusOr<TriangleMesh> mesh =
       TriangleMesh::create(std::move(vertices_), std::move(indices_), std::move(parts_));
-  if (!mesh.ok()) return data_loss(absl::StrCat("what is there is no mesh: ", mesh.status().message()));
+  if (!mesh.ok()) return data_loss(absl::StrCat("the chunks are not a valid mesh: ", mesh.status().message()));
   return mesh;
 }
 
@@ -151,18 +156,20 @@ absl::Status PartsReader::add(absl::string_view chunk) {
   if (kind == BytesKind::kPartsHeader) {
     begun_ = true;
     part_count_ = reader.number_upto(limits::kMaxMeshParts, "the number of parts");
+  } else if (kind == BytesKind::kMeshCreator) {
+    creator_ = std::string(reader.text(limits::kMaxCreatorLength, "the creator"));
   } else if (kind == BytesKind::kMeshParts) {
     read_parts(reader, parts_);
   } else {
     reader.fail("the kind of a chunk", "is not known");
   }
-  if (parts_.size() > part_count_) reader.fail("a chunk", "is one too many");
+  if (parts_.size() > part_count_) reader.fail("a chunk", "is surplus");
   reader.end("a chunk");
   return reader.status();
 }
 
 absl::StatusOr<std::vector<MeshPart>> PartsReader::finish(size_t triangles) && {
-  if (!begun_) return data_loss("the header of parts is not there");
+  if (!begun_) return data_loss("the header of parts is missing");
   if (parts_.size() != part_count_)
     return data_loss(absl::StrCat("of ", part_count_, " parts ", parts_.size(), " are there"));
   if (absl::Status status = check_parts(parts_, triangles); !status.ok())

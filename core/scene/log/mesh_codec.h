@@ -1,6 +1,6 @@
 // Encodes and decodes meshes as chunks for the log: vertices and indices, which are stored once for all names of equal
-// content, and parts, which are stored for each name. The tree is not included: its topology is cached separately, see
-// tree_codec.h. One thread at a time.
+// content, and parts (named ranges of triangles), which are stored for each name. The tree is not included: its
+// topology is cached separately, see tree_codec.h. One thread at a time.
 #ifndef LOCUS_CORE_SCENE_LOG_MESH_CODEC_H_
 #define LOCUS_CORE_SCENE_LOG_MESH_CODEC_H_
 
@@ -23,8 +23,8 @@ class MeshWriter {
   // Unpacks all vertices at once. next() unpacks the indices, one chunk at a time.
   explicit MeshWriter(std::shared_ptr<const StaticMesh> mesh);
 
-  // Returns the next chunk, of at most UpdateLog::kMaxChunkBytes bytes, or nullopt at the end. Suitable as a
-  // ChunkSource.
+  // Returns the next chunk, of at most UpdateLog::kMaxChunkBytes bytes, or nullopt at the end. May be passed to
+  // UpdateLog as a ChunkSource.
   absl::StatusOr<std::optional<std::string>> next();
 
  private:
@@ -40,7 +40,8 @@ class MeshWriter {
   size_t next_index_ = 0;   // number of vertex indices written so far
 };
 
-// Encoder of the parts of one name of a mesh: a header with the number of parts, then the parts.
+// Encoder of what is stored for one mesh name: a header with the number of parts, the creator if there is one, and the
+// parts.
 class PartsWriter {
  public:
   explicit PartsWriter(std::shared_ptr<const StaticMesh> mesh) : mesh_(std::move(mesh)) {}
@@ -51,10 +52,12 @@ class PartsWriter {
  private:
   const std::shared_ptr<const StaticMesh> mesh_;
   bool begun_ = false;
+  bool creator_written_ = false;
   size_t next_part_ = 0;
 };
 
-// Decoder of the chunks that MeshWriter wrote, and of meshes in format 1, whose content includes the parts.
+// Decoder of the chunks that MeshWriter wrote, and of the chunks of data format 1, in which the content of a mesh
+// includes the parts.
 class MeshReader {
  public:
   // Decodes the next chunk. The chunks must be added in the order in which they were written. DATA_LOSS describes
@@ -67,9 +70,9 @@ class MeshReader {
   void read_header(ByteReader& reader);
 
   bool begun_ = false;
-  uint64_t vertex_numbers_ = 0;  // expected sizes of vertices_, indices_ and parts_, from the header
-  uint64_t index_numbers_ = 0;
-  uint64_t part_count_ = 0;
+  uint64_t vertex_numbers_ = 0;  // expected size of vertices_, from the header
+  uint64_t index_numbers_ = 0;   // expected size of indices_, from the header
+  uint64_t part_count_ = 0;      // expected size of parts_, from the header
   std::vector<float> vertices_;
   std::vector<uint32_t> indices_;
   std::vector<MeshPart> parts_;
@@ -83,11 +86,14 @@ class PartsReader {
   // Returns the parts once all chunks were added. DATA_LOSS if chunks are missing or the parts do not fit a mesh of
   // `triangles` triangles.
   absl::StatusOr<std::vector<MeshPart>> finish(size_t triangles) &&;
+  // Returns the creator of the mesh; empty if none is stored.
+  const std::string& creator() const { return creator_; }
 
  private:
   bool begun_ = false;
   uint64_t part_count_ = 0;  // expected size of parts_, from the header
   std::vector<MeshPart> parts_;
+  std::string creator_;
 };
 
 }  // namespace locus

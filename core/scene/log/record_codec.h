@@ -21,7 +21,7 @@
 namespace locus {
 
 // Append one record to `to`, whose size is a multiple of 8 before and after. Preconditions: the batches have passed
-// check_form(), and those of encode_joined() satisfy may_join().
+// check_form(), and the batches of encode_joined() satisfy may_join().
 void encode_batch(const UpdateBatch& batch, std::string& to);
 void encode_joined(absl::Span<const UpdateBatch* const> batches, std::string& to);
 // Appends a static change. `placed` has the ids of all placed instances in the order of the change, including the ids
@@ -38,10 +38,10 @@ class Record {
     std::vector<UpdateBatch> batches;  // at least one; all satisfy may_join()
   };
   struct Change {
-    StaticChange change;          // ids are set, mesh pointers are null
-    std::vector<MeshKey> meshes;  // mesh of each placement; names are empty in format 1
+    StaticChange change;          // all placements have ids; all mesh pointers are null
+    std::vector<MeshKey> meshes;  // key of each placement's mesh; without a name in data format 1
   };
-  using Content = std::variant<UpdateBatch, Joined, Change>;  // batches pass check_form()
+  using Content = std::variant<UpdateBatch, Joined, Change>;  // all batches have passed check_form()
   Content& content() { return content_; }
   const Content& content() const { return content_; }
 

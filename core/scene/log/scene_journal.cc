@@ -9,19 +9,18 @@
 namespace locus {
 namespace {
 
-// The largest batch fits into a record, and so does the largest static change: an item or instance takes at most 128
-// bytes in all its columns, and the column lengths of a list take at most 256 bytes.
+// The largest batch fits into a record, and so does the largest static change: the values of an item have at most 128
+// bytes in all columns, the column lengths of a list at most 256 bytes, and an instance at most 256 bytes, including
+// the hash and name of its mesh.
 static_assert(uint64_t{limits::kMaxUpdateItems} * 128 + uint64_t{limits::kMaxUpdateLists} * 256 <=
               UpdateLog::kMaxRecordBytes);
-static_assert(uint64_t{limits::kMaxInstances} * 128 <= UpdateLog::kMaxRecordBytes);
+static_assert(uint64_t{limits::kMaxInstances} * 256 <= UpdateLog::kMaxRecordBytes);
 
 }  // namespace
 
 void SceneJournal::check_invariants() const {
-  if constexpr (kDebugChecks) {
-    LOCUS_CHECK_LE(position_.snapshot_sequence, position_.sequence);
-    LOCUS_CHECK(position_.bytes == 0 || position_.sequence > position_.snapshot_sequence);
-  }
+  LOCUS_CHECK_LE(position_.snapshot_sequence, position_.sequence);
+  LOCUS_CHECK(position_.bytes == 0 || position_.sequence > position_.snapshot_sequence);
 }
 
 void SceneJournal::end_record(uint64_t epoch, const UpdateBatch& batch) {
@@ -76,7 +75,7 @@ absl::Status SceneJournal::append(AckLevel level) {
       position_.bytes += bytes_.size();
       // A different sequence number would mean that the log belongs to another scene.
       LOCUS_CHECK_EQ(*last, position_.sequence);
-      check_invariants();
+      LOCUS_DCHECK_CALL(check_invariants());
     }
   }
   entries_.clear();
@@ -107,7 +106,7 @@ void SceneJournal::snapshot_written(uint64_t sequence, uint64_t total_bytes) {
   position_.snapshot_sequence = sequence;
   position_.bytes = logged - total_bytes;
   bytes_in_snapshots_ = total_bytes;
-  check_invariants();
+  LOCUS_DCHECK_CALL(check_invariants());
 }
 
 }  // namespace locus

@@ -31,7 +31,7 @@ struct SceneLog {
   UpdateLog* log = nullptr;  // outlives the scene
   SceneKey key = 0;
   AckLevel level = AckLevel::kLocal;
-  LogPosition position;  // position of the log when the journal begins
+  LogPosition position;  // position of the log when the journal is created
 };
 
 class SceneJournal {
@@ -41,7 +41,8 @@ class SceneJournal {
   bool on() const { return log_.log != nullptr; }
   SceneKey key() const { return log_.key; }
 
-  // Appends one record for each batch, with a single sync. After an error none of the batches counts as logged.
+  // Appends one record for each batch, with a single sync. After an error, treat all batches as not logged: see
+  // UpdateLog.
   absl::Status append_each(uint64_t epoch, absl::Span<const UpdateBatch* const> batches) LOCUS_EXCLUDES(mutex_);
   // Appends a single record for all batches, which become one revision.
   absl::Status append_joined(uint64_t epoch, absl::Span<const UpdateBatch* const> batches) LOCUS_EXCLUDES(mutex_);
@@ -53,8 +54,8 @@ class SceneJournal {
   absl::Status remove();
 
   LogPosition position() const LOCUS_EXCLUDES(mutex_);
-  // Returns the size in bytes of all records appended by this journal, plus the records that followed the snapshot when
-  // the journal began. Never decreases.
+  // Returns the size in bytes of all records that this journal has appended, plus the size of the records that followed
+  // the snapshot when the journal was created. Never decreases.
   uint64_t total_bytes() const LOCUS_EXCLUDES(mutex_);
   // Records that the log's snapshot now includes all records up to `sequence`. `total_bytes` is what total_bytes()
   // returned when `sequence` was the last record.
@@ -63,21 +64,21 @@ class SceneJournal {
  private:
   // Checks the invariants of the class comment. O(1).
   void check_invariants() const LOCUS_REQUIRES(mutex_);
-  // Ends the record that was last encoded into bytes_: adds its entry, with the writer and batch number of `batch`, and
-  // its end.
+  // Ends the record that was last encoded into bytes_: adds its LogEntry, with the writer and batch number of `batch`,
+  // to entries_, and its end offset to ends_.
   void end_record(uint64_t epoch, const UpdateBatch& batch);
   absl::Status append(AckLevel level) LOCUS_EXCLUDES(mutex_);
 
   const SceneLog log_;
-  // Records being appended: their encoded bytes, the entry of each, and the end of each as an offset in bytes_. All are
-  // empty between calls.
+  // Records that are being appended: bytes_ is their encoding, entries_ has one entry for each record, and ends_ has
+  // the end of each record as an offset in bytes_. All three are empty between calls.
   std::string bytes_;
   std::vector<LogEntry> entries_;
   std::vector<size_t> ends_;
 
   mutable Mutex mutex_;
   LogPosition position_ LOCUS_GUARDED_BY(mutex_);
-  uint64_t bytes_in_snapshots_ LOCUS_GUARDED_BY(mutex_) = 0;  // total_bytes() at the last snapshot
+  uint64_t bytes_in_snapshots_ LOCUS_GUARDED_BY(mutex_) = 0;  // total_bytes() for the last snapshot's state
 };
 
 }  // namespace locus

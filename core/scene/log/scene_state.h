@@ -1,12 +1,15 @@
-// Complete state of a scene at one revision, to be written to a snapshot in chunks and read again: the part that
-// readers see, and the part that only the writer uses. The history is not included. Plain data.
+// Complete state of a scene at one revision, except the history: the part that readers see, and the part that only the
+// writer uses. FrozenScene is written to the log as a snapshot; SceneState is the result of reading this snapshot. Also
+// defines the limits of a chunk. Plain data.
 #ifndef LOCUS_CORE_SCENE_LOG_SCENE_STATE_H_
 #define LOCUS_CORE_SCENE_LOG_SCENE_STATE_H_
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <vector>
 
+#include "core/base/limits.h"
 #include "core/scene/objects/object.h"
 #include "core/scene/snapshot/scene_snapshot.h"
 #include "core/scene/statics/static_set.h"
@@ -20,7 +23,7 @@ struct FrozenScene {
   WriterTable writers;
   bool has_past = false;   // SceneWriter::has_past()
   uint64_t sequence = 0;   // sequence number of the last record whose effect is included
-  uint64_t log_bytes = 0;  // SceneJournal::total_bytes() at that record
+  uint64_t log_bytes = 0;  // value of SceneJournal::total_bytes() after that record
 };
 
 // Decoded scene snapshot, the input of SceneWriter::restore().
@@ -34,6 +37,20 @@ struct SceneState {
   double cell_size = 0;                      // cell size of the grid
   std::vector<std::vector<Object>> objects;  // one vector for each chunk read
 };
+
+// Maximum numbers of objects and instances in one chunk of a snapshot, for StateWriter and StateReader. The limits are
+// part of the format: a later version may write smaller chunks, but must still read chunks of these sizes.
+inline constexpr size_t kObjectsPerChunk = 8192;
+// Maximum encoded size of an object in bytes: id, group, tag, layers, kind, position, rotation, size and radius.
+inline constexpr size_t kMaxBytesOfObject = 8 + 8 + 8 + 4 + 1 + 24 + 16 + 12 + 4;
+inline constexpr size_t kInstancesPerChunk = 4096;
+// Maximum encoded size of an instance in bytes. Includes the content hash and the name, with length and padding, of the
+// instance's mesh, as if no other instance in the chunk used that mesh.
+inline constexpr size_t kMaxBytesOfInstance = 32 + 8 + limits::kMaxNameLength + 1 + 8 + 8 + 8 + 4 + 4 + 24 + 16 + 4;
+// Maximum length in bytes of ItemError::field. The longest field that is written, inserts[65535].capsule.half_axes, has
+// 32 bytes; the other bytes are a reserve.
+inline constexpr size_t kMaxErrorField = 128;
+inline constexpr size_t kMaxBytesOfError = 24 + kMaxErrorField;
 
 }  // namespace locus
 

@@ -9,7 +9,6 @@
 #include "core/base/limits.h"
 #include "core/base/refusal.h"
 #include "core/base/status_macros.h"
-#include "core/scene/log/state_limits.h"
 
 namespace locus {
 namespace {
@@ -39,7 +38,7 @@ UpdateAck read_ack(ByteReader& reader) {
   return ack;
 }
 
-// Returns true if all values are within [min, max]. A NaN is not.
+// Returns true if all values are within [min, max], and none is NaN.
 template <class T>
 bool all_within(absl::Span<const T> values, double min, double max) {
   bool valid = true;
@@ -62,7 +61,7 @@ struct LabelColumns {
 
   LabelColumns(ByteReader& reader, size_t max) {
     ids = reader.column<uint64_t>("ids");
-    if (ids.empty() || ids.size() > max) reader.fail("ids", "are too many, or none");
+    if (ids.empty() || ids.size() > max) reader.fail("ids", "are missing or too many");
     if (std::find(ids.begin(), ids.end(), kNoId) != ids.end()) reader.fail("an id", "is 0");
     groups = reader.shared_column<uint64_t>(ids.size(), 1, "groups");
     tags = reader.shared_column<uint64_t>(ids.size(), 1, "tags");
@@ -124,7 +123,7 @@ void StateReader::read_header(ByteReader& reader) {
   if (reader.good() && state_.epoch == 0) reader.fail("the epoch", "is 0");
   state_.revision = reader.number("the revision");
   state_.tick = reader.number("the tick");
-  state_.has_past = reader.number_upto(1, "whether there is a past") != 0;
+  state_.has_past = reader.number_upto(1, "the flag has_past") != 0;
   writers_ = reader.number_upto(limits::kMaxWriters, "the number of writers");
   instances_ = reader.number_upto(limits::kMaxInstances, "the number of instances");
   objects_ = reader.number_upto(limits::kMaxObjects, "the number of objects");
@@ -137,7 +136,7 @@ void StateReader::read_writers(ByteReader& reader) {
     WriterTable::Writer writer;
     writer.number = reader.number("a writer");
     writer.batch = reader.number("the last batch of a writer");
-    writer.heard = reader.number("when a writer was heard");
+    writer.heard = reader.number("the activity count of a writer");
     writer.ack = read_ack(reader);
     if (reader.good() && !state_.writers.restore(std::move(writer))) reader.fail("a writer", "occurs twice, or is 0");
   }
@@ -201,14 +200,14 @@ void StateReader::read_objects(ByteReader& reader) {
   objects_read_ += n;
 }
 
-// Builds the set of instances by placing all of them again. Their transforms are stored exactly, so the result equals
-// the stored set.
+// Builds the set of instances by placing all decoded instances in an empty set. The transforms of instances are stored
+// exactly, so the result equals the encoded set.
 absl::Status StateReader::place(const FindMesh& find_mesh) {
   StaticChange change;
   for (const auto& [mesh, placed] : placed_) {
     PlacementColumns place{find_mesh(mesh), placed.ids,    placed.translations, placed.rotations,
                            placed.scales,   placed.layers, placed.groups,       placed.tags};
-    if (place.mesh == nullptr) return data_loss("a mesh that instances use is not there");
+    if (place.mesh == nullptr) return data_loss("a mesh that instances use is missing");
     change.place.push_back(std::move(place));
   }
   const auto no_object = [](Id) { return false; };
@@ -219,7 +218,7 @@ absl::Status StateReader::place(const FindMesh& find_mesh) {
 }
 
 absl::StatusOr<SceneState> StateReader::finish(const FindMesh& find_mesh) && {
-  if (!begun_) return data_loss("the header is not there");
+  if (!begun_) return data_loss("the header is missing");
   if (state_.writers.size() != writers_ || instances_read_ != instances_ || objects_read_ != objects_)
     return data_loss(absl::StrCat("the header counts ", writers_, " writers, ", instances_, " instances and ", objects_,
                                   " objects, the chunks contain ", state_.writers.size(), ", ", instances_read_,

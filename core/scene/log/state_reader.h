@@ -15,8 +15,8 @@
 
 namespace locus {
 
-// Function that returns the mesh with the name and content of a key, or null if there is none. If the key has no name
-// (format 1), it may return any mesh of the content.
+// Function that returns the mesh with the name and content of a key, or null if there is no such mesh. If the key has
+// no name, because it was stored in data format 1, the function may return any mesh of the content.
 using FindMesh = std::function<std::shared_ptr<const StaticMesh>(const MeshKey&)>;
 
 class StateReader {
@@ -43,9 +43,9 @@ class StateReader {
 
   SceneState state_;
   bool begun_ = false;
-  uint64_t writers_ = 0;  // expected numbers of writers, instances and objects, from the header
-  uint64_t instances_ = 0;
-  uint64_t objects_ = 0;
+  uint64_t writers_ = 0;    // expected number of writers, from the header
+  uint64_t instances_ = 0;  // expected number of instances, from the header
+  uint64_t objects_ = 0;    // expected number of objects, from the header
   uint64_t instances_read_ = 0;
   uint64_t objects_read_ = 0;
   std::map<MeshKey, Placed> placed_;

@@ -7,12 +7,11 @@
 #include "absl/container/flat_hash_map.h"
 #include "core/base/check.h"
 #include "core/scene/log/byte_codec.h"
-#include "core/scene/log/state_limits.h"
 
 namespace locus {
 namespace {
 
-// Size in bytes above which a chunk of writers ends. Its last writer may exceed this size.
+// Size in bytes after which no further writer is added to a chunk. The last writer of a chunk may exceed this size.
 constexpr size_t kWritersChunk = UpdateLog::kMaxChunkBytes / 2;
 static_assert(kWritersChunk + size_t{limits::kMaxListedItemErrors} * kMaxBytesOfError + 1024 <=
               UpdateLog::kMaxChunkBytes);
@@ -32,7 +31,7 @@ void write_ack(const UpdateAck& ack, ByteWriter& writer) {
   }
 }
 
-// Writes one column with an entry get(item) for each item. get() returns an array of the values of the entry.
+// Writes one column, whose entry for each item is the array of values that get(item) returns.
 template <class Items, class Get>
 void write_each(ByteWriter& writer, const Items& items, const Get& get) {
   using Entry = std::decay_t<decltype(get(items[0]))>;

@@ -1,8 +1,9 @@
-// Encodes a scene's state in chunks, one at a time, from an immutable snapshot: the scene continues meanwhile, and only
-// one chunk is in memory. One thread at a time.
+// Encodes a scene's state in chunks, one at a time, from an immutable snapshot: the scene may change meanwhile, and
+// only one chunk is in memory. One thread at a time.
 //
-// Chunks: a header with the counts; writers; instances; objects in grid order. Decoded by StateReader
-// (core/scene/log/state_reader.h); FORMAT.md describes the bytes.
+// The first chunk is a header with the numbers of writers, instances and objects. The chunks of writers follow, then
+// the chunks of instances, then the chunks of objects, in the order of the grid. StateReader
+// (core/scene/log/state_reader.h) decodes the chunks; FORMAT.md describes the bytes.
 #ifndef LOCUS_CORE_SCENE_LOG_STATE_WRITER_H_
 #define LOCUS_CORE_SCENE_LOG_STATE_WRITER_H_
 
@@ -20,8 +21,8 @@ class StateWriter {
  public:
   explicit StateWriter(FrozenScene scene);
 
-  // Returns the next chunk, of at most UpdateLog::kMaxChunkBytes bytes, or nullopt at the end. Suitable as a
-  // ChunkSource.
+  // Returns the next chunk, of at most UpdateLog::kMaxChunkBytes bytes, or nullopt at the end. May be passed to
+  // UpdateLog as a ChunkSource.
   absl::StatusOr<std::optional<std::string>> next();
   // Returns the size in bytes of all chunks that next() has returned.
   uint64_t bytes() const { return bytes_; }

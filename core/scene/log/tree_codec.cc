@@ -24,7 +24,7 @@ absl::StatusOr<TreeTopology> decode_outline(const AlignedBytes& bytes) {
   const uint64_t version = reader.number("the version of the builder");
   if (reader.good() && version != kBvhBuilderVersion)
     return absl::FailedPreconditionError(
-        absl::StrCat("the tree is of builder ", version, ", this is ", kBvhBuilderVersion));
+        absl::StrCat("builder version ", version, " made the tree, the current version is ", kBvhBuilderVersion));
   TreeTopology topology;
   topology.numbers = reader.column<uint32_t>("the numbers of the triangles");
   const auto sizes = reader.column<uint8_t>("the sizes of the blocks");

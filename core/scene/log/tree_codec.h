@@ -1,5 +1,5 @@
 // Encodes and decodes the topology of a mesh's tree (core/index/bvh/tree_topology.h) for the log. The bytes include the
-// version of the tree builder. They do not depend on the machine's instruction set, because trees do not. Plain
+// version of the tree builder. The bytes are the same for all instruction sets, because the trees are the same. Plain
 // functions; any thread.
 #ifndef LOCUS_CORE_SCENE_LOG_TREE_CODEC_H_
 #define LOCUS_CORE_SCENE_LOG_TREE_CODEC_H_
@@ -15,8 +15,9 @@ namespace locus {
 // Returns the encoded topology.
 std::string encode_outline(const TreeTopology& topology);
 
-// Returns a topology that borrows from `bytes`. DATA_LOSS describes damage; FAILED_PRECONDITION if another version of
-// the builder wrote it. Does not check that the topology fits the mesh: TriangleBvh::restore() does.
+// Returns a topology that borrows from `bytes`. DATA_LOSS describes damage; FAILED_PRECONDITION if the topology was
+// written by another version of the tree builder. Does not check that the topology fits the mesh:
+// TriangleBvh::restore() does.
 absl::StatusOr<TreeTopology> decode_outline(const AlignedBytes& bytes);
 
 }  // namespace locus

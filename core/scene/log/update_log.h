@@ -1,15 +1,16 @@
 // Interface of the durable storage of scenes and meshes: for each scene a snapshot of its state, followed by records
 // with sequence numbers without gaps. The log stores bytes, which the caller encodes (core/scene/log/record_codec.h),
-// and detects damage. Implemented in server/storage; the daemon's main() passes it to the scenes.
+// and detects damage of the stored bytes. Implemented in server/storage; the daemon's main() passes it to the scenes.
 //
-// The interface is meant to be served by a replicated log later: sequence numbers are dense within a scene, every
-// record carries the epoch of its writer and the batch it came from, and the durability of an ack is an AckLevel.
+// A replicated log can implement the interface later: for this purpose, the sequence numbers of a scene have no gaps,
+// every record has the epoch of the scene and the writer id and number of its batch, and the durability of an ack is an
+// AckLevel.
 //
-// Threads: every member may be called from any thread; append() of one scene by one thread at a time. Calls wait for
-// the disk. Errors of all members: RESOURCE_EXHAUSTED if the disk is full (queries need no disk: continue to serve them
-// and try again later), DATA_LOSS naming the damaged item, UNAVAILABLE if the disk fails otherwise. If a call that
-// writes fails, nothing counts as written, although a part of it may be found after a restart. The call may be
-// repeated.
+// Threads: every member may be called from any thread, but append() for a scene only from one thread at a time. Calls
+// wait for the disk. Errors of all members: RESOURCE_EXHAUSTED if the disk is full (queries need no disk: continue to
+// serve them and try again later), DATA_LOSS naming the damaged item, UNAVAILABLE if the disk fails otherwise. If a
+// call that writes fails, treat its data as not written, although a part of the data may be found after a restart. The
+// caller may repeat the call.
 #ifndef LOCUS_CORE_SCENE_LOG_UPDATE_LOG_H_
 #define LOCUS_CORE_SCENE_LOG_UPDATE_LOG_H_
 
@@ -38,13 +39,13 @@ enum class AckLevel : uint8_t {
 // Record to be appended.
 struct LogEntry {
   uint64_t epoch = 0;
-  uint64_t writer = 0;      // writer of the batch, or of the last of joined batches; 0 if it has none
-  uint64_t batch = 0;       // number of that batch; 0 if it has none
+  uint64_t writer = 0;      // writer id of the batch, or of the last joined batch; 0: no writer id
+  uint64_t batch = 0;       // number of this batch in the sequence of its writer; 0: no number
   absl::string_view bytes;  // at most kMaxRecordBytes
 };
 
 struct LogRecord {
-  uint64_t sequence = 0;  // from 1, without gaps
+  uint64_t sequence = 0;  // position in the scene's log, from 1 without gaps
   LogEntry entry;
 };
 
@@ -52,20 +53,20 @@ struct LogRecord {
 struct StoredScene {
   SceneKey key = 0;
   std::string name;
-  std::string spec;  // specification, encoded by the caller
+  std::string spec;  // the scene's SceneSpec, encoded by encode_spec() (core/scene/spec_codec.h)
   uint64_t epoch = 0;
-  uint64_t snapshot_sequence = 0;  // sequence number of the last record in the snapshot
+  uint64_t snapshot_sequence = 0;  // sequence number of the last record whose effect is in the snapshot
   uint64_t last_sequence = 0;      // sequence number of the last record
   uint64_t log_bytes = 0;          // size in bytes of the records after the snapshot
-  bool copied = false;             // copied by back_up(): the original may have advanced, so call restart_scene() first
-  absl::Status damage;             // not OK (DATA_LOSS): the scene must not be served
+  bool copied = false;  // true: copy by back_up(); call restart_scene() first, because the original may have changed
+  absl::Status damage;  // not OK (DATA_LOSS): the scene must not be served
 };
 
 struct StoredMesh {
   std::string name;
   std::array<uint8_t, 32> sha256 = {};  // hash of the content
   absl::Status damage;                  // not OK (DATA_LOSS): the mesh must not be used
-  bool parts_in_content = false;        // stored in format 1: the content has the parts, read_parts() has none
+  bool parts_in_content = false;  // true (data format 1): the content includes the parts; read_parts() returns none
 };
 
 // Function that returns the next chunk of a long sequence of bytes, nullopt at its end, or an error.
@@ -84,27 +85,28 @@ class UpdateLog {
   // included.
   virtual const std::vector<StoredScene>& stored_scenes() const = 0;
   virtual const std::vector<StoredMesh>& stored_meshes() const = 0;
-  // Returns DATA_LOSS if stored_scenes() or stored_meshes() may lack entries or contain deleted ones.
+  // Returns DATA_LOSS if stored_scenes() or stored_meshes() may lack entries or contain deleted scenes or meshes.
   virtual absl::Status catalogue_damage() const = 0;
   // Returns true if the previous process shut down cleanly, so that no record of AckLevel::kMemory is lost.
   virtual bool closed_in_order() const = 0;
 
-  // Creates a scene with a snapshot at sequence number 0; `state` returns its chunks, of at most kMaxChunkBytes each.
-  // Returns the key of the scene. Synced when this returns, like all calls except append().
+  // Creates a scene with a snapshot at sequence number 0; `state` returns the chunks of the snapshot, of at most
+  // kMaxChunkBytes each. Returns the key of the scene. The scene is synced to the disk when this call returns; the same
+  // holds for all calls that write, except append() and keep_outline().
   virtual absl::StatusOr<SceneKey> create_scene(absl::string_view name, absl::string_view spec, uint64_t epoch,
                                                 ChunkSource state) = 0;
   // Deletes a scene, damaged or not.
   virtual absl::Status delete_scene(SceneKey scene) = 0;
-  // Starts a new epoch for the records that follow. Required if records may be lost or the scene is a copy whose
-  // original may have advanced.
+  // Starts a new epoch for the records that follow. Required if acknowledged records may be lost, or if the scene is a
+  // copy and its original may have appended further records.
   virtual absl::Status restart_scene(SceneKey scene, uint64_t epoch) = 0;
 
   // Appends records in order, all or none, with one sync if `level` requires it; one sync may serve several scenes that
   // append at the same time. Preconditions: the entries have the scene's epoch (FAILED_PRECONDITION otherwise), and
-  // together at most kMaxRecordBytes. Returns the sequence number of the last record.
+  // their bytes are at most kMaxRecordBytes in total. Returns the sequence number of the last record.
   virtual absl::StatusOr<uint64_t> append(SceneKey scene, absl::Span<const LogEntry> entries, AckLevel level) = 0;
-  // Passes the records from sequence number `from` on to `sink`, in order, until `sink` fails. Precondition: the
-  // snapshot does not include record `from`.
+  // Calls `sink` with each record from sequence number `from` on, in order, until `sink` returns an error.
+  // Precondition: the snapshot does not include record `from`.
   virtual absl::Status read(SceneKey scene, uint64_t from, RecordSink sink) const = 0;
   // Returns the sequence number of the last record.
   virtual absl::StatusOr<uint64_t> latest(SceneKey scene) const = 0;
@@ -115,7 +117,8 @@ class UpdateLog {
   virtual absl::Status read_snapshot(SceneKey scene, ChunkSink sink) const = 0;
 
   // Adds a mesh name. The content, vertices and indices, is stored once for all names of equal content: `content` is
-  // not called if the content is already stored. `parts` are stored for each name.
+  // called only if the content is not stored yet, or if read_mesh() has found it damaged. `parts` are stored for each
+  // name.
   virtual absl::Status add_mesh(absl::string_view name, const std::array<uint8_t, 32>& sha256, ChunkSource content,
                                 ChunkSource parts) = 0;
   virtual absl::Status delete_mesh(absl::string_view name) = 0;
@@ -124,9 +127,13 @@ class UpdateLog {
 
   // Write and read a cache of tree topologies (core/scene/log/tree_codec.h), one for each content, which makes recovery
   // faster. Writing ignores errors; reading returns nullopt if nothing is stored. The topology is deleted with the last
-  // name of its content and is not part of a backup. One thread at a time for one content.
+  // name of its content and is not part of a backup. For each content, only one thread at a time may call these two
+  // functions.
   virtual void keep_outline(const std::array<uint8_t, 32>& sha256, absl::string_view bytes) = 0;
   virtual std::optional<std::string> read_outline(const std::array<uint8_t, 32>& sha256) const = 0;
+
+  // Returns the memory in bytes of the log's caches and of records that are not in its tables yet.
+  virtual uint64_t cache_bytes() const { return 0; }
 
   // Writes a consistent copy of all scenes and meshes into the new directory `path`. Other calls may continue
   // meanwhile.

@@ -1,4 +1,4 @@
-// A moving object as a scene stores it: identity, filters and shape. Plain data.
+// Moving object of a scene: its id, group, tag, layers and shape. Plain data.
 #ifndef LOCUS_CORE_SCENE_OBJECTS_OBJECT_H_
 #define LOCUS_CORE_SCENE_OBJECTS_OBJECT_H_
 

@@ -13,8 +13,8 @@ float at_least(double length) {
   return std::nextafter(static_cast<float>(length), std::numeric_limits<float>::infinity());
 }
 
-// Returns how far the shape may reach from its position under any rotation. It does not depend on the current rotation,
-// so a rotation never moves an object to another cell.
+// Returns the extent of the shape: an upper bound of the distance from its position to any of its points, under any
+// rotation. The extent does not depend on the current rotation, so a rotation never moves an object to another cell.
 float extent_of(const Shape& shape) {
   switch (shape.kind) {
     case ShapeKind::kPoint:

@@ -1,5 +1,6 @@
 // The moving objects of a scene at one revision, indexed by id and by a grid. Immutable and safe to read from any
-// thread; shares unchanged memory with other revisions. A SpatialIndex (core/index/spatial_index.h) of objects.
+// thread; shares unchanged memory with other revisions. ObjectSet satisfies the concept SpatialIndex
+// (core/index/spatial_index.h).
 #ifndef LOCUS_CORE_SCENE_OBJECTS_OBJECT_SET_H_
 #define LOCUS_CORE_SCENE_OBJECTS_OBJECT_SET_H_
 
@@ -13,7 +14,7 @@
 
 namespace locus {
 
-// Return the shape, or the complete object, that a grid reference points to.
+// Return the shape, or the complete object, to which a reference into the grid points.
 Shape shape_of(const GridRef& value);
 Object object_of(const GridRef& value);
 // Returns the grid item that stores `object` under `handle`.
@@ -28,8 +29,8 @@ class ObjectSet {
 
   size_t size() const { return grid_.size(); }
   const GridSnapshot& grid() const { return grid_; }
-  // Returns a reference to the object with this id, or a null reference if there is none. O(1), plus a search through
-  // the keys of one brick.
+  // Returns a reference to the object with this id, or a null reference if no object has the id. O(1), plus a search
+  // through the keys of one brick.
   GridRef find_ref(Id id) const;
   std::optional<Object> find(Id id) const;
   // Returns true if an object with this id is stored at exactly this position.
@@ -38,7 +39,7 @@ class ObjectSet {
     return known && known.entry().position == object.shape.position;
   }
 
-  // Calls fn(object) for each object, in an order that depends only on the history of the grid. O(size).
+  // Calls fn(object) for each object, in an order that depends only on the sequence of changes of the grid. O(size).
   template <class Fn>
   void for_each(Fn&& fn) const {
     grid_.for_each([&fn](const GridRef& value) {
@@ -47,7 +48,8 @@ class ObjectSet {
     });
   }
 
-  // Calls fn(object) from `cursor` on until fn returns false, and advances `cursor`, so that a later call continues.
+  // Calls fn(object) for the objects from `cursor` on, until fn returns false. Advances `cursor`, so that a later call
+  // continues after the last object that was passed to fn.
   template <class Fn>
   void for_each_from(GridCursor& cursor, const Fn& fn) const {
     grid_.for_each_from(cursor, [&fn](const GridRef& value) { return fn(object_of(value)); });

@@ -9,11 +9,11 @@
 namespace locus {
 namespace {
 
-constexpr size_t kAhead = 16;       // prefetch distance, in objects
-constexpr uint32_t kNewLife = ~0u;  // in place of an index: the inserted object updates no removed one
+constexpr size_t kPrefetchObjects = 16;  // prefetch distance, in objects
+constexpr uint32_t kNewLife = ~0u;       // in place of an index: an inserted object that updates no removed object
 
-// Returns for each object of `inserted` the index in `removed` of the object that it updates; kNewLife if there is
-// none.
+// Returns for each object of `inserted` the index in `removed` of the object that it updates, or kNewLife if it updates
+// no removed object.
 std::vector<uint32_t> updated_objects(absl::Span<const Object> removed, absl::Span<const Object> inserted,
                                       const absl::flat_hash_set<Id>& replaced) {
   std::vector<uint32_t> before(inserted.size(), kNewLife);
@@ -29,12 +29,10 @@ std::vector<uint32_t> updated_objects(absl::Span<const Object> removed, absl::Sp
 }  // namespace
 
 void ObjectStore::check_invariants() const {
-  if constexpr (kDebugChecks) {
-    if (!planted(PlantedBug::kGhostAfterMove)) LOCUS_CHECK_EQ(grid_.size(), handles_.size());
-    LOCUS_CHECK_EQ(size_t{next_handle_}, handles_.size() + free_handles_.size() + quarantined_handles_.size());
-    LOCUS_CHECK(moves_ != nullptr || quarantined_handles_.empty());
-    LOCUS_CHECK(free_handles_.empty() || free_handles_.back() < next_handle_);
-  }
+  if (!planted(PlantedBug::kGhostAfterMove)) LOCUS_CHECK_EQ(grid_.size(), handles_.size());
+  LOCUS_CHECK_EQ(size_t{next_handle_}, handles_.size() + free_handles_.size() + quarantined_handles_.size());
+  LOCUS_CHECK(moves_ != nullptr || quarantined_handles_.empty());
+  LOCUS_CHECK(free_handles_.empty() || free_handles_.back() < next_handle_);
 }
 
 std::optional<Object> ObjectStore::find(Id id) const {
@@ -59,8 +57,8 @@ void ObjectStore::free_handle(uint32_t handle) {
   }
 }
 
-// Frees handles quarantined in `oldest_tick` as well: the set of that tick was made at its end, and so does not contain
-// the objects removed in it.
+// Also frees the handles of objects removed in `oldest_tick`: the object set that the history has for this tick was
+// made at the end of the tick, and so does not contain these objects.
 void ObjectStore::start_tick(uint64_t tick, uint64_t oldest_tick) {
   LOCUS_CHECK(moves_ != nullptr);
   tick_ = tick;
@@ -69,7 +67,7 @@ void ObjectStore::start_tick(uint64_t tick, uint64_t oldest_tick) {
        quarantined_handles_.pop_front())
     free_handles_.push_back(quarantined_handles_.front().handle);
   LOCUS_DCHECK(quarantined_handles_.empty() || quarantined_handles_.back().tick <= tick);
-  check_invariants();
+  LOCUS_DCHECK_CALL(check_invariants());
 }
 
 size_t ObjectStore::move(const GridMoves& moves) {
@@ -80,7 +78,7 @@ size_t ObjectStore::move(const GridMoves& moves) {
   if (moves_ != nullptr)
     for (const GridMove& move : moves.moves) moves_->moved(grid_.at(move.handle), move.position);
   const size_t replaced_bytes = grid_.apply({{}, moves, {}});
-  check_invariants();
+  LOCUS_DCHECK_CALL(check_invariants());
   return replaced_bytes;
 }
 
@@ -120,13 +118,13 @@ size_t ObjectStore::apply(absl::Span<const Object> removed, absl::Span<const Obj
   std::vector<GridItem> items;
   items.reserve(inserted.size());
   for (size_t i = 0; i < inserted.size(); ++i) {
-    if (i + kAhead < inserted.size()) handles_.prefetch(inserted[i + kAhead].id);
+    if (i + kPrefetchObjects < inserted.size()) handles_.prefetch(inserted[i + kPrefetchObjects].id);
     items.push_back(before[i] == kNewLife ? begin_life(inserted[i]) : continue_life(inserted[i], leaving[before[i]]));
   }
   for (size_t i = 0; i < removed.size(); ++i)
     if (ends[i] != 0) free_handle(leaving[i]);
   const size_t replaced_bytes = grid_.apply({leaving, {}, items}) + handles_.take_replaced_bytes();
-  check_invariants();
+  LOCUS_DCHECK_CALL(check_invariants());
   return replaced_bytes;
 }
 
@@ -139,7 +137,7 @@ bool ObjectStore::fill(std::vector<std::vector<Object>> chunks, double cell_size
   items.reserve(count);
   for (std::vector<Object>& chunk : chunks) {
     for (size_t i = 0; i < chunk.size(); ++i) {
-      if (i + kAhead < chunk.size()) handles_.prefetch(chunk[i + kAhead].id);
+      if (i + kPrefetchObjects < chunk.size()) handles_.prefetch(chunk[i + kPrefetchObjects].id);
       const uint32_t handle = new_handle();
       if (!handles_.set(chunk[i].id, handle)) return false;
       if (moves_ != nullptr) moves_->born(handle);
@@ -149,7 +147,7 @@ bool ObjectStore::fill(std::vector<std::vector<Object>> chunks, double cell_size
   }
   grid_.fill(items, cell_size);
   handles_.take_replaced_bytes();
-  check_invariants();
+  LOCUS_DCHECK_CALL(check_invariants());
   return true;
 }
 

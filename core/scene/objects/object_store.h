@@ -4,8 +4,8 @@
 // A handle identifies one lifetime of an object, from its insertion to its removal. Invariants: every object has a
 // handle of its own, below handle_count(); the table from ids to handles and the grid hold the same objects; every
 // handle below handle_count() belongs to an object, is free, or is quarantined. A store that tracks lifetimes
-// quarantines the handle of a removed object for as long as a set in the history contains the object: no other object
-// gets the handle before that.
+// quarantines the handle of a removed object, so that no other object gets the handle, for as long as an object set in
+// the history contains the object.
 #ifndef LOCUS_CORE_SCENE_OBJECTS_OBJECT_STORE_H_
 #define LOCUS_CORE_SCENE_OBJECTS_OBJECT_STORE_H_
 
@@ -35,10 +35,10 @@ class ObjectStore {
     LOCUS_DCHECK_EQ(next_handle_, 0u);
     moves_ = std::make_unique<TickMoves>();
   }
-  // Begins `tick`. `oldest_tick` is the oldest tick of the history: frees the quarantined handles that no set from this
-  // tick on uses. Requires track_lifetimes().
+  // Begins `tick`. `oldest_tick` is the oldest tick of the history. Frees the quarantined handles that no object set
+  // from `oldest_tick` on uses. Requires track_lifetimes().
   void start_tick(uint64_t tick, uint64_t oldest_tick);
-  // Returns how far objects moved since start_tick(); no displacement if lifetimes are not tracked.
+  // Returns the displacement of objects since start_tick(); an empty Displacement if lifetimes are not tracked.
   Displacement displacement() { return moves_ == nullptr ? Displacement() : moves_->displacement(); }
 
   size_t size() const { return grid_.size(); }
@@ -61,10 +61,10 @@ class ObjectStore {
   // Prefetches the memory that at(handle) reads.
   [[gnu::always_inline]] void prefetch_slot(uint32_t handle) const { grid_.prefetch_slot(handle); }
 
-  // Replaces the objects `removed` by `inserted`. An id in both is an update of one object, unless it is in `replaced`:
-  // then its lifetime ends and another begins. Preconditions: every removed object is present; no inserted id remains
-  // present after the removals. O(removed + inserted), plus the size of the changed bricks. Returns the number of bytes
-  // that existing sets hold and later sets will not share.
+  // Replaces the objects `removed` by `inserted`. An id in both lists is an update of one object, unless the id is in
+  // `replaced`: then the lifetime of the old object ends, and a new lifetime begins. Preconditions: every removed
+  // object is present; after the removals, no object with an inserted id is present. O(removed + inserted), plus the
+  // size of the changed bricks. Returns the number of bytes that existing sets hold and later sets will not share.
   size_t apply(absl::Span<const Object> removed, absl::Span<const Object> inserted,
                const absl::flat_hash_set<Id>& replaced = {});
   // Moves objects. Precondition: the handles belong to objects and are distinct. Returns the number of replaced bytes,
@@ -72,7 +72,7 @@ class ObjectStore {
   size_t move(const GridMoves& moves);
   void insert(const Object& object) { apply({}, {&object, 1}); }
   // Inserts the objects of `chunks` into an empty store with cells of about `cell_size`. Frees each chunk once it is
-  // inserted. Returns false if an id occurs twice: then the store must not be used any more.
+  // inserted. Returns false if an id occurs twice; after that, the store must not be used any more.
   bool fill(std::vector<std::vector<Object>> chunks, double cell_size);
   // Removes the object with the id of `object`. Returns false and changes nothing if contains() is false.
   bool remove(const Object& object);

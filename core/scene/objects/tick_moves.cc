@@ -9,16 +9,14 @@
 namespace locus {
 
 void TickMoves::check_invariants() const {
-  if constexpr (kDebugChecks) {
-    LOCUS_CHECK_LE(fast_.size(), kMaxFast);
-    LOCUS_CHECK_LE(displacement_.bound, fast_length_);
-    for (size_t i = 0; i < fast_.size(); ++i) {
-      if (i > 0) LOCUS_CHECK_LT(fast_[i - 1].handle, fast_[i].handle);
-      LOCUS_CHECK_LT(fast_length_, fast_[i].length);
-      LOCUS_CHECK_LT(size_t{fast_[i].handle}, starts_.size());
-      const Start& start = starts_[fast_[i].handle];
-      LOCUS_CHECK(start.tick == tick_ && start.kind == Kind::kListed);
-    }
+  LOCUS_CHECK_LE(fast_.size(), kMaxFast);
+  LOCUS_CHECK_LE(displacement_.bound, fast_length_);
+  for (size_t i = 0; i < fast_.size(); ++i) {
+    if (i > 0) LOCUS_CHECK_LT(fast_[i - 1].handle, fast_[i].handle);
+    LOCUS_CHECK_LT(fast_length_, fast_[i].length);
+    LOCUS_CHECK_LT(size_t{fast_[i].handle}, starts_.size());
+    const Start& start = starts_[fast_[i].handle];
+    LOCUS_CHECK(start.tick == tick_ && start.kind == Kind::kListed);
   }
 }
 
@@ -50,7 +48,7 @@ void TickMoves::moved(const GridRef& before, Vec3d to) {
   const bool listed = start.kind == Kind::kListed && !planted(PlantedBug::kRewindFastBox);
   if (listed || length > fast_length_) {
     add_fast(before.handle(), start, to, length);
-    check_invariants();
+    LOCUS_DCHECK_CALL(check_invariants());
     return;
   }
   displacement_.bound = std::max(displacement_.bound, length);

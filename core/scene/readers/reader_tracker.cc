@@ -6,7 +6,6 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/check.h"
 #include "core/base/refusal.h"
-#include "core/scene/snapshot/snapshot_bytes.h"
 
 namespace locus {
 namespace {
@@ -14,8 +13,9 @@ namespace {
 // Held bytes are counted again only after 1 / kCountShare of the budget was replaced since the last count, so that pins
 // just below the budget do not cause a count for every batch. Pins may exceed the budget by that amount.
 constexpr uint64_t kCountShare = 64;
-// Upper bound of the bytes that a revision holds and a later one does not, as a multiple of the bytes known to be
-// replaced in between, which do not include lookup tables. Measured: up to 2.2 times.
+// Upper bound of A / B for two revisions. A: bytes that the earlier revision holds and the later one does not. B:
+// difference of their SceneSnapshot::replaced_bytes, which does not count lookup tables. The largest measured ratio is
+// 2.2.
 constexpr uint64_t kMaxOfReplaced = 4;
 constexpr uint32_t kRetryMs = 10;
 
@@ -27,9 +27,9 @@ absl::Status revoked_status(uint64_t revision, uint64_t budget, uint64_t held) {
   refusal.asked = static_cast<double>(held);
   refusal.retry_after_ms = kRetryMs;
   return refuse(absl::StatusCode::kResourceExhausted,
-                absl::StrCat("limit pinned_bytes is ", budget, "; revisions that were still read held ", held,
-                             " bytes that updates had replaced, and this read revision ", revision,
-                             ", the oldest. Ask again, in smaller batches if it happens again"),
+                absl::StrCat("limit pinned_bytes is ", budget, "; revisions in use by readers held ", held,
+                             " bytes that updates had replaced, and this reader used the oldest one, ", revision,
+                             ". Repeat the query; if this happens again, use smaller batches"),
                 refusal);
 }
 
@@ -40,7 +40,7 @@ SnapshotPin::SnapshotPin(std::shared_ptr<ReaderTracker> tracker, SnapshotPtr sna
 
 SnapshotPin::~SnapshotPin() {
   if (tracker_ == nullptr) return;
-  // Free the snapshot before the writer may continue, and outside the lock, because it may take long.
+  // Free the snapshot before remove() lets the writer continue, and outside the lock, because freeing may take long.
   snapshot_.reset();
   tracker_->remove(entry_, revocation_.get());
 }
@@ -58,12 +58,10 @@ void SnapshotPin::on_revoke(std::function<void()> revocation) {
 }
 
 void ReaderTracker::check_invariants() const {
-  if constexpr (kDebugChecks) {
-    LOCUS_CHECK_LE(size_t{revoked_}, pinned_.size());
-    LOCUS_CHECK_LE(counted_at_, enforced_at_);
-    LOCUS_CHECK_LE(counted_, budget_);
-    LOCUS_CHECK(fixed_ == 0 || budget_ == fixed_);
-  }
+  LOCUS_CHECK_LE(size_t{revoked_}, pinned_.size());
+  LOCUS_CHECK_LE(counted_at_, enforced_at_);
+  LOCUS_CHECK_LE(counted_, budget_);
+  LOCUS_CHECK(fixed_ == 0 || budget_ == fixed_);
 }
 
 uint64_t ReaderTracker::budget_for(uint64_t scene_bytes) const {
@@ -84,7 +82,7 @@ SnapshotPin::Entry ReaderTracker::add(const SnapshotPtr& snapshot) {
   if (snapshot->replaced_bytes < enforced_at_) late_bytes_ += enforced_at_ - snapshot->replaced_bytes;
   LOCUS_DCHECK(entry == pinned_.begin() || std::prev(entry)->second.replaced_bytes <= pinned.replaced_bytes);
   LOCUS_DCHECK(std::next(entry) == pinned_.end() || pinned.replaced_bytes <= std::next(entry)->second.replaced_bytes);
-  check_invariants();
+  LOCUS_DCHECK_CALL(check_invariants());
   return entry;
 }
 
@@ -98,7 +96,7 @@ void ReaderTracker::remove(SnapshotPin::Entry entry, const SnapshotPin::Revocati
   pinned_.erase(entry);
   LOCUS_DCHECK(!revoked || revoked_ > 0);
   if (revoked && --revoked_ == 0) returned_.notify_all();
-  check_invariants();
+  LOCUS_DCHECK_CALL(check_invariants());
 }
 
 void ReaderTracker::add_revocation(std::shared_ptr<SnapshotPin::Revocation> revocation) {
@@ -124,7 +122,7 @@ std::vector<ReaderTracker::Holding> ReaderTracker::pinned_before(const SceneSnap
   return pinned;
 }
 
-// Bytes replaced between two consecutive pinned revisions are counted for the older one only, so that bytes which
+// Bytes replaced between two consecutive pinned revisions are counted only for the older revision, so that bytes which
 // several pinned revisions share are counted once.
 uint64_t ReaderTracker::count(std::vector<Holding>& pinned, const SceneSnapshot& latest) {
   uint64_t held = 0;
@@ -147,8 +145,8 @@ void ReaderTracker::enforce_budget(const SceneSnapshot& latest) {
     pinned = pinned_before(latest);
   }
   uint64_t held = count(pinned, latest);
-  // The budget may depend on the memory of the scene, which takes longer to measure than the held bytes. So measure it
-  // only if the held bytes exceed the smallest possible budget.
+  // The budget may depend on the memory of the scene, which takes longer to measure than the held bytes. So the memory
+  // of the scene is measured only if the held bytes exceed the smallest possible budget.
   const uint64_t budget = budget_for(held <= budget_for(0) ? 0 : bytes_of(latest));
   const MutexLock lock(mutex_);
   budget_ = budget;
@@ -156,21 +154,40 @@ void ReaderTracker::enforce_budget(const SceneSnapshot& latest) {
   const uint64_t held_by_all = held;
   for (size_t i = 0; held > budget; ++i) {
     LOCUS_DCHECK_LT(i, pinned.size());
-    revoke(*pinned[i].snapshot, held_by_all);
+    revoke(*pinned[i].snapshot, held_by_all, budget);
     held -= pinned[i].bytes;
   }
   counted_ = held;
-  check_invariants();
+  LOCUS_DCHECK_CALL(check_invariants());
 }
 
-void ReaderTracker::revoke(const SceneSnapshot& snapshot, uint64_t held) {
+uint64_t ReaderTracker::revoke_beyond(const SceneSnapshot& latest, uint64_t bytes) {
+  std::vector<Holding> pinned;
+  {
+    const MutexLock lock(mutex_);
+    pinned = pinned_before(latest);
+  }
+  const uint64_t held = count(pinned, latest);
+  uint64_t left = held;
+  const MutexLock lock(mutex_);
+  uint64_t revoked = 0;
+  for (size_t i = 0; i < pinned.size() && left > bytes; ++i) {
+    if (revoke(*pinned[i].snapshot, held, bytes)) revoked += pinned[i].bytes;
+    left -= pinned[i].bytes;
+  }
+  LOCUS_DCHECK_CALL(check_invariants());
+  return revoked;
+}
+
+bool ReaderTracker::revoke(const SceneSnapshot& snapshot, uint64_t held, uint64_t budget) {
   const auto entry = pinned_.find(snapshot.revision);
-  if (entry == pinned_.end() || entry->second.revoked) return;
-  entry->second.budget = budget_;
+  if (entry == pinned_.end() || entry->second.revoked) return false;
+  entry->second.budget = budget;
   entry->second.held = held;
   entry->second.revoked.store(true, std::memory_order_release);
   ++revoked_;
   LOCUS_DCHECK_LE(size_t{revoked_}, pinned_.size());
+  return true;
 }
 
 bool ReaderTracker::over_budget() const {

@@ -1,6 +1,6 @@
-// Tracks the revisions of a scene that are being read and the memory that they keep from being freed, so that slow
-// readers cannot make memory grow without limit while updates stream in. If pinned revisions hold more than the budget,
-// the pins of the oldest ones are revoked, and the writer waits until they are released.
+// Tracks the revisions of a scene that are being read, and the memory that is not freed because of these revisions, so
+// that slow readers cannot make memory grow without limit while updates stream in. If pinned revisions hold more than
+// the budget, the pins of the oldest revisions are revoked, and the writer waits until these pins are released.
 //
 // Threads: every member may be called from any thread; enforce_budget() from one thread at a time. Readers and the
 // writer block each other only for the access to a small map: memory is counted outside the lock. Invariants: each
@@ -26,7 +26,7 @@ namespace locus {
 
 class ReaderTracker;
 
-// Reader's hold on a snapshot: registered with the tracker until it is destroyed. One thread at a time.
+// Reader's hold on a snapshot: the pin is registered with the tracker until it is destroyed. One thread at a time.
 class SnapshotPin {
  public:
   SnapshotPin(std::shared_ptr<ReaderTracker> tracker, SnapshotPtr snapshot);
@@ -41,8 +41,8 @@ class SnapshotPin {
   // Returns OK, or RESOURCE_EXHAUSTED naming the limit pinned_bytes once the pin is revoked. Cheap: readers poll it.
   absl::Status status() const;
 
-  // Registers a callback for readers that may block, for example on a slow client. revoke_overdue() calls it under the
-  // tracker's lock, at most once, if the pin is revoked but not released. Call at most once for each pin.
+  // Registers a callback for readers that may block, for example on a slow client. revoke_overdue() calls the callback
+  // under the tracker's lock, at most once, if the pin is revoked but not released. Call at most once for each pin.
   void on_revoke(std::function<void()> revocation);
 
  private:
@@ -52,8 +52,8 @@ class SnapshotPin {
     uint64_t replaced_bytes;  // SceneSnapshot::replaced_bytes
     uint32_t pins = 0;
     std::atomic<bool> revoked{false};
-    // Budget and held bytes at the time of the revocation. Written before `revoked`, and so safe to read once it is
-    // true.
+    // Budget and held bytes at the time of the revocation. Both are written before `revoked` is set, and so are safe to
+    // read once `revoked` is true.
     uint64_t budget = 0;
     uint64_t held = 0;
   };
@@ -71,12 +71,13 @@ class ReaderTracker {
   using Time = std::chrono::steady_clock::time_point;
   static constexpr Time kNever = Time::max();
 
-  // `budget` in bytes; 0 = the larger of limits::kPinnedBytes and limits::kPinnedShare times the memory of the scene.
+  // `budget` is the memory budget of readers in bytes. 0 means the larger of limits::kPinnedBytes and
+  // limits::kPinnedShare times the memory of the scene.
   explicit ReaderTracker(uint64_t budget) : fixed_(budget), budget_(budget_for(0)) {}
 
-  // Revokes the oldest pins until the memory held by pins fits the budget. The writer calls it after publishing
-  // `latest`. Usually O(1); O(memory that the pinned revisions do not share) if the bytes replaced since the oldest pin
-  // could exceed the budget. `latest` and all pinned snapshots belong to one scene.
+  // Revokes the oldest pins until the memory held by pins fits the budget. The writer calls enforce_budget() after
+  // publishing `latest`. Usually O(1); O(memory that the pinned revisions do not share) if the bytes replaced since the
+  // oldest pin could exceed the budget. `latest` and all pinned snapshots belong to one scene.
   void enforce_budget(const SceneSnapshot& latest) LOCUS_EXCLUDES(mutex_);
 
   // Returns true while a revoked pin is not released, unless the tracker is closed.
@@ -87,11 +88,14 @@ class ReaderTracker {
   uint64_t budget() const LOCUS_EXCLUDES(mutex_);
   // Calls the on_revoke() callbacks of pins that are revoked but not released, each at most once.
   void revoke_overdue() LOCUS_EXCLUDES(mutex_);
+  // Revokes the oldest pins until pins hold at most `bytes`, whatever the budget. Called when memory is short. Returns
+  // the bytes that the pins revoked by this call hold, which become free when their readers end.
+  uint64_t revoke_beyond(const SceneSnapshot& latest, uint64_t bytes) LOCUS_EXCLUDES(mutex_);
   // Closes the tracker: running and later calls of wait_until_returned() return true at once.
   void close() LOCUS_EXCLUDES(mutex_);
 
   struct Use {
-    uint64_t held = 0;    // bytes that only pinned revisions before the latest hold
+    uint64_t held = 0;    // bytes held only by pinned revisions before the latest revision
     uint64_t budget = 0;  // maximum of `held`, in bytes
   };
   // Returns the memory held by pins. `latest_bytes` is bytes_of(latest). O(memory that the pinned revisions do not
@@ -107,7 +111,7 @@ class ReaderTracker {
     uint64_t bytes = 0;
   };
 
-  // Checks the invariants of the class comment, except the sum over all entries. O(1).
+  // Checks the invariants, without counting the revoked entries of pinned_. O(1).
   void check_invariants() const LOCUS_REQUIRES(mutex_);
   uint64_t budget_for(uint64_t scene_bytes) const;
   SnapshotPin::Entry add(const SnapshotPtr& snapshot) LOCUS_EXCLUDES(mutex_);
@@ -119,22 +123,26 @@ class ReaderTracker {
   std::vector<Holding> pinned_before(const SceneSnapshot& latest) const LOCUS_REQUIRES(mutex_);
   // Sets Holding::bytes of each entry of `pinned`, which is in the order of revisions, and returns the sum.
   static uint64_t count(std::vector<Holding>& pinned, const SceneSnapshot& latest);
-  void revoke(const SceneSnapshot& snapshot, uint64_t held) LOCUS_REQUIRES(mutex_);
+  // Revokes the pins of a revision because all pins hold `held` bytes, more than `budget`. Returns false if they are
+  // revoked already.
+  bool revoke(const SceneSnapshot& snapshot, uint64_t held, uint64_t budget) LOCUS_REQUIRES(mutex_);
 
-  const uint64_t fixed_;  // budget given to the constructor; 0 = derived from the memory of the scene
+  const uint64_t fixed_;  // budget passed to the constructor; 0: derived from the memory of the scene
   mutable Mutex mutex_;
   mutable ConditionVariable returned_;
-  std::map<uint64_t, SnapshotPin::Pinned> pinned_ LOCUS_GUARDED_BY(mutex_);  // by revision
+  std::map<uint64_t, SnapshotPin::Pinned> pinned_ LOCUS_GUARDED_BY(mutex_);  // key: revision
   std::list<std::shared_ptr<SnapshotPin::Revocation>> revocations_ LOCUS_GUARDED_BY(mutex_);
   uint32_t revoked_ LOCUS_GUARDED_BY(mutex_) = 0;  // number of revoked entries of pinned_
   bool closed_ LOCUS_GUARDED_BY(mutex_) = false;
-  // Results of the last count: the bytes held by pins that are not revoked, SceneSnapshot::replaced_bytes of the latest
-  // snapshot at that time, and the budget.
+  // Results of the last count of held memory: counted_ is the number of bytes held by pins that are not revoked,
+  // counted_at_ is SceneSnapshot::replaced_bytes of the latest snapshot at that time, and budget_ is the budget in
+  // bytes.
   uint64_t counted_ LOCUS_GUARDED_BY(mutex_) = 0;
   uint64_t counted_at_ LOCUS_GUARDED_BY(mutex_) = 0;
   uint64_t budget_ LOCUS_GUARDED_BY(mutex_);
-  // enforced_at_: replaced_bytes of the last snapshot passed to enforce_budget(). late_bytes_: bytes that were replaced
-  // before enforced_at_ and may be held by pins of older revisions that were added since the last count.
+  // enforced_at_ is SceneSnapshot::replaced_bytes of the last snapshot passed to enforce_budget(). late_bytes_ is a sum
+  // over the revisions that were pinned since the last count: the bytes that had been replaced between the revision and
+  // the snapshot of enforced_at_ when the revision was pinned.
   uint64_t enforced_at_ LOCUS_GUARDED_BY(mutex_) = 0;
   uint64_t late_bytes_ LOCUS_GUARDED_BY(mutex_) = 0;
 };

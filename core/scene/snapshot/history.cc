@@ -7,8 +7,8 @@
 namespace locus {
 namespace {
 
-// Returns a copy of `record` whose `bytes` count the memory that it does not share with `next`, the objects of the next
-// record or of the latest revision.
+// Returns a copy of `record` whose `bytes` count the memory that the record does not share with `next`, the objects of
+// the next record or, for the last record, of the latest revision.
 std::shared_ptr<const HistoryRecord> with_bytes(const HistoryRecord& record, const ObjectSet& next) {
   HistoryRecord counted = record;
   counted.bytes = sizeof(HistoryRecord) + record.objects.unshared_bytes(next);
@@ -19,20 +19,18 @@ std::shared_ptr<const HistoryRecord> with_bytes(const HistoryRecord& record, con
 }  // namespace
 
 void HistoryRecorder::check_invariants() const {
-  if constexpr (kDebugChecks) {
-    if (history_ == nullptr) return;
-    LOCUS_CHECK(on() && has_past_);
-    LOCUS_CHECK(!history_->records.empty());
-    LOCUS_CHECK_LE(uint64_t{history_->bytes}, options_.bytes);
-    size_t bytes = 0;
-    const HistoryRecord* previous = nullptr;
-    for (const std::shared_ptr<const HistoryRecord>& record : history_->records) {
-      if (previous != nullptr) LOCUS_CHECK_LT(previous->tick, record->tick);
-      bytes += record->bytes;
-      previous = record.get();
-    }
-    LOCUS_CHECK_EQ(bytes, history_->bytes);
+  if (history_ == nullptr) return;
+  LOCUS_CHECK(on() && has_past_);
+  LOCUS_CHECK(!history_->records.empty());
+  LOCUS_CHECK_LE(uint64_t{history_->bytes}, options_.bytes);
+  size_t bytes = 0;
+  const HistoryRecord* previous = nullptr;
+  for (const std::shared_ptr<const HistoryRecord>& record : history_->records) {
+    if (previous != nullptr) LOCUS_CHECK_LT(previous->tick, record->tick);
+    bytes += record->bytes;
+    previous = record.get();
   }
+  LOCUS_CHECK_EQ(bytes, history_->bytes);
 }
 
 void HistoryRecorder::close(uint64_t tick, const ObjectSet& objects, const Displacement& since_last,
@@ -54,7 +52,7 @@ void HistoryRecorder::close(uint64_t tick, const ObjectSet& objects, const Displ
          next.records[first + 1]->tick <= next_tick - options_.ticks)
     ++first;
   drop_first(next, first, PastLimit::kTicks);
-  publish(std::move(next));
+  publish(std::move(next), options_.bytes, PastLimit::kBytes);
   measured_ = false;
 }
 
@@ -71,6 +69,12 @@ void HistoryRecorder::drop() {
   history_ = nullptr;
 }
 
+bool HistoryRecorder::trim(uint64_t bytes) {
+  if (history_ == nullptr || history_->bytes <= bytes) return false;
+  publish(*history_, bytes, PastLimit::kMemory);
+  return true;
+}
+
 void HistoryRecorder::drop_first(History& history, size_t count, PastLimit reason) {
   if (count > 0) limit_ = reason;
   LOCUS_DCHECK_LE(count, history.records.size());
@@ -82,17 +86,17 @@ void HistoryRecorder::measure(const ObjectSet& now) {
   if (std::exchange(measured_, true) || history_ == nullptr) return;
   History next = *history_;
   next.records.back() = with_bytes(*next.records.back(), now);
-  publish(std::move(next));
+  publish(std::move(next), options_.bytes, PastLimit::kBytes);
 }
 
-void HistoryRecorder::publish(History history) {
+void HistoryRecorder::publish(History history, uint64_t max_bytes, PastLimit reason) {
   history.bytes = 0;
   size_t first = history.records.size();
-  while (first > 0 && history.bytes + history.records[first - 1]->bytes <= options_.bytes)
+  while (first > 0 && history.bytes + history.records[first - 1]->bytes <= max_bytes)
     history.bytes += history.records[--first]->bytes;
-  drop_first(history, first, PastLimit::kBytes);
+  drop_first(history, first, reason);
   history_ = history.records.empty() ? nullptr : std::make_shared<const History>(std::move(history));
-  check_invariants();
+  LOCUS_DCHECK_CALL(check_invariants());
 }
 
 }  // namespace locus

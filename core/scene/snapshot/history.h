@@ -1,6 +1,6 @@
-// History of a scene: the objects at the end of each of the last ticks. Records share unchanged memory with each other
-// and with the latest revision, so that a record costs only the memory that its tick changed. A History is immutable
-// once published and may be read by any thread. Invariants: records are ascending by tick; History::bytes is the sum of
+// History of a scene: the objects at the end of each recorded tick. Records share unchanged memory with each other and
+// with the latest revision, so that a record costs only the memory that its tick changed. A History is immutable once
+// published and may be read by any thread. Invariants: records are ascending by tick; History::bytes is the sum of
 // HistoryRecord::bytes and at most HistoryOptions::bytes.
 #ifndef LOCUS_CORE_SCENE_SNAPSHOT_HISTORY_H_
 #define LOCUS_CORE_SCENE_SNAPSHOT_HISTORY_H_
@@ -16,13 +16,15 @@ namespace locus {
 
 struct HistoryRecord {
   uint64_t tick = 0;
-  ObjectSet objects;     // at the end of that tick
-  Displacement to_next;  // displacement up to the next record; unset in the last record: see SceneSnapshot::since_close
-  size_t bytes = 0;      // memory that the next record, or else the latest revision, does not share
+  ObjectSet objects;  // objects at the end of `tick`
+  // Displacement up to the next record. Not set in the last record: see SceneSnapshot::since_close.
+  Displacement to_next;
+  // Memory in bytes that is not shared with the next record or, for the last record, with the latest revision.
+  size_t bytes = 0;
 };
 
 struct History {
-  std::vector<std::shared_ptr<const HistoryRecord>> records;  // ascending by tick, all below the scene's tick
+  std::vector<std::shared_ptr<const HistoryRecord>> records;  // ascending by tick, all before the scene's tick
   size_t bytes = 0;                                           // memory of all records
 };
 using HistoryPtr = std::shared_ptr<const History>;
@@ -30,21 +32,23 @@ using HistoryPtr = std::shared_ptr<const History>;
 // Reason why a history does not reach further back than its oldest tick.
 enum class PastLimit : uint8_t {
   kOff,       // the scene keeps no history
-  kBegan,     // there is no tick before: the scene began there, or restarted its ticks
-  kTicks,     // older ticks are further back than HistoryOptions::ticks
+  kBegan,     // there is no earlier tick: the scene began, or restarted its ticks, at the oldest tick
+  kTicks,     // older ticks are more than HistoryOptions::ticks before the current tick
   kBytes,     // older ticks did not fit into HistoryOptions::bytes
+  kMemory,    // older ticks were dropped because the server was short of memory
   kRestored,  // the scene was read from a snapshot on disk, which contains no history
 };
 
 struct HistoryOptions {
-  // Number of ticks before the current one that queries may ask about. 0 keeps no history and costs nothing.
+  // Number of ticks before the current tick at which queries may be evaluated. With 0, no history is kept.
   uint32_t ticks = 0;
-  // Maximum memory of all records in bytes; beyond it the oldest records are dropped. The memory of a record is counted
-  // with the first revision after its tick, and again when the next record is appended.
+  // Maximum memory of all records in bytes; if the records exceed this maximum, the oldest records are dropped. The
+  // memory of a record is counted when the first revision after its tick is made, and again when the next record is
+  // appended.
   uint64_t bytes = 0;
 };
 
-// Recorder of the history, used by the writer: adds records and drops old ones. One thread at a time.
+// Recorder of the history, used by the writer: adds records and drops old records. One thread at a time.
 class HistoryRecorder {
  public:
   explicit HistoryRecorder(const HistoryOptions& options) : options_(options) {}
@@ -62,6 +66,9 @@ class HistoryRecorder {
   void measure(const ObjectSet& now);
   // Drops all records.
   void drop();
+  // Drops the oldest records until the rest takes at most `bytes`, because memory is short. Returns whether a record
+  // was dropped. Later records are kept as if this had not been called.
+  bool trim(uint64_t bytes);
   // Returns true if close() was called since the last drop(), even if all records were dropped to save memory. The
   // result depends on the batches alone, so that a replay of the same batches gives the same revisions.
   bool has_past() const { return has_past_; }
@@ -78,7 +85,9 @@ class HistoryRecorder {
   // Checks the invariants of the published history. O(records).
   void check_invariants() const;
   void drop_first(History& history, size_t count, PastLimit reason);
-  void publish(History history);
+  // Publishes `history` without its oldest records, so that the rest takes at most `max_bytes`. `reason` is the reason
+  // for which these are dropped.
+  void publish(History history, uint64_t max_bytes, PastLimit reason);
 
   HistoryOptions options_;
   HistoryPtr history_;

@@ -7,8 +7,8 @@
 namespace locus {
 namespace {
 
-// Allowances for rounding: a factor for lengths, and a length for interpolated positions. They exceed the rounding
-// errors, which are a few times 2^-52 of the magnitudes.
+// Bounds of rounding errors: kEpsilonFactor is a factor for lengths, kPositionEpsilon a distance for interpolated
+// positions. Both exceed the rounding errors, which are a few times 2^-52 of the magnitudes.
 constexpr double kEpsilonFactor = 1 + 0x1p-36;
 constexpr double kPositionEpsilon = limits::kMaxCoordinate * 0x1p-49;
 

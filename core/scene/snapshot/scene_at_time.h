@@ -1,10 +1,11 @@
-// View of the moving objects of a scene at one time, which may lie between two recorded ticks. Queries run on it.
-// Borrows from a snapshot; cheap to copy; any thread.
+// View of the moving objects of a scene at one time, which may lie between two recorded ticks. Queries search this view
+// for objects. Borrows from a snapshot and is cheap to copy. Any thread may use a view.
 //
-// An object exists at a time if it existed at the end of the last tick recorded up to that time. It moves on in a
-// straight line if the same lifetime exists at the next recorded tick, and else stays in place. A search runs on the
-// objects of the earlier tick, widened by the displacement bound, and each object found is interpolated. At a recorded
-// tick, and at the latest revision, nothing is interpolated or widened.
+// An object exists at a time if it existed at the end of the last tick recorded up to that time. If the same lifetime
+// of the object exists at the next recorded tick, the object moves there in a straight line; otherwise it stays in
+// place. A search widens its region by the displacement bound, finds objects at their positions at the earlier recorded
+// tick, and interpolates each object found. At a recorded tick, and at the latest revision, nothing is interpolated or
+// widened.
 #ifndef LOCUS_CORE_SCENE_SNAPSHOT_SCENE_AT_TIME_H_
 #define LOCUS_CORE_SCENE_SNAPSHOT_SCENE_AT_TIME_H_
 
@@ -43,17 +44,19 @@ class SceneAtTime {
   Shape shape(const GridRef& object) const { return next_ == nullptr ? shape_of(object) : shape_between(object); }
 
   // Returns an upper bound of the distance between an object's interpolated and stored positions: 0 if nothing is
-  // interpolated, infinity for a fast mover. Callers add their own allowance for the rounding of coordinates.
+  // interpolated, infinity for a fast mover (an object that is listed individually because it moved far). Callers add
+  // an epsilon of their own for the rounding of coordinates.
   double displacement_bound(const GridRef& object) const {
     if (fast_ != nullptr && is_fast(object.handle())) return std::numeric_limits<double>::infinity();
     return displacement_bound_;
   }
 
-  // Returns the region of the grid to search for the objects in the box `bounds` or, if `ball` is given, in that ball,
-  // whose bounds are `bounds`: the box or ball, widened by the displacement bound.
+  // Returns the region of the grid to search for the objects in the box `bounds` or, if `ball` is given, in `ball`,
+  // whose bounds are `bounds`. The region is the box or ball, widened by the displacement bound.
   GridRegion region(const Aabbd& bounds, const std::optional<Balld>& ball) const;
-  // Calls visit(GridRef) once for each object that may be in a box or ball with the bounds `bounds`: for the fast
-  // movers near `bounds`, and for all other objects that ask(visit) finds. `ask` must search region().
+  // Calls visit(GridRef) once for each object that may be in a box or ball with the bounds `bounds`: for each fast
+  // mover whose path may meet `bounds`, and for each other object that ask(visit) finds. `ask` must search the
+  // GridRegion that region() returns and call `visit` for each object found.
   template <class Ask, class Visit>
   void visit_asked(const Aabbd& bounds, Work& work, const Ask& ask, const Visit& visit) const;
   // Visit objects like the members of GridSnapshot with the same names, but at interpolated positions.
@@ -69,8 +72,8 @@ class SceneAtTime {
                                      [](const FastMover& mover, uint32_t value) { return mover.handle < value; });
     return at != fast_->end() && at->handle == handle;
   }
-  // Calls visit() for each fast mover for which might_meet(bounds of all its positions) is true. Returns false as soon
-  // as visit() returns false.
+  // Calls visit() for each fast mover for which might_meet() returns true for the bounds of the mover along its path.
+  // Returns false as soon as visit() returns false.
   template <class MightMeet, class Visit>
   bool visit_fast(const MightMeet& might_meet, Work& work, const Visit& visit) const;
 

@@ -1,5 +1,5 @@
-// Complete state of a scene at one revision. Immutable and shared: a holder reads that revision from any thread for as
-// long as it holds the snapshot, while the writer continues.
+// Complete state of a scene at one revision. Immutable and shared: any thread may read the revision for as long as it
+// holds the snapshot, while the writer makes further revisions.
 #ifndef LOCUS_CORE_SCENE_SNAPSHOT_SCENE_SNAPSHOT_H_
 #define LOCUS_CORE_SCENE_SNAPSHOT_SCENE_SNAPSHOT_H_
 
@@ -15,23 +15,31 @@ enum class Winding : uint8_t { kCounterClockwise, kClockwise };
 
 struct SceneSnapshot {
   uint64_t epoch = 0;     // identifies one unbroken sequence of revisions
-  uint64_t revision = 0;  // +1 for each applied batch or static change
-  uint64_t tick = 0;      // time step, set by the update batches
+  uint64_t revision = 0;  // one higher after each applied batch or static change
+  uint64_t tick = 0;      // time step of the caller, set by update batches
   Winding winding = Winding::kCounterClockwise;
   std::shared_ptr<const StaticSet> statics;
   ObjectSet objects;
   HistoryPtr history;        // null if the history has no record
   Displacement since_close;  // displacement from the last history record to this revision
-  // Total bytes that the revisions up to this one have replaced, without lookup tables. Includes memory that was
-  // allocated and replaced between two revisions, and memory that the history still holds. Never decreases.
+  // Total bytes of memory that the revisions up to this one have replaced, not counting lookup tables. Includes memory
+  // that was allocated and replaced between two revisions, and memory that the history still holds. Never decreases.
   uint64_t replaced_bytes = 0;
-  PastLimit past_limit = PastLimit::kOff;  // reason why the history does not reach further back
+  PastLimit past_limit = PastLimit::kOff;  // reason why the history has no ticks before oldest_tick()
 
-  // Returns the oldest tick that queries may ask about.
+  // Returns the oldest tick at which queries may be evaluated.
   uint64_t oldest_tick() const { return history == nullptr ? tick : history->records.front()->tick; }
 };
 
 using SnapshotPtr = std::shared_ptr<const SceneSnapshot>;
+
+// Returns the bytes that `held` holds and `later`, a later revision of the same scene, does not: objects, instances and
+// history, but not meshes, which scenes share. The result is exact, except that it may overestimate the bytes of the
+// history if ticks were restarted between the two revisions. O(size of the difference).
+uint64_t unshared_bytes(const SceneSnapshot& held, const SceneSnapshot& later);
+
+// Returns the bytes of the snapshot without its history and meshes. O(objects).
+uint64_t bytes_of(const SceneSnapshot& snapshot);
 
 }  // namespace locus
 

@@ -1,4 +1,4 @@
-// Placement of a mesh in a scene. Plain data, immutable once in a static set.
+// Placement of a mesh in a scene. Plain data, immutable once it is in a StaticSet.
 #ifndef LOCUS_CORE_SCENE_STATICS_INSTANCE_H_
 #define LOCUS_CORE_SCENE_STATICS_INSTANCE_H_
 

@@ -51,8 +51,10 @@ absl::StatusOr<std::shared_ptr<const StaticMesh>> StaticMesh::restore(std::strin
 }
 
 std::shared_ptr<const StaticMesh> StaticMesh::share(std::string name, std::vector<MeshPart> parts,
-                                                    const StaticMesh& other) {
-  return std::shared_ptr<const StaticMesh>(new StaticMesh(std::move(name), std::move(parts), other.content_));
+                                                    const StaticMesh& other, std::string creator) {
+  std::shared_ptr<StaticMesh> mesh(new StaticMesh(std::move(name), std::move(parts), other.content_));
+  mesh->creator_ = std::move(creator);
+  return mesh;
 }
 
 void StaticMesh::Content::keep_columns(const TriangleMesh& mesh) {
@@ -106,7 +108,8 @@ std::vector<float> StaticMesh::vertices() const {
 }
 
 uint64_t StaticMesh::bytes() const {
-  uint64_t bytes = sizeof(*this) + name_.capacity() + shared_bytes() + parts_.capacity() * sizeof(MeshPart);
+  uint64_t bytes =
+      sizeof(*this) + name_.capacity() + creator_.capacity() + shared_bytes() + parts_.capacity() * sizeof(MeshPart);
   for (const MeshPart& part : parts_) bytes += part.name.capacity();
   return bytes;
 }

@@ -1,8 +1,9 @@
 // Mesh with a name, parts and a tree, ready for queries: built once from the uploaded columns and shared by all scenes
-// and instances. The content of a mesh is what follows from the uploaded bytes of vertices and indices, the tree
-// included. Meshes of equal bytes share one content, but each has a name and parts of its own: see share(). The tree
-// stores every corner of every triangle, so the columns themselves are not stored: the data that the tree lacks is
-// stored packed, and the columns can be restored byte for byte. Immutable; safe to share between threads.
+// and instances. The content of a mesh is all data that is computed from the uploaded bytes of vertices and indices,
+// including the tree. Meshes of equal bytes share one content, but each has a name and parts of its own: see share().
+// The tree stores every corner of every triangle, so the uploaded columns are not stored. Only the data of the columns
+// that is not in the tree is stored, in packed form, so that the columns can be restored byte for byte. Immutable; safe
+// to share between threads.
 #ifndef LOCUS_CORE_SCENE_STATICS_STATIC_MESH_H_
 #define LOCUS_CORE_SCENE_STATICS_STATIC_MESH_H_
 
@@ -21,7 +22,8 @@ namespace locus {
 
 using Sha256 = std::array<uint8_t, 32>;
 
-// Key of a mesh in records and snapshots. The name is empty in format 1, which stores only the hash of the content.
+// Key of a mesh in records and snapshots. The name is empty in data format 1, an older format that stores only the hash
+// of the content.
 struct MeshKey {
   Sha256 sha256 = {};
   std::string name;
@@ -31,22 +33,22 @@ struct MeshKey {
 
 class StaticMesh {
  public:
-  // Builds a mesh and its tree. Errors: those of TriangleBvh::build(). `sha256` is the hash of the uploaded bytes; it
-  // is not verified.
+  // Builds a mesh and its tree. Returns the errors of TriangleBvh::build(). `sha256` is the hash of the uploaded bytes,
+  // which is not verified.
   static absl::StatusOr<std::shared_ptr<const StaticMesh>> build(std::string name, const Sha256& sha256,
                                                                  TriangleMesh mesh, const BvhOptions& options = {});
 
-  // Builds a mesh and restores its tree from `topology`, which was stored for the same content. Errors: those of
+  // Builds a mesh and restores its tree from `topology`, which was stored for the same content. Returns the errors of
   // TriangleBvh::restore().
   static absl::StatusOr<std::shared_ptr<const StaticMesh>> restore(std::string name, const Sha256& sha256,
                                                                    const TriangleMesh& mesh,
                                                                    const TreeTopology& topology,
                                                                    const BvhOptions& options = {});
 
-  // Returns a mesh with the given name and parts that shares the content of `other`, the tree included. Precondition:
-  // `parts` have passed check_parts() for this content.
-  static std::shared_ptr<const StaticMesh> share(std::string name, std::vector<MeshPart> parts,
-                                                 const StaticMesh& other);
+  // Returns a mesh with the given name, parts and creator that shares the content of `other`, including the tree.
+  // Precondition: `parts` have passed check_parts() for this content.
+  static std::shared_ptr<const StaticMesh> share(std::string name, std::vector<MeshPart> parts, const StaticMesh& other,
+                                                 std::string creator = {});
 
   const std::string& name() const { return name_; }
   const Sha256& sha256() const { return content_->sha256; }
@@ -60,6 +62,8 @@ class StaticMesh {
   // Returns the bounds of all triangles.
   const Aabbf& bounds() const { return tree().bounds(); }
   const std::vector<MeshPart>& parts() const { return parts_; }
+  // Returns the caller who uploaded the mesh and to whom it is counted; empty: nobody.
+  const std::string& creator() const { return creator_; }
   // Returns triangle `number`, counted in the order of the uploaded indices. Precondition: number < triangle_count().
   Triangle triangle(uint32_t number) const;
 
@@ -79,12 +83,12 @@ class StaticMesh {
     std::array<float, 3> position;
   };
 
-  // Data that follows from the uploaded vertices and indices, shared by meshes of equal bytes.
+  // Data that is computed from the uploaded vertices and indices, shared by meshes of equal bytes.
   struct Content {
     Sha256 sha256 = {};
     TriangleBvh tree;
     PackedIndices indices;
-    PackedNumbers blocks;  // index of the tree block of each triangle, by triangle number
+    PackedNumbers blocks;  // for each triangle number, the index of the tree's TriangleBlock with this triangle
     std::vector<UnusedVertex> unused_vertices;
     uint32_t vertex_count = 0;
     uint32_t zero_area_count = 0;
@@ -97,6 +101,7 @@ class StaticMesh {
 
   std::string name_;
   std::vector<MeshPart> parts_;
+  std::string creator_;
   std::shared_ptr<const Content> content_;  // never null
 };
 

@@ -21,7 +21,7 @@ constexpr double kMaxPlacedBound = 2 * limits::kMaxCoordinate;
 absl::Status check_columns(const PlacementColumns& place, const std::string& field) {
   const size_t n = place.count();
   const auto check = [&](size_t numbers, size_t width, ColumnNeed need, absl::string_view name) {
-    return check_column(numbers, width, n, need, absl::StrCat(field, ".", name));
+    return check_column(numbers, width, n, need, {field, {}, name});
   };
   RETURN_IF_ERROR(check(place.translations.size(), 3, ColumnNeed::kEachOrOne, "translations"));
   RETURN_IF_ERROR(check(place.rotations.size(), 4, ColumnNeed::kOptional, "rotations"));
@@ -81,51 +81,30 @@ absl::Status refuse_group_zero(const StaticChange& change) {
                          static_cast<uint32_t>(zero - change.remove_groups.begin()), "0 means no group");
 }
 
-// Change being applied. Collects the instances of the new set: those that remain after the removals, then the placed
-// ones.
-class Changing {
+// Ids of the instances of a set that is being made.
+class InstanceIds {
  public:
-  Changing(const StaticSet& old, const std::function<bool(Id)>& is_object, uint64_t seed)
-      : old_(old), is_object_(is_object), next_id_(seed) {}
+  InstanceIds(const std::function<bool(Id)>& is_object, uint64_t seed) : is_object_(is_object), next_id_(seed) {}
 
-  absl::Status remove(const StaticChange& change) {
-    absl::flat_hash_set<Id> removed;
-    for (size_t i = 0; i < change.remove_ids.size(); ++i) {
-      const Id id = change.remove_ids[i];
-      if (old_.find(id) == nullptr)
-        return refuse_argument(Reason::kUnknownId, "remove_ids", static_cast<uint32_t>(i),
-                               absl::StrCat("no instance has the id ", id));
-      removed.insert(id);
-    }
-    const absl::flat_hash_set<Group> groups(change.remove_groups.begin(), change.remove_groups.end());
-    if (groups.contains(0)) return refuse_group_zero(change);
-    for (const Instance& instance : old_.tree().values()) {
-      if (removed.contains(instance.id) || groups.contains(instance.group)) continue;
-      instances_.push_back(instance);
-      taken_.insert(instance.id);
-    }
-    return absl::OkStatus();
-  }
+  void take(Id id) { taken_.insert(id); }
 
-  absl::Status place(const PlacementColumns& columns, const std::string& field) {
+  // Checks placements and passes each of their instances to `keep`.
+  template <class Keep>
+  absl::Status place(const PlacementColumns& columns, const std::string& field, const Keep& keep) {
     LOCUS_CHECK(columns.mesh != nullptr);
     RETURN_IF_ERROR(check_columns(columns, field));
     const size_t n = columns.count();
-    if (instances_.size() + n > limits::kMaxInstances)
-      return refuse_full(field, "instances", limits::kMaxInstances, static_cast<double>(instances_.size() + n), 0);
+    if (taken_.size() + n > limits::kMaxInstances)
+      return refuse_full(field, "instances", limits::kMaxInstances, static_cast<double>(taken_.size() + n), 0);
     for (uint32_t i = 0; i < n; ++i) {
       ASSIGN_OR_RETURN(Instance instance, read_instance(columns, i, field));
       instance.id = columns.ids.empty() ? choose_id() : columns.ids[i];
       RETURN_IF_ERROR(check_id(instance.id, i, field));
       taken_.insert(instance.id);
-      placed_.push_back(instance.id);
-      instances_.push_back(std::move(instance));
+      keep(std::move(instance));
     }
     return absl::OkStatus();
   }
-
-  std::vector<Instance>& instances() { return instances_; }
-  std::vector<Id>& placed() { return placed_; }
 
  private:
   absl::Status check_id(Id id, uint32_t i, const std::string& field) const {
@@ -144,10 +123,50 @@ class Changing {
     return id;
   }
 
-  const StaticSet& old_;
   const std::function<bool(Id)>& is_object_;
   uint64_t next_id_;
   absl::flat_hash_set<Id> taken_;
+};
+
+// Static change that is being applied. Collects the instances of the new set: first the old instances that are not
+// removed, then the placed instances.
+class Changing {
+ public:
+  Changing(const StaticSet& old, const std::function<bool(Id)>& is_object, uint64_t seed)
+      : old_(old), ids_(is_object, seed) {}
+
+  absl::Status remove(const StaticChange& change) {
+    absl::flat_hash_set<Id> removed;
+    for (size_t i = 0; i < change.remove_ids.size(); ++i) {
+      const Id id = change.remove_ids[i];
+      if (old_.find(id) == nullptr)
+        return refuse_argument(Reason::kUnknownId, "remove_ids", static_cast<uint32_t>(i),
+                               absl::StrCat("no instance has the id ", id));
+      removed.insert(id);
+    }
+    const absl::flat_hash_set<Group> groups(change.remove_groups.begin(), change.remove_groups.end());
+    if (groups.contains(0)) return refuse_group_zero(change);
+    for (const Instance& instance : old_.tree().values()) {
+      if (removed.contains(instance.id) || groups.contains(instance.group)) continue;
+      instances_.push_back(instance);
+      ids_.take(instance.id);
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status place(const PlacementColumns& columns, const std::string& field) {
+    return ids_.place(columns, field, [this](Instance instance) {
+      placed_.push_back(instance.id);
+      instances_.push_back(std::move(instance));
+    });
+  }
+
+  std::vector<Instance>& instances() { return instances_; }
+  std::vector<Id>& placed() { return placed_; }
+
+ private:
+  const StaticSet& old_;
+  InstanceIds ids_;
   std::vector<Instance> instances_;
   std::vector<Id> placed_;
 };
@@ -155,18 +174,16 @@ class Changing {
 }  // namespace
 
 void StaticSet::check_invariants() const {
-  if constexpr (kDebugChecks) {
-    LOCUS_CHECK_EQ(positions_.size(), tree_.size());
-    for (uint32_t i = 0; i < tree_.values().size(); ++i) {
-      const Instance& instance = tree_.values()[i];
-      LOCUS_CHECK_NE(instance.id, kNoId);
-      LOCUS_CHECK(instance.mesh != nullptr);
-      LOCUS_CHECK_EQ(positions_.at(instance.id), i);
-    }
-    size_t uses = 0;
-    for (const auto& [mesh, count] : uses_) uses += count;
-    LOCUS_CHECK_EQ(uses, tree_.size());
+  LOCUS_CHECK_EQ(positions_.size(), tree_.size());
+  for (uint32_t i = 0; i < tree_.values().size(); ++i) {
+    const Instance& instance = tree_.values()[i];
+    LOCUS_CHECK_NE(instance.id, kNoId);
+    LOCUS_CHECK(instance.mesh != nullptr);
+    LOCUS_CHECK_EQ(positions_.at(instance.id), i);
   }
+  size_t uses = 0;
+  for (const auto& [mesh, count] : uses_) uses += count;
+  LOCUS_CHECK_EQ(uses, tree_.size());
 }
 
 std::shared_ptr<const StaticSet> StaticSet::empty() { return std::shared_ptr<const StaticSet>(new StaticSet()); }
@@ -186,8 +203,16 @@ absl::StatusOr<StaticSet::Changed> StaticSet::apply(const StaticChange& change,
     ++set->uses_[instance.mesh.get()];
     set->triangle_count_ += instance.mesh->triangle_count();
   }
-  set->check_invariants();
+  LOCUS_DCHECK_CALL(set->check_invariants());
   return Changed{std::move(set), std::move(changing.placed())};
+}
+
+absl::Status StaticSet::check_placements(absl::Span<const PlacementColumns> place) {
+  const std::function<bool(Id)> no_object = [](Id) { return false; };
+  InstanceIds ids(no_object, 0);
+  for (size_t i = 0; i < place.size(); ++i)
+    RETURN_IF_ERROR(ids.place(place[i], absl::StrCat("place[", i, "]"), [](const Instance&) {}));
+  return absl::OkStatus();
 }
 
 const Instance* StaticSet::find(Id id) const {

@@ -1,6 +1,6 @@
-// Static part of a scene: instances of meshes and a tree over them. Immutable, shared by snapshots, any thread; a
-// change makes a new set, so that a failed change has no effect. Invariants: ids are distinct and not 0; positions_ has
-// one entry for each instance; the counts of uses_ add up to size().
+// Static part of a scene: instances of meshes and a tree over these instances. Immutable, shared by snapshots, and safe
+// to read from any thread. A change makes a new set, so that a failed change has no effect. Invariants: ids are
+// distinct and not 0; positions_ has one entry for each instance; the counts of uses_ add up to size().
 #ifndef LOCUS_CORE_SCENE_STATICS_STATIC_SET_H_
 #define LOCUS_CORE_SCENE_STATICS_STATIC_SET_H_
 
@@ -17,17 +17,18 @@
 
 namespace locus {
 
-// Borrowed columns of the placements of one mesh. N is the number of ids, or of translations if there are no ids. Each
-// other column has N entries, one entry for all placements, or none for the default in brackets.
+// Borrowed columns of the placements of one mesh. Let N be the number of ids, or of translations if there are no ids.
+// Each other column has N entries, or one entry for all placements, or no entries. The default applies to a column
+// without entries.
 struct PlacementColumns {
   std::shared_ptr<const StaticMesh> mesh;
-  absl::Span<const uint64_t> ids;         // [chosen by the set, with bit 63 set]
-  absl::Span<const double> translations;  // 3N; with ids, 3 for all are enough
-  absl::Span<const float> rotations;      // 4N, x y z w [identity]
-  absl::Span<const float> scales;         // N, > 0 [1]
-  absl::Span<const uint32_t> layers;      // [bit 0]
-  absl::Span<const uint64_t> groups;      // [0]
-  absl::Span<const uint64_t> tags;        // [0]
+  absl::Span<const uint64_t> ids;         // if empty, the set chooses the ids and sets their bit 63
+  absl::Span<const double> translations;  // entries x y z; not empty
+  absl::Span<const float> rotations;      // quaternions x y z w; default: no rotation
+  absl::Span<const float> scales;         // > 0; default: 1
+  absl::Span<const uint32_t> layers;      // default: bit 0
+  absl::Span<const uint64_t> groups;      // default: 0, no group
+  absl::Span<const uint64_t> tags;        // default: 0
 
   size_t count() const { return ids.empty() ? translations.size() / 3 : ids.size(); }
 };
@@ -45,21 +46,26 @@ class StaticSet {
 
   struct Changed {
     std::shared_ptr<const StaticSet> set;
-    std::vector<Id> placed;  // in the order of the request, chosen ids included
+    std::vector<Id> placed;  // ids of the placed instances, in the order of the request
   };
-  // Returns a new set without the instances that the change removes and with those that it places. `is_object` returns
-  // true for the id of an object, which no instance may have. Ids that the set chooses are counted up from `seed`. An
-  // error refuses the whole change and names the field and index of the wrong value. O(instances).
+  // Returns a new set without the instances that the change removes, and with the instances that the change places.
+  // `is_object` returns true for an id that an object has, because no instance may have the same id. If the set chooses
+  // ids, it counts up from `seed` + 1. An error refuses the whole change and names the field and index of the invalid
+  // value. O(instances).
   absl::StatusOr<Changed> apply(const StaticChange& change, const std::function<bool(Id)>& is_object,
                                 uint64_t seed) const;
+
+  // Returns the error with which apply() refuses these placements on a set without instances; OK if there is none.
+  // Builds no set: needs about 20 bytes of memory for each placement. O(placements).
+  static absl::Status check_placements(absl::Span<const PlacementColumns> place);
 
   const Bvh<Instance>& tree() const { return tree_; }
   const Instance* find(Id id) const;
   size_t size() const { return tree_.size(); }
   uint64_t triangle_count() const { return triangle_count_; }
-  // Returns the number of instances of `mesh`, without instances of equal meshes under other names.
+  // Returns the number of instances of `mesh`, not counting instances of meshes with equal content under other names.
   uint32_t uses(const StaticMesh* mesh) const;
-  // Returns the size in bytes of the set without the meshes, which sets share.
+  // Returns the size in bytes of the set without the meshes, which are shared by several sets.
   uint64_t bytes() const;
 
  private:
@@ -68,7 +74,7 @@ class StaticSet {
   void check_invariants() const;
 
   Bvh<Instance> tree_;
-  absl::flat_hash_map<Id, uint32_t> positions_;  // index into tree_.values()
+  absl::flat_hash_map<Id, uint32_t> positions_;  // index of each instance in tree_.values()
   absl::flat_hash_map<const StaticMesh*, uint32_t> uses_;
   uint64_t triangle_count_ = 0;
 };

@@ -1,5 +1,6 @@
-// Application of one update batch as an overlay of changed objects over the current revision: a refused batch changes
-// nothing, and the index is updated once for each object. One thread.
+// Application of one update batch. Collects the changed objects in a table beside the store and computes their
+// difference to the store at the end: a refused batch changes nothing, and the grid is updated once for each object.
+// One thread at a time.
 #ifndef LOCUS_CORE_SCENE_UPDATES_BATCH_APPLIER_H_
 #define LOCUS_CORE_SCENE_UPDATES_BATCH_APPLIER_H_
 
@@ -17,7 +18,7 @@
 namespace locus {
 
 // Controls whether difference() reports objects that were replaced under the same id or teleported. Only scenes with
-// history need it.
+// history need these reports.
 enum class TrackLifetimes : uint8_t { kNo, kYes };
 
 class BatchApplier {
@@ -30,19 +31,20 @@ class BatchApplier {
   // Applies clear, removes, inserts, moves and relabels, in this order. Call once.
   void run();
 
-  // Returns the number of objects after the batch. Nothing is removed after the inserts, so that no insert leads to a
-  // higher number: it is enough to check this one against a limit.
+  // Returns the number of objects after the batch. A batch removes objects only before its inserts, so no insert makes
+  // the number higher than this final number. It is therefore sufficient to check the final number against a limit.
   size_t object_count() const { return count_; }
   uint32_t applied() const { return applied_; }
   uint32_t refused() const { return refused_; }
   std::vector<ItemError>& errors() { return errors_; }
 
   // Result of run(): objects to remove in their old state, and objects to add in their new state. A changed object is
-  // in both lists. An object that ends in its old state is in neither, unless it was replaced.
+  // in both lists. An object whose new state equals its old state is in neither list, unless its id is in `replaced`.
   struct Difference {
     std::vector<Object> removed;
     std::vector<Object> added;
-    // Ids whose old lifetime ends, teleported objects included. Empty unless TrackLifetimes::kYes.
+    // Ids of objects for which the batch begins a new lifetime: inserted and teleported objects. Empty unless
+    // TrackLifetimes::kYes.
     absl::flat_hash_set<Id> replaced;
     bool empty() const { return removed.empty() && added.empty(); }
   };
@@ -70,7 +72,7 @@ class BatchApplier {
   const TrackLifetimes track_lifetimes_;
   absl::flat_hash_set<Id> replaced_;
   size_t count_;                                            // number of objects after the items applied so far
-  absl::flat_hash_map<Id, std::optional<Object>> changed_;  // nullopt: removed
+  absl::flat_hash_map<Id, std::optional<Object>> changed_;  // new state by id; nullopt: removed
   uint32_t applied_ = 0;
   uint32_t refused_ = 0;
   std::vector<ItemError> errors_;

@@ -5,12 +5,10 @@
 namespace locus {
 
 void CoalescedMoves::check_invariants(uint32_t handle) {
-  if constexpr (kDebugChecks) {
-    const GridMove* const move = find(handle);
-    LOCUS_CHECK(move != nullptr);
-    LOCUS_CHECK(move->rotation == GridMove::kKeeps || move->rotation < rotations_.size());
-    LOCUS_CHECK_LE(moves_.size(), move_of_handle_.size());
-  }
+  const GridMove* const move = find(handle);
+  LOCUS_CHECK(move != nullptr);
+  LOCUS_CHECK(move->rotation == GridMove::kKeeps || move->rotation < rotations_.size());
+  LOCUS_CHECK_LE(moves_.size(), move_of_handle_.size());
 }
 
 bool CoalescedMoves::differs(const GridMove& move, const Quaternion* rotation, const GridMove* before,

@@ -1,5 +1,5 @@
-// Moves of several batches, coalesced during replay: the grid is updated once for each object, which makes replaying a
-// log faster than writing it was. One thread at a time. Invariant: each handle has at most one move.
+// Moves of several batches, coalesced during replay: the grid is updated once for each object, so that replaying a log
+// takes less time than the original updates took. One thread at a time. Invariant: each handle has at most one move.
 #ifndef LOCUS_CORE_SCENE_UPDATES_COALESCED_MOVES_H_
 #define LOCUS_CORE_SCENE_UPDATES_COALESCED_MOVES_H_
 
@@ -11,8 +11,8 @@ namespace locus {
 
 class CoalescedMoves {
  public:
-  // Adds the moves of one batch for objects of `store`. Returns true if any of them changes the position or rotation
-  // that the moves added before it have left. O(moves).
+  // Adds the moves of one batch for objects of `store`. Returns true if any of these moves changes the position or
+  // rotation that its object has after the moves of earlier calls. O(moves).
   bool add(const GridMoves& batch, const ObjectStore& store);
 
   bool empty() const { return moves_.empty(); }
@@ -31,9 +31,10 @@ class CoalescedMoves {
   }
   bool differs(const GridMove& move, const Quaternion* rotation, const GridMove* before, const GridRef& stored) const;
 
-  std::vector<GridMove> moves_;  // distinct handles
+  std::vector<GridMove> moves_;  // at most one move for each handle
   std::vector<Quaternion> rotations_;
-  std::vector<uint32_t> move_of_handle_;  // index into moves_ by handle; stale unless the move there has the handle
+  // For each handle, the index of its move in moves_. An entry is stale unless the move at this index has the handle.
+  std::vector<uint32_t> move_of_handle_;
 };
 
 }  // namespace locus

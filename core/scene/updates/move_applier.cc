@@ -15,13 +15,11 @@ constexpr size_t kItemsAtOnce = 64;
 }  // namespace
 
 void MoveApplier::check_invariants() const {
-  if constexpr (kDebugChecks) {
-    for (size_t i = 0; i < moves_.size(); ++i) {
-      LOCUS_CHECK_EQ(size_t{last_move_[moves_[i].handle]}, i);
-      LOCUS_CHECK(moves_[i].rotation == GridMove::kKeeps || moves_[i].rotation < rotations_.size());
-    }
-    LOCUS_CHECK_LE(errors_.size(), size_t{refused_});
+  for (size_t i = 0; i < moves_.size(); ++i) {
+    LOCUS_CHECK_EQ(size_t{last_move_[moves_[i].handle]}, i);
+    LOCUS_CHECK(moves_[i].rotation == GridMove::kKeeps || moves_[i].rotation < rotations_.size());
   }
+  LOCUS_CHECK_LE(errors_.size(), size_t{refused_});
 }
 
 bool MoveApplier::serves(const UpdateBatch& batch) {
@@ -49,7 +47,7 @@ void MoveApplier::finish(const ObjectStore& objects) {
     return !(move.position == now.entry().position) ||
            (move.rotation != GridMove::kKeeps && !(rotations_[move.rotation] == now.form().rotation));
   });
-  check_invariants();
+  LOCUS_DCHECK_CALL(check_invariants());
 }
 
 void MoveApplier::refuse(const char* column, const Item& item, Reason reason) {

@@ -1,7 +1,7 @@
 // Application of a batch that only moves objects, the common case at every tick: converts the columns directly into
 // moves of the grid. Like BatchApplier, it does not change the store; ObjectStore::move() applies the moves.
 //
-// Reuses its memory from batch to batch; one thread. Invariant: each handle has at most one move.
+// Reuses its memory from batch to batch. One thread at a time. Invariant: each handle has at most one move.
 #ifndef LOCUS_CORE_SCENE_UPDATES_MOVE_APPLIER_H_
 #define LOCUS_CORE_SCENE_UPDATES_MOVE_APPLIER_H_
 
@@ -20,8 +20,7 @@ class MoveApplier {
   // Returns true if the batch only moves objects.
   static bool serves(const UpdateBatch& batch);
 
-  // Reads one batch. Preconditions: the batch has passed check_form(), and serves(batch) is true.
-  // O(items).
+  // Reads one batch. Preconditions: the batch has passed check_form(), and serves(batch) is true. O(items).
   void run(const ObjectStore& objects, const UpdateBatch& batch) {
     begin(objects);
     add(objects, batch);
@@ -38,11 +37,12 @@ class MoveApplier {
     clear_scratch(rotations_);
   }
 
-  // Returns the moves of the last run() or finish(), one for each object that moves: its last move in the batches.
+  // Returns the moves of the last run() or finish(), one for each object that moves, with the last position and the
+  // last rotation that the batches set.
   GridMoves moves() const { return {moves_, rotations_, last_move_}; }
   // Returns true if any of moves() changes a position or a rotation.
   bool changes() const { return changes_; }
-  // Return the numbers of applied and refused items, and the errors, of the last batch.
+  // Return the numbers of applied and refused items, and the errors, of the last batch passed to run() or add().
   uint32_t applied() const { return applied_; }
   uint32_t refused() const { return refused_; }
   std::vector<ItemError>& errors() { return errors_; }
@@ -62,8 +62,9 @@ class MoveApplier {
 
   std::vector<GridMove> moves_;
   std::vector<Quaternion> rotations_;
-  std::vector<uint32_t> last_move_;  // index into moves_ by handle; stale unless the move there has the handle
-  std::vector<uint32_t> handles_;    // handles of the items being read
+  // For each handle, the index of its move in moves_. An entry is stale unless the move at this index has the handle.
+  std::vector<uint32_t> last_move_;
+  std::vector<uint32_t> handles_;  // handles of the items being read
   bool changes_ = false;
   uint32_t applied_ = 0;
   uint32_t refused_ = 0;

@@ -16,8 +16,8 @@ namespace locus {
 
 class PoseReader {
  public:
-  // Precondition: the columns have passed check_form(), and one of the two position columns is given unless there are
-  // no items.
+  // Precondition: the columns have passed check_form(), and one of the two position columns has entries unless there
+  // are no items.
   PoseReader(Vec3d frame, absl::Span<const float> positions, absl::Span<const double> positions_f64,
              absl::Span<const float> rotations)
       : frame_(frame),
@@ -26,13 +26,13 @@ class PoseReader {
         stride_(std::max(positions.size(), positions_f64.size()) == 3 ? 0 : 3),
         rotations_(rotations, 4) {}
 
-  // Returns the name of the given position column, for errors.
+  // Returns the name of the position column that is used, for errors.
   const char* position_column() const { return absolute_ != nullptr ? "positions_f64" : "positions"; }
   static constexpr char kRotationColumn[] = "rotations";
   bool has_rotations() const { return rotations_.given(); }
 
-  // Read item i and return Reason::kUnspecified, or return the reason why its values are refused. A rotation is
-  // normalized. read_rotation() requires has_rotations().
+  // Read the position or rotation of item `i`. Return Reason::kUnspecified, or the reason why the values of the item
+  // are refused. A rotation is normalized. read_rotation() requires has_rotations().
   Reason read_position(size_t i, Vec3d& position) const {
     LOCUS_DCHECK(relative_ != nullptr || absolute_ != nullptr);
     const size_t at = i * stride_;
@@ -50,7 +50,7 @@ class PoseReader {
   Vec3d frame_;
   const float* relative_;
   const double* absolute_;  // null if positions are relative
-  size_t stride_;           // 0: one entry for all items
+  size_t stride_;           // number of values from one item to the next; 0: one entry for all items
   ColumnReader<float> rotations_;
 };
 

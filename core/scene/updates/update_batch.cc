@@ -10,46 +10,71 @@
 namespace locus {
 namespace {
 
-absl::Status check_positions(absl::Span<const float> relative, absl::Span<const double> absolute, size_t n,
-                             const std::string& field) {
-  if (!relative.empty() && !absolute.empty())
-    return refuse_argument(Reason::kMalformed, field + ".positions_f64", {},
-                           "give positions or positions_f64, not both");
-  if (absolute.empty()) return check_column(relative.size(), 3, n, ColumnNeed::kEachOrOne, field + ".positions");
-  return check_column(absolute.size(), 3, n, ColumnNeed::kEachOrOne, field + ".positions_f64");
-}
+// Check of one element of the list `list` of a batch, such as inserts[2]: verifies that the length of each column fits
+// the number of items, `items`.
+class ElementCheck {
+ public:
+  ElementCheck(absl::string_view list, size_t index, size_t items) : list_(list), index_(index), items_(items) {}
 
-absl::Status check_shape(const InsertColumns& insert, size_t n, const std::string& field) {
-  const bool has_radius = insert.kind == ShapeKind::kBall || insert.kind == ShapeKind::kCapsule;
-  const bool has_extent = insert.kind == ShapeKind::kBox || insert.kind == ShapeKind::kCapsule;
-  const std::string shape = field + (insert.kind == ShapeKind::kBall  ? ".ball"
-                                     : insert.kind == ShapeKind::kBox ? ".box"
-                                                                      : ".capsule");
-  if (has_radius) RETURN_IF_ERROR(check_column(insert.radii.size(), 1, n, ColumnNeed::kEachOrOne, shape + ".radii"));
-  if (!has_extent) return absl::OkStatus();
-  return check_column(insert.extents.size(), 3, n, ColumnNeed::kEachOrOne,
-                      shape + (insert.kind == ShapeKind::kBox ? ".half_extents" : ".half_axes"));
-}
+  absl::Status run(const InsertColumns& insert) const {
+    RETURN_IF_ERROR(check_positions(insert.positions, insert.positions_f64));
+    RETURN_IF_ERROR(check_length(insert.rotations.size(), 4, ColumnNeed::kOptional, "rotations"));
+    RETURN_IF_ERROR(check_shape(insert));
+    return check_labels(insert);
+  }
+
+  absl::Status run(const MoveColumns& move) const {
+    RETURN_IF_ERROR(check_positions(move.positions, move.positions_f64));
+    return check_length(move.rotations.size(), 4, ColumnNeed::kOptional, "rotations");
+  }
+
+  absl::Status run(const RelabelColumns& relabel) const { return check_labels(relabel); }
+
+ private:
+  absl::Status check_length(size_t values, size_t width, ColumnNeed need, absl::string_view column) const {
+    return check_column(values, width, items_, need, {list_, index_, column});
+  }
+
+  absl::Status check_positions(absl::Span<const float> relative, absl::Span<const double> absolute) const {
+    if (!relative.empty() && !absolute.empty())
+      return refuse_argument(Reason::kMalformed, ColumnName{list_, index_, "positions_f64"}.text(), {},
+                             "give positions or positions_f64, not both");
+    if (absolute.empty()) return check_length(relative.size(), 3, ColumnNeed::kEachOrOne, "positions");
+    return check_length(absolute.size(), 3, ColumnNeed::kEachOrOne, "positions_f64");
+  }
+
+  absl::Status check_shape(const InsertColumns& insert) const {
+    switch (insert.kind) {
+      case ShapeKind::kPoint:
+        return absl::OkStatus();
+      case ShapeKind::kBall:
+        return check_length(insert.radii.size(), 1, ColumnNeed::kEachOrOne, "ball.radii");
+      case ShapeKind::kBox:
+        return check_length(insert.extents.size(), 3, ColumnNeed::kEachOrOne, "box.half_extents");
+      case ShapeKind::kCapsule:
+        break;
+    }
+    RETURN_IF_ERROR(check_length(insert.radii.size(), 1, ColumnNeed::kEachOrOne, "capsule.radii"));
+    return check_length(insert.extents.size(), 3, ColumnNeed::kEachOrOne, "capsule.half_axes");
+  }
+
+  template <class Columns>
+  absl::Status check_labels(const Columns& columns) const {
+    RETURN_IF_ERROR(check_length(columns.layers.size(), 1, ColumnNeed::kOptional, "layers"));
+    RETURN_IF_ERROR(check_length(columns.groups.size(), 1, ColumnNeed::kOptional, "groups"));
+    return check_length(columns.tags.size(), 1, ColumnNeed::kOptional, "tags");
+  }
+
+  const absl::string_view list_;
+  const size_t index_;
+  const size_t items_;
+};
 
 template <class Columns>
-absl::Status check_labels(const Columns& columns, size_t n, const std::string& field) {
-  RETURN_IF_ERROR(check_column(columns.layers.size(), 1, n, ColumnNeed::kOptional, field + ".layers"));
-  RETURN_IF_ERROR(check_column(columns.groups.size(), 1, n, ColumnNeed::kOptional, field + ".groups"));
-  return check_column(columns.tags.size(), 1, n, ColumnNeed::kOptional, field + ".tags");
-}
-
-absl::Status check_insert(const InsertColumns& insert, const std::string& field) {
-  const size_t n = insert.ids.size();
-  RETURN_IF_ERROR(check_positions(insert.positions, insert.positions_f64, n, field));
-  RETURN_IF_ERROR(check_column(insert.rotations.size(), 4, n, ColumnNeed::kOptional, field + ".rotations"));
-  RETURN_IF_ERROR(check_shape(insert, n, field));
-  return check_labels(insert, n, field);
-}
-
-absl::Status check_move(const MoveColumns& move, const std::string& field) {
-  const size_t n = move.ids.size();
-  RETURN_IF_ERROR(check_positions(move.positions, move.positions_f64, n, field));
-  return check_column(move.rotations.size(), 4, n, ColumnNeed::kOptional, field + ".rotations");
+absl::Status check_list(absl::string_view list, const std::vector<Columns>& elements) {
+  for (size_t i = 0; i < elements.size(); ++i)
+    RETURN_IF_ERROR(ElementCheck(list, i, elements[i].ids.size()).run(elements[i]));
+  return absl::OkStatus();
 }
 
 size_t item_count(const UpdateBatch& batch) {
@@ -88,13 +113,9 @@ bool may_join(const UpdateBatch& first, const UpdateBatch& second) {
 
 absl::Status check_form(const UpdateBatch& batch) {
   RETURN_IF_ERROR(check_header(batch));
-  for (size_t i = 0; i < batch.inserts.size(); ++i)
-    RETURN_IF_ERROR(check_insert(batch.inserts[i], absl::StrCat("inserts[", i, "]")));
-  for (size_t i = 0; i < batch.moves.size(); ++i)
-    RETURN_IF_ERROR(check_move(batch.moves[i], absl::StrCat("moves[", i, "]")));
-  for (size_t i = 0; i < batch.relabels.size(); ++i)
-    RETURN_IF_ERROR(check_labels(batch.relabels[i], batch.relabels[i].ids.size(), absl::StrCat("relabels[", i, "]")));
-  return absl::OkStatus();
+  RETURN_IF_ERROR(check_list("inserts", batch.inserts));
+  RETURN_IF_ERROR(check_list("moves", batch.moves));
+  return check_list("relabels", batch.relabels);
 }
 
 }  // namespace locus

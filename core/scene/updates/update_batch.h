@@ -1,5 +1,6 @@
-// Update batch as borrowed columns, and its acknowledgement. Plain data; the columns outlive the call that takes the
-// batch. Order of application: clear, removes, inserts, moves, relabels; all become one revision.
+// Update batch as borrowed columns, and its acknowledgement. Plain data; the columns outlive the call that applies the
+// batch. A batch is applied in the order clear, removes, inserts, moves, relabels; all these changes become one
+// revision.
 #ifndef LOCUS_CORE_SCENE_UPDATES_UPDATE_BATCH_H_
 #define LOCUS_CORE_SCENE_UPDATES_UPDATE_BATCH_H_
 
@@ -14,39 +15,39 @@
 
 namespace locus {
 
-// Columns of objects to insert. A column has N entries (N = number of ids), one entry for all items, or none for the
-// default in brackets.
+// Columns of objects to insert. Let N be the number of ids. Each other column has N entries, or one entry for all
+// items. A column with a default may also have no entries; then the default applies.
 struct InsertColumns {
   absl::Span<const uint64_t> ids;
-  absl::Span<const float> positions;       // 3N, relative to the frame; either this or positions_f64
-  absl::Span<const double> positions_f64;  // 3N, absolute
-  absl::Span<const float> rotations;       // 4N, x y z w [identity]
+  absl::Span<const float> positions;       // entries x y z, relative to the frame; empty if positions_f64 is used
+  absl::Span<const double> positions_f64;  // entries x y z, absolute; empty if positions is used
+  absl::Span<const float> rotations;       // quaternions x y z w; default: no rotation
   ShapeKind kind = ShapeKind::kPoint;
-  absl::Span<const float> radii;      // N, balls and capsules, >= 0
-  absl::Span<const float> extents;    // 3N, half extents of boxes >= 0, or half axes of capsules
-  absl::Span<const uint32_t> layers;  // [bit 0]
-  absl::Span<const uint64_t> groups;  // [0]
-  absl::Span<const uint64_t> tags;    // [0]
+  absl::Span<const float> radii;      // balls and capsules only, >= 0
+  absl::Span<const float> extents;    // entries x y z: half extents of boxes, >= 0, or half axes of capsules
+  absl::Span<const uint32_t> layers;  // default: bit 0
+  absl::Span<const uint64_t> groups;  // default: 0, no group
+  absl::Span<const uint64_t> tags;    // default: 0
 };
 
 struct MoveColumns {
   absl::Span<const uint64_t> ids;
   absl::Span<const float> positions;
   absl::Span<const double> positions_f64;
-  absl::Span<const float> rotations;  // [unchanged]
+  absl::Span<const float> rotations;  // if empty, the rotations do not change
   bool teleport = false;
 };
 
 struct RelabelColumns {
   absl::Span<const uint64_t> ids;
-  absl::Span<const uint32_t> layers;  // [unchanged], like groups and tags
+  absl::Span<const uint32_t> layers;  // if empty, the layers do not change; the same holds for groups and tags
   absl::Span<const uint64_t> groups;
   absl::Span<const uint64_t> tags;
 };
 
 struct UpdateBatch {
   Vec3d frame;
-  std::optional<uint64_t> tick;  // tick of the batch [the scene's current tick]
+  std::optional<uint64_t> tick;  // tick of the batch; nullopt: the scene's current tick
   bool clear = false;
   absl::Span<const uint64_t> remove_ids;
   absl::Span<const uint64_t> remove_groups;
@@ -56,12 +57,12 @@ struct UpdateBatch {
   bool upsert = false;
   bool all_or_nothing = false;
   bool restart_ticks = false;
-  uint64_t writer = 0;  // random id of the sender, 0 = none; a (writer, batch) pair is applied once
-  uint64_t batch = 0;   // sequence number within the writer, from 1 without gaps; 0 = none
+  uint64_t writer = 0;  // writer id; 0: no id; batches with equal (writer, batch) are applied only once
+  uint64_t batch = 0;   // number of the batch in the sequence of its writer, from 1 without gaps; 0: no number
 };
 
 struct ItemError {
-  std::string field;  // column of the value, for example inserts[0].positions
+  std::string field;  // column of the refused value, for example inserts[0].positions
   uint32_t index = 0;
   Id id = kNoId;
   Reason reason = Reason::kUnspecified;
@@ -78,10 +79,11 @@ struct UpdateAck {
 };
 
 // Returns true if the two batches may be applied as one revision: both only move objects, without teleport,
-// all_or_nothing or restart_ticks, at the same tick. The second batch wins for objects that both move.
+// all_or_nothing or restart_ticks, at the same tick. If both batches move an object, the second batch determines the
+// result.
 bool may_join(const UpdateBatch& first, const UpdateBatch& second);
 
-// Checks the form of a batch: column lengths, frame, writer and limits. INVALID_ARGUMENT names the wrong field.
+// Checks the form of a batch: column lengths, frame, writer and limits. INVALID_ARGUMENT names the invalid field.
 absl::Status check_form(const UpdateBatch& batch);
 
 }  // namespace locus

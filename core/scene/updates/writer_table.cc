@@ -25,12 +25,10 @@ absl::Status gap(uint64_t expected, uint64_t batch) {
 }  // namespace
 
 void WriterTable::check_invariants() const {
-  if constexpr (kDebugChecks) {
-    LOCUS_CHECK_LE(writers_.size(), size_t{limits::kMaxWriters});
-    LOCUS_CHECK_LE(kept_errors_, kMaxKeptErrors);
-    LOCUS_CHECK(!writers_.empty() || kept_errors_ == 0);
-    LOCUS_CHECK(!writers_.contains(0));
-  }
+  LOCUS_CHECK_LE(writers_.size(), size_t{limits::kMaxWriters});
+  LOCUS_CHECK_LE(kept_errors_, kMaxKeptErrors);
+  LOCUS_CHECK(!writers_.empty() || kept_errors_ == 0);
+  LOCUS_CHECK(!writers_.contains(0));
 }
 
 absl::StatusOr<std::optional<UpdateAck>> WriterTable::admit(uint64_t writer, uint64_t batch) const {
@@ -63,7 +61,7 @@ void WriterTable::record(uint64_t writer, uint64_t batch, const UpdateAck& ack) 
   if (kept_errors_ + ack.errors.size() > kMaxKeptErrors) forget_acks();
   kept_errors_ += ack.errors.size();
   last = {batch, ++clock_, ack};
-  check_invariants();
+  LOCUS_DCHECK_CALL(check_invariants());
 }
 
 void WriterTable::forget_oldest() {
@@ -94,7 +92,7 @@ bool WriterTable::restore(Writer writer) {
   kept_errors_ += writer.ack.errors.size();
   clock_ = std::max(clock_, writer.heard);
   writers_[writer.number] = {writer.batch, writer.heard, std::move(writer.ack)};
-  check_invariants();
+  LOCUS_DCHECK_CALL(check_invariants());
   return true;
 }
 

@@ -1,9 +1,9 @@
 // Table of the last batch and ack of each known writer, so that a batch that is sent twice is applied once. Bounded:
-// the writer that was least recently active is evicted first, and its next batch is refused, because it may be a
-// duplicate. If the stored acks would list more than kMaxKeptErrors errors, the acks of all writers are dropped, but no
-// writer is. A value type; one thread at a time. Invariants: at most limits::kMaxWriters writers, none of them 0, each
-// with an activity count of at most clock_; kept_errors_ is the number of errors in all stored acks, at most
-// kMaxKeptErrors.
+// the writer that was least recently active is evicted first, and its next batch is refused, because this batch may be
+// a duplicate. If the stored acks would list more than kMaxKeptErrors errors, the acks of all writers are dropped, but
+// the writers and their batch numbers are kept. A value type; one thread at a time. Invariants: at most
+// limits::kMaxWriters writers are stored, no writer id is 0, and no activity count exceeds clock_; kept_errors_ is the
+// number of errors in all stored acks, at most kMaxKeptErrors.
 #ifndef LOCUS_CORE_SCENE_UPDATES_WRITER_TABLE_H_
 #define LOCUS_CORE_SCENE_UPDATES_WRITER_TABLE_H_
 
@@ -23,27 +23,27 @@ class WriterTable {
   // Maximum number of item errors in all stored acks.
   static constexpr size_t kMaxKeptErrors = size_t{64} * limits::kMaxListedItemErrors;
 
-  // Returns nullopt if the batch must be applied: it is the next one of its writer, or has no writer. If it was applied
-  // before, returns its ack, or an empty ack if that is not stored, marked as duplicate. FAILED_PRECONDITION BATCH_GAP
-  // if an earlier batch is missing.
+  // Returns nullopt if the batch must be applied, because it is the next batch of its writer or has no writer. If the
+  // batch was applied before, returns its ack, marked as duplicate, or, if the ack is not stored, an empty ack that is
+  // marked as duplicate. FAILED_PRECONDITION BATCH_GAP if an earlier batch is missing.
   absl::StatusOr<std::optional<UpdateAck>> admit(uint64_t writer, uint64_t batch) const;
   // Returns true if admit() would return nullopt. Faster than admit().
   bool is_new(uint64_t writer, uint64_t batch) const;
-  // Stores the latest batch of a writer and its ack. Evicts another writer, or drops all acks, if a limit would be
-  // exceeded. Does nothing for writer 0.
+  // Stores the number and the ack of the latest batch of a writer. Evicts another writer, or drops all acks, if a limit
+  // would be exceeded. Does nothing for writer 0.
   void record(uint64_t writer, uint64_t batch, const UpdateAck& ack);
 
   struct Writer {
-    uint64_t number = 0;
-    uint64_t batch = 0;
-    uint64_t heard = 0;  // activity count: higher for a writer that was active later
-    UpdateAck ack;       // epoch 0: the ack was dropped
+    uint64_t number = 0;  // writer id
+    uint64_t batch = 0;   // number of the writer's last batch
+    uint64_t heard = 0;   // activity count: higher for a writer that was active later
+    UpdateAck ack;        // ack of the last batch; epoch 0: the ack was dropped
   };
-  // Returns all known writers, ascending by number. O(writers).
+  // Returns all known writers, ascending by writer id. O(writers).
   std::vector<Writer> writers() const;
   size_t size() const { return writers_.size(); }
   // Inserts an entry that writers() returned. Returns false and changes nothing if a limit would be exceeded, the
-  // writer is known, or a number is 0.
+  // writer is known, or the number of the writer or of its batch is 0.
   bool restore(Writer writer);
 
  private:

@@ -11,8 +11,9 @@
 namespace locus::server {
 namespace {
 
-// Locks the directory, so that no process writes during the check. Two kinds of directories are checked without a lock:
-// a backup that was never opened has no lock file, and on a read-only disk the lock cannot be acquired.
+// Locks the directory, so that no process writes during the check. Returns OK without a lock, with `lock` null, for a
+// backup that was never opened, because it has no lock file, and for a directory on a read-only disk, because its lock
+// file cannot be locked.
 absl::Status acquire_lock(const StorageOptions& options, std::unique_ptr<DirectoryLock>& lock) {
   if (!options.env->FileExists(absl::StrCat(options.path, "/", DirectoryLock::kName)).ok()) return absl::OkStatus();
   auto taken = DirectoryLock::acquire(*options.env, options.path);
@@ -20,6 +21,8 @@ absl::Status acquire_lock(const StorageOptions& options, std::unique_ptr<Directo
   if (taken.ok()) lock = *std::move(taken);
   return absl::OkStatus();
 }
+
+std::string verdict(const std::string& damage) { return damage.empty() ? "intact" : absl::StrCat("DAMAGED: ", damage); }
 
 }  // namespace
 
@@ -84,6 +87,23 @@ absl::StatusOr<DirectoryReport> check(const StorageOptions& given) {
   report = report_of(damage_report);
   report.closed_in_order = durable_marker.ok() && durable_marker->closed;
   return report;
+}
+
+std::string to_text(const DirectoryReport& report) {
+  std::string text;
+  for (const std::string& damage : {report.damage, report.catalogue_damage})
+    if (!damage.empty()) absl::StrAppend(&text, "directory: ", verdict(damage), "\n");
+  for (const SceneReport& scene : report.scenes)
+    absl::StrAppend(&text, "scene ", scene.name, ": ", verdict(scene.damage), " (snapshot to record ",
+                    scene.snapshot_sequence, ", ", scene.snapshot_bytes, " bytes; log to record ", scene.last_sequence,
+                    ", ", scene.log_bytes, " bytes)\n");
+  for (const MeshReport& mesh : report.meshes)
+    absl::StrAppend(&text, "mesh ", mesh.name, ": ", verdict(mesh.damage), " (", mesh.bytes, " bytes)\n");
+  absl::StrAppend(&text, report.scenes.size(), " scenes, ", report.meshes.size(), " meshes, ",
+                  report.closed_in_order ? "closed in order" : "not closed in order", ": ",
+                  report.intact() ? "all is intact" : "NOT all is intact: run `locusd repair`, or restore a backup",
+                  "\n");
+  return text;
 }
 
 }  // namespace locus::server

@@ -1,5 +1,5 @@
-// Verifies a data directory for `locusd check` and for repair(). Reads every byte and changes none. Free functions; any
-// thread.
+// Verifies a data directory for `locusd check` and for repair(). Reads every byte of the directory and changes no file.
+// Free functions; any thread.
 #ifndef LOCUS_SERVER_STORAGE_INTEGRITY_CHECK_H_
 #define LOCUS_SERVER_STORAGE_INTEGRITY_CHECK_H_
 
@@ -19,8 +19,8 @@ struct SceneReport {
   std::string name;
   uint64_t epoch = 0;
   uint64_t snapshot_sequence = 0;
-  uint64_t last_sequence = 0;      // last record before the first missing one
-  uint64_t expected_sequence = 0;  // last record that must exist
+  uint64_t last_sequence = 0;      // sequence number of the last record before the first missing record
+  uint64_t expected_sequence = 0;  // sequence number of the last record that must exist
   uint64_t snapshot_chunks = 0;
   uint64_t snapshot_bytes = 0;
   uint64_t log_bytes = 0;
@@ -35,8 +35,9 @@ struct MeshReport {
 };
 
 struct DirectoryReport {
-  std::string damage;            // reason why nothing is readable
-  std::string catalogue_damage;  // reason why scenes or meshes may be missing below, or deleted ones present
+  std::string damage;  // reason why no part of the directory is readable; empty if a part is readable
+  // Reason why `scenes` and `meshes` may be incomplete or contain deleted scenes and meshes; empty if they are correct.
+  std::string catalogue_damage;
   bool closed_in_order = false;
   std::vector<SceneReport> scenes;  // sorted by name
   std::vector<MeshReport> meshes;   // sorted by name
@@ -44,12 +45,16 @@ struct DirectoryReport {
   bool intact() const;
 };
 
-// Verifies every byte. Damage is part of the report, not an error. Errors: NOT_FOUND if there is no data directory,
-// FAILED_PRECONDITION if a process has it open or another version wrote it, UNAVAILABLE if the disk fails.
+// Verifies every byte of the data directory. Damage is part of the report, not an error. Errors: NOT_FOUND if there is
+// no data directory, FAILED_PRECONDITION if a process has the directory open or this version of locusd does not know
+// its format, UNAVAILABLE if the disk fails.
 absl::StatusOr<DirectoryReport> check(const StorageOptions& options);
 
-// Converts the result of verify() to the report that is shown to people.
+// Converts the result of verify() to the report that `locusd check` prints.
 DirectoryReport report_of(const DamageReport& damage_report);
+
+// Returns the report as text for people, with one line for each scene and mesh.
+std::string to_text(const DirectoryReport& report);
 
 }  // namespace locus::server
 

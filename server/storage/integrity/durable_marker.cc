@@ -5,8 +5,8 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/check.h"
-#include "server/storage/rocksdb/bytes.h"
 #include "server/storage/rocksdb/errors.h"
+#include "server/storage/rocksdb/row_codec.h"
 #include "server/storage/rocksdb/rows.h"
 
 namespace locus::server {
@@ -17,14 +17,14 @@ constexpr size_t kFirstSlotBytes = 4096;
 constexpr size_t kMaxFileBytes = size_t{64} << 20;
 
 std::string framed(const std::string& bytes) {
-  ByteWriter out;
+  RowWriter out;
   out.bytes(kMagic).string(bytes);
   const uint64_t sum = checksum(out.view());
   return out.u64(sum).take();
 }
 
 std::optional<DurableMarker> unframed(absl::string_view slot) {
-  ByteReader in(slot);
+  RowReader in(slot);
   if (in.bytes(kMagic.size()) != kMagic) return std::nullopt;
   const absl::string_view bytes = in.bytes(in.u32());
   const size_t summed = slot.size() - in.rest().size();
@@ -42,7 +42,7 @@ absl::Status error(const std::string& folder, const rocksdb::Status& status) {
 }  // namespace
 
 std::string encode(const DurableMarker& durable_marker) {
-  ByteWriter out;
+  RowWriter out;
   out.u64(durable_marker.write_number)
       .u8(durable_marker.closed ? 1 : 0)
       .u64(durable_marker.catalogue)
@@ -62,7 +62,7 @@ std::string encode(const DurableMarker& durable_marker) {
 }
 
 std::optional<DurableMarker> decode_durable_marker(absl::string_view bytes) {
-  ByteReader in(bytes);
+  RowReader in(bytes);
   DurableMarker found;
   found.write_number = in.u64();
   found.closed = in.u8() != 0;

@@ -1,12 +1,13 @@
-// The durable marker: a small file, HIGH_WATER, beside the database. It records which data the database must contain:
-// the scenes, the last synced record of each, and the generation of the catalogue. So it reveals losses that RocksDB
-// does not detect, such as a truncated log. Invariant: it never names data that is not synced.
+// The durable marker: a small file, HIGH_WATER, beside the database. The marker records which data the database must
+// contain: the scenes, the last synced record of each scene, and the generation of the catalogue (the rows of scenes
+// and meshes). So it reveals losses that RocksDB does not detect, such as a truncated log. Invariant: the marker never
+// names data that is not synced.
 //
-// The file has two slots of equal size; ../rocksdb/FORMAT.md describes their bytes. Writes alternate between the slots,
-// in place; each carries an increasing write number and a checksum, so that a torn write leaves the other slot valid.
-// When a slot is too small, the whole file is replaced.
+// The file has two slots of equal size; ../rocksdb/FORMAT.md describes their bytes. Each write overwrites the slot with
+// the older marker, so a torn write leaves the other slot valid. A slot contains a write number, which each write
+// increments, and a checksum. If a slot is too small for the marker, the whole file is replaced.
 //
-// Threads: one thread at a time.
+// Threads: only one thread at a time may use a DurableMarkerFile.
 #ifndef LOCUS_SERVER_STORAGE_INTEGRITY_DURABLE_MARKER_H_
 #define LOCUS_SERVER_STORAGE_INTEGRITY_DURABLE_MARKER_H_
 
@@ -23,24 +24,24 @@
 
 namespace locus::server {
 
-// The minimum state of a scene that the database must contain.
+// Minimum state of a scene that the database must contain.
 struct SceneMarker {
   SceneKey scene = 0;
   std::string name;
-  uint64_t sequence = 0;          // last synced record
+  uint64_t sequence = 0;          // sequence number of the last synced record
   uint64_t running_checksum = 0;  // running checksum of record `sequence`
   uint64_t row_checksum = 0;      // checksum of the scene's row in the catalogue
-  bool copied = false;            // the directory is a copy made by back_up(), and the scene has no new epoch since
-  std::string damage;             // damage found by an earlier opening; kept until the scene is deleted or repaired
+  bool copied = false;            // true if back_up() made this directory and the scene still has the original's epoch
+  std::string damage;             // damage found by an opening; empty if intact; kept until deletion or repair
 };
 
 struct DurableMarker {
-  uint64_t write_number = 0;      // incremented by each write: the slot with the higher number is newer
-  bool closed = false;            // the log was closed in order: no write followed this marker
+  uint64_t write_number = 0;      // incremented by each write; the slot with the higher number is newer
+  bool closed = false;            // true after a clean shutdown: no write followed this marker
   uint64_t catalogue = 0;         // generation of the catalogue; 0 until the database is created
   SceneKey next_scene = 1;        // next free scene key
   uint64_t mesh_sum = 0;          // sum of the checksums of the catalogue's mesh rows
-  uint64_t flushed_sequence = 0;  // RocksDB sequence number up to which every write is covered by this marker
+  uint64_t flushed_sequence = 0;  // this marker covers every write up to this RocksDB sequence number
   std::string manifest;           // name of RocksDB's list of its files, the MANIFEST
   uint64_t manifest_bytes = 0;    // minimum length of the MANIFEST
   std::string catalogue_damage;   // damage of the catalogue found by an earlier opening
@@ -54,16 +55,17 @@ class DurableMarkerFile {
  public:
   static constexpr absl::string_view kName = "HIGH_WATER";
 
-  // Reads both slots of the file in `folder` and returns the newer valid one. NOT_FOUND if there is no file, DATA_LOSS
-  // if neither slot is valid, UNAVAILABLE for an error of the disk.
+  // Reads both slots of the file in `folder` and returns the marker of the valid slot with the higher write number.
+  // NOT_FOUND if there is no file, DATA_LOSS if neither slot is valid, UNAVAILABLE for an error of the disk.
   static absl::StatusOr<DurableMarker> read(rocksdb::Env& env, const std::string& folder);
 
   DurableMarkerFile(rocksdb::Env& env, std::string folder) : env_(env), folder_(std::move(folder)) {}
 
-  // Increments the write number, writes one slot and syncs it. Replaces the file instead on the first call, after an
-  // error, and if the marker does not fit into a slot.
+  // Increments the write number, writes one slot and syncs the file. On the first call, after an error, and if the
+  // marker does not fit into a slot, calls replace() instead.
   absl::Status write(DurableMarker& durable_marker);
-  // Writes both slots of a new file and renames it into place, synced: no damage to a single slot can undo this write.
+  // Writes `durable_marker` into both slots of a new file, syncs the file and renames it to HIGH_WATER. So damage to
+  // one slot cannot bring back an older marker.
   absl::Status replace(DurableMarker& durable_marker);
 
  private:

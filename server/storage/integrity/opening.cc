@@ -11,9 +11,9 @@
 #include "core/base/check.h"
 #include "core/base/refusal.h"
 #include "core/base/status_macros.h"
-#include "server/storage/rocksdb/bytes.h"
 #include "server/storage/rocksdb/errors.h"
 #include "server/storage/rocksdb/reading.h"
+#include "server/storage/rocksdb/row_codec.h"
 
 namespace locus::server {
 namespace {
@@ -39,8 +39,8 @@ std::vector<std::string> files_in(rocksdb::Env& env, const std::string& folder) 
   return names;
 }
 
-// Syncs RocksDB's log files. A killed process may have left records in the page cache only; this process will read and
-// serve them, so they must be on the disk first.
+// Syncs RocksDB's log files. A killed process may have left records in the page cache only. This process will read and
+// serve such records, so they must be on the disk first.
 rocksdb::Status sync_logs(rocksdb::Env& env, const std::string& folder) {
   rocksdb::Status status;
   for (const std::string& name : files_in(env, folder)) {
@@ -60,7 +60,7 @@ absl::Status make_folder(rocksdb::Env& env, const std::string& path) {
   return status.ok() ? absl::OkStatus() : disk_error(absl::StrCat("making the data directory ", path), status);
 }
 
-// Returns whether the directory has no database, or one whose creation was interrupted.
+// Returns whether the directory has no database, or a database whose creation was interrupted.
 absl::StatusOr<bool> is_new(const StorageOptions& options, const absl::StatusOr<DurableMarker>& durable_marker) {
   if (durable_marker.ok()) return durable_marker->catalogue == 0;
   if (!absl::IsNotFound(durable_marker.status())) return false;
@@ -72,8 +72,8 @@ absl::StatusOr<bool> is_new(const StorageOptions& options, const absl::StatusOr<
 }
 
 absl::Status create_database(const StorageOptions& options, OpenedDirectory& opened) {
-  // Write a marker of generation 0 first. If creating the database is interrupted, the next opening then creates it
-  // again.
+  // Write a marker of generation 0 first. If the creation of the database is interrupted, the next opening creates the
+  // database again.
   RETURN_IF_ERROR(opened.durable_marker_file->replace(opened.durable_marker));
   const DatabaseOptions wanted = database_options_of(options);
   rocksdb::Status status = Database::open(wanted, OpenMode::kCreate, opened.database);
@@ -81,8 +81,7 @@ absl::Status create_database(const StorageOptions& options, OpenedDirectory& ope
   Database& database = *opened.database;
   const Catalogue catalogue(Catalogue::Rows(), 0, 1);
   rocksdb::WriteBatch batch;
-  status =
-      batch.Put(database.meta(), slice_of(kFormatKey), with_checksum(kFormatKey, ByteWriter().u32(kFormat).view()));
+  status = batch.Put(database.meta(), slice_of(kFormatKey), with_checksum(kFormatKey, RowWriter().u32(kFormat).view()));
   if (!status.ok()) return disk_error("the format", status);
   catalogue.add_to(batch, database.meta(), CatalogueChange());
   RETURN_IF_ERROR(database.write(batch, true));
@@ -128,8 +127,8 @@ absl::Status verify_and_record(const Database& database, const DurableMarker* ex
   return opened.durable_marker_file->replace(opened.durable_marker);
 }
 
-// Opens a database that a strict opening refused for `why`. First verifies it read-only and records the damage; then
-// opens it leniently, which drops its unreadable parts for good.
+// Opens a database that OpenMode::kStrict refused with the status `why`. First opens it read-only, verifies it and
+// records the damage in the durable marker; then opens it with OpenMode::kLenient, which deletes the unreadable parts.
 absl::Status open_damaged(const StorageOptions& options, const rocksdb::Status& why, const DurableMarker* expected,
                           OpenedDirectory& opened) {
   const DatabaseOptions wanted = database_options_of(options);
@@ -141,8 +140,8 @@ absl::Status open_damaged(const StorageOptions& options, const rocksdb::Status& 
   }
   rocksdb::Status status = Database::open(wanted, OpenMode::kLenient, opened.database);
   if (!status.ok()) return unopenable(options, status.ToString());
-  // The lenient opening has removed a damaged log, so a strict opening may succeed now. A strict database is preferred:
-  // it stops at errors of the disk, and recover() resumes it.
+  // The lenient opening has removed a damaged log, so a strict opening may succeed now. Prefer a strict opening,
+  // because then RocksDB stops writing at a disk error, and recover() resumes it.
   opened.database = nullptr;
   if (Database::open(wanted, OpenMode::kStrict, opened.database).ok()) return absl::OkStatus();
   status = Database::open(wanted, OpenMode::kLenient, opened.database);
@@ -156,7 +155,7 @@ absl::StatusOr<std::unique_ptr<DirectoryLock>> DirectoryLock::acquire(rocksdb::E
   const rocksdb::Status status = env.LockFile(absl::StrCat(path, "/", kName), &lock);
   if (status.ok()) return std::unique_ptr<DirectoryLock>(new DirectoryLock(env, lock));
   const std::string message = status.ToString();
-  // These are RocksDB's messages for a lock held by another process and for one held by this process.
+  // RocksDB's messages if another process holds the lock, and if this process holds it.
   if (absl::StrContains(message, "Resource temporarily unavailable") || absl::StrContains(message, "lock hold")) {
     Refusal refusal;
     refusal.reason = Reason::kInUse;

@@ -1,6 +1,6 @@
-// Opens a data directory: creates a new one, opens and verifies an intact one, and salvages the readable part of a
-// damaged one. Damage is recorded in the durable marker before any other file changes, so that every later opening
-// reports it again. README.md one folder up draws the order. Free functions; any thread.
+// Opens a data directory: creates a missing directory, verifies an intact one, and keeps the readable part of a damaged
+// one. Damage is recorded in the durable marker before any other file changes, so that every later opening reports the
+// damage again. The diagram in server/storage/README.md shows the order of the steps. Free functions; any thread.
 #ifndef LOCUS_SERVER_STORAGE_INTEGRITY_OPENING_H_
 #define LOCUS_SERVER_STORAGE_INTEGRITY_OPENING_H_
 
@@ -21,7 +21,7 @@ class DirectoryLock {
  public:
   static constexpr absl::string_view kName = "IN_USE";
 
-  // Acquires the lock. FAILED_PRECONDITION if another process, or this one, already holds it.
+  // Acquires the lock. FAILED_PRECONDITION if any process, including this one, already holds the lock.
   static absl::StatusOr<std::unique_ptr<DirectoryLock>> acquire(rocksdb::Env& env, const std::string& path);
   ~DirectoryLock();
   DirectoryLock(const DirectoryLock&) = delete;
@@ -42,24 +42,26 @@ struct OpenedDirectory {
   DamageReport damage_report;
 };
 
-// Returns `options` with defaults filled in: the file system, and a disk reserve and a log buffer that fit the size of
-// the disk.
+// Returns `options` with defaults filled in: the file system if it is null, the disk reserve if it has no value, and
+// the log buffer bounded by a share of the disk's size.
 StorageOptions with_defaults(StorageOptions options);
 DatabaseOptions database_options_of(const StorageOptions& options);
 
-// Opens and verifies the directory. Precondition: `options` come from with_defaults(). Errors: those of
-// RocksdbLog::open().
+// Opens and verifies the directory. Precondition: `options` are a result of with_defaults(). Errors:
+// FAILED_PRECONDITION if a process has the directory open, its format is unknown or a repair was interrupted, DATA_LOSS
+// if it is too damaged to be opened, UNAVAILABLE or RESOURCE_EXHAUSTED for an error of the disk.
 absl::StatusOr<OpenedDirectory> open_directory(const StorageOptions& options);
 
-// Compares RocksDB's list of its files (the MANIFEST) with the durable marker. DATA_LOSS if the database is missing, or
-// if the MANIFEST is missing or shorter than the marker says.
+// Compares RocksDB's list of its files (the MANIFEST) with the durable marker. DATA_LOSS if the database is missing. If
+// the current MANIFEST has the name that the marker contains, also DATA_LOSS if the MANIFEST is missing or shorter than
+// the marker says. RocksDB starts a new MANIFEST at times; a MANIFEST of another name is not checked.
 absl::Status check_file_list(rocksdb::Env& env, const std::string& database_folder,
                              const DurableMarker& durable_marker);
 // Stores the current name and length of the MANIFEST in the durable marker.
 void describe_file_list(const Database& database, DurableMarker& durable_marker);
 
-// Folder in the data directory that exists only during a repair. An interrupted repair leaves it, so that it blocks
-// opening until the repair is run again.
+// Folder in the data directory that exists only during a repair. An interrupted repair leaves this folder behind, and
+// open_directory() then fails until the repair is run again.
 inline constexpr absl::string_view kRepairedFolder = "repaired";
 
 }  // namespace locus::server

@@ -10,9 +10,9 @@
 #include "core/base/status_macros.h"
 #include "server/storage/integrity/opening.h"
 #include "server/storage/integrity/scene_table.h"
-#include "server/storage/rocksdb/bytes.h"
 #include "server/storage/rocksdb/errors.h"
 #include "server/storage/rocksdb/reading.h"
+#include "server/storage/rocksdb/row_codec.h"
 
 namespace locus::server {
 namespace {
@@ -30,7 +30,7 @@ absl::Status move_if_exists(const fs::path& from, const fs::path& to) {
                 : absl::OkStatus();
 }
 
-// Writer of rows, records and chunks into the new database, in batches of kBatchBytes.
+// Writer of rows, records and chunks into the new database, in batches of about kBatchBytes.
 class Copier {
  public:
   explicit Copier(Database& target) : target_(target) {}
@@ -62,8 +62,8 @@ absl::Status copy_chunks(const Database& source, rocksdb::ColumnFamilyHandle* fr
   });
 }
 
-// Copies the scene's records up to the first damaged or missing one. Stores the position of the last copied record in
-// `last`.
+// Copies the scene's records before the first damaged or missing record. Stores the position of the last copied record
+// in `last`.
 absl::Status copy_records(const Database& source, const SceneRow& row, Position& last, Copier& copier) {
   absl::Status failed;
   last = {row.snapshot_sequence, row.running_checksum};
@@ -73,7 +73,7 @@ absl::Status copy_records(const Database& source, const SceneRow& row, Position&
         const std::string head = record_head(record.entry);
         last = {record.sequence, record_checksum(key, head, record.entry.bytes, last.running_checksum)};
         copier.put(copier.target().log(), key,
-                   absl::StrCat(head, record.entry.bytes, ByteWriter().u64(last.running_checksum).view()));
+                   absl::StrCat(head, record.entry.bytes, RowWriter().u64(last.running_checksum).view()));
         failed = copier.write_if_large();
         return failed;
       });
@@ -133,6 +133,15 @@ absl::Status copy_scene(const Database& source, const SceneHealth& found, const 
   return absl::OkStatus();
 }
 
+// Copies chunks of a mesh. If a chunk is damaged, returns DATA_LOSS and deletes the chunks that were already copied.
+absl::Status copy_mesh_chunks(const Database& source, const Sha256& sha256, const ContentRow& row, Copier& copier) {
+  rocksdb::ColumnFamilyHandle* const to = copier.target().mesh();
+  const std::string prefix = mesh_prefix(sha256, row.content_id);
+  absl::Status status = copy_chunks(source, source.mesh(), to, prefix, row.chunks, copier);
+  if (absl::IsDataLoss(status)) LOCUS_CHECK(copier.batch().DeleteRange(to, prefix, end_of(prefix)).ok());
+  return status;
+}
+
 absl::Status copy_mesh(const Database& source, const MeshHealth& found, Copier& copier, Result& result,
                        RepairReport& report) {
   const std::string content = content_key(found.sha256);
@@ -140,19 +149,23 @@ absl::Status copy_mesh(const Database& source, const MeshHealth& found, Copier& 
   if (result.rows.contains(content)) {
     status = absl::OkStatus();
   } else if (found.content.content_id != 0) {
-    status = copy_chunks(source, source.mesh(), copier.target().mesh(),
-                         mesh_prefix(found.sha256, found.content.content_id), found.content.chunks, copier);
+    status = copy_mesh_chunks(source, found.sha256, found.content, copier);
   }
-  if (status.ok() && found.parts)
-    status = copy_chunks(source, source.mesh(), copier.target().mesh(),
-                         mesh_prefix(found.sha256, found.parts->content_id), found.parts->chunks, copier);
   if (!status.ok() && !absl::IsDataLoss(status)) return status;
+  MeshRepair repaired{found.name, found.damage, !status.ok(), false};
   if (status.ok()) {
+    MeshRow row{found.sha256, found.parts};
+    absl::Status parts = row.parts ? copy_mesh_chunks(source, row.sha256, *row.parts, copier) : absl::OkStatus();
+    if (!parts.ok() && !absl::IsDataLoss(parts)) return parts;
+    repaired.parts_dropped = !parts.ok();
+    // If the parts are damaged, store the mesh without parts: a row without `parts` means that the content's chunks
+    // include the parts, but this content was stored without any.
+    if (repaired.parts_dropped) row.parts = std::nullopt;
     put_row(content, with_checksum(content, encode(found.content)), result, copier);
     const std::string key = mesh_key(found.name);
-    put_row(key, with_checksum(key, encode(MeshRow{found.sha256, found.parts})), result, copier);
+    put_row(key, with_checksum(key, encode(row)), result, copier);
   }
-  if (!found.damage.empty()) report.meshes.push_back({found.name, found.damage, !status.ok()});
+  if (!found.damage.empty()) report.meshes.push_back(std::move(repaired));
   return absl::OkStatus();
 }
 
@@ -178,7 +191,7 @@ absl::Status make_copy(const Database& source, const DamageReport& damage_report
   const uint64_t generation = std::max(expected == nullptr ? 0 : expected->catalogue,
                                        damage_report.catalogue ? damage_report.catalogue->generation : 0);
   const Catalogue catalogue(result.rows, generation, durable_marker.next_scene);
-  copier.put(target->meta(), std::string(kFormatKey), with_checksum(kFormatKey, ByteWriter().u32(kFormat).view()));
+  copier.put(target->meta(), std::string(kFormatKey), with_checksum(kFormatKey, RowWriter().u32(kFormat).view()));
   catalogue.add_to(copier.batch(), target->meta(), CatalogueChange());
   RETURN_IF_ERROR(copier.write(true));
   durable_marker.catalogue = generation + 1;
@@ -189,9 +202,9 @@ absl::Status make_copy(const Database& source, const DamageReport& damage_report
   return DurableMarkerFile(*options.env, folder).replace(durable_marker);
 }
 
-// Moves the old database and marker into before-repair-N and the repaired ones into their place. Called once
-// repaired/READY exists, which is the commit point of a repair: from then on a restart only repeats these moves, and
-// skips those that were done before.
+// Moves the old database and marker into the folder before-repair-N, and the new database and marker from repaired/ to
+// their place. Precondition: repaired/READY, which contains the path of before-repair-N, exists. Writing READY is the
+// commit point of a repair: after a later crash, the next call of repair() only does the moves that are still missing.
 absl::Status install_repaired(const StorageOptions& options, std::string& kept_at) {
   rocksdb::Env& env = *options.env;
   const fs::path here = options.path;
@@ -251,6 +264,19 @@ absl::StatusOr<std::unique_ptr<Database>> open_source(const StorageOptions& opti
   return database;
 }
 
+std::string outcome_of(const SceneRepair& scene) {
+  if (scene.deleted) return "had been deleted and is deleted again: nothing is lost";
+  if (scene.dropped) return "LOST: no part of it could be kept";
+  const std::string kept = absl::StrCat("kept up to record ", scene.kept_to, ", with a new epoch");
+  if (scene.lost_from == 0) return absl::StrCat(kept, "; no lost record is known");
+  return absl::StrCat(kept, "; LOST: records ", scene.lost_from, " to ", scene.lost_to);
+}
+
+std::string outcome_of(const MeshRepair& mesh) {
+  if (mesh.dropped) return "LOST";
+  return mesh.parts_dropped ? "kept; LOST: the names of its parts" : "kept";
+}
+
 }  // namespace
 
 absl::StatusOr<RepairReport> repair(const StorageOptions& given) {
@@ -289,6 +315,17 @@ absl::StatusOr<RepairReport> repair(const StorageOptions& given) {
   report.changed = true;
   RETURN_IF_ERROR(install_repaired(options, report.kept_at));
   return report;
+}
+
+std::string to_text(const RepairReport& report) {
+  if (!report.changed) return "all is intact: no file was changed\n";
+  std::string text;
+  for (const SceneRepair& scene : report.scenes)
+    absl::StrAppend(&text, "scene ", scene.name, ": ", scene.damage, "; ", outcome_of(scene), "\n");
+  for (const MeshRepair& mesh : report.meshes)
+    absl::StrAppend(&text, "mesh ", mesh.name, ": ", mesh.damage, "; ", outcome_of(mesh), "\n");
+  absl::StrAppend(&text, "the old database is in ", report.kept_at, "; remove it when it is no longer needed\n");
+  return text;
 }
 
 }  // namespace locus::server

@@ -1,5 +1,5 @@
 // Repairs a damaged data directory for `locusd repair`: copies every intact part into a new database and moves the old
-// one, unchanged, into the folder before-repair-N. Free functions; any thread.
+// database, unchanged, into the folder before-repair-N. Free functions; any thread.
 #ifndef LOCUS_SERVER_STORAGE_INTEGRITY_REPAIR_H_
 #define LOCUS_SERVER_STORAGE_INTEGRITY_REPAIR_H_
 
@@ -18,32 +18,37 @@ struct SceneRepair {
   SceneKey key = 0;
   std::string name;
   std::string damage;
-  bool dropped = false;    // no part of the scene could be kept
+  bool dropped = false;    // no part of the scene was kept
   bool deleted = false;    // the scene had been deleted, reappeared, and is deleted again: nothing is lost
-  uint64_t kept_to = 0;    // last record that was kept
-  uint64_t lost_from = 0;  // first lost record; 0 = no lost record is known
+  uint64_t kept_to = 0;    // sequence number of the last record that was kept
+  uint64_t lost_from = 0;  // sequence number of the first lost record; 0 if no lost record is known
   uint64_t lost_to = 0;
-  uint64_t epoch = 0;  // epoch from now on; it differs from the old one because readers may have seen lost records
+  uint64_t epoch = 0;  // epoch after the repair; a new epoch, because readers may have seen lost records
 };
 
 struct MeshRepair {
   std::string name;
   std::string damage;
   bool dropped = false;
+  bool parts_dropped = false;  // the mesh is kept, but without the names of its parts
 };
 
 struct RepairReport {
   DirectoryReport found;            // state found before the repair
-  bool changed = false;             // false: everything was intact, no file was changed
+  bool changed = false;             // whether files were changed; false if everything was intact
   std::vector<SceneRepair> scenes;  // damaged scenes only
   std::vector<MeshRepair> meshes;   // damaged meshes only
   std::string kept_at;              // folder to which the old database was moved
 };
 
-// Repairs the directory, which no process may have open. Needs disk space for a copy of the intact part. After an error
-// or a crash the directory is either unchanged, or the next repair finishes this one. Errors: those of check(), and
-// RESOURCE_EXHAUSTED.
+// Repairs the directory. Needs disk space for a copy of the intact part. After an error or a crash the directory is
+// either unchanged, or the next call of repair() finishes this repair. Errors: NOT_FOUND if there is no data directory,
+// FAILED_PRECONDITION if a process has the directory open or this version of locusd does not know its format, DATA_LOSS
+// if no part is readable, RESOURCE_EXHAUSTED if the disk is full, UNAVAILABLE if the disk fails otherwise.
 absl::StatusOr<RepairReport> repair(const StorageOptions& options);
+
+// Returns the report as text for people, with one line for each damaged scene and mesh.
+std::string to_text(const RepairReport& report);
 
 }  // namespace locus::server
 

@@ -21,7 +21,7 @@ absl::Status not_found(SceneKey scene) {
 void SceneTable::add(SceneLogStatePtr scene) {
   LOCUS_DCHECK(scene != nullptr);
   MutexLock lock(mutex_);
-  check_invariants(*scene);
+  LOCUS_DCHECK_CALL(check_invariants(*scene));
   scenes_[scene->key] = std::move(scene);
 }
 
@@ -78,7 +78,7 @@ void SceneTable::end_append(SceneLogState& scene, Position written, bool synced)
   scene.written = written;
   scene.possibly_written_end = 0;
   if (synced) scene.synced = written;
-  check_invariants(scene);
+  LOCUS_DCHECK_CALL(check_invariants(scene));
 }
 
 void SceneTable::fail_append(SceneLogState& scene, uint64_t last) {
@@ -101,7 +101,7 @@ void SceneTable::mark_synced(const std::vector<std::pair<SceneLogStatePtr, Posit
   MutexLock lock(mutex_);
   for (const auto& [scene, position] : positions) {
     if (scene->synced.sequence < position.sequence) scene->synced = position;
-    check_invariants(*scene);
+    LOCUS_DCHECK_CALL(check_invariants(*scene));
   }
 }
 
@@ -118,7 +118,7 @@ void SceneTable::set_row(SceneLogState& scene, const SceneRow& row, uint64_t row
   scene.row_checksum = row_checksum;
   // The snapshot is synced and contains all records up to snapshot_sequence.
   if (scene.synced.sequence < row.snapshot_sequence) scene.synced = {row.snapshot_sequence, row.running_checksum};
-  check_invariants(scene);
+  LOCUS_DCHECK_CALL(check_invariants(scene));
   totals_ = totals;
 }
 
@@ -140,7 +140,8 @@ void SceneTable::fill_marker(uint64_t database_sequence, DurableMarker& durable_
   durable_marker.scene_markers.clear();
   bool all_synced = true;
   for (const auto& [key, scene] : scenes_) {
-    // The marker must not cover the writes of an append in progress, which come after append_began_at.
+    // The marker must not cover the writes of an append in progress, whose RocksDB sequence numbers follow
+    // append_began_at.
     if (scene->append_began_at) database_sequence = std::min(database_sequence, *scene->append_began_at);
     all_synced = all_synced && scene->synced.sequence == scene->written.sequence;
     SceneMarker& scene_marker = durable_marker.scene_markers.emplace_back();
@@ -156,11 +157,9 @@ void SceneTable::fill_marker(uint64_t database_sequence, DurableMarker& durable_
 }
 
 void SceneTable::check_invariants(const SceneLogState& scene) const {
-  if constexpr (kDebugChecks) {
-    LOCUS_CHECK_LE(scene.synced.sequence, scene.written.sequence);
-    if (scene.synced.sequence == scene.written.sequence)
-      LOCUS_CHECK_EQ(scene.synced.running_checksum, scene.written.running_checksum);
-  }
+  LOCUS_CHECK_LE(scene.synced.sequence, scene.written.sequence);
+  if (scene.synced.sequence == scene.written.sequence)
+    LOCUS_CHECK_EQ(scene.synced.running_checksum, scene.written.running_checksum);
 }
 
 }  // namespace locus::server

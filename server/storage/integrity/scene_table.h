@@ -1,9 +1,9 @@
-// Table of the scenes' logs: the last written and the last synced record of each. The durable marker is filled from
-// this table.
+// Table of the scenes' logs: the last written and the last synced record of each scene. fill_marker() copies this data
+// into the durable marker.
 //
 // Threads: every member may be called from any thread; the table's lock is held briefly, never during disk I/O.
-// Invariants: `synced` is never after `written`, and neither decreases; so fill_marker() names only data that is
-// already synced.
+// Invariants: a scene's `synced` position is never after its `written` position, and neither position decreases.
+// Therefore fill_marker() names only data that is already synced.
 #ifndef LOCUS_SERVER_STORAGE_INTEGRITY_SCENE_TABLE_H_
 #define LOCUS_SERVER_STORAGE_INTEGRITY_SCENE_TABLE_H_
 
@@ -40,13 +40,14 @@ struct SceneLogState {
   bool copied = false;
   Position written;
   Position synced;
-  // Sequence number of the last record of failed appends. The records after `written` up to this one may still be in
-  // RocksDB's log and reappear, so the next append overwrites or deletes them.
+  // Sequence number of the last record of failed appends; 0 if no append failed since the last successful one. Records
+  // after `written` up to this number may still be in RocksDB's log and reappear after a restart, so the next append
+  // overwrites or deletes them.
   uint64_t possibly_written_end = 0;
-  // Last sequence number that RocksDB had used before the append in progress; nothing if there is none.
+  // Last sequence number that RocksDB had used before the append in progress; no value if no append is in progress.
   std::optional<uint64_t> append_began_at;
   bool deleted = false;
-  Mutex writing;  // held during a whole append, so that writes to a scene never overtake each other
+  Mutex writing;  // held during a whole append, so that records are written in the order of their sequence numbers
 };
 
 using SceneLogStatePtr = std::shared_ptr<SceneLogState>;
@@ -59,23 +60,26 @@ class SceneTable {
   };
 
   void add(SceneLogStatePtr scene) LOCUS_EXCLUDES(mutex_);
-  // Returns the scene. NOT_FOUND if it is unknown; if the scene is damaged, the status that describes the damage.
+  // Returns the scene. NOT_FOUND if the table has no such scene; if the scene is damaged, the status that describes the
+  // damage.
   absl::StatusOr<SceneLogStatePtr> find(SceneKey scene) const LOCUS_EXCLUDES(mutex_);
-  // Returns the scene even if it is damaged; null if it is unknown.
+  // Returns the scene even if it is damaged; null if the table has no such scene.
   SceneLogStatePtr find_any(SceneKey scene) const LOCUS_EXCLUDES(mutex_);
   bool has_name(absl::string_view name) const LOCUS_EXCLUDES(mutex_);
   size_t size() const LOCUS_EXCLUDES(mutex_);
   uint64_t last_of(const SceneLogState& scene) const LOCUS_EXCLUDES(mutex_);
 
-  // Begins an append and returns the position after which it writes. The caller must hold `scene.writing` from before
-  // this call until end_append() or fail_append() has returned. `database_sequence` is RocksDB's last sequence number
-  // now. FAILED_PRECONDITION if the scene's epoch is not `epoch`, NOT_FOUND if the scene was deleted.
+  // Begins an append. Returns the position of the scene's last record, which the append's records follow. The caller
+  // must hold `scene.writing` from before this call until end_append() or fail_append() has returned.
+  // `database_sequence` is RocksDB's current last sequence number. FAILED_PRECONDITION if the scene's epoch is not
+  // `epoch`, NOT_FOUND if the scene was deleted.
   absl::StatusOr<Start> begin_append(SceneLogState& scene, uint64_t epoch, uint64_t database_sequence)
       LOCUS_EXCLUDES(mutex_);
-  // Ends an append that succeeded. `written` is the position of its last record; `synced` says whether that record is
-  // synced.
+  // Ends an append that succeeded. `written` is the position of the append's last record; `synced` says whether that
+  // record is synced.
   void end_append(SceneLogState& scene, Position written, bool synced) LOCUS_EXCLUDES(mutex_);
-  // Ends an append that failed. Its records, up to sequence number `last`, may still be in RocksDB's log.
+  // Ends an append that failed. `last` is the sequence number of its last record. Its records may still be in RocksDB's
+  // log.
   void fail_append(SceneLogState& scene, uint64_t last) LOCUS_EXCLUDES(mutex_);
 
   // Returns the last written position of each scene. Call it before a sync, and pass the result to mark_synced() after
@@ -83,7 +87,8 @@ class SceneTable {
   std::vector<std::pair<SceneLogStatePtr, Position>> written() const LOCUS_EXCLUDES(mutex_);
   void mark_synced(const std::vector<std::pair<SceneLogStatePtr, Position>>& positions) LOCUS_EXCLUDES(mutex_);
 
-  // Record a synced change of the catalogue: its new totals, and the changed row of a scene or the removal of a scene.
+  // Record a synced change of the catalogue. These three functions store the catalogue's new totals; set_row() also
+  // stores data of a scene's changed row, and remove() removes a scene.
   void set_catalogue(const CatalogueRow& totals) LOCUS_EXCLUDES(mutex_);
   void set_row(SceneLogState& scene, const SceneRow& row, uint64_t row_checksum, const CatalogueRow& totals)
       LOCUS_EXCLUDES(mutex_);

@@ -7,9 +7,9 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/status_macros.h"
-#include "server/storage/rocksdb/bytes.h"
 #include "server/storage/rocksdb/errors.h"
 #include "server/storage/rocksdb/reading.h"
+#include "server/storage/rocksdb/row_codec.h"
 
 namespace locus::server {
 namespace {
@@ -18,9 +18,10 @@ constexpr absl::string_view kNoMarker = "HIGH_WATER is missing or unreadable, so
 
 // Result of comparing the catalogue in the database with the durable marker.
 struct CatalogueState {
-  bool intact = false;         // not older than the marker, and its rows match its own sums
-  bool newer = false;          // changed after the marker was written
-  bool meshes_intact = false;  // its mesh rows match the sum that the newer of catalogue and marker has
+  bool intact = false;  // the catalogue is not older than the marker, and its rows match the sums stored in it
+  bool newer = false;   // the catalogue was changed after the marker was written
+  // The mesh rows match the mesh sum that is stored in the catalogue or in the marker, whichever is newer.
+  bool meshes_intact = false;
 };
 
 std::string count_of(uint64_t count, absl::string_view thing) {
@@ -34,7 +35,7 @@ absl::Status read_meta(const Database& database, DamageReport& found) {
     const std::optional<absl::string_view> bytes = verified(key, view_of(at->value()));
     if (!bytes || key == kFamilyMark) continue;
     if (key == kFormatKey) {
-      const uint32_t format = ByteReader(*bytes).u32();
+      const uint32_t format = RowReader(*bytes).u32();
       if (format < kOldestFormat || format > kFormat)
         return absl::FailedPreconditionError(absl::StrCat("the data directory has format ", format,
                                                           ", of another version of locusd; this one knows formats ",
@@ -49,7 +50,8 @@ absl::Status read_meta(const Database& database, DamageReport& found) {
       found.rows.emplace(key, view_of(at->value()));
     }
   }
-  // Rows after an unreadable block count as lost. They are reported because sums and durable marker no longer match.
+  // Rows after an unreadable block count as lost. The caller detects the loss, because the remaining rows do not match
+  // the catalogue's sums or the durable marker.
   if (at->status().ok() || is_damage(at->status())) return absl::OkStatus();
   return read_error("reading the catalogue", at->status());
 }
@@ -109,7 +111,7 @@ std::string log_damage(SceneHealth& scene, const SceneMarker* scene_marker, cons
   return "";
 }
 
-// Reads every byte of the scene's snapshot and records. Returns a description of the damage, empty if there is none.
+// Reads every byte of the scene's snapshot and records. Returns a description of the damage; empty if all are intact.
 std::string deep_damage(const SceneHealth& scene, const Database& database, absl::Status& disk) {
   const SceneRow& row = *scene.row;
   const auto discard = [](absl::string_view) { return absl::OkStatus(); };

@@ -1,5 +1,5 @@
-// Verifies the contents of a data directory: every scene and mesh by sequence numbers, checksums and the durable
-// marker. Does not rely on RocksDB to detect damage. Free functions; any thread.
+// Verifies every scene and mesh of a data directory by its sequence numbers, its checksums and the durable marker. Does
+// not rely on RocksDB to detect damage. Free functions; any thread.
 #ifndef LOCUS_SERVER_STORAGE_INTEGRITY_VERIFY_H_
 #define LOCUS_SERVER_STORAGE_INTEGRITY_VERIFY_H_
 
@@ -19,13 +19,13 @@ namespace locus::server {
 struct SceneHealth {
   SceneKey key = 0;
   std::string name;
-  std::optional<SceneRow> row;  // nothing if the scene's row is lost
+  std::optional<SceneRow> row;  // no value if the scene's row is lost
   uint64_t row_checksum = 0;
-  uint64_t last = 0;              // last record before the first missing one
+  uint64_t last = 0;              // sequence number of the last record before the first missing record
   uint64_t running_checksum = 0;  // checksum of record `last`
   uint64_t log_bytes = 0;
-  uint64_t expected_sequence = 0;  // last record that must exist
-  bool copied = false;             // SceneMarker::copied
+  uint64_t expected_sequence = 0;  // sequence number of the last record that must exist
+  bool copied = false;             // true if back_up() made this directory and the scene still has the original's epoch
   std::string damage;              // description of the damage; empty if the scene is intact
 };
 
@@ -33,7 +33,7 @@ struct MeshHealth {
   std::string name;
   Sha256 sha256 = {};
   ContentRow content;
-  std::optional<ContentRow> parts;  // nothing in format 1, which stores the parts with the content
+  std::optional<ContentRow> parts;  // no value in format 1, where the content's chunks include the parts
   std::string damage;
 };
 
@@ -42,9 +42,11 @@ struct DamageReport {
   uint32_t format = kFormat;
   Catalogue::Rows rows;  // every row with a correct checksum
   std::optional<CatalogueRow> catalogue;
-  std::vector<SceneHealth> scenes;   // scenes of the catalogue and of the durable marker, sorted by key
-  std::vector<MeshHealth> meshes;    // sorted by name
-  std::string catalogue_damage;      // set if names may be missing or deleted ones present; then all meshes are damaged
+  std::vector<SceneHealth> scenes;  // scenes of the catalogue and of the durable marker, sorted by key
+  std::vector<MeshHealth> meshes;   // sorted by name
+  // If not empty, the reason why the catalogue may lack rows, or may contain rows that were deleted. All meshes then
+  // count as damaged.
+  std::string catalogue_damage;
   std::vector<std::string> pending;  // keys of unfinished snapshots and meshes
 };
 
@@ -52,8 +54,9 @@ struct DamageReport {
 // records.
 enum class Depth : uint8_t { kKeys, kEverything };
 
-// Verifies the database against the durable marker. `durable_marker` is null if the marker is lost; then everything
-// counts as damaged. Errors: UNAVAILABLE if the disk fails, FAILED_PRECONDITION for a format of another version.
+// Verifies the database against the durable marker. `durable_marker` is null if the marker is lost; then all scenes and
+// meshes count as damaged. Errors: UNAVAILABLE if the disk fails, FAILED_PRECONDITION if this version of locusd does
+// not know the directory's format.
 absl::StatusOr<DamageReport> verify(const Database& database, const DurableMarker* durable_marker, Depth depth);
 
 // Returns advice on how to repair the data directory `path`, to be appended to an error message about damage.

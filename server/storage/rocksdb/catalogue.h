@@ -1,11 +1,11 @@
-// The catalogue: the rows of all scenes and meshes. They are stored in the column family meta. This class keeps a copy
-// in memory, with the sums of the rows' checksums; the sums reveal a row that was lost, changed or restored from an
-// earlier time. A change is one write batch and increments the catalogue's generation.
+// The catalogue: the rows of all scenes and meshes, which RocksDB stores in the column family meta. This class keeps a
+// copy of the rows in memory, with the sums of their checksums; the sums reveal a row that was lost, changed or
+// restored from an earlier time. Each change is one write batch and increments the catalogue's generation.
 //
-// A batch that failed may still be in RocksDB's log and reappear after a restart. Therefore the next change rewrites
-// every row that a failed change touched.
+// A batch whose write failed may still be in RocksDB's log and reappear after a restart. Therefore the next change
+// rewrites every row that a failed change contained.
 //
-// Threads: one thread at a time.
+// Threads: only one thread at a time may use a Catalogue.
 #ifndef LOCUS_SERVER_STORAGE_ROCKSDB_CATALOGUE_H_
 #define LOCUS_SERVER_STORAGE_ROCKSDB_CATALOGUE_H_
 
@@ -21,37 +21,39 @@
 
 namespace locus::server {
 
-// Change of the catalogue: rows to put or, without a value, to delete. Values have no checksum yet.
+// Change of the catalogue. A row with a value is stored; a row without a value is deleted. The values do not include
+// the checksum, which add_to() appends.
 struct CatalogueChange {
   struct Row {
     std::string key;
     std::optional<std::string> value;
   };
   std::vector<Row> rows;
-  SceneKey next_scene = 0;  // 0 = unchanged
+  SceneKey next_scene = 0;  // next free scene key after the change; 0 = unchanged
 };
 
 class Catalogue {
  public:
-  // Rows by key. Each value ends with its checksum.
+  // Rows by key. Each value ends with the row's checksum.
   using Rows = std::map<std::string, std::string, std::less<>>;
 
   Catalogue() = default;
-  // Constructs the catalogue from the rows that were read from the disk.
+  // Constructs the catalogue from the rows that were read from the disk. `next_scene` is the next free scene key.
   Catalogue(Rows rows, uint64_t generation, SceneKey next_scene);
 
   const CatalogueRow& totals() const { return totals_; }
   const Rows& rows() const { return rows_; }
-  // Returns the value of a row without its checksum, nothing if there is no such row.
+  // Returns the value of the row `key` without the checksum; no value if the catalogue has no such row.
   std::optional<absl::string_view> find(absl::string_view key) const;
 
-  // Adds to `batch` the rows of `change`, the current state of every row that a failed change touched, and the new
-  // totals. The caller writes the batch and then calls apply(change) if that succeeded, otherwise fail(change).
+  // Adds to `batch`, in the column family `meta`, the rows of `change`, the current state of every row that a failed
+  // change contained, and the new totals. The caller writes the batch, then calls apply(change) if the write succeeded
+  // and fail(change) otherwise.
   void add_to(rocksdb::WriteBatch& batch, rocksdb::ColumnFamilyHandle* meta, const CatalogueChange& change) const;
   void apply(const CatalogueChange& change);
   void fail(const CatalogueChange& change);
 
-  // Adds the checksums of `rows` to the two sums in `totals`.
+  // Adds the checksums of `rows` to `totals.scene_sum` or `totals.mesh_sum`.
   static void add_sums(const Rows& rows, CatalogueRow& totals);
 
  private:
@@ -61,7 +63,7 @@ class Catalogue {
 
   Rows rows_;
   CatalogueRow totals_;
-  std::set<std::string, std::less<>> possibly_written_;  // keys of failed changes, which may be on the disk
+  std::set<std::string, std::less<>> possibly_written_;  // keys of rows in failed changes, which may be on the disk
 };
 
 }  // namespace locus::server

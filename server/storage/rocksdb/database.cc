@@ -14,21 +14,22 @@
 namespace locus::server {
 namespace {
 
-constexpr uint64_t kTableBytes = uint64_t{32} << 20;  // memory table of a family of chunks
-constexpr uint64_t kMetaBytes = uint64_t{4} << 20;    // memory table of meta
+constexpr uint64_t kTableBytes = uint64_t{32} << 20;  // size of the memory table of snapshot and of mesh
+constexpr uint64_t kMetaBytes = uint64_t{4} << 20;    // size of the memory table of meta
 constexpr size_t kBlockBytes = size_t{64} << 10;
 constexpr size_t kCacheBytes = size_t{8} << 20;
 constexpr int kBuffers = 4;
-// Number of tables in level 0 from which on RocksDB merges them, and the number at which it would stall writers. The
-// latter is never reached, because stalling does not help here.
+// Numbers of tables in RocksDB's level 0. RocksDB merges the tables once there are kTablesToMerge of them. It would
+// stall writers once there are kUnlimitedTables, a number that is never reached; stalling does not help here.
 constexpr int kTablesToMerge = 4;
 constexpr int kUnlimitedTables = 1 << 20;
 constexpr uint64_t kManifestBytes = uint64_t{4} << 20;
 constexpr size_t kInfoLogBytes = size_t{1} << 20;
 constexpr uint64_t kLogBuffersOnDisk = 4;
+constexpr uint64_t kRecoveryBytes = uint64_t{1} << 20;  // disk space for recover(), without that of the memory tables
 constexpr auto kBufferPoll = std::chrono::milliseconds(1);
 
-// Logger that drops every message. For the read-only modes.
+// Logger that drops every message. The read-only modes use it, because they must not write a log file.
 class NoLogger final : public rocksdb::Logger {
  public:
   using rocksdb::Logger::Logv;
@@ -48,7 +49,7 @@ rocksdb::ColumnFamilyOptions family_options(uint64_t buffer_bytes, OpenMode mode
   options.level0_stop_writes_trigger = kUnlimitedTables;
   options.soft_pending_compaction_bytes_limit = 0;
   options.hard_pending_compaction_bytes_limit = 0;
-  // A compaction that meets an unreadable block would stop all writes.
+  // Do not compact a damaged database: if a compaction failed to read a damaged block, RocksDB would stop all writes.
   options.disable_auto_compactions = lenient(mode);
   rocksdb::BlockBasedTableOptions table;
   table.block_size = kBlockBytes;
@@ -60,8 +61,9 @@ rocksdb::ColumnFamilyOptions family_options(uint64_t buffer_bytes, OpenMode mode
 
 }  // namespace
 
-// Listener that makes every error of the disk recoverable, but only by recover(). Without it RocksDB would refuse
-// writes for the life of the process after some errors, and retry by itself every five seconds after the others.
+// Listener that lets recover(), and nothing else, resume the database after every disk error. Without this listener
+// RocksDB would refuse writes until the process ends (after severe errors) or retry by itself every five seconds (after
+// all other errors).
 class Database::ErrorWatch final : public rocksdb::EventListener {
  public:
   std::atomic<bool> seen = false;
@@ -81,15 +83,16 @@ rocksdb::DBOptions database_options(const DatabaseOptions& options, OpenMode mod
   found.create_if_missing = mode == OpenMode::kCreate;
   found.create_missing_column_families = mode == OpenMode::kCreate;
   found.paranoid_checks = !lenient(mode);
-  // RocksDB's default, point-in-time recovery, silently drops everything after the first unreadable record.
+  // RocksDB's default, point-in-time recovery, silently drops all records after the first unreadable one.
   found.wal_recovery_mode = lenient(mode) ? rocksdb::WALRecoveryMode::kSkipAnyCorruptedRecords
                                           : rocksdb::WALRecoveryMode::kTolerateCorruptedTailRecords;
-  // Keep the log after reading it, because flushing it into tables would double the time to the first query
-  // (open_directory() has synced it). Flush only a damaged log, so that its unreadable rest can be deleted.
+  // Keep the log files after reading them, because flushing their records into tables would double the time to the
+  // first query. Flushing is not needed for durability: open_directory() has synced the log files. Only kLenient
+  // flushes, so that RocksDB can delete a log file with an unreadable part.
   found.avoid_flush_during_recovery = mode != OpenMode::kLenient;
-  // RocksDB 7.8 could record in its manifest how far each log was synced (track_and_verify_wals_in_manifest). It stays
-  // off: a read-only open without that check, which is how a damaged directory is read, then ends the process by an
-  // assertion. The durable marker detects the same damage.
+  // Leave off the option track_and_verify_wals_in_manifest of RocksDB 7.8, which records in the MANIFEST how far each
+  // log was synced. After a database was opened with the option, opening it damaged, read-only and without the option
+  // ends the process by an assertion. The durable marker detects the same damage.
   found.max_total_wal_size = kLogBuffersOnDisk * options.log_buffer_bytes;
   found.max_manifest_file_size = kManifestBytes;
   found.info_log_level = rocksdb::InfoLogLevel::WARN_LEVEL;
@@ -98,7 +101,7 @@ rocksdb::DBOptions database_options(const DatabaseOptions& options, OpenMode mod
   found.stats_dump_period_sec = 0;
   found.stats_persist_period_sec = 0;
   found.skip_stats_update_on_db_open = true;
-  found.max_file_opening_threads = 1;  // the default starts 64 threads to open a few files
+  found.max_file_opening_threads = 1;  // the default starts many threads to open a few files
   if (read_only(mode)) found.info_log = std::make_shared<NoLogger>();
   return found;
 }
@@ -171,7 +174,8 @@ absl::Status Database::fail_writes(const rocksdb::Status& status) {
   return error_;
 }
 
-// Uses an empty synced write, because SyncWAL() aborts the process if another thread's write has just failed.
+// Uses an empty synced write instead of RocksDB's SyncWAL(), which aborts the process if another thread's write has
+// just failed.
 absl::Status Database::sync() {
   rocksdb::WriteBatch empty;
   return write(empty, true);
@@ -179,15 +183,21 @@ absl::Status Database::sync() {
 
 bool Database::needs_recovery() const { return broken_ || errors_->seen; }
 
-absl::Status Database::recover() {
+absl::Status Database::recover(uint64_t free_bytes) {
+  if (const uint64_t needed = buffered_bytes() + kRecoveryBytes; free_bytes < needed) {
+    absl::Status refusal = refuse_recovery(needed, free_bytes);
+    MutexLock lock(mutex_);
+    if (broken_) error_ = refusal;
+    return refusal;
+  }
   if (!broken_) fail_writes(rocksdb::Status::IOError("a table could not be written")).IgnoreError();
-  // RocksDB aborts the process on a write to a log file that failed before. Resume() accepts writes again before
-  // flush_to_new_log() replaces that file, so wait until all calls of write_now() have returned.
+  // RocksDB aborts the process if it writes to a log file in which an earlier write failed. After Resume() it accepts
+  // writes again, but only flush_to_new_log() replaces that file. So wait until all calls of write_now() have returned.
   while (writers_ > 0) std::this_thread::sleep_for(kBufferPoll);
   errors_->seen = false;
   rocksdb::Status status = db_->Resume();
-  // If the memory tables are empty, Resume() flushes nothing and keeps the log file that failed. flush_to_new_log()
-  // then fails too, but leaves a row in memory, so that the next recover() succeeds.
+  // If the memory tables are empty, Resume() flushes nothing and keeps the log file in which a write failed. Then
+  // flush_to_new_log() fails too, but leaves a row in the memory tables, so that the next call of recover() succeeds.
   if (status.ok()) status = flush_to_new_log();
   if (!status.ok()) {
     errors_->seen = true;
@@ -228,6 +238,11 @@ void Database::wait_for_buffers(rocksdb::ColumnFamilyHandle* family) const {
   while (!needs_recovery() && db_->GetIntProperty(family, rocksdb::DB::Properties::kNumImmutableMemTable, &waiting) &&
          waiting >= 2)
     std::this_thread::sleep_for(kBufferPoll);
+}
+
+uint64_t Database::block_cache_bytes() const {
+  uint64_t bytes = 0;
+  return db_->GetIntProperty(rocksdb::DB::Properties::kBlockCacheUsage, &bytes) ? bytes : 0;
 }
 
 uint64_t Database::buffered_bytes() const {

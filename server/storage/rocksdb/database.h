@@ -1,7 +1,8 @@
 // The RocksDB database in a data directory: its column families, its open modes, and writes. After the first failed
 // write every write fails until recover() succeeds.
 //
-// Threads: any thread may call any member; recover() one thread at a time, others may write meanwhile.
+// Threads: any thread may call any member, but only one thread at a time may call recover(). Other threads may call
+// write() meanwhile.
 #ifndef LOCUS_SERVER_STORAGE_ROCKSDB_DATABASE_H_
 #define LOCUS_SERVER_STORAGE_ROCKSDB_DATABASE_H_
 
@@ -28,19 +29,19 @@ inline constexpr absl::string_view kLogFamily = "log";
 enum class OpenMode : uint8_t {
   kCreate,           // creates the database
   kStrict,           // refuses damage, except a torn end of the write-ahead log
-  kLenient,          // reads every readable part and drops the rest for good
-  kReadOnly,         // kStrict without changing any file
-  kReadOnlyLenient,  // kLenient without changing any file
+  kLenient,          // opens a damaged database too: keeps the readable parts and deletes all other parts
+  kReadOnly,         // refuses damage like kStrict; changes no file
+  kReadOnlyLenient,  // reads the readable parts of a damaged database; changes no file
 };
 
 struct DatabaseOptions {
   rocksdb::Env* env = nullptr;
-  std::string folder;  // rocksdb/ below the data directory
+  std::string folder;  // path of the folder rocksdb/ in the data directory
   uint64_t log_buffer_bytes = 0;
 };
 
-// Return the options of the database and of its column families (in the order meta, log, snapshot, mesh), for opening
-// and for rocksdb::RepairDB().
+// Return the options of the database and of its column families (in the order meta, log, snapshot, mesh). They are
+// arguments of rocksdb::DB::Open() and rocksdb::RepairDB().
 rocksdb::DBOptions database_options(const DatabaseOptions& options, OpenMode mode);
 std::vector<rocksdb::ColumnFamilyDescriptor> families(const DatabaseOptions& options, OpenMode mode);
 
@@ -65,40 +66,45 @@ class Database {
   absl::Status sync();
 
   bool needs_recovery() const;
-  // Resumes writing after an error, in a new log file, so that no record follows a torn one. Waits until calls of
-  // write() in progress have returned; calls made meanwhile fail.
-  absl::Status recover() LOCUS_EXCLUDES(mutex_);
-  // Starts flushing all memory tables, so that log files can be deleted. Returns at once; if flushing fails, the next
-  // write reports the error.
+  // Resumes writing after an error. Starts a new log file, because RocksDB reads no record that follows a torn one.
+  // Waits until the calls of write() in progress have returned; new calls of write() fail meanwhile. Flushes all memory
+  // tables: if the disk's free space, `free_bytes`, is too small for them, returns RESOURCE_EXHAUSTED with the bytes
+  // needed. If write() fails already, it fails with this error from then on.
+  absl::Status recover(uint64_t free_bytes) LOCUS_EXCLUDES(mutex_);
+  // Starts flushing all memory tables, so that RocksDB can delete old log files. Returns at once; if flushing fails,
+  // the next write reports the error.
   void flush_soon();
-  // Waits until fewer than two full memory tables of the family wait to be flushed. RocksDB would stall all writers if
-  // all memory tables of the family were full.
+  // Waits until fewer than two full memory tables of `family` are waiting to be flushed. If all memory tables of a
+  // family were full, RocksDB would stall all writers.
   void wait_for_buffers(rocksdb::ColumnFamilyHandle* family) const;
-  // Returns the bytes in memory tables that are not flushed.
+  // Returns the total size in bytes of the memory tables of all column families that are not flushed yet.
   uint64_t buffered_bytes() const;
+  // Returns the size in bytes of the blocks of tables that are held in memory.
+  uint64_t block_cache_bytes() const;
 
  private:
   class ErrorWatch;
 
   Database(OpenMode mode);
   absl::Status write_now(rocksdb::WriteBatch& batch, bool sync) LOCUS_EXCLUDES(mutex_);
-  // Makes every write fail from now on. Returns the error with which they fail.
+  // Makes every write fail until recover() succeeds. Returns the error of these writes: `status` converted by
+  // disk_error() or, if `status` is OK, the earlier error.
   absl::Status fail_writes(const rocksdb::Status& status) LOCUS_EXCLUDES(mutex_);
-  // Puts kFamilyMark into every family, without the write-ahead log, and flushes all families. After that no earlier
-  // log file is needed.
+  // Writes a row with the key kFamilyMark into the memory table of every family, bypassing the write-ahead log, and
+  // flushes all families. Afterwards no earlier log file is needed.
   rocksdb::Status flush_to_new_log();
 
   const OpenMode mode_;
   WalWatch wal_watch_;
   std::shared_ptr<ErrorWatch> errors_;
-  std::unique_ptr<rocksdb::Env> env_;  // declared before db_, which uses it
+  std::unique_ptr<rocksdb::Env> env_;  // declared before db_, which uses the Env until it is destroyed
   std::unique_ptr<rocksdb::DB> db_;
   std::vector<rocksdb::ColumnFamilyHandle*> families_;
   std::atomic<bool> broken_ = false;
   std::atomic<int> writers_ = 0;  // number of calls of write_now() in progress
-  Mutex lenient_;  // serializes writes in the lenient modes, in which RocksDB would accept writes after a failed one
+  Mutex lenient_;  // serializes writes in the lenient modes, where RocksDB would accept a write after a failed write
   mutable Mutex mutex_;
-  absl::Status error_ LOCUS_GUARDED_BY(mutex_);  // error of the write that set broken_
+  absl::Status error_ LOCUS_GUARDED_BY(mutex_);  // error that write() returns while broken_ is set
 };
 
 }  // namespace locus::server

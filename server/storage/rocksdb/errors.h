@@ -15,12 +15,17 @@ namespace locus::server {
 // UNAVAILABLE for any other failure. `doing` names the operation in the message.
 absl::Status disk_error(absl::string_view doing, const rocksdb::Status& status);
 
-// Converts an error of reading RocksDB's own files as disk_error() does, but a missing file is DATA_LOSS.
+// Converts an error of reading RocksDB's own files: DATA_LOSS for a missing file, otherwise the result of disk_error().
 absl::Status read_error(absl::string_view doing, const rocksdb::Status& status);
 
-// Returns RESOURCE_EXHAUSTED for an operation that would leave less than `reserve_bytes` of the disk's `free_bytes`,
-// which are reserved for snapshots. `what` names the refused operation in the message.
-absl::Status refuse_full_disk(absl::string_view what, uint64_t reserve_bytes, uint64_t free_bytes);
+// Returns the RESOURCE_EXHAUSTED error of a write of `bytes` bytes that would leave less than `reserve_bytes` free on
+// the disk; the reserve is for snapshots and recovery. `free_bytes` is the disk's free space before the write. `what`
+// names the operation in the message.
+absl::Status refuse_full_disk(absl::string_view what, uint64_t bytes, uint64_t reserve_bytes, uint64_t free_bytes);
+
+// Returns the RESOURCE_EXHAUSTED error of writes that cannot resume after a disk error: resuming needs `needed_bytes`
+// of free space on the disk, which has only `free_bytes`.
+absl::Status refuse_recovery(uint64_t needed_bytes, uint64_t free_bytes);
 
 // Returns whether `status` reports damaged or missing files, as opposed to a failing, full or busy disk.
 bool is_damage(const rocksdb::Status& status);

@@ -4,8 +4,9 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/status_macros.h"
-#include "server/storage/rocksdb/bytes.h"
+#include "rocksdb/snapshot.h"
 #include "server/storage/rocksdb/errors.h"
+#include "server/storage/rocksdb/row_codec.h"
 
 namespace locus::server {
 namespace {
@@ -36,7 +37,7 @@ class Walk {
   std::unique_ptr<rocksdb::Iterator> iterator_;
 };
 
-uint64_t sequence_of(absl::string_view log_key) { return ByteReader(log_key.substr(8)).big_u64(); }
+uint64_t sequence_of(absl::string_view log_key) { return RowReader(log_key.substr(8)).big_u64(); }
 
 absl::Status damaged(absl::string_view what) { return absl::DataLossError(what); }
 
@@ -100,17 +101,25 @@ absl::Status read_records(const Database& database, SceneKey scene, uint64_t fro
 
 absl::Status read_chunks(const Database& database, rocksdb::ColumnFamilyHandle* family, const std::string& prefix,
                          const ChunkList& list, ChunkSink sink) {
-  Walk walk(database, family, prefix, end_of(prefix));
+  // Read all chunks from one state of the database, because another thread may replace the scene's snapshot meanwhile.
+  // Get each chunk by its key instead of iterating: an iterator also reads neighbouring blocks and fails if one of them
+  // is damaged, even if no chunk is stored in that block.
+  rocksdb::ManagedSnapshot snapshot(&database.db());
+  rocksdb::ReadOptions options = reading_options();
+  options.snapshot = snapshot.snapshot();
   ChunkList found;
-  for (; walk.more(); walk.next()) {
-    if (walk.key() != chunk_key(prefix, static_cast<uint32_t>(found.chunks)))
-      return damaged(absl::StrCat("chunk ", found.chunks, " is missing"));
-    const std::optional<absl::string_view> bytes = verified(walk.key(), walk.value());
+  rocksdb::PinnableSlice value;
+  while (found.chunks < list.chunks) {
+    const std::string key = chunk_key(prefix, static_cast<uint32_t>(found.chunks));
+    const rocksdb::Status read = database.db().Get(options, family, key, &value);
+    if (read.IsNotFound()) return damaged(absl::StrCat("chunk ", found.chunks, " is missing"));
+    if (!read.ok()) return read_error(absl::StrCat("reading chunk ", found.chunks), read);
+    const std::optional<absl::string_view> bytes = verified(key, view_of(value));
     if (!bytes) return damaged(absl::StrCat("chunk ", found.chunks, " does not match its checksum"));
-    found.add(walk.value());
+    found.add(view_of(value));
     RETURN_IF_ERROR(sink(*bytes));
+    value.Reset();
   }
-  if (!walk.status().ok()) return read_error(absl::StrCat("reading chunk ", found.chunks), walk.status());
   if (found == list) return absl::OkStatus();
   return damaged(
       absl::StrCat("the chunks (", found.chunks, " of ", list.chunks, ") do not match the checksum of their list"));

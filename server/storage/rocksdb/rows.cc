@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "core/base/check.h"
-#include "server/storage/rocksdb/bytes.h"
+#include "server/storage/rocksdb/row_codec.h"
 
 namespace locus::server {
 namespace {
@@ -32,39 +32,39 @@ void ChunkList::add(absl::string_view chunk_value) {
   digest = checksum(chunk_value.substr(chunk_value.size() - kChecksumBytes), digest);
 }
 
-std::string scene_key(SceneKey scene) { return ByteWriter().u8(kSceneTag).big_u64(scene).take(); }
+std::string scene_key(SceneKey scene) { return RowWriter().u8(kSceneTag).big_u64(scene).take(); }
 std::string mesh_key(absl::string_view name) { return tagged(kMeshTag, name); }
 std::string content_key(const Sha256& sha256) { return tagged(kContentTag, view_of(sha256)); }
 std::string pending_snapshot_key(SceneKey scene, uint64_t content_id) {
-  return ByteWriter().u8(kPendingSnapshotTag).big_u64(scene).big_u64(content_id).take();
+  return RowWriter().u8(kPendingSnapshotTag).big_u64(scene).big_u64(content_id).take();
 }
 std::string pending_mesh_key(const Sha256& sha256, uint64_t content_id) {
-  return ByteWriter().u8(kPendingMeshTag).bytes(view_of(sha256)).big_u64(content_id).take();
+  return RowWriter().u8(kPendingMeshTag).bytes(view_of(sha256)).big_u64(content_id).take();
 }
-std::string log_key(SceneKey scene, uint64_t sequence) { return ByteWriter().big_u64(scene).big_u64(sequence).take(); }
+std::string log_key(SceneKey scene, uint64_t sequence) { return RowWriter().big_u64(scene).big_u64(sequence).take(); }
 
 std::string end_of(std::string prefix) {
   while (!prefix.empty() && prefix.back() == '\xff') prefix.pop_back();
-  if (prefix.empty()) return std::string(64, '\xff');  // sorts after every key, since none is as long
+  if (prefix.empty()) return std::string(64, '\xff');  // sorts after every key: no key begins with 64 such bytes
   prefix.back() = static_cast<char>(prefix.back() + 1);
   return prefix;
 }
-std::string scene_prefix(SceneKey scene) { return ByteWriter().big_u64(scene).take(); }
+std::string scene_prefix(SceneKey scene) { return RowWriter().big_u64(scene).take(); }
 std::string snapshot_prefix(SceneKey scene, uint64_t content_id) {
-  return ByteWriter().big_u64(scene).big_u64(content_id).take();
+  return RowWriter().big_u64(scene).big_u64(content_id).take();
 }
 std::string mesh_prefix(const Sha256& sha256, uint64_t content_id) {
-  return ByteWriter().bytes(view_of(sha256)).big_u64(content_id).take();
+  return RowWriter().bytes(view_of(sha256)).big_u64(content_id).take();
 }
 std::string chunk_key(absl::string_view prefix, uint32_t index) {
-  return ByteWriter().bytes(prefix).big_u32(index).take();
+  return RowWriter().bytes(prefix).big_u32(index).take();
 }
 
 std::string with_checksum(absl::string_view key, absl::string_view bytes) {
   std::string value;
   value.reserve(bytes.size() + kChecksumBytes);
   value.append(bytes.data(), bytes.size());
-  return value.append(ByteWriter().u64(checksum(bytes, checksum(key))).view());
+  return value.append(RowWriter().u64(checksum(bytes, checksum(key))).view());
 }
 
 std::optional<absl::string_view> verified(absl::string_view key, absl::string_view value) {
@@ -75,22 +75,22 @@ std::optional<absl::string_view> verified(absl::string_view key, absl::string_vi
 }
 
 uint64_t stored_checksum(absl::string_view value) {
-  return value.size() < kChecksumBytes ? 0 : ByteReader(value.substr(value.size() - kChecksumBytes)).u64();
+  return value.size() < kChecksumBytes ? 0 : RowReader(value.substr(value.size() - kChecksumBytes)).u64();
 }
 
 std::string encode(const ContentRow& row) {
-  return ByteWriter().u64(row.content_id).u64(row.chunks.chunks).u64(row.chunks.bytes).u64(row.chunks.digest).take();
+  return RowWriter().u64(row.content_id).u64(row.chunks.chunks).u64(row.chunks.bytes).u64(row.chunks.digest).take();
 }
 
 std::string encode(const MeshRow& row) {
-  ByteWriter out;
+  RowWriter out;
   out.bytes(view_of(row.sha256));
   if (row.parts) out.bytes(encode(*row.parts));
   return out.take();
 }
 
 std::string encode(const SceneRow& row) {
-  ByteWriter out;
+  RowWriter out;
   out.u64(row.key)
       .string(row.name)
       .string(row.spec)
@@ -101,11 +101,11 @@ std::string encode(const SceneRow& row) {
 }
 
 std::string encode(const CatalogueRow& row) {
-  return ByteWriter().u64(row.generation).u64(row.next_scene).u64(row.scene_sum).u64(row.mesh_sum).take();
+  return RowWriter().u64(row.generation).u64(row.next_scene).u64(row.scene_sum).u64(row.mesh_sum).take();
 }
 
 std::optional<ContentRow> decode_content(absl::string_view bytes) {
-  ByteReader in(bytes);
+  RowReader in(bytes);
   ContentRow row;
   row.content_id = in.u64();
   row.chunks.chunks = in.u64();
@@ -115,7 +115,7 @@ std::optional<ContentRow> decode_content(absl::string_view bytes) {
 }
 
 std::optional<MeshRow> decode_mesh(absl::string_view bytes) {
-  ByteReader in(bytes);
+  RowReader in(bytes);
   MeshRow row;
   const absl::string_view sha256 = in.bytes(row.sha256.size());
   if (!in.ok()) return std::nullopt;
@@ -126,7 +126,7 @@ std::optional<MeshRow> decode_mesh(absl::string_view bytes) {
 }
 
 std::optional<SceneRow> decode_scene(absl::string_view bytes) {
-  ByteReader in(bytes);
+  RowReader in(bytes);
   SceneRow row;
   row.key = in.u64();
   row.name = in.string();
@@ -142,7 +142,7 @@ std::optional<SceneRow> decode_scene(absl::string_view bytes) {
 }
 
 std::optional<CatalogueRow> decode_catalogue(absl::string_view bytes) {
-  ByteReader in(bytes);
+  RowReader in(bytes);
   CatalogueRow row;
   row.generation = in.u64();
   row.next_scene = in.u64();
@@ -152,18 +152,18 @@ std::optional<CatalogueRow> decode_catalogue(absl::string_view bytes) {
 }
 
 std::string record_head(const LogEntry& entry) {
-  ByteWriter out;
+  RowWriter out;
   out.u8(kRecordFormat).u64(entry.epoch).u64(entry.writer).u64(entry.batch);
   return out.u32(static_cast<uint32_t>(entry.bytes.size())).take();
 }
 
 uint64_t record_checksum(absl::string_view key, absl::string_view head, absl::string_view bytes,
                          uint64_t running_checksum) {
-  return checksum(ByteWriter().bytes(key).bytes(head).u64(checksum(bytes)).view(), running_checksum);
+  return checksum(RowWriter().bytes(key).bytes(head).u64(checksum(bytes)).view(), running_checksum);
 }
 
 std::optional<LogEntry> decode_record(absl::string_view value) {
-  ByteReader in(value);
+  RowReader in(value);
   LogEntry entry;
   const uint8_t format = in.u8();
   entry.epoch = in.u64();

@@ -1,18 +1,25 @@
-// Format 2 of the keys and values in RocksDB; FORMAT.md in this folder describes every byte. Each value ends with a
+// Format 3 of the keys and values in RocksDB; FORMAT.md in this folder describes every byte. Each value ends with a
 // checksum over key and value, which reveals a value under a wrong key. Free functions on plain data; any thread.
 //
-// Format 1 is read, too: its rows of meshes have no parts, which stood among the chunks of the content. A directory of
-// format 1 becomes one of format 2 when it is opened.
+// A mesh has a content (vertices and triangles), stored once for all names of equal content, and parts (named ranges of
+// triangles), stored for each name. Snapshots, contents and parts are stored as chunks; a random content id in their
+// keys identifies each list of chunks.
 //
+// Formats 1 and 2 can be read, too. The mesh rows of format 1 have no `parts`: the chunks of the content include the
+// parts. In formats 1 and 2 no scene and no mesh has a creator. Opening a directory of an older format sets its format
+// number to 3 and leaves all rows unchanged.
+//
+// Column families, the fields of their keys, and the value under each key (`scene` is a SceneKey, `id` a content id):
 // meta      "format"; "catalogue"; 's' scene: a scene; 'm' name: a mesh; 'c' sha256: a mesh's content; 'p' scene id
-//           and 'q' sha256 id: unfinished chunks of a snapshot or mesh
-// log       scene sequence: a record. Its checksum covers the checksum of the record before, from the scene's first
-//           record on. So a record that is lost, belongs to another scene or is from an earlier time breaks the chain.
-// snapshot  scene id index: a chunk
+//           and 'q' sha256 id: mark the chunks of a snapshot or mesh as unfinished
+// log       scene sequence: a record. Its checksum covers the checksum of the record before, and so depends on all
+//           earlier records. Therefore a missing, exchanged or outdated record is detected.
+// snapshot  scene id index: a chunk of a scene's snapshot
 // mesh      sha256 id index: a chunk of the content, or of the parts of one name
-// The content ids of snapshots and meshes are random and never reused, because reads ignore range deletions: no key may
-// be written again after it was deleted. Each family has a row under kFamilyMark, the key "\0", which sorts first; it
-// makes the family flush into a table.
+//
+// Content ids are never reused, because reads ignore range deletions: no key may be written again after it was deleted.
+// Each family has an empty row with the key kFamilyMark, "\0", which sorts first. Database::flush_to_new_log() writes
+// this row, because RocksDB flushes a family only if its memory table has a row.
 #ifndef LOCUS_SERVER_STORAGE_ROCKSDB_ROWS_H_
 #define LOCUS_SERVER_STORAGE_ROCKSDB_ROWS_H_
 
@@ -26,7 +33,7 @@
 
 namespace locus::server {
 
-inline constexpr uint32_t kFormat = 2;
+inline constexpr uint32_t kFormat = 3;
 inline constexpr uint32_t kOldestFormat = 1;
 inline constexpr absl::string_view kFormatKey = "format";
 inline constexpr absl::string_view kCatalogueKey = "catalogue";
@@ -39,7 +46,7 @@ inline constexpr char kPendingMeshTag = 'q';
 
 using Sha256 = std::array<uint8_t, 32>;
 
-// Returns XXH3 (64 bits) of `bytes`.
+// Returns the 64-bit XXH3 hash of `bytes`.
 uint64_t checksum(absl::string_view bytes, uint64_t seed = 0);
 
 // Summary of a list of chunks: their number, their size in bytes without checksums, and a hash over their checksums in
@@ -53,16 +60,16 @@ struct ChunkList {
   bool operator==(const ChunkList&) const = default;
 };
 
-// Id and chunks of a mesh's content, or of the parts of one mesh name.
+// Content id and summary of the chunks of a snapshot, of a mesh's content, or of the parts of one mesh name.
 struct ContentRow {
   uint64_t content_id = 0;
   ChunkList chunks;
 };
 
-// Row of a mesh's name: the hash of the mesh's content, and the parts.
+// Row of one mesh name: hash of the mesh's content, and the chunks of the name's parts.
 struct MeshRow {
   Sha256 sha256 = {};
-  std::optional<ContentRow> parts;  // nothing in format 1
+  std::optional<ContentRow> parts;  // no value in rows of format 1: the content's chunks include the parts
 };
 
 struct SceneRow {
@@ -71,12 +78,13 @@ struct SceneRow {
   std::string spec;
   uint64_t epoch = 0;
   uint64_t snapshot_sequence = 0;
-  uint64_t running_checksum = 0;  // checksum of record snapshot_sequence: seed of the next record's checksum
+  uint64_t running_checksum = 0;  // checksum of record snapshot_sequence, and seed of the next record's checksum
   uint64_t snapshot_id = 0;
   ChunkList snapshot;
 };
 
-// Summary of the catalogue: the sums of the rows' checksums, and the generation, which each change increments.
+// Summary of the catalogue: a generation, which each change increments, the next free scene key, and the sums of the
+// checksums of all scene rows and of all mesh rows.
 struct CatalogueRow {
   uint64_t generation = 0;
   SceneKey next_scene = 1;
@@ -96,12 +104,12 @@ std::string end_of(std::string prefix);
 std::string scene_prefix(SceneKey scene);
 std::string snapshot_prefix(SceneKey scene, uint64_t content_id);
 std::string mesh_prefix(const Sha256& sha256, uint64_t content_id);
-// Returns the key of a chunk. `prefix` is that of all chunks of the snapshot or mesh.
+// Returns the key of a chunk. `prefix` is the common prefix of the keys of all chunks of the snapshot or mesh.
 std::string chunk_key(absl::string_view prefix, uint32_t index);
 
-// Returns the value of a row of meta or of a chunk: `bytes`, then the checksum over key and bytes.
+// Returns the stored form of a chunk or of a row in meta: `bytes`, then the checksum over key and bytes.
 std::string with_checksum(absl::string_view key, absl::string_view bytes);
-// Returns `value` without its checksum; nothing if the checksum is wrong.
+// Returns `value` without its checksum; no value if the checksum is wrong.
 std::optional<absl::string_view> verified(absl::string_view key, absl::string_view value);
 // Returns the checksum at the end of `value`, which is its last eight bytes; 0 if the value is shorter.
 uint64_t stored_checksum(absl::string_view value);
@@ -115,14 +123,14 @@ std::optional<CatalogueRow> decode_catalogue(absl::string_view bytes);
 std::optional<ContentRow> decode_content(absl::string_view bytes);
 std::optional<MeshRow> decode_mesh(absl::string_view bytes);
 
-// The value of a record is its head, its bytes and a checksum. They are built separately, so that the bytes are copied
-// once.
+// The value of a record is its head, its bytes and a checksum. These three are built separately, so that the bytes are
+// copied only once, into the write batch.
 inline constexpr size_t kRecordHeadBytes = 1 + 8 + 8 + 8 + 4;
 inline constexpr size_t kRecordOverhead = kRecordHeadBytes + 8;
 std::string record_head(const LogEntry& entry);
 uint64_t record_checksum(absl::string_view key, absl::string_view head, absl::string_view bytes,
                          uint64_t running_checksum);
-// Returns the entry of a record, which borrows from `value`; nothing if the value is malformed. Does not verify the
+// Returns the entry of a record, which borrows from `value`; no value if `value` is malformed. Does not verify the
 // checksum.
 std::optional<LogEntry> decode_record(absl::string_view value);
 

@@ -17,25 +17,26 @@ struct StorageOptions {
   // Data directory; created if it is missing. One process at a time may have it open.
   std::string path;
 
-  // File system; null = that of the machine. Tests inject faults here. Borrowed.
+  // File system, borrowed; null = the machine's file system. Tests pass a file system that injects faults.
   rocksdb::Env* env = nullptr;
 
-  // Free disk space that appending leaves unused, so that snapshots (which shorten the log) and RocksDB's own files can
-  // still be written. Default: 64 MiB or 5 % of the disk, whichever is less.
+  // Bytes of disk space that append() leaves free, so that snapshots (which shorten the log) and RocksDB's own files
+  // can still be written. No value = 64 MiB or 5 % of the disk, whichever is less.
   std::optional<uint64_t> reserve_bytes;
 
-  // Size in bytes of RocksDB's memory table for log records. If it is larger, snapshots drop more records before these
-  // are written a second time, into a table; but after a kill the daemon must read more of the log when it starts.
+  // Size in bytes of RocksDB's memory table for log records. With a larger table, snapshots delete more records before
+  // RocksDB writes them to the disk a second time, in a table file; but after a crash the daemon must read a longer
+  // write-ahead log when it starts.
   uint64_t log_buffer_bytes = uint64_t{64} << 20;
 
-  // Maximum delay between the append of an AckLevel::kMemory record and its sync.
+  // Maximum delay between the append of a record with AckLevel::kMemory and the sync of that record.
   std::chrono::milliseconds memory_sync_delay{50};
 
-  // Delay between a sync of the log and the update of the durable marker. A log that loses its end is not detected if
-  // the lost records were synced within this time before a crash.
+  // Delay between a sync of the log and the update of the durable marker. If records that were synced within this time
+  // before a crash are later missing at the end of the log, the loss is not detected.
   std::chrono::milliseconds durable_marker_delay{10};
 
-  // If false, records are acknowledged without being synced. For tests that check that they detect lost records.
+  // If false, records are acknowledged without a sync. Only for tests that must be able to detect lost records.
   bool sync = true;
 };
 

@@ -12,14 +12,14 @@
 namespace locus::server {
 namespace {
 
-// A table ends with the metaindex block, which lists the positions of other blocks (the properties among them), the
-// index and a footer: the checksum type, the positions of the metaindex and index blocks, zeros, the format version and
-// a magic number. Source: RocksDB 7, table formats 2 to 5.
+// A table ends with the metaindex block, which lists the positions of other blocks such as the properties block, with
+// the index block, and with a footer. The footer contains the checksum type, the positions of the metaindex and index
+// blocks, zeros, the format version and a magic number. Source: RocksDB 7, table formats 2 to 5.
 constexpr size_t kFooterBytes = 53;
-constexpr size_t kTrailerBytes = 5;  // after each block: compression type and checksum
+constexpr size_t kTrailerBytes = 5;  // size of the trailer of each block: compression type (u8) and checksum (u32)
 constexpr char kXxh3 = 4;
 constexpr absl::string_view kProperties = "rocksdb.properties";
-constexpr uint64_t kMaxBytes = uint64_t{16} << 20;
+constexpr uint64_t kMaxTableBytes = uint64_t{16} << 20;
 
 struct Handle {
   uint64_t offset = 0;
@@ -62,7 +62,7 @@ class Tail {
 
  private:
   bool read(uint64_t offset, uint64_t size, std::string& bytes) {
-    if (size > kMaxBytes || offset > size_ || size > size_ - offset) return false;
+    if (size > kMaxTableBytes || offset > size_ || size > size_ - offset) return false;
     bytes.resize(size);
     rocksdb::Slice found;
     const rocksdb::IOStatus status = file_.Read(offset, size, rocksdb::IOOptions(), &found, bytes.data(), nullptr);
@@ -72,7 +72,7 @@ class Tail {
   }
 
   bool read_block(const Handle& handle, std::string& bytes) {
-    if (handle.size > kMaxBytes || !read(handle.offset, handle.size + kTrailerBytes, bytes)) return false;
+    if (handle.size > kMaxTableBytes || !read(handle.offset, handle.size + kTrailerBytes, bytes)) return false;
     uint32_t stored = 0;
     std::memcpy(&stored, bytes.data() + handle.size + 1, sizeof(stored));
     const auto compression = static_cast<uint8_t>(bytes[handle.size]);

@@ -1,6 +1,6 @@
 // File system that refuses to open tables (.sst files) whose properties block is damaged. RocksDB uses that block
-// before it verifies the block's checksum, and Debian's build aborts the process if the block is damaged. With this
-// guard, such a table is treated like any other damaged table.
+// before it verifies the block's checksum, and Debian's build of RocksDB aborts the process if the block is damaged.
+// With this guard RocksDB returns an error instead, as for other damaged tables.
 //
 // Threads: any thread, as rocksdb::FileSystem requires.
 #ifndef LOCUS_SERVER_STORAGE_ROCKSDB_TABLE_GUARD_H_

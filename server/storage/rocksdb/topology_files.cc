@@ -12,13 +12,13 @@ namespace {
 
 constexpr absl::string_view kUnfinished = ".new";
 // Upper bound of the size of any topology file. Larger files were not written by this class and are not read.
-constexpr uint64_t kMaxBytes = uint64_t{8} * limits::kMaxMeshTriangles;
+constexpr uint64_t kMaxTopologyBytes = uint64_t{8} * limits::kMaxMeshTriangles;
 
 std::string name_of(const Sha256& sha256) {
   return absl::BytesToHexString(absl::string_view(reinterpret_cast<const char*>(sha256.data()), sha256.size()));
 }
 
-// Returns whether `name` is the name of a topology file or of a leftover temporary file.
+// Returns whether `name` is the name of a topology file or of a temporary file of an interrupted keep().
 bool is_outline_name(absl::string_view name) {
   name = absl::StripSuffix(name, kUnfinished);
   return name.size() == 2 * Sha256().size() && name.find_first_not_of("0123456789abcdef") == name.npos;
@@ -44,7 +44,7 @@ std::optional<std::string> TopologyFiles::read(const Sha256& sha256) const {
   const std::string name = name_of(sha256);
   std::string bytes;
   uint64_t size = 0;
-  if (!env_.GetFileSize(path_of(name), &size).ok() || size > kMaxBytes) return std::nullopt;
+  if (!env_.GetFileSize(path_of(name), &size).ok() || size > kMaxTopologyBytes) return std::nullopt;
   if (!rocksdb::ReadFileToString(&env_, path_of(name), &bytes).ok()) return std::nullopt;
   const std::optional<absl::string_view> found = verified(name, bytes);
   if (!found) return std::nullopt;

@@ -1,7 +1,8 @@
-// The folder outlines/ of a data directory: a cache of the tree topologies of meshes, one file each, named by the
-// mesh's SHA-256. Any file may be deleted at any time. No function returns an error: a file that cannot be written is
-// omitted, and a file with a wrong checksum reads as missing. Therefore files need no sync. Files with other names are
-// never changed.
+// The folder outlines/ of a data directory: a cache of the tree topologies of meshes. The folder has one file for each
+// mesh content (vertices and triangles), named by the content's SHA-256. Any file may be deleted at any time, because
+// the tree can be built without it; so files need no sync. No function returns an error: keep() ignores it if a file
+// cannot be written, and read() returns no value if a file has a wrong checksum. Files with other names are never
+// changed.
 //
 // Threads: any thread; calls for the same SHA-256 must not overlap.
 #ifndef LOCUS_SERVER_STORAGE_ROCKSDB_TOPOLOGY_FILES_H_
@@ -27,7 +28,7 @@ class TopologyFiles {
   void keep(const Sha256& sha256, absl::string_view bytes);
   std::optional<std::string> read(const Sha256& sha256) const;
   void drop(const Sha256& sha256);
-  // Deletes every file whose SHA-256 is not in `used`, and leftover temporary files.
+  // Deletes every topology file whose SHA-256 is not in `used`, and temporary files of interrupted calls of keep().
   void drop_unused(const std::set<Sha256>& used);
 
  private:

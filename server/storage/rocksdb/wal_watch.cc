@@ -1,7 +1,7 @@
 #include "server/storage/rocksdb/wal_watch.h"
 
-#include "server/storage/rocksdb/bytes.h"
 #include "server/storage/rocksdb/database.h"
+#include "server/storage/rocksdb/row_codec.h"
 
 namespace locus::server {
 namespace {
@@ -13,7 +13,7 @@ class SceneCollector final : public rocksdb::WriteBatch::Handler {
       : log_family_(log_family), scenes_(scenes) {}
 
   rocksdb::Status PutCF(uint32_t family, const rocksdb::Slice& key, const rocksdb::Slice&) override {
-    if (family == log_family_ && key.size() == 16) scenes_.insert(ByteReader({key.data(), key.size()}).big_u64());
+    if (family == log_family_ && key.size() == 16) scenes_.insert(RowReader({key.data(), key.size()}).big_u64());
     return rocksdb::Status::OK();
   }
   rocksdb::Status DeleteCF(uint32_t, const rocksdb::Slice&) override { return rocksdb::Status::OK(); }
@@ -37,9 +37,9 @@ void WalWatch::ColumnFamilyLogNumberMap(const std::map<uint32_t, uint64_t>&,
 rocksdb::WalFilter::WalProcessingOption WalWatch::LogRecordFound(unsigned long long, const std::string&,
                                                                  const rocksdb::WriteBatch& batch, rocksdb::WriteBatch*,
                                                                  bool*) {
-  // A batch begins with the RocksDB sequence number of its first write. WriteBatch has no accessor for it.
+  // A batch begins with the RocksDB sequence number of its first write. WriteBatch has no accessor for this number.
   const std::string& bytes = batch.Data();
-  const uint64_t first = ByteReader(bytes).u64();
+  const uint64_t first = RowReader(bytes).u64();
   const bool gap = next_write_ != 0 && first > next_write_;
   if (gap && at_gap_ == AtGap::kRefuse) return WalProcessingOption::kCorruptedRecord;
   if (gap) {

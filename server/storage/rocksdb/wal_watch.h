@@ -1,9 +1,10 @@
-// Detects gaps in RocksDB's write-ahead log (WAL) while the database opens. Each batch in it carries the RocksDB
+// Detects gaps in RocksDB's write-ahead log (WAL) while the database opens. Each batch in the WAL carries the RocksDB
 // sequence number of its first write, so a lost batch leaves a gap in these numbers even if RocksDB skipped it
-// silently. Also collects the scenes that have records after the last gap. If the record numbers of such a scene are
-// dense, no record of it is missing; for all other scenes that is unknown.
+// silently. Also collects the scenes that have records after the last gap. If the sequence numbers of such a scene's
+// records have no gap, none of its records is missing. For a scene without records after the last gap, it is unknown
+// whether records at its end are missing.
 //
-// Threads: RocksDB calls it from the opening thread; read the results after that.
+// Threads: RocksDB calls the filter from the thread that opens the database; read the results after the opening.
 #ifndef LOCUS_SERVER_STORAGE_ROCKSDB_WAL_WATCH_H_
 #define LOCUS_SERVER_STORAGE_ROCKSDB_WAL_WATCH_H_
 
@@ -19,7 +20,7 @@ namespace locus::server {
 
 // Reaction to a gap in the log.
 enum class AtGap : uint8_t {
-  kRefuse,  // the database does not open
+  kRefuse,  // opening the database fails
   kContinue,
 };
 

@@ -5,12 +5,12 @@
 #include <numeric>
 
 #include "absl/strings/str_cat.h"
-#include "core/geometry/point_shape.h"
+#include "core/geometry/shape.h"
 
 namespace locus::bench::dynamic {
 namespace {
 
-// One query's part of the answers.
+// Answers to one query.
 struct Part {
   absl::Span<const uint64_t> ids;
   absl::Span<const float> distances;  // empty if the task has no distances
@@ -93,7 +93,7 @@ std::vector<uint64_t> truth_of(const World& world, Task task, const Queries& que
 bool is_right(const World& world, Task task, const Queries& queries, size_t query, const Part& ours) {
   std::vector<uint64_t> truth = truth_of(world, task, queries, query);
   std::vector<uint64_t> given(ours.ids.begin(), ours.ids.end());
-  if (task != Task::kNearest) {  // its order is part of the answer
+  if (task != Task::kNearest) {  // the order of nearest objects is part of the answer
     std::sort(truth.begin(), truth.end());
     std::sort(given.begin(), given.end());
   }
@@ -117,7 +117,7 @@ void compare(const std::string& case_name, Task task, const World& world, const 
       report.disagreements.push_back(absl::StrCat(case_name, ", query ", i, ": ours is wrong; ", peer, " differs"));
       return;
     }
-    if (task == Task::kNearest && are_as_far(task, our_part, their_part)) continue;  // tied objects
+    if (task == Task::kNearest && are_as_far(task, our_part, their_part)) continue;  // ties
     if (differ++ == 0) first = i;
   }
   if (differ == 0) return;

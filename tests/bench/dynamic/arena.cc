@@ -11,12 +11,12 @@
 namespace locus::bench::dynamic {
 namespace {
 
-constexpr size_t kBatchesApart = 997;     // distance between the first batches of two readers
-constexpr size_t kBatchesToACount = 500;  // batches between a reader's counts of all objects, outside its latencies
+constexpr size_t kBatchesApart = 997;     // distance between the numbers of the first batches of two readers
+constexpr size_t kBatchesToACount = 500;  // a reader counts all objects, untimed, once in this many batches
 
 void sleep_for(double seconds) { std::this_thread::sleep_for(std::chrono::duration<double>(seconds)); }
 
-// Returns how often the kernel preempted this thread, because of other programs.
+// Returns how often the kernel has preempted this thread to run another one (involuntary context switches).
 int64_t preemptions() {
   rusage usage{};
   getrusage(RUSAGE_THREAD, &usage);

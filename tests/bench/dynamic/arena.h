@@ -1,5 +1,5 @@
-// One uniform world that readers and a writer share for windows of time. Each window starts its own threads; between
-// windows none runs.
+// A uniform world that readers and a writer use at the same time, for one window of time after another. Each window
+// starts its own threads and joins them at its end.
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_ARENA_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_ARENA_H_
 
@@ -12,11 +12,11 @@
 
 namespace locus::bench::dynamic {
 
-// Load beside the readers: none, a thread that only counts (to measure the cost of a busy second core alone), or the
-// writer.
+// Load that runs beside the readers: none, a thread that only spins (to measure the cost of a busy second core alone),
+// or the writer.
 enum class Beside : uint8_t { kNothing, kSpinning, kWriter };
 
-// Priority of readers relative to the writer: equal, or that of the daemon's threads for large batches.
+// Priority of readers relative to the writer: equal, or below it, like the daemon's threads for large batches.
 enum class Readers : uint8_t { kEqual, kBelow };
 
 inline constexpr double kUnpaced = 0;
@@ -26,16 +26,16 @@ struct Window {
   uint32_t readers = 1;
   Beside beside = Beside::kNothing;
   size_t batch = 1000;     // moves per revision
-  double rate = kUnpaced;  // moves per second, or unlimited
+  double rate = kUnpaced;  // moves per second; kUnpaced: as many as possible
   Readers stand = Readers::kEqual;
 };
 
 struct Seen {
-  std::vector<double> latencies;  // seconds of each batch of 100 queries, of all readers, without interrupted batches
-  uint64_t interrupted = 0;       // batches during which the kernel preempted the thread
+  std::vector<double> latencies;  // seconds of each batch of 100 queries; interrupted batches are left out
+  uint64_t interrupted = 0;       // number of batches during which the kernel preempted the reader
   double moves_a_second = 0;
   double moves_a_computed_second = 0;  // moves per second of the writer thread's processor time
-  uint64_t wrong_counts = 0;           // number of checked revisions that did not hold every object exactly once
+  uint64_t wrong_counts = 0;           // number of counted revisions in which an object was missing or present twice
 };
 
 class Arena {

@@ -15,7 +15,8 @@ using Box = boost::geometry::model::box<Point>;
 using Value = std::pair<Point, uint32_t>;
 using Tree = index::rtree<Value, index::linear<16>>;
 
-constexpr float kRadius = 0.5f;  // radius of all objects: the tree holds points, so regions are grown by it
+// Radius of all objects; the tree stores their centres, so query regions are grown by the radius.
+constexpr float kRadius = 0.5f;
 
 Point point_of(Vec3f v) { return {v.x, v.y, v.z}; }
 

@@ -8,12 +8,12 @@ namespace locus::bench::dynamic {
 namespace {
 
 constexpr btScalar kMargin = 0.25f;
-constexpr btScalar kTicksAhead = 2;  // ticks by which a box is stretched along the velocity
+constexpr btScalar kTicksAhead = 2;  // a box is extended by the object's path of this many ticks
 
 btVector3 vector_of(Vec3f v) { return {v.x, v.y, v.z}; }
 btDbvtVolume volume_of(Vec3f center, float radius) { return btDbvtVolume::FromCR(vector_of(center), radius); }
 
-// Passes every leaf whose box overlaps to `test`, which decides.
+// Visitor of the leaves whose boxes overlap the query's box. It calls `test`, which tests the object itself.
 template <class Test>
 class Leaves : public btDbvt::ICollide {
  public:

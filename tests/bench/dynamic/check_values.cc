@@ -10,12 +10,12 @@
 namespace locus::bench::dynamic {
 namespace {
 
-// Values as printed: rounded to their last digit.
+// Expected results of one world, rounded to the last digit that is given.
 struct Known {
   Kind kind;
   uint32_t count;
-  double ball, box;           // ids per query
-  double ray_share, ray_sum;  // rays that hit, and the sum of their distances
+  double ball, box;           // mean number of ids per query
+  double ray_share, ray_sum;  // share of rays that hit an object, and sum of the distances at which they hit
   double nearest_sum;         // sum of the distances to the centres of the nearest objects
 };
 constexpr Known kKnown[] = {

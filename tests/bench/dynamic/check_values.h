@@ -1,5 +1,5 @@
-// Expected results of the workload, computed by other programs from the same definition: sums of all answers over
-// kQueries queries. A pure function.
+// Verification of the workload's results: their sums over kQueries queries must equal sums that other programs computed
+// from the same definition of the workload. Writes into a report; pure otherwise.
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_CHECK_VALUES_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_CHECK_VALUES_H_
 
@@ -10,11 +10,11 @@
 
 namespace locus::bench::dynamic {
 
-// Returns the number of ticks from the start of a world to its queries.
+// Returns the number of ticks by which a world of `count` objects is advanced before it is queried.
 uint32_t ticks_before_queries(uint32_t count);
 
-// Reports sums that differ from the known ones for this world after that many ticks. Accepts worlds without known
-// values.
+// Reports sums that differ from the expected ones for this world after ticks_before_queries(). Reports nothing for a
+// world, or a number of queries, without expected sums.
 void check_values(const std::string& case_name, Task task, const World& world, const Queries& queries,
                   const std::string& contender, const Answers& answers, Report& report);
 

@@ -10,7 +10,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-// Returns answers with `ids` ids in all, at that distance.
+// Returns answers that have `ids` ids in total, each at `distance`.
 Answers answers_of(size_t ids, float distance) {
   Answers answers;
   answers.ids.assign(ids, 1);

@@ -44,13 +44,14 @@ class Rounds {
     return false;
   }
 
-  // Runs a window. Makes the world when the first case needs it.
+  // Runs `window` for the time of this program's options. Makes the world at the first call, since not every case needs
+  // it.
   Seen run(const Window& window) {
     if (arena_ == nullptr) arena_ = std::make_unique<Arena>(count_);
     Window timed = window;
     timed.seconds = options_.quick ? 0.05 : 2;
     Seen seen = arena_->run(timed);
-    // Without a complete batch in the window, the length of the window is the only known bound.
+    // If no batch was completed in the window, a latency is only known to be at least the window's length.
     if (timed.readers != 0 && seen.latencies.empty()) seen.latencies.push_back(timed.seconds);
     if (timed.readers == 1) {
       batches_ += seen.latencies.size();
@@ -62,7 +63,7 @@ class Rounds {
     return seen;
   }
 
-  // Measures one reader alone, beside a thread that only counts, and beside the writer, in turns.
+  // Measures one reader in three situations, in turns: alone, beside a thread that only spins, and beside the writer.
   void run_latencies() {
     progress_(name_of_case("concurrent_p99/1reader"));
     const Window windows[] = {
@@ -133,7 +134,7 @@ class Rounds {
   const uint32_t count_;
   Report& report_;
   std::unique_ptr<Arena> arena_;
-  size_t batches_ = 0, interrupted_ = 0;  // of the cases with one reader
+  size_t batches_ = 0, interrupted_ = 0;  // numbers of timed and of interrupted batches in windows with one reader
 };
 
 }  // namespace

@@ -1,5 +1,5 @@
 // The one interface of locus and of every peer: objects are inserted, moved and removed by ids that the caller chooses,
-// and all get the same queries in the same columns. One thread a contender.
+// and every contender gets the same queries in the same columns. Only one thread uses a contender.
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_CONTENDER_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_CONTENDER_H_
 
@@ -22,14 +22,14 @@ inline constexpr float kReach = 10;  // radius of every ball, half the edge of e
 inline constexpr float kRayLength = 100;
 inline constexpr uint32_t kNearestCount = 8;
 
-// Balls of N objects: positions has 3N entries.
+// Columns of N objects, which are balls: `positions` has x, y, z of each centre, 3N entries.
 struct Objects {
   absl::Span<const uint64_t> ids;
   absl::Span<const float> positions;
   absl::Span<const float> radii;
 };
 
-// Current positions, and the velocity per tick for contenders that can use it.
+// Columns of N moves: new positions, and velocities per tick for contenders that use them; 3N entries each.
 struct Moves {
   absl::Span<const uint64_t> ids;
   absl::Span<const float> positions;
@@ -40,11 +40,11 @@ inline Vec3f point_at(absl::Span<const float> numbers, size_t i) {
   return {numbers[3 * i], numbers[3 * i + 1], numbers[3 * i + 2]};
 }
 
-// Results, query after query.
+// Results of several queries, concatenated in the order of the queries.
 struct Answers {
   std::vector<uint64_t> ids;
-  std::vector<float> distances;  // one per id, for rays and nearest
-  std::vector<uint32_t> counts;  // ids per query
+  std::vector<float> distances;  // one per id in results of rays and nearest; empty for other tasks
+  std::vector<uint32_t> counts;  // number of ids of each query
 
   void clear() {
     ids.clear();
@@ -65,17 +65,18 @@ class Contender {
   const std::string& name() const { return name_; }
   virtual bool does(Task task) const = 0;
 
-  // Loads all objects, by the contender's fastest method. Called once, first.
+  // Loads all objects, by the contender's fastest method. Called once, before all other functions.
   virtual void load(const Objects& objects) = 0;
   virtual void move(const Moves& moves) = 0;
   virtual void remove(absl::Span<const uint64_t>) {}
   virtual void insert(const Objects&) {}
-  // Releases the data that is kept only for rewind.
+  // Releases past positions, which only queries about the past need.
   virtual void forget_past() {}
 
-  // Appends the results: every object that shares a point with the ball or box of kReach around each centre, in any
-  // order; the first object on each ray, if there is one, and its distance; the kNearestCount objects nearest to each
-  // centre, the nearest first, and their distances, which are 0 inside.
+  // Appends the results of each query. Balls and boxes: every object that shares a point with the ball or box of kReach
+  // around the centre, in any order. Rays: the first object that the ray hits, and its distance; no entry if the ray
+  // hits none. Nearest: the kNearestCount objects nearest to the centre, the nearest first, and their distances, 0 for
+  // an object that contains the centre.
   virtual void balls(absl::Span<const Vec3f>, Answers&) {}
   virtual void boxes(absl::Span<const Vec3f>, Answers&) {}
   virtual void rays(absl::Span<const Rayf>, Answers&) {}
@@ -85,7 +86,7 @@ class Contender {
   const std::string name_;
 };
 
-// Answers N centres; `find(center, ids)` appends the ids of one.
+// Answers the query of each centre; `find(center, ids)` appends the ids of one query.
 template <class Find>
 void each_region(absl::Span<const Vec3f> centers, Answers& answers, Find find) {
   for (const Vec3f& center : centers) {
@@ -95,7 +96,7 @@ void each_region(absl::Span<const Vec3f> centers, Answers& answers, Find find) {
   }
 }
 
-// An id and a distance.
+// First object that a ray hits, and its distance from the origin.
 struct FirstHit {
   uint64_t id = 0;
   float distance = kRayLength;
@@ -113,10 +114,10 @@ void each_ray(absl::Span<const Rayf> rays, Answers& answers, Find find) {
   }
 }
 
-// The kNearestCount best candidates offered, by any key that grows with the distance, ascending.
+// The kNearestCount candidates with the lowest keys, ascending. The key can be any number that grows with the distance.
 class NearestFound {
  public:
-  // Returns the key below which a candidate must be to be kept.
+  // Returns the bound of keys: a candidate is kept only if its key is lower.
   float limit() const {
     return count_ < kNearestCount ? std::numeric_limits<float>::infinity() : figures_[kNearestCount - 1];
   }
@@ -130,7 +131,7 @@ class NearestFound {
     figures_[at] = figure;
     ids_[at] = id;
   }
-  // Appends the result; `to_distance` converts each key.
+  // Appends the candidates to `answers` as one query's result; `to_distance` converts each key to a distance.
   template <class ToDistance>
   void append_to(Answers& answers, const ToDistance& to_distance) const {
     answers.counts.push_back(static_cast<uint32_t>(count_));
@@ -144,7 +145,8 @@ class NearestFound {
   size_t count_ = 0;
 };
 
-// Returns the distance to the surface of a ball of this radius, from the squared distance to its centre.
+// Returns the distance of a point to a ball, 0 inside it. `squared` is the squared distance of the point to the ball's
+// centre.
 inline float surface_distance(float squared, float radius) { return std::max(0.0f, std::sqrt(squared) - radius); }
 
 // Factory of one kind of contender.

@@ -17,18 +17,19 @@ namespace locus::bench::dynamic {
 namespace {
 
 constexpr uint32_t kCounts[] = {10'000, 100'000, 1'000'000};
-// Cases that run for one world each.
+// Cases that run once for each world.
 constexpr const char* kCases[] = {"memory",    "ball",      "box",           "ray",  "nearest", "ball_batch",
                                   "box_batch", "ray_batch", "nearest_batch", "move", "insert",  "reinsert"};
 
-// Returns whether a world is in the default set, which runs without a filter.
+// Returns whether a world is in the default set, which runs if there is no filter.
 bool is_usual(Kind kind, uint32_t count) {
   if (kind == Kind::kOneCell) return count == 10'000;
   if (kind == Kind::kUniform) return true;
   return count == 100'000 || (kind == Kind::kClustered && count == 1'000'000);
 }
 
-// Returns the number of queries. In a world of one cell every query finds every object, so it has fewer.
+// Returns the number of queries about a world. A world of one cell gets fewer, since each of its queries finds all
+// objects.
 size_t query_count(Kind kind, uint32_t count, const Options& options) {
   if (kind == Kind::kOneCell) return std::max(20u, 2'000'000 / count);
   return options.quick && kind != Kind::kUniform ? kQueries / 10 : kQueries;
@@ -39,7 +40,7 @@ bool wants_any(const Options& options, const std::string& world) {
                      [&](const char* name) { return options.filter.wants(absl::StrCat(name, "/", world)); });
 }
 
-// Runs `work` and adds the heap bytes that it keeps to `bytes`.
+// Runs `work` and adds to `bytes` the heap bytes that `work` allocates and does not free.
 template <class Work>
 void weigh(int64_t& bytes, const Work& work) {
   const int64_t before = heap_bytes();
@@ -86,7 +87,7 @@ void run_world(const Options& options, World& world, Report& report) {
 
 absl::Status run_dynamic_suite(const Options& options, const Progress& progress, Report& report) {
   report.notes = missing_peers({kBullet, kBoost, kNanoflann});
-  report.notes.emplace_back("worlds of several sizes: boost_rtree, nanoflann and flat_hash_map take one size only");
+  report.notes.emplace_back("worlds of several sizes: boost_rtree, nanoflann and flat_hash_map support only one size");
   for (const Kind kind : kKinds) {
     for (const uint32_t count : kCounts) {
       if (options.quick && count != kCounts[0]) continue;

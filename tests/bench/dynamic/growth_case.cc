@@ -8,7 +8,7 @@
 namespace locus::bench::dynamic {
 namespace {
 
-// Returns the side of a uniform world with the density of 100,000 objects in the usual one.
+// Returns the side of a uniform world in which `count` objects are as dense as 100,000 in a world of side kSide.
 float side_of(uint32_t count) { return kSide * std::sqrt(static_cast<float>(count) / 100'000); }
 
 struct Grown {

@@ -1,5 +1,5 @@
-// The case growth/ball: time of a ball query in locus among many objects compared with few of the same density. One
-// thread.
+// The case growth/ball: time of a ball query of locus among many objects, compared with its time among few objects at
+// the same density. One thread.
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_GROWTH_CASE_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_GROWTH_CASE_H_
 

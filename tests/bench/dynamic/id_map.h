@@ -1,4 +1,4 @@
-// Map from ids to indices, which a caller needs beside a library without ids. Indices of removed objects are used
+// Map from ids to indices, which a caller needs if a library has indices but no ids. Indices of removed ids are used
 // again. One thread.
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_ID_MAP_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_ID_MAP_H_
@@ -12,7 +12,7 @@ namespace locus::bench::dynamic {
 
 class IdMap {
  public:
-  // Assigns indices in order.
+  // Assigns the indices 0, 1, 2 ... to `ids`.
   explicit IdMap(absl::Span<const uint64_t> ids) {
     numbers_.reserve(ids.size());
     for (const uint64_t id : ids) numbers_.emplace(id, static_cast<uint32_t>(numbers_.size()));
@@ -24,7 +24,7 @@ class IdMap {
     numbers_.erase(at);
     return free_.back();
   }
-  // Inserts an id. There must be at least one removed index that is free.
+  // Inserts an id and returns its index. At least one index of a removed id must be free.
   uint32_t insert(uint64_t id) {
     const uint32_t number = free_.back();
     free_.pop_back();

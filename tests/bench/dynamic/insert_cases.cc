@@ -8,9 +8,9 @@
 namespace locus::bench::dynamic {
 namespace {
 
-constexpr uint32_t kReinserted = 10;  // reinserts one object in this many
+constexpr uint32_t kReinserted = 10;  // the case reinsert uses one of every 10 objects
 
-// Columns of a part of the objects.
+// Columns of the objects that are reinserted.
 struct Some {
   std::vector<uint64_t> ids;
   std::vector<float> positions, radii;

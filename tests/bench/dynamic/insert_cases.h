@@ -1,6 +1,6 @@
-// The cases insert (all objects into an empty structure) and reinsert (a tenth of them, drawn with seed 9: all removed,
-// then inserted again) of one world, and memory (bytes of a structure, including everything that a caller of ids needs,
-// after the ticks before the queries, with one live revision). One thread.
+// Three cases of one world. insert: all objects are inserted into an empty structure. reinsert: a tenth of the objects,
+// drawn with seed 9, is removed, then inserted again. memory: bytes of a structure with one live revision, including
+// the map of ids if the structure needs one, after ticks_before_queries() ticks. One thread.
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_INSERT_CASES_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_INSERT_CASES_H_
 

@@ -1,5 +1,5 @@
-// The repeated requests of a reader of locus: batches of 100 queries, each at one revision. Const members from any
-// thread.
+// The repeated requests of a reader of locus: batches of 100 queries, each at one revision. Any thread may call const
+// members.
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_MIXED_BATCHES_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_MIXED_BATCHES_H_
 
@@ -14,8 +14,8 @@ class MixedBatches {
  public:
   explicit MixedBatches(const Queries& queries);
 
-  // Runs hundred `number` of the queries as one batch: 40 balls, 30 boxes, 20 rays and 10 nearest. Returns the number
-  // of ids found.
+  // Runs 100 of the queries as one batch: 40 balls, 30 boxes, 20 rays and 10 nearest. `number` selects the hundred.
+  // Returns the number of ids found.
   size_t ask(const SceneSnapshot& snapshot, size_t number) const;
 
  private:
@@ -27,7 +27,8 @@ class MixedBatches {
   std::vector<float> centers_, origins_, directions_;
 };
 
-// Counts the objects in a box far larger than the world, each of which must be found exactly once.
+// Returns the number of objects that a box query far larger than the world finds: each object of the world exactly
+// once.
 size_t count_objects(const SceneSnapshot& snapshot);
 
 }  // namespace locus::bench::dynamic

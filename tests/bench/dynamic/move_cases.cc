@@ -9,7 +9,7 @@
 namespace locus::bench::dynamic {
 namespace {
 
-// One tick's columns.
+// Columns of the moves of one tick.
 struct Tick {
   std::vector<uint64_t> ids;
   std::vector<float> positions, velocities;
@@ -26,7 +26,8 @@ class MoveRace {
   explicit MoveRace(const WorldRun& run) : run_(run) {}
 
   void run() {
-    // Small worlds run several ticks at a time, since a single one would mostly measure caches filled by the others.
+    // A contender moves a small world by several ticks in one turn: a single tick would mostly measure reloading the
+    // caches, which the other contenders have filled.
     const uint32_t count = run_.world.count();
     const size_t ticks = run_.options.quick ? 1 : std::clamp<size_t>(100'000 / count, 1, 8);
     const size_t chunks = run_.options.quick || count >= 1'000'000 ? 1 : 4;
@@ -50,7 +51,7 @@ class MoveRace {
       ticks_.emplace_back(run_.world.moves());
     }
   }
-  // Reads the columns, so that every contender finds them in the caches as after receiving them.
+  // Reads the columns, so that every contender finds them in the caches, as a server does after it has received them.
   void touch() {
     for (const Tick& tick : ticks_)
       touched_ += static_cast<double>(std::accumulate(tick.ids.begin(), tick.ids.end(), uint64_t{0})) +

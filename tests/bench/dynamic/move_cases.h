@@ -1,5 +1,5 @@
-// The case move of one world: whole ticks by ids that the caller chooses, through the scene's writer of locus. One
-// thread.
+// The case move of one world: moves of all objects, tick by tick, by ids that the caller chooses. In locus they go
+// through the scene's writer. One thread.
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_MOVE_CASES_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_MOVE_CASES_H_
 
@@ -7,7 +7,7 @@
 
 namespace locus::bench::dynamic {
 
-// Advances the world and all contenders.
+// Measures the case. Advances the world, and moves the objects in all contenders.
 void run_move_case(const WorldRun& run);
 
 }  // namespace locus::bench::dynamic

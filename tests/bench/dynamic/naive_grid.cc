@@ -4,12 +4,13 @@
 #include "tests/bench/dynamic/peers.h"
 #include "tests/bench/dynamic/scalar_tests.h"
 
-// A simple grid without tuning: a hash map from cells to lists of ids, another from ids to objects.
+// A simple grid without tuning: one hash map from cells to lists of ids, and one from ids to objects.
 namespace locus::bench::dynamic {
 namespace {
 
 constexpr float kCell = 10;
-constexpr float kRadius = 0.5f;  // radius of all objects: the most by which one extends beyond its cell
+constexpr float kRadius = 0.5f;  // radius of all objects; an object is stored in the cell of its centre and extends
+                                 // beyond that cell by at most kRadius
 
 int cell_of(float x) { return static_cast<int>(std::floor(x / kCell)); }
 uint64_t key_of(int x, int y, int z) {
@@ -72,7 +73,7 @@ class NaiveGrid : public Contender {
     ids.pop_back();
     if (ids.empty()) cells_.erase(cell);
   }
-  // Visits every object stored in the cells between `low` and `high`.
+  // Visits every object stored in the cells that the box from `low` to `high` overlaps.
   template <class Visit>
   void visit(Vec3f low, Vec3f high, const Visit& visit) const {
     for (int x = cell_of(low.x); x <= cell_of(high.x); ++x)
@@ -91,7 +92,7 @@ class NaiveGrid : public Contender {
       if (meets(body.position, body.radius, center)) ids.push_back(body.id);
     });
   }
-  // Steps along the ray by one cell's length at a time.
+  // Returns the first hit. Divides the ray into segments of a cell's length and tests the objects around each.
   FirstHit first_of(const Rayf& ray) const {
     FirstHit first;
     const Vec3f grown = {kRadius, kRadius, kRadius};

@@ -6,7 +6,8 @@
 namespace locus::bench::dynamic {
 namespace {
 
-constexpr float kRadius = 0.5f;  // radius of all objects: query balls are grown by it
+// Radius of all objects; the tree stores their centres, so query balls are grown by the radius.
+constexpr float kRadius = 0.5f;
 constexpr size_t kLeafSize = 16;
 
 // Set of points with the interface that nanoflann requires.

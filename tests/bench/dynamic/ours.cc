@@ -3,7 +3,7 @@
 #include <array>
 
 #include "core/base/check.h"
-#include "core/geometry/point_shape.h"
+#include "core/geometry/shape.h"
 #include "core/index/hash_grid/region_walk.h"
 #include "core/index/regions.h"
 #include "tests/support/run_batch.h"
@@ -20,7 +20,7 @@ auto collector(const Meets& meets, std::vector<uint64_t>& ids) {
   };
 }
 
-// Returns the first hit up to kRayLength; the lower id wins a tie.
+// Returns the first hit up to kRayLength; of two hits at one distance, the one with the lower id.
 FirstHit first_of(const SceneSnapshot& snapshot, const ObjectRay& ray) {
   Work work;
   double nearest = kRayLength;
@@ -150,10 +150,16 @@ class Batches : public Contender {
   std::vector<Vec3f> origins_, directions_;
 };
 
+SceneSpec spec_with(const HistoryOptions& history) {
+  SceneSpec spec;
+  spec.history = history;
+  return spec;
+}
+
 }  // namespace
 
 Ours::Ours(const HistoryOptions& history)
-    : Contender("locus"), scene_("bench", {{}, Winding::kCounterClockwise, history}, 1, StaticSet::empty()) {}
+    : Contender("locus"), scene_("bench", spec_with(history), 1, StaticSet::empty()) {}
 
 void Ours::apply(const UpdateBatch& batch, size_t items) {
   const absl::StatusOr<UpdateAck> ack = scene_.apply(batch);
@@ -191,8 +197,9 @@ void Ours::insert(const Objects& objects) {
   apply(batch, objects.ids.size());
 }
 
-// Answers regions as the query engine does: one after the other, or together in one walk if that is faster.
-// `region_of(center)` returns the region of a query, `meets_of(center)` its meets().
+// Answers balls or boxes as the query engine does: one after the other, or all in one walk of the grid if that is
+// faster. `region_of(center)` returns a query's region, `meets_of(center)` the predicate that decides whether the query
+// meets an object.
 template <class RegionOf, class MeetsOf>
 void Ours::ask_regions(absl::Span<const Vec3f> centers, Answers& answers, const RegionOf& region_of,
                        const MeetsOf& meets_of) {

@@ -1,5 +1,6 @@
-// The only code of the dynamic suite that calls locus: a scene's writer, its index alone, and whole batches as the
-// server runs them. One thread, except for threads that the scene itself promises.
+// The only code of the dynamic suite that calls locus: the scene's writer, the scene's index without the query engine,
+// and whole batches as the server runs them. One thread; latest() and status() may be called from any thread, like
+// those of Scene.
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_OURS_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_OURS_H_
 
@@ -12,11 +13,11 @@
 
 namespace locus::bench::dynamic {
 
-// Updates go through the writer: each call is one batch, each move() a tick. Queries go to the index of the latest
-// revision.
+// Contender with a Scene. Updates go through the scene's writer: each call is one batch, and each move() one tick.
+// Queries go to the index of the latest revision.
 class Ours : public Contender {
  public:
-  // `history` sets how many past ticks are kept.
+  // Makes an empty scene; `history` sets how many past ticks it keeps.
   explicit Ours(const HistoryOptions& history = {});
   bool does(Task) const override { return true; }
 
@@ -40,11 +41,12 @@ class Ours : public Contender {
                    const MeetsOf& meets_of);
 
   Scene scene_;
-  SnapshotPtr snapshot_;  // the latest
+  SnapshotPtr snapshot_;  // latest snapshot of scene_
   uint64_t tick_ = 0;
 };
 
-// Returns a contender for queries of `ours` only: each call is one batch of one block, at the present or at `time`.
+// Returns a contender that only answers queries about the scene of `ours`. Each call is one batch of one block, about
+// the present or, if given, about `time`. Borrows `ours`.
 std::unique_ptr<Contender> batches_of(const Ours& ours, std::optional<AsOf> time = {});
 
 }  // namespace locus::bench::dynamic

@@ -10,7 +10,8 @@
 
 namespace locus::bench::dynamic {
 
-// Makes btDbvt alone, as Debian ships it: boxes with a margin, stretched along the velocity.
+// Makes Bullet's dynamic tree of boxes, btDbvt, without the rest of Bullet: boxes have a margin and are stretched along
+// the velocity.
 std::unique_ptr<Contender> bullet();
 // Makes Boost.Geometry's rtree<linear<16>> of points: a move is a removal and an insertion.
 std::unique_ptr<Contender> boost_rtree();
@@ -18,7 +19,7 @@ std::unique_ptr<Contender> boost_rtree();
 std::unique_ptr<Contender> nanoflann_tree();
 // Makes a hash map of cells.
 std::unique_ptr<Contender> naive_grid();
-// Makes a list of all objects sorted by cell each tick.
+// Makes a list of all objects, which is sorted by cell anew at each tick.
 std::unique_ptr<Contender> sorted_rebuild();
 
 // Returns the factories of all available peers.

@@ -15,8 +15,8 @@ using ::testing::IsEmpty;
 constexpr uint32_t kCount = 3000;
 constexpr float kCrowded = 300;  // side of a world in which most queries find something
 
-// Returns answers with an id that no object has, so that every right answer differs and the comparison tests all
-// objects.
+// Returns answers with an id that no object has. So every right answer differs, and compare() tests all objects to
+// decide.
 Answers wrong_answers(size_t queries) {
   Answers answers;
   answers.ids.assign(queries, 1);
@@ -25,7 +25,8 @@ Answers wrong_answers(size_t queries) {
   return answers;
 }
 
-// Among ties, peers may return any object, so the comparison is with locus, which is compared with brute force.
+// Verifies the nearest objects of `contender`. A peer may return any of several objects at one distance, so its answers
+// are compared with those of locus, and those of locus with a test of all objects.
 void expect_right_nearest(Contender& contender, const World& world) {
   if (!contender.does(Task::kNearest)) return;
   const Queries queries = queries_of(world, 20);

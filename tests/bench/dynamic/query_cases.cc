@@ -11,7 +11,7 @@
 namespace locus::bench::dynamic {
 namespace {
 
-// Number of calls into which the queries are divided: contenders that take batches get one batch per call.
+// Number of calls into which the queries are divided. For a contender that runs batches, a call is one batch.
 constexpr size_t kParts = 10;
 
 struct QueryCase {
@@ -24,7 +24,7 @@ constexpr QueryCase kCases[] = {{"ball", "ball_batch", Task::kBall},
                                 {"ray", "ray_batch", Task::kRay},
                                 {"nearest", "nearest_batch", Task::kNearest}};
 
-// Returns one of kParts.
+// Returns the queries of one of kParts calls.
 template <class T>
 absl::Span<const T> part_of(const std::vector<T>& queries, size_t part) {
   const size_t begin = queries.size() * part / kParts, end = queries.size() * (part + 1) / kParts;
@@ -62,8 +62,9 @@ class QueryRace {
   }
 
  private:
-  // Work of one contender in a turn: several passes over all queries, since a single one would mostly measure caches
-  // filled by the others; but only some of the parts if the contender is slow.
+  // Work of one contender in a turn: `parts` calls. These are several passes over all queries if the contender is fast,
+  // since a single pass would mostly measure reloading the caches, which the others have filled; less than a pass if it
+  // is slow.
   struct Entry {
     Contender* contender = nullptr;
     size_t parts = 1;
@@ -87,7 +88,7 @@ class QueryRace {
     }
   }
 
-  // Returns the number of parts to run, if all kParts take `seconds`.
+  // Returns the number of calls in a turn of a contender whose kParts calls take `seconds`.
   size_t parts_of(double seconds) const {
     const double turn = run_.options.quick ? 0.002 : 0.1;
     return static_cast<size_t>(std::clamp(kParts * turn / seconds, 1.0, 5.0 * kParts));
@@ -105,7 +106,8 @@ class QueryRace {
     return {entry.contender->name(), run_turn, static_cast<double>(count), {}};
   }
 
-  // Adds cells for all contestants but one of the first two, which are both locus.
+  // Adds cells for all contestants except `out`, one of the first two: both are locus, one with single queries and one
+  // with batches.
   void add(const char* name, std::vector<Contestant> contestants, std::vector<std::vector<double>> times, size_t out) {
     if (!run_.options.filter.wants(run_.case_of(name))) return;
     contestants.erase(contestants.begin() + static_cast<ptrdiff_t>(out));

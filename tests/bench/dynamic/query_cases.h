@@ -1,5 +1,5 @@
-// The cases ball, box, ray and nearest of one world, by locus's index alone, and those with _batch by whole batches.
-// One thread.
+// The cases of queries about one world. ball, box, ray and nearest use locus's index without the query engine;
+// ball_batch, box_batch, ray_batch and nearest_batch use whole batches. One thread.
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_QUERY_CASES_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_QUERY_CASES_H_
 
@@ -7,11 +7,11 @@
 
 namespace locus::bench::dynamic {
 
-// Returns a hash of the answers that is independent of the order within a query.
+// Returns a hash of the answers, independent of the order of the ids within a query.
 std::string hash_of(const Answers& answers);
 
-// Verifies that all contenders find the same objects in some balls about the present world, so that objects are where
-// they should be. Returns the hash of locus's answers.
+// Verifies that all contenders find the same objects in some balls of the present world, which shows that updates moved
+// the objects to the right positions. Returns the hash of locus's answers.
 std::string compare_some_balls(const WorldRun& run, const std::string& case_name);
 
 void run_query_cases(const WorldRun& run);

@@ -11,9 +11,9 @@
 namespace locus::bench::dynamic {
 namespace {
 
-constexpr std::array<uint32_t, 3> kAges = {1, 10, 30};  // ticks before the present
-constexpr float kFraction = 0.5f;                       // part of the way from that tick to the next
-constexpr uint32_t kTicks = 32;                         // ticks that are kept, and run before the queries
+constexpr std::array<uint32_t, 3> kAges = {1, 10, 30};  // age of a recorded tick: ticks before the present
+constexpr float kFraction = 0.5f;                       // time of the queries after the recorded tick, in ticks
+constexpr uint32_t kTicks = 32;  // number of ticks that run before the queries, all kept in the history
 constexpr uint64_t kHistoryBytes = uint64_t{8} << 30;
 constexpr size_t kCalls = 10;     // number of batches into which the queries are divided
 constexpr size_t kChecked = 100;  // maximum number of queries that brute force verifies
@@ -23,7 +23,8 @@ std::string name_of_case(uint32_t age, uint32_t count) {
   return absl::StrCat("rewind/", name_of_age(age), "/", name_of_count(count));
 }
 
-// A world whose past is kept by locus, and as lists of positions for the ticks of the queries.
+// A world whose history is stored by locus, and also as lists of positions for the ticks around the times of the
+// queries.
 class PastWorld {
  public:
   explicit PastWorld(uint32_t count)
@@ -42,7 +43,7 @@ class PastWorld {
   uint32_t count() const { return world_.count(); }
   static AsOf time(uint32_t age) { return {kTicks - age, kFraction}; }
 
-  // Returns the ids that a ball meets, ascending, by testing all objects.
+  // Returns the ids of the objects that a ball met at the time of `age`, ascending, by testing all objects.
   std::vector<uint64_t> truth(Vec3f center, uint32_t age) const {
     const std::vector<float>&at = positions_.at(age), &next = positions_.at(age - 1);
     const Objects objects = world_.objects();
@@ -67,7 +68,7 @@ class PastWorld {
   World world_;
   Queries queries_;
   Ours ours_;
-  std::map<uint32_t, std::vector<float>> positions_;  // key: age
+  std::map<uint32_t, std::vector<float>> positions_;  // positions of all objects, by age
 };
 
 class Rewinding {
@@ -99,8 +100,8 @@ class Rewinding {
   }
 
  private:
-  // Returns the number of passes over all queries in a turn; a single one would mostly measure caches filled by the
-  // others.
+  // Returns the number of passes over all queries in a turn. A single pass would mostly measure reloading the caches,
+  // which the other contestants have filled.
   size_t passes() const { return options_.quick ? 1 : 5; }
 
   Contestant contestant(const std::string& name, Contender& contender) {
@@ -138,7 +139,7 @@ class Rewinding {
   PastWorld past_;
   std::unique_ptr<Contender> now_;
   std::vector<std::unique_ptr<Contender>> rewound_;
-  std::vector<std::string> hashes_;  // of the answers of rewound_
+  std::vector<std::string> hashes_;  // hash of the answers of each of rewound_
   Answers answers_;
 };
 

@@ -1,5 +1,5 @@
-// Exact tests for peers that only cull: plain float tests of a ball, as a user of such a library would write them.
-// Inline, since each peer's file is compiled on its own.
+// Tests of one object, a ball, for peers that only cull by boxes: plain float code, as a user of such a library would
+// write it. Inline, since each peer's file is compiled on its own.
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_SCALAR_TESTS_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_SCALAR_TESTS_H_
 
@@ -24,7 +24,8 @@ inline bool scalar_box_meets(Vec3f position, float radius, Vec3f center) {
   return x * x + y * y + z * z <= radius * radius;
 }
 
-// Updates `first` if the ball is hit before it. A ray that starts inside hits at 0.
+// Updates `first` if the ray hits the object nearer than `first`, or as near with a lower id. A ray that starts inside
+// the object hits it at distance 0.
 inline void scalar_ray_meets(const Rayf& ray, Vec3f position, float radius, uint64_t id, FirstHit& first) {
   const Vec3f to_center = position - ray.origin;
   const float along = dot(to_center, ray.direction);

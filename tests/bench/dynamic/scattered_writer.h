@@ -1,5 +1,6 @@
-// A writer of moves without locality: batches of objects in a stride of 7919, all of them once to the next tick, then
-// all of them back, and so on. The columns are made beforehand, like a received message. One thread.
+// A writer of moves without locality: consecutive objects of a batch are 7919 apart in the world's order. All objects
+// are moved to their positions of the next tick, batch by batch, then all are moved back, and so on. The columns are
+// made beforehand, as if they had been received. One thread.
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_SCATTERED_WRITER_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_SCATTERED_WRITER_H_
 
@@ -12,7 +13,8 @@ namespace locus::bench::dynamic {
 
 class ScatteredWriter {
  public:
-  // Advances the world by one tick. The count of objects must be a multiple of every batch size.
+  // Makes the columns, and advances the world by one tick for this. The number of objects must be a multiple of the
+  // size of every batch.
   explicit ScatteredWriter(World& world);
 
   // Moves the next `batch` objects.
@@ -21,7 +23,7 @@ class ScatteredWriter {
  private:
   std::vector<uint64_t> ids_;
   std::vector<float> velocities_;
-  std::array<std::vector<float>, 2> positions_;  // used alternately
+  std::array<std::vector<float>, 2> positions_;  // positions at the next tick, and before it; used alternately
   size_t next_ = 0, turn_ = 0;
 };
 

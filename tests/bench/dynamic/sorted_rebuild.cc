@@ -9,8 +9,8 @@
 #include "tests/bench/dynamic/peers.h"
 #include "tests/bench/dynamic/scalar_tests.h"
 
-// All objects in the order of a dense grid's cells, sorted again each tick by a counting sort: no versions, no separate
-// moves, one cell size. A lower bound of the cost of a moving world.
+// A list of all objects in the order of a dense grid's cells, sorted anew at each tick by a counting sort. It has no
+// versions, no moves of single objects and one cell size: a lower bound of the cost of a moving world.
 namespace locus::bench::dynamic {
 namespace {
 
@@ -32,7 +32,7 @@ class SortedRebuild : public Contender {
     positions_.resize(count);
     for (size_t i = 0; i < count; ++i) positions_[i] = point_at(objects.positions, i);
     cells_.resize(count);
-    // Vectors of floats may be read past the last object.
+    // The AVX2 loop reads kLanes floats at once, so it may read past the last object.
     for (std::vector<float>* column : {&x_, &y_, &z_, &r_}) column->resize(count + kLanes);
     sorted_ids_.resize(count);
     build();
@@ -72,7 +72,7 @@ class SortedRebuild : public Contender {
  private:
   static Vec3f reach() { return {kReach, kReach, kReach}; }
 
-  // Chooses cells for four objects each on average, from the present bounds.
+  // Chooses the cell size from the present bounds, so that a cell has four objects on average.
   void lay_grid() {
     Vec3f high = positions_[0];
     low_ = high;
@@ -98,7 +98,7 @@ class SortedRebuild : public Contender {
       ++begins_[cells_[i] + 2];
     }
     for (size_t i = 2; i < begins_.size(); ++i) begins_[i] += begins_[i - 1];
-    // Increments the end of each run until it is the begin of the next.
+    // begins_[c + 1] is the next free slot of cell `c`; at the end it is the begin of cell c + 1.
     for (uint32_t i = 0; i < positions_.size(); ++i) {
       const uint32_t at = begins_[cells_[i] + 1]++;
       x_[at] = positions_[i].x;
@@ -116,7 +116,8 @@ class SortedRebuild : public Contender {
                static_cast<size_t>(last_[2] + 1) +
            static_cast<size_t>(z);
   }
-  // Visits the objects between `low` and `high`, and some others, as ranges of slots.
+  // Calls visit(begin, end) for ranges of slots that contain all objects between `low` and `high`, and possibly other
+  // objects.
   template <class Visit>
   void each_run(Vec3f low, Vec3f high, const Visit& visit) const {
     const Vec3f grown = {largest_, largest_, largest_};
@@ -150,7 +151,7 @@ class SortedRebuild : public Contender {
       if (scalar_ball_meets({x_[i], y_[i], z_[i]}, r_[i], center)) ids.push_back(sorted_ids_[i]);
   }
 #endif
-  // Steps along the ray by one cell's length at a time.
+  // Returns the first hit. Divides the ray into segments of a cell's length and tests the objects around each.
   FirstHit first_of(const Rayf& ray) const {
     FirstHit first;
     for (float t = 0; t < kRayLength && t <= first.distance + largest_; t += cell_) {
@@ -163,13 +164,14 @@ class SortedRebuild : public Contender {
     return first;
   }
 
-  // Searches rings of cells around that of the centre. Keys are squared distances to centres if all radii are equal,
-  // which gives the same order, else distances to surfaces, negative inside.
+  // Searches rings of cells around the cell of `center` for the nearest objects. Objects are ordered by the distance
+  // from `center` to their surface, negative inside. If all radii are equal (kOneSize), the squared distance to their
+  // centres is used instead, which gives the same order.
   template <bool kOneSize>
   NearestFound nearest_of(Vec3f center) const {
     NearestFound found;
     const std::array<int, 3> home = {cell_of(center, 0), cell_of(center, 1), cell_of(center, 2)};
-    float inside = std::numeric_limits<float>::infinity();  // distance to the nearest side of the home cell
+    float inside = std::numeric_limits<float>::infinity();  // distance of `center` to the nearest side of its cell
     for (int axis = 0; axis < 3; ++axis) {
       const float from_low = center[axis] - low_[axis] - static_cast<float>(home[static_cast<size_t>(axis)]) * cell_;
       inside = std::min({inside, from_low, cell_ - from_low});
@@ -187,7 +189,7 @@ class SortedRebuild : public Contender {
     }
     return found;
   }
-  // Visits the cells whose largest distance from `home` on an axis is `ring`.
+  // Visits the cells whose distance from `home`, the maximum over the axes in cells, is `ring`.
   template <class Visit>
   void each_run_of_ring(const std::array<int, 3>& home, int ring, const Visit& visit) const {
     const auto row = [&](int x, int y, int first_z, int last_z) {
@@ -208,18 +210,18 @@ class SortedRebuild : public Contender {
   }
 
   std::unique_ptr<IdMap> map_;
-  // By object index.
+  // Columns indexed by object.
   std::vector<uint64_t> ids_;
   std::vector<Vec3f> positions_;
   std::vector<float> radii_;
   std::vector<uint32_t> cells_;
-  float smallest_ = 0, largest_ = 0;  // of radii_
-  // The grid: cell `c` is the slots begins_[c] to begins_[c + 1] - 1.
+  float smallest_ = 0, largest_ = 0;  // minimum and maximum of radii_
+  // The grid: cell `c` has the slots begins_[c] to begins_[c + 1] - 1.
   Vec3f low_;
   float cell_ = 1, per_cell_ = 1;
   std::array<int, 3> last_{};
   std::vector<uint32_t> begins_;
-  // By slot.
+  // Columns indexed by slot: objects in the order of their cells.
   std::vector<float> x_, y_, z_, r_;
   std::vector<uint64_t> sorted_ids_;
 };

@@ -10,7 +10,7 @@ namespace locus::bench::dynamic {
 namespace {
 
 constexpr float kAround = 6.2831853f;
-constexpr float kStep = 8;  // step of an object in kBorder
+constexpr float kStep = 8;  // movement of an object per tick in a world of kind kBorder
 constexpr uint32_t kTowns = 20;
 
 class Draws {
@@ -30,7 +30,7 @@ class Draws {
   cli::SplitMix64 numbers_;
 };
 
-// Draws positions of one kind.
+// Generator of the initial positions in a world of one kind.
 class Places {
  public:
   Places(Kind kind, Vec3f low, Vec3f high) : draws_(1), kind_(kind), low_(low), size_(high - low) {
@@ -92,7 +92,7 @@ std::vector<float> drawn_radii(Kind kind, uint32_t count) {
   return radii;
 }
 
-// Returns the position of a randomly drawn object, moved a little.
+// Returns the position of a randomly drawn object, moved by up to 5 on each axis.
 Vec3f near_an_object(const World& world, Draws& draws) {
   Vec3f point = point_at(world.objects().positions, draws.next() % world.count());
   for (int axis = 0; axis < 3; ++axis) point[axis] += std::fma(10.0f, draws.unit(), -5.0f);

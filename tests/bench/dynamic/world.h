@@ -1,10 +1,9 @@
 // The moving objects of the dynamic suite: determined by a kind, a count and fixed seeds, and drawn in a fixed order,
-// so that the workload can be repeated in any server at any time. One thread a world.
+// so that the workload can be repeated in any server at any time. Only one thread uses a world.
 //
-// Random numbers are SplitMix64; f = (next >> 40) * 2^-24, uniform over [0, 1). Everything is float; a product to which
-// something is added is not rounded before the addition (a fused multiplication). Seed 1: twenty towns (x and y 100 +
-// 1800 f, drawn for every kind), then the objects; seed 2: velocities; seed 5: mixed radii; seed 7: ids, without their
-// highest bit.
+// Random numbers are SplitMix64; f = (next >> 40) * 2^-24, uniform over [0, 1). All arithmetic is float; a product plus
+// a term is computed with one rounding (fused multiply-add). Seed 1: twenty towns (x and y 100 + 1800 f, drawn for
+// every kind), then the objects; seed 2: velocities; seed 5: mixed radii; seed 7: ids, without their highest bit.
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_WORLD_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_WORLD_H_
 
@@ -18,34 +17,35 @@
 
 namespace locus::bench::dynamic {
 
-// kUniform: 2000 x 2000 x 100. kClustered: four of five in towns, discs of radius 100. kFar: uniform, 1e6 away in x and
-// y. kOneCell: 8 x 8 x 8. kBorder: at multiples of 8, one step of 8 along one axis a tick. kGiant: uniform, the first
-// has the radius 5000. kMixed: uniform, radii 0.25 * 2^(7 f f'). All other radii are 0.5.
+// Distribution of objects. kUniform: 2000 x 2000 x 100. kClustered: four of five objects are in towns, which are discs
+// of radius 100. kFar: uniform, 1e6 away from the origin in x and y. kOneCell: 8 x 8 x 8. kBorder: coordinates are
+// multiples of 8, and each tick moves an object by 8 along one axis. kGiant: uniform, the first object has the radius
+// 5000. kMixed: uniform, radii 0.25 * 2^(7 f f') with two draws f and f'. All other radii are 0.5.
 enum class Kind : uint8_t { kUniform, kClustered, kFar, kOneCell, kBorder, kGiant, kMixed };
 inline constexpr std::array<Kind, 7> kKinds = {Kind::kUniform, Kind::kClustered, Kind::kFar,  Kind::kOneCell,
                                                Kind::kBorder,  Kind::kGiant,     Kind::kMixed};
 const char* name_of(Kind kind);
-// Returns whether all radii are 0.5.
+// Returns whether all radii of such a world are 0.5.
 constexpr bool has_one_size(Kind kind) { return kind != Kind::kGiant && kind != Kind::kMixed; }
-// Returns a short name, such as 10k or 1M.
+// Returns the count in short form, such as 10k or 1M.
 std::string name_of_count(uint32_t count);
 
 inline constexpr float kSide = 2000;
 
 class World {
  public:
-  // Makes a world. `side` is the size of a uniform one in x and y.
+  // Makes a world of `count` objects. `side` is the size of a uniform world in x and y.
   World(Kind kind, uint32_t count, float side = kSide);
 
-  // Advances by one tick: every object moves by its velocity, of which a component is reversed if it would leave the
-  // world.
+  // Advances by one tick: every object moves by its velocity. If it would leave the world along an axis, that component
+  // of its velocity is reversed first.
   void step();
-  // Advances one object only.
+  // Advances one object, given by its index, by one tick.
   void step(uint32_t object);
 
   Kind kind() const { return kind_; }
   uint32_t count() const { return static_cast<uint32_t>(ids_.size()); }
-  // Returns the present objects: valid as long as the world, and updated by each step().
+  // Returns views of the world's columns: valid as long as the world, and updated by each step().
   Objects objects() const { return {ids_, positions_, radii_}; }
   Moves moves() const { return {ids_, positions_, velocities_}; }
   // Returns a name such as uniform/10k.
@@ -60,11 +60,10 @@ class World {
   std::vector<float> radii_;
 };
 
-// Queries about a world at present (for the check values, at its start): positions of randomly drawn objects, moved by
-// up to 5 on each axis.
+// Queries about a world: the present positions of randomly drawn objects, moved by up to 5 on each axis.
 struct Queries {
   std::vector<Vec3f> centers;  // seed 3: for balls, boxes and nearest
-  std::vector<Rayf> rays;      // seed 4: z of the directions times 0.2, length kRayLength
+  std::vector<Rayf> rays;      // seed 4: drawn directions with z times 0.2, then normalised; length kRayLength
 };
 inline constexpr size_t kQueries = 10'000;
 Queries queries_of(const World& world, size_t count = kQueries);

@@ -1,4 +1,4 @@
-// Data that the cases of one world share: contenders, and the report. Plain data.
+// Data that the cases of one world share: the world, its queries, the contenders, and the report. Plain data.
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_WORLD_RUN_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_WORLD_RUN_H_
 
@@ -16,14 +16,14 @@ namespace locus::bench::dynamic {
 
 struct Entrant {
   std::unique_ptr<Contender> contender;
-  int64_t bytes = 0;  // bytes that it keeps after loading and moves
+  int64_t bytes = 0;  // heap bytes that the contender holds after loading and moves
 };
 
 struct WorldRun {
   const Options& options;
   World& world;
-  const Queries& queries;                // made at its start
-  const std::vector<Entrant>& entrants;  // loaded, and moved like the world; locus is the first
+  const Queries& queries;                // made from the world before its first tick
+  const std::vector<Entrant>& entrants;  // contenders, loaded and moved like the world; the first is locus
   const Ours& ours;                      // the first entrant
   Report& report;
 
@@ -33,7 +33,7 @@ struct WorldRun {
 // Returns the factories of locus and of all peers that can hold this world.
 std::vector<Maker> makers_for(const World& world);
 
-// Returns a cell with the fields that a case knows.
+// Returns a cell of the suite `dynamic` without results.
 inline Cell cell_of(const std::string& case_name, const std::string& metric, const std::string& results_hash) {
   Cell cell;
   cell.suite = "dynamic";

@@ -5,7 +5,7 @@
 
 #include <set>
 
-// Another program of the same definition computed the expected values.
+// Tests of the drawn numbers. Another program computed the expected values from the definition in world.h.
 namespace locus::bench::dynamic {
 namespace {
 

@@ -1,5 +1,5 @@
-// Filter for cases by name: those in which a regular expression matches anywhere. For every suite. Copies are cheap and
-// share; const members may run concurrently.
+// Filter for cases by name: it selects the names in which a regular expression matches anywhere. For every suite.
+// Copies are cheap, since they share the compiled expression; const members may run concurrently.
 #ifndef LOCUS_TESTS_BENCH_FRAME_CASE_FILTER_H_
 #define LOCUS_TESTS_BENCH_FRAME_CASE_FILTER_H_
 
@@ -17,7 +17,8 @@ class CaseFilter {
   // Selects every case.
   CaseFilter() = default;
 
-  // Compiles a pattern in POSIX extended syntax; an empty one selects every case. INVALID_ARGUMENT with the reason.
+  // Compiles a pattern in POSIX extended syntax; an empty pattern selects every case. Returns INVALID_ARGUMENT with the
+  // reason if the pattern is not valid.
   static absl::StatusOr<CaseFilter> create(const std::string& pattern);
 
   bool wants(const std::string& case_name) const;

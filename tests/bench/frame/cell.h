@@ -1,5 +1,4 @@
-// Results of a benchmark: cells, each with a figure of locus and one of a peer, and the sentences that belong to them.
-// For every suite.
+// Results of a benchmark: cells, each with a figure of locus and one of a peer, and notes about them. For every suite.
 #ifndef LOCUS_TESTS_BENCH_FRAME_CELL_H_
 #define LOCUS_TESTS_BENCH_FRAME_CELL_H_
 
@@ -17,17 +16,17 @@ struct Cell {
   double ours = 0;
   double peer = 0;
   std::string peer_name;
-  double ratio = 0;   // above 1 means locus is better; the median over the rounds
-  double spread = 0;  // of the rounds' ratios: (maximum - minimum) / median
+  double ratio = 0;   // median of the rounds' ratios; above 1 means locus is better
+  double spread = 0;  // (maximum - minimum) / median of the rounds' ratios
   std::string results_hash;
 };
 
 struct Report {
-  // Called with each cell as soon as it is known; may be empty.
+  // Called with each cell as soon as it is added; may be empty.
   std::function<void(const Cell& cell)> on_cell;
   std::vector<Cell> cells;
   std::vector<std::string> notes;          // facts for the reader: a missing peer, rays that differ
-  std::vector<std::string> disagreements;  // unexplained differences; one is enough for exit status 1
+  std::vector<std::string> disagreements;  // unexplained differences of results; if there is one, the exit status is 1
 
   void add(Cell cell) {
     if (on_cell) on_cell(cell);

@@ -15,13 +15,13 @@ inline constexpr int kMaxThreads = 256;
 
 struct Options {
   std::string suite;
-  std::string json;                 // output file; empty = none
+  std::string json;                 // path of the JSON output file; empty = no JSON
   bool quick = false;               // runs every case with a small workload
   CaseFilter filter;                // cases to run
-  int rounds = kMinRounds;          // without the warm-up round
-  std::vector<std::string> meshes;  // replaces the suite's own
-  int threads = 2;                  // threads of the cases that use several
-  std::string levels;               // folder of fetched levels
+  int rounds = kMinRounds;          // number of measured rounds; the warm-up round is not counted
+  std::vector<std::string> meshes;  // meshes to use instead of the suite's default ones; empty = default
+  int threads = 2;                  // number of threads in the case threads2, whose name contains this number
+  std::string levels;               // folder where fetch_levels.sh stored levels
 };
 
 }  // namespace locus::bench

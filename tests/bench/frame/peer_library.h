@@ -1,5 +1,5 @@
-// Peer libraries, with a flag whether this program was configured with them, and the notes about missing ones. For
-// every suite. Plain data and pure functions.
+// Peer libraries, with a flag whether this program was configured with the library, and notes about missing libraries.
+// For every suite. Plain data and pure functions.
 #ifndef LOCUS_TESTS_BENCH_FRAME_PEER_LIBRARY_H_
 #define LOCUS_TESTS_BENCH_FRAME_PEER_LIBRARY_H_
 
@@ -12,7 +12,7 @@
 namespace locus::bench {
 
 struct PeerLibrary {
-  const char* package;  // name in Debian
+  const char* package;  // name of the Debian package
   bool is_here;
 };
 

@@ -13,7 +13,7 @@
 
 namespace locus::bench {
 
-// Returns the processor time of this thread, that of the process, or wall time; in seconds.
+// Clocks, in seconds: processor time of this thread, processor time of the process, and wall time.
 double thread_seconds();
 double process_seconds();
 double wall_seconds();
@@ -21,19 +21,21 @@ double wall_seconds();
 struct Contestant {
   std::string name;
   std::function<void(size_t chunk)> run;
-  double operations = 1;                      // in all chunks together: the divisor of times
-  std::function<void(size_t chunk)> prepare;  // runs before the clock starts; may be empty
+  double operations = 1;                      // operations in all chunks together; a time is divided by this
+  std::function<void(size_t chunk)> prepare;  // runs before each chunk, while the clock is stopped; may be empty
 };
 
-// kDone: all contestants have done the same work just before.
+// Warm-up of the caches: one round of race() that is not counted, or none, if all contestants have just done the same
+// work.
 enum class WarmUp : uint8_t { kOneRound, kDone };
 
-// Returns nanoseconds per operation: one row a contestant, one column a round. A round is all contestants at the first
-// chunk, then all at the second and so on; the warm-up round before is not counted.
+// Returns nanoseconds per operation: one row for each contestant, one column for each round. In a round, all
+// contestants run the first chunk, then all run the second chunk, and so on. The warm-up round is not counted.
 std::vector<std::vector<double>> race(const std::vector<Contestant>& contestants, size_t chunks, int rounds,
                                       double (*clock)(), WarmUp warm_up = WarmUp::kOneRound);
 
-// Adds one cell for each contestant but the first, which is locus. `cell` has the fields that they share.
+// Adds one cell for each contestant except the first, which is locus. `cell` has the fields that are equal in all
+// cells; `times` is a result of race().
 void add_cells(const std::vector<Contestant>& contestants, const std::vector<std::vector<double>>& times,
                const Cell& cell, Report& report);
 

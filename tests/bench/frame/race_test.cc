@@ -10,7 +10,7 @@ namespace {
 
 using ::testing::ElementsAre;
 
-double now = 0;  // time of the clock of these tests
+double now = 0;  // present time of the clock that these tests pass to race(), in seconds
 
 double read_clock() { return now; }
 

@@ -23,7 +23,7 @@ std::string json_of(const Report& report);
 // Writes the JSON; FAILED_PRECONDITION if the file cannot be written.
 absl::Status write_json(const Report& report, const std::string& path);
 
-// Returns 1 if there is a disagreement, else 0.
+// Returns 1 if the report has a disagreement, otherwise 0.
 int exit_status(const Report& report);
 
 }  // namespace locus::bench

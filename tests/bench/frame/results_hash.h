@@ -1,10 +1,11 @@
-// A hash of results in their order, so that those of two runs, or two machines, can be compared by one word. One
-// object, one thread. Source: Fowler, Noll, Vo (FNV-1a), over 64-bit words.
+// A hash of a sequence of results: the results of two runs, or of two machines, are compared by comparing one word.
+// Only one thread uses an object. Source: Fowler, Noll, Vo (FNV-1a), over 64-bit words.
 #ifndef LOCUS_TESTS_BENCH_FRAME_RESULTS_HASH_H_
 #define LOCUS_TESTS_BENCH_FRAME_RESULTS_HASH_H_
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 
@@ -14,7 +15,7 @@ class ResultsHash {
  public:
   void add(uint64_t value) { state_ = (state_ ^ value) * 0x100000001B3u; }
   uint64_t value() const { return state_; }
-  // Returns sixteen hexadecimal digits.
+  // Returns the hash as sixteen hexadecimal digits.
   std::string text() const { return absl::StrCat(absl::Hex(state_, absl::kZeroPad16)); }
 
  private:
@@ -25,6 +26,13 @@ class ResultsHash {
 inline std::string hash_of_number(uint64_t value) {
   ResultsHash hash;
   hash.add(value);
+  return hash.text();
+}
+
+// Returns the hash of several values.
+inline std::string hash_of_numbers(const std::vector<uint64_t>& values) {
+  ResultsHash hash;
+  for (const uint64_t value : values) hash.add(value);
   return hash.text();
 }
 

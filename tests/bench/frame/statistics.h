@@ -1,5 +1,5 @@
-// Statistics from the rounds of a race to the figures of a cell. Pure functions for every suite. Inputs are never
-// empty.
+// Statistics that compute the figures of a cell from the rounds of a race. Pure functions for every suite. Inputs must
+// not be empty.
 #ifndef LOCUS_TESTS_BENCH_FRAME_STATISTICS_H_
 #define LOCUS_TESTS_BENCH_FRAME_STATISTICS_H_
 
@@ -7,16 +7,17 @@
 
 namespace locus::bench {
 
-// Returns the middle value, or the mean of the two in the middle.
+// Returns the middle value; of an even number of values, the mean of the two middle ones.
 double median(std::vector<double> values);
 
-// Returns the smallest value that at least that share (0 ... 1) of all values do not exceed.
+// Returns the smallest of the values for which at least the part `share` (0 ... 1) of all values is less or equal.
 double percentile(std::vector<double> values, double share);
 
 // Returns (maximum - minimum) / median.
 double spread(const std::vector<double>& values);
 
-// Returns peer[i] / ours[i] for each round: both were measured side by side, so that other load disturbs both equally.
+// Returns peer[i] / ours[i] for each round: both times were measured in the same round, so that other load disturbed
+// both equally.
 std::vector<double> round_ratios(const std::vector<double>& ours, const std::vector<double>& peer);
 
 }  // namespace locus::bench

@@ -11,13 +11,14 @@
 
 namespace locus::bench {
 
-// Reports progress on standard error.
+// Function that prints a sentence about the progress on standard error.
 using Progress = std::function<void(const std::string& sentence)>;
 
 struct Suite {
   std::string name;
   std::string description;
-  // Adds to the report case by case. Fails if the suite cannot run at all, for example if a mesh cannot be read.
+  // Runs the cases and adds the results of each to the report. Returns an error if the suite cannot run at all, for
+  // example if a mesh cannot be read.
   absl::Status (*run)(const Options& options, const Progress& progress, Report& report);
 };
 

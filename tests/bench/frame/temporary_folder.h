@@ -1,5 +1,5 @@
-// A folder of a benchmark's own under TMPDIR, or /tmp, removed with its content. For suites that write files. One
-// thread at a time.
+// A new folder under TMPDIR, or under /tmp if TMPDIR is not set; the destructor removes it with its content. For suites
+// that write files. One thread at a time.
 #ifndef LOCUS_TESTS_BENCH_FRAME_TEMPORARY_FOLDER_H_
 #define LOCUS_TESTS_BENCH_FRAME_TEMPORARY_FOLDER_H_
 

@@ -28,7 +28,7 @@ constexpr size_t kWriters = 8;
 
 struct Size {
   size_t moves;
-  size_t commits;  // per chunk
+  size_t commits;  // number of commits in a chunk
   double bar;
 };
 constexpr Size kSizes[] = {{16, 400, 0.8}, {256, 400, 0.8}, {4096, 100, 0.6}};
@@ -39,7 +39,7 @@ size_t commits_of_all(const LogRun& run, const Size& size) {
   return commits_of(run, size) * run.chunks() * static_cast<size_t>(run.options.rounds + 1);
 }
 
-// Returns records in the format of a scene's log, with moves of objects.
+// Returns `count` records in the format of a scene's log, each with `moves` moves of objects.
 std::vector<std::string> records_of(size_t moves, size_t count) {
   dynamic::World world(dynamic::Kind::kUniform, kObjects);
   std::vector<std::string> records(count);
@@ -111,7 +111,7 @@ class OurLog {
 
 constexpr const char* kMetric = "ns/commit";
 
-// Measures one writer: each commit is on the disk before the next.
+// Measures one writer, whose next commit begins when the previous one is on the disk.
 absl::Status measure_commits(const LogRun& run, const Size& size) {
   const std::string name = absl::StrCat("commit/", size.moves);
   if (!run.options.filter.wants(name)) return absl::OkStatus();
@@ -159,7 +159,7 @@ absl::Status measure_commits(const LogRun& run, const Size& size) {
   return status;
 }
 
-// Measures several scenes, each with a writer of its own: one sync can serve all.
+// Measures writers that each have a scene and a thread: one sync of the log can serve the commits of all.
 absl::Status measure_writers(const LogRun& run, const Size& size) {
   const std::string name = absl::StrCat("writers/", kWriters, "/", size.moves);
   if (!run.options.filter.wants(name)) return absl::OkStatus();

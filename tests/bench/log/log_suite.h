@@ -6,7 +6,7 @@
 
 namespace locus::bench::log {
 
-// Runs the suite; UNAVAILABLE if files cannot be written.
+// Runs the suite; returns an error if files cannot be written.
 absl::Status run_log_suite(const Options& options, const Progress& progress, Report& report);
 
 }  // namespace locus::bench::log

@@ -37,7 +37,7 @@ class MeshCase {
     };
   }
 
-  // Uploads the mesh and opens the directory again.
+  // Adds the mesh `name` to a new data directory, then closes and reopens the directory.
   absl::Status prepare(const std::string& name) {
     const absl::StatusOr<BenchMesh> level = load_mesh(name);
     if (!level.ok()) return level.status();
@@ -51,7 +51,8 @@ class MeshCase {
     return open();
   }
 
-  // Removes the stored topology, so that recovery builds the tree, as in a directory of an earlier version.
+  // Removes the stored topology and releases the mesh. Recovery must then build the tree, as it must for a directory of
+  // an earlier version, which stored no topology.
   void forget_topology() {
     topology_ = log_->read_outline({1}).value_or("");
     log_->keep_outline({1}, "");
@@ -67,7 +68,7 @@ class MeshCase {
   }
 
   const absl::Status& status() const { return status_; }
-  // Returns the mesh of the last restore or build.
+  // Returns the mesh of the last recover(); null if it was released since.
   const MeshPtr& mesh() const { return mesh_; }
   size_t topology_bytes() const { return topology_.size(); }
 

@@ -1,5 +1,5 @@
-// The minimum that a log must do: a file to which records are appended, each synced before the next. No checksums, no
-// sequence numbers, no detection of damage. One thread a file.
+// The minimal log, to compare with: a file to which records are appended, each synced before the next. It has no
+// checksums, no sequence numbers and no detection of damage. Only one thread uses a file.
 #ifndef LOCUS_TESTS_BENCH_LOG_RAW_FILE_H_
 #define LOCUS_TESTS_BENCH_LOG_RAW_FILE_H_
 
@@ -14,14 +14,14 @@ namespace locus::bench::log {
 
 class RawFile {
  public:
-  // Creates a file. With `reserved` bytes it already holds that many zeros on the disk, which records overwrite: then a
-  // sync has no new file length to write. UNAVAILABLE.
+  // Creates a file. If `reserved` is not 0, first writes this number of zeros to the disk, which the records then
+  // overwrite, so that a sync need not write a new file length. Returns the system's error on failure.
   static absl::StatusOr<std::unique_ptr<RawFile>> create(const std::string& path, uint64_t reserved);
   ~RawFile();
   RawFile(const RawFile&) = delete;
   RawFile& operator=(const RawFile&) = delete;
 
-  // Writes a record; it is on the disk (fdatasync) at return. UNAVAILABLE.
+  // Writes a record and syncs it to the disk (fdatasync). Returns the system's error on failure.
   absl::Status append(absl::string_view record);
   // Returns all appended bytes.
   absl::StatusOr<std::string> read_all() const;

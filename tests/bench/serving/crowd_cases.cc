@@ -13,11 +13,11 @@
 namespace locus::bench::serving {
 namespace {
 
-constexpr size_t kLarge = 8192;  // rays per batch
+constexpr size_t kLarge = 8192;  // rays per batch of the other client
 constexpr size_t kBulkWindow = 4;
 constexpr double kUntilBusy = 0.2;  // seconds for the other client to connect
 constexpr size_t kCalls = 16;       // calls that the overloaded server admits
-constexpr size_t kFlood = 10;       // factor by which callers exceed that
+constexpr size_t kFlood = 10;       // number of callers, as a multiple of the admitted calls
 constexpr const char* kAtOnce = "overload/10x/at_once";
 constexpr const char* kAsTold = "overload/10x/as_told";
 
@@ -25,7 +25,8 @@ class CrowdCases {
  public:
   CrowdCases(const ServingRun& run, const BenchMesh& mesh) : run_(run), mesh_(mesh) {}
 
-  // Measures small batches one after another, alone and beside another client's large ones, in turns.
+  // Measures the time of small batches, sent one after another, in turns: alone, and beside another client's large
+  // batches.
   absl::Status mixed(TwinScene& scene) const {
     run_.progress("mixed_p99/16");
     constexpr size_t kSmall = GoodClient::kRays;
@@ -56,7 +57,8 @@ class CrowdCases {
     return absl::OkStatus();
   }
 
-  // Measures ten times as many callers as are admitted; `again` is their behaviour after a refusal.
+  // Measures the rate of answers with ten times as many callers as the server admits; `again` is the behaviour of a
+  // refused caller.
   absl::Status overload(const std::string& name, Again again) const {
     if (!run_.wants(name)) return absl::OkStatus();
     run_.progress(name);
@@ -91,12 +93,13 @@ class CrowdCases {
  private:
   static constexpr double kShares[] = {0.5, 0.99};
 
-  // Measurements of a flood, and of the calm before it.
+  // Sums over the rounds of an overload case: of the floods, with too many callers, and of the calm phase before each
+  // flood, with as many callers as the server admits.
   struct Crowd {
-    std::vector<double> refusals;  // seconds of each
-    std::vector<int64_t> memory;   // after each flood
+    std::vector<double> refusals;  // seconds until each refusal
+    std::vector<int64_t> memory;   // resident bytes of the server after each flood
     size_t calm_answers = 0, answers = 0;
-    double calm_client = 0, calm_server = 0, client = 0, server = 0;  // seconds of processor time
+    double calm_client = 0, calm_server = 0, client = 0, server = 0;  // processor time in seconds
 
     void add(const Flood& calm, const Flood& flood) {
       refusals.insert(refusals.end(), flood.refusals.begin(), flood.refusals.end());
@@ -107,8 +110,8 @@ class CrowdCases {
       client += flood.client_seconds;
       server += flood.server_seconds;
     }
-    // Returns microseconds of processor time for each refusal: the time beyond that of the answers, each of which takes
-    // as much as in the calm.
+    // Returns microseconds of processor time per refusal. From the floods' `seconds` it subtracts the time of the
+    // answers, assuming that an answer takes as long as in the calm.
     double each(double seconds, double calm_seconds) const {
       const double answering = calm_seconds * static_cast<double>(answers) / static_cast<double>(calm_answers);
       return 1e6 * (seconds - answering) / static_cast<double>(refusals.size());

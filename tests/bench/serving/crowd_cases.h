@@ -1,5 +1,6 @@
-// Effects of one client on another, and of a flood on the server: small batches beside large ones, more calls than are
-// admitted, deadlines and cancelled calls. For the suite serving.
+// Effects of one client on another, and of a flood of calls on the server: small batches beside large ones, more calls
+// than the server admits, clients that do not read or that reconnect, expired and cancelled calls. For the suite
+// serving.
 #ifndef LOCUS_TESTS_BENCH_SERVING_CROWD_CASES_H_
 #define LOCUS_TESTS_BENCH_SERVING_CROWD_CASES_H_
 
@@ -8,7 +9,7 @@
 
 namespace locus::bench::serving {
 
-// Runs mixed_p50/16, mixed_p99/16, overload/10x, deadline/1ms, cancel/1000.
+// Runs mixed_p50/16, mixed_p99/16, overload/10x, and the cases of guest_cases.h and ending_cases.h.
 absl::Status run_crowd_cases(const ServingRun& run);
 
 }  // namespace locus::bench::serving

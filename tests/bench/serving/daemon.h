@@ -1,4 +1,4 @@
-// A locusd started by the benchmark, with a client of the library to fill it. For every case. One thread.
+// A locusd that the benchmark starts, with a client of the library to fill it. For every case. One thread.
 #ifndef LOCUS_TESTS_BENCH_SERVING_DAEMON_H_
 #define LOCUS_TESTS_BENCH_SERVING_DAEMON_H_
 
@@ -12,10 +12,15 @@
 
 namespace locus::bench::serving {
 
+// Option of locusd for cases with many new connections, all of which come from one address.
+inline constexpr const char* kManyNewConnections = "--max-new-connections=100000";
+
 class Daemon final : public LocalServer {
  public:
-  // Starts locusd with `options` beside those for its port. UNAVAILABLE, with its output, if it does not serve in time.
-  static absl::StatusOr<std::unique_ptr<Daemon>> start(const std::vector<std::string>& options = {});
+  // Starts locusd with `options`, and options for its port; connections to it use `credentials`. Returns UNAVAILABLE,
+  // with the output of locusd, if it does not serve in time.
+  static absl::StatusOr<std::unique_ptr<Daemon>> start(const std::vector<std::string>& options = {},
+                                                       const client::CredentialOptions& credentials = {});
 
   const client::Client& client() const { return *client_; }
 

@@ -47,7 +47,7 @@ absl::Status create(const Daemon& daemon, const std::string& name, v1::Durabilit
   return daemon.client().create_scene(request).status();
 }
 
-// Two scenes with the same objects on one daemon: acks of one wait for the disk, those of the other do not.
+// Two scenes with the same objects on one daemon: acks of the first scene wait for the disk, acks of the second do not.
 class DurableCases {
  public:
   DurableCases(const ServingRun& run, const Daemon& daemon) : run_(run), daemon_(daemon) {}
@@ -89,7 +89,7 @@ class DurableCases {
     return status;
   }
 
-  // Measures queries beside a stream of a quarter of a million moves a second.
+  // Measures queries of a third scene while a stream sends 256,000 moves a second to one of the two scenes.
   absl::Status queries() {
     run_.progress(kQueriesName);
     Batches batches;
@@ -131,7 +131,7 @@ class DurableCases {
 
   size_t chunks() const { return run_.options.quick ? 1 : 4; }
 
-  // Sends one message each millisecond.
+  // Sends one message of moves per millisecond until `over` is true.
   absl::Status keep_moving(size_t scene, const std::atomic<bool>& over) {
     std::vector<v1::StreamUpdatesRequest> one = {messages_[scene].front()};
     UpdateLoad load(daemon_, one, 1, UpdateLoad::Expect::kApplied);
@@ -144,7 +144,7 @@ class DurableCases {
     return load.status();
   }
 
-  // Verifies that both scenes give the same answers.
+  // Verifies that both scenes give the same answers, and returns the hash of the answers.
   uint64_t compare(const std::string& name) const {
     uint64_t hashes[2] = {};
     for (size_t i = 0; i < 2; ++i) {
@@ -159,11 +159,11 @@ class DurableCases {
   const ServingRun& run_;
   const Daemon& daemon_;
   dynamic::World world_{dynamic::Kind::kUniform, kMoving};
-  std::vector<std::vector<v1::StreamUpdatesRequest>> messages_;  // per scene
+  std::vector<std::vector<v1::StreamUpdatesRequest>> messages_;  // messages of moves for each scene
 };
 
-// A scene whose snapshot holds all objects, followed by records of moves; then the daemon is killed, and started again
-// several times.
+// The case restart: a scene whose log has a snapshot of all objects, followed by records of moves. The daemon is killed
+// and started again several times.
 class RestartCase {
  public:
   explicit RestartCase(const ServingRun& run) : run_(run) {}
@@ -203,7 +203,7 @@ class RestartCase {
     if (!daemon.ok()) return daemon.status();
     absl::Status status = create(**daemon, "arena", v1::DURABILITY_LOCAL);
     status.Update((*daemon)->client().apply("arena", insert_all(world_)).status());
-    // Writes until the log is larger than the scene, so that a new snapshot replaces it.
+    // Writes until the records of the log are larger than the scene, so that the daemon writes a new snapshot.
     const size_t ticks = run_.options.quick ? 40 : 4;
     uint64_t written = 1, kept = 0;
     for (size_t tick = 0; status.ok() && tick < ticks && kept == 0; ++tick) {
@@ -221,7 +221,7 @@ class RestartCase {
     return status;
   }
 
-  // Writes a tick, or its first records.
+  // Writes the records of one tick, at most the first `max_records` of them, and adds their number to `written`.
   absl::Status move(const Daemon& daemon, size_t max_records, uint64_t& written) {
     std::vector<v1::StreamUpdatesRequest> messages = move_messages(world_, "arena", kMovesARecord, 1);
     messages.resize(std::min(messages.size(), max_records));

@@ -1,4 +1,5 @@
-// Cost of acks that wait for the disk, and the time until a killed daemon answers again. For the suite serving.
+// Cost of acks that wait for the disk, and the time until a daemon that was killed answers again. For the suite
+// serving.
 #ifndef LOCUS_TESTS_BENCH_SERVING_DURABLE_CASES_H_
 #define LOCUS_TESTS_BENCH_SERVING_DURABLE_CASES_H_
 
@@ -7,9 +8,9 @@
 
 namespace locus::bench::serving {
 
-// Runs durable/256, durable_queries/256: moves over one stream, and queries beside such a stream, with acks that wait
-// for the disk and acks that do not, on one daemon in turns. Runs restart/1M: seconds from the start of a daemon that
-// was killed to its first answer, which must be right, compared with the bar of one second.
+// Runs durable/256 (moves over one stream) and durable_queries/256 (queries beside such a stream). Both are measured
+// with acks that wait for the disk and with acks that do not, in turns, on one daemon. Runs restart/1M: seconds from
+// the start of a daemon that was killed to its first right answer, compared with a bar of one second.
 absl::Status run_durable_cases(const ServingRun& run);
 
 }  // namespace locus::bench::serving

@@ -1,5 +1,5 @@
-// Answer of the echo server: 24 bytes a ray, copied from the ray's own columns at memory speed. For the server and for
-// its verification. Pure function.
+// Answer of the echo server: 24 bytes a ray, copied from the columns of the request, so that the answer costs little.
+// For the echo server, and for the benchmark that verifies its answers. Pure function.
 #ifndef LOCUS_TESTS_BENCH_SERVING_ECHO_ANSWER_H_
 #define LOCUS_TESTS_BENCH_SERVING_ECHO_ANSWER_H_
 
@@ -7,7 +7,7 @@
 
 namespace locus::bench::serving {
 
-// Answers the batch's first block, which has rays with a t_max and a mask each.
+// Answers the batch's first block, which must have one t_max and one mask for each ray.
 inline void answer_echo(const v1::QueryBatch& batch, v1::QueryResult& result) {
   result.Clear();
   v1::BlockResult& block = *result.add_blocks();

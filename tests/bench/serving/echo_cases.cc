@@ -26,7 +26,7 @@ constexpr Echo kEchos[] = {{1024, 4}, {8192, 2}};
 
 struct Moves {
   size_t moves;
-  double bar;  // required millions a second
+  double bar;  // required millions of moves per second
 };
 constexpr Moves kMoves[] = {{256, 30}, {4096, 75}};
 
@@ -35,7 +35,7 @@ std::string empty_name(const Echo& echo) { return absl::StrCat("empty/", echo.ra
 std::string parsed_name(const Moves& moves) { return absl::StrCat("moves/", moves.moves); }
 std::string applied_name(const Moves& moves) { return absl::StrCat("moves_applied/", moves.moves); }
 
-// Makes batches of 32 bytes a ray, whose answers have 24: all columns of a hit.
+// Makes batches that have 32 bytes per ray, and whose answers have 24 bytes per ray: all columns of a hit.
 Batches echo_batches(size_t rays, size_t messages, const std::string& scene) {
   Batches batches;
   batches.queries = rays * messages;
@@ -62,7 +62,7 @@ class EchoCases {
   EchoCases(const ServingRun& run, const RawTcpServer& plain, TwinScene& scene)
       : run_(run), plain_(plain), scene_(scene) {}
 
-  // Measures columns to the server and back through the server's call code, without other work.
+  // Measures columns that are sent to locus-echo and back: the server's code for calls, without queries.
   absl::Status echo(const Echo& echo) {
     const std::string name = echo_name(echo);
     if (!run_.wants(name)) return absl::OkStatus();
@@ -81,7 +81,7 @@ class EchoCases {
     return status;
   }
 
-  // Measures as many bytes through the daemon: the rays are checked and run on an empty scene.
+  // Measures messages of the same size that are sent to the daemon: the rays are checked and run on an empty scene.
   absl::Status empty(const Echo& echo) {
     const std::string name = empty_name(echo);
     if (!run_.wants(name)) return absl::OkStatus();
@@ -90,8 +90,8 @@ class EchoCases {
     return there_and_back(name, echo, scene_.daemon(), batches, process.hashes());
   }
 
-  // The writer's first batch has been applied, so as duplicates of it all messages are read whole and acked, and no
-  // object moves.
+  // Measures moves that are read and acked but not applied: every message has the writer id and number of a batch that
+  // was applied before, so the daemon treats it as a duplicate.
   absl::Status parsed(const Moves& moves) {
     const std::string name = parsed_name(moves);
     if (!run_.wants(name)) return absl::OkStatus();
@@ -125,7 +125,7 @@ class EchoCases {
     return status;
   }
 
-  // Measures ticks of a world, each object once a tick, in the daemon and in this process.
+  // Measures ticks of a world, in which every object moves once, in the daemon and in this process.
   absl::Status applied(const Moves& moves) {
     const std::string name = applied_name(moves);
     if (!run_.wants(name)) return absl::OkStatus();
@@ -193,7 +193,8 @@ class EchoCases {
         absl::StrFormat("%s: processor time a message: %s; over plain sockets %s", name, time.text(), plain.text()));
   }
 
-  // Verifies that all objects are at the same positions as in process.
+  // Verifies, by queries, that the daemon's objects are at the same positions as those of this process. Returns the
+  // hash of the answers.
   uint64_t compare_objects(const std::string& name) const {
     v1::QueryBatch batch;
     v1::Balls* const balls = batch.add_blocks()->mutable_balls();

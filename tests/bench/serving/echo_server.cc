@@ -1,6 +1,6 @@
-// The program `locus-echo`: streams of queries with the server's own template for calls, as many IO threads and its
-// limits, but every batch is answered at once with columns of the same length. It checks nothing and has no scene, so
-// that it measures transport alone. locus-bench starts it with locusd's options for the port.
+// The program `locus-echo`: streams of queries with the server's own template for calls, number of IO threads and
+// limits. It answers every batch at once with columns of 24 bytes per ray, checks only their lengths and has no scene,
+// so that locus-bench can measure transport alone. locus-bench starts it with locusd's options for the port.
 #include <fcntl.h>
 #include <grpcpp/resource_quota.h>
 #include <grpcpp/server.h>
@@ -43,6 +43,7 @@ struct EchoMethod {
   using Response = v1::StreamQueriesResponse;
   using Work = EchoWork;
   static constexpr server::Rpc kRpc = server::Rpc::kStreamQueries;
+  static constexpr const char* kPath = "/locus.v1.QueryService/StreamQueries";
   static constexpr bool kStream = true;
   static constexpr bool kInOrder = false;
 
@@ -50,6 +51,7 @@ struct EchoMethod {
               grpc::ServerCompletionQueue* queue, void* tag) const {
     service->RequestStreamQueries(context, wire, queue, queue, tag);
   }
+  Work make_work(server::CallSlot& slot) const { return Work(slot); }
   void begin(Work& work, const std::string&, const Request& request, Response& response) const {
     work.begin(request.batch(), *response.mutable_result());
   }
@@ -57,7 +59,7 @@ struct EchoMethod {
   Service* service;
 };
 
-// Tunes malloc like locusd, before anything else.
+// Tunes malloc like locusd. Called first in main(), before anything is allocated.
 void keep_freed_memory() {
   mallopt(M_MMAP_THRESHOLD, 64 << 20);
   mallopt(M_TRIM_THRESHOLD, 512 << 20);
@@ -73,7 +75,7 @@ void set_limits(const server::ServerConfig& config, grpc::ServerBuilder& builder
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
 }
 
-// Writes the file atomically.
+// Writes the port to the file atomically, since locus-bench polls the file. Returns false on failure.
 bool write_port(const std::string& path, int port) {
   const std::string temporary = path + ".tmp", text = absl::StrCat(port, "\n");
   const int file = open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
@@ -84,7 +86,7 @@ bool write_port(const std::string& path, int port) {
 
 // Serves until a signal ends the process.
 int serve(const server::ServerConfig& config) {
-  server::Host host(config, nullptr);
+  server::RpcState state(config.max_calls, config.max_streams, config.memory_limit, [] { return 0; });
   Service service;
   grpc::ServerBuilder builder;
   set_limits(config, builder);
@@ -95,7 +97,7 @@ int serve(const server::ServerConfig& config) {
   const std::unique_ptr<grpc::Server> grpc = builder.BuildAndStart();
   if (grpc == nullptr) return EXIT_FAILURE;
   std::list<server::Listener<EchoMethod>> listeners;
-  for (size_t i = 0; i < io.loops(); ++i) listeners.emplace_back(host, EchoMethod{&service}, io.loop(i)).listen();
+  for (size_t i = 0; i < io.loops(); ++i) listeners.emplace_back(state, EchoMethod{&service}, io.loop(i)).listen();
   io.start();
   if (!write_port(config.port_file, port)) std::_Exit(EXIT_FAILURE);
   while (true) pause();

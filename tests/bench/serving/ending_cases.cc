@@ -13,12 +13,11 @@ namespace {
 
 constexpr uint32_t kObjects = 100'000;
 constexpr double kMaxMs = 5;
-constexpr double kSettled = 0.05;  // seconds after which a server without work is checked
+constexpr double kSettled = 0.05;  // seconds; settle() samples every tenth of this
 constexpr const char* kDeadline = "deadline/1ms";
 constexpr const char* kCancel = "cancel/1000";
 
-// Makes a request of balls that each meet every object, so that it ends only after its last test. `balls` is chosen so
-// that it takes about a second.
+// Makes a request of `balls` balls, each of which overlaps every object, so that the request takes long.
 v1::QueryRequest long_job(const std::string& scene, int balls) {
   v1::QueryRequest request;
   request.set_scene(scene);
@@ -35,7 +34,7 @@ class EndingCases {
   EndingCases(const ServingRun& run, TwinScene& scene)
       : run_(run), scene_(scene), stub_(v1::QueryService::NewStub(scene.daemon().channel())) {}
 
-  // Determines how many balls take about a second (a tenth of one in a quick run).
+  // Makes the job: doubles the number of balls until the server computes for more than a second (0.1 s in a quick run).
   absl::Status make_job() {
     const double wanted = run_.options.quick ? 0.1 : 1;
     for (int balls = 64; balls <= 65'536; balls *= 2) {
@@ -103,8 +102,8 @@ class EndingCases {
     }
   }
 
-  // Returns whether the call ended as expected, or was refused because the server had no processor time to drop the
-  // call before.
+  // Returns whether the call ended with `expected`. Counts a refused call: the server had no processor time to drop the
+  // call before. Stores any other status as wrong.
   bool is_ended(const grpc::Status& status, grpc::StatusCode expected) {
     if (status.error_code() == grpc::StatusCode::RESOURCE_EXHAUSTED)
       ++refused_;
@@ -113,8 +112,8 @@ class EndingCases {
     return status.error_code() == expected;
   }
 
-  // Waits until the server is idle and returns the milliseconds that it has computed since `before`. Processor time
-  // does not depend on the machine's other load.
+  // Waits until the server is idle. Returns the milliseconds of processor time that it has used since it had used
+  // `before` seconds. Processor time does not depend on the machine's other load.
   double settle(double before) const {
     double last = computed();
     for (int i = 0; i < 200; ++i) {

@@ -1,5 +1,5 @@
-// Time until the server stops work whose result no caller waits for: after a deadline, after a cancellation. For the
-// suite serving.
+// Processor time that the server spends on a call whose caller waits no longer, since the deadline has passed or the
+// call was cancelled. For the suite serving.
 #ifndef LOCUS_TESTS_BENCH_SERVING_ENDING_CASES_H_
 #define LOCUS_TESTS_BENCH_SERVING_ENDING_CASES_H_
 
@@ -10,7 +10,8 @@ namespace locus::bench::serving {
 
 bool wants_ending(const ServingRun& run);
 
-// Runs deadline/1ms and cancel/1000: milliseconds that the server still computes, compared with the complete job.
+// Runs deadline/1ms and cancel/1000: milliseconds of processor time that the server uses after the end of the call,
+// compared with those of the complete job.
 absl::Status run_ending_cases(const ServingRun& run);
 
 }  // namespace locus::bench::serving

@@ -1,5 +1,5 @@
-// A well-behaved client: one small batch after another over a stream of its own. Its waiting times show the effect of
-// other clients. For every case with other clients. One thread.
+// A well-behaved client: it sends one small batch after another over a stream of its own. The times that it waits for
+// answers show the effect of other clients. For every case with other clients. One thread.
 #ifndef LOCUS_TESTS_BENCH_SERVING_GOOD_CLIENT_H_
 #define LOCUS_TESTS_BENCH_SERVING_GOOD_CLIENT_H_
 
@@ -16,10 +16,10 @@ class GoodClient {
  public:
   static constexpr size_t kRays = 16;  // rays per batch
 
-  // Sends the scene's `rays` and compares the answers with this process's.
+  // Opens a stream, and computes in this process the answers to `batches`, with which ask() compares the server's.
   GoodClient(const ServingRun& run, TwinScene& scene, const std::string& case_name, Batches batches);
 
-  // Sends `count` batches and appends the seconds of each.
+  // Sends `count` batches and appends to `seconds` the time until each was answered.
   void ask(size_t count, std::vector<double>& seconds);
 
   const std::vector<uint64_t>& expected() const { return expected_; }

@@ -9,7 +9,7 @@
 namespace locus::bench::serving {
 namespace {
 
-// Returns the numbers of readers: one, and many.
+// Returns the number of silent readers in each case: one, and many.
 std::vector<size_t> silent_readers(const ServingRun& run) { return {1, run.options.quick ? size_t{8} : size_t{32}}; }
 size_t churners(const ServingRun& run) { return run.options.quick ? 50 : 1000; }
 std::string silent_name(size_t readers) { return absl::StrCat("silent_reader/", readers); }
@@ -21,7 +21,8 @@ class GuestCases {
  public:
   GuestCases(const ServingRun& run, const BenchMesh& mesh) : run_(run), mesh_(mesh) {}
 
-  // Sends queries with long answers that need little work, so that the work itself is not the load.
+  // Measures clients that never read. Their queries have long answers but need little work, so that unread answers are
+  // the load.
   absl::Status silent(size_t readers) const {
     const std::string name = silent_name(readers);
     if (!run_.wants(name)) return absl::OkStatus();
@@ -40,7 +41,7 @@ class GuestCases {
   }
 
  private:
-  // Resources of a server without clients other than the good one.
+  // Open files and resident bytes of the server while the good client is its only client.
   struct Held {
     int64_t files = 0, bytes = 0;
   };
@@ -49,11 +50,12 @@ class GuestCases {
     int64_t most = 0;
   };
 
-  // Runs guests of a kind on a daemon of their own. Those of churn end by themselves; silent ones are killed.
+  // Measures the good client alone and beside guests of a kind, on a new daemon. Guests of churn end by themselves;
+  // silent guests are killed.
   absl::Status beside(const std::string& name, const std::string& kind, size_t guests,
                       const v1::QueryBatch& batch) const {
     run_.progress(name);
-    const auto daemon = Daemon::start();
+    const auto daemon = Daemon::start({kManyNewConnections});
     if (!daemon.ok()) return daemon.status();
     TwinScene scene(**daemon, "guests");
     absl::Status status = scene.create();
@@ -89,7 +91,7 @@ class GuestCases {
   absl::Status while_they_are_there(const GuestProgram& program, GoodClient& good, std::vector<double>& seconds) const {
     const absl::StatusOr<std::unique_ptr<Process>> guests = program.start();
     if (!guests.ok()) return guests.status();
-    constexpr double kUntilStuck = 0.5;  // seconds, at least
+    constexpr double kUntilStuck = 0.5;  // minimum seconds, so that flow control stops the silent guests
     const double start = wall_seconds();
     const auto enough = [&] { return seconds.size() >= count() && wall_seconds() - start > kUntilStuck; };
     while (good.status().ok() && !(*guests)->has_ended() && (program.ends() || !enough()))
@@ -100,7 +102,8 @@ class GuestCases {
 
   size_t count() const { return run_.options.quick ? 300 : 5000; }
 
-  // Waits for connections to close shortly after their calls.
+  // Returns the resources after waiting, for up to 5 s, until at most `files` files are open: connections close shortly
+  // after their calls.
   static Held held(const Daemon& daemon, int64_t files) {
     constexpr double kMaxSeconds = 5, kPatience = 0.02;
     for (double waited = 0; waited < kMaxSeconds && daemon.process().open_files() > files; waited += kPatience)
@@ -108,7 +111,8 @@ class GuestCases {
     return {daemon.process().open_files(), daemon.process().resident_bytes()};
   }
 
-  // The server keeps freed memory for later guests, so memory must not grow after the first time.
+  // Notes whether the server released the guests' resources. It keeps freed memory for later guests, so its memory is
+  // compared with the memory after the first round.
   void note_left_behind(const std::string& name, const LeftBehind& left) const {
     constexpr double kMaxGrowth = 1.1;
     const bool returned = left.last.files <= left.before.files &&

@@ -1,5 +1,5 @@
-// Effects of clients that do not read, or that connect and leave by the hundred, on another client, and the resources
-// that stay occupied after them. For the suite serving.
+// Effects of clients that do not read, and of hundreds of clients that connect and leave, on another client; and the
+// server's resources that stay occupied after these clients have left. For the suite serving.
 #ifndef LOCUS_TESTS_BENCH_SERVING_GUEST_CASES_H_
 #define LOCUS_TESTS_BENCH_SERVING_GUEST_CASES_H_
 
@@ -11,8 +11,8 @@ namespace locus::bench::serving {
 
 bool wants_guests(const ServingRun& run);
 
-// Runs silent_reader/1, silent_reader/32, churn/1000 (fewer in a quick run): p99 of another client, alone and beside
-// them.
+// Runs silent_reader/1, silent_reader/32, churn/1000 (fewer in a quick run): 99th percentile of another client's
+// waiting times, alone and beside these clients.
 absl::Status run_guest_cases(const ServingRun& run, const BenchMesh& mesh);
 
 }  // namespace locus::bench::serving

@@ -1,10 +1,9 @@
-// The program locus-guests as the cases start it: the kind of guests and their query. One thread.
+// Arguments with which the cases start the program locus-guests: the kind of guests and their query. One thread.
 #ifndef LOCUS_TESTS_BENCH_SERVING_GUEST_PROCESS_H_
 #define LOCUS_TESTS_BENCH_SERVING_GUEST_PROCESS_H_
 
 #include <fstream>
 #include <memory>
-#include <sstream>
 #include <string>
 #include <vector>
 
@@ -18,7 +17,8 @@ namespace locus::bench::serving {
 
 class GuestProgram {
  public:
-  // Starts the program; guest_program.cc explains `kind` and `guests`.
+  // Writes the guests' message to a file; start() runs the program. guest_program.cc explains `kind` and `guests` (its
+  // COUNT).
   GuestProgram(const Daemon& daemon, const std::string& kind, size_t guests, const std::string& scene,
                const v1::QueryBatch& batch)
       : words_{"locus-guests", kind, daemon.address(), absl::StrCat(guests), folder_.file("message")},
@@ -33,13 +33,9 @@ class GuestProgram {
   absl::StatusOr<std::unique_ptr<Process>> start() const {
     return Process::start(program_beside("locus-guests"), words_, folder_.file("log"));
   }
-  // Returns whether the program ends by itself.
+  // Returns whether the program ends by itself; otherwise it must be killed.
   bool ends() const { return ends_; }
-  std::string log() const {
-    std::ostringstream text;
-    text << std::ifstream(folder_.file("log")).rdbuf();
-    return text.str();
-  }
+  std::string log() const { return text_of_file(folder_.file("log")); }
 
  private:
   const TemporaryFolder folder_;

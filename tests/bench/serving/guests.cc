@@ -73,7 +73,7 @@ void SilentReaders::write_until_stuck() {
   }
 }
 
-// Each guest has at most one operation pending; silent ones have none.
+// A client that connects, asks once and leaves. It has at most one pending operation, and none in the step kStays.
 struct Churn::Guest {
   enum class Step : uint8_t { kCalls, kAsks, kIsAnswered, kStays, kSaysGoodbye, kGoes };
 

@@ -1,7 +1,7 @@
 // Clients beside the measured one: one with large batches all the time, many that never read their answers, and many
-// that connect, send one query and leave. Each has a connection and a stream of its own; one thread drives them all.
-// They run in a program of their own, since gRPC shares threads between the connections of a process, so that a client
-// waiting for an answer would do work of the others.
+// that connect, send one query and leave. Each client has a connection and a stream of its own; one thread drives all
+// clients. They run in a separate program, since gRPC shares threads between the connections of a process: in one
+// process, the measured client would do work of the other clients while it waits.
 #ifndef LOCUS_TESTS_BENCH_SERVING_GUESTS_H_
 #define LOCUS_TESTS_BENCH_SERVING_GUESTS_H_
 
@@ -16,15 +16,16 @@
 
 namespace locus::bench::serving {
 
-// Raises the limit of open files, which bounds connections, to the maximum that the system allows.
+// Raises this process's limit of open files, which bounds the number of connections, to the maximum that the system
+// allows.
 void allow_many_files();
 
-// Keeps a fixed number of equal messages in flight.
+// Client that keeps a fixed number of equal messages in flight.
 class BulkCaller {
  public:
   BulkCaller(const std::string& address, size_t window, v1::StreamQueriesRequest message);
 
-  // Sends some messages. Errors show in status().
+  // Sends 64 messages and waits for their answers. Errors are stored in status().
   void run();
   const absl::Status& status() const { return status_; }
 
@@ -40,14 +41,14 @@ class BulkCaller {
 // Clients that write until flow control stops them, and read nothing.
 class SilentReaders {
  public:
-  // Borrows the message.
+  // Connects `count` clients. Borrows the message.
   SilentReaders(const std::string& address, size_t count, const v1::StreamQueriesRequest& message);
   // Drops the connections without ending the calls.
   ~SilentReaders();
   SilentReaders(const SilentReaders&) = delete;
   SilentReaders& operator=(const SilentReaders&) = delete;
 
-  // Writes until no client has been able to write for a while.
+  // Writes messages; returns when flow control has stopped all clients for a while.
   void write_until_stuck();
 
  private:
@@ -58,8 +59,8 @@ class SilentReaders {
   std::vector<std::unique_ptr<Guest>> guests_;
 };
 
-// Connects guests until `at_once` are there; then each new one replaces the oldest, which alternately ends its call in
-// order and breaks it off. All have left at the end.
+// Clients that connect, send one query, and leave. At most `at_once` are connected; then each new guest replaces the
+// oldest. Guests alternately end their calls in order and cancel them. At the end of run() all have left.
 class Churn {
  public:
   // Borrows the message.
@@ -68,7 +69,7 @@ class Churn {
   Churn(const Churn&) = delete;
   Churn& operator=(const Churn&) = delete;
 
-  // Runs until `guests` have connected and left. Errors show in status().
+  // Runs until `guests` guests have connected and left. Errors are stored in status().
   void run(size_t guests);
   const absl::Status& status() const { return status_; }
 

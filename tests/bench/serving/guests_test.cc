@@ -39,7 +39,7 @@ TEST(ChurnTest, UnansweredGuestsAreAnError) {
   const auto server = LocalServer::start("locus-echo");
   ASSERT_TRUE(server.ok()) << server.status();
   v1::StreamQueriesRequest message = one_ray();
-  message.mutable_batch()->mutable_blocks(0)->add_masks(1);  // one mask too many
+  message.mutable_batch()->mutable_blocks(0)->add_masks(1);  // invalid: more masks than rays
   Churn guests((*server)->address(), 5, message);
   guests.run(20);
   EXPECT_FALSE(guests.status().ok());
@@ -54,7 +54,7 @@ TEST(SilentReadersTest, GetStuck) {
   block.mutable_rays()->mutable_t_max()->Resize(8192, 1);
   block.mutable_masks()->Resize(8192, 1);
   SilentReaders guests((*server)->address(), 2, message);
-  guests.write_until_stuck();  // returns, although the writers have no end
+  guests.write_until_stuck();  // returns, since flow control stops the writers
 }
 
 }  // namespace

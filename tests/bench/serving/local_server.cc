@@ -1,11 +1,7 @@
 #include "tests/bench/serving/local_server.h"
 
-#include <fstream>
-#include <sstream>
-
 #include "absl/strings/str_cat.h"
 #include "grpcpp/create_channel.h"
-#include "grpcpp/security/credentials.h"
 #include "grpcpp/support/channel_arguments.h"
 
 namespace locus::bench::serving {
@@ -14,21 +10,16 @@ namespace {
 constexpr double kStartSeconds = 20;
 constexpr double kPatience = 0.005;
 
-std::string text_of(const std::string& path) {
-  std::ostringstream text;
-  text << std::ifstream(path).rdbuf();
-  return text.str();
-}
-
 }  // namespace
 
-std::shared_ptr<grpc::Channel> connection_to(const std::string& address) {
+std::shared_ptr<grpc::Channel> connection_to(const std::string& address,
+                                             const std::shared_ptr<grpc::ChannelCredentials>& credentials) {
   grpc::ChannelArguments arguments;
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
   arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
   arguments.SetMaxReceiveMessageSize(-1);
   arguments.SetMaxSendMessageSize(-1);
-  return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
+  return grpc::CreateCustomChannel(address, credentials, arguments);
 }
 
 absl::StatusOr<std::unique_ptr<LocalServer>> LocalServer::start(const std::string& program) {
@@ -37,7 +28,7 @@ absl::StatusOr<std::unique_ptr<LocalServer>> LocalServer::start(const std::strin
   return server;
 }
 
-std::string LocalServer::log() const { return text_of(folder_.file("log")); }
+std::string LocalServer::log() const { return text_of_file(folder_.file("log")); }
 
 absl::Status LocalServer::run(const std::string& program, const std::vector<std::string>& options) {
   const std::string path = program_beside(program);
@@ -52,9 +43,9 @@ absl::Status LocalServer::run(const std::string& program, const std::vector<std:
   std::string port;
   for (double waited = 0; port.empty() && waited < kStartSeconds && !process_->has_ended(); waited += kPatience) {
     sleep_seconds(kPatience);
-    port = text_of(port_file);
+    port = text_of_file(port_file);
   }
-  if (port.empty()) return absl::UnavailableError(absl::StrCat(program, " did not start: ", text_of(log)));
+  if (port.empty()) return absl::UnavailableError(absl::StrCat(program, " did not start: ", text_of_file(log)));
   address_ = absl::StrCat("127.0.0.1:", std::stoi(port));
   return absl::OkStatus();
 }

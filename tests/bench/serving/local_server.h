@@ -1,26 +1,30 @@
-// A program in the folder of this one that serves gRPC on a free port of the loopback, and connections to it. For the
+// A program beside this one that serves gRPC on a free port of the loopback, and connections to that program. For the
 // daemon and for the echo server. One thread.
 #ifndef LOCUS_TESTS_BENCH_SERVING_LOCAL_SERVER_H_
 #define LOCUS_TESTS_BENCH_SERVING_LOCAL_SERVER_H_
 
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/status/statusor.h"
 #include "grpcpp/channel.h"
+#include "grpcpp/security/credentials.h"
 #include "tests/bench/frame/temporary_folder.h"
 #include "tests/bench/serving/process.h"
 
 namespace locus::bench::serving {
 
-// Returns a channel with a connection of its own.
-std::shared_ptr<grpc::Channel> connection_to(const std::string& address);
+// Returns a channel to `address` that shares its connection with no other channel.
+std::shared_ptr<grpc::Channel> connection_to(
+    const std::string& address,
+    const std::shared_ptr<grpc::ChannelCredentials>& credentials = grpc::InsecureChannelCredentials());
 
 class LocalServer {
  public:
-  // Runs the program of that name, which takes locusd's options for its port. UNAVAILABLE, with its output, if it does
-  // not serve in time.
+  // Starts the program `program`, which must accept locusd's options for its port. Returns UNAVAILABLE, with the
+  // program's output, if it does not serve in time.
   static absl::StatusOr<std::unique_ptr<LocalServer>> start(const std::string& program);
   virtual ~LocalServer() = default;
   LocalServer(const LocalServer&) = delete;
@@ -28,20 +32,23 @@ class LocalServer {
 
   const std::string& address() const { return address_; }
   const Process& process() const { return *process_; }
-  // Returns the output up to now.
+  // Returns the program's output up to now.
   std::string log() const;
 
-  std::shared_ptr<grpc::Channel> channel() const { return connection_to(address_); }
+  std::shared_ptr<grpc::Channel> channel() const { return connection_to(address_, credentials_); }
 
  protected:
   LocalServer() = default;
-  // Runs the program, once. Adds `options` to those for the port.
+  // Starts the program with `options`, and options for its port. Call it once.
   absl::Status run(const std::string& program, const std::vector<std::string>& options);
+  // Sets the credentials of channel(), which otherwise has none.
+  void set_credentials(std::shared_ptr<grpc::ChannelCredentials> credentials) { credentials_ = std::move(credentials); }
 
  private:
   TemporaryFolder folder_;
-  std::unique_ptr<Process> process_;  // destroyed before its folder
+  std::unique_ptr<Process> process_;  // declared after folder_, so that it ends before its folder is removed
   std::string address_;
+  std::shared_ptr<grpc::ChannelCredentials> credentials_ = grpc::InsecureChannelCredentials();
 };
 
 }  // namespace locus::bench::serving

@@ -11,6 +11,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 #include <thread>
 
 #include "absl/strings/str_cat.h"
@@ -33,8 +34,8 @@ int64_t entries_in(const std::string& folder) {
   return entries;
 }
 
-// Runs between fork() and exec(): makes only system calls. `parent` detects that the parent died before prctl() took
-// effect.
+// Executes the program in the child after fork(). Makes only system calls, since another thread may have held a lock at
+// fork(). If the parent, `parent`, died before prctl() took effect, ends the child.
 [[noreturn]] void become(const char* path, char* const* arguments, int log, pid_t parent) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != parent) _exit(kNoProgram);
@@ -101,6 +102,12 @@ int64_t Process::resident_bytes() const {
 
 int64_t Process::open_files() const { return entries_in(folder_of(pid_) + "/fd"); }
 int64_t Process::threads() const { return entries_in(folder_of(pid_) + "/task"); }
+
+std::string text_of_file(const std::string& path) {
+  std::ostringstream text;
+  text << std::ifstream(path).rdbuf();
+  return text.str();
+}
 
 std::string program_beside(const std::string& name) {
   std::error_code error;

@@ -1,5 +1,5 @@
-// Programs that a benchmark starts, and their resources according to the kernel. For the suite serving. One thread a
-// process; none outlives the thread that started it, even if that is killed.
+// Programs that a benchmark starts, and their resources according to the kernel. For the suite serving. Only one thread
+// uses an object. The kernel kills a program when the thread that started it ends, even if that thread is killed.
 #ifndef LOCUS_TESTS_BENCH_SERVING_PROCESS_H_
 #define LOCUS_TESTS_BENCH_SERVING_PROCESS_H_
 
@@ -20,12 +20,12 @@ double cpu_seconds_of(pid_t pid);
 
 class Process {
  public:
-  // Runs the program `path` with `arguments`, the first of which is its own name; its output goes to the file `log`.
-  // UNAVAILABLE if there is no such program.
+  // Starts the program `path` with `arguments`, the first of which is the program's name; its output goes to the file
+  // `log`. Returns UNAVAILABLE if there is no such program.
   static absl::StatusOr<std::unique_ptr<Process>> start(const std::string& path,
                                                         const std::vector<std::string>& arguments,
                                                         const std::string& log);
-  // Asks the process to end, and kills it after five seconds.
+  // Asks the process to end; kills it if it has not ended after five seconds.
   ~Process();
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
@@ -48,9 +48,13 @@ class Process {
   int exit_code_ = -1;
 };
 
-// Returns the path of the program in the folder of this one, or in the PATH; empty if there is none.
+// Returns the path of the program `name` in the folder of this program, otherwise in the PATH; empty if it is in
+// neither.
 std::string program_beside(const std::string& name);
 std::string program_in_path(const std::string& name);
+
+// Returns the content of a file; empty if it cannot be read.
+std::string text_of_file(const std::string& path);
 
 void sleep_seconds(double seconds);
 

@@ -1,5 +1,5 @@
-// Processor time of a client and of its server while they exchange messages, to show the client's own part of a ratio.
-// One thread.
+// Processor time of a client and of its server while they exchange messages, to show how much of a measured time the
+// client takes. One thread.
 #ifndef LOCUS_TESTS_BENCH_SERVING_PROCESSOR_TIME_H_
 #define LOCUS_TESTS_BENCH_SERVING_PROCESSOR_TIME_H_
 
@@ -15,7 +15,7 @@ namespace locus::bench::serving {
 
 class ProcessorTime {
  public:
-  // Measures this process as the client.
+  // Measures this process as the client, and the process `server`.
   explicit ProcessorTime(pid_t server) : server_(server) {}
 
   // Measures `run`, which sends `messages` messages and receives their answers.
@@ -28,7 +28,7 @@ class ProcessorTime {
     messages_ += messages;
   }
 
-  // Returns microseconds a message.
+  // Processor time in microseconds per message.
   double client() const { return 1e6 * here_ / static_cast<double>(messages_); }
   double server() const { return 1e6 * there_ / static_cast<double>(messages_); }
   std::string text() const { return absl::StrFormat("client %.1f us, server %.1f us", client(), server()); }

@@ -7,7 +7,7 @@
 namespace locus::bench::serving {
 namespace {
 
-// Batches of one of `shares` workers, repeated in a cycle: first, first + shares ...
+// Indices of the batches of one of `shares` workers: first, first + shares ... below `count`, repeated in a cycle.
 class Share {
  public:
   Share(size_t first, size_t shares, size_t count) : first_(first), shares_(shares), count_(count), at_(first) {}

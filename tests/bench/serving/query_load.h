@@ -1,5 +1,5 @@
-// Repeated batches of queries: in a server, over streams that each have a connection of their own, or in this process
-// by threads. For every case that counts queries a second. One thread.
+// Repeated batches of queries: answered by a server, over streams with a connection each, or by threads of this
+// process. For every case that counts queries per second. One thread.
 #ifndef LOCUS_TESTS_BENCH_SERVING_QUERY_LOAD_H_
 #define LOCUS_TESTS_BENCH_SERVING_QUERY_LOAD_H_
 
@@ -17,13 +17,14 @@ namespace locus::bench::serving {
 using QueryStreamLoad = StreamLoad<v1::StreamQueriesRequest, v1::StreamQueriesResponse>;
 std::unique_ptr<QueryStreamLoad> open_query_streams(const LocalServer& server, size_t streams);
 
-// Messages, and the same as columns for this process. Every stream and every thread has its own share of them.
+// Messages for a server, and the same batches as columns for this process. Streams and threads divide the batches among
+// them.
 struct Batches {
   std::vector<v1::StreamQueriesRequest> messages;
-  std::vector<QueryBatch> columns;  // borrowed from the messages
-  size_t queries = 0;               // in all messages together
+  std::vector<QueryBatch> columns;  // borrow the values of `messages`
+  size_t queries = 0;               // number of queries in all messages together
 
-  // Sets the columns. Call it when the messages are complete.
+  // Sets `columns`. Call it when all messages have been added, since `columns` borrows from them.
   void borrow();
 };
 
@@ -31,9 +32,10 @@ class ServerLoad {
  public:
   ServerLoad(const LocalServer& server, Batches& batches, size_t streams, size_t window);
 
-  // Sends all batches, `passes` times, divided among the streams. Errors show in status().
+  // Sends all batches `passes` times, divided among the streams. Errors are stored in status().
   void run(size_t passes);
-  // Sends every batch once; returns a hash of each answer, in the order of the batches, and counts the rows of all.
+  // Sends every batch once; returns a hash of each answer, in the order of the batches, and sets rows() to the number
+  // of rows in all answers.
   std::vector<uint64_t> hashes();
   size_t rows() const { return rows_; }
 

@@ -59,7 +59,7 @@ void answer(int socket) {
   _exit(0);
 }
 
-// Returns a listening socket and sets `port`; -1 on failure.
+// Returns a listening socket on a free port of the loopback and sets `port`; returns -1 on failure.
 int listen_on_free_port(int& port) {
   const int listener = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   sockaddr_in address{};

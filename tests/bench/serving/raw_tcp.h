@@ -1,5 +1,6 @@
-// Baseline with plain kernel sockets and the same bytes: a process that reads messages of one size and answers each
-// with as many bytes of another, and its clients. For the cases that measure the cost of messages. One thread.
+// Baseline with plain kernel sockets and the same bytes: a process that reads messages of a fixed size and answers each
+// with a message of another fixed size, and clients of that process. For the cases that measure the cost of messages.
+// One thread.
 #ifndef LOCUS_TESTS_BENCH_SERVING_RAW_TCP_H_
 #define LOCUS_TESTS_BENCH_SERVING_RAW_TCP_H_
 
@@ -21,7 +22,8 @@ struct MessageBytes {
 
 class RawTcpServer {
  public:
-  // Forks this process, so it must be called while there is one thread; the copy ends with this object.
+  // Starts the server process by fork(), so it must be called while this process has one thread. The destructor ends
+  // the server process.
   static absl::StatusOr<std::unique_ptr<RawTcpServer>> start();
   ~RawTcpServer();
   RawTcpServer(const RawTcpServer&) = delete;
@@ -37,12 +39,12 @@ class RawTcpServer {
   const int port_;
 };
 
-// Messages over connections that each have a thread of their own.
+// Clients of the server: connections, each with a thread of its own.
 class RawTcpLoad {
  public:
   RawTcpLoad(const RawTcpServer& server, const MessageBytes& bytes, size_t connections, size_t window);
 
-  // Sends `messages` messages, divided among the connections.
+  // Sends `messages` messages, divided among the connections, and receives their answers.
   void run(size_t messages);
   const absl::Status& status() const { return status_; }
 

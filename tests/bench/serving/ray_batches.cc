@@ -50,4 +50,12 @@ Batches batches_of(const std::vector<RayQuery>& rays, size_t size, const std::st
   return batches;
 }
 
+void check_answers(const ServingRun& run, const std::string& case_name, const std::vector<uint64_t>& theirs,
+                   const std::vector<uint64_t>& ours) {
+  size_t differ = 0;
+  for (size_t i = 0; i < ours.size(); ++i) differ += theirs[i] != ours[i] ? 1 : 0;
+  if (differ != 0)
+    run.disagree(absl::StrCat(case_name, ": ", differ, " of ", ours.size(), " batches have other answers over gRPC"));
+}
+
 }  // namespace locus::bench::serving

@@ -1,4 +1,5 @@
-// Rays of a level that the cases send, in messages. Pure functions.
+// Rays in a level, messages of rays, and the comparison of their answers. For the cases that send rays. Functions
+// without state.
 #ifndef LOCUS_TESTS_BENCH_SERVING_RAY_BATCHES_H_
 #define LOCUS_TESTS_BENCH_SERVING_RAY_BATCHES_H_
 
@@ -12,16 +13,20 @@
 
 namespace locus::bench::serving {
 
-// Returns the level named in the options, else a real one that was fetched; in a quick run, or if none was fetched, a
-// generated one.
+// Returns the first mesh named in the options. If none is named, returns a real level that was fetched; in a quick run,
+// or if it was not fetched, a generated level.
 absl::StatusOr<BenchMesh> level_of(const ServingRun& run);
 
 // Returns rays between random points of the level, or neighbouring rays of a picture of it.
 std::vector<RayQuery> scattered_rays(const BenchMesh& mesh, size_t count);
 std::vector<RayQuery> coherent_rays(const BenchMesh& mesh, size_t count);
 
-// Makes messages of `size` rays; the last may have fewer.
+// Makes messages of `size` rays each; the last message may have fewer.
 Batches batches_of(const std::vector<RayQuery>& rays, size_t size, const std::string& scene);
+
+// Reports a disagreement if the hashes of the answers of a server differ from those of this process.
+void check_answers(const ServingRun& run, const std::string& case_name, const std::vector<uint64_t>& theirs,
+                   const std::vector<uint64_t>& ours);
 
 }  // namespace locus::bench::serving
 

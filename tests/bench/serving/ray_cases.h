@@ -1,5 +1,5 @@
-// Rays of a real level over streams, compared with the same batches in this process on the same cores, and one stream
-// compared with two. For the suite serving.
+// Rays of a real level over streams, compared with the same batches in this process on the same cores; and rays over
+// one stream compared with two streams. For the suite serving.
 #ifndef LOCUS_TESTS_BENCH_SERVING_RAY_CASES_H_
 #define LOCUS_TESTS_BENCH_SERVING_RAY_CASES_H_
 
@@ -8,8 +8,8 @@
 
 namespace locus::bench::serving {
 
-// Runs rays/90ns/1024, rays/90ns/8192, rays/270ns/1024, rays/270ns/8192, one_stream/1024, one_stream/8192. The bar of
-// the first four is computed from the cost of a ray in process.
+// Runs rays/90ns/1024, rays/90ns/8192, rays/270ns/1024, rays/270ns/8192, one_stream/1024, one_stream/8192. The required
+// ratio of the first four cases is computed from the cost of a ray in process.
 absl::Status run_ray_cases(const ServingRun& run);
 
 }  // namespace locus::bench::serving

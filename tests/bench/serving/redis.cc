@@ -9,15 +9,16 @@ namespace {
 constexpr double kStartSeconds = 10;
 constexpr double kPatience = 0.005;
 
-// Returns the path of Redis. Debian's redis-tools contains the server under another name; its first argument selects
-// the program. So no package that would start a service is needed.
+// Returns the path of a program that runs as a Redis server if its argv[0] is redis-server; empty if none is installed.
+// This can be redis-check-rdb in Debian's redis-tools, so the package redis-server, which would start a service, is not
+// needed.
 std::string redis_program() {
   const std::string server = program_in_path("redis-server");
   return server.empty() ? program_in_path("redis-check-rdb") : server;
 }
 
-// Reads the number after the first character of the line, and sets `at` to the next line; returns false if the line is
-// incomplete.
+// Reads the number after the first character of the line at `at`, and advances `at` to the next line; returns false if
+// the line is incomplete.
 bool read_line(absl::string_view text, size_t& at, int64_t& number) {
   const size_t end = text.find("\r\n", at);
   if (end == absl::string_view::npos) return false;
@@ -26,7 +27,7 @@ bool read_line(absl::string_view text, size_t& at, int64_t& number) {
   return true;
 }
 
-// Skips one element that is no list.
+// Advances `at` past one element that is not a list; returns false if the element is incomplete.
 bool pass_element(absl::string_view text, size_t& at) {
   if (at >= text.size()) return false;
   const bool is_string = text[at] == '$';

@@ -1,6 +1,6 @@
-// Redis as started by a benchmark: in memory, on a socket in a folder of its own, stopped with this object; and the
-// part of its protocol that is needed. Messages are serialized beforehand and replies only counted, so that its client
-// costs almost nothing. One thread.
+// A Redis server that a benchmark starts, in memory and on a socket in a temporary folder; and the part of its protocol
+// that the cases need. Messages are serialized beforehand and replies are only counted, so that the client costs almost
+// nothing. The destructor stops the server. One thread.
 #ifndef LOCUS_TESTS_BENCH_SERVING_REDIS_H_
 #define LOCUS_TESTS_BENCH_SERVING_REDIS_H_
 
@@ -18,12 +18,13 @@ namespace locus::bench::serving {
 
 class Redis {
  public:
-  // Starts Redis; UNAVAILABLE if it is not installed, or does not answer in time.
+  // Starts Redis. Returns UNAVAILABLE if it is not installed, or does not answer in time.
   static absl::StatusOr<std::unique_ptr<Redis>> start();
 
-  // Sends all messages, `passes` times, with up to `window` in flight. An error of Redis shows in status().
+  // Sends all messages `passes` times, with up to `window` in flight. An error of Redis is stored in status().
   void run(const std::vector<std::string>& messages, size_t passes, size_t window);
-  // Returns the number of list members, or the sum of the integers, in all replies of the last run.
+  // Returns the sum over all replies of the last run(): the number of members of a list reply, the value of an integer
+  // reply.
   size_t counted() const { return counted_; }
   const absl::Status& status() const { return status_; }
 

@@ -16,24 +16,24 @@ using dynamic::name_of_count;
 
 constexpr size_t kMovesAMessage = 4096;
 constexpr size_t kBallsAMessage = 1024;
-constexpr size_t kWindow = 8;          // messages in flight, of locus and of 4,096 positions each in Redis
-constexpr size_t kSearchWindow = 256;  // single queries in flight
+constexpr size_t kWindow = 8;  // messages in flight to locus, and GEOADD commands of 4,096 positions in flight to Redis
+constexpr size_t kSearchWindow = 256;  // GEOSEARCH commands in flight to Redis
 constexpr float kReach = dynamic::kReach;
 
-// Redis stores positions on the globe in 52 bits: 0.6 m at the equator. So a unit of the world is 20 m there, and 2,000
-// of them are 40 km about (0, 0), where a metre is exact to 5e-6 and the error of positions is up to 0.015 units on
-// each axis.
+// Metres on Redis's globe per unit of the world. Redis rounds positions to 52 bits, 0.6 m at the equator. At 20 m per
+// unit the world's 2,000 units are 40 km around (0, 0): there the globe's curvature changes a metre by less than 5e-6,
+// and the rounding error is up to 0.015 units on each axis.
 constexpr double kMetres = 20;
-constexpr double kEarthRadius = 6372797.560856;  // Redis's
+constexpr double kEarthRadius = 6372797.560856;  // radius that Redis uses, in metres
 constexpr double kDegrees = kMetres / kEarthRadius * 180 / std::numbers::pi;
-// About 2 * 0.01 / kReach of a ball's hits lie so close to its border that Redis may decide otherwise; both errors
-// balance.
+// Tolerated difference of the hit counts, as a part of all hits. About 2 * 0.01 / kReach of a ball's hits are so close
+// to its border that Redis may decide differently, but wrong hits and wrong misses nearly cancel in the count.
 constexpr double kMayDiffer = 0.001;
 constexpr double kFewHits = 5;
 
 std::string longitude(float x) { return absl::StrFormat("%.8f", (double{x} - dynamic::kSide / 2) * kDegrees); }
 
-// Sizes of the comparison, and the required ratio at each.
+// Number of objects in a case of balls, and the required ratio.
 struct BallBar {
   uint32_t count;
   double bar;
@@ -54,7 +54,7 @@ class FlatWorld {
     fill(0, world_.count(), *insert);
     return batch;
   }
-  // Adds moves of every object, as messages for both.
+  // Appends moves of all objects: messages for locus to `ours`, and commands for Redis to `redis`.
   void add_moves(const std::string& scene, std::vector<v1::StreamUpdatesRequest>& ours,
                  std::vector<std::string>& redis) const {
     for (size_t first = 0; first < world_.count(); first += kMovesAMessage) {
@@ -136,7 +136,7 @@ class RedisCases {
     const Hits hits = search_all(flat, scene, name);
     Searches searches = searches_of(flat, scene);
     ServerLoad server(daemon_, searches.ours, 1, kWindow);
-    // Redis gets fewer of the same queries where each takes long.
+    // Redis gets only a part of the queries, since it takes longer for each.
     std::vector<std::string> theirs = searches.redis;
     theirs.resize(run_.options.quick ? 200 : theirs.size() / 4);
     const size_t passes = passes_of_a_chunk(run_, [&](size_t) { server.run(1); });

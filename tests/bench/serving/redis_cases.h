@@ -1,4 +1,4 @@
-// Moves and balls over one connection, compared with Redis's GEOADD and GEOSEARCH, in a flat world. For the suite
+// Moves and balls over one connection, in a flat world, compared with GEOADD and GEOSEARCH of Redis. For the suite
 // serving.
 #ifndef LOCUS_TESTS_BENCH_SERVING_REDIS_CASES_H_
 #define LOCUS_TESTS_BENCH_SERVING_REDIS_CASES_H_
@@ -8,8 +8,8 @@
 
 namespace locus::bench::serving {
 
-// Runs moves/100k, ball/10k, ball/100k, ball/1M; in a quick run moves/10k and ball/10k. Without Redis it leaves them
-// out and adds a note.
+// Runs moves/100k, ball/10k, ball/100k, ball/1M; in a quick run moves/10k and ball/10k. If Redis is not installed, adds
+// a note instead.
 absl::Status run_redis_cases(const ServingRun& run);
 
 }  // namespace locus::bench::serving

@@ -1,4 +1,4 @@
-// Data that the cases of the suite share, the options and the report, with short helpers. Plain data.
+// Data that the cases of the suite share (the options and the report), and helpers that add cells. Plain data.
 #ifndef LOCUS_TESTS_BENCH_SERVING_SERVING_RUN_H_
 #define LOCUS_TESTS_BENCH_SERVING_SERVING_RUN_H_
 
@@ -37,7 +37,8 @@ inline Cell cell_of(const std::string& case_name, const std::string& metric, con
   return cell;
 }
 
-// Direction of a comparison between locus and one peer, round by round: kMore for rates, kLess for times.
+// Direction of a comparison: kMore if a higher value is better, as for rates; kLess if a lower value is better, as for
+// times.
 enum class Better : uint8_t { kLess, kMore };
 inline void add_cell(const ServingRun& run, Cell cell, const std::string& peer, const std::vector<double>& ours,
                      const std::vector<double>& theirs, Better better) {
@@ -50,8 +51,8 @@ inline void add_cell(const ServingRun& run, Cell cell, const std::string& peer, 
   run.report.add(std::move(cell));
 }
 
-// Returns the number of passes in a chunk that is long enough for the time of starting threads and filling windows not
-// to matter; makes one warm-up pass.
+// Returns the number of passes that take about 0.1 s, at most 100, so that the time of starting threads and filling
+// windows does not matter. Calls `pass` once to measure it; in a quick run returns 1.
 template <class Run>
 size_t passes_of_a_chunk(const ServingRun& run, const Run& pass) {
   if (run.options.quick) return 1;

@@ -5,11 +5,12 @@
 #include "tests/bench/serving/echo_cases.h"
 #include "tests/bench/serving/ray_cases.h"
 #include "tests/bench/serving/redis_cases.h"
+#include "tests/bench/serving/tls_cases.h"
 
 namespace locus::bench::serving {
 absl::Status run_serving_suite(const Options& options, const Progress& progress, Report& report) {
   const ServingRun run{options, progress, report};
-  // Started first, while the process has one thread.
+  // Must be started first: it forks, which requires that this process has one thread.
   absl::StatusOr<std::unique_ptr<RawTcpServer>> plain = nullptr;
   if (wants_raw_tcp(run)) plain = RawTcpServer::start();
   if (!plain.ok()) return plain.status();
@@ -18,6 +19,7 @@ absl::Status run_serving_suite(const Options& options, const Progress& progress,
   if (status.ok()) status = run_redis_cases(run);
   if (status.ok()) status = run_crowd_cases(run);
   if (status.ok()) status = run_durable_cases(run);
+  if (status.ok()) status = run_tls_cases(run);
   return status;
 }
 

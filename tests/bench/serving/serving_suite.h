@@ -1,5 +1,5 @@
 // The suite `serving`: a server and its client as two processes on the loopback, compared with the same work in this
-// process, plain sockets and Redis. For main.cc.
+// process, with plain sockets and with Redis. For main.cc.
 #ifndef LOCUS_TESTS_BENCH_SERVING_SERVING_SUITE_H_
 #define LOCUS_TESTS_BENCH_SERVING_SERVING_SUITE_H_
 
@@ -8,7 +8,7 @@
 
 namespace locus::bench::serving {
 
-// Runs the cases, which start build/release/bin/locusd, beside this program. UNAVAILABLE if it is missing.
+// Runs the cases, which start the locusd in the folder of this program. Returns UNAVAILABLE if it is missing.
 absl::Status run_serving_suite(const Options& options, const Progress& progress, Report& report);
 
 }  // namespace locus::bench::serving

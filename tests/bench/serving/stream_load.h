@@ -1,6 +1,6 @@
-// The load generator: bidirectional calls, each on a connection of its own, with a window of messages in flight on
-// each, all on one completion queue and driven by the thread that calls run(). Messages are serialized and parsed as by
-// any client. Blocking clients, or a thread a connection, would use more processor time than the measured server. One
+// The load generator: bidirectional calls with a connection each and a window of messages in flight on each. The thread
+// that calls run() drives all calls by one completion queue, since blocking clients, or one thread per connection,
+// would use more processor time than the measured server. Messages are serialized and parsed as by any client. One
 // thread at a time.
 #ifndef LOCUS_TESTS_BENCH_SERVING_STREAM_LOAD_H_
 #define LOCUS_TESTS_BENCH_SERVING_STREAM_LOAD_H_
@@ -24,7 +24,7 @@
 
 namespace locus::bench::serving {
 
-// Time without a message from the server after which it counts as hung.
+// Maximum time without a message from the server; after that, run() assumes that the server hangs and fails.
 inline constexpr std::chrono::seconds kSilence{60};
 
 inline absl::Status failed(const grpc::Status& status) {
@@ -35,12 +35,12 @@ template <class Request, class Response>
 class StreamLoad {
  public:
   using Call = grpc::ClientAsyncReaderWriter<Request, Response>;
-  // Opens a call, for example by stub.AsyncStreamQueries.
+  // Function that opens a call, for example by stub.AsyncStreamQueries.
   using Open = std::function<std::unique_ptr<Call>(grpc::ClientContext*, grpc::CompletionQueue*, void* tag)>;
-  // Returns the next message and sets a number that identifies it; nullptr = there are no more. run() sets
-  // its `sequence`.
+  // Function that returns the next message and sets `number`, which identifies the message to Reply; nullptr = there
+  // are no more. run() sets the message's `sequence`.
   using Next = std::function<Request*(uint64_t& number)>;
-  // Called with an answer and the time since its message was written.
+  // Function that is called with an answer, the number of its message, and the time since the message was written.
   using Reply = std::function<void(uint64_t number, const Response& response, double seconds)>;
 
   explicit StreamLoad(const Open& open) : StreamLoad(std::vector<Open>{open}) {}
@@ -69,12 +69,12 @@ class StreamLoad {
   StreamLoad(const StreamLoad&) = delete;
   StreamLoad& operator=(const StreamLoad&) = delete;
 
-  // Keeps `window` messages in flight on the only stream until there are no more and all are answered.
+  // Keeps `window` messages in flight on the only stream until `next` has no more and all are answered.
   absl::Status run(size_t window, const Next& next, const Reply& reply) {
     return run(window, std::vector<Next>{next}, reply);
   }
 
-  // Works likewise on several streams, each with messages of its own.
+  // Keeps `window` messages in flight on every stream; next[i] returns the messages of stream i.
   absl::Status run(size_t window, const std::vector<Next>& next, const Reply& reply) {
     for (size_t i = 0; i < streams_.size(); ++i) {
       streams_[i]->begin(window, next[i]);
@@ -136,7 +136,7 @@ class StreamLoad {
       call->Write(*request, &written);
     }
 
-    // Processes an answer; returns false if it belongs to no message.
+    // Processes the received answer; returns false if its sequence number is not the number of a slot.
     bool take(const Reply& reply) {
       const size_t slot = response.sequence();
       if (slot >= slots.size()) return false;
@@ -156,7 +156,7 @@ class StreamLoad {
     bool writing = false;
   };
 
-  // Returns the next event; null if none comes in time.
+  // Returns the next event; null if there is none within kSilence.
   Event* await() {
     void* event = nullptr;
     const auto deadline = std::chrono::system_clock::now() + kSilence;
@@ -164,7 +164,7 @@ class StreamLoad {
     return static_cast<Event*>(event);
   }
 
-  // Returns the status with which a stream ended.
+  // Cancels all streams, and returns the error with which `stream` ended.
   absl::Status end(Stream& stream) {
     alive_ = false;
     grpc::Status status;

@@ -10,7 +10,8 @@
 
 namespace locus::bench::serving {
 
-// Runs fn(0) ... fn(count - 1), each on a thread of its own, the first on this one; returns when all have ended.
+// Runs fn(0) ... fn(count - 1) at the same time: fn(0) on this thread, each of the others on a new thread. Returns when
+// all have ended.
 template <class Fn>
 void on_threads(size_t count, const Fn& fn) {
   std::vector<std::thread> threads;
@@ -19,7 +20,7 @@ void on_threads(size_t count, const Fn& fn) {
   for (std::thread& thread : threads) thread.join();
 }
 
-// A number of turns shared by all threads. Any thread.
+// A counter of remaining turns that threads share: take() returns true once for each turn. Any thread may call it.
 class Turns {
  public:
   explicit Turns(size_t turns) : left_(static_cast<int64_t>(turns)) {}

@@ -1,5 +1,5 @@
-// One scene twice: in a server, and in this process, where the same batches run without a network. For every case that
-// compares the two. One thread fills it; then any thread may read.
+// A pair of equal scenes: one in a server, and one in this process, where the same batches run without a network. For
+// every case that compares the two. One thread fills the scenes; then any thread may read.
 #ifndef LOCUS_TESTS_BENCH_SERVING_TWIN_SCENE_H_
 #define LOCUS_TESTS_BENCH_SERVING_TWIN_SCENE_H_
 
@@ -22,10 +22,10 @@ class TwinScene {
  public:
   TwinScene(const Daemon& daemon, const std::string& name);
 
-  // Creates both; returns the error of the server.
+  // Creates the scene in the server; returns the error of the server.
   absl::Status create();
   absl::Status place(const BenchMesh& mesh);
-  // Applies a batch to both; fails also if an item is refused.
+  // Applies a batch to both scenes; also returns an error if an item is refused.
   absl::Status apply(const v1::UpdateBatch& batch);
 
   const std::string& name() const { return name_; }
@@ -38,18 +38,19 @@ class TwinScene {
   Scene here_;
 };
 
-// Returns the columns of a message, borrowed as in the server: rays and balls; inserts of points and balls, and moves.
+// Returns the columns of a message, which must outlive them. Supports only what the cases send: rays and balls; inserts
+// of points and balls, and moves.
 QueryBatch columns_of(const v1::QueryBatch& batch);
 UpdateBatch columns_of(const v1::UpdateBatch& batch);
 
-// Checks every value of a parsed batch and answers it as the server does, in this thread alone.
+// Checks every value of a parsed batch and answers it as the server does, in the calling thread.
 test::BatchResult answer_here(const SceneSnapshot& snapshot, const QueryBatch& batch);
 
-// Returns a hash that is equal for equal answers of server and process.
+// Returns a hash of an answer of this process, or of the server: equal if the answers are equal.
 uint64_t hash_of(const test::BatchResult& result);
 uint64_t hash_of(const v1::QueryResult& result);
 
-// Returns the number of rows: hits of rays, results of balls.
+// Returns the number of rows of a result: hits of rays, objects in balls.
 size_t rows_of(const v1::QueryResult& result);
 
 }  // namespace locus::bench::serving

@@ -10,9 +10,9 @@
 namespace locus::bench::serving {
 namespace {
 
-constexpr double kComing = 0.05;  // share of the time until all callers have started
+constexpr double kComing = 0.05;  // part of the run during which the callers start one by one
 
-// Returns a policy that retries for ever.
+// Returns a policy that retries without a limit.
 client::RetryPolicy patient() {
   client::RetryPolicy policy;
   policy.max_attempts = std::numeric_limits<int>::max();
@@ -102,7 +102,7 @@ class Calls {
       start(slot);
   }
 
-  // Returns the seconds until the caller's next call.
+  // Counts the result of a completed call. Returns the seconds until the caller's next call.
   double book(Slot& slot) {
     if (slot.status.ok()) {
       ++flood_.answered;
@@ -124,7 +124,7 @@ class Calls {
   grpc::CompletionQueue queue_;
   std::vector<v1::QueryRequest> requests_;
   std::vector<Slot> slots_;
-  std::multimap<double, Slot*> waiting_;  // by time of their next call
+  std::multimap<double, Slot*> waiting_;  // callers that wait, by the time of their next call
   size_t under_way_ = 0;
   double end_ = 0;
   size_t sent_ = 0;

@@ -1,4 +1,5 @@
-// Batches of updates over one stream, in order, repeatedly. For every case that counts moves a second. One thread.
+// Batches of updates that are sent repeatedly over one stream, in order. For every case that counts moves per second.
+// One thread.
 #ifndef LOCUS_TESTS_BENCH_SERVING_UPDATE_LOAD_H_
 #define LOCUS_TESTS_BENCH_SERVING_UPDATE_LOAD_H_
 
@@ -14,16 +15,16 @@ namespace locus::bench::serving {
 
 class UpdateLoad {
  public:
-  // Expected kind of every ack: of a batch applied without refusals, or of a duplicate.
+  // Expected kind of every ack: ack of a batch that was applied without refusals, or of a duplicate.
   enum class Expect : uint8_t { kApplied, kDuplicate };
 
   // Borrows the messages.
   UpdateLoad(const Daemon& daemon, std::vector<v1::StreamUpdatesRequest>& messages, size_t window, Expect expect);
 
-  // Sends all messages, `passes` times. Errors show in status().
+  // Sends all messages `passes` times. Errors are stored in status().
   void run(size_t passes);
   const absl::Status& status() const { return status_; }
-  // Returns the size of the last ack.
+  // Returns the serialized size of the last ack in bytes.
   size_t ack_bytes() const { return ack_bytes_; }
 
  private:

@@ -1,4 +1,5 @@
-// A world of the dynamic suite as messages for a server. For cases that move objects. Plain functions.
+// Messages for a server with the objects and moves of a world of the dynamic suite. For cases that move objects.
+// Stateless functions.
 #ifndef LOCUS_TESTS_BENCH_SERVING_WORLD_MESSAGES_H_
 #define LOCUS_TESTS_BENCH_SERVING_WORLD_MESSAGES_H_
 
@@ -10,10 +11,11 @@
 
 namespace locus::bench::serving {
 
-// Returns inserts of all objects, as balls.
+// Returns a batch that inserts all objects of the world as balls.
 v1::UpdateBatch insert_all(const dynamic::World& world);
 
-// Returns moves of `ticks` ticks in messages of `size`; the last of a tick may have fewer.
+// Advances the world by `ticks` ticks and returns their moves in messages of `size` moves; the last message of a tick
+// may have fewer.
 std::vector<v1::StreamUpdatesRequest> move_messages(dynamic::World& world, const std::string& scene, size_t size,
                                                     size_t ticks);
 

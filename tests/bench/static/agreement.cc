@@ -9,7 +9,7 @@
 namespace locus::bench {
 namespace {
 
-// Maximum number of triangle tests to decide about the differing rays of one comparison.
+// Maximum number of triangle tests of one comparison; differing rays beyond this are counted but not tested.
 constexpr size_t kMaxTests = 400'000'000;
 
 RayAnswer by_every_triangle(const BenchMesh& mesh, const RayQuery& query) {
@@ -41,7 +41,7 @@ bool right(uint8_t answer, const RayAnswer& truth) { return hits(answer) == hits
 std::string words(const RayAnswer& answer) { return hits(answer) ? absl::StrFormat("t = %.9g", answer.t) : "a miss"; }
 std::string words(uint8_t answer) { return hits(answer) ? "a hit" : "a miss"; }
 
-// Describes the first of the differing rays, and their number.
+// Returns a sentence with the number of differing rays, `count` of `of`, and a description of the first.
 std::string difference(const std::string& case_name, const Peer& peer, size_t count, size_t of,
                        const std::string& first) {
   return absl::StrCat(case_name, ": ", peer.name(), " differs from us in ", count, " of ", of,

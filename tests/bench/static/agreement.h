@@ -1,7 +1,7 @@
 // Comparison of a peer's answers with those of locus. If they differ, a test of every triangle by the predicates of
-// core/geometry decides which are right. Those of locus must always be right. A peer may differ within the limits
-// below, which is noted, or if it names a known fault; anything else is a disagreement. Writes into a report; pure
-// otherwise.
+// core/geometry decides which answers are right. The answers of locus must always be right. A peer's differences are
+// noted if they are within the limits below, or if the peer has a known fault; otherwise they are a disagreement.
+// Writes into a report; pure otherwise.
 #ifndef LOCUS_TESTS_BENCH_STATIC_AGREEMENT_H_
 #define LOCUS_TESTS_BENCH_STATIC_AGREEMENT_H_
 
@@ -16,31 +16,32 @@
 
 namespace locus::bench {
 
-// Rays differ if only one of both hits, or if the hits are further apart than this part of the diagonal.
+// Tolerance: two answers to a ray differ if only one of them is a hit, or if the difference of their t exceeds this
+// part of the mesh's diagonal.
 inline constexpr double kSameHit = 1e-4;
-// Tolerated shares: one differing ray in kDifferingRays (silhouettes that a ray skims), and the part of all ids (float
-// tests that round).
+// Tolerated differences of a peer: kDifferingRays in kDifferingRaysOf rays, since a ray can graze a silhouette, and the
+// part kDifferingIds of all ids, since float tests round.
 inline constexpr size_t kDifferingRays = 20;
 inline constexpr size_t kDifferingRaysOf = 500'000;
 inline constexpr double kDifferingIds = 1e-3;
 
-// Compares first hits. `ours` has the answers to all of a case's rays, `theirs` those to the rays that the peer was
-// asked.
+// Compares first hits. `ours` has the answers to all rays of a case, `theirs` the answers to the rays in `asked`, which
+// the peer was asked.
 void compare_first(const std::string& case_name, const BenchMesh& mesh, const Peer& peer, Task task,
                    const Asked<RayQuery>& asked, absl::Span<const RayAnswer> ours, absl::Span<const RayAnswer> theirs,
                    Report& report);
 void compare_any(const std::string& case_name, const BenchMesh& mesh, const Peer& peer, const Asked<RayQuery>& asked,
                  absl::Span<const uint8_t> ours, absl::Span<const uint8_t> theirs, Report& report);
 
-// Counts over the queries of a case.
+// Differences between a peer and locus in all queries of a case.
 struct RegionTally {
   size_t queries = 0;            // differing queries
   size_t ids = 0;                // differing ids
-  size_t all_ids = 0;            // of locus in all queries
-  std::string first_difference;  // in words
+  size_t all_ids = 0;            // ids that locus found in all queries
+  std::string first_difference;  // a sentence; empty if there is none
 };
-// Compares the ids of one query, in any order. `overlaps` decides by core/geometry. Counts the peer's errors; reports
-// those of locus at once.
+// Compares the ids of one query, which may be in any order. `overlaps(id)` returns whether the query reaches a
+// triangle, by core/geometry. Adds differences to the tally, and reports an error of locus at once.
 template <class Overlaps>
 void compare_ids(const std::string& where, std::vector<uint32_t> ours, std::vector<uint32_t> theirs, Overlaps overlaps,
                  RegionTally& tally, Report& report);

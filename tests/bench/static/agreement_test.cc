@@ -17,7 +17,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
-// A peer whose answers are right, except for the first hit of each batch.
+// A peer that misses the first hit of each batch; all its other answers are right.
 class Liar : public Peer {
  public:
   explicit Liar(const BenchMesh& mesh, std::string fault = "") : Peer("liar"), right_(mesh), fault_(std::move(fault)) {}

@@ -1,5 +1,5 @@
-// Boost.Geometry's R-tree as a peer of the static suite: the boxes of triangles, packed, 16 a node. Only if
-// libboost-dev is installed; see peers.h.
+// Boost.Geometry's R-tree as a peer of the static suite: it stores the boxes of triangles in packed nodes of 16. Built
+// only if libboost-dev is installed; see peers.h.
 #ifndef LOCUS_TESTS_BENCH_STATIC_BOOST_RTREE_H_
 #define LOCUS_TESTS_BENCH_STATIC_BOOST_RTREE_H_
 

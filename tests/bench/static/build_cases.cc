@@ -9,7 +9,7 @@ namespace {
 
 using Builders = std::vector<std::unique_ptr<Builder>>;
 
-// Measures the time of the whole process, so that the work of other threads counts.
+// Measures the builders by the processor time of the whole process, so that the work of all their threads counts.
 void run_build(const std::string& name, const MeshRun& run, const Builders& builders, const Cell& shared) {
   run.progress(name);
   const auto count = static_cast<double>(run.mesh.triangles.size());

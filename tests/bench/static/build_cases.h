@@ -1,5 +1,5 @@
-// The cases of building: time for a tree from triangles by one thread, and the bytes that stay resident for each
-// triangle.
+// The cases build (time in which one thread builds a tree from triangles) and memory (bytes per triangle that stay
+// resident after a build).
 #ifndef LOCUS_TESTS_BENCH_STATIC_BUILD_CASES_H_
 #define LOCUS_TESTS_BENCH_STATIC_BUILD_CASES_H_
 
@@ -7,7 +7,7 @@
 
 namespace locus::bench {
 
-// Runs build and memory. Uses no peers of `run`: it makes its own builders and destroys them.
+// Runs build and memory. Makes builders of its own and destroys them; the peers in `run` are not used.
 void run_build_cases(const MeshRun& run);
 
 }  // namespace locus::bench

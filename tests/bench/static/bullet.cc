@@ -22,7 +22,8 @@ class NearestHit : public btTriangleRaycastCallback {
   uint32_t number = kNoTriangle;
 };
 
-// Passes every triangle whose box overlaps to `test`, which decides.
+// Visitor of the triangles whose boxes overlap the query's box. It stores the numbers of triangles for which `test` is
+// true.
 template <class Test>
 class Collect : public btTriangleCallback {
  public:
@@ -83,8 +84,8 @@ class Bullet : public Peer {
   }
 
  private:
-  // Bullet's rays need an end: no hit is further than twice the diagonal from an origin within the bounds or a
-  // camera's.
+  // Returns the first hit. Bullet's rays need an end: from an origin within the bounds, or from the camera, no hit is
+  // further away than twice the diagonal.
   RayAnswer first_of(const RayQuery& ray) {
     const float length = std::min(ray.t_max, 2 * mesh_.diagonal);
     const btVector3 from = vector_of(ray.origin), to = from + vector_of(ray.direction) * length;

@@ -1,5 +1,5 @@
 // Bullet's static mesh as a peer of the static suite: btBvhTriangleMeshShape with quantised boxes, as Debian ships it.
-// Only if libbullet-dev is installed; see peers.h.
+// Built only if libbullet-dev is installed; see peers.h.
 #ifndef LOCUS_TESTS_BENCH_STATIC_BULLET_H_
 #define LOCUS_TESTS_BENCH_STATIC_BULLET_H_
 
@@ -10,7 +10,7 @@
 
 namespace locus::bench {
 
-// Adds the peer. Bullet keeps triangle numbers in 21 bits: for larger meshes it adds a note instead.
+// Adds the peer. Bullet stores triangle numbers in 21 bits: for a mesh with more triangles, adds a note instead.
 void add_bullet_peer(const BenchMesh& mesh, Needs needs, Peers& peers, std::vector<std::string>& notes);
 
 }  // namespace locus::bench

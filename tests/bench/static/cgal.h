@@ -1,5 +1,5 @@
-// CGAL's AABB tree in float as a peer of the static suite: rays and boxes. Its balls are surfaces, which leave out the
-// triangles inside, so it is not used for balls. Only if libcgal-dev is installed; see peers.h.
+// CGAL's AABB tree in float as a peer of the static suite: rays and boxes. CGAL is not used for balls: its balls are
+// surfaces, so it would not find triangles inside a ball. Built only if libcgal-dev is installed; see peers.h.
 #ifndef LOCUS_TESTS_BENCH_STATIC_CGAL_H_
 #define LOCUS_TESTS_BENCH_STATIC_CGAL_H_
 

@@ -27,7 +27,8 @@ RTCDevice device() {
   return only;
 }
 
-// A committed scene over copies of the mesh's buffers, with the padding that Embree reads beyond the last vertex.
+// An Embree scene, built by commit(), and the copies of the mesh's buffers that it uses. The vertices are padded, since
+// Embree reads beyond the last one.
 class Scene {
  public:
   Scene(const BenchMesh& mesh, RTCSceneFlags flags) : flags_(flags), vertices_(mesh.vertices), indices_(mesh.indices) {
@@ -106,7 +107,7 @@ void set(RTCRayHit& to, const RayQuery& ray) {
 
 constexpr char kLeaks[] = "Embree lets rays pass between triangles where its scene is not RTC_SCENE_FLAG_ROBUST";
 
-// Uses rtcIntersect1 and rtcOccluded1, one ray a call.
+// Peer that uses rtcIntersect1 and rtcOccluded1, one ray per call.
 class SingleRays : public Peer {
  public:
   SingleRays(std::string name, std::shared_ptr<const Scene> scene, std::vector<Task> tasks, std::string fault)
@@ -138,7 +139,8 @@ class SingleRays : public Peer {
   std::string fault_;
 };
 
-// Uses rtcIntersect1M, a stream of rays a call, with the flag for coherent rays if they are.
+// Peer that uses rtcIntersect1M, a stream of up to kStream rays per call; CoherentRayStream sets Embree's flag for
+// coherent rays.
 class RayStream : public Peer {
  public:
   explicit RayStream(std::shared_ptr<const Scene> scene) : Peer("embree_intersect1m"), scene_(std::move(scene)) {}
@@ -182,7 +184,7 @@ void intersect(const int* valid, RTCScene scene, RTCIntersectContext* context, R
   rtcIntersect16(valid, scene, context, rays);
 }
 
-// Uses rtcIntersect8 and rtcIntersect16: coherent rays side by side.
+// Peer that uses rtcIntersect8 or rtcIntersect16: packets of kWidth coherent rays.
 template <class Packet, size_t kWidth>
 class RayPackets : public Peer {
  public:
@@ -223,7 +225,7 @@ class RayPackets : public Peer {
   std::shared_ptr<const Scene> scene_;
 };
 
-// Uses rtcOccluded1 with a filter that records each hit and rejects it, so that the search continues.
+// Peer that uses rtcOccluded1 with a filter. The filter stores each hit and rejects it, so that the search continues.
 class AllHits : public Peer {
  public:
   explicit AllHits(std::shared_ptr<const Scene> scene) : Peer("embree_robust"), scene_(std::move(scene)) {}
@@ -242,7 +244,7 @@ class AllHits : public Peer {
 
  private:
   struct Found {
-    RTCIntersectContext context;  // first member: Embree's part
+    RTCIntersectContext context;  // must be the first member: the filter gets a pointer to it
     uint32_t* ids;
     uint32_t count;
   };
@@ -256,8 +258,8 @@ class AllHits : public Peer {
   std::shared_ptr<const Scene> scene_;
 };
 
-// Uses rtcPointQuery; a float test decides about each triangle that it finds. Boxes are searched by the ball around
-// them.
+// Peer that uses rtcPointQuery; a float test decides about each triangle that rtcPointQuery finds. A box is searched by
+// the ball around it.
 class PointQuery : public Peer {
  public:
   PointQuery(const BenchMesh& mesh, std::shared_ptr<const Scene> scene)
@@ -302,7 +304,7 @@ class PointQuery : public Peer {
     const auto decide = [](RTCPointQueryFunctionArguments* arguments) {
       auto& into = *static_cast<Found<Test>*>(arguments->userPtr);
       if (into.test(into.triangles[arguments->primID])) into.ids[into.count++] = arguments->primID;
-      return false;  // keeps the radius
+      return false;  // false: the query's radius has not changed
     };
     rtcPointQuery(scene_->get(), &query, &context, decide, &found);
     return found.count;

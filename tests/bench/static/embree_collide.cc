@@ -23,7 +23,7 @@ void set(RTCBounds* to, const Aabbf& bounds) {
   to->upper_z = bounds.max.z;
 }
 
-// Geometry of which Embree knows the bounds only.
+// Returns a committed scene of user geometry: Embree knows only the bounds of each thing.
 template <class Thing>
 RTCScene scene_of(const Thing* things, size_t count, RTCBoundsFunction bounds, RTCBuildQuality quality) {
   const RTCScene scene = rtcNewScene(device());
@@ -57,7 +57,8 @@ class EmbreeCollide : public Peer {
   EmbreeCollide& operator=(const EmbreeCollide&) = delete;
 
   bool does(Task task) const override { return task == Task::kBox; }
-  // The ids of a batch arrive unsorted: they are appended to `ids`, from its start again when it is full.
+  // Appends ids to `ids` in the order in which rtcCollide finds pairs, not sorted by box; continues at the start of
+  // `ids` when it is full.
   void box_ids(absl::Span<const Obbf> boxes, absl::Span<uint32_t> ids, uint32_t* counts) override {
     std::fill_n(counts, boxes.size(), 0);
     Found found{triangles_, boxes, ids, counts, 0};

@@ -1,5 +1,5 @@
-// Embree's rtcCollide as a peer for boxes: the boxes of a batch become a scene of their own, built for each batch, and
-// an exact test decides about each of its pairs with the triangles' boxes. Only if Debian's libembree-dev is installed;
+// Embree's rtcCollide as a peer for boxes: for each batch of boxes a scene is built. rtcCollide finds pairs of a box
+// and a triangle's box, and a float test decides about each pair. Built only if Debian's libembree-dev is installed;
 // see peers.h.
 #ifndef LOCUS_TESTS_BENCH_STATIC_EMBREE_COLLIDE_H_
 #define LOCUS_TESTS_BENCH_STATIC_EMBREE_COLLIDE_H_

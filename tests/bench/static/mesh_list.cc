@@ -7,7 +7,7 @@
 namespace locus::bench {
 namespace {
 
-// Sizes from a city that fits into the first-level cache to a body larger than the last-level cache.
+// Generated meshes, from a city that fits into the first-level cache to a body larger than the last-level cache.
 const std::vector<std::string> kGenerated = {"city:10000", "city:70000", "terrain:270000", "blob:4300000"};
 const std::vector<std::string> kQuick = {"city:2000", "blob:5000"};
 
@@ -15,7 +15,7 @@ const std::vector<std::string> kQuick = {"city:2000", "blob:5000"};
 struct Fetched {
   const char* name;
   const char* file;
-  const char* entry;  // with its separator; empty = none
+  const char* entry;  // entry of an archive, with the separator '#'; empty = the path is no archive
 };
 constexpr Fetched kFetched[] = {{"delta", "pak1-maps.pk3", "#maps/delta.bsp"}, {"bunny", "bunny.obj", ""}};
 

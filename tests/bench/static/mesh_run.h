@@ -1,4 +1,4 @@
-// Data that the cases of one mesh share. Borrowed; one thread.
+// Data that the cases of one mesh share, all borrowed. One thread.
 #ifndef LOCUS_TESTS_BENCH_STATIC_MESH_RUN_H_
 #define LOCUS_TESTS_BENCH_STATIC_MESH_RUN_H_
 
@@ -26,14 +26,14 @@ inline std::string case_of(const std::string& start, const BenchMesh& mesh) {
   return absl::StrCat(start, "/", mesh.name);
 }
 
-// Queries that a contestant is asked, and their positions among all.
+// Queries that a contestant is asked, and the index of each among all queries of the case.
 template <class Query>
 struct Asked {
   std::vector<Query> queries;
   std::vector<size_t> places;
 };
 
-// Returns all queries, or 16 of each 128 for slow peers.
+// Returns the queries for a peer: all of them, or 16 of each 128 if the peer is slow.
 template <class Query>
 Asked<Query> asked_of(const Peer& peer, const std::vector<Query>& queries) {
   Asked<Query> asked;
@@ -45,7 +45,8 @@ Asked<Query> asked_of(const Peer& peer, const std::vector<Query>& queries) {
   return asked;
 }
 
-// Returns the position at which one chunk of `count` queries begins; that of chunk `chunks` is `count`.
+// Returns the index of the first query of a chunk, if `count` queries are divided into `chunks` chunks; `count` for
+// chunk `chunks`.
 inline size_t chunk_begin(size_t count, size_t chunk, size_t chunks) { return count * chunk / chunks; }
 
 inline size_t chunks_for(size_t count, size_t chunk_size) {

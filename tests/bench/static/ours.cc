@@ -17,8 +17,8 @@ namespace locus::bench {
 namespace {
 
 constexpr size_t kBatch = 1024;      // rays per call of the kernels
-constexpr size_t kRegionBatch = 16;  // balls or boxes per call
-constexpr size_t kAllBatch = 256;    // rays per call for all hits, and the maximum number of hits of each
+constexpr size_t kRegionBatch = 16;  // balls or boxes per call of find_triangles()
+constexpr size_t kAllBatch = 256;    // rays per call of the kernel for all hits
 constexpr uint32_t kMaxRows = 128;
 
 using AskKernel = void (*)(const TriangleTree& tree, const KernelRay* rays, KernelHit* hits, size_t count);
@@ -39,8 +39,8 @@ KernelRay kernel_ray(const RayQuery& ray) {
           true};
 }
 
-// Returns whether the kernels' bounds hold. The workloads' directions have unit length, so only the ray's length can
-// exceed the bounds.
+// Returns whether the kernels' error bounds hold for a ray. Directions have unit length, so only `reach` must be
+// tested.
 bool kernels_hold(const RayQuery& ray, float magnitude) {
   const double reach = double{max_component(abs(ray.origin))} + double{magnitude};
   return reach >= kMinKernelReach && reach <= kMaxKernelReach;
@@ -48,7 +48,7 @@ bool kernels_hold(const RayQuery& ray, float magnitude) {
 
 TriangleRay triangle_ray(const RayQuery& ray) { return {to_double(ray.origin), to_double(ray.direction)}; }
 
-// Returns the float above t: the searches below exclude their limit, the workloads include it.
+// Returns the float above t: the searches below exclude hits at their limit, the workloads include hits at t_max.
 float just_beyond(float t) { return std::nextafter(t, std::numeric_limits<float>::infinity()); }
 
 RayAnswer first_by_triangles(const TriangleBvh& tree, const RayQuery& ray) {
@@ -62,7 +62,8 @@ bool any_by_triangles(const TriangleBvh& tree, const RayQuery& ray) {
   return any_ray(tree, triangle_ray(ray), just_beyond(ray.t_max));
 }
 
-// Runs the kernels batch by batch; `settled` and `unsettled` get each ray's position.
+// Runs a kernel on batches of rays. Calls `settled` with the index of a ray and its result, or `unsettled` with the
+// index if the kernel could not decide.
 template <class Settled, class Unsettled>
 void ask_kernels(const TriangleBvh& tree, AskKernel ask, absl::Span<const RayQuery> rays, Settled settled,
                  Unsettled unsettled) {
@@ -82,7 +83,7 @@ void ask_kernels(const TriangleBvh& tree, AskKernel ask, absl::Span<const RayQue
   }
 }
 
-// Finds all hits of one ray, written from the start of `ids`.
+// Writes the numbers of all triangles that one ray hits to `ids`. Returns their number.
 uint32_t all_by_triangles(const TriangleBvh& tree, const RayQuery& ray, uint32_t* ids) {
   std::vector<RayHit<Triangle>> found;
   all_rays(tree, triangle_ray(ray), just_beyond(ray.t_max), tree.size(), found);
@@ -90,8 +91,8 @@ uint32_t all_by_triangles(const TriangleBvh& tree, const RayQuery& ray, uint32_t
   return static_cast<uint32_t>(found.size());
 }
 
-// Finds all hits of up to kAllBatch rays, by the kernels where their bounds hold. Writes from the start of `ids` again
-// if the rest could be too small.
+// Finds all hits of up to kAllBatch rays, by the kernel for the rays for which its bounds hold. Continues at the start
+// of `ids` if the remaining part could be too small for all triangles.
 void find_all(const TriangleBvh& tree, const RayKernels& kernels, absl::Span<const RayQuery> rays,
               absl::Span<uint32_t> ids, uint32_t* counts, KernelRow* rows) {
   std::array<KernelRay, kAllBatch> batch;
@@ -110,7 +111,8 @@ void find_all(const TriangleBvh& tree, const RayKernels& kernels, absl::Span<con
   }
 }
 
-// Writes each batch from the start of `ids` again; repeats queries whose ids do not fit behind the others.
+// Finds the triangles of balls or boxes in batches. Each batch writes from the start of `ids`; queries whose ids do not
+// fit are repeated in the next batch.
 template <class Shape>
 void find_in_batches(const TriangleBvh& tree, absl::Span<const Shape> shapes, absl::Span<uint32_t> ids,
                      uint32_t* counts) {

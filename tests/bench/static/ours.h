@@ -1,5 +1,5 @@
 // The only code of the static suite that calls locus, by the functions that the server's queries use for a mesh.
-// Immutable; any number of threads may ask.
+// Immutable; any number of threads may use it.
 #ifndef LOCUS_TESTS_BENCH_STATIC_OURS_H_
 #define LOCUS_TESTS_BENCH_STATIC_OURS_H_
 
@@ -26,10 +26,11 @@ class Ours : public Peer {
   std::shared_ptr<const StaticMesh> mesh_;
 };
 
-// Makes a builder of the tree from triangles, on one thread; bytes() are the whole StaticMesh's, with the uploaded
-// mesh.
+// Makes a builder of the tree from triangles, on one thread; bytes() returns the bytes of a StaticMesh, which contains
+// the uploaded mesh.
 std::unique_ptr<Builder> our_builder(const BenchMesh& mesh);
-// Returns a hash of the storage order of a built tree: the results of the cases build and memory.
+// Returns a hash of the order in which a built tree stores its triangles: the results_hash of the cases build and
+// memory.
 std::string storage_order_hash(const BenchMesh& mesh);
 
 }  // namespace locus::bench

@@ -1,6 +1,6 @@
-// The one interface of locus and of every peer: the same queries in the same columns, answers into buffers of the
-// caller. A peer is made from a mesh, which must outlive it, and is then ready. One thread uses a peer at a time,
-// except locus.
+// The one interface of locus and of every peer: all get the same queries in the same columns, and write answers into
+// buffers of the caller. A peer is built by its constructor from a mesh that must outlive it. Only one thread may use a
+// peer at a time, but any number may use locus.
 #ifndef LOCUS_TESTS_BENCH_STATIC_PEER_H_
 #define LOCUS_TESTS_BENCH_STATIC_PEER_H_
 
@@ -19,11 +19,11 @@ inline constexpr uint32_t kNoTriangle = 0xFFFFFFFFu;
 inline constexpr size_t kSpareIds = 65'536;
 
 struct RayAnswer {
-  float t = 0;  // t of a hit
+  float t = 0;  // t of the hit; meaningless for a miss
   uint32_t triangle = kNoTriangle;
 };
 
-// Kind of query of a case.
+// Kind of query that a case measures.
 enum class Task : uint8_t { kFirst, kFirstOfCamera, kAny, kAll, kBall, kBox };
 
 class Peer {
@@ -37,16 +37,17 @@ class Peer {
   virtual bool does(Task task) const = 0;
   // Returns whether the peer gets only an eighth of the queries, 16 of each 128.
   virtual bool slow() const { return false; }
-  // Returns the reason why some of its answers are known to be wrong; empty = all should be right.
+  // Returns the reason why some answers of this peer are known to be wrong; empty = all answers should be right.
   virtual std::string known_fault(Task) const { return ""; }
 
-  // Answers queries; `answers` has one entry for each ray. Only functions whose task does() supports are called.
+  // Answers rays: the first hit, or whether there is any; the second argument has one entry for each ray. Of the
+  // functions below, only those are called whose task does() returns true for.
   virtual void first(absl::Span<const RayQuery>, RayAnswer*) {}
   virtual void any(absl::Span<const RayQuery>, uint8_t*) {}
-  // Writes the numbers of all triangles that each ray, ball or box reaches, in any order, to `ids`, from its start
-  // again if it is full or the peer works query by query; `ids` has room for all triangles of the mesh and kSpareIds
-  // more. A call with one query leaves that query's numbers at the start. Sets `counts` to the number of ids of each
-  // query.
+  // Writes to `ids` the numbers of all triangles that each ray, ball or box reaches, in any order, and to `counts` how
+  // many each query reaches. `ids` has room for all triangles of the mesh and kSpareIds more. A peer may continue at
+  // the start of `ids` when it is full, or at each query, so only a call with one query returns all its numbers, from
+  // the start of `ids`.
   virtual void ray_ids(absl::Span<const RayQuery>, absl::Span<uint32_t> /*ids*/, uint32_t* /*counts*/) {}
   virtual void ball_ids(absl::Span<const Ballf>, absl::Span<uint32_t> /*ids*/, uint32_t* /*counts*/) {}
   virtual void box_ids(absl::Span<const Obbf>, absl::Span<uint32_t> /*ids*/, uint32_t* /*counts*/) {}
@@ -57,14 +58,14 @@ class Peer {
 
 using Peers = std::vector<std::unique_ptr<Peer>>;
 
-// Structures that the selected cases need: for hits of rays, and for all triangles of a ray, ball or box. Others are
-// not built.
+// Structures that the selected cases need: `rays` for first and any hits, `regions` for all triangles of a ray, ball or
+// box. Structures that no case needs are not built.
 struct Needs {
   bool rays = false;
   bool regions = false;
 };
 
-// Interface of building, for the cases build and memory.
+// Interface of a contestant that builds a tree, for the cases build and memory.
 class Builder {
  public:
   explicit Builder(std::string name) : name_(std::move(name)) {}
@@ -73,7 +74,7 @@ class Builder {
   Builder& operator=(const Builder&) = delete;
 
   const std::string& name() const { return name_; }
-  // Runs before the clock starts.
+  // Releases the previous tree; runs while the clock is stopped.
   virtual void prepare() = 0;
   virtual void build() = 0;
   // Returns the bytes that stay resident after a build().

@@ -1,5 +1,5 @@
-// All peers of the static suite that this build has. CMake selects the installed ones; deploy/packages.sh has the set
-// `bench`.
+// All peers of the static suite that this build has: CMake selects those whose libraries are installed.
+// `deploy/packages.sh bench` installs all.
 #ifndef LOCUS_TESTS_BENCH_STATIC_PEERS_H_
 #define LOCUS_TESTS_BENCH_STATIC_PEERS_H_
 
@@ -10,7 +10,7 @@
 
 namespace locus::bench {
 
-// Makes the peers for a mesh. Adds a note for each that cannot take this mesh.
+// Makes the peers for a mesh. Adds a note for each peer that cannot store this mesh.
 Peers all_peers(const BenchMesh& mesh, Needs needs, std::vector<std::string>& notes);
 
 // Makes the builders of the cases build and memory.

@@ -12,11 +12,11 @@ namespace locus::bench {
 namespace {
 
 constexpr size_t kRaysAChunk = 20'000;
-// Large enough for the time of starting threads not to matter.
+// Rays per chunk with several threads: so many that the time of waking the threads does not matter.
 constexpr size_t kRaysAThreadsChunk = 60'000;
 constexpr uint64_t kIncoherentSeed = 101;
 constexpr uint64_t kShortSeed = 202;
-constexpr float kShortReach = 0.05f;  // part of the diagonal
+constexpr float kShortReach = 0.05f;  // length of a short ray, as a part of the mesh's diagonal
 
 enum class Rays : uint8_t { kIncoherent, kShort, kCamera };
 struct RayCase {
@@ -77,7 +77,7 @@ struct Entry {
   std::vector<Answer> answers;
 };
 
-// Lists locus first, then the peers that support the task.
+// Returns an entry for locus, then one for each peer that supports the task.
 template <class Answer>
 std::vector<Entry<Answer>> entries_of(const MeshRun& run, Task task, const std::vector<RayQuery>& rays) {
   std::vector<Entry<Answer>> entries;
@@ -123,10 +123,11 @@ void run_case(const MeshRun& run, const RayCase& ray_case) {
 
 std::string threads_case(const MeshRun& run) { return case_of(absl::StrCat("threads", run.options.threads), run.mesh); }
 
-// Threads that wait for the next chunk: starting one can take longer than a chunk.
+// Threads that wait for the next chunk. They are not started for each chunk, since starting a thread can take longer
+// than a chunk.
 class Team {
  public:
-  // Makes a team. `work` gets a member's index, from 0; member 0 is the thread that calls run().
+  // Starts `members` - 1 threads. `work` gets a member's index, from 0; member 0 is the thread that calls run().
   Team(size_t members, std::function<void(size_t member)> work)
       : work_(std::move(work)), begin_(static_cast<ptrdiff_t>(members)), end_(static_cast<ptrdiff_t>(members)) {
     for (size_t member = 1; member < members; ++member) {
@@ -159,7 +160,7 @@ class Team {
   std::vector<std::thread> others_;
 };
 
-// Rays divided among several threads, each with a part of every chunk.
+// Rays that several threads of locus answer: each thread gets a part of every chunk.
 class SharedRays {
  public:
   SharedRays(Peer& peer, const std::vector<RayQuery>& rays, size_t chunks, size_t threads)

@@ -14,9 +14,9 @@ namespace {
 struct RegionCase {
   const char* name;
   Task task;
-  float fraction;  // radius or size as a part of the diagonal
+  float fraction;  // radius or size as a part of the mesh's diagonal
   uint64_t seed;
-  size_t count;  // a tenth for meshes of more than a million triangles
+  size_t count;  // number of queries; a tenth of it for meshes of more than a million triangles
   size_t quick_count;
   size_t chunk;
 };
@@ -55,10 +55,10 @@ template <class Query>
 struct Entry {
   Peer* peer;
   Asked<Query> asked;
-  std::vector<uint32_t> counts;  // ids per query
+  std::vector<uint32_t> counts;  // number of ids of each query
 };
 
-// Hash of a set of ids, independent of their order.
+// Hash of a set of ids, independent of the order of the ids.
 struct SetOfIds {
   uint32_t count = 0;
   uint64_t sum = 0;
@@ -71,7 +71,7 @@ SetOfIds set_of(absl::Span<const uint32_t> ids) {
   return set;
 }
 
-// One case of one kind of query, from its queries to its cells.
+// Comparison and measurement of one case: runs the queries and adds the cells.
 template <class Query>
 class RegionRace {
  public:
@@ -113,7 +113,7 @@ class RegionRace {
     return absl::MakeConstSpan(ids_.data(), count);
   }
 
-  // Compares query by query, before anything is timed.
+  // Compares the results of all peers with those of locus, query by query, before the race.
   void compare_all() {
     for (const Query& query : queries_) {
       sets_.push_back(set_of(ids_of(run_.ours, query)));
@@ -153,7 +153,7 @@ class RegionRace {
     return {entry.peer->name(), run_chunk, static_cast<double>(count), {}};
   }
 
-  // Verifies that the timed runs found as many ids as the compared ones.
+  // Verifies that locus found as many ids in the race as in compare_all().
   void check_counts() {
     const std::vector<uint32_t>& timed = entries_.front().counts;
     for (size_t i = 0; i < timed.size(); ++i) {
@@ -170,7 +170,7 @@ class RegionRace {
   const std::vector<Query> queries_;
   std::vector<uint32_t> ids_;
   std::vector<Entry<Query>> entries_;
-  std::vector<SetOfIds> sets_;  // of locus, per query
+  std::vector<SetOfIds> sets_;  // hash of the ids that locus found, for each query
   ResultsHash hash_;
 };
 

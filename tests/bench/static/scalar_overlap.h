@@ -1,6 +1,6 @@
-// Tests for peers that only cull: plain float tests of one triangle, as a user of such a library would write them.
-// Faster than core/geometry's in double, and sometimes wrong by a rounding, which static_suite tolerates. Inline, since
-// each peer's file is compiled on its own.
+// Tests of one triangle for peers that only cull by boxes: plain float code, as a user of such a library would write
+// it. Faster than the tests of core/geometry in double, and sometimes wrong by a rounding, which agreement.h tolerates.
+// Inline, since each peer's file is compiled on its own.
 #ifndef LOCUS_TESTS_BENCH_STATIC_SCALAR_OVERLAP_H_
 #define LOCUS_TESTS_BENCH_STATIC_SCALAR_OVERLAP_H_
 
@@ -11,7 +11,7 @@
 
 namespace locus::bench {
 
-// Returns the squared length of `to_point` minus s times one edge and t times the other: the distance to a point of the
+// Returns the squared length of `to_point` - s `ab` - t `ac`: the squared distance of the query point to a point of the
 // triangle.
 inline float squared_distance_at(Vec3f to_point, Vec3f ab, Vec3f ac, float s, float t) {
   return squared_length(to_point - ab * s - ac * t);
@@ -42,12 +42,14 @@ inline float scalar_squared_distance(Vec3f point, const Triangle& triangle) {
   return squared_distance_at(ap, ab, ac, vb * whole, vc * whole);
 }
 
-// Returns whether an axis separates: `p0`, `p1`, `p2` are the vertices along it, `reach` is the box's half extent.
+// Returns whether an axis separates the triangle from the box. `p0`, `p1`, `p2` are projections of the vertices on the
+// axis, relative to the box's centre; `reach` is half the length of the box's projection.
 inline bool separates(float p0, float p1, float p2, float reach) {
   return std::max(std::min(p0, std::min(p1, p2)), -std::max(p0, std::max(p1, p2))) > reach;
 }
 
-// Tests the three axes edge x unit vector. Vertices are relative to the box's centre.
+// Returns whether one of the three axes `edge` x unit vector separates. The vertices `a`, `b`, `c` are relative to the
+// box's centre.
 inline bool edge_separates(Vec3f a, Vec3f b, Vec3f c, Vec3f edge, Vec3f half) {
   const float x = std::fabs(edge.x), y = std::fabs(edge.y), z = std::fabs(edge.z);
   return separates(edge.y * a.z - edge.z * a.y, edge.y * b.z - edge.z * b.y, edge.y * c.z - edge.z * c.y,
@@ -58,11 +60,11 @@ inline bool edge_separates(Vec3f a, Vec3f b, Vec3f c, Vec3f edge, Vec3f half) {
                    half.x * y + half.y * x);
 }
 
-// Tests three axes of the box, the normal, nine products. Source: Akenine-Moller, Fast 3D Triangle-Box Overlap Testing,
-// 2001.
+// Returns whether a triangle overlaps an axis-aligned box. Tests three axes of the box, the triangle's normal, and nine
+// cross products. Source: Akenine-Moller, Fast 3D Triangle-Box Overlap Testing, 2001.
 inline bool scalar_box_overlaps(Vec3f centre, Vec3f half, const Triangle& triangle) {
   const Vec3f a = triangle.a - centre, b = triangle.b - centre, c = triangle.c - centre;
-  // Computes all three before one branch: most candidate triangles end here, equally often by each axis.
+  // Computes three tests before one branch: most triangles that miss are separated here, by each axis equally often.
   if (static_cast<int>(separates(a.x, b.x, c.x, half.x)) | static_cast<int>(separates(a.y, b.y, c.y, half.y)) |
       static_cast<int>(separates(a.z, b.z, c.z, half.z)))
     return false;

@@ -1,5 +1,5 @@
 // The suite `static`: queries of one immutable level by one thread at full speed, in locus and in the best libraries
-// for it. Cases and workloads: README.md.
+// for this task. Cases and workloads: README.md.
 #ifndef LOCUS_TESTS_BENCH_STATIC_STATIC_SUITE_H_
 #define LOCUS_TESTS_BENCH_STATIC_STATIC_SUITE_H_
 
@@ -8,7 +8,8 @@
 
 namespace locus::bench {
 
-// Runs the suite. Errors: those of load_mesh() for a mesh named in the options. Missing fetched levels are only noted.
+// Runs the suite. Returns the error of load_mesh() for a mesh named in the options. Levels that were not fetched are
+// only noted.
 absl::Status run_static_suite(const Options& options, const Progress& progress, Report& report);
 
 }  // namespace locus::bench

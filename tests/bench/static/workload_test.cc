@@ -4,7 +4,7 @@
 
 #include "tests/bench/static/two_sheets.h"
 
-// Another program of the same definition computed the expected values.
+// Tests of the drawn queries. Another program computed the expected values from the definition in workload.h.
 namespace locus::bench {
 namespace {
 

@@ -47,7 +47,7 @@ class BulkTest : public ::testing::Test {
     const ExitCode code = run_into(line, out, err);
     return {code, out.str(), err.str()};
   }
-  // Returns the output of a line that must succeed.
+  // Runs a command line, expects that it succeeds, and returns its output.
   std::string out_of(const std::vector<std::string>& line) const {
     const BulkOutcome outcome = run(line);
     EXPECT_EQ(outcome.code, ExitCode::kOk) << outcome.err;
@@ -64,7 +64,7 @@ class BulkTest : public ::testing::Test {
   std::string address_;
 };
 
-// Named pipe with a writer.
+// Named pipe, created by the constructor, to which a test writes.
 class NamedPipe {
  public:
   NamedPipe() : path_(TestFile::path_of("pipe")) { EXPECT_EQ(mkfifo(path_.c_str(), 0600), 0); }
@@ -73,7 +73,7 @@ class NamedPipe {
   NamedPipe& operator=(const NamedPipe&) = delete;
 
   const std::string& path() const { return path_; }
-  // Writes to the pipe. The first call waits for a reader.
+  // Writes to the pipe. The first call waits until a reader opens the pipe.
   void write(const std::string& bytes) {
     if (!file_.is_open()) file_.open(path_);
     file_ << bytes << std::flush;
@@ -85,10 +85,10 @@ class NamedPipe {
   std::ofstream file_;
 };
 
-// Stream buffer that collects the output of another thread and can wait for a text.
+// Stream buffer that collects the output of one thread while another thread waits for a text in it.
 class SharedText : public std::streambuf {
  public:
-  // Returns whether `part` was written within a minute.
+  // Waits until `part` is in the output. Returns false after a minute.
   bool wait_for(const std::string& part) {
     std::unique_lock lock(mutex_);
     return changed_.wait_for(lock, std::chrono::minutes(1), [&] { return text_.find(part) != std::string::npos; });

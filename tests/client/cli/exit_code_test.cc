@@ -1,4 +1,4 @@
-// Tests of the program as a child process: exit codes and streams, as scripts use them.
+// Tests of the program as a child process: its exit codes, standard output and standard error.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
@@ -18,7 +18,7 @@ using ::testing::HasSubstr;
 
 struct Exit {
   int code = -1;
-  std::string text;  // both streams
+  std::string text;  // standard output and standard error, mixed
 };
 
 Exit run_program(const std::string& environment, const std::string& arguments) {

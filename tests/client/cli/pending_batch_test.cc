@@ -21,7 +21,7 @@ v1::UpdateBatch removes(uint64_t id) { return UpdateBuilder().remove(id).build()
 
 class PendingBatchTest : public ::testing::Test {
  protected:
-  // Adds a line and returns the message of its error; "" if it was added.
+  // Adds the items of `line` to the pending batch. Returns the error message, or "" if they were added.
   std::string add(const v1::UpdateBatch& line, const std::string& scene = "arena") {
     const v1::UpdateBatch before = pending_.batch();
     const absl::Status added = pending_.add(scene, line);

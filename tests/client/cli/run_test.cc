@@ -87,6 +87,20 @@ TEST(HelpTest, EveryCommandHasHelpWithExamples) {
                                                           {"wait"},
                                                           {"limits"},
                                                           {"health"},
+                                                          {"context"},
+                                                          {"context", "list"},
+                                                          {"context", "show"},
+                                                          {"context", "use"},
+                                                          {"context", "set"},
+                                                          {"context", "remove"},
+                                                          {"token"},
+                                                          {"token", "create"},
+                                                          {"token", "list"},
+                                                          {"token", "revoke"},
+                                                          {"cert"},
+                                                          {"cert", "authority"},
+                                                          {"cert", "server"},
+                                                          {"cert", "client"},
                                                           {"version"}};
   for (std::vector<std::string> command : commands) {
     command.push_back("--help");

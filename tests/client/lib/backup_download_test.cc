@@ -1,9 +1,8 @@
-#include "client/lib/backup_download.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "client/lib/client.h"
+#include "client/lib/transfers.h"
 #include "tests/client/lib/fake_server.h"
 
 namespace locus::client {
@@ -14,7 +13,7 @@ using testing::FakeServer;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-// Sink that keeps verified files in memory, and fails at a configured call.
+// Sink that stores verified files in memory. Its begin_file() fails for the path `refused`.
 class KeptFiles final : public BackupSink {
  public:
   absl::Status begin(const BackupSize& announced) override {
@@ -43,7 +42,7 @@ class KeptFiles final : public BackupSink {
   std::string refused;
 };
 
-// Fake server that sends three files as an announcement and three messages.
+// Fixture with a fake server that sends a backup of three files as an announcement and three messages.
 class BackupDownloadTest : public ::testing::Test {
  protected:
   void SetUp() override {

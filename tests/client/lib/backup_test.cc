@@ -43,7 +43,7 @@ TEST(BackupPathsTest, DuplicatePathsAndFilesUsedAsFoldersAreRefused) {
   EXPECT_EQ(paths.add("tables/deep/1").message(), "comes twice");
   EXPECT_EQ(paths.add("tables").message(), "is a folder of another file");
   EXPECT_EQ(paths.add("tables/deep").message(), "is a folder of another file");
-  EXPECT_EQ(paths.add("tables/deep/1/2").message(), "has another file for a folder");
+  EXPECT_EQ(paths.add("tables/deep/1/2").message(), "is below a path that is a file");
 }
 
 TEST(BackupPathsTest, TheNumberOfFilesIsLimited) {

@@ -153,6 +153,17 @@ TEST_F(ClientTest, HealthIsServingAndAnUnknownServiceIsNotFound) {
   EXPECT_TRUE(absl::IsNotFound(client_->health("no.such.Service").status()));
 }
 
+TEST_F(ClientTest, QuotasAreReadPageByPage) {
+  EXPECT_EQ(client_->get_quotas()->size(), 1u);
+  v1::GetQuotasRequest request;
+  request.set_all(true);
+  const absl::StatusOr<std::vector<v1::IdentityQuotas>> all = client_->get_quotas(request);
+  ASSERT_TRUE(all.ok()) << all.status();
+  ASSERT_EQ(all->size(), 2u);
+  EXPECT_EQ(all->back().identity(), "token:b");
+  EXPECT_FALSE(all->back().quotas(1).has_limit());
+}
+
 TEST_F(ClientTest, AStoppedServerIsUnavailable) {
   server_.stop();
   EXPECT_TRUE(absl::IsUnavailable(client_->get_server().status()));

@@ -1,6 +1,6 @@
-// Fake server of the real protocol inside the test's process, with configurable failures: for tests of the client
-// library and the command line. Handlers run on gRPC's threads; failures are configured before the first call, or
-// through the locked setters.
+// Fake server of the real protocol inside the test's process, with configurable failures. For tests of the client
+// library and the command line. Handlers run on gRPC's threads, so tests configure failures before the first call, or
+// by members that lock a mutex.
 #ifndef LOCUS_TESTS_CLIENT_LIB_FAKE_SERVER_H_
 #define LOCUS_TESTS_CLIENT_LIB_FAKE_SERVER_H_
 
@@ -40,12 +40,14 @@ inline std::string metadata_of(const grpc::ServerContext& context, const std::st
   return found == context.client_metadata().end() ? "" : std::string(found->second.data(), found->second.size());
 }
 
-// Fake UpdateService: applies batches by the protocol's rules for writers, and breaks streams as configured.
+// Fake UpdateService: acknowledges batches by the protocol's rules for writer ids and batch numbers, and breaks streams
+// as configured in `breaks`.
 class FakeUpdates final : public v1::UpdateService::Service {
  public:
-  // Breaks of streams: after how many messages, and whether the message before the break is applied without an ack.
+  // Plan for breaking streams. If `apply_last` is set, the last message before a break is applied, but its ack is not
+  // sent.
   struct Breaks {
-    int after_messages = 0;  // 0 = never
+    int after_messages = 0;  // number of messages after which a stream breaks; 0 = never
     int times = 0;           // total number of streams that break
     bool apply_last = false;
     grpc::Status status{grpc::StatusCode::UNAVAILABLE, "planned"};
@@ -99,21 +101,21 @@ class FakeUpdates final : public v1::UpdateService::Service {
     return applied_;
   }
 
-  // Forgets every writer, like a server that lost its state.
+  // Forgets the batch numbers of every writer, like a server that lost its state.
   void forget_writers() {
     std::lock_guard lock(mutex_);
     next_.clear();
   }
 
   Breaks breaks;
-  std::set<uint64_t> refused_ticks;  // batches of these ticks are refused
+  std::set<uint64_t> refused_ticks;  // ticks whose batches are refused
   int failing_calls = 0;
   int calls = 0;
   int streams = 0;
   int duplicates = 0;
   int gaps = 0;
-  std::vector<std::string> scenes;  // x-scene of each call
-  // Refused items that every ack lists.
+  std::vector<std::string> scenes;  // value of the metadata key x-scene in each call
+  // Errors of refused items that every ack returns.
   std::vector<v1::ItemError> item_errors;
   v1::UpdateBatch last_batch;
 
@@ -159,7 +161,7 @@ class FakeUpdates final : public v1::UpdateService::Service {
   std::vector<uint64_t> applied_;
 };
 
-// Fake QueryService: answers every query by `answer`.
+// Fake QueryService: answers each Query call with the result of `answer`.
 class FakeQueries final : public v1::QueryService::Service {
  public:
   grpc::Status Query(grpc::ServerContext* context, const v1::QueryRequest* request,
@@ -175,8 +177,8 @@ class FakeQueries final : public v1::QueryService::Service {
     return answer(*request, *response->mutable_result());
   }
 
-  // Delays the answers of each pair of messages until both have arrived, then sends them in reverse order. If
-  // `stream_answer` is set, it answers each message at once.
+  // Delays the answers of each pair of messages until both have arrived, then sends them in reverse order. If the
+  // member `stream_answer` is set, answers each message at once with its result instead.
   grpc::Status StreamQueries(
       grpc::ServerContext*,
       grpc::ServerReaderWriter<v1::StreamQueriesResponse, v1::StreamQueriesRequest>* stream) override {
@@ -226,7 +228,7 @@ class FakeQueries final : public v1::QueryService::Service {
     return grpc::Status::OK;
   };
   std::function<v1::QueryResult(const v1::QueryBatch&)> stream_answer;
-  int silent_messages = 0;  // number of stream messages that are never answered
+  int silent_messages = 0;  // number of next messages on streams that are never answered
   int failing_calls = 0;
   grpc::Status failure{grpc::StatusCode::UNAVAILABLE, "planned"};
   int calls = 0;
@@ -237,7 +239,7 @@ class FakeQueries final : public v1::QueryService::Service {
   std::mutex mutex_;
 };
 
-// Fake SceneService: keeps scenes by name and meshes by hash.
+// Fake SceneService: stores scenes by name and meshes by hash.
 class FakeScenes final : public v1::SceneService::Service {
  public:
   grpc::Status CreateScene(grpc::ServerContext*, const v1::CreateSceneRequest* request,
@@ -312,7 +314,7 @@ class FakeScenes final : public v1::SceneService::Service {
     return grpc::Status::OK;
   }
 
-  // Sends the configured messages, independent of earlier uploads.
+  // Sends the messages in `mesh_pieces`, whatever was uploaded before.
   grpc::Status DownloadMesh(grpc::ServerContext*, const v1::DownloadMeshRequest* request,
                             grpc::ServerWriter<v1::DownloadMeshResponse>* writer) override {
     std::lock_guard lock(mutex_);
@@ -346,7 +348,7 @@ class FakeScenes final : public v1::SceneService::Service {
     return grpc::Status::OK;
   }
 
-  // Replaces a scene; may be called while calls arrive.
+  // Replaces the scene of the same name; may be called while the server handles calls.
   void replace(const v1::Scene& scene) {
     std::lock_guard lock(mutex_);
     scenes[scene.name()] = scene;
@@ -365,7 +367,7 @@ class FakeScenes final : public v1::SceneService::Service {
   std::vector<uint32_t> indices;
   size_t largest_message = 0;
   std::vector<v1::DownloadMeshResponse> mesh_pieces;
-  int failing_downloads = 0;  // number of downloads that end after their first message
+  int failing_downloads = 0;  // number of next downloads that fail after their first message
   bool no_mesh = false;
   v1::ChangeInstancesRequest last_change;
   int creates = 0;
@@ -389,10 +391,28 @@ class FakeServerService final : public v1::ServerService::Service {
     return grpc::Status::OK;
   }
 
-  // Sends the configured messages and the configured status.
+  // Returns one entry a page, of those that the request asks for.
+  grpc::Status GetQuotas(grpc::ServerContext*, const v1::GetQuotasRequest* request,
+                         v1::GetQuotasResponse* response) override {
+    const bool second = request->page_token() == "token:a";
+    v1::IdentityQuotas& entry = *response->add_identities();
+    entry.set_identity(!request->identity().empty() ? request->identity() : second ? "token:b" : "token:a");
+    v1::QuotaUse& scenes = *entry.add_quotas();
+    scenes.set_name("scenes");
+    scenes.set_limit(8);
+    scenes.set_used(3);
+    scenes.set_available(5);
+    v1::QuotaUse& objects = *entry.add_quotas();
+    objects.set_name("objects");
+    objects.set_used(1000000);
+    if (request->all() && !second) response->set_next_page_token("token:a");
+    return grpc::Status::OK;
+  }
+
+  // Sends the messages in `backup_pieces`, then the status `backup_end`.
   grpc::Status Backup(grpc::ServerContext*, const v1::BackupRequest*,
                       grpc::ServerWriter<v1::BackupResponse>* writer) override {
-    // Copies the messages: after a client has cancelled, the test configures the next backup while this call still
+    // Copies the messages, because a test that has cancelled a backup configures the next one while this call still
     // runs.
     const std::vector<v1::BackupResponse> pieces = backup_pieces;
     for (const v1::BackupResponse& piece : pieces) {
@@ -401,7 +421,7 @@ class FakeServerService final : public v1::ServerService::Service {
     return backup_end;
   }
 
-  // Configures a backup of files by path, one message per file, as the server sends files below 1 MiB.
+  // Configures a backup of `files` (bytes by path). Each file is one message, as the server sends files below 1 MiB.
   void plan_backup(const std::map<std::string, std::string>& files) {
     backup_pieces.assign(1, {});
     v1::BackupSize& announced = *backup_pieces[0].mutable_announced();
@@ -439,7 +459,7 @@ class FakeServer {
     if (server_) server_->Shutdown(std::chrono::system_clock::now());
     server_.reset();
   }
-  // Restarts on the same port, with the same state.
+  // Restarts the server on the same port, with the same state.
   void restart() { start(address()); }
 
   FakeUpdates updates;

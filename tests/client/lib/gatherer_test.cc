@@ -14,7 +14,7 @@ using Numbers = std::vector<int>;
 
 constexpr absl::Duration kLong = absl::Hours(1);
 
-// Items that were sent, one list per message.
+// Recorder of sent items: one list per message.
 class Sent {
  public:
   auto taker() {

@@ -1,10 +1,9 @@
-#include "client/lib/mesh_download.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <limits>
 
+#include "client/lib/transfers.h"
 #include "tests/client/lib/fake_server.h"
 
 namespace locus::client {
@@ -18,7 +17,7 @@ std::string hash_of(const std::vector<float>& vertices, const std::vector<uint32
   return std::string(hash.begin(), hash.end());
 }
 
-// Fake server with one mesh: two triangles over four vertices, in three messages.
+// Fixture with a fake server that sends one mesh, two triangles with four vertices, in three messages.
 class MeshDownloadTest : public ::testing::Test {
  protected:
   void SetUp() override {

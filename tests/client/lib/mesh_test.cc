@@ -13,7 +13,7 @@ std::string hex(const Sha256& hash) {
   return absl::BytesToHexString(absl::string_view(reinterpret_cast<const char*>(hash.data()), hash.size()));
 }
 
-// Expected values from Python: hashlib.sha256 over struct.pack of the counts and columns.
+// The expected hashes were computed in Python, with hashlib.sha256 over struct.pack of the counts and columns.
 TEST(MeshSha256Test, CoversCountsVerticesAndIndicesInLittleEndianOrder) {
   const std::vector<float> vertices = {0, 0, 0, 1, 0, 0, 0, 1, 0};
   const std::vector<uint32_t> indices = {0, 1, 2};

@@ -17,7 +17,8 @@ using testing::FakeServer;
 
 constexpr absl::Duration kLong = absl::Hours(1);
 
-// Fake server: a ray hits the id equal to its origin's x, and a ball of radius r finds the ids 1 to r.
+// Returns the answer of the fake server: a ray hits the object whose id equals the x of the ray's origin, and a ball of
+// radius r finds the ids 1 to r.
 v1::QueryResult answer_by_values(const v1::QueryBatch& batch) {
   v1::QueryResult result;
   for (const v1::QueryBlock& block : batch.blocks()) {

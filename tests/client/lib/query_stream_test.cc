@@ -21,13 +21,14 @@ class QueryStreamTest : public ::testing::Test {
     open({.reconnect = kPatient});
   }
 
-  // Retries that last longer than a test's server is down.
+  // Retry policy that retries for longer than any test stops its server.
   static constexpr RetryPolicy kPatient = {
       .max_attempts = 1000, .first_backoff = absl::Milliseconds(1), .max_backoff = absl::Milliseconds(20)};
 
   void open(const QueryStreamOptions& options) { stream_ = client_->query_stream("arena", options); }
 
-  // The fake server answers with max_work as the revision, which identifies the batch of an answer.
+  // Sends a batch with `number` as max_work. The fake server returns max_work as the revision of its answer, so the
+  // revision identifies the batch.
   std::future<absl::StatusOr<v1::QueryResult>> ask(uint64_t number) {
     v1::QueryBatch batch;
     batch.set_max_work(number);

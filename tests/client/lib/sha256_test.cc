@@ -9,16 +9,16 @@
 namespace locus::client {
 namespace {
 
-std::string hex(const Sha256& hash) {
+std::string hexadecimal(const Sha256& hash) {
   return absl::BytesToHexString({reinterpret_cast<const char*>(hash.data()), hash.size()});
 }
 
-// Examples of FIPS 180-2.
+// The texts and their hashes are the examples of FIPS 180-2.
 TEST(Sha256HasherTest, HashesOfTheStandardsExamplesAreCorrect) {
   Sha256Hasher hasher;
-  EXPECT_EQ(hex(hasher.finish()), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
+  EXPECT_EQ(hexadecimal(hasher.finish()), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
   hasher.add("abc");
-  EXPECT_EQ(hex(hasher.finish()), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+  EXPECT_EQ(hexadecimal(hasher.finish()), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
 }
 
 TEST(Sha256HasherTest, PartsHashLikeTheWholeAndFinishResetsTheHasher) {
@@ -28,7 +28,7 @@ TEST(Sha256HasherTest, PartsHashLikeTheWholeAndFinishResetsTheHasher) {
   hasher.add("a");
   hasher.add("");
   hasher.add("bc");
-  EXPECT_EQ(hex(hasher.finish()), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+  EXPECT_EQ(hexadecimal(hasher.finish()), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
 }
 
 }  // namespace

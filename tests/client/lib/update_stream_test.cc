@@ -32,7 +32,7 @@ std::vector<uint64_t> one_to(uint64_t last) {
   return ticks;
 }
 
-// Outcomes of batches in the order of their callbacks.
+// Recorder of the ticks and status codes of batches, in the order in which the batches' callbacks were called.
 struct Outcomes {
   std::mutex mutex;
   std::vector<uint64_t> ticks;

@@ -1,4 +1,4 @@
-"""Tests that the mirrored schema gives the same bytes as the real one, for every message and field."""
+"""Tests that the mirrored schema encodes every message and field to the same bytes as the real schema."""
 import array
 import os
 import random
@@ -34,7 +34,7 @@ def scalar(field, random_numbers):
 
 
 def fill(real, mirror, random_numbers, depth=0):
-    """Sets random fields of both messages to equal values; columns are lists in one and bytes in the other."""
+    """Sets random fields of both messages to equal values; columns are lists in `real` and bytes in `mirror`."""
     chosen_of_oneof = {oneof.name: random_numbers.choice(oneof.fields) for oneof in real.DESCRIPTOR.oneofs}
     for field in real.DESCRIPTOR.fields:
         oneof = field.containing_oneof
@@ -71,7 +71,7 @@ class MirrorTest(unittest.TestCase):
             cls.real.update({name: getattr(module, name) for name in module.DESCRIPTOR.message_types_by_name})
 
     def pairs(self):
-        """Yields random messages of every type, in both schemas."""
+        """Yields random messages of every type, each in the real and in the mirrored schema."""
         random_numbers = random.Random(SEED)
         for name, real_class in sorted(self.real.items()):
             for number in range(ROUNDS):

@@ -51,7 +51,7 @@ class Daemon:
 
 
 class DaemonTest(unittest.TestCase):
-    """Base class whose tests share a locusd and a client; each test gets a scene named after it."""
+    """Base class whose tests share a locusd and a client; each test has a scene that is named after it."""
 
     @classmethod
     def setUpClass(cls):

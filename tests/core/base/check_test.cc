@@ -29,14 +29,14 @@ TEST(CheckTest, PassedChecksEvaluateOperandsOnceAndPrintNothing) {
   EXPECT_EQ(calls, 3);
 }
 
-// NaN compares false with every value, so each ordered check of a NaN fails.
+// Every ordered comparison with NaN is false, so each ordered check of a NaN fails.
 TEST(CheckDeathTest, NanFailsEveryOrderedComparison) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_DEATH(LOCUS_CHECK_LE(nan, 1.0), "nan and 1");
   EXPECT_DEATH(LOCUS_CHECK_LE(1.0, nan), "1 and nan");
 }
 
-// Release builds compile the operands but do not evaluate them.
+// Release builds compile the operands of a LOCUS_DCHECK but do not evaluate them.
 TEST(CheckDeathTest, DebugChecksAbortIfEnabledAndEvaluateNothingOtherwise) {
   int calls = 0;
   const auto next = [&calls] { return ++calls; };
@@ -48,9 +48,12 @@ TEST(CheckDeathTest, DebugChecksAbortIfEnabledAndEvaluateNothingOtherwise) {
     EXPECT_DEATH(LOCUS_DCHECK_LE(next(), 0), "next\\(\\) <= 0 with 1 and 0");
     EXPECT_DEATH(LOCUS_DCHECK_LT(next(), 1), "next\\(\\) < 1 with 1 and 1");
     EXPECT_DEATH(LOCUS_DCHECK(next() == 2), "check failed: next\\(\\) == 2");
+    LOCUS_DCHECK_CALL(next());
+    EXPECT_EQ(calls, 1);
   } else {
     LOCUS_DCHECK_EQ(next(), 2);
     LOCUS_DCHECK(next() == 2);
+    LOCUS_DCHECK_CALL(next());
     EXPECT_EQ(calls, 0);
   }
 }

@@ -19,7 +19,7 @@ struct FewHashes {
 struct LastHash {
   uint64_t operator()(Id) const { return ~uint64_t{0}; }
 };
-// Hash by the low bits of an id, which choose one of the 64 buckets of a table of one leaf.
+// Hash by the low six bits of an id: in a table of one leaf they select one of its 64 buckets.
 struct LowBits {
   uint64_t operator()(Id id) const { return id << 58; }
 };
@@ -39,8 +39,8 @@ void expect_equal(const Table& table, const Model& model, Id ids) {
   }
 }
 
-// Writes at random to a table and its model; every snapshot taken on the way must stay unchanged. Mostly inserts in the
-// first half, mostly erases in the second.
+// Applies random writes to a table and to its model, a std::map; expects that snapshots made in between do not change.
+// In the first half of the steps most writes are inserts, in the second half most are erases.
 template <class Hash>
 void check_against_model(Id ids, uint32_t steps, uint64_t seed) {
   SCOPED_TRACE(testing::Message() << "seed " << seed);
@@ -90,7 +90,7 @@ TEST(PersistentIdTableTest, TheNullIdIsNeverFoundNorErased) {
 TEST(PersistentIdTableTest, ASearchEndsAlthoughEveryBucketHasOverflowed) {
   PersistentIdTable<LowBits> table;
   Model model;
-  // Insert six ids per bucket, of which one overflows; then erase the other five.
+  // Inserts six ids per bucket: five fit, and the last overflows to a later bucket. Then erases the five.
   for (Id bucket = 0; bucket < 64; ++bucket) {
     for (Id i = 1; i <= 6; ++i) table.set(i << 6 | bucket, 7);
     for (Id i = 1; i <= 5; ++i) ASSERT_TRUE(table.erase(i << 6 | bucket));

@@ -1,5 +1,5 @@
-// Readers of snapshots concurrent with the writer of a table: checks their values, and data races under
-// ThreadSanitizer.
+// Readers of snapshots run beside the writer of a table. The test checks the values that they read; ThreadSanitizer
+// detects data races.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -14,12 +14,12 @@ namespace {
 constexpr Id kIds = 2'000;
 constexpr int kReads = 50;
 
-// Latest published snapshot.
+// Holder of the latest published snapshot, which threads exchange under a mutex.
 class Published {
  public:
   void put(PersistentIdTable<> table) {
     const std::lock_guard lock(mutex_);
-    std::swap(table_, table);  // frees the previous snapshot here or in a reader
+    std::swap(table_, table);  // the last owner of the previous snapshot, this thread or a reader, frees it
   }
   PersistentIdTable<> get() const {
     const std::lock_guard lock(mutex_);
@@ -31,8 +31,8 @@ class Published {
   PersistentIdTable<> table_;
 };
 
-// The writer replaces all values of a generation by the next, some after erasing their ids. No snapshot may contain two
-// generations.
+// The value of every id is the number of a generation. In each generation the writer replaces all values, some after
+// erasing their ids, and publishes a snapshot. No snapshot may contain two generations.
 TEST(PersistentIdTableTest, ReadersOfSnapshotsNeverSeeConcurrentWrites) {
   Published published;
   std::atomic<int> reads{0};

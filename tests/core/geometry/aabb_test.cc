@@ -59,7 +59,7 @@ TEST(AabbTest, SquaredDistanceIsZeroInsideAndExactOutside) {
   EXPECT_EQ(squared_distance(Vec3d{-3, 0.5, -4}, kUnit), 25);
 }
 
-// This property makes culling by any superset safe.
+// A superset of a box is never farther from a point and never smaller, so culling by any superset loses no result.
 TEST(AabbTest, ASupersetIsNeverFartherNorSmaller) {
   constexpr uint64_t kSeed = 71;
   test::Random random(kSeed);
@@ -80,7 +80,7 @@ TEST(BallTest, ABoxThatTheBallReachesOverlapsItsBounds) {
   int reached = 0;
   for (int i = 0; i < 100000; ++i) {
     const Ballf ball{random.float_vector(random.magnitude(-10, 20)), static_cast<float>(random.magnitude(-10, 10))};
-    // A box whose nearest point is on the surface up to float rounding.
+    // The box is a single point on the surface of the ball, up to float rounding.
     Vec3d toward = random.unit_vector();
     if (random.chance(0.5)) toward = {random.chance(0.5) ? 1.0 : -1.0, 0, 0};
     const Vec3f point = to_float(to_double(ball.center) + toward * double{ball.radius});

@@ -44,14 +44,16 @@ TEST(DoubleDoubleTest, SumsOfProductsHaveARelativeErrorBelowTwoToTheMinus100) {
     const DoubleDouble result = (DoubleDouble(a) * b + c) * (DoubleDouble(d) - e);
     const Quad exact = (Quad{a} * b + c) * (Quad{d} - e);
     const Quad found = Quad{result.rounded()} + (result - result.rounded()).rounded();
-    // The bound is relative to the operands: if the first factor almost cancels, its result has fewer bits.
+    // The error bound is relative to the size of the operands, since the sum a * b + c has fewer exact bits if its
+    // terms almost cancel.
     const Quad size = (std::abs(a * b) + std::abs(c)) * (std::abs(d) + std::abs(e));
     ASSERT_LE(std::abs(static_cast<double>(found - exact)), 0x1p-100 * static_cast<double>(size))
         << "seed " << kSeed + 2 << " case " << i;
   }
 }
 
-// Watertightness depends on this: both triangles at an edge get the same edge function except for its sign.
+// Watertightness depends on the exact change of sign: the two triangles at an edge compute the same edge function with
+// opposite signs.
 TEST(DoubleDoubleTest, SwappingTheProductsOfADifferenceOnlyFlipsItsSign) {
   Random random(kSeed + 3);
   for (int i = 0; i < 100000; ++i) {

@@ -16,7 +16,7 @@ using test::Vec3q;
 
 TEST(EdgeOnTriangleTest, CasesFoundByTheProofAgreeWithTheReference) { EXPECT_EQ(test::edge_on_difference(), ""); }
 
-// Triangle, its transform and a ray almost within its plane, with a sine of the angle down to 2^-60.
+// Triangle, its transform, and a ray almost within the triangle's plane: the sine of their angle is as low as 2^-60.
 struct Grazing {
   Triangle triangle;
   Transform transform;
@@ -38,7 +38,8 @@ Grazing any_grazing(Random& random) {
   const double size = random.magnitude(-8, 8);
   Grazing grazing{any_triangle(size, random), {}, {}, {}};
   Triangle& triangle = grazing.triangle;
-  // In a plane perpendicular to an axis of an instance that is not rotated, floats can be arbitrarily close to edge-on.
+  // If the triangle is perpendicular to an axis and the instance is not rotated, a ray can be arbitrarily close to
+  // edge-on.
   const bool across = random.chance(0.5);
   const auto axis = static_cast<int>(random.below(3));
   if (across) triangle.b[axis] = triangle.c[axis] = triangle.a[axis];
@@ -58,7 +59,8 @@ Grazing any_grazing(Random& random) {
   return grazing;
 }
 
-// Tests the definition of a miss for one triangle, and that no hit is farther from its triangle than that tolerance.
+// With the tolerance e of the definition of a miss (tests/support/proof/ray_judge.h): no triangle is missed, and no hit
+// is farther than e / 2 from its triangle.
 TEST(EdgeOnTriangleTest, HitsAreWithinTheToleranceAtEveryAngle) {
   constexpr uint64_t kSeed = 92;
   Random random(kSeed);
@@ -92,7 +94,8 @@ TEST(EdgeOnTriangleTest, HitsAreWithinTheToleranceAtEveryAngle) {
   EXPECT_GT(flat, static_cast<int>(test::scaled_count(40'000) / 400));
 }
 
-// Wall almost perpendicular to x whose border is 2^-60 beside the ray along z, a distance that double cannot resolve.
+// Fixture with a triangle almost perpendicular to x and a ray along z. The triangle's border is 2^-60 beside the ray, a
+// distance that the test in double cannot resolve.
 class BesideTheBorderTest : public ::testing::Test {
  protected:
   std::optional<EdgeOnHit> hit(bool hit_in_double, Cull cull = Cull::kNone, double depth = 0) const {

@@ -45,7 +45,7 @@ TEST(PointTriangleTest, DistanceToHairlinesAgreesWithTheSearch) {
   }
 }
 
-// Integer points: every squared distance is a fraction of integers.
+// Point with integer coordinates, so that every squared distance is a fraction of integers.
 using Whole = Vec3<int64_t>;
 
 struct Fraction {
@@ -78,7 +78,8 @@ Whole lattice_point(int index, int side, int64_t from) {
 Vec3d to_vec(Whole v) { return {double(v.x), double(v.y), double(v.z)}; }
 Vec3f to_vec3f(Whole v) { return to_float(to_vec(v)); }
 
-// Tests every triangle of a lattice, most of them oblique and many without area, with every point in and around it.
+// Tests every triangle with vertices on a lattice of 3x3x3 points, most of them oblique and many without area, with
+// every point of a lattice of 5x5x5 around it.
 TEST(PointTriangleTest, DistancesOnALatticeAreTheNearestFloats) {
   for (int corners = 0; corners < 27 * 27 * 27; ++corners) {
     const Whole a = lattice_point(corners % 27, 3, 0), b = lattice_point(corners / 27 % 27, 3, 0),

@@ -1,4 +1,5 @@
-// PrimitiveTraits supports types that are independent of it; a missing member is a single error that names the member.
+// PrimitiveTraits supports types of other libraries, and the compiler reports a missing member of a trait by one error
+// that names the member.
 #include "core/geometry/primitive_traits.h"
 
 #include <unistd.h>
@@ -23,7 +24,7 @@ struct Crate {
 
 namespace locus {
 
-// A ball written as centre and radius in a standard container.
+// A ball as a standard container of four numbers: x, y, z of the centre, then the radius.
 using ArrayBall = std::array<double, 4>;
 
 template <>
@@ -36,7 +37,7 @@ struct PrimitiveTraits<ArrayBall> {
   static Shape shape(const ArrayBall& b) {
     return {ShapeKind::kBall, {b[0], b[1], b[2]}, {}, {}, static_cast<float>(b[3])};
   }
-  static uint64_t id(const ArrayBall& b) { return static_cast<uint64_t>(b[3]); }  // identified by radius
+  static uint64_t id(const ArrayBall& b) { return static_cast<uint64_t>(b[3]); }  // the radius is the id
   static Aabbd bounds(const ArrayBall& b) { return bounds_of(shape(b)); }
   static Vec3d position(const ArrayBall& b) { return {b[0], b[1], b[2]}; }
   static std::optional<double> ray(const ArrayBall& b, const ObjectRay& ray) {
@@ -104,9 +105,10 @@ TEST(PrimitiveTraitsTest, AStructOfAnotherNamespaceCanBeStoredAndQueried) {
   EXPECT_EQ(result[0].serial, 7u);
 }
 
-// Figure 37.15 of the source: of two overlapping primitives the one tested first need not be the one hit first.
+// Figure 37.15 of Hughes et al., the source of primitive_traits.h: if two primitives overlap, the ray may hit the one
+// that is tested second before the one that is tested first.
 TEST(PrimitiveTraitsTest, TheNearerOfTwoOverlappingPrimitivesWinsInEitherOrder) {
-  const game::Crate large{1, 10, 0, 0, 8}, small{2, 6, 0, 0, 2};  // entered at 6 and at 5
+  const game::Crate large{1, 10, 0, 0, 8}, small{2, 6, 0, 0, 2};  // the ray enters `large` at 6 and `small` at 5
   for (const bool large_first : {true, false}) {
     ListIndex<game::Crate> index;
     index.insert(large_first ? large : small);

@@ -1,4 +1,5 @@
-// Slab test: it is monotone in the box, and its interval contains every point of the ray in the box.
+// Tests of the slab test: a superset of a box has at least the box's interval, and the interval contains the t of every
+// point of the ray in the box.
 #include "core/geometry/ray.h"
 
 #include "gtest/gtest.h"
@@ -15,7 +16,7 @@ Vec3<S> cast(Vec3d v) {
   return {static_cast<S>(v.x), static_cast<S>(v.y), static_cast<S>(v.z)};
 }
 
-// Random ray and box, often degenerate: flat boxes, directions along axes, origins on the planes of the box.
+// Random ray and box. Many are degenerate: flat boxes, directions along axes, origins on the planes of the box.
 template <class S>
 struct SlabCase {
   Ray<S> ray;
@@ -78,7 +79,8 @@ TYPED_TEST(SlabRayTest, PointsOfTheRayInTheBoxLieInTheInterval) {
   Random random(kSeed);
   for (int i = 0; i < 200000; ++i) {
     SlabCase<S> c(random);
-    // The box gets a corner on the ray up to the rounding of S; the pad must cover the rounding.
+    // Makes a box that contains a point of the ray after the point is rounded to S; the pad must cover the error of
+    // this rounding.
     const auto t =
         static_cast<test::Real>(random.between(0, 1)) * (magnitude(c.box) + max_component(abs(c.ray.origin)));
     const test::Vec3r point = test::to_real(c.ray.origin) + test::to_real(c.ray.direction) * t;

@@ -16,7 +16,8 @@ using test::Vec3r;
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-// Intersection of the ray with the triangle's plane, and its distance to the nearest edge, negative outside.
+// Intersection of a ray with a triangle's plane, computed in long double. `inset` is the distance of the intersection
+// to the nearest edge, negative outside the triangle.
 struct Reference {
   bool edge_on;
   Real t;
@@ -43,7 +44,8 @@ Vec3d point_of(const Triangle& t, double u, double v) {
   return to_double(t.a) + (to_double(t.b) - to_double(t.a)) * u + (to_double(t.c) - to_double(t.a)) * v;
 }
 
-// Edge functions have rounding errors, so the computed depth of a plane that contains the origin may be negative.
+// Edge functions have rounding errors, so the computed t of a plane that contains the origin may be slightly negative;
+// it must still be a hit.
 TEST(RayTriangleTest, ARayThatStartsOnAWallHitsItAtZeroInAnyDirection) {
   constexpr uint64_t kSeed = 57;
   Random random(kSeed);
@@ -72,7 +74,8 @@ TEST(RayTriangleTest, ARayThatStartsVisiblyBehindATriangleMissesIt) {
   }
 }
 
-// No miss, for one triangle: a triangle that is hit even if shrunk by e is hit, at most e too late.
+// Let e be 2^-20 (|origin| + extent of the triangle). If a ray hits a triangle at least e inside its edges, hit()
+// reports a hit, and its distance is wrong by at most e / 4.
 TEST(RayTriangleTest, NoMissAndNoLateHitAtAnyAngleAndDistance) {
   constexpr uint64_t kSeed = 51;
   Random random(kSeed);
@@ -123,7 +126,7 @@ TEST(RayTriangleTest, WeightsReproduceThePoint) {
   }
 }
 
-// Verdict by signed volumes in integer arithmetic, without rounding.
+// Result of exact_verdict(), which computes signed volumes in integer arithmetic, without rounding.
 enum class Exact { kMiss, kHit };
 
 int64_t volume(const int64_t (&p)[3], const int64_t (&q)[3], const int64_t (&d)[3]) {
@@ -138,7 +141,8 @@ Exact exact_verdict(const int64_t (&o)[3], const int64_t (&d)[3], const int64_t 
   const bool all_up = ab >= 0 && bc >= 0 && ca >= 0, all_down = ab <= 0 && bc <= 0 && ca <= 0;
   const int64_t sum = ab + bc + ca;
   if (!(all_up || all_down) || sum == 0) return Exact::kMiss;
-  const int64_t height = volume(p[0], p[1], p[2]);  // height of the origin over the triangle, times the sign of `sum`
+  // Proportional to the height of the origin over the triangle, times the sign of `sum`.
+  const int64_t height = volume(p[0], p[1], p[2]);
   return (sum > 0 ? height : -height) >= 0 ? Exact::kHit : Exact::kMiss;
 }
 
@@ -176,13 +180,13 @@ TEST(RayTriangleTest, EdgeOnAndZeroAreaTrianglesAreNeverHit) {
   constexpr uint64_t kSeed = 54;
   Random random(kSeed);
   for (int i = 0; i < 20000; ++i) {
-    // Exactly collinear vertices, without rounding: a, b and 2 b - a on a grid.
+    // Makes a triangle whose vertices a, b and 2 b - a are whole numbers and exactly collinear.
     const Vec3d a = random.whole_vector(1000), b = random.whole_vector(1000);
     const Triangle needle{to_float(a), to_float(b), to_float(b * 2.0 - a), 0};
     const Vec3d origin = random.vector(3000);
     const Vec3d target = a + (b - a) * random.between(0, 2);
     ASSERT_FALSE(TriangleRay(origin, target - origin).hit(needle).has_value()) << "seed " << kSeed << " case " << i;
-    // A wall perpendicular to an axis and a ray within its plane.
+    // Makes a wall perpendicular to an axis, and a ray within its plane.
     Vec3d from = random.vector(10), to = random.vector(1) - from;
     Triangle wall{random.float_vector(1), random.float_vector(1), random.float_vector(1), 0};
     const int axis = static_cast<int>(random.below(3));
@@ -237,7 +241,7 @@ TEST(RayTriangleTest, TheHitDoesNotDependOnTheLengthOfTheDirection) {
     const Triangle triangle{random.float_vector(1), random.float_vector(1), random.float_vector(1), 0};
     const Vec3d origin = random.vector(2);
     const Vec3d direction = point_of(triangle, random.between(-0.2, 0.8), random.between(-0.2, 0.8)) - origin;
-    const int exponent = random.whole(-100, 100);  // 1e-30 to 1e30
+    const int exponent = random.whole(-100, 100);  // factor of the direction, from about 1e-30 to 1e30
     const Vec3d longer = direction * std::ldexp(1.0, exponent);
     const TriangleRay one(origin, direction), other(origin, longer);
     const auto a = one.hit(triangle), b = other.hit(triangle);

@@ -1,4 +1,5 @@
-// Rays and shapes: compares verdict, distance and normal with a reference that finds the chord by search.
+// Tests of rays and shapes: compares hit or miss, distance and normal with a reference that finds the chord (the ray's
+// interval in the solid) by numerical search.
 #include <array>
 #include <iomanip>
 #include <sstream>
@@ -22,14 +23,15 @@ using test::Vec3r;
 constexpr std::array<ShapeKind, 3> kSolids = {ShapeKind::kBall, ShapeKind::kBox, ShapeKind::kCapsule};
 constexpr std::array<Inside, 3> kModes = {Inside::kSolid, Inside::kHollow, Inside::kSkip};
 
-// Ray, shape and the reference values of their verdict. Distances are in world units, not in units of the direction.
+// Ray and shape, with the values from which the reference computes the expected hit. Distances are in world units, not
+// in multiples of the direction's length.
 struct RayCase {
   Shape shape;
   Rayd ray;
   Real tolerance;
   Vec3r offset, unit;
   Real speed, max_distance;
-  Real inside_gauge;  // signed distance of the origin, negative inside
+  Real inside_gauge;  // signed distance of the ray's origin to the solid, negative inside
 
   RayCase(const Shape& s, const Rayd& r) : shape(s), ray(r) {
     offset = to_real(r.origin) - to_real(s.position);
@@ -45,8 +47,8 @@ struct RayCase {
   }
 };
 
-// Expects that the chord of the solid grown by the tolerance contains the hit, and that the chord of the shrunk solid
-// does not begin (for exits: end) before the hit.
+// Expects that the hit is not before the chord of the solid grown by the tolerance, and not after the beginning of the
+// chord of the solid shrunk by the tolerance.
 void expect_entry(const RayCase& c, const std::optional<ShapeHit>& hit) {
   const std::optional<RealInterval> outer = c.chord(c.tolerance), inner = c.chord(-c.tolerance);
   if (!outer || outer->far < 0) {
@@ -140,7 +142,8 @@ TEST_P(ShapeRayTest, RandomRaysAgreeWithTheReference) {
   EXPECT_GT(inside, 500);
 }
 
-// A distance within 1e-9 of touching is exactly touching on the lattice, so the grown reference is exact.
+// Compares verdicts with a reference for the shape grown by 1e-9. This reference is exact for shapes and rays with
+// whole coordinates: such a ray that comes within 1e-9 of the shape touches it.
 TEST_P(ShapeRayTest, LatticeVerdictsAreExact) {
   constexpr uint64_t kSeed = 202;
   constexpr Real kGrown = 1e-9L;

@@ -1,7 +1,5 @@
-// Bounds and overlaps of shapes, compared with references by search and by clipping.
+// Bounds and overlaps of shapes, compared with references by numerical search and by polygon clipping.
 #include "core/geometry/shape.h"
-
-#include <array>
 
 #include "gtest/gtest.h"
 #include "tests/support/box_clip.h"
@@ -17,8 +15,6 @@ using test::SolidReference;
 using test::to_real;
 using test::Vec3r;
 
-constexpr std::array<ShapeKind, 4> kKinds = {ShapeKind::kPoint, ShapeKind::kBall, ShapeKind::kBox, ShapeKind::kCapsule};
-
 struct QueryBox {
   Obbd box;
   Quaternion rotation;
@@ -28,13 +24,13 @@ QueryBox query_box(Vec3d center, Vec3d half, const Quaternion& rotation) {
   return {{center, half, rotation_of(rotation)}, rotation};
 }
 
-// Returns the rounding tolerance of a verdict on two solids of `size`, one at `position`, the other at `offset` from
-// it.
+// Returns the rounding tolerance of an overlap test of two solids of `size`: one at `position`, the other at `position`
+// + `offset`.
 Real allowance(Vec3d position, Vec3r offset, double size) {
   return 1e-12L * (test::length(offset) + size) + 1e-15L * test::length(to_real(position));
 }
 
-// Returns whether the solid of `shape` and the box, grown by `grown`, share a point.
+// Returns whether the solid of `shape` and the query's box share a point after one of them is grown by `grown`.
 bool reference_overlap(const QueryBox& query, const Shape& shape, Real grown) {
   const Vec3r offset = to_real(shape.position) - to_real(query.box.center);
   const test::RealBox box = test::real_box({}, query.rotation, to_real(query.box.half));
@@ -138,7 +134,7 @@ TEST_P(ShapeOverlapTest, BoundsContainTheSolid) {
     const Shape shape = test::random_shape(random, GetParam(), random.magnitude(0, 30));
     const Aabbd bounds = bounds_of(shape);
     const SolidReference solid(shape);
-    // The farthest point of the solid in a random direction or along an axis.
+    // Computes the farthest point of the solid in a random direction or along an axis.
     Vec3r unit = to_real(random.unit_vector());
     if (random.chance(0.5)) {
       unit = {};
@@ -151,7 +147,8 @@ TEST_P(ShapeOverlapTest, BoundsContainTheSolid) {
     if (shape.kind == ShapeKind::kCapsule)
       far = to_real(shape.size) * std::copysign(1.0L, dot(local, to_real(shape.size)));
     const Vec3r point = to_real(shape.position) + test::turned(shape.rotation, far) + unit * solid.core_radius();
-    // The sums of an axis-aligned box are exact except for one rounding.
+    // If the shape is not rotated, its bounds are sums that are exact except for one rounding, which the comparison
+    // must tolerate.
     const Real magnitude = test::length(to_real(shape.position)) + test::largest_size(shape);
     const Real epsilon = shape.rotation.is_identity() ? 0x1p-52L * magnitude : 0;
     for (int axis = 0; axis < 3; ++axis) {
@@ -161,9 +158,10 @@ TEST_P(ShapeOverlapTest, BoundsContainTheSolid) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(EveryKind, ShapeOverlapTest, testing::ValuesIn(kKinds));
+INSTANTIATE_TEST_SUITE_P(EveryKind, ShapeOverlapTest, testing::ValuesIn(test::kShapeKinds));
 
-// The fast path decides most balls by the distance alone; these cases are where distance and bounds could disagree.
+// The full test requires that the ball reaches the shape's bounds and that the distance is small enough; the fast path
+// tests most balls by the distance alone. The cases are so close to touching that the two conditions could differ.
 TEST(ShapeTest, TheFastPathOfBallsAndPointsEqualsTheFullTest) {
   Random random(11);
   int met = 0;
@@ -188,7 +186,7 @@ TEST(ShapeTest, TheFastPathOfBallsAndPointsEqualsTheFullTest) {
 
 TEST(ShapeTest, A345TriangleTouchesAndTheNextSmallerRadiusDoesNot) {
   const Shape box{ShapeKind::kBox, {0, 0, 0}, {}, {1, 1, 1}, 0};
-  const Vec3d beside_edge = {4, 5, 0};  // the edge x = 1, y = 1 is 3 and 4 away
+  const Vec3d beside_edge = {4, 5, 0};  // the box's edge at x = 1, y = 1 is 3 away along x and 4 along y
   EXPECT_TRUE(ball_overlaps({beside_edge, 5}, box));
   EXPECT_FALSE(ball_overlaps({beside_edge, std::nextafter(5.0, 0.0)}, box));
   const Shape ball{ShapeKind::kBall, {4, 5, 1}, {}, {}, 5};

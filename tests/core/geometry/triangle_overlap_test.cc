@@ -14,7 +14,8 @@ using test::reference_distance;
 using test::size_of;
 using test::to_real;
 
-// Returns the verdict by polygon clipping in long double, with the box grown by `grown`, or shrunk if it is negative.
+// Returns whether the triangle overlaps the box after the box is grown by `grown` (shrunk if it is negative), by
+// polygon clipping in long double.
 bool reference_overlap(const Obbf& box, const Quaternion& rotation, const Triangle& t, Real grown) {
   const test::RealBox real = test::real_box(to_real(box.center), rotation, to_real(box.half));
   return test::clipped_polygon_remains({real.local(to_real(t.a)), real.local(to_real(t.b)), real.local(to_real(t.c))},
@@ -114,7 +115,8 @@ TEST(TriangleOverlapTest, TrianglesWithoutAreaCountAsSegmentsAndPoints) {
   EXPECT_TRUE(ball_overlaps({{1, 1, -1}, 2}, point));
 }
 
-// Region tests by dot products lose needles by cancellation; distances to the three edges do not.
+// A needle is a triangle whose height is tiny. Tests of the triangle's interior by dot products can miss it by
+// cancellation; the distances to its three edges do not.
 TEST(TriangleOverlapTest, NeedlesAreNotDropped) {
   const Triangle needle{{1000, 0, 0}, {1100, 0, 0}, {1050, 1e-5f, 0}, 0};
   EXPECT_TRUE(ball_overlaps({{1025, 0, 0.5f}, 0.5f}, needle));

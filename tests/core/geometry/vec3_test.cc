@@ -7,7 +7,8 @@
 namespace locus {
 namespace {
 
-// GCC 12.2 drops the rounding if its SLP vectoriser, which the build disables, packs two conversions.
+// Rounds two numbers to float and back. GCC 12.2 would drop the rounding if its SLP vectoriser, which the build
+// disables, packed the two conversions.
 [[gnu::noinline]] void round_through_float(const double* __restrict in, double* __restrict out) {
   for (int i = 0; i < 2; ++i) out[i] = static_cast<double>(static_cast<float>(in[i]));
 }

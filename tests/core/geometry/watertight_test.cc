@@ -1,4 +1,5 @@
-// Rays from inside a closed mesh always hit: aimed at every vertex and edge of a dented icosphere of 20,480 triangles.
+// Rays from inside a closed mesh always hit the mesh. They are aimed at every vertex and edge of a dented icosphere of
+// 20,480 triangles.
 #include <map>
 #include <utility>
 #include <vector>
@@ -52,7 +53,7 @@ Sphere subdivided(const Sphere& coarse) {
   return fine;
 }
 
-// Closed float mesh that knows the triangles around each vertex.
+// Closed mesh with float vertices, and lists of the triangles around each vertex.
 class DentedSphere {
  public:
   DentedSphere(double size, Vec3d offset, uint64_t seed) {
@@ -75,7 +76,8 @@ class DentedSphere {
   const std::vector<Vec3f>& vertices() const { return vertices_; }
   const std::vector<Edge>& edges() const { return edges_; }
 
-  // Returns whether the ray hits any triangle; tests those around both ends of `edge` first.
+  // Returns whether the ray hits any triangle; tests the triangles around both ends of `edge` first, since the ray is
+  // aimed at `edge`.
   bool is_hit(const TriangleRay& ray, const Edge& edge) const {
     for (const uint32_t end : {edge.first, edge.second})
       for (const uint32_t number : around_[end])
@@ -142,7 +144,8 @@ TEST(WatertightTest, InstancesFarFromTheOriginDoNotLeak) {
   }
 }
 
-// The vertices collapse to the few floats available at this position; the mesh stays closed.
+// The sphere is so far from the origin that vertices are rounded to coarsely spaced floats, some of them to the same
+// point; the mesh stays closed.
 TEST(WatertightTest, MeshesDegradedByFloatSpacingDoNotLeak) {
   constexpr uint64_t kSeed = 64;
   const Vec3d center = {1e6, 1e6, -1e6};

@@ -28,7 +28,7 @@ Object ball_at(Id id, double x, float radius = 1) {
 
 ObjectRay along_x() { return ObjectRay(Rayd{{0, 0, 0}, {1, 0, 0}}); }
 
-// Fixture that runs each test for every structure.
+// Fixture that runs each test for every index structure.
 template <class Index>
 class IndexQueriesTest : public ::testing::Test {
  protected:
@@ -139,7 +139,8 @@ TYPED_TEST(IndexQueriesTest, AllRaysAreStrictAtTheDistance) {
 
 TYPED_TEST(IndexQueriesTest, ResultsAreAppendedAndNeverOverwritten) {
   const auto index = this->make({ball_at(1, 10), ball_at(2, 20)});
-  // Farther than every hit of this ray, so that a sort of the whole vector would move it.
+  // The given vector contains a hit that is farther than every hit of the ray, so that a sort of the whole vector would
+  // move it.
   std::vector<RayHit<Object>> hits = {{1e9, ball_at(77, 0)}};
   all_rays(index, along_x(), kInfinity, 1, hits);
   EXPECT_THAT(ids_of(hits), ElementsAre(77, 1));
@@ -168,7 +169,7 @@ TYPED_TEST(IndexQueriesTest, TouchingCountsAsOverlap) {
 }
 
 TYPED_TEST(IndexQueriesTest, ConservativeQueriesDecideByBounds) {
-  // All three queries meet the ball's bounds at a corner, outside the ball.
+  // The queries (a ball, a box and a ray) overlap the stored ball's bounds at a corner, but not the stored ball.
   const auto index = this->make({ball_at(1, 0, 10)});
   const Balld ball{{10, 10, 10}, 1};
   const Obbd box{{10, 10, 10}, {1, 1, 1}, {}};
@@ -199,8 +200,8 @@ TYPED_TEST(IndexQueriesTest, WorkIsAddedToTheCallersCounter) {
   EXPECT_EQ(work.tests, 104u);
 }
 
-// The expression first_ray(statics) || first_ray(dynamics) stops at the static hit, although the nearer hit may be
-// dynamic.
+// The expression first_ray(statics) || first_ray(dynamics) does not search `dynamics` after a hit in `statics`,
+// although `dynamics` may have a nearer hit.
 TYPED_TEST(IndexQueriesTest, TheNearerHitOfASecondIndexIsNotSkippedAfterAHitInTheFirst) {
   const auto statics = this->make({ball_at(1, 50)});
   const auto dynamics = this->make({ball_at(2, 10)});

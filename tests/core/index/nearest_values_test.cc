@@ -24,7 +24,7 @@ Object ball_at(Id id, double x, float radius = 1) {
   return object;
 }
 
-// Fixture that runs each test for every structure.
+// Fixture that runs each test for every index structure.
 template <class Index>
 class NearestValuesTest : public ::testing::Test {
  protected:

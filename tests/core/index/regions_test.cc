@@ -18,7 +18,7 @@ Aabb<S> random_box(Random& random, double size) {
   return {rounded<S>(low), rounded<S>(low + random.positive_vector(random.magnitude(-8, 0) * size))};
 }
 
-// Returns a box that contains `box`, often with only one float of difference.
+// Returns a box that contains `box`; many of its coordinates differ by only one representable number.
 template <class S>
 Aabb<S> superset(const Aabb<S>& box, Random& random) {
   constexpr S kInfinity = std::numeric_limits<S>::infinity();
@@ -34,8 +34,8 @@ Aabb<S> superset(const Aabb<S>& box, Random& random) {
 template <class S>
 class RegionsTest : public ::testing::Test {
  protected:
-  // Checks with random boxes that a box that overlaps the region overlaps its bounds, and that every superset of it
-  // overlaps the region. Returns the number of boxes that overlap.
+  // Checks with random boxes: each box that overlaps the region overlaps region.bounds(), and each superset of such a
+  // box overlaps the region. Returns the number of boxes that overlap the region.
   template <class Region>
   static int expect_monotone_and_bounded(const Region& region, Random& random, double size) {
     int reached = 0;
@@ -94,7 +94,8 @@ TYPED_TEST(RegionsTest, ABoxWhoseSquaredGapUnderflowsOverlapsTheBoundsToo) {
 }
 
 TEST(RegionsTest, BoundsOfAFloatBoxRoundOutward) {
-  // In float, 16777216 + 1 rounds back to 16777216, which would lose the touch at 16777217.
+  // In float, 16777216 + 1 rounds back to 16777216, so a bound that is not rounded outward would not contain the box's
+  // end at 16777217.
   const BoxRegion<float> region(Obbf{{16777216, 0, 0}, {1, 1, 1}, {}});
   EXPECT_GE(region.bounds().max.x, 16777217.0);
   EXPECT_TRUE(region.overlaps({{16777216, 0, 0}, {16777218, 1, 1}}));

@@ -122,7 +122,7 @@ TEST(TriangleMeshTest, TooManyPartsAreRefusedWithTheLimit) {
 }
 
 TEST(TriangleMeshTest, ZeroAreaTrianglesAreCountedAndKeepTheirNumbers) {
-  // A repeated corner and three corners in a line, before one that has area.
+  // Three triangles: one with a repeated corner, one with its corners in a line, and one with area.
   const std::vector<float> vertices = {0, 0, 0, 1, 2, 3, 2, 4, 6, 0, 1, 0};
   const auto mesh = TriangleMesh::create(vertices, {0, 0, 1, 0, 1, 2, 0, 1, 3}, {});
   ASSERT_TRUE(mesh.ok());

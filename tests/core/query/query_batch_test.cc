@@ -15,7 +15,7 @@ namespace {
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInf = std::numeric_limits<float>::infinity();
 
-// Three valid blocks; tests make the last one, of 20 queries, invalid.
+// Returns two valid blocks, followed by `last`, the block that is tested.
 std::vector<OwnedBlock> three_blocks(OwnedBlock last) {
   return {rays_along_x(RayMode::kFirst), one_ball({0, 0, 0}, 1), std::move(last)};
 }
@@ -60,7 +60,8 @@ Refusal refusal_for(const std::vector<OwnedBlock>& blocks) {
   return refusal_of(status).value_or(Refusal{});
 }
 
-// Expects the error to name `field` of block 2 and `index`; -1 means no index.
+// Expects that check_batch() refuses a batch whose block 2 is `block`, with an error that names `field` and `index`;
+// `index` -1 = the error names no index.
 void expect_refusal(const OwnedBlock& block, Reason reason, const std::string& field, int index) {
   const Refusal refusal = refusal_for(three_blocks(block));
   EXPECT_EQ(reason_name(refusal.reason), reason_name(reason));
@@ -310,7 +311,7 @@ TEST(CheckBatchTest, MaxReplyBytesHasALimit) {
 
 TEST(CheckBatchTest, DenseRowsMustFitTheReply) {
   std::vector<OwnedBlock> blocks = {rays_along_x(RayMode::kFirst, std::vector<float>(3 * 65536, 0))};
-  EXPECT_TRUE(check_batch(batch_of(blocks)).ok());  // T, ID and TRIANGLE: 16 bytes a ray
+  EXPECT_TRUE(check_batch(batch_of(blocks)).ok());  // the columns T, ID and TRIANGLE have 16 bytes per ray
   blocks[0].settings.columns = {Column::kT, Column::kId, Column::kNormal, Column::kPoint, Column::kPose};
   const Refusal refusal = refusal_for(blocks);
   EXPECT_EQ(refusal.reason, Reason::kLimit);
@@ -343,7 +344,7 @@ TEST(CheckBatchTest, CountsCannotBeCutEither) {
   balls.points.assign(3 * 1000, 1);
   const std::vector<OwnedBlock> blocks = {balls};
   QueryBatch batch = batch_of(blocks);
-  batch.max_reply_bytes = 1000 * (4 + 4) + 2 * 256;  // counts, room for a list of cut queries, a block and a reply
+  batch.max_reply_bytes = 1000 * (4 + 4) + 2 * 256;  // counts, list of truncated queries, overhead of block and reply
   EXPECT_TRUE(check_batch(batch).ok());
   --batch.max_reply_bytes;
   const Refusal refusal = refusal_of(check_batch(batch)).value_or(Refusal{});

@@ -40,7 +40,7 @@ class RecoverTest : public SceneFixture {
     again_ = std::make_unique<MemoryLog>(kept);
     return recover_scene(*again_, again_->stored_scenes().front(), find_, progress);
   }
-  // Returns the error message of recovery, and expects DATA_LOSS.
+  // Recovers the scene from `kept`, expects DATA_LOSS, and returns the error message.
   std::string message(const MemoryLog::Kept& kept) {
     const absl::Status status = recover(kept).status();
     EXPECT_EQ(status.code(), absl::StatusCode::kDataLoss) << status;
@@ -66,7 +66,7 @@ TEST_F(RecoverTest, AMissingLastRecordIsDetected) {
             absl::DataLossError("scene arena: records 4 to 5 are not there"));
 }
 
-// Log that breaks its contract: it leaves out a record.
+// Log that breaks the contract of UpdateLog: read() omits record 2.
 class GappedLog : public MemoryLog {
  public:
   using MemoryLog::MemoryLog;
@@ -91,7 +91,7 @@ TEST_F(RecoverTest, ErrorsNameTheDamagedRecordSnapshotOrSpecification) {
   EXPECT_EQ(message(wrong), "scene arena: record 1: the kind is cut off");
   wrong = kept;
   stored(wrong).snapshot.clear();
-  EXPECT_EQ(message(wrong), "scene arena: snapshot: the header is not there");
+  EXPECT_EQ(message(wrong), "scene arena: snapshot: the header is missing");
   wrong = kept;
   stored(wrong).spec = "";
   EXPECT_EQ(message(wrong), "scene arena: specification: the kind is cut off");
@@ -107,14 +107,15 @@ TEST_F(RecoverTest, ScenesAndMeshesMarkedAsDamagedAreNotRead) {
   EXPECT_EQ(recover_mesh(again, mesh).status(), absl::DataLossError("mesh m: a file is gone"));
 }
 
-// If the cached topology is from another builder version, damaged or missing, the tree is built and cached again.
+// If the stored topology is from another builder version, damaged or missing, the tree is built and its topology is
+// stored again.
 TEST_F(RecoverTest, AnUnusableTopologyIsReplacedByThatOfARebuiltTree) {
   const MemoryLog::Kept kept = log_.crash();
   ASSERT_EQ(kept.topologies.size(), 1u);
   const std::string right = kept.topologies.at(mesh_->sha256());
   std::string of_another_builder = right, of_other_triangles = right;
   of_another_builder[8] = static_cast<char>(kBvhBuilderVersion + 1);
-  of_other_triangles[24] = static_cast<char>(99);  // the first triangle's number
+  of_other_triangles[24] = static_cast<char>(99);  // number of the first triangle
   for (const std::string& wrong : {of_another_builder, of_other_triangles, right.substr(0, 20), std::string()}) {
     MemoryLog again(kept);
     again.keep_outline(mesh_->sha256(), wrong);

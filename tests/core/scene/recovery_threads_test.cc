@@ -1,4 +1,4 @@
-// Tests writers, readers, snapshots and static changes at the same time with a slow log: everything acknowledged is
+// Tests writers, readers, snapshots and static changes at the same time with a slow log: every acknowledged change is
 // recovered.
 #include <gtest/gtest.h>
 
@@ -27,7 +27,8 @@ class RecoveryThreadsTest : public SceneFixture {
     log_.take(std::chrono::microseconds(200));
   }
 
-  // Each writer moves its own object; x is the number of its last batch.
+  // Applies `batches` batches of `writer`. Each batch moves the writer's own object: the object's x coordinate is the
+  // number of the last batch.
   void write(uint64_t writer, uint64_t batches) {
     for (uint64_t number = 1; number <= batches; number += 2) {
       std::vector<Id> ids = {writer};

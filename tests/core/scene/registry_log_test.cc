@@ -1,4 +1,4 @@
-// Tests a registry with a log: after a restart it contains exactly what was acknowledged.
+// Tests a registry with a log: after a restart, the registry contains exactly the acknowledged scenes and meshes.
 #include <gmock/gmock.h>
 
 #include <chrono>
@@ -76,6 +76,27 @@ TEST_F(RegistryLogTest, ScenesMeshesAndInstancesSurviveARestart) {
   EXPECT_EQ(registry_->delete_mesh("m").code(), absl::StatusCode::kFailedPrecondition);
 }
 
+TEST_F(RegistryLogTest, CreatorsSurviveARestartAndAFailedDeletion) {
+  SceneSpec spec;
+  spec.creator = "token:a";
+  spec.history = {4, 1000};
+  ASSERT_TRUE(registry_->add_mesh("m", StaticMesh::share("m", {}, *mesh_, "token:a")).ok());
+  const ScenePtr scene = registry_->create_scene("first", spec, kEpoch, "", false)->scene;
+  ASSERT_TRUE(scene->apply(with(points({1, 2}, {0, 0, 0}))).ok());
+  for (int times = 0; times < 2; ++times) {
+    restart();
+    log_->fail_with(kFull);
+    EXPECT_EQ(registry_->delete_mesh("m"), kFull);
+    EXPECT_EQ(registry_->delete_scene("first"), kFull);
+    log_->fail_with(absl::OkStatus());
+    const CreatorUse use = registry_->creator_use("token:a");
+    EXPECT_EQ(use.scenes, 1u);
+    EXPECT_EQ(use.objects, 2u);
+    EXPECT_EQ(use.history_bytes, 1000u);
+    EXPECT_EQ(use.mesh_bytes, (*registry_->find_mesh("m", "mesh"))->bytes());
+  }
+}
+
 TEST_F(RegistryLogTest, NamesOfEqualContentKeepPartsAndUsesOverARestart) {
   const std::vector<MeshPart> walls = {{"walls", 0}}, doors = {{"doors", 0}};
   PlacementColumns first = placement({5, 6}, {1, 2, 3}), second = placement({7}, {4, 5, 6});
@@ -112,7 +133,7 @@ TEST_F(RegistryLogTest, NamesOfEqualContentKeepPartsAndUsesOverARestart) {
 TEST_F(RegistryLogTest, ARecordWithoutANameMeansTheLowestNameOfFormat1) {
   for (const char* const name : {"b", "c", "d"}) ASSERT_TRUE(registry_->add_mesh(name, mesh_).ok());
   MemoryLog::Kept kept = log_->crash();
-  for (const char* const name : {"c", "d"}) kept.parts.erase(name);  // as format 1 kept them
+  for (const char* const name : {"c", "d"}) kept.parts.erase(name);  // format 1 stores no parts for a name
   const MemoryLog log(kept);
   EXPECT_TRUE(log.stored_meshes()[1].parts_in_content);
   const FindMesh find = find_restored_meshes(log, *registry_);
@@ -133,10 +154,10 @@ TEST_F(RegistryLogTest, DamagedPartsAreTheDamageOfTheirNameAlone) {
   ASSERT_TRUE(content.ok()) << content.status();
   EXPECT_TRUE(recover_name(log, log.stored_meshes()[0], content->mesh).ok());
   EXPECT_EQ(recover_name(log, log.stored_meshes()[1], content->mesh).status(),
-            absl::DataLossError("mesh m: the header of parts is not there"));
+            absl::DataLossError("mesh m: the header of parts is missing"));
 }
 
-TEST_F(RegistryLogTest, WhatWasDeletedStaysSo) {
+TEST_F(RegistryLogTest, DeletedScenesAndMeshesStayDeleted) {
   ASSERT_TRUE(registry_->add_mesh("m", mesh_).ok());
   ASSERT_TRUE(create("gone").ok());
   EXPECT_TRUE(registry_->delete_scene("gone").ok());
@@ -182,7 +203,8 @@ TEST_F(RegistryLogTest, ADeletedMeshIsNotPlaced) {
   ASSERT_TRUE(registry_->delete_mesh("m").ok());
   expect_refusal(scene->change_instances(placing(placement({5}, {0, 0, 0}))).status(), absl::StatusCode::kNotFound,
                  Reason::kNotFound, "place[0].mesh");
-  // The old pointer stays refused after equal content is added, because uses are counted for the registered mesh.
+  // The deleted mesh is still refused after a mesh with the same name and content is added, because the change still
+  // places the deleted StaticMesh, whose uses the registry would not count.
   ASSERT_TRUE(registry_->add_mesh("m", make_mesh("m", 1)).ok());
   EXPECT_EQ(scene->change_instances(placing(placement({5}, {0, 0, 0}))).status().code(), absl::StatusCode::kNotFound);
 }

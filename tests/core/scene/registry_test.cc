@@ -32,23 +32,6 @@ class RegistryTest : public SceneFixture {
 using Names = std::vector<std::string>;
 using MeshParts = std::vector<MeshPart>;
 
-TEST_F(RegistryTest, SceneNamesFollowTheirRule) {
-  for (const std::string& name :
-       {std::string("a"), std::string("a1"), std::string("a-b"), std::string("z--9"), std::string(63, 'x')})
-    EXPECT_TRUE(check_scene_name(name, "name").ok()) << name;
-  for (const std::string& name :
-       {std::string(), std::string("1a"), std::string("-a"), std::string("a-"), std::string("A"), std::string("a_b"),
-        std::string("a b"), std::string("\xc3\xa4"), std::string(64, 'x'), std::string("a\0b", 3)})
-    expect_refusal(check_scene_name(name, "name"), absl::StatusCode::kInvalidArgument, Reason::kMalformed, "name");
-}
-
-TEST_F(RegistryTest, MeshNamesFollowTheirRule) {
-  for (const std::string& name : {std::string("A/b.obj#1"), std::string("0"), std::string(63, '~')})
-    EXPECT_TRUE(check_mesh_name(name, "mesh").ok()) << name;
-  for (const std::string& name : {std::string(), std::string("a b"), std::string(64, 'x'), std::string("a\n")})
-    expect_refusal(check_mesh_name(name, "mesh"), absl::StatusCode::kInvalidArgument, Reason::kMalformed, "mesh");
-}
-
 TEST_F(RegistryTest, ACreatedSceneIsFound) {
   const ScenePtr scene = created("arena");
   EXPECT_EQ(*registry_.find_scene("arena"), scene);
@@ -158,6 +141,7 @@ TEST_F(RegistryTest, EqualContentUnderTwoNamesIsHeldOnce) {
   EXPECT_EQ(*registry_.find_mesh("alias", "mesh"), alias);
   EXPECT_EQ(alias->name(), "alias");
   EXPECT_EQ(registry_.mesh_count(), 2u);
+  EXPECT_EQ(registry_.mesh_bytes(), mesh_->bytes() + alias->bytes() - alias->shared_bytes());
 }
 
 TEST_F(RegistryTest, NamesOfEqualContentKeepTheirOwnParts) {
@@ -166,6 +150,39 @@ TEST_F(RegistryTest, NamesOfEqualContentKeepTheirOwnParts) {
   ASSERT_TRUE(registry_.add_mesh("alias", StaticMesh::share("alias", doors, *mesh_)).ok());
   EXPECT_EQ((*registry_.find_mesh("m", "mesh"))->parts(), walls);
   EXPECT_EQ((*registry_.find_mesh("alias", "mesh"))->parts(), doors);
+}
+
+TEST_F(RegistryTest, ScenesObjectsHistoriesAndMeshesAreSummedByCreator) {
+  SceneSpec spec;
+  spec.creator = "token:a";
+  spec.history = {4, 1000};
+  const ScenePtr first = registry_.create_scene("first", spec, kEpoch, "", false)->scene;
+  spec.history = {};
+  ASSERT_TRUE(registry_.create_scene("second", spec, kEpoch, "", false).ok());
+  created("nobodys");
+  ASSERT_TRUE(first->apply(with(points({1, 2, 3}, {0, 0, 0}))).ok());
+  const MeshPtr m = *registry_.add_mesh("m", StaticMesh::share("m", {}, *mesh_, "token:a"));
+  const MeshPtr alias = *registry_.add_mesh("alias", StaticMesh::share("alias", {}, *mesh_, "token:b"));
+  EXPECT_EQ(alias->creator(), "token:b");
+  CreatorUse use = registry_.creator_use("token:a");
+  EXPECT_EQ(use.scenes, 2u);
+  EXPECT_EQ(use.objects, 3u);
+  EXPECT_EQ(use.history_bytes, 1000u);
+  EXPECT_EQ(use.mesh_bytes, m->bytes());
+  EXPECT_EQ(registry_.creator_uses().size(), 2u);
+  UpdateBatch removal;
+  const std::vector<uint64_t> gone = {1, 2};
+  removal.remove_ids = gone;
+  ASSERT_TRUE(first->apply(removal).ok());
+  EXPECT_EQ(registry_.creator_use("token:a").objects, 1u);
+  ASSERT_TRUE(registry_.delete_scene("first").ok());
+  ASSERT_TRUE(registry_.delete_mesh("m").ok());
+  use = registry_.creator_use("token:a");
+  EXPECT_EQ(use.scenes, 1u);
+  EXPECT_EQ(use.objects + use.history_bytes + use.mesh_bytes, 0u);
+  ASSERT_TRUE(registry_.delete_scene("second").ok());
+  ASSERT_TRUE(registry_.delete_mesh("alias").ok());
+  EXPECT_TRUE(registry_.creator_uses().empty());
 }
 
 TEST_F(RegistryTest, OtherPartsUnderAKnownNameAreRefused) {

@@ -153,7 +153,7 @@ TEST_F(SceneJoinedTest, AClosedSceneRefusesAll) {
             absl::StatusCode::kNotFound);
 }
 
-// Uses random moves of known and unknown objects, with and without rotations and writers.
+// The batches are random moves of known and unknown objects, with and without rotations and writer ids.
 TEST_F(SceneJoinedTest, JoinedBatchesLeaveTheSameStateAsTheBatchesOneByOne) {
   Random random(6);
   Scene alone("alone", SceneSpec(), kEpoch, StaticSet::empty());

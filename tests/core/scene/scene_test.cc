@@ -15,13 +15,13 @@ using Deadline = std::chrono::steady_clock::time_point;
 class SceneTest : public SceneFixture {
  protected:
   static constexpr Deadline kNow = Deadline::min();
-  // Deadline so late that only a deadlock reaches it.
+  // Returns a deadline so late that only a deadlocked test reaches it.
   static Deadline far_away() { return std::chrono::steady_clock::now() + std::chrono::minutes(10); }
 
   static View exactly(uint64_t revision) { return {View::Kind::kExactly, revision, 0}; }
   static View at_least(uint64_t revision) { return {View::Kind::kAtLeast, revision, 0}; }
 
-  // Changes the scene `count` times.
+  // Applies `count` batches, each of which begins the next tick.
   void tick(uint64_t count) {
     for (uint64_t i = 0; i < count; ++i) {
       UpdateBatch batch;
@@ -102,7 +102,7 @@ TEST_F(SceneTest, AtMostTheLimitOfRecentRevisionsIsKept) {
 }
 
 TEST_F(SceneTest, RecentRevisionsAreDroppedBeyondTheLimitOfReplacedBytes) {
-  // Each move of all objects replaces between a sixth and a fifth of the limit.
+  // There are so many objects that a move of all objects replaces between a sixth and a fifth of limits::kRecentBytes.
   std::vector<Id> all(limits::kRecentBytes / 420);
   for (uint64_t i = 0; i < all.size(); ++i) all[i] = i + 1;
   apply(with(points(all, {0, 0, 0})));

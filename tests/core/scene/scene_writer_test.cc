@@ -192,7 +192,7 @@ TEST_F(SceneWriterTest, AcksWithTooManyErrorsAreDroppedButBatchNumbersAreKept) {
 
 TEST_F(SceneWriterTest, TheLeastRecentlyActiveWriterIsEvicted) {
   for (uint64_t writer = 1; writer <= limits::kMaxWriters; ++writer) apply(numbered({}, writer, 1));
-  apply(numbered({}, 1, 2));  // now writer 2 is the least recently active one
+  apply(numbered({}, 1, 2));  // makes writer 2 the least recently active writer
   apply(numbered({}, limits::kMaxWriters + 1, 1));
   expect_gap(numbered({}, 2, 2), 1);
   EXPECT_TRUE(apply(numbered({}, 1, 2)).duplicate);

@@ -16,6 +16,7 @@ SceneSpec full_spec() {
   spec.pinned_bytes = 77;
   spec.overload = OverloadPolicy::kLatestWins;
   spec.durability = Durability::kMemory;
+  spec.creator = "token:ci";
   return spec;
 }
 
@@ -29,6 +30,20 @@ TEST(SpecCodecTest, ASpecificationRoundTrips) {
   EXPECT_EQ(spec->pinned_bytes, 77u);
   EXPECT_EQ(spec->overload, OverloadPolicy::kLatestWins);
   EXPECT_EQ(spec->durability, Durability::kMemory);
+  EXPECT_EQ(spec->creator, "token:ci");
+}
+
+// Data formats 1 and 2 have no creators, and their specifications stay readable.
+TEST(SpecCodecTest, ASpecificationWithoutACreatorIsWrittenAsInFormat2) {
+  SceneSpec spec = full_spec();
+  const std::string owned = encode_spec(spec);
+  spec.creator.clear();
+  const std::string bytes = encode_spec(spec);
+  EXPECT_EQ(bytes.substr(0, 4), "LSSP");
+  EXPECT_EQ(owned.substr(0, 4), "LSOS");
+  EXPECT_EQ(bytes.substr(4), owned.substr(4, bytes.size() - 4));
+  ASSERT_TRUE(decode_spec(bytes).ok());
+  EXPECT_EQ(decode_spec(bytes)->creator, "");
 }
 
 TEST(SpecCodecTest, DamagedBytesNeverHarm) {

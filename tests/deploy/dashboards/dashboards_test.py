@@ -87,7 +87,7 @@ class DashboardsTest(unittest.TestCase):
     def names(self):
         return {sample.name for sample in self.samples} | set(self.families)
 
-    def test_what_the_command_line_asked_is_what_was_counted(self):
+    def test_calls_of_the_command_line_are_counted(self):
         self.assertEqual(self.value("locus_queries_total", kind="ray"), 2)
         self.assertEqual(self.value("locus_queries_total", kind="ball"), 1)
         self.assertEqual(self.value("locus_calls_total", rpc="Query", code="OK"), 3)
@@ -124,7 +124,7 @@ class DashboardsTest(unittest.TestCase):
         alerts = yaml.safe_load(read("alerts.yml"))
         return shown + [rule["expr"] for group in alerts["groups"] for rule in group["rules"]]
 
-    def test_dashboard_and_alerts_name_only_what_is_there(self):
+    def test_dashboard_and_alerts_name_only_existing_metrics(self):
         expressions = self.expressions()
         self.assertGreater(len(expressions), 20)
         labels = {}

@@ -1,4 +1,4 @@
-// Backups through the command line against a real server, from the log's copy to a data directory.
+// Backups by the command line against a real server: a backup is made and restored to a data directory.
 #include <atomic>
 #include <filesystem>
 #include <fstream>

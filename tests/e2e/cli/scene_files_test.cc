@@ -1,4 +1,5 @@
-// Scenes as files, through the command line against a real server: generated levels in, dumps and exports out.
+// Commands that read and write scenes as files, against a real server: they import generated levels, dump scenes and
+// export them.
 #include <unistd.h>
 
 #include <fstream>

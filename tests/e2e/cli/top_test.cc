@@ -1,9 +1,14 @@
 // `locus top` against a real server.
 #include <csignal>
+#include <filesystem>
+#include <fstream>
 #include <sstream>
 
 #include "client/cli/run.h"
+#include "server/security/token_file.h"
 #include "tests/support/rpc_test.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/test_certificates.h"
 
 namespace locus::test {
 namespace {
@@ -62,7 +67,7 @@ TEST_F(TopTest, OnceAsATableNamesTheSceneAndHasNoEscapes) {
 }
 
 TEST_F(TopTest, ASignalEndsItWithZero) {
-  // Block the signal, so that it stays pending until `top` waits for it.
+  // Blocks the signal, so that the signal stays pending until `top` waits for it.
   sigset_t interrupt;
   sigset_t before;
   sigemptyset(&interrupt);
@@ -78,6 +83,31 @@ TEST_F(TopTest, AnUnreachableServerIsReportedWithAHint) {
   const Outcome outcome = run_top("127.0.0.1:1", {"--once"});
   EXPECT_EQ(outcome.code, cli::ExitCode::kUnreachable);
   EXPECT_THAT(outcome.err, HasSubstr("--http-listen"));
+}
+
+TEST(TopRightsTest, ATokenIsSentAndARefusalSaysWhichRightIsMissing) {
+  const TemporaryFolder folder;
+  const auto write = [&](const std::string& name, const std::string& text) {
+    std::ofstream(folder.file(name)) << text;
+    std::filesystem::permissions(folder.file(name), std::filesystem::perms::owner_read);
+    return folder.file(name);
+  };
+  const TestAuthority authority("authority");
+  const TestCertificate pair = authority.for_server();
+  server::ServerConfig config = with_http();
+  config.access_file = write("access", "grant token:scraper metrics\ngrant token:other backup\n");
+  config.token_file = folder.file("tokens");
+  const std::string scraper = write("a", *server::add_token(config.token_file, "scraper", 1'000'000, {}, ""));
+  const std::string other = write("b", *server::add_token(config.token_file, "other", 1'000'000, {}, ""));
+  config.tls_cert = write("crt", pair.certificate);
+  config.tls_key = write("key", pair.key);
+  const std::string ca = write("ca", authority.certificate());
+  RunningServer running(config);
+  const std::string http = "127.0.0.1:" + std::to_string(running.server().http_port());
+  EXPECT_EQ(run_top(http, {"--once", "--ca", ca, "--token-file", scraper}).code, cli::ExitCode::kOk);
+  EXPECT_THAT(run_top(http, {"--once", "--ca", ca, "--token-file", other}).err, HasSubstr("lacks the right metrics"));
+  EXPECT_THAT(run_top(http, {"--once", "--ca", ca}).err, HasSubstr("needs the right metrics"));
+  EXPECT_NE(run_top(http, {"--once", "--token-file", scraper}).code, cli::ExitCode::kOk) << "without TLS";
 }
 
 TEST_F(TopTest, AGrpcPortOrAnInvalidAddressIsAnError) {

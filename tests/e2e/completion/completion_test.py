@@ -1,4 +1,4 @@
-"""Completions of half a line of locus in each shell: python3 completion_test.py BIN_DIRECTORY. Needs bash, zsh and fish."""
+"""Tests completions of an unfinished line in each shell: completion_test.py BIN_DIRECTORY. Needs bash, zsh and fish."""
 
 import os
 import subprocess
@@ -14,12 +14,12 @@ START_SECONDS = 30
 
 
 def last_part(offer):
-    """Returns the part behind the last = or comma: shells differ in how much of the word they repeat."""
+    """Returns the part after the last = or comma, because shells repeat different parts of the word before it."""
     return offer.split("=")[-1].split(",")[-1] if not offer.startswith("--") or "=" in offer else offer
 
 
 class Offers:
-    """The tests, for one shell each."""
+    """The tests of completion; a subclass for each shell runs them."""
 
     @classmethod
     def setUpClass(cls):

@@ -1,4 +1,4 @@
-"""One class a shell: the completions that it offers at the end of a line. Each class runs the real shell."""
+"""One class for each shell, with the completions that this shell offers at the end of a line. Runs the real shells."""
 
 import os
 import pty
@@ -53,7 +53,7 @@ class Fish(Shell):
 
 
 class Zsh(Shell):
-    """Completion needs the line editor, which needs a terminal: a bound key writes the matches to a file."""
+    """Runs zsh in a terminal, because completion needs the line editor: a bound key writes the matches to a file."""
 
     name = "zsh"
     SETUP = r"""

@@ -78,12 +78,12 @@ class InstallTest(unittest.TestCase):
     def flags(self, *what):
         return run("pkg-config", *what, "locus-client", **self.pkgconfig).split()
 
-    def test_the_components_are_the_whole_and_share_nothing(self):
+    def test_every_file_belongs_to_exactly_one_component(self):
         self.assertEqual(sorted(path for paths in self.components.values() for path in paths), sorted(self.files))
         self.assertEqual({path for path in self.components["dev"] if path.startswith("bin/")}, set())
         self.assertEqual({path for path in self.components["runtime"] if path.endswith((".h", ".a", ".cmake", ".pc"))}, set())
 
-    def test_everything_a_user_looks_for_is_there(self):
+    def test_the_expected_files_are_installed(self):
         for path in ("bin/locus", "bin/locusd", "share/doc/locus/README.md", "share/doc/locus/LICENSE",
                      "share/man/man1/locus.1", "share/man/man1/locus-query-ray.1", "share/man/man8/locusd.8",
                      "share/bash-completion/completions/locus", "share/zsh/site-functions/_locus",
@@ -92,11 +92,11 @@ class InstallTest(unittest.TestCase):
                      "include/locus/client/lib/client.h", "include/locus/locus/v1/query_service.grpc.pb.h"):
             self.assertIn(path, self.files)
 
-    def test_no_header_stands_where_it_could_meet_another_projects(self):
+    def test_all_headers_are_in_the_folder_of_the_project(self):
         outside = {path for path in self.files if path.startswith("include/") and not path.startswith("include/locus/")}
         self.assertEqual(outside, set())
 
-    def test_no_installed_text_names_the_folders_it_was_built_in(self):
+    def test_no_installed_text_names_the_build_folders(self):
         for path in sorted(self.files):
             if path.endswith((".cmake", ".pc", ".h", ".conf.example")):
                 with open(os.path.join(self.tree, path), encoding="utf-8") as file:
@@ -151,7 +151,7 @@ class InstallTest(unittest.TestCase):
         script = f"import locus; print(locus.connect({self.address!r}).healthy())"
         self.assertEqual(run("/usr/bin/python3", "-B", "-c", script, PYTHONPATH=folders[0]), "True\n")
 
-    def test_both_say_the_version_of_the_program(self):
+    def test_both_packages_have_the_version_of_the_program(self):
         version = self.flags("--modversion")
         self.assertEqual(run(os.path.join(self.tree, "bin/locus"), "--version").split(), ["locus", *version])
 

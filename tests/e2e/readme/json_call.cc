@@ -1,5 +1,5 @@
 // Calls a unary method of locus.v1 with a JSON request and prints the JSON answer. It replaces grpcurl, which Debian
-// does not have, so that a test can run the README's manual call.
+// does not package, so that a test can run the example call of the README.
 //
 //   json_call ADDRESS locus.v1.Service/Method JSON
 #include <google/protobuf/descriptor.h>
@@ -61,7 +61,7 @@ int main(int argc, char** argv) {
   if (argc != 4) return fail("give ADDRESS, SERVICE/METHOD and JSON");
   const std::string target = argv[2];
   const size_t slash = target.find('/');
-  // Refer to one message of each file, so that all files are linked into the pool of generated types.
+  // References one message of each proto file, so that the linker keeps all proto files in the pool of generated types.
   for (const Message* linked : std::initializer_list<const Message*>{
            &locus::v1::QueryRequest::default_instance(), &locus::v1::GetSceneRequest::default_instance(),
            &locus::v1::GetServerRequest::default_instance(), &locus::v1::ApplyUpdatesRequest::default_instance()})

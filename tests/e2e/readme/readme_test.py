@@ -5,8 +5,9 @@
 Blocks marked console hold `$ command` lines, each followed by its output; a block marked grpcurl holds one call, which is
 made with json_call in its place. EPOCH stands for the scene's random epoch. The block marked cpp was compiled as
 readme_example; its last comment says what it prints. Blocks marked python, here and in client/python/README.md, are
-scripts for the package in PYTHON_DIRECTORY (without which they are skipped); their last comments say likewise. The
-address in them is replaced by that of the daemon. Blocks marked text are for reading: only their programs are looked for.
+scripts for the package in PYTHON_DIRECTORY (without which they are skipped); their last comments also say what they
+print. The address in them is replaced by that of the daemon. Blocks marked text are not run: the test only checks that
+their programs exist.
 """
 
 import os
@@ -31,7 +32,7 @@ def blocks(kind, readme=README):
 
 
 def commands(block):
-    """Pairs of a command and the output shown below it."""
+    """Returns pairs of a command and the output shown below it."""
     parts = re.split(r"^\$ ", block, flags=re.MULTILINE)[1:]
     return [(part.split("\n", 1)[0], part.split("\n", 1)[1]) for part in parts]
 

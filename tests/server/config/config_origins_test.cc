@@ -26,7 +26,7 @@ class ConfigOriginsTest : public testing::Test {
     });
   }
 
-  // Returns the option as "value, origin, place".
+  // Returns the value of the option `name` as "value, origin, place".
   std::string of(const std::string& name, const std::vector<std::string>& arguments = {}) {
     const auto values = origins(arguments);
     EXPECT_TRUE(values.ok()) << values.status();
@@ -97,7 +97,7 @@ TEST_F(ConfigOriginsTest, OptionsThatTheDaemonRefusesGiveTheSameError) {
   const auto values = origins({"--max-scenes", "0"});
   EXPECT_EQ(values.status().code(), absl::StatusCode::kInvalidArgument);
   EXPECT_THAT(std::string(values.status().message()), HasSubstr("--max-scenes"));
-  EXPECT_THAT(std::string(origins({"--listen", "0.0.0.0:1"}).status().message()), HasSubstr("two ways out"));
+  EXPECT_THAT(std::string(origins({"--listen", "0.0.0.0:1"}).status().message()), HasSubstr("two other ways"));
 }
 
 TEST_F(ConfigOriginsTest, TheCommandConfigPrintsOptionsInUseAndStartsNothing) {

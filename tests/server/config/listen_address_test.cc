@@ -34,5 +34,11 @@ TEST(ListenAddressTest, AnAddressIsPrintedInTheFormThatIsParsed) {
     EXPECT_EQ(to_string(*parse_listen_address(text), 7575), text);
 }
 
+TEST(ListenAddressTest, PermissionsAreThreeOctalDigits) {
+  EXPECT_EQ(*parse_unix_mode("0600"), 0600u);
+  EXPECT_EQ(*parse_unix_mode("666"), 0666u);
+  for (const char* text : {"", "6", "0800", "rw-", "1600", "06000"}) EXPECT_FALSE(parse_unix_mode(text).ok()) << text;
+}
+
 }  // namespace
 }  // namespace locus::server

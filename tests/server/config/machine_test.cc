@@ -11,7 +11,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A temporary folder with the files of control groups.
+// Fixture with a temporary folder in which tests write the files of control groups.
 class MachineTest : public testing::Test {
  protected:
   MachineTest() : root_(testing::TempDir() + "machine_" + test_name()) { fs::remove_all(root_); }

@@ -72,7 +72,7 @@ TEST_F(ServerConfigTest, CheckWithoutADirectoryIsAMistake) {
   const Invocation invocation = read({"check"});
   EXPECT_FALSE(invocation.maintenance.has_value());
   EXPECT_EQ(invocation.exit_code, 2);
-  EXPECT_THAT(invocation.text, HasSubstr("which directory"));
+  EXPECT_THAT(invocation.text, HasSubstr("no data directory"));
 }
 
 TEST_F(ServerConfigTest, CheckHasItsOwnHelp) {
@@ -123,16 +123,16 @@ TEST_F(ServerConfigTest, MistakesEndWithTwoAndNameTheOption) {
   }
 }
 
-TEST_F(ServerConfigTest, NonLocalAddressesNeedInsecure) {
+TEST_F(ServerConfigTest, NonLocalAddressesNeedTlsAndAnAccessFileOrInsecure) {
   const Invocation refused = read({"--listen", "0.0.0.0:7575"});
   EXPECT_FALSE(refused.config.has_value());
   EXPECT_EQ(refused.exit_code, 2);
-  EXPECT_THAT(refused.text, HasSubstr("0.0.0.0:7575"));
-  EXPECT_THAT(refused.text, HasSubstr("two ways out"));
+  EXPECT_THAT(refused.text, HasSubstr("missing: --tls-cert, --tls-key, --access-file."));
+  EXPECT_THAT(refused.text, HasSubstr("locusd --listen 0.0.0.0:7575 --tls-cert server.crt --tls-key server.key "
+                                      "--access-file access.conf"));
+  EXPECT_THAT(refused.text, HasSubstr("two other ways"));
   EXPECT_THAT(refused.text, HasSubstr("127.0.0.1"));
-  EXPECT_THAT(refused.text, HasSubstr("proxy in front that ends TLS"));
-  EXPECT_THAT(refused.text, HasSubstr("--insecure"));
-  EXPECT_THAT(refused.text, HasSubstr("LOCUS_INSECURE=1"));
+  EXPECT_THAT(refused.text, HasSubstr("LOCUS_INSECURE=1 or --insecure"));
   EXPECT_TRUE(read({"--listen", "0.0.0.0:7575", "--insecure"}).config.has_value());
   environment_ = {{"LOCUS_INSECURE", "1"}};
   EXPECT_TRUE(read({"--listen", "0.0.0.0:7575"}).config.has_value());
@@ -140,13 +140,56 @@ TEST_F(ServerConfigTest, NonLocalAddressesNeedInsecure) {
   EXPECT_FALSE(read({"--listen", "0.0.0.0:7575"}).config.has_value());
 }
 
+TEST_F(ServerConfigTest, ARefusalNamesOnlyWhatIsMissing) {
+  const std::vector<std::string> with_tls = {"--listen", "[::]:1", "--tls-cert", "a.crt", "--tls-key", "a.key"};
+  const Invocation refused = read(with_tls);
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.text, HasSubstr("missing: --access-file."));
+  EXPECT_THAT(refused.text, HasSubstr("--listen [::]:1 --tls-cert a.crt --tls-key a.key --access-file access.conf"));
+  std::vector<std::string> complete = with_tls;
+  complete.insert(complete.end(), {"--access-file", "access"});
+  const Invocation accepted = read(complete);
+  ASSERT_TRUE(accepted.config.has_value()) << accepted.text;
+  EXPECT_EQ(accepted.config->tls_cert, "a.crt");
+  EXPECT_EQ(accepted.config->access_file, "access");
+  EXPECT_FALSE(accepted.config->insecure);
+}
+
+TEST_F(ServerConfigTest, ACertificateNeedsItsKeyAndAClientCaNeedsBoth) {
+  EXPECT_THAT(read({"--tls-cert", "a"}).text, HasSubstr("belong together"));
+  EXPECT_THAT(read({"--tls-key", "a"}).text, HasSubstr("belong together"));
+  EXPECT_THAT(read({"--tls-client-ca", "a"}).text, HasSubstr("--tls-client-ca needs --tls-cert"));
+  EXPECT_TRUE(read({"--tls-cert", "a", "--tls-key", "b", "--tls-client-ca", "c"}).config.has_value());
+}
+
+TEST_F(ServerConfigTest, LimitsOfConnectionsHaveDefaultsAndRanges) {
+  const ServerConfig config = *read({}).config;
+  EXPECT_EQ(config.max_connections, 0u);
+  EXPECT_EQ(config.max_connections_per_address, 1024u);
+  EXPECT_EQ(config.max_new_connections, 200u);
+  EXPECT_EQ(config.handshake_timeout_s, 10u);
+  EXPECT_EQ(config.idle_timeout_s, 0u);
+  EXPECT_EQ(config.unix_mode, "0600");
+  EXPECT_FALSE(config.accept_compression);
+  EXPECT_TRUE(read({"--accept-compression"}).config->accept_compression);
+  EXPECT_EQ(read({"--handshake-timeout-s", "0"}).exit_code, 2);
+  EXPECT_EQ(read({"--max-new-connections", "0"}).exit_code, 2);
+  EXPECT_EQ(read({"--unix-mode", "rw"}).exit_code, 2);
+  EXPECT_EQ(read({"--audit-bytes", "1"}).exit_code, 2);
+  EXPECT_EQ(read({"--audit-bytes", "2MiB"}).config->audit_bytes, uint64_t{2} << 20);
+}
+
 TEST_F(ServerConfigTest, TheHttpPortFollowsTheSameRuleAndCanBeTurnedOff) {
   EXPECT_EQ(read({}).config->http_listen, "127.0.0.1:7576");
   EXPECT_EQ(read({"--http-listen", ""}).config->http_listen, "");
   EXPECT_EQ(read({"--http-listen", "[::1]:1"}).config->http_listen, "[::1]:1");
-  EXPECT_THAT(read({"--http-listen", "0.0.0.0:7576"}).text, HasSubstr("two ways out"));
+  EXPECT_THAT(read({"--http-listen", "0.0.0.0:7576"}).text, HasSubstr("missing: --tls-cert, --tls-key, --access-file"));
+  const std::vector<std::string> protection = {"--tls-cert", "a", "--tls-key", "b", "--access-file", "c"};
+  std::vector<std::string> pages = {"--http-listen", "0.0.0.0:7576"};
+  pages.insert(pages.end(), protection.begin(), protection.end());
+  EXPECT_TRUE(read(pages).config.has_value());
   EXPECT_TRUE(read({"--http-listen", "0.0.0.0:7576", "--insecure"}).config.has_value());
-  EXPECT_THAT(read({"--http-listen", "unix:/tmp/a.sock"}).text, HasSubstr("speak TCP"));
+  EXPECT_THAT(read({"--http-listen", "unix:/tmp/a.sock"}).text, HasSubstr("scrapers use TCP"));
   EXPECT_THAT(read({"--http-listen", "nowhere"}).text, HasSubstr("nowhere"));
   EXPECT_THAT(read({"--http-listen", "", "--http-port-file", "p"}).text, HasSubstr("needs an HTTP port"));
   environment_ = {{"LOCUS_HTTP_LISTEN", ""}};

@@ -12,7 +12,7 @@ using ::testing::ElementsAreArray;
 
 constexpr size_t kRows = 5;
 
-// Writes 1, 2, 3, ... into every column, on both ways into a reply.
+// Writes the numbers `first`, `first` + 1, ... into the `entries` entries of `column`.
 template <class T>
 void count_up(T* column, size_t entries, uint32_t first = 1) {
   for (size_t i = 0; i < entries; ++i) column[i] = static_cast<T>(first + i);

@@ -3,14 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <array>
-#include <chrono>
 #include <vector>
 
 namespace locus::server {
 namespace {
 
 constexpr std::array<uint64_t, 4> kIds = {1, 2, 3, 4};
-constexpr std::chrono::steady_clock::time_point kNow = std::chrono::steady_clock::time_point::min();
 
 UpdateBatch moving() {
   UpdateBatch batch;
@@ -18,14 +16,17 @@ UpdateBatch moving() {
   return batch;
 }
 
-TEST(MemoryUseTest, OnlyBatchesWithInsertsCountAsInserting) {
-  EXPECT_FALSE(cost_of({}).inserts);
-  EXPECT_FALSE(cost_of(moving()).inserts);
+TEST(MemoryUseTest, ABatchIsOfTheKindThatNeedsMostMemory) {
   UpdateBatch batch;
+  batch.remove_ids = kIds;
+  EXPECT_EQ(cost_of(batch).kind, UpdateCost::Kind::kRemoves);
+  batch.moves.emplace_back().ids = kIds;
+  EXPECT_EQ(cost_of(batch).kind, UpdateCost::Kind::kMoves);
   batch.inserts.emplace_back();
-  EXPECT_FALSE(cost_of(batch).inserts);
+  EXPECT_EQ(cost_of(batch).kind, UpdateCost::Kind::kMoves);
   batch.inserts.emplace_back().ids = kIds;
-  EXPECT_TRUE(cost_of(batch).inserts);
+  EXPECT_EQ(cost_of(batch).kind, UpdateCost::Kind::kInserts);
+  EXPECT_EQ(item_count(batch), 3 * kIds.size());
 }
 
 TEST(MemoryUseTest, EveryItemOfABatchCostsTheSame) {
@@ -38,46 +39,22 @@ TEST(MemoryUseTest, EveryItemOfABatchCostsTheSame) {
   EXPECT_GT(eight, four);
 }
 
-TEST(MemoryUseTest, AnUploadCostsMoreThanItsColumnsAndTheLargestDoesNotOverflow) {
-  EXPECT_GT(upload_cost(100, 200), uint64_t{100 * 12 + 200 * 12 + 200 * 72});
+TEST(MemoryUseTest, AnUploadAndItsTreeCostMoreThanTheyKeepAndTheLargestDoNotOverflow) {
+  EXPECT_GT(upload_cost(100, 200), uint64_t{100 * 12 + 200 * 12});
+  EXPECT_GT(tree_cost(200), uint64_t{200 * 72});
   EXPECT_GT(upload_cost(limits::kMaxMeshVertices, limits::kMaxMeshTriangles), uint64_t{1} << 32);
+  EXPECT_GT(tree_cost(limits::kMaxMeshTriangles), uint64_t{1} << 32);
+}
+
+TEST(MemoryUseTest, PartsCostMemoryWithTheirNames) {
+  const std::vector<MeshPart> two = {{"a", 0}, {std::string(200, 'b'), 1}};
+  EXPECT_GE(parts_cost(two), parts_cost({}) + 2 * sizeof(MeshPart) + 201);
 }
 
 TEST(MemoryUseTest, OnlyPlacementsCostMemory) {
-  const std::array<double, 6> translations = {};
-  StaticChange change;
-  change.remove_ids = kIds;
-  EXPECT_EQ(change_cost(*StaticSet::empty(), change), 0u);
-  change.place.emplace_back().translations = translations;
-  const uint64_t two = change_cost(*StaticSet::empty(), change);
-  change.place.emplace_back().ids = kIds;
-  EXPECT_EQ(change_cost(*StaticSet::empty(), change), 3 * two);
-}
-
-TEST(MemoryUseTest, TheProcessHoldsMemoryAndMoreOfItWhenItIsTouched) {
-  const Registry registry;
-  const MemoryBudget::Meter meter = process_memory(registry);
-  const uint64_t before = meter.used();
-  ASSERT_GT(before, 0u);
-  const std::vector<char> touched(size_t{64} << 20, 'x');
-  EXPECT_GT(meter.used(), before + touched.size() / 2);
-}
-
-TEST(MemoryUseTest, FreeingMemoryDropsTheOldRevisionsOfEveryScene) {
-  Registry registry;
-  std::vector<ScenePtr> scenes;
-  for (const char* name : {"a", "b"}) scenes.push_back(registry.create_scene(name, {}, 1, "", false)->scene);
-  for (const ScenePtr& scene : scenes) {
-    UpdateBatch batch;
-    batch.tick = 1;
-    ASSERT_TRUE(scene->apply(batch).ok());
-    ASSERT_TRUE(scene->view({View::Kind::kExactly, 0, 0}, kNow).ok());
-  }
-  process_memory(registry).release_memory();
-  for (const ScenePtr& scene : scenes) {
-    EXPECT_FALSE(scene->view({View::Kind::kExactly, 0, 0}, kNow).ok());
-    EXPECT_TRUE(scene->view({View::Kind::kExactly, 1, 0}, kNow).ok());
-  }
+  EXPECT_EQ(change_cost(5, 0), 0u);
+  EXPECT_EQ(change_cost(0, 6), 3 * change_cost(0, 2));
+  EXPECT_EQ(change_cost(4, 2), change_cost(0, 6));
 }
 
 }  // namespace

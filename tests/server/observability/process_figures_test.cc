@@ -5,6 +5,7 @@
 #include <sys/un.h>
 
 #include <chrono>
+#include <vector>
 
 #include "tests/support/http_get.h"
 
@@ -23,6 +24,13 @@ TEST(ProcessFiguresTest, EveryFigureOfTheProcessIsPositive) {
   EXPECT_GT(process.start_seconds, now - 86400);
 }
 
+TEST(ProcessFiguresTest, ResidentMemoryGrowsWhenMemoryIsTouched) {
+  const uint64_t before = resident_bytes();
+  ASSERT_GT(before, 0u);
+  const std::vector<char> touched(size_t{64} << 20, 'x');
+  EXPECT_GT(resident_bytes(), before + touched.size() / 2);
+}
+
 TEST(ProcessFiguresTest, OnlyConnectionsToTheGivenAddressesAreCounted) {
   const int listening = socket(AF_INET, SOCK_STREAM, 0);
   sockaddr_in name{};
@@ -36,7 +44,7 @@ TEST(ProcessFiguresTest, OnlyConnectionsToTheGivenAddressesAreCounted) {
   const std::string address = "127.0.0.1:" + std::to_string(port);
   EXPECT_EQ(read_process({address}).connections, 0u);
   {
-    // The other ends are in this process too, but have ports of their own.
+    // The clients' sockets are in this process too, but have other local ports, so read_process() does not count them.
     const test::RawConnection first(port, "");
     const test::RawConnection second(port, "");
     const int accepted[] = {accept(listening, nullptr, nullptr), accept(listening, nullptr, nullptr)};

@@ -1,5 +1,5 @@
-// Calls on completion queues that end after each of their events in turn: by the caller, by a broken connection, by the
-// server. AddressSanitizer detects leaks, and the test's time limit detects calls that hang.
+// Calls on completion queues that are ended after any number of their events: by the caller, by a broken connection, or
+// by the server. AddressSanitizer detects leaks, and the test's time limit detects calls that hang.
 #include "server/rpc/hot_call.h"
 
 #include <fcntl.h>
@@ -11,6 +11,7 @@
 
 #include <future>
 #include <list>
+#include <map>
 #include <set>
 
 #include "locus/v1/query_service.grpc.pb.h"
@@ -20,24 +21,26 @@ namespace locus::test {
 namespace {
 
 using server::CallSlot;
-using server::Host;
 using server::IoLoop;
 using server::IoThreads;
 using server::Listener;
 using server::MemberTag;
+using server::RpcState;
 
-// Behaviour of the work on a message, chosen by the message's max_work.
+// Behaviour of the work on a message. The value is sent as the message's max_work.
 enum What : uint64_t {
-  kAtOnce = 1,     // answers before begin() returns
-  kElsewhere = 2,  // answers after another thread has posted
+  kAtOnce = 1,     // answers within begin()
+  kElsewhere = 2,  // answers in an event that another thread posts
   kHeld = 3,       // answers when give_up() is called, or when a message kLetGo arrives
-  kLetGo = 4,      // makes all held work answer, then answers
+  kLetGo = 4,      // makes all work of kHeld answer, then answers itself
   kRefused = 5,
-  kHoldsOthers = 6,  // like kElsewhere, and stops the call from reading meanwhile
+  kHoldsOthers = 6,  // like kElsewhere, and the call reads no messages before that event
   kAside = 7,        // answers as a deferred task
+  kBulky = 8,        // like kAtOnce, with an answer that no flow control window holds
 };
+constexpr size_t kBulkyBytes = 3u << 20;
 
-// Work with a chosen behaviour.
+// Work on a message, with one of the behaviours What.
 class FakeWork : private server::DeferredTask {
  public:
   explicit FakeWork(CallSlot& slot) : slot_(slot) {}
@@ -82,6 +85,10 @@ class FakeWork : private server::DeferredTask {
   MemberTag<FakeWork> returned_{*this, &FakeWork::returned};
 };
 
+void fill_up(v1::QueryResult& result) {
+  result.add_blocks()->mutable_ids()->Resize(static_cast<int>(kBulkyBytes / sizeof(uint64_t)), 1);
+}
+
 using Service =
     v1::QueryService::WithRawMethod_Query<v1::QueryService::WithRawMethod_StreamQueries<v1::QueryService::Service>>;
 
@@ -90,6 +97,7 @@ struct Unary {
   using Response = v1::QueryResponse;
   using Work = FakeWork;
   static constexpr server::Rpc kRpc = server::Rpc::kQuery;
+  static constexpr const char* kPath = "/locus.v1.QueryService/Query";
   static constexpr bool kStream = false;
   static constexpr bool kInOrder = false;
   void listen(grpc::ServerContext* context, grpc::ByteBuffer* request,
@@ -97,7 +105,9 @@ struct Unary {
               void* tag) const {
     service->RequestQuery(context, request, wire, queue, queue, tag);
   }
-  void begin(Work& work, const std::string&, const Request& request, Response&) const {
+  Work make_work(CallSlot& slot) const { return Work(slot); }
+  void begin(Work& work, const std::string&, const Request& request, Response& response) const {
+    if (request.batch().max_work() == kBulky) fill_up(*response.mutable_result());
     work.begin(request.batch().max_work());
   }
   Service* service;
@@ -109,30 +119,33 @@ struct Streamed {
   using Response = v1::StreamQueriesResponse;
   using Work = FakeWork;
   static constexpr server::Rpc kRpc = server::Rpc::kStreamQueries;
+  static constexpr const char* kPath = "/locus.v1.QueryService/StreamQueries";
   static constexpr bool kStream = true;
   static constexpr bool kInOrder = kOrdered;
   void listen(grpc::ServerContext* context, grpc::ServerAsyncReaderWriter<grpc::ByteBuffer, grpc::ByteBuffer>* wire,
               grpc::ServerCompletionQueue* queue, void* tag) const {
     service->RequestStreamQueries(context, wire, queue, queue, tag);
   }
+  Work make_work(CallSlot& slot) const { return Work(slot); }
   void begin(Work& work, const std::string&, const Request& request, Response& response) const {
     response.mutable_result();
+    if (request.batch().max_work() == kBulky) fill_up(*response.mutable_result());
     work.begin(request.batch().max_work());
   }
   Service* service;
 };
 
-// A server with one connection and one IO loop, whose turns the test takes on its own thread.
+// A server with one connection and one IO loop. The test runs the loop on its own thread, by calls of turn().
 template <class Stream>
 class Bench {
  public:
-  Bench() : host_(test_config(), nullptr) {
+  Bench() {
     grpc::ServerBuilder builder;
     builder.RegisterService(&service_);
     io_ = std::make_unique<IoThreads>(builder, 1);
     server_ = builder.BuildAndStart();
-    unary_.emplace(host_, Unary{&service_}, io());
-    stream_.emplace(host_, Stream{&service_}, io());
+    unary_.emplace(state_, Unary{&service_}, io());
+    stream_.emplace(state_, Stream{&service_}, io());
     unary_->listen();
     stream_->listen();
     int ends[2];
@@ -140,7 +153,9 @@ class Bench {
     for (const int end : ends) fcntl(end, F_SETFL, O_NONBLOCK);
     client_end_ = dup(ends[1]);
     grpc::AddInsecureChannelFromFd(server_.get(), ends[0]);
-    channel_ = grpc::CreateInsecureChannelFromFd("bench", ends[1]);
+    grpc::ChannelArguments arguments;
+    arguments.SetInt(GRPC_ARG_HTTP2_BDP_PROBE, 0);  // flow control windows that do not grow
+    channel_ = grpc::CreateCustomInsecureChannelFromFd("bench", ends[1], arguments);
     stub_ = v1::QueryService::NewStub(channel_);
   }
   ~Bench() {
@@ -150,8 +165,8 @@ class Bench {
 
   // Shuts the server down.
   void end() {
-    host_.drain.end();
-    // Shutdown() blocks until all calls have ended, and calls need turns of the loop to end.
+    state_.drain.end();
+    // Shutdown() runs on its own thread: it blocks until all calls have ended, and calls need turns of the loop to end.
     std::thread shutdown([this] { server_->Shutdown(std::chrono::system_clock::now()); });
     while (!io().empty()) io().turn();
     shutdown.join();
@@ -159,17 +174,38 @@ class Bench {
   }
 
   IoLoop& io() { return io_->loop(0); }
-  Host& host() { return host_; }
+  RpcState& state() { return state_; }
   v1::QueryService::Stub& stub() { return *stub_; }
 
+  // Runs `client` on a new thread, and turns of the loop until a call has arrived and all calls have ended. Then calls
+  // `ended`, and runs further turns until the client has ended.
+  void serve_until_idle(const std::function<void()>& client, const std::function<void()>& ended) {
+    std::atomic<bool> over{false};
+    std::thread thread([&] {
+      client();
+      over = true;
+      io().post(nudge_);
+    });
+    while (io().idle()) io().turn();
+    while (!io().idle()) io().turn();
+    ended();
+    while (!over) io().turn();
+    thread.join();
+  }
+
   void drain() {
-    host_.drain.begin();
+    state_.drain.begin();
     io_->drain();
+  }
+  // Leaves no memory except the reserve of small claims.
+  void fill_memory() {
+    memory_used_ = limits::kMaxMemory;
+    state_.memory.refresh();
   }
   void break_connection() { shutdown(client_end_, SHUT_RDWR); }
 
-  // Runs `client` on a thread, takes `before` turns, interrupts, and takes turns until the client has ended and no call
-  // is left. Returns false if the client ended before the interruption.
+  // Runs `client` on a new thread. Runs `before` turns of the loop, calls `interruption`, and runs further turns until
+  // the client has ended and the loop has no calls. Returns false if the client ended before the interruption.
   template <class Interruption>
   bool interrupt(int before, const std::function<void()>& client, const Interruption& interruption) {
     std::atomic<bool> over{false};
@@ -189,7 +225,8 @@ class Bench {
  private:
   void nudged(bool) {}
 
-  Host host_;
+  std::atomic<uint64_t> memory_used_{0};
+  RpcState state_{limits::kMaxCalls, limits::kMaxStreams, limits::kMaxMemory, [this] { return memory_used_.load(); }};
   Service service_;
   std::unique_ptr<IoThreads> io_;
   std::unique_ptr<grpc::Server> server_;
@@ -209,7 +246,7 @@ v1::StreamQueriesRequest message(uint64_t sequence, uint64_t what) {
   return request;
 }
 
-// Messages of a client's stream, and the answers to them.
+// A client's stream: the messages that hold() sends, and the sequence numbers of the answers.
 struct Conversation {
   std::vector<uint64_t> messages = {kAtOnce, kElsewhere, kHeld, kRefused, kAside, kHoldsOthers, kAtOnce, kHeld, kLetGo};
   grpc::ClientContext context;
@@ -228,7 +265,8 @@ struct Conversation {
   }
 };
 
-// Holds conversations that are interrupted after 0, 1, 2, ... events, until one ends before its interruption.
+// Runs one conversation after another, interrupted after 0, 1, 2, ... events, until a conversation ends before its
+// interruption.
 template <class Stream, class Interruption, class Check>
 void after_every_event(const Interruption& interruption, const Check& check) {
   bool in_time = true;
@@ -239,7 +277,7 @@ void after_every_event(const Interruption& interruption, const Check& check) {
     in_time = bench.interrupt(
         before, [&] { conversation.hold(bench.stub()); }, [&] { interruption(bench, conversation); });
     check(conversation);
-    EXPECT_EQ(bench.host().streams.used(), 0u);
+    EXPECT_EQ(bench.state().streams.used(), 0u);
   }
 }
 
@@ -261,6 +299,39 @@ TYPED_TEST(HotCallTest, EveryMessageIsAnsweredOnceInTheOrderOfTheRpc) {
   EXPECT_EQ(sorted, TypeParam::kInOrder);
 }
 
+TYPED_TEST(HotCallTest, AMessageThatIsRefusedUnreadIsAnsweredUnderItsSequenceAndTheStreamContinues) {
+  Bench<TypeParam> bench;
+  bench.fill_memory();
+  std::map<uint64_t, v1::Error> errors;
+  grpc::Status status;
+  bench.interrupt(
+      0,
+      [&] {
+        grpc::ClientContext context;
+        set_timeout(context);
+        const auto stream = bench.stub().StreamQueries(&context);
+        v1::StreamQueriesRequest large = message(1, kAtOnce);
+        large.mutable_batch()->add_blocks()->mutable_rays()->mutable_origins()->Resize(300'000, 0.f);
+        stream->Write(large);
+        v1::StreamQueriesRequest many = message(2, kAtOnce);
+        many.clear_scene();
+        for (uint32_t i = 0; i <= limits::kMaxBlocks; ++i) many.mutable_batch()->add_blocks();
+        stream->Write(many);
+        stream->Write(message(3, kAtOnce));
+        stream->WritesDone();
+        v1::StreamQueriesResponse response;
+        while (stream->Read(&response)) errors[response.sequence()] = response.error();
+        status = stream->Finish();
+      },
+      [] {});
+  EXPECT_TRUE(status.ok()) << status.error_message();
+  ASSERT_EQ(errors.size(), 3u);
+  EXPECT_EQ(errors[1].limit(), "memory_bytes");
+  EXPECT_GT(errors[1].retry_after_ms(), 0u);
+  EXPECT_EQ(errors[2].limit(), "blocks");
+  EXPECT_EQ(errors[3].code(), 0);
+}
+
 TYPED_TEST(HotCallTest, ACallerMayGiveUpAfterAnyEventOfItsStream) {
   after_every_event<TypeParam>([](auto&, Conversation& conversation) { conversation.context.TryCancel(); },
                                [](const Conversation& conversation) {
@@ -280,7 +351,7 @@ TYPED_TEST(HotCallTest, TheServerMayDrainAfterAnyEventOfAStreamAndAnswersTheMess
       [](Conversation& conversation) {
         if (!conversation.status.ok())
           expect_refused(conversation.status, {grpc::StatusCode::UNAVAILABLE, v1::REASON_DRAINING, ""});
-        // The answered messages must be the first ones, each once.
+        // The answered messages must be the first messages of the stream, each answered once.
         std::sort(conversation.answers.begin(), conversation.answers.end());
         for (size_t i = 0; i < conversation.answers.size(); ++i) EXPECT_EQ(conversation.answers[i], i + 1);
       });
@@ -290,7 +361,7 @@ TEST(UnaryHotCallTest, ACallMayEndInAnyWayAfterAnyEvent) {
   for (const uint64_t what : {kAtOnce, kElsewhere, kHeld, kRefused, kAside})
     for (const char* how : {"cancel", "break", "drain"}) {
       bool in_time = true;
-      // A held call has one event before its end: its arrival.
+      // A call of kHeld has only one event before its end, its arrival, so further interruptions would wait for ever.
       for (int before = 0; in_time && (what != kHeld || before < 2); ++before) {
         SCOPED_TRACE(testing::Message() << how << " " << what << " after " << before);
         Bench<Streamed<false>> bench;
@@ -309,9 +380,32 @@ TEST(UnaryHotCallTest, ACallMayEndInAnyWayAfterAnyEvent) {
               if (how == std::string("break")) bench.break_connection();
               if (how == std::string("drain")) bench.drain();
             });
-        EXPECT_EQ(bench.host().calls.used(), 0u);
+        EXPECT_EQ(bench.state().calls.used(), 0u);
       }
     }
+}
+
+TYPED_TEST(HotCallTest, AStreamWhoseAnswersNobodyReadsIsCancelledAndReturnsItsMemory) {
+  Bench<TypeParam> bench;
+  bench.state().stall_limit = std::chrono::milliseconds(1);
+  std::promise<void> ended;
+  grpc::Status status;
+  bench.serve_until_idle(
+      [&] {
+        grpc::ClientContext context;
+        set_timeout(context);
+        const auto stream = bench.stub().StreamQueries(&context);
+        stream->Write(message(1, kBulky));
+        ended.get_future().wait();
+        v1::StreamQueriesResponse response;
+        while (stream->Read(&response)) {
+        }
+        status = stream->Finish();
+      },
+      [&] { ended.set_value(); });
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::CANCELLED);
+  EXPECT_EQ(bench.state().streams.used(), 0u);
+  EXPECT_EQ(bench.state().memory.claimed(server::MemoryLine::kReplies), 0u);
 }
 
 TEST(UnaryHotCallTest, ACallMayArriveWhileTheServerEnds) {
@@ -325,13 +419,13 @@ TEST(UnaryHotCallTest, ACallMayArriveWhileTheServerEnds) {
       v1::QueryResponse response;
       bench.stub().Query(&context, request, &response);
     });
-    // The delays end the server from before the call arrives until long after. The call stays in the queue meanwhile,
-    // because no turn is taken.
+    // Because of the different delays, the server ends before the call's arrival, at about that time, or long after. A
+    // call that has arrived stays in the completion queue until end(), because the loop runs no turn before.
     std::this_thread::sleep_for(std::chrono::microseconds(100 * i));
     bench.end();
     client.join();
     EXPECT_TRUE(bench.io().empty());
-    EXPECT_EQ(bench.host().calls.used(), 0u);
+    EXPECT_EQ(bench.state().calls.used(), 0u);
   }
 }
 

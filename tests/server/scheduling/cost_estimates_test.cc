@@ -9,7 +9,8 @@
 namespace locus::server {
 namespace {
 
-// Makes a block of the given kind. Its number of queries comes from the columns; their values are never read.
+// Makes a block of the given kind. The estimates depend on the lengths of its columns, which give the number of
+// queries, not on the values.
 QueryBlock block_of(decltype(QueryBlock::kind) kind, Source source = Source::kBoth) {
   QueryBlock block;
   block.kind = kind;

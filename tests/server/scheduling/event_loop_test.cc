@@ -14,7 +14,7 @@ namespace {
 
 using std::chrono::steady_clock;
 
-// Event source: a queue of tags. Fails the test if two threads wait in next() at once.
+// Event source that returns tags from a queue. Fails the test if two threads wait in next() at once.
 class QueueSource final : public EventSource {
  public:
   void put(EventTag& tag) {
@@ -73,7 +73,7 @@ class Work final : public DeferredTask {
   std::function<void()> run_, done_;
 };
 
-// Event loop that `threads` threads run until it is destroyed.
+// Event loop with `threads` threads that run its turns until the destructor.
 class Served {
  public:
   explicit Served(size_t threads) {
@@ -109,7 +109,7 @@ TEST(EventLoopTest, PostedTagsArriveInOrderWhileTheLeaderSleeps) {
 
 TEST(EventLoopTest, ALongDeferredTaskHandsTheLeadToAnotherThread) {
   std::latch meet(2), all(2);
-  // Each task waits for the other, so on one thread neither would end.
+  // Each of the two tasks waits for the other, so if both ran on one thread, neither would end.
   const auto run = [&meet] { meet.arrive_and_wait(); };
   Work one(run, [&all] { all.count_down(); }), other(run, [&all] { all.count_down(); });
   Served served(2);
@@ -192,7 +192,8 @@ TEST(EventLoopTest, TheEndOfTheSourceStopsEveryThread) {
   std::this_thread::sleep_for(std::chrono::milliseconds(5));
 }
 
-// Handlers share data without a lock, which ThreadSanitizer verifies. Every event and every task is handled once.
+// Handlers change `shared` without a lock, so ThreadSanitizer would report handlers that run concurrently. The final
+// count shows that every event and every task is handled once.
 TEST(EventLoopTest, HandlersNeverRunConcurrentlyAndNoEventIsLost) {
   constexpr uint64_t kChains = 24, kSteps = 400;
   uint64_t shared = 0;  // data shared by handlers
@@ -200,7 +201,8 @@ TEST(EventLoopTest, HandlersNeverRunConcurrentlyAndNoEventIsLost) {
   std::latch all(kChains);
   Served served(3);
 
-  // Cycle: an event, a deferred task, a post by another thread, a timer, and again an event.
+  // Chain of kSteps events. Each event causes the next in a randomly chosen way: by the source, a post, a timer, or a
+  // deferred task.
   struct Chain {
     Chain(uint64_t number, Served& with, uint64_t& count, std::atomic<uint64_t>& works, std::latch& end)
         : served(with),

@@ -15,7 +15,8 @@ using testing::ElementsAre;
 
 constexpr uint64_t kTurn = 10;
 
-// Returns the clients of the next `count` turns. An entry is its client times 1000 plus an index, and stays queued.
+// Returns the clients of the next `count` turns. An entry of the queue is 1000 times the client's number, plus an
+// index. Entries stay queued.
 std::vector<uint64_t> clients_in_turn(FairQueue<int>& queue, int count) {
   std::vector<uint64_t> clients;
   for (int i = 0; i < count; ++i) clients.push_back(static_cast<uint64_t>(queue.next(kTurn) / 1000));
@@ -100,7 +101,8 @@ TEST(FairQueueTest, IdleClientsAreForgotten) {
   EXPECT_LE(queue.clients(), FairQueue<int>::kMaxIdleClients);
 }
 
-// Turns of random cost: clients that always wait get equal work, up to the cost of one turn.
+// The costs of turns are random. Clients whose entries always wait get equal work; the difference is at most the cost
+// of one turn.
 TEST(FairQueueTest, SharesAreEqualByWorkNotByTurns) {
   FairQueue<int> queue;
   std::mt19937 random(1);
@@ -109,7 +111,7 @@ TEST(FairQueueTest, SharesAreEqualByWorkNotByTurns) {
   constexpr uint64_t kMax = 100;
   for (int i = 0; i < 10'000; ++i) {
     const int client = queue.next(kTurn) / 1000;
-    // The turns of client 5 are long.
+    // The turns of client 5 are longer than those of other clients.
     const uint64_t cost = random() % (client == 5 ? kMax : 5);
     queue.charge(static_cast<uint64_t>(client), static_cast<int64_t>(cost) - static_cast<int64_t>(kTurn));
     had[client] += static_cast<double>(cost);

@@ -12,39 +12,59 @@
 namespace locus::server {
 namespace {
 
-constexpr uint64_t kLimit = 3200;
+// Limit whose ceiling for growth is kCeiling.
+constexpr uint64_t kLimit = 3657;
+constexpr uint64_t kCeiling = 3200;
 
 class MemoryBudgetTest : public testing::Test {
  protected:
   MemoryBudget::Meter meter() {
-    return {[this] {
-              ++measurements_;
-              return used_;
-            },
-            [this] {
-              ++given_back_;
-              used_ -= spare_;
-              spare_ = 0;
-            }};
+    return [this] {
+      ++measurements_;
+      return used_;
+    };
   }
 
   uint64_t used_ = 0;
-  uint64_t spare_ = 0;  // part of used_ that release_memory() frees
   int measurements_ = 0;
-  int given_back_ = 0;
 };
+
+TEST_F(MemoryBudgetTest, AConnectionMayHoldHalfOfWhatIsLeftForClaims) {
+  constexpr uint64_t kLarge = uint64_t{1} << 30;
+  used_ = kLarge / 2;
+  MemoryBudget budget(kLarge, meter());
+  EXPECT_EQ(budget.connection_share(), kLarge / 4);
+  const absl::StatusOr<MemoryBudget::Claim> claim = budget.claim(MemoryLine::kReplies, "", kLarge / 4);
+  ASSERT_TRUE(claim.ok());
+  used_ += kLarge / 4;  // the claimed memory exists now
+  budget.refresh();
+  EXPECT_EQ(budget.connection_share(), kLarge / 4) << "claims do not make it smaller";
+  used_ = kLarge * 2;
+  budget.refresh();
+  EXPECT_GT(budget.connection_share(), 0u) << "half of the reserve of small claims";
+  EXPECT_LT(budget.connection_share(), kLarge / 16);
+}
+
+TEST_F(MemoryBudgetTest, RefusedClaimsAreCountedForEachLine) {
+  used_ = kLimit;
+  MemoryBudget budget(kLimit, meter());
+  EXPECT_FALSE(budget.claim(MemoryLine::kDumps, "", 100).ok());
+  EXPECT_FALSE(budget.claim(MemoryLine::kDumps, "", 100).ok());
+  EXPECT_EQ(budget.refused(MemoryLine::kDumps), 2u);
+  EXPECT_EQ(budget.refused(MemoryLine::kUploads), 0u);
+}
 
 TEST_F(MemoryBudgetTest, WorkFitsUpToTheLimitAndNotBeyond) {
   used_ = 1200;
   MemoryBudget budget(kLimit, meter());
-  EXPECT_TRUE(budget.claim("inserts", 2000).ok());
-  EXPECT_FALSE(budget.claim("inserts", 2001).ok());
+  EXPECT_TRUE(budget.claim(MemoryLine::kUploads, "inserts", 2000).ok());
+  EXPECT_FALSE(budget.claim(MemoryLine::kUploads, "inserts", 2001).ok());
 }
 
 TEST_F(MemoryBudgetTest, ARefusalNamesTheLimitAndWhatToDo) {
   used_ = 3000;
   MemoryBudget budget(kLimit, meter());
-  const absl::Status status = budget.claim("inserts", 500).status();
+  const absl::Status status = budget.claim(MemoryLine::kUploads, "inserts", 500).status();
   EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted);
   EXPECT_THAT(std::string(status.message()), testing::HasSubstr("--memory-limit"));
   const std::optional<Refusal> refusal = refusal_of(status);
@@ -58,47 +78,120 @@ TEST_F(MemoryBudgetTest, ARefusalNamesTheLimitAndWhatToDo) {
 
 TEST_F(MemoryBudgetTest, AClaimCountsUntilTheWorkEnds) {
   MemoryBudget budget(kLimit, meter());
-  std::optional<MemoryBudget::Claim> first(*budget.claim("mesh", 3000));
-  EXPECT_FALSE(budget.claim("mesh", 300).ok());
+  std::optional<MemoryBudget::Claim> first(*budget.claim(MemoryLine::kUploads, "mesh", 3000));
+  EXPECT_FALSE(budget.claim(MemoryLine::kUploads, "mesh", 300).ok());
   first.reset();
-  EXPECT_TRUE(budget.claim("mesh", 300).ok());
+  EXPECT_TRUE(budget.claim(MemoryLine::kUploads, "mesh", 300).ok());
 }
 
 TEST_F(MemoryBudgetTest, MemoryUsedByEndedWorkCountsAfterwards) {
   MemoryBudget budget(kLimit, meter());
-  EXPECT_TRUE(budget.claim("mesh", 3000).ok());
+  EXPECT_TRUE(budget.claim(MemoryLine::kUploads, "mesh", 3000).ok());
   used_ = 2500;
-  EXPECT_FALSE(budget.claim("mesh", 800).ok());
-  EXPECT_TRUE(budget.claim("mesh", 700).ok());
+  EXPECT_FALSE(budget.claim(MemoryLine::kUploads, "mesh", 800).ok());
+  EXPECT_TRUE(budget.claim(MemoryLine::kUploads, "mesh", 700).ok());
 }
 
-TEST_F(MemoryBudgetTest, MemoryIsReleasedBeforeWorkIsRefused) {
+TEST_F(MemoryBudgetTest, MemoryIsMeasuredBeforeWorkIsRefused) {
   used_ = 3000;
-  spare_ = 1000;
   MemoryBudget budget(kLimit, meter());
-  EXPECT_TRUE(budget.claim("inserts", 1200).ok());
-  EXPECT_EQ(given_back_, 1);
+  used_ = 2000;
+  EXPECT_TRUE(budget.claim(MemoryLine::kUploads, "inserts", 1200).ok());
+  EXPECT_FALSE(budget.take_shortage());
 }
 
-TEST_F(MemoryBudgetTest, WorkLargerThanTheLimitReleasesNoMemory) {
+TEST_F(MemoryBudgetTest, WorkLargerThanTheLimitIsNoShortage) {
   MemoryBudget budget(kLimit, meter());
-  EXPECT_FALSE(budget.claim("mesh", kLimit + 1).ok());
-  EXPECT_FALSE(budget.claim("mesh", UINT64_MAX).ok());
-  EXPECT_EQ(given_back_, 0);
+  EXPECT_FALSE(budget.claim(MemoryLine::kUploads, "mesh", kCeiling + 1).ok());
+  EXPECT_FALSE(budget.claim(MemoryLine::kUploads, "mesh", UINT64_MAX).ok());
+  EXPECT_FALSE(budget.take_shortage());
 }
 
-TEST_F(MemoryBudgetTest, WorkThatIsNeverRefusedReleasesMemoryToo) {
+TEST_F(MemoryBudgetTest, ARefusedClaimIsAShortageThatIsReportedOnce) {
   used_ = 3300;
-  spare_ = 1000;
   MemoryBudget budget(kLimit, meter());
-  for (int i = 0; i < 3; ++i) const MemoryBudget::Claim claim = budget.claim_anyway(60);
-  EXPECT_EQ(given_back_, 1);
-  EXPECT_LE(used_, kLimit);
+  for (int i = 0; i < 3; ++i) EXPECT_FALSE(budget.claim(MemoryLine::kUploads, "mesh", 60).ok());
+  EXPECT_TRUE(budget.take_shortage());
+  EXPECT_FALSE(budget.take_shortage());
+}
+
+TEST_F(MemoryBudgetTest, GrowthIsRefusedFirstThenMovesThenQueries) {
+  constexpr uint64_t kLarge = uint64_t{1} << 30;
+  used_ = kLarge - kLarge / 8;
+  MemoryBudget budget(kLarge, meter());
+  constexpr uint64_t kSome = 1u << 20;
+  EXPECT_FALSE(budget.claim(MemoryLine::kUploads, "mesh", kSome).ok());
+  EXPECT_FALSE(budget.claim(MemoryLine::kDumps, "mesh", kSome).ok());
+  EXPECT_FALSE(budget.claim(MemoryLine::kInserts, "inserts", kSome).ok());
+  EXPECT_TRUE(budget.claim(MemoryLine::kMoves, "moves", kSome).ok());
+  used_ = kLarge - 3 * (kLarge / 32);
+  budget.refresh();
+  EXPECT_FALSE(budget.claim(MemoryLine::kMoves, "moves", kSome).ok());
+  EXPECT_TRUE(budget.claim(MemoryLine::kRequests, "", kSome).ok());
+  EXPECT_TRUE(budget.claim(MemoryLine::kReplies, "", kSome).ok());
+  used_ = kLarge;
+  budget.refresh();
+  EXPECT_FALSE(budget.claim(MemoryLine::kReplies, "", kSome).ok());
+}
+
+TEST_F(MemoryBudgetTest, SmallClaimsHaveAReserveThatIsBounded) {
+  used_ = 2 * kLimit;
+  MemoryBudget budget(kLimit, meter());
+  std::vector<MemoryBudget::Claim> claims;
+  for (uint64_t owner = 0; owner < 4; ++owner) {
+    for (int i = 0; i < 16; ++i) {  // 1 MiB each
+      absl::StatusOr<MemoryBudget::Claim> claim = budget.claim(MemoryLine::kRequests, "", 64u << 10, owner);
+      ASSERT_TRUE(claim.ok()) << claim.status();
+      claims.push_back(*std::move(claim));
+    }
+    EXPECT_FALSE(budget.claim(MemoryLine::kReplies, "", 1, owner).ok());
+  }
+  EXPECT_FALSE(budget.claim(MemoryLine::kReplies, "", 1, 4).ok());
+  EXPECT_FALSE(budget.claim(MemoryLine::kInserts, "", 1, 4).ok());
+  claims.pop_back();
+  EXPECT_TRUE(budget.claim(MemoryLine::kReplies, "", 1, 4).ok());
+  EXPECT_FALSE(budget.claim(MemoryLine::kReplies, "", (64u << 10) + 1, 4).ok());
+  claims.clear();
+  EXPECT_TRUE(budget.claim(MemoryLine::kReplies, "", 64u << 10, 0).ok());
+}
+
+TEST_F(MemoryBudgetTest, OrdinaryClaimsLeaveTheReserveToOthers) {
+  constexpr uint64_t kLarge = uint64_t{1} << 30;
+  MemoryBudget budget(kLarge, meter());
+  std::vector<MemoryBudget::Claim> claims;
+  while (true) {
+    absl::StatusOr<MemoryBudget::Claim> claim = budget.claim(MemoryLine::kReplies, "", 12u << 20, 1);
+    if (!claim.ok()) break;
+    claims.push_back(*std::move(claim));
+  }
+  EXPECT_LT(budget.ceiling(MemoryLine::kReplies) - budget.taken(), 12u << 20);
+  for (int i = 0; i < 1000; ++i) {  // the first owner fills the rest, and its part of the reserve
+    absl::StatusOr<MemoryBudget::Claim> claim = budget.claim(MemoryLine::kReplies, "", 64u << 10, 1);
+    if (!claim.ok()) break;
+    claims.push_back(*std::move(claim));
+  }
+  EXPECT_FALSE(budget.claim(MemoryLine::kReplies, "", 64u << 10, 1).ok());
+  EXPECT_TRUE(budget.claim(MemoryLine::kRequests, "", 64u << 10, 2).ok());
+  EXPECT_LE(budget.taken(), kLarge);
+}
+
+TEST_F(MemoryBudgetTest, AClaimCanShrinkAndMove) {
+  MemoryBudget budget(kLimit, meter());
+  MemoryBudget::Claim claim = *budget.claim(MemoryLine::kUploads, "mesh", 3000);
+  claim.shrink(100);
+  claim.shrink(500);
+  EXPECT_EQ(claim.bytes(), 100u);
+  EXPECT_EQ(budget.claimed(MemoryLine::kUploads), 100u);
+  MemoryBudget::Claim other = std::move(claim);
+  claim = MemoryBudget::Claim();
+  EXPECT_EQ(budget.claimed(MemoryLine::kUploads), 100u);
+  other.release();
+  EXPECT_EQ(budget.claimed(MemoryLine::kUploads), 0u);
 }
 
 TEST_F(MemoryBudgetTest, SmallWorkIsMeasuredRarely) {
   MemoryBudget budget(kLimit, meter());
-  for (int i = 0; i < 1000; ++i) EXPECT_TRUE(budget.claim("inserts", 1).ok());
+  for (int i = 0; i < 1000; ++i) EXPECT_TRUE(budget.claim(MemoryLine::kUploads, "inserts", 1).ok());
   EXPECT_LT(measurements_, 20);
 }
 
@@ -111,12 +204,12 @@ TEST_F(MemoryBudgetTest, ManyThreadsNeverClaimMoreThanTheLimit) {
   for (int i = 0; i < 4; ++i)
     threads.emplace_back([&] {
       for (int round = 0; round < 300; ++round) {
-        const absl::StatusOr<MemoryBudget::Claim> claim = budget.claim("inserts", 1000);
+        const absl::StatusOr<MemoryBudget::Claim> claim = budget.claim(MemoryLine::kUploads, "inserts", 1000);
         if (!claim.ok()) continue;
         {
           MutexLock lock(mutex);
           claimed += 1000;
-          exceeded = exceeded || claimed > kLimit;
+          exceeded = exceeded || claimed > kCeiling;
         }
         MutexLock lock(mutex);
         claimed -= 1000;

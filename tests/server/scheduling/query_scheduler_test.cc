@@ -21,7 +21,7 @@ using testing::HasSubstr;
 constexpr uint64_t kTurn = 100'000;
 constexpr uint64_t kSmall = 200'000, kLarge = 2'000'000;
 
-// Clock of each thread, which advances only while a job works on it.
+// Clock of this thread, in nanoseconds; it advances only while a job works on this thread.
 thread_local uint64_t worked_here = 0;
 
 SchedulerOptions options_of(uint32_t threads) {
@@ -32,7 +32,7 @@ SchedulerOptions options_of(uint32_t threads) {
   return options;
 }
 
-// List of the clients whose jobs were worked on, in order.
+// List of the clients of all turns, in the order of the turns.
 class Book {
  public:
   void add(uint64_t client) {
@@ -49,7 +49,7 @@ class Book {
   std::vector<uint64_t> turns_ LOCUS_GUARDED_BY(mutex_);
 };
 
-// Job of `turns` turns, which any number of threads may run at once.
+// Job of `turns` turns. Any number of threads may run turns at once.
 class TurnsJob final : public QueryJob {
  public:
   TurnsJob(uint32_t turns, uint64_t client = 0, Book* book = nullptr) : turns_(turns), client_(client), book_(book) {}
@@ -75,7 +75,7 @@ class TurnsJob final : public QueryJob {
     done_.fetch_add(1);
   }
 
-  // Makes one turn wait while `*hold` is true.
+  // Makes the turn with index `turn` wait while `*hold` is true.
   void hold(std::atomic<bool>* hold, uint32_t turn = 0) {
     hold_ = hold;
     held_turn_ = turn;
@@ -152,7 +152,8 @@ TEST(QuerySchedulerTest, TheRestOfAnInlineRunCanBeQueued) {
   EXPECT_EQ(scheduler.stats().inline_done, 0u);
 }
 
-// With one thread and two clients whose jobs all wait, turns alternate however many jobs each has.
+// The scheduler has one thread, and the jobs of two clients wait. Turns alternate between the clients, however many
+// jobs each client has.
 TEST(QuerySchedulerTest, AClientWithAHundredJobsDelaysAnotherByNoMoreThanItsShare) {
   Book book;
   std::vector<std::unique_ptr<TurnsJob>> jobs;
@@ -227,7 +228,7 @@ TEST(QuerySchedulerTest, AJobThatTurnsOutLargeGivesWayToSmallOnes) {
 TEST(QuerySchedulerTest, SeveralThreadsWorkOnOneJob) {
   QueryScheduler scheduler(options_of(3));
   std::atomic<uint32_t> here{0};
-  // Each turn waits until three threads are working.
+  // Job of three turns, each of which waits until three threads are working on the job.
   class Meeting final : public QueryJob {
    public:
     explicit Meeting(std::atomic<uint32_t>& here) : here_(here) {}
@@ -367,7 +368,7 @@ TEST(QuerySchedulerTest, BothClassesTogetherHaveALimitToo) {
   SchedulerOptions options = options_of(1);
   options.limit.jobs = 2;
   QueryScheduler scheduler(options);
-  Blocker blocker(scheduler);  // the first job
+  Blocker blocker(scheduler);  // occupies the first of two jobs
   TurnsJob second(1), third(1);
   ASSERT_TRUE(scheduler.submit(second, 1, kLarge).ok());
   EXPECT_EQ(refusal_of(scheduler.submit(third, 1, kSmall).status())->limit, "batches");

@@ -35,7 +35,7 @@ class SnapshotterTest : public testing::Test {
     return options;
   }
 
-  // Appends `count` records, each with one point.
+  // Applies `count` batches, each of which inserts one point and appends one record to the log.
   void apply(uint64_t count) {
     for (uint64_t i = 0; i < count; ++i) {
       const std::vector<uint64_t> ids = {++last_id_};
@@ -52,7 +52,7 @@ class SnapshotterTest : public testing::Test {
     while (snapshotter.stats().written < count) std::this_thread::yield();
   }
 
-  // Returns the scene as recovered after a crash.
+  // Simulates a crash and returns the scene that is recovered from the log.
   ScenePtr recovered() {
     crashed_ = std::make_unique<test::MemoryLog>(log_.crash());
     absl::StatusOr<ScenePtr> scene =
@@ -93,7 +93,7 @@ TEST_F(SnapshotterTest, FewRecordsCauseNoSnapshot) {
     const Snapshotter snapshotter(registry_, &log_, options);
     std::this_thread::sleep_for(milliseconds(20));
     EXPECT_EQ(snapshotter.stats().written, 0u);
-    // One more record makes a snapshot due, which shows that the scenes were checked.
+    // One more record makes a snapshot due. That it is written shows that the snapshotter checks the scene.
     apply(1);
     wait_for_snapshots(snapshotter, 1);
   }

@@ -27,7 +27,7 @@ ScenePtr make_scene(OverloadPolicy overload = OverloadPolicy::kEveryBatch, uint6
   return std::make_shared<Scene>("scene", spec, 1, StaticSet::empty());
 }
 
-// Batch that moves or inserts points and owns its columns.
+// Batch that moves or inserts points. It owns its columns.
 class Points final : public PendingUpdate {
  public:
   enum class Kind : uint8_t { kInsert, kMove };
@@ -98,7 +98,7 @@ class UpdateQueueTest : public testing::Test {
     EXPECT_TRUE(scene_->apply(batch).ok());
   }
 
-  // Returns options with which threads of the queue apply every batch.
+  // Returns options with which `threads` threads of the queue apply every batch: post() applies none itself.
   static UpdateQueueOptions without_inline(uint32_t threads = 1) {
     UpdateQueueOptions options;
     options.threads = threads;
@@ -106,7 +106,7 @@ class UpdateQueueTest : public testing::Test {
     return options;
   }
 
-  // Posts a batch that keeps the thread that applies it busy until release().
+  // Posts a batch that keeps one thread of the queue busy until the batch's release().
   std::unique_ptr<Points> occupy(UpdateQueue& queue) {
     auto held = move({1}, -1);
     held->hold();
@@ -244,7 +244,8 @@ TEST_F(UpdateQueueTest, ARefusedBatchDoesNotDelayTheNext) {
   EXPECT_TRUE(right->wait().ok());
 }
 
-// A reader was revoked and keeps its snapshot: its scene waits, other scenes do not, and the queue's thread stays free.
+// A reader's pin was revoked, but the reader keeps its snapshot. Updates of its scene wait, updates of other scenes do
+// not, and the queue's thread is not blocked.
 TEST_F(UpdateQueueTest, AReaderThatHoldsTooMuchStallsItsOwnSceneOnly) {
   const ScenePtr pinned = make_scene(OverloadPolicy::kEveryBatch, limits::kMinPinnedBytes);
   std::vector<uint64_t> ids(50'000);

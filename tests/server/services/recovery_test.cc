@@ -24,7 +24,7 @@ using test::MemoryLog;
 constexpr char kServing[] = "\x08\x01";
 constexpr char kNotServing[] = "\x08\x02";
 
-// A log whose read_snapshot() blocks until let_go() is called.
+// Log whose read_snapshot() blocks until let_go() is called.
 class HeldLog final : public MemoryLog {
  public:
   explicit HeldLog(const Kept& kept) : MemoryLog(kept) {}
@@ -50,7 +50,7 @@ class RecoveryTest : public testing::Test {
  protected:
   ~RecoveryTest() override { std::remove(socket_.c_str()); }
 
-  // Returns the contents of a log with one scene at revision 1.
+  // Returns the contents of a log that stores one scene at revision 1.
   static MemoryLog::Kept kept_world() {
     MemoryLog log;
     Registry registry(&log);

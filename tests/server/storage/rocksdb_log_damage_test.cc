@@ -1,5 +1,6 @@
 // Damages a small data directory at one position at a time (flipped bytes, truncated, zeroed and missing files) and
-// opens it twice: each scene is either refused or identical to the written one, and both openings report the same.
+// opens the directory twice. Each scene must be either refused or identical to the scene that was written, and both
+// openings must report the same damage.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -26,7 +27,7 @@ using test::StoredModel;
 // Contents of files by their paths below the data directory.
 using Files = std::map<std::string, std::string>;
 
-// How the sample's last process ended.
+// Way in which the last process that wrote the sample ended.
 enum class Ending : uint8_t { kInOrder, kKilled };
 
 struct Sample {
@@ -34,11 +35,11 @@ struct Sample {
   StoredModel model;
 };
 
-// Result of one opening.
+// Result of opening a directory once.
 struct Verdict {
-  std::string opening;                        // the error, if it did not open
-  std::map<std::string, std::string> damage;  // by scene; "" = damage of the catalogue
-  std::string difference;                     // difference from the acknowledged contents
+  std::string opening;                        // error of RocksdbLog::open(); empty if it succeeded
+  std::map<std::string, std::string> damage;  // damage by scene name; "" = the catalogue
+  std::string difference;                     // first difference from the acknowledged contents; empty if there is none
   size_t served = 0;
 
   bool operator==(const Verdict&) const = default;
@@ -66,7 +67,7 @@ StorageOptions small_options(const std::string& path, rocksdb::Env* env) {
   options.path = path;
   options.env = env;
   options.reserve_bytes = 0;
-  options.log_buffer_bytes = 1 << 16;  // RocksDB reserves that much for its log each time it opens
+  options.log_buffer_bytes = 1 << 16;  // small, because RocksDB reserves this size for its log at each opening
   options.durable_marker_delay = std::chrono::milliseconds(1);
   options.memory_sync_delay = std::chrono::milliseconds(1);
   return options;
@@ -79,8 +80,8 @@ bool write_mesh(UpdateLog& log) {
          log.delete_mesh("probe").ok();
 }
 
-// Makes a directory with a few scenes, whose snapshots and records are partly in tables and partly in the log, and with
-// meshes.
+// Makes a directory with a few scenes and meshes. Snapshots and records of the scenes are partly in tables and partly
+// in RocksDB's log.
 Sample make_sample(Ending ending, int max_steps) {
   Sample sample;
   const test::TemporaryFolder folder;
@@ -94,14 +95,15 @@ Sample make_sample(Ending ending, int max_steps) {
     const int steps = life == 2 ? max_steps / 2 : max_steps;
     const int failing = max_steps * 2 / 3;
     for (int step = 0; step < steps; ++step) {
-      // The recovery after an error writes tables.
+      // Makes a sync fail, because RocksDB writes tables when it recovers from an error.
       if (life < 2 && step == failing) faulty->fail_syncs(1);
       sample.model.step(**log, random);
       while (life < 2 && step == failing && !write_mesh(**log))
         std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
     if (life < 2 || ending == Ending::kInOrder) continue;
-    // After this the durable marker is up to date, and the files are those that a killed process leaves.
+    // After this pause the durable marker is up to date. Copies the files while the log is open, which are the files
+    // that a killed process leaves.
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
     sample.files = files_below(options.path);
   }
@@ -129,7 +131,7 @@ Verdict open_once(const std::string& path, rocksdb::Env* env, const StoredModel&
   return verdict;
 }
 
-// Opens a directory of these files `times` times; returns the result of each opening.
+// Writes `files` to a directory and opens it `times` times; returns the result of each opening.
 std::vector<Verdict> open_damaged_files(const Files& files, const StoredModel& model, int times) {
   const test::TemporaryFolder folder;
   write_files(files, folder.file("data"));
@@ -239,7 +241,7 @@ class RocksdbLogDamageTest : public ::testing::TestWithParam<Ending> {
   uint64_t served_beside_ = 0;
 };
 
-// Uses a sample so small that every byte can be damaged.
+// Fixture with a sample so small that a test can damage every byte.
 class LongRocksdbLogDamageTest : public RocksdbLogDamageTest {
  protected:
   const Sample& sample() const override {

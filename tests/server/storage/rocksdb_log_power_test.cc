@@ -1,5 +1,5 @@
-// Power losses at random moments, simulated by a file system that drops unsynced data. The Long suite runs a thousand,
-// or LOCUS_FAULT_RUNS if that is set.
+// Power losses at random moments, simulated by a file system that drops unsynced data. The Long suite simulates a
+// thousand power losses, or LOCUS_FAULT_RUNS if that is set.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -26,8 +26,8 @@ struct Outcome {
   uint64_t acknowledged = 0;
 };
 
-// Writes to a log until the power fails, in some runs after the process was killed and restarted. Returns the
-// difference between the acknowledged contents and those found afterwards.
+// Writes to a log until the power fails; for some seeds the process is killed and restarted before. Returns the
+// difference between the acknowledged contents and the contents found afterwards.
 Outcome lose_power_once(uint64_t seed, Syncing syncing) {
   Random random(seed);
   const test::TemporaryFolder folder;
@@ -38,7 +38,7 @@ Outcome lose_power_once(uint64_t seed, Syncing syncing) {
   options.path = folder.file("disk/data");
   options.env = env.get();
   options.reserve_bytes = 0;
-  options.log_buffer_bytes = 0;  // the minimum: tables are written all the time
+  options.log_buffer_bytes = 0;  // RocksDB raises it to the minimum, so that it often writes tables
   options.durable_marker_delay = std::chrono::milliseconds(1);
   options.memory_sync_delay = std::chrono::milliseconds(2);
   options.sync = syncing == Syncing::kAsPromised;

@@ -49,7 +49,7 @@ class RocksdbLogTest : public ::testing::Test {
     return *key;
   }
   void append(SceneKey scene, uint64_t count) { ASSERT_EQ(append_records(*log_, scene, 7, count), absl::OkStatus()); }
-  // Expects that the records from `first` on are intact and end at `last`.
+  // Expects that the scene's records from `first` to `last` are intact and that there are no later records.
   void expect_records(SceneKey scene, uint64_t first, uint64_t last) {
     uint64_t found = 0;
     EXPECT_EQ(record_difference(*log_, scene, first, found), "");
@@ -244,7 +244,27 @@ TEST_F(RocksdbLogTest, PartsAreKeptForEachNameAndGoWithIt) {
   EXPECT_EQ(read_mesh(*log_, hash_of(1)).status().code(), absl::StatusCode::kNotFound);
 }
 
-// The format that a directory, which nobody has open, says it has.
+TEST_F(RocksdbLogTest, DamagedContentIsStoredAgainWhenItIsUploadedAgain) {
+  // The content is larger than a block of a table, so that damage to it does not make other values unreadable.
+  const std::vector<std::string> content = {"the bytes of a mesh" + std::string(200'000, '.')};
+  ASSERT_EQ(add_mesh("a", 1, content), absl::OkStatus());
+  ASSERT_EQ(add_mesh("b", 1, content), absl::OkStatus());
+  open();  // reopens, so that RocksDB writes the content from its log into a table
+  log_ = nullptr;
+  test::flip_bit_of(content[0], options_.path + "/rocksdb");
+  open();
+  ASSERT_EQ(read_mesh(*log_, hash_of(1)).status().code(), absl::StatusCode::kDataLoss);
+  ASSERT_EQ(add_mesh("c", 1, content), absl::OkStatus());
+  EXPECT_EQ(asked_, 1u) << "the log must not rely on content that it could not read";
+  EXPECT_EQ(read_mesh(*log_, hash_of(1)).value(), content);
+  ASSERT_EQ(add_mesh("d", 1, content), absl::OkStatus());
+  EXPECT_EQ(asked_, 0u) << "now the content is stored";
+  open();
+  EXPECT_EQ(log_->stored_meshes().size(), 4u);
+  EXPECT_EQ(read_mesh(*log_, hash_of(1)).value(), content);
+}
+
+// Returns the format number that is stored in a directory. No process may have the directory open.
 uint32_t format_of(const std::string& path) {
   rocksdb::DB* raw = nullptr;
   const rocksdb::Status opened = rocksdb::DB::OpenForReadOnly(rocksdb::Options(), path + "/rocksdb", &raw);
@@ -256,7 +276,7 @@ uint32_t format_of(const std::string& path) {
   return bytes ? static_cast<uint32_t>(static_cast<unsigned char>(bytes->front())) : 0;
 }
 
-TEST_F(RocksdbLogTest, ADirectoryOfFormat1BecomesOneOfFormat2AndItsMeshesKeepTheirPartsInTheContent) {
+TEST_F(RocksdbLogTest, ADirectoryOfFormat1BecomesOneOfFormat3AndItsMeshesKeepTheirPartsInTheContent) {
   options_.path = folder_.file("sample");
   std::filesystem::copy(LOCUS_SOURCE_DIR "/tests/golden/data/format-1/data", options_.path,
                         std::filesystem::copy_options::recursive);
@@ -270,7 +290,7 @@ TEST_F(RocksdbLogTest, ADirectoryOfFormat1BecomesOneOfFormat2AndItsMeshesKeepThe
   ASSERT_EQ(log_->add_mesh("another", stored.sha256, content, parts), absl::OkStatus());
   ASSERT_EQ(log_->delete_mesh(stored.name), absl::OkStatus());
   log_ = nullptr;
-  EXPECT_EQ(format_of(options_.path), 2u);
+  EXPECT_EQ(format_of(options_.path), 3u);
   open();
   ASSERT_EQ(log_->stored_meshes().size(), 1u);
   EXPECT_FALSE(log_->stored_meshes()[0].parts_in_content);
@@ -278,7 +298,7 @@ TEST_F(RocksdbLogTest, ADirectoryOfFormat1BecomesOneOfFormat2AndItsMeshesKeepThe
   EXPECT_FALSE(read_mesh(*log_, stored.sha256)->empty());
 }
 
-TEST_F(RocksdbLogTest, WhereThePartsCannotBeHadNeitherNameNorContentIsKept) {
+TEST_F(RocksdbLogTest, AMeshWhosePartsCannotBeReadIsNotStored) {
   const test::ChunksFrom content({"content"});
   const auto parts = [] { return absl::StatusOr<std::optional<std::string>>(absl::CancelledError("enough")); };
   EXPECT_EQ(log_->add_mesh("a", hash_of(1), content, parts), absl::CancelledError("enough"));
@@ -383,7 +403,7 @@ TEST_F(RocksdbLogTest, SnapshotsFreeTheDiskSpaceOfTheLog) {
   EXPECT_LT(size(), uint64_t{40} << 20) << "of 80 MB that were written";
 }
 
-// Runs one appending thread for each scene and one thread that writes snapshots of all of them.
+// Runs one thread per scene that appends records, and one thread that writes snapshots of all scenes.
 TEST_F(RocksdbLogTest, ConcurrentAppendsAndSnapshotsKeepEveryRecord) {
   constexpr int kScenes = 8;
   const uint64_t records = test::scaled_count(200);

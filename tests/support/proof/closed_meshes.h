@@ -1,5 +1,6 @@
-// Closed meshes with a known interior, for the proof that no ray leaks out of them: neighbours have bitwise equal
-// vertices, and the ball of `inner_radius` around the origin lies inside. Plain data and functions without state.
+// Closed meshes with a known interior, for the proof that no ray leaks out of them. Neighbouring triangles have bitwise
+// equal vertices, and the ball of `inner_radius` around the origin lies inside the mesh. Plain data and functions
+// without state.
 #ifndef LOCUS_TESTS_SUPPORT_PROOF_CLOSED_MESHES_H_
 #define LOCUS_TESTS_SUPPORT_PROOF_CLOSED_MESHES_H_
 
@@ -16,11 +17,12 @@ namespace locus::test {
 struct ClosedMesh {
   std::vector<Triangle> triangles;
   double inner_radius;
-  double lattice = 0;  // all coordinates are multiples of it; 0: no lattice
+  double lattice = 0;  // all coordinates are multiples of this number; 0 means no lattice
 };
 
-// Halves each edge of an icosahedron `level` times and projects the vertices to a sphere of radius 1 plus or minus
-// `noise`; vertices are rounded to multiples of `lattice` unless that is 0. 20 * 4^level triangles.
+// Returns a mesh of 20 * 4^level triangles: an icosahedron whose edges are halved `level` times and whose vertices are
+// projected to a distance of 1 plus or minus `noise` from the origin. Unless `lattice` is 0, coordinates are rounded to
+// multiples of `lattice`.
 inline ClosedMesh icosphere(int level, double noise, double lattice, uint64_t seed) {
   using Corners = std::array<size_t, 3>;
   const double g = (1 + std::sqrt(5.0)) / 2;

@@ -1,15 +1,16 @@
-// The proof that no ray leaves a closed mesh: rays from positions inside it, aimed at its corners and edges, through
-// the server's query engine, by every instruction set, as first, any and all hits. One thread.
+// The proof that no ray leaves a closed mesh: rays from positions inside the mesh, aimed at its corners and edges, are
+// traced by the server's query engine, with every instruction set, as first, any and all hits. One thread.
 //
-// Precision of the aim: a request holds floats, an origin relative to its frame and a direction. The position inside is
-// rounded to float there and, at frame + offset, to double; the direction is computed in double from the rounded
-// origin, and rounded to float once. So a ray passes its corner or edge at a distance of about 2^-24 of its length:
-// below the resolution of float. Rays of lattice meshes, which are not rotated and only moved by whole numbers, are
-// exact in all of these steps and pass through the corner or the point of the edge itself.
+// Precision of the aim: a request contains, as floats, the direction of a ray and the offset of its origin from the
+// frame. So the position inside the mesh is rounded twice: the offset to float, and frame + offset to double. The
+// direction is computed in double from the rounded origin, and rounded to float once. So a ray passes its corner or
+// edge at a distance of about 2^-24 of the ray's length: below the resolution of float. Lattice meshes are not rotated
+// and are only moved by whole numbers, so all of these steps are exact for their rays: such a ray passes through the
+// corner, or through a point of the edge.
 //
-// The origin is inside nevertheless: the error of the offset is 2^-24 of itself, at most 2^-19 of the mesh's radius;
-// that of the sum with a frame of up to 2e6 is 2^-33, which is 2^-23 of the smallest radius here, 1e-3. The positions
-// keep a distance of 5 % of the inner radius from its end.
+// The rounded origin is still inside the mesh. The error of the offset is 2^-24 of the offset, at most 2^-19 of the
+// mesh's radius. The error of frame + offset, with a frame of up to 2e6, is 2^-33, which is 2^-23 of the smallest
+// radius used, 1e-3. Positions are at most 95 % of the inner radius away from the centre.
 #ifndef LOCUS_TESTS_SUPPORT_PROOF_LEAK_PROOF_H_
 #define LOCUS_TESTS_SUPPORT_PROOF_LEAK_PROOF_H_
 
@@ -26,7 +27,7 @@
 namespace locus::test {
 
 struct LeakTally {
-  uint64_t rays = 0;  // each asked as first, any and all hits by each instruction set
+  uint64_t rays = 0;  // number of rays; each is traced for first, any and all hits by each instruction set
   uint64_t leaks = 0;
   std::vector<std::string> first_leaks;
 
@@ -38,8 +39,8 @@ struct LeakTally {
   }
 };
 
-// Returns two icospheres, a blob and an icosphere on a lattice; with some thousands of triangles, or with tens of
-// thousands if `finer` is 1.
+// Returns four closed meshes: two icospheres, a blob and an icosphere on a lattice. The meshes have 1,280 to 5,120
+// triangles if `finer` is 0, and 5,120 to about 50,000 triangles if `finer` is 1.
 inline std::vector<ClosedMesh> meshes_with_an_inside(int finer, uint64_t seed) {
   return {icosphere(4 + finer, 0.01, 0, seed), icosphere(3 + finer, 0.1, 0, seed + 1),
           small_blob(finer == 0 ? 5'000 : 50'000, seed), icosphere(3 + finer, 0.02, 0x1p-12, seed)};
@@ -49,7 +50,8 @@ class LeakProof {
  public:
   LeakProof(uint64_t seed, std::vector<ClosedMesh> meshes) : seed_(seed), meshes_(std::move(meshes)) {}
 
-  // Runs `rays` rays in all, equally many for each mesh, placed at that scale and distance from the origin.
+  // Traces `rays` rays in total, the same number for each mesh. Each mesh is scaled by `scale`, either in its vertices
+  // or in its transform, and its position on each axis is at most `distance` from the origin.
   LeakTally run(double scale, double distance, uint64_t rays) const {
     Random random(seed_ + static_cast<uint64_t>(distance));
     LeakTally tally;
@@ -85,12 +87,12 @@ class LeakProof {
     placed.rotation = random.rotation();
     if (mesh.lattice == 0) return placed;
     placed.rotation = {};
-    if (scale < 1) placed.scale = 0x1p-10f;  // where 1e-3 would be rounded
+    if (scale < 1) placed.scale = 0x1p-10f;  // a power of two, because 1e-3 would be rounded
     for (int axis = 0; axis < 3; ++axis) placed.translation[axis] = std::round(placed.translation[axis]);
     return placed;
   }
 
-  // Returns a position within 95 % of the inner radius, in mesh axes.
+  // Returns a random position, in mesh axes, whose distance from the origin is at most 95 % of the inner radius.
   static Vec3d place_inside(const ClosedMesh& mesh, Random& random) {
     Vec3d place = random.unit_vector() * (mesh.inner_radius * random.between(0, 0.95));
     for (int axis = 0; axis < 3 && mesh.lattice != 0; ++axis)
@@ -98,7 +100,8 @@ class LeakProof {
     return place;
   }
 
-  // Returns a corner, the middle of the edge after it, or another point of that edge, sometimes very near the corner.
+  // Returns a corner of the triangle, the middle of the edge that starts at this corner, or another point of this edge,
+  // sometimes very near the corner.
   static Vec3d place_of_border(const ClosedMesh& mesh, const Triangle& triangle, uint64_t turn, Random& random) {
     const Vec3d corners[] = {to_double(triangle.a), to_double(triangle.b), to_double(triangle.c)};
     const Vec3d from = corners[turn % 3], along = corners[(turn + 1) % 3] - from;
@@ -109,11 +112,11 @@ class LeakProof {
     return from + along * (random.chance(0.3) ? random.magnitude(-30, -1) : random.unit());
   }
 
-  // Aims at the triangles in turn, at all corners and edges of each, in an order that spreads few rays over the whole
-  // mesh.
+  // Returns the rays with the numbers `first` to `first` + kBlockRays - 1. Each ray is aimed at a corner or an edge of
+  // a triangle. Successive rays take triangles kStride apart, so that even a few rays are spread over the whole mesh.
   static OwnedBlock rays_at_borders(const ClosedMesh& mesh, const Transform& transform, uint64_t first,
                                     Random& random) {
-    constexpr uint64_t kStride = 7'919;  // a prime that divides no number of triangles here
+    constexpr uint64_t kStride = 7'919;  // a prime that does not divide any mesh's number of triangles
     OwnedBlock block = rays_along_x(RayMode::kFirst, {});
     block.sizes.clear();
     const uint64_t count = mesh.triangles.size();
@@ -125,7 +128,7 @@ class LeakProof {
     for (uint64_t i = first; i < first + kBlockRays; ++i) {
       const Vec3d inside = transform.translation + turned(place_inside(mesh, random));
       const Vec3f offset = to_float(inside - block.settings.frame);
-      const Vec3d origin = block.settings.frame + to_double(offset);  // the rounding of the server
+      const Vec3d origin = block.settings.frame + to_double(offset);  // rounded as by the server
       const Vec3d target = place_of_border(mesh, mesh.triangles[i * kStride % count], i / count, random);
       const Vec3f direction = to_float(turned(target) - (origin - transform.translation));
       block.points.insert(block.points.end(), {offset.x, offset.y, offset.z});

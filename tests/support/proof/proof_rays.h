@@ -1,6 +1,6 @@
-// The rays of the proof that no ray misses: random ones; ones aimed at the interiors, edges and corners of triangles;
-// ones that start on triangles, graze them or come from far away; and rays of a lattice from the planes of walls.
-// Functions of the generator's state alone.
+// The rays of the proof that no ray misses: random rays; rays aimed at the interiors, edges and corners of triangles;
+// rays that start on triangles, graze triangles or start far away; and rays along the lattice of a mesh from the planes
+// of the mesh's walls. The rays depend only on the state of the random generator.
 #ifndef LOCUS_TESTS_SUPPORT_PROOF_PROOF_RAYS_H_
 #define LOCUS_TESTS_SUPPORT_PROOF_PROOF_RAYS_H_
 
@@ -28,7 +28,7 @@ inline Vec3d inner_point(const Triangle& triangle, Random& random) {
   return point_in(triangle, u, random.unit() * (1 - u));
 }
 
-// Returns a corner, or a point of the edge between the first and the second vertex.
+// Returns the first corner, or a point of the edge between the first and the second corner.
 inline Vec3d boundary_point(const Triangle& triangle, Random& random) {
   return random.chance(0.3) ? to_double(triangle.a) : point_in(triangle, random.chance(0.3) ? 0.5 : random.unit(), 0);
 }
@@ -61,7 +61,7 @@ inline MeshRay surface_ray(const ProofMesh& mesh, Random& random) {
   return {origin, inner_point(random.pick(mesh.triangles), random)};
 }
 
-// Draws a ray that is nearly in the triangle's plane, down to a slope of a millionth.
+// Generates a ray that is nearly in the triangle's plane, down to a slope of a millionth.
 inline MeshRay grazing_ray(const ProofMesh& mesh, Random& random) {
   const Triangle& triangle = random.pick(mesh.triangles);
   const Vec3d from = inner_point(triangle, random), to = inner_point(triangle, random);
@@ -74,7 +74,7 @@ inline MeshRay far_ray(const ProofMesh& mesh, Random& random) {
   return {target + random.unit_vector() * mesh.size * random.magnitude(0, 10), target};
 }
 
-// Draws a ray from a point of the lattice, usually on a wall's plane, along an axis or a diagonal.
+// Generates a ray from a point of the lattice, usually on a wall's plane, along an axis or a diagonal.
 inline MeshRay lattice_ray(const ProofMesh& mesh, Random& random) {
   if (mesh.lattice == 0) return boundary_ray(mesh, random);
   const Vec3d corner = to_double(random.pick(mesh.triangles).a);
@@ -110,11 +110,13 @@ inline void add_ray(const ProofInstance& instance, const MeshRay& ray, Random& r
 
 }  // namespace internal
 
-// Length of a run of rays in nearly equal directions, in one block of four: the kernels process them as packets.
+// Length of a run of rays in nearly equal directions, which the kernels trace as packets. One block in four contains
+// such runs.
 inline constexpr size_t kBeamRays = 24;
 
-// Draws `count` rays from the families in turn. Origins are floats in the block's frame, which is near their instance
-// or, for one block in four, anywhere within a kilometre of it: the reference starts from the values in the block.
+// Generates `count` rays from the families in turn. Origins are floats relative to the block's frame. In three of four
+// blocks the frame is at an instance, in the other blocks up to a kilometre away from it. The reference uses the
+// rounded values in the block.
 inline OwnedBlock proof_rays(const ProofScene& scene, size_t count, Random& random) {
   OwnedBlock block = rays_along_x(RayMode::kFirst, {});
   block.sizes.clear();

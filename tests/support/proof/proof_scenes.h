@@ -1,5 +1,5 @@
-// The scenes of the proof that no ray misses: meshes of several kinds and sizes, each placed unchanged, moved, far
-// away, rotated and scaled, and several times over. Immutable; safe from any thread.
+// The scenes of the proof that no ray misses. Meshes of several kinds and sizes are placed in several ways: unchanged,
+// moved, far away, rotated and scaled, and several times in one scene. Immutable; safe from any thread.
 #ifndef LOCUS_TESTS_SUPPORT_PROOF_PROOF_SCENES_H_
 #define LOCUS_TESTS_SUPPORT_PROOF_PROOF_SCENES_H_
 
@@ -16,15 +16,15 @@ struct ProofMesh {
   std::vector<Triangle> triangles;
   StaticMeshPtr stored;
   ReferenceTree reference;
-  Real extent;         // the largest |coordinate|
-  double size;         // the longest side of its bounds
-  double lattice = 0;  // all corners are multiples of it; 0: no lattice
+  Real extent;         // largest |coordinate| of the mesh
+  double size;         // longest side of the mesh's bounds
+  double lattice = 0;  // all coordinates are multiples of this number; 0 means no lattice
 };
 
 struct ProofInstance {
   Id id;
   std::shared_ptr<const ProofMesh> mesh;
-  Transform transform;  // as stored
+  Transform transform;  // transform as stored in the scene
 };
 
 struct ProofScene {
@@ -44,7 +44,8 @@ inline std::shared_ptr<const ProofMesh> proof_mesh(std::vector<Triangle> triangl
 
 namespace internal {
 
-// Scales, then moves: each vertex is rounded once, so that closed meshes stay closed.
+// Returns the triangles scaled by `scale`, then moved by `by`. Each coordinate is rounded once, so that closed meshes
+// stay closed.
 inline std::vector<Triangle> moved(std::vector<Triangle> triangles, double scale, Vec3d by) {
   for (Triangle& triangle : triangles)
     for (Vec3f* vertex : {&triangle.a, &triangle.b, &triangle.c}) *vertex = to_float(to_double(*vertex) * scale + by);
@@ -63,7 +64,7 @@ inline std::vector<Triangle> slivers(uint32_t count, uint64_t seed) {
   return triangles;
 }
 
-// Returns triangles of all sizes that intersect each other; each tenth one is a copy of an earlier one.
+// Returns triangles of all sizes that intersect each other; every tenth triangle is a copy of an earlier one.
 inline std::vector<Triangle> soup(uint32_t count, uint64_t seed) {
   Random random(seed);
   std::vector<Triangle> triangles;
@@ -101,7 +102,8 @@ inline std::vector<PlacedMesh> three_through_each_other(double size, Random& ran
   return three;
 }
 
-// Places a mesh many times, so that rays meet several instances, in one order by bounds and in another by hits.
+// Returns 20 overlapping placements of a mesh. A ray meets several instances, and their order by bounds along the ray
+// can differ from their order by hits.
 inline std::vector<PlacedMesh> many_all_over(double size, Random& random) {
   std::vector<PlacedMesh> many(20);
   for (PlacedMesh& placed : many) {
@@ -140,7 +142,8 @@ inline std::vector<std::shared_ptr<const ProofMesh>> proof_meshes(uint64_t seed)
           proof_mesh(bumpy_sphere(100, 0.02, seed))};
 }
 
-// Returns every mesh at every placement, three intersecting instances of it, and many.
+// Returns for every mesh a scene for each placement, a scene of three intersecting instances and a scene of many
+// instances.
 inline std::vector<ProofScene> proof_scenes(uint64_t seed) {
   Random random(seed);
   std::vector<ProofScene> scenes;

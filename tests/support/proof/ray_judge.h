@@ -1,14 +1,14 @@
-// Verifies answers to rays by a reference in long double that starts from the stored values. For the proof that no ray
-// misses. With e = 2^-20 (|origin in mesh axes| + mesh extent), in mesh axes:
+// Verifier of answers to rays by a reference in long double, which is computed from the stored values. For the proof
+// that no ray misses. The tolerance is e = 2^-20 (|origin in mesh axes| + mesh extent), in mesh axes:
 //
-// - miss: the reference hits a triangle at least e within its border, and the answer has no hit up to there plus
-//   e / |direction|.
-// - false hit: the answer names a triangle that is farther than e from the answer's point on the ray, or one that is
-//   culled, or a t beyond t_max.
-// - undecidable: the answer differs from the reference without e, and is none of these.
+// - miss: the reference hits a triangle at t, at least e within its border, and the answer has no hit up to t + e /
+//   |direction|.
+// - false hit: the answer names a triangle that is farther than e from the answer's point on the ray, or a triangle
+//   that is culled, or a t beyond t_max.
+// - undecidable: the answer is neither a miss nor a false hit, but differs from the answer of the reference with e = 0.
 //
-// An answer with all hits misses a triangle if the reference hits it in this way and the answer does not list it. No
-// angle is exempt: a nearly edge-on triangle is verified like any other.
+// An answer with all hits misses a triangle if the reference hits the triangle at least e within its border and the
+// answer does not list the triangle. No angle is exempt: a nearly edge-on triangle is verified like any other.
 #ifndef LOCUS_TESTS_SUPPORT_PROOF_RAY_JUDGE_H_
 #define LOCUS_TESTS_SUPPORT_PROOF_RAY_JUDGE_H_
 
@@ -23,13 +23,13 @@ namespace locus::test {
 
 struct RayTally {
   uint64_t rays = 0;
-  uint64_t hits = 0;  // answers with a hit
+  uint64_t hits = 0;  // number of answers with a hit
   uint64_t misses = 0;
   uint64_t false_hits = 0;
   uint64_t undecidable = 0;
-  uint64_t repeats = 0;             // repetitions of the same rays with other modes and limits
-  uint64_t differing_repeats = 0;   // repetitions with a different answer
-  std::vector<std::string> faults;  // the first few, described
+  uint64_t repeats = 0;             // number of repetitions of the rays with other modes and limits
+  uint64_t differing_repeats = 0;   // number of repetitions with a different answer
+  std::vector<std::string> faults;  // descriptions of the first few errors
 
   void add(const RayTally& other) {
     rays += other.rays;
@@ -47,7 +47,7 @@ struct RayTally {
   bool clean() const { return misses == 0 && false_hits == 0 && differing_repeats == 0; }
 };
 
-// A hit of an answer. No hit: id kNoId, t +inf.
+// One hit of an answer. If the ray hits nothing, `id` is kNoId and `t` is infinite.
 struct RayRow {
   Real t;
   Id id;
@@ -58,7 +58,7 @@ inline RayRow ray_row(const BlockResult& result, size_t row) {
   return {Real{result.t[row]}, result.ids[row], result.triangles[row]};
 }
 
-// One ray of a block against the instances of a scene.
+// Verifier of the answer to one ray of a block.
 class RayJudge {
  public:
   RayJudge(const ProofScene& scene, const OwnedBlock& block, size_t ray)
@@ -66,11 +66,11 @@ class RayJudge {
     const auto column = [ray](const std::vector<float>& c) {
       return Vec3d{c[3 * ray], c[3 * ray + 1], c[3 * ray + 2]};
     };
-    // Positions are frame plus offset, rounded once.
+    // Compute the origin like the server: frame + offset, rounded once.
     ray_ = {to_real(block.settings.frame + column(block.points)), to_real(column(block.sizes))};
   }
 
-  // In order of severity.
+  // Result of a verification, in order of severity.
   enum class Verdict { kRight, kUndecidable, kFalseHit, kMiss };
 
   // Verifies an answer with the first hit.
@@ -82,7 +82,8 @@ class RayJudge {
     return verdict;
   }
 
-  // Verifies rows begin to end (exclusive) of an answer with all hits: each is right and none is missing.
+  // Verifies the rows `begin` to `end` - 1, which are an answer with all hits: each row must be right, and no row
+  // missing.
   Verdict judge_all(const BlockResult& answer, size_t begin, size_t end) const {
     Verdict verdict = Verdict::kRight;
     for (size_t row = begin; row < end; ++row) verdict = std::max(verdict, judge_row(ray_row(answer, row)));
@@ -127,14 +128,16 @@ class RayJudge {
     return meeting && meeting->inset >= 0 ? Verdict::kRight : Verdict::kUndecidable;
   }
 
-  // Verifies that the answer may lack a triangle that the reference meets, with rows up to `end`.
+  // Returns the verdict on a triangle that the reference meets and an answer does not list, if the answer contains all
+  // hits up to t = `end`.
   Verdict judge_missing(const Placed& in, const Meeting& meeting, Real end) const {
     if (meeting.inset < 0 || culled(meeting.slope)) return Verdict::kRight;
     const bool within = meeting.inset >= in.e && meeting.t + in.e / in.speed < end;
     return within ? Verdict::kMiss : Verdict::kUndecidable;
   }
 
-  // Verifies that the reference hits nothing in an instance so much before `t` that an answer at `t` is late.
+  // Verifies that the first hit at `t` is not too late: the reference must not hit any triangle of the instance earlier
+  // by more than the tolerance.
   Verdict judge_before(const ProofInstance& instance, Real t) const {
     const Placed in = placed(instance);
     const Real limit = t < kForever ? t - in.e / in.speed : t_max_;
@@ -181,7 +184,7 @@ inline RayTally judge_first_hits(const ProofScene& scene, const OwnedBlock& bloc
   return tally;
 }
 
-// Verifies the answer to a block of rays of mode kAll, of which none was cut.
+// Verifies the answer to a block of rays of mode kAll. Precondition: the answer to no ray was truncated.
 inline RayTally judge_all_hits(const ProofScene& scene, const OwnedBlock& block, const BlockResult& result) {
   RayTally tally;
   for (size_t i = 0, row = 0; i < result.counts.size(); row += result.counts[i++]) {

@@ -1,5 +1,5 @@
 // The proof that no ray misses, as a run of any number of rays. Equal seeds give equal rays, on any number of threads
-// and any processor; the instruction sets of the processor share the rays.
+// and any processor; each ray is traced by one of the processor's instruction sets.
 #ifndef LOCUS_TESTS_SUPPORT_PROOF_RAY_PROOF_H_
 #define LOCUS_TESTS_SUPPORT_PROOF_RAY_PROOF_H_
 
@@ -52,16 +52,16 @@ class RayProof {
   }
 
  private:
-  static constexpr uint64_t kRoundBlocks = 5'000;  // between new scenes
-  // Number of shares of the blocks: at least one for the portable code, the rest divided equally among those with
-  // kernels.
+  static constexpr uint64_t kRoundBlocks = 5'000;  // number of blocks after which new scenes are generated
+  // Number of shares into which the blocks of a round are divided. The portable code processes at least one share; the
+  // other shares are divided about equally among the instruction sets that have kernels.
   static constexpr uint64_t kShares = 8;
   static uint64_t share_before(size_t set, size_t sets) {
     if (set == sets) return kShares;
     return sets == 1 ? 0 : (kShares - 1) * set / (sets - 1);
   }
 
-  // Runs `count` blocks, each by the next instruction set.
+  // Runs `count` blocks, divided among the instruction sets.
   void run_round(uint64_t begin, uint64_t count) {
     const std::vector<std::string> sets = instruction_sets();
     for (size_t i = 0; i < sets.size(); ++i) {

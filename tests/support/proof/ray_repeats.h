@@ -1,6 +1,6 @@
-// Repeats the rays of a block with other modes and limits, whose answers follow from the first hits: any hit, the
-// nearest of all, limits at the hits. For the proof that no ray misses. Answers with all hits do not follow from first
-// hits, so the reference verifies them.
+// Repetition of the rays of a block with other modes and limits, whose answers follow from the first hits: mode ANY,
+// the nearest row of mode ALL, and limits at the hits. For the proof that no ray misses. The other rows of mode ALL do
+// not follow from the first hits, so the reference verifies them.
 #ifndef LOCUS_TESTS_SUPPORT_PROOF_RAY_REPEATS_H_
 #define LOCUS_TESTS_SUPPORT_PROOF_RAY_REPEATS_H_
 
@@ -38,7 +38,7 @@ inline RayTally repeat_as_all(const ProofScene& scene, OwnedBlock block, const B
   const BlockResult all = run_block(*scene.snapshot, block);
   RayTally tally;
   if (all.truncated.empty()) tally = judge_all_hits(scene, block, all);
-  tally.rays = tally.hits = tally.undecidable = 0;  // counted with the first hits
+  tally.rays = tally.hits = tally.undecidable = 0;  // these are counted when the first hits are verified
   for (size_t i = 0, row = 0; i < first.t.size(); row += all.counts[i++]) {
     const bool hit = first.ids[i] != kNoId;
     const bool same = (all.counts[i] != 0) == hit && (!hit || same_row(all, row, first, i));
@@ -47,7 +47,7 @@ inline RayTally repeat_as_all(const ProofScene& scene, OwnedBlock block, const B
   return tally;
 }
 
-// Repeats with a limit exactly at the hit, which keeps the hit.
+// Repeats the rays with a limit exactly at the hit, which must not change the answer.
 inline RayTally repeat_with_limit_at_hit(const ProofScene& scene, OwnedBlock block, const BlockResult& first) {
   RayTally tally;
   for (size_t i = 0; i < first.t.size(); ++i)
@@ -58,7 +58,8 @@ inline RayTally repeat_with_limit_at_hit(const ProofScene& scene, OwnedBlock blo
   return tally;
 }
 
-// Repeats with a limit just before the hit, which excludes it and must find no other.
+// Repeats the rays with a limit just before a first hit at t > 0: there must be no hit. Rays with a first hit at t = 0
+// must give the same answer again.
 inline RayTally repeat_with_limit_before_hit(const ProofScene& scene, OwnedBlock block, const BlockResult& first) {
   RayTally tally;
   for (size_t i = 0; i < first.t.size(); ++i)
@@ -74,7 +75,7 @@ inline RayTally repeat_with_limit_before_hit(const ProofScene& scene, OwnedBlock
 
 }  // namespace internal
 
-// Repeats in a randomly chosen way.
+// Repeats the rays in a way chosen at random.
 inline RayTally repeat_rays(const ProofScene& scene, const OwnedBlock& block, const BlockResult& first,
                             Random& random) {
   switch (random.below(4)) {

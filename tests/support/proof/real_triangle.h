@@ -39,7 +39,7 @@ class RealTriangle {
 
   Real slope(const RealRay& ray) const { return dot(normal_, ray.direction); }
 
-  // Returns nothing for a triangle without area, for an exactly edge-on one, and if t is not within 0 .. limit.
+  // Returns nullopt if the triangle has no area or is exactly edge-on, or if t is not within 0 .. limit.
   std::optional<Meeting> meet(const RealRay& ray, Real limit) const {
     Meeting meeting;
     meeting.slope = slope(ray);

@@ -1,6 +1,7 @@
-// Tree over triangles in long double that shares no code with the product, for verifying more rays than a plain list
-// could: median splits, and double boxes inflated far beyond any rounding of their test. For the proof that no ray
-// misses; a test compares it with the list. Immutable after construction; safe from any thread.
+// Tree over triangles in long double that shares no code with the product. The tree makes it possible to verify more
+// rays than a plain list of triangles does. It is split at medians, and its boxes in double are widened by far more
+// than any rounding error of the box test. For the proof that no ray misses; a test compares the tree with the list.
+// Immutable after construction; safe from any thread.
 #ifndef LOCUS_TESTS_SUPPORT_PROOF_REFERENCE_TREE_H_
 #define LOCUS_TESTS_SUPPORT_PROOF_REFERENCE_TREE_H_
 
@@ -16,7 +17,7 @@ namespace locus::test {
 
 class ReferenceTree {
  public:
-  // Builds the tree. Triangle numbers are positions in `triangles`, which is not empty.
+  // Builds the tree. The number of a triangle is its index in `triangles`, which must not be empty.
   explicit ReferenceTree(const std::vector<Triangle>& triangles) : order_(triangles.size()) {
     std::vector<Aabbd> boxes;
     for (const Triangle& triangle : triangles) {
@@ -32,8 +33,9 @@ class ReferenceTree {
   const RealTriangle& triangle(uint32_t number) const { return triangles_[number]; }
   uint32_t size() const { return static_cast<uint32_t>(triangles_.size()); }
 
-  // Calls visit(number, meeting) for every triangle that the ray meets within its border at 0 <= t <= limit, and for
-  // some that it meets outside, with a negative inset. The visitor may lower `limit`.
+  // Calls visit(number, meeting) for every triangle that the ray meets within the triangle's border at 0 <= t <= limit.
+  // Also calls it for some triangles whose plane the ray meets outside the border: their inset is negative. The visitor
+  // may lower `limit`.
   template <class Visit>
   void visit(const RealRay& ray, const Real& limit, Visit visit) const {
     const RoughRay rough_ray(ray, magnitude_);
@@ -61,8 +63,10 @@ class ReferenceTree {
 
   struct Node {
     Aabbd box;
-    uint32_t first;  // position in `order_` of a leaf's first triangle, else the first of two children
-    uint32_t count;  // number of triangles of a leaf, else 0
+    // Position of the first triangle in `order_` for a leaf. For an inner node, the index of its first child; the
+    // second child follows the first.
+    uint32_t first;
+    uint32_t count;  // number of triangles of a leaf; 0 for an inner node
   };
 
   // A triangle in double: points p of its plane have normal . p = level, and within it inward[i] . p >= border[i].
@@ -71,8 +75,8 @@ class ReferenceTree {
     double level, border[3];
   };
 
-  // A ray in double. Its rounding and that of the test move it by some 2^-51 of its reach, the length up to which it is
-  // tested; the pad is 2^-30 of that.
+  // A ray in double. `reach` is the length up to which it is tested. Rounding of the ray and of the test moves the ray
+  // by about 2^-51 of the reach; the pad is 2^-30 of the reach.
   struct RoughRay {
     RoughRay(const RealRay& ray, double magnitude) {
       double reach = magnitude;
@@ -84,7 +88,8 @@ class ReferenceTree {
       }
       pad = 0x1p-30 * reach;
       for (int axis = 0; axis < 3; ++axis) {
-        // Over its whole reach such a ray leaves the slab's plane by less than the pad.
+        // Treat the ray as parallel to the planes of a slab if, over the whole reach, its distance from them changes by
+        // less than the pad.
         parallel[axis] = std::abs(direction[axis]) < 1e-25 * longest;
         inverse[axis] = parallel[axis] ? 0 : 1 / direction[axis];
       }
@@ -104,8 +109,9 @@ class ReferenceTree {
       return near <= far;
     }
 
-    // Returns false only if a hit is impossible: at more than 2^-20 of a right angle the error of the point where the
-    // ray meets the plane is some 2^-30 of the reach, and four pads are 2^-28.
+    // Returns false only if a hit is impossible. Returns true for rays almost parallel to the triangle. For any other
+    // ray, the error of the point where the ray meets the plane is about 2^-30 of the reach, and the tolerance of four
+    // pads is 2^-28 of the reach.
     bool may_meet(const Rough& triangle, double limit) const {
       const double slope = dot(triangle.normal, direction);
       if (std::abs(slope) < 0x1p-20 * longest) return true;

@@ -1,7 +1,6 @@
 #include "client/cli/extras/completion/completion.h"
 
-#include "client/cli/extras/completion/fish.h"
-#include "client/cli/extras/completion/posix_shells.h"
+#include "client/cli/extras/completion/shell_scripts.h"
 
 namespace locus::cli {
 

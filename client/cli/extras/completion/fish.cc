@@ -1,7 +1,6 @@
-#include "client/cli/extras/completion/fish.h"
-
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_replace.h"
+#include "client/cli/extras/completion/shell_scripts.h"
 #include "client/cli/extras/completion/table.h"
 
 namespace locus::cli {
@@ -108,16 +107,16 @@ complete -c NAME -e
 complete -c NAME -f -a '(__NAME_complete)'
 )shell";
 
-std::string quoted(const std::string& text) {
+std::string fish_quoted(const std::string& text) {
   return absl::StrCat("'", absl::StrReplaceAll(text, {{"\\", "\\\\"}, {"'", "\\'"}}), "'");
 }
 
-std::string table_function(const CommandWords& program) {
+std::string fish_table_function(const CommandWords& program) {
   std::string script = absl::StrCat("# A line for each candidate: kind, word, kind of value, description.\nfunction __",
                                     program.path, "_table\n    switch $argv[1]\n");
   for (const TableEntry& entry : completion_table(program)) {
-    absl::StrAppend(&script, "        case ", quoted(entry.path), "\n            printf '%s\\n'");
-    for (const std::string& line : entry.lines) absl::StrAppend(&script, " \\\n                ", quoted(line));
+    absl::StrAppend(&script, "        case ", fish_quoted(entry.path), "\n            printf '%s\\n'");
+    for (const std::string& line : entry.lines) absl::StrAppend(&script, " \\\n                ", fish_quoted(line));
     absl::StrAppend(&script, "\n");
   }
   absl::StrAppend(&script, "    end\nend\n");
@@ -128,7 +127,7 @@ std::string table_function(const CommandWords& program) {
 
 std::string fish_script(const CommandWords& program) {
   return absl::StrCat("# Completion of ", program.path, " for fish, written by `", program.path,
-                      " completion fish`.\n\n", table_function(program),
+                      " completion fish`.\n\n", fish_table_function(program),
                       absl::StrReplaceAll(kFunctions, {{"NAME", program.path}}));
 }
 

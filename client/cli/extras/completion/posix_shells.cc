@@ -1,7 +1,6 @@
-#include "client/cli/extras/completion/posix_shells.h"
-
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_replace.h"
+#include "client/cli/extras/completion/shell_scripts.h"
 #include "client/cli/extras/completion/table.h"
 
 namespace locus::cli {
@@ -157,16 +156,16 @@ _NAME() {
 if [[ ${funcstack[1]} == _NAME ]]; then _NAME "$@"; else compdef _NAME NAME; fi
 )shell";
 
-std::string quoted(const std::string& text) {
+std::string posix_quoted(const std::string& text) {
   return absl::StrCat("'", absl::StrReplaceAll(text, {{"'", "'\\''"}}), "'");
 }
 
-std::string table_function(const CommandWords& program) {
+std::string posix_table_function(const CommandWords& program) {
   std::string script = absl::StrCat("# A line for each candidate: kind, word, kind of value, description.\n_",
                                     program.path, "_table() {\n  case $1 in\n");
   for (const TableEntry& entry : completion_table(program)) {
-    absl::StrAppend(&script, "    ", quoted(entry.path), ") printf '%s\\n'");
-    for (const std::string& line : entry.lines) absl::StrAppend(&script, " \\\n      ", quoted(line));
+    absl::StrAppend(&script, "    ", posix_quoted(entry.path), ") printf '%s\\n'");
+    for (const std::string& line : entry.lines) absl::StrAppend(&script, " \\\n      ", posix_quoted(line));
     absl::StrAppend(&script, " ;;\n");
   }
   absl::StrAppend(&script, "  esac\n}\n");
@@ -175,7 +174,7 @@ std::string table_function(const CommandWords& program) {
 
 std::string script_of(const CommandWords& program, const std::string& shell, const char* functions) {
   return absl::StrCat("# Completion of ", program.path, " for ", shell, ", written by `", program.path, " completion ",
-                      shell, "`.\n\n", table_function(program),
+                      shell, "`.\n\n", posix_table_function(program),
                       absl::StrReplaceAll(absl::StrCat(kReadersOfTheTable, functions), {{"NAME", program.path}}));
 }
 

@@ -9,7 +9,8 @@
 namespace locus::cli {
 namespace {
 
-// Returns the description with line breaks and tabs replaced by spaces, since both separate entries of the table.
+// Returns the description with line breaks and tabs replaced by spaces, since line breaks separate the lines of the
+// table and tabs separate their fields.
 std::string short_text(const std::string& description) {
   return absl::StrReplaceAll(description, {{"\n", " "}, {"\t", " "}});
 }
@@ -46,8 +47,8 @@ void add_option_lines(const std::vector<OptionWords>& options, std::vector<std::
   }
 }
 
-// Returns the options that `command` accepts: its own ones, then those of the commands above it except options that it
-// redefines under the same name.
+// Returns the options that `command` accepts: the command's own options, then the options of the commands above it,
+// except options that the command redefines under the same name.
 std::vector<OptionWords> options_in_reach(const CommandWords& command, const std::vector<OptionWords>& above) {
   std::vector<OptionWords> options = command.options;
   for (const OptionWords& option : above) {

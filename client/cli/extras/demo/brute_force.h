@@ -1,6 +1,6 @@
 // Reference evaluation of queries by brute force: tests every triangle and every object with the server's predicates,
-// but without its index structures. The server's answers must equal these bit for bit. Immutable; threads may share one
-// object.
+// but without its index structures. The server's answers must equal the answers of this evaluation bit for bit.
+// Immutable; threads may share one object.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_DEMO_BRUTE_FORCE_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_DEMO_BRUTE_FORCE_H_
 

@@ -61,7 +61,7 @@ class Sampler {
   size_t stride_ = 1;
 };
 
-// Sends one batch of each kind in turn, each after the answer to the one before, until `done` is set.
+// Sends one batch of each kind in turn, each batch after the answer to the previous batch, until `done` is set.
 absl::Status ask(const client::Client& client, const DemoWorld& world, const LoadOptions& options,
                  const std::vector<DemoKind>& kinds, const std::atomic<bool>& done, LoadResult& result) {
   const std::unique_ptr<client::QueryStream> stream = client.query_stream(options.scene);

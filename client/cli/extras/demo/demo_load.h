@@ -1,4 +1,4 @@
-// Load generator of `locus demo`: one thread moves every object each tick while others send queries.
+// Load generator of `locus demo`: one thread moves every object each tick while two threads send queries.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_DEMO_DEMO_LOAD_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_DEMO_DEMO_LOAD_H_
 

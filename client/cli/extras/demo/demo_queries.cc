@@ -8,7 +8,8 @@
 namespace locus::cli {
 namespace {
 
-constexpr uint32_t kMaxRows = 65536;  // per query; more than fit in a reply, whose size truncates first
+// Maximum for one query; the maximum size of a reply truncates large results earlier.
+constexpr uint32_t kMaxRows = 65536;
 
 client::Float3 float3(Vec3f v) { return {v.x, v.y, v.z}; }
 

@@ -9,11 +9,11 @@
 namespace locus::cli {
 namespace {
 
-constexpr float kInset = 0.98f;  // objects move within this fraction of the level's extent, inside its walls
+constexpr float kInset = 0.98f;  // objects move within this fraction of the level's size, inside its walls
 
-Quaternion random_rotation(DemoRandom& random) {
+locus::Quaternion random_rotation(DemoRandom& random) {
   for (;;) {
-    const Quaternion q{random.sign(), random.sign(), random.sign(), random.sign()};
+    const locus::Quaternion q{random.sign(), random.sign(), random.sign(), random.sign()};
     if (unit_deviation(q) < 0.5) return normalized(q);
   }
 }
@@ -44,7 +44,7 @@ DemoWorld::DemoWorld(const Aabbd& bounds, uint32_t objects, uint64_t seed)
     object.velocity = random.direction() * (length * 0.002f);
     object.radius = length * (0.001f + 0.004f * random.unit());
     object.size = {object.radius * (0.5f + random.unit()), object.radius * (0.5f + random.unit()), object.radius};
-    object.rotation = object.kind == ShapeKind::kBall ? Quaternion{} : random_rotation(random);
+    object.rotation = object.kind == ShapeKind::kBall ? locus::Quaternion{} : random_rotation(random);
     objects_.push_back(object);
   }
 }

@@ -38,10 +38,10 @@ class DemoWorld {
   struct DemoObject {
     ShapeKind kind;
     Vec3f start;     // relative to the frame
-    Vec3f velocity;  // distance a tick
+    Vec3f velocity;  // distance per tick
     Vec3f size;
     float radius;
-    Quaternion rotation;
+    locus::Quaternion rotation;
   };
 
   Vec3f offset(const DemoObject& object, uint64_t tick) const;

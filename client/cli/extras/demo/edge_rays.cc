@@ -69,7 +69,7 @@ std::optional<Aim> aim(const Edge& edge, DemoRandom& random) {
   const Vec3d side = cross(along * (1 / length), *left);
   const Vec3d other = cross(*right, along * (1 / length));
   Vec3d away = side + other;
-  if (squared_length(away) < 0.5) return std::nullopt;  // too sharp a fold: no point is in front of both triangles
+  if (squared_length(away) < 0.5) return std::nullopt;  // the fold is too sharp: no point is in front of both triangles
   const Vec3d jitter = *left * (0.4 * random.sign()) + along * (0.3 * random.sign() / length);
   away = normalized(away) + jitter;
   if (random.unit() < 0.5f) away = -away;

@@ -1,5 +1,5 @@
-// Test rays aimed at edges shared by two triangles: a fast intersector with rounding errors can miss both triangles
-// there. The origin of a ray lies in front of both triangles, so the ray must hit one of them.
+// Test rays aimed at edges shared by two triangles: because of rounding errors, a fast intersection test can miss both
+// triangles at such an edge. The origin of a ray lies in front of both triangles, so the ray must hit one of them.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_DEMO_EDGE_RAYS_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_DEMO_EDGE_RAYS_H_
 
@@ -23,8 +23,8 @@ struct EdgeRays {
 // aim_at_edges() chooses.
 inline constexpr float kEdgeAllowance = 1e-3f;
 
-// Returns `count` rays, distributed in turn over all edges that are shared by exactly two triangles, neither of them a
-// sliver. Returns fewer rays only if hardly any edge is suitable.
+// Returns `count` rays, distributed evenly over all edges that are shared by exactly two triangles, neither of which is
+// a sliver. Returns fewer than `count` rays only if hardly any edge is suitable.
 EdgeRays aim_at_edges(const std::vector<Triangle>& triangles, size_t count, uint64_t seed);
 
 }  // namespace locus::cli

@@ -65,7 +65,7 @@ void add_camera_options(CLI::App& command, CameraOptions& options) {
       ->check(CLI::Range(0.01, 170.0).description(""));
   command
       .add_option("--ortho", options.orthographic,
-                  "No perspective: so many units from the lower to the upper edge; 0 = what is framed")
+                  "Orthographic projection: height of the picture in units; 0 = fit what is framed")
       ->type_name("UNITS")
       ->check(CLI::Range(0.0, 1e9).description(""));
 }

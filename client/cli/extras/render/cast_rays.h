@@ -17,8 +17,8 @@ namespace locus::cli {
 
 // Choice of the revision or revisions at which the rays are answered.
 enum class Moment {
-  kOne,   // all rays at CastOptions::revision; fails if the server drops it meanwhile
-  kLive,  // each batch at the latest revision, at least CastOptions::revision
+  kOne,   // all rays at CastOptions::revision; fails if the server drops this revision meanwhile
+  kLive,  // each batch at the newest revision, which is at least CastOptions::revision
 };
 
 // Choice whether the server reports the work of each ray. With kReported every ray is a block of its own, which costs
@@ -46,9 +46,9 @@ struct CastResult {
 // Callback for progress. It is called from time to time in the caller's thread with the number of rays answered so far.
 using CastProgress = std::function<void(uint64_t done)>;
 
-// Sends all rays and blocks until every ray is answered. Returns the errors of the server; for a revision that the
+// Sends all rays and waits until every ray is answered. Returns the errors of the server; for a revision that the
 // server has dropped, OUT_OF_RANGE with an explanation; DATA_LOSS if the columns of an answer do not match the request.
-// Memory: 28 bytes per pixel, 52 with the work.
+// Memory: 28 bytes per pixel, 52 if the work is reported.
 absl::StatusOr<CastResult> cast_rays(const client::Client& client, const Camera& camera, const ImageSize& size,
                                      const CastOptions& options, const CastProgress& progress = {});
 

@@ -17,8 +17,8 @@ struct Light {
   friend Light operator*(Light a, double s) { return {a.red * s, a.green * s, a.blue * s}; }
 };
 
-// Convert between linear light and stored colours with a gamma of 2, which is close to that of sRGB. Light is clamped
-// to 0 .. 1.
+// Convert between linear light and stored colours with a gamma of 2, which is close to the gamma of sRGB. Light is
+// clamped to 0 .. 1.
 Colour colour_of(Light light);
 Light light_of(Colour colour);
 

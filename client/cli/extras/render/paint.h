@@ -16,7 +16,7 @@ namespace locus::cli {
 struct ValueScale {
   double min = 0;
   double median = 0;
-  double high = 0;  // 99th percentile; gets the last colour, so that outliers do not darken the rest
+  double high = 0;  // 99th percentile, shown in the last colour, so that outliers do not darken other values
   double max = 0;
 };
 
@@ -28,8 +28,8 @@ std::vector<double> depths_of(const RayImage& image);
 
 // Paints hits shaded by a lamp that is behind the camera, above and to its left, with dark edges and with haze at a
 // distance. Instances are pale, objects coloured; the hue depends on the id. Shading is two-sided: the back of a
-// triangle is lit like its front. Source of the falloff: Mitchell, McTaggart and Green, Shading in Valve's Source
-// Engine, 2006.
+// triangle is lit like its front. Source of the diffuse term (half Lambert): Mitchell, McTaggart and Green, Shading in
+// Valve's Source Engine, 2006.
 Picture paint_shaded(const RayImage& image, const Camera& camera);
 
 // Paints depths with the colour map viridis: the nearest bright, the furthest dark. Pixels without a hit are black.

@@ -1,43 +1,38 @@
 #include "client/cli/extras/render/ray_image.h"
 
-#include <openssl/evp.h>
-
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <limits>
-#include <memory>
 
 #include "absl/strings/escaping.h"
 #include "absl/strings/string_view.h"
 #include "client/lib/result_rows.h"
+#include "client/lib/sha256.h"
 
 namespace locus::cli {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "columns are hashed as they lie in memory");
 
-class Sha256 {
+class ImageHash {
  public:
-  Sha256() : context_(EVP_MD_CTX_new(), &EVP_MD_CTX_free) { EVP_DigestInit_ex(context_.get(), EVP_sha256(), nullptr); }
-
   template <class T>
-  Sha256& add(const T* values, size_t count) {
-    EVP_DigestUpdate(context_.get(), values, count * sizeof(T));
+  ImageHash& add(const T* values, size_t count) {
+    hasher_.add(values, count * sizeof(T));
     return *this;
   }
-  Sha256& add(const ImageSize& size) {
+  ImageHash& add(const ImageSize& size) {
     const std::array<uint32_t, 2> sides = {size.width, size.height};
     return add(sides.data(), sides.size());
   }
   std::string hex() {
-    std::array<unsigned char, 32> hash{};
-    EVP_DigestFinal_ex(context_.get(), hash.data(), nullptr);
+    const client::Sha256 hash = hasher_.finish();
     return absl::BytesToHexString(absl::string_view(reinterpret_cast<const char*>(hash.data()), hash.size()));
   }
 
  private:
-  std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context_;
+  client::Sha256Hasher hasher_;
 };
 
 }  // namespace
@@ -56,11 +51,11 @@ uint64_t RayImage::hits() const {
 }
 
 std::string depth_sha256(const RayImage& image) {
-  return Sha256().add(image.size).add(image.t.data(), image.t.size()).hex();
+  return ImageHash().add(image.size).add(image.t.data(), image.t.size()).hex();
 }
 
 std::string ids_sha256(const RayImage& image) {
-  Sha256 hash;
+  ImageHash hash;
   hash.add(image.size).add(image.ids.data(), image.ids.size());
   return hash.add(image.triangles.data(), image.triangles.size()).hex();
 }

@@ -15,9 +15,10 @@ namespace {
 constexpr int kSections = 16;
 constexpr int kCuts = kSections - 1;  // number of cuts that are tested for each side
 constexpr int kSides = 6;             // lower and upper side of each axis: side = 2 axis + (1 if upper)
-constexpr int kMaxRounds = 16;        // enough: 16 to this power exceeds the resolution of doubles
-constexpr double kFlat = 1e-4;        // a box is flat along an axis if extent / longest side is less
-constexpr double kWidening = 1e-6;    // relative to the longest side; more than the rounding of slabs to float
+constexpr int kMaxRounds = 16;        // enough, since 16^16 exceeds the resolution of doubles
+// A box is flat along an axis if its size along the axis is less than this share of its longest side.
+constexpr double kFlat = 1e-4;
+constexpr double kWidening = 1e-6;  // share of the longest side; more than the rounding error of slabs in float
 
 absl::Status not_found(const std::string& scene, uint64_t id, absl::string_view why) {
   return absl::NotFoundError(absl::StrCat("scene ", scene, " has no object or instance ", id, why));
@@ -33,8 +34,8 @@ absl::Status check_there(const client::Client& client, const std::string& scene,
   return result.blocks(0).ids(0) == id ? absl::OkStatus() : not_found(scene, id, "");
 }
 
-// Returns the slab of `box` between side `side` and its cut `cut`. Cut c is (c + 1) / 16 of the box's extent inward
-// from the side.
+// Returns the slab of `box` between side `side` and its cut `cut`. Cut c is inward from the side by (c + 1) / 16 of the
+// box's size along that axis.
 Aabbd slab_of(const Aabbd& box, int side, int cut) {
   const int axis = side / 2;
   Aabbd slab = box;
@@ -100,8 +101,9 @@ Aabbd narrowed(const Aabbd& box, const std::vector<bool>& reached) {
   return widened(result);
 }
 
-// Returns whether another round is worthwhile: whether the last one shrank the box along some axis by more than half a
-// slab (1/32 of its extent). Axes along which the box is flat are ignored, since widened() undoes their progress.
+// Returns whether another round is worthwhile: whether the last round shrank the box along some axis by more than half
+// a slab (1/32 of the box's size along the axis). Axes along which the box is flat are ignored, since widened() undoes
+// their progress.
 bool moved(const Aabbd& before, const Aabbd& after) {
   const Vec3d old_extent = before.extent(), new_extent = after.extent();
   for (int axis = 0; axis < 3; ++axis) {

@@ -28,8 +28,9 @@ struct MetricSample {
   absl::string_view label(absl::string_view key) const;
 };
 
-// Returns all samples in the order of the text; ignores comments and timestamps. Returns INVALID_ARGUMENT that names
-// the line if the text is not in the format, or RESOURCE_EXHAUSTED if it exceeds a maximum above.
+// Returns all samples in the order of the text; ignores comments and timestamps. Returns INVALID_ARGUMENT, with the
+// number of the line, if a line is not in the format or has more than kMaxMetricLabels labels. Returns
+// RESOURCE_EXHAUSTED if the text exceeds kMaxMetricSamples or kMaxMetricLineBytes.
 absl::StatusOr<std::vector<MetricSample>> parse_metrics(absl::string_view text);
 
 }  // namespace locus::cli

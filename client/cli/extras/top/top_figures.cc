@@ -11,18 +11,18 @@
 namespace locus::cli {
 namespace {
 
-using Samples = std::vector<MetricSample>;
+using MetricSamples = std::vector<MetricSample>;
 using Key = std::pair<std::string, std::string>;  // name and value of one label
 
 // Returns the values of the metric `name`, keyed by the value of `label` and summed over all other labels.
-std::map<std::string, double> by_label(const Samples& samples, absl::string_view name, absl::string_view label) {
+std::map<std::string, double> by_label(const MetricSamples& samples, absl::string_view name, absl::string_view label) {
   std::map<std::string, double> sums;
   for (const MetricSample& sample : samples)
     if (sample.name == name) sums[std::string(sample.label(label))] += sample.value;
   return sums;
 }
 
-double sum_of(const Samples& samples, absl::string_view name) {
+double sum_of(const MetricSamples& samples, absl::string_view name) {
   double sum = 0;
   for (const MetricSample& sample : samples)
     if (sample.name == name) sum += sample.value;
@@ -50,7 +50,7 @@ Json rate(double before, double now, double seconds) {
 // Histogram: maps each bucket's upper bound in seconds to the number of durations up to it.
 using Buckets = std::map<double, double>;
 
-Buckets buckets_of(const Samples& samples, absl::string_view name, const Key& of) {
+Buckets buckets_of(const MetricSamples& samples, absl::string_view name, const Key& of) {
   Buckets buckets;
   for (const MetricSample& sample : samples) {
     double bound = 0;
@@ -88,7 +88,7 @@ Json quantile_ms(const Buckets& buckets, double share) {
   return nullptr;
 }
 
-Json server_of(const Samples& before, const Samples& now, double seconds) {
+Json server_of(const MetricSamples& before, const MetricSamples& now, double seconds) {
   const std::map<std::string, double> limits = by_label(now, "locus_limit", "limit");
   const std::map<std::string, double> used = by_label(now, "locus_limit_used", "limit");
   const std::map<std::string, double> queue = by_label(now, "locus_queue_depth", "class");
@@ -109,7 +109,7 @@ Json server_of(const Samples& before, const Samples& now, double seconds) {
   return server;
 }
 
-std::vector<Json> rpcs_of(const Samples& before, const Samples& now, double seconds) {
+std::vector<Json> rpcs_of(const MetricSamples& before, const MetricSamples& now, double seconds) {
   std::vector<Json> rows;
   const std::map<std::string, double> old_calls = by_label(before, "locus_calls_total", "rpc");
   for (const auto& [rpc, calls] : by_label(now, "locus_calls_total", "rpc")) {
@@ -125,7 +125,7 @@ std::vector<Json> rpcs_of(const Samples& before, const Samples& now, double seco
   return rows;
 }
 
-std::vector<Json> queries_of(const Samples& before, const Samples& now, double seconds) {
+std::vector<Json> queries_of(const MetricSamples& before, const MetricSamples& now, double seconds) {
   constexpr double kMicroseconds = 1e6;
   std::vector<Json> rows;
   const std::map<std::string, double> old_count = by_label(before, "locus_queries_total", "kind");
@@ -139,7 +139,7 @@ std::vector<Json> queries_of(const Samples& before, const Samples& now, double s
   return rows;
 }
 
-std::vector<Json> scenes_of(const Samples& before, const Samples& now, double seconds) {
+std::vector<Json> scenes_of(const MetricSamples& before, const MetricSamples& now, double seconds) {
   std::vector<Json> rows;
   const std::map<std::string, double> old_revisions = by_label(before, "locus_scene_revision", "scene");
   std::map<std::string, std::map<std::string, double>> figures;

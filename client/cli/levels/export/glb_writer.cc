@@ -8,7 +8,6 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
-#include "client/cli/levels/export/export_limits.h"
 #include "core/base/status_macros.h"
 
 namespace locus::cli {

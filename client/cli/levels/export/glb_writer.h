@@ -12,6 +12,7 @@
 #define LOCUS_CLIENT_CLI_LEVELS_EXPORT_GLB_WRITER_H_
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <string>
@@ -24,6 +25,14 @@
 #include "client/cli/output.h"
 
 namespace locus::cli {
+
+// Maximum number of nodes in a file. A capsule takes four nodes, any other object or an instance takes one. The
+// RESOURCE_EXHAUSTED errors of GlbWriter name the limit that was exceeded.
+inline constexpr size_t kMaxExportNodes = size_t{1} << 20;
+// Maximum size of a file in bytes: the GLB format stores sizes in 32 bits.
+inline constexpr uint64_t kMaxExportBytes = UINT32_MAX;
+// Maximum number of parts of a mesh. A mesh with more parts is written as a single part.
+inline constexpr size_t kMaxExportParts = 4096;
 
 // Transform from a node's coordinates to its parent's: scale, then rotation (quaternion x, y, z, w), then translation.
 struct GlbPlace {
@@ -53,7 +62,7 @@ class GlbWriter {
     size_t mesh = 0;
     GlbPlace place;
   };
-  // Adds a node under the root with one child node for each of `children`. Errors as add_node().
+  // Adds a node under the root with one child node for each of `children`. Returns the same errors as add_node().
   absl::Status add_group(const std::string& name, const GlbPlace& place, const std::vector<Child>& children,
                          const Json& extras);
 

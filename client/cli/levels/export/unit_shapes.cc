@@ -20,8 +20,8 @@ void add_ring(ImportedMesh& mesh, double radius, double z) {
   }
 }
 
-// Adds the band of triangles between two rings of vertices, the first of which are `low` and `high`. Ring `high` has
-// the larger z.
+// Adds the band of triangles between two rings of vertices. `low` and `high` are the indices of the first vertex of
+// each ring; the ring of `high` has the larger z.
 void add_band(ImportedMesh& mesh, uint32_t low, uint32_t high) {
   for (uint32_t sector = 0; sector < kSectors; ++sector) {
     const uint32_t next = (sector + 1) % kSectors;

@@ -1,5 +1,5 @@
-// Meshes of the object shapes at unit size. Each is written once and drawn, scaled, by every object of its kind. The
-// meshes that make up one shape form a closed surface together. Triangles are counter-clockwise seen from outside.
+// Meshes of the object shapes at unit size. Each mesh is written once and drawn, scaled, by every object of its kind.
+// The meshes that make up one shape form a closed surface together. Triangles are counter-clockwise seen from outside.
 // Functions without state.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_EXPORT_UNIT_SHAPES_H_
 #define LOCUS_CLIENT_CLI_LEVELS_EXPORT_UNIT_SHAPES_H_
@@ -8,7 +8,7 @@
 
 namespace locus::cli {
 
-// Number of vertices of the polygon that approximates a circle. All of them lie exactly on the shape's surface.
+// Number of vertices of the polygon that approximates a circle. All vertices lie exactly on the shape's surface.
 inline constexpr int kShapeSectors = 16;
 
 // Returns a ball of radius 1 with its poles on the z axis.

@@ -9,8 +9,11 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "absl/strings/string_view.h"
+#include "client/cli/levels/import/import_child.h"
 #include "client/cli/levels/import/import_limits.h"
 #include "client/cli/levels/import/input_file.h"
+#include "client/cli/levels/import/level_codec.h"
+#include "client/cli/levels/import/level_files.h"
 #include "client/cli/levels/import/quake/bsp_import.h"
 #include "client/cli/levels/import/quake/pk3_archive.h"
 #include "client/cli/levels/import/scene_import.h"
@@ -36,13 +39,8 @@ absl::Status check_options(const std::string& extension, const ImportOptions& op
   return absl::OkStatus();
 }
 
-absl::StatusOr<ImportedLevel> import_bsp_file(const std::string& path, const ImportOptions& options) {
-  ASSIGN_OR_RETURN(const std::string bytes, read_input_file(path, kMaxBspBytes));
-  return import_bsp(bytes, file_stem(path), options);
-}
-
-absl::StatusOr<ImportedLevel> import_pk3_file(const std::string& path, const ImportOptions& options) {
-  ASSIGN_OR_RETURN(Pk3Level found, read_pk3_level(path, options.entry));
+absl::StatusOr<ImportedLevel> import_pk3(const LevelFiles& files, const ImportOptions& options) {
+  ASSIGN_OR_RETURN(Pk3Level found, read_pk3_level(files.bytes, files.name, options.entry));
   absl::StatusOr<ImportedLevel> level = import_bsp(found.bytes, file_stem(found.entry), options);
   if (!level.ok())
     return absl::Status(level.status().code(), absl::StrCat(found.entry, ": ", level.status().message()));
@@ -57,6 +55,20 @@ absl::StatusOr<ImportedLevel> import_pk3_file(const std::string& path, const Imp
   return level;
 }
 
+// Parses the files in memory. Runs in the child process.
+absl::StatusOr<ImportedLevel> parse_files(const LevelFiles& files, const ImportOptions& options) {
+  const std::string extension = lower_extension(files.name);
+  if (extension == ".bsp") return import_bsp(files.bytes, file_stem(files.name), options);
+  if (extension == ".pk3") return import_pk3(files, options);
+  return import_scene(files, options);
+}
+
+uint64_t size_of(const LevelFiles& files) {
+  uint64_t bytes = files.bytes.size();
+  for (const auto& [uri, content] : files.referenced) bytes += content.size();
+  return bytes;
+}
+
 }  // namespace
 
 absl::StatusOr<ImportedLevel> import_file(const std::string& path, const ImportOptions& options) {
@@ -68,10 +80,12 @@ absl::StatusOr<ImportedLevel> import_file(const std::string& path, const ImportO
                                                    ": give OBJ, PLY, STL, GLB/glTF, BSP or PK3"));
   }
   RETURN_IF_ERROR(check_options(extension, options));
-  RETURN_IF_ERROR(check_input_file(path, kMaxImportFileBytes));
-  if (extension == ".bsp") return import_bsp_file(path, options);
-  if (extension == ".pk3") return import_pk3_file(path, options);
-  return import_scene(path, options);
+  ASSIGN_OR_RETURN(const LevelFiles files, read_level_files(path));
+  ASSIGN_OR_RETURN(const ChildAnswer answer, run_in_child(path, limits_for(size_of(files)),
+                                                          [&] { return encode_level(parse_files(files, options)); }));
+  absl::StatusOr<ImportedLevel> level = decode_level(answer.bytes);
+  if (level.ok()) level->filtered = answer.filtered;
+  return level;
 }
 
 }  // namespace locus::cli

@@ -1,6 +1,6 @@
-// Limits of the importers. A file that exceeds a limit on bytes, vertices, triangles or archive entries is refused with
-// an error that states the limit. The limits on parts, names and listed entries refuse nothing: see their comments.
-// Constants only.
+// Limits of the importers. A file that exceeds a limit is refused with an error that names the limit: see exceeds() in
+// import_error.h. The limits on parts, part names and listed entries refuse nothing: see their comments. Constants
+// only.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_IMPORT_LIMITS_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_IMPORT_LIMITS_H_
 
@@ -9,26 +9,58 @@
 
 namespace locus::cli {
 
+// Files. The size is that of the file and of all files that it refers to.
 inline constexpr uint64_t kMaxImportFileBytes = uint64_t{4} << 30;
+inline constexpr size_t kMaxReferencedFiles = 256;
+inline constexpr size_t kMaxReferenceBytes = 1024;                 // length of a reference, except data: URIs
+inline constexpr size_t kMaxDataUriBytes = size_t{256} << 20;      // length of all data: URIs of a file together
+inline constexpr size_t kMaxGltfJsonBytes = 2 * kMaxDataUriBytes;  // the JSON part of a glTF or GLB file
+inline constexpr size_t kMaxGltfDepth = 64;                        // nesting of objects and lists in the JSON part
+inline constexpr size_t kMaxSceneNodes = size_t{1} << 20;          // nodes of a scene
+inline constexpr size_t kMaxSceneDepth = 256;                      // nesting of nodes
+inline constexpr size_t kMaxSceneMeshes = size_t{1} << 20;         // meshes of a scene
+inline constexpr size_t kMaxSceneMeshUses = size_t{1} << 20;       // uses of meshes by nodes
+
+// Result.
 inline constexpr size_t kMaxImportTriangles = size_t{1} << 27;
 // Maximum number of vertices. Formats without shared vertices store three vertices for each triangle.
 inline constexpr size_t kMaxImportVertices = 3 * kMaxImportTriangles;
 static_assert(kMaxImportVertices <= UINT32_MAX, "a vertex number must fit an index");
 
-// Maximum number of parts of a mesh. All further triangles belong to the last part.
+// Maximum number of parts of a mesh. After this many parts, all further triangles belong to the last part.
 inline constexpr size_t kMaxImportParts = 4096;
-// Maximum length of a part's name, which is truncated to it.
+// Maximum length of a part's name in bytes; a longer name is truncated.
 inline constexpr size_t kMaxPartNameBytes = 128;
 // Maximum absolute value of a coordinate, equal to the server's limit for frames and coordinates.
 inline constexpr double kMaxImportCoordinate = 1e9;
+// Maximum number of notes and maximum length of a text (a note, an error, a name) that a child process returns; longer
+// texts are truncated.
+inline constexpr size_t kMaxImportNotes = 64;
+inline constexpr size_t kMaxImportTextBytes = 8192;
 
-// Maximum size of a Quake 3 level in bytes: thirty times the largest level that the Quake 3 compiler writes.
+// Time and memory of the child process that reads a file. The memory grows with the size of the file, so that a small
+// file cannot take all memory of the machine: base + factor * file size, and not more than the maximum.
+inline constexpr uint32_t kMaxImportSeconds = 300;
+inline constexpr uint32_t kMaxImportCpuSeconds = 300;
+inline constexpr uint64_t kImportMemoryBase = uint64_t{2} << 30;
+inline constexpr uint64_t kImportMemoryFactor = 64;
+inline constexpr uint64_t kMaxImportMemory = uint64_t{32} << 30;
+
+// Quake 3. Maximum size of a level in bytes: thirty times the largest level that the Quake 3 compiler writes.
 inline constexpr size_t kMaxBspBytes = size_t{256} << 20;
 inline constexpr size_t kMaxBspTriangles = size_t{1} << 24;
 inline constexpr int kMaxPatchSubdivisions = 64;
-inline constexpr int64_t kMaxArchiveEntries = int64_t{1} << 20;
-// Maximum number of archive entries that a message lists.
+
+// Archives.
+inline constexpr int64_t kMaxArchiveEntries = int64_t{1} << 16;
+inline constexpr size_t kMaxEntryNameBytes = 1024;
+// Maximum ratio of a level's unpacked size to its packed size, for levels of more than kMinJudgedBytes. Levels of games
+// reach about 10; bytes that are all equal reach about 1000.
+inline constexpr uint64_t kMaxArchiveRatio = 200;
+inline constexpr size_t kMinJudgedBytes = size_t{1} << 20;
+// Maximum number of archive entries that a message lists, and of bytes that their names take in it.
 inline constexpr size_t kMaxListedEntries = 64;
+inline constexpr size_t kMaxListedBytes = 4096;
 static_assert(kMaxBspTriangles <= kMaxImportTriangles);
 
 }  // namespace locus::cli

@@ -20,16 +20,17 @@ struct MeshPart {
 
 struct ImportedMesh {
   std::string name;
-  std::vector<float> vertices;    // interleaved x, y, z of each vertex: 3 V values
-  std::vector<uint32_t> indices;  // three vertex indices per triangle, counter-clockwise seen from outside: 3 T values
+  std::vector<float> vertices;    // x, y, z of each vertex, interleaved
+  std::vector<uint32_t> indices;  // three vertex indices per triangle, counter-clockwise seen from outside
   std::vector<MeshPart> parts;
 };
 
 struct ImportedLevel {
   std::vector<ImportedMesh> meshes;
-  std::array<double, 3> recentre{};  // translation to place every mesh with, so that it has the file's coordinates
+  std::array<double, 3> recentre{};  // placed with this translation, a mesh has the file's coordinates
   std::string source_format;         // "OBJ", "PLY", "STL", "glTF", "GLB" or "Quake 3 BSP"
   std::vector<std::string> notes;    // sentences for the user about anything that was skipped, chosen or changed
+  bool filtered = false;             // a filter of system calls was on while the file was read
 };
 
 }  // namespace locus::cli

@@ -6,6 +6,7 @@
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
+#include "client/cli/levels/import/import_error.h"
 #include "core/base/status_macros.h"
 
 namespace locus::cli {
@@ -30,8 +31,7 @@ absl::Status check_input_file(const std::string& path, uint64_t max_bytes) {
   if (error) return absl::InvalidArgumentError(absl::StrCat("cannot access ", path, ": ", error.message()));
   if (size == 0) return absl::InvalidArgumentError(absl::StrCat(path, " is empty: export or copy it again"));
   if (size > max_bytes) {
-    return absl::ResourceExhaustedError(
-        absl::StrCat(path, " has ", size, " bytes, the limit is ", max_bytes, ": split it into several files"));
+    return exceeds(path, absl::StrCat(size, " bytes"), "import_file_bytes", max_bytes, "split it into several files");
   }
   if (!std::ifstream(path, std::ios::binary)) {
     return absl::InvalidArgumentError(absl::StrCat("cannot open ", path, ": check its permissions"));

@@ -9,14 +9,15 @@
 #include "absl/container/flat_hash_map.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "client/cli/levels/import/clean_text.h"
+#include "client/cli/levels/import/import_error.h"
 #include "client/cli/levels/import/import_limits.h"
-#include "client/cli/levels/import/part_name.h"
 #include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
 
-// Ratio of a level's distance from the origin to its size above which the level is recentred. At ratio 8, float
+// A level is recentred if its distance from the origin exceeds its size by more than this factor. At factor 8, float
 // coordinates relative to the origin lose three of their 24 bits.
 constexpr double kFarRatio = 8;
 
@@ -56,6 +57,8 @@ class VertexWelder {
 
 }  // namespace
 
+std::string clean_part_name(absl::string_view raw) { return clean_text(raw, kMaxPartNameBytes); }
+
 void LevelBuilder::begin_part(absl::string_view name) {
   std::string clean = clean_part_name(name);
   if (!parts_.empty() && parts_.back().name == clean) return;
@@ -70,12 +73,10 @@ void LevelBuilder::begin_part(absl::string_view name) {
 
 absl::Status LevelBuilder::ensure_room(size_t vertices, size_t triangles) const {
   if (triangles > kMaxImportTriangles - triangle_count()) {
-    return absl::ResourceExhaustedError(
-        absl::StrCat("more than ", kMaxImportTriangles, " triangles: split the file into several meshes"));
+    return exceeds("the file", "more triangles", "triangles", kMaxImportTriangles, "split it into several files");
   }
   if (vertices > kMaxImportVertices - vertex_count()) {
-    return absl::ResourceExhaustedError(
-        absl::StrCat("more than ", kMaxImportVertices, " vertices: split the file into several meshes"));
+    return exceeds("the file", "more vertices", "vertices", kMaxImportVertices, "split it into several files");
   }
   return absl::OkStatus();
 }

@@ -1,6 +1,6 @@
 // Builder of one upload-ready mesh from the triangles of one file. Coordinates are collected in double and rounded
-// once. For the importers. Each builder is used by one thread. Invariant: every index added is below the number of
-// vertices added.
+// once, and names of parts are sanitized, so that they can be sent and printed. For the importers. Each builder is used
+// by one thread. Invariant: every index added is below the number of vertices added.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_LEVEL_BUILDER_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_LEVEL_BUILDER_H_
 
@@ -16,6 +16,9 @@
 #include "client/cli/levels/import/imported_mesh.h"
 
 namespace locus::cli {
+
+// Returns clean_text() of `raw` with at most kMaxPartNameBytes.
+std::string clean_part_name(absl::string_view raw);
 
 class LevelBuilder {
  public:
@@ -39,9 +42,9 @@ class LevelBuilder {
   size_t vertex_count() const { return positions_.size(); }
   size_t triangle_count() const { return indices_.size() / 3; }
 
-  // Returns the level with its single mesh. Recentres it if its bounds are far from the origin, rounds coordinates once
-  // to float, merges equal vertices and drops unused ones. Returns INVALID_ARGUMENT if there is no triangle, or if a
-  // used coordinate is not finite or exceeds kMaxImportCoordinate. Cost: linear.
+  // Returns the level with its single mesh. Recentres the level if its bounds are far from the origin, rounds
+  // coordinates once to float, merges equal vertices and drops unused vertices. Returns INVALID_ARGUMENT if there is no
+  // triangle, or if a used coordinate is not finite or exceeds kMaxImportCoordinate. Cost: linear.
   absl::StatusOr<ImportedLevel> finish(std::string name) &&;
 
  private:

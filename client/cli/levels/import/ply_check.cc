@@ -10,12 +10,15 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
+#include "client/cli/levels/import/clean_text.h"
+#include "client/cli/levels/import/count_check.h"
 #include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
 
 constexpr size_t kMaxHeaderBytes = 1 << 16;
+constexpr size_t kMaxShownBytes = 40;  // length of a word of the file in a message
 
 enum class PlyEncoding { kAscii, kLittleEndian, kBigEndian };
 
@@ -65,7 +68,7 @@ absl::StatusOr<PlyProperty> read_property(const std::vector<absl::string_view>& 
     property.value_bytes = type_bytes(words[1]);
     if (property.value_bytes > 0) return property;
   }
-  return damaged(absl::StrCat("header property of unknown form: ", words.back()));
+  return damaged(absl::StrCat("header property of unknown form: ", clean_text(words.back(), kMaxShownBytes)));
 }
 
 absl::Status read_format(const std::vector<absl::string_view>& words, PlyHeader& header) {
@@ -77,7 +80,7 @@ absl::Status read_format(const std::vector<absl::string_view>& words, PlyHeader&
   } else if (name == "binary_big_endian") {
     header.encoding = PlyEncoding::kBigEndian;
   } else {
-    return damaged(absl::StrCat("unknown format ", name));
+    return damaged(absl::StrCat("unknown format ", clean_text(name, kMaxShownBytes)));
   }
   return absl::OkStatus();
 }
@@ -88,7 +91,7 @@ absl::Status read_header_line(const std::vector<absl::string_view>& words, PlyHe
     PlyElement element;
     if (words.size() != 3 || !absl::SimpleAtoi(words[2], &element.count))
       return damaged("element line without a count");
-    element.name = std::string(words[1]);
+    element.name = clean_text(words[1], kMaxShownBytes);  // printed in messages
     header.elements.push_back(std::move(element));
   } else if (words[0] == "property") {
     if (header.elements.empty()) return damaged("property before the first element");
@@ -177,6 +180,7 @@ absl::Status check_ascii_body(const PlyHeader& header, absl::string_view body) {
 
 absl::StatusOr<uint64_t> check_ply(absl::string_view bytes) {
   ASSIGN_OR_RETURN(const PlyHeader header, read_header(bytes));
+  uint64_t vertices = 0;
   uint64_t faces = 0;
   for (const PlyElement& element : header.elements) {
     if (element.name == "tristrips" && element.count > 0) {
@@ -184,12 +188,14 @@ absl::StatusOr<uint64_t> check_ply(absl::string_view bytes) {
           "the PLY file stores triangle strips (element tristrips), which are not supported: open it in MeshLab, "
           "Blender or the like and save it with faces");
     }
+    if (element.name == "vertex") vertices += std::min(element.count, UINT64_MAX - vertices);
     if (element.name == "face") faces += std::min(element.count, UINT64_MAX - faces);
   }
   const absl::string_view body = bytes.substr(header.body);
   const absl::Status status =
       header.encoding == PlyEncoding::kAscii ? check_ascii_body(header, body) : check_binary_body(header, body);
   if (!status.ok()) return status;
+  RETURN_IF_ERROR(check_counts({vertices, faces}));
   return faces;
 }
 

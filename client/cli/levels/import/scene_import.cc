@@ -1,10 +1,13 @@
 #include "client/cli/levels/import/scene_import.h"
 
+#include <assimp/MemoryIOWrapper.h>
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
 #include <algorithm>
 #include <array>
+#include <assimp/IOStream.hpp>
+#include <assimp/IOSystem.hpp>
 #include <assimp/Importer.hpp>
 #include <cmath>
 #include <cstddef>
@@ -16,6 +19,9 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
+#include "client/cli/levels/import/clean_text.h"
+#include "client/cli/levels/import/count_check.h"
+#include "client/cli/levels/import/import_error.h"
 #include "client/cli/levels/import/import_limits.h"
 #include "client/cli/levels/import/input_file.h"
 #include "client/cli/levels/import/level_builder.h"
@@ -64,24 +70,54 @@ absl::Status refusal(absl::string_view what) {
   return absl::InvalidArgumentError(absl::StrCat(what, "; export the file again or convert it to GLB"));
 }
 
+// File system of assimp that has only the files of one level, in memory.
+class MemoryFiles final : public Assimp::IOSystem {
+ public:
+  // Borrows the files.
+  explicit MemoryFiles(const LevelFiles& files) : files_(files) {}
+
+  bool Exists(const char* name) const override { return find(name) != nullptr; }
+  char getOsSeparator() const override { return '/'; }
+  Assimp::IOStream* Open(const char* name, const char* mode) override {
+    const std::string* bytes = find(name);
+    if (bytes == nullptr || mode[0] != 'r') return nullptr;
+    return new Assimp::MemoryIOStream(reinterpret_cast<const uint8_t*>(bytes->data()), bytes->size());
+  }
+  void Close(Assimp::IOStream* stream) override { delete stream; }
+
+ private:
+  const std::string* find(const std::string& name) const {
+    if (name == files_.name) return &files_.bytes;
+    const auto found = files_.referenced.find(name);
+    return found == files_.referenced.end() ? nullptr : &found->second;
+  }
+
+  const LevelFiles& files_;
+};
+
 // Parses the file with assimp. assimp throws on some damaged files and on exhausted memory; this function converts its
 // exceptions to errors.
-absl::StatusOr<const aiScene*> parse(Assimp::Importer& importer, const std::string& path) {
+absl::StatusOr<const aiScene*> parse(Assimp::Importer& importer, const LevelFiles& files) {
   const aiScene* scene = nullptr;
+  importer.SetIOHandler(new MemoryFiles(files));  // owned by the importer
   try {
-    scene = importer.ReadFile(path, 0);
+    scene = importer.ReadFile(files.name, 0);
   } catch (const std::exception& error) {
-    return refusal(absl::StrCat("cannot read ", path, ": ", error.what()));
+    return refusal(absl::StrCat("cannot read ", files.name, ": ", error.what()));
   }
-  if (scene == nullptr) return refusal(absl::StrCat("cannot read ", path, ": ", importer.GetErrorString()));
-  if (scene->mRootNode == nullptr) return refusal(absl::StrCat("cannot read ", path, ": it has no scene"));
+  if (scene == nullptr) return refusal(absl::StrCat("cannot read ", files.name, ": ", importer.GetErrorString()));
+  if (scene->mRootNode == nullptr) return refusal(absl::StrCat("cannot read ", files.name, ": it has no scene"));
+  if (scene->mNumMeshes > kMaxSceneMeshes) {
+    return exceeds("the file", absl::StrCat(scene->mNumMeshes, " meshes"), "scene_meshes", kMaxSceneMeshes,
+                   "join its meshes");
+  }
   return scene;
 }
 
-// Checks that coordinates are finite and indices in range. Call it before triangulation, which does not check indices;
-// neither does assimp's parser for some formats.
+// Checks that coordinates are finite and indices are in range. Must be called before triangulation, which does not
+// check indices. assimp's parser does not check indices of some formats either.
 absl::Status check_mesh(const aiMesh& mesh, size_t index) {
-  const std::string name = absl::StrCat("mesh ", index, " (", mesh.mName.C_Str(), ")");
+  const std::string name = absl::StrCat("mesh ", index, " (", clean_text(mesh.mName.C_Str(), kMaxPartNameBytes), ")");
   for (size_t v = 0; v < mesh.mNumVertices; ++v) {
     const aiVector3D& p = mesh.mVertices[v];
     if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
@@ -102,7 +138,7 @@ absl::Status check_mesh(const aiMesh& mesh, size_t index) {
 struct FaceCounts {
   uint64_t faces = 0;
   uint64_t points_and_lines = 0;
-  uint64_t triangles = 0;  // after triangulation: n - 2 for a polygon of n corners
+  uint64_t triangles = 0;  // number after triangulation: n - 2 for a polygon of n corners
 };
 
 FaceCounts count_faces(const aiScene& scene) {
@@ -119,12 +155,14 @@ FaceCounts count_faces(const aiScene& scene) {
   return counts;
 }
 
-// Returns the number of faces that the header of a PLY file declares. Returns nullopt for other formats, which do not
-// declare it.
-absl::StatusOr<std::optional<uint64_t>> declared_faces(const std::string& path) {
-  if (lower_extension(path) != ".ply") return std::nullopt;
-  ASSIGN_OR_RETURN(const std::string bytes, read_input_file(path, kMaxImportFileBytes));
-  ASSIGN_OR_RETURN(const uint64_t declared, check_ply(bytes));
+// Checks the bytes of an OBJ, PLY or STL file before assimp reads them. Returns the number of faces that the header of
+// a PLY file declares, and nullopt for other formats, which do not declare it.
+absl::StatusOr<std::optional<uint64_t>> check_bytes(const LevelFiles& files) {
+  const std::string extension = lower_extension(files.name);
+  if (extension == ".obj") RETURN_IF_ERROR(check_counts(count_obj(files.bytes)));
+  if (extension == ".stl") RETURN_IF_ERROR(check_counts(count_stl(files.bytes)));
+  if (extension != ".ply") return std::nullopt;
+  ASSIGN_OR_RETURN(const uint64_t declared, check_ply(files.bytes));
   return declared;
 }
 
@@ -161,22 +199,37 @@ std::string part_name(const aiNode& node, const aiMesh& mesh) {
   return absl::StrCat(node_name, "/", mesh_name);
 }
 
+struct PlacedNode {
+  const aiNode* node = nullptr;
+  Affine to_world;
+  size_t depth = 0;
+};
+
 // Adds the meshes of all nodes in depth-first order. Uses an explicit stack instead of recursion, since the untrusted
-// file decides the depth of the tree.
+// file determines the depth of the tree.
 absl::Status add_nodes(const aiScene& scene, LevelBuilder& builder) {
-  std::vector<std::pair<const aiNode*, Affine>> stack;
-  stack.emplace_back(scene.mRootNode, Affine::from(scene.mRootNode->mTransformation));
+  std::vector<PlacedNode> stack = {{scene.mRootNode, Affine::from(scene.mRootNode->mTransformation), 0}};
+  size_t nodes = 0;
+  size_t uses = 0;
   while (!stack.empty()) {
-    const auto [node, to_world] = stack.back();
+    const PlacedNode placed = stack.back();
+    const aiNode& node = *placed.node;
     stack.pop_back();
-    for (size_t i = 0; i < node->mNumMeshes; ++i) {
-      const aiMesh& mesh = *scene.mMeshes[node->mMeshes[i]];
-      builder.begin_part(part_name(*node, mesh));
-      RETURN_IF_ERROR(add_mesh(mesh, to_world, builder));
+    if (++nodes > kMaxSceneNodes || placed.depth > kMaxSceneDepth + 1) {
+      return exceeds("the scene", "more nodes, or deeper nesting", "scene_nodes", kMaxSceneNodes, "flatten its nodes");
     }
-    for (size_t i = node->mNumChildren; i-- > 0;) {
-      const aiNode* child = node->mChildren[i];
-      stack.emplace_back(child, to_world.times(Affine::from(child->mTransformation)));
+    for (size_t i = 0; i < node.mNumMeshes; ++i) {
+      if (++uses > kMaxSceneMeshUses) {
+        return exceeds("the scene", "more uses of meshes", "scene_mesh_uses", kMaxSceneMeshUses, "join its meshes");
+      }
+      if (node.mMeshes[i] >= scene.mNumMeshes) return refusal("a node names a mesh that is not there");
+      const aiMesh& mesh = *scene.mMeshes[node.mMeshes[i]];
+      builder.begin_part(part_name(node, mesh));
+      RETURN_IF_ERROR(add_mesh(mesh, placed.to_world, builder));
+    }
+    for (size_t i = node.mNumChildren; i-- > 0;) {
+      const aiNode* child = node.mChildren[i];
+      stack.push_back({child, placed.to_world.times(Affine::from(child->mTransformation)), placed.depth + 1});
     }
   }
   return absl::OkStatus();
@@ -211,21 +264,22 @@ void add_notes(const FaceCounts& found, uint64_t triangles_left, ImportedLevel& 
 
 }  // namespace
 
-absl::StatusOr<ImportedLevel> import_scene(const std::string& path, const ImportOptions& options) {
+absl::StatusOr<ImportedLevel> import_scene(const LevelFiles& files, const ImportOptions& options) {
   // Check before parsing: assimp reads out of bounds on some files that this check refuses.
-  ASSIGN_OR_RETURN(const std::optional<uint64_t> declared, declared_faces(path));
+  ASSIGN_OR_RETURN(const std::optional<uint64_t> declared, check_bytes(files));
   Assimp::Importer importer;
-  ASSIGN_OR_RETURN(const aiScene* const parsed, parse(importer, path));
+  ASSIGN_OR_RETURN(const aiScene* const parsed, parse(importer, files));
   const FaceCounts found = count_faces(*parsed);
   RETURN_IF_ERROR(check_scene(*parsed, found, declared));
   const aiScene* scene = importer.ApplyPostProcessing(aiProcess_Triangulate);
-  if (scene == nullptr) return refusal(absl::StrCat("cannot triangulate ", path, ": ", importer.GetErrorString()));
+  if (scene == nullptr)
+    return refusal(absl::StrCat("cannot triangulate ", files.name, ": ", importer.GetErrorString()));
 
   LevelBuilder builder(options.scale);
   RETURN_IF_ERROR(add_nodes(*scene, builder));
-  absl::StatusOr<ImportedLevel> level = std::move(builder).finish(file_stem(path));
+  absl::StatusOr<ImportedLevel> level = std::move(builder).finish(file_stem(files.name));
   if (!level.ok()) return level;
-  level->source_format = format_name(path);
+  level->source_format = format_name(files.name);
   const FaceCounts left = count_faces(*scene);
   add_notes(found, left.faces - left.points_and_lines, *level);
   return level;

@@ -1,5 +1,5 @@
-// Input of bytes from a file, a pipe or standard input, read in chunks. For inputs that do not fit in memory or never
-// end. Not thread-safe.
+// Input of bytes from a file, a pipe or standard input, read buffer by buffer. For inputs that do not fit in memory or
+// never end. Not thread-safe.
 #ifndef LOCUS_CLIENT_CLI_ROWS_BULK_BYTE_INPUT_H_
 #define LOCUS_CLIENT_CLI_ROWS_BULK_BYTE_INPUT_H_
 

@@ -1,5 +1,6 @@
-// Parser of csv records into rows. The first record is the header, which names the columns. For the row reader. Not
-// thread-safe.
+// Parser of csv records (RFC 4180) into fields and rows. The first record is the header, which names the columns. For
+// the row reader. Not thread-safe. Debian's csv libraries for C and C++ are unsuitable: libcsv does not bound the size
+// of a field, and fast-cpp-csv-parser does not support line breaks in quotes.
 #ifndef LOCUS_CLIENT_CLI_ROWS_BULK_CSV_ROWS_H_
 #define LOCUS_CLIENT_CLI_ROWS_BULK_CSV_ROWS_H_
 
@@ -13,6 +14,11 @@
 #include "client/cli/rows/bulk/row_schema.h"
 
 namespace locus::cli {
+
+// Splits `record`, given without its line end, at the commas outside quotes, and removes the quotes. Blanks around an
+// unquoted field are dropped. Returns INVALID_ARGUMENT for a quote in the middle of a field; `fields` then contains the
+// fields before it. An empty record has one empty field.
+absl::Status split_csv_record(absl::string_view record, std::vector<std::string>& fields);
 
 class CsvRows {
  public:

@@ -56,7 +56,8 @@ class RowHandler final : public nlohmann::json_sax<nlohmann::json> {
     }
     const Field& field = schema_[slot_->field];
     if (field.option.empty()) return true;
-    return refuse(absl::StrCat(field.name, " is there and ", field.option, " is given: leave one of them out"));
+    return refuse(absl::StrCat("the key ", field.name, " and the option ", field.option,
+                               " are both given: leave one of them out"));
   }
   bool start_array(std::size_t /*elements*/) override {
     if (!started_) return refuse("a list, not an object in braces");

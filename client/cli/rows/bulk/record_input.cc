@@ -40,8 +40,7 @@ absl::StatusOr<Arrival> RecordInput::next(Record& record, std::optional<Clock::t
 }
 
 // Scans for the end of a record. Returns true if [begin_, scanned_) is a complete record including its line end. A
-// quote within a quoted field is written twice, so the parity of the quotes so far decides whether a line break is
-// quoted.
+// quote within a quoted field is written twice, so a line break is quoted if the number of quotes before it is odd.
 bool RecordInput::find_end() {
   while (scanned_ < buffer_.size()) {
     const char c = buffer_[scanned_++];

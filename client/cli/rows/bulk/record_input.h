@@ -1,5 +1,5 @@
 // Input split into records: lines, or csv records, which may contain quoted line breaks. For the row readers. Holds one
-// chunk of the input and at most one record in memory. Not thread-safe.
+// read buffer and at most one record in memory. Not thread-safe.
 #ifndef LOCUS_CLIENT_CLI_ROWS_BULK_RECORD_INPUT_H_
 #define LOCUS_CLIENT_CLI_ROWS_BULK_RECORD_INPUT_H_
 
@@ -20,8 +20,8 @@ inline constexpr size_t kMaxRecordBytes = 65536;
 enum class RecordForm { kLine, kCsv };
 
 struct Record {
-  absl::string_view text;  // without line end and byte order mark; valid until the next call
-  uint64_t line = 0;       // line of the input where it begins, from 1
+  absl::string_view text;  // without line end and byte order mark; valid until the next call of RecordInput::next()
+  uint64_t line = 0;       // line of the input where the record begins, from 1
 };
 
 enum class Arrival { kRecord, kPause, kEnd };

@@ -128,7 +128,7 @@ absl::Status RowBuilder::finish(uint64_t line, RowBatch& batch) {
     if (given == 0 && schema_[i].required) return wrong({i}, "is missing");
     if (given == 0 || schema_[i].parts.empty()) continue;
     for (size_t part = 0; part < schema_[i].size(); ++part) {
-      if ((given & (1u << part)) == 0) return wrong({i, part}, "is missing, while other parts are there");
+      if ((given & (1u << part)) == 0) return wrong({i, part}, "is missing, but other parts are given");
     }
   }
   for (size_t i = 0; i < schema_.size(); ++i) {

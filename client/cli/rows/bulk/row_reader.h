@@ -1,5 +1,5 @@
-// Reader of csv or ndjson rows, batch by batch. For the commands that accept rows; the only entry to the readers in
-// this folder. Not thread-safe. Holds at most one batch and one chunk of the input in memory.
+// Reader of csv or ndjson rows, batch by batch. For the commands that accept rows, which use the readers in this folder
+// only through RowReader. Not thread-safe. Holds at most one batch and one read buffer in memory.
 #ifndef LOCUS_CLIENT_CLI_ROWS_BULK_ROW_READER_H_
 #define LOCUS_CLIENT_CLI_ROWS_BULK_ROW_READER_H_
 
@@ -19,8 +19,8 @@ namespace locus::cli {
 
 enum class RowFormat { kCsv, kNdjson };
 
-// Maximum time to collect a batch while the input is slow, counted from the batch's first row: after this time the
-// batch ends as soon as no data is ready.
+// Time after a batch's first row from which the batch ends as soon as the input has no data ready, so that rows of a
+// slow input are not held back.
 inline constexpr std::chrono::milliseconds kRowPause{50};
 
 enum class BatchEnd {
@@ -29,7 +29,7 @@ enum class BatchEnd {
   kEnd,    // the input has ended
 };
 
-// Behaviour while the batch is still empty: wait for the first row, or return kPause after kRowPause.
+// Behaviour of next() while the batch is still empty: wait for the first row, or return kPause after kRowPause.
 enum class Patience { kWait, kPause };
 
 class RowReader {
@@ -39,8 +39,8 @@ class RowReader {
   RowReader& operator=(const RowReader&) = delete;
 
   // Reads the next rows, at most `max_rows`, into `batch`. The batch can be empty at the end of the input, and with
-  // Patience::kPause. The message of an error is "FILE:LINE: REASON"; after an error neither the batch nor the reader
-  // may be used.
+  // Patience::kPause. Returns INVALID_ARGUMENT with the message "FILE:LINE: REASON" for a malformed row, or UNKNOWN if
+  // reading fails; after an error neither the batch nor the reader may be used.
   absl::StatusOr<BatchEnd> next(size_t max_rows, Patience patience, RowBatch& batch);
 
   const RowSchema& schema() const { return schema_; }

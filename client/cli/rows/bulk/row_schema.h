@@ -40,14 +40,14 @@ struct Field {
 
 using RowSchema = std::vector<Field>;
 
-// Position of a value: the index of a field in the schema and, for one part of a vector, the index of the part. Without
-// `part` it means the whole field.
+// Position of a value: the index of a field in the schema and, for one part of a vector, the index of the part. A slot
+// without `part` is the whole field.
 struct Slot {
   size_t field = 0;
   std::optional<size_t> part = std::nullopt;
 };
 
-// Returns the slot with this name, for example "from.x" or "from"; none if the schema has no such field or part.
+// Returns the slot with this name, for example "from.x" or "from"; nullopt if the schema has no such field or part.
 std::optional<Slot> find_slot(const RowSchema& schema, absl::string_view name);
 
 // Returns the name of a slot: "from.x" for one part, "from" for the whole field.
@@ -56,9 +56,9 @@ std::string slot_name(const RowSchema& schema, const Slot& slot);
 // Returns the names of all csv columns of the schema, for messages: "from.x, from.y, ...".
 std::string known_columns(const RowSchema& schema);
 
-// Values of one field for all rows of a batch. The field's kind decides whether `numbers` (Field::size() entries per
-// row) or `integers` (one entry per row) is filled. For a row without a value the entries are 0, and so is its entry in
-// `given`.
+// Values of one field for all rows of a batch. The field's kind determines whether `numbers` (Field::size() entries per
+// row) or `integers` (one entry per row) is filled. `given` has one entry per row: 1 if the row has a value, otherwise
+// 0. For a row without a value, the entries of `numbers` or `integers` are 0.
 struct RowColumn {
   std::vector<double> numbers;
   std::vector<uint64_t> integers;

@@ -1,5 +1,5 @@
-// Lines of the input from which a sent batch was made, so that the line of an item can be found that the server's error
-// names. For the commands that send rows. Plain data and lookups.
+// Input lines of the rows in a sent batch, from which the line of the item that a server's error names is found. For
+// the commands that send rows. Plain data and lookups.
 #ifndef LOCUS_CLIENT_CLI_ROWS_BULK_SENT_ROWS_H_
 #define LOCUS_CLIENT_CLI_ROWS_BULK_SENT_ROWS_H_
 
@@ -20,8 +20,8 @@ struct SentRows {
 
   size_t rows() const { return lines.size(); }
 
-  // Returns the line of entry `index` of the list that `field`, a path from a server's error, names ("moves[3].ids",
-  // "blocks[0].rays.directions", "remove_ids"); none if that entry does not belong to a row.
+  // Returns the line of entry `index` of one of the batch's lists. `field` is the path of the list in a server's error
+  // ("moves[3].ids", "blocks[0].rays.directions", "remove_ids"). Returns nullopt if no row belongs to that entry.
   std::optional<uint64_t> line_of(absl::string_view field, size_t index) const;
 
   // Returns the range of the batch's lines for messages, as "17" or "17-8208"; empty if the batch has no rows.

@@ -1,4 +1,4 @@
-// Selection of the ray and region kernels for the instruction set in use.
+// Selection of the ray and region kernels for the instruction set that this process uses.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_DISPATCH_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_DISPATCH_H_
 

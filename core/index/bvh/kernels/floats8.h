@@ -1,6 +1,7 @@
 // Vector of eight floats for the kernels: a thin wrapper that lets one source serve several instruction sets. The
-// functions are documented in floats8_avx2.h; floats8_sse4.h offers the same functions. Everything has internal
-// linkage, because each object is compiled for another instruction set and the linker must not merge their functions.
+// functions are documented in floats8_avx2.h; floats8_sse4.h offers the same functions. All functions have internal
+// linkage, because each object file is compiled for another instruction set and the linker must not merge functions of
+// different object files.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_FLOATS8_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_FLOATS8_H_
 

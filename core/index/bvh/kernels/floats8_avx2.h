@@ -25,11 +25,12 @@ struct Floats8 {
   friend inline Floats8 operator/(Floats8 a, Floats8 b) { return {_mm256_div_ps(a.v, b.v)}; }
 };
 
-// Return a * b + c, a * b - c and c - a * b, each rounded once here and twice in floats8_sse4.h.
+// Return a * b + c, a * b - c and c - a * b. AVX2 rounds each result once; floats8_sse4.h rounds the product and the
+// sum.
 static inline Floats8 multiply_add(Floats8 a, Floats8 b, Floats8 c) { return {_mm256_fmadd_ps(a.v, b.v, c.v)}; }
 static inline Floats8 multiply_subtract(Floats8 a, Floats8 b, Floats8 c) { return {_mm256_fmsub_ps(a.v, b.v, c.v)}; }
 static inline Floats8 subtract_product(Floats8 c, Floats8 a, Floats8 b) { return {_mm256_fnmadd_ps(a.v, b.v, c.v)}; }
-// Return the minimum or maximum of each lane; the lane of `b` if either operand's lane is NaN.
+// Return the minimum or maximum of each lane. If the lane of either operand is NaN, the result is the lane of `b`.
 static inline Floats8 minimum(Floats8 a, Floats8 b) { return {_mm256_min_ps(a.v, b.v)}; }
 static inline Floats8 maximum(Floats8 a, Floats8 b) { return {_mm256_max_ps(a.v, b.v)}; }
 static inline Floats8 square_root(Floats8 a) { return {_mm256_sqrt_ps(a.v)}; }
@@ -44,7 +45,7 @@ static inline Floats8 bit_or(Floats8 a, Floats8 b) { return {_mm256_or_ps(a.v, b
 static inline void store_bits(Floats8 a, uint32_t* to) { a.store(reinterpret_cast<float*>(to)); }
 // Returns a mask for select(): the sign bit of a lane is set if a >= b.
 static inline Floats8 greater_equal_mask(Floats8 a, Floats8 b) { return {_mm256_cmp_ps(a.v, b.v, _CMP_GE_OQ)}; }
-// Returns `yes` in the lanes where the sign bit of `mask` is set, `no` in the others.
+// Returns the lane of `yes` where the sign bit of the mask's lane is set, else the lane of `no`.
 static inline Floats8 select(Floats8 mask, Floats8 yes, Floats8 no) { return {_mm256_blendv_ps(no.v, yes.v, mask.v)}; }
 
 // Returns a vector whose lanes all have the value of the largest lane of `a`.
@@ -54,7 +55,8 @@ static inline Floats8 horizontal_max(Floats8 a) {
   return {_mm256_max_ps(pairs, _mm256_permute_ps(pairs, _MM_SHUFFLE(2, 3, 0, 1)))};
 }
 
-// Return one bit a lane: at_most() whether a <= b, below() whether a < b. The bit is 0 if either operand's lane is NaN.
+// Return a mask with one bit per lane, set if a <= b (at_most) or a < b (below). The bit is 0 if the lane of either
+// operand is NaN.
 static inline uint32_t at_most(Floats8 a, Floats8 b) {
   return static_cast<uint32_t>(_mm256_movemask_ps(_mm256_cmp_ps(a.v, b.v, _CMP_LE_OQ)));
 }
@@ -62,8 +64,8 @@ static inline uint32_t below(Floats8 a, Floats8 b) {
   return static_cast<uint32_t>(_mm256_movemask_ps(_mm256_cmp_ps(a.v, b.v, _CMP_LT_OQ)));
 }
 
-// Table with one row for each set of lanes, given as a bit mask: the indices of the lanes in the set, in increasing
-// order, at the front of the row. Computed at compile time.
+// Table with one row for each bit mask of eight lanes. A row begins with the indices of the lanes in the mask, in
+// increasing order. Computed at compile time.
 struct PackTable {
   alignas(64) uint8_t lanes[256][8];
   constexpr PackTable() : lanes() {
@@ -126,8 +128,8 @@ static inline uint32_t pack_sorted(const TriangleNode& node, Floats8 near, Float
   return static_cast<uint32_t>(__builtin_popcount(set));
 }
 
-// Moves those of the elements from .. from + 7 whose bits are set in `set` to the indices from `to` on, in both
-// `children` and `nears`. Precondition: `to` <= `from`. May read and write eight elements of each array.
+// Moves the elements with the indices `from` to from + 7 whose bits are set in `set` to the indices from `to` on, in
+// both `children` and `nears`. Precondition: `to` <= `from`. May read and write eight elements of each array.
 static inline void pack_entries(uint32_t* children, float* nears, uint32_t from, uint32_t set, uint32_t to) {
   const __m256i packed = pack_permutation(set);
   const __m256i child = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(children + from));
@@ -162,7 +164,7 @@ static inline Doubles widened(float a, float b, float c) {
   return reinterpret_cast<Doubles>(_mm256_cvtps_pd(_mm_setr_ps(a, b, c, c)));
 }
 
-// Table like PackTable, but with the lanes in decreasing order.
+// Table like PackTable, but the indices of the lanes are in decreasing order.
 struct FallingPackTable {
   alignas(64) uint8_t lanes[256][8];
   constexpr FallingPackTable() : lanes() {
@@ -175,7 +177,7 @@ struct FallingPackTable {
 };
 static constexpr FallingPackTable kFallingPack;
 
-// Returns the child slots of a node, with the bits of `flag` set in the slots that are in the mask `flagged`.
+// Returns the values of a node's child slots, with the bits of `flag` set in the slots that are in the mask `flagged`.
 static inline __m256i flagged_children(const TriangleNode& node, uint32_t flagged, uint32_t flag) {
   const __m256i lanes = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
   const __m256i bits = _mm256_and_si256(_mm256_set1_epi32(static_cast<int>(flagged)), lanes);
@@ -183,8 +185,8 @@ static inline __m256i flagged_children(const TriangleNode& node, uint32_t flagge
   return _mm256_or_si256(_mm256_load_si256(reinterpret_cast<const __m256i*>(node.child)), flags);
 }
 
-// Writes the child slots in the mask `set`, from the last to the first, with the bits of `flag` set in those that are
-// also in the mask `flagged`. May overwrite all eight elements of `children`.
+// Writes the values of the child slots in the mask `set`, from the last slot to the first, with the bits of `flag` set
+// in the values of slots that are also in the mask `flagged`. May overwrite all eight elements of `children`.
 static inline void pack_falling(const TriangleNode& node, uint32_t set, uint32_t flagged, uint32_t flag,
                                 uint32_t* children) {
   const __m256i order =
@@ -193,7 +195,7 @@ static inline void pack_falling(const TriangleNode& node, uint32_t set, uint32_t
                       _mm256_permutevar8x32_epi32(flagged_children(node, flagged, flag), order));
 }
 
-// Does the same as pack_falling(), but writes from the first slot to the last.
+// Writes the same values as pack_falling(), but from the first slot to the last.
 static inline void pack_rising(const TriangleNode& node, uint32_t set, uint32_t flagged, uint32_t flag,
                                uint32_t* children) {
   _mm256_storeu_si256(reinterpret_cast<__m256i*>(children),
@@ -205,22 +207,21 @@ static inline uint32_t block_slots(const TriangleNode& node) {
   return static_cast<uint32_t>(_mm256_movemask_ps(_mm256_load_ps(reinterpret_cast<const float*>(node.child))));
 }
 
-// Loads `count` numbers, or the first eight if there are more, without reading beyond them. Lanes without a number are
-// 0.
+// Loads the first `count` numbers at `from`, at most eight, without reading beyond them. Lanes without a number are 0.
 static inline __m256i load_numbers(const uint32_t* from, uint32_t count) {
   const __m256i lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
   const __m256i within = _mm256_cmpgt_epi32(_mm256_set1_epi32(static_cast<int>(count)), lanes);
   return _mm256_maskload_epi32(reinterpret_cast<const int*>(from), within);
 }
 
-// Writes those of the `count` numbers at `from` whose bits are set in `set`; `count` is at most eight. May overwrite
-// eight elements at `to`.
+// Writes to `to` those of the `count` numbers at `from` whose bits are set in `set`; `count` is at most eight. May
+// overwrite eight elements at `to`.
 static inline void pack_numbers(const uint32_t* from, uint32_t count, uint32_t set, uint32_t* to) {
   const __m256i all_numbers = load_numbers(from, count);
   _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), _mm256_permutevar8x32_epi32(all_numbers, pack_permutation(set)));
 }
 
-// Copies `count` numbers. May write up to seven more elements at `to`.
+// Copies `count` numbers from `from` to `to`. May overwrite up to seven elements behind the copied numbers.
 static inline void copy_numbers(const uint32_t* from, uint32_t count, uint32_t* to) {
   for (uint32_t done = 0; done < count; done += 8)
     _mm256_storeu_si256(reinterpret_cast<__m256i*>(to + done), load_numbers(from + done, count - done));

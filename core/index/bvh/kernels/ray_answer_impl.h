@@ -1,5 +1,5 @@
-// Code shared by single rays and packets of rays: the table of the rows of a node's bounds, and the choice between
-// hits.
+// Code shared by the tracing of single rays and of packets (eight coherent rays traced together): the table of the rows
+// of a node's bounds, and the choice between hits.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_RAY_ANSWER_IMPL_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_RAY_ANSWER_IMPL_H_
 
@@ -34,16 +34,17 @@ static inline uint32_t number_of(const TriangleTree& tree, const TriangleBlock& 
   return tree.numbers[block.first + static_cast<uint32_t>(lane)];
 }
 
-// Returns whether the hit (t, number) replaces the ray's best hit so far, because it is nearer, or equally near with a
-// lower triangle number. If `found`, the best hit so far is (limit, best); otherwise `limit` is the limit of the ray.
+// Returns whether the hit (t, number) replaces the ray's best hit so far, because the new hit is nearer, or equally
+// near with a lower triangle number. If `found` is true, the best hit so far is (limit, best); otherwise the ray has no
+// hit yet, and `limit` is KernelRay::limit.
 static inline bool is_better(float t, uint32_t number, float limit, bool found, uint32_t best) {
   if (t > limit || (planted(PlantedBug::kKernelLimit) && !found && t == limit)) return false;
   return !found || t < limit || (number >= best) == planted(PlantedBug::kKernelTie);
 }
 
-// Buffer of the lowest hits of one ray so far by (t, triangle number), at most `max_rows`.
+// Buffer of at most `max_rows` hits of one ray: the lowest hits so far by (t, triangle number).
 struct KeptRows {
-  KernelRow* rows;  // if max_rows rows are stored, the highest one is first
+  KernelRow* rows;  // if max_rows rows are stored, the highest row is first
   uint32_t max_rows;
 
   static inline bool is_lower(const KernelRow& a, const KernelRow& b) {
@@ -51,8 +52,8 @@ struct KeptRows {
     return a.t < b.t || (a.t == b.t && a.number < b.number);
   }
 
-  // Stores a hit if it is among the lowest max_rows hits so far. `count` is the number of rows stored, and is
-  // incremented until it is max_rows; from then on, `limit` is lowered to the t of the highest row.
+  // Stores a hit if it is among the lowest max_rows hits so far. `count` is the number of rows stored; a stored hit
+  // increments it until it is max_rows. Once max_rows rows are stored, sets `limit` to the t of the highest row.
   inline void offer(const KernelRow& row, uint32_t& count, float& limit) const {
     if (row.t > limit) return;
     if (count < max_rows)

@@ -1,20 +1,21 @@
-// Test of one ray with the eight triangles of a block, or of eight rays with one triangle: float rules out triangles,
-// double decides the others. Error bounds, with R = max |origin| + max |vertex|, E = the block's extent, and d = the
-// direction's largest component. Sheared coordinates are those of TriangleRay divided by d:
+// Test of one ray with the eight triangles of a block, or of eight rays with one triangle: a test in float excludes
+// most triangles, and a test in double gives the result for the triangles that remain. Error bounds, with R = max
+// |origin| + max |vertex|, E = the block's extent, and d = the direction's largest component. Sheared coordinates are
+// those of TriangleRay divided by d:
 //
 // - The error of a sheared coordinate is at most 10 * 2^-24 R: rounding of the origin, the differences, the shear, the
 //   product and the sum. A ray that hits the block's padded box passes within 2^-20 R of it, so sheared coordinates are
 //   at most 2 E + 2^-18 R, and the error of an edge function (two products and a difference) is less than
 //   edge = 2^-17 R E + 2^-36 R^2.
-// - t is an average of vertex depths with the edge functions as weights. If |determinant| > 8 edge, its error is at
-//   most (6 edge E / |determinant| + 2^-20 R) / |d|. A ray that starts on a triangle hits it although rounding may
+// - t is an average of vertex depths with the edge functions as weights. If |determinant| > 8 edge, the error of t is
+//   at most (6 edge E / |determinant| + 2^-20 R) / |d|. A ray that starts on a triangle hits it although rounding may
 //   place the triangle up to 2^-42 R^3 / |determinant / d| behind the start; the interval of t includes this distance.
 //   Products that underflow add at most 2^-150 / |determinant|, which is within 2^-20 R / |d| if R >= 2^-25 and |d| <=
 //   2^20.
-// - If TriangleRay treats a triangle as nearly edge-on, double is too coarse, and the ray is left undecided. Any other
-//   hit has an error in double of less than 2^-24 of its own coordinates and the origin's. The hit therefore lies
-//   within the padded slabs of the triangle's own box. TriangleRay clamps t to that box, and queries clamp it to the
-//   bounds of the instance; neither clamp has an effect on such a hit.
+// - If TriangleRay treats a triangle as nearly edge-on, double is not precise enough, and the verdict on the ray is
+//   kUndecided. The error in double of a hit on any other triangle is less than 2^-24 of the coordinates of the hit and
+//   the origin. The hit therefore lies within the padded slabs of the triangle's own box. TriangleRay clamps t to that
+//   box, and queries clamp it to the bounds of the instance; neither clamp has an effect on such a hit.
 //
 // Source: Woop, Benthin, Wald, Watertight Ray/Triangle Intersection, 2013.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_RAY_BLOCK_IMPL_H_
@@ -33,15 +34,16 @@ static inline double minimum(double a, double b) { return b < a ? b : a; }
 
 // Eight pairs of a ray and a triangle: one ray with eight triangles, or eight rays with one triangle.
 struct Pairs {
-  Floats8 from_x, from_y, from_z;  // origin of the ray, by the axes of the projection
+  Floats8 from_x, from_y, from_z;  // origin of the ray on the axes of the projection
   Floats8 shear_x, shear_y, reciprocal_z;
   Floats8 limit;
-  Floats8 edge, noise, t_floor;  // error bounds: `edge` for edge functions; noise / |determinant| + t_floor for t
-  Floats8 xs[3], ys[3], zs[3];   // coordinates of the triangle's vertices
+  // Error bounds: `edge` for the edge functions, noise / |determinant| + t_floor for t.
+  Floats8 edge, noise, t_floor;
+  Floats8 xs[3], ys[3], zs[3];  // coordinates of the triangle's vertices
 };
 
 // Triangles of eight pairs, projected along the ray, relative to the ray's origin. All coordinates are negated, which
-// does not change the edge functions, because these are sums of products of two coordinates.
+// does not change the edge functions, because each is a sum of products of two coordinates.
 struct Projected {
   Floats8 weight_a, weight_b, weight_c;  // edge functions
   Floats8 a_z, b_z, c_z;                 // depths, negated
@@ -64,11 +66,11 @@ static inline Projected project(const Pairs& pairs) {
   return p;
 }
 
-// Results of the float test of eight pairs; in masks, one bit a pair.
+// Results of the float test of eight pairs of a ray and a triangle. A mask has one bit for each pair.
 struct PairResults {
-  uint32_t candidates;             // pairs that may hit within the limit
-  uint32_t inside;                 // pairs whose edge functions may all have the same sign
-  uint32_t edge_on;                // pairs that may be edge-on, for which t is not known
+  uint32_t candidates;             // mask of the pairs that may hit within the limit
+  uint32_t inside;                 // mask of the pairs whose edge functions may all have the same sign
+  uint32_t edge_on;                // mask of the pairs that may be edge-on, for which t is not known
   Floats8 min_weight, max_weight;  // smallest and largest edge function of each pair
   Floats8 earliest, latest;        // bounds of t
 };
@@ -104,13 +106,13 @@ static inline uint32_t certain_hits(const Pairs& pairs, const PairResults& resul
          ((front & below(pairs.edge, results.min_weight)) | (back & below(results.max_weight, zero - pairs.edge)));
 }
 
-// Results of the float test of one ray with a block; one bit a triangle.
+// Results of the float test of one ray with a block; each mask has one bit per triangle.
 struct BlockResults {
   uint32_t candidates;  // triangles that the ray may hit within the limit
-  uint32_t certain;     // triangles that the ray certainly hits within the limit; kAny only
+  uint32_t certain;     // triangles that the ray certainly hits within the limit; 0 unless kAny
 };
 
-// Tests one ray with the triangles of a block in float. `query` is the same ray as `ray`, as the caller gave it.
+// Tests one ray with the triangles of a block in float. `query` is the caller's ray, from which `ray` was prepared.
 template <bool kAny>
 static inline BlockResults test_block(const TriangleBlock& block, PreparedRay ray, float limit,
                                       const KernelRay& query) {
@@ -152,15 +154,16 @@ static inline Doubles coordinates(const TriangleBlock& block, uint32_t axis, int
   return widened(rows[0][lane], rows[3][lane], rows[6][lane]);
 }
 
-// Decision in double about one ray and one triangle.
+// Result of the test of one ray with one triangle in double. `t` is valid only for KernelVerdict::kHit.
 struct Verdict {
   KernelVerdict verdict;
   float t;
 };
 
-// Returns true if TriangleRay would treat the triangle as nearly edge-on; may also return true slightly beyond
-// TriangleRay's bound. Sheared coordinates are at most 2 E + 2^-18 R (as above), so that bound is at most d^2 (2^-12
-// E^2 + 2^-29 R E + 2^-48 R^2). This larger value is cheaper to compute and is tested first.
+// Returns true if TriangleRay would treat the triangle as nearly edge-on; may also return true for triangles slightly
+// beyond TriangleRay's bound. `size` is |determinant| and `along` is d; R, E and d are defined at the top of this file.
+// Sheared coordinates are at most 2 E + 2^-18 R, so TriangleRay's bound is at most d^2 (2^-12 E^2 + 2^-29 R E + 2^-48
+// R^2). This larger bound is cheaper to compute, so `size` is compared with it first.
 static inline bool may_be_edge_on(const TriangleBlock& block, PreparedRay prepared, Doubles x, Doubles y,
                                   Doubles depths, double along, double size) {
   const double extent = block.extent, edge_scale = prepared.value(kEdgeScale);
@@ -176,7 +179,7 @@ static inline bool may_be_edge_on(const TriangleBlock& block, PreparedRay prepar
 }
 
 // Returns the result of TriangleRay::is_exactly_edge_on(): whether the triangle's plane is perpendicular to a mesh axis
-// and contains the ray's direction. This is frequent if walls are aligned with the axes.
+// and contains the ray's direction. Such triangles are frequent in meshes with axis-aligned walls.
 static inline bool is_exactly_edge_on(const TriangleBlock& block, int lane, const KernelRay& ray) {
   uint32_t across = 0;
   for (uint32_t axis = 0; axis < 3; ++axis) {
@@ -187,7 +190,7 @@ static inline bool is_exactly_edge_on(const TriangleBlock& block, int lane, cons
   return ray.unrotated && across != 0;
 }
 
-// Decides in double whether the ray hits the triangle in lane `lane`. It computes TriangleRay::edge_test() without the
+// Tests in double whether the ray hits the triangle in lane `lane`. Computes TriangleRay::edge_test() without the
 // scaling by powers of two, which changes no bit of the result for the directions and distances that the kernels
 // accept.
 static inline Verdict decide(const TriangleBlock& block, int lane, const KernelRay& ray, PreparedRay prepared) {
@@ -212,8 +215,8 @@ static inline Verdict decide(const TriangleBlock& block, int lane, const KernelR
   const double t = (shares[0] + shares[1] + shares[2]) / (determinant * along);
   if (t < 0) {
     const double unit = along * along;
-    // A triangle far behind the origin is not hit. For a triangle slightly behind it TriangleRay::depth_noise() must
-    // decide, so the ray is left undecided here.
+    // A triangle far behind the origin is not hit. For a triangle slightly behind the origin the result depends on
+    // TriangleRay::depth_error(), which is not computed here, so the verdict is kUndecided.
     const double noise = double{prepared.value(kStartNoise)} * unit / size + double{prepared.value(kTFloor)};
     return {t < -noise ? KernelVerdict::kMiss : KernelVerdict::kUndecided, 0};
   }

@@ -1,8 +1,9 @@
-// Ray kernels: intersect many rays with the tree of one mesh by vector instructions; each instruction set has its
-// kernels in an object file of its own. A kernel decides in float only outside a documented error bound, and otherwise
-// in double by the arithmetic of TriangleRay (core/geometry/ray_triangle.h), so that its answers equal those of
-// TriangleRay bit for bit. If double cannot decide either, the ray is left undecided and the caller traces it triangle
-// by triangle. Plain data; functions without state, safe from any thread; a call uses 220 KB of stack.
+// Ray kernels: vector code that intersects many rays with the tree of one mesh. The kernels of each instruction set are
+// in an object file of their own. A kernel uses a result computed in float only if it is outside a documented error
+// bound. Otherwise the kernel repeats the test in double by the arithmetic of TriangleRay
+// (core/geometry/ray_triangle.h), so that its answers equal those of TriangleRay bit for bit. If double is not precise
+// enough either, the verdict on the ray is kUndecided, and the caller traces the ray again, triangle by triangle with
+// TriangleRay. Plain data; functions without state, safe from any thread; a call uses 220 KB of stack.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_RAY_KERNELS_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_RAY_KERNELS_H_
 
@@ -18,11 +19,11 @@ namespace locus {
 struct KernelRay {
   double origin[3];
   double direction[3];
-  float limit;        // maximum t of a hit, inclusive, in units of the direction's length
+  float limit;        // maximum t of a hit, inclusive, in units of `direction`
   bool accept_front;  // whether to report triangles seen counter-clockwise
   bool accept_back;   // whether to report triangles seen clockwise
-  // True if the ray was not rotated into mesh axes: a zero component of its direction is exact, so that a triangle
-  // perpendicular to that axis is exactly edge-on.
+  // True if the transform to mesh axes had no rotation. A zero component of the direction is then exact, so a triangle
+  // perpendicular to the axis of this component is exactly edge-on.
   bool unrotated = false;
 };
 
@@ -32,43 +33,44 @@ inline constexpr double kMaxKernelDirection = 0x1p20;
 // limits, products in the error bounds would underflow or overflow.
 inline constexpr double kMinKernelReach = 0x1p-24;
 inline constexpr double kMaxKernelReach = 0x1p33;
-// A ray that was tested with more triangles than this is left undecided, which bounds the time of a call.
+// Maximum number of triangles with which a ray is tested; with more triangles its verdict is kUndecided. Bounds the
+// time of a call.
 inline constexpr uint32_t kMaxKernelTests = 4096;
 
 enum class KernelVerdict : uint8_t { kMiss, kHit, kUndecided };
 
 // Answer to one ray.
 struct KernelHit {
-  float t;          // in units of the direction's length; first() only
-  uint32_t number;  // first(): lowest triangle number of those hit at t; all(): count of rows
+  float t;          // in units of the ray's direction; valid for first() only
+  uint32_t number;  // first(): lowest number of the triangles hit at t; all(): number of rows written
   KernelVerdict verdict;
-  uint32_t nodes;  // nodes opened
-  uint32_t tests;  // triangles tested
+  uint32_t nodes;  // number of nodes opened
+  uint32_t tests;  // number of triangles tested
 };
 
 // One of the hits found by all().
 struct KernelRow {
-  float t;          // in units of the direction's length
+  float t;          // in units of the ray's direction
   uint32_t number;  // triangle number
 };
 
 // Kernels of one instruction set.
 struct RayKernels {
-  const char* name;  // instruction set
+  const char* name;  // name of the instruction set
   // Finds the nearest hit of each of `count` rays. One call with many rays is faster than many calls, because the rays
   // are traced interleaved. Each answer depends only on its own ray.
   void (*first)(const TriangleTree& tree, const KernelRay* rays, KernelHit* hits, size_t count);
   // Determines whether each of `count` rays hits any triangle.
   void (*any)(const TriangleTree& tree, const KernelRay* rays, KernelHit* hits, size_t count);
-  // Finds all hits of each ray, or if there are more than `max_rows`, the lowest `max_rows` by (t, triangle number).
-  // Precondition: `max_rows` >= 1. The rows of ray i begin at rows[i * max_rows] and are not sorted. The rows of an
-  // undecided ray are undefined.
+  // Finds all hits of each ray or, if a ray has more than `max_rows` hits, its lowest `max_rows` hits by (t, triangle
+  // number). Precondition: `max_rows` >= 1. The rows of ray i begin at rows[i * max_rows] and are not sorted. The rows
+  // of an undecided ray are undefined.
   void (*all)(const TriangleTree& tree, const KernelRay* rays, KernelHit* hits, size_t count, KernelRow* rows,
               uint32_t max_rows);
 };
 
-// Return the kernels of one instruction set. Each function is the only symbol that its object file exports. Must be
-// called only on a processor that supports the instruction set.
+// Return the kernels of one instruction set. Each function is the only symbol that its object file exports.
+// Precondition: the processor supports the instruction set.
 const RayKernels& ray_kernels_avx2();
 const RayKernels& ray_kernels_sse4();
 

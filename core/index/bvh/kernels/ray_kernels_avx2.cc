@@ -1,4 +1,4 @@
-// Compiled for AVX2 and FMA.
+// Ray kernels compiled for AVX2 and FMA.
 #include "core/index/bvh/kernels/ray_kernels_impl.h"
 
 namespace locus {

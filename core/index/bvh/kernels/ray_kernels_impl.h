@@ -1,10 +1,10 @@
 // Implementation of the ray kernels, compiled once for each instruction set by the .cc file that includes it. Up to 32
 // rays are traced interleaved, one step each in turn, which hides memory latency: while one ray waits for memory, the
-// others continue. Steps of the same kind are executed together for all rays that need them, so that the processor
-// seldom mispredicts a branch; a misprediction costs more than a step.
+// others continue. Steps of the same kind are executed together for all rays whose next step is of that kind, so that
+// the processor seldom mispredicts a branch; a misprediction costs more than a step.
 //
 // Sources: Wald, Benthin, Boulos, Getting Rid of Packets, 2008 (single rays in wide trees); Kocberber, Falsafi, Grot,
-// Asynchronous Memory Access Chaining, 2015 (many searches in flight).
+// Asynchronous Memory Access Chaining, 2015 (many searches interleaved).
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_RAY_KERNELS_IMPL_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_RAY_KERNELS_IMPL_H_
 
@@ -19,21 +19,22 @@
 namespace locus {
 namespace {
 
-constexpr uint32_t kMaxFlights = 32;     // rays traced interleaved
-constexpr uint32_t kMaxPackets = 2;      // packets of coherent rays traced interleaved
-constexpr uint32_t kPreparedRays = 256;  // rays prepared at once; the index of such a ray fits in a byte
+constexpr uint32_t kMaxFlights = 32;  // maximum number of rays traced interleaved
+constexpr uint32_t kMaxPackets = 2;   // maximum number of packets traced interleaved
+// Maximum number of rays prepared at once. The index of a prepared ray fits in a byte.
+constexpr uint32_t kPreparedRays = 256;
 static_assert(kPreparedRays <= 256 && kPreparedRays % kTreeWidth == 0 && kMaxFlights <= 256);
 
 // Ray being traced. `waiting` is a stack of child slot values: the nodes and blocks that the ray enters at or before
-// its limit. Its lowest element is the sentinel kNoChild. `nears` holds the t of entry for each other element (not if
-// kAny).
+// its limit. The lowest element of `waiting` is the sentinel kNoChild. nears[i] is the t at which the ray enters
+// waiting[i]; unused if kAny.
 struct alignas(64) InFlightRay {
   PreparedRay ray;
   uint32_t index;  // index of the ray in the arrays of rays and hits
   uint32_t now;    // current node or block, or kNoChild at the end
   uint32_t top;    // number of elements in `waiting`
   float limit;
-  uint32_t number;  // triangle number of the best hit so far; kAll: count of rows stored
+  uint32_t number;  // triangle number of the best hit so far; if kAll, number of rows stored
   uint32_t nodes, tests;
   bool found, undecided;
   alignas(64) uint32_t waiting[kTreeStack];
@@ -43,10 +44,11 @@ struct alignas(64) InFlightRay {
 // Kind of a ray's next step. kCandidates has all bits set, so that the bitwise or of kCandidates and any other step is
 // kCandidates. kSteps is the number of kinds.
 enum Step : uint32_t { kNode = 0, kBlock = 1, kEnd = 2, kCandidates = 3, kSteps = 4 };
-// Returns the step that processes the value of a child slot: kNode, kBlock, or kEnd for kNoChild.
+// Returns the step that processes `reference`, the value of a child slot: kNode, kBlock, or kEnd for kNoChild.
 static inline uint32_t step_at(uint32_t reference) { return (reference >> 31) + (reference == kNoChild ? 1u : 0u); }
 
-// Lists of the rays in flight by the kind of their next step. A ray is identified by its index in RayStream's flights.
+// Lists of the rays being traced, one list for each kind of next step. A ray is identified by its index in RayStream's
+// `flights`.
 struct WorkList {
   uint8_t flights[kSteps][kMaxFlights];
   uint32_t counts[kSteps] = {};
@@ -74,7 +76,7 @@ class RayStream {
         count_(count),
         flights_(flights) {}
 
-  // Traces all rays. What depends on the result of a step runs in a second loop over the same rays, so that the
+  // Traces all rays. Work that depends on the result of a step is done in a second loop over the same rays, so that the
   // processor's out-of-order window contains the independent steps of several rays.
   inline void run() {
     WorkList now;
@@ -119,7 +121,7 @@ class RayStream {
   }
 
   // Opens the current node: pushes the children that the ray may hit, the nearest one last. If kAny, pushes them in the
-  // order of their slots, because any hit will do.
+  // order of their slots, because the query needs no particular hit.
   inline void open_node(uint32_t slot) {
     InFlightRay& flight = flights_[slot];
     const PreparedRay ray = flight.ray;
@@ -165,10 +167,10 @@ class RayStream {
   }
 
   // Pops the next node or block. If the opened block has candidates, or the ray has exceeded kMaxKernelTests, schedules
-  // resolve() instead, which pops afterwards.
+  // resolve() instead, which pops the next node or block afterwards.
   inline void finish_block(uint32_t slot, WorkList& next_steps) {
     InFlightRay& flight = flights_[slot];
-    // Computed without branches, which would be mispredicted too often here.
+    // Computed without branches, because the processor would mispredict them too often.
     const uint32_t resolve_first = static_cast<uint32_t>(opened_[slot].results.candidates != 0) |
                                    static_cast<uint32_t>(flight.tests > kMaxKernelTests);
     const uint32_t next_reference = flight.waiting[flight.top - 1], step = step_at(next_reference);
@@ -178,7 +180,7 @@ class RayStream {
     next_steps.add(slot, step | ((0u - resolve_first) & kCandidates));
   }
 
-  // Decides the candidates of the opened block in double, then pops the next node or block, or ends the ray.
+  // Tests the candidates of the opened block in double, then pops the next node or block, or ends the ray.
   inline void resolve(uint32_t slot, WorkList& next_steps) {
     const OpenedBlock& opened = opened_[slot];
     InFlightRay& flight = flights_[slot];
@@ -252,12 +254,12 @@ class RayStream {
   const KernelRay* const rays_;
   const PreparedRays* const prepared_;
   KernelHit* const hits_;
-  const KeptRows kept_;  // kAll: output rows of the first ray
+  const KeptRows kept_;  // output rows of the first ray; used only if kAll
   const uint8_t* const indices_;
   const uint32_t count_;
   InFlightRay* const flights_;
-  // Array and element size for each step, used for prefetching. For kEnd the size is 0: the root is prefetched,
-  // needlessly, but without a branch.
+  // Array and element size for each step, used for prefetching. For kEnd the size is 0, so the root is prefetched: this
+  // needs no branch and does no harm.
   const char* const bases_[3] = {reinterpret_cast<const char*>(tree_.nodes),
                                  reinterpret_cast<const char*>(tree_.blocks),
                                  reinterpret_cast<const char*>(tree_.nodes)};
@@ -267,12 +269,12 @@ class RayStream {
 };
 
 // Divides the rays into groups of eight consecutive rays, and traces each group of coherent rays as one Packet, which
-// writes their hits. Writes the indices of all other rays to `rest` and returns the number of these rays.
+// writes the answers of these rays to `hits`. Writes the indices of all other rays to `rest` and returns their number.
 template <bool kAny>
 static uint32_t trace_packets(const TriangleTree& tree, const KernelRay* rays, const PreparedRays* prepared,
                               KernelHit* hits, uint32_t count, uint8_t* rest) {
   uint32_t rest_count = 0, first = 0;
-  // Starts `packet` with the next group of coherent rays. Returns false if there is none.
+  // Starts `packet` with the next group of coherent rays. Returns false if no such group remains.
   const auto start_next = [&](Packet<kAny>& packet) {
     while (first < count) {
       const uint32_t now = first, size = count - now < kTreeWidth ? count - now : kTreeWidth;

@@ -1,8 +1,8 @@
-// Packet of eight coherent rays, traced through one tree together: each box and each triangle is tested with all rays
-// at once. Cameras and sensors send such rays. Each ray is tested with the same boxes and triangles, using the same
-// arithmetic, as if it were traced alone, so that its answer is the same. Boxes that no ray can hit are culled first,
-// eight at a time, by a frustum around the rays. Several packets take steps in turn, so that one packet continues while
-// another waits for memory.
+// Packet of eight coherent rays (rays close to each other with similar directions), traced through one tree together:
+// each box and each triangle is tested with all rays at once. Simulated cameras and sensors generate coherent rays. The
+// tests of a ray use the same arithmetic as if the ray were traced alone, so that its answer is the same. Boxes that no
+// ray can hit are culled first, eight at a time, by a frustum around the rays. Several packets take steps in turn, so
+// that one packet continues while another waits for memory.
 //
 // Source: Wald, Slusallek, Benthin, Wagner, Interactive Rendering with Coherent Ray Tracing, 2001.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_RAY_PACKET_IMPL_H_
@@ -28,8 +28,8 @@ static inline bool are_coherent(const PreparedRays& rays, float magnitude) {
   for (uint32_t column = kFromX; column <= kFromZ; ++column)
     if (differ(column, kMaxSpread * magnitude)) return false;
   if (differ(kShearX, kMaxSpread) || differ(kShearY, kMaxSpread)) return false;
-  // The octant and the axis are compared as integers: interpreted as floats they are denormal, and would compare equal
-  // if the host process treats denormals as zero.
+  // The octant and the axis are compared as integers: as floats their bits are denormal numbers, which would compare
+  // equal if the host process treats denormals as zero.
   const PreparedRay first(rays, 0);
   uint32_t different = 0;
   for (uint32_t i = 1; i < kTreeWidth; ++i) {
@@ -43,7 +43,8 @@ static inline bool are_coherent(const PreparedRays& rays, float magnitude) {
 template <bool kAny>
 class Packet {
  public:
-  // Starts eight rays at the root of the tree. `rays` and `hits` have eight elements; all arguments are borrowed.
+  // Starts eight rays at the root of the tree. `rays` and `hits` have eight elements. Borrows all arguments until
+  // step() returns false.
   inline void start(const TriangleTree& tree, const KernelRay* rays, const PreparedRays& prepared, KernelHit* hits) {
     tree_ = &tree;
     rays_ = rays;
@@ -67,12 +68,12 @@ class Packet {
     top_ = 1;
   }
 
-  // Opens one node or block and returns true. If none is left, completes the answers and returns false; step() must not
-  // be called again before start().
+  // Opens one node or block and returns true. If no node or block is left, completes the answers and returns false;
+  // step() must not be called again before start().
   inline bool step() {
     while (top_ != 0) {
-      // This is a reference, because a copy would be stored in two halves, and the load of the whole that follows would
-      // stall.
+      // `now` is a reference, because the compiler would store a copy in two halves, and the load of the whole vector
+      // that follows would stall.
       const Waiting& now = waiting_[--top_];
       const uint32_t reference = now.reference;
       // The rays' limits may have decreased since the box was pushed. A box that a ray enters exactly at its limit is
@@ -114,7 +115,7 @@ class Packet {
     Floats8 reciprocal[3], near_offset[3], far_offset[3];
   };
 
-  // Prefetches the next node or block; other packets are stepped meanwhile.
+  // Prefetches the next node or block, so that it is loaded while other packets take their steps.
   inline void prefetch_next() const {
     if (top_ == 0) return;
     const uint32_t reference = waiting_[top_ - 1].reference;
@@ -124,9 +125,9 @@ class Packet {
       prefetch(&tree_->blocks[reference & ~kBlockBit], sizeof(TriangleBlock));
   }
 
-  // Frustum around the rays, with equal values in all lanes: bounds of the rays' origins and reciprocal directions.
-  // According to these bounds, a slab is entered no later and left no earlier than by any of the rays. The pad is twice
-  // that of the rays, which covers the rounding of this computation.
+  // Frustum around the rays, with equal values in all lanes: bounds of the rays' origins and reciprocal directions. The
+  // frustum enters a slab no later, and leaves it no earlier, than any of the rays. `pad` is twice the largest pad of
+  // the rays, which covers the rounding of the frustum's own test.
   struct RayFrustum {
     Floats8 near_origin[3], far_origin[3], min_reciprocal[3], max_reciprocal[3], pad[3];
   };
@@ -190,8 +191,8 @@ class Packet {
     return top;
   }
 
-  // Tests the rays in the mask `rays` with a block: each triangle with all of these rays at once or, if few rays hit
-  // the block's box, each ray with all triangles at once.
+  // Tests the rays in the mask `rays` with a block: each triangle with eight rays at once or, if few rays hit the
+  // block's box, each ray with eight triangles at once.
   inline void open_block(const TriangleBlock& block, uint32_t rays) {
     for (uint32_t i = 0; i < kTreeWidth; ++i) hits_[i].tests += (rays >> i & 1u) * block.count;
     constexpr int kRayCost = 5, kTriangleCost = 2;  // measured relative costs
@@ -249,8 +250,8 @@ class Packet {
   // Returns the integer in `column`, an axis or the octant, which is equal for all rays of the packet.
   inline uint32_t axis(uint32_t column) const { return PreparedRay(*prepared_, 0).integer(column); }
 
-  // Returns pairs of the eight rays with a triangle of `block`. All members are set except for the coordinates of the
-  // triangle's vertices.
+  // Returns pairs of the eight rays with a triangle of `block`. Sets all members except the coordinates of the
+  // triangle's vertices (xs, ys, zs).
   inline Pairs pairs_with(const TriangleBlock& block) const {
     const auto column = [&](uint32_t index) { return Floats8::load(prepared_->columns[index]); };
     const Floats8 extent = Floats8::splat(block.extent);
@@ -269,9 +270,9 @@ class Packet {
     return pairs;
   }
 
-  // Adds a triangle that ray `i` certainly hits. Its exact t is computed later, because most hits found first are not
-  // the nearest. `limit` is an upper bound of its t: it becomes the ray's limit if it is lower, and candidates beyond
-  // it are removed.
+  // Adds a triangle that ray `i` certainly hits. The exact t of the hit is computed later, because most hits found
+  // first are not the nearest. `limit` is an upper bound of this t. If `limit` is lower than the ray's limit, it
+  // becomes the new limit of the ray, and candidates beyond the new limit are removed.
   inline void add_candidate(uint32_t i, const Candidate& candidate, float limit) {
     if (limit < limits_[i]) {
       limits_[i] = limit;
@@ -294,8 +295,8 @@ class Packet {
     candidate_counts_[i] = 0;
   }
 
-  // Decides in double whether ray `i` hits the triangle in lane `lane`, and records the hit. Does nothing if the ray
-  // needs no more tests: a ray that was given up stays undecided, even if it hits another triangle of the same block.
+  // Tests in double whether ray `i` hits the triangle in lane `lane`, and records the hit. Does nothing if the ray
+  // needs no more tests: after give_up() a ray stays undecided, even if it hits another triangle of the same block.
   inline void resolve(const TriangleBlock& block, int lane, uint32_t i) {
     if (limits_[i] < 0 && !planted(PlantedBug::kKernelHitAfterGivingUp)) return;
     const Verdict verdict = decide(block, lane, rays_[i], PreparedRay(*prepared_, i));
@@ -323,7 +324,7 @@ class Packet {
       limits_[i] = t;
   }
 
-  // Leaves ray `i` undecided, so that it needs no more tests.
+  // Sets the verdict on ray `i` to kUndecided, so that the ray needs no more tests.
   inline void give_up(uint32_t i) {
     hits_[i].verdict = KernelVerdict::kUndecided;
     limits_[i] = kNever;

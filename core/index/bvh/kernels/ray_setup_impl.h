@@ -11,16 +11,16 @@
 namespace locus {
 namespace {
 
-// Relative amount by which the slab test of a node is widened. It is twice the amount by which SlabRay widens the box
-// of a triangle. So rounding in float never culls a node that contains a triangle whose box SlabRay accepts.
+// Relative pad of the slab test of nodes: twice kTrianglePad, the pad with which SlabRay tests the box of a triangle.
+// So rounding in float never culls a node that contains a triangle whose box SlabRay accepts.
 constexpr float kTreePad = 0x1p-20f;
 
-// Columns of PreparedRays: the constants computed for each ray. t is in units of the direction's length. x, y and z are
+// Columns of PreparedRays: the constants computed for each ray. t is in units of the ray's direction. x, y and z are
 // the axes of the projection along the ray: z is the axis of the direction's largest component (the first of equal
 // components), as in TriangleRay; x and y are the other two axes, in the order that preserves the orientation of a
 // projected triangle for all rays.
 enum Column : uint32_t {
-  kReciprocal = 0,  // three columns, by axis of the mesh: 1 / direction
+  kReciprocal = 0,  // three columns, one for each mesh axis: 1 / direction
   kNearOffset = 3,  // three columns: a slab is entered at t = bound * reciprocal - near offset
   kFarOffset = 6,   // three columns: a slab is left at t = bound * reciprocal - far offset
   kLimit = 9,
@@ -35,10 +35,10 @@ enum Column : uint32_t {
   kEdgeNoise,  // error bound of t: (edge noise * bound of edge functions * extent + start noise) / determinant + floor
   kStartNoise,
   kTFloor,
-  kAxisX,  // mesh axes (0 to 2) that are x, y and z of the projection: integers
+  kAxisX,  // integers: the mesh axes (0 to 2) that are x, y and z of the projection
   kAxisY,
   kAxisZ,
-  kOctant,  // bit k is set if component k of the direction is negative: an integer
+  kOctant,  // integer: bit k is set if component k of the direction is negative
   kColumns
 };
 
@@ -112,8 +112,8 @@ class Projection {
   }
 
  private:
-  // Chooses the axis z in double for the rays in the mask `ties`, whose largest components are equal in float. The
-  // choice must be that of TriangleRay, because the last bits of t depend on the axis.
+  // Chooses the axis z in double for the rays in the mask `ties`, whose largest components are equal in float.
+  // TriangleRay must choose the same axis, because the last bits of t depend on it.
   void decide_ties(uint32_t ties, const KernelRay* rays, size_t count) {
     alignas(32) float x[kTreeWidth], y[kTreeWidth];
     is_x_.store(x);
@@ -132,12 +132,14 @@ class Projection {
   Floats8 is_x_, is_y_, backwards_;  // masks: the sign bit of a lane is set if true
 };
 
-// Computes the slab constants and the octant. `reach` is the largest |coordinate| of each origin plus that of the mesh.
-// Writes the reciprocals of the directions to `inverse`, three elements.
+// Computes the slab constants and the octant of each ray. `reach` is the largest |coordinate| of the ray's origin plus
+// the largest |coordinate| of the mesh. Writes the reciprocals of the direction components to the three elements of
+// `inverse`.
 static inline void prepare_slabs(const RayColumns& rays, Floats8 reach, Floats8* inverse, PreparedRays& to) {
   const Floats8* const d = rays.direction;
   const Floats8 longest = maximum(maximum(absolute(d[0]), absolute(d[1])), absolute(d[2]));
-  // A component smaller than 1e-18 of the largest component is replaced by that value, as in SlabRay.
+  // A component smaller than 1e-18 of the largest component is replaced by 1e-18 of the largest component, as in
+  // SlabRay.
   const Floats8 min_component = longest * Floats8::splat(1e-18f),
                 pad = reach * Floats8::splat(planted(PlantedBug::kKernelTreePad) ? 0 : kTreePad);
   Floats8 octant = bits_of(0);
@@ -153,7 +155,7 @@ static inline void prepare_slabs(const RayColumns& rays, Floats8 reach, Floats8*
   octant.store(to.columns[kOctant]);
 }
 
-// Computes the error bounds explained in ray_block_impl.h, where `reach` is called R.
+// Computes the error bounds explained in ray_block_impl.h, where R denotes `reach`.
 static inline void prepare_bounds(Floats8 reach, Floats8 abs_reciprocal_z, PreparedRays& to) {
   (reach * Floats8::splat(0x1p-17f)).store(to.columns[kEdgeScale]);
   (reach * reach * Floats8::splat(0x1p-36f)).store(to.columns[kEdgeFloor]);
@@ -162,8 +164,8 @@ static inline void prepare_bounds(Floats8 reach, Floats8 abs_reciprocal_z, Prepa
   (reach * Floats8::splat(0x1p-20f) * abs_reciprocal_z).store(to.columns[kTFloor]);
 }
 
-// Computes the constants of the first eight of `count` rays, or of all if there are fewer. `magnitude` is the largest
-// |coordinate| of the mesh.
+// Computes the constants of the first eight of `count` rays, or of all rays if `count` is less than eight. `magnitude`
+// is the largest |coordinate| of the mesh.
 static inline void prepare(const KernelRay* rays, size_t count, float magnitude, PreparedRays& to) {
   const RayColumns columns = columns_of(rays, count);
   const Floats8* const o = columns.origin;

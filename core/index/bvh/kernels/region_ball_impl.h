@@ -1,26 +1,26 @@
 // Tests of a ball with eight boxes or eight triangles at a time, for region_kernels_impl.h. Error bounds of the
 // triangle tests, with u = 2^-24, E = the block's extent, r = the radius and L = r + 2 E. The ball overlaps the block's
 // box, so the distance of a vertex from the centre is at most L, and an edge is at most sqrt(3) E < L long. All
-// computations start with differences of floats, whose relative error is u. Each product and each sum is counted as one
-// rounding, as without fused products: the error of a product of two differences is 4 u of its value within a
-// difference of two such products, and 5 u within a dot product.
+// computations start with differences of floats, whose relative error is u. Each product and each sum counts as one
+// rounding, as if compiled without fused multiply-add: the error of a product of two differences is 4 u of its value
+// within a difference of two such products, and 5 u within a dot product.
 //
-// Most triangles are decided by their vertices alone, relative to the centre:
+// For most triangles a test of the vertices alone, relative to the centre, gives the result:
 // - The error of the squared length of such a vertex is 5 u of its value: a vertex is certainly inside if this square
-//   is at most r^2 (1 - 2^-19). The predicate then finds the triangle too: by its distance from the edge that starts at
+//   is at most r^2 (1 - 2^-19). The predicate then finds the triangle too, by its distance from the edge that starts at
 //   this vertex, whatever the lengths of the edges.
 // - The error of the projection of a vertex on another one, A, is 5 u L |A|; the squares on both sides of the
 //   comparison add 6 u. If all three projections are beyond (r + 2^-19 (r + E)) |A|, the triangle is outside: a plane
 //   separates it from the ball by more than 2^-22 L.
 //
-// The other triangles need a closer test:
+// The other triangles need the more expensive test of test_closely():
 // - The error of the foot of the perpendicular on an edge is 5 u L for the dot product, 5 u for the square of the edge
 //   and u for the quotient: 11 u L along the edge. The error of the vector from the foot to the centre is 4 u L for the
-//   two differences, the product and the last difference, and that of its length 2 u. The sum is 17 u L, within
-//   near = 2^-19 L + 2^-59; the constant covers squares that underflow, whose edges are shorter than it.
-// - The error of a normal's component is 4 u of its two products, at most 8 u E^2, so that of a normal is 14 u E^2. The
-//   error of its dot product with the offset is 14 u E^2 L and 4 u of at most 3 E^2 L: 26 u E^2 L. The error of the
-//   radius times its length is 14 u E^2 L and 4 u of 3 E^2 L: 26 u E^2 L, and 3 u for the sum. The sum is within
+//   two differences, the product and the last difference, and the error of its length is 2 u L. The sum is 17 u L,
+//   within near = 2^-19 L + 2^-59; the term 2^-59 covers edges so short that their squares underflow.
+// - The error of a normal's component is 4 u of its two products, at most 8 u E^2, so the error of a normal is 14 u
+//   E^2. The error of its dot product with the offset is 14 u E^2 L and 4 u of at most 3 E^2 L: 26 u E^2 L. The error
+//   of the radius times its length is 14 u E^2 L and 4 u of 3 E^2 L: 26 u E^2 L, and 3 u for the sum. The sum is within
 //   plane = 2^-17 E^2 L. This bound also prevents triangles with a sine below 2^-20 at a vertex, whose planes the
 //   predicate handles separately, from being found by their planes.
 // - The barycentric weights of the foot on the plane are differences of products of two dot products; the error is 11 u
@@ -28,12 +28,13 @@
 //   of two weights, 100 u for the square, and 60 u for the differences that leave the third weight. The sum is
 //   410 u E^3 L, within weight = 2^-15 E^3 L.
 // - The bounds of a single triangle use its longer edge at vertex a for E, and the maximum of that edge and the offset
-//   for R. The error of weights is 24 u E^3 R twice, 24 u for the square and 10 u, within 2^-17; that of normals is
-//   6 u E^2, of heights 10 u E^2 R and of the radius times the length 10 u E^2 r, within 2^-19 E^2 (R + r).
+//   for R. The error of weights is 24 u E^3 R twice, 24 u E^3 R for the square and 10 u E^3 R, within 2^-17 E^3 R. The
+//   error of normals is 6 u E^2, the error of heights 10 u E^2 R and the error of the radius times the normal's length
+//   10 u E^2 r, within 2^-19 E^2 (R + r).
 //
 // The predicate's own rounding errors are smaller by a factor of 2^-28, or 2^-12 for squared distances, so that a
-// certain result here equals the result of the predicate. The predicate also tests whether the ball overlaps the
-// triangle's own box, which is never farther away than the triangle.
+// result that these tests call certain equals the result of the predicate. The predicate also tests whether the ball
+// overlaps the triangle's own box, which is never farther away than the triangle.
 //
 // Source: Ericson, Real-Time Collision Detection, 2005 (distances by clamped segments and weights of the foot).
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_REGION_BALL_IMPL_H_
@@ -46,24 +47,24 @@
 namespace locus {
 namespace {
 
-// Result masks for the children of a node; one bit a slot.
+// Result masks for the children of a node; one bit per slot.
 struct ChildResults {
   uint32_t overlapping;  // boxes that the region may overlap
-  uint32_t contained;    // those of the overlapping boxes that are certainly inside the region
+  uint32_t contained;    // overlapping boxes that are certainly inside the region
 };
 
-// Result masks for the triangles of a block; one bit a lane.
+// Result masks for the triangles of a block; one bit per lane.
 struct TriangleResults {
   uint32_t certain;    // triangles that certainly overlap the region
-  uint32_t undecided;  // triangles that the RegionJudge must decide
+  uint32_t undecided;  // triangles that the RegionJudge must test
 };
 
-constexpr float kSquarePad = 0x1p-19f;  // relative pad of squared distances to boxes, whose rounding error is 2^-21
+constexpr float kSquarePad = 0x1p-19f;  // relative pad of squared distances to boxes; their rounding error is 2^-21
 
 // Returns the absolute pad that covers the underflow of squares and of products of more than two lengths.
 static inline float square_floor() { return planted(PlantedBug::kRegionFloor) ? 0 : 0x1p-120f; }
 
-// Returns `bound`, or 0 if `bug` is planted, so that tests can show that the error bound is needed.
+// Returns the error bound `bound`, or 0 if `bug` is planted: a test then shows that the bound is needed.
 static inline float bound_unless(PlantedBug bug, float bound) { return planted(bug) ? 0 : bound; }
 
 // Eight vectors of three components.
@@ -86,17 +87,17 @@ static inline Vector8 cross(Vector8 a, Vector8 b) {
           multiply_subtract(a.x, b.y, a.y * b.x)};
 }
 
-// Returns the squared distance from a point to a segment. `offset` is the vector from the segment's start to the point,
-// `edge` the segment, `along` their dot product and `length` the square of `edge`.
+// Returns the squared distance from a point to an edge. `offset` is the vector from the start of the edge to the point,
+// `edge` the vector along the edge, `along` their dot product and `length` the squared length of `edge`.
 static inline Floats8 squared_distance_to_edge(Vector8 offset, Vector8 edge, Floats8 along, Floats8 length) {
-  // If the edge has no length, the quotient of zeros is NaN, and maximum() returns its second operand, zero.
+  // If the edge has length 0, the quotient 0 / 0 is NaN, and maximum() returns its second operand, zero.
   const Floats8 foot = minimum(maximum(along / length, Floats8::splat(0)), Floats8::splat(1));
   const Vector8 rest = {subtract_product(offset.x, foot, edge.x), subtract_product(offset.y, foot, edge.y),
                         subtract_product(offset.z, foot, edge.z)};
   return dot(rest, rest);
 }
 
-// Ball as a Query of region_kernels_impl.h.
+// Query of region_kernels_impl.h for a ball.
 class BallQuery {
  public:
   inline void set(const KernelBall& ball) {
@@ -136,16 +137,17 @@ class BallQuery {
   }
 
  private:
-  // Returns one bit a triangle: whether its vertices, relative to the centre, all lie beyond the plane that is
-  // perpendicular to the first vertex and has the distance sqrt(limit) from the centre. `square` is the squared length
-  // of the first vertex, and `second` and `third` are its dot products with the other two vertices.
+  // Returns a mask with one bit per triangle, set if all its vertices lie beyond the plane that is perpendicular to the
+  // vector from the centre to the first vertex and has the distance sqrt(limit) from the centre. `square` is the
+  // squared length of this vector, and `second` and `third` are its dot products with the vectors to the other two
+  // vertices.
   static inline uint32_t are_beyond_plane(Floats8 square, Floats8 second, Floats8 third, Floats8 limit) {
     const Floats8 min_product = maximum(minimum(square, minimum(second, third)), Floats8::splat(0));
     return below(multiply_add(square, limit, Floats8::splat(square_floor())), min_product * min_product);
   }
 
-  // Tests the ball with those triangles of a block whose bits are set in `asked_lanes`. Not inline, because its use of
-  // registers would make the caller spill its own.
+  // Tests the ball with those triangles of a block whose bits are set in `asked_lanes`. Not inline, because the caller
+  // would then have to spill registers.
   __attribute__((noinline)) TriangleResults test_closely(const TriangleBlock& block, uint32_t asked_lanes) const {
     const Vector8 a = Vector8::load(block.vertices), b = Vector8::load(block.vertices + 3),
                   c = Vector8::load(block.vertices + 6);
@@ -182,8 +184,8 @@ class BallQuery {
     const TriangleResults results = {certain, open & ~certain & ~(far & below(min_weight, Floats8::splat(-weight)))};
     if (results.undecided == 0) return results;
 
-    // Most triangles that are still undecided are small ones in a block with large ones: error bounds that depend on a
-    // triangle's own size, not on the block's extent, decide them.
+    // Most triangles that are still undecided are small triangles in a block with large ones. Test these again with
+    // error bounds that depend on the size of each triangle instead of the block's extent.
     const Floats8 longest = maximum(bb, cc), reach8 = square_root(maximum(longest, dot(offset, offset)));
     const Floats8 own_weight = multiply_add(Floats8::splat(bound_unless(PlantedBug::kRegionOwnBounds, 0x1p-17f)),
                                             longest * square_root(longest) * reach8, Floats8::splat(square_floor()));

@@ -1,26 +1,30 @@
-// Tests of a box with eight boxes or eight triangles at a time, for region_kernels_impl.h: separating axes in the box's
-// own axes, like the predicate. Error bounds of the triangle test, with u = 2^-24, E = the block's extent, h = the half
-// extents and, by axis, R = h + 2 E. The box overlaps the block's box, so no coordinate of a vertex, relative to the
-// centre and along the box's axes, exceeds R. All computations start with differences of floats, whose relative error
-// is u, and each product and each sum is counted as one rounding, as without fused products. If the box is not rotated:
+// Tests of a box with eight boxes or eight triangles at a time, for region_kernels_impl.h: separating axis tests in the
+// box's own axes, as in the predicate box_overlaps(). Error bounds of the triangle test, with u = 2^-24, E = the
+// block's extent, h = the half extents and, by axis, R = h + 2 E. The box overlaps the block's box, so no coordinate of
+// a vertex, relative to the centre and along the box's axes, exceeds R. All computations start with differences of
+// floats, whose relative error is u, and each product and each sum counts as one rounding, as if compiled without fused
+// multiply-add. If the box is not rotated:
 //
 // - On the axis perpendicular to a box axis and an edge (x, y), the error of a projected vertex is 4 u (|x| R_y + |y|
-//   R_x): two differences, a product and a sum; the error of the projected box is the same. The half extents `inner`
-//   and `outer`, which differ from h by 16 u R, change the projected box by twice the sum of both errors. If an edge is
-//   parallel to the box's axis, all projections are exactly zero, which counts as overlapping. Edges are scaled by
-//   2^60, so that no product underflows.
+//   R_x): two differences, a product and a sum; the error of the projected box is the same. The padded half extents
+//   `inner` and `outer`, which differ from h by 16 u R, change the projected box by twice the sum of these two errors.
+//   If an edge is parallel to the box's axis, all projections are exactly zero, which counts as overlapping. Edges are
+//   scaled by 2^60, so that no product underflows.
 // - The error of a normal's component, which is at most E^2, is 3 u of each of its products and u of itself: 7 u E^2.
-//   The error of the triangle's height is 7 u and 4 u of E^2 (R_x + R_y + R_z), that of the projected box 7 u and 3 u,
-//   and each sum with the bound adds u: 23 u in total, within plane = 32 u of it.
+//   The error of the triangle's height is (7 + 4) u E^2 (R_x + R_y + R_z), the error of the projected box (7 + 3) u of
+//   the same product, and the two sums with the bound add u each: 23 u in total, within plane = 32 u E^2 (R_x + R_y +
+//   R_z).
 //
-// If the box is rotated, with S the sum of R: the error of coordinates, sums of three products, is 5 u S, and that of
-// edges 9 u E; `inner` and `outer` differ from h by 2^-18 S. Across an edge, the error of a projected vertex is 42 u E
-// S and that of the projected box 14 u E S, within 2^-17 E S. The error of a normal's component is 78 u E^2, that of
-// the height 78 u, 26 u and 9 u of E^2 S, and that of the projected box 87 u, within 2^-15 E^2 S.
+// If the box is rotated, with S the sum of R: the error of coordinates, sums of three products, is 5 u S, and the error
+// of edges 9 u E; `inner` and `outer` differ from h by 2^-18 S. On an axis perpendicular to an edge, the error of a
+// projected vertex is 42 u E S and the error of the projected box 14 u E S; the sum is within 2^-17 E S. The error of a
+// normal's component is 78 u E^2, the error of the height (78 + 26 + 9) u E^2 S, and the error of the projected box 87
+// u E^2 S; the sum of the last two errors is within 2^-15 E^2 S.
 //
-// A triangle that certainly overlaps on all axes has a point in common with the box; so has the triangle's own bounding
-// box, which the predicate tests too. Triangles without area are never certain unless a vertex is inside; a vertex
-// inside overlaps on every axis, because rounding is monotone.
+// A triangle whose projections certainly overlap the box's on all axes has a point in common with the box. Then the
+// triangle's own bounding box, which the predicate tests too, also has a point in common with the box. A triangle
+// without area is never certain unless a vertex is inside the box; such a vertex overlaps the box on every axis,
+// because rounding is monotone.
 //
 // Source: Akenine-Moller, Fast 3D Triangle-Box Overlap Testing, 2001.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_REGION_BOX_IMPL_H_
@@ -40,8 +44,8 @@ static inline Vector8 max_of_three(Vector8 a, Vector8 b, Vector8 c) {
 static inline Vector8 absolute(Vector8 a) { return {absolute(a.x), absolute(a.y), absolute(a.z)}; }
 static inline Vector8 scaled(Vector8 a, Floats8 s) { return {a.x * s, a.y * s, a.z * s}; }
 
-// One axis-aligned box, repeated in all lanes. overlaps() and contains() test whether it overlaps or contains each of
-// eight boxes with the corners `low` and `high`.
+// One axis-aligned box, repeated in all lanes. overlaps() and contains() test whether this box overlaps or contains
+// each of eight boxes with the corners `low` and `high`.
 struct Boxes8 {
   Vector8 min, max;
 
@@ -55,7 +59,7 @@ struct Boxes8 {
   }
 };
 
-// Result masks of the separating axis test for eight triangles; one bit a triangle.
+// Result masks of the separating axis test for eight triangles; one bit per triangle.
 struct OverlapBits {
   uint32_t possible;  // triangles not certainly separated from the box along any axis tested so far
   uint32_t certain;   // triangles certainly not separated along any axis tested so far
@@ -68,7 +72,7 @@ struct OverlapBits {
   }
 };
 
-// Box as a Query of region_kernels_impl.h.
+// Query of region_kernels_impl.h for a box.
 template <bool kRotated>
 class BoxQuery {
  public:
@@ -163,7 +167,7 @@ class BoxQuery {
     return {column(0), column(1), column(2)};
   }
 
-  // Returns the edge between two vertices in box axes. `from` and `to` are the vertices' first rows in
+  // Returns, in box axes, the edge from one vertex to another. `from` and `to` are the first rows of these vertices in
   // TriangleBlock::vertices.
   inline Vector8 edge_of(const TriangleBlock& block, int from, int to) const {
     return to_box_axes(Vector8::load(block.vertices + to) - Vector8::load(block.vertices + from));
@@ -198,8 +202,8 @@ class BoxQuery {
     overlap.add_axis(height, projected_half - bounds.plane, projected_half + bounds.plane);
   }
 
-  // Adds three separating axes: those perpendicular to an edge and to one box axis each. The edge starts at `from`;
-  // `other` is the opposite vertex.
+  // Adds three separating axes, each perpendicular to the edge and to one of the three box axes. The edge starts at
+  // `from`; `other` is the opposite vertex.
   static inline void add_edge_axes(Vector8 edge, Vector8 from, Vector8 other, const BlockBounds& bounds,
                                    OverlapBits& overlap) {
     const Vector8 e = scaled(edge, Floats8::splat(planted(PlantedBug::kRegionEdgeScale) ? 1 : kEdgeScale));
@@ -211,8 +215,8 @@ class BoxQuery {
                   bounds.outer.y, bounds.across, overlap);
   }
 
-  // Adds one separating axis, which lies in the plane of two box axes, called x and y here: (-y, x), which is
-  // perpendicular to the edge (x, y).
+  // Adds one separating axis in the plane of two box axes. Let (x, y) be the components of the edge on these two axes;
+  // the separating axis is (-y, x), which is perpendicular to the edge.
   static inline void add_edge_axis(Floats8 x, Floats8 y, Floats8 from_x, Floats8 from_y, Floats8 other_x,
                                    Floats8 other_y, Floats8 inner_x, Floats8 inner_y, Floats8 outer_x, Floats8 outer_y,
                                    Floats8 across, OverlapBits& overlap) {

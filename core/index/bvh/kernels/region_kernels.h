@@ -1,9 +1,10 @@
-// Region kernels: find all triangles of one mesh's tree that overlap a ball or a box, eight boxes or triangles at a
-// time; each instruction set has its kernels in an object file of its own. A kernel decides in float only outside a
-// documented error bound. Otherwise it calls the caller's RegionJudge, which uses the predicates of
-// core/geometry/triangle_overlap.h, so that the answers of kernels equal those of the predicates. The triangle numbers
-// of a subtree that lies completely inside the region are copied without tests. The kernels are used through
-// core/query/kinds/triangle_search.h. Plain data; functions without state, safe from any thread.
+// Region kernels: vector code that finds all triangles of one mesh's tree that overlap a ball or a box; tests eight
+// boxes or triangles at a time. The kernels of each instruction set are in an object file of their own. A kernel uses a
+// result computed in float only if it is outside a documented error bound. Otherwise the kernel calls the caller's
+// RegionJudge, which uses the predicates of core/geometry/triangle_overlap.h, so that the answers of kernels equal the
+// answers of the predicates. The triangle numbers of a subtree that lies completely inside the region are copied
+// without tests. The kernels are used through core/query/kinds/triangle_search.h. Plain data; functions without state,
+// safe from any thread.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_REGION_KERNELS_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_REGION_KERNELS_H_
 
@@ -14,8 +15,8 @@
 
 namespace locus {
 
-// Ball in mesh axes. Precondition: all members are finite, and the largest |coordinate| of its centre + its radius +
-// the tree's magnitude is at most kMaxRegionReach.
+// Ball in mesh axes. Precondition: all members are finite, and the sum of the largest |coordinate| of its centre, its
+// radius and TriangleTree::magnitude is at most kMaxRegionReach.
 struct KernelBall {
   float center[3];
   float radius;
@@ -26,7 +27,8 @@ struct KernelBox {
   float center[3];
   float half[3];
   float rotation[9];  // rows of the matrix from box axes to mesh axes
-  // Axis-aligned box strictly around the box, and, if the box is not rotated, one strictly within it.
+  // Axis-aligned box strictly around this box (`outer`) and, if this box is not rotated, axis-aligned box strictly
+  // within it (`inner`).
   float outer_min[3], outer_max[3];
   float inner_min[3], inner_max[3];
 };
@@ -35,16 +37,16 @@ inline constexpr float kMaxRegionReach = 0x1p29f;
 // Number of tested triangles after which a call of RegionKernel::one() pauses, so that its caller can check deadlines
 // and cancellation.
 inline constexpr uint32_t kMaxRegionTests = 4096;
-// Minimum of RegionVisit::room: the triangle numbers of one block must fit.
+// Minimum of RegionVisit::room: the output array must have room for the triangle numbers of one block.
 inline constexpr size_t kMinRegionRoom = 8;
 // Maximum number of regions in a call of many().
 inline constexpr size_t kMaxRegions = 16;
-// Number of unprocessed items (blocks and contained subtrees) above which a visit opens no more nodes until all items
-// are processed. Opening one node adds up to eight items.
+// Number of unprocessed items (blocks, and subtrees completely inside the region) above which a visit opens no more
+// nodes until all items are processed. Opening one node adds up to eight items.
 inline constexpr uint32_t kMaxRegionItems = 56;
 
-// Predicate for the triangles that float cannot decide. meets() returns whether the triangle in lane `lane` of `block`
-// overlaps `region`.
+// Exact predicate for the triangles whose float result is within the error bound. meets() returns whether the triangle
+// in lane `lane` of `block` overlaps `region`, which the caller owns.
 struct RegionJudge {
   bool (*meets)(const void* region, const TriangleBlock& block, uint32_t lane);
   const void* region;
@@ -53,19 +55,19 @@ struct RegionJudge {
 // Resumable visit of one tree for one region: its state between two calls, and the output of the last call.
 struct RegionVisit {
   RegionJudge judge;
-  uint32_t* numbers;   // output of the next call
+  uint32_t* numbers;   // output array of the next call; owned by the caller
   size_t room;         // length of `numbers`, at least kMinRegionRoom; a call may overwrite all of it
   size_t found;        // count of triangle numbers written by the last call; successive calls write in storage order
-  uint32_t nodes;      // nodes opened by the last call
-  uint32_t tests;      // triangles tested by the last call
-  uint32_t judged;     // number of these triangles that the judge decided
-  uint32_t top;        // length of `waiting`
+  uint32_t nodes;      // number of nodes opened by the last call
+  uint32_t tests;      // number of triangles tested by the last call
+  uint32_t judged;     // number of tested triangles for which `judge` was called
+  uint32_t top;        // number of elements in the stack `waiting`
   uint32_t next, end;  // range of unprocessed elements of `items`
-  NodeRange rest;      // part of a contained subtree that did not fit and is still to be copied
-  alignas(32) uint32_t waiting[kTreeStack];  // stack of nodes to open and contained subtrees
+  NodeRange rest;  // numbers of a subtree inside the region that did not fit in `numbers` and are still to be copied
+  alignas(32) uint32_t waiting[kTreeStack];  // stack of nodes to open and subtrees inside the region
   alignas(32) uint32_t items[kMaxRegionItems + kTreeWidth];
 
-  // Begins a visit at the root.
+  // Begins a visit at the root; undecided triangles will be tested by `by`.
   void start(const RegionJudge& by) {
     judge = by;
     top = 1;
@@ -80,10 +82,10 @@ struct RegionVisit {
 // Kernel of one kind of region.
 // - one() continues a visit until it is complete, the room for numbers is used up, or at least kMaxRegionTests
 //   triangles were tested.
-// - many() answers up to kMaxRegions regions and opens their nodes in turns, which overlaps their memory accesses. It
-//   writes the triangle numbers found for each region to `numbers`, one region after the other, and how many there are
-//   for each region to `counts`. It returns the number of answered regions, which is less than `regions` if `room` was
-//   too small for the next one.
+// - many() answers up to kMaxRegions regions and opens their nodes in turns, so that their memory accesses overlap.
+//   many() writes the triangle numbers found for each region to `numbers`, one region after the other, and the count of
+//   triangle numbers of each region to `counts`. `room` is the length of `numbers`. Returns the number of answered
+//   regions, which is less than `regions` if `room` was too small for the next region.
 template <class Region>
 struct RegionKernel {
   void (*one)(const TriangleTree&, const Region&, RegionVisit&);
@@ -93,14 +95,14 @@ struct RegionKernel {
 
 // Kernels of one instruction set.
 struct RegionKernels {
-  const char* name;  // instruction set
+  const char* name;  // name of the instruction set
   RegionKernel<KernelBall> ball;
-  RegionKernel<KernelBox> box;  // box that is not rotated
+  RegionKernel<KernelBox> box;  // for boxes that are not rotated
   RegionKernel<KernelBox> turned_box;
 };
 
-// Return the kernels of one instruction set. Each function is the only symbol that its object file exports. Must be
-// called only on a processor that supports the instruction set.
+// Return the kernels of one instruction set. Each function is the only symbol that its object file exports.
+// Precondition: the processor supports the instruction set.
 const RegionKernels& region_kernels_avx2();
 const RegionKernels& region_kernels_sse4();
 

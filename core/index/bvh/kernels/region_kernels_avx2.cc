@@ -1,4 +1,4 @@
-// Compiled for AVX2 and FMA.
+// Region kernels compiled for AVX2 and FMA.
 #include "core/index/bvh/kernels/region_kernels_impl.h"
 
 namespace locus {

@@ -1,9 +1,9 @@
 // Traversal of the region kernels, compiled once for each instruction set by the .cc file that includes it. A traversal
 // first opens nodes and collects items: blocks to test, and blocks and subtrees that are completely inside the region.
 // Then it processes the items one by one. The two phases alternate, so that mispredicted branches of one phase do not
-// delay the other. Of a node's children, the blocks become items at once and the nodes are pushed with the last slot
-// lowest, so that items are collected in storage order. region_ball_impl.h and region_box_impl.h contain the tests and
-// their error bounds.
+// delay the other. If a node is opened, its overlapping blocks become items at once, and its overlapping child nodes
+// are pushed from the last slot to the first, so that items are collected in storage order. region_ball_impl.h and
+// region_box_impl.h contain the tests and their error bounds.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_REGION_KERNELS_IMPL_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_REGION_KERNELS_IMPL_H_
 
@@ -13,11 +13,13 @@
 namespace locus {
 namespace {
 
-// Flag of a node or block that is completely inside the region. Indices of nodes and blocks are below it.
+// Flag of a node or block that is completely inside the region. Indices of nodes and blocks are less than
+// kContainedBit, so they do not use this bit.
 constexpr uint32_t kContainedBit = 0x40000000u;
 static_assert((kContainedBit & kBlockBit) == 0 && kMinRegionRoom >= kTreeWidth);
 
-// State of one query's traversal: the stack `waiting` of nodes, and the collected `items` that are not processed yet.
+// State of one query's traversal: the stack `waiting` of nodes (`top` elements), the collected `items` that are not
+// processed yet (`end` elements), and the number of opened nodes.
 template <class Query>
 struct Walk {
   Query query;
@@ -28,7 +30,7 @@ struct Walk {
   // Returns whether a node is pending and `items` has room for its blocks.
   inline bool can_continue() const { return (top != 0) & (end <= kMaxRegionItems); }
 
-  // Pops one element of the stack: opens it if it is a node, or makes it an item if it is a contained subtree.
+  // Pops one element of the stack. A subtree inside the region becomes an item; any other node is opened.
   __attribute__((always_inline)) inline void step(const TriangleTree& tree) {
     const uint32_t now = waiting[--top];
     if ((now & kContainedBit) != 0) {
@@ -60,7 +62,7 @@ static inline uint32_t judged(const TriangleBlock& block, uint32_t undecided, co
 struct Sink {
   uint32_t* out;
   size_t count, room;
-  NodeRange rest;  // part of a subtree that did not fit and is still to be copied
+  NodeRange rest;  // numbers of a subtree inside the region that did not fit and are still to be copied
   uint32_t tests, judged;
 
   // Returns whether the buffer may be too small for the numbers of one more block.
@@ -77,8 +79,8 @@ struct Sink {
     rest.count -= fits;
   }
 
-  // Writes the numbers of those triangles of an item that overlap the region. If a contained subtree does not fit
-  // completely, the part not written stays in `rest`.
+  // Writes the numbers of those triangles of an item that overlap the region. If the item is a subtree whose numbers do
+  // not all fit in the buffer, the numbers not written stay in `rest`.
   template <class Query>
   __attribute__((always_inline)) inline void process_item(const TriangleTree& tree, const Query& query,
                                                           const RegionJudge& judge, uint32_t item) {
@@ -156,7 +158,7 @@ class Walks {
   inline Walk<Query>& operator[](size_t i) { return lanes_[i].walk; }
 
   // Opens nodes of all queries in turns: while one query waits for memory or for the result of its last step, the
-  // others continue. Stops for each query when no node is pending or its items are full.
+  // others continue. Stops for each query when can_continue() returns false: no node is pending, or its items are full.
   inline void open_all(const TriangleTree& tree) {
     uint32_t active[kMaxRegions];
     for (uint32_t i = 0; i < count_; ++i) active[i] = i;
@@ -183,8 +185,8 @@ class Walks {
   uint32_t count_;
 };
 
-// Completes a walk and writes the triangle numbers that it finds. Returns false if there may be too little room for
-// them.
+// Completes a walk and writes the triangle numbers that it finds. Returns false if the buffer may be too small for
+// these numbers.
 template <class Query>
 static inline bool finish(const TriangleTree& tree, const RegionJudge& judge, Walk<Query>& walk, Sink& sink) {
   for (;;) {

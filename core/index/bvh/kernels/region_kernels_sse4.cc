@@ -1,4 +1,4 @@
-// Compiled for SSE up to 4.2: x86-64-v2.
+// Region kernels compiled for x86-64-v2 (SSE 4.2).
 #include "core/index/bvh/kernels/region_kernels_impl.h"
 
 namespace locus {

@@ -1,9 +1,10 @@
 // Kernels that cull the values of the hash grid in float, eight at a time: plain data and a table of functions,
-// compiled once per instruction set. They only cull; exact decisions are made elsewhere, in double. Threads: any.
+// compiled once per instruction set. The kernels only cull; their callers apply the exact predicates, in double. Any
+// thread.
 //
-// A kernel never drops a value that satisfies the caller's original query, in spite of rounding in its own operations,
-// because callers widen the query by kCullEpsilon times the magnitudes involved. This covers, with room to spare, the
-// rounding of the columns to float (2^-24 of a coordinate), of the query (2^-24), and of the sums, products and fused
+// A kernel never drops a value that satisfies the caller's original query, in spite of rounding, because callers widen
+// the query by kCullEpsilon times the magnitudes of its coordinates and the brick's. The widening covers the rounding
+// of the columns to float (2^-24 of a coordinate), of the query to float (2^-24), and of the sums, products and fused
 // products of the kernels (each 2^-24 of its result).
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_KERNELS_GRID_KERNELS_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_KERNELS_GRID_KERNELS_H_
@@ -14,7 +15,7 @@ namespace locus {
 
 inline constexpr float kCullEpsilon = 0x1p-20f;
 inline constexpr float kDiagonal =
-    1.73206f;  // upper bound of sqrt(3): distance to a corner of a value's bounds, in extents
+    1.73206f;  // upper bound of sqrt(3): distance from a position to a corner of the bounds, in extents
 inline constexpr uint32_t kMaxSorted = 64;
 
 // Rows of consecutive values of one block.
@@ -26,7 +27,7 @@ struct GridRows {
   const float* y;
   const float* z;
   const float* extent;
-  const uint64_t* dead;  // one bit per value, and 64 more; null if no value is dead
+  const uint64_t* dead;  // one bit per slot, set if its value is dead, and 64 more bits; null if no value is dead
   uint32_t count;
   uint32_t begin[kMax];
   uint32_t end[kMax];
@@ -38,7 +39,7 @@ struct GridBox {
 
 struct GridLine {
   float point[3], direction[3];  // the direction has length 1
-  float radius;                  // added to kDiagonal times the extent of each value
+  float radius;                  // radius of the line; kDiagonal times a value's extent is added to it
   float from, to;                // part of the line, as signed distances from `point`
 };
 
@@ -56,15 +57,16 @@ struct GridNear {
 
 struct GridKernels {
   const char* name;
-  // Each writes the slots of the values that meet the box, line or ball to `slots`, in order, and returns their number.
-  // `slots` has room for kMaxValues and one vector more.
+  // Write the slots of the values that meet the box, line or ball to `slots`, in increasing order within each row, and
+  // return their number. `slots` has room for kMaxValues elements and one vector of eight more.
   uint32_t (*cull_box)(const GridRows& rows, const GridBox& box, uint32_t* slots);
   uint32_t (*cull_line)(const GridRows& rows, const GridLine& line, uint32_t* slots);
   uint32_t (*cull_ball)(const GridRows& rows, const GridBall& ball, uint32_t* slots);
-  // Writes the slots of the values in the shell, in order, to `slots` and their keys to `keys`. A key never exceeds the
-  // exact squared distance. Both arrays have room for kMaxValues and one vector more.
+  // Writes the slots of the values in the shell to `slots`, in the same order, and their keys to `keys`; returns their
+  // number. A key never exceeds the exact squared distance. Both arrays have room for kMaxValues elements and one
+  // vector of eight more.
   uint32_t (*collect_near)(const GridRows& rows, const GridNear& near, uint32_t* slots, float* keys);
-  // Sorts at most kMaxSorted distinct integers.
+  // Sorts at most kMaxSorted distinct integers in increasing order.
   void (*sort_few)(int32_t* values, uint32_t count);
 };
 

@@ -1,4 +1,4 @@
-// AVX2 version of the kernels.
+// Hash grid kernels compiled for AVX2.
 #include "core/index/hash_grid/kernels/grid_kernels_impl.h"
 
 namespace locus {

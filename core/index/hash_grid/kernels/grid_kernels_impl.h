@@ -1,5 +1,6 @@
-// Implementation of the hash grid's kernels, written once with vectors of eight floats. Included by one source per
-// instruction set; everything has internal linkage.
+// Implementation of the hash grid's kernels, written once with vectors of eight floats. Included by one source file per
+// instruction set; all functions have internal linkage, so that the linker does not merge functions of different
+// instruction sets.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_KERNELS_GRID_KERNELS_IMPL_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_KERNELS_GRID_KERNELS_IMPL_H_
 
@@ -64,8 +65,8 @@ struct LanesOfMasks {
 constexpr LanesOfMasks kLanesOfMasks;
 #endif
 
-// Writes the slots of the lanes in the mask `kept`, one after the other; may write up to a vector of garbage behind
-// them.
+// Writes the slots of the lanes in the mask `kept`, one after the other; lane 0 is slot `slot`. May overwrite eight
+// elements of `slots`.
 inline void write_slots(uint32_t kept, uint32_t slot, uint32_t* slots) {
 #ifdef __AVX2__
   const __m256i lanes = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(static_cast<int64_t>(kLanesOfMasks.lanes[kept])));
@@ -95,7 +96,8 @@ inline void write_lanes(uint32_t kept, uint32_t slot, Floats key, uint32_t* slot
 #endif
 }
 
-// List of the vectors of all rows. One loop over this list is faster than a loop of unknown length for each row.
+// List of the vectors of eight values in all rows: first slot, and mask of the lanes that belong to the row. One loop
+// over this list is faster than a loop of unknown length for each row.
 struct RowVectors {
   static constexpr uint32_t kUsual = 4;  // vectors of a row that are written without a loop of unknown length
   static constexpr uint32_t kMax = GridRows::kMaxValues / kLanes + GridRows::kMax + kUsual;
@@ -118,8 +120,8 @@ struct RowVectors {
   uint32_t lanes[kMax];
 };
 
-// Writes the slots of all live values of the rows that keep(slot) accepts. keep(slot) returns a mask with one bit for
-// each of the eight values from `slot` on. Returns the number of written slots.
+// Writes the slots of the live values of the rows that keep() accepts. keep(slot) returns a mask with one bit for each
+// of the eight values from `slot` on. Returns the number of written slots.
 template <class Keep>
 inline uint32_t collect(const GridRows& rows, uint32_t* slots, const Keep& keep) {
   uint32_t count = 0;

@@ -1,4 +1,5 @@
-// Portable version of the kernels: the compiler splits each vector into two halves, or into single floats.
+// Hash grid kernels for any processor: the compiler splits each vector of eight floats into two halves, or into single
+// floats.
 #include "core/index/hash_grid/kernels/grid_kernels_impl.h"
 
 namespace locus {

@@ -48,7 +48,7 @@ TEST_F(BackupCommandTest, AnExistingDirectoryIsRefused) {
   std::filesystem::create_directory(backup_);
   const Outcome outcome = run({"backup", backup_});
   EXPECT_EQ(outcome.code, ExitCode::kFailed);
-  EXPECT_THAT(outcome.err, HasSubstr("is there already: choose another directory"));
+  EXPECT_THAT(outcome.err, HasSubstr("exists already: choose another directory"));
   EXPECT_TRUE(std::filesystem::is_empty(backup_));
 }
 
@@ -66,7 +66,7 @@ TEST_F(BackupCommandTest, AServerWithoutStorageIsReportedWithItsOwnMessage) {
 
 TEST_F(BackupCommandTest, AFileNamedSha256SumsFromTheServerIsRefused) {
   server_.servers.plan_backup({{"SHA256SUMS", "mine"}});
-  EXPECT_THAT(run({"backup", backup_}).err, HasSubstr("which a backup has for itself"));
+  EXPECT_THAT(run({"backup", backup_}).err, HasSubstr("a name that the backup itself uses"));
   EXPECT_TRUE(std::filesystem::is_empty(folder_.path()));
 }
 

@@ -58,5 +58,10 @@ TEST(ChecksumsTest, RepeatedPathsAndPathsOutsideTheBackupAreDataLoss) {
   EXPECT_THAT(refusal_of(hex + "  x\n" + hex + "  x\n"), HasSubstr("comes twice"));
 }
 
+TEST(ChecksumsTest, ALongPathIsShortenedInTheMessage) {
+  const std::string message = refusal_of(kHex + ("  ../" + std::string(100'000, '\x01')) + "\n");
+  EXPECT_LT(message.size(), 1200u);
+}
+
 }  // namespace
 }  // namespace locus::cli

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+#include <cerrno>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -77,7 +78,7 @@ TEST_F(PartialDirectoryTest, OnlyTheOwnerHasAccess) {
 TEST_F(PartialDirectoryTest, AnExistingTargetIsRefusedUnlessTheRuleAllowsEmpty) {
   std::filesystem::create_directory(target_);
   const PartialDirectory strict(target_, TargetRule::kNothing);
-  EXPECT_THAT(std::string(strict.check().message()), HasSubstr("is there already"));
+  EXPECT_THAT(std::string(strict.check().message()), HasSubstr("exists already"));
   const PartialDirectory lenient(target_, TargetRule::kNothingOrEmpty);
   EXPECT_TRUE(lenient.check().ok());
   std::ofstream(target_ + "/CURRENT") << "precious";
@@ -140,6 +141,20 @@ TEST_F(PartialDirectoryTest, AFileIsNeverWrittenTwice) {
   ASSERT_TRUE(directory.make(0).ok());
   ASSERT_TRUE(write_file(directory, "one", "1").ok());
   EXPECT_FALSE(directory.open_file("one").ok());
+}
+
+TEST(FileErrorTest, TheCodeDependsOnErrno) {
+  EXPECT_TRUE(absl::IsNotFound(file_error("read", "x", ENOENT)));
+  EXPECT_TRUE(absl::IsResourceExhausted(file_error("write", "x", ENOSPC)));
+  EXPECT_TRUE(absl::IsResourceExhausted(file_error("write", "x", EDQUOT)));
+  EXPECT_TRUE(absl::IsFailedPrecondition(file_error("read", "x", EACCES))) << "only servers deny";
+  EXPECT_TRUE(absl::IsFailedPrecondition(file_error("read", "x", EIO)));
+}
+
+TEST(FileErrorTest, TheMessageHasTheCauseAndAdvice) {
+  EXPECT_EQ(file_error("write", "a/b", ENOSPC).message(),
+            "cannot write a/b: No space left on device; free some of that disk, or choose another");
+  EXPECT_THAT(std::string(file_error("make", "a", EBUSY).message()), HasSubstr("choose a new directory within it"));
 }
 
 }  // namespace

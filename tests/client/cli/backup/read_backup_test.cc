@@ -83,7 +83,7 @@ TEST_F(RestoreCommandTest, EveryTruncationOfEveryFileIsFound) {
 
 TEST_F(RestoreCommandTest, ADamagedFileIsReported) {
   write("tables/000007.sst", "other");
-  expect_damaged("tables/000007.sst has other bytes than SHA256SUMS says");
+  expect_damaged("tables/000007.sst does not match its checksum in SHA256SUMS");
 }
 
 TEST_F(RestoreCommandTest, AMissingFileIsReported) {

@@ -27,7 +27,7 @@ constexpr char kRayHeader[] = "from.x,from.y,from.z,dir.x,dir.y,dir.z\n";
 
 class BulkQueryTest : public BulkTest {
  protected:
-  // Inserts a block of balls around the origin, in one batch.
+  // Inserts 1000 balls on a lattice of 10 x 10 x 10 points in one command.
   void insert_balls() {
     std::string rows = "id,at.x,at.y,at.z\n";
     for (int i = 0; i < 1000; ++i)
@@ -37,8 +37,8 @@ class BulkQueryTest : public BulkTest {
   }
 };
 
-// Returns random rays whose coordinates are multiples of 1/8, hence exact floats: with options and with rows, the frame
-// is the origin.
+// Returns random rays whose coordinates are multiples of 1/8, hence exact floats, so that the frame is the origin for
+// rays given by options as well as for rays read from rows.
 std::vector<std::array<double, 6>> random_rays(int count) {
   test::Random random(17);
   std::vector<std::array<double, 6>> rays;
@@ -275,7 +275,7 @@ TEST_F(BulkQueryTest, OptionsThatExcludeEachOtherAreUsageErrors) {
 TEST_F(BulkQueryTest, AColumnBesideItsOptionAndAMissingFileAreReported) {
   const TestFile file(kRayHeader);
   EXPECT_THAT(run({"query", "ray", "world", "--from-csv", file.path(), "--dir", "0,0,1"}).err,
-              HasSubstr(file.path() + ":1: column dir is there and --dir is given: leave one of them out"));
+              HasSubstr(file.path() + ":1: the column dir and the option --dir are both given: leave one of them out"));
   EXPECT_EQ(run({"query", "ray", "world", "--from-csv", "/nonexistent/rays.csv"}).code, ExitCode::kNotFound);
 }
 

@@ -1,6 +1,6 @@
-// Pictures of generated scenes by a real server, compared with the hashes in tests/golden/renders.txt: the hits of the
-// rays are the same on every machine and with any number of threads. If they differ, the picture is kept in the build
-// tree.
+// Pictures of generated scenes, rendered by a real server. Their hits must be the same on every machine and with any
+// number of threads, so their hashes are compared with tests/golden/renders.txt. If a hash differs, the picture is kept
+// in the build tree.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ namespace locus::cli {
 namespace {
 
 constexpr client::Rotation kTilted = {0.18257419f, 0.36514837f, 0.54772256f, 0.73029674f};  // (1, 2, 3, 4), normalised
-constexpr client::Rotation kAboutZ = {0, 0, 0.38268343f, 0.92387953f};                      // an eighth of a turn
+constexpr client::Rotation kAboutZ = {0, 0, 0.38268343f, 0.92387953f};                      // 45 degrees
 
 struct GoldenPicture {
   std::string name;
@@ -42,7 +42,7 @@ const std::vector<GoldenPicture>& golden_pictures() {
   return pictures;
 }
 
-// Returns 60 balls, 60 boxes and 60 capsules spread over a square around `middle`.
+// Returns inserts of 60 balls, 60 boxes and 60 capsules, spread over a square around `middle`.
 client::UpdateBuilder made_objects(const client::Double3& middle, uint64_t seed) {
   client::UpdateBuilder updates;
   SplitMix64 random(seed);
@@ -72,7 +72,7 @@ void make_scene(RenderServer& server, const std::string& name) {
   server.apply(name, objects);
 }
 
-// Hashes of one picture's depths and ids.
+// Hash of the depths and hash of the ids of one picture.
 struct Hashes {
   std::string depth;
   std::string ids;

@@ -1,4 +1,4 @@
-// Scripts against a real locusd: the committed examples, and copies of them with mistakes.
+// Tests that run scripts against a real locusd: the committed examples, and copies of the examples with mistakes.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

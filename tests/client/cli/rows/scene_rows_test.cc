@@ -6,7 +6,7 @@
 namespace locus::cli {
 namespace {
 
-// Adds one thing to the columns that runs of objects and of instances share.
+// Appends the object or instance `id`, with default values, to the columns that Insert and Placement have in common.
 template <class Run>
 void fill_shared(Run& run, uint64_t id) {
   run.add_ids(id);

@@ -11,7 +11,8 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-// "" where the expectation holds, else why not; mistakes in its form begin with "form: ".
+// Returns "" if the expectation is met, otherwise the reason why not. If the text is not a valid expectation, returns
+// "form: " and the error.
 std::string verdict(const std::string& text) {
   const absl::StatusOr<Expectation> expectation = read_expectation(text, testing::some_variables());
   if (!expectation.ok()) return "form: " + std::string(expectation.status().message());
@@ -65,13 +66,13 @@ TEST(ExpectationTest, AWrongFormIsNamed) {
   EXPECT_EQ(verdict("1"), "form: expected one of == != < <= > >= contains, found the end of the line");
   EXPECT_EQ(verdict("1 = 1"), "form: expected one of == != < <= > >= contains, found `= 1`");
   EXPECT_EQ(verdict("1 == 1 1"), "form: expected the end of the line, found `1`");
-  EXPECT_EQ(verdict("1 < 1 within 2"), "form: `within` goes with == only");
+  EXPECT_EQ(verdict("1 < 1 within 2"), "form: `within` is allowed only with ==");
   EXPECT_THAT(verdict("1 == "), HasSubstr("form: expected a value"));
   EXPECT_THAT(verdict("$nobody == 1"), HasSubstr("form: $nobody is not defined"));
 }
 
 TEST(ExpectationTest, ANegativeToleranceHoldsForNothing) {
-  EXPECT_THAT(verdict("1 == 1 within -1"), HasSubstr("not negative"));
+  EXPECT_THAT(verdict("1 == 1 within -1"), HasSubstr("must not be negative"));
 }
 
 }  // namespace

@@ -10,7 +10,8 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// Returns the value of the whole text, or "error: " and the reason.
+// Evaluates `text` as one expression. Returns its value as text; "error: " and the reason if it is not valid; "rest: "
+// and the text that follows the expression.
 std::string worth(const std::string& text) {
   static const auto& variables = *new Variables(testing::some_variables());
   Cursor cursor(text);
@@ -21,7 +22,7 @@ std::string worth(const std::string& text) {
   return shown(*value);
 }
 
-TEST(ExpressionTest, OperatorsBindAsInSchool) {
+TEST(ExpressionTest, ProductsBindTighterThanSums) {
   EXPECT_EQ(worth("1 + 2 * 3"), "7");
   EXPECT_EQ(worth("(1 + 2) * 3"), "9");
   EXPECT_EQ(worth("10 - 4 - 3"), "3");
@@ -46,7 +47,7 @@ TEST(ExpressionTest, ThreeNumbersWithCommasAreOneVector) {
   EXPECT_EQ(worth("0,0,0,1"), "0,0,0,1") << "a quaternion is a list";
 }
 
-TEST(ExpressionTest, VectorsDoNotGoWithEverything) {
+TEST(ExpressionTest, VectorsAreRefusedByOperatorsForNumbers) {
   for (const char* text :
        {"1,2,3 + 1", "1,2,3 * 1,2,3", "1 / 1,2,3", "1,2,3 % 2", "$word + 1", "true + 1", "null * 2"}) {
     EXPECT_THAT(worth(text), HasSubstr("error: ")) << text;
@@ -70,7 +71,7 @@ TEST(ExpressionTest, IdsOf64BitsAreNotRounded) {
   EXPECT_EQ(worth("$near.id[1] - 9223372036854775808"), "1");
 }
 
-TEST(ExpressionTest, ADefaultStandsInForWhatIsNotThere) {
+TEST(ExpressionTest, ADefaultReplacesAMissingVariableOrValue) {
   EXPECT_EQ(worth("${absent:-7} + 1"), "8");
   EXPECT_EQ(worth("${absent.field[2]:-7}"), "7");
   EXPECT_EQ(worth("${n:-7}"), "3");
@@ -108,8 +109,8 @@ TEST(ExpressionTest, FunctionsWork) {
   EXPECT_EQ(worth("round(sin(radians(90)))"), "1");
 }
 
-TEST(ExpressionTest, FunctionsRefuseWhatTheyCannotTake) {
-  EXPECT_THAT(worth("nope(1)"), HasSubstr("there is no function nope; there are abs, cos, cross"));
+TEST(ExpressionTest, FunctionsRefuseWrongArguments) {
+  EXPECT_THAT(worth("nope(1)"), HasSubstr("there is no function nope; the functions are abs, cos, cross"));
   EXPECT_EQ(worth("dot(1,2,3)"), "error: dot() takes 2 arguments, not 1");
   EXPECT_EQ(worth("sqrt()"), "error: sqrt() takes 1 argument, not 0");
   EXPECT_THAT(worth("sqrt(-1)"), HasSubstr("not a finite number"));
@@ -121,7 +122,7 @@ TEST(ExpressionTest, FunctionsRefuseWhatTheyCannotTake) {
 TEST(ExpressionTest, UnknownValuesMakeUnknownResults) {
   for (const char* text : {"$later + 1", "$later.id[0] * 2", "(0, $later, 1)", "\"x $later\"", "max(1, $later)",
                            "$p[$later]", "-$later"}) {
-    EXPECT_EQ(worth(text), "a value not known yet") << text;
+    EXPECT_EQ(worth(text), "an unknown value") << text;
   }
   EXPECT_THAT(worth("$later + nope(1)"), HasSubstr("error: ")) << "mistakes are found all the same";
 }
@@ -141,15 +142,15 @@ TEST(ExpressionTest, MistakesNameWhatWasFound) {
   EXPECT_THAT(worth("'open"), HasSubstr("not closed"));
   EXPECT_THAT(worth("\"open"), HasSubstr("not closed"));
   EXPECT_THAT(worth("\"open {1\""), HasSubstr("error: "));
-  EXPECT_THAT(worth("\"\\q\""), HasSubstr("\\q means nothing"));
+  EXPECT_THAT(worth("\"\\q\""), HasSubstr("\\q is not an escape sequence"));
   EXPECT_THAT(worth("${n"), HasSubstr("expected `}` or `:-`"));
   EXPECT_THAT(worth("${n:-7"), HasSubstr("} is missing"));
   EXPECT_THAT(worth("$p[1"), HasSubstr("expected `]`"));
   EXPECT_THAT(worth("max(1 2)"), HasSubstr("expected `)`"));
   EXPECT_THAT(worth("1 / 0"), HasSubstr("division by zero"));
   EXPECT_THAT(worth("1,2,3 / 0"), HasSubstr("division by zero"));
-  EXPECT_THAT(worth("12abc"), HasSubstr("`12abc` is no number"));
-  EXPECT_THAT(worth("99999999999999999999"), HasSubstr("is no number of at most 64 bits"));
+  EXPECT_THAT(worth("12abc"), HasSubstr("`12abc` is not a number"));
+  EXPECT_THAT(worth("99999999999999999999"), HasSubstr("is not a number of at most 64 bits"));
   EXPECT_EQ(worth("1 ] 2"), "rest: ] 2");
 }
 

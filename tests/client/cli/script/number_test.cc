@@ -21,7 +21,7 @@ TEST(NumberTest, IntegersAreExactOverAllIds) {
   EXPECT_NE(compare(number("9223372036854775809"), number("9223372036854775808")), 0);
 }
 
-TEST(NumberTest, WhatIsNoNumberIsNone) {
+TEST(NumberTest, TextsThatAreNotNumbersGiveNone) {
   for (const char* text : {"", "-", ".", "abc", "1x", "inf", "nan", "-inf", "1e999", "18446744073709551616",
                            "-9223372036854775809", "--1", "+1", "1,2", "0x", "1.2.3"}) {
     EXPECT_EQ(parse_number(text), std::nullopt) << text;
@@ -33,13 +33,13 @@ TEST(NumberTest, DoublesPrintInTheFewestDigitsThatReadBack) {
   EXPECT_EQ(text_of(number("30.0")), "30");
 }
 
-TEST(NumberTest, DivisionOfIntegersStaysExactWhereItCan) {
+TEST(NumberTest, DivisionOfIntegersIsExactIfTheQuotientIsIntegral) {
   EXPECT_EQ(text_of(*divide(number("18446744073709551614"), number("2"))), "9223372036854775807");
   EXPECT_EQ(text_of(*divide(number("7"), number("2"))), "3.5");
   EXPECT_EQ(text_of(*modulo(number("-7"), number("3"))), "2");
 }
 
-TEST(NumberTest, WhatLeaves64BitsIsRefusedAndNotRounded) {
+TEST(NumberTest, ResultsBeyond64BitsAreRefusedAndNotRounded) {
   const Number most = number("18446744073709551615");
   const Number least = number("-9223372036854775808");
   EXPECT_FALSE(add(most, number("1")).ok());
@@ -60,7 +60,7 @@ TEST(NumberTest, DivisionByZeroAndResultsThatAreNotFiniteAreRefused) {
 }
 
 TEST(NumberTest, AnIntegerAndADoubleCompareExactly) {
-  // The three would be equal as doubles.
+  // If the integer were converted to double, it would equal the other number in each of the first three comparisons.
   EXPECT_GT(compare(number("9007199254740993"), Number(9007199254740992.0)), 0);
   EXPECT_EQ(compare(number("9007199254740992"), Number(9007199254740992.0)), 0);
   EXPECT_LT(compare(number("18446744073709551615"), Number(18446744073709551616.0)), 0);
@@ -71,7 +71,7 @@ TEST(NumberTest, AnIntegerAndADoubleCompareExactly) {
   EXPECT_GT(compare(number("1"), Number(-1e300)), 0);
 }
 
-TEST(NumberTest, JsonKeepsWhatItIs) {
+TEST(NumberTest, JsonKeepsIntegersAndDoublesApart) {
   EXPECT_EQ(json_of(number("18446744073709551615")), Json(std::numeric_limits<uint64_t>::max()));
   EXPECT_EQ(json_of(number("-1")), Json(-1));
   EXPECT_EQ(number_from(Json("7")), std::nullopt) << "a text";

@@ -20,9 +20,9 @@ using ::testing::IsEmpty;
 
 class RunnerTest : public ::testing::Test {
  protected:
-  RunnerTest() { context_.options().address = server_.address(); }
+  RunnerTest() { context_.options().connection.address = server_.address(); }
 
-  // Checks, then runs; the exit code as the program would have it.
+  // Checks the script and, if it has no mistake, runs it. Returns the exit code that the program would have.
   ExitCode run(const std::string& text, AfterFailure after = AfterFailure::kStop) {
     const absl::StatusOr<Script> script = parse_script("x.locus", text);
     EXPECT_TRUE(script.ok()) << script.status();
@@ -36,7 +36,7 @@ class RunnerTest : public ::testing::Test {
     EXPECT_EQ(run(text), ExitCode::kUsage) << text;
     return std::string(mistake_.message());
   }
-  // Every query is answered by one hit of object 7.
+  // Makes the fake server answer every query with one hit of object 7.
   void answer_hits() {
     server_.queries.answer = [](const v1::QueryRequest&, v1::QueryResult& result) {
       result.set_revision(12);
@@ -82,7 +82,7 @@ TEST_F(RunnerTest, ACommandThatFailsGivesItsOwnExitCodeAndItsLine) {
   EXPECT_EQ(run("scene delete arena"), ExitCode::kDenied);
 }
 
-TEST_F(RunnerTest, KeepGoingTellsEachFailureAndCountsThem) {
+TEST_F(RunnerTest, KeepGoingPrintsEachFailureAndCountsThem) {
   EXPECT_EQ(run("expect 1 == 2\nscene describe nowhere\nlet x = 1\nexpect $x == 1\necho on", AfterFailure::kGoOn),
             ExitCode::kFailed);
   EXPECT_THAT(err_.str(), HasSubstr("x.locus:1: expected 1 == 2, but it is 1"));
@@ -94,8 +94,8 @@ TEST_F(RunnerTest, KeepGoingTellsEachFailureAndCountsThem) {
   EXPECT_EQ(counts_.broken, 1u);
 }
 
-TEST_F(RunnerTest, KeepGoingEndsWhereNobodyAnswers) {
-  context_.options().address = "unix:/nonexistent/locus.sock";
+TEST_F(RunnerTest, KeepGoingEndsIfTheServerCannotBeReached) {
+  context_.options().connection.address = "unix:/nonexistent/locus.sock";
   EXPECT_EQ(run("scene list\necho never", AfterFailure::kGoOn), ExitCode::kUnreachable);
   EXPECT_THAT(out_.str(), IsEmpty());
 }
@@ -139,16 +139,16 @@ TEST_F(RunnerTest, AnEmptyBatchIsAMistake) {
   EXPECT_THAT(err_.str(), HasSubstr("x.locus:2: the batch is empty"));
 }
 
-TEST_F(RunnerTest, OfABatchThatFailsNothingIsSent) {
+TEST_F(RunnerTest, ABatchThatFailsSendsNothing) {
   EXPECT_EQ(run("begin\nmove arena --id 1 --to 0,0,0\nremove arena --id 1\ncommit"), ExitCode::kUsage);
   EXPECT_THAT(err_.str(), HasSubstr("x.locus:3: a batch removes, then inserts, then moves"));
   EXPECT_EQ(server_.updates.calls, 0);
   EXPECT_EQ(run("remove arena --id 1"), ExitCode::kOk) << "no batch is left open";
 }
 
-TEST_F(RunnerTest, WhereBeginFailsTheWholeBatchIsPassedOver) {
+TEST_F(RunnerTest, IfBeginFailsTheWholeBatchIsSkipped) {
   variables_.set("t", Value::of(Json("soon"))).IgnoreError();
-  // Unknown while the script is checked, since the loop sets it.
+  // The value of `u` is unknown while the script is checked, since the loop sets it.
   EXPECT_EQ(
       run("repeat 1\nlet u = $t\nbegin --tick $u\nremove arena --id 1\ncommit\nend\necho on", AfterFailure::kGoOn),
       ExitCode::kFailed);
@@ -194,7 +194,7 @@ TEST_F(RunnerTest, OptionsOfALineHoldForThatLine) {
   EXPECT_EQ(out_.str(), "{\n  \"scenes\": []\n}\nno scenes\n");
 }
 
-TEST_F(RunnerTest, EchoAndSleepDoWhatTheySay) {
+TEST_F(RunnerTest, EchoPrintsAndSleepWaits) {
   EXPECT_EQ(run("sleep 0.001\necho 'a  b' {1 + 1} # c"), ExitCode::kOk);
   EXPECT_EQ(out_.str(), "a  b 2\n");
   out_.str("");
@@ -224,13 +224,13 @@ TEST_F(RunnerTest, ACheckFindsEveryKindOfMistakeAndSendsNothing) {
            {"sleep 3601", "sleep takes 0 to 3600 seconds"},
            {"sleep -1", "sleep takes 0 to 3600 seconds"},
            {"expect 1 = 1", "expected one of =="},
-           {"scene list -> 1x", "`-> NAME` keeps a result and ends the line"},
-           {"scene list -> a b", "`-> NAME` keeps a result and ends the line"},
-           {"expect-error NOT_FOUND scene list -> a", "no result to keep"},
+           {"scene list -> 1x", "`-> NAME` stores a result and must end the line"},
+           {"scene list -> a b", "`-> NAME` stores a result and must end the line"},
+           {"expect-error NOT_FOUND scene list -> a", "no result to store"},
            {"expect-error NOT_FOUND no-such-command", "no-such-command"},
            {"begin 7\nremove arena --id 1\ncommit", "expected `begin` or `begin --tick N`"},
            {"begin --tick x\nremove arena --id 1\ncommit", "a tick is an integer"},
-           {"begin\nremove arena --id 1 -> a\ncommit", "no result to keep"},
+           {"begin\nremove arena --id 1 -> a\ncommit", "no result to store"},
            {"begin\nremove arena --id 1\ncommit now", "expected `commit`"},
            {"echo 'open", "not closed"}}) {
     EXPECT_THAT(mistake_in("echo never\n" + line), HasSubstr(message)) << line;
@@ -240,7 +240,7 @@ TEST_F(RunnerTest, ACheckFindsEveryKindOfMistakeAndSendsNothing) {
   EXPECT_EQ(server_.updates.calls + server_.queries.calls + server_.scenes.creates, 0);
 }
 
-TEST_F(RunnerTest, ACheckTakesResultsForWhateverSuits) {
+TEST_F(RunnerTest, ACheckAcceptsUnknownResultsAsAnyValue) {
   answer_hits();
   EXPECT_EQ(run("let scene = 'arena'\nuse $scene\n" + std::string(kRay) + " -> shot\n" +
                 "expect-error USAGE query ray --from $shot.revision --dir {0,0,$shot.t} --mode $shot.tick\n"
@@ -266,9 +266,9 @@ TEST_F(RunnerTest, ACalculationThatFailsOnlyWhenRunNamesItsLine) {
   EXPECT_EQ(run(std::string(kRay) + " -> shot\nlet x = $shot.nothing"), ExitCode::kFailed) << "not 5, not found";
 }
 
-TEST_F(RunnerTest, ACommandWithoutResultLeavesNoneToKeep) {
+TEST_F(RunnerTest, ACommandWithoutResultCannotStoreOne) {
   EXPECT_EQ(run("--help -> h"), ExitCode::kFailed);
-  EXPECT_THAT(err_.str(), HasSubstr("x.locus:1: this command has no result to keep"));
+  EXPECT_THAT(err_.str(), HasSubstr("x.locus:1: this command has no result to store"));
 }
 
 }  // namespace

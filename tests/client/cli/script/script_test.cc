@@ -34,7 +34,7 @@ TEST(ScriptTest, LinesBecomeStatementsWithTheirNumbers) {
   EXPECT_EQ(script->statements[3].verb, Verb::kCommand) << "a word that only begins like let";
 }
 
-TEST(ScriptTest, BlocksKnowTheirOtherEnd) {
+TEST(ScriptTest, BlocksAreLinkedToTheirOtherEnd) {
   const absl::StatusOr<Script> script = parse_script("x", "repeat 2\nbegin\nrepeat 3\ninsert point\nend\ncommit\nend");
   ASSERT_TRUE(script.ok()) << script.status();
   EXPECT_EQ(script->statements[0].partner, 6u);
@@ -42,14 +42,14 @@ TEST(ScriptTest, BlocksKnowTheirOtherEnd) {
   EXPECT_EQ(script->statements[4].partner, 2u);
 }
 
-TEST(ScriptTest, ACommitThatIsToFailClosesItsBatch) {
+TEST(ScriptTest, ACommitExpectedToFailClosesItsBatch) {
   const absl::StatusOr<Script> script = parse_script("x", "begin\nmove --id 1\nexpect-error UNKNOWN_ID commit");
   ASSERT_TRUE(script.ok()) << script.status();
   EXPECT_EQ(script->statements[2].verb, Verb::kCommit);
   EXPECT_EQ(script->statements[2].reason, "UNKNOWN_ID");
 }
 
-TEST(ScriptTest, BlocksThatDoNotCloseAreRefused) {
+TEST(ScriptTest, UnclosedBlocksAreRefused) {
   EXPECT_EQ(mistake("let a = 1\nrepeat 2\n"), "x.locus:2: `repeat` without `end`");
   EXPECT_EQ(mistake("begin"), "x.locus:1: `begin` without `commit`");
   EXPECT_EQ(mistake("end"), "x.locus:1: `end` without `repeat`");
@@ -60,11 +60,11 @@ TEST(ScriptTest, BlocksThatDoNotCloseAreRefused) {
             "x.locus:3: `end` while the block of line 2 is open: close that one first");
 }
 
-TEST(ScriptTest, ABatchHoldsOnlyWhatChangesObjects) {
+TEST(ScriptTest, ABatchContainsOnlyChangesOfObjects) {
   for (const char* line : {"query ray", "scene list", "use hall", "begin", "expect-error NOT_FOUND get", "wait",
                            "expect-error UNKNOWN_ID move --id 1"}) {
     EXPECT_THAT(mistake(std::string("begin\n") + line + "\ncommit"),
-                HasSubstr("cannot stand in the batch that begins in line 1: it holds only insert, move, remove"))
+                HasSubstr("is not allowed in the batch that begins in line 1: until commit, only insert, move, remove"))
         << line;
   }
   EXPECT_EQ(
@@ -81,7 +81,7 @@ TEST(ScriptTest, ExpectErrorNamesAFailureAndHasACommand) {
   }
   for (const char* rest : {"", " # comment", " let a = 1", " end", " expect-error NOT_FOUND get"}) {
     EXPECT_THAT(mistake(std::string("expect-error NOT_FOUND") + rest),
-                StartsWith("x.locus:1: expect-error REASON stands before a command or commit"))
+                StartsWith("x.locus:1: expect-error REASON must be followed by a command or commit"))
         << rest;
   }
 }
@@ -93,7 +93,7 @@ TEST(ScriptTest, EverythingHasALimit) {
   EXPECT_THAT(mistake(std::string(kMaxScriptBytes + 1, ' ')), HasSubstr("at most 16777216 bytes"));
   std::string deep;
   for (size_t i = 0; i <= kMaxBlockNesting; ++i) deep += "repeat 2\n";
-  EXPECT_EQ(mistake(deep), "x.locus:17: more than 16 blocks within each other");
+  EXPECT_EQ(mistake(deep), "x.locus:17: more than 16 nested blocks");
 }
 
 TEST(ScriptTest, ControlCharactersAreRefused) {

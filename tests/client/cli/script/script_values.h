@@ -1,4 +1,4 @@
-// Values that tests of scripts start from. For the tests of this folder.
+// Variables with known values, on which the tests of this folder evaluate expressions and expectations.
 #ifndef LOCUS_TESTS_CLIENT_CLI_SCRIPT_SCRIPT_VALUES_H_
 #define LOCUS_TESTS_CLIENT_CLI_SCRIPT_SCRIPT_VALUES_H_
 
@@ -12,7 +12,7 @@
 
 namespace locus::cli::testing {
 
-// A result of a query: `rows` as JSON.
+// Returns a result of a query whose rows are the JSON list `rows`.
 inline Value result_of(const std::string& rows) {
   Report report;
   report.head = {{"epoch", "18446744073709551615"}, {"revision", 12}, {"min", {1.5, 2.0, 3.0}}};
@@ -22,7 +22,9 @@ inline Value result_of(const std::string& rows) {
   return Value::of(std::make_shared<const Report>(std::move(report)));
 }
 
-// shot: one row; near: three rows; none: no rows; miss: a row without hit; big: an id of 64 bits; later: not known yet.
+// Returns these variables: `shot`, a result with one row; `near`, a result with three rows; `none`, a result without
+// rows; `miss`, a result with one row that is not a hit; `big`, an id of 64 bits; `n`, 3; `p`, a vector; `word`, a
+// text; `later`, a value that is not known yet.
 inline Variables some_variables() {
   Variables variables;
   const auto set = [&](const std::string& name, Value value) {

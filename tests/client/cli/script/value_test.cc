@@ -29,7 +29,7 @@ TEST_F(ValueTest, AResultHasFactsColumnsAndACount) {
   EXPECT_EQ(field("none", "count"), "0");
 }
 
-TEST_F(ValueTest, RowsAreThereUnderTheirName) {
+TEST_F(ValueTest, RowsAreAFieldUnderTheirName) {
   const absl::StatusOr<Value> row = entry_of(*field_of(variable("near"), "hits"), absl::int128(1));
   ASSERT_TRUE(row.ok());
   EXPECT_EQ(shown(*field_of(*row, "id")), "9223372036854775809");
@@ -44,7 +44,7 @@ TEST_F(ValueTest, AColumnOfOneRowIsItsEntryAndItsRow) {
   EXPECT_EQ(shown(*entry_of(*entry_of(point, absl::int128(0)), absl::int128(2))), "30.5");
 }
 
-TEST_F(ValueTest, AColumnOfSeveralRowsIsNoNumber) {
+TEST_F(ValueTest, AColumnOfSeveralRowsIsNotANumber) {
   const absl::StatusOr<Number> number = number_of(*field_of(variable("near"), "id"));
   EXPECT_THAT(std::string(number.status().message()), HasSubstr("id has 3 rows: choose one, as in id[0]"));
 }
@@ -54,7 +54,7 @@ TEST_F(ValueTest, AColumnOfNoRowsIsEmptyWhateverItsName) {
   EXPECT_FALSE(number_of(*field_of(variable("none"), "id")).ok());
 }
 
-TEST_F(ValueTest, AFieldThatIsNotThereNamesThoseThatAre) {
+TEST_F(ValueTest, AMissingFieldIsReportedWithTheExistingNames) {
   EXPECT_EQ(field("near", "revison"), "there is no field revison; there are epoch, revision, min, hits, count, id");
   EXPECT_THAT(field("n", "x"), HasSubstr("3 is not a record"));
 }
@@ -67,7 +67,7 @@ TEST_F(ValueTest, AnEntryBeyondTheEndIsRefused) {
   EXPECT_FALSE(entry_of(variable("shot"), absl::int128(0)).ok()) << "a whole result";
 }
 
-TEST_F(ValueTest, TextsThatReadAsNumbersAndVectorsCountAsSuch) {
+TEST_F(ValueTest, TextsOfNumbersAndVectorsAreTreatedAsSuch) {
   EXPECT_EQ(text_of(*number_of(variable("big"))), "9223372036854775809");
   EXPECT_EQ(*vector_of(Value::of(Json("1,2.5,-3"))), (Vector{1, 2.5, -3}));
   EXPECT_FALSE(operand_of(Value::of(Json("1,2"))).ok());
@@ -79,19 +79,19 @@ TEST_F(ValueTest, AMissIsNoNumber) {
               HasSubstr("null is not a number"));
 }
 
-TEST_F(ValueTest, AsAWordListsHaveCommasAndWholeResultsNone) {
+TEST_F(ValueTest, AsAWordAListHasCommasAndAResultIsRefused) {
   EXPECT_EQ(*text_of(variable("p")), "1,2,3");
   EXPECT_EQ(*text_of(Value::of(Vector{0.5, -1, 1e30})), "0.5,-1,1e+30");
-  EXPECT_THAT(std::string(text_of(variable("shot")).status().message()), HasSubstr("name one of its fields: epoch"));
+  EXPECT_THAT(std::string(text_of(variable("shot")).status().message()), HasSubstr("name one of them: epoch"));
 }
 
 TEST_F(ValueTest, MessagesStayReadable) {
   EXPECT_LT(shown(Value::of(Json(std::string(1'000'000, 'x')))).size(), 300u);
   EXPECT_EQ(shown(*field_of(variable("none"), "id")), "empty: there are no rows");
-  EXPECT_EQ(shown(variable("later")), "a value not known yet");
+  EXPECT_EQ(shown(variable("later")), "an unknown value");
 }
 
-TEST_F(ValueTest, FieldsOfTheUnknownAreUnknown) {
+TEST_F(ValueTest, FieldsOfUnknownValuesAreUnknown) {
   EXPECT_FALSE(field_of(variable("later"), "id")->known());
   EXPECT_FALSE(entry_of(variable("later"), absl::int128(7))->known());
 }

@@ -24,7 +24,7 @@ TEST(VariablesTest, NamesAreWords) {
   EXPECT_TRUE(variables.set("_a1", Value::of(Json(1))).ok());
 }
 
-TEST(VariablesTest, ThereIsALimit) {
+TEST(VariablesTest, TheirNumberIsLimited) {
   Variables variables;
   for (size_t i = 0; i < kMaxVariables; ++i) ASSERT_TRUE(variables.set(absl::StrCat("v", i), {}).ok());
   EXPECT_TRUE(absl::IsResourceExhausted(variables.set("more", {})));

@@ -22,7 +22,7 @@ std::vector<std::string> words(const std::string& line) {
   return texts;
 }
 
-TEST(WordsTest, BlanksDivideAndQuotesKeep) {
+TEST(WordsTest, BlanksSeparateWordsAndQuotesPreserveBlanks) {
   EXPECT_THAT(words("  query ray\tarena  "), ElementsAre("query", "ray", "arena"));
   EXPECT_THAT(words("a 'b c' \"d e\" f\\ g"), ElementsAre("a", "b c", "d e", "f g"));
   EXPECT_THAT(words("'' \"\""), ElementsAre("", ""));
@@ -30,24 +30,24 @@ TEST(WordsTest, BlanksDivideAndQuotesKeep) {
   EXPECT_THAT(words(""), IsEmpty());
 }
 
-TEST(WordsTest, ACommentBeginsOnlyWhereAWordWould) {
+TEST(WordsTest, ACommentBeginsOnlyAtTheBeginningOfAWord) {
   EXPECT_THAT(words("a # b c"), ElementsAre("a"));
   EXPECT_THAT(words("# all"), IsEmpty());
   EXPECT_THAT(words("a#b '#c'"), ElementsAre("a#b", "#c"));
 }
 
-TEST(WordsTest, VariablesAndExpressionsAreFilledInAndNeverDivide) {
+TEST(WordsTest, SubstitutedValuesNeverSplitAWord) {
   EXPECT_THAT(words("--from $p --id $near.id[1]"), ElementsAre("--from", "1,2,3", "--id", "9223372036854775809"));
   EXPECT_THAT(words("--at {$n * 2},0,1 {$p + 0,0,1}"), ElementsAre("--at", "6,0,1", "1,2,4"));
   EXPECT_THAT(words("$word"), ElementsAre("two words"));
   EXPECT_THAT(words("${n}x $n.5 $n. ${absent:-a b}"), ElementsAre("3x", "3.5", "3.", "a b"));
 }
 
-TEST(WordsTest, SingleQuotesAndBackslashesKeepSigns) {
+TEST(WordsTest, SingleQuotesAndBackslashesPreserveSpecialCharacters) {
   EXPECT_THAT(words("'$n {1}' \\$n \\{1} \\#"), ElementsAre("$n {1}", "$n", "{1}", "#"));
 }
 
-TEST(WordsTest, AWordTellsWhetherItStandsInTheLine) {
+TEST(WordsTest, AWordIsMarkedBareIfItIsLiteral) {
   const absl::StatusOr<std::vector<Word>> read = read_words("-> '->' $word", testing::some_variables());
   ASSERT_TRUE(read.ok());
   EXPECT_TRUE((*read)[0].bare);
@@ -55,18 +55,18 @@ TEST(WordsTest, AWordTellsWhetherItStandsInTheLine) {
   EXPECT_FALSE((*read)[2].bare);
 }
 
-TEST(WordsTest, AValueNotKnownYetLeavesAMark) {
+TEST(WordsTest, AnUnknownValueBecomesAPlaceholder) {
   EXPECT_THAT(words("--tick=$later"), ElementsAre(std::string("--tick=") + kNotKnownYet));
   EXPECT_THAT(words("\"a $later b\""), ElementsAre(std::string(1, kNotKnownYet)));
 }
 
-TEST(WordsTest, WhatIsNotClosedIsRefused) {
+TEST(WordsTest, UnclosedQuotesAndBracesAreRefused) {
   for (const char* line : {"'a", "\"a", "a {1", "${n", "a\\", "\"a\\", "{", "$", "a 'b' \"c", "\"{\"}"}) {
     EXPECT_THAT(words(line).front(), HasSubstr("error: ")) << line;
   }
 }
 
-TEST(WordsTest, AWholeResultIsNoWord) { EXPECT_THAT(words("--id $shot").front(), HasSubstr("name one of its fields")); }
+TEST(WordsTest, AWholeResultIsNotAWord) { EXPECT_THAT(words("--id $shot").front(), HasSubstr("name one of them")); }
 
 TEST(WordsTest, AWordHasALimit) {
   Variables variables;
@@ -76,7 +76,7 @@ TEST(WordsTest, AWordHasALimit) {
   EXPECT_TRUE(absl::IsResourceExhausted(read_words("\"$half$half\"", variables).status()));
 }
 
-TEST(WordsTest, AMillionCharactersTakeNoTime) {
+TEST(WordsTest, AMillionCharactersAreReadInLinearTime) {
   EXPECT_EQ(words(std::string(1'000'000, 'x')).front().size(), 1'000'000u);
   EXPECT_THAT(words("'" + std::string(1'000'000, '\\')).front(), HasSubstr("not closed"));
   std::string many;

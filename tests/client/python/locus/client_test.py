@@ -21,6 +21,16 @@ class ClientTest(DaemonTest):
         self.assertIn("rays", server.features)
         self.assertGreater(server.limits["reply_bytes"].value, 4_000_000)
 
+    def test_quotas_are_those_of_the_caller_and_its_connection(self):
+        own, connection = self.client.quotas().items()
+        self.assertEqual(own[0], "anonymous")
+        self.assertTrue(connection[0].startswith("connection:"))
+        self.assertEqual(own[1]["scenes"], locus.Quota(None, 0, None))
+        self.assertNotIn("scenes", connection[1])
+        self.assertIn("open_streams", connection[1])
+        self.assertEqual(list(self.client.quotas("token:ci")), ["token:ci"])
+        self.assertEqual(self.client.quotas(everybody=True), {})
+
     def test_a_serving_server_is_healthy(self):
         self.assertTrue(self.client.healthy())
         with self.assertRaises(locus.LocusError) as raised:

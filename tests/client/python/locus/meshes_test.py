@@ -1,4 +1,4 @@
-"""Tests of meshes and instances: uploaded in chunks, placed by columns, hit by rays."""
+"""Tests of meshes and instances: uploaded in several messages, placed by columns, hit by rays."""
 import array
 import hashlib
 import struct

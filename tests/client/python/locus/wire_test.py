@@ -1,4 +1,4 @@
-"""Tests of decoding without protobuf: all that protobuf may write is decoded, everything else is refused."""
+"""Tests of decoding without protobuf: all encodings that protobuf may write are decoded, all others are refused."""
 import random
 import unittest
 

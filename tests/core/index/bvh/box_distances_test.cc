@@ -32,8 +32,8 @@ Eight random_eight(Random& random, double extent, double size) {
   return eight;
 }
 
-// The limit is exactly the distance of one of the boxes, at any scale: a box within the limit in double must be within
-// it in float.
+// Uses the exact distance of one of the boxes as the limit, at any scale: a box whose distance in double is within the
+// limit must not be culled in float.
 TEST(BoxDistancesTest, NoBoxWithinTheLimitInDoubleIsCulledInFloat) {
   constexpr uint64_t kSeed = 61;
   Random random(kSeed);

@@ -22,7 +22,7 @@ BvhLayout<S> build(const std::vector<Aabb<S>>& boxes, int bins = 32) {
   return layout.ok() ? *std::move(layout) : BvhLayout<S>();
 }
 
-// Visits all nodes of a layout and checks its documented properties.
+// Checker of a tree's layout: visits all nodes and verifies the documented properties of the layout.
 template <class S>
 class LayoutChecker {
  public:
@@ -34,7 +34,7 @@ class LayoutChecker {
       EXPECT_TRUE(layout_.nodes.empty());
       return;
     }
-    // Depth-first order: nodes and positions must be visited in the order of their indices.
+    // Visits nodes depth-first: the indices of nodes and the positions of values must ascend.
     struct Pending {
       BvhChild child;
       Aabb<S> bounds;
@@ -141,7 +141,7 @@ TYPED_TEST(BvhBuildTest, CoincidentBoxesGiveAShallowTree) {
   const size_t count = scaled_count(100'000);
   const std::vector<Aabb<TypeParam>> boxes(count, {{1, 2, 3}, {4, 5, 6}});
   expect_valid(boxes);
-  // A tree of full nodes has log8(count / 8) levels.
+  // A tree whose nodes are all full has log8(count / 8) levels; the tree may have twice as many.
   const double ideal = std::log2(static_cast<double>(count) / 8) / 3;
   EXPECT_LE(build(boxes).depth, static_cast<uint32_t>(std::ceil(2 * ideal)));
 }

@@ -1,4 +1,4 @@
-// Trees answer as the list does, bit for bit, for any number of bins.
+// Trees and the list give bitwise equal results, for any number of bins of the builder.
 #include <gtest/gtest.h>
 
 #include "tests/support/scene_search.h"

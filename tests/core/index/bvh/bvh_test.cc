@@ -28,7 +28,8 @@ Triangle across_x_axis(float x, float box_start, uint32_t number) {
   return {{x - slope, -1, -1}, {x - slope, 1, -1}, {x + slope, 0, 1}, number};
 }
 
-// Returns rows of eight such triangles at x = 0, 10, 20 and so on. Triangle number / 8 is the index of the row.
+// Returns rows of eight triangles of across_x_axis() at x = 0, 10, 20 and so on. A triangle's number / 8 is the index
+// of its row.
 std::vector<Triangle> rows_across_x_axis(uint32_t rows) {
   std::vector<Triangle> triangles;
   for (uint32_t i = 0; i < 8 * rows; ++i) {
@@ -64,7 +65,7 @@ std::vector<TriangleRay> incoherent_rays(const Aabbf& bounds, size_t count, uint
   return rays;
 }
 
-// Mean work of the first hits of incoherent rays that start within the tree's bounds.
+// Mean work per ray of a search for the first hits of incoherent rays that start within the tree's bounds.
 struct MeanWork {
   double nodes, tests;
 };
@@ -127,7 +128,7 @@ TEST(BvhTest, RegionsAreVisitedInStorageOrder) {
 }
 
 // If a primitive straddles two leaves, the leaf that the ray enters first may contain a farther hit than the next leaf
-// (Hughes et al., ch. 37, Fig. 37.15): the first hit found is not the nearest hit.
+// (Hughes et al., ch. 37, Fig. 37.15), so the hit that is found first need not be the nearest.
 TEST(BvhTest, AFartherHitInTheLeafVisitedFirstDoesNotHideANearerOneInALaterLeaf) {
   std::vector<Triangle> triangles;
   for (uint32_t i = 0; i < 8; ++i) triangles.push_back(across_x_axis(10, 1, i));
@@ -219,8 +220,8 @@ TEST(BvhTest, LargeMeshesAnswerAsTheListDoes) {
   }
 }
 
-// Cost needs tests of its own, because a badly split tree still answers correctly. The ceilings are 5 % above the costs
-// of the current builder.
+// Tests the cost, since a badly split tree still answers correctly. The ceilings are 5 % above the costs of the current
+// builder.
 TEST(BvhTest, SahCostAndVisitsOfASphereStayUnderTheirCeilings) {
   const Bvh<Triangle> tree = build(bumpy_sphere(64, 0.02, 1));
   const MeanWork work = mean_work(tree);

@@ -1,5 +1,5 @@
-// Trees restored from a topology: from its own topology, a tree equals the built one byte for byte; from any other
-// topology, it answers as correctly.
+// Tests of trees restored from a topology. A tree restored from its own topology equals the built tree byte for byte; a
+// tree restored from any other topology gives the same answers.
 #include "core/index/bvh/tree_topology.h"
 
 #include <gtest/gtest.h>
@@ -28,7 +28,7 @@ std::vector<Triangle> renumbered(std::vector<Triangle> triangles) {
   return triangles;
 }
 
-// Restores a tree. `triangles` are in the order of their numbers.
+// Restores a tree from `topology`. `triangles` are in the order of their numbers.
 absl::StatusOr<TriangleBvh> restore(const TreeTopology& topology, const std::vector<Triangle>& triangles,
                                     const BvhOptions& options = {}) {
   const auto triangle = [&](uint32_t number) { return triangles[number]; };
@@ -59,8 +59,8 @@ TEST(TreeTopologyTest, TreesOfEverySmallSizeAreRestored) {
   }
 }
 
-// Returns the first difference between a list and a tree restored from a random topology. That there is none makes it
-// safe to store topologies.
+// Returns the first difference between the answers of a tree restored from a random topology and those of a list of the
+// same values. There must be no difference: a stored topology that is wrong may cost speed, but not correctness.
 std::string difference_of_any_topology(const TestScene<Triangle>& scene) {
   if (scene.values.empty()) return "";
   TestScene<Triangle> numbered = scene;
@@ -83,7 +83,7 @@ TEST(TreeTopologyTest, KernelsAnswerATreeOfAnyTopologyAsAllTrianglesDo) {
     ASSERT_TRUE(use_instruction_set(name).ok());
     const RayKernels* const kernels = active_ray_kernels();
     const RegionKernels* const region_kernels = active_region_kernels();
-    if (kernels == nullptr) continue;  // there are no portable kernels
+    if (kernels == nullptr) continue;  // the portable instruction set has no kernels
     for (uint64_t seed = 0; seed < 4; ++seed) {
       Random random(seed);
       const RandomOutline made(static_cast<uint32_t>(triangles.size()), random);
@@ -208,7 +208,7 @@ TEST(TreeTopologyTest, ATreeOfTheMaximumDepthIsVisitedCompletely) {
   const RegionTrial regions = random_region_trial("chain", chain.triangles(), *chain.tree(), scaled_count(40), 4);
   for (const std::string& name : instruction_sets()) {
     ASSERT_TRUE(use_instruction_set(name).ok());
-    if (active_ray_kernels() == nullptr) continue;  // there are no portable kernels
+    if (active_ray_kernels() == nullptr) continue;  // the portable instruction set has no kernels
     EXPECT_EQ(trial.difference(*active_ray_kernels()), "") << name;
     EXPECT_EQ(regions.difference(*active_region_kernels()), "") << name;
   }

@@ -1,5 +1,5 @@
 // Properties of a TriangleBvh build other than correct answers: equal trees on any number of threads, cancellation, and
-// trees of low cost. Cost needs tests of its own, because a badly split tree still answers correctly.
+// trees of low cost. The cost is tested separately, because a badly split tree still answers correctly.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -24,7 +24,7 @@ TriangleBvh build(const std::vector<Triangle>& triangles, const BvhOptions& opti
   return tree.ok() ? *std::move(tree) : TriangleBvh();
 }
 
-// Returns a mesh that is large enough for many tasks.
+// Returns a mesh that is so large that its build is divided into many tasks.
 std::vector<Triangle> large_mesh() { return bumpy_sphere(130, 0.05, 6); }
 
 TEST(TriangleBvhBuildTest, AnyNumberOfThreadsGivesTheSameBytes) {
@@ -49,7 +49,7 @@ TEST(TriangleBvhBuildTest, CoincidentTrianglesGiveTheSameBytesOnAnyThreadsToo) {
   expect_equal_bytes(build(triangles, options), build(triangles));
 }
 
-// Cancels the build in every seventh task: the result must be CANCELLED each time.
+// Cancels a build at one task, for every seventh task of the build: the result must be CANCELLED each time.
 TEST(TriangleBvhBuildTest, ABuildCancelledAnywhereEndsWithCancelled) {
   const std::vector<Triangle> triangles = large_mesh();
   size_t tasks = 0;
@@ -84,8 +84,8 @@ TEST(TriangleBvhBuildTest, TheFirstTriangleThatIsNotFiniteIsNamedByAnyThreads) {
   }
 }
 
-// Example: the ground below houses. Small triangles in the block of the ground would be tested by every ray that meets
-// the ground.
+// A large triangle is, for example, the ground below houses. If its block also contained small triangles, every ray
+// that meets the ground would test these.
 TEST(TriangleBvhBuildTest, ALargeTriangleGetsABlockOfItsOwn) {
   std::vector<Triangle> triangles;
   for (int i = 0; i < 15; ++i) {
@@ -101,7 +101,8 @@ TEST(TriangleBvhBuildTest, ALargeTriangleGetsABlockOfItsOwn) {
     EXPECT_EQ(tree.blocks[block].count == 1, tree.numbers[tree.blocks[block].first] == 15);
 }
 
-// Visitor that searches the first hit and counts the blocks it visits, by their first triangles.
+// Visitor that searches for the first hit and counts the blocks that it visits: one for each triangle that is the first
+// of its block.
 class CountingRay {
  public:
   CountingRay(const TriangleRay& ray, const std::unordered_set<uint32_t>& first_of_block, size_t& blocks)
@@ -122,10 +123,11 @@ class CountingRay {
 };
 
 struct TreeCost {
-  double sah, nodes, blocks, bytes;  // `nodes` and `blocks` are counts a ray; `bytes` are a triangle
+  double sah, nodes, blocks, bytes;  // `nodes` and `blocks` are means per ray, `bytes` is a mean per triangle
 };
 
-// Returns the mean cost of the first hits of incoherent rays that start within the tree's bounds.
+// Returns the cost of a tree: its SAH cost, its size, and the mean work of finding the first hits of incoherent rays
+// that start within the tree's bounds.
 TreeCost cost_of(const std::vector<Triangle>& triangles, const BvhOptions& options = {}) {
   const TriangleBvh tree = build(triangles, options);
   std::unordered_set<uint32_t> first_of_block;
@@ -154,7 +156,7 @@ void expect_below(const TreeCost& cost, const TreeCost& ceiling) {
   EXPECT_LT(cost.bytes, ceiling.bytes);
 }
 
-// The ceilings are 4 % above the costs of the current builder.
+// The ceilings, the expected maxima of cost_of(), are 4 % above the costs of the current builder.
 TEST(TriangleBvhBuildTest, ASphereStaysBelowItsCeilings) {
   expect_below(cost_of(bumpy_sphere(64, 0.02, 1)), {11.3, 5.2, 1.46, 56});
 }

@@ -110,7 +110,7 @@ TEST(TriangleBvhTest, TheRangeOfANodeIsTheRangesOfItsBlocksThenOfItsNodes) {
   }
 }
 
-// Bvh is built by the same builder and has cost ceilings of its own (bvh_test.cc).
+// Bvh and TriangleBvh have the same builder; bvh_test.cc tests the cost of a Bvh.
 TEST(TriangleBvhTest, CostsTheSameAsABvhOfTheTriangles) {
   const std::vector<Triangle> triangles = bumpy_sphere(64, 0.02, 1);
   const absl::StatusOr<Bvh<Triangle>> values = Bvh<Triangle>::build(triangles);

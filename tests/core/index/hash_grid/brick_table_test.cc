@@ -15,12 +15,13 @@ TEST(BrickTableTest, AnEmptyTableFindsNoBrick) {
   EXPECT_TRUE(table.for_each([](uint32_t) { return false; }));
 }
 
-// Keys from a small range are inserted and erased, so that probes cross gaps that were closed.
+// Inserts and erases keys from a small range, so that probes cross places where the table closed the gap of an erased
+// key.
 TEST(BrickTableTest, EqualsAMapThroughRandomInsertsAndErases) {
   test::Random random(7);
   BrickTable table;
   std::map<GridKey, uint32_t> model;
-  std::vector<GridKey> keys;  // by brick
+  std::vector<GridKey> keys;  // key of each brick, by the brick's index
   for (int step = 0; step < 20'000; ++step) {
     const GridKey key{random.whole(-5, 5), random.whole(-5, 5), random.whole(-3, 3)};
     const auto known = model.find(key);

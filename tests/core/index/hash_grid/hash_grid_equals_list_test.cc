@@ -29,8 +29,8 @@ TEST(HashGridEqualsListTest, ThroughRandomInsertsMovesAndRemoves) {
   EXPECT_EQ(search_grid_scenes(scaled_count(300), any_adversarial_scene, moving_grid_difference), "");
 }
 
-// The scenes are large enough for marches through many bricks, for several levels with many bricks each and for choices
-// of the cell size.
+// The scenes are so large that rays march through many bricks, several levels have many bricks each, and the grid
+// chooses its cell size.
 TEST(HashGridEqualsListTest, OnTensOfThousandsOfObjects) {
   for (uint64_t seed = 0; seed < scaled_count(20); ++seed) {
     Random random(seed);

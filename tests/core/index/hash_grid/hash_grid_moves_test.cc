@@ -1,5 +1,5 @@
-// Batches of moves only: a few, half or all of the values at once, with and without move indices by handle, and
-// snapshots that share the log to which later moves append.
+// Batches that contain only moves, of a few, half or all of the values, with and without GridMoves::by_handle; and
+// snapshots that share a brick's log, to which later moves append.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -26,7 +26,7 @@ std::vector<Object> crowd(size_t count, double half, Random& random, bool with_f
   return objects;
 }
 
-// Store with a model of its contents.
+// ObjectStore and a list of the objects that it must contain.
 class Crowd {
  public:
   Crowd(size_t count, bool with_forms, uint64_t seed)
@@ -38,7 +38,8 @@ class Crowd {
   const std::vector<Object>& objects() const { return objects_; }
   ObjectSet snapshot() { return store_.snapshot(); }
 
-  // Moves about that share of the objects, each at most once. `with_indices`: passes the move indices by handle.
+  // Moves a random part of the objects, about `share` of them, each at most once. If `with_indices` is true, also
+  // passes GridMoves::by_handle.
   void move(double share, bool with_indices) {
     std::vector<GridMove> moves;
     std::vector<Quaternion> rotations;
@@ -57,7 +58,7 @@ class Crowd {
     }
     store_.move({moves, rotations, by_handle});
   }
-  // Removes a random object and inserts it again elsewhere under its id.
+  // Removes a random object and inserts an object with the same id at another position.
   void replace_one() {
     Object& object = objects_[random_.below(objects_.size())];
     const Object before = object;
@@ -127,7 +128,8 @@ TEST_P(HashGridMovesTest, QueriesEqualTheModelAfterMovesOfAnyShareAndSnapshotsSt
 INSTANTIATE_TEST_SUITE_P(Forms, HashGridMovesTest, ::testing::Bool(),
                          [](const auto& test) { return test.param ? "Any" : "BallsOnly"; });
 
-// A batch of few moves appends to a log that versions share: the writer appends while readers of earlier versions read.
+// A batch of few moves appends to a log that several versions of a brick share: the writer appends while readers read
+// earlier versions.
 TEST(HashGridMovesThreadsTest, ReadersSeeTheirVersionWhileTheWriterAppendsToTheSharedLog) {
   struct Version {
     ObjectSet set;

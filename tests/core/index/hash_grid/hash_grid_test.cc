@@ -41,7 +41,7 @@ std::vector<Object> crowd(size_t count, double half, float radius, uint64_t seed
   return objects;
 }
 
-// Returns options of a grid that keeps the cell size 8.
+// Returns options of a grid whose cell size is always 8.
 HashGridOptions fixed_cells() {
   HashGridOptions options;
   options.first_choice = std::numeric_limits<size_t>::max();
@@ -195,7 +195,8 @@ TEST(HashGridTest, TheCellSizeFollowsTheValuesAndChangesNoResult) {
   EXPECT_EQ(first_difference(grid, scene), "");
 }
 
-// Limits the time of a batch: each replaces only a part of the grid.
+// After a new cell size is chosen, each batch moves only a part of the values to the new cells, so that the time of a
+// batch is limited.
 TEST(HashGridTest, AfterANewCellSizeEachBatchRefilesAFewValuesAndResultsStayCorrect) {
   Random random(9);
   std::vector<Object> objects = crowd(40'000, 1000, 0.01f, 9);

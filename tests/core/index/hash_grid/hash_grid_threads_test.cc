@@ -1,4 +1,4 @@
-// One writer at full speed and two readers that never wait for it: each snapshot shows exactly one revision.
+// One writer at full speed and two readers that never wait for the writer: each snapshot contains exactly one revision.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -35,7 +35,8 @@ class Published {
 
 constexpr size_t kObjects = 1'000;
 
-// Expects a consistent snapshot: all objects carry the number of the same revision as their tag.
+// Expects that a snapshot contains one revision: the tag of an object is the number of the revision that wrote the
+// object, and all objects must have the same tag.
 void expect_one_revision(const ObjectSet& grid) {
   std::vector<Object> found;
   ball_overlap(grid, {{}, 1e6}, found);

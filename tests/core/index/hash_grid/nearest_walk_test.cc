@@ -1,5 +1,6 @@
-// Shells around a point miss no value and end; the values of a shell are visited from near to far; and a search from
-// empty space does not visit the empty cells on the way.
+// Shells are the regions around a point that a nearest search visits one after another. They miss no value and are
+// finite in number; the values of a shell are visited from near to far; and a search from empty space does not visit
+// the empty cells between the point and the values.
 #include "core/index/hash_grid/nearest_walk.h"
 
 #include <gtest/gtest.h>
@@ -34,7 +35,7 @@ std::vector<Object> crowd(size_t count, double half, uint64_t seed) {
   return objects;
 }
 
-// Returns the number of cells and bricks visited to find the nearest `count` objects.
+// Returns the number of cells and bricks that a search for the nearest `count` objects visits.
 uint64_t cells_of(const ObjectGrid& grid, Vec3d point, size_t count) {
   std::vector<ValueAt<Object>> found;
   Work work;
@@ -91,14 +92,15 @@ TEST(NearestWalkTest, TheKeyOfALimitIsNotBelowTheLimit) {
   EXPECT_EQ(key_limit(1e60), std::numeric_limits<float>::infinity());
 }
 
-// Up to kMaxSorted candidates are sorted by a kernel, more by std::sort().
+// A kernel sorts up to kMaxSorted candidates; std::sort() sorts a larger number.
 TEST(NearestWalkTest, AnyNumberOfValuesIsVisitedOnceAndFromNearToFar) {
   const Vec3d center = {1000, 1000, 1000};
   for (const size_t count : {1, 7, 8, 9, 63, 64, 65, 2000}) {
     std::vector<Object> objects = crowd(count, 20, count);
     for (Object& object : objects) object.shape.position = object.shape.position + center;
     HashGridOptions options;
-    options.first_choice = std::numeric_limits<size_t>::max();  // else a few objects get cells as wide as the world
+    options.first_choice = std::numeric_limits<size_t>::max();  // otherwise the grid would choose cells as wide as the
+                                                                // world for a few objects
     ObjectGrid grid(options);
     grid.apply({}, objects);
     const ObjectSet set = grid.snapshot();

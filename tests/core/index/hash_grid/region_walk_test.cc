@@ -1,5 +1,5 @@
-// A walk visits for each of its regions the same values as the grid's own visit of that region, in the same order and
-// at the same cost, whatever was moved before and however many values or bricks a region holds.
+// A walk of many regions visits for each region the same values as a separate visit of that region, in the same order
+// and with the same amount of work, after any moves and for any number of values or bricks in a region.
 #include "core/index/hash_grid/region_walk.h"
 
 #include <gtest/gtest.h>
@@ -22,7 +22,8 @@ struct Visited {
   Work work;
 };
 
-// Returns a grid of balls of two sizes. Some have moved, so that bricks have logs and dead slots.
+// Returns a grid of balls of two sizes. Some balls have moved, so that bricks have logs and dead slots (slots of values
+// that were moved or removed).
 GridSnapshot crowd(Random& random) {
   HashGrid grid;
   std::vector<GridItem> items(kCount);

@@ -1,4 +1,5 @@
-// The march names, exactly once, the brick of every value that passes the slab test, in a slab that is not too late.
+// A march along a ray lists slabs of bricks. The brick of every value that passes the slab test is in exactly one slab,
+// whose `near` does not exceed the value's near value.
 #include "core/index/hash_grid/slab_march.h"
 
 #include <gtest/gtest.h>
@@ -24,7 +25,8 @@ struct FiledLevel {
   std::vector<Filed> values;
 };
 
-// Returns a level of values that extend up to half a cell beyond their cells; many are thin and exactly on a border.
+// Returns a level of values that extend up to half a cell beyond their cells; many values are thin and exactly on a
+// border between cells.
 FiledLevel random_level(Random& random, Vec3d center) {
   FiledLevel level;
   const int exponent = random.whole(-6, 8);
@@ -43,8 +45,8 @@ FiledLevel random_level(Random& random, Vec3d center) {
   return level;
 }
 
-// Returns a ray through a corner or a face of one of the values, or so little outside that the value passes the slab
-// test only by its padding.
+// Returns a ray through a corner or a face of one of the values' bounds, or so little outside that the value passes the
+// slab test only because of the pad.
 Rayd grazing_ray(Random& random, const FiledLevel& level, double pad) {
   const Aabbd& box = random.pick(level.values).bounds;
   Vec3d through = random.chance(0.5) ? box.min : box.max;
@@ -64,7 +66,8 @@ bool names(const KeyRange& range, const GridKey& brick) {
   return true;
 }
 
-// Expects that each value that passes the slab test is named once. Returns the number of these values.
+// Expects that the brick of each value that passes the slab test is in exactly one slab. Returns the number of these
+// values.
 int check_march(const FiledLevel& level, const SlabRay<double>& ray, double limit) {
   const SlabMarch march(ray, level.geometry, limit);
   EXPECT_TRUE(std::isfinite(march.bricks()));

@@ -14,7 +14,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-// Grid of objects with the given ids.
+// Grid block that contains one object for each of the given ids.
 class Block {
  public:
   explicit Block(const std::vector<Id>& ids) : block_(static_cast<uint32_t>(ids.size()), false) {

@@ -1,4 +1,5 @@
-// Rays that the kernels trace chunk by chunk, compared with tests of every triangle of every instance.
+// Tests rays that the kernels trace in several chunks: compares their results with tests of every triangle of every
+// instance.
 #include "core/query/kinds/kernel_rays.h"
 
 #include <gmock/gmock.h>
@@ -14,9 +15,9 @@
 namespace locus::test {
 namespace {
 
-constexpr size_t kRays = 700;  // several chunks, the last of them not full
+constexpr size_t kRays = 700;  // so many that they form several chunks, of which the last is not full
 
-// Forty instances of three meshes, rotated, scaled and overlapping each other.
+// Returns a world of forty instances of three meshes; the instances are rotated and scaled and overlap each other.
 QueryWorld crowd() {
   Random random(1);
   const StaticMeshPtr meshes[] = {mesh_of(bumpy_sphere(8, 0.1, 1)), mesh_of(bumpy_sphere(5, 0.2, 2)),
@@ -82,7 +83,7 @@ TEST_P(KernelRaysTest, AllHitsAndTruncatedHitsEqualThoseOfBruteForce) {
   }
 }
 
-// The ray has more hits in one mesh than the kernels keep.
+// The ray has more hits in one mesh than the kernels return for one ray.
 TEST_P(KernelRaysTest, AllHitsOfARayThroughManyTrianglesOfOneMeshAreFound) {
   constexpr uint32_t kWalls = 500;
   std::vector<Triangle> walls;

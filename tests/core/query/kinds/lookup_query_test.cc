@@ -76,7 +76,7 @@ TEST(LookupQueryTest, AGroupRequestedTwiceIsAnsweredTwice) {
   EXPECT_THAT(result.ids, ElementsAre(3, 5, 3, 5));
 }
 
-// Keeping each answer separately would take 65,536 times 2,000 rows.
+// If each query stored a separate answer, the batch would need 65,536 * 2,000 rows.
 TEST(LookupQueryTest, ALargeGroupRequestedManyTimesIsKeptOnceAndTruncatedToTheReply) {
   QueryWorld world;
   for (Id id = 1; id <= 2000; ++id) world.objects.push_back(ball_object(id, {}));

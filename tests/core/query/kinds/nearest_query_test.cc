@@ -22,7 +22,8 @@ Object point_object(Id id, Vec3d position) {
   return object;
 }
 
-// Instances 4 and 5 with walls at x = 0, 10 and 20, instance 5 displaced by 3; objects between them.
+// Returns a world with the instances 4 and 5 of a mesh whose walls are at x = 0, 10 and 20, and with objects at x = -4,
+// -2 and 6. Instance 5 is displaced by 3 along x.
 QueryWorld mixed_world() {
   QueryWorld world;
   const StaticMeshPtr walls = mesh_of({wall_triangle(0), wall_triangle(10), wall_triangle(20)});
@@ -135,7 +136,7 @@ TEST(NearestQueryTest, DistancesToScaledInstancesAreInWorldUnits) {
   QueryWorld world;
   PlacedMesh wall = placed(4, wall_mesh(), {10, 0, 0});
   wall.scale = 8;
-  wall.rotation = {0, 0, 0.70710678f, 0.70710678f};  // its plane is now y = 0
+  wall.rotation = {0, 0, 0.70710678f, 0.70710678f};  // the wall's plane is now y = 0
   world.instances = {wall};
   const BlockResult result = run_block(*snapshot_of(world), one_point({10, 24, 0}));
   ASSERT_EQ(result.t.size(), 1u);

@@ -21,7 +21,7 @@ Object point_object(Id id, Vec3d position) {
   return object;
 }
 
-// Mesh of walls at x = 0 to 9: triangle n is at x = (7 n) mod 10.
+// Returns a mesh of ten walls of one triangle each: triangle n is at x = 7 * n mod 10.
 StaticMeshPtr ten_walls() {
   std::vector<Triangle> walls;
   for (int i = 0; i < 10; ++i) walls.push_back(wall_triangle(static_cast<float>(7 * i % 10)));
@@ -73,7 +73,7 @@ TEST(OverlapQueryTest, SortedTrianglesAscend) {
   OwnedBlock block = one_box({5, 0, 0}, {1.5f, 1, 1}, StaticDetail::kTrianglesSorted);
   const BlockResult result = run_block(*snapshot_of(mixed_world()), block);
   EXPECT_THAT(result.ids, ElementsAre(4, 4, 4, kChosenIdBit | 1, kChosenIdBit | 1, kChosenIdBit | 1));
-  EXPECT_THAT(result.triangles, ElementsAre(2, 5, 8, 2, 5, 8));  // at x = 4, 5, 6
+  EXPECT_THAT(result.triangles, ElementsAre(2, 5, 8, 2, 5, 8));  // the triangles at x = 4, 5 and 6
 }
 
 TEST(OverlapQueryTest, ObjectsAreOneRowAmongTriangles) {

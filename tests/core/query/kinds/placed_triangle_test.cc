@@ -62,7 +62,8 @@ TEST(PlacedTriangleTest, BoundsContainTheTriangleAndAreGrownByRoundingOnly) {
   });
 }
 
-// Culling by the instance's bounds, or measuring to them, therefore never changes a verdict of the triangle's bounds.
+// The bounds of a placed triangle are within the instance's bounds. Therefore a search that culls by the instance's
+// bounds, or by the distance to these, never misses a triangle whose own bounds meet the query.
 TEST(PlacedTriangleTest, BoundsLieWithinTheInstanceBounds) {
   for_each_triangle([](const Instance& instance, const PlacedTriangles& placed, const Triangle& triangle) {
     EXPECT_TRUE(contains(instance.bounds, placed.bounds_of_triangle(triangle)));

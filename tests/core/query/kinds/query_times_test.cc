@@ -1,4 +1,5 @@
-// Times of queries: resolving them, the errors for times outside the history, and the results of a batch.
+// Tests how the times of queries are resolved, the errors for times outside the history, and the results of a batch
+// with times.
 #include "core/query/kinds/query_times.h"
 
 #include <gmock/gmock.h>
@@ -17,7 +18,7 @@ SceneSpec ten_ticks() {
   return spec;
 }
 
-// Scene whose point 1 is at (t, 0, 0) at tick t, up to 30; it is in group 4.
+// Scene at tick 30 with one object: point 1 of group 4. It was at (t, 0, 0) at each tick t.
 class QueryTimesTest : public SceneFixture {
  protected:
   QueryTimesTest() : SceneFixture(ten_ticks()) {}
@@ -87,7 +88,7 @@ TEST_F(QueryTimesTest, WithoutAsOfTicksNoTimesAreReported) {
 TEST_F(QueryTimesTest, ATimeOutsideTheHistoryRefusesTheBatchAndNamesTheRange) {
   const absl::Status status = refusal(where({25, 19}, {0, 0.75f}));
   expect_refusal(status, absl::StatusCode::kOutOfRange, Reason::kOutOfRange, "blocks[0].as_of_ticks", 1);
-  EXPECT_NE(status.message().find("ticks 20 to 30"), absl::string_view::npos) << status;
+  EXPECT_NE(status.message().find("the recorded ticks are 20 to 30"), absl::string_view::npos) << status;
   expect_refusal(refusal(where({31})), absl::StatusCode::kOutOfRange, Reason::kOutOfRange, "blocks[0].as_of_ticks", 0);
   expect_refusal(refusal(where({30}, {0.5f})), absl::StatusCode::kOutOfRange, Reason::kOutOfRange,
                  "blocks[0].as_of_ticks", 0);
@@ -96,7 +97,7 @@ TEST_F(QueryTimesTest, ATimeOutsideTheHistoryRefusesTheBatchAndNamesTheRange) {
 TEST_F(QueryTimesTest, AFutureTimeIsRefusedWithoutAdviceAboutHistory) {
   for (const OwnedBlock& block : {where({31}), where({30}, {0.5f})}) {
     const std::string message(refusal(block).message());
-    EXPECT_NE(message.find("has not come yet; ticks 20 to 30 are kept"), std::string::npos) << message;
+    EXPECT_NE(message.find("is in the future; the recorded ticks are 20 to 30. "), std::string::npos) << message;
     EXPECT_EQ(message.find("history"), std::string::npos) << message;
   }
 }
@@ -130,10 +131,10 @@ TEST_F(QueryTimesTest, TimesCountTowardsTheReplySize) {
   EXPECT_LT(fixed_reply_bytes(batch), with_times);
 }
 
-// Tests of the reason that the error for a time outside the history gives.
+// Tests of the explanation in the error message for a time outside the history.
 class NotKeptTest : public SceneFixture {
  protected:
-  // Objects 1 to 100 all move at each tick up to 30.
+  // Moves the objects 1 to 100 at each tick from 1 to 30.
   static void live(Scene& scene) {
     Columns columns;
     std::vector<uint64_t> ids(100);
@@ -159,23 +160,25 @@ class NotKeptTest : public SceneFixture {
     const absl::Status status = run_batch(snapshot, batch, {}).status();
     expect_refusal(status, absl::StatusCode::kOutOfRange, Reason::kOutOfRange, "blocks[0].as_of_ticks", 0);
     const std::string message(status.message());
-    return message.substr(message.find(": ") + 2);  // without the field
+    return message.substr(message.find(": ") + 2);  // part of the message after the field's name
   }
 };
 
 TEST_F(NotKeptTest, ASceneWithoutHistoryAdvisesHistoryTicks) {
   live(scene_);
-  EXPECT_EQ(refusal(*scene_.latest(), 29),
-            "tick 29 is not kept; ticks 30 to 30 are: the scene keeps no past. Ask about now, clamp, or create the "
-            "scene with history_ticks");
+  EXPECT_EQ(
+      refusal(*scene_.latest(), 29),
+      "tick 29 is too old; the recorded ticks are 30 to 30: the scene has no history. Query the current tick, clamp, "
+      "or create the scene with history_ticks");
 }
 
 TEST_F(NotKeptTest, ATickBeyondHistoryTicksAdvisesMoreHistoryTicks) {
   Scene scene("scene", ten_ticks(), kEpoch, StaticSet::empty());
   live(scene);
-  EXPECT_EQ(refusal(*scene.latest(), 19),
-            "tick 19 is not kept; ticks 20 to 30 are: older ones are beyond history_ticks. Ask about one of those, "
-            "clamp, or create the scene with a larger history_ticks");
+  EXPECT_EQ(
+      refusal(*scene.latest(), 19),
+      "tick 19 is too old; the recorded ticks are 20 to 30: older ticks are beyond history_ticks. Query one of these "
+      "ticks, clamp, or create the scene with a larger history_ticks");
 }
 
 TEST_F(NotKeptTest, ATickThatDidNotFitAdvisesMoreHistoryBytes) {
@@ -185,7 +188,7 @@ TEST_F(NotKeptTest, ATickThatDidNotFitAdvisesMoreHistoryBytes) {
   live(scene);
   EXPECT_GT(scene.latest()->oldest_tick(), 1u);
   EXPECT_THAT(refusal(*scene.latest(), 1),
-              ::testing::HasSubstr(": older ones did not fit into history_bytes. Ask about one of those, clamp, or "
+              ::testing::HasSubstr(": older ticks did not fit into history_bytes. Query one of these ticks, clamp, or "
                                    "create the scene with a larger history_bytes"));
 }
 
@@ -196,12 +199,14 @@ TEST_F(NotKeptTest, ATickBeforeRestartTicksStaysOutsideTheHistory) {
   restart.restart_ticks = true;
   restart.tick = 25;
   ASSERT_TRUE(scene.apply(restart).ok());
-  EXPECT_EQ(refusal(*scene.latest(), 24),
-            "tick 24 is not kept; ticks 25 to 25 are: the scene's ticks began there. Ask about one of those, or clamp");
+  EXPECT_EQ(
+      refusal(*scene.latest(), 24),
+      "tick 24 is too old; the recorded ticks are 25 to 25: the scene's ticks began there. Query one of these ticks, "
+      "or clamp");
 }
 
-// Scene whose ball 7 is at the origin at tick 1 and at (0, 5, 0) at tick 3; within the tick between it first moves far
-// away.
+// Scene whose ball 7 is at the origin at the end of tick 1 and at (0, 5, 0) at the end of tick 2. Within tick 2, the
+// ball first moves far away.
 class FastMoverQueryTest : public SceneFixture {
  protected:
   FastMoverQueryTest() : SceneFixture(ten_ticks()) {}
@@ -226,7 +231,7 @@ class FastMoverQueryTest : public SceneFixture {
     batch(3, {});
   }
 
-  // Time half way between ticks 1 and 2, at which the ball is at (0, 2.5, 0).
+  // Returns a block of one query at the time half way between ticks 1 and 2, when the ball is at (0, 2.5, 0).
   static OwnedBlock half_way(decltype(QueryBlock::kind) kind, std::vector<float> points,
                              std::vector<float> sizes = {}) {
     OwnedBlock block;
@@ -241,7 +246,7 @@ class FastMoverQueryTest : public SceneFixture {
     const BlockResult result = run_block(*scene_.latest(), block);
     return {result.ids.begin(), result.ids.end()};
   }
-  // Fails unless every kind of query finds the ball where it was.
+  // Expects that every kind of query finds the ball at (0, 2.5, 0).
   void expect_found() const {
     const std::vector<uint64_t> ball = {7};
     OwnedBlock lookup = half_way(LookupColumns{}, {});

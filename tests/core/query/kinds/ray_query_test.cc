@@ -94,7 +94,8 @@ TEST(RayQueryTest, AllReportsAnObjectOnce) {
   }
 }
 
-// A static hit must not end the search for objects, and an object's hit must not hide a nearer static one.
+// A hit of an instance must not end the search for objects, and a hit of an object must not hide a nearer hit of an
+// instance.
 TEST(RayQueryTest, TheNearerOfAnInstanceAndAnObjectWins) {
   for (const double wall : {3.0, 7.0}) {
     QueryWorld world;
@@ -136,7 +137,7 @@ TEST(RayQueryTest, AtEqualDistanceAndIdTheLowerTriangleWins) {
   EXPECT_THAT(run_block(*snapshot_of(world), rays_along_x(RayMode::kAll)).triangles, ElementsAre(1, 2, 3, 0));
 }
 
-// The hits kept among equally distant ones must not depend on the order of visiting.
+// Which of several hits with equal t are returned must not depend on the order in which the objects are visited.
 TEST(RayQueryTest, TruncationAmongEqualDistancesKeepsTheLowestIds) {
   QueryWorld world;
   for (Id id = 40; id > 0; --id) {
@@ -322,7 +323,7 @@ TEST(RayQueryTest, UvAndPointDescribeTheSamePosition) {
   world.instances = {instance};
   const SnapshotPtr snapshot = snapshot_of(world);
   const Transform& transform = snapshot->statics->find(1)->transform;
-  const auto weighted = [&](double u, double v) {  // relative to the frame
+  const auto weighted = [&](double u, double v) {  // point of the placed triangle, relative to the frame
     const Vec3d in_mesh = to_double(triangle.a) * (1 - u - v) + to_double(triangle.b) * u + to_double(triangle.c) * v;
     return transform.point_to_world(in_mesh) - instance.translation;
   };
@@ -344,7 +345,7 @@ TEST(RayQueryTest, UvAndPointDescribeTheSamePosition) {
 TEST(RayQueryTest, ConservativeRaysEnterBoundsAndHaveNoSurface) {
   QueryWorld world;
   world.objects = {ball_object(1, {5, 0, 0})};
-  OwnedBlock block = one_ray(RayMode::kFirst, {0, 0.9f, 0.9f}, {1, 0, 0});  // past the ball, through its bounds
+  OwnedBlock block = one_ray(RayMode::kFirst, {0, 0.9f, 0.9f}, {1, 0, 0});  // enters the bounds, misses the ball
   EXPECT_THAT(run_block(*snapshot_of(world), block).ids, ElementsAre(0));
   block.settings.precision = Precision::kConservative;
   block.settings.columns = {Column::kT, Column::kId, Column::kNormal, Column::kUv};
@@ -355,7 +356,8 @@ TEST(RayQueryTest, ConservativeRaysEnterBoundsAndHaveNoSurface) {
   EXPECT_THAT(result.uvs, ElementsAre(0, 0));
 }
 
-// Bounds are grown by 2^-41 of the magnitudes, and the slab test by 2^-40 of the magnitudes of origin and box.
+// The hit may be early because of two paddings: the bounds of a placed triangle are grown by 2^-41 times the magnitudes
+// of the translation and the mesh, and the slab test by 2^-40 times the magnitudes of the ray's origin and the bounds.
 TEST(RayQueryTest, ConservativeRaysEnterBoundsOfPlacedTrianglesWhereTheyAreFarFromTheOrigin) {
   for (const double away : {0.0, 1e3, 1e6, 1e9 - 100}) {
     QueryWorld world;
@@ -382,7 +384,7 @@ TEST(RayQueryTest, ConservativeRaysMissPlacedTrianglesThatTheyMissFarFromTheOrig
 
 class FarHitTest : public ::testing::TestWithParam<Precision> {
  protected:
-  // Walls 5e44 and 9e44 lengths of the direction away, a ball between them.
+  // Places walls at t = 5e44 and t = 9e44, which are too large for a float, and a ball between the walls.
   FarHitTest() {
     world_.objects = {ball_object(3, {7, 0, 0})};
     world_.instances = {placed(9, wall_mesh(), {5, 0, 0}), placed(2, wall_mesh(), {9, 0, 0})};

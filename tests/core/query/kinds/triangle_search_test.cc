@@ -57,7 +57,7 @@ class TriangleSearchTest : public ::testing::Test {
 };
 
 TEST_F(TriangleSearchTest, BatchesFindWhatThePredicatesFindInStorageOrderWithAndWithoutKernels) {
-  ASSERT_GT(tree_.bytes(), size_t{2} << 20);  // large enough for searches to take turns
+  ASSERT_GT(tree_.bytes(), size_t{2} << 20);  // larger than 2 MiB, so that the kernels interleave searches
   for (const std::string& name : instruction_sets()) {
     SCOPED_TRACE(name);
     ASSERT_TRUE(use_instruction_set(name).ok());

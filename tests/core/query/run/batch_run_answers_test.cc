@@ -150,7 +150,7 @@ TEST(RunBatchTest, AStopEndsTheBatchWithItsStatus) {
 
 TEST(RunBatchTest, TheStopIsPolledAtLeastEvery4096Tests) {
   const SnapshotPtr snapshot = snapshot_of(crowd(5'000));
-  for (const uint32_t mask : {1u, 0u}) {  // skipped objects count as work as well
+  for (const uint32_t mask : {1u, 0u}) {  // with mask 0 all objects are skipped, which must count as work too
     int asked = 0;
     RunOptions options;
     options.stop = [&] {
@@ -236,8 +236,9 @@ TEST(RunBatchTest, WorkOfABatchIsTheSumOfItsBlocks) {
   EXPECT_EQ(result.work.cells, sum.cells);
 }
 
-// Grids of 250,000 values and more are walked for several balls or boxes at once, by a function that outlives the call
-// that sets it up; AddressSanitizer sees a reference in it that does not.
+// In a grid of at least 250,000 values, a RegionWalk visits many regions together. It calls a visitor after
+// walk_regions() has returned: if the visitor referenced local variables of walk_regions(), AddressSanitizer would
+// detect it.
 TEST(RunBatchTest, ManyBallsAndBoxesInAGridLargerThanTheCachesAnswerLikeBruteForce) {
   QueryWorld world;
   for (Id id = 1; id <= 250'000; ++id)

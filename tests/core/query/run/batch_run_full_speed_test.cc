@@ -1,6 +1,5 @@
-// One writer at full speed, readers that check a model at the revision they happen to see and at random ticks of its
-// past. tests/property/scene_proof_test.cc
-// runs the same for ten minutes.
+// Tests one writer at full speed beside readers. The readers compare the latest revision, and random past ticks, with a
+// model. tests/property/scene_proof_test.cc runs the same test for ten minutes.
 #include <gtest/gtest.h>
 
 #include "tests/support/full_speed.h"

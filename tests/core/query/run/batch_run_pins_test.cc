@@ -1,5 +1,5 @@
-// Slow readers beside a writer at full speed: the memory they pin is bounded, they are revoked, and other readers are
-// not affected.
+// Tests slow readers beside a writer at full speed: the memory that the readers pin is bounded, their pins are revoked,
+// and other readers are not affected.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -18,7 +18,7 @@ namespace {
 constexpr uint64_t kObjects = 1'000;
 constexpr Scene::Deadline kNow = Scene::Deadline::min();
 
-// Scene whose objects all move with every revision, to x = revision.
+// Scene whose objects all move in every revision; the x coordinate of each object is the number of the revision.
 class RunBatchPinsTest : public ::testing::Test {
  protected:
   RunBatchPinsTest() : ids_(kObjects), positions_(3 * kObjects), scene_(empty(0)) {
@@ -52,7 +52,7 @@ class RunBatchPinsTest : public ::testing::Test {
     return positions_;
   }
 
-  // Publishes the next revision. Called by one thread.
+  // Publishes the next revision. Only one thread may call it.
   void advance() {
     UpdateBatch batch;
     MoveColumns move;
@@ -62,13 +62,15 @@ class RunBatchPinsTest : public ::testing::Test {
     ASSERT_TRUE(scene_->apply(batch).ok());
   }
 
-  // Expects pinned bytes within the limit, plus the growth by one more revision and by the time until the next check.
+  // Expects that the pinned bytes are at most the limit, plus 1/16 of the limit (readers may pin so much before the
+  // bytes are counted again), plus the size of two revisions.
   void expect_bounded() const {
     const SceneStatus status = scene_->status();
     EXPECT_LE(status.pinned_bytes, status.max_pinned_bytes + status.max_pinned_bytes / 16 + 2 * scene_bytes_);
   }
 
-  // Drops the revoked pins from the front of `pins`, which are ordered from oldest to newest, as they are revoked.
+  // Drops the revoked pins from the front of `pins` and returns their number. `pins` ascend by revision, and the oldest
+  // pins are revoked first.
   static uint64_t drop_revoked(std::deque<SnapshotPin>& pins) {
     uint64_t dropped = 0;
     for (; !pins.empty() && !pins.front().status().ok(); ++dropped) pins.pop_front();
@@ -103,7 +105,7 @@ TEST_F(RunBatchPinsTest, ABatchThatPinsTooMuchEndsAtItsNextCheckAndTheWriterCont
     EXPECT_EQ(answer.status().code(), absl::StatusCode::kResourceExhausted);
   });
   while (!begun) std::this_thread::yield();
-  // Pins newer revisions until the pins together exceed the limit.
+  // Pins newer revisions until the pins together exceed the limit and the reader's pin is revoked.
   std::deque<SnapshotPin> others;
   while (!revoked) {
     others.push_back(*scene_->pin({}, kNow));
@@ -141,7 +143,7 @@ TEST_F(RunBatchPinsTest, ABatchThatPinsOneRevisionForLongIsAnswered) {
   reader.join();
 }
 
-// One reader keeps every revision until it is revoked, oldest first; another one reads quickly.
+// One reader, `hoarder`, holds pins until they are revoked; another reader releases each pin quickly.
 TEST_F(RunBatchPinsTest, QuickReadersAreNeverRevokedBesideOneThatKeepsAllRevisions) {
   const uint64_t turns = scaled_count(2'000);
   std::atomic<bool> done{false};
@@ -150,7 +152,8 @@ TEST_F(RunBatchPinsTest, QuickReadersAreNeverRevokedBesideOneThatKeepsAllRevisio
     std::deque<SnapshotPin> kept;
     uint64_t seen = 0;
     while (!done) {
-      // Pins at most one revision per answer to the quick reader, so that its pin is never the oldest of too many.
+      // Pins at most one revision per answer that the quick reader gets, so that the quick reader's pin is never the
+      // oldest when the pins exceed the limit.
       if (quick > seen) {
         seen = quick;
         kept.push_back(*scene_->pin({}, kNow));
@@ -169,7 +172,8 @@ TEST_F(RunBatchPinsTest, QuickReadersAreNeverRevokedBesideOneThatKeepsAllRevisio
       ++quick;
     }
   });
-  // Stops on failure: a failed reader makes no more progress, and without it no pin is revoked.
+  // Stops on failure: if the quick reader fails, the hoarder pins no further revisions, so that no pin would be
+  // revoked.
   for (uint64_t i = 0; (i < turns || revoked == 0) && !HasFailure(); ++i) {
     advance();
     expect_bounded();

@@ -16,7 +16,7 @@ namespace {
 
 using ::testing::IsEmpty;
 
-// Batch, result and run over them.
+// Batch of the requested blocks, its result, and the BatchRun that answers the batch.
 struct Prepared {
   Prepared(const SceneSnapshot& snapshot, std::vector<OwnedBlock> requested, RunOptions options = {},
            uint32_t reply_bytes = 0)
@@ -60,7 +60,7 @@ OwnedBlock many_balls(size_t count, StaticDetail detail) {
   return block;
 }
 
-// Returns blocks of every layout, most of them several chunks long.
+// Returns blocks of several query kinds and column sets, most of them several chunks long.
 std::vector<OwnedBlock> mixed_blocks() {
   std::vector<OwnedBlock> blocks = {many_rays(RayMode::kFirst, 700), many_balls(900, StaticDetail::kInstances),
                                     many_rays(RayMode::kAny, 600),   many_rays(RayMode::kFirst, 0),
@@ -72,7 +72,8 @@ std::vector<OwnedBlock> mixed_blocks() {
   return blocks;
 }
 
-// Works on `run` with `threads` threads. Returns the number of calls of work() that returned kDone.
+// Calls run.work() on each of `threads` threads until there is no more work. Returns the number of calls that returned
+// kDone.
 int work_on(BatchRun& run, size_t threads) {
   std::atomic<int> done_calls{0};
   std::vector<std::thread> pool;
@@ -211,10 +212,14 @@ TEST(BatchRunTest, AStoppedBatchIsDoneWithItsStatusWhenTheActiveThreadsReturn) {
     EXPECT_EQ(work_on(*prepared.run, threads), 1);
     EXPECT_EQ(prepared.run->status().code(), absl::StatusCode::kCancelled);
     EXPECT_LE(stop_polls, 5 + static_cast<int>(threads)) << "no thread starts another chunk";
+    const Work written = prepared.run->cost().work;
+    EXPECT_GT(prepared.run->work_done(), 0u);
+    EXPECT_GE(prepared.run->work_done(), written.nodes + written.cells + written.tests);
   }
 }
 
-// A ray that meets thousands of triangles takes tens of microseconds, and the kernels take many rays at once.
+// A ray that hits thousands of triangles takes tens of microseconds, and one call of the kernels, which cannot be
+// interrupted, traces many rays.
 TEST(BatchRunTest, RaysThroughThousandsOfTrianglesPollTheStopInBoundedWork) {
   constexpr size_t kWalls = 4'000, kRays = 500;
   std::vector<Triangle> walls;

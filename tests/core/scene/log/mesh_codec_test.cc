@@ -66,8 +66,9 @@ TEST(MeshCodecTest, AMeshOfAnyNumberOfChunksRoundTrips) {
   }
 }
 
-// Format 1 had the parts behind the indices, and their number in the header.
-TEST(MeshCodecTest, PartsThatStandWithTheColumnsAreRead) {
+// In format 1, the header of a mesh's content has the number of parts, and chunks of parts follow the chunks of
+// indices.
+TEST(MeshCodecTest, PartsInTheContentOfFormat1AreRead) {
   Random random(4);
   const auto mesh = random_mesh(random, 90, 60, 3);
   std::vector<std::string> chunks = chunks_of<MeshWriter>(mesh);
@@ -80,6 +81,18 @@ TEST(MeshCodecTest, PartsThatStandWithTheColumnsAreRead) {
   EXPECT_EQ(again->parts(), mesh->parts());
 }
 
+TEST(MeshCodecTest, TheCreatorStandsWithTheParts) {
+  Random random(6);
+  const auto mesh = random_mesh(random, 90, 60, 3);
+  const auto owned = StaticMesh::share("mesh", mesh->parts(), *mesh, "cert:game1");
+  const std::vector<std::string> chunks = chunks_of<PartsWriter>(owned);
+  EXPECT_EQ(chunks.size(), chunks_of<PartsWriter>(mesh).size() + 1);
+  PartsReader reader;
+  for (const std::string& chunk : chunks) ASSERT_TRUE(reader.add(chunk).ok());
+  EXPECT_EQ(reader.creator(), "cert:game1");
+  EXPECT_EQ(std::move(reader).finish(60).value(), mesh->parts());
+}
+
 TEST(MeshCodecTest, PartsThatDoNotFitTheirMeshAreDamage) {
   Random random(5);
   const std::vector<std::string> chunks = chunks_of<PartsWriter>(random_mesh(random, 90, 60, 3));
@@ -87,7 +100,7 @@ TEST(MeshCodecTest, PartsThatDoNotFitTheirMeshAreDamage) {
   EXPECT_EQ(read_parts(chunks, 40).status().code(), absl::StatusCode::kDataLoss);
 }
 
-TEST(MeshCodecTest, AChunkThatIsMissingOrThereTwiceIsSeen) {
+TEST(MeshCodecTest, AMissingOrRepeatedChunkIsDetected) {
   Random random(2);
   const auto mesh = random_mesh(random, 90, 60, 3);
   const std::vector<std::string> chunks = chunks_of<MeshWriter>(mesh), parts = chunks_of<PartsWriter>(mesh);
@@ -105,7 +118,7 @@ TEST(MeshCodecTest, AChunkThatIsMissingOrThereTwiceIsSeen) {
     EXPECT_EQ(read(fewer).status().code(), absl::StatusCode::kDataLoss) << i;
     EXPECT_EQ(read(more).status().code(), absl::StatusCode::kDataLoss) << i;
   }
-  EXPECT_EQ(read({}).status(), absl::DataLossError("the header is not there"));
+  EXPECT_EQ(read({}).status(), absl::DataLossError("the header is missing"));
 }
 
 TEST(MeshCodecTest, DamagedBytesNeverHarm) {

@@ -23,7 +23,7 @@ std::string encoded(const UpdateBatch& batch) {
   return bytes;
 }
 
-// Compares bits, so that equal NaNs compare equal.
+// Returns true if `a` and `b` have equal bits, so that a NaN equals a NaN with the same bits.
 template <class T>
 bool same(absl::Span<const T> a, absl::Span<const T> b) {
   return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0);
@@ -149,7 +149,8 @@ TEST_F(RecordCodecTest, AStaticChangeOfFormat1NamesContentsOnly) {
   std::string bytes;
   ByteWriter writer(bytes);
   write_kind(writer, BytesKind::kStaticChange);
-  for (int column = 0; column < 2; ++column) writer.column(absl::Span<const uint64_t>());  // removed ids and groups
+  for (int column = 0; column < 2; ++column)
+    writer.column(absl::Span<const uint64_t>());  // removed ids, removed groups
   writer.number(uint64_t{1});
   writer.column(absl::MakeConstSpan(mesh_->sha256()));
   const uint64_t ids[] = {5};
@@ -164,14 +165,14 @@ TEST_F(RecordCodecTest, AStaticChangeOfFormat1NamesContentsOnly) {
   EXPECT_THAT(read.change.place.at(0).ids, ElementsAre(5));
 }
 
-TEST_F(RecordCodecTest, WhatIsWrongIsNamed) {
+TEST_F(RecordCodecTest, ErrorsNameTheInvalidValue) {
   std::string bytes = encoded(with(points({1}, {0, 0, 0})));
   EXPECT_EQ(Record::decode("").status(), absl::DataLossError("the kind is cut off"));
-  EXPECT_EQ(Record::decode(bytes + std::string(8, '\0')).status(), absl::DataLossError("a record has bytes too many"));
+  EXPECT_EQ(Record::decode(bytes + std::string(8, '\0')).status(), absl::DataLossError("a record has surplus bytes"));
   EXPECT_THAT(Record::decode(absl::string_view(bytes).substr(0, 60)).status().message(), HasSubstr("is cut off"));
   std::string later = bytes;
   later[4] = 9;
-  EXPECT_THAT(Record::decode(later).status().message(), HasSubstr("version 9 is not known, 1 is"));
+  EXPECT_THAT(Record::decode(later).status().message(), HasSubstr("version 9 is not the known version 1"));
   bytes[0] ^= 1;
   EXPECT_EQ(Record::decode(bytes).status(), absl::DataLossError("the kind of a record is not known"));
 }
@@ -183,7 +184,7 @@ TEST_F(RecordCodecTest, ABatchOfWrongFormIsRefusedNamingTheField) {
   EXPECT_THAT(status.message(), HasSubstr("inserts[0].positions"));
 }
 
-// A batch decoded from damaged bytes can be applied like any other.
+// Damaged bytes are either refused with DATA_LOSS or decoded to a record that can be applied without a crash.
 TEST_F(RecordCodecTest, DamagedBytesNeverHarm) {
   Random random(2);
   RandomUpdates updates(random, 40);

@@ -144,7 +144,7 @@ TEST_F(StateReaderTest, EveryReasonOfARefusedItemComesBackAndNoLaterOne) {
   }
 }
 
-TEST_F(StateReaderTest, TheSceneMayGoOnWhileItsStateIsWritten) {
+TEST_F(StateReaderTest, TheSceneMayChangeWhileItsStateIsWritten) {
   insert_balls(20'000);
   const auto before = read(written());
   ASSERT_TRUE(before.ok());
@@ -160,7 +160,7 @@ TEST_F(StateReaderTest, TheSceneMayGoOnWhileItsStateIsWritten) {
   EXPECT_EQ(scene_difference(**again, **before, random_), "");
 }
 
-TEST_F(StateReaderTest, AChunkThatIsMissingOrThereTwiceIsSeen) {
+TEST_F(StateReaderTest, AMissingOrRepeatedChunkIsDetected) {
   live(1, 60);
   const Chunks chunks = written();
   ASSERT_EQ(chunks.size(), 4u);
@@ -176,7 +176,7 @@ TEST_F(StateReaderTest, AChunkThatIsMissingOrThereTwiceIsSeen) {
 TEST_F(StateReaderTest, AMissingMeshIsDetected) {
   live(1, 5);
   mesh_ = nullptr;
-  EXPECT_THAT(read(written()).status().message(), HasSubstr("a mesh that instances use is not there"));
+  EXPECT_THAT(read(written()).status().message(), HasSubstr("a mesh that instances use is missing"));
 }
 
 TEST_F(StateReaderTest, DamagedBytesNeverHarm) {

@@ -45,7 +45,7 @@ TEST(TreeCodecTest, TheTopologyOfAnotherBuilderVersionIsRefused) {
   EXPECT_EQ(restore(bytes, box_city(1, 1)).status().code(), absl::StatusCode::kFailedPrecondition);
 }
 
-// A topology does not record the instruction set, because the trees are equal.
+// The encoded topology does not contain the instruction set, because all instruction sets build equal trees.
 TEST(TreeCodecTest, EveryInstructionSetMakesTheSameTopology) {
   const std::string bytes = encoded(bumpy_sphere(40, 0.05, 6));
   for (const std::string& name : instruction_sets()) {
@@ -63,7 +63,8 @@ class DamagedTopologyTest : public ::testing::Test {
     bytes_ = encoded(scene_.values);
   }
 
-  // Returns true if a tree can be restored from the bytes, and expects correct answers from it.
+  // Returns true if a tree can be restored from the bytes. Expects that queries of a restored tree return correct
+  // answers.
   bool is_taken(const std::string& bytes) {
     const absl::StatusOr<TriangleBvh> tree = restore(bytes, scene_.values);
     if (!tree.ok()) return false;
@@ -77,7 +78,7 @@ class DamagedTopologyTest : public ::testing::Test {
   std::string bytes_;
 };
 
-// The triangle numbers follow the kind, the builder version and their count.
+// In the encoded topology, the triangle numbers follow the kind, the builder version and the number of triangles.
 TEST_F(DamagedTopologyTest, ASwapOfTriangleNumbersIsAcceptedAndAnswersStayCorrect) {
   constexpr size_t kNumbers = 24;
   ASSERT_GT(scene_.values.size(), 20u);
@@ -99,10 +100,10 @@ TEST_F(DamagedTopologyTest, RandomDamageIsRefusedOrAnswersStayCorrect) {
   EXPECT_GT(refused, scaled_count(10'000));
 }
 
-// If this fails, the builder makes different trees: raise kBvhBuilderVersion and update the values here, so that
-// topologies cached in data directories are rebuilt.
+// If this test fails, the builder makes different trees than before: increment kBvhBuilderVersion, so that topologies
+// cached in data directories are rebuilt, and update the expected values of this test.
 TEST(TreeCodecTest, TheTreesOfThisBuilderVersionHaveTheRecordedHash) {
-  uint64_t hash = 14'695'981'039'346'656'037u;  // FNV-1a
+  uint64_t hash = 14'695'981'039'346'656'037u;  // offset basis of FNV-1a
   for (const char byte : encoded(box_city(9, 3))) hash = (hash ^ static_cast<uint8_t>(byte)) * 1'099'511'628'211u;
   EXPECT_EQ(kBvhBuilderVersion, 1u);
   EXPECT_EQ(hash, 2'252'812'711'579'794'862u);

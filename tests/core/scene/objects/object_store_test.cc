@@ -36,7 +36,8 @@ void expect_holds(const ObjectSet& set, const std::map<Id, Object>& model) {
   for (const auto& [id, object] : model) EXPECT_EQ(set.find(id), object) << id;
 }
 
-// Every field of an object is returned as stored, whatever else its brick contains and however often that is rebuilt.
+// Every field of an object is returned as stored, whatever else its brick contains and however often the brick is
+// rebuilt.
 TEST(ObjectStoreTest, SetsEqualAReferenceMapAfterRandomChanges) {
   Random random(11);
   ObjectStore store;

@@ -5,7 +5,6 @@
 #include <optional>
 #include <thread>
 
-#include "core/scene/snapshot/snapshot_bytes.h"
 #include "tests/support/scene_fixture.h"
 
 namespace locus::test {
@@ -15,7 +14,7 @@ class ReaderTrackerTest : public SceneFixture {
  protected:
   static constexpr Scene::Deadline kNow = Scene::Deadline::min();
 
-  // Budget of four times the memory of all objects.
+  // Budget of pinned bytes: about four times the memory of all objects, assuming 300 bytes for each object.
   static constexpr uint64_t kObjects = 2'000;
   static constexpr uint64_t kBudget = 4 * 300 * kObjects;
   static SceneSpec bounded(uint64_t budget) {
@@ -37,12 +36,12 @@ class ReaderTrackerTest : public SceneFixture {
   UpdateBatch step() {
     return with(move_to(all_, std::vector<float>(3 * all_.size(), float(scene_.latest()->revision))));
   }
-  // Applies a step; fails if it would have to wait.
+  // Applies step(). Returns DEADLINE_EXCEEDED if the update would have to wait for readers.
   absl::Status step_now() { return scene_.apply(step(), kNow).status(); }
 
   SnapshotPin pin(const View& view = {}) { return *scene_.pin(view, kNow); }
 
-  // Pins each revision and replaces it until a pin is revoked.
+  // Repeatedly pins the latest revision and publishes a new revision, until the first pin is revoked. Returns all pins.
   std::vector<SnapshotPin> pin_too_much() {
     std::vector<SnapshotPin> pins;
     while (pins.empty() || pins.front().status().ok()) {
@@ -103,7 +102,7 @@ TEST_F(ReaderTrackerTest, ARevokedReaderGetsAnErrorThatNamesTheLimit) {
   EXPECT_EQ(refusal.limit_value, kBudget);
   EXPECT_GT(refusal.asked, kBudget);
   EXPECT_GT(refusal.retry_after_ms, 0u);
-  EXPECT_NE(status.message().find("Ask again, in smaller batches"), absl::string_view::npos) << status;
+  EXPECT_NE(status.message().find("use smaller batches"), absl::string_view::npos) << status;
 }
 
 TEST_F(ReaderTrackerTest, UpdatesWaitUntilRevokedPinsAreReleased) {

@@ -14,7 +14,7 @@ class HistoryTest : public ::testing::Test {
     return spec;
   }
 
-  // Advances a scene of 1000 points, all of which move at every tick.
+  // Applies `ticks` batches, each `stride` ticks after the previous batch; each batch moves 1000 points.
   static void live(Scene& scene, uint64_t ticks, uint64_t stride = 1) {
     std::vector<uint64_t> ids(1000);
     for (size_t i = 0; i < ids.size(); ++i) ids[i] = i + 1;
@@ -55,6 +55,32 @@ TEST_F(HistoryTest, SkippedTicksCountTowardsTheLimit) {
   EXPECT_EQ(scene.latest()->oldest_tick(), 90u);
   live(scene, 1, 1000);
   EXPECT_EQ(scene.latest()->oldest_tick(), 100u);
+}
+
+TEST_F(HistoryTest, TrimmingDropsTheOldestTicksAndNothingElse) {
+  Scene scene("scene", spec(20, uint64_t{1} << 30), 1, StaticSet::empty());
+  live(scene, 20);
+  const SnapshotPtr before = scene.latest();
+  const uint64_t bytes = before->history->bytes;
+  EXPECT_EQ(scene.trim_history(bytes), 0u);
+  EXPECT_EQ(scene.latest(), before);
+  const uint64_t freed = scene.trim_history(bytes / 2);
+  const SnapshotPtr after = scene.latest();
+  EXPECT_EQ(freed, bytes - after->history->bytes);
+  EXPECT_GE(freed, bytes / 2);
+  EXPECT_EQ(after->revision, before->revision);
+  EXPECT_EQ(after->tick, before->tick);
+  EXPECT_EQ(after->objects.size(), before->objects.size());
+  EXPECT_EQ(after->past_limit, PastLimit::kMemory);
+  EXPECT_EQ(after->history->records.back(), before->history->records.back());
+  EXPECT_GT(after->oldest_tick(), before->oldest_tick());
+  live(scene, 3);
+  EXPECT_EQ(scene.latest()->revision, before->revision + 3);
+  const uint64_t left = scene.status().history_bytes;
+  EXPECT_EQ(scene.trim_history(0), left);
+  EXPECT_EQ(recorded(scene), 0u);
+  live(scene, 3);
+  EXPECT_EQ(recorded(scene), 3u);
 }
 
 TEST_F(HistoryTest, KeepsAtMostTheConfiguredBytes) {

@@ -27,7 +27,7 @@ class SceneAtTimeTest : public SceneFixture {
     return with(move);
   }
 
-  // Returns the shape of the object at that time, nullopt if it did not exist.
+  // Returns the shape of object `id` at the given time, or nullopt if the object did not exist.
   std::optional<Shape> shape(Id id, uint64_t tick, float fraction = 0) const {
     const SnapshotPtr snapshot = scene_.latest();
     const std::optional<SceneAtTime> moment = find_scene_at(*snapshot, {tick, fraction});

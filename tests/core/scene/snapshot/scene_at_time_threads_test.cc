@@ -14,7 +14,7 @@ namespace {
 
 constexpr uint64_t kObjects = 500;
 
-// At tick t, object i is at (t, i, 0), and exactly the objects with i % 7 != t % 7 exist.
+// Returns whether object `id` exists at `tick`. At tick t, an existing object i is at (t, i, 0).
 bool lives(uint64_t id, uint64_t tick) { return id % 7 != tick % 7; }
 
 void apply_tick(Scene& scene, uint64_t tick) {

@@ -1,5 +1,5 @@
-// Tests readers that run beside a fast writer and static changes: they never wait, and every read sees one complete
-// revision.
+// Tests readers that run beside a fast writer and static changes: the readers never wait, and every read sees one
+// complete revision.
 #include "core/scene/snapshot/scene_snapshot.h"
 
 #include <atomic>
@@ -12,8 +12,8 @@
 namespace locus::test {
 namespace {
 
-// Object i stands at x = tick + i / 1024 in the revisions of that tick, on a line of its own in y, and carries the tick
-// as its tag.
+// Number of objects. In all revisions of tick t, object i is at x = t + i / 1024, has a y coordinate of its own, and
+// has the tag t.
 constexpr uint64_t kObjects = 200;
 
 double place_of(uint64_t i, uint64_t tick) { return static_cast<double>(tick) + static_cast<double>(i) / 1024; }
@@ -33,7 +33,7 @@ void expect_object_of(const Object& object, uint64_t tick) {
   EXPECT_EQ(object.shape.position.x, place_of(object.id, tick)) << "object " << object.id;
 }
 
-// Reads the objects through the grid and through the id table, and expects one complete revision.
+// Reads the objects through the grid and through the id table, and expects that both give the objects of one revision.
 void expect_whole(const SceneSnapshot& snapshot) {
   WorldVisitor visitor;
   Work work;
@@ -48,8 +48,8 @@ void expect_whole(const SceneSnapshot& snapshot) {
   EXPECT_EQ(in_map, kObjects);
 }
 
-// Expects one complete revision from a batch of three blocks: a lookup of all objects, a ball around all, and a ray
-// along the line of each object.
+// Runs a batch of three blocks (a lookup of all objects, a ball around all objects, and a ray along the line of each
+// object) and expects that all answers are about one revision.
 void expect_answers_of_one_revision(const SceneSnapshot& snapshot) {
   std::vector<uint64_t> ids;
   std::vector<float> origins;
@@ -131,7 +131,7 @@ class SceneSnapshotTest : public SceneFixture {
     EXPECT_EQ(apply(batch).refused, 0u);
   }
 
-  // Places an instance far above the lines of the objects.
+  // Places an instance far above the lines along which objects move.
   void place(Id id) {
     const double translation[] = {0, 0, 1000};
     StaticChange change = placing({mesh_, {&id, 1}, translation, {}, {}, {}, {}, {}});

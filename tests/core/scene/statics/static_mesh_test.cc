@@ -30,7 +30,8 @@ struct Columns {
   std::vector<uint32_t> indices;
 };
 
-// Equal positions are one vertex, numbered by first use.
+// Returns columns in which corners at equal positions share one vertex; vertices are numbered in the order of their
+// first use.
 Columns welded(const std::vector<Triangle>& triangles) {
   Columns columns;
   std::map<std::array<float, 3>, uint32_t> known;
@@ -108,7 +109,7 @@ TEST(StaticMeshTest, CountsTheMemoryBesideTheTree) {
   EXPECT_GE(rich->bytes(), lean->bytes() + 16 + sizeof(MeshPart) + 200);
 }
 
-TEST(StaticMeshTest, AMeshThatSharesHasANameAndPartsOfItsOwnAndAllElseIsTheOthers) {
+TEST(StaticMeshTest, AMeshThatSharesContentHasItsOwnNameAndParts) {
   const auto first = build({0, 0, 0, 2, 0, 0, 0, 3, 0, 9, 9, 9}, {0, 1, 2, 0, 2, 1}, {{"a", 0}, {"b", 1}});
   const auto second = StaticMesh::share("second", {{std::string(100, 'c'), 0}}, *first);
   EXPECT_EQ(second->name(), "second");
@@ -118,14 +119,14 @@ TEST(StaticMeshTest, AMeshThatSharesHasANameAndPartsOfItsOwnAndAllElseIsTheOther
   EXPECT_EQ(second->vertices(), first->vertices());
   EXPECT_EQ(uploaded_indices(*second), uploaded_indices(*first));
   EXPECT_EQ(&second->tree(), &first->tree());
-  // Shared memory is the same, and counted in both.
+  // bytes() of each of the two meshes includes the content that both share.
   EXPECT_EQ(second->shared_bytes(), first->shared_bytes());
   EXPECT_GT(second->shared_bytes(), second->tree().bytes());
   EXPECT_GE(second->bytes(), second->shared_bytes() + sizeof(MeshPart) + 100);
   EXPECT_LT(second->bytes(), second->shared_bytes() + sizeof(StaticMesh) + sizeof(MeshPart) + 200);
 }
 
-TEST(StaticMeshTest, RestoredFromItsOutlineItIsTheSameToTheLastByteItGives) {
+TEST(StaticMeshTest, AMeshRestoredFromItsTopologyEqualsTheOriginal) {
   const Columns columns = welded(box_city(9, 3));
   const std::vector<MeshPart> parts = {{"a", 0}, {"b", 7}};
   const auto built = build(columns.vertices, columns.indices, parts);

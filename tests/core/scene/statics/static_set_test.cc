@@ -1,4 +1,4 @@
-// Tests static changes: removes and placements become one revision or are refused together.
+// Tests static changes: the removals and placements of a change become one revision or are refused together.
 #include "core/scene/statics/static_set.h"
 
 #include <limits>
@@ -21,7 +21,7 @@ class StaticSetTest : public SceneFixture {
     return changed.ok() ? *changed : InstanceChange{};
   }
 
-  // Also expects that the scene keeps the same snapshot.
+  // Expects that the change `what` is refused with the given error, and that the scene still has the same snapshot.
   void expect_refused(const StaticChange& what, Reason reason, const std::string& field, std::optional<uint32_t> index,
                       absl::StatusCode code = absl::StatusCode::kInvalidArgument) {
     const SnapshotPtr before = scene_.latest();
@@ -233,7 +233,8 @@ TEST_F(StaticSetTest, TooManyInstancesNameTheLimit) {
 }
 
 TEST_F(StaticSetTest, AnObjectInsertedDuringTheBuildKeepsItsId) {
-  // The change and the insert race for the id: exactly one of them must be refused.
+  // A thread places an instance while this thread inserts an object with the same id: exactly one of the two must be
+  // refused.
   for (Id id = 1; id <= 50; ++id) {
     const StaticChange what = placing(placement({100 + id, id}, {0, 0, 0}));
     const UpdateBatch batch = with(points({id}, {0, 0, 0}));
@@ -258,6 +259,23 @@ TEST_F(StaticSetTest, ConcurrentChangesAreAllApplied) {
   EXPECT_EQ(revision(), 16u);
   EXPECT_EQ(scene_.latest()->statics->size(), 16u);
   EXPECT_EQ(scene_.status().pending_changes, 0u);
+}
+
+TEST_F(StaticSetTest, PlacementsAreCheckedWithTheErrorsOfTheirChange) {
+  EXPECT_TRUE(StaticSet::check_placements({placement({}, {1, 2, 3}), placement({5, 6}, {1, 2, 3})}).ok());
+  const std::vector<std::vector<PlacementColumns>> bad = {
+      {placement({5}, {1, 2, 3}), placement({6, 5}, {1, 2, 3})},
+      {placement({5}, {1, 2, 3}), placement({0}, {1, 2, 3})},
+      {placement({5}, {1, kNan, 3})},
+      {placement({5}, {1, 2})},
+  };
+  for (const std::vector<PlacementColumns>& place : bad) {
+    StaticChange change;
+    change.place = place;
+    const absl::Status status = StaticSet::check_placements(place);
+    EXPECT_FALSE(status.ok());
+    EXPECT_EQ(status, scene_.change_instances(change).status());
+  }
 }
 
 TEST_F(StaticSetTest, UsesCountInstancesOfAMesh) {

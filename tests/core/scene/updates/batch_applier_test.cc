@@ -1,5 +1,5 @@
-// Tests the application of the items of a batch, through a scene: order, refused items, kept and default columns,
-// rounding.
+// Tests the application of the items of a batch through a scene: their order, refused items, values of columns that a
+// batch omits, and rounding.
 #include "core/scene/updates/batch_applier.h"
 
 #include <limits>
@@ -17,7 +17,7 @@ constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 class BatchApplierTest : public SceneFixture {
  protected:
-  // Applies a batch with one refused item and returns its error.
+  // Applies a batch that has one refused item, and returns the error of that item.
   ItemError only_error(const UpdateBatch& batch) {
     const UpdateAck ack = apply(batch);
     EXPECT_EQ(ack.refused, 1u);
@@ -144,7 +144,7 @@ TEST_F(BatchApplierTest, OfTwoUpsertsOfAnIdInOneBatchTheLaterStaysAndBothAreAppl
   EXPECT_EQ(object(1)->shape.position, (Vec3d{0, 0, 0}));
 }
 
-TEST_F(BatchApplierTest, ARefusedUpsertLeavesWhatTheOneBeforeItMade) {
+TEST_F(BatchApplierTest, ARefusedUpsertKeepsTheEffectOfTheEarlierOne) {
   UpdateBatch batch = with(points({1, 1}, {1, 1, 1, kNan, 2, 2}));
   batch.upsert = true;
   expect_error(batch, "inserts[0].positions", 1, 1, Reason::kNotFinite);
@@ -166,7 +166,7 @@ TEST_F(BatchApplierTest, ARemovedIdIsInsertedAgainOnceUnlessUpsertIsSet) {
   }
 }
 
-TEST_F(BatchApplierTest, TheLaterOfTwoMovesKeepsTheRotationOfTheFirstWhereItHasNone) {
+TEST_F(BatchApplierTest, ALaterMoveWithoutRotationKeepsThatOfTheEarlierOne) {
   apply(with(points({1}, {0, 0, 0})));
   MoveColumns first = move_to({1}, {1, 1, 1});
   first.rotations = columns_.floats({1, 0, 0, 0});
@@ -266,7 +266,7 @@ TEST_F(BatchApplierTest, PositionsAreFramePlusOffsetRoundedOnceToDouble) {
   UpdateBatch batch = with(points({1}, {0.1f, -0.1f, 0}));
   batch.frame = {0.7, 123456789.125, 0.3};
   apply(batch);
-  // The exact values of the two floats are written out; each sum is rounded once.
+  // The literals are the exact values of 0.1f and -0.1f; each sum is rounded once.
   EXPECT_EQ(object(1)->shape.position.x, 0.7 + 0.100000001490116119384765625);
   EXPECT_EQ(object(1)->shape.position.y, 123456789.125 - 0.100000001490116119384765625);
   EXPECT_EQ(object(1)->shape.position.z, 0.3);

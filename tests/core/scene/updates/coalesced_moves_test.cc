@@ -1,4 +1,4 @@
-// Tests coalesced moves, compared with the same moves applied at once.
+// Tests coalesced moves: they have the same effect as the same moves applied one batch after another.
 #include "core/scene/updates/coalesced_moves.h"
 
 #include <gtest/gtest.h>
@@ -23,7 +23,8 @@ class CoalescedMovesTest : public ::testing::Test {
     }
   }
 
-  // Returns whether the batch changes anything, for the store that applies it and for the coalesced moves.
+  // Applies the batch to at_once_ and adds it to the coalesced moves of deferred_. Returns whether the batch changes an
+  // object, first for at_once_, then for the coalesced moves.
   std::pair<bool, bool> move(const UpdateBatch& batch) {
     moves_.run(at_once_, batch);
     const bool changes = moves_.changes();
@@ -70,7 +71,7 @@ TEST_F(CoalescedMovesTest, RandomMovesLeaveTheSameStateAsUncoalescedMoves) {
       std::vector<float> positions, rotations;
       const bool turns = random.chance(0.5);
       for (Id& id : ids) {
-        id = 1 + random.below(6);  // one is unknown
+        id = 1 + random.below(6);  // id 6 is unknown
         positions.insert(positions.end(), {static_cast<float>(random.below(3)), 0, 0});
         if (turns)
           random.chance(0.5) ? rotations.insert(rotations.end(), {0, 0, 0, 1})

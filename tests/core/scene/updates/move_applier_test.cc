@@ -87,7 +87,7 @@ TEST_F(MoveApplierTest, GivesTheSameResultAsBatchApplier) {
       batch.moves.push_back(move);
     }
     const absl::StatusOr<UpdateAck> fast = scene_.apply(batch);
-    batch.relabels.emplace_back();  // an empty list: the same batch takes the general path
+    batch.relabels.emplace_back();  // an empty list, so that BatchApplier applies the batch
     const absl::StatusOr<UpdateAck> general = other.apply(batch);
     ASSERT_TRUE(fast.ok() && general.ok());
     ASSERT_EQ(ack_text(*fast), ack_text(*general)) << "seed 5, round " << round;

@@ -1,4 +1,4 @@
-// Tests check_form(): refused column lengths, frames and values, and the field that the refusal names.
+// Tests check_form(): which column lengths, frames and values it refuses, and which field the refusal names.
 #include "core/scene/updates/update_batch.h"
 
 #include <limits>
@@ -25,7 +25,7 @@ class UpdateFormTest : public ::testing::Test {
 
   InsertColumns& insert() { return batch_.inserts[0]; }
 
-  // Returns the field of the refusal, empty if the form is accepted.
+  // Returns the field that check_form() names in its refusal of the batch; an empty string if it accepts the batch.
   std::string refused_field(Reason reason = Reason::kColumnLength) {
     const absl::Status status = check_form(batch_);
     if (status.ok()) return "";
@@ -35,8 +35,8 @@ class UpdateFormTest : public ::testing::Test {
     return refusal->field;
   }
 
-  // Tries each length of `column` from 0 to 3 * width + 1 and returns the accepted ones, in entries; expects the others
-  // to be refused with `field`.
+  // Tries each length of `column` from 0 to 3 * width + 1 values. Returns the accepted lengths, in entries of `width`
+  // values, and expects that all other lengths are refused with the field `field`.
   template <class T>
   std::vector<size_t> accepted(absl::Span<const T>& column, size_t width, const std::string& field) {
     const absl::Span<const T> before = column;

@@ -20,7 +20,7 @@ class TableGuardTest : public ::testing::Test {
     bytes_ = test::file_bytes(path_);
   }
 
-  // Returns whether the guard opens a table with these bytes.
+  // Returns whether the guard opens a table file that contains `bytes`.
   bool opens(const std::string& bytes) {
     test::write_file_bytes(path_, bytes);
     std::unique_ptr<rocksdb::FSRandomAccessFile> file;
@@ -38,8 +38,8 @@ class TableGuardTest : public ::testing::Test {
 
 TEST_F(TableGuardTest, IntactTableOpens) { EXPECT_TRUE(opens(bytes_)); }
 
-// Flips bytes from the properties block, which RocksDB reads before verifying it, to the first byte of the footer, the
-// checksum type. RocksDB verifies the rest of the footer itself.
+// Flips a bit of each byte from the properties block, which RocksDB reads before it verifies the block, to the checksum
+// type, which is the first byte of the footer. RocksDB itself verifies the other bytes of the footer.
 TEST_F(TableGuardTest, AnyFlippedByteFromPropertiesToFooterIsRefused) {
   const size_t properties = bytes_.find("rocksdb.block.based.table.index.type");
   ASSERT_NE(properties, std::string::npos);
@@ -53,7 +53,7 @@ TEST_F(TableGuardTest, AnyFlippedByteFromPropertiesToFooterIsRefused) {
 }
 
 TEST_F(TableGuardTest, FooterWithWrongPositionsIsRefused) {
-  size_t at = bytes_.size() - 52;  // after the checksum type: offset and length of the metaindex block
+  size_t at = bytes_.size() - 52;  // position after the checksum type: offset and length of the metaindex block
   for (int varint = 0; varint < 2; ++varint) {
     for (bool more = true; more; ++at) {
       std::string wrong = bytes_;

@@ -1,6 +1,7 @@
 // Decoder of the drawn surfaces in a Quake 3 level file (IBSP version 46). For the BSP importer. Plain data and a
-// function without state. Invariants of a BspFile returned by parse_bsp(): every texture, vertex and meshvert index of
-// a face is in range, and every float is finite.
+// function without state. A meshvert is an entry of the file's list of triangle corners: a vertex index relative to the
+// face's first vertex. Invariants of a BspFile returned by parse_bsp(): every texture, vertex and meshvert index of a
+// face is in range, and every float is finite.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_QUAKE_BSP_FILE_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_QUAKE_BSP_FILE_H_
 
@@ -30,7 +31,7 @@ struct BspFace {
 struct BspFile {
   std::vector<std::string> textures;
   std::vector<std::array<float, 3>> vertices;
-  std::vector<uint32_t> meshverts;  // vertex indices, relative to the face's first vertex
+  std::vector<uint32_t> meshverts;  // triangle corners: vertex indices, relative to the face's first vertex
   std::vector<BspFace> faces;
 };
 

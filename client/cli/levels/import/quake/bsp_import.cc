@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "client/cli/levels/import/import_error.h"
 #include "client/cli/levels/import/import_limits.h"
 #include "client/cli/levels/import/level_builder.h"
 #include "client/cli/levels/import/quake/bezier_patch.h"
@@ -37,8 +38,8 @@ absl::Status check_triangles(const BspFile& file, int subdivisions) {
   for (size_t i = 0; i < file.faces.size(); ++i) {
     total += triangles_of(file.faces[i], subdivisions);
     if (total > kMaxBspTriangles) {
-      return absl::ResourceExhaustedError(absl::StrCat("lump 13 faces[", i, "]: the level has more than ",
-                                                       kMaxBspTriangles, " triangles; give fewer patch subdivisions"));
+      return exceeds(absl::StrCat("lump 13 faces[", i, "]: the level"), "more triangles", "level_triangles",
+                     kMaxBspTriangles, "give fewer patch subdivisions");
     }
   }
   return absl::OkStatus();
@@ -76,8 +77,8 @@ void add_patch(const BspFile& file, const BspFace& face, int subdivisions, Level
 absl::StatusOr<ImportedLevel> import_bsp(absl::string_view bytes, const std::string& name,
                                          const ImportOptions& options) {
   if (bytes.size() > kMaxBspBytes) {
-    return absl::ResourceExhaustedError(
-        absl::StrCat("the level has ", bytes.size(), " bytes, the limit is ", kMaxBspBytes, ": give another level"));
+    return exceeds("the level", absl::StrCat(bytes.size(), " bytes"), "level_bytes", kMaxBspBytes,
+                   "give another level");
   }
   ASSIGN_OR_RETURN(const BspFile file, parse_bsp(bytes));
   RETURN_IF_ERROR(check_triangles(file, options.patch_subdivisions));

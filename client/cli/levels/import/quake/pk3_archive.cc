@@ -12,6 +12,8 @@
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "client/cli/levels/import/clean_text.h"
+#include "client/cli/levels/import/import_error.h"
 #include "client/cli/levels/import/import_limits.h"
 #include "client/cli/levels/import/input_file.h"
 #include "core/base/status_macros.h"
@@ -31,31 +33,44 @@ struct CloseEntry {
 struct LevelEntry {
   std::string name;
   zip_uint64_t index = 0;
+  uint64_t packed_bytes = 0;  // declared size, at most the size of the archive
 };
 
 absl::Status unreadable(const std::string& path, absl::string_view why) {
   return absl::InvalidArgumentError(absl::StrCat("cannot read ", path, " as a zip archive: ", why, "; copy it again"));
 }
 
-absl::StatusOr<Archive> open_archive(const std::string& path) {
-  int code = 0;
-  if (zip_t* archive = zip_open(path.c_str(), ZIP_RDONLY, &code)) return Archive(archive);
+// Opens an archive in memory, which must outlive the result.
+absl::StatusOr<Archive> open_archive(absl::string_view bytes, const std::string& path) {
   zip_error_t error;
-  zip_error_init_with_code(&error, code);
+  zip_error_init(&error);
+  zip_source_t* const source = zip_source_buffer_create(bytes.data(), bytes.size(), 0, &error);
+  zip_t* const archive = source == nullptr ? nullptr : zip_open_from_source(source, ZIP_RDONLY, &error);
   const std::string why = zip_error_strerror(&error);
   zip_error_fini(&error);
+  if (archive != nullptr) return Archive(archive);
+  if (source != nullptr) zip_source_free(source);
   return unreadable(path, why);
 }
 
-absl::StatusOr<std::vector<LevelEntry>> list_levels(zip_t* archive, const std::string& path) {
+absl::StatusOr<std::vector<LevelEntry>> list_levels(zip_t* archive, uint64_t archive_bytes, const std::string& path) {
   const zip_int64_t count = zip_get_num_entries(archive, 0);
   if (count < 0 || count > kMaxArchiveEntries) {
-    return unreadable(path, absl::StrCat(count, " entries, the limit is ", kMaxArchiveEntries));
+    return exceeds(path, absl::StrCat(count, " entries"), "archive_entries", kMaxArchiveEntries,
+                   "give an archive with fewer files");
   }
   std::vector<LevelEntry> levels;
   for (zip_uint64_t i = 0; i < static_cast<zip_uint64_t>(count); ++i) {
-    const char* name = zip_get_name(archive, i, 0);
-    if (name != nullptr && lower_extension(name) == ".bsp") levels.push_back({name, i});
+    zip_stat_t stat;
+    if (zip_stat_index(archive, i, 0, &stat) != 0 || (stat.valid & ZIP_STAT_NAME) == 0) continue;
+    const absl::string_view name = stat.name;
+    if (name.size() > kMaxEntryNameBytes) {
+      return exceeds(path, absl::StrCat("an entry whose name has ", name.size(), " bytes"), "entry_name_bytes",
+                     kMaxEntryNameBytes, "rename the entry");
+    }
+    if (lower_extension(name) != ".bsp") continue;
+    const uint64_t packed = (stat.valid & ZIP_STAT_COMP_SIZE) == 0 ? 0 : uint64_t{stat.comp_size};
+    levels.push_back({std::string(name), i, std::min(packed, archive_bytes)});
   }
   if (levels.empty()) {
     return absl::NotFoundError(absl::StrCat(path, " holds no .bsp level: give an archive with maps"));
@@ -76,7 +91,7 @@ std::vector<std::string> names_of(const std::vector<LevelEntry>& levels) {
 std::string listing(std::vector<std::string> names) {
   const size_t all = names.size();
   names.resize(std::min(all, kMaxListedEntries));
-  return absl::StrCat(absl::StrJoin(names, ", "), all > names.size() ? ", ..." : "");
+  return absl::StrCat(clean_text(absl::StrJoin(names, ", "), kMaxListedBytes), all > names.size() ? ", ..." : "");
 }
 
 absl::StatusOr<size_t> choose_level(const std::vector<LevelEntry>& levels, const std::string& path,
@@ -96,6 +111,21 @@ absl::StatusOr<size_t> choose_level(const std::vector<LevelEntry>& levels, const
       absl::StrCat("no level ", entry, " in ", path, ": choose one of ", listing(names_of(levels))));
 }
 
+// Returns RESOURCE_EXHAUSTED if a level of `bytes` unpacked bytes so far exceeds a limit.
+absl::Status check_unpacked(uint64_t bytes, const LevelEntry& level, const std::string& path) {
+  if (bytes > kMaxBspBytes) {
+    return exceeds(absl::StrCat(level.name, " in ", path), "more bytes unpacked", "level_bytes", kMaxBspBytes,
+                   "give another level");
+  }
+  if (bytes > kMinJudgedBytes && bytes / kMaxArchiveRatio > level.packed_bytes) {
+    return exceeds(absl::StrCat(level.name, " in ", path),
+                   absl::StrCat("more than ", kMaxArchiveRatio, " unpacked bytes for each of its ", level.packed_bytes,
+                                " packed bytes"),
+                   "archive_ratio", kMaxArchiveRatio, "pack the level again, or give the .bsp file itself");
+  }
+  return absl::OkStatus();
+}
+
 absl::StatusOr<std::string> unpack(zip_t* archive, const LevelEntry& level, const std::string& path) {
   const std::unique_ptr<zip_file_t, CloseEntry> file(zip_fopen_index(archive, level.index, 0));
   if (file == nullptr) return unreadable(path, absl::StrCat(level.name, ": ", zip_strerror(archive)));
@@ -106,21 +136,18 @@ absl::StatusOr<std::string> unpack(zip_t* archive, const LevelEntry& level, cons
     const zip_int64_t got = zip_fread(file.get(), chunk.data(), chunk.size());
     if (got < 0) return unreadable(path, absl::StrCat(level.name, ": ", zip_file_strerror(file.get())));
     if (got == 0) return bytes;
-    if (static_cast<size_t>(got) > kMaxBspBytes - bytes.size()) {
-      return absl::ResourceExhaustedError(
-          absl::StrCat(level.name, " in ", path, " unpacks to more than ", kMaxBspBytes, " bytes: give another level"));
-    }
+    RETURN_IF_ERROR(check_unpacked(bytes.size() + static_cast<uint64_t>(got), level, path));
     bytes.append(chunk.data(), static_cast<size_t>(got));
   }
 }
 
 }  // namespace
 
-absl::StatusOr<Pk3Level> read_pk3_level(const std::string& path, const std::string& entry) {
-  ASSIGN_OR_RETURN(const Archive archive, open_archive(path));
-  ASSIGN_OR_RETURN(const std::vector<LevelEntry> levels, list_levels(archive.get(), path));
-  ASSIGN_OR_RETURN(const size_t chosen, choose_level(levels, path, entry));
-  ASSIGN_OR_RETURN(std::string bytes, unpack(archive.get(), levels[chosen], path));
+absl::StatusOr<Pk3Level> read_pk3_level(absl::string_view archive, const std::string& name, const std::string& entry) {
+  ASSIGN_OR_RETURN(const Archive opened, open_archive(archive, name));
+  ASSIGN_OR_RETURN(const std::vector<LevelEntry> levels, list_levels(opened.get(), archive.size(), name));
+  ASSIGN_OR_RETURN(const size_t chosen, choose_level(levels, name, entry));
+  ASSIGN_OR_RETURN(std::string bytes, unpack(opened.get(), levels[chosen], name));
 
   Pk3Level level{levels[chosen].name, std::move(bytes), names_of(levels)};
   level.others.erase(level.others.begin() + static_cast<std::ptrdiff_t>(chosen));

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
 
 namespace locus::cli {
 
@@ -16,10 +17,11 @@ struct Pk3Level {
 };
 
 // Returns the level named `entry`: its full path, or its file name with or without ".bsp", case-insensitive. An empty
-// `entry` selects the first level in alphabetical order. Returns NOT_FOUND with a list of the archive's levels if none
-// matches, INVALID_ARGUMENT if the archive cannot be read, and RESOURCE_EXHAUSTED if the unpacked level exceeds
-// kMaxBspBytes. The size that the archive declares is not trusted.
-absl::StatusOr<Pk3Level> read_pk3_level(const std::string& path, const std::string& entry);
+// `entry` selects the first level in alphabetical order. `archive` is the untrusted content of the file called `name`
+// in errors. Returns NOT_FOUND with a list of the archive's levels if none matches, INVALID_ARGUMENT if the archive
+// cannot be read, and RESOURCE_EXHAUSTED naming the limit for too many entries, too long names, and a level whose
+// unpacked size exceeds kMaxBspBytes or kMaxArchiveRatio. The sizes that the archive declares are not trusted.
+absl::StatusOr<Pk3Level> read_pk3_level(absl::string_view archive, const std::string& name, const std::string& entry);
 
 }  // namespace locus::cli
 

@@ -1,4 +1,5 @@
-// Tests that the demo's checks can fail: answers computed by brute force pass, and each kind of damage is detected.
+// Tests that the demo's checks can fail: they accept answers computed by brute force, and detect each kind of wrong
+// answer.
 #include "client/cli/extras/demo/demo_queries.h"
 
 #include <gtest/gtest.h>
@@ -15,7 +16,7 @@ constexpr uint64_t kSeed = 7;
 constexpr uint64_t kTick = 13;
 constexpr int kQueries = 40;
 
-// Small city with objects, and the correct answers to a batch of each kind at kTick.
+// Fixture with a small city with objects at kTick, and the correct answers to one batch of each kind.
 class DemoQueriesTest : public testing::Test {
  protected:
   DemoQueriesTest() : level_(make_level()), world_(level_.bounds, 5000, kSeed), checker_(level_.instances, world_) {

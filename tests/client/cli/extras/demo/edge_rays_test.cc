@@ -15,7 +15,7 @@ std::vector<Triangle> city() {
   return place_level(level).instances.front().triangles;
 }
 
-// Returns the number of rays without a hit up to the target.
+// Returns the number of rays that hit no triangle between their origin and their target.
 size_t count_passed(const EdgeRays& rays, const std::vector<Triangle>& triangles) {
   size_t passed = 0;
   for (size_t i = 0; i < rays.size(); ++i) {
@@ -38,7 +38,8 @@ TEST(EdgeRaysTest, NoRayMissesAnIntactMesh) {
   EXPECT_EQ(count_passed(aim_at_edges(triangles, 2000, 1), triangles), 0u);
 }
 
-// About half the rays of an edge hit each of its triangles, so rays must pass through a mesh with holes.
+// About half of the rays aimed at an edge hit one triangle at the edge, and half hit the other triangle. So if every
+// second triangle is removed from the mesh, some rays must pass through.
 TEST(EdgeRaysTest, RaysPassWhereTrianglesAreMissing) {
   const std::vector<Triangle> triangles = city();
   std::vector<Triangle> holed;

@@ -14,9 +14,9 @@ namespace {
 using ::testing::Each;
 using ::testing::HasSubstr;
 
-constexpr ImageSize kSize = {120, 100};  // more than one batch
+constexpr ImageSize kSize = {120, 100};  // so many pixels that their rays are more than one batch
 
-// Scene of a ball above a city's ground, seen from far above, at a large distance from the origin.
+// Scene, far from the world's origin, with a ball above the ground of a city. The camera looks down from above.
 class CastRaysTest : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -103,7 +103,7 @@ TEST_F(CastRaysTest, SourceMaskAndCullSelectTheHits) {
   EXPECT_TRUE(std::isinf(cast().image.t[0]));
   options_.mask = 1;
   options_.cull = v1::CULL_BACK;
-  camera_.eye.z = -0.25;  // inside the ground slab, whose bottom shows its back
+  camera_.eye.z = -0.25;  // inside the ground slab: rays downward hit the back of its bottom, which is culled
   EXPECT_THAT(cast().image.ids, Each(0u));
 }
 

@@ -8,7 +8,8 @@
 namespace locus::cli {
 namespace {
 
-// Extent of a box in the picture: 1 is the edge.
+// Position of a box in a picture: distances from the picture's centre to the box's left, right, lower and upper side,
+// in units of the distance to the picture's edge; and the depth of the box's nearest corner.
 struct Shown {
   double left = 0, right = 0, down = 0, up = 0;
   double nearest = HUGE_VAL;

@@ -18,7 +18,7 @@ int spread(Colour colour) {
 
 Camera looking_along_y() { return {.eye = {}, .axes = *view_axes({0, 1, 0}, {0, 0, 1}), .half_height = 0.1}; }
 
-// Returns an image whose pixels all hit the front of one object or instance.
+// Returns an image of which every pixel hits the front of the object or instance `id`.
 RayImage wall(const ImageSize& size, uint64_t id, uint32_t triangle) {
   RayImage image(size);
   for (size_t pixel = 0; pixel < size.pixels(); ++pixel) {

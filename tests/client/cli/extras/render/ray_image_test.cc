@@ -10,7 +10,7 @@
 namespace locus::cli {
 namespace {
 
-// Returns an image of three pixels: one hits an object, one a triangle, one nothing.
+// Returns an image of three pixels: the first hits an object, the second hits a triangle, the third hits nothing.
 RayImage three_pixels() {
   RayImage image({3, 1});
   image.t = {2.5f, 8, INFINITY};

@@ -54,7 +54,7 @@ class RenderServer {
     EXPECT_EQ(ack->refused(), 0u);
   }
 
-  // Uploads a city of about this many triangles, named by the number.
+  // Uploads a city of about `triangles` triangles and returns the mesh's name, which contains that number.
   std::string upload_city(uint64_t triangles) {
     const ImportedMesh city = generate_city(triangles, 7);
     const std::string name = "city-" + std::to_string(triangles);

@@ -12,7 +12,7 @@ using ::testing::HasSubstr;
 
 constexpr client::Rotation kQuarterAboutZ = {0, 0, 0.70710678f, 0.70710678f};
 
-// Scene of a city, far from the origin, and objects of known bounds.
+// Scene, far from the origin, with a city and objects whose bounds are known.
 class ThingBoundsTest : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -35,7 +35,8 @@ class ThingBoundsTest : public ::testing::Test {
     return thing_bounds(server_.client(), "arena", server_.revision("arena"), id, bounds);
   }
 
-  // Expects bounds that enclose the given ones and are too wide by no more than documented.
+  // Expects that the bounds of thing `id` enclose the box with centre `centre` and half extents `half`, and exceed that
+  // box on each side by at most 1/12 of its size along the axis.
   void expect_bounds(uint64_t id, const Vec3d& centre, const Vec3d& half) {
     const absl::StatusOr<Aabbd> found = find(id);
     ASSERT_TRUE(found.ok()) << found.status();
@@ -64,7 +65,7 @@ TEST_F(ThingBoundsTest, BoundsOfAnInstanceEncloseItsPlacedTriangles) {
   for (size_t i = 0; i < city.vertices.size(); i += 3) {
     mesh = merge(mesh, Vec3d{city.vertices[i], city.vertices[i + 1], city.vertices[i + 2]});
   }
-  // The rotation is 90 degrees about z: (x, y) goes to (-y, x).
+  // The rotation is 90 degrees about z: (x, y) becomes (-y, x).
   const Aabbd placed = {{kOut.x - 0.5 * mesh.max.y, kOut.y + 0.5 * mesh.min.x, 0.5 * mesh.min.z},
                         {kOut.x - 0.5 * mesh.min.y, kOut.y + 0.5 * mesh.max.x, 0.5 * mesh.max.z}};
   const absl::StatusOr<Aabbd> found = find(1);

@@ -26,7 +26,7 @@ struct GlbFile {
   Json json;
   std::string binary;
 
-  // Returns the values of an accessor: three a row for positions, one for indices.
+  // Returns the values of an accessor: three per position, one per index.
   template <class T>
   std::vector<T> column(size_t accessor) const {
     const Json& entry = json["accessors"][accessor];
@@ -67,8 +67,8 @@ inline void expect_accessor_true(const GlbFile& file, const Json& primitive) {
   EXPECT_EQ(indices.size() % 3, 0u);
 }
 
-// Expects one buffer, views within the buffer, accessors within their views, exact bounds, and every node under the
-// root.
+// Expects that a file is valid: it has one buffer, views are within the buffer, accessors are within their views and
+// have exact bounds, and every node except the root has exactly one parent.
 inline void expect_valid(const GlbFile& file) {
   EXPECT_EQ(file.json["asset"]["version"], "2.0");
   ASSERT_EQ(file.json["buffers"].size(), 1u);

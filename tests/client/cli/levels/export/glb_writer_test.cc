@@ -6,7 +6,6 @@
 
 #include <cmath>
 
-#include "client/cli/levels/export/export_limits.h"
 #include "client/cli/levels/export/unit_shapes.h"
 #include "client/cli/levels/import/import_file.h"
 #include "tests/client/cli/levels/export/glb_file.h"
@@ -31,7 +30,7 @@ class GlbWriterTest : public ::testing::Test {
     return file;
   }
 
-  // Reads the file back with the importer.
+  // Reads the written file with the importer.
   ImportedLevel imported() {
     absl::StatusOr<ImportedLevel> level = import_file(path_, {});
     EXPECT_TRUE(level.ok()) << level.status();
@@ -103,7 +102,8 @@ TEST_F(GlbWriterTest, AMeshOfTooManyPartsIsWrittenAsOne) {
   EXPECT_EQ(file.triangles(0), kMaxExportParts + 1);
 }
 
-// assimp 5.2.5 would drop these differences: transforms within 0.01 of the identity, and vertices nearer than 1e-5.
+// assimp 5.2.5 would drop differences that this test uses: of transforms within 0.01 of the identity, and of vertices
+// that are nearer to each other than 1e-5.
 TEST_F(GlbWriterTest, SmallDifferencesAreKept) {
   ImportedMesh tiny = unit_box();
   for (float& coordinate : tiny.vertices) coordinate *= 1e-7f;
@@ -170,7 +170,7 @@ TEST_F(GlbWriterTest, NamesOfArbitraryBytesGiveValidJson) {
 TEST_F(GlbWriterTest, TooManyNodesAreRefusedNamingTheLimit) {
   GlbWriter writer("arena", UpAxis::kY);
   const size_t mesh = writer.reserve_mesh();
-  // The root and the group are nodes too.
+  // The root and the group are nodes too, so these children are one too many.
   const std::vector<GlbWriter::Child> children(kMaxExportNodes - 1, {mesh, {}});
   const absl::Status status = writer.add_group("", {}, children, Json::object());
   EXPECT_TRUE(absl::IsResourceExhausted(status));

@@ -71,7 +71,8 @@ TEST(BlobTest, EveryVertexIsWithinTheRadiiAndTheSurfaceIsBumpy) {
   EXPECT_GT(most - least, 2);
 }
 
-// Casts rays from points near the origin at every vertex and close past it, with the server's query code.
+// Casts rays by the server's query code. For every vertex, one ray is aimed at the vertex and one at a point beside it,
+// both from points near the origin.
 TEST(BlobTest, NoRayFromInsideLeaks) {
   constexpr uint64_t kSeed = 21;
   SCOPED_TRACE(kSeed);

@@ -27,15 +27,15 @@ inline Point cross(const Point& a, const Point& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
-// Returns the normal of a triangle; its length is twice the area.
+// Returns the normal of a triangle; its length is twice the triangle's area.
 inline Point normal(const ImportedMesh& mesh, size_t triangle) {
   const Point a = vertex(mesh, mesh.indices[3 * triangle]);
   return cross(minus(vertex(mesh, mesh.indices[3 * triangle + 1]), a),
                minus(vertex(mesh, mesh.indices[3 * triangle + 2]), a));
 }
 
-// Inserts the directed edges of the mesh into `edges` and returns the number of duplicates: 0 if the triangles are
-// consistently oriented.
+// Inserts the directed edges of the mesh into `edges`. Returns the number of edges that occur more than once: 0 if the
+// triangles are consistently oriented.
 inline size_t repeated_edges(const ImportedMesh& mesh, std::unordered_set<uint64_t>& edges) {
   size_t repeated = 0;
   for (size_t i = 0; i < mesh.indices.size(); ++i) {
@@ -45,14 +45,14 @@ inline size_t repeated_edges(const ImportedMesh& mesh, std::unordered_set<uint64
   return repeated;
 }
 
-// Returns the number of directed edges without their opposite: the length of the border.
+// Returns the number of directed edges whose opposite edge is not in `edges`: the edges of the mesh's border.
 inline size_t open_edges(const std::unordered_set<uint64_t>& edges) {
   size_t open = 0;
   for (const uint64_t edge : edges) open += edges.count(edge << 32 | edge >> 32) == 0 ? 1 : 0;
   return open;
 }
 
-// Returns the SHA-256 in hexadecimal of the bytes of the vertices and the indices.
+// Returns the SHA-256 of the bytes of the mesh's vertices and indices, in hexadecimal.
 inline std::string bytes_hash(const ImportedMesh& mesh) {
   std::string bytes(mesh.vertices.size() * sizeof(float) + mesh.indices.size() * sizeof(uint32_t), 0);
   std::memcpy(bytes.data(), mesh.vertices.data(), mesh.vertices.size() * sizeof(float));

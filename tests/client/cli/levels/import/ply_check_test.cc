@@ -85,6 +85,16 @@ TEST(PlyCheckTest, DamagedHeadersAreRefused) {
   EXPECT_THAT(message("ply\nelement face 1\nproperty quad a\nend_header\n"), HasSubstr("unknown form"));
 }
 
+TEST(PlyCheckTest, MessagesContainNoControlCharactersOfTheFile) {
+  for (const std::string& line : {std::string("format \x1B[2J"), std::string("element \x1B[2J 9\nproperty char x"),
+                                  "element a 1\nproperty \x1B[2J" + std::string(9000, 'x')}) {
+    const absl::Status status = check_ply("ply\n" + line + "\nend_header\n").status();
+    EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << line;
+    EXPECT_EQ(status.message().find('\x1B'), absl::string_view::npos) << status;
+    EXPECT_LT(status.message().size(), 300u);
+  }
+}
+
 TEST(PlyCheckTest, RandomMutationsNeverCrash) {
   constexpr uint64_t kSeed = 11;
   SplitMix64 random(kSeed);

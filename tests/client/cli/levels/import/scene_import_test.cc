@@ -30,7 +30,8 @@ std::array<float, 3> corner(const ImportedMesh& mesh, size_t triangle, size_t nu
   return {mesh.vertices.at(at), mesh.vertices.at(at + 1), mesh.vertices.at(at + 2)};
 }
 
-// Returns a binary glTF with one triangle (0,0,0) (1,0,0) (0,1,0) and these nodes, given in JSON, all in the scene.
+// Returns a binary glTF file with one triangle (0,0,0) (1,0,0) (0,1,0). `nodes` are the nodes in JSON, `scene_nodes`
+// the indices of the scene's root nodes.
 std::string glb(const std::string& nodes, const std::string& scene_nodes) {
   std::string data;
   for (float value : {0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 0.f, 1.f, 0.f}) append_f32(data, value);
@@ -62,7 +63,7 @@ TEST(SceneImportTest, ObjPolygonsAreCutAndObjectsBecomeParts) {
   EXPECT_EQ(mesh.name, "yard");
   EXPECT_EQ(level->source_format, "OBJ");
   EXPECT_EQ(mesh.indices.size(), 9u);
-  EXPECT_EQ(mesh.vertices.size(), 15u);  // shared across the parts
+  EXPECT_EQ(mesh.vertices.size(), 15u);  // 5 vertices, which the two parts share
   ASSERT_EQ(mesh.parts.size(), 2u);
   EXPECT_EQ(mesh.parts[0].name, "floor");
   EXPECT_EQ(mesh.parts[1].name, "wall");

@@ -1,5 +1,5 @@
-// Files for the import tests: a temporary folder that is deleted with its test, and little-endian bytes. One test, one
-// thread.
+// Files for the import tests: a temporary folder that is deleted at the end of the test, and functions that append
+// little-endian numbers. Not thread-safe.
 #ifndef LOCUS_TESTS_CLIENT_CLI_LEVELS_IMPORT_TEST_FILES_H_
 #define LOCUS_TESTS_CLIENT_CLI_LEVELS_IMPORT_TEST_FILES_H_
 
@@ -34,7 +34,7 @@ class TempFolder {
 
   std::string path(const std::string& name) const { return (path_ / name).string(); }
 
-  // Returns the new file's path.
+  // Writes a file `name` into the folder and returns its path.
   std::string write(const std::string& name, const std::string& bytes) const {
     std::ofstream file(path(name), std::ios::binary);
     file << bytes;

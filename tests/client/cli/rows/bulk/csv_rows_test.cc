@@ -64,16 +64,46 @@ TEST(CsvRowsTest, AMissingRequiredColumnIsReported) {
 TEST(CsvRowsTest, ARepeatedColumnOrOneGivenByAnOptionIsRefused) {
   EXPECT_EQ(header_refusal("from.x,from.y,from.z,max_t,max-t"), "column max_t is there twice");
   EXPECT_EQ(header_refusal("from.x,from.y,from.z,mask"),
-            "column mask is there and --mask is given: leave one of them out");
+            "the column mask and the option --mask are both given: leave one of them out");
 }
 
 TEST(CsvRowsTest, RowsOfWrongLengthOrWithWrongCellsAreRefused) {
   EXPECT_EQ(row_refusal("1,2,3"), "has 3 fields, the header names 4");
   EXPECT_EQ(row_refusal("1,2,3,4,5"), "has 5 fields, the header names 4");
   EXPECT_EQ(row_refusal("1,abc,3,4"), "from.y: 'abc' is no number");
-  EXPECT_EQ(row_refusal("1,,3,4"), "from.y: is missing, while other parts are there");
+  EXPECT_EQ(row_refusal("1,,3,4"), "from.y: is missing, but other parts are given");
   EXPECT_EQ(row_refusal(",,,4"), "from: is missing");
   EXPECT_THAT(row_refusal("1,2\"3,3,4"), HasSubstr("a quote in the middle"));
+}
+
+std::vector<std::string> fields_of(absl::string_view record) {
+  std::vector<std::string> fields;
+  const absl::Status split = split_csv_record(record, fields);
+  EXPECT_TRUE(split.ok()) << split;
+  return fields;
+}
+
+TEST(CsvRecordTest, CommasSeparateFields) { EXPECT_THAT(fields_of("1,2,3"), ElementsAre("1", "2", "3")); }
+
+TEST(CsvRecordTest, AnEmptyRecordIsOneEmptyField) { EXPECT_THAT(fields_of(""), ElementsAre("")); }
+
+TEST(CsvRecordTest, ACommaAtTheEndIsFollowedByAnEmptyField) { EXPECT_THAT(fields_of(",a,"), ElementsAre("", "a", "")); }
+
+TEST(CsvRecordTest, QuotedFieldsMayHaveCommasQuotesAndLineBreaks) {
+  EXPECT_THAT(fields_of("\"a,b\",\"say \"\"hi\"\"\",\"two\r\nlines\",\"\""),
+              ElementsAre("a,b", "say \"hi\"", "two\r\nlines", ""));
+}
+
+TEST(CsvRecordTest, BlanksAroundAnUnquotedFieldAreDroppedAndThoseInQuotesKept) {
+  EXPECT_THAT(fields_of(" 1 ,\t2,\" 3 \""), ElementsAre("1", "2", " 3 "));
+}
+
+TEST(CsvRecordTest, AQuoteInTheMiddleOfAFieldIsRefused) {
+  for (const char* record : {"1,a\"b", "1,\"a\"b", "1,\"a", "1,\"a\"\"", "1, \"a\""}) {
+    std::vector<std::string> fields;
+    EXPECT_THAT(std::string(split_csv_record(record, fields).message()), HasSubstr("field 2: a quote in the middle"))
+        << record;
+  }
 }
 
 }  // namespace

@@ -93,7 +93,8 @@ TEST(NdjsonRowsTest, KeysThatAreUnknownRepeatedOrGivenByAnOptionAreRefused) {
   EXPECT_THAT(refusal(R"({"form":[1,2,3]})"),
               HasSubstr("unknown key 'form'; known are: from.x, from.y, from.z, max_t"));
   EXPECT_EQ(refusal(R"({"from":[1,2,3],"from":[1,2,3]})"), "from.x: is given twice");
-  EXPECT_EQ(refusal(R"({"from":[1,2,3],"dir":[1,2,3]})"), "dir is there and --dir is given: leave one of them out");
+  EXPECT_EQ(refusal(R"({"from":[1,2,3],"dir":[1,2,3]})"),
+            "the key dir and the option --dir are both given: leave one of them out");
 }
 
 TEST(NdjsonRowsTest, DeepNestingIsRefusedAtItsFirstLevel) {

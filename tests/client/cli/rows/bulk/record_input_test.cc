@@ -19,7 +19,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Pair;
 
-using Records = std::vector<std::pair<std::string, uint64_t>>;  // text and line of each record
+using Records = std::vector<std::pair<std::string, uint64_t>>;  // text and line number of each record
 
 struct Outcome {
   Records records;

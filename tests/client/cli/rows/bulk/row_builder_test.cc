@@ -88,7 +88,7 @@ TEST(RowBuilderTest, AnIncompleteRowIsNotAppended) {
   builder.start();
   EXPECT_EQ(builder.finish(1, batch).message(), "at: is missing");
   ASSERT_TRUE(builder.put_text({0, 0}, "1").ok());
-  EXPECT_EQ(builder.finish(1, batch).message(), "at.y: is missing, while other parts are there");
+  EXPECT_EQ(builder.finish(1, batch).message(), "at.y: is missing, but other parts are given");
   EXPECT_EQ(builder.put_text({0, 0}, "1").message(), "at.x: is given twice");
   EXPECT_EQ(batch.rows(), 0u);
   EXPECT_TRUE(batch.columns[0].numbers.empty());

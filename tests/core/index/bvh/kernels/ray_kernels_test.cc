@@ -1,4 +1,5 @@
-// Compares the ray kernels of every instruction set with tests of all triangles one by one, bit for bit.
+// Tests of the ray kernels of every instruction set: their results equal, bit for bit, those of testing all triangles
+// one by one.
 #include "core/index/bvh/kernels/ray_kernels.h"
 
 #include <gtest/gtest.h>
@@ -45,7 +46,7 @@ TEST_P(RayKernelsTest, AnswerCoherentRaysAsAllTrianglesDo) {
 }
 
 #ifdef __SSE__
-// Some libraries set these processor flags for the whole thread.
+// Some libraries set the processor flags that treat denormals as zero; the flags apply to all later code of the thread.
 TEST_P(RayKernelsTest, AnswersDoNotChangeIfDenormalsAreTreatedAsZero) {
   const TriangleBvh tree = *TriangleBvh::build(bumpy_sphere(14, 0.1, 1));
   std::vector<KernelRay> rays;
@@ -60,7 +61,7 @@ TEST_P(RayKernelsTest, AnswersDoNotChangeIfDenormalsAreTreatedAsZero) {
   };
   const std::vector<uint32_t> expected = numbers();
   const unsigned int usual = _mm_getcsr();
-  _mm_setcsr(usual | 0x8040);  // flush to zero, denormals are zero
+  _mm_setcsr(usual | 0x8040);  // sets the flags FTZ (flush to zero) and DAZ (denormals are zero)
   const std::vector<uint32_t> found = numbers();
   _mm_setcsr(usual);
   EXPECT_EQ(found, expected);
@@ -105,7 +106,7 @@ TEST_P(RayKernelsTest, AnswerSliversAndTrianglesWithoutAreaAsAllTrianglesDo) {
 
 TEST_P(RayKernelsTest, OfEqualHitsTheLowestNumberWins) { EXPECT_EQ(copies_trial().difference(*kernels_), ""); }
 
-// If max_rows hits were found, triangles behind them must not be tested.
+// When max_rows hits have been found, triangles behind these hits must not be tested.
 TEST_P(RayKernelsTest, FullRowsShortenTheRay) {
   std::vector<Triangle> walls;
   for (uint32_t i = 0; i < 1'000; ++i) walls.push_back(wall_at(static_cast<float>(i), i));
@@ -118,7 +119,7 @@ TEST_P(RayKernelsTest, FullRowsShortenTheRay) {
   EXPECT_LT(hit.tests, 60u);
 }
 
-// The ray hits the boxes of all triangles of a pile and misses each of the triangles.
+// The ray hits the boxes of all triangles of a pile but misses each triangle, so the kernel gives up.
 TEST_P(RayKernelsTest, ARayThatTestsTooManyTrianglesIsLeftUndecided) {
   std::vector<Triangle> pile;
   for (uint32_t i = 0; i < 3 * kMaxKernelTests; ++i) pile.push_back(wall_at(static_cast<float>(i), i));

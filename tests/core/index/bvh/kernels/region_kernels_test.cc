@@ -33,7 +33,8 @@ class RegionKernelsTest : public ::testing::TestWithParam<std::string> {
   }
   void TearDown() override { ASSERT_TRUE(use_instruction_set("").ok()); }
 
-  // Compares `count` regions of each kind.
+  // Compares the kernels with the predicates for `count` regions of each kind: balls, boxes and rotated boxes, some of
+  // which only touch a triangle.
   void compare(const std::vector<Triangle>& triangles, size_t count, uint64_t seed) {
     const absl::StatusOr<TriangleBvh> tree = TriangleBvh::build(triangles);
     ASSERT_TRUE(tree.ok()) << tree.status();
@@ -66,7 +67,7 @@ class RegionKernelsTest : public ::testing::TestWithParam<std::string> {
     EXPECT_EQ(found, expected) << described(shape);
   }
 
-  // Returns the share of tested triangles that the predicates decided.
+  // Returns the share of the tested triangles for which the predicates were called.
   double judged_share() const { return static_cast<double>(judged_) / static_cast<double>(tests_); }
 
  private:
@@ -75,7 +76,7 @@ class RegionKernelsTest : public ::testing::TestWithParam<std::string> {
 
 TEST_P(RegionKernelsTest, FindTheSameAsThePredicatesInRandomRegions) {
   compare(bumpy_sphere(14, 0.1, 1), scaled_count(1'500), 1);
-  EXPECT_LT(judged_share(), 0.03);  // touching regions included
+  EXPECT_LT(judged_share(), 0.03);  // although half of the regions only touch a triangle
 }
 
 TEST_P(RegionKernelsTest, FindTheSameAsThePredicatesOnALattice) {
@@ -113,7 +114,7 @@ TEST_P(RegionKernelsTest, FindTheSameAsThePredicatesAmongSliversAndTrianglesWith
   compare(slivers, scaled_count(1'000), 7);
 }
 
-// Balls for which the foot of the perpendicular is near one edge, while the other two edges are near as well.
+// Tests balls around points above a triangle so narrow that all three edges are near the foot of the perpendicular.
 TEST_P(RegionKernelsTest, FindTheSameAsThePredicatesForBallsBesideNarrowTriangles) {
   Random random(12);
   for (size_t i = 0; i < scaled_count(20'000) && !HasFailure(); ++i) {
@@ -132,7 +133,7 @@ TEST_P(RegionKernelsTest, FindTheSameAsThePredicatesForBallsBesideNarrowTriangle
   }
 }
 
-// Coordinates that are nearly zero, like results of sine and cosine: their products underflow.
+// Some coordinates are nearly zero, like rounded results of sine and cosine, so that products of coordinates underflow.
 TEST_P(RegionKernelsTest, FindTheSameAsThePredicatesAmongNearlyFlatTriangles) {
   Random random(8);
   std::vector<Triangle> flat;
@@ -149,8 +150,8 @@ TEST_P(RegionKernelsTest, FindTheSameAsThePredicatesAmongNearlyFlatTriangles) {
   compare(flat, scaled_count(1'000), 9);
 }
 
-// Small and large triangles share blocks: the error bound by the block's extent is much larger than that of a small
-// one.
+// Blocks contain small and large triangles. For a small triangle, the kernel's error bound, which depends on the
+// block's extent, is much larger than a bound by the triangle's own size.
 TEST_P(RegionKernelsTest, FindTheSameAsThePredicatesAmongTrianglesOfManySizes) {
   Random random(10);
   std::vector<Triangle> mixed;
@@ -191,8 +192,8 @@ TEST_P(RegionKernelsTest, ACallPausesAfterTheMaximumNumberOfTests) {
   EXPECT_LT(search.tests(), kMaxRegionTests + 8);
 }
 
-// Batch of as many balls as one call of many() answers, from an empty ball to one around the mesh, and the numbers that
-// each of them finds in a search of its own.
+// Batch of as many balls as one call of many() answers, from a ball without triangles to a ball around the mesh; and,
+// in `alone`, the triangle numbers that a separate search finds for each ball.
 struct Together {
   explicit Together(const TriangleBvh& tree) {
     for (size_t i = 0; i < kMaxRegions; ++i) {
@@ -219,7 +220,7 @@ struct Together {
   RegionJudge judges[kMaxRegions];
   uint32_t counts[kMaxRegions];
   std::vector<uint32_t> numbers, alone;
-  std::vector<size_t> ends;  // end of each region's numbers in `alone`
+  std::vector<size_t> ends;  // end of each ball's numbers in `alone`
 };
 
 TEST_P(RegionKernelsTest, RegionsAnsweredTogetherFindTheSameAsAlone) {
@@ -242,7 +243,8 @@ TEST_P(RegionKernelsTest, RegionsWithoutRoomForTheirNumbersAreNotAnswered) {
     ASSERT_LT(answered, kMaxRegions);
     size_t end = 0;
     for (size_t i = 0; i < answered; ++i) EXPECT_EQ(end += together.counts[i], together.ends[i]) << i;
-    // The answered regions fit, and the next one does not, given that a kernel may write beyond its last number.
+    // The numbers of the answered regions fit into `room`; the numbers of the next region would not leave
+    // kMinRegionRoom, which a kernel needs because it may write beyond the last number.
     EXPECT_LE(end, room);
     EXPECT_LT(room, together.ends[answered] + kMinRegionRoom);
   }

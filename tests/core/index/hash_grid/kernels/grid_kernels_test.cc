@@ -1,4 +1,5 @@
-// Kernels of every instruction set keep each value that the exact test in double keeps, and few others.
+// Kernels of every instruction set keep each value that the exact test in double keeps, and no value that is more than
+// an epsilon outside.
 #include "core/index/hash_grid/kernels/grid_kernels.h"
 
 #include <gtest/gtest.h>
@@ -15,7 +16,7 @@
 namespace locus::test {
 namespace {
 
-// Columns of one block, padded by one vector.
+// Columns of one block, with eight unused values at the end, since kernels read whole vectors.
 struct Columns4 {
   explicit Columns4(size_t values) : count(static_cast<uint32_t>(values)) {
     for (std::vector<float>* column : {&x, &y, &z, &extent}) column->resize(values + 8);
@@ -44,8 +45,8 @@ class GridKernelsTest : public ::testing::TestWithParam<std::string> {
   void SetUp() override { ASSERT_TRUE(use_instruction_set(GetParam()).ok()); }
   void TearDown() override { ASSERT_TRUE(use_instruction_set("").ok()); }
 
-  // Runs the kernel run(rows, slots) on random rows and compares the kept slots with keep(slot): 1 = must be kept, 0 =
-  // may be kept, -1 = must not be kept.
+  // Runs the kernel run(rows, slots) on random rows and compares the slots that it keeps with keep(slot): 1 = must be
+  // kept, 0 = may be kept, -1 = must not be kept.
   template <class Run, class Keep>
   static void expect_kept(Columns4& columns, Random& random, const Run& run, const Keep& keep) {
     for (int round = 0; round < 200; ++round) {
@@ -76,7 +77,8 @@ class GridKernelsTest : public ::testing::TestWithParam<std::string> {
   }
 };
 
-// Returns 1 if `distance` is less than `extent` by more than an epsilon, -1 if it is greater by more than that, else 0.
+// Returns 1 if `distance` is less than `extent` by more than an epsilon, -1 if it is greater by more than an epsilon,
+// otherwise 0.
 int verdict(double distance, double extent) {
   constexpr double kEpsilon = 1e-4;
   return distance <= extent - kEpsilon ? 1 : distance > extent + kEpsilon ? -1 : 0;

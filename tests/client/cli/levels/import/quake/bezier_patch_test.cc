@@ -70,11 +70,13 @@ TEST(BezierPatchTest, AFlatRegularPatchIsARegularGrid) {
   }
 }
 
-// Compares each of the four borders of one patch with each border of another, in both directions.
+// Makes each border of one patch equal to each border of another patch, in both directions; then the tessellated
+// borders must be equal too.
 TEST(BezierPatchTest, PatchesWithEqualBordersMeetWithoutACrack) {
   constexpr uint64_t kSeed = 5;
   SplitMix64 random(kSeed);
-  // Positions of the points of border k in a 3 x 3 grid of control points, and in the tessellated n x n grid.
+  // Returns the indices of the points on border k, 0 .. 3, of a grid of n x n points: the grid of control points (n =
+  // 3) or the tessellated patch.
   const auto border = [](int k, size_t n) {
     std::vector<size_t> at;
     for (size_t i = 0; i < n; ++i) at.push_back(k == 0 ? i : k == 1 ? (n - 1) * n + i : k == 2 ? i * n : i * n + n - 1);

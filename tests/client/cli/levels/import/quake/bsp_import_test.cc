@@ -21,7 +21,7 @@ std::string message(const BspWriter& level) {
   return std::string(import_bsp(level.bytes(), "level", {}).status().message());
 }
 
-// Returns twice the area of triangle t seen from +z: positive if it is counter-clockwise.
+// Returns twice the signed area of triangle `t` as seen from +z: positive if the triangle is counter-clockwise.
 double area_from_above(const ImportedMesh& mesh, size_t t) {
   const auto at = [&](size_t corner, size_t axis) -> double {
     return mesh.vertices[3 * mesh.indices[3 * t + corner] + axis];
@@ -173,7 +173,8 @@ TEST(BspImportTest, RandomMutationsAreRefusedOrGiveAValidMesh) {
     const uint32_t changes = 1 + random.below(4);
     for (uint32_t i = 0; i < changes; ++i) {
       const size_t at = random.below(static_cast<uint32_t>(bytes.size()));
-      // Small values pass more checks than random ones, so that later checks are tested too.
+      // Half of the values are small, because small values pass more checks than random bytes, so that later checks are
+      // tested too.
       bytes[at] = static_cast<char>(random.below(2) == 0 ? random.next() : random.below(20));
     }
     const auto level = import_bsp(bytes, "level", {});

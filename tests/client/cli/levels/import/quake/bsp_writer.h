@@ -1,5 +1,5 @@
-// Writer of small Quake 3 levels for the tests, with arbitrary valid or invalid values in any field. One test, one
-// thread.
+// Writer of small Quake 3 levels for the tests, with arbitrary valid or invalid values in any field. Only one thread
+// uses an object.
 #ifndef LOCUS_TESTS_CLIENT_CLI_LEVELS_IMPORT_QUAKE_BSP_WRITER_H_
 #define LOCUS_TESTS_CLIENT_CLI_LEVELS_IMPORT_QUAKE_BSP_WRITER_H_
 
@@ -70,7 +70,8 @@ struct BspWriter {
 };
 
 // Returns a level of one polygon (2 triangles, texture floor), one mesh face (1 triangle, texture crate), one flat 3 x
-// 3 patch (texture floor) and one billboard. They lie in the planes z = 0, 1 and 2 and face +z.
+// 3 patch (texture floor) and one billboard. The polygon is in the plane z = 0, the mesh face in z = 1 and the patch in
+// z = 2; they face +z.
 inline BspWriter small_level() {
   BspWriter level;
   level.textures = {"textures/floor", "models/crate"};

@@ -18,6 +18,7 @@ namespace {
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 using Entries = std::map<std::string, std::string>;
 
@@ -29,11 +30,16 @@ std::string write_archive(const TempFolder& folder, const Entries& entries) {
     zip_source_t* source = zip_source_buffer(archive, bytes.data(), bytes.size(), 0);
     const zip_int64_t number = zip_file_add(archive, name.c_str(), source, 0);
     EXPECT_GE(number, 0) << name;
-    // Uses the fastest compression level, since one test packs more than the limit.
+    // Uses the fastest compression level, since one test compresses more bytes than the import limit.
     EXPECT_EQ(zip_set_file_compression(archive, static_cast<zip_uint64_t>(number), ZIP_CM_DEFLATE, 1), 0) << name;
   }
   EXPECT_EQ(zip_close(archive), 0);
   return path;
+}
+
+std::string archive_of(const TempFolder& folder, const Entries& entries) {
+  std::ifstream file(write_archive(folder, entries), std::ios::binary);
+  return std::string(std::istreambuf_iterator<char>(file), {});
 }
 
 Entries three_levels() {
@@ -92,17 +98,71 @@ TEST(Pk3ArchiveTest, ReadingGivesTheWholeBytes) {
   std::string big(300'000, '\0');
   SplitMix64 random(1);
   for (char& c : big) c = static_cast<char>(random.next());
-  const auto level = read_pk3_level(write_archive(folder, {{"maps/a.bsp", big}}), "");
+  const auto level = read_pk3_level(archive_of(folder, {{"maps/a.bsp", big}}), "a.pk3", "");
   ASSERT_TRUE(level.ok()) << level.status();
   EXPECT_EQ(level->bytes, big);
   EXPECT_EQ(level->entry, "maps/a.bsp");
   EXPECT_THAT(level->others, ElementsAre());
 }
 
+void write_random_word(std::string& bytes, size_t at, SplitMix64& random) {
+  const uint64_t word = random.next();
+  for (size_t i = 0; i < 4; ++i) bytes[at + i] = static_cast<char>(word >> (8 * i));
+}
+
+std::string message_of(const absl::StatusOr<Pk3Level>& level) { return std::string(level.status().message()); }
+
 TEST(Pk3ArchiveTest, ALevelThatUnpacksBeyondTheLimitIsRefused) {
   const TempFolder folder;
-  const auto level = read_pk3_level(write_archive(folder, {{"a.bsp", std::string(kMaxBspBytes + 1, '\0')}}), "");
-  EXPECT_EQ(level.status().code(), absl::StatusCode::kResourceExhausted) << level.status();
+  std::string big(kMaxBspBytes + 1, '\0');
+  SplitMix64 random(1);
+  for (size_t i = 0; i + 4 < big.size(); i += 256) write_random_word(big, i, random);
+  const auto level = read_pk3_level(archive_of(folder, {{"a.bsp", big}}), "a.pk3", "");
+  EXPECT_EQ(level.status().code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(message_of(level),
+            "a.bsp in a.pk3 has more bytes unpacked, the limit level_bytes is 268435456: give another level");
+}
+
+TEST(Pk3ArchiveTest, ALevelThatExpandsBeyondTheRatioIsRefusedEarly) {
+  const TempFolder folder;
+  const std::string archive = archive_of(folder, {{"a.bsp", std::string(8 << 20, '\0')}});
+  EXPECT_LT(archive.size(), 50'000u);
+  const auto level = read_pk3_level(archive, "a.pk3", "");
+  EXPECT_EQ(level.status().code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_THAT(message_of(level), HasSubstr("the limit archive_ratio is 200: pack the level again"));
+}
+
+TEST(Pk3ArchiveTest, ASmallLevelMayExpandByAnyRatio) {
+  const TempFolder folder;
+  const std::string zeros(kMinJudgedBytes, '\0');
+  const auto level = read_pk3_level(archive_of(folder, {{"a.bsp", zeros}}), "a.pk3", "");
+  ASSERT_TRUE(level.ok()) << level.status();
+  EXPECT_EQ(level->bytes, zeros);
+}
+
+TEST(Pk3ArchiveTest, TooManyEntriesAreRefused) {
+  const TempFolder folder;
+  Entries entries;
+  for (int64_t i = 0; i <= kMaxArchiveEntries; ++i) entries["e" + std::to_string(i)] = "";
+  const auto level = read_pk3_level(archive_of(folder, entries), "a.pk3", "");
+  EXPECT_EQ(level.status().code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(message_of(level),
+            "a.pk3 has 65537 entries, the limit archive_entries is 65536: give an archive with fewer files");
+}
+
+TEST(Pk3ArchiveTest, ALongEntryNameIsRefused) {
+  const TempFolder folder;
+  const Entries entries = {{std::string(kMaxEntryNameBytes + 1, 'x'), ""}};
+  const auto level = read_pk3_level(archive_of(folder, entries), "a.pk3", "");
+  EXPECT_EQ(level.status().code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_THAT(message_of(level), HasSubstr("the limit entry_name_bytes is 1024"));
+}
+
+TEST(Pk3ArchiveTest, ListedEntriesHaveNoControlCharacters) {
+  const TempFolder folder;
+  const auto level = import_file(write_archive(folder, {{"maps/\x1B[2J.bsp", "a"}}), {.entry = "none"});
+  EXPECT_EQ(level.status().code(), absl::StatusCode::kNotFound);
+  EXPECT_THAT(std::string(level.status().message()), Not(HasSubstr("\x1B")));
 }
 
 TEST(Pk3ArchiveTest, RandomMutationsAreRefusedOrGiveAValidMesh) {
@@ -124,6 +184,7 @@ TEST(Pk3ArchiveTest, RandomMutationsAreRefusedOrGiveAValidMesh) {
       ASSERT_NO_FATAL_FAILURE(expect_sound(*level));
     } else {
       ++refused;
+      ASSERT_THAT(std::string(level.status().message()), Not(HasSubstr("the importer"))) << "the reader crashed";
     }
   }
   EXPECT_GT(refused, 50) << "seed " << kSeed;

@@ -1,0 +1,136 @@
+// `locus context`: named connection options of servers; one name is the default.
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <system_error>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/str_cat.h"
+#include "client/cli/commands.h"
+#include "client/cli/output.h"
+#include "client/cli/security/saved_contexts.h"
+#include "core/base/status_macros.h"
+
+namespace locus::cli {
+namespace {
+
+struct ContextOptions {
+  std::string name;
+  SavedContext saved;
+  bool tls = false;
+};
+
+Json context_row(const std::string& name, const SavedContexts& contexts, const SavedContext& saved) {
+  Json row = {{"name", name}, {"default", name == contexts.default_name}};
+  for (const auto& [key, value] : fields_of(saved)) row[key] = value.empty() ? Json() : Json(value);
+  return row;
+}
+
+absl::Status list_contexts(const ContextOptions&, Context& context) {
+  ASSIGN_OR_RETURN(const SavedContexts contexts, read_contexts(context.contexts_path()));
+  Report report;
+  report.rows_name = "contexts";
+  report.no_rows = "no contexts";
+  const Json columns = context_row("", {}, {});
+  for (const auto& [key, value] : columns.items()) report.keys.push_back(key);
+  for (const auto& [name, saved] : contexts.by_name) report.rows.push_back(context_row(name, contexts, saved));
+  context.write(report);
+  return absl::OkStatus();
+}
+
+absl::Status show_context(const ContextOptions& options, Context& context) {
+  ASSIGN_OR_RETURN(const SavedContexts contexts, read_contexts(context.contexts_path()));
+  const std::string& name = options.name.empty() ? contexts.default_name : options.name;
+  if (name.empty()) return absl::NotFoundError("no context is the default: `locus context use NAME` chooses one");
+  ASSIGN_OR_RETURN(const SavedContext saved, find_context(contexts, name));
+  Report report;
+  report.head = context_row(name, contexts, saved);
+  context.write(report);
+  return absl::OkStatus();
+}
+
+absl::Status use_context(const ContextOptions& options, Context& context) {
+  ASSIGN_OR_RETURN(SavedContexts contexts, read_contexts(context.contexts_path()));
+  RETURN_IF_ERROR(find_context(contexts, options.name).status());
+  contexts.default_name = options.name;
+  return write_contexts(context.contexts_path(), contexts);
+}
+
+// Makes the path of a file absolute, since a context is used from any folder.
+void make_absolute(std::string& path) {
+  std::error_code ignored;
+  if (!path.empty()) path = std::filesystem::absolute(path, ignored).string();
+}
+
+absl::Status set_context(const ContextOptions& options, Context& context) {
+  RETURN_IF_ERROR(check_context_name(options.name));
+  ASSIGN_OR_RETURN(SavedContexts contexts, read_contexts(context.contexts_path()));
+  SavedContext& saved = contexts.by_name[options.name];
+  saved = options.saved;
+  if (options.tls) saved.tls = "true";
+  for (const auto& [key, value] : fields_of(saved)) {
+    if (std::any_of(value.begin(), value.end(), [](unsigned char c) { return absl::ascii_iscntrl(c); }))
+      return usage_error(absl::StrCat("the value of ", key, " has a control character"));
+  }
+  for (std::string* path : {&saved.ca, &saved.cert, &saved.key, &saved.token_file}) make_absolute(*path);
+  return write_contexts(context.contexts_path(), contexts);
+}
+
+absl::Status remove_context(const ContextOptions& options, Context& context) {
+  ASSIGN_OR_RETURN(SavedContexts contexts, read_contexts(context.contexts_path()));
+  RETURN_IF_ERROR(find_context(contexts, options.name).status());
+  contexts.by_name.erase(options.name);
+  if (contexts.default_name == options.name) contexts.default_name.clear();
+  return write_contexts(context.contexts_path(), contexts);
+}
+
+CLI::App& add_one(CLI::App& parent, const char* name, const char* description, const char* example) {
+  CLI::App& command = *parent.add_subcommand(name, description);
+  command.footer(absl::StrCat("Examples:\n  locus context ", example));
+  return command;
+}
+
+void add_context_set(CLI::App& parent, Context& context) {
+  const auto options = std::make_shared<ContextOptions>();
+  CLI::App& command = add_one(parent, "set", "Make a context, or replace one",
+                              "set prod --address game.example.com:7575 --ca ca.pem --token-file game.token");
+  command.add_option("NAME", options->name, "Letters, digits, `-`, `_` and `.`, at most 63")->required();
+  command.add_option("--address", options->saved.address, "Where locusd listens")->type_name("ADDRESS");
+  command.add_flag("--tls", options->tls, "Encrypt the connection; --ca and --cert imply it");
+  command.add_option("--ca", options->saved.ca, "Certificates of the server's authority")->type_name("FILE");
+  command.add_option("--cert", options->saved.cert, "Certificate of this client")->type_name("FILE");
+  command.add_option("--key", options->saved.key, "Private key of --cert")->type_name("FILE");
+  command.add_option("--token-file", options->saved.token_file, "File with the token; only its name is kept")
+      ->type_name("FILE");
+  run_when_chosen(command, options, context, set_context);
+}
+
+}  // namespace
+
+void add_context_command(CLI::App& parent, Context& context) {
+  CLI::App& command = *parent.add_subcommand("context", "Keep the addresses and credentials of servers by name");
+  command.footer(R"(Contexts are in ~/.config/locus/contexts. They name files with credentials and contain no secret.
+An option on the line comes before its environment variable, and that before the context. The default context is used
+only if the line names no context and neither the line nor LOCUS_ADDRESS gives an address, so that its credentials do not
+reach another server.
+Examples:
+  locus context set prod --address game.example.com:7575 --ca ca.pem --token-file game.token
+  locus context use prod
+  locus --context prod health)");
+  command.require_subcommand(1);
+  const auto options = std::make_shared<ContextOptions>();
+  run_when_chosen(add_one(command, "list", "List the contexts", "list"), options, context, list_contexts);
+  CLI::App& show = add_one(command, "show", "Show a context; never a token", "show prod");
+  show.add_option("NAME", options->name, "The context [the default one]");
+  run_when_chosen(show, options, context, show_context);
+  CLI::App& use = add_one(command, "use", "Make a context the default", "use prod");
+  use.add_option("NAME", options->name, "The context")->required();
+  run_when_chosen(use, options, context, use_context);
+  add_context_set(command, context);
+  CLI::App& remove = add_one(command, "remove", "Remove a context; its files stay", "remove prod");
+  remove.add_option("NAME", options->name, "The context")->required();
+  run_when_chosen(remove, options, context, remove_context);
+}
+
+}  // namespace locus::cli

@@ -1,0 +1,35 @@
+// Global options that choose the server and the credentials of its connection: on the line, in the environment, or in a
+// named context. For run.h and Context. Functions without state.
+#ifndef LOCUS_CLIENT_CLI_CONNECTION_OPTIONS_H_
+#define LOCUS_CLIENT_CLI_CONNECTION_OPTIONS_H_
+
+#include <string>
+
+#include "CLI/CLI.hpp"
+#include "absl/status/status.h"
+#include "client/lib/client.h"
+#include "client/lib/options.h"
+
+namespace locus::cli {
+
+struct ConnectionOptions {
+  std::string address = client::kDefaultAddress;
+  std::string context = {};  // name of the context; empty = the default one, if no address is given
+  client::CredentialOptions credentials = {};
+};
+
+// Names of the options that add_connection_options() adds.
+inline constexpr const char* kConnectionOptionNames[] = {"--address", "--context", "--tls",       "--ca",
+                                                         "--cert",    "--key",     "--token-file"};
+
+// Adds the options to the parser, with their environment variables.
+void add_connection_options(CLI::App& app, ConnectionOptions& options);
+
+// Fills in the options that neither the line nor the environment gives, from the named context or, if no address is
+// given, from the default context. `app` has parsed the line; `path` is the contexts file. Returns NOT_FOUND for an
+// unknown name, INVALID_ARGUMENT for a malformed file.
+absl::Status complete_from_context(const CLI::App& app, const std::string& path, ConnectionOptions& options);
+
+}  // namespace locus::cli
+
+#endif  // LOCUS_CLIENT_CLI_CONNECTION_OPTIONS_H_

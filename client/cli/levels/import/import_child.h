@@ -1,0 +1,40 @@
+// Child process that reads untrusted bytes: with limited memory, time and files, and with a filter of system calls. It
+// is a fork of the calling process, so it has the bytes to read in its memory, and it returns its answer over a pipe.
+// The child cannot change the memory of the caller, and the caller does not trust the child's answer. Used by
+// import_file(). Thread-safe. README.md says why a plain fork is enough.
+#ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_IMPORT_CHILD_H_
+#define LOCUS_CLIENT_CLI_LEVELS_IMPORT_IMPORT_CHILD_H_
+
+#include <cstdint>
+#include <string>
+
+#include "absl/functional/function_ref.h"
+#include "absl/status/statusor.h"
+#include "client/cli/levels/import/import_limits.h"
+
+namespace locus::cli {
+
+struct ChildLimits {
+  uint64_t memory_bytes = kImportMemoryBase;  // address space beyond that of the caller; unlimited in sanitizer builds
+  uint32_t seconds = kMaxImportSeconds;
+  uint32_t cpu_seconds = kMaxImportCpuSeconds;
+};
+
+// Returns the limits for a file of this size.
+ChildLimits limits_for(uint64_t file_bytes);
+
+struct ChildAnswer {
+  std::string bytes;
+  bool filtered = false;  // the filter of system calls was on
+};
+
+// Calls `produce` in a child process and returns its result. `what` names the file in errors. INVALID_ARGUMENT if the
+// child crashed, made a forbidden system call, or threw; RESOURCE_EXHAUSTED naming the limit if it exceeded one, or if
+// no process can be started. When this function returns, the child has ended and nothing of it is left. `produce` must
+// not use threads or locks of the caller, must not read files, and is cut off without its destructors.
+absl::StatusOr<ChildAnswer> run_in_child(absl::string_view what, const ChildLimits& limits,
+                                         absl::FunctionRef<std::string()> produce);
+
+}  // namespace locus::cli
+
+#endif  // LOCUS_CLIENT_CLI_LEVELS_IMPORT_IMPORT_CHILD_H_

@@ -1,0 +1,63 @@
+// Named contexts: the connection options of servers, in a file of the user. For `locus context` and --context.
+//   default = prod
+//   [prod]
+//   address = game.example.com:7575
+//   ca = /etc/game/ca.pem
+//   token_file = /etc/game/token
+// Lines that begin with # are ignored, and are lost when the file is written. The file never contains a token. Plain
+// data and functions without state.
+#ifndef LOCUS_CLIENT_CLI_SECURITY_SAVED_CONTEXTS_H_
+#define LOCUS_CLIENT_CLI_SECURITY_SAVED_CONTEXTS_H_
+
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+
+namespace locus::cli {
+
+// Connection options of one server. Empty = not set.
+struct SavedContext {
+  std::string address = {};
+  std::string tls = {};  // "true", "false" or empty
+  std::string ca = {};
+  std::string cert = {};
+  std::string key = {};
+  std::string token_file = {};
+};
+
+struct SavedContexts {
+  std::string default_name;  // empty = none
+  std::map<std::string, SavedContext> by_name;
+};
+
+// Returns the name and the value of each option of a context, in the order of the file.
+std::vector<std::pair<std::string, std::string>> fields_of(const SavedContext& context);
+
+// Returns the path of the user's file: locus/contexts in $XDG_CONFIG_HOME or in $HOME/.config. Empty if neither
+// variable is set.
+std::string default_contexts_path();
+
+// Parses the text of a contexts file. Returns INVALID_ARGUMENT with the file's name and the line.
+absl::StatusOr<SavedContexts> parse_contexts(absl::string_view file, absl::string_view text);
+// Returns the text of a contexts file.
+std::string contexts_text(const SavedContexts& contexts);
+
+// Reads the contexts. A missing file counts as a file without contexts.
+absl::StatusOr<SavedContexts> read_contexts(const std::string& path);
+// Writes the contexts with mode 0600, and creates the file's folder if it does not exist.
+absl::Status write_contexts(const std::string& path, const SavedContexts& contexts);
+
+// Returns the context of this name. Returns NOT_FOUND with the names that exist.
+absl::StatusOr<SavedContext> find_context(const SavedContexts& contexts, const std::string& name);
+
+// Returns OK if the name has 1 to 63 of a-z, A-Z, 0-9, `-`, `_` and `.`.
+absl::Status check_context_name(absl::string_view name);
+
+}  // namespace locus::cli
+
+#endif  // LOCUS_CLIENT_CLI_SECURITY_SAVED_CONTEXTS_H_

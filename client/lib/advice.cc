@@ -1,0 +1,58 @@
+#include "client/lib/advice.h"
+
+#include <iterator>
+
+#include "absl/strings/match.h"
+
+namespace locus::client {
+namespace {
+
+// Part of gRPC's message for a failed connection, and the advice for it.
+struct Advice {
+  absl::string_view symptom;
+  absl::string_view remedy;
+};
+
+// Advice for a connection that the server closed at once. gRPC cannot know the cause if TLS is off; with TLS 1.3 a
+// server refuses a client's certificate only after the client's handshake.
+constexpr absl::string_view kClosedAtOnce =
+    "the server ended the connection at once: it may require TLS, or a client certificate that it knows";
+
+// Ordered: the first match is used.
+constexpr Advice kOnHandshakes[] = {
+    {": Permission denied",
+     "permission denied: the socket's file admits other users only; the server's operator can set --unix-mode and "
+     "--unix-owner"},
+    {"wrong version number", "the server does not use TLS: connect without it"},
+    {"certificate verify failed",
+     "the server's certificate does not come from a known authority, or has expired: give the CA file of the server's "
+     "operator"},
+    {"is not in peer certificate",
+     "the server's certificate is for other names: use the name in the certificate as address or as server name"},
+    {"Ssl handshake failed", "the server and this client do not agree on TLS: compare their certificates and CA files"},
+    {"failed to connect to all addresses; last error: UNAVAILABLE", kClosedAtOnce},
+};
+
+}  // namespace
+
+std::string advice_on_handshake(absl::string_view message) {
+  for (const Advice& advice : kOnHandshakes) {
+    if (absl::StrContains(message, advice.symptom)) return std::string(advice.remedy);
+  }
+  return "";
+}
+
+std::string advice_on(absl::StatusCode code, absl::string_view message) {
+  switch (code) {
+    case absl::StatusCode::kUnauthenticated:
+      return "give a valid token or a client certificate";
+    case absl::StatusCode::kPermissionDenied:
+      return "ask the operator of the server for the right to do this";
+    case absl::StatusCode::kUnavailable:
+      return advice_on_handshake(message);
+    default:
+      return "";
+  }
+}
+
+}  // namespace locus::client

@@ -1,0 +1,31 @@
+// Files with certificates and keys, checked before gRPC uses them, since gRPC reports mistakes in them only to its own
+// log. Internal to the library. Functions without state; any thread.
+#ifndef LOCUS_CLIENT_LIB_PEM_FILE_H_
+#define LOCUS_CLIENT_LIB_PEM_FILE_H_
+
+#include <cstddef>
+#include <string>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+
+namespace locus::client {
+
+inline constexpr size_t kMaxCredentialBytes = size_t{1} << 20;
+
+// Returns the content of a file with credentials. `option` names the option in messages. Returns NOT_FOUND if there is
+// no such file, FAILED_PRECONDITION if it cannot be read, INVALID_ARGUMENT if it is empty or larger than
+// kMaxCredentialBytes.
+absl::StatusOr<std::string> read_small_file(absl::string_view option, const std::string& file);
+
+// Checks that the text has at least one certificate and no malformed one. Returns INVALID_ARGUMENT with `file`.
+absl::Status check_certificates(const std::string& file, absl::string_view pem);
+
+// Checks that the text has a private key without password, and that the key is the one of the first certificate of
+// `certificates`. Returns INVALID_ARGUMENT with `file`.
+absl::Status check_key(const std::string& file, absl::string_view pem, absl::string_view certificates);
+
+}  // namespace locus::client
+
+#endif  // LOCUS_CLIENT_LIB_PEM_FILE_H_

@@ -1,0 +1,50 @@
+#include "core/scene/snapshot/scene_snapshot.h"
+
+#include <algorithm>
+
+#include "core/base/check.h"
+
+namespace locus {
+namespace {
+
+// Returns the first history record of `snapshot` at or after `tick`, or null if there is no such record.
+const HistoryRecord* first_record(const SceneSnapshot& snapshot, uint64_t tick) {
+  if (snapshot.history == nullptr) return nullptr;
+  const auto& records = snapshot.history->records;
+  const auto first = std::lower_bound(
+      records.begin(), records.end(), tick,
+      [](const std::shared_ptr<const HistoryRecord>& record, uint64_t at) { return record->tick < at; });
+  return first == records.end() ? nullptr : first->get();
+}
+
+// Returns the bytes of the history records of `held` that `later` does not hold. HistoryRecord::bytes excludes memory
+// shared with the next record: this memory is counted with the next record, or is still held by `later` and so not
+// counted.
+uint64_t unshared_history_bytes(const SceneSnapshot& held, const SceneSnapshot& later) {
+  if (held.history == nullptr || held.history == later.history) return 0;
+  uint64_t bytes = 0;
+  for (const std::shared_ptr<const HistoryRecord>& record : held.history->records) {
+    const HistoryRecord* kept = first_record(later, record->tick);
+    if (kept == record.get()) continue;
+    // Appending a record replaces the record before it by a copy with the same objects, so compare the objects.
+    const bool same_tick = kept != nullptr && kept->tick == record->tick;
+    bytes += same_tick ? record->objects.unshared_bytes(kept->objects) : record->bytes;
+  }
+  return bytes;
+}
+
+}  // namespace
+
+uint64_t unshared_bytes(const SceneSnapshot& held, const SceneSnapshot& later) {
+  LOCUS_DCHECK_LE(held.revision, later.revision);
+  const uint64_t statics = held.statics == later.statics ? 0 : held.statics->bytes();
+  // Compare with the oldest set of objects since `held` that `later` holds: this set shares the most memory with
+  // `held`.
+  const HistoryRecord* next = first_record(later, held.tick);
+  return statics + held.objects.unshared_bytes(next == nullptr ? later.objects : next->objects) +
+         unshared_history_bytes(held, later);
+}
+
+uint64_t bytes_of(const SceneSnapshot& snapshot) { return snapshot.statics->bytes() + snapshot.objects.bytes(); }
+
+}  // namespace locus

@@ -1,0 +1,147 @@
+// Accepts the connections of all listening sockets. A new connection must pass the limits and begin like a client of
+// gRPC, in time; only then it is handed over to gRPC. The acceptor keeps a duplicate of the connection's descriptor, so
+// that the connection can be closed from this side, and releases it when the connection has ended.
+//
+// Threads: one thread does all work and calls the hooks; the members may be called from any thread. Invariant: each
+// admitted connection is counted by the limiter until it has ended, and is in exactly one of two states: opening, with
+// the acceptor owning its only descriptor, or handed over, with an entry in the table.
+#ifndef LOCUS_SERVER_CONNECTIONS_ACCEPTOR_H_
+#define LOCUS_SERVER_CONNECTIONS_ACCEPTOR_H_
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "absl/container/flat_hash_map.h"
+#include "absl/strings/string_view.h"
+#include "core/base/mutex.h"
+#include "server/connections/connection.h"
+#include "server/connections/connection_limiter.h"
+#include "server/connections/connection_table.h"
+#include "server/connections/first_bytes.h"
+#include "server/connections/flood_guard.h"
+#include "server/connections/listening_socket.h"
+
+namespace locus::server {
+
+struct AcceptorOptions {
+  ConnectionLimits limits;
+  Transport tcp_transport = Transport::kPlain;   // unix sockets are always plain
+  std::chrono::milliseconds opening_timeout{0};  // maximum time for the first bytes of a client; 0 = none
+  std::chrono::milliseconds idle_timeout{0};     // maximum time without an open call; 0 = none
+};
+
+// Functions that the acceptor calls on its thread.
+struct AcceptorHooks {
+  // Takes over the descriptor, which does not block, of a connection that the table already contains.
+  std::function<void(int descriptor, const Connection& connection)> hand_over;
+  // Reports refused connections, at most once a second: how many since the last report, the last peer and its reason.
+  std::function<void(uint64_t refused, const std::string& address, const char* reason)> refused;
+};
+
+// Numbers of connections since the start.
+struct AcceptorStats {
+  uint64_t accepted = 0;          // accepted by the kernel, including those of the next lines
+  uint64_t refused_full = 0;      // over the limit on all connections
+  uint64_t refused_address = 0;   // over the limit of their address
+  uint64_t refused_too_fast = 0;  // over the limit on new connections of their address
+  uint64_t refused_bytes = 0;     // did not begin like a client of gRPC
+  uint64_t timed_out = 0;         // did not begin in time, or were idle for too long
+  uint64_t ended = 0;             // handed over, and ended since
+};
+
+class Acceptor {
+ public:
+  // Starts the thread. `sockets` already listen, so clients wait until this is called. `table` and `guard` must outlive
+  // the acceptor.
+  Acceptor(std::vector<ListeningSocket> sockets, const AcceptorOptions& options, ConnectionTable& table,
+           FloodGuard& guard, AcceptorHooks hooks);
+  // Ends the thread and releases all connections, open or not.
+  ~Acceptor();
+  Acceptor(const Acceptor&) = delete;
+  Acceptor& operator=(const Acceptor&) = delete;
+
+  // Closes the listening sockets and the connections that are still opening; connections that were handed over stay.
+  // When it returns, no further connection is handed over.
+  void stop_accepting() LOCUS_EXCLUDES(mutex_);
+
+  AcceptorStats stats() const;
+
+ private:
+  using Time = std::chrono::steady_clock::time_point;
+
+  // A connection from accept() until its end.
+  struct Entry {
+    Peer peer;
+    Transport transport = Transport::kPlain;
+    int descriptor = -1;                     // descriptor of an opening connection
+    std::shared_ptr<Connection> connection;  // connection that was handed over
+    Time since;                              // time of accept(), or since which no call has been open
+    uint64_t calls_begun = 0;                // calls begun until the last check for idle connections
+  };
+  using Entries = absl::flat_hash_map<uint64_t, Entry>;
+
+  void run() LOCUS_EXCLUDES(mutex_);
+  // Returns the milliseconds until the next time that something is due, as an argument of epoll_wait().
+  int wait_time() const;
+  void handle(uint64_t id, uint32_t events, Time now);
+  void accept_some(ListeningSocket& listening, Time now);
+  void admit(int descriptor, const ListeningSocket& listening, Time now);
+  void opening(uint64_t id);
+  void hand_over(uint64_t id, Entry& entry);
+  void ended(uint64_t id);
+  void close_overdue(Time now);
+  void refuse(int descriptor, const std::string& address, const char* reason);
+  void report(Time now);
+  void pause(Time now);
+  void resume();
+  void close_sockets() LOCUS_EXCLUDES(mutex_);
+  void wake() const;
+  void add_event(int descriptor, uint32_t events, uint64_t id) const;
+
+  std::vector<ListeningSocket> sockets_;
+  const AcceptorOptions options_;
+  ConnectionTable& table_;
+  FloodGuard& guard_;
+  const AcceptorHooks hooks_;
+  const int epoll_;
+  const int wake_;
+
+  // Used by the thread only.
+  ConnectionLimiter limiter_;
+  Entries entries_;
+  uint64_t next_id_;
+  size_t opening_ = 0;
+  bool closed_ = false;  // the listening sockets are closed
+  bool paused_ = false;
+  Time resume_at_;
+  Time next_check_;
+  uint64_t unreported_ = 0;
+  Time last_report_;
+  std::string last_address_;
+  const char* last_reason_ = nullptr;
+
+  std::atomic<uint64_t> accepted_{0};
+  std::atomic<uint64_t> refused_full_{0};
+  std::atomic<uint64_t> refused_address_{0};
+  std::atomic<uint64_t> refused_too_fast_{0};
+  std::atomic<uint64_t> refused_bytes_{0};
+  std::atomic<uint64_t> timed_out_{0};
+  std::atomic<uint64_t> ended_{0};
+
+  std::atomic<bool> stop_{false};
+  std::atomic<bool> end_{false};
+  Mutex mutex_;
+  ConditionVariable stopped_changed_;
+  bool stopped_ LOCUS_GUARDED_BY(mutex_) = false;
+  std::thread thread_;
+};
+
+}  // namespace locus::server
+
+#endif  // LOCUS_SERVER_CONNECTIONS_ACCEPTOR_H_

@@ -1,0 +1,67 @@
+// Limits on connections: how many there may be in all and from one address, and how many new ones an address may open
+// in a second. The limiter only decides; the acceptor closes refused connections.
+//
+// Threads: one thread at a time; the current time is an argument. Invariants, in check_invariants(): no address has
+// more connections than there are in all, and no limit is exceeded.
+#ifndef LOCUS_SERVER_CONNECTIONS_CONNECTION_LIMITER_H_
+#define LOCUS_SERVER_CONNECTIONS_CONNECTION_LIMITER_H_
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+#include "absl/container/flat_hash_map.h"
+
+namespace locus::server {
+
+struct ConnectionLimits {
+  uint32_t connections = 4096;              // maximum for all addresses together
+  uint32_t connections_per_address = 1024;  // maximum for one address
+  uint32_t new_per_second = 200;            // new connections a second from one address, on average
+  uint32_t burst = 400;                     // new connections that an address may open at once
+};
+
+enum class Admission : uint8_t { kAdmitted, kFull, kAddressFull, kTooFast };
+
+class ConnectionLimiter {
+ public:
+  using Time = std::chrono::steady_clock::time_point;
+
+  explicit ConnectionLimiter(const ConnectionLimits& limits) : limits_(limits) {}
+
+  // Decides on a new connection of the address `key`, and counts it if it is admitted.
+  Admission admit(const std::string& key, Time now);
+  // Takes back one admitted connection of the address `key`.
+  void leave(const std::string& key);
+
+  // Takes `count` new connections from what the address `key` may open, because it has misused one. It may open none
+  // until they have been refilled, which takes at most as long as refilling two bursts.
+  void charge(const std::string& key, uint32_t count);
+
+  // Returns the number of admitted connections.
+  uint32_t connections() const { return connections_; }
+  // Returns the number of addresses that are remembered.
+  size_t addresses() const { return addresses_.size(); }
+
+ private:
+  struct Address {
+    uint32_t connections = 0;
+    double tokens = 0;  // new connections that may be opened now
+    Time updated;
+  };
+
+  void refill(Address& address, Time now) const;
+  // If many addresses are remembered, forgets the addresses that have no connections and may open a full burst again.
+  void forget_idle(Time now);
+  void check_invariants(const Address& changed) const;
+
+  const ConnectionLimits limits_;
+  uint32_t connections_ = 0;
+  size_t cleanup_at_ = 0;
+  absl::flat_hash_map<std::string, Address> addresses_;
+};
+
+}  // namespace locus::server
+
+#endif  // LOCUS_SERVER_CONNECTIONS_CONNECTION_LIMITER_H_

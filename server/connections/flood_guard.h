@@ -1,0 +1,117 @@
+// Closes connections that send more than their calls explain: floods of small frames, endless headers, and calls that
+// are begun only to be cancelled. gRPC reads such bytes without telling the application, so the guard compares what the
+// kernel has received with what the calls of the connection have read. gRPC also makes calls faster than the
+// application can accept and end them, so the guard asks gRPC how many streams of a connection it keeps in memory.
+// Users of a connection do nothing but count.
+//
+// Threads: watch() and forget() may be called from any thread. One thread of the guard looks at the connections that
+// have received something since its last look; others cost nothing.
+#ifndef LOCUS_SERVER_CONNECTIONS_FLOOD_GUARD_H_
+#define LOCUS_SERVER_CONNECTIONS_FLOOD_GUARD_H_
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <thread>
+
+#include "absl/container/flat_hash_map.h"
+#include "core/base/mutex.h"
+#include "server/connections/connection.h"
+
+namespace locus::server {
+
+// Budgets of one connection. See judge().
+struct FloodLimits {
+  uint64_t bytes_per_second = uint64_t{1} << 20;  // unexplained bytes that are always accepted
+  uint64_t burst_bytes = uint64_t{4} << 20;       // unexplained bytes that are accepted at once
+  // Bytes of a message that may have arrived although no call has read it yet: the limit on received messages, for each
+  // open call or stream, but not more than gRPC's buffers hold for all.
+  uint64_t message_bytes = uint64_t{32} << 20;
+  uint64_t buffered_bytes = uint64_t{256} << 20;
+  uint64_t cancelled_per_second = 1000;  // cancelled calls that are always accepted
+  // Streams that the transport may keep in memory for a connection: more than a client may have open at once.
+  uint64_t streams = 4096;
+};
+
+// State of a connection at one time.
+struct FloodSample {
+  std::chrono::steady_clock::time_point time;
+  ReceivedCounts received;
+  CallCounts counts;
+  std::optional<uint64_t> streams;  // streams that the transport keeps in memory, if they were counted
+};
+
+// State of a connection that is kept between two samples.
+struct FloodBudget {
+  FloodSample last;
+  double unexplained = 0;    // bytes received and not explained, less the bytes that are always accepted
+  uint64_t streams = 0;      // streams in memory when they were counted last
+  FloodSample second_begin;  // sample with which the present second of counting cancelled calls began
+};
+
+enum class FloodVerdict : uint8_t { kHonest, kTooManyBytes, kTooManyCancelled, kTooManyStreams };
+
+// Judges a connection by its sample, and updates `budget`, whose `last` and `second_begin` begin as the sample at which
+// the connection was accepted. Received bytes are explained by the metadata of a call, by a message with its frames,
+// and by written bytes, which window updates follow. Segments that carry little count as 64 bytes, which is what they
+// cost.
+FloodVerdict judge(const FloodSample& sample, const FloodLimits& limits, FloodBudget& budget);
+
+class FloodGuard {
+ public:
+  using OnClosed = std::function<void(const Connection& connection, const char* reason)>;
+  // Returns the number of streams of a connection that the transport keeps in memory: those that the peer has begun and
+  // that are not yet destroyed, whether or not their calls were accepted. Returns nullopt if the number is unknown.
+  using CountStreams = std::function<std::optional<uint64_t>(Connection& connection)>;
+
+  // Starts the thread, which calls `count_streams` for connections that send much beside messages, and `on_closed`
+  // after it has closed a connection.
+  FloodGuard(const FloodLimits& limits, CountStreams count_streams, OnClosed on_closed);
+  ~FloodGuard();
+  FloodGuard(const FloodGuard&) = delete;
+  FloodGuard& operator=(const FloodGuard&) = delete;
+
+  // Begins to look at a connection that was just accepted.
+  void watch(const std::shared_ptr<Connection>& connection) LOCUS_EXCLUDES(mutex_);
+  // Stops looking at the connection. Call it before Connection::release().
+  void forget(const Connection& connection) LOCUS_EXCLUDES(mutex_);
+
+  // Returns the number of connections that were closed.
+  uint64_t closed() const { return closed_.load(); }
+
+ private:
+  struct Watched {
+    std::shared_ptr<Connection> connection;
+    FloodBudget budget;
+    uint64_t uncounted_bytes = 0;                        // received beside messages since the streams were counted last
+    std::chrono::steady_clock::time_point window_begin;  // time of the last call of Connection::begin_cancel_window()
+  };
+
+  void run() LOCUS_EXCLUDES(mutex_);
+  // Waits until the next look is due. Returns false if the guard ends.
+  bool wait() LOCUS_EXCLUDES(mutex_);
+  void look() LOCUS_EXCLUDES(mutex_);
+  void look_at(const std::shared_ptr<Watched>& watched);
+  // Returns whether so much has arrived beside messages that the streams of the connection must be counted.
+  static bool must_count(const FloodSample& sample, Watched& watched);
+
+  const FloodLimits limits_;
+  const CountStreams count_streams_;
+  const OnClosed on_closed_;
+  const int epoll_;
+  std::atomic<uint64_t> closed_{0};
+  // Time until which the thread looks more often; used by the thread only.
+  std::chrono::steady_clock::time_point alert_until_;
+  Mutex mutex_;
+  ConditionVariable end_;
+  bool ended_ LOCUS_GUARDED_BY(mutex_) = false;
+  absl::flat_hash_map<const Connection*, std::shared_ptr<Watched>> watched_ LOCUS_GUARDED_BY(mutex_);
+  std::thread thread_;
+};
+
+}  // namespace locus::server
+
+#endif  // LOCUS_SERVER_CONNECTIONS_FLOOD_GUARD_H_

@@ -1,0 +1,185 @@
+#include "server/host/memory_keeper.h"
+
+#include <malloc.h>
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/check.h"
+#include "server/host/memory_lines.h"
+#include "server/observability/log.h"
+
+namespace locus::server {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::steady_clock;
+
+constexpr milliseconds kInterval{50};
+// Minimum intervals between two releases of free memory while memory is short or claims are refused, and otherwise. A
+// release visits the whole heap.
+constexpr milliseconds kReleaseInterval{1000};
+constexpr milliseconds kIdleReleaseInterval{5000};
+// Minimum interval between two looks at the readers of all scenes while memory is short. A look may visit much of what
+// they hold.
+constexpr milliseconds kReadersInterval{1000};
+// Minimum interval between two log lines about the refused claims of one line.
+constexpr milliseconds kRefusalsInterval{5000};
+
+std::vector<ScenePtr> all_scenes(const Registry& registry) {
+  return registry.list_scenes("", std::numeric_limits<size_t>::max());
+}
+
+uint64_t history_bytes(const Scene& scene) {
+  const SnapshotPtr snapshot = scene.latest();
+  return snapshot->history == nullptr ? 0 : snapshot->history->bytes;
+}
+
+}  // namespace
+
+std::vector<uint64_t> shrunk_sizes(const std::vector<uint64_t>& sizes, uint64_t excess) {
+  const uint64_t sum = std::accumulate(sizes.begin(), sizes.end(), uint64_t{0});
+  const double kept = sum <= excess ? 0.0 : static_cast<double>(sum - excess) / static_cast<double>(sum);
+  std::vector<uint64_t> shrunk;
+  for (const uint64_t size : sizes) shrunk.push_back(static_cast<uint64_t>(static_cast<double>(size) * kept));
+  return shrunk;
+}
+
+MemoryKeeper::MemoryKeeper(MemoryBudget& budget, Registry& registry, Shed shed)
+    : budget_(budget), registry_(registry), shed_(std::move(shed)) {
+  thread_ = std::thread([this] { run(); });
+}
+
+MemoryKeeper::~MemoryKeeper() {
+  {
+    const MutexLock lock(mutex_);
+    ended_ = true;
+    ended_changed_.notify_all();
+  }
+  thread_.join();
+}
+
+void MemoryKeeper::run() {
+  while (true) {
+    {
+      const MutexLock lock(mutex_);
+      const steady_clock::time_point next = steady_clock::now() + kInterval;
+      while (!ended_ && ended_changed_.wait_until(mutex_, next)) {
+      }
+      if (ended_) return;
+    }
+    keep();
+  }
+}
+
+void MemoryKeeper::keep() {
+  budget_.refresh();
+  const uint64_t enough = short_memory(budget_.limit());
+  const bool is_short = budget_.taken() > enough;
+  if (is_short) shed_connections();
+  const steady_clock::time_point now = steady_clock::now();
+  refused_ = budget_.take_shortage() || refused_;
+  const bool is_needed = is_short || refused_;
+  if (now - last_release_ >= (is_needed ? kReleaseInterval : kIdleReleaseInterval)) {
+    last_release_ = now;
+    refused_ = false;
+    release(is_needed);
+  }
+  if (const uint64_t taken = budget_.taken(); taken > enough) trim_histories(taken - enough);
+  if (is_short && now - last_readers_ >= kReadersInterval) {
+    last_readers_ = now;
+    revoke_readers();
+  }
+  log_refusals(now);
+}
+
+// Memory use is now far above the point at which inserts and uploads are refused and histories are shortened. What
+// still grows is memory that gRPC allocates for frames and that no call has claimed, for example for calls that are
+// cancelled at once, or for headers without an end.
+void MemoryKeeper::shed_connections() {
+  const bool is_full = budget_.measured() > budget_.ceiling(MemoryLine::kMoves);
+  const size_t closed = shed_(is_full);
+  if (closed == 0) return;
+  log(LogLevel::kWarning, "memory is nearly full: the connections that hold or send most were closed",
+      {{"connections", absl::StrCat(closed)}, {"memory_bytes", absl::StrCat(budget_.measured())}});
+}
+
+void MemoryKeeper::release(bool is_needed) {
+  if (is_needed) {
+    for (const ScenePtr& scene : all_scenes(registry_)) scene->forget_recent();
+  } else if (mallinfo2().fordblks <= cache_ceiling(budget_.limit())) {
+    return;
+  }
+  malloc_trim(0);
+  budget_.refresh();
+}
+
+void MemoryKeeper::trim_histories(uint64_t excess) {
+  std::vector<ScenePtr> scenes;
+  std::vector<uint64_t> sizes;
+  for (const ScenePtr& scene : all_scenes(registry_)) {
+    const uint64_t bytes = history_bytes(*scene);
+    if (bytes == 0) continue;
+    scenes.push_back(scene);
+    sizes.push_back(bytes);
+  }
+  if (scenes.empty()) return;
+  const std::vector<uint64_t> shrunk = shrunk_sizes(sizes, excess);
+  uint64_t trimmed = 0;
+  for (size_t i = 0; i < scenes.size(); ++i) trimmed += scenes[i]->trim_history(shrunk[i]);
+  if (trimmed == 0) return;
+  trimmed_bytes_.fetch_add(trimmed);
+  malloc_trim(0);
+  budget_.refresh();
+  log(LogLevel::kWarning, "memory is short: the oldest ticks of histories were dropped",
+      {{"dropped_bytes", absl::StrCat(trimmed)},
+       {"memory_bytes", absl::StrCat(budget_.taken())},
+       {"limit", absl::StrCat(budget_.limit())},
+       {"hint", "give scenes a smaller history_bytes, or the server a larger --memory-limit"}});
+}
+
+void MemoryKeeper::revoke_readers() {
+  const std::vector<ScenePtr> scenes = all_scenes(registry_);
+  std::vector<uint64_t> held;
+  for (const ScenePtr& scene : scenes) held.push_back(scene->status().pinned_bytes);
+  const uint64_t sum = std::accumulate(held.begin(), held.end(), uint64_t{0});
+  // Once inserts are refused, readers of old revisions also give way to them.
+  const uint64_t growth = budget_.ceiling(MemoryLine::kInserts), taken = budget_.taken();
+  const uint64_t excess = taken - std::min(taken, growth);
+  const uint64_t allowed = std::min(pinned_ceiling(budget_.limit()), sum - std::min(sum, excess));
+  if (sum <= allowed) return;
+  const std::vector<uint64_t> shrunk = shrunk_sizes(held, sum - allowed);
+  uint64_t revoked = 0;
+  for (size_t i = 0; i < scenes.size(); ++i)
+    if (held[i] > shrunk[i]) revoked += scenes[i]->revoke_readers(shrunk[i]);
+  if (revoked == 0) return;
+  revoked_bytes_.fetch_add(revoked);
+  log(LogLevel::kWarning, "memory is short: the readers of the oldest revisions were cancelled",
+      {{"pinned_bytes", absl::StrCat(sum)},
+       {"revoked_bytes", absl::StrCat(revoked)},
+       {"memory_bytes", absl::StrCat(taken)},
+       {"limit", absl::StrCat(budget_.limit())},
+       {"hint", "lower --pinned-limit, send smaller batches, or give the server a larger --memory-limit"}});
+}
+
+void MemoryKeeper::log_refusals(steady_clock::time_point now) {
+  if (now - last_refusals_ < kRefusalsInterval) return;
+  for (size_t i = 0; i < kMemoryLines; ++i) {
+    const auto line = static_cast<MemoryLine>(i);
+    const uint64_t refused = budget_.refused(line), before = std::exchange(logged_refusals_[i], refused);
+    if (refused == before) continue;
+    last_refusals_ = now;
+    log(LogLevel::kWarning, "memory is full: claims were refused",
+        {{"line", std::string(memory_line_name(line))},
+         {"refused", absl::StrCat(refused - before)},
+         {"ceiling", absl::StrCat(budget_.ceiling(line))},
+         {"memory_bytes", absl::StrCat(budget_.taken())},
+         {"limit", absl::StrCat(budget_.limit())},
+         {"hint", "`locus limits` shows what the memory is used for"}});
+  }
+}
+
+}  // namespace locus::server

@@ -1,0 +1,77 @@
+// Thread that keeps the memory of the process below its limit: measures the process periodically and, when memory runs
+// short or a claim was refused, drops old revisions, returns free memory to the kernel, drops the oldest ticks of
+// histories, so that histories give way before inserts and uploads are refused, and cancels the readers of the oldest
+// revisions. No other thread does this: it visits all scenes and the whole heap. Logs which lines of the budget gave
+// way or were refused.
+//
+// Threads: the constructor starts the thread, the destructor ends it.
+#ifndef LOCUS_SERVER_HOST_MEMORY_KEEPER_H_
+#define LOCUS_SERVER_HOST_MEMORY_KEEPER_H_
+
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <thread>
+#include <vector>
+
+#include "core/base/mutex.h"
+#include "core/scene/registry.h"
+#include "server/scheduling/memory_budget.h"
+
+namespace locus::server {
+
+// Returns the maximum size of each of several parts, so that all together take `excess` bytes less: each is shortened
+// in proportion to its size. `sizes` are the bytes of the parts.
+std::vector<uint64_t> shrunk_sizes(const std::vector<uint64_t>& sizes, uint64_t excess);
+
+class MemoryKeeper {
+ public:
+  // Function that closes the connections that hold most claims and send most, because what they send uses memory inside
+  // gRPC that is in no claim. With `close` false, it only measures what they send. Returns the number of closed
+  // connections.
+  using Shed = std::function<size_t(bool close)>;
+
+  // `budget` and `registry` must outlive the keeper.
+  MemoryKeeper(MemoryBudget& budget, Registry& registry, Shed shed);
+  ~MemoryKeeper();
+  MemoryKeeper(const MemoryKeeper&) = delete;
+  MemoryKeeper& operator=(const MemoryKeeper&) = delete;
+
+  // Measures the process, and frees memory if it is short. The thread calls it; tests may.
+  void keep();
+
+  // Returns the bytes by which histories were shortened so far.
+  uint64_t trimmed_bytes() const { return trimmed_bytes_.load(); }
+  // Returns the bytes that cancelled readers held so far.
+  uint64_t revoked_bytes() const { return revoked_bytes_.load(); }
+
+ private:
+  void run() LOCUS_EXCLUDES(mutex_);
+  // Returns free memory to the kernel. If memory is needed, first drops all revisions of each scene except the latest
+  // one; otherwise does nothing unless much memory is free.
+  void release(bool is_needed);
+  void trim_histories(uint64_t excess);
+  void shed_connections();
+  void revoke_readers();
+  void log_refusals(std::chrono::steady_clock::time_point now);
+
+  MemoryBudget& budget_;
+  Registry& registry_;
+  const Shed shed_;
+  std::atomic<uint64_t> trimmed_bytes_{0};
+  std::atomic<uint64_t> revoked_bytes_{0};
+  // Used by the thread only.
+  std::chrono::steady_clock::time_point last_release_{}, last_readers_{}, last_refusals_{};
+  bool refused_ = false;  // a claim was refused since the last release
+  std::array<uint64_t, kMemoryLines> logged_refusals_{};
+  Mutex mutex_;
+  ConditionVariable ended_changed_;
+  bool ended_ LOCUS_GUARDED_BY(mutex_) = false;
+  std::thread thread_;
+};
+
+}  // namespace locus::server
+
+#endif  // LOCUS_SERVER_HOST_MEMORY_KEEPER_H_

@@ -1,0 +1,42 @@
+// The lines of the memory budget as an operator sees them: what memory is used for, and the ceiling of each line. Work
+// in progress is claimed (server/scheduling/memory_budget.h), what stays is measured. The sum of all lines is about the
+// sum that the budget keeps below the memory limit: memory that claims have allocated already counts twice in it.
+//
+// Plain functions; any thread. Cost: O(scenes + meshes + memory that pinned revisions do not share).
+#ifndef LOCUS_SERVER_HOST_MEMORY_LINES_H_
+#define LOCUS_SERVER_HOST_MEMORY_LINES_H_
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/scene/log/update_log.h"
+#include "core/scene/registry.h"
+#include "server/scheduling/memory_budget.h"
+
+namespace locus::server {
+
+struct MemoryLineUse {
+  std::string name;      // such as "history" or "replies"
+  bool claimed = false;  // true: claimed before the memory exists; false: measured
+  uint64_t used = 0;     // bytes
+  // Bytes. Of claimed lines, and of scenes and meshes: the use of the whole process beyond which they may not grow. Of
+  // history: the use of the whole process beyond which it gives way. Of the others: the most that the line may take.
+  uint64_t ceiling = 0;
+};
+
+// Returns all lines, the claimed ones in the order in which they are refused. `log` may be null.
+std::vector<MemoryLineUse> memory_lines(const MemoryBudget& budget, const Registry& registry, const UpdateLog* log);
+
+// Returns the use of the whole process from which on memory is short: histories give way.
+uint64_t short_memory(uint64_t limit);
+// Returns the bytes that pinned revisions of all scenes may hold while memory is short.
+uint64_t pinned_ceiling(uint64_t limit);
+// Returns the bytes of free memory that the allocator may keep while memory is not short.
+uint64_t cache_ceiling(uint64_t limit);
+// Returns the bytes that gRPC's buffers may take, of messages in transit and of frames that no call has claimed.
+uint64_t network_ceiling(uint64_t limit);
+
+}  // namespace locus::server
+
+#endif  // LOCUS_SERVER_HOST_MEMORY_LINES_H_

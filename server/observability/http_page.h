@@ -1,0 +1,32 @@
+// Pages of the HTTP port: what a page function gets and returns. Plain data.
+#ifndef LOCUS_SERVER_OBSERVABILITY_HTTP_PAGE_H_
+#define LOCUS_SERVER_OBSERVABILITY_HTTP_PAGE_H_
+
+#include <functional>
+#include <map>
+#include <string>
+
+namespace locus::server {
+
+// Reader of a page, as a page function sees it. Every text is the reader's own choice, except the name in a
+// certificate, which was verified.
+struct HttpRequest {
+  std::string peer;              // address and port of the reader, as calls show it
+  std::string address;           // limit key of the reader's address; see connection.h
+  std::string authorization;     // value of the header `authorization`; empty = none
+  std::string certificate_name;  // see certificate_name.h; empty = no certificate
+};
+
+// A reply of code 401 gets the header `WWW-Authenticate: Bearer`.
+struct HttpReply {
+  int code = 200;
+  std::string content_type = "text/plain; charset=utf-8";
+  std::string body;
+};
+
+// Map from the path of a page, such as "/metrics", to the function that makes the page.
+using HttpPages = std::map<std::string, std::function<HttpReply(const HttpRequest&)>, std::less<>>;
+
+}  // namespace locus::server
+
+#endif  // LOCUS_SERVER_OBSERVABILITY_HTTP_PAGE_H_

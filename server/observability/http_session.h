@@ -1,0 +1,21 @@
+// One connection of the HTTP port: TLS if there is any, one request, its reply, the end. For http_server.cc only.
+#ifndef LOCUS_SERVER_OBSERVABILITY_HTTP_SESSION_H_
+#define LOCUS_SERVER_OBSERVABILITY_HTTP_SESSION_H_
+
+#include <boost/asio/ip/tcp.hpp>
+#include <functional>
+#include <utility>
+
+#include "server/observability/http_page.h"
+#include "server/observability/http_tls.h"
+
+namespace locus::server {
+
+// Serves a connection, on threads of the io_context of `socket`, which must have a strand of its own. Calls `ended`
+// there once, unless the io_context stops before. `pages` and `tls`, which is null without TLS, must outlive the
+// io_context's threads.
+void serve_http(boost::asio::ip::tcp::socket socket, HttpTls* tls, const HttpPages& pages, std::function<void()> ended);
+
+}  // namespace locus::server
+
+#endif  // LOCUS_SERVER_OBSERVABILITY_HTTP_SESSION_H_

@@ -1,0 +1,103 @@
+#include "server/rpc/receive.h"
+
+#include <google/protobuf/io/coded_stream.h>
+#include <google/protobuf/io/zero_copy_stream_impl_lite.h>
+#include <google/protobuf/wire_format_lite.h>
+#include <grpcpp/support/proto_buffer_reader.h>
+#include <grpcpp/support/proto_buffer_writer.h>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/base/check.h"
+#include "core/base/refusal.h"
+#include "core/base/status_macros.h"
+#include "server/rpc/inflate.h"
+
+namespace locus::server {
+namespace {
+
+using google::protobuf::Descriptor;
+using google::protobuf::FieldDescriptor;
+using google::protobuf::internal::WireFormatLite;
+using google::protobuf::io::CodedInputStream;
+using google::protobuf::io::CodedOutputStream;
+using google::protobuf::io::StringOutputStream;
+
+// Maximum size in bytes of a slice of a response.
+constexpr int kSliceBytes = 1 << 20;
+
+// Maximum size in bytes of a text in an envelope: names of scenes are shorter. Maximum size of all its fields.
+constexpr uint32_t kMaxEnvelopeText = 256;
+constexpr int kMaxEnvelopeBytes = 2048;
+
+// Copies one field to `to` if it is a number or a short text of the message `type`; skips it otherwise. Returns false
+// if the bytes end within the field.
+bool copy_scalar(uint32_t tag, const Descriptor& type, CodedInputStream& from, CodedOutputStream& to) {
+  const FieldDescriptor* const field = type.FindFieldByNumber(WireFormatLite::GetTagFieldNumber(tag));
+  const WireFormatLite::WireType wire = WireFormatLite::GetTagWireType(tag);
+  if (wire == WireFormatLite::WIRETYPE_START_GROUP || wire == WireFormatLite::WIRETYPE_END_GROUP) return false;
+  if (wire != WireFormatLite::WIRETYPE_LENGTH_DELIMITED)
+    return field == nullptr ? WireFormatLite::SkipField(&from, tag) : WireFormatLite::SkipField(&from, tag, &to);
+  uint32_t length = 0;
+  if (!from.ReadVarint32(&length) || length > INT32_MAX) return false;
+  const bool is_text = field != nullptr && field->cpp_type() == FieldDescriptor::CPPTYPE_STRING;
+  if (!is_text || length > kMaxEnvelopeText) return from.Skip(static_cast<int>(length));
+  std::string text;
+  if (!from.ReadString(&text, static_cast<int>(length))) return false;
+  to.WriteTag(tag);
+  to.WriteVarint32(length);
+  to.WriteString(text);
+  return true;
+}
+
+}  // namespace
+
+absl::StatusOr<CallMemory> parse_request(const Caller& caller, const WirePlan& plan, grpc::ByteBuffer& bytes,
+                                         google::protobuf::Message& request) {
+  std::vector<MemoryBudget::Claim> inflated;  // until the message is parsed
+  if (caller.state().max_inflated_bytes > 0 && is_gzip(bytes)) {
+    ASSIGN_OR_RETURN(inflated, inflate_gzip(caller.memory(), caller.state().max_inflated_bytes, bytes));
+  }
+  ASSIGN_OR_RETURN(const uint64_t parsed, plan.scan(bytes));
+  ASSIGN_OR_RETURN(CallMemory claim, caller.claim(MemoryLine::kRequests, "", parsed));
+  bool good = false;
+  {
+    grpc::ProtoBufferReader reader(&bytes);
+    good = request.ParseFromZeroCopyStream(&reader);
+  }
+  bytes.Clear();
+  if (good) return claim;
+  return refuse_argument(Reason::kMalformed, "", {}, "the bytes are no message of this call's type");
+}
+
+bool parse_envelope(const grpc::ByteBuffer& bytes, google::protobuf::Message& request) {
+  grpc::ByteBuffer borrowed(bytes);  // shares the slices: the reader takes a pointer to a buffer that is not const
+  grpc::ProtoBufferReader reader(&borrowed);
+  if (!reader.status().ok()) return false;
+  CodedInputStream in(&reader);
+  std::string fields;
+  {
+    StringOutputStream stream(&fields);
+    CodedOutputStream out(&stream);
+    while (const uint32_t tag = in.ReadTag())
+      if (!copy_scalar(tag, *request.GetDescriptor(), in, out) || out.ByteCount() > kMaxEnvelopeBytes) return false;
+  }
+  return in.ConsumedEntireMessage() && request.ParseFromString(fields);
+}
+
+grpc::ByteBuffer to_bytes(const google::protobuf::Message& response) {
+  grpc::ByteBuffer bytes;
+  const size_t size = response.ByteSizeLong();
+  LOCUS_CHECK_LE(size, size_t{INT32_MAX});  // responses are far below the maximum size of a message
+  bool written = false;
+  {
+    grpc::ProtoBufferWriter writer(&bytes, kSliceBytes, static_cast<int>(size));
+    written = response.SerializeToZeroCopyStream(&writer);
+  }
+  LOCUS_CHECK(written);
+  return bytes;
+}
+
+}  // namespace locus::server

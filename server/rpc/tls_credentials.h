@@ -1,0 +1,91 @@
+// TLS for the connections of a server: the credentials for gRPC, and a thread that looks for changed files each second.
+// New connections use the newest good files; connections that exist keep theirs, so no call is dropped. Files that
+// cannot be used are logged as an error once, and the files before them stay in use. Certificate, key and client CA are
+// always replaced together, in memory, so a key is never used with another certificate. The owner ends the connections
+// of clients that are no longer trusted, through TlsHooks.
+//
+// gRPC asks for new files when a connection begins. It does so without a lock, which is safe because only one thread,
+// that of the acceptor, gives connections to gRPC.
+//
+// Threads: the members may be called from any thread.
+#ifndef LOCUS_SERVER_RPC_TLS_CREDENTIALS_H_
+#define LOCUS_SERVER_RPC_TLS_CREDENTIALS_H_
+
+#include <grpc/grpc_security.h>
+#include <grpcpp/security/server_credentials.h>
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "absl/status/statusor.h"
+#include "core/base/mutex.h"
+#include "server/security/tls_files.h"
+
+namespace locus::server {
+
+// Functions that the thread calls, and authority_removed also reload(). They must not call the TlsCredentials.
+struct TlsHooks {
+  // Called after new files are in use in which a certificate of the client CA is missing. Connections that begin later
+  // use the new files.
+  std::function<void()> authority_removed = [] {};
+  std::function<void()> second_passed = [] {};  // called each second
+};
+
+class TlsCredentials {
+ public:
+  // Reads the files and starts the thread. Returns an error that names the file and the reason if they cannot be used.
+  static absl::StatusOr<std::unique_ptr<TlsCredentials>> start(const TlsFiles& files, TlsHooks hooks = {});
+  // Ends the thread. The gRPC server must have ended before.
+  ~TlsCredentials();
+  TlsCredentials(const TlsCredentials&) = delete;
+  TlsCredentials& operator=(const TlsCredentials&) = delete;
+
+  // Returns credentials for TLS 1.2 and 1.3, for one acceptor. If there is a file of client CAs, every client must have
+  // a certificate that one of them has signed.
+  std::shared_ptr<grpc::ServerCredentials> grpc_credentials();
+
+  // Reads the files again at once. Returns whether they have changed and are in use from now on.
+  bool reload() LOCUS_EXCLUDES(mutex_);
+
+  // Returns the contents in use.
+  TlsContents contents() const LOCUS_EXCLUDES(mutex_);
+
+  // Return how often changed files were taken into use, and how often they could not be used.
+  uint64_t reloads() const { return reloads_.load(); }
+  uint64_t failures() const { return failures_.load(); }
+
+ private:
+  TlsCredentials(const TlsFiles& files, TlsHooks hooks, TlsContents contents);
+  static grpc_ssl_certificate_config_reload_status fetch(void* self, grpc_ssl_server_certificate_config** config);
+  // Certificates of the client CA, in PEM.
+  struct Change {
+    std::string before;
+    std::string now;
+  };
+  // Takes `contents` into use if they are new and good; otherwise returns nullopt.
+  std::optional<Change> replace(absl::StatusOr<TlsContents> contents) LOCUS_EXCLUDES(mutex_);
+  void run() LOCUS_EXCLUDES(mutex_);
+  void note_failure(const absl::Status& why) LOCUS_REQUIRES(mutex_);
+
+  const TlsFiles files_;
+  const TlsHooks hooks_;
+  std::atomic<uint64_t> reloads_{0};
+  std::atomic<uint64_t> failures_{0};
+  mutable Mutex mutex_;
+  ConditionVariable end_;
+  bool ended_ LOCUS_GUARDED_BY(mutex_) = false;
+  TlsContents contents_ LOCUS_GUARDED_BY(mutex_);
+  bool fetched_ LOCUS_GUARDED_BY(mutex_) = false;       // gRPC has the present contents
+  absl::Status last_failure_ LOCUS_GUARDED_BY(mutex_);  // OK if the files are in use
+  bool logged_ LOCUS_GUARDED_BY(mutex_) = false;        // the last failure is logged
+  std::thread thread_;
+};
+
+}  // namespace locus::server
+
+#endif  // LOCUS_SERVER_RPC_TLS_CREDENTIALS_H_

@@ -1,0 +1,17 @@
+// Name in a client's certificate, by which grants know the client. A pure function; any thread.
+#ifndef LOCUS_SERVER_SECURITY_CERTIFICATE_NAME_H_
+#define LOCUS_SERVER_SECURITY_CERTIFICATE_NAME_H_
+
+#include <openssl/x509.h>
+
+#include <string>
+
+namespace locus::server {
+
+// Returns the first URI among the alternative names, or else the first DNS name, or else the common name of the
+// subject, as the gRPC port does. Returns an empty text if there is none. The caller has verified the certificate.
+std::string certificate_name(const X509& certificate);
+
+}  // namespace locus::server
+
+#endif  // LOCUS_SERVER_SECURITY_CERTIFICATE_NAME_H_

@@ -1,0 +1,82 @@
+// Watches a few files by looking at them periodically, which also detects files that are replaced by renaming and works
+// on every file system. A change is reported when the files have looked the same twice in a row, so that a file that is
+// being written is not read half-done. A change that could not be handled is reported again until it could.
+//
+// Threads: one thread looks and calls the function; it ends in the destructor.
+#ifndef LOCUS_SERVER_SECURITY_FILE_WATCHER_H_
+#define LOCUS_SERVER_SECURITY_FILE_WATCHER_H_
+
+#include <sys/types.h>
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "core/base/mutex.h"
+#include "server/security/security_limits.h"
+
+namespace locus::server {
+
+// State of a file as far as stat() shows it; all 0 = there is none, or it cannot be seen.
+struct FileMark {
+  uint64_t device = 0;
+  uint64_t inode = 0;
+  uint64_t bytes = 0;
+  int64_t modified_ns = 0;
+  int64_t changed_ns = 0;
+
+  bool operator==(const FileMark&) const = default;
+};
+// Returns the state of a file, following symbolic links.
+FileMark mark_of(const std::string& file);
+
+// Decides when a change is to be reported, without a thread. One thread at a time.
+class FileChanges {
+ public:
+  using Mark = std::function<FileMark(const std::string& file)>;
+  FileChanges(std::vector<std::string> files, Mark mark = mark_of);
+
+  // Looks at all files. Returns true if they differ from those last reported, and have not changed since the previous
+  // look.
+  bool look();
+
+ private:
+  std::vector<FileMark> marks() const;
+
+  const std::vector<std::string> files_;
+  const Mark mark_;
+  std::vector<FileMark> reported_;
+  std::vector<FileMark> previous_;
+};
+
+class FileWatcher {
+ public:
+  // Calls `read` at once, because files may have changed since their owner read them, then looks every `pause` and
+  // calls `read` after each change. While `read` returns false, calls it again every `retry`, even without a change.
+  FileWatcher(std::vector<std::string> files, std::function<bool()> read,
+              std::chrono::milliseconds pause = std::chrono::milliseconds(kFileWatchMilliseconds),
+              std::chrono::milliseconds retry = std::chrono::milliseconds(kFileRetryMilliseconds));
+  ~FileWatcher();
+  FileWatcher(const FileWatcher&) = delete;
+  FileWatcher& operator=(const FileWatcher&) = delete;
+
+ private:
+  bool wait() LOCUS_EXCLUDES(mutex_);
+  void run() LOCUS_EXCLUDES(mutex_);
+
+  const std::function<bool()> read_;
+  const std::chrono::milliseconds pause_;
+  const std::chrono::milliseconds retry_;
+  FileChanges changes_;  // used by the thread only
+  Mutex mutex_;
+  ConditionVariable stop_;
+  bool stopping_ LOCUS_GUARDED_BY(mutex_) = false;
+  std::thread thread_;
+};
+
+}  // namespace locus::server
+
+#endif  // LOCUS_SERVER_SECURITY_FILE_WATCHER_H_

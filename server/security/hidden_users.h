@@ -1,0 +1,16 @@
+// Finds out whether the kernel can tell the users of unix sockets apart here. A pure function; any thread.
+#ifndef LOCUS_SERVER_SECURITY_HIDDEN_USERS_H_
+#define LOCUS_SERVER_SECURITY_HIDDEN_USERS_H_
+
+#include "absl/strings/string_view.h"
+
+namespace locus::server {
+
+// Returns whether a user namespace shows some users of the machine as the user `nobody`. `uid_map` is the text of
+// /proc/self/uid_map: lines of a first user inside, a first user outside, and a number of users. An empty or malformed
+// text hides nobody.
+bool hides_users(absl::string_view uid_map);
+
+}  // namespace locus::server
+
+#endif  // LOCUS_SERVER_SECURITY_HIDDEN_USERS_H_

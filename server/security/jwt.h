@@ -1,0 +1,49 @@
+// Verifies JSON Web Tokens with the public keys of a JWKS file. Accepted algorithms: RS256, ES256 and EdDSA (Ed25519),
+// each only with a key of its type; never `none`, and never a shared secret (HS256).
+//
+// Immutable; any thread. Sources: RFC 7515 (JWS), 7517 (JWK), 7519 (JWT), 8037 (EdDSA), 8725 (good practice).
+#ifndef LOCUS_SERVER_SECURITY_JWT_H_
+#define LOCUS_SERVER_SECURITY_JWT_H_
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+#include "server/security/identity.h"
+#include "server/security/signature_key.h"
+
+namespace locus::server {
+
+class JwtVerifier {
+ public:
+  // Parses the text of a JWKS file; `file` is its name in errors. Keys that are not for signatures or of another type
+  // are skipped, with a sentence in `warnings`. Returns INVALID_ARGUMENT if the text is no JWKS, has a private or
+  // secret key, a key that is too weak (RSA below 2048 bits) or wrong, or no usable key; or if `audience` is empty.
+  static absl::StatusOr<JwtVerifier> parse(absl::string_view file, absl::string_view text, absl::string_view audience,
+                                           absl::string_view issuer, std::vector<std::string>& warnings);
+
+  // Returns the identity `jwt:SUBJECT` that a JWT proves at `now` (seconds since 1970). Returns UNAUTHENTICATED if
+  // anything about it is wrong: form, algorithm, signature, audience, issuer or times, which may be off by
+  // kJwtSkewSeconds. The text of the error says which.
+  absl::StatusOr<IdentityPtr> verify(absl::string_view jwt, int64_t now) const;
+
+  // Returns whether a key with this thumbprint, as in Identity::credential, is in the file.
+  bool has_key(absl::string_view thumbprint) const;
+
+ private:
+  JwtVerifier() = default;
+
+  absl::Status check_signature(absl::string_view header, absl::string_view signed_text, absl::string_view signature,
+                               const SignatureKey** key) const;
+  absl::Status check_claims(const json_t* claims, int64_t now) const;
+
+  std::vector<SignatureKey> keys_;
+  std::string audience_;
+  std::string issuer_;
+};
+
+}  // namespace locus::server
+
+#endif  // LOCUS_SERVER_SECURITY_JWT_H_

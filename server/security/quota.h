@@ -1,0 +1,52 @@
+// Quotas of one identity or connection: how much it may use at a time or in a second. Plain data; any thread.
+#ifndef LOCUS_SERVER_SECURITY_QUOTA_H_
+#define LOCUS_SERVER_SECURITY_QUOTA_H_
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+
+#include "absl/strings/string_view.h"
+
+namespace locus::server {
+
+// Subject of a quota. The first three are rates, in units a second; the others are amounts in use at a time.
+enum class QuotaKind : uint8_t {
+  kQueries,        // queries of batches
+  kWork,           // nodes, cells and primitive tests that queries visited
+  kUpdateItems,    // items of update batches
+  kBytesInFlight,  // memory claimed by calls in progress: parsed requests, their work, replies not yet taken
+  kOpenStreams,
+  kObjects,       // objects in the scenes that the identity created
+  kScenes,        // scenes that it created
+  kMeshBytes,     // memory of the meshes that it uploaded; a content with several names counts for each name
+  kHistoryBytes,  // sum of history_bytes of the scenes that it created: the most that their histories may take
+};
+inline constexpr size_t kQuotaKinds = 9;
+inline constexpr std::array<absl::string_view, kQuotaKinds> kQuotaNames = {
+    "queries_per_s", "work_per_s", "update_items_per_s", "bytes_in_flight", "open_streams",
+    "objects",       "scenes",     "mesh_bytes",         "history_bytes"};
+
+constexpr absl::string_view quota_name(QuotaKind kind) { return kQuotaNames[static_cast<size_t>(kind)]; }
+constexpr bool is_rate(QuotaKind kind) { return kind <= QuotaKind::kUpdateItems; }
+// Returns whether a connection can have a quota of the kind: the others count what stays when a connection ends.
+constexpr bool is_of_connections(QuotaKind kind) { return kind <= QuotaKind::kOpenStreams; }
+// Returns the kind of a name such as "open_streams"; nullopt if there is none.
+std::optional<QuotaKind> quota_named(absl::string_view name);
+
+inline constexpr double kNoQuota = std::numeric_limits<double>::infinity();
+inline constexpr double kDefaultBurstSeconds = 2;
+
+struct Quota {
+  std::array<double, kQuotaKinds> limits = {kNoQuota, kNoQuota, kNoQuota, kNoQuota, kNoQuota,
+                                            kNoQuota, kNoQuota, kNoQuota, kNoQuota};
+  double burst_s = kDefaultBurstSeconds;  // seconds of an unused rate that may be used at once
+
+  double of(QuotaKind kind) const { return limits[static_cast<size_t>(kind)]; }
+};
+
+}  // namespace locus::server
+
+#endif  // LOCUS_SERVER_SECURITY_QUOTA_H_

@@ -1,0 +1,38 @@
+// Options of access control: the files that say who may do what, and the file that records it. Plain data.
+#ifndef LOCUS_SERVER_SECURITY_SECURITY_OPTIONS_H_
+#define LOCUS_SERVER_SECURITY_SECURITY_OPTIONS_H_
+
+#include <cstdint>
+#include <string>
+
+namespace locus::server {
+
+// If all files are empty, access control is off: every caller is `anonymous` and may do everything.
+struct SecurityOptions {
+  // File of grants and quotas (see access_file.h). If it is empty but a token file or JWKS file is given, every caller
+  // with a valid token, JWT or certificate may do everything, and all others nothing.
+  std::string access_file;
+
+  // File of the tokens that are accepted (see token_file.h); empty = none.
+  std::string token_file;
+
+  // JSON Web Key Set with the public keys of those who issue JWTs (see jwt.h); empty = JWTs are not accepted.
+  std::string jwks_file;
+
+  // Audience that a JWT must name; required with `jwks_file`.
+  std::string jwt_audience;
+
+  // Issuer that a JWT must name; empty = any that signs with a key of `jwks_file`.
+  std::string jwt_issuer;
+
+  // File to which each change is appended as a line of JSON; refusals are appended to `audit_file`.refused (see
+  // audit_log.h). Empty = none.
+  std::string audit_file;
+
+  // Size in bytes after which an audit file is renamed to `audit_file`.1 and a new one begun; at least 65,536.
+  uint64_t audit_bytes = uint64_t{64} << 20;
+};
+
+}  // namespace locus::server
+
+#endif  // LOCUS_SERVER_SECURITY_SECURITY_OPTIONS_H_

@@ -1,0 +1,66 @@
+// Access control of a server: reads the files of identities, rights and quotas, reads them again when they change, and
+// makes running calls check their rights after each change and once their credentials expire.
+//
+// Threads: reload() from any thread. Between start() and stop(), one thread watches the files and another one looks for
+// expired credentials.
+#ifndef LOCUS_SERVER_SERVICES_ACCESS_H_
+#define LOCUS_SERVER_SERVICES_ACCESS_H_
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <thread>
+
+#include "absl/status/statusor.h"
+#include "core/base/mutex.h"
+#include "server/config/server_config.h"
+#include "server/rpc/rpc_state.h"
+#include "server/security/access_control.h"
+#include "server/security/file_watcher.h"
+
+namespace locus::server {
+
+class Access {
+ public:
+  // Reads the files that `config` names and sets `state.access`. Returns an error that names the file and its mistake.
+  // `state` must outlive the result.
+  static absl::StatusOr<std::unique_ptr<Access>> open(const ServerConfig& config, RpcState& state);
+  ~Access();
+  Access(const Access&) = delete;
+  Access& operator=(const Access&) = delete;
+
+  // Reads the files once more and starts to watch them, and to write what the audit log counts. `recheck_calls` makes
+  // every running call check its rights; it is called after each change, and twice a second because credentials expire.
+  void start(std::function<void()> recheck_calls);
+  // Ends the threads. `recheck_calls` is not called afterwards.
+  void stop();
+
+  // Reads the files again. If one has a mistake, everything stays as it was, and the mistake is logged as an error.
+  void reload();
+
+ private:
+  Access(RpcState& state, std::unique_ptr<AccessControl> control) : state_(state), control_(std::move(control)) {}
+  // Logs the result of reading the files.
+  void report(const absl::Status& status) const;
+  // Reads the files again for the watcher. Returns whether they had no mistake. Logs a mistake once, although the
+  // watcher repeats a failed reading each second.
+  bool reload_watched();
+  void run_clock() LOCUS_EXCLUDES(mutex_);
+  // Calls recheck_ unless stop() was called.
+  void recheck() LOCUS_EXCLUDES(mutex_);
+
+  RpcState& state_;
+  const std::unique_ptr<AccessControl> control_;
+  std::function<void()> recheck_;
+  absl::Status last_reading_;     // used by the watcher's thread only
+  bool read_by_watcher_ = false;  // used by the watcher's thread only
+  std::optional<FileWatcher> watcher_;
+  std::thread clock_;
+  Mutex mutex_;
+  ConditionVariable ended_changed_;
+  bool ended_ LOCUS_GUARDED_BY(mutex_) = false;
+};
+
+}  // namespace locus::server
+
+#endif  // LOCUS_SERVER_SERVICES_ACCESS_H_

@@ -1,0 +1,144 @@
+#include "server/services/connections.h"
+
+#include <grpcpp/security/server_credentials.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
+#include "server/config/connection_limits.h"
+#include "server/config/listen_address.h"
+#include "server/observability/log.h"
+#include "server/scheduling/clocks.h"
+
+namespace locus::server {
+namespace {
+
+// Returns the configured maximum number of connections; without one, the number for which the process may open enough
+// files.
+uint32_t max_connections(const ServerConfig& config) {
+  if (config.max_connections > 0) return config.max_connections;
+  rlimit files{};
+  if (getrlimit(RLIMIT_NOFILE, &files) != 0 || files.rlim_cur == RLIM_INFINITY) return kDefaultConnections;
+  const uint64_t spare = files.rlim_cur > kReservedFiles ? files.rlim_cur - kReservedFiles : 0;
+  return static_cast<uint32_t>(std::clamp<uint64_t>(spare / kFilesPerConnection, kMinConnections, kDefaultConnections));
+}
+
+AcceptorOptions acceptor_options(const ServerConfig& config) {
+  AcceptorOptions options;
+  options.limits.connections = max_connections(config);
+  options.limits.connections_per_address = config.max_connections_per_address;
+  options.limits.new_per_second = config.max_new_connections;
+  options.limits.burst = 2 * config.max_new_connections;
+  options.tcp_transport = config.tls_cert.empty() ? Transport::kPlain : Transport::kTls;
+  options.opening_timeout = std::chrono::seconds(config.handshake_timeout_s);
+  options.idle_timeout = std::chrono::seconds(config.idle_timeout_s);
+  return options;
+}
+
+// Streams that a connection may have in memory beyond the open ones: they have ended, but are not destroyed yet.
+constexpr uint64_t kEndedStreams = 512;
+
+FloodLimits flood_limits(const ServerConfig& config, uint32_t streams) {
+  FloodLimits limits;
+  limits.message_bytes = config.max_receive_bytes;
+  limits.streams = streams + kEndedStreams;
+  return limits;
+}
+
+void log_refused(uint64_t refused, const std::string& address, const char* reason) {
+  log(LogLevel::kWarning, "connections refused",
+      {{"count", absl::StrCat(refused)}, {"last_address", address}, {"reason", reason}});
+}
+
+void log_closed(const Connection& connection, const char* reason) {
+  log(LogLevel::kWarning, "connection closed", {{"peer", connection.peer().label}, {"reason", reason}});
+}
+
+void log_ended(size_t closed, const char* reason) {
+  if (closed == 0) return;
+  log(LogLevel::kWarning, "connections closed", {{"count", absl::StrCat(closed)}, {"reason", reason}});
+}
+
+// Returns functions that end the connections of clients whose certificate is no longer trusted. TLS checks certificates
+// only when a connection begins.
+TlsHooks tls_hooks(const ServerConfig& config, ConnectionTable& table) {
+  TlsHooks hooks;
+  if (config.tls_client_ca.empty()) return hooks;
+  hooks.authority_removed = [&table] {
+    constexpr const char* kReason = "a client CA was removed: clients must prove their certificates again";
+    log_ended(table.close_if([](const Connection& connection) { return !connection.peer().uid; }, kReason), kReason);
+  };
+  hooks.second_passed = [&table] {
+    constexpr const char* kReason = "the client's certificate has expired";
+    const int64_t now = unix_seconds();
+    const auto has_expired = [now](const Connection& connection) {
+      const int64_t end = connection.certificate_end.load(std::memory_order_relaxed);
+      return end != 0 && end <= now;
+    };
+    log_ended(table.close_if(has_expired, kReason), kReason);
+  };
+  return hooks;
+}
+
+}  // namespace
+
+Connections::Connections(const ServerConfig& config, ConnectionTable& table)
+    : config_(config), table_(table), stream_counter_(table) {}
+
+Connections::~Connections() = default;
+
+absl::StatusOr<std::unique_ptr<Connections>> Connections::listen(const ServerConfig& config, ConnectionTable& table) {
+  std::unique_ptr<Connections> made(new Connections(config, table));
+  if (!config.tls_cert.empty()) {
+    ASSIGN_OR_RETURN(made->tls_, TlsCredentials::start({config.tls_cert, config.tls_key, config.tls_client_ca},
+                                                       tls_hooks(config, table)));
+  }
+  UnixAccess unix_access;
+  unix_access.owner = config.unix_owner;
+  ASSIGN_OR_RETURN(unix_access.mode, parse_unix_mode(config.unix_mode));
+  for (const std::string& text : config.listen) {
+    ASSIGN_OR_RETURN(const ListenAddress address, parse_listen_address(text));
+    absl::StatusOr<std::vector<ListeningSocket>> sockets = listen_on(address, unix_access);
+    if (!sockets.ok())
+      return absl::Status(sockets.status().code(),
+                          absl::StrCat("cannot listen on ", text, ": ", sockets.status().message()));
+    const uint16_t port = sockets->front().port();
+    made->addresses_.push_back(to_string(address, port));
+    if (made->port_ == 0) made->port_ = port;
+    for (ListeningSocket& listening : *sockets) made->sockets_.push_back(std::move(listening));
+  }
+  return made;
+}
+
+void Connections::add_to(grpc::ServerBuilder& builder, uint32_t streams) {
+  max_streams_ = streams;
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, static_cast<int>(streams));
+  builder.AddChannelArgument(GRPC_ARG_ENABLE_CHANNELZ, 1);  // counts streams
+  builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS,
+                             static_cast<int>(config_.handshake_timeout_s) * 1000);
+  intake_ = std::make_unique<ConnectionIntake>(
+      builder, tls_ == nullptr ? grpc::InsecureServerCredentials() : tls_->grpc_credentials());
+}
+
+void Connections::start(grpc::Server& server) {
+  intake_->started(server);
+  guard_ = std::make_unique<FloodGuard>(
+      flood_limits(config_, max_streams_), [this](Connection& connection) { return stream_counter_.count(connection); },
+      log_closed);
+  AcceptorHooks hooks;
+  hooks.hand_over = [this](int descriptor, const Connection& connection) {
+    intake_->hand_over(descriptor, connection);
+  };
+  hooks.refused = log_refused;
+  acceptor_ =
+      std::make_unique<Acceptor>(std::move(sockets_), acceptor_options(config_), table_, *guard_, std::move(hooks));
+}
+
+void Connections::stop_accepting() {
+  if (acceptor_ != nullptr) acceptor_->stop_accepting();
+}
+
+}  // namespace locus::server

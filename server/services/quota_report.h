@@ -1,0 +1,27 @@
+// Quotas and how much of them is in use: what callers hold now (server/security/quotas.h) together with what they
+// created (core/scene/registry.h). No state; any thread.
+#ifndef LOCUS_SERVER_SERVICES_QUOTA_REPORT_H_
+#define LOCUS_SERVER_SERVICES_QUOTA_REPORT_H_
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "locus/v1/server_service.pb.h"
+#include "server/host/host.h"
+#include "server/rpc/call.h"
+
+namespace locus::server {
+
+// Serves one GetQuotas call. PERMISSION_DENIED if the request is about other callers, and the caller does not
+// administer all scenes.
+absl::Status get_quotas(const Host& host, const Caller& caller, const v1::GetQuotasRequest& request,
+                        v1::GetQuotasResponse& response);
+
+// Returns for each quota that somebody has, by its name, the largest share of it that an identity or connection uses.
+std::vector<std::pair<std::string, double>> largest_quota_shares(const Host& host);
+
+}  // namespace locus::server
+
+#endif  // LOCUS_SERVER_SERVICES_QUOTA_REPORT_H_

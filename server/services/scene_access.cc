@@ -1,0 +1,62 @@
+#include "server/services/scene_access.h"
+
+#include <algorithm>
+#include <chrono>
+
+#include "core/base/names.h"
+#include "core/base/status_macros.h"
+#include "server/convert/status.h"
+
+namespace locus::server {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::steady_clock;
+
+// Interval at which a waiting thread checks whether its call has ended.
+constexpr milliseconds kWaitSlice{50};
+// Time that readers have to release a revoked snapshot before wait_for_readers() calls revoke_overdue_readers().
+constexpr milliseconds kReadersMayTake{1000};
+
+}  // namespace
+
+absl::StatusOr<ScenePtr> find_scene(const Host& host, const Caller& caller, const std::string& name,
+                                    absl::string_view field) {
+  RETURN_IF_ERROR(check_scene_name(name, field));
+  RETURN_IF_ERROR(caller.check_scene(name));
+  if (absl::Status status = caller.check_right(name); !status.ok()) {
+    if (absl::IsNotFound(status)) caller.audit_hidden(name);
+    return status;
+  }
+  return host.registry.find_scene(name);
+}
+
+absl::StatusOr<CallMemory> claim_copy(const Caller& caller, uint64_t bytes, MemoryLine line) {
+  constexpr uint64_t kSmallCopy = 64u << 10;
+  return caller.claim(bytes <= kSmallCopy ? MemoryLine::kReplies : line, "", bytes);
+}
+
+absl::StatusOr<SnapshotPin> wait_for(const Scene& scene, const View& view, SteadyTime until, const Caller& caller) {
+  while (true) {
+    const SteadyTime slice = std::min(until, steady_clock::now() + kWaitSlice);
+    absl::StatusOr<SnapshotPin> snapshot = scene.pin(view, slice);
+    if (snapshot.status().code() != absl::StatusCode::kDeadlineExceeded || slice == until) return snapshot;
+    RETURN_IF_ERROR(caller.stop());
+    if (caller.state().drain.draining()) return draining();
+  }
+}
+
+absl::Status wait_for_readers(Scene& scene, const std::function<absl::Status()>& stop) {
+  const SteadyTime start = steady_clock::now();
+  while (true) {
+    const SteadyTime now = steady_clock::now();
+    absl::Status late = scene.wait_for_readers(now + kWaitSlice);
+    if (late.ok()) return late;
+    absl::Status stopped = stop();
+    if (stopped.code() == absl::StatusCode::kDeadlineExceeded) return late;
+    if (!stopped.ok()) return stopped;
+    if (now - start > kReadersMayTake) scene.revoke_overdue_readers();
+  }
+}
+
+}  // namespace locus::server

@@ -1,0 +1,38 @@
+// Functions with which calls find a scene, wait for a revision of the scene, and wait for its readers. No state; any
+// thread.
+#ifndef LOCUS_SERVER_SERVICES_SCENE_ACCESS_H_
+#define LOCUS_SERVER_SERVICES_SCENE_ACCESS_H_
+
+#include <functional>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "core/scene/scene.h"
+#include "server/host/host.h"
+#include "server/rpc/call.h"
+
+namespace locus::server {
+
+// Checks the scene's name and the metadata x-scene, then returns the scene. Errors name `field`, the field of the
+// request that contains the name.
+absl::StatusOr<ScenePtr> find_scene(const Host& host, const Caller& caller, const std::string& name,
+                                    absl::string_view field);
+
+// Claims `bytes` for responses that copy parts of scenes or meshes. Up to 64 KiB are claimed as replies, which are
+// refused last; more bytes are claimed on `line`.
+absl::StatusOr<CallMemory> claim_copy(const Caller& caller, uint64_t bytes, MemoryLine line = MemoryLine::kDumps);
+
+// Waits for the revision that `view` names, but at most until the time `until`, and pins the revision's snapshot.
+// Returns at once when the revision is published or the scene is deleted, and within 50 ms when the call ends or the
+// server drains. If the server drains, the error is UNAVAILABLE, DRAINING.
+absl::StatusOr<SnapshotPin> wait_for(const Scene& scene, const View& view, SteadyTime until, const Caller& caller);
+
+// Waits until every reader whose pin on a snapshot of the scene was revoked has released the pin. Once the wait has
+// taken longer than a second, calls Scene::revoke_overdue_readers() repeatedly. Calls `stop` every 50 ms and, if its
+// status is not OK, returns this status; instead of DEADLINE_EXCEEDED, returns the scene's error, which names the limit
+// pinned_bytes.
+absl::Status wait_for_readers(Scene& scene, const std::function<absl::Status()>& stop);
+
+}  // namespace locus::server
+
+#endif  // LOCUS_SERVER_SERVICES_SCENE_ACCESS_H_

@@ -1,0 +1,142 @@
+"""Job: the arguments of an attack, and its connection to the runner. Attacks run in a process of their own."""
+import collections
+import resource
+import time
+
+import wire
+
+MEMORY = 1 << 30  # memory limit of the attacking process, so that the suite itself stays small
+MAX_WRONG = 20
+DYING_SECONDS = 0.3
+MIN_STEP_SECONDS = 0.25
+STRANGER = "mtls-stranger"  # the front with which the attacker has no certificate; with the front mtls it has one
+# Fronts that must hold off every attack: no row is left out, and the victim's p99 may grow less.
+SHIELDED = (STRANGER, "edge")
+MAX_SLOWER, MAX_SHIELDED_SLOWER = 10, 5  # how many times the victim's p99 may grow, if the attack does not say more
+# Outcomes of a call that give the caller no information, or that no client request may cause.
+NEVER = ("INTERNAL", "UNKNOWN", "CLOSED", "TIMEOUT", "RESET", "DATA_LOSS", "ABORTED")
+
+# HAProxy 2.6 sometimes turns a refusal that comes before the whole message was sent into a reset without headers
+# (REFUSED_STREAM), which gRPC reports as UNAVAILABLE.
+REFUSED_STREAM = ("RESET", "HTTP status none")
+
+# One row of the table. `steps(job)` returns (name, function of job) pairs that run one after another; `what` and
+# `bound` describe the attack and its amount in a few words. `slower` is the allowed factor by which the victim's p99
+# may grow. `flags` are options of the daemon; a daemon that the suite did not start does not have them.
+Attack = collections.namedtuple("Attack", "name group steps what bound slower flags", defaults=(MAX_SLOWER, ()))
+
+
+class Lost(Exception):
+    """The daemon accepts no more connections."""
+
+
+def one(function):
+    """Returns the `steps` of an attack that has a single step."""
+    return lambda job: [("", function)]
+
+
+class Job:
+    """One run of an attack. Each step lasts `seconds`. In the quick form all steps share `seconds`, and some may be
+    skipped.
+    """
+
+    def __init__(self, target, seconds, quick, pipe, front="plain"):
+        self.target, self.seconds, self.quick, self.pipe, self.front = target, seconds, quick, pipe, front
+        self.until = time.monotonic() + seconds
+        self.end = self.until + seconds  # end of a quick attack
+        self.wrongs = set()
+
+    def never_ends(self, path):
+        """Returns options of call(): a call such as Watch may stay open, so its timeout is allowed and short."""
+        return {"allowed": (*(code for code in wire.CODES if code not in NEVER), "TIMEOUT"), "timeout": 2} \
+            if path.endswith("/Watch") else {"timeout": 30}
+
+    def begin(self, index, name):
+        self.until = time.monotonic() + self.seconds
+        self.pipe.send(("step", index, name))
+
+    def over(self):
+        return time.monotonic() >= self.until
+
+    def connect(self, **options):
+        """Returns a new connection; raises Lost if the daemon refuses it."""
+        try:
+            return wire.Connection(self.target, **options)
+        except ConnectionRefusedError as error:
+            raise Lost() from error
+
+    def count(self, code, number=1):
+        self.pipe.send(("codes", code, number))
+
+    def wrong(self, text):
+        if text not in self.wrongs and len(self.wrongs) < MAX_WRONG:
+            self.wrongs.add(text)
+            self.pipe.send(("wrong", text))
+
+    def skip(self, text):
+        self.pipe.send(("skip", text))
+
+    def check(self, reply, what, allowed=None, text=True):
+        """Counts a Reply. Reports it as wrong if its code is not allowed, or if it is an error without a text.
+
+        A stranger, whom TLS refuses, must get no reply at all.
+        """
+        self.count(reply.code)
+        if self.front == STRANGER:
+            if reply.code not in ("CLOSED", "TIMEOUT"):
+                self.wrong(f"{what}: a stranger got {reply.code} {reply.text[:80]}".rstrip())
+            return
+        if self.front == "edge" and (reply.code, reply.text) == REFUSED_STREAM:
+            return
+        if reply.code in ("CLOSED", "TIMEOUT") and not self.accepts():
+            raise Lost()
+        if reply.code not in allowed if allowed else reply.code in NEVER:
+            self.wrong(f"{what}: {reply.code} {reply.text[:80]}".rstrip())
+        elif text and reply.code not in ("OK", "TIMEOUT") and not reply.text:
+            self.wrong(f"{what}: {reply.code} without a text")
+
+    def accepts(self):
+        """Returns whether the daemon accepts connections. Waits first, since a dying daemon still accepts for a
+        moment.
+        """
+        time.sleep(DYING_SECONDS)
+        try:
+            wire.open_socket(self.target, 5).close()
+            return True
+        except ConnectionRefusedError:
+            return False
+        except (OSError, wire.Closed):
+            return True
+
+    def call(self, path, body, what, allowed=None, **options):
+        """Makes a call on a new connection and checks its reply."""
+        try:
+            with self.connect() as connection:
+                self.check(connection.call(path, body, **options), what, allowed)
+        except (wire.Closed, OSError) as error:
+            self.check(wire.Reply("CLOSED", str(error), b""), what, allowed)
+
+
+def work(attack, job, first):
+    """Runs the steps of an attack from index `first` on; main function of the attacking process."""
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    steps = attack.steps(job)
+    job.pipe.send(("steps", len(steps)))
+    if job.quick:
+        job.seconds = max(job.seconds / len(steps), MIN_STEP_SECONDS)
+    for index in range(first, len(steps)):
+        if job.quick and index > 0 and time.monotonic() > job.end:
+            job.skip(f"{len(steps) - index} of {len(steps)} steps for lack of time")
+            break
+        job.begin(index, steps[index][0])
+        try:
+            steps[index][1](job)
+        except Lost:
+            break
+        except (wire.Closed, ConnectionError, TimeoutError):
+            job.count("ENDED")
+            if not job.accepts():
+                break
+        except Exception as error:  # a broken attack must not count as a passed one
+            job.wrong(f"the attack itself failed: {type(error).__name__}: {error}")
+    job.pipe.send(("end",))

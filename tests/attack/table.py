@@ -1,0 +1,99 @@
+"""The table of all attacks, the groups of the quick form, and the rows that locusd still fails."""
+import functools
+import multiprocessing
+import time
+
+import wire
+from job import SHIELDED, Attack, Job, Lost, one
+from rows import calls, connections, frames, messages, replies
+
+# Rows that locusd fails, each with the observed effect. The quick form skips them, unless a front shields locusd. Remove
+# a name once its row passes.
+NOT_YET = {
+    "union": "closes connections of honest clients when memory is nearly full",
+    "continuation": "sometimes out of memory, if the flood guard looks too late on a busy machine",
+    "hpack": "serves no client for a long time",
+}
+
+# Rows that the union runs together: those that cost the daemon most although it withstands each of them.
+TOGETHER = ("reset-queries", "settings", "ping", "garbage", "slow-bodies", "wrong-bytes", "honest", "unread", "continuation")
+
+
+# Address of the honest part of the union, so that it is not refused with the attacks.
+HONEST_ADDRESS = "127.0.0.3"
+
+
+class Ended:
+    """Replaces the pipe of an attack within the union: forwards codes and errors, but no steps."""
+
+    def __init__(self, name, pipe, lock):
+        self.name, self.pipe, self.lock = name, pipe, lock
+
+    def send(self, event):
+        if event[0] in ("codes", "wrong"):
+            with self.lock:
+                self.pipe.send(event if event[0] == "codes" else ("wrong", f"{self.name}: {event[1]}"))
+
+
+def run_again(attack, job):
+    """Repeats the steps of an attack until the time is over."""
+    steps, at = attack.steps(job), 0
+    while time.monotonic() < job.end:
+        job.until = job.end
+        try:
+            steps[at % len(steps)][1](job)
+        except Lost:
+            return
+        except (OSError, EOFError, wire.Closed):
+            pass
+        at += 1
+
+
+def not_yet(front):
+    """Returns the names of the rows that fail through a front."""
+    return () if front in SHIELDED else tuple(NOT_YET)
+
+
+def together(job):
+    """Runs several attacks at the same time, each in its own process, until all have ended."""
+    context, processes = multiprocessing.get_context("fork"), []
+    lock = context.Lock()
+    for attack in ROWS:
+        if attack.name in TOGETHER and attack.name not in not_yet(job.front):
+            target = job.target._replace(source=HONEST_ADDRESS) if attack.name == "honest" else job.target
+            part = Job(target, job.seconds, True, Ended(attack.name, job.pipe, lock), job.front)
+            processes.append(context.Process(target=run_again, args=(attack, part), daemon=True))
+            processes[-1].start()
+    for process in processes:
+        process.join(job.seconds + 60)
+        if process.is_alive():
+            process.kill()
+            process.join()
+
+
+UNION = Attack("union", "union", one(together), "several attacks at the same time: " + ", ".join(TOGETHER),
+               "one process each", 50)
+ROWS = [*messages.ROWS, *replies.ROWS, *frames.ROWS, *connections.ROWS, *calls.ROWS, UNION]
+GROUPS = tuple(dict.fromkeys(attack.group for attack in ROWS))
+
+
+@functools.lru_cache(maxsize=None)
+def by_name():
+    return {attack.name: attack for attack in ROWS}
+
+
+def chosen(word, front="plain"):
+    """Returns (attacks, whether in the quick form, names left out) of `all`, `quick`, `quick:GROUP`, or names with commas."""
+    head, _, group = word.partition(":")
+    if head == "quick":
+        rows = [attack for attack in ROWS if not group or attack.group == group]
+        if not rows:
+            raise ValueError(f"there is no group {group}; the groups are {', '.join(GROUPS)}")
+        fails = not_yet(front)
+        return [row for row in rows if row.name not in fails], True, [row.name for row in rows if row.name in fails]
+    if word == "all":
+        return ROWS, False, []
+    unknown = [name for name in word.split(",") if name not in by_name()]
+    if unknown:
+        raise ValueError(f"there is no attack {', '.join(unknown)}; see --list")
+    return [by_name()[name] for name in word.split(",")], False, []

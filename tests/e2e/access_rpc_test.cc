@@ -1,0 +1,485 @@
+// Checks each rpc of the server with callers of different rights: a row for each rpc says who may call it.
+#include <gmock/gmock.h>
+#include <google/protobuf/descriptor.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <fstream>
+#include <future>
+#include <map>
+#include <set>
+#include <sstream>
+#include <thread>
+
+#include "grpc/health/v1/health.grpc.pb.h"
+#include "server/security/token_file.h"
+#include "tests/support/raw_call.h"
+#include "tests/support/rpc_test.h"
+#include "tests/support/running_server.h"
+#include "tests/support/temporary_folder.h"
+
+namespace locus::test {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+enum class Outcome { kServed, kDenied, kHidden, kUnknown };
+
+// Callers, and the columns of the table.
+enum Who { kReader, kUpdater, kAdmin, kOps, kElsewhere, kAnonymous, kCallers };
+constexpr std::array<const char*, kCallers> kNames = {"reader", "updater", "admin", "ops", "elsewhere", ""};
+constexpr const char* kAccess = R"(# who may do what
+grant token:reader read arena-*
+grant token:updater update arena-*
+grant token:admin admin *
+grant token:ops meshes,backup,metrics,reflection
+grant token:elsewhere admin lobby-*
+)";
+
+struct Row {
+  const char* path;
+  std::array<Outcome, kCallers> outcomes;
+};
+
+constexpr Outcome kYes = Outcome::kServed, kNo = Outcome::kDenied, kHid = Outcome::kHidden, kWho = Outcome::kUnknown;
+constexpr std::array<Outcome, kCallers> kReads = {kYes, kYes, kYes, kHid, kHid, kWho};
+constexpr std::array<Outcome, kCallers> kUpdates = {kNo, kYes, kYes, kHid, kHid, kWho};
+constexpr std::array<Outcome, kCallers> kDeletes = {kNo, kNo, kYes, kHid, kHid, kWho};
+constexpr std::array<Outcome, kCallers> kCreates = {kNo, kNo, kYes, kNo, kNo, kWho};
+constexpr std::array<Outcome, kCallers> kAdmins = kCreates;  // those who administer all scenes
+constexpr std::array<Outcome, kCallers> kServers = {kNo, kNo, kNo, kYes, kNo, kWho};
+constexpr std::array<Outcome, kCallers> kKnown = {kYes, kYes, kYes, kYes, kYes, kWho};
+constexpr std::array<Outcome, kCallers> kAll = {kYes, kYes, kYes, kYes, kYes, kYes};
+
+const std::vector<Row> kRows = {
+    {"/locus.v1.QueryService/Query", kReads},
+    {"/locus.v1.QueryService/StreamQueries", kReads},
+    {"/locus.v1.UpdateService/ApplyUpdates", kUpdates},
+    {"/locus.v1.UpdateService/StreamUpdates", kUpdates},
+    {"/locus.v1.SceneService/CreateScene", kCreates},
+    {"/locus.v1.SceneService/GetScene", kReads},
+    {"/locus.v1.SceneService/ListScenes", kKnown},
+    {"/locus.v1.SceneService/DeleteScene", kDeletes},
+    {"/locus.v1.SceneService/UploadMesh", kServers},
+    {"/locus.v1.SceneService/ListMeshes", kServers},
+    {"/locus.v1.SceneService/DeleteMesh", kServers},
+    {"/locus.v1.SceneService/DownloadMesh", kServers},
+    {"/locus.v1.SceneService/ChangeInstances", kUpdates},
+    {"/locus.v1.SceneService/DumpScene", kReads},
+    {"/locus.v1.ServerService/GetServer", kKnown},
+    {"/locus.v1.ServerService/GetQuotas", kAdmins},
+    {"/locus.v1.ServerService/Backup", kServers},
+    {"/grpc.health.v1.Health/Check", kAll},
+    {"/grpc.health.v1.Health/Watch", kAll},
+    {"/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo", kServers},
+};
+
+class AccessRpcTest : public ::testing::Test {
+ protected:
+  AccessRpcTest() {
+    write("access", kAccess);
+    for (const char* name : kNames)
+      if (*name != '\0') tokens_[name] = *server::add_token(folder_.file("tokens"), name, 1'000'000, {}, "");
+    running_.emplace(config());
+    create("arena-1");
+  }
+
+  void write(const std::string& name, const std::string& text) const {
+    const std::string fresh = folder_.file(name) + ".new";
+    std::ofstream(fresh) << text;
+    std::filesystem::permissions(fresh, std::filesystem::perms::owner_read | std::filesystem::perms::owner_write);
+    std::filesystem::rename(fresh, folder_.file(name));
+  }
+  std::string read(const std::string& name) const {
+    std::ostringstream text;
+    text << std::ifstream(folder_.file(name)).rdbuf();
+    return text.str();
+  }
+  server::ServerConfig config() const {
+    server::ServerConfig config = test_config();
+    config.access_file = folder_.file("access");
+    config.token_file = folder_.file("tokens");
+    config.audit_file = folder_.file("audit");
+    config.log_level = server::LogLevel::kError;
+    return config;
+  }
+
+  RawReply call(const std::string& path, const std::string& who, const std::string& scene = "arena-1",
+                std::chrono::milliseconds timeout = kCallTimeout) {
+    const std::string bytes = std::string("\x0a") + static_cast<char>(scene.size()) + scene;
+    return raw_call(running_->stubs().channel, path, bytes, timeout, who.empty() ? "" : tokens_[who]);
+  }
+  // Waits until `count` calls are in progress.
+  void wait_for_calls(double count) {
+    v1::GetServerResponse server;
+    double used = 0;
+    while (used < count + 1) {  // the call that asks counts too
+      ASSERT_TRUE(server.ParseFromString(call("/locus.v1.ServerService/GetServer", "admin", "").bytes));
+      for (const v1::Limit& limit : server.limits())
+        if (limit.name() == "calls") used = limit.used();
+    }
+  }
+  void create(const std::string& scene) {
+    const grpc::Status status = call("/locus.v1.SceneService/CreateScene", "admin", scene).status;
+    EXPECT_TRUE(status.ok() || status.error_code() == grpc::StatusCode::ALREADY_EXISTS) << status.error_message();
+  }
+
+  // Returns the status of a call. Streams answer with errors in their messages.
+  static grpc::Status status_of(const std::string& path, const RawReply& reply) {
+    v1::StreamQueriesResponse queries;
+    v1::StreamUpdatesResponse updates;
+    v1::Error error;
+    if (path.ends_with("/StreamQueries") && queries.ParseFromString(reply.bytes)) error = queries.error();
+    if (path.ends_with("/StreamUpdates") && updates.ParseFromString(reply.bytes)) error = updates.error();
+    if (!reply.status.ok() || error.code() == 0) return reply.status;
+    return {static_cast<grpc::StatusCode>(error.code()), error.message()};
+  }
+  static Outcome outcome_of(const grpc::Status& status) {
+    if (status.error_code() == grpc::StatusCode::UNAUTHENTICATED) return Outcome::kUnknown;
+    if (status.error_code() == grpc::StatusCode::PERMISSION_DENIED) return Outcome::kDenied;
+    const bool hidden = status.error_code() == grpc::StatusCode::NOT_FOUND &&
+                        status.error_message() == "scene: no scene is called 'arena-1'; create it first";
+    return hidden ? Outcome::kHidden : Outcome::kServed;
+  }
+
+  const TemporaryFolder folder_;
+  std::map<std::string, std::string> tokens_;
+  std::optional<RunningServer> running_;
+};
+
+TEST_F(AccessRpcTest, EveryRpcIsServedOrRefusedAsItsRowSays) {
+  for (const Row& row : kRows) {
+    for (int who = 0; who < kCallers; ++who) {
+      create("arena-1");
+      const std::string path = row.path;
+      const bool endless = path == "/grpc.health.v1.Health/Watch";
+      const RawReply reply = call(path, kNames[static_cast<size_t>(who)], "arena-1",
+                                  endless ? std::chrono::milliseconds(300) : kCallTimeout);
+      const grpc::Status status = status_of(path, reply);
+      EXPECT_EQ(outcome_of(status), row.outcomes[static_cast<size_t>(who)])
+          << path << " by " << kNames[static_cast<size_t>(who)] << ": " << status.error_code() << " "
+          << status.error_message();
+    }
+  }
+}
+
+TEST_F(AccessRpcTest, EveryRpcHasARow) {
+  std::set<std::string> rows;
+  for (const Row& row : kRows) rows.insert(row.path);
+  for (const char* file :
+       {"locus/v1/query_service.proto", "locus/v1/scene_service.proto", "locus/v1/server_service.proto",
+        "locus/v1/update_service.proto", "grpc/health/v1/health.proto"}) {
+    const auto* descriptor = google::protobuf::DescriptorPool::generated_pool()->FindFileByName(file);
+    ASSERT_NE(descriptor, nullptr) << file;
+    for (int i = 0; i < descriptor->service_count(); ++i)
+      for (int k = 0; k < descriptor->service(i)->method_count(); ++k) {
+        const auto* method = descriptor->service(i)->method(k);
+        EXPECT_TRUE(rows.contains("/" + method->service()->full_name() + "/" + method->name())) << method->full_name();
+      }
+  }
+}
+
+TEST_F(AccessRpcTest, WrongCredentialsAreRefusedWithoutAHint) {
+  tokens_["wrong"] = tokens_["reader"].substr(0, tokens_["reader"].size() - 1) + "!";
+  tokens_["stranger"] = "locus_nobody_0123456789012345678901234567890123456789012";
+  const grpc::Status wrong = call("/locus.v1.SceneService/GetScene", "wrong").status;
+  const grpc::Status stranger = call("/locus.v1.SceneService/GetScene", "stranger").status;
+  EXPECT_EQ(wrong.error_code(), grpc::StatusCode::UNAUTHENTICATED);
+  EXPECT_EQ(stranger.error_code(), grpc::StatusCode::UNAUTHENTICATED);
+  EXPECT_EQ(wrong.error_message(), stranger.error_message());
+}
+
+TEST_F(AccessRpcTest, AConnectionEndsWithItsThirtyThirdWrongCredential) {
+  tokens_["wrong"] = tokens_["reader"].substr(0, tokens_["reader"].size() - 1) + "!";
+  const auto health = grpc::health::v1::Health::NewStub(running_->stubs().channel);
+  grpc::ClientContext context;
+  set_timeout(context);
+  const auto watch = health->Watch(&context, {});  // on the same connection, and ends with it
+  grpc::health::v1::HealthCheckResponse serving;
+  ASSERT_TRUE(watch->Read(&serving));
+  std::atomic<bool> ended{false};
+  std::thread watcher([&] {
+    while (watch->Read(&serving)) {
+    }
+    ended = true;
+  });
+  for (int i = 0; i < 32; ++i)
+    EXPECT_EQ(call("/locus.v1.SceneService/GetScene", "wrong").status.error_code(), grpc::StatusCode::UNAUTHENTICATED);
+  EXPECT_TRUE(call("/locus.v1.SceneService/GetScene", "reader").status.ok());
+  EXPECT_FALSE(ended);
+  call("/locus.v1.SceneService/GetScene", "wrong");
+  watcher.join();  // returns when the connection ends
+  EXPECT_EQ(watch->Finish().error_code(), grpc::StatusCode::UNAVAILABLE);
+}
+
+TEST_F(AccessRpcTest, ListedScenesAreThoseThatTheCallerMayRead) {
+  create("lobby-1");
+  const auto names = [&](const std::string& who) {
+    v1::ListScenesResponse response;
+    EXPECT_TRUE(response.ParseFromString(call("/locus.v1.SceneService/ListScenes", who, "").bytes));
+    std::string all;
+    for (const v1::Scene& scene : response.scenes()) all += scene.name() + " ";
+    return all;
+  };
+  EXPECT_EQ(names("reader"), "arena-1 ");
+  EXPECT_EQ(names("elsewhere"), "lobby-1 ");
+  EXPECT_EQ(names("admin"), "arena-1 lobby-1 ");
+  EXPECT_EQ(names("ops"), "");
+}
+
+TEST_F(AccessRpcTest, ARevokedTokenEndsItsStreams) {
+  grpc::ClientContext context;
+  set_timeout(context);
+  context.AddMetadata("authorization", "Bearer " + tokens_["reader"]);
+  const auto stream = running_->stubs().queries->StreamQueries(&context);
+  v1::StreamQueriesRequest request;
+  request.set_scene("arena-1");
+  ASSERT_TRUE(stream->Write(request));
+  v1::StreamQueriesResponse response;
+  ASSERT_TRUE(stream->Read(&response));
+  ASSERT_TRUE(server::revoke_token(folder_.file("tokens"), "reader").ok());
+  EXPECT_FALSE(stream->Read(&response));  // returns when the stream ends
+  EXPECT_EQ(stream->Finish().error_code(), grpc::StatusCode::UNAUTHENTICATED);
+  EXPECT_EQ(call("/locus.v1.SceneService/GetScene", "reader").status.error_code(), grpc::StatusCode::UNAUTHENTICATED);
+  EXPECT_TRUE(call("/locus.v1.SceneService/GetScene", "updater").status.ok());
+}
+
+TEST_F(AccessRpcTest, AStreamThatLosesItsGrantEndsAsIfTheSceneWereAbsent) {
+  grpc::ClientContext context;
+  set_timeout(context);
+  context.AddMetadata("authorization", "Bearer " + tokens_["reader"]);
+  const auto stream = running_->stubs().queries->StreamQueries(&context);
+  v1::StreamQueriesRequest request;
+  request.set_scene("arena-1");
+  ASSERT_TRUE(stream->Write(request));
+  v1::StreamQueriesResponse response;
+  ASSERT_TRUE(stream->Read(&response));
+  write("access", "grant token:reader read lobby-*\n");
+  running_->server().reload();
+  EXPECT_FALSE(stream->Read(&response));
+  const grpc::Status ended = stream->Finish();
+  const grpc::Status absent = call("/locus.v1.SceneService/GetScene", "reader", "lobby-9").status;
+  EXPECT_EQ(ended.error_code(), grpc::StatusCode::NOT_FOUND);
+  EXPECT_EQ(ended.error_message(), "scene: no scene is called 'arena-1'; create it first");
+  EXPECT_EQ(absent.error_message(), "scene: no scene is called 'lobby-9'; create it first");
+}
+
+TEST_F(AccessRpcTest, CallsThatWaitEndWhenTheyLoseTheirGrant) {
+  v1::QueryRequest query;
+  query.set_scene("arena-1");
+  query.mutable_batch()->mutable_view()->set_at_least(99);
+  v1::DumpSceneRequest dump;
+  dump.set_scene("arena-1");
+  dump.mutable_view()->set_at_least(99);
+  const auto wait = [&](const std::string& path, const std::string& bytes) {
+    return std::async(std::launch::async, [&, path, bytes] {
+      return raw_call(running_->stubs().channel, path, bytes, kCallTimeout, tokens_["reader"]).status;
+    });
+  };
+  std::future<grpc::Status> unary = wait("/locus.v1.QueryService/Query", query.SerializeAsString());
+  std::future<grpc::Status> blocking = wait("/locus.v1.SceneService/DumpScene", dump.SerializeAsString());
+  wait_for_calls(2);
+  write("access", "grant token:admin admin *\n");
+  running_->server().reload();
+  EXPECT_EQ(unary.get().error_code(), grpc::StatusCode::PERMISSION_DENIED);
+  EXPECT_EQ(blocking.get().error_code(), grpc::StatusCode::CANCELLED);
+}
+
+TEST_F(AccessRpcTest, AChangedAccessFileIsInForceAfterAReloadAndABadOneIsNot) {
+  write("access", "grant token:reader update arena-*\n");
+  running_->server().reload();
+  EXPECT_TRUE(call("/locus.v1.UpdateService/ApplyUpdates", "reader").status.ok());
+  write("access", "grant token:reader\n");
+  running_->server().reload();
+  EXPECT_TRUE(call("/locus.v1.UpdateService/ApplyUpdates", "reader").status.ok());
+  EXPECT_EQ(call("/locus.v1.SceneService/GetScene", "admin").status.error_code(), grpc::StatusCode::PERMISSION_DENIED);
+}
+
+TEST_F(AccessRpcTest, ChangesAndRefusalsAreAudited) {
+  call("/locus.v1.SceneService/DeleteScene", "reader");
+  call("/locus.v1.SceneService/DeleteScene", "admin");
+  call("/locus.v1.UpdateService/ApplyUpdates", "");
+  running_.reset();  // writes the queued lines
+  const std::string changes = read("audit"), refusals = read("audit.refused");
+  EXPECT_THAT(changes, HasSubstr(R"("principal":"token:admin")"));
+  EXPECT_THAT(changes, HasSubstr(R"("subject":"arena-1")"));
+  EXPECT_THAT(refusals, HasSubstr(R"("principal":"token:reader")"));
+  EXPECT_THAT(refusals, HasSubstr(R"("code":"PERMISSION_DENIED")"));
+  EXPECT_THAT(refusals, HasSubstr(R"("rpc":"/locus.v1.UpdateService/ApplyUpdates")"));
+  EXPECT_THAT(refusals, HasSubstr(R"("code":"UNAUTHENTICATED")"));
+  for (const auto& [name, token] : tokens_) EXPECT_EQ((changes + refusals).find(token), std::string::npos) << name;
+}
+
+TEST_F(AccessRpcTest, CallersWithoutCredentialsFillNoAuditFile) {
+  call("/locus.v1.SceneService/DeleteScene", "admin");
+  for (int i = 0; i < 200; ++i) call("/locus.v1.SceneService/DeleteScene", "");
+  running_.reset();  // writes the queued lines
+  const std::string changes = read("audit"), refusals = read("audit.refused");
+  EXPECT_EQ(changes.find("UNAUTHENTICATED"), std::string::npos);
+  EXPECT_LT(std::count(refusals.begin(), refusals.end(), '\n'), 100);
+  EXPECT_THAT(refusals, HasSubstr("more refusals were not written"));
+}
+
+TEST_F(AccessRpcTest, GuessesAtHiddenScenesAreAuditedOnce) {
+  call("/locus.v1.SceneService/GetScene", "elsewhere", "arena-1");
+  call("/locus.v1.QueryService/Query", "elsewhere", "arena-2");
+  call("/locus.v1.SceneService/DeleteScene", "elsewhere", "arena-3");
+  call("/locus.v1.SceneService/GetScene", "reader", "arena-4");  // absent, but not hidden
+  running_.reset();
+  const std::string audit = read("audit.refused");
+  EXPECT_THAT(audit, HasSubstr(R"("rpc":"/locus.v1.SceneService/GetScene","subject":"arena-1","code":"NOT_FOUND")"));
+  EXPECT_THAT(audit, HasSubstr(R"("rpc":"/locus.v1.QueryService/Query","subject":"arena-2","code":"NOT_FOUND")"));
+  EXPECT_THAT(audit, HasSubstr(R"("rpc":"/locus.v1.SceneService/DeleteScene","subject":"arena-3","code":"NOT_FOUND")"));
+  EXPECT_THAT(audit, Not(HasSubstr("arena-4")));
+  size_t hidden = 0;
+  for (size_t at = audit.find("NOT_FOUND"); at != std::string::npos; at = audit.find("NOT_FOUND", at + 1)) ++hidden;
+  EXPECT_EQ(hidden, 3u);
+}
+
+TEST_F(AccessRpcTest, AcceptedUpdatesAreCountedByPrincipalAndScene) {
+  for (uint64_t i = 1; i <= 3; ++i) {
+    v1::ApplyUpdatesRequest request;
+    request.set_scene("arena-1");
+    *request.mutable_batch() = insert_balls(i * 100, i * 100 + 9);
+    EXPECT_TRUE(raw_call(running_->stubs().channel, "/locus.v1.UpdateService/ApplyUpdates", request.SerializeAsString(),
+                         kCallTimeout, tokens_["updater"])
+                    .status.ok());
+  }
+  running_.reset();
+  EXPECT_THAT(read("audit"),
+              HasSubstr(R"("rpc":"/locus.v1.UpdateService/ApplyUpdates","subject":"arena-1","code":"OK")"));
+  EXPECT_THAT(read("audit"), HasSubstr("3 batches changed 30 objects in "));
+}
+
+TEST_F(AccessRpcTest, AQuotaOfQueriesRefusesWithItsName) {
+  write("access", "grant token:reader read arena-*\nquota token:reader queries_per_s=10 burst_s=1\n");
+  running_->server().reload();
+  v1::QueryRequest request;
+  request.set_scene("arena-1");
+  v1::Rays* rays = request.mutable_batch()->add_blocks()->mutable_rays();
+  for (int i = 0; i < 8; ++i)
+    for (int axis = 0; axis < 3; ++axis) {
+      rays->add_origins(0.0f);
+      rays->add_directions(1.0f);
+    }
+  const auto ask = [&] {
+    return raw_call(running_->stubs().channel, "/locus.v1.QueryService/Query", request.SerializeAsString(),
+                    kCallTimeout, tokens_["reader"])
+        .status;
+  };
+  EXPECT_TRUE(ask().ok());
+  const grpc::Status refused = ask();
+  EXPECT_EQ(refused.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_THAT(refused.error_message(), HasSubstr("queries_per_s"));
+}
+
+TEST_F(AccessRpcTest, DescriptionsAndDumpsUseTheQuotaOfWork) {
+  v1::ApplyUpdatesRequest updates;
+  updates.set_scene("arena-1");
+  v1::Insert* insert = updates.mutable_batch()->add_inserts();
+  insert->mutable_point();
+  for (uint64_t id = 1; id <= 100; ++id) {
+    insert->add_ids(id);
+    for (int axis = 0; axis < 3; ++axis) insert->add_positions(0.0f);
+  }
+  ASSERT_TRUE(raw_call(running_->stubs().channel, "/locus.v1.UpdateService/ApplyUpdates", updates.SerializeAsString(),
+                       kCallTimeout, tokens_["admin"])
+                  .status.ok());
+  write("access", std::string(kAccess) + "quota token:reader work_per_s=1\nquota token:updater work_per_s=1\n");
+  running_->server().reload();
+  const std::map<std::string, std::string> calls = {{"reader", "/locus.v1.SceneService/GetScene"},
+                                                    {"updater", "/locus.v1.SceneService/DumpScene"}};
+  for (const auto& [who, path] : calls) {
+    EXPECT_TRUE(call(path, who).status.ok()) << path;
+    const grpc::Status refused = call(path, who).status;
+    EXPECT_EQ(refused.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED) << path;
+    EXPECT_THAT(refused.error_message(), HasSubstr("work_per_s")) << path;
+  }
+}
+
+// One stream of queries, and its answer to one message.
+struct OpenQueries {
+  OpenQueries(Stubs& stubs, const std::string& token) {
+    set_timeout(context);
+    context.AddMetadata("authorization", "Bearer " + token);
+    stream = stubs.queries->StreamQueries(&context);
+    v1::StreamQueriesRequest request;
+    request.set_scene("arena-1");
+    stream->Write(request);
+    v1::StreamQueriesResponse response;
+    is_open = stream->Read(&response);
+  }
+  grpc::Status end() {
+    stream->WritesDone();
+    return stream->Finish();
+  }
+  grpc::ClientContext context;
+  std::unique_ptr<grpc::ClientReaderWriter<v1::StreamQueriesRequest, v1::StreamQueriesResponse>> stream;
+  bool is_open = false;
+};
+
+TEST_F(AccessRpcTest, AQuotaThatComesAndGoesCountsTheStreamsThatWereOpenedUnderIt) {
+  const std::string without = "grant token:reader read arena-*\n";
+  const std::string with = without + "quota token:reader open_streams=1\n";
+  const auto reload = [&](const std::string& access) {
+    write("access", access);
+    running_->server().reload();
+  };
+  reload(with);
+  OpenQueries counted(running_->stubs(), tokens_["reader"]);
+  ASSERT_TRUE(counted.is_open);
+  reload(without);
+  EXPECT_TRUE(counted.end().ok());
+  OpenQueries uncounted(running_->stubs(), tokens_["reader"]);
+  ASSERT_TRUE(uncounted.is_open);
+  reload(with);
+  std::optional<OpenQueries> second;  // is admitted once the server has forgotten the first stream
+  for (int tries = 0; tries < 1000 && !(second && second->is_open); ++tries) {
+    if (second) second->end();
+    second.emplace(running_->stubs(), tokens_["reader"]);
+  }
+  ASSERT_TRUE(second->is_open);
+  EXPECT_TRUE(uncounted.end().ok());
+  for (int tries = 0; tries < 100; ++tries) {
+    OpenQueries third(running_->stubs(), tokens_["reader"]);
+    EXPECT_FALSE(third.is_open);
+    EXPECT_EQ(third.end().error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  }
+  EXPECT_TRUE(second->end().ok());
+}
+
+TEST_F(AccessRpcTest, WorkOfQueriesThatFailIsChargedToTheQuota) {
+  v1::ApplyUpdatesRequest update;
+  update.set_scene("arena-1");
+  v1::Insert* insert = update.mutable_batch()->add_inserts();
+  for (uint64_t id = 1; id <= 2000; ++id) {
+    insert->add_ids(id);
+    for (int axis = 0; axis < 3; ++axis) insert->add_positions(0.0f);
+  }
+  insert->mutable_ball()->add_radii(1);
+  ASSERT_TRUE(raw_call(running_->stubs().channel, "/locus.v1.UpdateService/ApplyUpdates", update.SerializeAsString(),
+                       kCallTimeout, tokens_["admin"])
+                  .status.ok());
+  write("access", "grant token:reader read arena-*\nquota token:reader work_per_s=1000 burst_s=1\n");
+  running_->server().reload();
+  v1::QueryRequest request;
+  request.set_scene("arena-1");
+  v1::Rays* rays = request.mutable_batch()->add_blocks()->mutable_rays();
+  rays->set_mode(v1::RAY_MODE_ALL);
+  for (int i = 0; i < 3 * 60'000; ++i) {
+    rays->add_origins(-2.0f);
+    rays->add_directions(1.0f);
+  }
+  grpc::Status status;
+  for (int tries = 0; tries < 200 && status.error_code() != grpc::StatusCode::RESOURCE_EXHAUSTED; ++tries)
+    status = raw_call(running_->stubs().channel, "/locus.v1.QueryService/Query", request.SerializeAsString(),
+                      std::chrono::milliseconds(50), tokens_["reader"])
+                 .status;
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_THAT(status.error_message(), HasSubstr("work_per_s"));
+}
+
+}  // namespace
+}  // namespace locus::test

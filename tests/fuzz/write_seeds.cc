@@ -1,0 +1,216 @@
+// Writes the seeds that need an encoder into tests/fuzz/seeds: fuzz_write_seeds FOLDER. The same folders also contain
+// seeds of text formats and inputs that once failed, which it does not change.
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <optional>
+
+#include "client/cli/levels/import/level_codec.h"
+#include "core/scene/log/mesh_codec.h"
+#include "core/scene/log/record_codec.h"
+#include "core/scene/log/state_writer.h"
+#include "core/scene/log/tree_codec.h"
+#include "core/scene/scene.h"
+#include "core/scene/spec_codec.h"
+#include "locus/v1/query_service.pb.h"
+#include "locus/v1/scene_service.pb.h"
+#include "locus/v1/update_service.pb.h"
+#include "tests/client/cli/levels/import/quake/bsp_writer.h"
+#include "tests/fuzz/fuzz_target.h"
+#include "tests/support/columns.h"
+#include "tests/support/random_updates.h"
+
+namespace locus::fuzz {
+namespace {
+
+class SeedWriter {
+ public:
+  explicit SeedWriter(std::filesystem::path folder) : folder_(std::move(folder)) {}
+
+  void write(const std::string& target, const std::string& name, absl::string_view bytes) const {
+    std::filesystem::create_directories(folder_ / target);
+    std::ofstream file(folder_ / target / name, std::ios::binary);
+    file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    LOCUS_CHECK(file.good());
+  }
+
+ private:
+  std::filesystem::path folder_;
+};
+
+std::shared_ptr<const StaticMesh> two_triangles() {
+  auto mesh = TriangleMesh::create({0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0, 5, 5, 5}, {0, 1, 2, 1, 3, 2},
+                                   {{"floor", 0}, {"wall", 1}});
+  Sha256 sha256{};
+  sha256[0] = 1;
+  return *StaticMesh::build("mesh", sha256, *std::move(mesh));
+}
+
+PlacementColumns placement(test::Columns& columns) {
+  PlacementColumns place;
+  place.mesh = two_triangles();
+  place.ids = columns.ids({100, 101});
+  place.translations = columns.doubles({0, 0, 0, 5, 6, 7});
+  place.groups = columns.ids({3});
+  return place;
+}
+
+void write_records(const SeedWriter& seeds) {
+  test::Columns columns;
+  test::Random random(1);
+  test::RandomUpdates updates(random, 20);
+  for (int i = 0; i < 6; ++i) {
+    UpdateBatch batch = updates.draw(columns, 4);
+    if (!check_form(batch).ok()) continue;
+    std::string bytes;
+    encode_batch(batch, bytes);
+    seeds.write("record", "batch_" + std::to_string(i), bytes);
+  }
+  MoveColumns move;
+  move.ids = columns.ids({1, 2});
+  move.positions = columns.floats({1, 2, 3, 4, 5, 6});
+  UpdateBatch moves;
+  moves.moves.push_back(move);
+  std::string joined;
+  encode_joined(std::vector<const UpdateBatch*>{&moves, &moves}, joined);
+  seeds.write("record", "joined", joined);
+  StaticChange change;
+  change.place.push_back(placement(columns));
+  change.remove_groups = columns.ids({9});
+  std::string bytes;
+  encode_change(change, change.place[0].ids, bytes);
+  seeds.write("record", "change", bytes);
+}
+
+template <class Writer>
+std::string chunks_of(Writer writer) {
+  std::string input;
+  while (std::optional<std::string> chunk = *writer.next()) append_piece(input, *chunk);
+  return input;
+}
+
+void write_states(const SeedWriter& seeds) {
+  test::Columns columns;
+  test::Random random(2);
+  test::RandomUpdates updates(random, 12);
+  Scene scene("scene", SceneSpec(), 77, StaticSet::empty());
+  seeds.write("state", "empty", chunks_of(StateWriter(scene.freeze())));
+  for (int i = 0; i < 30; ++i) scene.apply(updates.draw(columns, 4)).IgnoreError();
+  seeds.write("state", "objects", chunks_of(StateWriter(scene.freeze())));
+  StaticChange change;
+  change.place.push_back(placement(columns));
+  LOCUS_CHECK(scene.change_instances(change).ok());
+  seeds.write("state", "instances", chunks_of(StateWriter(scene.freeze())));
+}
+
+void write_meshes(const SeedWriter& seeds) {
+  seeds.write("mesh", "two_triangles", chunks_of(MeshWriter(two_triangles())));
+  seeds.write("mesh_parts", "two_parts", chunks_of(PartsWriter(two_triangles())));
+  seeds.write("tree", "two_triangles", encode_outline(two_triangles()->tree().topology()));
+  std::vector<Triangle> many;
+  for (int i = 0; i < 64; ++i) {
+    const auto x = static_cast<float>(i);
+    many.push_back({{x, 0, 0}, {x + 0.5f, 0, 0}, {x, 1, 0}});
+  }
+  const TriangleBvh tree = *TriangleBvh::build(many);
+  seeds.write("tree", "many_triangles", encode_outline(tree.topology()));
+  SceneSpec spec;
+  seeds.write("spec", "defaults", encode_spec(spec));
+  spec.labels = {{"map", "delta"}, {"mode", "ctf"}};
+  spec.history = {60, 1 << 20};
+  seeds.write("spec", "labels", encode_spec(spec));
+}
+
+void add_shapes(v1::QueryBatch& batch) {
+  v1::QueryBlock* rays = batch.add_blocks();
+  for (float value : {0.f, 0.f, 100.f, 1.f, 2.f, 3.f}) rays->mutable_rays()->add_origins(value);
+  for (float value : {0.f, 0.f, -1.f}) rays->mutable_rays()->add_directions(value);
+  rays->mutable_rays()->set_mode(v1::RAY_MODE_ALL);
+  rays->add_columns(v1::COLUMN_T);
+  rays->add_as_of_ticks(2);
+  v1::QueryBlock* balls = batch.add_blocks();
+  for (float value : {0.f, 1.f, 0.f}) balls->mutable_balls()->add_centers(value);
+  balls->mutable_balls()->add_radii(4);
+  v1::QueryBlock* boxes = batch.add_blocks();
+  for (float value : {0.f, 1.f, 0.f}) boxes->mutable_boxes()->add_centers(value);
+  for (float value : {3.f, 3.f, 3.f}) boxes->mutable_boxes()->add_half_extents(value);
+  for (float value : {0.f, 0.f, 0.f, 1.f}) boxes->mutable_boxes()->add_rotations(value);
+  boxes->mutable_boxes()->set_detail(v1::STATIC_DETAIL_TRIANGLES);
+}
+
+void write_queries(const SeedWriter& seeds) {
+  v1::QueryBatch batch;
+  add_shapes(batch);
+  seeds.write("queries", "shapes", batch.SerializeAsString());
+  v1::QueryBatch others;
+  v1::QueryBlock* nearest = others.add_blocks();
+  for (float value : {0.f, 1.f, 0.f}) nearest->mutable_nearest()->add_points(value);
+  nearest->mutable_nearest()->set_k(3);
+  nearest->add_masks(5);
+  nearest->mutable_frame()->set_x(1e6);
+  v1::QueryBlock* lookup = others.add_blocks();
+  lookup->mutable_lookup()->add_ids(1);
+  lookup->mutable_lookup()->add_ids(9);
+  lookup->add_columns(v1::COLUMN_POSE);
+  others.add_blocks()->mutable_lookup()->add_groups(3);
+  seeds.write("queries", "nearest_and_lookup", others.SerializeAsString());
+}
+
+void write_updates(const SeedWriter& seeds) {
+  v1::UpdateBatch batch;
+  v1::Insert* insert = batch.add_inserts();
+  insert->add_ids(7);
+  insert->add_ids(8);
+  for (float value : {0.f, 0.f, 30.f, 1.f, 1.f, 1.f}) insert->add_positions(value);
+  insert->mutable_ball()->add_radii(0.5);
+  v1::Move* move = batch.add_moves();
+  move->add_ids(7);
+  for (double value : {1e6, 0., 3.}) move->add_positions_f64(value);
+  v1::Relabel* relabel = batch.add_relabels();
+  relabel->add_ids(8);
+  relabel->add_groups(4);
+  batch.add_remove_ids(1);
+  batch.set_tick(9);
+  v1::UpdateBatch second;
+  second.set_writer(5);
+  second.set_batch(1);
+  second.set_upsert(true);
+  *second.add_inserts() = *insert;
+  second.mutable_inserts(0)->mutable_box()->add_half_extents(1);
+  std::string input;
+  append_piece(input, batch.SerializeAsString());
+  append_piece(input, second.SerializeAsString());
+  seeds.write("updates", "two_batches", input);
+  v1::SceneSpec spec;
+  (*spec.mutable_labels())["map"] = "delta";
+  spec.set_history_ticks(60);
+  spec.set_winding(v1::WINDING_CLOCKWISE);
+  seeds.write("scene_specs", "labels", spec.SerializeAsString());
+}
+
+void write_all(const SeedWriter& seeds) {
+  write_records(seeds);
+  write_states(seeds);
+  write_meshes(seeds);
+  write_queries(seeds);
+  write_updates(seeds);
+  seeds.write("bsp", "small_level", cli::small_level().bytes());
+  cli::ImportedLevel level;
+  level.source_format = "OBJ";
+  level.notes = {"One note."};
+  level.meshes.push_back(
+      {"yard", {0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0}, {0, 1, 2, 1, 3, 2}, {{"floor", 0}, {"wall", 1}}});
+  seeds.write("level_answer", "two_triangles", cli::encode_level(level));
+  seeds.write("level_answer", "error", cli::encode_level(absl::NotFoundError("no such entry")));
+}
+
+}  // namespace
+}  // namespace locus::fuzz
+
+int main(int argc, char** argv) {
+  if (argc != 2) {
+    std::cerr << "usage: fuzz_write_seeds FOLDER\n";
+    return 2;
+  }
+  locus::fuzz::write_all(locus::fuzz::SeedWriter(argv[1]));
+}
