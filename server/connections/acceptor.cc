@@ -223,7 +223,7 @@ void Acceptor::hand_over(uint64_t id, Entry& entry) {
   // Without flags, epoll reports only errors and the end of both directions. gRPC shuts both down before it closes its
   // descriptor.
   add_event(duplicate, EPOLLET, id);
-  hooks_.hand_over(descriptor, *entry.connection);
+  hooks_.hand_over(descriptor, entry.connection);
 }
 
 // Releases a connection that has ended.

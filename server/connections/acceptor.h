@@ -39,7 +39,7 @@ struct AcceptorOptions {
 // Functions that the acceptor calls on its thread.
 struct AcceptorHooks {
   // Takes over the descriptor, which does not block, of a connection that the table already contains.
-  std::function<void(int descriptor, const Connection& connection)> hand_over;
+  std::function<void(int descriptor, const std::shared_ptr<Connection>& connection)> hand_over;
   // Reports refused connections, at most once a second: how many since the last report, the last peer and its reason.
   std::function<void(uint64_t refused, const std::string& address, const char* reason)> refused;
 };

@@ -200,6 +200,10 @@ void FloodGuard::look_at(const std::shared_ptr<Watched>& watched) {
       break;
   }
   alert_until_ = sample.time + kAlertTime;
+  close_for(connection, reason);
+}
+
+void FloodGuard::close_for(Connection& connection, const char* reason) {
   if (!connection.close(reason)) return;
   closed_.fetch_add(1);
   on_closed_(connection, reason);

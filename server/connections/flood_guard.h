@@ -68,7 +68,7 @@ class FloodGuard {
   using CountStreams = std::function<std::optional<uint64_t>(Connection& connection)>;
 
   // Starts the thread, which calls `count_streams` for connections that send much beside messages, and `on_closed`
-  // after it has closed a connection.
+  // after a connection was closed, on the thread that has closed it.
   FloodGuard(const FloodLimits& limits, CountStreams count_streams, OnClosed on_closed);
   ~FloodGuard();
   FloodGuard(const FloodGuard&) = delete;
@@ -78,6 +78,9 @@ class FloodGuard {
   void watch(const std::shared_ptr<Connection>& connection) LOCUS_EXCLUDES(mutex_);
   // Stops looking at the connection. Call it before Connection::release().
   void forget(const Connection& connection) LOCUS_EXCLUDES(mutex_);
+
+  // Closes a connection that another check has found to flood the server. Does nothing if it is already closed.
+  void close_for(Connection& connection, const char* reason);
 
   // Returns the number of connections that were closed.
   uint64_t closed() const { return closed_.load(); }

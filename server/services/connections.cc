@@ -128,9 +128,13 @@ void Connections::start(grpc::Server& server) {
   guard_ = std::make_unique<FloodGuard>(
       flood_limits(config_, max_streams_), [this](Connection& connection) { return stream_counter_.count(connection); },
       log_closed);
+  reads_ = std::make_unique<CheckedReads>(
+      [this](Connection& connection, const char* reason) { guard_->close_for(connection, reason); });
   AcceptorHooks hooks;
-  hooks.hand_over = [this](int descriptor, const Connection& connection) {
-    intake_->hand_over(descriptor, connection);
+  hooks.hand_over = [this](int descriptor, const std::shared_ptr<Connection>& connection) {
+    const bool is_plain = tls_ == nullptr || connection->peer().uid;
+    if (is_plain) reads_->watch(descriptor, connection);
+    intake_->hand_over(descriptor, *connection);
   };
   hooks.refused = log_refused;
   acceptor_ =

@@ -17,6 +17,7 @@
 #include "absl/status/statusor.h"
 #include "server/config/server_config.h"
 #include "server/connections/acceptor.h"
+#include "server/connections/checked_reads.h"
 #include "server/connections/connection_table.h"
 #include "server/connections/flood_guard.h"
 #include "server/rpc/connection_intake.h"
@@ -63,7 +64,8 @@ class Connections {
   uint32_t max_streams_ = 0;
   StreamCounter stream_counter_;  // used by the guard's thread
   std::unique_ptr<FloodGuard> guard_;
-  std::unique_ptr<Acceptor> acceptor_;  // declared last, so destroyed first: it uses the guard and the intake
+  std::unique_ptr<CheckedReads> reads_;
+  std::unique_ptr<Acceptor> acceptor_;  // declared last, so destroyed first: it uses the others
 };
 
 }  // namespace locus::server

@@ -30,10 +30,10 @@ class AcceptorTest : public ::testing::Test {
     ASSERT_TRUE(sockets.ok()) << sockets.status();
     port_ = sockets->front().port();
     AcceptorHooks hooks;
-    hooks.hand_over = [this](int descriptor, const Connection& connection) {
+    hooks.hand_over = [this](int descriptor, const std::shared_ptr<Connection>& connection) {
       const MutexLock lock(mutex_);
       taken_.insert(descriptor);
-      names_.insert(connection.peer().name);
+      names_.insert(connection->peer().name);
     };
     hooks.refused = [this](uint64_t refused, const std::string&, const char* reason) {
       const MutexLock lock(mutex_);

@@ -1,0 +1,89 @@
+#include "server/connections/checked_reads.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <utility>
+
+#include "absl/container/flat_hash_map.h"
+#include "absl/strings/string_view.h"
+#include "core/base/mutex.h"
+#include "server/connections/header_check.h"
+
+namespace locus::server {
+namespace {
+
+constexpr const char* kReason = "a block of headers that is too long or in too many frames";
+
+// Returns the kernel's number of a socket, which no other socket ever gets; 0 if the descriptor is none.
+uint64_t cookie_of(int descriptor) {
+  uint64_t cookie = 0;
+  socklen_t size = sizeof cookie;
+  return getsockopt(descriptor, SOL_SOCKET, SO_COOKIE, &cookie, &size) == 0 ? cookie : 0;
+}
+
+struct WatchedSocket {
+  CheckedReads* owner = nullptr;
+  uint64_t cookie = 0;
+  std::shared_ptr<Connection> connection;
+  HeaderCheck check;
+};
+
+// Watched sockets of the process whose descriptors have equal remainders.
+struct Shard {
+  Mutex mutex;
+  absl::flat_hash_map<int, WatchedSocket> sockets LOCUS_GUARDED_BY(mutex);
+};
+
+constexpr size_t kShards = 64;
+
+std::array<Shard, kShards>& shards() {
+  static auto* const made = new std::array<Shard, kShards>;  // never destroyed: threads may read until the process ends
+  return *made;
+}
+
+Shard& shard_of(int descriptor) { return shards()[static_cast<size_t>(descriptor) % kShards]; }
+
+bool accepts(HeaderCheck& check, const msghdr& message, size_t count) {
+  for (size_t i = 0; i < message.msg_iovlen && count > 0; ++i) {
+    const size_t size = std::min(count, message.msg_iov[i].iov_len);
+    if (!check.accepts({static_cast<const char*>(message.msg_iov[i].iov_base), size})) return false;
+    count -= size;
+  }
+  return true;
+}
+
+}  // namespace
+
+CheckedReads::~CheckedReads() {
+  for (Shard& shard : shards()) {
+    const MutexLock lock(shard.mutex);
+    absl::erase_if(shard.sockets, [this](const auto& entry) { return entry.second.owner == this; });
+  }
+}
+
+void CheckedReads::watch(int descriptor, std::shared_ptr<Connection> connection) {
+  Shard& shard = shard_of(descriptor);
+  const MutexLock lock(shard.mutex);
+  shard.sockets.insert_or_assign(descriptor,
+                                 WatchedSocket{this, cookie_of(descriptor), std::move(connection), HeaderCheck()});
+}
+
+bool CheckedReads::accept(int descriptor, const msghdr& message, size_t count) {
+  if (descriptor < 0) return true;
+  Shard& shard = shard_of(descriptor);
+  const MutexLock lock(shard.mutex);
+  const auto found = shard.sockets.find(descriptor);
+  if (found == shard.sockets.end()) return true;
+  WatchedSocket& socket = found->second;
+  if (socket.cookie != cookie_of(descriptor)) {
+    shard.sockets.erase(found);
+    return true;
+  }
+  if (accepts(socket.check, message, count)) return true;
+  socket.owner->on_refused_(*socket.connection, kReason);
+  shard.sockets.erase(found);
+  return false;
+}
+
+}  // namespace locus::server

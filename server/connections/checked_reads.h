@@ -1,0 +1,47 @@
+// Checks the bytes that the transport reads from connections without TLS, before it parses them. The transport reads
+// with recvmsg(), and server/rpc replaces this function by one that asks CheckedReads::accept() about each read; see
+// README.md. Bytes of other descriptors are always accepted.
+//
+// Threads: every member may be called from any thread; reads of different descriptors rarely wait for each other.
+// Invariant: bytes are checked only if their descriptor is still the socket that was watched, by the kernel's cookie,
+// because the transport closes a descriptor without telling us, and its number is used again.
+#ifndef LOCUS_SERVER_CONNECTIONS_CHECKED_READS_H_
+#define LOCUS_SERVER_CONNECTIONS_CHECKED_READS_H_
+
+#include <sys/socket.h>
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <utility>
+
+#include "server/connections/connection.h"
+
+namespace locus::server {
+
+class CheckedReads {
+ public:
+  using OnRefused = std::function<void(Connection& connection, const char* reason)>;
+
+  // `on_refused` is called on the reading thread, once for each connection whose bytes are refused. It must not call
+  // recvmsg().
+  explicit CheckedReads(OnRefused on_refused) : on_refused_(std::move(on_refused)) {}
+  // Stops checking; `on_refused` is not called any more.
+  ~CheckedReads();
+  CheckedReads(const CheckedReads&) = delete;
+  CheckedReads& operator=(const CheckedReads&) = delete;
+
+  // Begins to check the reads from `descriptor`, the socket of `connection`, from which nothing was read yet.
+  void watch(int descriptor, std::shared_ptr<Connection> connection);
+
+  // Checks `count` bytes that were read from `descriptor` into `message`. Returns false if they are refused; then the
+  // connection was reported, and the transport must not see the bytes. Costs about 0.1 us for a watched descriptor.
+  static bool accept(int descriptor, const msghdr& message, size_t count);
+
+ private:
+  const OnRefused on_refused_;
+};
+
+}  // namespace locus::server
+
+#endif  // LOCUS_SERVER_CONNECTIONS_CHECKED_READS_H_
