@@ -32,9 +32,10 @@ build_packages="g++ cmake ninja-build pkg-config libgrpc++-dev libprotobuf-dev p
 python_packages="python3 python3-grpcio python3-protobuf"
 # ccache speeds up later builds; binutils provides nm for tests/house; prometheus-client and yaml read the metrics,
 # alerts and dashboards; zsh and fish run the completions; groff and mandoc format the manual; tests run haproxy as a
-# proxy and as the front of deploy/edge; tests/attack speaks HTTP/2 by python3-h2 and makes certificates by openssl.
+# proxy and as the front of deploy/edge; tests/attack speaks HTTP/2 by python3-h2 and makes certificates by openssl; the
+# test of deploy/security connects two namespaces by iproute2.
 test_packages="libgtest-dev libgmock-dev ccache clang-format git python3 binutils python3-numpy
-  python3-prometheus-client python3-yaml python3-h2 openssl zsh fish mandoc groff-base haproxy"
+  python3-prometheus-client python3-yaml python3-h2 openssl zsh fish mandoc groff-base haproxy iproute2"
 # redis-tools contains the server too, without the service that redis-server would start.
 bench_packages="libembree-dev libbullet-dev libcgal-dev libnanoflann-dev redis-tools"
 # The compiler of the asan preset, and the libraries of its sanitizers.

@@ -1,8 +1,8 @@
-// Thread that keeps the memory of the process below its limit: measures the process periodically and, when memory runs
-// short or a claim was refused, drops old revisions, returns free memory to the kernel, drops the oldest ticks of
-// histories, so that histories give way before inserts and uploads are refused, and cancels the readers of the oldest
-// revisions. No other thread does this: it visits all scenes and the whole heap. Logs which lines of the budget gave
-// way or were refused.
+// Thread that keeps the memory of the process below its limit. It measures the process periodically. When memory runs
+// short or a claim was refused, it drops old revisions and returns free memory to the kernel; then it drops the oldest
+// ticks of histories, so that histories give way before inserts and uploads are refused; then it cancels the readers of
+// the oldest revisions. Only this thread does so, because it visits all scenes and the whole heap. It logs which lines
+// of the budget were shortened or refused.
 //
 // Threads: the constructor starts the thread, the destructor ends it.
 #ifndef LOCUS_SERVER_HOST_MEMORY_KEEPER_H_

@@ -67,8 +67,8 @@ class Caller {
   // UNAUTHENTICATED if the credentials were revoked or have expired since the call began; otherwise the errors of
   // authorize() and check_right() for the rights that the caller has now.
   absl::Status recheck(const std::string& scene) const;
-  // Returns the identity; that of callers without credentials before authorize(), and in servers without access
-  // control.
+  // Returns the caller's identity. Before authorize(), and in servers without access control, this is the identity of
+  // callers without credentials.
   const Identity& identity() const { return *identity_; }
 
   // Returns an id of the client: of its identity if it has one, otherwise of its connection. The same for all calls of
@@ -79,7 +79,8 @@ class Caller {
   std::array<std::string, 2> quota_subjects() const;
   // Takes `amount` from a quota of the caller's identity and of its connection: see Quotas.
   absl::Status take_quota(QuotaKind kind, double amount) const;
-  // Charges both with work that was done already.
+  // Charges a quota of the caller's identity and of its connection with work that was already done, whether or not the
+  // quotas suffice.
   void charge_quota(QuotaKind kind, double amount) const;
   // Takes `amount` of a quota for as long as the result lives.
   absl::StatusOr<QuotaHold> hold_quota(QuotaKind kind, double amount) const;
@@ -104,7 +105,7 @@ class Caller {
   void promise_audit() { is_answer_audited_ = true; }
   // Counts an update of a scene, for the audit log's line a minute. `items` is the number of objects that it changed.
   void audit_update(const std::string& scene, uint64_t items) const;
-  // Returns whether the refusal `status` belongs into the audit log.
+  // Returns whether the refusal `status` is written to the audit log.
   static bool is_audited(const absl::Status& status);
 
   // Cancels the call at once, even while it is blocked in a read or write.

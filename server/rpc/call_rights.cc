@@ -1,4 +1,4 @@
-// Part of Caller: who calls, and what the caller may do.
+// Functions of Caller that identify the caller, check its rights and quotas, and write audit lines.
 #include <algorithm>
 #include <functional>
 #include <limits>

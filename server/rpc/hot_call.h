@@ -126,8 +126,8 @@ class HotCall final : private IoLoop::ActiveCall {
     Request request_;
     Response response_;
     typename Method::Work work_;
-    CallMemory request_claim_;  // until the slot is released
-    CallMemory answer_claim_;   // until the answer is written
+    CallMemory request_claim_;  // memory of the request, claimed until the slot is released
+    CallMemory answer_claim_;   // memory of the answer, claimed until it is written
     bool answered_ = false;
     bool holds_ = false;  // the work called hold(): read no message before this one is answered
     SteadyTime arrived_;
@@ -297,7 +297,7 @@ class HotCall final : private IoLoop::ActiveCall {
     });
   }
 
-  // Reduces the claim of a slot to the size of its answer.
+  // Reduces the memory that is claimed for the answer of a slot to the size that the answer has.
   void shrink_claim(Slot& slot) {
     constexpr uint64_t kWorthwhile = 64u << 10;
     if (slot.answer_claim_.bytes() > kWorthwhile)
@@ -440,7 +440,7 @@ class HotCall final : private IoLoop::ActiveCall {
   Wire wire_{&context_};
   Bytes incoming_;           // owned by gRPC while reading_
   Bytes outgoing_;           // owned by gRPC while writing_
-  CallMemory answer_claim_;  // claim of a unary call's answer, while it is sent with the status
+  CallMemory answer_claim_;  // memory of a unary call's answer while it is sent with the status
   Tag accepted_tag_{*this, &HotCall::accepted};
   Tag read_tag_{*this, &HotCall::read};
   Tag written_tag_{*this, &HotCall::written};

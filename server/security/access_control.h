@@ -27,7 +27,7 @@
 
 namespace locus::server {
 
-// Proofs of identity that a call came with. The views are borrowed during authenticate().
+// Credentials of one call: what proves the caller's identity. The views are borrowed during authenticate().
 struct Credentials {
   absl::string_view bearer;            // see bearer_of_header(); empty = none
   absl::string_view certificate_name;  // of the verified client certificate: first URI SAN, else first DNS SAN, else CN

@@ -43,7 +43,8 @@ class AccessRules {
   bool allows(const Identity& identity, Right right) const { return allows(identity, right, {}); }
   // Returns whether the identity has a right to every scene, by a grant with the pattern `*`.
   bool allows_all(const Identity& identity, Right right) const;
-  // Returns whether there can be a scene to which the identity has the right, or it has the right to the server.
+  // Returns whether the identity has the right to the server, or to all scenes that match some pattern, whether or not
+  // such a scene exists.
   bool allows_any(const Identity& identity, Right right) const;
   // Returns whether the identity has any right at all.
   bool knows(const Identity& identity) const;

@@ -12,7 +12,7 @@ namespace locus::server {
 
 struct AuditEntry {
   int64_t unix_ms = 0;    // milliseconds since 1970
-  std::string principal;  // who
+  std::string principal;  // identity of the caller, such as token:ci
   std::string peer;       // address and port that the call came from
   std::string address;    // address by which callers are counted; not written
   std::string rpc;        // full method path, or the HTTP page

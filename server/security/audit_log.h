@@ -1,7 +1,7 @@
-// Audit log: one line of JSON for each change, in FILE, and for refusals, in FILE.refused, so that no number of
-// refusals rotates a change away. A caller's refusals beyond a few a second are counted instead (refusal_tally.h).
-// Callers never wait for the disk: one thread writes what a bounded queue holds, and a line says how many were dropped
-// if the queue was full. Refusals may fill half of the queue.
+// Audit log: each change is one line of JSON in FILE, each refusal one in FILE.refused. The files are separate, because
+// otherwise many refusals could rotate the lines of changes away. A caller's refusals beyond a few a second are counted
+// instead (refusal_tally.h). Callers never wait for the disk: one thread writes the lines of a bounded queue. If the
+// queue was full, a line says how many lines were dropped. Refusals may fill half of the queue.
 //
 // The files have mode 0600. When one reaches the given size it is renamed to FILE.1, FILE.1 to FILE.2 and so on; four
 // older files are kept. Threads: every member may be called from any thread. A line is written whole or not at all,

@@ -69,8 +69,9 @@ class Quotas {
   QuotaHold hold_anyway(absl::Span<const std::string> subjects, QuotaKind kind, double amount, uint64_t now)
       LOCUS_EXCLUDES(mutex_);
 
-  // Takes `amount` whatever the quota: for what is known only afterwards. take() then refuses until a rate has
-  // recovered, or enough of an amount was released. Counts nothing if the subject is new and the table full.
+  // Takes `amount` even if the quota does not suffice, for work whose amount is known only after it was done. Later
+  // calls of take() are refused until the rate has recovered, or enough of the amount in use was released. Counts
+  // nothing if the subject is new and the table full.
   void charge(absl::string_view subject, QuotaKind kind, double amount, uint64_t now) LOCUS_EXCLUDES(mutex_);
   // Gives back an amount in use. Not for rates.
   void release(absl::string_view subject, QuotaKind kind, double amount) LOCUS_EXCLUDES(mutex_);
@@ -98,7 +99,7 @@ class Quotas {
     uint64_t generation = 0;
     uint64_t filled = 0;  // time up to which the buckets are filled
     std::array<Bucket, kRates> buckets;
-    std::array<double, kQuotaKinds> in_use{};  // of amounts
+    std::array<double, kQuotaKinds> in_use{};  // quotas that limit an amount in use: the amount
   };
 
   absl::Status take_locked(absl::string_view subject, QuotaKind kind, double amount, uint64_t now, Besides besides)
@@ -121,7 +122,7 @@ class Quotas {
   mutable Mutex mutex_;
   std::vector<Account> accounts_ LOCUS_GUARDED_BY(mutex_);
   absl::flat_hash_map<std::string, size_t> slots_ LOCUS_GUARDED_BY(mutex_);  // positions in accounts_
-  size_t hand_ LOCUS_GUARDED_BY(mutex_) = 0;                                 // where the next eviction looks first
+  size_t hand_ LOCUS_GUARDED_BY(mutex_) = 0;  // account at which the next eviction begins its search
 };
 
 // Amount of a quota that subjects have in use, given back when destroyed. An empty hold has taken nothing. Must not

@@ -18,7 +18,7 @@ inline constexpr size_t kMaxTokenIdLength = 63;
 inline constexpr size_t kMaxKeys = 64;             // keys of a JWKS file
 inline constexpr size_t kMaxPrincipalBytes = 256;  // text of a principal
 inline constexpr size_t kMaxJwtBytes = 8192;
-inline constexpr int64_t kJwtSkewSeconds = 60;  // how far the clock of the JWT's issuer may differ from the server's
+inline constexpr int64_t kJwtSkewSeconds = 60;  // maximum difference of the clocks of a JWT's issuer and the server
 
 inline constexpr size_t kMaxQuotaSubjects = 65536;        // identities and connections whose use is counted
 inline constexpr size_t kMaxAuditQueue = 4096;            // audit lines that wait for the writer

@@ -67,6 +67,15 @@ class FaultTest(unittest.TestCase):
     def test_a_victim_that_is_refused_afterwards_is_noticed(self):
         self.assertEqual(run_fault("refuse")[0], "hangs")
 
+    def test_a_victim_that_is_mostly_refused_or_connects_slowly_is_noticed(self):
+        row = runner.Row(table.ROWS[0], LIMIT)
+        row.idle = {"p99_ms": 1.0, "connect_p99_ms": 2.0}
+        row.during = {"calls": 10, "errors": {"CLOSED": 5}, "p99_ms": 1.0, "connect_p99_ms": 20.0}
+        self.assertEqual(row.failures(False), [])
+        row.during |= {"errors": {"CLOSED": 4, "CONNECT": 2}, "connect_p99_ms": 100.0}
+        self.assertEqual(row.failures(True), ["only 4 of the victim's 10 calls were answered"])
+        self.assertIn("slow: p99 of new connections 50 times as long, at most 10 are allowed", row.failures(False))
+
     def test_wrong_codes_and_refusals_without_a_text_are_noticed(self):
         self.assertIn("INTERNAL a fault", run_fault("internal")[1])
         self.assertIn("INVALID_ARGUMENT without a text", run_fault("no_text")[1])

@@ -21,6 +21,7 @@ LOOK_SECONDS = 0.05
 MAX_DEATHS = 20
 WORLD_OBJECTS = 20000
 MIN_SLOW_MS = 50.0  # a p99 below this may be caused by the machine instead of the daemon
+MIN_ANSWERED = 0.5  # share of the victim's calls that must be answered during the attack
 
 Options = collections.namedtuple("Options", "program limit front seconds quick address pid authority",
                                  defaults=(None, None, None))
@@ -54,11 +55,23 @@ class Row:
         """Returns the factor by which the victim's p99 grew."""
         return self.during.get("p99_ms", 0) / max(self.idle.get("p99_ms", 0), 1.0)
 
+    def slower_connections(self):
+        """Returns the factor by which the p99 of the victim's new connections, with their first call, grew."""
+        return self.during.get("connect_p99_ms", 0) / max(self.idle.get("connect_p99_ms", 0), 1.0)
+
+    def answered(self):
+        """Returns how many of the victim's calls during the attack were answered, and how many there were."""
+        calls = self.during.get("calls", 0)
+        return calls - sum(self.during.get("errors", {}).values()), calls
+
     def failures(self, quick):
         """Returns the failures of the row, each in a few words. Times are checked only in the long form."""
         found = [f"{how} in {step}" if step else how for step, how in self.deaths]
         if not self.served:
             found.append("the victim is not served afterwards")
+        answered, calls = self.answered()
+        if not self.deaths and answered < MIN_ANSWERED * calls:
+            found.append(f"only {answered} of the victim's {calls} calls were answered")
         if self.stuck:
             found.append("the attack did not end")
         if not self.deaths and self.after > self.before + self.kept_allowed():
@@ -68,6 +81,9 @@ class Row:
         if not quick and self.slower() > self.max_slower and self.during["p99_ms"] > MIN_SLOW_MS:
             found.append(f"slow: p99 {self.slower():.0f} times as long, at most {self.max_slower} are allowed; "
                          f"longest in {self.worst or 'the only step'}")
+        if not quick and self.slower_connections() > self.max_slower and self.during["connect_p99_ms"] > MIN_SLOW_MS:
+            found.append(f"slow: p99 of new connections {self.slower_connections():.0f} times as long, at most "
+                         f"{self.max_slower} are allowed")
         return found + self.wrong
 
 

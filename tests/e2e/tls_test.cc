@@ -1,10 +1,15 @@
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <atomic>
 #include <functional>
+#include <iostream>
+#include <optional>
 #include <thread>
+#include <vector>
 
 #include "server/rpc/tls_credentials.h"
+#include "server/security/token_file.h"
 #include "tests/support/raw_socket.h"
 #include "tests/support/running_server.h"
 #include "tests/support/temporary_folder.h"
@@ -173,42 +178,107 @@ TEST_F(TlsTest, AServerWithABadNewFileServesNewConnections) {
   }
 }
 
-// Runs clients on old and new connections while the files are replaced.
+// Runs clients with tokens on old and new connections while certificates, tokens and rights are replaced.
 class TlsReloadTest : public TlsTest {
  protected:
-  void reload(int times) {
-    RunningServer running(config(false));
-    std::atomic<bool> end{false};
-    std::atomic<int> calls{0};
-    std::atomic<int> failed{0};
-    const auto count = [&](const grpc::Status& status) {
-      ++calls;
-      if (!status.ok() && ++failed < 5) ADD_FAILURE() << status.error_message();
-    };
-    std::thread steady([&] {
-      const auto channel = channel_to(running.address(), authority_.certificate());
-      while (!end.load()) count(get_server(channel));
-    });
-    std::thread opening([&] {
-      while (!end.load()) count(get_server(channel_to(running.address(), authority_.certificate())));
-    });
-    for (int i = 0; i < times; ++i) {
-      write(authority_.for_server("server " + std::to_string(i)));
-      running.server().reload_tls();  // false if the server has just read them by itself
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    }
-    end.store(true);
-    steady.join();
-    opening.join();
-    EXPECT_EQ(failed.load(), 0);
-    EXPECT_GT(calls.load(), times);
+  TlsReloadTest() {
+    replace_file(folder_.file("access"), "grant token:caller admin *\ngrant token:guest read *\n");
+    token_ = *server::add_token(tokens(), "caller", kForever, {}, "");
+    server::ServerConfig with_tokens = config(false);
+    with_tokens.access_file = folder_.file("access");
+    with_tokens.token_file = tokens();
+    running_.emplace(with_tokens);
   }
+  ~TlsReloadTest() override {
+    end_.store(true);
+    for (std::thread& thread : clients_of_test_) thread.join();
+  }
+
+  std::string tokens() const { return folder_.file("tokens"); }
+  std::shared_ptr<grpc::Channel> channel() { return channel_to(running_->address(), authority_.certificate()); }
+  static void set_token(grpc::ClientContext& context, const std::string& token) {
+    set_timeout(context);
+    context.AddMetadata("authorization", "Bearer " + token);
+  }
+  void call(const std::shared_ptr<grpc::Channel>& channel) {
+    grpc::ClientContext context;
+    set_token(context, token_);
+    v1::GetServerResponse response;
+    const grpc::Status status = v1::ServerService::NewStub(channel)->GetServer(&context, {}, &response);
+    calls_.fetch_add(1);
+    if (!status.ok() && failed_.fetch_add(1) < 5) ADD_FAILURE() << status.error_message();
+  }
+  void start_clients() {
+    clients_of_test_.emplace_back([this, kept = channel()] {
+      while (!end_.load()) call(kept);
+    });
+    clients_of_test_.emplace_back([this] {
+      while (!end_.load()) call(channel());
+    });
+  }
+
+  // Gives a guest a token, lets it open a stream, revokes the token, and waits until the stream has ended. Returns the
+  // time from the revocation to the end.
+  std::chrono::nanoseconds revoke_one(const std::shared_ptr<grpc::Channel>& channel) {
+    const absl::StatusOr<std::string> token = server::add_token(tokens(), "guest", kForever, {}, "");
+    EXPECT_TRUE(token.ok()) << token.status();
+    running_->server().reload();
+    grpc::ClientContext context;
+    set_token(context, *token);
+    const auto stream = v1::QueryService::NewStub(channel)->StreamQueries(&context);
+    v1::StreamQueriesRequest request;
+    request.set_scene("world");
+    v1::StreamQueriesResponse response;
+    EXPECT_TRUE(stream->Write(request) && stream->Read(&response));
+    const auto begin = std::chrono::steady_clock::now();
+    EXPECT_TRUE(server::revoke_token(tokens(), "guest").ok());
+    EXPECT_FALSE(stream->Read(&response));  // returns when the stream ends
+    const auto end = std::chrono::steady_clock::now();
+    EXPECT_EQ(stream->Finish().error_code(), grpc::StatusCode::UNAUTHENTICATED);
+    return end - begin;
+  }
+
+  // Replaces the certificate, adds a token and revokes it, `times` times.
+  void reload(int times) {
+    create_world();
+    start_clients();
+    const std::shared_ptr<grpc::Channel> guests = channel();
+    std::chrono::nanoseconds longest{0};
+    for (int i = 0; i < times && !HasFailure(); ++i) {
+      write(authority_.for_server("server " + std::to_string(i)));
+      longest = std::max(longest, revoke_one(guests));
+    }
+    std::cout << "proof: " << times << " changes of certificates and tokens: " << calls_.load() << " calls, "
+              << failed_.load() << " failed; streams of revoked tokens ended within "
+              << std::chrono::ceil<std::chrono::milliseconds>(longest).count() << " ms" << std::endl;
+    EXPECT_EQ(failed_.load(), 0);
+    EXPECT_GT(calls_.load(), times);
+  }
+
+ private:
+  static constexpr int64_t kForever = 1'000'000;
+
+  void create_world() {
+    grpc::ClientContext context;
+    set_token(context, token_);
+    v1::CreateSceneRequest request;
+    request.set_name("world");
+    v1::CreateSceneResponse response;
+    ASSERT_TRUE(v1::SceneService::NewStub(channel())->CreateScene(&context, request, &response).ok());
+  }
+
+  std::string token_;
+  std::optional<RunningServer> running_;
+  std::atomic<bool> end_{false};
+  std::atomic<int> calls_{0};
+  std::atomic<int> failed_{0};
+  std::vector<std::thread> clients_of_test_;
 };
 
-TEST_F(TlsReloadTest, AHundredChangesOfTheFilesDropNoCall) { reload(100); }
+TEST_F(TlsReloadTest, FiftyChangesDropNoCallAndEndTheStreamsOfRevokedTokens) { reload(50); }
 
 using LongTlsReloadTest = TlsReloadTest;
-TEST_F(LongTlsReloadTest, AThousandChangesOfTheFilesDropNoCall) { reload(1000); }
+TEST_F(LongTlsReloadTest, AThousandChangesDropNoCallAndEndTheStreamsOfRevokedTokens) { reload(1000); }
 
 }  // namespace
 }  // namespace locus::test

@@ -19,6 +19,7 @@
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/support/columns.h"
 #include "tests/support/random_updates.h"
+#include "tests/support/raw_socket.h"
 
 namespace locus::fuzz {
 namespace {
@@ -186,6 +187,26 @@ void write_updates(const SeedWriter& seeds) {
   spec.set_history_ticks(60);
   spec.set_winding(v1::WINDING_CLOCKWISE);
   seeds.write("scene_specs", "labels", spec.SerializeAsString());
+  v1::CreateSceneRequest create;
+  create.set_name("world");
+  *create.mutable_spec() = spec;
+  seeds.write("wire", "scene", create.SerializeAsString());
+  v1::ApplyUpdatesRequest apply;
+  apply.set_scene("world");
+  *apply.mutable_batch() = batch;
+  seeds.write("wire", "updates", apply.SerializeAsString());
+  apply.mutable_batch()->clear_inserts();
+  for (uint32_t list = 0; list <= limits::kMaxUpdateLists; ++list) apply.mutable_batch()->add_inserts();
+  seeds.write("wire", "too_many_lists", apply.SerializeAsString());
+}
+
+// Frames after the size of the pieces in which they are read, which is 3.
+void write_frames(const SeedWriter& seeds) {
+  const std::string begin = '\2' + test::kHttp2Opening;
+  std::string endless = test::http2_frame(1, 0, 1, "headers");
+  for (int frame = 0; frame < 20; ++frame) endless += test::http2_frame(9, 0, 1, "h");
+  seeds.write("frames", "call", begin + test::http2_frame(1, 4, 1, "headers") + test::http2_frame(0, 1, 1, "data"));
+  seeds.write("frames", "endless_headers", begin + endless);
 }
 
 void write_all(const SeedWriter& seeds) {
@@ -194,6 +215,7 @@ void write_all(const SeedWriter& seeds) {
   write_meshes(seeds);
   write_queries(seeds);
   write_updates(seeds);
+  write_frames(seeds);
   seeds.write("bsp", "small_level", cli::small_level().bytes());
   cli::ImportedLevel level;
   level.source_format = "OBJ";

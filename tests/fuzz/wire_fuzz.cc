@@ -1,0 +1,87 @@
+// Bytes of clients that are checked before Protobuf or gRPC parses them: the scan of a request, and the frames of
+// HTTP/2.
+#include <google/protobuf/descriptor.h>
+#include <google/protobuf/message.h>
+#include <grpcpp/support/slice.h>
+
+#include <array>
+#include <memory>
+#include <set>
+#include <utility>
+
+#include "core/base/refusal.h"
+#include "locus/v1/query_service.pb.h"
+#include "locus/v1/scene_service.pb.h"
+#include "locus/v1/server_service.pb.h"
+#include "locus/v1/update_service.pb.h"
+#include "server/connections/header_check.h"
+#include "server/rpc/wire_plan.h"
+#include "tests/fuzz/fuzz_target.h"
+
+namespace locus::server {
+namespace {
+
+using google::protobuf::Descriptor;
+using google::protobuf::Message;
+using google::protobuf::MessageFactory;
+
+struct Request {
+  const Message* prototype;
+  WirePlan plan;
+};
+
+// Returns the types of all requests, each with its plan.
+const std::vector<Request>& requests() {
+  static const auto* const made = [] {
+    std::set<const Descriptor*> types;
+    for (const Descriptor* some : {v1::QueryRequest::descriptor(), v1::ApplyUpdatesRequest::descriptor(),
+                                   v1::CreateSceneRequest::descriptor(), v1::GetServerRequest::descriptor()})
+      for (int service = 0; service < some->file()->service_count(); ++service)
+        for (int method = 0; method < some->file()->service(service)->method_count(); ++method)
+          types.insert(some->file()->service(service)->method(method)->input_type());
+    auto* all = new std::vector<Request>;
+    for (const Descriptor* type : types)
+      all->push_back({MessageFactory::generated_factory()->GetPrototype(type), WirePlan(*type, request_limits())});
+    return all;
+  }();
+  return *made;
+}
+
+grpc::ByteBuffer in_two_slices(absl::string_view bytes) {
+  const absl::string_view first = bytes.substr(0, bytes.size() / 3), second = bytes.substr(first.size());
+  const std::array<grpc::Slice, 2> slices{grpc::Slice(first.data(), first.size()),
+                                          grpc::Slice(second.data(), second.size())};
+  return {slices.data(), slices.size()};
+}
+
+// An accepted message takes no more memory than the scan says. What Protobuf itself writes is not malformed.
+void check_request(const Request& request, absl::string_view input) {
+  const absl::StatusOr<uint64_t> scanned = request.plan.scan(in_two_slices(input));
+  if (!scanned.ok()) fuzz::check_error(scanned.status());
+  const std::unique_ptr<Message> parsed(request.prototype->New());
+  const uint64_t empty = parsed->SpaceUsedLong();
+  if (!parsed->ParseFromArray(input.data(), static_cast<int>(input.size()))) return;
+  if (scanned.ok()) LOCUS_CHECK_LE(parsed->SpaceUsedLong() - empty, *scanned);
+  parsed->DiscardUnknownFields();
+  const absl::StatusOr<uint64_t> again = request.plan.scan(in_two_slices(parsed->SerializeAsString()));
+  LOCUS_CHECK(again.ok() || refusal_of(again.status())->reason == Reason::kLimit);
+}
+
+LOCUS_FUZZ_TARGET(wire) {
+  for (const Request& request : requests()) check_request(request, input);
+}
+
+// The result for the frames must not depend on the pieces in which they are read; the input's first byte is the size of
+// a piece.
+LOCUS_FUZZ_TARGET(frames) {
+  if (input.empty()) return;
+  const size_t piece = size_t{static_cast<uint8_t>(input[0])} + 1;
+  input.remove_prefix(1);
+  HeaderCheck whole, in_pieces;
+  bool accepted = true;
+  for (size_t at = 0; at < input.size() && accepted; at += piece) accepted = in_pieces.accepts(input.substr(at, piece));
+  LOCUS_CHECK(whole.accepts(input) == accepted);
+}
+
+}  // namespace
+}  // namespace locus::server
