@@ -13,8 +13,6 @@
 namespace locus::server {
 namespace {
 
-constexpr const char* kReason = "a block of headers that is too long or in too many frames";
-
 // Returns the kernel's number of a socket, which no other socket ever gets; 0 if the descriptor is none.
 uint64_t cookie_of(int descriptor) {
   uint64_t cookie = 0;
@@ -81,7 +79,7 @@ bool CheckedReads::accept(int descriptor, const msghdr& message, size_t count) {
     return true;
   }
   if (accepts(socket.check, message, count)) return true;
-  socket.owner->on_refused_(*socket.connection, kReason);
+  socket.owner->on_refused_(*socket.connection, HeaderCheck::kReason);
   shard.sockets.erase(found);
   return false;
 }

@@ -23,6 +23,8 @@ class HeaderCheck {
   // Maximum CONTINUATION frames of a block. A client needs one for each 16 KiB after the first.
   static constexpr uint32_t kMaxContinuations = 8;
 
+  static constexpr const char* kReason = "a block of headers that is too long or in too many frames";
+
   // Checks the next bytes of the connection. Returns false if a block exceeds a maximum; then the connection must be
   // closed, and later results have no meaning.
   bool accepts(absl::string_view bytes);

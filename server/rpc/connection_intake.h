@@ -1,7 +1,6 @@
 // Hands accepted connections over to gRPC. TCP connections go through gRPC's external acceptor, which supports TLS and
 // names each peer by its address. It would give all peers of unix sockets the same name, so unix connections are added
-// by their descriptors, which then are part of their names. The .cc file also replaces recvmsg(), with which gRPC
-// reads, so that CheckedReads sees the bytes first.
+// by their descriptors, which then are part of their names.
 //
 // Threads: hand_over() on one thread, between started() and the shutdown of the server.
 #ifndef LOCUS_SERVER_RPC_CONNECTION_INTAKE_H_

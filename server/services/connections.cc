@@ -11,6 +11,7 @@
 #include "server/config/connection_limits.h"
 #include "server/config/listen_address.h"
 #include "server/observability/log.h"
+#include "server/rpc/read_hooks.h"
 #include "server/scheduling/clocks.h"
 
 namespace locus::server {
@@ -130,6 +131,7 @@ void Connections::start(grpc::Server& server) {
       log_closed);
   reads_ = std::make_unique<CheckedReads>(
       [this](Connection& connection, const char* reason) { guard_->close_for(connection, reason); });
+  check_tls_reads([](const char* reason) { log(LogLevel::kWarning, "TLS connection closed", {{"reason", reason}}); });
   AcceptorHooks hooks;
   hooks.hand_over = [this](int descriptor, const std::shared_ptr<Connection>& connection) {
     const bool is_plain = tls_ == nullptr || connection->peer().uid;

@@ -1,13 +1,19 @@
 #include <gmock/gmock.h>
+#include <openssl/bio.h>
+#include <openssl/ssl.h>
+#include <sys/socket.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <functional>
 #include <iostream>
+#include <memory>
 #include <optional>
 #include <thread>
 #include <vector>
 
+#include "server/connections/header_check.h"
 #include "server/rpc/tls_credentials.h"
 #include "server/security/token_file.h"
 #include "tests/support/raw_socket.h"
@@ -82,6 +88,47 @@ TEST_F(TlsTest, OnlyClientsWithACertificateOfTheClientCaAreServed) {
   EXPECT_FALSE(get_server(channel_to(running.address(), root, foreign), std::chrono::seconds(2)).ok());
   const TestCertificate expired = clients_.issue({.common_name = "game", .valid_from_s = -7200, .valid_to_s = -3600});
   EXPECT_FALSE(get_server(channel_to(running.address(), root, expired), std::chrono::seconds(2)).ok());
+}
+
+// A TLS connection that has chosen HTTP/2 and sends bytes of its own making.
+class RawTlsSocket {
+ public:
+  explicit RawTlsSocket(const std::string& address) {
+    constexpr std::array<unsigned char, 3> kHttp2{2, 'h', '2'};
+    EXPECT_EQ(SSL_CTX_set_alpn_protos(context_.get(), kHttp2.data(), kHttp2.size()), 0);
+    BIO_set_conn_hostname(connection_.get(), address.c_str());
+    EXPECT_EQ(BIO_do_connect(connection_.get()), 1);
+    const timeval timeout{60, 0};
+    setsockopt(static_cast<int>(BIO_get_fd(connection_.get(), nullptr)), SOL_SOCKET, SO_RCVTIMEO, &timeout,
+               sizeof timeout);
+  }
+  bool send(const std::string& bytes) {
+    return BIO_write(connection_.get(), bytes.data(), static_cast<int>(bytes.size())) == static_cast<int>(bytes.size());
+  }
+  // Reads until the server closes the connection. Returns false if it sends nothing for a minute.
+  bool wait_closed() {
+    std::array<char, 4096> bytes;
+    while (BIO_read(connection_.get(), bytes.data(), bytes.size()) > 0) {
+    }
+    return BIO_should_retry(connection_.get()) == 0;
+  }
+
+ private:
+  const std::unique_ptr<SSL_CTX, decltype(&SSL_CTX_free)> context_{SSL_CTX_new(TLS_client_method()), &SSL_CTX_free};
+  const std::unique_ptr<BIO, decltype(&BIO_free_all)> connection_{BIO_new_ssl_connect(context_.get()), &BIO_free_all};
+};
+
+TEST_F(TlsTest, ABlockOfHeadersThatIsTooLongClosesItsConnection) {
+  const RunningServer running(config(false));
+  constexpr uint8_t kHeaders = 1, kContinuation = 9;
+  std::string frames = kHttp2Opening + http2_frame(kHeaders, 0, 1, "");
+  for (uint32_t frame = 0; frame < server::HeaderCheck::kMaxContinuations; ++frame)
+    frames += http2_frame(kContinuation, 0, 1, "");
+  RawTlsSocket attacker(running.address());
+  ASSERT_TRUE(attacker.send(frames));
+  EXPECT_TRUE(attacker.send(http2_frame(kContinuation, 0, 1, "")));
+  EXPECT_TRUE(attacker.wait_closed());
+  EXPECT_TRUE(get_server(channel_to(running.address(), authority_.certificate())).ok());
 }
 
 TEST_F(TlsTest, BadFilesAreRefusedAtTheStartWithTheirNames) {

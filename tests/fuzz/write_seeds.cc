@@ -195,9 +195,9 @@ void write_updates(const SeedWriter& seeds) {
   apply.set_scene("world");
   *apply.mutable_batch() = batch;
   seeds.write("wire", "updates", apply.SerializeAsString());
-  apply.mutable_batch()->clear_inserts();
-  for (uint32_t list = 0; list <= limits::kMaxUpdateLists; ++list) apply.mutable_batch()->add_inserts();
-  seeds.write("wire", "too_many_lists", apply.SerializeAsString());
+  for (uint32_t label = 0; label <= limits::kMaxLabels; ++label)
+    (*create.mutable_spec()->mutable_labels())[std::to_string(label)] = "x";
+  seeds.write("wire", "too_many_labels", create.SerializeAsString());
 }
 
 // Frames after the size of the pieces in which they are read, which is 3.

@@ -84,7 +84,7 @@ THIRD_PARTY = {
     "assimp/": ["client/cli/levels/import"],
     "zip.h": ["client/cli/levels/import"],
     "seccomp.h": ["client/cli/levels/import"],
-    "openssl/": ["server/services", "server/security", "server/observability", "client/lib", "client/cli/security"],
+    "openssl/": ["server/services", "server/rpc", "server/security", "server/observability", "client/lib", "client/cli/security"],
     "rhonabwy.h": ["server/security"],
     "jansson.h": ["server/security"],
     "png.h": ["client/cli/extras/render"],

@@ -1,0 +1,75 @@
+#include "server/rpc/read_hooks.h"
+
+#include <dlfcn.h>
+#include <openssl/ssl.h>
+#include <sys/socket.h>
+
+#include <atomic>
+#include <cerrno>
+#include <memory>
+
+#include "absl/strings/string_view.h"
+#include "server/connections/checked_reads.h"
+#include "server/connections/header_check.h"
+
+namespace locus::server {
+namespace {
+
+using OnRefused = void (*)(const char* reason);
+
+void free_check(void*, void* check, CRYPTO_EX_DATA*, int, long, void*) { delete static_cast<HeaderCheck*>(check); }
+
+struct TlsChecks {
+  OnRefused on_refused;
+  int index;  // index of a connection's HeaderCheck among the data that OpenSSL keeps for it
+};
+
+std::atomic<const TlsChecks*> tls_checks{nullptr};  // null until check_tls_reads()
+
+bool has_chosen_http2(const SSL* ssl) {
+  const unsigned char* name = nullptr;
+  unsigned int size = 0;
+  SSL_get0_alpn_selected(ssl, &name, &size);
+  return absl::string_view(reinterpret_cast<const char*>(name), size) == "h2";
+}
+
+// Checks bytes that were read from a TLS connection. Returns false if they are refused.
+bool accept(SSL* ssl, absl::string_view bytes) {
+  const TlsChecks* checks = tls_checks.load();
+  if (checks == nullptr || SSL_is_server(ssl) == 0 || !has_chosen_http2(ssl)) return true;
+  auto* check = static_cast<HeaderCheck*>(SSL_get_ex_data(ssl, checks->index));
+  if (check == nullptr) {
+    auto made = std::make_unique<HeaderCheck>();
+    if (SSL_set_ex_data(ssl, checks->index, made.get()) == 0) return false;  // no memory for it
+    check = made.release();
+  }
+  if (check->accepts(bytes)) return true;
+  checks->on_refused(HeaderCheck::kReason);
+  return false;
+}
+
+}  // namespace
+
+void check_tls_reads(OnRefused on_refused) {
+  static const TlsChecks kChecks{on_refused, SSL_get_ex_new_index(0, nullptr, nullptr, nullptr, free_check)};
+  tls_checks.store(&kChecks);
+}
+
+}  // namespace locus::server
+
+extern "C" __attribute__((visibility("default"))) ssize_t recvmsg(int descriptor, msghdr* message, int flags) {
+  static const auto original = reinterpret_cast<decltype(&recvmsg)>(dlsym(RTLD_NEXT, "recvmsg"));
+  const ssize_t count = original(descriptor, message, flags);
+  if (count <= 0 || (flags & (MSG_PEEK | MSG_ERRQUEUE)) != 0) return count;
+  if (locus::server::CheckedReads::accept(descriptor, *message, static_cast<size_t>(count))) return count;
+  errno = ECONNRESET;
+  return -1;
+}
+
+extern "C" __attribute__((visibility("default"))) int SSL_read(SSL* ssl, void* buffer, int size) {
+  static const auto original = reinterpret_cast<decltype(&SSL_read)>(dlsym(RTLD_NEXT, "SSL_read"));
+  const int count = original(ssl, buffer, size);
+  if (count <= 0) return count;
+  const absl::string_view bytes(static_cast<const char*>(buffer), static_cast<size_t>(count));
+  return locus::server::accept(ssl, bytes) ? count : -1;
+}
