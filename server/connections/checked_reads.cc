@@ -2,13 +2,14 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <utility>
 
 #include "absl/container/flat_hash_map.h"
 #include "absl/strings/string_view.h"
 #include "core/base/mutex.h"
-#include "server/connections/header_check.h"
+#include "server/connections/frame_check.h"
 
 namespace locus::server {
 namespace {
@@ -24,7 +25,7 @@ struct WatchedSocket {
   CheckedReads* owner = nullptr;
   uint64_t cookie = 0;
   std::shared_ptr<Connection> connection;
-  HeaderCheck check;
+  FrameCheck check;
 };
 
 // Watched sockets of the process whose descriptors have equal remainders.
@@ -42,13 +43,16 @@ std::array<Shard, kShards>& shards() {
 
 Shard& shard_of(int descriptor) { return shards()[static_cast<size_t>(descriptor) % kShards]; }
 
-bool accepts(HeaderCheck& check, const msghdr& message, size_t count) {
+// Returns as FrameCheck::refusal() does.
+const char* refusal(FrameCheck& check, const msghdr& message, size_t count) {
+  const FrameCheck::Time now = std::chrono::steady_clock::now();
   for (size_t i = 0; i < message.msg_iovlen && count > 0; ++i) {
     const size_t size = std::min(count, message.msg_iov[i].iov_len);
-    if (!check.accepts({static_cast<const char*>(message.msg_iov[i].iov_base), size})) return false;
+    const char* reason = check.refusal({static_cast<const char*>(message.msg_iov[i].iov_base), size}, now);
+    if (reason != nullptr) return reason;
     count -= size;
   }
-  return true;
+  return nullptr;
 }
 
 }  // namespace
@@ -64,7 +68,7 @@ void CheckedReads::watch(int descriptor, std::shared_ptr<Connection> connection)
   Shard& shard = shard_of(descriptor);
   const MutexLock lock(shard.mutex);
   shard.sockets.insert_or_assign(descriptor,
-                                 WatchedSocket{this, cookie_of(descriptor), std::move(connection), HeaderCheck()});
+                                 WatchedSocket{this, cookie_of(descriptor), std::move(connection), FrameCheck()});
 }
 
 bool CheckedReads::accept(int descriptor, const msghdr& message, size_t count) {
@@ -78,8 +82,9 @@ bool CheckedReads::accept(int descriptor, const msghdr& message, size_t count) {
     shard.sockets.erase(found);
     return true;
   }
-  if (accepts(socket.check, message, count)) return true;
-  socket.owner->on_refused_(*socket.connection, HeaderCheck::kReason);
+  const char* reason = refusal(socket.check, message, count);
+  if (reason == nullptr) return true;
+  socket.owner->on_refused_(*socket.connection, reason);
   shard.sockets.erase(found);
   return false;
 }

@@ -6,22 +6,23 @@
 
 #include <atomic>
 #include <cerrno>
+#include <chrono>
 #include <memory>
 
 #include "absl/strings/string_view.h"
 #include "server/connections/checked_reads.h"
-#include "server/connections/header_check.h"
+#include "server/connections/frame_check.h"
 
 namespace locus::server {
 namespace {
 
 using OnRefused = void (*)(const char* reason);
 
-void free_check(void*, void* check, CRYPTO_EX_DATA*, int, long, void*) { delete static_cast<HeaderCheck*>(check); }
+void free_check(void*, void* check, CRYPTO_EX_DATA*, int, long, void*) { delete static_cast<FrameCheck*>(check); }
 
 struct TlsChecks {
   OnRefused on_refused;
-  int index;  // index of a connection's HeaderCheck among the data that OpenSSL keeps for it
+  int index;  // index of a connection's FrameCheck among the data that OpenSSL keeps for it
 };
 
 std::atomic<const TlsChecks*> tls_checks{nullptr};  // null until check_tls_reads()
@@ -37,15 +38,15 @@ bool has_chosen_http2(const SSL* ssl) {
 bool accept(SSL* ssl, absl::string_view bytes) {
   const TlsChecks* checks = tls_checks.load();
   if (checks == nullptr || SSL_is_server(ssl) == 0 || !has_chosen_http2(ssl)) return true;
-  auto* check = static_cast<HeaderCheck*>(SSL_get_ex_data(ssl, checks->index));
+  auto* check = static_cast<FrameCheck*>(SSL_get_ex_data(ssl, checks->index));
   if (check == nullptr) {
-    auto made = std::make_unique<HeaderCheck>();
+    auto made = std::make_unique<FrameCheck>();
     if (SSL_set_ex_data(ssl, checks->index, made.get()) == 0) return false;  // no memory for it
     check = made.release();
   }
-  if (check->accepts(bytes)) return true;
-  checks->on_refused(HeaderCheck::kReason);
-  return false;
+  const char* reason = check->refusal(bytes, std::chrono::steady_clock::now());
+  if (reason != nullptr) checks->on_refused(reason);
+  return reason == nullptr;
 }
 
 }  // namespace

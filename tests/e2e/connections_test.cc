@@ -4,7 +4,7 @@
 #include <thread>
 #include <vector>
 
-#include "server/connections/header_check.h"
+#include "server/connections/frame_check.h"
 #include "tests/support/raw_socket.h"
 #include "tests/support/rpc_test.h"
 #include "tests/support/temporary_folder.h"
@@ -97,7 +97,7 @@ TEST_F(ConnectionsTest, ABlockOfHeadersThatIsTooLongClosesItsConnectionAtOnce) {
   RawSocket attacker = opened();
   EXPECT_TRUE(attacker.send(http2_frame(kHeaders, 0, 1, headers_of("/locus.v1.QueryService/Query"))));
   const std::string part = http2_frame(kContinuation, 0, 1, header("name", std::string(100, 'v')));
-  attacker.send(repeated(part, server::HeaderCheck::kMaxContinuations + 1));
+  attacker.send(repeated(part, server::FrameCheck::kMaxContinuations + 1));
   EXPECT_TRUE(wait_until([&] { return !attacker.discard(); }));
   EXPECT_TRUE(victim_is_served());
 }

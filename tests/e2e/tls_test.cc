@@ -13,7 +13,7 @@
 #include <thread>
 #include <vector>
 
-#include "server/connections/header_check.h"
+#include "server/connections/frame_check.h"
 #include "server/rpc/tls_credentials.h"
 #include "server/security/token_file.h"
 #include "tests/support/raw_socket.h"
@@ -122,7 +122,7 @@ TEST_F(TlsTest, ABlockOfHeadersThatIsTooLongClosesItsConnection) {
   const RunningServer running(config(false));
   constexpr uint8_t kHeaders = 1, kContinuation = 9;
   std::string frames = kHttp2Opening + http2_frame(kHeaders, 0, 1, "");
-  for (uint32_t frame = 0; frame < server::HeaderCheck::kMaxContinuations; ++frame)
+  for (uint32_t frame = 0; frame < server::FrameCheck::kMaxContinuations; ++frame)
     frames += http2_frame(kContinuation, 0, 1, "");
   RawTlsSocket attacker(running.address());
   ASSERT_TRUE(attacker.send(frames));

@@ -14,7 +14,7 @@
 #include "locus/v1/scene_service.pb.h"
 #include "locus/v1/server_service.pb.h"
 #include "locus/v1/update_service.pb.h"
-#include "server/connections/header_check.h"
+#include "server/connections/frame_check.h"
 #include "server/rpc/wire_plan.h"
 #include "tests/fuzz/fuzz_target.h"
 
@@ -77,10 +77,12 @@ LOCUS_FUZZ_TARGET(frames) {
   if (input.empty()) return;
   const size_t piece = size_t{static_cast<uint8_t>(input[0])} + 1;
   input.remove_prefix(1);
-  HeaderCheck whole, in_pieces;
-  bool accepted = true;
-  for (size_t at = 0; at < input.size() && accepted; at += piece) accepted = in_pieces.accepts(input.substr(at, piece));
-  LOCUS_CHECK(whole.accepts(input) == accepted);
+  const FrameCheck::Time now{};
+  FrameCheck whole, in_pieces;
+  const char* reason = nullptr;
+  for (size_t at = 0; at < input.size() && reason == nullptr; at += piece)
+    reason = in_pieces.refusal(input.substr(at, piece), now);
+  LOCUS_CHECK(whole.refusal(input, now) == reason);
 }
 
 }  // namespace

@@ -10,7 +10,7 @@
 #include <thread>
 #include <vector>
 
-#include "server/connections/header_check.h"
+#include "server/connections/frame_check.h"
 #include "tests/support/raw_socket.h"
 
 namespace locus::server {
@@ -19,7 +19,7 @@ namespace {
 using test::http2_frame;
 using test::kHttp2Opening;
 
-const std::string kTooLong = kHttp2Opening + http2_frame(1, 0, 1, std::string(HeaderCheck::kMaxBlockBytes + 1, 'h'));
+const std::string kTooLong = kHttp2Opening + http2_frame(1, 0, 1, std::string(FrameCheck::kMaxBlockBytes + 1, 'h'));
 
 // Asks about bytes that were read into two buffers, of which the first has `first` bytes.
 bool accepted(int descriptor, std::string bytes, size_t first = 10) {
