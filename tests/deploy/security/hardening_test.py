@@ -137,7 +137,8 @@ class MutualTlsTest(unittest.TestCase):
         self.check(self.client, query)
         self.assertIn("no scene is called 'lobby-1'", self.refuse(self.client, query.replace("arena-1", "lobby-1")))
         token = query.split(" query ")[0]
-        self.assertIn("lacks the right update to scene 'arena-1'", self.refuse(self.client, f"{token} insert arena-1 ball --id 1 --at 0,0,0 --radius 1"))
+        insert = f"{token} insert arena-1 ball --id 1 --at 0,0,0 --radius 1"
+        self.assertIn("lacks the right update to scene 'arena-1'", self.refuse(self.client, insert))
         self.refuse(self.client, "locus -a locus.internal:7575 --ca ca.pem --token-file ci.token scene list")
         self.refuse(self.client, "locus -a locus.internal:7575 scene list")
 
