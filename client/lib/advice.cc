@@ -7,14 +7,15 @@
 namespace locus::client {
 namespace {
 
-// Part of gRPC's message for a failed connection, and the advice for it.
+// Advice for a failed connection: `remedy` is given if gRPC's error message contains `symptom`.
 struct Advice {
   absl::string_view symptom;
   absl::string_view remedy;
 };
 
-// Advice for a connection that the server closed at once. gRPC cannot know the cause if TLS is off; with TLS 1.3 a
-// server refuses a client's certificate only after the client's handshake.
+// Advice for a connection that the server closed at once. The advice names two possible causes, because gRPC's message
+// does not distinguish them: the server requires TLS, or it refused the client's certificate. With TLS 1.3 a server
+// refuses a certificate only after the client has completed its handshake.
 constexpr absl::string_view kClosedAtOnce =
     "the server ended the connection at once: it may require TLS, or a client certificate that it knows";
 

@@ -10,9 +10,9 @@
 
 namespace locus::client {
 
-// Returns advice for a connection that was not permitted or ended during its establishment: the server does not use
-// TLS, requires TLS, or a certificate was not accepted. `message` is gRPC's text. Empty if no server answered or the
-// cause is another one.
+// Returns advice for a connection that failed because the permissions of a unix socket forbid it, or because client and
+// server do not agree on TLS: only one of them uses TLS, or a certificate was not accepted. `message` is gRPC's text.
+// Returns an empty string if no server answered or for any other cause.
 std::string advice_on_handshake(absl::string_view message);
 
 // Returns advice for an error without details from the server; empty if there is no advice.

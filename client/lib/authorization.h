@@ -25,16 +25,17 @@ inline constexpr size_t kMaxTokenBytes = 8192;
 // Returns whether these options ask for TLS.
 bool uses_tls(const CredentialOptions& options);
 
-// Returns whether data for the gRPC target `target` never leaves this machine: a unix socket, `localhost`, an address
-// that begins with 127, or [::1].
+// Returns whether data for the gRPC target `target` never leaves this machine. This is true for a unix socket,
+// `localhost`, an address that begins with 127, and [::1].
 bool stays_on_this_machine(absl::string_view target);
 
 // The token of one client, which has none if no token was configured. Thread-safe; streams share ownership.
-// Invariant: a token has only visible ASCII characters, since gRPC aborts the process for others.
+// Invariant: a token has only visible ASCII characters, since gRPC aborts the process for any other character.
 class Authorization {
  public:
-  // Reads the token. Returns FAILED_PRECONDITION if it may not be sent to `target`, INVALID_ARGUMENT if it is malformed
-  // or given twice, NOT_FOUND if there is no such file. No message contains the token.
+  // Reads the token. Returns FAILED_PRECONDITION if the token may not be sent to `target` or its file cannot be read,
+  // INVALID_ARGUMENT if the token is malformed or both `token` and `token_file` are set, and NOT_FOUND if the file does
+  // not exist. No message contains the token.
   static absl::StatusOr<std::shared_ptr<Authorization>> make(const CredentialOptions& options,
                                                              const std::string& target);
 

@@ -51,7 +51,7 @@ absl::StatusOr<Response> call(Stub& stub, const CallPlan& plan, const Request& r
     return plan.repeat == Repeat::kNever ? attempt() : with_retries(plan.retry, deadline, attempt);
   };
   absl::Status status = attempts();
-  // A server that does not accept the token has done nothing, so every call may be repeated.
+  // A server that refuses the token has changed nothing, so even a call that is not repeatable may be sent again.
   if (absl::IsUnauthenticated(status) && plan.authorization.has_newer(token)) status = attempts();
   if (!status.ok()) return status;
   return response;
@@ -69,7 +69,7 @@ struct Client::Connection {
   std::unique_ptr<v1::SceneService::StubInterface> scenes;
   std::unique_ptr<v1::UpdateService::StubInterface> updates;
   std::unique_ptr<v1::QueryService::StubInterface> queries;
-  std::unique_ptr<v1::SceneService::StubInterface> transfers;  // on `bulk`; for uploads, downloads and dumps
+  std::unique_ptr<v1::SceneService::StubInterface> transfers;  // use `bulk`: uploads, downloads and dumps
 
   const std::shared_ptr<grpc::Channel>& channel_of(Lane lane) const { return lane == Lane::kBulk ? bulk : channel; }
   CallPlan once(absl::string_view scene = {}) const {

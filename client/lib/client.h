@@ -57,8 +57,8 @@ class Client {
  public:
   // Connects to `address`: host:port, host alone (port 7575) or unix:/path. Blocks until the connection is established.
   // Returns UNAVAILABLE naming the address if no server answers or the TLS handshake fails, or INVALID_ARGUMENT for an
-  // empty address. Returns INVALID_ARGUMENT, NOT_FOUND or FAILED_PRECONDITION naming what is wrong if
-  // options.credentials contradict each other, name a file that cannot be used, or would reveal a token.
+  // empty address. Returns INVALID_ARGUMENT, NOT_FOUND or FAILED_PRECONDITION, with the cause in the message, if
+  // members of options.credentials contradict each other, name a file that cannot be used, or would reveal a token.
   static absl::StatusOr<std::unique_ptr<Client>> connect(absl::string_view address = kDefaultAddress,
                                                          const ClientOptions& options = {});
   ~Client();
@@ -70,15 +70,15 @@ class Client {
 
   // Returns the server's version, features and limits. Retried.
   absl::StatusOr<v1::GetServerResponse> get_server() const;
-  // Returns the quotas of this caller and how much of them is in use or, as `request` says, those of an identity or of
-  // all identities, read page by page. Retried.
+  // Returns the quotas of this caller and how much of each quota is in use. If `request` names another identity or asks
+  // for all identities, returns their quotas instead. Reads all pages. Retried.
   absl::StatusOr<std::vector<v1::IdentityQuotas>> get_quotas(v1::GetQuotasRequest request = {}) const;
   // Returns the health of the whole server, or of one service given by its full name. Retried.
   absl::StatusOr<Health> health(absl::string_view service = "") const;
   // Passes a consistent copy of the server's data directory to `sink`, in this thread, and returns the copy's size. Not
-  // retried; to try again, call backup() with a new sink. Returns DATA_LOSS if the received files differ from what the
-  // server announced (number of files, sizes, hashes) or if a path leads out of the backup, and UNIMPLEMENTED if the
-  // server has no data directory.
+  // retried; to try again, call backup() with a new sink. Returns DATA_LOSS if the received files differ from the
+  // server's announcement (number of files, sizes, hashes) or if a path leads out of the backup, and UNIMPLEMENTED if
+  // the server has no data directory.
   absl::StatusOr<BackupSize> backup(BackupSink& sink) const;
 
   // Create, read, list and delete scenes. get_scene() and list_scenes() are retried; create_scene() and delete_scene()
@@ -95,7 +95,7 @@ class Client {
   absl::StatusOr<v1::UploadMeshResponse> upload_mesh(const MeshColumns& mesh,
                                                      const UploadProgress& progress = {}) const;
   // Downloads a mesh as the server stores it, completely into memory: 12 bytes per vertex and per triangle. Retried.
-  // Returns DATA_LOSS if the received mesh differs from what the server announced (counts, hash) or is invalid (an
+  // Returns DATA_LOSS if the received mesh differs from the server's announcement (counts, hash) or is invalid (an
   // index beyond the vertices, a vertex that is not finite, parts out of order). Never holds more data than was
   // announced.
   absl::StatusOr<DownloadedMesh> download_mesh(absl::string_view name, const DownloadProgress& progress = {}) const;

@@ -83,7 +83,7 @@ std::shared_ptr<grpc::Channel> open_channel(const std::string& target, const Cli
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, kFirstReconnectMs);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, kMaxReconnectMs);
-  // Ignore a proxy set in the environment: it cannot reach this machine's loopback interface.
+  // Ignore a proxy set in the environment: a proxy on another machine cannot reach this machine's loopback interface.
   if (stays_on_this_machine(target)) arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
   const std::string& server_name = options.credentials.server_name;
   if (!server_name.empty()) arguments.SetSslTargetNameOverride(server_name);

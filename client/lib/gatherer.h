@@ -42,7 +42,8 @@ class Gatherer {
   Gatherer(const Gatherer&) = delete;
   Gatherer& operator=(const Gatherer&) = delete;
 
-  // Calls add_to(batch), which must add one item to the batch, with the lock held. Waits first while the batch is full.
+  // Waits while the batch is full, then calls add_to(batch) with the lock held. add_to() must add one item to the
+  // batch.
   template <class AddTo>
   void add(const AddTo& add_to) {
     std::unique_lock lock(mutex_);

@@ -18,7 +18,7 @@ struct RetryPolicy {
   int max_attempts = 5;
   // Wait before the second attempt.
   absl::Duration first_backoff = absl::Milliseconds(100);
-  // Maximum wait before its random variation, unless the server requests a longer wait.
+  // Maximum wait before the random variation is applied. A longer wait that the server requests is used unchanged.
   absl::Duration max_backoff = absl::Seconds(2);
 };
 
@@ -36,7 +36,7 @@ struct CredentialOptions {
   // authorities that this machine trusts.
   std::string ca_file = {};
   // Files with the client's certificate chain and its private key, for servers that ask clients for a certificate
-  // (mutual TLS). Both or neither.
+  // (mutual TLS). Set both options or neither.
   std::string certificate_file = {};
   std::string key_file = {};
   // Name that the server's certificate must contain. Empty = the host of the address.
@@ -52,7 +52,7 @@ struct CredentialOptions {
 };
 
 struct ClientOptions {
-  // Encryption and identity. Default: neither.
+  // TLS, client certificate and token. Default: none of them.
   CredentialOptions credentials;
   // Maximum duration of connect().
   absl::Duration connect_timeout = absl::Seconds(10);

@@ -26,7 +26,7 @@ CertificatePtr next_certificate(BIO* reader) {
   return {PEM_read_bio_X509(reader, nullptr, nullptr, nullptr), &X509_free};
 }
 
-// Gives OpenSSL no password, so that it does not ask for one on the terminal.
+// Tells OpenSSL that there is no password, so that OpenSSL does not ask for one on the terminal.
 int no_password(char*, int, int, void*) { return -1; }
 
 }  // namespace

@@ -19,11 +19,12 @@ inline constexpr size_t kMaxCredentialBytes = size_t{1} << 20;
 // kMaxCredentialBytes.
 absl::StatusOr<std::string> read_small_file(absl::string_view option, const std::string& file);
 
-// Checks that the text has at least one certificate and no malformed one. Returns INVALID_ARGUMENT with `file`.
+// Checks that the text has at least one certificate and no malformed certificate. Otherwise returns INVALID_ARGUMENT
+// with the name `file` in the message.
 absl::Status check_certificates(const std::string& file, absl::string_view pem);
 
-// Checks that the text has a private key without password, and that the key is the one of the first certificate of
-// `certificates`. Returns INVALID_ARGUMENT with `file`.
+// Checks that the text has a private key without a password, and that this key belongs to the first certificate of
+// `certificates`. Otherwise returns INVALID_ARGUMENT with the name `file` in the message.
 absl::Status check_key(const std::string& file, absl::string_view pem, absl::string_view certificates);
 
 }  // namespace locus::client

@@ -142,8 +142,8 @@ class PipelinedStream {
   static constexpr std::chrono::hours kLongestWait{1};
 
   // One gRPC call. A hold (AddHold) prevents gRPC from finishing the call while other threads may still start writes;
-  // the read that fails at the end of the call removes the hold. Members are guarded by the stream's lock, except
-  // `response_`, which only the read reactions use, one after another.
+  // OnReadDone() removes the hold after the failed read at the end of the call. Members are guarded by the stream's
+  // lock, except `response_`, which only the read in progress and OnReadDone() use.
   class Attempt final : public Reactor {
    public:
     explicit Attempt(PipelinedStream& stream)
@@ -205,8 +205,8 @@ class PipelinedStream {
     std::optional<absl::Status> end_;
   };
 
-  // Starts writing the next unwritten request, or ends the writes of a closing stream without unanswered requests. Does
-  // nothing while a write is in progress. Precondition: the caller holds the lock.
+  // Starts writing the next unwritten request. If the stream is closing and no request is unanswered, ends the writes
+  // of the call instead. Does nothing while a write is in progress. Precondition: the caller holds the lock.
   void pump() {
     if (!attempt_ || !attempt_->writable()) return;
     const auto next = std::find_if(items_.begin(), items_.end(), [](const Item& item) { return !item.written; });
@@ -289,8 +289,8 @@ class PipelinedStream {
     return end;
   }
 
-  // Waits for the end of the current call. Returns false if it cancelled the call because no response arrived for
-  // `patience_`.
+  // Waits for the end of the current call and returns true. If no response arrives for `patience_` while requests are
+  // unanswered, cancels the call, waits for its end and returns false.
   bool wait_for_end(std::unique_lock<std::mutex>& lock) {
     const auto ended = [this] { return attempt_->end().has_value(); };
     while (!ended()) {
@@ -305,8 +305,8 @@ class PipelinedStream {
     return true;
   }
 
-  // Returns the wait before the next call, or nothing if the stream ends with `end`. Connections lost while no request
-  // is unanswered do not count as failures.
+  // Returns the wait before the next call, or nothing if the stream ends with `end`. A connection that is lost while no
+  // request is unanswered does not count as a failure.
   std::optional<absl::Duration> wait_before_next(const absl::Status& end) {
     if (broken_off_ || !fatal_.ok() || end.ok() || !worth_reconnecting(end)) return std::nullopt;
     if (items_.empty()) return absl::ZeroDuration();

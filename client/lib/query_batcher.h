@@ -62,9 +62,9 @@ class QueryBatcher {
   QueryBatcher(const QueryBatcher&) = delete;
   QueryBatcher& operator=(const QueryBatcher&) = delete;
 
-  // Add a query. Its callback is called exactly once, with the answer or with the error of its message. If one query
-  // has an invalid value, for example one that is not finite, the server refuses all queries of the same message. Both
-  // functions block while `max_items` queries wait because the server does not keep up.
+  // Add a query. Its callback is called exactly once, with the answer or with the error of the message that carried the
+  // query. If one query has an invalid value, for example one that is not finite, the server refuses all queries of the
+  // same message. Both functions block while `max_items` queries wait because the server does not keep up.
   void ray(const SingleRay& ray, HitCallback on_hit);
   void ball(const SingleBall& ball, IdsCallback on_ids);
 

@@ -14,14 +14,14 @@ namespace locus::client {
 
 class QueryBuilder {
  public:
-  // Requires an answer at `revision` or later. `revision` is for example that of an ack ("read your own writes"). The
+  // Requires an answer at `revision` or later, for example at the revision of an ack ("read your own writes"). The
   // server waits until the scene has reached this revision. By default the server answers at the latest revision
   // without waiting.
   QueryBuilder& at_least(const Revision& revision);
   // Requests exactly this revision. The query fails with OUT_OF_RANGE if the server no longer retains it.
   QueryBuilder& exactly(const Revision& revision);
-  // Sets the maximum work for the batch: the number of visited tree nodes and grid cells and of tested triangles and
-  // objects, all added up; 0 = no limit.
+  // Sets the maximum work for the batch: the sum of visited tree nodes, visited grid cells, tested triangles and tested
+  // objects; 0 = no limit.
   QueryBuilder& max_work(uint64_t work);
   // Requests a report of the work done for the batch.
   QueryBuilder& explain();

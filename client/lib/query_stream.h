@@ -53,7 +53,7 @@ class QueryStream {
   // exactly once, with the answer or the error of this batch; returns an error if the stream has ended, and then never
   // calls `on_result`.
   absl::Status send(v1::QueryBatch batch, ResultCallback on_result);
-  // Sends a batch and returns its future, which also receives the error of a stream that has ended.
+  // Sends a batch and returns a future for its answer. If the stream has ended, the future receives the stream's error.
   std::future<absl::StatusOr<v1::QueryResult>> send(v1::QueryBatch batch);
 
   // Blocks until all sent batches are answered and their callbacks have returned. Returns the error of the stream if it

@@ -2,8 +2,8 @@
 // block and copies no columns; it only stores the index of each query's first row. Views are immutable, so any number
 // of threads may read a view.
 //
-// of() checks the lengths of the columns once, and returns DATA_LOSS if they are inconsistent, so that no access runs
-// past the end of a column, whatever the server sent. Indices of queries and rows are not checked, as in
+// of() checks the lengths of the columns once, and returns DATA_LOSS if they are inconsistent. So no access runs past
+// the end of a column, even if the server sent a malformed result. Indices of queries and rows are not checked, as in
 // std::vector::operator[].
 #ifndef LOCUS_CLIENT_LIB_RESULT_ROWS_H_
 #define LOCUS_CLIENT_LIB_RESULT_ROWS_H_

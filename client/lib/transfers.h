@@ -1,4 +1,4 @@
-// Message streams of the calls of Client that transfer meshes and backups. Internal to the library.
+// Implementations of those calls of Client that stream meshes and backups. Internal to the library.
 #ifndef LOCUS_CLIENT_LIB_TRANSFERS_H_
 #define LOCUS_CLIENT_LIB_TRANSFERS_H_
 

@@ -46,7 +46,7 @@ struct Relabeling {
   std::optional<uint64_t> tag = std::nullopt;
 };
 
-// Kind of a move. After a teleport, queries about the history never place the object between the two positions.
+// Kind of a move. Queries about the history never place an object between its positions before and after a teleport.
 enum class MoveKind { kContinuous, kTeleport };
 
 class UpdateBuilder {
@@ -101,8 +101,8 @@ class UpdateBuilder {
 
   v1::UpdateBatch batch_;
   bool move_takes_rows_ = false;  // move() may append rows to the last entry of batch_.moves
-  // For each form two indices into batch_.inserts: of the entry that collects the rows with relative positions, and of
-  // the entry that collects the rows with absolute positions; -1 = no such entry yet.
+  // Two indices into batch_.inserts for each form of an object: the first is the entry that collects rows with relative
+  // positions, the second is the entry that collects rows with absolute positions; -1 = no such entry yet.
   std::array<int, 8> row_inserts_ = {-1, -1, -1, -1, -1, -1, -1, -1};
 };
 

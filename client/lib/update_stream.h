@@ -70,7 +70,7 @@ class UpdateStream {
   // once; returns an error if the stream has ended, and then never calls `on_ack`. Overwrites `writer` and `batch` of
   // the batch.
   absl::Status send(v1::UpdateBatch batch, AckCallback on_ack);
-  // Sends a batch and returns its future, which also receives the error of a stream that has ended.
+  // Sends a batch and returns a future for its ack. If the stream has ended, the future receives the stream's error.
   std::future<absl::StatusOr<v1::UpdateAck>> send(v1::UpdateBatch batch);
 
   // Blocks until all sent batches are answered and their callbacks have returned. Returns the error of the stream if it

@@ -33,7 +33,7 @@ struct Rotation {
   friend constexpr bool operator==(const Rotation&, const Rotation&) = default;
 };
 
-// Labels by which queries filter and report an object. The defaults are those of the protocol.
+// Labels by which queries filter and report an object. The defaults equal the protocol's defaults.
 struct Labels {
   uint32_t layers = 1;  // a query finds the object iff (layers & mask of the query) != 0; 0 = hidden
   uint64_t group = 0;   // 0 = no group

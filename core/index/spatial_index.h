@@ -59,11 +59,11 @@ struct AnyPointVisitor {
 };
 }  // namespace internal
 
-// Structure that can be queried. visit_ray() passes to the visitor, exactly once each, all values whose bounds have an
-// interval on the ray with near <= far, far >= 0 and near <= limit(), roughly from near to far. A structure may pass
-// further values, each at most once. visit_region() passes in this way all values whose bounds overlaps() accepts, and
-// visit_nearest() all values whose bounds have a squared_distance() of at most limit() from the point, roughly from
-// near to far.
+// Structure that can be queried. A visit passes to the visitor, exactly once each, all values that satisfy the visit's
+// condition. It may pass further values, each at most once. Condition of visit_ray(): the bounds of the value have an
+// interval on the ray with near <= far, far >= 0 and near <= limit(). Condition of visit_region(): overlaps() accepts
+// the bounds. Condition of visit_nearest(): the bounds have a squared_distance() of at most limit() from the point.
+// visit_ray() and visit_nearest() pass the values roughly from near to far.
 template <class Index>
 concept SpatialIndex = Bounded<typename Index::Value> &&
     requires(const Index& index, const SlabRay<ScalarOf<typename Index::Value>>& slabs,

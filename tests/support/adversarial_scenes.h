@@ -221,7 +221,7 @@ inline SceneSketch long_and_short_directions(Random& random) {
   return sketch;
 }
 
-// Generates placements at distances that double, so that any split leaves nearly all of them on one side.
+// Generates placements whose distances double from one to the next, so that any split leaves nearly all on one side.
 inline SceneSketch doubling_distances(Random& random) {
   SceneSketch sketch{"doubling distances", {}, {}, {}, {}};
   const Vec3d direction = random.chance(0.5) ? lattice_direction(random) : random.unit_vector();

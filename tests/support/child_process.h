@@ -46,8 +46,8 @@ class ChildProcess {
   }
 
  private:
-  // Replaces the forked process by the program. Neither allocates nor locks, since only async-signal-safe calls are
-  // allowed between fork() and exec(). The kernel kills the program if the test is killed.
+  // Replaces the forked process by the program. This function must not allocate memory or lock, since only
+  // async-signal-safe calls are allowed between fork() and exec(). The kernel kills the program if the test is killed.
   [[noreturn]] static void become(const std::vector<char*>& argv, const std::string& log) {
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     const int file = open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);

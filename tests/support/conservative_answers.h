@@ -206,8 +206,8 @@ std::string conservative_fault(const QueryScene& scene, const Fault& fault) {
 
 }  // namespace internal
 
-// Returns a description of the first row of the exact answers that the conservative answers do not contain or contain
-// with a greater t; empty if there is no such row.
+// Returns a description of the first row of the exact answers that is missing in the conservative answers or has a
+// greater t there; empty if there is no such row.
 inline std::string superset_fault(const QueryScene& scene) {
   return internal::conservative_fault(
       scene, [](const OwnedBlock& /*block*/, size_t /*query*/, const internal::Found& exact,
@@ -217,8 +217,8 @@ inline std::string superset_fault(const QueryScene& scene) {
 // Returns a description of the first error in the conservative answers; empty if there is none. An error is a missing
 // row whose query meets the bounds of its triangle, or a row whose query does not meet these bounds after they are
 // grown by a tolerance: 2^-38 of the largest |coordinates| of the placed mesh and the query. Another error is a t that
-// differs from the t of the bounds and of the exact row, or from the distance of the row's point. Use it only for
-// scenes of instances, and for queries without filters, limits and culling.
+// differs from the t of the bounds and of the exact row, or from the distance of the row's point. Preconditions: the
+// scene has only instances, and the queries have no filters, limits or culling.
 inline std::string placed_bounds_fault(const QueryScene& scene) {
   return internal::conservative_fault(
       scene, [&](const OwnedBlock& block, size_t i, const internal::Found& exact, const internal::Found& conservative) {

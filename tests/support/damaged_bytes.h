@@ -8,8 +8,8 @@
 
 namespace locus::test {
 
-// Returns `bytes` with at least one bit or the length changed. Sometimes overwrites whole words with small or large
-// numbers, which are harmful as lengths.
+// Returns a damaged copy of `bytes`. The copy is truncated, or one to three times a bit is flipped or a word is
+// overwritten by a small or large number, which does harm if a reader takes it for a length.
 inline std::string damaged(const std::string& bytes, Random& random) {
   std::string result = bytes;
   if (random.chance(0.2)) {

@@ -76,8 +76,8 @@ class FaultyFiles final : public rocksdb::FileSystemWrapper {
   // If `full` is true, makes every write fail because the disk is full, and GetFreeSpace() return 0, until fill(false).
   void fill(bool full) { full_ = full; }
 
-  // Writes the files that remain after a power loss into the folder `to`. If `torn`, each file also keeps a random part
-  // from the start of its unsynced bytes.
+  // Writes the files that remain after a power loss into the folder `to`. If `torn` is true, a file may also keep some
+  // of its unsynced bytes, from the first one on.
   void lose_power(const std::string& to, Random& random, bool torn) {
     const std::lock_guard lock(mutex_);
     std::filesystem::create_directories(to);

@@ -88,8 +88,8 @@ inline Object moved(const Object& object, const std::vector<Object>& objects, Ra
   return result;
 }
 
-// Random batches of inserts, moves and removes, applied to a grid and a list in lockstep. A snapshot of the grid kept
-// during the run must still give the answers of the list's copy that was made at the same time.
+// Applies random batches of inserts, moves and removes to a grid and a list in lockstep. Now and then keeps a snapshot
+// of the grid and a copy of the list; the answers of each pair must still be equal at the end.
 class GridLockstep {
  public:
   GridLockstep(const ObjectScene& scene, Random& random)
@@ -165,8 +165,8 @@ inline std::string moving_grid_difference(const ObjectScene& scene, Random& rand
   return GridLockstep(shorter, random).run(12);
 }
 
-// Returns the first difference that compare(scene, random) finds in the scenes draw(seed, random) of seeds 0 to count -
-// 1; empty if there is none.
+// Searches the scenes draw(seed, random) of the seeds 0 to count - 1. Returns the first difference that compare(scene,
+// random) finds; empty if there is none.
 template <class Draw, class Compare>
 std::string search_grid_scenes(uint64_t count, const Draw& draw, const Compare& compare) {
   for (uint64_t seed = 0; seed < count; ++seed) {

@@ -16,7 +16,7 @@ inline void add_lattice_rays(SceneSketch& sketch, double step, Random& random) {
   }
 }
 
-// Generates at most three placements larger than the region of all other placements.
+// Generates small placements and one to three placements that are usually larger than the region of the small ones.
 inline SceneSketch giants_among_small(Random& random) {
   SceneSketch sketch{"giants among small ones", {}, {}, {}, {}};
   for (int i = 0; i < 40; ++i) {
@@ -43,8 +43,8 @@ inline SceneSketch points_on_borders(Random& random) {
   return sketch;
 }
 
-// Generates placements whose side is exactly the cell size of a level, or greater by 2^-22 of it. Their centres are on
-// cell borders of that level.
+// Generates cubes whose side is the cell size of a level, either exactly or multiplied by 1 + 2^-22. Their centres are
+// on cell borders of that level.
 inline SceneSketch sizes_between_levels(Random& random) {
   SceneSketch sketch{"sizes between levels", {}, {}, {}, {}};
   for (int i = 0; i < 40; ++i) {

@@ -55,8 +55,8 @@ class IndexJudge {
   }
 
   // Compares the first hit, any hit, all hits and the conservative results of a ray. The limits are infinity and, for
-  // the first two hits, the t of the hit, the next greater float and half of t. `turn` selects the values for which the
-  // contract of visit_ray() is checked.
+  // each of the two nearest hits, its t, the next greater value of type S, and half of its t. `turn` selects the values
+  // for which the contract of visit_ray() is checked.
   std::string ray_difference(const typename Traits::RayQuery& ray, size_t turn) const {
     constexpr S kInfinity = std::numeric_limits<S>::infinity();
     Hits hits;

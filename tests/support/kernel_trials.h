@@ -32,7 +32,7 @@ inline Vec3d place_within(const Triangle& triangle, Random& random) {
 }  // namespace internal
 
 // Generates random queries: half of them have a limit of about a fifth of the mesh's size, and about a third of them
-// cull.
+// cull the front or the back of triangles.
 inline std::vector<KernelQuestion> random_questions(const std::vector<Triangle>& mesh, size_t count, uint64_t seed) {
   Random random(seed);
   const Aabbf bounds = internal::bounds_of_all(mesh);
@@ -77,7 +77,7 @@ inline std::vector<KernelTrial> far_trials() {
 }
 
 // Makes runs of rays in nearly equal directions, as cameras and sensors generate them: from one position, from
-// positions close together, or side by side along an axis. Limits and culls differ within a run.
+// positions close together, or side by side along an axis. Limits and culling differ within a run.
 inline KernelTrial beam_trial(std::string name, const std::vector<Triangle>& mesh, uint64_t seed) {
   Random random(seed);
   const Aabbf bounds = internal::bounds_of_all(mesh);

@@ -28,8 +28,8 @@ inline Layers random_layers(Random& random) {
   return random.pick(kLayers);
 }
 
-// Generates a placement: unchanged, or moved to `near`, sometimes up to a million units farther, and rotated and
-// scaled.
+// Generates a placement: unchanged, or moved to `near` (sometimes up to a million units from `near` on each axis) and
+// often rotated or scaled.
 inline PlacedMesh random_placement(Vec3d near, Random& random) {
   PlacedMesh placed;
   if (random.chance(0.4)) return placed;

@@ -60,7 +60,7 @@ class RawSocket {
   }
 
   bool connected() const { return connected_; }
-  // Sends all bytes; false if the server has closed the connection.
+  // Sends all bytes. Returns false if the server has closed the connection.
   bool send(const std::string& bytes) {
     for (size_t sent = 0; sent < bytes.size();) {
       const ssize_t count = ::send(fd_, bytes.data() + sent, bytes.size() - sent, MSG_NOSIGNAL);
@@ -69,12 +69,12 @@ class RawSocket {
     }
     return true;
   }
-  // Sends what fits into the buffers at once; false if the server has closed the connection.
+  // Sends as many bytes as the socket accepts without waiting. Returns false if the server has closed the connection.
   bool send_some(const std::string& bytes) {
     const ssize_t count = ::send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
     return count > 0 || errno == EAGAIN;
   }
-  // Discards what has arrived. Returns false if the server has closed the connection.
+  // Discards the bytes received so far. Returns false if the server has closed the connection.
   bool discard() {
     char buffer[65536];
     ssize_t count = 0;
@@ -89,7 +89,7 @@ class RawSocket {
     pollfd wait{fd_, POLLIN, 0};
     return send(bytes) && poll(&wait, 1, 60'000) == 1 && recv(fd_, &byte, 1, 0) == 1;
   }
-  // Waits until the server closes the connection. Returns false if it does not within a minute.
+  // Waits until the server closes the connection. Returns false if the connection is still open after a minute.
   bool wait_closed() {
     const auto end = std::chrono::steady_clock::now() + std::chrono::minutes(1);
     while (std::chrono::steady_clock::now() < end) {
@@ -105,7 +105,7 @@ class RawSocket {
   bool connected_ = false;
 };
 
-// Waits until `condition` holds. Returns false if it does not within a minute.
+// Waits until `condition` holds. Returns false if it still does not hold after a minute.
 inline bool wait_until(const std::function<bool()>& condition) {
   const auto end = std::chrono::steady_clock::now() + std::chrono::minutes(1);
   while (!condition()) {

@@ -1,8 +1,9 @@
-// Comparison of a scene with history with a model that keeps every tick in full. Inserts, moves, teleports, relabels
-// and removes objects at random, and queries the scene at random times. Compares every column of the answers bit for
-// bit, with every instruction set, on one and two threads, and in the brute-force mode. A tick has one batch or several
-// batches, in which the same object can move far and back, be replaced, teleport, be removed and be inserted again. For
-// the random tests, which expect no difference, and for planted bugs.
+// Comparison between a scene with history and a model that keeps every tick in full. The test inserts, moves,
+// teleports, relabels and removes objects at random, and queries the scene at random times. It compares every column of
+// the answers bit for bit, with every instruction set, on one and two threads, and in the brute-force mode. A tick has
+// one batch or several batches, in which the same object can move far and back, be replaced, teleport, be removed and
+// be inserted again. For the random tests, which expect no difference, and for the tests of planted bugs, which expect
+// one.
 #ifndef LOCUS_TESTS_SUPPORT_REWIND_LOCKSTEP_H_
 #define LOCUS_TESTS_SUPPORT_REWIND_LOCKSTEP_H_
 
@@ -52,8 +53,8 @@ inline void append_answer(const BlockResult& from, uint32_t query, BlockResult& 
 
 class RewindLockstep {
  public:
-  // Makes a scene whose objects move about `step` per batch and stay within `world` of the origin; sometimes an object
-  // moves much farther. A batch begins a tick with the probability `new_tick`.
+  // Makes a scene whose objects move by about `step` per batch and stay within `world` of the origin; sometimes an
+  // object moves much farther. A batch begins a tick with the probability `new_tick`.
   RewindLockstep(uint64_t seed, double world, double step, double new_tick)
       : random_(seed),
         world_(world),

@@ -1,4 +1,4 @@
-// Comparison of the whole visible state of two scenes: for tests in which one was restored from the log of the other.
+// Comparison of the whole visible state of two scenes: for tests that restore one scene from the log of the other.
 #ifndef LOCUS_TESTS_SUPPORT_SCENE_DIFFERENCE_H_
 #define LOCUS_TESTS_SUPPORT_SCENE_DIFFERENCE_H_
 

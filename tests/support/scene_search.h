@@ -14,7 +14,7 @@
 namespace locus::test {
 
 // Returns the first difference found in the scenes of seeds 0 to count - 1, with its seed; empty if there is none.
-// `draw` generates the sketch of a seed; `difference` compares for one TestScene<V>.
+// `draw` generates the sketch of a seed; `difference` returns the first difference in one TestScene<V>.
 template <Primitive V, class Draw, class Difference>
 std::string search_scenes(uint64_t count, const Draw& draw, const Difference& difference) {
   for (uint64_t seed = 0; seed < count; ++seed) {

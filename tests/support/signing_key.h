@@ -46,7 +46,7 @@ class SigningKey {
                         base64url(point.substr(33)), "\"", members, "}");
   }
 
-  // Returns a JWT of these texts, signed by this key even if the header names another algorithm.
+  // Returns a JWT with this header and these claims, signed by this key even if the header names another algorithm.
   std::string jwt(absl::string_view header, absl::string_view claims) const {
     const std::string text = absl::StrCat(base64url(header), ".", base64url(claims));
     return absl::StrCat(text, ".", base64url(signature(text)));

@@ -1,4 +1,4 @@
-// A call of a client that sends its headers and then nothing, until the test says so.
+// A client's call that sends its headers, and nothing more until the test calls send().
 #ifndef LOCUS_TESTS_SUPPORT_SILENT_CALL_H_
 #define LOCUS_TESTS_SUPPORT_SILENT_CALL_H_
 

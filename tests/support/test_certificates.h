@@ -119,7 +119,7 @@ class TestAuthority {
   CertificatePtr certificate_;
 };
 
-// Writes a file and puts it into place at once, as a careful operator does.
+// Replaces a file atomically: writes a new file and renames it to `path`.
 inline void replace_file(const std::string& path, const std::string& text) {
   std::ofstream(path + ".new") << text;
   ASSERT_EQ(std::rename((path + ".new").c_str(), path.c_str()), 0);

@@ -1,7 +1,7 @@
 // Binary tree over boxes with leaves of up to kBvhLeafSize boxes: the intermediate result of a build, before the tree
-// is collapsed to nodes of up to eight children. Equal references and options result in an equal tree, on whatever
-// threads and in whatever order BvhOptions::parallel_for runs the tasks. Immutable after build(). Invariants: the two
-// children of a node partition its references (BoxReference); a node's bounds are exactly the box around its
+// is collapsed to nodes of up to eight children. Equal references and options result in an equal tree; the threads and
+// the order in which BvhOptions::parallel_for runs the tasks have no effect. Immutable after build(). Invariants: the
+// two children of a node partition its references (BoxReference); a node's bounds are exactly the box around its
 // references. Internal to this folder.
 #ifndef LOCUS_CORE_INDEX_BVH_BINARY_TREE_H_
 #define LOCUS_CORE_INDEX_BVH_BINARY_TREE_H_

@@ -87,7 +87,7 @@ class Bvh {
 
     const SlabRay<S>& slabs() const { return slabs_; }
     // Returns the next value in the order of visit_ray(), or null after the last value. `limit` is the largest near
-    // value of interest, as RayVisitor::limit(); it may decrease from call to call, but not increase.
+    // value of interest (see RayVisitor::limit()); it may decrease from call to call, but not increase.
     const V* next(S limit, Work& work);
 
    private:

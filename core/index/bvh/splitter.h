@@ -52,10 +52,11 @@ class Splitter {
  public:
   explicit Splitter(const BvhOptions& options) : options_(options) {}
 
-  // Splits `references`, more than kBvhLeafSize elements, and reorders them so that the left part precedes the right
-  // part. Neither part is empty. `extent` is extent_of(references), and `levels` is the number of tree levels available
-  // below the two parts. If the best cut leaves a part that cannot be halved into leaves within `levels` levels,
-  // `references` are halved at the median centre instead. The result is undefined if the build was cancelled.
+  // Splits `references`, which must have more than kBvhLeafSize elements, and reorders them so that the left part
+  // precedes the right part. Neither part is empty. `extent` is extent_of(references), and `levels` is the number of
+  // tree levels available below the two parts. If the best cut leaves a part that cannot be halved into leaves within
+  // `levels` levels, `references` are halved at the median centre instead. The result is undefined if the build was
+  // cancelled.
   Halves<S> split(BoxReferences<S> references, const Extent<S>& extent, uint32_t levels) const;
 
  private:

@@ -56,7 +56,7 @@ class TriangleBvh {
   Triangle triangle(const TriangleBlock& block, uint32_t lane) const;
   // Returns the size in bytes of the memory allocated by this object; sizeof(TriangleBvh) is not included.
   size_t bytes() const;
-  // Returns the expected number of nodes and blocks opened by a random ray, computed as by Bvh::sah_cost().
+  // Returns the expected number of nodes and blocks opened by a random ray, computed like Bvh::sah_cost().
   double sah_cost() const;
   // Returns the topology of this tree. Its triangle numbers are borrowed from this object. The tree must not be empty.
   TreeTopology topology() const { return topology_of(arrays_); }

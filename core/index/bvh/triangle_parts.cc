@@ -10,7 +10,7 @@
 namespace locus {
 namespace {
 
-// Bound of the boxes of unused slots, which no test hits: min = +kUnusedBound, max = -kUnusedBound.
+// Bound of the boxes of unused slots: min = +kUnusedBound and max = -kUnusedBound, so that no test hits such a box.
 constexpr float kUnusedBound = 1e30f;
 
 using OctantOrders = std::array<uint32_t, 8>;  // TriangleNode::order: one element for each octant of ray directions

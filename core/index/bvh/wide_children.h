@@ -1,6 +1,6 @@
-// Children of one wide node (a node of up to eight children). The wide node replaces a binary node, its root, and some
-// inner nodes below the root; its children are the binary nodes next below these, as WideChoice determines. Borrows the
-// binary tree.
+// Children of one wide node (a node of up to eight children). The wide node replaces a part of the binary tree: a root
+// node and some of the inner nodes below it, which WideChoice determines. The children of the wide node are the binary
+// nodes directly below this part. Borrows the binary tree.
 #ifndef LOCUS_CORE_INDEX_BVH_WIDE_CHILDREN_H_
 #define LOCUS_CORE_INDEX_BVH_WIDE_CHILDREN_H_
 

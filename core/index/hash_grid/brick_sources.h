@@ -70,11 +70,11 @@ class MoveFinder {
   absl::Span<const uint32_t> index_by_handle_;
 };
 
-// Writes to `out` a source for each value in the first `count` slots of a block that stays in the brick, including
-// values that move within the brick. Returns the end of the written sources. Skips slots for which is_dead(slot)
-// returns true. Calls leave(block, slot, move) for each value that moves out of the brick. Adds to `moved` the number
-// of values that move, within the brick or out of the brick. `flag` is GridSlot::kRecent if the block is a log, else 0.
-// `out` must have room for `count` sources.
+// Writes to `out` a source for each value that stays in the brick, even if the value moves within the brick. Reads the
+// values in the first `count` slots of `block`, except slots for which is_dead(slot) returns true. Returns the end of
+// the written sources. Calls leave(block, slot, move) for each value that moves out of the brick. Adds to `moved` the
+// number of values that move, within the brick or out of the brick. `flag` is GridSlot::kRecent if the block is a log,
+// else 0. `out` must have room for `count` sources.
 template <class IsDead, class Leave>
 BrickSource* gather_block(const BrickGeometry& geometry, const GridBlock& block, uint32_t count, uint32_t flag,
                           const MoveFinder& moves, BrickSource* out, size_t& moved, const IsDead& is_dead,

@@ -1,6 +1,6 @@
 // Hash table from the keys of one level to the indices of its bricks: open addressing with linear probing, at most half
-// full. An entry stores the index and part of the hash but no key, so the caller of find() compares the key with that
-// of the brick. A value type; threads as for a standard container.
+// full. An entry stores the index and part of the hash but no key, so the caller of find() compares the key with the
+// key of the brick. A value type; threads as for a standard container.
 //
 // Invariant: size_ slots are occupied, at most half of all slots; no slot between the home slot of an entry's hash and
 // the slot of the entry is free.

@@ -5,8 +5,8 @@
 // Threads: immutable once shared; any thread. A log is the exception: its single writer appends values behind the slots
 // that earlier versions of the brick use, while readers of these versions read the same memory.
 //
-// Invariants: in a sorted block values are ordered by cell, and those of cell c occupy the slots offsets[c] to
-// offsets[c + 1] - 1; in a log they are in order of arrival. Float columns are padded with zeros to whole vectors of
+// Invariants: in a sorted block values are ordered by cell, and the values of cell c occupy the slots offsets[c] to
+// offsets[c + 1] - 1; in a log values are in order of arrival. Float columns are padded with zeros to whole vectors of
 // eight floats, and a vector load may start at any value.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_GRID_BLOCK_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_GRID_BLOCK_H_

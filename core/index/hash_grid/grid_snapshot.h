@@ -41,7 +41,7 @@ using BrickIndices = PersistentArray<uint32_t, 1024>;
 
 struct GridLevel {
   int exponent = 0;        // cell edge = 2^exponent
-  LevelGeometry geometry;  // geometry around all values; does not shrink until the level is empty
+  LevelGeometry geometry;  // its bounds contain all values and do not shrink until the level is empty
   size_t size = 0;         // number of values
   std::shared_ptr<const BrickTable> table;
 };
@@ -54,7 +54,7 @@ KeyRange within_brick(const KeyRange& range, const GridKey& brick);
 
 }  // namespace internal
 
-// Position of an iteration over a snapshot by for_each_from(). Valid only for this snapshot.
+// Position of an iteration by for_each_from(). Valid only for the snapshot on which the iteration runs.
 struct GridCursor {
   size_t brick = 0;
   size_t values = 0;  // number of values of the brick at `brick` that have been visited
@@ -94,9 +94,9 @@ class GridSnapshot {
 
   // Calls visit(GridRef) for every value whose bounds have a squared_distance() of at most limit() from `point`, and
   // for some other values near the point; roughly from near to far on each level. limit() may decrease during the
-  // visit. Ends if visit() returns false. Cost on each level: proportional to the number of cells within the final
-  // limit() and of their values. If the range of these cells has more bricks than the level, each brick of the level is
-  // tested once instead.
+  // visit. Ends if visit() returns false. The cost on each level is proportional to the number of cells within the
+  // final limit() plus the number of values in these cells. If the range of these cells has more bricks than the level,
+  // each brick of the level is tested once instead.
   template <class Limit, class Visit>
   void visit_nearest(const Vec3d& point, const Limit& limit, Work& work, const Visit& visit) const;
 

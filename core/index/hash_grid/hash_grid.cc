@@ -130,8 +130,8 @@ uint32_t HashGrid::brick_for(Level& level, const GridKey& key) {
   return brick;
 }
 
-// Finds `brick` in touched_ at the index touched_indices_[brick]. If an earlier batch wrote this index, touched_ has no
-// entry or another brick there, so touched_indices_ need not be cleared between batches.
+// Looks for `brick` in touched_ at the index touched_indices_[brick]. If this index is left over from an earlier batch,
+// touched_ has no entry or another brick there, so touched_indices_ need not be cleared between batches.
 inline uint32_t HashGrid::touch(uint32_t brick) {
   const uint32_t known_index = touched_indices_[brick];
   if (known_index < touched_.size() && touched_[known_index] == brick) return known_index;
@@ -311,12 +311,12 @@ bool HashGrid::moves_nearly_all(const GridBatch& batch) const {
          moves >= size_ / 2;
 }
 
-// Replaces move_all() if at least half of all values move: iterates over the bricks and looks up the move of each
-// value. The values of a brick are adjacent in memory, so the moves need not be grouped by brick.
+// Does the work of move_all(), but iterates over the bricks and looks up the move of each value. Used if at least
+// half of all values move. The values of a brick are adjacent in memory, so the moves need not be grouped by brick.
 void HashGrid::gather_all(const GridMoves& moves) {
   const internal::MoveFinder finder(moves);
   const auto bricks =
-      static_cast<uint32_t>(brick_info_.size());  // bricks that insert_moved() creates hold arrivals only
+      static_cast<uint32_t>(brick_info_.size());  // bricks that insert_moved() creates later hold arrivals only
   sources_.resize(size_);
   internal::BrickSource* next = sources_.data();
   for (uint32_t index = 0; index < bricks; ++index) {
@@ -342,8 +342,8 @@ void HashGrid::gather_all(const GridMoves& moves) {
 
 size_t HashGrid::apply(const GridBatch& batch) {
   replaced_bytes_ = 0;
-  if (size_ == 0 &&
-      batch.inserted.size() >= first_choice_) {  // choose before a bulk load, so that it stores each value once
+  // Choose the cell size before a bulk load, so that the load stores each value only once.
+  if (size_ == 0 && batch.inserted.size() >= first_choice_) {
     internal::EvenSample sample(batch.inserted.size());
     for (const GridItem& item : batch.inserted) sample.offer(item.entry.position, 2.0 * double{item.reach});
     base_exponent_ = internal::choose_cell_exponent(sample.values(), batch.inserted.size());

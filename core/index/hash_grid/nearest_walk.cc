@@ -23,8 +23,9 @@ GridNear near_of(const Brick& brick, const Vec3d& point, float above, float up_t
   return near;
 }
 
-// Returns the epsilon by which the region of a shell is widened, so that it overlaps the bounds of every value whose
-// key lies in the shell: more than twice the epsilon of near_of() plus the rounding of the region's sides.
+// Returns the epsilon by which the region of a shell is widened, so that this region overlaps the bounds of every value
+// whose key lies in the shell. The returned epsilon is more than twice the epsilon of near_of() plus the rounding of
+// the region's sides.
 double epsilon_of(const Vec3d& point, const LevelGeometry& level) {
   const double edge = (1 << kBrickBits) / level.cells_per_unit;
   const double size = max_component(abs(point)) + magnitude(level.bounds);

@@ -25,7 +25,8 @@ struct LevelGeometry {
 class SlabMarch {
  public:
   struct Slab {
-    double near;      // lower bound of the near values of the bounds of values in this or a later slab
+    // Lower bound of the t at which the ray enters the padded bounds of any value in this or a later slab.
+    double near;
     KeyRange bricks;  // keys of the bricks; may be empty
   };
 

@@ -32,7 +32,7 @@ class RayProof {
   RayProof(uint64_t rays, uint64_t seed, unsigned threads)
       : blocks_((rays + internal::kBlockRays - 1) / internal::kBlockRays), seed_(seed), threads_(threads) {}
 
-  // Runs the proof. Selects the widest instruction set at the end.
+  // Runs the proof. Afterwards the widest instruction set is selected.
   RayTally run() {
     for (uint64_t begin = 0; begin < blocks_; begin += kRoundBlocks) {
       scenes_ = proof_scenes(seed_ + begin);

@@ -1,5 +1,5 @@
 // One triangle and one ray in long double: the point where they meet, its distance from the triangle's border, and the
-// angle. For the proof that no ray misses; shares no arithmetic with the product. Immutable.
+// slope of the ray. For the proof that no ray misses; shares no arithmetic with the product. Immutable.
 #ifndef LOCUS_TESTS_SUPPORT_PROOF_REAL_TRIANGLE_H_
 #define LOCUS_TESTS_SUPPORT_PROOF_REAL_TRIANGLE_H_
 
@@ -12,7 +12,7 @@
 
 namespace locus::test {
 
-// Returns the unit vector along v; zero for zero.
+// Returns the unit vector along v, or the zero vector if v is zero.
 inline Vec3r unit(Vec3r v) {
   const Real size = length(v);
   return size == 0 ? Vec3r{} : v * (1 / size);
@@ -39,7 +39,8 @@ class RealTriangle {
 
   Real slope(const RealRay& ray) const { return dot(normal_, ray.direction); }
 
-  // Returns nullopt if the triangle has no area or is exactly edge-on, or if t is not within 0 .. limit.
+  // Returns the point where the ray meets the triangle's plane. Returns nullopt if the triangle has no area or is
+  // exactly edge-on, or if t is not within 0 .. limit.
   std::optional<Meeting> meet(const RealRay& ray, Real limit) const {
     Meeting meeting;
     meeting.slope = slope(ray);

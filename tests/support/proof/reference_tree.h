@@ -58,7 +58,7 @@ class ReferenceTree {
   }
 
  private:
-  static constexpr size_t kMaxDepth = 64;  // halves leave at most 32 levels
+  static constexpr size_t kMaxDepth = 64;  // each split halves the triangles, so at most 32 levels are needed
   static constexpr uint32_t kLeafSize = 4;
 
   struct Node {
@@ -69,7 +69,8 @@ class ReferenceTree {
     uint32_t count;  // number of triangles of a leaf; 0 for an inner node
   };
 
-  // A triangle in double: points p of its plane have normal . p = level, and within it inward[i] . p >= border[i].
+  // A triangle in double: a point p of its plane has normal . p = level. A point p within the triangle also has
+  // inward[i] . p >= border[i] for each edge i.
   struct Rough {
     Vec3d normal, inward[3];
     double level, border[3];

@@ -128,8 +128,9 @@ static inline uint32_t pack_sorted(const TriangleNode& node, Floats8 near, Float
   return static_cast<uint32_t>(__builtin_popcount(set));
 }
 
-// Moves the elements with the indices `from` to from + 7 whose bits are set in `set` to the indices from `to` on, in
-// both `children` and `nears`. Precondition: `to` <= `from`. May read and write eight elements of each array.
+// Packs both `children` and `nears`: takes the eight elements that begin at index `from`, keeps those whose bits are
+// set in `set`, and moves them, in the same order, to the indices from `to` on. Precondition: `to` <= `from`. May read
+// and write eight elements of each array.
 static inline void pack_entries(uint32_t* children, float* nears, uint32_t from, uint32_t set, uint32_t to) {
   const __m256i packed = pack_permutation(set);
   const __m256i child = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(children + from));

@@ -1,7 +1,8 @@
 // Test of one ray with the eight triangles of a block, or of eight rays with one triangle: a test in float excludes
-// most triangles, and a test in double gives the result for the triangles that remain. Error bounds, with R = max
-// |origin| + max |vertex|, E = the block's extent, and d = the direction's largest component. Sheared coordinates are
-// those of TriangleRay divided by d:
+// most triangles, and a test in double gives the result for the triangles that remain. A sheared coordinate is x or y
+// of a vertex, relative to the origin and projected along the ray to z = 0; TriangleRay computes the same value
+// multiplied by d. Error bounds, with R = max |origin| + max |vertex|, E = the block's extent, and d = the direction's
+// largest component:
 //
 // - The error of a sheared coordinate is at most 10 * 2^-24 R: rounding of the origin, the differences, the shear, the
 //   product and the sum. A ray that hits the block's padded box passes within 2^-20 R of it, so sheared coordinates are
@@ -190,9 +191,9 @@ static inline bool is_exactly_edge_on(const TriangleBlock& block, int lane, cons
   return ray.unrotated && across != 0;
 }
 
-// Tests in double whether the ray hits the triangle in lane `lane`. Computes TriangleRay::edge_test() without the
-// scaling by powers of two, which changes no bit of the result for the directions and distances that the kernels
-// accept.
+// Tests in double whether the ray hits the triangle in lane `lane`. Computes TriangleRay::edge_test(), but omits its
+// scaling by powers of two. For the directions and distances that the kernels accept, this scaling would change no bit
+// of the result.
 static inline Verdict decide(const TriangleBlock& block, int lane, const KernelRay& ray, PreparedRay prepared) {
   const uint32_t axis_x = prepared.integer(kAxisX), axis_y = prepared.integer(kAxisY),
                  axis_z = prepared.integer(kAxisZ);

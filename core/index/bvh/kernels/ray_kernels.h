@@ -1,9 +1,10 @@
 // Ray kernels: vector code that intersects many rays with the tree of one mesh. The kernels of each instruction set are
-// in an object file of their own. A kernel uses a result computed in float only if it is outside a documented error
-// bound. Otherwise the kernel repeats the test in double by the arithmetic of TriangleRay
-// (core/geometry/ray_triangle.h), so that its answers equal those of TriangleRay bit for bit. If double is not precise
-// enough either, the verdict on the ray is kUndecided, and the caller traces the ray again, triangle by triangle with
-// TriangleRay. Plain data; functions without state, safe from any thread; a call uses 220 KB of stack.
+// in an object file of their own. A kernel accepts the result of a float test only if a documented bound of the
+// rounding error proves that the result is right. Otherwise the kernel repeats the test in double by the arithmetic of
+// TriangleRay (core/geometry/ray_triangle.h), so that its answers equal the answers of TriangleRay bit for bit. If
+// double is not precise enough either, the verdict on the ray is kUndecided, and the caller traces the ray again,
+// triangle by triangle with TriangleRay. Plain data; functions without state, safe from any thread; a call uses 220 KB
+// of stack.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_RAY_KERNELS_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_RAY_KERNELS_H_
 

@@ -166,8 +166,8 @@ class RayStream {
     opened.index = block_index;
   }
 
-  // Pops the next node or block. If the opened block has candidates, or the ray has exceeded kMaxKernelTests, schedules
-  // resolve() instead, which pops the next node or block afterwards.
+  // Schedules resolve() if the opened block has candidates or the ray has exceeded kMaxKernelTests; resolve() then pops
+  // the next node or block. Otherwise pops the next node or block itself.
   inline void finish_block(uint32_t slot, WorkList& next_steps) {
     InFlightRay& flight = flights_[slot];
     // Computed without branches, because the processor would mispredict them too often.
@@ -258,8 +258,8 @@ class RayStream {
   const uint8_t* const indices_;
   const uint32_t count_;
   InFlightRay* const flights_;
-  // Array and element size for each step, used for prefetching. For kEnd the size is 0, so the root is prefetched: this
-  // needs no branch and does no harm.
+  // Address and element size of the array that each step reads, used for prefetching. For kEnd the size is 0, so the
+  // root is prefetched, which is harmless and needs no branch.
   const char* const bases_[3] = {reinterpret_cast<const char*>(tree_.nodes),
                                  reinterpret_cast<const char*>(tree_.blocks),
                                  reinterpret_cast<const char*>(tree_.nodes)};

@@ -5,13 +5,13 @@
 // rounding, as if compiled without fused multiply-add: the error of a product of two differences is 4 u of its value
 // within a difference of two such products, and 5 u within a dot product.
 //
-// For most triangles a test of the vertices alone, relative to the centre, gives the result:
-// - The error of the squared length of such a vertex is 5 u of its value: a vertex is certainly inside if this square
-//   is at most r^2 (1 - 2^-19). The predicate then finds the triangle too, by its distance from the edge that starts at
-//   this vertex, whatever the lengths of the edges.
-// - The error of the projection of a vertex on another one, A, is 5 u L |A|; the squares on both sides of the
-//   comparison add 6 u. If all three projections are beyond (r + 2^-19 (r + E)) |A|, the triangle is outside: a plane
-//   separates it from the ball by more than 2^-22 L.
+// For most triangles a test of the vertices alone, as vectors from the centre, gives the result:
+// - The error of the squared length of such a vector is 5 u of its value: a vertex is certainly inside if its squared
+//   length is at most r^2 (1 - 2^-19). The predicate then finds the triangle too, by its distance from the edge that
+//   starts at this vertex; this is true for edges of any length.
+// - The error of the dot product of such a vector with A, one of the three vectors, is 5 u L |A|; the squares on both
+//   sides of the comparison add 6 u. If the dot products of all three vectors with A are greater than
+//   (r + 2^-19 (r + E)) |A|, the triangle is outside: a plane separates it from the ball by more than 2^-22 L.
 //
 // The other triangles need the more expensive test of test_closely():
 // - The error of the foot of the perpendicular on an edge is 5 u L for the dot product, 5 u for the square of the edge

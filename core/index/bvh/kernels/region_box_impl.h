@@ -1,9 +1,9 @@
 // Tests of a box with eight boxes or eight triangles at a time, for region_kernels_impl.h: separating axis tests in the
 // box's own axes, as in the predicate box_overlaps(). Error bounds of the triangle test, with u = 2^-24, E = the
-// block's extent, h = the half extents and, by axis, R = h + 2 E. The box overlaps the block's box, so no coordinate of
-// a vertex, relative to the centre and along the box's axes, exceeds R. All computations start with differences of
-// floats, whose relative error is u, and each product and each sum counts as one rounding, as if compiled without fused
-// multiply-add. If the box is not rotated:
+// block's extent, h = the half extents and, on each axis, R = h + 2 E. The box overlaps the block's box, so no
+// coordinate of a vertex, relative to the centre and along the box's axes, exceeds R. All computations start with
+// differences of floats, whose relative error is u, and each product and each sum counts as one rounding, as if
+// compiled without fused multiply-add. If the box is not rotated:
 //
 // - On the axis perpendicular to a box axis and an edge (x, y), the error of a projected vertex is 4 u (|x| R_y + |y|
 //   R_x): two differences, a product and a sum; the error of the projected box is the same. The padded half extents
@@ -21,10 +21,10 @@
 // normal's component is 78 u E^2, the error of the height (78 + 26 + 9) u E^2 S, and the error of the projected box 87
 // u E^2 S; the sum of the last two errors is within 2^-15 E^2 S.
 //
-// A triangle whose projections certainly overlap the box's on all axes has a point in common with the box. Then the
-// triangle's own bounding box, which the predicate tests too, also has a point in common with the box. A triangle
-// without area is never certain unless a vertex is inside the box; such a vertex overlaps the box on every axis,
-// because rounding is monotone.
+// If the projections of a triangle certainly overlap the projections of the box on all axes, the triangle has a point
+// in common with the box. Then the triangle's own bounding box, which the predicate tests too, also has a point in
+// common with the box. A triangle without area is never certain unless a vertex is inside the box; such a vertex
+// overlaps the box on every axis, because rounding is monotone.
 //
 // Source: Akenine-Moller, Fast 3D Triangle-Box Overlap Testing, 2001.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_REGION_BOX_IMPL_H_

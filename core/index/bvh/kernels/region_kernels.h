@@ -1,10 +1,10 @@
 // Region kernels: vector code that finds all triangles of one mesh's tree that overlap a ball or a box; tests eight
-// boxes or triangles at a time. The kernels of each instruction set are in an object file of their own. A kernel uses a
-// result computed in float only if it is outside a documented error bound. Otherwise the kernel calls the caller's
-// RegionJudge, which uses the predicates of core/geometry/triangle_overlap.h, so that the answers of kernels equal the
-// answers of the predicates. The triangle numbers of a subtree that lies completely inside the region are copied
-// without tests. The kernels are used through core/query/kinds/triangle_search.h. Plain data; functions without state,
-// safe from any thread.
+// boxes or triangles at a time. The kernels of each instruction set are in an object file of their own. A kernel
+// accepts the result of a float test only if a documented bound of the rounding error proves that the result is right.
+// Otherwise the kernel calls the caller's RegionJudge, which uses the predicates of core/geometry/triangle_overlap.h,
+// so that the answers of kernels equal the answers of the predicates. The triangle numbers of a subtree that lies
+// completely inside the region are copied without tests. The kernels are used through
+// core/query/kinds/triangle_search.h. Plain data; functions without state, safe from any thread.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_REGION_KERNELS_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_REGION_KERNELS_H_
 
@@ -45,8 +45,8 @@ inline constexpr size_t kMaxRegions = 16;
 // nodes until all items are processed. Opening one node adds up to eight items.
 inline constexpr uint32_t kMaxRegionItems = 56;
 
-// Exact predicate for the triangles whose float result is within the error bound. meets() returns whether the triangle
-// in lane `lane` of `block` overlaps `region`, which the caller owns.
+// Exact predicate for the triangles that the float tests leave undecided. meets() returns whether the triangle in lane
+// `lane` of `block` overlaps `region`, which the caller owns.
 struct RegionJudge {
   bool (*meets)(const void* region, const TriangleBlock& block, uint32_t lane);
   const void* region;

@@ -3,9 +3,9 @@
 // thread.
 //
 // A kernel never drops a value that satisfies the caller's original query, in spite of rounding, because callers widen
-// the query by kCullEpsilon times the magnitudes of its coordinates and the brick's. The widening covers the rounding
-// of the columns to float (2^-24 of a coordinate), of the query to float (2^-24), and of the sums, products and fused
-// products of the kernels (each 2^-24 of its result).
+// the query by kCullEpsilon times the magnitudes of the query's coordinates and the brick's coordinates. The widening
+// covers the rounding of the columns to float (2^-24 of a coordinate), of the query to float (2^-24), and of the sums,
+// products and fused products of the kernels (each 2^-24 of its result).
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_KERNELS_GRID_KERNELS_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_KERNELS_GRID_KERNELS_H_
 
@@ -62,9 +62,9 @@ struct GridKernels {
   uint32_t (*cull_box)(const GridRows& rows, const GridBox& box, uint32_t* slots);
   uint32_t (*cull_line)(const GridRows& rows, const GridLine& line, uint32_t* slots);
   uint32_t (*cull_ball)(const GridRows& rows, const GridBall& ball, uint32_t* slots);
-  // Writes the slots of the values in the shell to `slots`, in the same order, and their keys to `keys`; returns their
-  // number. A key never exceeds the exact squared distance. Both arrays have room for kMaxValues elements and one
-  // vector of eight more.
+  // Writes the slots of the values in the shell to `slots`, in increasing order within each row, and their keys to
+  // `keys`; returns the number of these values. A key never exceeds the exact squared distance. Both arrays have room
+  // for kMaxValues elements and one vector of eight more.
   uint32_t (*collect_near)(const GridRows& rows, const GridNear& near, uint32_t* slots, float* keys);
   // Sorts at most kMaxSorted distinct integers in increasing order.
   void (*sort_few)(int32_t* values, uint32_t count);
