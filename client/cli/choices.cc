@@ -10,8 +10,8 @@
 namespace locus::cli {
 namespace {
 
-// Prefix of the validator's name. The allowed words are stored in that name: CLI11 never prints it, and choices_of()
-// reads it back.
+// Prefix of the validator's name. The allowed words follow the prefix in the name, and choices_of() reads them from
+// there. CLI11 never prints the name.
 constexpr char kName[] = "choices:";
 
 }  // namespace

@@ -1,5 +1,5 @@
-// Global options that choose the server and the credentials of its connection: on the line, in the environment, or in a
-// named context. For run.h and Context. Functions without state.
+// Global options that choose the server and the credentials for the connection to it. An option is taken from the line,
+// else from its environment variable, else from a named context. For run.h and Context. Functions without state.
 #ifndef LOCUS_CLIENT_CLI_CONNECTION_OPTIONS_H_
 #define LOCUS_CLIENT_CLI_CONNECTION_OPTIONS_H_
 

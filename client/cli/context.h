@@ -44,7 +44,8 @@ class Context {
   std::ostream& err() { return err_; }
   Progress progress() const { return progress_; }
 
-  // Returns the address of the server, after the context of the line was applied.
+  // Returns the address of the server. Call it after the line was parsed, since the line, the environment or a named
+  // context can set the address.
   const std::string& address() const { return options_.connection.address; }
 
   // Returns the connection to address(); the first call opens it. Errors: UNAVAILABLE, with advice, if no
@@ -76,7 +77,8 @@ class Context {
   // Returns the path of the file of named contexts; empty = there is none.
   const std::string& contexts_path() const { return contexts_path_; }
   void set_contexts_path(std::string path) { contexts_path_ = std::move(path); }
-  // Stores the error of the line's context, which connect() then returns. Commands that do not connect still work.
+  // Stores the result of reading the named context. If it is an error, connect() returns it; commands that do not
+  // connect still work.
   void set_connection_mistake(absl::Status mistake) { connection_mistake_ = std::move(mistake); }
   const absl::Status& connection_mistake() const { return connection_mistake_; }
 

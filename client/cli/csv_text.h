@@ -2,7 +2,7 @@
 //
 // Only the keys of a row decide its columns, never its values, so that the header is the same for every result. A key
 // that names a vector is split (`normal.x,normal.y,normal.z`, `uv.u,uv.v`, `rotation.x` .. `rotation.w`); any other key
-// is one column. Lists and objects under such a key are one cell of JSON.
+// is one column, in which a list or an object is one cell of JSON text.
 #ifndef LOCUS_CLIENT_CLI_CSV_TEXT_H_
 #define LOCUS_CLIENT_CLI_CSV_TEXT_H_
 

@@ -82,7 +82,8 @@ std::optional<Refusal> run_with_default_scene(const std::vector<std::string>& ar
 }
 
 // Makes the parser refuse --timeout and the options of the connection, and ignore their environment variables. For
-// lines of a script, which all use one connection: its options are given on the command line of `locus`, before `run`.
+// lines of a script: all of them use the one connection whose options stand before `run` on the command line of
+// `locus`.
 void restrict_to_script(CLI::App& app) {
   std::vector<const char*> names(std::begin(kConnectionOptionNames), std::end(kConnectionOptionNames));
   names.push_back("--timeout");

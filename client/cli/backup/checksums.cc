@@ -13,7 +13,7 @@ namespace {
 
 constexpr size_t kHexDigits = 64;
 constexpr absl::string_view kBetween = "  ";
-constexpr size_t kShownPathBytes = 200;  // length of a path in a message
+constexpr size_t kShownPathBytes = 200;  // maximum length of a path in a message
 
 bool is_hex_digit(char c) { return absl::ascii_isdigit(static_cast<unsigned char>(c)) || (c >= 'a' && c <= 'f'); }
 

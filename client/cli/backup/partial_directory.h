@@ -1,6 +1,6 @@
 // Directory that appears either complete or not at all. The directory is created and filled as TARGET.partial, and
 // renamed to TARGET after all its files were synced to disk. For backups and restored data directories. Not
-// thread-safe. Also file_error(), which makes the errors of file operations in client/cli/backup.
+// thread-safe. This header also declares file_error(), which makes the errors of file operations in client/cli/backup.
 //
 // Invariant: TARGET does not change before keep(). The destructor removes TARGET.partial unless keep() has renamed it;
 // a process that is killed leaves TARGET.partial behind.

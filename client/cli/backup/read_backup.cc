@@ -24,8 +24,8 @@ namespace fs = std::filesystem;
 
 constexpr size_t kReadBytes = size_t{1} << 20;
 constexpr size_t kNamedProblems = 5;
-// Maximum size of SHA256SUMS: one line for each of the maximum number of files, of 64 hexadecimal digits, two spaces,
-// the path and a line feed.
+// Maximum size of SHA256SUMS. The file has one line for each file of the backup: 64 hexadecimal digits, two spaces, the
+// path and a line feed.
 constexpr uint64_t kMaxChecksumBytes = client::kMaxBackupFiles * (client::kMaxBackupPathLength + 67);
 
 // Damage found in a backup: counts the damaged files and names the first kNamedProblems of them.

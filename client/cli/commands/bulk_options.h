@@ -54,8 +54,8 @@ Field column_or_option(Field field, const std::vector<T>& values, const std::str
   return field;
 }
 
-// Returns the usage error for an option with several values: with bulk input, the single value of an option applies to
-// all rows.
+// Returns the usage error for an option that has several values. With bulk input an option may have only one value,
+// which applies to all rows.
 absl::Status several_values(const std::string& option);
 // Returns several_values(option) if `values` has more than one value, otherwise OK.
 template <class T>

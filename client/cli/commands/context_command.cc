@@ -57,7 +57,7 @@ absl::Status use_context(const ContextOptions& options, Context& context) {
   return write_contexts(context.contexts_path(), contexts);
 }
 
-// Makes the path of a file absolute, since a context is used from any folder.
+// Makes the path of a file absolute, since a context can be used in any working directory.
 void make_absolute(std::string& path) {
   std::error_code ignored;
   if (!path.empty()) path = std::filesystem::absolute(path, ignored).string();

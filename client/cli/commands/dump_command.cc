@@ -21,8 +21,8 @@ struct DumpOptions {
   ViewOptions view;
 };
 
-// Dumps a scene. Rows are written as they arrive. In a script (Context::keeps_reports()), whose later lines can use the
-// rows, the rows are collected in one report instead.
+// Dumps a scene. Writes each row when it arrives. In a script (Context::keeps_reports()), collects all rows in one
+// report instead, since later lines of the script can use them.
 absl::Status dump(const DumpOptions& options, Context& context) {
   RETURN_IF_ERROR(check(options.view));
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());

@@ -17,7 +17,7 @@ namespace locus::cli {
 struct PlacementOptions {
   std::string scene;
   bool create = false;
-  std::string mesh;  // name of a single mesh, prefix of the names of several; empty = names in the level
+  std::string mesh;  // name of a single mesh, or prefix for the names of several; empty = the level's names
   Triple at;
   Number64 id;  // id of the first instance; other instances get the following ids; 0 = the server chooses
   std::vector<Number64> layers;

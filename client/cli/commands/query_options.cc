@@ -19,8 +19,9 @@ const NamedValues<v1::Column>& column_names() {
   return names;
 }
 
-// Returns whether `value` is exactly representable as a float. Positions with other values are sent as the frame. Also
-// returns true for NaN and infinity, so that they are sent as a position, which the server's error then names.
+// Returns whether `value` is exactly representable as a float; if a coordinate is not, framed() sends a frame other
+// than the origin. Also returns true for NaN and infinity, so that they do not change the frame, and the server's error
+// names the position that contains them.
 bool is_float(double value) { return !std::isfinite(value) || static_cast<double>(static_cast<float>(value)) == value; }
 
 void add_filter_options(CLI::App& command, QueryOptions& options) {

@@ -53,7 +53,7 @@ absl::StatusOr<ImageSize> ray_image_size(const RenderOptions& options) {
   const ImageSize size = picture_size(options);
   const uint64_t rays_a_pixel = uint64_t{rays_a_side(options)} * rays_a_side(options);
   // The products cannot overflow: width and height have 32 bits, and the second product is computed only if the first
-  // is small.
+  // is at most kMaxRenderRays.
   if (size.pixels() > kMaxRenderRays || size.pixels() * rays_a_pixel > kMaxRenderRays) {
     return usage_error(absl::StrCat("--size ", size.width, "x", size.height, " with --samples ", rays_a_pixel,
                                     " takes more rays than a picture may have (", kMaxRenderRays,

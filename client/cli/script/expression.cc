@@ -209,7 +209,7 @@ Answer read_path(Cursor& cursor, const Variables& variables, Value value) {
   }
 }
 
-// Returns whether a default replaces the value: whether it is null or a column without rows.
+// Returns whether `value` is null or a column without rows, so that a default replaces it.
 bool is_missing(const Value& value) {
   if (value.kind == Value::Kind::kColumn && value.result->rows.empty()) return true;
   const absl::StatusOr<Json> json = value.known() ? plain(value) : Json(0);

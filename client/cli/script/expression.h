@@ -1,6 +1,6 @@
 // Parser of script expressions, which also evaluates them:
 //
-//   list    = sum {"," sum}                          numbers only where there are several
+//   list    = sum {"," sum}                          only numbers, if there are several
 //   sum     = product {("+" | "-") product}
 //   product = unary {("*" | "/" | "%") unary}
 //   unary   = {"-"} primary

@@ -49,7 +49,7 @@ Answer finite_vector(const Vector& vector) {
   return Value::of(vector);
 }
 
-// The absolute value of a number, or of each part of a vector.
+// Returns the absolute value of a number, or of each part of a vector.
 Answer absolute(const Value& value) {
   ASSIGN_OR_RETURN(const Operand operand, operand_of(value));
   if (const Vector* const vector = std::get_if<Vector>(&operand)) {

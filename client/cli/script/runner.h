@@ -26,8 +26,9 @@ struct ScriptCounts {
 absl::Status check_script(const Script& script, const Variables& variables, Context& context, ScriptCounts& counts);
 
 // Runs a checked script. Writes the error of each failed line, with name:line, to the context's error stream at once.
-// The first failure ends the run. With kGoOn the run ends only if the server cannot be reached; if lines have failed,
-// it returns FAILED_PRECONDITION at the end. A batch that a failure leaves open is dropped, and none of it is sent.
+// The first failure ends the run. With kGoOn the run continues after failures, unless the server cannot be reached, and
+// the function returns FAILED_PRECONDITION at the end if lines have failed. A batch that is still open when the run
+// ends is dropped, and none of its changes are sent.
 absl::Status run_script(const Script& script, const Variables& variables, AfterFailure after, Context& context,
                         ScriptCounts& counts);
 

@@ -17,7 +17,7 @@ struct Statement {
   size_t line = 0;     // line number, from 1
   std::string text;    // text after the verb; for a command the whole line
   std::string reason;  // expect-error only: name of the expected failure of the command or commit
-  size_t partner = 0;  // begin, commit, repeat and end only: index of the other end of the block
+  size_t partner = 0;  // begin, commit, repeat and end only: index of the statement at the block's other end
 };
 
 struct Script {

@@ -77,8 +77,8 @@ absl::Status is_something_else(const Value& value, absl::string_view wanted) {
   return absl::InvalidArgumentError(absl::StrCat(shown(value), " is not ", wanted));
 }
 
-// Returns the entry of a column with exactly one row, or plain() of another value. Refuses other columns: it is not
-// clear which row is meant.
+// Returns plain(value), but INVALID_ARGUMENT for a column with no row or with several rows, since it is not clear which
+// entry is meant.
 absl::StatusOr<Json> single(const Value& value) {
   if (value.kind == Value::Kind::kColumn && value.result->rows.size() != 1) {
     return absl::InvalidArgumentError(absl::StrCat(value.column, " has ", value.result->rows.size(),

@@ -41,8 +41,9 @@ struct Value {
   std::string column = {};
 };
 
-// Returns a field of a result (an entry of its head, a column of its rows, `count`, or all rows under their name) or of
-// a record. Returns NOT_FOUND with the existing names.
+// Returns a field of a result or of a record. The fields of a result are the entries of its head, the columns of its
+// rows, the number of rows as `count`, and all rows under the name Report::rows_name. Returns NOT_FOUND with the
+// existing names if there is no such field.
 absl::StatusOr<Value> field_of(const Value& value, const std::string& name);
 // Returns an entry of a list or a row of a column, counted from 0. Returns OUT_OF_RANGE beyond the end.
 absl::StatusOr<Value> entry_of(const Value& value, const Number& index);
@@ -52,7 +53,8 @@ absl::StatusOr<uint64_t> size_of(const Value& value);
 // Returns a column with one row as its entry, any other column as a list. Returns INVALID_ARGUMENT for a whole result.
 absl::StatusOr<Json> plain(const Value& value);
 
-// Operand of a calculation. The conversions return INVALID_ARGUMENT, with a description of the value, for other values.
+// Operand of a calculation. The conversions return INVALID_ARGUMENT, with a description of the value, if the value does
+// not have the requested type.
 using Operand = std::variant<Number, Vector>;
 absl::StatusOr<Operand> operand_of(const Value& value);
 absl::StatusOr<Number> number_of(const Value& value);

@@ -38,7 +38,7 @@ using Extension = std::unique_ptr<X509_EXTENSION, FreedBy<X509_EXTENSION_free>>;
 using BigNumber = std::unique_ptr<BIGNUM, FreedBy<BN_free>>;
 
 constexpr size_t kMaxCommonName = 64;
-constexpr long kSecondsBeforeNow = 300;  // clocks of other machines may be behind
+constexpr long kSecondsBeforeNow = 300;  // validity begins earlier than now, since other machines' clocks may be behind
 
 absl::Status openssl_error() {
   char text[256] = "";
@@ -58,7 +58,8 @@ bool is_ip_address(const std::string& text) {
   return inet_pton(AF_INET, text.c_str(), &unused) == 1 || inet_pton(AF_INET6, text.c_str(), &unused) == 1;
 }
 
-// Checks the names, which also keeps the syntax of OpenSSL's extension texts out of them.
+// Checks the names. A host name or an address that passes contains no comma, which would begin another name in
+// OpenSSL's extension texts.
 absl::Status check_names(const CertificatePlan& plan) {
   const std::string& common = plan.common_name;
   if (common.empty() || common.size() > kMaxCommonName ||

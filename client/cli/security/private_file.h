@@ -35,8 +35,8 @@ absl::Status create_security_file(const std::string& path, const SecurityFile& c
 // the group stay; returns FAILED_PRECONDITION, without a change, if this process may not keep them.
 absl::Status replace_security_file(const std::string& path, const SecurityFile& content);
 
-// Lock of a file against other writers. The lock is the file PATH.lock, which is never deleted. Released by the
-// destructor.
+// Lock of a file against other writers. The lock is the file PATH.lock, which is never deleted. The destructor releases
+// the lock.
 class FileLock {
  public:
   // Waits until no other process holds the lock.

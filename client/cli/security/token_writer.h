@@ -19,7 +19,7 @@
 
 namespace locus::cli {
 
-inline constexpr size_t kMaxTokenLines = 10'000;  // lines of a token file, comments included; locusd reads no more
+inline constexpr size_t kMaxTokenLines = 10'000;  // lines of a token file with comments; locusd refuses a longer file
 inline constexpr size_t kMaxTokenId = 63;
 
 // Line of a token file, without its hash.

@@ -90,7 +90,7 @@ absl::Status check_ack(const v1::UpdateAck& ack) {
   return absl::InternalError(absl::StrCat(ack.refused(), " moves of a tick were refused"));
 }
 
-// Sends a batch that moves every object each tick, at options.ticks_a_second, and then waits for all acks.
+// Sends one batch per tick, which moves every object, at options.ticks_a_second. Then waits for all acks.
 absl::Status write(const client::Client& client, const DemoWorld& world, const LoadOptions& options,
                    LoadResult& result) {
   const std::unique_ptr<client::UpdateStream> stream = client.update_stream(options.scene);

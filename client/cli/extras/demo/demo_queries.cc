@@ -8,7 +8,7 @@
 namespace locus::cli {
 namespace {
 
-// Maximum for one query; the maximum size of a reply truncates large results earlier.
+// Maximum number of result rows of one query. Large results are truncated earlier, by the maximum size of a reply.
 constexpr uint32_t kMaxRows = 65536;
 
 client::Float3 float3(Vec3f v) { return {v.x, v.y, v.z}; }

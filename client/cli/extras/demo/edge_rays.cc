@@ -58,8 +58,8 @@ struct Aim {
   Vec3d away;  // offset of the ray's origin from the target
 };
 
-// Chooses a target on the edge and an origin for a ray to it. The origin lies in front of both triangles at the edge,
-// and as seen from it the triangles lie on different sides of the edge. Returns nullopt if there is no such origin.
+// Chooses a target on the edge and an origin for a ray to it. As seen from the origin, the two triangles at the edge
+// lie on different sides of the edge. Returns nullopt if no such origin was found.
 std::optional<Aim> aim(const Edge& edge, DemoRandom& random) {
   const std::optional<Vec3d> left = across(edge, edge.opposite[0]);
   const std::optional<Vec3d> right = across(edge, edge.opposite[1]);
@@ -69,7 +69,7 @@ std::optional<Aim> aim(const Edge& edge, DemoRandom& random) {
   const Vec3d side = cross(along * (1 / length), *left);
   const Vec3d other = cross(*right, along * (1 / length));
   Vec3d away = side + other;
-  if (squared_length(away) < 0.5) return std::nullopt;  // the fold is too sharp: no point is in front of both triangles
+  if (squared_length(away) < 0.5) return std::nullopt;  // the fold is too sharp: the normals are almost opposite
   const Vec3d jitter = *left * (0.4 * random.sign()) + along * (0.3 * random.sign() / length);
   away = normalized(away) + jitter;
   if (random.unit() < 0.5f) away = -away;

@@ -1,5 +1,6 @@
 // Test rays aimed at edges shared by two triangles: because of rounding errors, a fast intersection test can miss both
-// triangles at such an edge. The origin of a ray lies in front of both triangles, so the ray must hit one of them.
+// triangles at such an edge. As seen from the origin of a ray, the two triangles lie on different sides of the edge, so
+// the ray must hit one of them.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_DEMO_EDGE_RAYS_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_DEMO_EDGE_RAYS_H_
 

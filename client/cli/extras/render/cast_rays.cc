@@ -90,7 +90,8 @@ class Caster {
     block.rays(origins, directions);
   }
 
-  // Copies an answer into the image. Threads write disjoint ranges of the image, so only the counters need the lock.
+  // Copies an answer into the image. Threads write disjoint ranges of the image, so only the revisions and the tick of
+  // the result need the lock.
   absl::Status take(const PixelRange& range, const v1::QueryResult& answer) {
     const bool reported = options_.work == WorkReport::kReported;
     const uint64_t rays_per_block = reported ? 1 : range.size();
@@ -151,7 +152,7 @@ class Caster {
 
   const Camera& camera_;
   const CastOptions& options_;
-  CastResult result_;  // its counters are guarded by mutex_
+  CastResult result_;  // mutex_ guards its revisions and its tick, not its image
 
   std::mutex mutex_;
   absl::Status outcome_;  // first error

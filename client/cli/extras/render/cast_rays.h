@@ -46,9 +46,9 @@ struct CastResult {
 // Callback for progress. It is called from time to time in the caller's thread with the number of rays answered so far.
 using CastProgress = std::function<void(uint64_t done)>;
 
-// Sends all rays and waits until every ray is answered. Returns the errors of the server; for a revision that the
-// server has dropped, OUT_OF_RANGE with an explanation; DATA_LOSS if the columns of an answer do not match the request.
-// Memory: 28 bytes per pixel, 52 if the work is reported.
+// Sends all rays and waits until every ray is answered. Returns the errors of the server. If the server has dropped the
+// revision, returns OUT_OF_RANGE with an explanation. Returns DATA_LOSS if the columns of an answer do not match the
+// request. Memory: 28 bytes per pixel, 52 if the work is reported.
 absl::StatusOr<CastResult> cast_rays(const client::Client& client, const Camera& camera, const ImageSize& size,
                                      const CastOptions& options, const CastProgress& progress = {});
 

@@ -16,7 +16,7 @@ namespace locus::cli {
 struct ValueScale {
   double min = 0;
   double median = 0;
-  double high = 0;  // 99th percentile, shown in the last colour, so that outliers do not darken other values
+  double high = 0;  // 99th percentile; paint_heat() paints it brightest, so outliers do not darken the rest
   double max = 0;
 };
 

@@ -101,9 +101,9 @@ Aabbd narrowed(const Aabbd& box, const std::vector<bool>& reached) {
   return widened(result);
 }
 
-// Returns whether another round is worthwhile: whether the last round shrank the box along some axis by more than half
-// a slab (1/32 of the box's size along the axis). Axes along which the box is flat are ignored, since widened() undoes
-// their progress.
+// Returns whether the last round shrank the box along some axis by more than half a section (1/32 of the box's size
+// along the axis), so that another round is worthwhile. Axes along which the box is flat are ignored, since widened()
+// makes the box grow again along them.
 bool moved(const Aabbd& before, const Aabbd& after) {
   const Vec3d old_extent = before.extent(), new_extent = after.extent();
   for (int axis = 0; axis < 3; ++axis) {

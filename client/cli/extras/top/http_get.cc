@@ -36,7 +36,8 @@ absl::Status failure(CURLcode code, const std::string& address) {
   }
 }
 
-// Returns the error of a page that was answered with another status than 200. `body` is a text of the server.
+// Returns the error for a page that the server answered with the HTTP status `answer`, which is not 200. `body` is the
+// text of the server's answer.
 absl::Status refused_page(long answer, const std::string& page, const std::string& body) {
   const std::string text =
       absl::StrCat(page, " answers ", answer, ": ", absl::StripAsciiWhitespace(body.substr(0, 500)));

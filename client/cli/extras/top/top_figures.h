@@ -1,6 +1,6 @@
 // Figures that `locus top` shows: rates, quantiles and latest values, computed from two scrapes of one server's
-// metrics. Plain data and a function without state. A figure is null if it cannot be computed: the rate of a counter
-// that a restart of the server has reset, or a quantile of no calls.
+// metrics. Plain data and a function without state. A figure is null if it cannot be computed: a rate if a restart of
+// the server has reset its counter, a quantile if there were no calls.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_TOP_TOP_FIGURES_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_TOP_TOP_FIGURES_H_
 

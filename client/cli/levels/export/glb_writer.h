@@ -1,6 +1,6 @@
-// Writer of a glTF 2.0 scene in its binary form (GLB). The scene is collected in memory and written at once. For the
-// exporter. One writer writes one file in one thread. Source: Khronos Group, glTF 2.0 Specification, 2021 (ISO/IEC
-// 12113:2022).
+// Writer of a glTF 2.0 scene in its binary form (GLB). The scene is collected in memory, and one call of write() writes
+// the whole file. For the exporter. One writer writes one file in one thread. Source: Khronos Group, glTF 2.0
+// Specification, 2021 (ISO/IEC 12113:2022).
 //
 // assimp 5.2.5, with which the importer reads such files, can also write them, but it alters the scene: it drops
 // transforms within 0.01 of the identity and merges vertices nearer than 1e-5. It also needs 400 bytes of memory per
@@ -91,7 +91,7 @@ class GlbWriter {
   Json materials_ = Json::array();
   std::map<std::string, size_t> material_numbers_;
   std::string bytes_;                 // binary buffer
-  std::vector<uint32_t> renumbered_;  // index within the current part of each vertex of the current mesh, or kNoVertex
+  std::vector<uint32_t> renumbered_;  // per vertex of the current mesh: its index in the current part, or kNoVertex
 };
 
 }  // namespace locus::cli

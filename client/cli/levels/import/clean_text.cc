@@ -16,8 +16,7 @@ size_t character_length(absl::string_view text, size_t i) {
   if (lead < 0xC2 || lead > 0xF4 || !is_continuation(text, i + 1)) return 0;
   if (lead < 0xE0) return 2;
   const uint8_t second = byte_at(text, i + 1);
-  // Check the range of the second byte, by which overlong forms, surrogates and characters beyond U+10FFFF are
-  // recognized.
+  // Check the range of the second byte, which excludes overlong forms, surrogates and characters beyond U+10FFFF.
   if ((lead == 0xE0 && second < 0xA0) || (lead == 0xED && second > 0x9F)) return 0;
   if ((lead == 0xF0 && second < 0x90) || (lead == 0xF4 && second > 0x8F)) return 0;
   if (!is_continuation(text, i + 2)) return 0;
@@ -34,7 +33,8 @@ bool is_utf8(absl::string_view text) {
   return true;
 }
 
-// Returns whether a control character of two bytes, U+0080 to U+009F, begins at index `i`. Terminals obey these, too.
+// Returns whether a control character of two bytes, U+0080 to U+009F, begins at index `i`. Terminals interpret these
+// characters, too.
 bool is_wide_control(absl::string_view text, size_t i) {
   return byte_at(text, i) == 0xC2 && is_continuation(text, i + 1) && byte_at(text, i + 1) < 0xA0;
 }

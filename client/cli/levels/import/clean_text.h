@@ -9,9 +9,9 @@
 
 namespace locus::cli {
 
-// Returns `raw` truncated to `max_bytes` at a character boundary, with control characters, which could change a
-// terminal, replaced by '_'. If `raw` is not valid UTF-8, which a protobuf string must be, every byte outside ASCII is
-// replaced by '_'.
+// Returns `raw` truncated to `max_bytes` at a character boundary, with control characters replaced by '_', since a
+// terminal would interpret them. If `raw` is not valid UTF-8, which a protobuf string must be, every byte outside ASCII
+// is replaced by '_'.
 std::string clean_text(absl::string_view raw, size_t max_bytes);
 
 }  // namespace locus::cli

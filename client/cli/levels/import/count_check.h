@@ -1,6 +1,6 @@
-// Checks of the numbers of vertices and triangles of OBJ and STL files before assimp reads them, since assimp needs
-// about ten times the memory of the result. For the scene importer. Functions without state. PLY files have a check of
-// their own: ply_check.h.
+// Counts of the vertices and triangles of OBJ and STL files, and a check of these counts. The importer checks a file
+// before assimp reads it, since assimp needs about ten times the memory of the result. For the scene importer.
+// Functions without state. PLY files have a check of their own: ply_check.h.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_COUNT_CHECK_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_COUNT_CHECK_H_
 
@@ -19,7 +19,8 @@ struct ElementCounts {
 // Returns the number of vertices of an OBJ file, and a lower bound of its triangles: one for each face.
 ElementCounts count_obj(absl::string_view bytes);
 
-// Returns the counts of an STL file: as declared by a binary file, or of the facets of a text file.
+// Returns the counts of an STL file: three vertices for each triangle. The header of a binary file declares the number
+// of triangles; in a text file, the facets are counted.
 ElementCounts count_stl(absl::string_view bytes);
 
 // Returns RESOURCE_EXHAUSTED naming the limit that the counts exceed; else OK.

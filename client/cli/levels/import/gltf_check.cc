@@ -64,7 +64,7 @@ class GltfHandler final : public nlohmann::json_sax<nlohmann::json> {
   }
 
  private:
-  // Object or list that contains the current value. `key` is the last key of an object; empty in a list.
+  // Object or list that contains the current value. `key` is the key read last in an object, and empty in a list.
   struct Level {
     std::string key;
   };
@@ -121,7 +121,7 @@ class GltfHandler final : public nlohmann::json_sax<nlohmann::json> {
 
   absl::Status status_;
   std::vector<Level> path_;
-  std::vector<std::vector<uint32_t>> children_;  // of each node
+  std::vector<std::vector<uint32_t>> children_;  // for each node, the indices of its children
   std::vector<std::string> uris_;
   size_t listed_children_ = 0;
   size_t meshes_ = 0;
@@ -165,8 +165,9 @@ uint32_t read_word(absl::string_view bytes, size_t at) {
   return value;
 }
 
-// Returns the JSON part of a file. A GLB file has a header of 12 bytes (magic, version, length), then chunks with a
-// header of 8 bytes; version 1 has a fixed header of 20 bytes: magic, version, length, length of the JSON, format.
+// Returns the JSON part of a file. In a GLB file of either version it begins at byte 20, and its length is at byte 12.
+// Version 2 has a file header of 12 bytes (magic, version, length) and a chunk header of 8 bytes (length of the JSON,
+// type). Version 1 has one header of 20 bytes: magic, version, length, length of the JSON, format.
 absl::StatusOr<absl::string_view> json_part(absl::string_view bytes) {
   constexpr size_t kHeader = 20;
   if (bytes.substr(0, 4) != "glTF") return bytes;

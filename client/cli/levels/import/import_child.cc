@@ -59,7 +59,7 @@ uint64_t used_address_space() {
 
 bool limit_resources(const ChildLimits& limits) {
   const uint64_t used = used_address_space();  // read now: no file can be opened after setrlimit()
-  // The soft limit sends SIGXCPU, the hard limit SIGKILL.
+  // The kernel sends SIGXCPU at the soft limit, and SIGKILL at the hard limit.
   const rlimit processor{limits.cpu_seconds, limits.cpu_seconds + 1};
   const bool limited = set_limit(RLIMIT_CORE, 0) && set_limit(RLIMIT_FSIZE, 0) && set_limit(RLIMIT_NOFILE, 0) &&
                        setrlimit(RLIMIT_CPU, &processor) == 0;
@@ -68,8 +68,8 @@ bool limit_resources(const ChildLimits& limits) {
          set_limit(RLIMIT_DATA, used + limits.memory_bytes);
 }
 
-// Restores the default reaction to every signal that the program handles, except those by which sanitizers report
-// errors.
+// Restores the default action of these signals and unblocks all signals. Leaves the handlers of other signals, such as
+// SIGSEGV, through which sanitizers report errors.
 void reset_signals() {
   for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGXCPU, SIGXFSZ, SIGUSR1, SIGUSR2, SIGALRM})
     signal(number, SIG_DFL);
@@ -140,7 +140,8 @@ class Child {
   }
 
   enum class Reading { kEnded, kTimeout, kTooLong, kFailed };
-  // Appends the child's output to `bytes` until the child ends, `max_bytes` are exceeded, or the time is up.
+  // Appends the child's output to `bytes` until the child ends, a read fails, `bytes` would exceed `max_bytes`, or the
+  // time `until` is reached.
   Reading read_all(uint64_t max_bytes, Clock::time_point until, std::string& bytes) {
     std::array<char, 1 << 16> chunk;
     while (true) {

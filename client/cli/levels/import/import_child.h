@@ -15,7 +15,7 @@
 namespace locus::cli {
 
 struct ChildLimits {
-  uint64_t memory_bytes = kImportMemoryBase;  // address space beyond that of the caller; unlimited in sanitizer builds
+  uint64_t memory_bytes = kImportMemoryBase;  // address space besides the caller's; unlimited in sanitizer builds
   uint32_t seconds = kMaxImportSeconds;
   uint32_t cpu_seconds = kMaxImportCpuSeconds;
 };
@@ -25,13 +25,14 @@ ChildLimits limits_for(uint64_t file_bytes);
 
 struct ChildAnswer {
   std::string bytes;
-  bool filtered = false;  // the filter of system calls was on
+  bool filtered = false;  // the child ran with the filter of system calls
 };
 
-// Calls `produce` in a child process and returns its result. `what` names the file in errors. INVALID_ARGUMENT if the
-// child crashed, made a forbidden system call, or threw; RESOURCE_EXHAUSTED naming the limit if it exceeded one, or if
-// no process can be started. When this function returns, the child has ended and nothing of it is left. `produce` must
-// not use threads or locks of the caller, must not read files, and is cut off without its destructors.
+// Calls `produce` in a child process and returns its result. `what` is the name of the file in error messages. Returns
+// INVALID_ARGUMENT if the child crashed, made a forbidden system call, threw an exception, or sent no answer. Returns
+// RESOURCE_EXHAUSTED if the child exceeded a limit, which the message names, or if no process with these limits can be
+// started. When this function returns, the child has ended and is reaped. `produce` must not use threads or locks of
+// the caller and must not read files. The child can be killed at any point of `produce`, without running destructors.
 absl::StatusOr<ChildAnswer> run_in_child(absl::string_view what, const ChildLimits& limits,
                                          absl::FunctionRef<std::string()> produce);
 

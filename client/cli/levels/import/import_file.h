@@ -29,8 +29,8 @@ struct ImportOptions {
 // ImportedLevel::recentre is the inverse translation. The file is parsed by a child process (import_child.h), whose
 // answer is checked. Errors: NOT_FOUND (no such file or entry), INVALID_ARGUMENT (unknown type, damaged or empty file,
 // bad option, crash of the child), RESOURCE_EXHAUSTED (a limit of import_limits.h). Each message suggests a remedy.
-// Cost: the file is read once and held in memory; the child takes about 60 bytes for each of its vertices, and the mesh
-// is copied twice.
+// Cost: the file is read once and held in memory; the child needs about 60 bytes of memory for each vertex, and the
+// mesh is copied twice.
 absl::StatusOr<ImportedLevel> import_file(const std::string& path, const ImportOptions& options);
 
 }  // namespace locus::cli

@@ -9,7 +9,7 @@
 
 namespace locus::cli {
 
-// Files. The size is that of the file and of all files that it refers to.
+// Limits of input files. kMaxImportFileBytes limits the total size of a file and all files that it refers to.
 inline constexpr uint64_t kMaxImportFileBytes = uint64_t{4} << 30;
 inline constexpr size_t kMaxReferencedFiles = 256;
 inline constexpr size_t kMaxReferenceBytes = 1024;                 // length of a reference, except data: URIs
@@ -21,7 +21,7 @@ inline constexpr size_t kMaxSceneDepth = 256;                      // nesting of
 inline constexpr size_t kMaxSceneMeshes = size_t{1} << 20;         // meshes of a scene
 inline constexpr size_t kMaxSceneMeshUses = size_t{1} << 20;       // uses of meshes by nodes
 
-// Result.
+// Limits of the imported level.
 inline constexpr size_t kMaxImportTriangles = size_t{1} << 27;
 // Maximum number of vertices. Formats without shared vertices store three vertices for each triangle.
 inline constexpr size_t kMaxImportVertices = 3 * kMaxImportTriangles;
@@ -38,8 +38,9 @@ inline constexpr double kMaxImportCoordinate = 1e9;
 inline constexpr size_t kMaxImportNotes = 64;
 inline constexpr size_t kMaxImportTextBytes = 8192;
 
-// Time and memory of the child process that reads a file. The memory grows with the size of the file, so that a small
-// file cannot take all memory of the machine: base + factor * file size, and not more than the maximum.
+// Time and memory of the child process that reads a file. The memory limit is kImportMemoryBase + kImportMemoryFactor *
+// file size, at most kMaxImportMemory. It grows with the size of the file, so that a small file cannot take all memory
+// of the machine.
 inline constexpr uint32_t kMaxImportSeconds = 300;
 inline constexpr uint32_t kMaxImportCpuSeconds = 300;
 inline constexpr uint64_t kImportMemoryBase = uint64_t{2} << 30;
@@ -58,7 +59,7 @@ inline constexpr size_t kMaxEntryNameBytes = 1024;
 // reach about 10; bytes that are all equal reach about 1000.
 inline constexpr uint64_t kMaxArchiveRatio = 200;
 inline constexpr size_t kMinJudgedBytes = size_t{1} << 20;
-// Maximum number of archive entries that a message lists, and of bytes that their names take in it.
+// Maximum number of archive entries that a message lists, and maximum total length of their names in bytes.
 inline constexpr size_t kMaxListedEntries = 64;
 inline constexpr size_t kMaxListedBytes = 4096;
 static_assert(kMaxBspTriangles <= kMaxImportTriangles);

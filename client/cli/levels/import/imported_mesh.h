@@ -27,10 +27,10 @@ struct ImportedMesh {
 
 struct ImportedLevel {
   std::vector<ImportedMesh> meshes;
-  std::array<double, 3> recentre{};  // placed with this translation, a mesh has the file's coordinates
+  std::array<double, 3> recentre{};  // translation that moves the meshes back to the file's coordinates
   std::string source_format;         // "OBJ", "PLY", "STL", "glTF", "GLB" or "Quake 3 BSP"
   std::vector<std::string> notes;    // sentences for the user about anything that was skipped, chosen or changed
-  bool filtered = false;             // a filter of system calls was on while the file was read
+  bool filtered = false;             // the file was parsed under a filter of system calls
 };
 
 }  // namespace locus::cli

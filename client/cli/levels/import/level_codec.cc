@@ -62,7 +62,7 @@ class AnswerReader {
     return good_ ? value : 0;
   }
   std::string text() { return clean_text(take(number_upto(kMaxImportTextBytes)), kMaxImportTextBytes); }
-  // Reads a column of three values an entry.
+  // Reads a column with three values per entry.
   template <class T>
   std::vector<T> column(uint64_t max_entries) {
     const auto count = number<uint64_t>();
@@ -103,7 +103,7 @@ void write_mesh(const ImportedMesh& mesh, AnswerWriter& writer) {
 
 bool is_valid(const ImportedMesh& mesh) {
   bool valid = !mesh.indices.empty();
-  // A coordinate may be twice the maximum, since recentring moves a level by a value up to the maximum.
+  // A coordinate may be twice the maximum, since recentring moves a level by up to the maximum along each axis.
   for (const float coordinate : mesh.vertices) valid &= std::abs(coordinate) <= 2 * kMaxImportCoordinate;
   for (const uint32_t index : mesh.indices) valid &= index < mesh.vertices.size() / 3;
   for (size_t i = 0; i < mesh.parts.size(); ++i) {
@@ -144,7 +144,7 @@ ImportedLevel read_level(AnswerReader& reader) {
   return level;
 }
 
-// Returns the codes of errors that an importer returns.
+// Returns whether importers return errors with this code.
 bool is_import_error(absl::StatusCode code) {
   return code == absl::StatusCode::kInvalidArgument || code == absl::StatusCode::kNotFound ||
          code == absl::StatusCode::kResourceExhausted;

@@ -15,8 +15,8 @@ namespace locus::cli {
 std::string encode_level(const absl::StatusOr<ImportedLevel>& level);
 
 // Returns the level or the error that encode_level() encoded. The bytes are untrusted: a level that is returned has the
-// invariants of imported_mesh.h and is within the limits, and texts have no control characters. Anything else is
-// INVALID_ARGUMENT. Cost: linear.
+// invariants of imported_mesh.h and is within the limits, and texts have no control characters. Returns
+// INVALID_ARGUMENT for any other bytes. Cost: linear.
 absl::StatusOr<ImportedLevel> decode_level(absl::string_view bytes);
 
 }  // namespace locus::cli

@@ -18,7 +18,7 @@ namespace locus::cli {
 namespace {
 
 constexpr size_t kMaxHeaderBytes = 1 << 16;
-constexpr size_t kMaxShownBytes = 40;  // length of a word of the file in a message
+constexpr size_t kMaxShownBytes = 40;  // maximum length of a word of the file in a message
 
 enum class PlyEncoding { kAscii, kLittleEndian, kBigEndian };
 

@@ -1,5 +1,5 @@
-// Constant that says whether the program is built with a sanitizer, which reserves address space beyond any limit and
-// reports errors by system calls that a filter would forbid. For the child process of an import. Constant only.
+// Constant that is true if the program is built with a sanitizer. A sanitizer reserves more address space than any
+// limit allows, and reports errors by system calls that the filter would forbid. For the child process of an import.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_SANITIZED_BUILD_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_SANITIZED_BUILD_H_
 

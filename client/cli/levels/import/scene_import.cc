@@ -156,7 +156,7 @@ FaceCounts count_faces(const aiScene& scene) {
 }
 
 // Checks the bytes of an OBJ, PLY or STL file before assimp reads them. Returns the number of faces that the header of
-// a PLY file declares, and nullopt for other formats, which do not declare it.
+// a PLY file declares; nullopt for a file of any other format.
 absl::StatusOr<std::optional<uint64_t>> check_bytes(const LevelFiles& files) {
   const std::string extension = lower_extension(files.name);
   if (extension == ".obj") RETURN_IF_ERROR(check_counts(count_obj(files.bytes)));

@@ -13,7 +13,7 @@ namespace locus::cli {
 // Returns one mesh named after the file, with a part for each mesh of each node in depth-first order. Reads only the
 // bytes in `files`. Node transforms are multiplied in double. Under a mirroring transform the vertex order of triangles
 // is reversed, so that they stay counter-clockwise seen from outside. Points and lines are dropped and counted in a
-// note. The message of INVALID_ARGUMENT contains that of assimp.
+// note. If assimp cannot read the file, returns INVALID_ARGUMENT with assimp's error message.
 absl::StatusOr<ImportedLevel> import_scene(const LevelFiles& files, const ImportOptions& options);
 
 }  // namespace locus::cli

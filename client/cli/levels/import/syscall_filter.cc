@@ -20,8 +20,9 @@ struct ReleaseFilter {
 };
 using Filter = std::unique_ptr<std::remove_pointer_t<scmp_filter_ctx>, ReleaseFilter>;
 
-// Calls that are always allowed: memory, clocks, random numbers, locks within the process, and its end. A filter cannot
-// inspect memory behind pointer arguments, but none of these calls reaches a file, another process or the network.
+// Calls that are always allowed: memory, clocks, random numbers, locks and signal handlers of the process, and exit. A
+// filter cannot inspect memory behind pointer arguments, but none of these calls reaches a file, another process or the
+// network.
 constexpr int kAllowed[] = {SCMP_SYS(munmap),          SCMP_SYS(mremap),       SCMP_SYS(brk),
                             SCMP_SYS(madvise),         SCMP_SYS(futex),        SCMP_SYS(clock_gettime),
                             SCMP_SYS(gettimeofday),    SCMP_SYS(getrandom),    SCMP_SYS(getpid),

@@ -1,14 +1,15 @@
-// Filter of system calls for the process that reads an untrusted file, by libseccomp. For import_child.cc. The only
-// file that includes libseccomp. Changes the calling process.
+// Filter of system calls for the process that reads an untrusted file, by libseccomp. For import_child.cc. Only
+// syscall_filter.cc includes libseccomp. Changes the calling process.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_SYSCALL_FILTER_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_SYSCALL_FILTER_H_
 
 namespace locus::cli {
 
-// Restricts the calling thread permanently to memory, clocks, its own end, and writing to `descriptor`. Calls that
-// libraries try and can do without (opening and describing files, writing elsewhere, reading limits) fail with EPERM;
-// any other call ends the process with SIGSYS. Returns false and changes nothing if the kernel has no such filter, or
-// in a sanitizer build, whose reports need other calls.
+// Permanently restricts the system calls of the calling thread. It can still use memory, clocks, random numbers, its
+// own locks and signals, exit, and write to `descriptor`. Calls that libraries try but do not need (to open or read
+// files, query their properties, write to other descriptors, or query limits) fail with EPERM. Any other call kills the
+// process with SIGSYS. Returns false and changes nothing if the kernel does not support such filters, or in a sanitizer
+// build, since a sanitizer needs other calls for its reports.
 bool load_syscall_filter(int descriptor);
 
 }  // namespace locus::cli

@@ -19,8 +19,8 @@ namespace locus::cli {
 
 enum class RowFormat { kCsv, kNdjson };
 
-// Time after a batch's first row from which the batch ends as soon as the input has no data ready, so that rows of a
-// slow input are not held back.
+// Time that a batch waits for more rows after its first row. After this time the batch ends as soon as the input has no
+// data ready, so that rows of a slow input are not held back.
 inline constexpr std::chrono::milliseconds kRowPause{50};
 
 enum class BatchEnd {

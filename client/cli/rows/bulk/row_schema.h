@@ -32,7 +32,7 @@ struct Field {
   std::string parts = {};  // names of a vector's parts, "xyz" or "xyzw"; empty for one value
   std::vector<std::string> aliases = {};
   bool required = false;
-  std::string option = {};  // option that sets the value for all rows; then the input must not have the column
+  std::string option = {};  // option given for all rows, so the input must not have this column; empty = none
   std::vector<std::string> words = {};
 
   size_t size() const { return parts.empty() ? 1 : parts.size(); }

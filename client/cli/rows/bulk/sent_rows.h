@@ -1,4 +1,4 @@
-// Input lines of the rows in a sent batch, from which the line of the item that a server's error names is found. For
+// Line numbers of the rows in a sent batch, used to find the input line of the item that a server's error names. For
 // the commands that send rows. Plain data and lookups.
 #ifndef LOCUS_CLIENT_CLI_ROWS_BULK_SENT_ROWS_H_
 #define LOCUS_CLIENT_CLI_ROWS_BULK_SENT_ROWS_H_

@@ -3,8 +3,8 @@
 namespace locus::cli {
 
 PatchPoint bezier_curve_point(const PatchPoint& a, const PatchPoint& b, const PatchPoint& c, int step, int steps) {
-  // Return end points unchanged, so that points on a patch's border are not affected by rounding in the direction
-  // across it.
+  // Return end points unchanged. A point on a patch's border is then rounded only by the calculation along the border,
+  // not by the calculation across it.
   if (step == 0) return a;
   if (step == steps) return c;
   const double rest = steps - step;

@@ -35,8 +35,8 @@ struct BspFile {
   std::vector<BspFace> faces;
 };
 
-// Decodes `bytes`, the untrusted content of a whole file. Returns INVALID_ARGUMENT that names the damaged lump and
-// element. Cost: linear in the file's size.
+// Decodes `bytes`, the untrusted content of a whole file. Returns INVALID_ARGUMENT for a damaged file; the message
+// names the damaged lump and element. Cost: linear in the file's size.
 absl::StatusOr<BspFile> parse_bsp(absl::string_view bytes);
 
 }  // namespace locus::cli
