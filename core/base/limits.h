@@ -20,7 +20,7 @@ inline constexpr uint32_t kMaxMeshes = 65536;
 inline constexpr uint32_t kMaxNameLength = 63;  // names of scenes and of meshes
 inline constexpr uint32_t kMaxLabels = 16;
 inline constexpr uint32_t kMaxLabelLength = 256;
-inline constexpr uint32_t kMaxCreatorLength = 256;  // bytes of the name of who created a scene or mesh
+inline constexpr uint32_t kMaxCreatorLength = 256;  // length in bytes of the name of a scene's or mesh's creator
 inline constexpr uint32_t kMaxMeshParts = 65536;
 inline constexpr uint32_t kMaxMeshVertices = 1u << 28;
 inline constexpr uint32_t kMaxMeshTriangles = 1u << 27;
@@ -47,8 +47,9 @@ inline constexpr uint32_t kMaxNearest = 65536;        // number of values that a
 inline constexpr uint32_t kDefaultReplyBytes = 4'000'000;
 inline constexpr uint32_t kMaxReplyBytes = 64u << 20;
 
-// Limits of the recent revisions that each scene retains for queries that ask for one exact revision: the maximum
-// number of revisions, and the maximum size in bytes of their data that later revisions have replaced.
+// Limits of the recent revisions that each scene retains for queries that ask for one exact revision. kRecentRevisions
+// is the maximum number of revisions. kRecentBytes is the maximum size in bytes of the data that updates have replaced
+// since the oldest of these revisions.
 inline constexpr uint32_t kRecentRevisions = 64;
 inline constexpr uint64_t kRecentBytes = 2u << 20;
 // Readers that pin old revisions keep replaced data from being freed. The maximum size of this data per scene is

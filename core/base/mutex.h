@@ -42,8 +42,9 @@ class LOCUS_SCOPED_CAPABILITY MutexLock {
   Mutex& mutex_;
 };
 
-// Condition variable of a Mutex. The caller of a wait holds the mutex by a MutexLock; the wait releases the mutex and
-// acquires it again before returning. Wake-ups may be spurious: wait in a loop.
+// Condition variable for Mutex. The caller of wait() or wait_until() must hold the mutex through a MutexLock; the call
+// releases the mutex while it waits and acquires the mutex again before it returns. Wake-ups may be spurious: wait in a
+// loop.
 class ConditionVariable {
  public:
   void wait(Mutex& mutex) LOCUS_REQUIRES(mutex) { condition_.wait(mutex); }

@@ -6,11 +6,11 @@
 // Threads: each array object is like a standard container. Arrays that share leaves are independent: a thread may
 // write, copy or destroy its own array while other threads read theirs.
 //
-// Invariants: a leaf or List that two arrays share is immutable. Each leaf and List stores an owner: the value of
-// `owner_` of its array when it was created. At its first write after snapshot(), an array sets `owner_` to a new
-// number. An array changes in place only leaves and a List that store its current `owner_`, so it never reads reference
-// counts. The number of leaves is the smallest that holds size() values. Source of the owner numbers: Clojure's
-// transient collections (Hickey).
+// Invariants: a leaf or List that two arrays share is immutable. Each leaf and List stores an owner: the `owner_` of
+// the array that created the leaf or List, at the time of the creation. At the first write after snapshot(), an array
+// sets its `owner_` to a new number. An array changes a leaf or List in place only if the stored owner equals the
+// current `owner_` of the array, so no write needs to read reference counts. The number of leaves is the smallest that
+// holds size() values. Source of the owner numbers: Clojure's transient collections (Hickey).
 #ifndef LOCUS_CORE_BASE_PERSISTENT_ARRAY_H_
 #define LOCUS_CORE_BASE_PERSISTENT_ARRAY_H_
 
@@ -43,8 +43,8 @@ class PersistentArray {
   PersistentArray() : list_(std::make_shared<List>()) {}
   PersistentArray(PersistentArray&&) noexcept = default;
   PersistentArray& operator=(PersistentArray&&) noexcept = default;
-  // Copies an array that has not been written to since its creation or its last snapshot(). Copy any other array by
-  // snapshot().
+  // Copies `other`. Precondition: `other` has not been written to since its creation or its last snapshot(); copy any
+  // other array with snapshot().
   PersistentArray(const PersistentArray& other) : list_(other.list_) {
     LOCUS_CHECK_EQ(other.owner_, internal::kNoOwner);
   }

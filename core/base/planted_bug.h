@@ -40,7 +40,7 @@ enum class PlantedBug {
   // The region kernels:
   kRegionReach,       // boxes of nodes are tested against the ball without a pad
   kRegionInside,      // vertices are tested against the ball in float without an error bound
-  kRegionBeyond,      // planes between a triangle and the ball are tested in float without an error bound
+  kRegionBeyond,      // the test for a plane that separates a triangle from the ball omits the error bound
   kRegionNear,        // distances to edges are compared with the radius in float without an error bound
   kRegionPlane,       // distances to planes are compared with the radius in float without an error bound
   kRegionWeight,      // the test that the ball's centre projects into a triangle omits the error bound

@@ -58,17 +58,18 @@ absl::Status refuse(absl::StatusCode code, absl::string_view message, const Refu
 absl::Status refuse_argument(Reason reason, absl::string_view field, std::optional<uint32_t> index,
                              absl::string_view message);
 
-// Returns INVALID_ARGUMENT naming the limit, its value and the requested value `asked`. For a request that exceeds the
-// limit by itself, at any load of the server, so that repeating the request cannot succeed.
+// Returns INVALID_ARGUMENT naming the limit, its value and the requested value `asked`. Use this function for a request
+// that is too large at any load of the server, so that repeating the request cannot succeed.
 absl::Status refuse_limit(absl::string_view field, absl::string_view limit, double limit_value, double asked);
 
-// Returns RESOURCE_EXHAUSTED naming the limit, its value and the requested value `asked`. For a request that the server
-// or the scene has no room for at present; the same request may succeed later. `retry_after_ms` is 0 if waiting alone
-// does not help.
+// Returns RESOURCE_EXHAUSTED naming the limit, its value and the requested value `asked`. Use this function for a
+// request for which the server or the scene has no room at present; the same request may succeed later.
+// `retry_after_ms` is 0 if waiting alone does not help.
 absl::Status refuse_full(absl::string_view field, absl::string_view limit, double limit_value, double asked,
                          uint32_t retry_after_ms);
 
-// Returns NOT_FOUND for a scene that does not exist, or that the caller may not know of: both with the same text.
+// Returns NOT_FOUND for the scene `name`. Used if the scene does not exist, and also if the caller has no right to see
+// the scene: the text is the same, so that the caller cannot find out whether the scene exists.
 absl::Status no_scene(absl::string_view name);
 
 // Returns the refusal that refuse() attached to `status`; nullopt if `status` has no refusal.

@@ -2,7 +2,7 @@
 // ids that collide in a table. The hash of an id differs between processes, so no query result may depend on it. A
 // value type; any thread.
 //
-// The upper bits of the hash are distributed as well as its lower bits. Sources: Yi, wyhash (products folded into 64
+// The upper bits of the hash are distributed as evenly as the lower bits. Sources: Yi, wyhash (products folded into 64
 // bits); Dietzfelbinger et al., A Reliable Randomized Algorithm for the Closest-Pair Problem, 1997 (random multiplier).
 #ifndef LOCUS_CORE_BASE_SEEDED_HASH_H_
 #define LOCUS_CORE_BASE_SEEDED_HASH_H_

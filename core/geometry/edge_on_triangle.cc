@@ -46,7 +46,7 @@ class Projection {
     z_ = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
     x_ = (z_ + 1) % 3;
     y_ = (z_ + 2) % 3;
-    // Preserves the orientation of front faces, as TriangleRay does.
+    // Swaps x and y for a negative direction, as TriangleRay does, so that front faces keep their orientation.
     if (direction_[z_].sign() < 0) std::swap(x_, y_);
   }
 

@@ -1,8 +1,8 @@
-// Intersection of a ray with a triangle that is nearly edge-on to it. Rounding errors of the transform to mesh axes and
-// of the edge functions move such a hit by the error divided by the sine of the angle between ray and plane. At a sine
-// of 2^-28 this displacement exceeds the allowed error of a hit (TriangleRay::hit()). So the test is repeated in
-// DoubleDouble, from the stored, unrounded values. The computation in DoubleDouble uses neither division nor square
-// root. Pure functions; any thread.
+// Intersection of a ray with a triangle that is nearly edge-on to it. A rounding error of the transform to mesh axes or
+// of the edge functions moves such a hit by this error divided by the sine of the angle between ray and plane. At a
+// sine of 2^-28 this displacement exceeds the allowed error of a hit (TriangleRay::hit()). So edge_on_hit() repeats the
+// test in DoubleDouble, from the stored, unrounded values. The computation in DoubleDouble uses neither division nor
+// square root. Pure functions; any thread.
 #ifndef LOCUS_CORE_GEOMETRY_EDGE_ON_TRIANGLE_H_
 #define LOCUS_CORE_GEOMETRY_EDGE_ON_TRIANGLE_H_
 
@@ -31,7 +31,7 @@ struct EdgeOnHit {
 
 // Result of the test in double for the same ray and triangle.
 struct EdgeOnVerdict {
-  bool hit;             // true if the signs of the edge functions show a hit, whatever its t
+  bool hit;             // true if the signs of the edge functions show a hit, at any t
   double corner_error;  // bound of a corner's rounding error perpendicular to the ray, a length in mesh axes
 };
 

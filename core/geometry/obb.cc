@@ -7,7 +7,7 @@ namespace {
 
 // Pair of boxes `a` and `b`, in the own axes of `a`.
 struct Pair {
-  Vec3d offset;  // from the centre of `a` to that of `b`
+  Vec3d offset;  // from the centre of `a` to the centre of `b`
   Vec3d half_a, half_b;
   Vec3d axes_b[3];
   double tolerance;  // bound of the rounding error of a projection on an axis of length 1

@@ -25,11 +25,11 @@ template <class S>
 Aabbd bounds_of(const Obb<S>& box);
 
 // Returns whether the boxes share a point: separating axis test over 15 axes. Two axis-aligned boxes are compared
-// without tolerance, so that touching is exact if the sums are exact; otherwise boxes closer than 2^-49 of the
-// magnitudes of their offset and half extents count as touching. Both boxes are projected on the same rounded axis. So
-// the rounding error of an axis, which is large for nearly parallel edges, can only make that axis fail to separate the
-// boxes; it never separates boxes that overlap. Source: Gottschalk, Lin, Manocha, OBBTree: A Hierarchical Structure for
-// Rapid Interference Detection, 1996.
+// without tolerance, so that the test for touching is exact if the sums are exact. If at least one box is rotated, the
+// boxes count as touching if their gap is smaller than about 2^-49 of the sum of the magnitudes of their offset and
+// their half extents. Both boxes are projected on the same rounded axis. So the rounding error of an axis, which is
+// large for nearly parallel edges, can only make that axis fail to separate the boxes; it never separates boxes that
+// overlap. Source: Gottschalk, Lin, Manocha, OBBTree: A Hierarchical Structure for Rapid Interference Detection, 1996.
 bool boxes_overlap(const Obbd& a, const Obbd& b);
 
 }  // namespace locus

@@ -9,9 +9,9 @@
 namespace locus {
 
 // Returns the squared distance from `point` to the triangle: the minimum of the squared distances to the three edges
-// and, if the projection of `point` lies inside the triangle, to its plane. Each of the four is computed by cross
-// products and one division, so a result that is a small integer is exact. For a sliver triangle, whose normal suffers
-// from cancellation, the distance to the projected point replaces the distance to the plane.
+// and, if the projection of `point` lies inside the triangle, to its plane. Each of the four distances is computed by
+// cross products and one division, so a result that is a small integer is exact. For a sliver triangle, whose normal
+// suffers from cancellation, the distance to the projected point replaces the distance to the plane.
 double squared_distance(Vec3d point, Vec3d a, Vec3d b, Vec3d c);
 double squared_distance(Vec3d point, const Triangle& triangle);
 

@@ -10,9 +10,9 @@
 // Every rounding step is monotone in the box, so a superset of a box never has a larger near or a smaller far. A hit
 // requires that the slab test accepts the primitive's own box, so culling by any superset of that box never loses a
 // hit. The pads cover the rounding errors of the slab test itself, of the conversion of a ray to float, and of the
-// transform to mesh axes. A direction component below 1e-18 of the largest component is replaced by 1e-18 of that
-// component; within the world the resulting displacement is smaller than the pad. Source: Kay and Kajiya, Ray Tracing
-// Complex Scenes, 1986 (slabs); Ize, Robust BVH Ray Traversal, 2013 (padding).
+// transform to mesh axes. A direction component below 1e-18 of the largest component is replaced by 1e-18 of the
+// largest component; at all coordinates up to limits::kMaxCoordinate the resulting displacement is smaller than the
+// pad. Source: Kay and Kajiya, Ray Tracing Complex Scenes, 1986 (slabs); Ize, Robust BVH Ray Traversal, 2013 (padding).
 #ifndef LOCUS_CORE_GEOMETRY_RAY_H_
 #define LOCUS_CORE_GEOMETRY_RAY_H_
 

@@ -1,11 +1,12 @@
-// Watertight intersection of a ray and a triangle: a ray from inside a closed mesh always hits. The triangle is
-// projected along the ray. Each of the three edge functions (the difference of two products) then changes only its sign
-// if its two vertices are exchanged, so a shared edge has no gap, whatever the rounding. Boxes are culled in float, but
-// hits are computed in double: in float the error of t would be the rounding error divided by the sine of the angle
-// between ray and plane (measured in float: for 0.7 % of random rays the result is wrong by more than hit() allows, or
-// a hit is lost). If a triangle is so nearly edge-on that double is not precise enough either, edge_on_hit() of
-// edge_on_triangle.h computes the hit. Source: Woop, Benthin, Wald, Watertight Ray/Triangle Intersection, 2013; here
-// without its divisions, so that results on small integers are exact.
+// Watertight intersection of a ray and a triangle: a ray from inside a closed mesh always hits the mesh. The triangle
+// is projected along the ray. Each of the three edge functions is the difference of two products. If the two vertices
+// of an edge are exchanged, only the sign of its edge function changes, so an edge that two triangles share has no gap
+// in spite of rounding. Boxes are culled in float, but hits are computed in double: in float the error of t would be
+// the rounding error divided by the sine of the angle between ray and plane (measured in float: for 0.7 % of random
+// rays the result is wrong by more than hit() allows, or a hit is lost). If a triangle is so nearly edge-on that double
+// is not precise enough either, edge_on_hit() of edge_on_triangle.h computes the hit. Source: Woop, Benthin, Wald,
+// Watertight Ray/Triangle Intersection, 2013; the code here omits the divisions of the paper, so that results on small
+// integers are exact.
 #ifndef LOCUS_CORE_GEOMETRY_RAY_TRIANGLE_H_
 #define LOCUS_CORE_GEOMETRY_RAY_TRIANGLE_H_
 
@@ -39,9 +40,10 @@ class TriangleRay {
   const SlabRay<float>& slabs() const { return slabs_; }
   Cull cull() const { return cull_; }
 
-  // Convert t from units of the scaled direction to units of the given direction, and back. Both round monotonically.
-  // from_scaled() returns at most the largest finite float for a finite t. to_scaled() rounds up, so that a limit in a
-  // culling test never excludes a hit that from_scaled() rounds down to the limit.
+  // Convert t between two units: from_scaled() converts from units of the scaled direction to units of the given
+  // direction, to_scaled() converts back. Both functions round monotonically. from_scaled() returns at most the largest
+  // finite float for a finite t. to_scaled() rounds up, so that a limit in a culling test never excludes a hit that
+  // from_scaled() rounds down to the limit.
   float from_scaled(float t) const;
   float to_scaled(float t) const;
 

@@ -36,8 +36,9 @@ struct Rotation {
             row_x.z * v.x + row_y.z * v.y + row_z.z * v.z};
   }
   constexpr Vec3d column(int axis) const { return {row_x[axis], row_y[axis], row_z[axis]}; }
-  // Return the half extents, in world or local axes, of the axis-aligned bounds of a box with half extents `half` in
-  // the other axes: the absolute values of the matrix, or of its transpose, times `half`.
+  // Return the half extents of the axis-aligned bounds of a box after a change of axes. extent_to_world() converts the
+  // half extents `half` in local axes to half extents in world axes: |matrix| * half. extent_to_local() converts from
+  // world axes to local axes: |transpose| * half.
   Vec3d extent_to_world(Vec3d half) const;
   Vec3d extent_to_local(Vec3d half) const;
   friend constexpr bool operator==(const Rotation&, const Rotation&) = default;

@@ -1,5 +1,6 @@
-// Distances to and from a segment: the points s * half_axis, -1 <= s <= 1, relative to the segment's midpoint. With a
-// zero half axis the segment is a point. `point` is relative to the midpoint too. Pure functions; any thread.
+// Distances between a segment and a point or a box. The segment consists of the points s * half_axis, -1 <= s <= 1,
+// relative to its midpoint; with a zero half axis it is a point. The argument `point` is relative to the midpoint, too.
+// Pure functions; any thread.
 #ifndef LOCUS_CORE_GEOMETRY_SEGMENT_H_
 #define LOCUS_CORE_GEOMETRY_SEGMENT_H_
 

@@ -112,7 +112,7 @@ RowLayout row_layout(const QueryBlock& block);
 // Returns an upper bound of the encoded size of a reply in bytes, without the rows of kCounted blocks: dense rows, row
 // counts, effective times, lists of truncated queries, and field headers.
 uint64_t fixed_reply_bytes(const QueryBatch& batch);
-// Returns the batch's max_reply_bytes, or limits::kDefaultReplyBytes if it is 0.
+// Returns the batch's max_reply_bytes, or limits::kDefaultReplyBytes if max_reply_bytes is 0.
 uint64_t reply_limit(const QueryBatch& batch);
 
 // Returns an upper bound of the encoded size of the reply in bytes, rows of kCounted blocks included; at most

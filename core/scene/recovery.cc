@@ -103,7 +103,7 @@ class Replay {
     return last_ - stored_.snapshot_sequence;
   }
 
-  // Starts `epoch` unless it is the current epoch. DATA_LOSS if `epoch` is 0 or an earlier epoch of the scene.
+  // Starts `epoch` unless it is the current epoch. Returns DATA_LOSS if `epoch` is 0 or an earlier epoch of the scene.
   absl::Status enter_epoch(uint64_t epoch) {
     if (epoch == writer_.epoch()) return absl::OkStatus();
     ended_epochs_.insert(writer_.epoch());

@@ -1,5 +1,6 @@
-// Restores scenes and meshes from a log: reads the snapshot of a scene and replays every later record. DATA_LOSS names
-// the damaged scene or mesh and describes the damage; other errors are the log's.
+// Restores scenes and meshes from a log: reads the snapshot of a scene and replays every later record. Returns
+// DATA_LOSS, naming the scene or mesh and describing the damage, if stored data is damaged; all other errors come from
+// the log.
 //
 // History is not part of a snapshot: the history of a restored scene begins at its snapshot. Any thread may call the
 // functions; several scenes may be restored at the same time.
@@ -34,7 +35,7 @@ struct RecoveredMesh {
 
 // Returns the mesh that is stored under stored.name, with its tree from the cached topology. If no usable topology is
 // cached, builds the tree and stores the topology in the log's cache for the next recovery. Does not read the parts
-// that are stored for the name: recover_name() does.
+// that are stored for the name; recover_name() reads them.
 absl::StatusOr<RecoveredMesh> recover_mesh(UpdateLog& log, const StoredMesh& stored, const BvhOptions& options = {});
 
 // Returns the mesh of the name stored.name, with the parts and the creator that are stored for this name. The mesh
@@ -42,10 +43,9 @@ absl::StatusOr<RecoveredMesh> recover_mesh(UpdateLog& log, const StoredMesh& sto
 absl::StatusOr<MeshPtr> recover_name(const UpdateLog& log, const StoredMesh& stored, const MeshPtr& content);
 
 // Returns a function that finds the meshes which `registry` restored from `log`; both outlive the function. Records of
-// data format 1, the oldest one, identify a mesh by its content hash alone. For such a record
-// the function returns the mesh of the name that sorts first among the names of this content that were stored in format
-// 1. Every recovery makes the same choice for an existing instance, because a name cannot be deleted while instances
-// use it.
+// data format 1, the oldest format, identify a mesh only by its content hash. For such a record the function returns
+// the mesh of the name that sorts first among the names of this content that were stored in format 1. Every recovery
+// makes the same choice for an existing instance, because a name cannot be deleted while instances use it.
 FindMesh find_restored_meshes(const UpdateLog& log, const Registry& registry);
 
 }  // namespace locus

@@ -67,8 +67,8 @@ absl::StatusOr<ScenePtr> Registry::log_scene(const std::string& name, const Scen
   return std::make_shared<Scene>(name, spec, std::move(writer), on);
 }
 
-// Holds changes_mutex_ during the whole call, so that meanwhile no scene of the same name is created and no mesh that
-// `static_from` uses is deleted.
+// Holds changes_mutex_ during the whole call, so that during the call no other thread creates a scene of the same name
+// or deletes a mesh that `static_from` uses.
 absl::StatusOr<Registry::CreatedScene> Registry::create_scene(const std::string& name, const SceneSpec& spec,
                                                               uint64_t epoch, const std::string& static_from,
                                                               bool if_absent) {

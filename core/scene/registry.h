@@ -30,8 +30,8 @@ using MeshPtr = std::shared_ptr<const StaticMesh>;
 struct CreatorUse {
   uint64_t scenes = 0;
   uint64_t objects = 0;        // objects in the latest revisions
-  uint64_t history_bytes = 0;  // sum of HistoryOptions::bytes, the most that the histories may take
-  uint64_t mesh_bytes = 0;     // sum of StaticMesh::bytes(), also where several names share a content
+  uint64_t history_bytes = 0;  // sum of HistoryOptions::bytes, the maximum memory of the histories
+  uint64_t mesh_bytes = 0;     // sum of StaticMesh::bytes(); shared content counts once for each name
 };
 
 class Registry {
@@ -46,17 +46,17 @@ class Registry {
   };
   // Creates a scene. The scene begins with the instances of the scene `static_from`, or without instances if
   // `static_from` is empty. If the name is taken, returns the existing scene if `if_absent` is true, else
-  // ALREADY_EXISTS. NOT_FOUND if `static_from` does not exist; DATA_LOSS if `name` or `static_from` names a damaged
-  // scene; or the log's error.
+  // ALREADY_EXISTS. Returns NOT_FOUND if `static_from` does not exist, DATA_LOSS if `name` or `static_from` names a
+  // damaged scene, and the log's error if the log fails.
   absl::StatusOr<CreatedScene> create_scene(const std::string& name, const SceneSpec& spec, uint64_t epoch,
                                             const std::string& static_from, bool if_absent)
       LOCUS_EXCLUDES(changes_mutex_, mutex_);
-  // Returns the error of create_scene() for a `static_from` that no scene has.
+  // Returns the error that create_scene() returns if no scene has the name `static_from`.
   static absl::Status no_source(const std::string& static_from);
-  // Returns the scene of this name. NOT_FOUND if no scene has the name; DATA_LOSS if the scene is damaged.
+  // Returns the scene of this name, NOT_FOUND if no scene has the name, or DATA_LOSS if the scene is damaged.
   absl::StatusOr<ScenePtr> find_scene(const std::string& name) const LOCUS_EXCLUDES(mutex_);
-  // Deletes a scene, damaged or not, and closes it: its waiters get NOT_FOUND. If the log fails, returns the log's
-  // error, and the scene stays open.
+  // Deletes a scene, damaged or not, and closes it: callers that wait for the scene get NOT_FOUND. If the log fails,
+  // returns the log's error, and the scene stays open.
   absl::Status delete_scene(const std::string& name) LOCUS_EXCLUDES(changes_mutex_, mutex_);
   // Returns at most `limit` scenes in name order, beginning after the name `after`.
   std::vector<ScenePtr> list_scenes(const std::string& after, size_t limit) const LOCUS_EXCLUDES(mutex_);
@@ -74,16 +74,16 @@ class Registry {
   // Returns the mesh that is registered under key.name if its content has the hash key.sha256, else null. If key.name
   // is empty, because the key was stored in data format 1, returns find_content(key.sha256).
   MeshPtr find_stored(const MeshKey& key) const LOCUS_EXCLUDES(mutex_);
-  // Returns the mesh of this name. NOT_FOUND, naming `field`, if no mesh has the name; DATA_LOSS if the mesh is
+  // Returns the mesh of this name, NOT_FOUND naming `field` if no mesh has the name, or DATA_LOSS if the mesh is
   // damaged.
   absl::StatusOr<MeshPtr> find_mesh(const std::string& name, absl::string_view field) const LOCUS_EXCLUDES(mutex_);
   // Adds `mesh` under `name` and returns the registered mesh, which has this name and the parts of `mesh`. If a
   // registered mesh has equal content, both meshes share the content, so that equal content is in memory once. If the
-  // name is registered with equal content and equal parts, returns the registered mesh. ALREADY_EXISTS if the name has
-  // other content or other parts.
+  // name is registered with equal content and equal parts, returns the registered mesh. Returns ALREADY_EXISTS if the
+  // name is registered with other content or other parts.
   absl::StatusOr<MeshPtr> add_mesh(const std::string& name, MeshPtr mesh) LOCUS_EXCLUDES(mesh_changes_mutex_, mutex_);
-  // Deletes a mesh, damaged or not. FAILED_PRECONDITION IN_USE, naming the number of its instances, if a scene has
-  // instances that were placed under this name, or if a pending change places such instances.
+  // Deletes a mesh, damaged or not. Returns FAILED_PRECONDITION IN_USE, naming the number of its instances, if a scene
+  // has instances that were placed under this name, or if a pending change places such instances.
   absl::Status delete_mesh(const std::string& name) LOCUS_EXCLUDES(mesh_changes_mutex_, changes_mutex_, mutex_);
   struct NamedMesh {
     std::string name;
@@ -98,8 +98,9 @@ class Registry {
   // another name are not counted.
   uint32_t mesh_uses(const StaticMesh* mesh) const LOCUS_EXCLUDES(mutex_);
 
-  // Return the sums over all scenes and meshes that this creator created, and over those of each creator, in the order
-  // of names. Scenes and meshes without a creator, and damaged ones, count for nobody.
+  // creator_use() returns the sums over the scenes and meshes of one creator; creator_uses() returns these sums for
+  // each creator, in the order of names. Damaged scenes and meshes, and scenes and meshes without a creator, are not
+  // counted.
   CreatorUse creator_use(const std::string& creator) const LOCUS_EXCLUDES(mutex_);
   std::map<std::string, CreatorUse> creator_uses() const LOCUS_EXCLUDES(mutex_);
 
@@ -119,7 +120,7 @@ class Registry {
   };
   // Sums of one creator, who has at least one scene or mesh.
   struct Creator {
-    CreatorUse use;  // without `objects`
+    CreatorUse use;  // use.objects is not set; see `objects` below
     uint64_t meshes = 0;
     Scene::ObjectCount objects = std::make_shared<std::atomic<uint64_t>>(0);
   };
@@ -143,13 +144,14 @@ class Registry {
   // Returns a mesh with the name `name` and the parts of `mesh`. The returned mesh shares the content of a registered
   // mesh of equal content, or the content of `mesh` if no such mesh is registered.
   MeshPtr to_keep(const std::string& name, MeshPtr mesh) const LOCUS_REQUIRES(mutex_);
-  // Removes the mesh `name` from meshes_ and returns it. FAILED_PRECONDITION IN_USE if the mesh is in use. For a
-  // damaged mesh, returns null and removes nothing.
+  // Removes the mesh `name` from meshes_ and returns it. Returns FAILED_PRECONDITION IN_USE if the mesh is in use. For
+  // a damaged mesh, returns null and removes nothing.
   absl::StatusOr<MeshPtr> take_mesh(const std::string& name) LOCUS_EXCLUDES(mutex_);
   // Returns true if `mesh` is the mesh that is registered under its name.
   bool is_kept(const StaticMesh* mesh) const LOCUS_EXCLUDES(mutex_);
   uint32_t count_uses(const StaticMesh* mesh) const LOCUS_REQUIRES(mutex_);
-  // Adds a scene or mesh to the sums of its creator, or subtracts it.
+  // add_to_creator() adds a scene or mesh to the sums of its creator; take_from_creator() subtracts it. A creator
+  // without scenes and meshes is removed from creators_.
   void add_to_creator(Scene& scene) LOCUS_REQUIRES(mutex_);
   void add_to_creator(const StaticMesh& mesh) LOCUS_REQUIRES(mutex_);
   void take_from_creator(const Scene& scene) LOCUS_REQUIRES(mutex_);

@@ -292,7 +292,8 @@ void Scene::publish(const SnapshotPtr& snapshot) {
     LOCUS_DCHECK_EQ(snapshot->revision, latest_->revision + 1);
     LOCUS_DCHECK_EQ(snapshot->epoch, latest_->epoch);
     LOCUS_DCHECK_GE(snapshot->replaced_bytes, latest_->replaced_bytes);
-    // The difference of unsigned numbers may be negative; the sum is right again modulo 2^64.
+    // If the number of objects has decreased, the unsigned difference wraps around; the sum is still correct modulo
+    // 2^64.
     if (object_count_ != nullptr && !closed_)
       object_count_->fetch_add(uint64_t{snapshot->objects.size()} - uint64_t{latest_->objects.size()});
     latest_ = snapshot;

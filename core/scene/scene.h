@@ -57,7 +57,7 @@ struct SceneSpec {
   uint64_t pinned_bytes = 0;  // memory budget of readers in bytes; 0: the default of ReaderTracker
   OverloadPolicy overload = OverloadPolicy::kEveryBatch;
   Durability durability = Durability::kLocal;
-  std::string creator;  // caller who created the scene and to whom it is counted; empty: nobody
+  std::string creator;  // caller who created the scene and whose quota it uses; empty: no creator
 };
 
 // Revision that a caller requests: the latest revision (kLatest ignores `revision`), `revision` or any later revision
@@ -123,7 +123,7 @@ class Scene {
 
   // Removes instances and places new instances, as one revision. Builds the new tree of instances, one change at a
   // time, without blocking update batches. Waits like apply() while readers exceed their budget, but without a
-  // deadline. NOT_FOUND if a placed mesh was deleted: see check_meshes().
+  // deadline. Returns NOT_FOUND if a placed mesh was deleted: see check_meshes().
   absl::StatusOr<InstanceChange> change_instances(const StaticChange& change) LOCUS_EXCLUDES(writer_mutex_, mutex_);
 
   using IsKept = std::function<bool(const StaticMesh*)>;
@@ -134,10 +134,10 @@ class Scene {
   void check_meshes(IsKept is_kept) { is_kept_ = std::move(is_kept); }
 
   using ObjectCount = std::shared_ptr<std::atomic<uint64_t>>;
-  // Adds the scene's objects to `count`, and from now on every change of their number, until the scene is closed. Call
-  // before other threads use the scene.
+  // Adds the number of the scene's objects to `count`, and updates `count` whenever this number changes. close()
+  // subtracts the number again. Call before other threads use the scene.
   void count_objects_in(ObjectCount count) LOCUS_EXCLUDES(mutex_);
-  // Returns the count to which count_objects_in() adds this scene's objects; 0 if there is none.
+  // Returns the value of the count that was passed to count_objects_in(); 0 if count_objects_in() was not called.
   uint64_t counted_objects() const { return object_count_ == nullptr ? 0 : object_count_->load(); }
 
   // Returns true if the scene contains instances of the mesh, or if a pending change places instances of the mesh.
@@ -146,15 +146,15 @@ class Scene {
   SnapshotPtr latest() const LOCUS_EXCLUDES(mutex_);
 
   // Returns the snapshot of the revision that `view` requests. kAtLeast waits for the revision until `deadline`, then
-  // returns DEADLINE_EXCEEDED. FAILED_PRECONDITION SCENE_RESTARTED if the scene has another epoch; OUT_OF_RANGE if
-  // kExactly requests a revision that is not among the recent revisions; NOT_FOUND if the scene is closed.
+  // returns DEADLINE_EXCEEDED. Returns FAILED_PRECONDITION SCENE_RESTARTED if the scene has another epoch, OUT_OF_RANGE
+  // if kExactly requests a revision that is not among the recent revisions, and NOT_FOUND if the scene is closed.
   absl::StatusOr<SnapshotPtr> view(const View& view, Deadline deadline) const LOCUS_EXCLUDES(mutex_);
 
   // Returns the snapshot of view() with a pin that registers the reader. Used by readers that hold the snapshot for a
   // long time. These readers must poll SnapshotPin::status().
   absl::StatusOr<SnapshotPin> pin(const View& view, Deadline deadline) const LOCUS_EXCLUDES(mutex_);
-  // Waits until all revoked pins are released or the scene is closed. DEADLINE_EXCEEDED, naming the limit pinned_bytes,
-  // if a revoked pin is still not released at `until`.
+  // Waits until all revoked pins are released or the scene is closed. Returns DEADLINE_EXCEEDED, naming the limit
+  // pinned_bytes, if a revoked pin is still not released at `until`.
   absl::Status wait_for_readers(Deadline until) const LOCUS_EXCLUDES(mutex_);
   // Calls the on_revoke() callbacks of revoked pins that are not released. Used if a writer has waited too long for
   // readers.
@@ -183,12 +183,13 @@ class Scene {
     bool notified_ = false;
   };
 
-  // Drops the oldest ticks of the history until the rest takes at most `bytes`, and the revisions that are retained for
-  // kExactly views, except the latest one. The latest revision keeps its number. Waits for a batch that is being
-  // applied. Returns the bytes by which the history became smaller. Called when memory is short.
+  // Drops the oldest ticks of the history until the rest takes at most `bytes`. If it drops a tick, it also drops the
+  // revisions that are retained for kExactly views, except the latest revision, which keeps its number. Waits for a
+  // batch that is being applied. Returns the number of bytes by which the history became smaller. Called when memory is
+  // short.
   uint64_t trim_history(uint64_t bytes) LOCUS_EXCLUDES(writer_mutex_, mutex_);
-  // Revokes the pins of the oldest revisions until pinned revisions hold at most `bytes`: their readers are cancelled.
-  // Called when memory is short. Returns the bytes that become free once these readers have ended.
+  // Revokes the pins of the oldest revisions until pinned revisions hold at most `bytes`, and cancels the readers of
+  // the revoked pins. Called when memory is short. Returns the bytes that become free once these readers have ended.
   uint64_t revoke_readers(uint64_t bytes) LOCUS_EXCLUDES(mutex_);
   // Drops the revisions that are retained for kExactly views, except the latest one. Called when memory is short.
   void forget_recent() LOCUS_EXCLUDES(mutex_);
@@ -212,10 +213,10 @@ class Scene {
 
   SceneStatus status() const LOCUS_EXCLUDES(mutex_);
 
-  // Returns a summary of the latest revision, or of a revision that was published during the call. O(objects) once for
-  // each revision; callers at the same time wait for one of them and share its result.
+  // Returns a summary of the latest revision, or of a revision that was published during the call. Costs O(objects) at
+  // most once for each revision: concurrent callers wait for the first one and share its result.
   SceneSummary summary() const LOCUS_EXCLUDES(summarizing_mutex_, mutex_);
-  // Returns summary() if it takes O(1).
+  // Returns the summary of the latest revision if summary() has computed it already, else nullopt. O(1).
   std::optional<SceneSummary> known_summary() const LOCUS_EXCLUDES(mutex_);
 
  private:
@@ -246,10 +247,10 @@ class Scene {
   SceneJournal journal_;             // records are appended only under writer_mutex_
   IsKept is_kept_;                   // null: every mesh may be placed
   ObjectCount object_count_;         // may be null
-  mutable Mutex summarizing_mutex_;  // held while a summary is made; locked before mutex_
+  mutable Mutex summarizing_mutex_;  // held while summary() computes; locked before mutex_
   mutable Mutex mutex_;
   mutable ConditionVariable published_;
-  mutable std::optional<SceneSummary> summary_ LOCUS_GUARDED_BY(mutex_);  // the last one that was made
+  mutable std::optional<SceneSummary> summary_ LOCUS_GUARDED_BY(mutex_);  // result of the last computation in summary()
   SnapshotPtr latest_ LOCUS_GUARDED_BY(mutex_);
   std::deque<SnapshotPtr> recent_ LOCUS_GUARDED_BY(mutex_);  // retained snapshots, oldest first; back() is latest_
   // Watches that are not notified yet. The key is the awaited revision.

@@ -174,16 +174,17 @@ SceneWriter::Joined SceneWriter::apply_joined(absl::Span<const UpdateBatch* cons
     ack.applied = moves_.applied();
     ack.refused = moves_.refused();
     ack.errors = std::move(moves_.errors());
-    // Record the ack now: a later batch in `batches` may be the next batch of this writer, or a duplicate of this
-    // batch.
+    // Record the ack now, because a later element of `batches` may be the next batch of the same writer, or a duplicate
+    // of this batch.
     writers_.record(batch->writer, batch->batch, ack);
   }
   moves_.finish(objects_);
   if (any_new != nullptr) joined.snapshot = publish_moves(*any_new);
   for (size_t i = 0; i < batches.size(); ++i)
     if (is_new[i]) record_ack(*batches[i], *joined.acks[i]);
+  // A duplicate is answered last: it may repeat an earlier element of `batches`, whose ack is complete only now.
   for (size_t i = 0; i < batches.size(); ++i)
-    if (!is_new[i] && joined.acks[i].ok())  // this batch may repeat one of `batches`, whose ack is complete only now
+    if (!is_new[i] && joined.acks[i].ok())
       joined.acks[i] = old_ack(**writers_.admit(batches[i]->writer, batches[i]->batch));
   LOCUS_DCHECK_CALL(check_invariants());
   return joined;

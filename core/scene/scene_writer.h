@@ -28,7 +28,7 @@ class SceneWriter {
   SceneWriter(uint64_t epoch, Winding winding, std::shared_ptr<const StaticSet> statics,
               size_t max_objects = limits::kMaxObjects, const HistoryOptions& history = {});
 
-  // Returns a writer that continues from `state`. DATA_LOSS if an id occurs twice in `state`.
+  // Returns a writer that continues from `state`. Returns DATA_LOSS if an id occurs twice in `state`.
   static absl::StatusOr<SceneWriter> restore(SceneState state, Winding winding, const HistoryOptions& history);
 
   struct Applied {
@@ -36,8 +36,8 @@ class SceneWriter {
     SnapshotPtr snapshot;  // null when nothing changed
   };
   // Applies one batch. Precondition: the batch has passed check_form(). The ack lists refused items; with
-  // all_or_nothing, one refused item refuses the whole batch. RESOURCE_EXHAUSTED if the scene would have too many
-  // objects; FAILED_PRECONDITION BATCH_GAP if an earlier batch of the writer is missing.
+  // all_or_nothing, one refused item refuses the whole batch. Returns RESOURCE_EXHAUSTED if the scene would have too
+  // many objects, and FAILED_PRECONDITION BATCH_GAP if an earlier batch of the writer is missing.
   absl::StatusOr<Applied> apply(const UpdateBatch& batch);
 
   struct Joined {

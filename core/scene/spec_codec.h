@@ -12,7 +12,7 @@ namespace locus {
 
 // Returns the encoded specification.
 std::string encode_spec(const SceneSpec& spec);
-// Returns the specification that encode_spec() encoded; DATA_LOSS describes damage.
+// Returns the specification that encode_spec() encoded, or DATA_LOSS, with a description, if `bytes` are damaged.
 absl::StatusOr<SceneSpec> decode_spec(absl::string_view bytes);
 
 }  // namespace locus

@@ -29,8 +29,8 @@ struct Hit {
   }
 };
 
-// Return a hit at `t`: the first function on an object in the snapshot's latest state, the second on an object at the
-// time `moment`, which the hit borrows, the third on an instance.
+// Return a hit at `t`. The first function returns a hit on an object in the snapshot's latest state. The second returns
+// a hit on an object at the time `moment`, which the hit borrows. The third returns a hit on an instance.
 inline Hit hit_on(const GridRef& object, float t) { return {t, object.entry().id, kNoTriangle, object}; }
 inline Hit hit_on(const GridRef& object, float t, const SceneAtTime& moment) {
   return {t, object.entry().id, kNoTriangle, object, nullptr, &moment};

@@ -1,5 +1,6 @@
-// Collector of the best hits of one ray. Its limit(), the largest t at which a hit may still be retained, decreases as
-// hits are found, so that ray searches skip everything beyond this limit. A collector belongs to one thread.
+// Collector of the best hits of one ray. limit() is the largest t at which a hit may still be retained. This limit
+// decreases as hits are found, so that ray searches skip everything beyond the limit. A collector belongs to one
+// thread.
 #ifndef LOCUS_CORE_QUERY_KINDS_HIT_COLLECTOR_H_
 #define LOCUS_CORE_QUERY_KINDS_HIT_COLLECTOR_H_
 

@@ -61,8 +61,8 @@ void LowestRows::keep_lowest() {
   if (rows_ <= max_results_ && in_order()) return;
   const OverlapAnswer all = std::exchange(answer_, {{}, {}, {}, answer_.truncated || rows_ > max_results_});
   std::vector<RowRun> runs = all.runs;
-  // An instance may have two runs: a run that an earlier call merged, and a run with the triangles added since this
-  // call. The stable sort preserves their order.
+  // An instance may have two runs: a run that an earlier call of keep_lowest() made, and a run with the triangles that
+  // were added after that call. The stable sort preserves their order.
   std::stable_sort(runs.begin(), runs.end(), lower_run_id);
   rows_ = 0;
   for (size_t i = 0; i < runs.size() && rows_ < max_results_;) {

@@ -34,7 +34,7 @@ class NearestRows {
   // this distance is retained only if it precedes the last row in the order of nearer().
   float farthest() const { return farthest_; }
   // Returns the limit of squared distances in world axes. If the squared distance from the query's point to a box
-  // exceeds this limit, no row is retained for anything in the box.
+  // exceeds this limit, no object or triangle inside the box can become a retained row.
   double limit() const { return limit_; }
 
   void offer(const Hit& row) {
@@ -127,8 +127,8 @@ class NearestInstanceRows {
         farthest_(rows.farthest()),
         limit_(rows.limit()) {}
 
-  // Return limits like those of NearestRows. Without `every_triangle`, the instance has only one row, and the limits
-  // decrease to the distance of the nearest triangle found so far.
+  // Return limits with the same meaning as NearestRows::farthest() and NearestRows::limit(). Without `every_triangle`,
+  // the instance has only one row, and the limits decrease to the distance of the nearest triangle found so far.
   float farthest() const { return farthest_; }
   double limit() const { return limit_; }
 

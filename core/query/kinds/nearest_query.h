@@ -28,8 +28,9 @@ struct NearestRequest {
 NearestRequest nearest_request(const QueryBlock& block, const NearestColumns& nearest, size_t i);
 
 // Returns the nearest rows in order. Hit::t is the distance, and Hit::triangle the nearest triangle of an instance
-// (with every_triangle, the row's triangle). Objects are searched as of `moment`, which the rows borrow. Cost: visits
-// of the nodes and cells that are no farther than the last row, and O(log count) for each row inserted.
+// (with every_triangle, the row's triangle). Objects are searched as of `moment`, which the rows borrow. Cost: one
+// visit for each node and cell that is at most as far away as the last returned row, and O(log count) for each inserted
+// row.
 std::vector<Hit> run_nearest(QueryTask& task, const SceneAtTime& moment, const NearestRequest& request,
                              const Filter& filter);
 

@@ -1,7 +1,7 @@
 // Axis-aligned bounds of an instance's triangles in world axes. CONSERVATIVE queries test the bounds of
-// PlacedTriangles. EXACT rays, balls and boxes find a triangle only if they also meet its wider bounds of
-// LoosePlacedTriangles: the exact tests run in mesh axes and in floats, and without this condition they could report a
-// triangle that is far away in the world.
+// PlacedTriangles. EXACT rays, balls and boxes find a triangle only if they also meet the wider bounds that
+// LoosePlacedTriangles computes for the triangle: the exact tests run in mesh axes and in floats, and without this
+// condition they could report a triangle that is far away in the world.
 //
 // Both classes are immutable and borrow the instance; any number of threads may share one object.
 #ifndef LOCUS_CORE_QUERY_KINDS_PLACED_TRIANGLE_H_
@@ -34,10 +34,10 @@ inline Aabbd grown_around(const Corners& corners, double epsilon) {
 
 // Tight bounds of the triangles of an instance. The bounds of a triangle are the box around its corners in world axes,
 // grown by an epsilon that covers the rounding of the corners, which are transformed in double. The epsilon is about
-// 2^-40 times the magnitude of the translation plus that of the scaled mesh, since a mesh may be far from its own
-// origin while the translation cancels the offset. The bounds of each triangle lie within Instance::bounds, which are
-// grown by twice as much. So the t, distance and point of a CONSERVATIVE row depend only on the triangle's bounds, not
-// on the instance's bounds.
+// 2^-40 times the sum of the magnitudes of the translation and of the scaled mesh. Both magnitudes count, since a mesh
+// may be far from its own origin while the translation cancels this offset. The bounds of each triangle lie within
+// Instance::bounds, which are grown by twice as much. So the t, distance and point of a CONSERVATIVE row depend only on
+// the triangle's bounds, not on the instance's bounds.
 class PlacedTriangles {
  public:
   explicit PlacedTriangles(const Instance& instance)
@@ -93,9 +93,9 @@ class LoosePlacedTriangles {
   static constexpr double kRelativeEpsilon = 0x1p-21;
   static constexpr double kPlacementEpsilon = 0x1p-40;
 
-  // Returns the magnitude to which the rounding error of a vertex's transformation to world axes is relative. This
-  // magnitude is much larger than that of the transformed vertex if the translation cancels the offset of a mesh that
-  // is far from its own origin.
+  // Returns the magnitude that determines the rounding error of a vertex's transformation to world axes: the error is
+  // proportional to this magnitude. The result is much larger than the coordinates of the transformed vertex if the
+  // mesh is far from its own origin and the translation cancels this offset.
   static double placement_magnitude(const Instance& instance) {
     return max_component(abs(instance.transform.translation)) +
            double{instance.transform.scale} * magnitude(instance.mesh->bounds());

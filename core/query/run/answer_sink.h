@@ -1,5 +1,6 @@
-// Destination of a batch's result columns. The caller of a batch implements it, for example over the fields of a reply,
-// so that each value is written once, at its final position. The batch never writes columns that it does not return.
+// Interface to the memory of a batch's result columns. The caller that runs a batch implements this interface, for
+// example over the fields of a reply, so that each value is written once, at its final position. The batch never writes
+// columns that it does not return.
 //
 // Threads: one thread at a time calls a sink, but not always the same thread. Several threads may write at once to the
 // memory that a sink returned, each to its own rows.
@@ -13,7 +14,7 @@
 
 namespace locus {
 
-// Output arrays of the effective time of each query: its tick, and the fraction of the way to the next tick.
+// Output arrays for the effective times of queries: the tick, and the fraction of the way to the next tick.
 struct TimeSpans {
   uint64_t* ticks;
   float* fractions;
@@ -24,7 +25,7 @@ class AnswerSink {
   virtual ~AnswerSink() = default;
 
   // Appends `rows` uninitialized rows to each of the `columns` of block number `block`, and returns pointers to the
-  // first of them. The pointers stay valid until more rows of the same block are added. The caller writes all rows
+  // first new row. The pointers stay valid until more rows of the same block are added. The caller writes all rows
   // unless the batch ends with an error.
   virtual RowSpans add_rows(size_t block, ColumnSet columns, size_t rows) = 0;
   // Appends one byte for each query of the block. The caller writes 1 for a hit and 0 for a miss.

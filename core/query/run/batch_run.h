@@ -83,8 +83,8 @@ class BatchRun {
     return blocks_[block].cost;
   }
   QueryCost cost() const;
-  // Returns the number of nodes, cells and tests of all chunks that ran, also of those that a stop kept from the
-  // answer.
+  // Returns the number of nodes, cells and tests of all chunks that ran, including chunks that are missing from the
+  // answer because the batch was stopped.
   uint64_t work_done() const { return work_done_.load(std::memory_order_relaxed); }
 
  private:
@@ -118,8 +118,7 @@ class BatchRun {
 
   // Checks the invariants of the class comment; O(kMaxChunks).
   void check_invariants() const LOCUS_REQUIRES(mutex_);
-  // Checks that, in batch order, no query lies between query `end` - 1 of block `before` and query `begin` of block
-  // `block`.
+  // Checks that query `begin` of block `block` directly follows query `end` - 1 of block `before` in batch order.
   void check_adjacent(size_t before, size_t end, size_t block, size_t begin) const;
 
   // Returns whether a chunk may be started now.

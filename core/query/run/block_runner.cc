@@ -64,7 +64,8 @@ template <class Columns, class RegionOf>
 void BlockRunner::walk_regions(const Columns& columns, size_t begin, size_t end, const RegionOf& region_of) {
   if (block_.source == Source::kStatic || !RegionWalk::pays(task_.snapshot().objects.grid())) return;
   const OverlapOptions options = overlap_options(block_, columns.detail);
-  // Copies `region_of`: the walk calls it while later queries run, when the caller's function object no longer exists.
+  // Copies `region_of`: the walk calls the function during later queries, when the caller's function object no longer
+  // exists.
   task_.walk_regions(begin, end, [region_of, options](size_t i) { return region_of(i, options); });
 }
 

@@ -18,7 +18,7 @@ struct CollectedRows : ColumnArrays<ColumnVector> {
   std::vector<uint32_t> truncated;  // indices of truncated queries in the block, ascending
 };
 
-// Appends `rows` uninitialized rows to each column of `columns`, and returns pointers to the first of them. The
+// Appends `rows` uninitialized rows to each column of `columns`, and returns pointers to the first new row. The
 // pointers stay valid until the next call for the same `collected`.
 inline RowSpans add_rows(CollectedRows& collected, ColumnSet columns, size_t rows) {
   RowSpans spans;

@@ -95,8 +95,8 @@ class ByteReader {
     fail(what, "is out of range");
     return 0;
   }
-  // Reads the number of items that follow, each of at least `min_bytes`; fails if the remaining bytes cannot hold so
-  // many items.
+  // Reads the number of items that follow. Fails if the remaining bytes cannot hold so many items of at least
+  // `min_bytes` bytes each.
   uint64_t count(size_t min_bytes, const char* what) {
     LOCUS_DCHECK_GT(min_bytes, 0u);
     return number_upto(left_.size() / min_bytes, what);

@@ -56,7 +56,7 @@ std::string MeshWriter::header() const {
   write_kind(writer, BytesKind::kMeshHeader);
   writer.number(uint64_t{vertices_.size()});
   writer.number(uint64_t{3} * mesh_->triangle_count());
-  writer.number(uint64_t{0});  // number of parts: only data format 1 stores parts in the content
+  writer.number(uint64_t{0});  // number of parts: 0, since only data format 1 stores parts in the content
   return chunk;
 }
 

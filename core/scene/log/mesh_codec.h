@@ -40,8 +40,8 @@ class MeshWriter {
   size_t next_index_ = 0;   // number of vertex indices written so far
 };
 
-// Encoder of what is stored for one mesh name: a header with the number of parts, the creator if there is one, and the
-// parts.
+// Encoder of the data that is stored for one mesh name: a header with the number of parts, the creator if there is one,
+// and the parts.
 class PartsWriter {
  public:
   explicit PartsWriter(std::shared_ptr<const StaticMesh> mesh) : mesh_(std::move(mesh)) {}
@@ -60,10 +60,10 @@ class PartsWriter {
 // includes the parts.
 class MeshReader {
  public:
-  // Decodes the next chunk. The chunks must be added in the order in which they were written. DATA_LOSS describes
-  // damage.
+  // Decodes the next chunk. The chunks must be added in the order in which they were written. Returns DATA_LOSS, with a
+  // description, if the chunk is damaged.
   absl::Status add(absl::string_view chunk);
-  // Returns the mesh once all chunks were added. DATA_LOSS if chunks are missing or the mesh is not valid.
+  // Returns the mesh once all chunks were added. Returns DATA_LOSS if chunks are missing or the mesh is not valid.
   absl::StatusOr<TriangleMesh> finish() &&;
 
  private:
@@ -83,8 +83,8 @@ class PartsReader {
  public:
   // Decodes the next chunk, like MeshReader::add().
   absl::Status add(absl::string_view chunk);
-  // Returns the parts once all chunks were added. DATA_LOSS if chunks are missing or the parts do not fit a mesh of
-  // `triangles` triangles.
+  // Returns the parts once all chunks were added. Returns DATA_LOSS if chunks are missing or the parts do not fit a
+  // mesh of `triangles` triangles.
   absl::StatusOr<std::vector<MeshPart>> finish(size_t triangles) &&;
   // Returns the creator of the mesh; empty if none is stored.
   const std::string& creator() const { return creator_; }

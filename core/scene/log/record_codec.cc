@@ -19,8 +19,8 @@ enum Flag : uint32_t {
   kAllFlags = 31,
 };
 
-// Lower bounds of encoded sizes in bytes. A count in a record is refused if the remaining bytes cannot hold so many
-// items; otherwise a damaged count could make the decoder reserve too much memory.
+// Lower bounds of encoded sizes in bytes. The decoder refuses a count if the remaining bytes of the record cannot hold
+// so many items, because a damaged count could otherwise make the decoder reserve too much memory.
 constexpr size_t kMinListBytes = 32;  // at least four columns in each insert, move or relabel, with 8-byte lengths
 constexpr size_t kMinBatchBytes = 96;
 constexpr size_t kMinPlacementBytes = 32 + 7 * 8;

@@ -2,8 +2,8 @@
 // change. The result of applying a record depends only on the record and on the state before it, so that a replay gives
 // the same revision, acks and refused items. FORMAT.md describes the bytes.
 //
-// Decoding validates everything: DATA_LOSS describes damage. Columns that a shape's kind does not use are not stored.
-// Plain functions; any thread.
+// Decoding validates everything and returns DATA_LOSS, with a description, if the bytes are damaged. Columns that a
+// shape's kind does not use are not stored. Plain functions; any thread.
 #ifndef LOCUS_CORE_SCENE_LOG_RECORD_CODEC_H_
 #define LOCUS_CORE_SCENE_LOG_RECORD_CODEC_H_
 

@@ -57,8 +57,8 @@ class SceneJournal {
   // Returns the size in bytes of all records that this journal has appended, plus the size of the records that followed
   // the snapshot when the journal was created. Never decreases.
   uint64_t total_bytes() const LOCUS_EXCLUDES(mutex_);
-  // Records that the log's snapshot now includes all records up to `sequence`. `total_bytes` is what total_bytes()
-  // returned when `sequence` was the last record.
+  // Records that the log's snapshot now includes all records up to `sequence`. `total_bytes` is the value that
+  // total_bytes() returned when `sequence` was the last record.
   void snapshot_written(uint64_t sequence, uint64_t total_bytes) LOCUS_EXCLUDES(mutex_);
 
  private:
@@ -78,7 +78,7 @@ class SceneJournal {
 
   mutable Mutex mutex_;
   LogPosition position_ LOCUS_GUARDED_BY(mutex_);
-  uint64_t bytes_in_snapshots_ LOCUS_GUARDED_BY(mutex_) = 0;  // total_bytes() for the last snapshot's state
+  uint64_t bytes_in_snapshots_ LOCUS_GUARDED_BY(mutex_) = 0;  // total_bytes() at the snapshot's last record
 };
 
 }  // namespace locus

@@ -17,7 +17,8 @@
 
 namespace locus {
 
-// Frozen scene, the input of StateWriter. Cheap to hold while the scene continues.
+// State of a scene at one revision, the input of StateWriter. Holding it while the scene changes costs little memory,
+// because its snapshot shares memory with later revisions.
 struct FrozenScene {
   SnapshotPtr snapshot;
   WriterTable writers;

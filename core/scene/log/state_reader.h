@@ -1,5 +1,5 @@
-// Decodes a scene's state from the chunks that StateWriter wrote. Validates everything: DATA_LOSS describes damage. One
-// thread at a time.
+// Decodes a scene's state from the chunks that StateWriter wrote. Validates everything and returns DATA_LOSS, with a
+// description, if a chunk is damaged. One thread at a time.
 #ifndef LOCUS_CORE_SCENE_LOG_STATE_READER_H_
 #define LOCUS_CORE_SCENE_LOG_STATE_READER_H_
 
@@ -23,8 +23,8 @@ class StateReader {
  public:
   // Decodes the next chunk. The chunks must be added in the order in which they were written.
   absl::Status add(absl::string_view chunk);
-  // Returns the state once all chunks were added, and builds the tree of instances. DATA_LOSS if chunks are missing or
-  // `find_mesh` returns null.
+  // Returns the state once all chunks were added, and builds the tree of instances. Returns DATA_LOSS if chunks are
+  // missing or `find_mesh` returns null.
   absl::StatusOr<SceneState> finish(const FindMesh& find_mesh) &&;
 
  private:

@@ -15,9 +15,9 @@ namespace locus {
 // Returns the encoded topology.
 std::string encode_outline(const TreeTopology& topology);
 
-// Returns a topology that borrows from `bytes`. DATA_LOSS describes damage; FAILED_PRECONDITION if the topology was
-// written by another version of the tree builder. Does not check that the topology fits the mesh:
-// TriangleBvh::restore() does.
+// Returns a topology that borrows from `bytes`. Returns DATA_LOSS if the bytes are damaged, and FAILED_PRECONDITION if
+// another version of the tree builder made the topology. Does not check that the topology fits the mesh;
+// TriangleBvh::restore() checks this.
 absl::StatusOr<TreeTopology> decode_outline(const AlignedBytes& bytes);
 
 }  // namespace locus

@@ -58,7 +58,7 @@ struct StoredScene {
   uint64_t snapshot_sequence = 0;  // sequence number of the last record whose effect is in the snapshot
   uint64_t last_sequence = 0;      // sequence number of the last record
   uint64_t log_bytes = 0;          // size in bytes of the records after the snapshot
-  bool copied = false;  // true: copy by back_up(); call restart_scene() first, because the original may have changed
+  bool copied = false;  // true: copy made by back_up(); call restart_scene() first, as the original may have changed
   absl::Status damage;  // not OK (DATA_LOSS): the scene must not be served
 };
 
@@ -132,7 +132,8 @@ class UpdateLog {
   virtual void keep_outline(const std::array<uint8_t, 32>& sha256, absl::string_view bytes) = 0;
   virtual std::optional<std::string> read_outline(const std::array<uint8_t, 32>& sha256) const = 0;
 
-  // Returns the memory in bytes of the log's caches and of records that are not in its tables yet.
+  // Returns the memory in bytes of the log's caches and of its write buffers, which hold records that are not in a
+  // table file yet.
   virtual uint64_t cache_bytes() const { return 0; }
 
   // Writes a consistent copy of all scenes and meshes into the new directory `path`. Other calls may continue

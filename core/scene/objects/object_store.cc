@@ -10,7 +10,7 @@ namespace locus {
 namespace {
 
 constexpr size_t kPrefetchObjects = 16;  // prefetch distance, in objects
-constexpr uint32_t kNewLife = ~0u;       // in place of an index: an inserted object that updates no removed object
+constexpr uint32_t kNewLife = ~0u;       // marks an inserted object that updates no removed object
 
 // Returns for each object of `inserted` the index in `removed` of the object that it updates, or kNewLife if it updates
 // no removed object.

@@ -4,8 +4,8 @@
 // A handle identifies one lifetime of an object, from its insertion to its removal. Invariants: every object has a
 // handle of its own, below handle_count(); the table from ids to handles and the grid hold the same objects; every
 // handle below handle_count() belongs to an object, is free, or is quarantined. A store that tracks lifetimes
-// quarantines the handle of a removed object, so that no other object gets the handle, for as long as an object set in
-// the history contains the object.
+// quarantines the handle of a removed object: no other object gets the handle while an object set in the history
+// contains the removed object.
 #ifndef LOCUS_CORE_SCENE_OBJECTS_OBJECT_STORE_H_
 #define LOCUS_CORE_SCENE_OBJECTS_OBJECT_STORE_H_
 
@@ -35,8 +35,9 @@ class ObjectStore {
     LOCUS_DCHECK_EQ(next_handle_, 0u);
     moves_ = std::make_unique<TickMoves>();
   }
-  // Begins `tick`. `oldest_tick` is the oldest tick of the history. Frees the quarantined handles that no object set
-  // from `oldest_tick` on uses. Requires track_lifetimes().
+  // Begins `tick`. `oldest_tick` is the oldest tick of the history. Frees the quarantined handles of objects that were
+  // removed in `oldest_tick` or earlier, because no object set from `oldest_tick` on contains these objects. Requires
+  // track_lifetimes().
   void start_tick(uint64_t tick, uint64_t oldest_tick);
   // Returns the displacement of objects since start_tick(); an empty Displacement if lifetimes are not tracked.
   Displacement displacement() { return moves_ == nullptr ? Displacement() : moves_->displacement(); }

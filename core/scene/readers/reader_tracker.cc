@@ -10,12 +10,13 @@
 namespace locus {
 namespace {
 
-// Held bytes are counted again only after 1 / kCountShare of the budget was replaced since the last count, so that pins
-// just below the budget do not cause a count for every batch. Pins may exceed the budget by that amount.
+// Held bytes are counted again only after updates have replaced 1 / kCountShare of the budget since the last count, so
+// that pins just below the budget do not cause a count for every batch. Pins may therefore exceed the budget by this
+// share.
 constexpr uint64_t kCountShare = 64;
-// Upper bound of A / B for two revisions. A: bytes that the earlier revision holds and the later one does not. B:
-// difference of their SceneSnapshot::replaced_bytes, which does not count lookup tables. The largest measured ratio is
-// 2.2.
+// Upper bound of the ratio A / B for two revisions of a scene. A is the number of bytes that the earlier revision holds
+// and the later revision does not hold. B is the difference of their SceneSnapshot::replaced_bytes, which does not
+// count lookup tables. The largest measured ratio is 2.2.
 constexpr uint64_t kMaxOfReplaced = 4;
 constexpr uint32_t kRetryMs = 10;
 

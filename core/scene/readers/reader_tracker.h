@@ -1,6 +1,6 @@
-// Tracks the revisions of a scene that are being read, and the memory that is not freed because of these revisions, so
-// that slow readers cannot make memory grow without limit while updates stream in. If pinned revisions hold more than
-// the budget, the pins of the oldest revisions are revoked, and the writer waits until these pins are released.
+// Tracks the revisions of a scene that are being read, and the memory that cannot be freed while these revisions are
+// read. So slow readers cannot make memory grow without limit while updates stream in. If pinned revisions hold more
+// than the budget, the pins of the oldest revisions are revoked, and the writer waits until these pins are released.
 //
 // Threads: every member may be called from any thread; enforce_budget() from one thread at a time. Readers and the
 // writer block each other only for the access to a small map: memory is counted outside the lock. Invariants: each
@@ -88,8 +88,8 @@ class ReaderTracker {
   uint64_t budget() const LOCUS_EXCLUDES(mutex_);
   // Calls the on_revoke() callbacks of pins that are revoked but not released, each at most once.
   void revoke_overdue() LOCUS_EXCLUDES(mutex_);
-  // Revokes the oldest pins until pins hold at most `bytes`, whatever the budget. Called when memory is short. Returns
-  // the bytes that the pins revoked by this call hold, which become free when their readers end.
+  // Revokes the oldest pins until pins hold at most `bytes`, regardless of the budget. Called when memory is short.
+  // Returns the bytes that the pins revoked by this call hold, which become free when their readers end.
   uint64_t revoke_beyond(const SceneSnapshot& latest, uint64_t bytes) LOCUS_EXCLUDES(mutex_);
   // Closes the tracker: running and later calls of wait_until_returned() return true at once.
   void close() LOCUS_EXCLUDES(mutex_);
@@ -123,8 +123,8 @@ class ReaderTracker {
   std::vector<Holding> pinned_before(const SceneSnapshot& latest) const LOCUS_REQUIRES(mutex_);
   // Sets Holding::bytes of each entry of `pinned`, which is in the order of revisions, and returns the sum.
   static uint64_t count(std::vector<Holding>& pinned, const SceneSnapshot& latest);
-  // Revokes the pins of a revision because all pins hold `held` bytes, more than `budget`. Returns false if they are
-  // revoked already.
+  // Revokes the pins of a revision because all pins hold `held` bytes, more than `budget`. Returns false if the
+  // revision is no longer pinned, or if its pins are revoked already.
   bool revoke(const SceneSnapshot& snapshot, uint64_t held, uint64_t budget) LOCUS_REQUIRES(mutex_);
 
   const uint64_t fixed_;  // budget passed to the constructor; 0: derived from the memory of the scene
@@ -140,9 +140,9 @@ class ReaderTracker {
   uint64_t counted_ LOCUS_GUARDED_BY(mutex_) = 0;
   uint64_t counted_at_ LOCUS_GUARDED_BY(mutex_) = 0;
   uint64_t budget_ LOCUS_GUARDED_BY(mutex_);
-  // enforced_at_ is SceneSnapshot::replaced_bytes of the last snapshot passed to enforce_budget(). late_bytes_ is a sum
-  // over the revisions that were pinned since the last count: the bytes that had been replaced between the revision and
-  // the snapshot of enforced_at_ when the revision was pinned.
+  // enforced_at_ is SceneSnapshot::replaced_bytes of the last snapshot passed to enforce_budget(). late_bytes_ accounts
+  // for revisions that were already outdated when they were pinned after the last count: for each of them, it includes
+  // enforced_at_ at the time of the pin minus SceneSnapshot::replaced_bytes of the revision.
   uint64_t enforced_at_ LOCUS_GUARDED_BY(mutex_) = 0;
   uint64_t late_bytes_ LOCUS_GUARDED_BY(mutex_) = 0;
 };

@@ -67,7 +67,7 @@ class HistoryRecorder {
   // Drops all records.
   void drop();
   // Drops the oldest records until the rest takes at most `bytes`, because memory is short. Returns whether a record
-  // was dropped. Later records are kept as if this had not been called.
+  // was dropped. Does not change the memory limit for records that are added later.
   bool trim(uint64_t bytes);
   // Returns true if close() was called since the last drop(), even if all records were dropped to save memory. The
   // result depends on the batches alone, so that a replay of the same batches gives the same revisions.
@@ -85,8 +85,8 @@ class HistoryRecorder {
   // Checks the invariants of the published history. O(records).
   void check_invariants() const;
   void drop_first(History& history, size_t count, PastLimit reason);
-  // Publishes `history` without its oldest records, so that the rest takes at most `max_bytes`. `reason` is the reason
-  // for which these are dropped.
+  // Publishes `history` without its oldest records, so that the rest takes at most `max_bytes`. If a record is dropped,
+  // sets the result of limit() to `reason`.
   void publish(History history, uint64_t max_bytes, PastLimit reason);
 
   HistoryOptions options_;

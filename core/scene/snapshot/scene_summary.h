@@ -17,7 +17,7 @@ struct SceneSummary {
   uint64_t objects = 0;
   uint64_t instances = 0;
   uint64_t triangles = 0;
-  Aabbd bounds;  // of all objects and instances; empty if there are none
+  Aabbd bounds;  // bounds of all objects and instances; empty if the scene has neither
 };
 
 // Returns the summary of a revision. O(objects).

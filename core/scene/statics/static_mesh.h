@@ -62,7 +62,7 @@ class StaticMesh {
   // Returns the bounds of all triangles.
   const Aabbf& bounds() const { return tree().bounds(); }
   const std::vector<MeshPart>& parts() const { return parts_; }
-  // Returns the caller who uploaded the mesh and to whom it is counted; empty: nobody.
+  // Returns the caller who uploaded the mesh and whose quota it uses; empty if the mesh has no creator.
   const std::string& creator() const { return creator_; }
   // Returns triangle `number`, counted in the order of the uploaded indices. Precondition: number < triangle_count().
   Triangle triangle(uint32_t number) const;

@@ -49,14 +49,14 @@ class StaticSet {
     std::vector<Id> placed;  // ids of the placed instances, in the order of the request
   };
   // Returns a new set without the instances that the change removes, and with the instances that the change places.
-  // `is_object` returns true for an id that an object has, because no instance may have the same id. If the set chooses
-  // ids, it counts up from `seed` + 1. An error refuses the whole change and names the field and index of the invalid
-  // value. O(instances).
+  // `is_object` returns true for an id that an object has, because no instance may have the same id. The ids that the
+  // set chooses have bit 63 set and count up from `seed` + 1, without ids that are taken. An error refuses the whole
+  // change and names the field and index of the invalid value. O(instances).
   absl::StatusOr<Changed> apply(const StaticChange& change, const std::function<bool(Id)>& is_object,
                                 uint64_t seed) const;
 
-  // Returns the error with which apply() refuses these placements on a set without instances; OK if there is none.
-  // Builds no set: needs about 20 bytes of memory for each placement. O(placements).
+  // Returns the error that apply() would return for these placements in a scene without instances and objects, or OK.
+  // Builds no set, and so needs only about 20 bytes of memory for each placement. O(placements).
   static absl::Status check_placements(absl::Span<const PlacementColumns> place);
 
   const Bvh<Instance>& tree() const { return tree_; }

@@ -11,8 +11,8 @@ namespace locus {
 
 class CoalescedMoves {
  public:
-  // Adds the moves of one batch for objects of `store`. Returns true if any of these moves changes the position or
-  // rotation that its object has after the moves of earlier calls. O(moves).
+  // Adds the moves of one batch for objects of `store`. Returns true if, after the moves of earlier calls, any of these
+  // moves still changes the position or rotation of its object. O(moves).
   bool add(const GridMoves& batch, const ObjectStore& store);
 
   bool empty() const { return moves_.empty(); }

@@ -1,5 +1,5 @@
-// Application of a batch that only moves objects, the common case at every tick: converts the columns directly into
-// moves of the grid. Like BatchApplier, it does not change the store; ObjectStore::move() applies the moves.
+// Reads a batch that only moves objects, the common case at every tick, and converts its columns directly into moves of
+// the grid. Like BatchApplier, MoveApplier does not change the store; ObjectStore::move() applies the moves.
 //
 // Reuses its memory from batch to batch. One thread at a time. Invariant: each handle has at most one move.
 #ifndef LOCUS_CORE_SCENE_UPDATES_MOVE_APPLIER_H_

@@ -10,8 +10,8 @@
 namespace locus {
 namespace {
 
-// Check of one element of the list `list` of a batch, such as inserts[2]: verifies that the length of each column fits
-// the number of items, `items`.
+// Checks the column lengths of one element of a batch, such as inserts[2]. `list` is the name of the list, `index` the
+// index of the element, and `items` its number of items.
 class ElementCheck {
  public:
   ElementCheck(absl::string_view list, size_t index, size_t items) : list_(list), index_(index), items_(items) {}

@@ -78,12 +78,13 @@ struct UpdateAck {
   bool duplicate = false;
 };
 
-// Returns true if the two batches may be applied as one revision: both only move objects, without teleport,
-// all_or_nothing or restart_ticks, at the same tick. If both batches move an object, the second batch determines the
-// result.
+// Returns true if the two batches may be applied as one revision: both batches have the same tick and only move
+// objects, without teleport, all_or_nothing or restart_ticks. If both batches move an object, the second batch
+// determines the result.
 bool may_join(const UpdateBatch& first, const UpdateBatch& second);
 
-// Checks the form of a batch: column lengths, frame, writer and limits. INVALID_ARGUMENT names the invalid field.
+// Checks the form of a batch: column lengths, frame, writer and limits. Returns INVALID_ARGUMENT, naming the invalid
+// field, if the form is wrong.
 absl::Status check_form(const UpdateBatch& batch);
 
 }  // namespace locus

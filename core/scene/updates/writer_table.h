@@ -1,6 +1,6 @@
 // Table of the last batch and ack of each known writer, so that a batch that is sent twice is applied once. Bounded:
-// the writer that was least recently active is evicted first, and its next batch is refused, because this batch may be
-// a duplicate. If the stored acks would list more than kMaxKeptErrors errors, the acks of all writers are dropped, but
+// the least recently active writer is evicted first. Its next batch is then refused, because the batch may be a
+// duplicate. If the stored acks would list more than kMaxKeptErrors errors, the acks of all writers are dropped, but
 // the writers and their batch numbers are kept. A value type; one thread at a time. Invariants: at most
 // limits::kMaxWriters writers are stored, no writer id is 0, and no activity count exceeds clock_; kept_errors_ is the
 // number of errors in all stored acks, at most kMaxKeptErrors.
@@ -25,7 +25,7 @@ class WriterTable {
 
   // Returns nullopt if the batch must be applied, because it is the next batch of its writer or has no writer. If the
   // batch was applied before, returns its ack, marked as duplicate, or, if the ack is not stored, an empty ack that is
-  // marked as duplicate. FAILED_PRECONDITION BATCH_GAP if an earlier batch is missing.
+  // marked as duplicate. Returns FAILED_PRECONDITION BATCH_GAP if an earlier batch is missing.
   absl::StatusOr<std::optional<UpdateAck>> admit(uint64_t writer, uint64_t batch) const;
   // Returns true if admit() would return nullopt. Faster than admit().
   bool is_new(uint64_t writer, uint64_t batch) const;
