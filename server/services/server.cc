@@ -37,8 +37,6 @@ using std::chrono::system_clock;
 
 // Calls of the health and reflection services of one connection. These services have limits of their own.
 constexpr uint32_t kOtherCalls = kMaxHealthWatchers + kMaxHealthChecks + kMaxReflections;
-// Maximum number of bytes that gRPC reads from a connection at once.
-constexpr int kReadBytes = 32 << 10;
 // Interval in milliseconds between keepalive pings to clients, and maximum delay of the answer to a ping. The pings
 // detect clients whose machine is unreachable. The streams of such clients would otherwise stay open for ever.
 constexpr int kPingEveryMs = 30'000;
@@ -84,10 +82,6 @@ void set_limits(const ServerConfig& config, grpc::ServerBuilder& builder) {
   builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_GZIP, config.accept_compression);
   builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_DEFLATE, false);
   builder.AddChannelArgument(GRPC_ARG_ENABLE_PER_MESSAGE_DECOMPRESSION, 0);
-  // gRPC handles all frames of a read before it reports the first call. With reads of up to 4 MiB, its default, a flood
-  // of calls that are cancelled at once took a gigabyte in a single read.
-  builder.AddChannelArgument(GRPC_ARG_TCP_READ_CHUNK_SIZE, kReadBytes);
-  builder.AddChannelArgument(GRPC_ARG_TCP_MAX_READ_CHUNK_SIZE, kReadBytes);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kPingEveryMs);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kPingAnswerMs);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
