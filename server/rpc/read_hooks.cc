@@ -40,7 +40,7 @@ bool accept(SSL* ssl, absl::string_view bytes) {
   auto* check = static_cast<HeaderCheck*>(SSL_get_ex_data(ssl, checks->index));
   if (check == nullptr) {
     auto made = std::make_unique<HeaderCheck>();
-    if (SSL_set_ex_data(ssl, checks->index, made.get()) == 0) return false;  // no memory for it
+    if (SSL_set_ex_data(ssl, checks->index, made.get()) == 0) return false;  // out of memory
     check = made.release();
   }
   if (check->accepts(bytes)) return true;

@@ -28,9 +28,9 @@ constexpr uint64_t kGrowth = 2;
 // points to.
 constexpr uint64_t kStringBytes = 64;
 constexpr uint64_t kPointerBytes = 32;
-// Bytes of a map's node beside the key and the value.
+// Bytes of a map's node in addition to the key and the value.
 constexpr uint64_t kMapNodeBytes = 64;
-// Bytes that Protobuf keeps for an unknown field, beside its content.
+// Bytes that Protobuf keeps for an unknown field in addition to its content.
 constexpr uint64_t kUnknownBytes = 64;
 
 // Types of values on the wire, with Protobuf's numbers.
@@ -105,7 +105,7 @@ struct WirePlan::Field {
   Kind kind = Kind::kUnknown;
   Wire wire = Wire::kVarint;  // type of one value
   uint32_t value_bytes = 0;   // columns: bytes of one value in memory
-  uint32_t overhead = 0;      // strings and messages: bytes in memory beside the content
+  uint32_t overhead = 0;      // strings and messages: bytes in memory in addition to the content
   const Type* type = nullptr;
   const WireLimit* limit = nullptr;  // null: not repeated
 };
@@ -131,7 +131,8 @@ struct WirePlan::Scan {
   bool skip(Wire wire, uint32_t* bytes);
 };
 
-// Skips the value of a field. Groups are refused: no message of this protocol has one, and they may nest.
+// Skips the value of a field. Returns false for an invalid value and for a group: no message of this protocol has
+// groups, and groups may nest.
 bool WirePlan::Scan::skip(Wire wire, uint32_t* bytes) {
   uint64_t value = 0;
   uint32_t length = 0;
@@ -168,7 +169,8 @@ absl::Status WirePlan::Scan::count(const Field& field) {
   return refuse_limit(field.limit->path, field.limit->limit, field.limit->max, values);
 }
 
-// A column is packed or has one value for each tag; both forms are legal.
+// Counts the memory of a field of a column. The field contains all values of the column (packed) or a single value;
+// both forms are legal.
 absl::Status WirePlan::Scan::column(const Field& field, Wire wire) {
   uint32_t bytes = 0;
   if (!skip(wire, &bytes)) return no_message();

@@ -35,7 +35,8 @@ using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 using std::chrono::system_clock;
 
-// Calls of the health and reflection services of one connection. These services have limits of their own.
+// Maximum number of calls of the health and reflection services on one connection. These services have limits of their
+// own.
 constexpr uint32_t kOtherCalls = kMaxHealthWatchers + kMaxHealthChecks + kMaxReflections;
 // Maximum number of bytes that gRPC reads from a connection at once.
 constexpr int kReadBytes = 32 << 10;
@@ -80,7 +81,8 @@ void set_limits(const ServerConfig& config, grpc::ServerBuilder& builder) {
   builder.SetResourceQuota(quota);
   builder.SetMaxReceiveMessageSize(static_cast<int>(config.max_receive_bytes));
   builder.SetMaxSendMessageSize(-1);
-  // A compressed message of a few megabytes could inflate to gigabytes: gRPC refuses it, or leaves it as it is.
+  // gRPC must not inflate messages, because a few megabytes could become gigabytes. It refuses compressed messages or,
+  // with accept_compression, passes them on compressed.
   builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_GZIP, config.accept_compression);
   builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_DEFLATE, false);
   builder.AddChannelArgument(GRPC_ARG_ENABLE_PER_MESSAGE_DECOMPRESSION, 0);
@@ -184,7 +186,7 @@ void Server::reload() {
 void Server::drain(milliseconds grace) {
   const steady_clock::time_point deadline = steady_clock::now() + grace;
   Host& host = parts_->host;
-  // New connections are accepted until the end, so that probes hear that the server is not serving.
+  // New connections are accepted until the end, so that probes get the answer that the server is not serving.
   parts_->health_service.not_serving();
   host.drain.begin();
   parts_->access->stop();
