@@ -70,7 +70,7 @@ class EndingSignals {
 
   // Returns a flag that becomes true when the first signal arrives.
   const std::atomic<bool>& received() const { return received_; }
-  // Sets the function that is called on the thread after each SIGHUP; null: nothing happens.
+  // Sets the function that the thread calls after each SIGHUP. If it is null, SIGHUP has no effect.
   void on_hangup(std::function<void()> reload) {
     const MutexLock lock(mutex_);
     reload_ = std::move(reload);

@@ -23,7 +23,7 @@ constexpr const char* kGroups = "/sys/fs/cgroup";
 // Maximum nesting depth of control groups. More deeply nested groups are not read.
 constexpr int kMaxDepth = 64;
 
-// Returns the words of a file's first line; no words if the file cannot be read.
+// Returns the words of a file's first line; an empty list if the file cannot be read.
 std::vector<std::string> first_line(const std::string& path) {
   std::string line;
   std::ifstream file(path);

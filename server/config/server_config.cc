@@ -251,8 +251,9 @@ void follow_machine(ServerConfig& config) {
   LOCUS_DCHECK_LE(config.threads, limits::kMaxThreads);
 }
 
-// Returns an error unless `config` has all that an address needs that other machines can reach. `option` is the option
-// of the address, `exposed` says what anyone there could do.
+// Returns an error unless `config` has TLS and an access file, which an address needs if other machines can reach it.
+// `option` is the option that sets the address. `exposed` is text for the error: what anyone could do without TLS and
+// access control.
 absl::Status check_protected(const ServerConfig& config, absl::string_view option, absl::string_view address,
                              absl::string_view exposed) {
   std::vector<std::string> missing;

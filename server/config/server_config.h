@@ -38,9 +38,9 @@ struct ServerConfig {
   // Address of the HTTP pages: /metrics for Prometheus, /healthz, /readyz. `host:port` or `[v6]:port`; port 0 means any
   // free port; empty = no pages. If the default address is in use, the daemon logs a warning and runs without the
   // pages; any other address that is in use is an error. With `tls_cert`, the pages use TLS as the other TCP
-  // connections do. With access control, /metrics needs the right `metrics`, because it has the names of scenes and how
-  // they are used; /healthz and /readyz are for everybody. Change it so that a scraper on another machine can read the
-  // pages; that also needs `tls_cert` and `access_file`, or `insecure`.
+  // connections do. With access control, /metrics needs the right `metrics`, because it shows the names and the use of
+  // scenes; /healthz and /readyz are for everybody. Change it so that a scraper on another machine can read the pages;
+  // that also needs `tls_cert` and `access_file`, or `insecure`.
   std::string http_listen = kDefaultHttpListen;
 
   // File to write the port of the HTTP pages to, once they are served; empty = no file.
@@ -93,15 +93,16 @@ struct ServerConfig {
   // it if the network is slower than gzip, which takes 3 ms for each MiB; strangers can use up processor time with it.
   bool accept_compression = false;
 
-  // Limits on connections: in all, 0 = 4096 or fewer if the process may open few files; from one address, which for
-  // unix sockets is a user; and new ones a second from one address, with a burst of twice as many. Excess connections
-  // are closed at once. Raise the last two if many clients share one address, as behind a proxy.
+  // Maximum numbers of connections: of all clients (0 = 4096, or fewer if the process may open only few files), of one
+  // address, and of new connections a second of one address. An address may open twice the last number at once. For
+  // unix sockets, a user counts as an address. Excess connections are closed at once. Raise the last two if many
+  // clients share one address, as behind a proxy.
   uint32_t max_connections = 0;
   uint32_t max_connections_per_address = 1024;
   uint32_t max_new_connections = 200;
 
-  // Seconds after which a connection is closed that has not begun HTTP/2, over TLS if there is TLS. Raise it for
-  // clients on very slow lines.
+  // Seconds within which the client of a new connection must begin HTTP/2, after the TLS handshake if there is TLS;
+  // otherwise the connection is closed. Raise it for clients on very slow networks.
   uint32_t handshake_timeout_s = 10;
 
   // Seconds after which a connection without an open call is closed; 0 = never. Clients open a new one with their next
@@ -130,14 +131,15 @@ struct ServerConfig {
   std::string tls_cert;
   std::string tls_key;
 
-  // File of certificates in PEM that must have signed the certificate of every client. Empty = clients need no
-  // certificate. Set it to admit only machines that hold a certificate.
+  // File of CA certificates in PEM, one of which must have signed the certificate of each client. Empty = clients need
+  // no certificate. Set it to admit only machines that hold a certificate.
   std::string tls_client_ca;
 
   // File that says who may call what. Empty = every client may call everything.
   std::string access_file;
 
-  // File of tokens, and file of keys (JWKS) that sign tokens (JWT), by which clients name themselves; empty = none.
+  // Files for the authentication of clients: hashes of the accepted tokens, and public keys (JWKS) that verify signed
+  // tokens (JWT); empty = none.
   std::string token_file;
   std::string jwks_file;
 
@@ -145,9 +147,9 @@ struct ServerConfig {
   std::string jwt_audience;
   std::string jwt_issuer;
 
-  // File to which changing calls are written, one JSON object a line; empty = none. Refused calls are written to the
-  // file with `.refused` after its name. Each file is replaced by a new one when it is larger than `audit_bytes`; four
-  // older ones are kept.
+  // File to which calls that change something are logged, one JSON object a line; empty = none. Refused calls are
+  // written to the file with `.refused` after its name. Each file is replaced by a new one when it is larger than
+  // `audit_bytes`; four older ones are kept.
   std::string audit_file;
   uint64_t audit_bytes = uint64_t{64} << 20;
 

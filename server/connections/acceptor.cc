@@ -22,7 +22,8 @@ using std::chrono::steady_clock;
 // Maximum number of connections that are accepted from one socket before the other sockets are served.
 constexpr int kAcceptsAtOnce = 64;
 constexpr int kWakeUpsAtOnce = 256;
-// Pause after accept() failed because descriptors or memory are used up.
+// Reason with which idle connections are closed, and pause after accept() failed because descriptors or memory are used
+// up.
 constexpr const char* kIdle = "idle for too long";
 constexpr milliseconds kPause{100};
 constexpr milliseconds kCheckInterval{1000};
@@ -186,13 +187,13 @@ void Acceptor::admit(int descriptor, const ListeningSocket& listening, Time now)
   add_event(descriptor, EPOLLIN | EPOLLRDHUP | EPOLLET, id);
 }
 
-// Looks at the first bytes of a connection without taking them out of the socket.
+// Examines the first bytes of a connection without removing them from the socket.
 void Acceptor::opening(uint64_t id) {
   Entry& entry = entries_.at(id);
   std::array<char, kFirstBytes> bytes;
   const ssize_t count = recv(entry.descriptor, bytes.data(), bytes.size(), MSG_PEEK | MSG_DONTWAIT);
   if (count < 0 && (errno == EAGAIN || errno == EINTR)) return;
-  Opening seen = Opening::kBad;  // also if the peer has gone
+  Opening seen = Opening::kBad;  // stays kBad if the peer has gone
   if (count > 0) seen = examine_first_bytes(entry.transport, {bytes.data(), static_cast<size_t>(count)});
   if (seen == Opening::kIncomplete) return;
   --opening_;
@@ -220,8 +221,8 @@ void Acceptor::hand_over(uint64_t id, Entry& entry) {
   entry.since = steady_clock::now();
   table_.add(entry.connection);
   guard_.watch(entry.connection);
-  // Without flags, epoll reports only errors and the end of both directions. gRPC shuts both down before it closes its
-  // descriptor.
+  // Without EPOLLIN, epoll reports only errors and the shutdown of both directions. gRPC shuts both directions down
+  // before it closes its descriptor.
   add_event(duplicate, EPOLLET, id);
   hooks_.hand_over(descriptor, entry.connection);
 }
@@ -232,8 +233,10 @@ void Acceptor::ended(uint64_t id) {
   const Entry entry = std::move(found->second);
   entries_.erase(found);
   limiter_.leave(entry.peer.limit_key);
-  // A client that floods would otherwise come back at once, and each connection may cost some megabytes before the
-  // guard closes it again. Users of unix sockets are not charged: one may be a front, whose other clients would pay.
+  // Charge the address of a client whose connection this server has closed, except for idleness. Otherwise a client
+  // that floods would connect again at once, and each connection may cost some megabytes before the guard closes it.
+  // Users of unix sockets are not charged: the user may run a proxy, and the charge would refuse the proxy's other
+  // clients too.
   if (const char* reason = entry.connection->close_reason(); reason != nullptr && reason != kIdle && !entry.peer.uid)
     limiter_.charge(entry.peer.limit_key, options_.limits.new_per_second);
   guard_.forget(*entry.connection);
@@ -243,7 +246,8 @@ void Acceptor::ended(uint64_t id) {
   ended_.fetch_add(1);
 }
 
-// Closes connections that have not begun in time, and those that have been idle for too long.
+// Closes connections whose clients have not sent their first bytes in time, and connections that have been idle for too
+// long.
 void Acceptor::close_overdue(Time now) {
   std::vector<uint64_t> late;
   for (auto& [id, entry] : entries_) {

@@ -38,21 +38,22 @@ struct AcceptorOptions {
 
 // Functions that the acceptor calls on its thread.
 struct AcceptorHooks {
-  // Takes over the descriptor, which does not block, of a connection that the table already contains.
+  // Takes over the non-blocking descriptor of a connection. The table already contains the connection.
   std::function<void(int descriptor, const std::shared_ptr<Connection>& connection)> hand_over;
-  // Reports refused connections, at most once a second: how many since the last report, the last peer and its reason.
+  // Reports refused connections, at most once a second: `refused` is their number since the last report, `address` and
+  // `reason` describe the last of them.
   std::function<void(uint64_t refused, const std::string& address, const char* reason)> refused;
 };
 
 // Numbers of connections since the start.
 struct AcceptorStats {
-  uint64_t accepted = 0;          // accepted by the kernel, including those of the next lines
+  uint64_t accepted = 0;          // accepted by the kernel, including the refused connections
   uint64_t refused_full = 0;      // over the limit on all connections
   uint64_t refused_address = 0;   // over the limit of their address
   uint64_t refused_too_fast = 0;  // over the limit on new connections of their address
   uint64_t refused_bytes = 0;     // did not begin like a client of gRPC
   uint64_t timed_out = 0;         // did not begin in time, or were idle for too long
-  uint64_t ended = 0;             // handed over, and ended since
+  uint64_t ended = 0;             // ended after they were handed over to gRPC
 };
 
 class Acceptor {
@@ -81,7 +82,7 @@ class Acceptor {
     Transport transport = Transport::kPlain;
     int descriptor = -1;                     // descriptor of an opening connection
     std::shared_ptr<Connection> connection;  // connection that was handed over
-    Time since;                              // time of accept(), or since which no call has been open
+    Time since;                              // time of accept() or, once handed over, last time of activity
     uint64_t calls_begun = 0;                // calls begun until the last check for idle connections
   };
   using Entries = absl::flat_hash_map<uint64_t, Entry>;

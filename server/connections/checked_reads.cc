@@ -14,7 +14,7 @@
 namespace locus::server {
 namespace {
 
-// Returns the kernel's number of a socket, which no other socket ever gets; 0 if the descriptor is none.
+// Returns the cookie of a socket, a number that the kernel gives to no other socket; 0 if `descriptor` is not a socket.
 uint64_t cookie_of(int descriptor) {
   uint64_t cookie = 0;
   socklen_t size = sizeof cookie;
@@ -28,7 +28,7 @@ struct WatchedSocket {
   FrameCheck check;
 };
 
-// Watched sockets of the process whose descriptors have equal remainders.
+// Watched sockets of the process whose descriptors have the same remainder modulo kShards.
 struct Shard {
   Mutex mutex;
   absl::flat_hash_map<int, WatchedSocket> sockets LOCUS_GUARDED_BY(mutex);

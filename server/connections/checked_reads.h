@@ -3,8 +3,9 @@
 // read. Bytes of other descriptors are always accepted.
 //
 // Threads: every member may be called from any thread; reads of different descriptors rarely wait for each other.
-// Invariant: bytes are checked only if their descriptor is still the socket that was watched, by the kernel's cookie,
-// because the transport closes a descriptor without telling us, and its number is used again.
+// Invariant: bytes are checked only if their descriptor still refers to the watched socket. The transport closes
+// descriptors without a notification and the kernel reuses their numbers, so the kernel's cookie of the socket is
+// compared.
 #ifndef LOCUS_SERVER_CONNECTIONS_CHECKED_READS_H_
 #define LOCUS_SERVER_CONNECTIONS_CHECKED_READS_H_
 
@@ -34,8 +35,8 @@ class CheckedReads {
   // Begins to check the reads from `descriptor`, the socket of `connection`, from which nothing was read yet.
   void watch(int descriptor, std::shared_ptr<Connection> connection);
 
-  // Checks `count` bytes that were read from `descriptor` into `message`. Returns false if they are refused; then the
-  // connection was reported, and the transport must not see the bytes. Costs about 0.1 us for a watched descriptor.
+  // Checks `count` bytes that were read from `descriptor` into `message`. Returns false if the bytes are refused; then
+  // `on_refused` was called, and the transport must not get the bytes. Costs about 0.1 us for a watched descriptor.
   static bool accept(int descriptor, const msghdr& message, size_t count);
 
  private:

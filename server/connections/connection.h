@@ -1,5 +1,5 @@
-// One accepted connection as the rest of the server sees it: who is at the other end, what its calls have done so far,
-// and a way to close it. The acceptor makes a Connection for each socket; calls find theirs in the ConnectionTable.
+// One accepted connection as the rest of the server sees it: its peer, counts of its calls, and a function that closes
+// it. The acceptor makes a Connection for each socket; calls find theirs in the ConnectionTable.
 //
 // Threads: every member may be called from any thread. Counting takes no lock. Invariant: calls_open is the number of
 // begun calls that have not ended.
@@ -66,8 +66,8 @@ class Connection {
   }
   void call_ended() { calls_open_.fetch_sub(1, std::memory_order_relaxed); }
   // Counts a call that the peer ended before its answer. Closes the connection at once if, since begin_cancel_window(),
-  // it has cancelled more than kMaxCancelled calls and more than it let finish: gRPC accepts calls faster than the
-  // periodic checks of the guard could notice.
+  // the peer has cancelled more than kMaxCancelled calls, and more calls than it let finish. The periodic checks of the
+  // guard would detect this too late, because gRPC accepts calls very fast.
   void call_cancelled();
   // Restarts the count of cancelled calls. The guard calls it once a second.
   void begin_cancel_window();
@@ -91,8 +91,8 @@ class Connection {
   // Number by which the transport knows the connection; 0 while unknown. Used by the transport's counter of streams.
   std::atomic<int64_t> transport_id{0};
 
-  // Returns the identity that set_identity() stored last; null if there is none. It saves calls from checking the same
-  // credentials again.
+  // Returns the identity that set_identity() stored last; null if there is none. The identity is kept so that later
+  // calls need not check the same credentials again.
   std::shared_ptr<const void> identity() const LOCUS_EXCLUDES(mutex_);
   void set_identity(std::shared_ptr<const void> identity) LOCUS_EXCLUDES(mutex_);
 
@@ -106,8 +106,8 @@ class Connection {
   // Returns what the kernel has received; zeros if the connection is not TCP or its descriptor is released.
   ReceivedCounts received() const LOCUS_EXCLUDES(mutex_);
 
-  // Returns the bytes that the kernel has received since the last call and that are in no message read by a call; 0 for
-  // connections that are not TCP.
+  // Returns the number of bytes that the kernel has received since the previous use of this function, less the bytes of
+  // the messages that were read since then; 0 for connections that are not TCP.
   uint64_t unexplained_since_last_look();
 
   // Returns the descriptor; -1 after release(). Only for the thread that calls release().
@@ -135,10 +135,11 @@ class Connection {
   std::shared_ptr<const void> identity_ LOCUS_GUARDED_BY(mutex_);
 };
 
-// Returns the peer of the connected socket `descriptor`, with the name that gRPC gives the connection. A unix
-// connection has the name of a connection that gRPC gets by its descriptor, and its peer has the user id of the other
-// process. The limit key is the IPv4 address, the first 64 bits of the IPv6 address (a subscriber owns all addresses
-// that begin with them), or the user id. Returns nullopt if the peer has already gone.
+// Returns the peer of the connected socket `descriptor`, with the name that gRPC gives the connection. The name of a
+// unix connection is made from its descriptor, because gRPC gets the connection by its descriptor; the peer then also
+// has the user id of the other process. The limit key is the IPv4 address, the first 64 bits of the IPv6 address (a
+// subscriber owns all addresses that begin with these bits), or the user id. Returns nullopt if the peer has already
+// gone.
 std::optional<Peer> peer_of(int descriptor);
 
 }  // namespace locus::server

@@ -7,7 +7,7 @@
 namespace locus::server {
 namespace {
 
-// Number of remembered addresses from which on addresses without connections are forgotten.
+// Minimum number of remembered addresses at which the limiter forgets addresses without connections.
 constexpr size_t kManyAddresses = 1024;
 
 }  // namespace

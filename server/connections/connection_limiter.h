@@ -32,11 +32,12 @@ class ConnectionLimiter {
 
   // Decides on a new connection of the address `key`, and counts it if it is admitted.
   Admission admit(const std::string& key, Time now);
-  // Takes back one admitted connection of the address `key`.
+  // Subtracts one connection of the address `key`, which has ended.
   void leave(const std::string& key);
 
-  // Takes `count` new connections from what the address `key` may open, because it has misused one. It may open none
-  // until they have been refilled, which takes at most as long as refilling two bursts.
+  // Takes `count` tokens from the address `key`, because it has misused a connection. A new connection needs a token;
+  // tokens are refilled at the rate `new_per_second`. At most one burst of tokens can be owed, so the address has its
+  // full burst again after at most twice the time in which a burst is refilled.
   void charge(const std::string& key, uint32_t count);
 
   // Returns the number of admitted connections.
@@ -47,7 +48,7 @@ class ConnectionLimiter {
  private:
   struct Address {
     uint32_t connections = 0;
-    double tokens = 0;  // new connections that may be opened now
+    double tokens = 0;  // new connections that may be opened now; negative after charge()
     Time updated;
   };
 

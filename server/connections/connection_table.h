@@ -32,11 +32,11 @@ class ConnectionTable {
   // a stand-in, which counts but cannot be closed. While one caller holds the stand-in of a name, others get the same.
   std::shared_ptr<Connection> find(absl::string_view name);
 
-  // Closes the connections that use most memory, as far as it is known: a connection counts with the bytes that its
-  // calls have claimed, and with the bytes that it has received since the last call and that no message explains.
-  // Closes those with at least half as many as the first, and at least `min_bytes`. With `close` false, only remembers
-  // what they have received. Returns the number of closed connections. O(connections), with a system call for each; one
-  // thread at a time.
+  // Closes the connections that seem to use most memory. The weight of a connection is the sum of the bytes that its
+  // calls have claimed, and of the bytes that it has received since the previous use of this function and that belong
+  // to no message. Closes connections whose weight is at least `min_bytes` and at least half of the largest weight. If
+  // `close` is false, closes none and only records the received bytes for the next use. Returns the number of closed
+  // connections. O(connections), with a system call for each; one thread at a time.
   size_t shed_heaviest(bool close, uint64_t min_bytes, const char* reason);
 
   // Closes the accepted connections for which `is_chosen` is true. Returns their number. O(connections).

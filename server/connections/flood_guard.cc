@@ -16,24 +16,24 @@ using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 
 constexpr milliseconds kLookInterval{10};
-// Interval for some time after a connection was closed or has sent much that is unexplained: a client that floods sends
-// a megabyte or begins 100 streams in a millisecond, and comes back at once.
+// Interval between two looks during kAlertTime after a connection was closed or had many unexplained bytes. It is short
+// because a client that floods sends a megabyte or begins 100 streams in a millisecond, and connects again at once.
 constexpr milliseconds kAlertInterval{2};
 constexpr std::chrono::seconds kAlertTime{1};
 constexpr double kAlertBytes = 1 << 20;
 constexpr std::chrono::seconds kCancelWindow{1};
 constexpr int kEventsAtOnce = 256;
 
-// Bytes that a call needs beside the metadata that it shows: its frame, method, address and other fields of gRPC.
+// Bytes that a call needs in addition to the metadata that gRPC reports: its frame, method, address and other fields.
 constexpr uint64_t kCallBytes = 1024;
-// Bytes of frames and TLS that messages may need: a fixed number for each message, and a share of all message bytes.
+// Bytes that frames and TLS add to messages: a fixed number for each message, and a share of all message bytes.
 constexpr uint64_t kBytesBesideMessage = 96;
 constexpr uint64_t kFrameShare = 32;  // 1/32: frames of 16 KiB need 0.06 %, records of TLS up to 2 %
 // A peer that reads a reply sends at most one byte of window updates for this number of written bytes.
 constexpr uint64_t kWrittenPerByte = 64;
 constexpr uint64_t kSegmentBytes = 64;
-// Bytes beside messages after which the streams of a connection are counted, which takes about 15 us. With so many
-// bytes, a client that resets its calls begins up to 600 streams.
+// Received bytes outside of messages after which the streams of a connection are counted, which takes about 15 us. With
+// this number of bytes, a client that resets its calls can begin up to 600 streams.
 constexpr uint64_t kCountedBytes = 16 << 10;
 
 double explained_bytes(const CallCounts& now, const CallCounts& before) {
@@ -50,7 +50,8 @@ double received_bytes(const ReceivedCounts& now, const ReceivedCounts& before) {
   return static_cast<double>(std::max(now.bytes - before.bytes, segments * kSegmentBytes));
 }
 
-// Returns whether the peer cancels more calls than it lets finish, and more than are accepted, in one second.
+// Returns whether within one second the peer cancels more calls than it lets finish, and more than `limits` always
+// accepts.
 bool cancels_too_many(const FloodSample& sample, const FloodLimits& limits, FloodBudget& budget) {
   const CallCounts& begin = budget.second_begin.counts;
   const uint64_t cancelled = sample.counts.calls_cancelled - begin.calls_cancelled;
@@ -71,8 +72,9 @@ FloodVerdict judge(const FloodSample& sample, const FloodLimits& limits, FloodBu
                           std::max(0.0, seconds) * static_cast<double>(limits.bytes_per_second);
   budget.unexplained = std::max(0.0, budget.unexplained + received - accepted);
   budget.last = sample;
-  // gRPC reports a unary call only once its message has arrived. So streams count like open calls, and so does one
-  // stream that gRPC has not read yet.
+  // gRPC reports a unary call only when its message has arrived, so more messages may be arriving than calls are open.
+  // Allow one message for each stream in memory or open call, whichever are more, and one for a stream that gRPC has
+  // not read yet.
   budget.streams = sample.streams.value_or(budget.streams);
   const uint64_t messages = std::max(budget.streams, sample.counts.calls_open) + 1;
   const uint64_t arriving = std::min(limits.buffered_bytes, messages * limits.message_bytes);
@@ -108,7 +110,7 @@ void FloodGuard::watch(const std::shared_ptr<Connection>& connection) {
     const MutexLock lock(mutex_);
     watched_[connection.get()] = std::move(watched);
   }
-  // With EPOLLET, each arrival of bytes wakes the thread once, at its next look.
+  // With EPOLLET, a look finds a connection only if bytes have arrived since the look before.
   epoll_event event{};
   event.events = EPOLLIN | EPOLLET;
   event.data.ptr = connection.get();
@@ -176,7 +178,7 @@ void FloodGuard::look_at(const std::shared_ptr<Watched>& watched) {
   sample.time = steady_clock::now();
   sample.counts = connection.counts();
   sample.received = connection.received();
-  // The connection was released, so its count is 0.
+  // A count that has decreased means that the connection was released: then received() returns 0.
   if (sample.received.bytes < watched->budget.last.received.bytes) return;
   if (sample.time - watched->window_begin >= kCancelWindow) {
     watched->window_begin = sample.time;

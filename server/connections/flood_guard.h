@@ -1,11 +1,11 @@
-// Closes connections that send more than their calls explain: floods of small frames, endless headers, and calls that
-// are begun only to be cancelled. gRPC reads such bytes without telling the application, so the guard compares what the
-// kernel has received with what the calls of the connection have read. gRPC also makes calls faster than the
-// application can accept and end them, so the guard asks gRPC how many streams of a connection it keeps in memory.
-// Users of a connection do nothing but count.
+// Closes connections that send more bytes than their calls explain: floods of small frames, endless headers, and calls
+// that are begun only to be cancelled. gRPC does not report such bytes to the application, so the guard compares the
+// bytes that the kernel has received with the bytes that the calls of the connection have read. gRPC also begins calls
+// faster than the application can accept and end them, so the guard asks gRPC how many streams of a connection it keeps
+// in memory. The code that serves calls only updates the counts of its connection.
 //
-// Threads: watch() and forget() may be called from any thread. One thread of the guard looks at the connections that
-// have received something since its last look; others cost nothing.
+// Threads: watch() and forget() may be called from any thread. The guard's thread looks periodically at the connections
+// that have received bytes since its previous look; idle connections cost nothing.
 #ifndef LOCUS_SERVER_CONNECTIONS_FLOOD_GUARD_H_
 #define LOCUS_SERVER_CONNECTIONS_FLOOD_GUARD_H_
 
@@ -27,8 +27,9 @@ namespace locus::server {
 struct FloodLimits {
   uint64_t bytes_per_second = uint64_t{1} << 20;  // unexplained bytes that are always accepted
   uint64_t burst_bytes = uint64_t{4} << 20;       // unexplained bytes that are accepted at once
-  // Bytes of a message that may have arrived although no call has read it yet: the limit on received messages, for each
-  // open call or stream, but not more than gRPC's buffers hold for all.
+  // Bytes of messages that may have arrived although no call has read them yet: at most `message_bytes`, the maximum
+  // size of a message, for each open call or stream, and at most `buffered_bytes`, the size of gRPC's buffers, for all
+  // of them.
   uint64_t message_bytes = uint64_t{32} << 20;
   uint64_t buffered_bytes = uint64_t{256} << 20;
   uint64_t cancelled_per_second = 1000;  // cancelled calls that are always accepted
@@ -44,20 +45,20 @@ struct FloodSample {
   std::optional<uint64_t> streams;  // streams that the transport keeps in memory, if they were counted
 };
 
-// State of a connection that is kept between two samples.
+// State that is kept for a connection between two samples.
 struct FloodBudget {
   FloodSample last;
-  double unexplained = 0;    // bytes received and not explained, less the bytes that are always accepted
+  double unexplained = 0;    // unexplained bytes, less those that are always accepted
   uint64_t streams = 0;      // streams in memory when they were counted last
-  FloodSample second_begin;  // sample with which the present second of counting cancelled calls began
+  FloodSample second_begin;  // first sample of the current second, in which cancelled calls are counted
 };
 
 enum class FloodVerdict : uint8_t { kHonest, kTooManyBytes, kTooManyCancelled, kTooManyStreams };
 
-// Judges a connection by its sample, and updates `budget`, whose `last` and `second_begin` begin as the sample at which
-// the connection was accepted. Received bytes are explained by the metadata of a call, by a message with its frames,
-// and by written bytes, which window updates follow. Segments that carry little count as 64 bytes, which is what they
-// cost.
+// Judges a connection by its sample, and updates `budget`. Before the first call, `last` and `second_begin` of the
+// budget must be the sample at the time when the connection was accepted. Received bytes are explained by the metadata
+// of calls, by messages with their frames, and by written bytes, for which the peer sends window updates. A segment
+// counts as at least 64 bytes, because a small segment costs as much work.
 FloodVerdict judge(const FloodSample& sample, const FloodLimits& limits, FloodBudget& budget);
 
 class FloodGuard {
@@ -67,8 +68,8 @@ class FloodGuard {
   // that are not yet destroyed, whether or not their calls were accepted. Returns nullopt if the number is unknown.
   using CountStreams = std::function<std::optional<uint64_t>(Connection& connection)>;
 
-  // Starts the thread, which calls `count_streams` for connections that send much beside messages, and `on_closed`
-  // after a connection was closed, on the thread that has closed it.
+  // Starts the thread, which calls `count_streams` for connections that send many bytes outside of messages.
+  // `on_closed` is called after the guard has closed a connection, on the thread that has closed it.
   FloodGuard(const FloodLimits& limits, CountStreams count_streams, OnClosed on_closed);
   ~FloodGuard();
   FloodGuard(const FloodGuard&) = delete;
@@ -89,7 +90,7 @@ class FloodGuard {
   struct Watched {
     std::shared_ptr<Connection> connection;
     FloodBudget budget;
-    uint64_t uncounted_bytes = 0;                        // received beside messages since the streams were counted last
+    uint64_t uncounted_bytes = 0;                        // received outside of messages since the last count of streams
     std::chrono::steady_clock::time_point window_begin;  // time of the last call of Connection::begin_cancel_window()
   };
 
@@ -98,7 +99,7 @@ class FloodGuard {
   bool wait() LOCUS_EXCLUDES(mutex_);
   void look() LOCUS_EXCLUDES(mutex_);
   void look_at(const std::shared_ptr<Watched>& watched);
-  // Returns whether so much has arrived beside messages that the streams of the connection must be counted.
+  // Returns whether so many bytes have arrived outside of messages that the streams of the connection must be counted.
   static bool must_count(const FloodSample& sample, Watched& watched);
 
   const FloodLimits limits_;

@@ -24,7 +24,7 @@ struct UnixAccess {
   std::string owner;     // user or user:group, by name or number; empty = those of the process
 };
 
-// A socket that listens and does not block. It closes itself, and removes its file.
+// A non-blocking socket that listens. The destructor closes it and removes the file of a unix socket.
 class ListeningSocket {
  public:
   explicit ListeningSocket(int descriptor) : descriptor_(descriptor) {}

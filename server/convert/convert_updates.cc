@@ -10,7 +10,7 @@ absl::Status malformed_update(absl::string_view field, absl::string_view message
   return refuse_argument(Reason::kMalformed, field, {}, message);
 }
 
-// Checks that exactly one of the message's two columns of positions is given, or at most one if the message has no ids.
+// Checks that exactly one of the message's two columns of positions is set or, if the message has no ids, at most one.
 template <class Message>
 absl::Status check_positions(const Message& message, const std::string& field) {
   const bool relative = !message.positions().empty();

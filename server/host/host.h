@@ -41,7 +41,7 @@ struct Host : RpcState {
         updates(queue_options(with, with_log)) {}
 
   static constexpr uint32_t kChangeThreads = 2;
-  // Bytes that a connection must have claimed, or sent within the interval of the memory keeper, to be closed.
+  // Minimum weight in bytes of a connection that is closed when memory is short; see ConnectionTable::shed_heaviest().
   static constexpr uint64_t kMinShedBytes = 128u << 10;
   static constexpr uint32_t kLoggingThreads = 8;
 
@@ -73,7 +73,7 @@ struct Host : RpcState {
   UpdateLog* const log;
   SlowQueries slow_queries;
   Registry registry;
-  Mutex create_mutex;  // makes counting the scenes and adding one a single step
+  Mutex create_mutex;  // held while the scenes are counted and one is added
   WorkerPool pool;
   CostEstimates costs;
   QueryScheduler scheduler;

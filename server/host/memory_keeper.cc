@@ -19,14 +19,14 @@ using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 
 constexpr milliseconds kInterval{50};
-// Minimum intervals between two releases of free memory while memory is short or claims are refused, and otherwise. A
-// release visits the whole heap.
+// Minimum intervals between two releases of free memory: the first while memory is short or claims are refused, the
+// second at other times. They are long, because a release visits the whole heap.
 constexpr milliseconds kReleaseInterval{1000};
 constexpr milliseconds kIdleReleaseInterval{5000};
-// Minimum interval between two looks at the readers of all scenes while memory is short. A look may visit much of what
-// they hold.
+// Minimum interval between two checks of the readers of all scenes while memory is short. A check may visit much of the
+// data that the readers hold.
 constexpr milliseconds kReadersInterval{1000};
-// Minimum interval between two log lines about the refused claims of one line.
+// Minimum interval between two log entries about refused claims.
 constexpr milliseconds kRefusalsInterval{5000};
 
 std::vector<ScenePtr> all_scenes(const Registry& registry) {
@@ -96,9 +96,10 @@ void MemoryKeeper::keep() {
   log_refusals(now);
 }
 
-// Memory use is now far above the point at which inserts and uploads are refused and histories are shortened. What
-// still grows is memory that gRPC allocates for frames and that no call has claimed, for example for calls that are
-// cancelled at once, or for headers without an end.
+// Closes the connections that hold or send most if the measured memory exceeds the ceiling of moves; otherwise only
+// measures them. Inserts and uploads are refused and histories are shortened below this ceiling, so the memory that
+// still grows is memory that gRPC allocates and that no call has claimed, for example for calls that are cancelled at
+// once, or for endless headers.
 void MemoryKeeper::shed_connections() {
   const bool is_full = budget_.measured() > budget_.ceiling(MemoryLine::kMoves);
   const size_t closed = shed_(is_full);
@@ -146,7 +147,7 @@ void MemoryKeeper::revoke_readers() {
   std::vector<uint64_t> held;
   for (const ScenePtr& scene : scenes) held.push_back(scene->status().pinned_bytes);
   const uint64_t sum = std::accumulate(held.begin(), held.end(), uint64_t{0});
-  // Once inserts are refused, readers of old revisions also give way to them.
+  // If inserts are refused, cancel readers of old revisions, so that inserts succeed again.
   const uint64_t growth = budget_.ceiling(MemoryLine::kInserts), taken = budget_.taken();
   const uint64_t excess = taken - std::min(taken, growth);
   const uint64_t allowed = std::min(pinned_ceiling(budget_.limit()), sum - std::min(sum, excess));

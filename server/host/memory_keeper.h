@@ -1,8 +1,8 @@
 // Thread that keeps the memory of the process below its limit. It measures the process periodically. When memory runs
 // short or a claim was refused, it drops old revisions and returns free memory to the kernel; then it drops the oldest
 // ticks of histories, so that histories give way before inserts and uploads are refused; then it cancels the readers of
-// the oldest revisions. Only this thread does so, because it visits all scenes and the whole heap. It logs which lines
-// of the budget were shortened or refused.
+// the oldest revisions. Only this thread does this work, because the work visits all scenes and the whole heap. It logs
+// which lines of the budget were shortened or refused.
 //
 // Threads: the constructor starts the thread, the destructor ends it.
 #ifndef LOCUS_SERVER_HOST_MEMORY_KEEPER_H_
@@ -22,15 +22,15 @@
 
 namespace locus::server {
 
-// Returns the maximum size of each of several parts, so that all together take `excess` bytes less: each is shortened
-// in proportion to its size. `sizes` are the bytes of the parts.
+// Returns the new maximum sizes of several parts, so that all parts together take `excess` bytes less. Each part is
+// shortened in proportion to its size. `sizes` are the present sizes of the parts in bytes.
 std::vector<uint64_t> shrunk_sizes(const std::vector<uint64_t>& sizes, uint64_t excess);
 
 class MemoryKeeper {
  public:
-  // Function that closes the connections that hold most claims and send most, because what they send uses memory inside
-  // gRPC that is in no claim. With `close` false, it only measures what they send. Returns the number of closed
-  // connections.
+  // Function that closes the connections that claim and send most. Sent bytes count, because they use memory inside
+  // gRPC that no claim includes. If `close` is false, the function only measures the sent bytes. Returns the number of
+  // closed connections.
   using Shed = std::function<size_t(bool close)>;
 
   // `budget` and `registry` must outlive the keeper.
@@ -42,7 +42,7 @@ class MemoryKeeper {
   // Measures the process, and frees memory if it is short. The thread calls it; tests may.
   void keep();
 
-  // Returns the bytes by which histories were shortened so far.
+  // Returns the number of bytes by which histories were shortened so far.
   uint64_t trimmed_bytes() const { return trimmed_bytes_.load(); }
   // Returns the bytes that cancelled readers held so far.
   uint64_t revoked_bytes() const { return revoked_bytes_.load(); }

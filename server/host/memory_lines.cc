@@ -12,8 +12,8 @@ constexpr uint64_t kPinnedShare = 4;
 // The allocator may keep 1 / kCacheShare of the limit, and at least kMinCacheBytes.
 constexpr uint64_t kCacheShare = 8;
 constexpr uint64_t kMinCacheBytes = uint64_t{64} << 20;
-// gRPC's buffers may take the share that growth leaves free (MemoryBudget::ceiling()), but at least kMinNetworkBytes,
-// which is enough for a few of the largest messages.
+// gRPC's buffers may take 1 / kNetworkShare of the limit, and at least kMinNetworkBytes, which is enough for a few of
+// the largest messages. Inserts and uploads leave the same share free (MemoryBudget::ceiling()).
 constexpr uint64_t kNetworkShare = 8;
 constexpr uint64_t kMinNetworkBytes = uint64_t{64} << 20;
 
@@ -47,7 +47,8 @@ std::vector<MemoryLineUse> memory_lines(const MemoryBudget& budget, const Regist
     lines.push_back({std::string(memory_line_name(line)), true, budget.claimed(line), budget.ceiling(line)});
     known += lines.back().used;
   }
-  // gRPC does not say what its buffers take. They get what no other line accounts for: program and stacks too.
+  // gRPC does not report the size of its buffers. So their line gets all memory that is in no other line, including the
+  // program and the stacks.
   const uint64_t used = budget.used();
   lines[5].used = used - std::min(used, known);
   return lines;

@@ -1,6 +1,7 @@
-// The lines of the memory budget as an operator sees them: what memory is used for, and the ceiling of each line. Work
-// in progress is claimed (server/scheduling/memory_budget.h), what stays is measured. The sum of all lines is about the
-// sum that the budget keeps below the memory limit: memory that claims have allocated already counts twice in it.
+// The lines of the memory budget as an operator sees them: each use of memory, with its ceiling. The memory of work in
+// progress is claimed (server/scheduling/memory_budget.h); lasting data, such as scenes, is measured. The sum of all
+// lines is about the sum that the budget keeps below the memory limit. The budget's sum can be larger, because it
+// counts memory twice that is claimed and already allocated.
 //
 // Plain functions; any thread. Cost: O(scenes + meshes + memory that pinned revisions do not share).
 #ifndef LOCUS_SERVER_HOST_MEMORY_LINES_H_
@@ -20,21 +21,22 @@ struct MemoryLineUse {
   std::string name;      // such as "history" or "replies"
   bool claimed = false;  // true: claimed before the memory exists; false: measured
   uint64_t used = 0;     // bytes
-  // Bytes. Of claimed lines, and of scenes and meshes: the use of the whole process beyond which they may not grow. Of
-  // history: the use of the whole process beyond which it gives way. Of the others: the most that the line may take.
+  // Bytes. For claimed lines, and for scenes and meshes: the memory use of the whole process above which they may not
+  // grow. For history: the memory use of the whole process above which histories are shortened. For other lines: the
+  // maximum size of the line itself.
   uint64_t ceiling = 0;
 };
 
 // Returns all lines, the claimed ones in the order in which they are refused. `log` may be null.
 std::vector<MemoryLineUse> memory_lines(const MemoryBudget& budget, const Registry& registry, const UpdateLog* log);
 
-// Returns the use of the whole process from which on memory is short: histories give way.
+// Returns the memory use of the whole process above which memory is short, so that histories are shortened.
 uint64_t short_memory(uint64_t limit);
 // Returns the bytes that pinned revisions of all scenes may hold while memory is short.
 uint64_t pinned_ceiling(uint64_t limit);
 // Returns the bytes of free memory that the allocator may keep while memory is not short.
 uint64_t cache_ceiling(uint64_t limit);
-// Returns the bytes that gRPC's buffers may take, of messages in transit and of frames that no call has claimed.
+// Returns the bytes that gRPC's buffers may take, for messages in transit and for frames that no call has claimed.
 uint64_t network_ceiling(uint64_t limit);
 
 }  // namespace locus::server

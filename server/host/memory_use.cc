@@ -15,7 +15,7 @@ constexpr uint64_t kUploadTimesColumns = 3;
 // Peak bytes for each triangle while a mesh's tree is built: a copy of the mesh in the order of its triangles,
 // temporary memory, the tree, and data that is stored with the tree.
 constexpr uint64_t kBytesATriangle = 180;
-constexpr uint64_t kBytesAPart = 64;  // size of a part without its name
+constexpr uint64_t kBytesAPart = 64;  // memory of a mesh part without its name
 constexpr uint64_t kBytesAMeshName = 1024;
 constexpr uint64_t kBytesAnInstance = 1024;
 

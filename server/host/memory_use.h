@@ -28,7 +28,7 @@ uint64_t item_count(const UpdateBatch& batch);
 // Returns the cost of a batch whose form is not checked yet: its lists may have any length.
 UpdateCost cost_of(const UpdateBatch& batch);
 
-// Returns the peak memory in bytes of an upload's columns, and that of building its tree.
+// Return the peak memory in bytes of an upload's columns, and of building the mesh's tree.
 uint64_t upload_cost(uint32_t vertices, uint32_t triangles);
 uint64_t tree_cost(uint32_t triangles);
 

@@ -8,8 +8,8 @@
 
 namespace locus::server {
 
-// Reader of a page, as a page function sees it. Every text is the reader's own choice, except the name in a
-// certificate, which was verified.
+// Reader of a page, as a page function sees it. Every text comes from the reader and is not verified, except the name
+// in a certificate.
 struct HttpRequest {
   std::string peer;              // address and port of the reader, as calls show it
   std::string address;           // limit key of the reader's address; see connection.h

@@ -1,12 +1,13 @@
 // The daemon's HTTP port: a fixed set of pages without parameters, for scrapers and probes, over TLS if there are
-// certificates. HTTP and TLS are Boost.Beast's and OpenSSL's; no file, form, script or socket upgrade is served.
+// certificates. Boost.Beast implements HTTP and OpenSSL implements TLS; no file, form, script or socket upgrade is
+// served.
 //
 // The server's resources are bounded: observability_limits.h defines how many connections are served at a time, the
 // maximum size of a request, and the timeouts. Further connections wait in the kernel. Each connection serves one
 // request. Only GET and HEAD are served; other methods are answered with 405 and unknown paths with 404.
 //
-// Threads: the page functions and the function of certificates are called on threads of the HTTP server, several at
-// once.
+// Threads: the page functions and the function that returns certificates are called on threads of the HTTP server,
+// several at once.
 #ifndef LOCUS_SERVER_OBSERVABILITY_HTTP_SERVER_H_
 #define LOCUS_SERVER_OBSERVABILITY_HTTP_SERVER_H_
 
@@ -24,7 +25,7 @@ namespace locus::server {
 class HttpServer {
  public:
   // Function that returns the checked certificates that new connections use; if it is empty, there is no TLS. If the
-  // contents have a client CA, only clients with a certificate of it are served.
+  // contents have a client CA, only clients with a certificate signed by that CA are served.
   using Certificates = std::function<TlsContents()>;
 
   // Starts serving. `address` must be a TCP address. Returns UNAVAILABLE if the server cannot listen on it.

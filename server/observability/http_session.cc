@@ -43,7 +43,8 @@ HttpReply reply_to(const Request& request, const HttpRequest& reader, const Http
   return reply;
 }
 
-// Returns the reply to bytes that are no request; nullopt if there was no request at all.
+// Returns the reply to bytes that are not a valid request; nullopt if no reply is due, because no complete request was
+// received.
 std::optional<HttpReply> reply_to_mistake(const beast::error_code& error) {
   const bool long_header = error == http::error::header_limit || error == http::error::buffer_overflow;
   if (long_header) return HttpReply{.code = 431, .body = absl::StrCat("more than ", kMaxHttpRequestBytes, " bytes\n")};
@@ -77,7 +78,8 @@ std::string certificate_name_of(TlsStream& stream) {
   return name;
 }
 
-// Each operation's handler owns the session, which ends with the last of them. All run on the stream's strand.
+// One connection. The handler of each pending operation shares ownership of the session, so the session is destroyed
+// with the last handler. All handlers run on the stream's strand.
 template <class Stream>
 class HttpSession : public std::enable_shared_from_this<HttpSession<Stream>> {
  public:
@@ -105,7 +107,7 @@ class HttpSession : public std::enable_shared_from_this<HttpSession<Stream>> {
     }
   }
 
-  // Sets the time from now after which the connection's operations fail.
+  // Sets the deadline of the connection's next operations to kHttpTimeoutMs from now.
   void limit_time() { beast::get_lowest_layer(stream_).expires_after(std::chrono::milliseconds(kHttpTimeoutMs)); }
 
   void read() {
@@ -130,7 +132,7 @@ class HttpSession : public std::enable_shared_from_this<HttpSession<Stream>> {
     });
   }
 
-  // Ends the connection such that the reader gets the whole reply.
+  // Ends the connection in such a way that the reader gets the whole reply.
   void finish() {
     if constexpr (std::is_same_v<Stream, TlsStream>) {
       stream_.async_shutdown([self = this->shared_from_this()](const beast::error_code&) { self->ended_(); });

@@ -1,4 +1,5 @@
-// One connection of the HTTP port: TLS if there is any, one request, its reply, the end. For http_server.cc only.
+// Serves one connection of the HTTP port: the TLS handshake if TLS is on, one request and its reply. For http_server.cc
+// only.
 #ifndef LOCUS_SERVER_OBSERVABILITY_HTTP_SESSION_H_
 #define LOCUS_SERVER_OBSERVABILITY_HTTP_SESSION_H_
 

@@ -11,13 +11,14 @@ namespace {
 namespace ssl = boost::asio::ssl;
 using boost::system::error_code;
 
-// Returns null if OpenSSL refuses one of the contents.
+// Returns the settings for `contents`; null if OpenSSL refuses a certificate or the key.
 std::shared_ptr<ssl::context> make_context(const TlsContents& contents) {
   auto made = std::make_shared<ssl::context>(ssl::context::tls_server);
   SSL_CTX* const native = made->native_handle();
   const auto buffer = [](const std::string& text) { return boost::asio::buffer(text.data(), text.size()); };
   bool good = SSL_CTX_set_min_proto_version(native, TLS1_2_VERSION) == 1;
-  // A resumed session would carry the identity of an earlier certificate past a change of the client CA.
+  // Do not resume sessions: a resumed session would accept a certificate that was verified before the client CA
+  // changed.
   SSL_CTX_set_session_cache_mode(native, SSL_SESS_CACHE_OFF);
   SSL_CTX_set_options(native, SSL_OP_NO_TICKET | SSL_OP_NO_RENEGOTIATION);
   error_code error;

@@ -20,7 +20,8 @@ class HttpTls {
   explicit HttpTls(std::function<TlsContents()> certificates) : certificates_(std::move(certificates)) {}
 
   // Returns the settings for a new connection: TLS 1.2 and 1.3, and a required client certificate if there is a client
-  // CA. Made anew when the certificates have changed. Returns null if OpenSSL refuses the certificates.
+  // CA. The settings are made again after the certificates have changed. Returns null if OpenSSL refuses the
+  // certificates.
   std::shared_ptr<boost::asio::ssl::context> context() LOCUS_EXCLUDES(mutex_);
 
  private:

@@ -104,7 +104,7 @@ double number_at(const std::vector<std::string>& fields, size_t at) {
 }  // namespace
 
 uint64_t resident_bytes() {
-  // Sizes in pages: `mapped` of the whole address space, `resident` of the part that is in memory.
+  // Sizes in pages: `mapped` is the size of the whole address space, `resident` of the part that is in memory.
   uint64_t mapped = 0;
   uint64_t resident = 0;
   std::ifstream("/proc/self/statm") >> mapped >> resident;

@@ -94,7 +94,7 @@ class BlockingCalls::Call final : private IoLoop::ActiveCall, private MessageStr
     return refuse_full("", limit, max, max + 1.0, kCallRetryMs);
   }
 
-  // Checks what is known before the first message.
+  // Makes the checks that need no message: the method, the caller's rights, and whether the server serves.
   absl::Status check() {
     method_ = owner_.find(context_.method());
     if (method_ == nullptr) return no_method(context_.method());
@@ -163,7 +163,8 @@ class BlockingCalls::Call final : private IoLoop::ActiveCall, private MessageStr
     return wait();
   }
 
-  // Claims what the answer takes, because a claim of the body ends with the body, but the answer may still wait.
+  // Sets the answer and claims its memory. A claim that the body holds would not suffice: it ends with the body, but
+  // the answer may still wait to be sent.
   void answer(const google::protobuf::Message& response) override {
     answer_ = to_bytes(response);
     caller_->connection().written(answer_.Length());
@@ -198,7 +199,7 @@ class BlockingCalls::Call final : private IoLoop::ActiveCall, private MessageStr
     if (finished_ && over_ && first_ != First::kReading && first_ != First::kGivenUp) delete this;
   }
 
-  // Cancels a call whose caller may no longer make it.
+  // Cancels the call if its caller has lost the right to make it.
   void recheck() override {
     if (is_revoked_ || finishing_since_.load() != SteadyTime()) return;
     const std::string scene = this->scene();
@@ -212,7 +213,7 @@ class BlockingCalls::Call final : private IoLoop::ActiveCall, private MessageStr
   // Does nothing: the body polls Caller::stop(), which fails once the drain's grace period has passed.
   void drain() override {}
 
-  // Ends a call whose caller does not send the first message, or does not take the last one.
+  // Ends the call if its caller does not send the first message or does not read the answer.
   void end_if_stalled(SteadyTime now) override {
     const std::chrono::milliseconds limit = owner_.state_.stall_limit;
     if (first_ == First::kReading && now - arrived_ > limit)
@@ -221,7 +222,7 @@ class BlockingCalls::Call final : private IoLoop::ActiveCall, private MessageStr
     if (finishing_since != SteadyTime() && now - finishing_since > limit) context_.TryCancel();
   }
 
-  // Ends a call that waits for its first message.
+  // Ends a call whose first message has not arrived yet.
   void give_up(const absl::Status& status) {
     first_ = First::kGivenUp;
     finish(status);

@@ -2,7 +2,7 @@
 // and runs its body on a thread of its own. Calls of unknown methods are refused with UNIMPLEMENTED.
 //
 // gRPC's synchronous services are not used: they parse a message before any of our code runs, so that a message of a
-// few megabytes could use gigabytes, and they answer bytes that are no message with INTERNAL and no text.
+// few megabytes could use gigabytes. Also, they answer malformed bytes with INTERNAL and an empty text.
 //
 // Threads: add() and listen() before the server serves, by one thread. Calls arrive on IO loops.
 #ifndef LOCUS_SERVER_RPC_BLOCKING_CALLS_H_

@@ -26,7 +26,7 @@ struct BlockingMethod {
   std::function<absl::Status(const Caller&, MessageStream&)> body;
   // Maximum memory in bytes that a call holds for its responses at any time, unless its body claims more.
   uint64_t reply_bytes = 64u << 10;
-  bool is_change = false;  // every call is written to the audit log, not only refused ones
+  bool is_change = false;  // write every call to the audit log, not only refused calls
   WhileClosed while_closed = WhileClosed::kRefuse;
   AdmissionLimiter* limiter = nullptr;  // null: RpcState::calls
   const char* limit = "calls";          // name of the limiter in refusals

@@ -50,44 +50,45 @@ class Caller {
   // Counts the call and its metadata for its connection. Call it once, when the call was accepted.
   void count_call() const;
 
-  // Finds out who calls, and checks that the caller may call the method `path` of this server. UNAUTHENTICATED if the
-  // caller's credentials are not accepted, or if a caller without credentials may do nothing here; PERMISSION_DENIED if
-  // the caller lacks a right to the server that the method needs. Call it before the other functions on rights.
+  // Authenticates the caller, and checks that the caller may call the method `path` of this server. UNAUTHENTICATED if
+  // the caller's credentials are not accepted, or if a caller without credentials may do nothing here;
+  // PERMISSION_DENIED if the caller lacks a right to the server that the method needs. Call it before the other
+  // functions on rights.
   absl::Status authorize(absl::string_view path);
-  // Returns whether the caller has a right, for rights to scenes to the scene `scene`.
+  // Returns whether the caller has the right; if it is a right to scenes, whether the caller has it to `scene`.
   bool may(Right right, absl::string_view scene) const;
   // Returns whether the caller may administer every scene.
   bool administers_all() const;
   // Returns OK if the caller has the right to the scene that the method needs. NOT_FOUND, as for a scene that does not
   // exist, if the caller may not read the scene; PERMISSION_DENIED if the caller may read it, but lacks the right.
   absl::Status check_right(const std::string& scene) const;
-  // Returns PERMISSION_DENIED, which says that the caller lacks the right to the scene.
+  // Returns PERMISSION_DENIED with a text that names the caller, the missing right and the scene.
   absl::Status lacks_right(Right right, absl::string_view scene) const;
-  // Returns OK while the caller may go on with the call, which serves the scene `scene`, or none if that is empty.
-  // UNAUTHENTICATED if the credentials were revoked or have expired since the call began; otherwise the errors of
+  // Returns OK while the caller may continue the call. `scene` is the scene that the call serves; empty if it serves
+  // none. UNAUTHENTICATED if the credentials were revoked or have expired since the call began; otherwise the errors of
   // authorize() and check_right() for the rights that the caller has now.
   absl::Status recheck(const std::string& scene) const;
   // Returns the caller's identity. Before authorize(), and in servers without access control, this is the identity of
   // callers without credentials.
   const Identity& identity() const { return *identity_; }
 
-  // Returns an id of the client: of its identity if it has one, otherwise of its connection. The same for all calls of
-  // the client, and different for other clients.
+  // Returns an id of the client: a hash of its identity's name or, without an identity, of its connection's name. All
+  // calls of a client have the same id; other clients have other ids.
   uint64_t client() const;
 
   // Returns the names under which the quotas of the caller's identity and connection are counted.
   std::array<std::string, 2> quota_subjects() const;
-  // Takes `amount` from a quota of the caller's identity and of its connection: see Quotas.
+  // Takes `amount` from the quota `kind` of the caller's identity and of its connection. See Quotas::take().
   absl::Status take_quota(QuotaKind kind, double amount) const;
-  // Charges a quota of the caller's identity and of its connection with work that was already done, whether or not the
-  // quotas suffice.
+  // Takes `amount` from the quota `kind` of the caller's identity and of its connection even if the quota does not
+  // suffice, because the work is already done.
   void charge_quota(QuotaKind kind, double amount) const;
-  // Takes `amount` of a quota for as long as the result lives.
+  // Takes `amount` of the quota `kind` until the result is destroyed.
   absl::StatusOr<QuotaHold> hold_quota(QuotaKind kind, double amount) const;
 
-  // Claims `bytes` on a line of the server's memory, of the quotas bytes_in_flight of the caller's identity and
-  // connection and, for moves, requests and replies, of the share of its connection. RESOURCE_EXHAUSTED names the limit
-  // or quota that does not suffice: see MemoryBudget and Quotas.
+  // Claims `bytes` on `line` of the server's memory budget, and takes them from the quota bytes_in_flight of the
+  // caller's identity and connection. For moves, requests and replies, the bytes also count against the connection's
+  // share (MemoryBudget::connection_share()). RESOURCE_EXHAUSTED names the limit or quota that does not suffice.
   absl::StatusOr<CallMemory> claim(MemoryLine line, absl::string_view field, uint64_t bytes) const;
   // Claims `bytes` for work that is never refused, because it frees memory.
   CallMemory claim_anyway(MemoryLine line, uint64_t bytes) const;
@@ -95,15 +96,17 @@ class Caller {
   // Remembers the scene or mesh that a blocking call is about, for the audit log. Call it on the call's own thread.
   void set_subject(absl::string_view subject) const { subject_ = std::string(subject); }
   const std::string& subject() const { return subject_; }
-  // Appends a line to the audit log, if there is one: what the call changed in `subject`, a scene or mesh, or why it
-  // was refused.
+  // Appends a line to the audit log, if there is one: `status` says whether the call changed `subject`, a scene or
+  // mesh, or why the call was refused.
   void audit(absl::string_view subject, const absl::Status& status) const;
-  // Appends a line for a call about a scene that the caller may not read, whether it exists or not, unless the line of
-  // the call's answer says it too.
+  // Appends a line to the audit log for a call that names a scene that the caller may not read. Does nothing if
+  // promise_audit() was called and `scene` is the call's subject, because then the line of the answer names the scene
+  // too. The scene need not exist.
   void audit_hidden(absl::string_view scene) const;
-  // Promises that audit() is called with the answer of this call, whatever it is.
+  // Tells audit_hidden() that audit() will be called with the final status of this call.
   void promise_audit() { is_answer_audited_ = true; }
-  // Counts an update of a scene, for the audit log's line a minute. `items` is the number of objects that it changed.
+  // Counts an update of a scene for the line about updates that the audit log gets each minute. `items` is the number
+  // of objects that the update changed.
   void audit_update(const std::string& scene, uint64_t items) const;
   // Returns whether the refusal `status` is written to the audit log.
   static bool is_audited(const absl::Status& status);
@@ -136,7 +139,7 @@ class Caller {
   SteadyTime deadline_;
   const RpcRight* rpc_right_ = nullptr;  // row of the method; null before authorize()
   IdentityPtr identity_ = anonymous_identity();
-  std::array<std::string, 2> quota_subjects_;  // of quota_subjects(); set by authorize() with access control
+  std::array<std::string, 2> quota_subjects_;  // result of quota_subjects(); set by authorize() with access control
   mutable std::string subject_;
   bool is_answer_audited_ = false;
   const uint64_t number_ = next_request_number();

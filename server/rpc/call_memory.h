@@ -18,7 +18,7 @@ class CallMemory {
  public:
   CallMemory() = default;
   // Combines a claim with the quotas that were taken for it, and with the connection whose claimed_bytes include it;
-  // `connection` is null if they do not.
+  // `connection` is null if no connection's claimed_bytes include the claim.
   CallMemory(MemoryBudget::Claim claim, QuotaHold quota, std::shared_ptr<Connection> connection)
       : claim_(std::move(claim)), quota_(std::move(quota)), connection_(std::move(connection)) {}
   CallMemory(CallMemory&&) noexcept = default;

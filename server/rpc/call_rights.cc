@@ -44,7 +44,8 @@ absl::Status lacks(const Identity& identity, Right right, absl::string_view what
                                                   "; ask the operator for a line `grant` in the access file"));
 }
 
-// Adds `bytes` to what the connection has claimed; RESOURCE_EXHAUSTED if that exceeds `share`.
+// Adds `bytes` to the connection's claimed_bytes. Returns RESOURCE_EXHAUSTED, and adds nothing, if the sum would exceed
+// `share`.
 absl::Status take_share(Connection& connection, uint64_t share, absl::string_view field, uint64_t bytes) {
   constexpr uint32_t kShareRetryMs = 200;
   const uint64_t held = connection.claimed_bytes.fetch_add(bytes);
@@ -91,7 +92,7 @@ absl::StatusOr<IdentityPtr> authenticate(const AccessControl& access, Connection
 absl::Status Caller::check_certificate() const {
   int64_t end = connection_->certificate_end.load(std::memory_order_relaxed);
   if (end == 0) {
-    end = std::max<int64_t>(peer_certificate_end(context_), 1);  // 1: a certificate without an end has expired
+    end = std::max<int64_t>(peer_certificate_end(context_), 1);  // an unreadable certificate counts as expired
     connection_->certificate_end.store(end, std::memory_order_relaxed);
   }
   if (end == std::numeric_limits<int64_t>::max() || unix_seconds() < end) return absl::OkStatus();

@@ -261,8 +261,8 @@ class HotCall final : private IoLoop::ActiveCall {
     begin(*slots_.back(), std::move(refused));
   }
 
-  // Returns whether a message that was refused before it was parsed can be answered, so that its stream continues:
-  // whether its bytes are a message and name its sequence. Parses the rest of `request` only as far as needed for this.
+  // Returns whether a message that was refused before it was parsed can be answered by itself, so that its stream
+  // continues. This needs its sequence number, so only the numbers and short texts of `request` are parsed.
   static bool can_answer(const absl::Status& refused, const Bytes& bytes, Request& request) {
     const std::optional<Refusal> refusal = refusal_of(refused);
     return Method::kStream && refusal && refusal->reason != Reason::kMalformed && parse_envelope(bytes, request);
@@ -297,7 +297,7 @@ class HotCall final : private IoLoop::ActiveCall {
     });
   }
 
-  // Reduces the memory that is claimed for the answer of a slot to the size that the answer has.
+  // Reduces the claim for a slot's answer to the memory that the finished answer needs.
   void shrink_claim(Slot& slot) {
     constexpr uint64_t kWorthwhile = 64u << 10;
     if (slot.answer_claim_.bytes() > kWorthwhile)
@@ -419,7 +419,7 @@ class HotCall final : private IoLoop::ActiveCall {
     });
   }
 
-  // Ends a call whose caller may no longer make it.
+  // Ends the call if its caller has lost the right to make it.
   void recheck() override {
     if (finishing_ || stopping_) return;
     const std::string scene = Method::kStream || slots_.empty() ? scene_.scene() : slots_.front()->request_.scene();
@@ -429,7 +429,8 @@ class HotCall final : private IoLoop::ActiveCall {
     act([&] { stop(std::move(status)); });
   }
 
-  // Ends a call whose caller does not take its answer: unread answers keep their claims of memory.
+  // Ends the call if its caller does not read an answer for too long, because unread answers keep their claims of
+  // memory.
   void end_if_stalled(SteadyTime now) override {
     const bool is_writing = writing_ != nullptr || (finishing_ && !finished_);
     if (is_writing && now - writing_since_ > listener_.state_.stall_limit) context_.TryCancel();
@@ -451,7 +452,7 @@ class HotCall final : private IoLoop::ActiveCall {
   std::atomic<bool> stopped_{false};  // true once the caller no longer waits for answers; polled by work on any thread
   SteadyTime arrived_;
   std::optional<OpenStream> open_;
-  QuotaHold open_quota_;  // of a stream
+  QuotaHold open_quota_;  // quota of open streams, held by a stream
   std::optional<Caller> caller_;
   AdmissionLimiter::Permit permit_;
   SceneBinding scene_;

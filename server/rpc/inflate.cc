@@ -37,16 +37,16 @@ class Inflation {
   Inflation(const Inflation&) = delete;
   Inflation& operator=(const Inflation&) = delete;
 
-  // Returns the next bytes of the result, at most `bytes`; fewer at its end.
+  // Returns the next `bytes` bytes of the result, or fewer if the result ends before.
   absl::StatusOr<grpc::Slice> next(uint64_t bytes) {
     const grpc::Slice piece(bytes);
-    stream_.next_out = const_cast<Bytef*>(piece.begin());  // nobody else has the new piece
+    stream_.next_out = const_cast<Bytef*>(piece.begin());  // the new piece is not shared
     stream_.avail_out = static_cast<uInt>(bytes);
     while (!ended_ && stream_.avail_out > 0) RETURN_IF_ERROR(step());
     return piece.sub(0, bytes - stream_.avail_out);
   }
 
-  // Returns whether the stream has ended, and OK only if nothing follows it.
+  // Returns whether the stream has ended; INVALID_ARGUMENT if further bytes follow its end.
   absl::StatusOr<bool> ended() const {
     if (ended_ && (stream_.avail_in > 0 || next_input_ < input_.size())) return no_gzip();
     return ended_;

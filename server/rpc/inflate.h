@@ -14,14 +14,14 @@
 
 namespace locus::server {
 
-// Returns whether the bytes begin as gzip does. No message does, because the byte would be a tag of wire type 7, which
-// does not exist.
+// Returns whether the bytes begin with the first byte of gzip. No Protobuf message begins with this byte, because it
+// would be a tag with the wire type 7, which does not exist.
 bool is_gzip(const grpc::ByteBuffer& bytes);
 
-// Replaces `bytes` by what they inflate to. Returns claims of the memory that the new bytes take, which are made before
-// it is used. RESOURCE_EXHAUSTED naming the limit receive_bytes if there are more than `max_bytes`, INVALID_ARGUMENT
-// (MALFORMED) for bytes that are not exactly one gzip stream, and errors of MemoryBudget::claim(); `bytes` are
-// unchanged after an error. Cost: 3 ms for each MiB of the result.
+// Replaces `bytes` by their inflated content. Returns the claims of the memory of the content; each claim is made
+// before its memory is allocated. RESOURCE_EXHAUSTED naming the limit receive_bytes if there are more than `max_bytes`,
+// INVALID_ARGUMENT (MALFORMED) for bytes that are not exactly one gzip stream, and errors of MemoryBudget::claim();
+// `bytes` are unchanged after an error. Cost: 3 ms for each MiB of the result.
 absl::StatusOr<std::vector<MemoryBudget::Claim>> inflate_gzip(MemoryBudget& memory, uint64_t max_bytes,
                                                               grpc::ByteBuffer& bytes);
 

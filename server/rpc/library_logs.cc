@@ -18,7 +18,8 @@ namespace {
 
 std::atomic<LogLevel> grpc_errors{LogLevel::kWarning};
 
-// Any peer can cause errors of gRPC, such as a failed handshake of TLS, as often as it connects.
+// Logs a message of gRPC. Limits the number of lines, because any peer can cause errors of gRPC, such as a failed TLS
+// handshake, as often as it connects.
 void log_for_grpc(gpr_log_func_args* args) {
   static LineLimit& lines = *new LineLimit(kMaxLibraryLines);
   const LogLevel level = args->severity == GPR_LOG_SEVERITY_ERROR ? grpc_errors.load() : LogLevel::kDebug;

@@ -1,4 +1,4 @@
-// Name and end of the certificate of a call's client. Functions without state; any thread.
+// Name and expiry time in the certificate of a call's client. Functions without state; any thread.
 #ifndef LOCUS_SERVER_RPC_PEER_IDENTITY_H_
 #define LOCUS_SERVER_RPC_PEER_IDENTITY_H_
 

@@ -41,7 +41,7 @@ bool accept(SSL* ssl, absl::string_view bytes) {
   auto* check = static_cast<FrameCheck*>(SSL_get_ex_data(ssl, checks->index));
   if (check == nullptr) {
     auto made = std::make_unique<FrameCheck>();
-    if (SSL_set_ex_data(ssl, checks->index, made.get()) == 0) return false;  // no memory for it
+    if (SSL_set_ex_data(ssl, checks->index, made.get()) == 0) return false;  // out of memory
     check = made.release();
   }
   const char* reason = check->refusal(bytes, std::chrono::steady_clock::now());

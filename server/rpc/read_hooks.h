@@ -1,15 +1,15 @@
 // Replaces the functions with which gRPC reads from connections, recvmsg() and SSL_read(), for the whole process,
-// because gRPC 1.51 has no place between reading and parsing. The replacements call the original functions, and check
-// the frames of HTTP/2 that were read: those of sockets that a CheckedReads watches, and those of TLS connections of
-// clients that have chosen HTTP/2. A connection with refused bytes looks to gRPC as if the peer had reset it. See
-// server/connections/README.md for the reason.
+// because gRPC 1.51 offers no hook between reading and parsing. The replacements call the original functions, then
+// check the frames of HTTP/2 in the bytes that were read. Checked are the sockets that a CheckedReads watches, and TLS
+// connections whose clients have chosen HTTP/2. A connection with refused bytes looks to gRPC as if the peer had reset
+// it. See server/connections/README.md for the reason.
 #ifndef LOCUS_SERVER_RPC_READ_HOOKS_H_
 #define LOCUS_SERVER_RPC_READ_HOOKS_H_
 
 namespace locus::server {
 
 // Begins to check the bytes of TLS connections. `on_refused` is called on the reading thread for each read whose bytes
-// are refused. Call it before the first connection; the first call in the process counts. Any thread.
+// are refused. Call it before the first connection; only the first call in the process has an effect. Any thread.
 void check_tls_reads(void (*on_refused)(const char* reason));
 
 }  // namespace locus::server

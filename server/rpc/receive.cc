@@ -28,7 +28,7 @@ using google::protobuf::io::StringOutputStream;
 // Maximum size in bytes of a slice of a response.
 constexpr int kSliceBytes = 1 << 20;
 
-// Maximum size in bytes of a text in an envelope: names of scenes are shorter. Maximum size of all its fields.
+// Maximum sizes in bytes of one text in an envelope (names of scenes are shorter), and of all fields of an envelope.
 constexpr uint32_t kMaxEnvelopeText = 256;
 constexpr int kMaxEnvelopeBytes = 2048;
 
@@ -56,7 +56,7 @@ bool copy_scalar(uint32_t tag, const Descriptor& type, CodedInputStream& from, C
 
 absl::StatusOr<CallMemory> parse_request(const Caller& caller, const WirePlan& plan, grpc::ByteBuffer& bytes,
                                          google::protobuf::Message& request) {
-  std::vector<MemoryBudget::Claim> inflated;  // until the message is parsed
+  std::vector<MemoryBudget::Claim> inflated;  // held until the message is parsed
   if (caller.state().max_inflated_bytes > 0 && is_gzip(bytes)) {
     ASSIGN_OR_RETURN(inflated, inflate_gzip(caller.memory(), caller.state().max_inflated_bytes, bytes));
   }

@@ -12,16 +12,17 @@
 
 namespace locus::server {
 
-// Parses `bytes`, which it empties, into `request`. Returns a claim of the memory that the parsed message takes. Errors
-// of WirePlan::scan(), Caller::claim() and, if the server accepts compressed messages, inflate_gzip(). After an
-// error other than those of inflate_gzip(), `bytes` have the content that they had.
+// Parses `bytes`, which it empties, into `request`. Returns a claim of the memory of the parsed message. Errors: those
+// of inflate_gzip() if the server accepts compressed messages, those of WirePlan::scan() and Caller::claim(), and
+// INVALID_ARGUMENT (MALFORMED) if Protobuf cannot parse the bytes. After an error of scan() or claim(), `bytes` still
+// contain the message, inflated if it was compressed.
 absl::StatusOr<CallMemory> parse_request(const Caller& caller, const WirePlan& plan, grpc::ByteBuffer& bytes,
                                          google::protobuf::Message& request);
 
-// Parses of `bytes` only the numbers and the short texts of the message itself, such as the sequence number of a
-// message of a stream, so that a message can be refused by name although it was not parsed. Claims no memory, because
-// these fields take at most a few kilobytes. Returns false if the bytes are no message of this type, or if they have
-// more such fields. Does not change `bytes`.
+// Parses only the envelope of a message: its numbers and short texts, without its sub-messages. The envelope of a
+// stream's message has the sequence number, which is needed to refuse a message that was not parsed. Claims no memory,
+// because an envelope takes at most a few kilobytes. Returns false if the bytes are not a message of this type, or if
+// the envelope is larger. Does not change `bytes`.
 bool parse_envelope(const grpc::ByteBuffer& bytes, google::protobuf::Message& request);
 
 // Returns the bytes of a response.

@@ -29,13 +29,13 @@ struct RpcState {
   AdmissionLimiter calls;           // running calls, except streams
   AdmissionLimiter streams;         // open streams
   MemoryBudget memory;              // limit of the process
-  uint64_t max_inflated_bytes = 0;  // maximum size of a message that came compressed; 0 = gRPC refuses them
+  uint64_t max_inflated_bytes = 0;  // maximum size of an inflated message; 0 = gRPC refuses compressed ones
   // Identities and rights of callers. Set before the first call; null in servers without access control.
   AccessControl* access = nullptr;
   Quotas quotas{
       [this](absl::string_view subject) { return access == nullptr ? Quota() : access->rules()->quota_of(subject); }};
   Drain drain;
-  // Time after which a call ends whose caller neither sends nor takes a message that the call waits for.
+  // Maximum time that a call waits for its caller to send or read a message. After it, the call is ended.
   std::chrono::milliseconds stall_limit = std::chrono::seconds(60);
   std::atomic<bool> recovering{false};  // true while the scenes of the log are being recovered
 };

@@ -18,16 +18,17 @@ using std::chrono::steady_clock;
 using Json = nlohmann::json;
 
 constexpr intptr_t kSocketsAtOnce = 256;
-// gRPC may list a connection later than one with a higher number, so at this interval the counter asks for all numbers.
+// Interval at which the counter asks for the numbers of all connections, not only for new ones: gRPC may list a
+// connection later than another one with a higher number.
 constexpr std::chrono::seconds kAskAllInterval{1};
 
-// Parses a text that gRPC has allocated, and frees it. Returns a discarded value for null and for what is no JSON.
+// Parses a text that gRPC has allocated, and frees it. Returns a discarded value if `text` is null or not JSON.
 Json parse_channelz(char* text) {
   const std::unique_ptr<char, decltype(&gpr_free)> owned(text, &gpr_free);
   return Json::parse(text == nullptr ? "" : text, nullptr, /*allow_exceptions=*/false);
 }
 
-// Returns the number in a field; channelz writes 64-bit numbers as texts, and leaves out zeros.
+// Returns the number in a field; 0 if the field is missing. Channelz writes 64-bit numbers as texts and omits zeros.
 int64_t number_in(const Json& object, const char* field) {
   int64_t number = 0;
   const auto found = object.find(field);

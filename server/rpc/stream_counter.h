@@ -1,11 +1,12 @@
 // Counts the streams that gRPC keeps in memory for a connection, by gRPC's own statistics (channelz): those that the
 // client has begun and that are not yet destroyed. gRPC 1.51 makes a stream for each HEADERS frame, before the server
 // accepts its call, and keeps it after the client has reset it, without a limit. A client that resets each call at once
-// makes about 130,000 calls a second, three times as many as the server accepts and ends, so only gRPC knows them all.
+// makes about 130,000 calls a second, three times as many as the server accepts and ends, so only gRPC knows all of
+// them.
 //
 // Threads: one thread at a time. A count takes about 15 us; the first count of a connection takes longer, because it
-// asks for the numbers of all connections that gRPC has added since. Reconsider: with a gRPC that limits the calls that
-// wait to be accepted.
+// asks for the numbers of all connections that gRPC has added since. Remove this class once gRPC limits the number of
+// calls that wait to be accepted.
 #ifndef LOCUS_SERVER_RPC_STREAM_COUNTER_H_
 #define LOCUS_SERVER_RPC_STREAM_COUNTER_H_
 
@@ -20,7 +21,7 @@ namespace locus::server {
 
 class StreamCounter {
  public:
-  // `table` has the connections by the names that gRPC gives them, and must outlive the counter.
+  // `table` finds connections by the names that gRPC gives them. It must outlive the counter.
   explicit StreamCounter(ConnectionTable& table) : table_(table) {}
 
   // Returns the number of streams; nullopt if gRPC does not know the connection, such as before its handshake.

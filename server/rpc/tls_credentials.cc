@@ -60,7 +60,7 @@ TlsCredentials::~TlsCredentials() {
 std::shared_ptr<grpc::ServerCredentials> TlsCredentials::grpc_credentials() {
   const auto clients = files_.client_ca.empty() ? GRPC_SSL_DONT_REQUEST_CLIENT_CERTIFICATE
                                                 : GRPC_SSL_REQUEST_AND_REQUIRE_CLIENT_CERTIFICATE_AND_VERIFY;
-  // These options have TLS 1.2 and 1.3, as is gRPC's default.
+  // These options accept TLS 1.2 and 1.3, the default of gRPC.
   return std::make_shared<FetchingCredentials>(grpc_ssl_server_credentials_create_with_options(
       grpc_ssl_server_credentials_create_options_using_config_fetcher(clients, &TlsCredentials::fetch, this)));
 }
@@ -101,7 +101,7 @@ TlsContents TlsCredentials::contents() const {
   return contents_;
 }
 
-// Gives gRPC the contents unless it has them already.
+// Passes the contents to gRPC, unless gRPC has them already.
 grpc_ssl_certificate_config_reload_status TlsCredentials::fetch(void* self,
                                                                 grpc_ssl_server_certificate_config** config) {
   auto& credentials = *static_cast<TlsCredentials*>(self);
@@ -109,7 +109,8 @@ grpc_ssl_certificate_config_reload_status TlsCredentials::fetch(void* self,
   if (std::exchange(credentials.fetched_, true)) return GRPC_SSL_CERTIFICATE_CONFIG_RELOAD_UNCHANGED;
   const TlsContents& contents = credentials.contents_;
   const grpc_ssl_pem_key_cert_pair pair{contents.key.c_str(), contents.certificate.c_str()};
-  // gRPC needs certificates of authorities here even if it asks no client for a certificate, and then ignores them.
+  // gRPC requires CA certificates here. If it asks clients for no certificate, it ignores them, so pass any
+  // certificates.
   const std::string& roots = contents.client_ca.empty() ? contents.certificate : contents.client_ca;
   *config = grpc_ssl_server_certificate_config_create(roots.c_str(), &pair, 1);
   return GRPC_SSL_CERTIFICATE_CONFIG_RELOAD_NEW;
@@ -129,8 +130,8 @@ void TlsCredentials::run() {
   }
 }
 
-// Remembers a failure, and logs it when it is seen for the second time: while files are being replaced one after
-// another, they do not match each other for a moment.
+// Stores a failure, and logs it only when it occurs a second time in a row, because files that are replaced one after
+// another do not match each other for a moment.
 void TlsCredentials::note_failure(const absl::Status& why) {
   if (why != last_failure_) {
     last_failure_ = why;

@@ -1,11 +1,11 @@
 // TLS for the connections of a server: the credentials for gRPC, and a thread that looks for changed files each second.
-// New connections use the newest good files; connections that exist keep theirs, so no call is dropped. Files that
-// cannot be used are logged as an error once, and the files before them stay in use. Certificate, key and client CA are
-// always replaced together, in memory, so a key is never used with another certificate. The owner ends the connections
-// of clients that are no longer trusted, through TlsHooks.
+// New connections use the newest valid files; existing connections keep the files with which they began, so no call is
+// dropped. Files that cannot be used are logged as an error once, and the previous files stay in use. Certificate, key
+// and client CA are always replaced together, in memory, so a key is never used with another certificate. The owner
+// ends the connections of clients that are no longer trusted, through TlsHooks.
 //
-// gRPC asks for new files when a connection begins. It does so without a lock, which is safe because only one thread,
-// that of the acceptor, gives connections to gRPC.
+// gRPC asks for new files when a connection begins. It takes no lock for this, which is safe because only the
+// acceptor's thread hands connections over to gRPC.
 //
 // Threads: the members may be called from any thread.
 #ifndef LOCUS_SERVER_RPC_TLS_CREDENTIALS_H_
@@ -28,10 +28,11 @@
 
 namespace locus::server {
 
-// Functions that the thread calls, and authority_removed also reload(). They must not call the TlsCredentials.
+// Functions that the thread calls; reload() calls authority_removed too. They must not call functions of the
+// TlsCredentials.
 struct TlsHooks {
-  // Called after new files are in use in which a certificate of the client CA is missing. Connections that begin later
-  // use the new files.
+  // Called when a certificate of the client CA has been removed and the new files are in use. Connections that begin
+  // after the call use the new files.
   std::function<void()> authority_removed = [] {};
   std::function<void()> second_passed = [] {};  // called each second
 };
@@ -55,19 +56,19 @@ class TlsCredentials {
   // Returns the contents in use.
   TlsContents contents() const LOCUS_EXCLUDES(mutex_);
 
-  // Return how often changed files were taken into use, and how often they could not be used.
+  // Return how often changed files were put into use, and how often changed files could not be used.
   uint64_t reloads() const { return reloads_.load(); }
   uint64_t failures() const { return failures_.load(); }
 
  private:
   TlsCredentials(const TlsFiles& files, TlsHooks hooks, TlsContents contents);
   static grpc_ssl_certificate_config_reload_status fetch(void* self, grpc_ssl_server_certificate_config** config);
-  // Certificates of the client CA, in PEM.
+  // Certificates of the client CA before and after a change of the files, in PEM.
   struct Change {
     std::string before;
     std::string now;
   };
-  // Takes `contents` into use if they are new and good; otherwise returns nullopt.
+  // Replaces the contents in use if `contents` are new and valid; otherwise returns nullopt.
   std::optional<Change> replace(absl::StatusOr<TlsContents> contents) LOCUS_EXCLUDES(mutex_);
   void run() LOCUS_EXCLUDES(mutex_);
   void note_failure(const absl::Status& why) LOCUS_REQUIRES(mutex_);

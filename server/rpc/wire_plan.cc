@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "absl/container/inlined_vector.h"
 #include "absl/strings/str_cat.h"
 #include "core/base/check.h"
 #include "core/base/limits.h"
@@ -28,9 +29,9 @@ constexpr uint64_t kGrowth = 2;
 // points to.
 constexpr uint64_t kStringBytes = 64;
 constexpr uint64_t kPointerBytes = 32;
-// Bytes of a map's node beside the key and the value.
+// Bytes of a map's node in addition to the key and the value.
 constexpr uint64_t kMapNodeBytes = 64;
-// Bytes that Protobuf keeps for an unknown field, beside its content.
+// Bytes that Protobuf keeps for an unknown field in addition to its content.
 constexpr uint64_t kUnknownBytes = 64;
 
 // Types of values on the wire, with Protobuf's numbers.
@@ -105,9 +106,10 @@ struct WirePlan::Field {
   Kind kind = Kind::kUnknown;
   Wire wire = Wire::kVarint;  // type of one value
   uint32_t value_bytes = 0;   // columns: bytes of one value in memory
-  uint32_t overhead = 0;      // strings and messages: bytes in memory beside the content
+  uint32_t overhead = 0;      // strings and messages: bytes in memory in addition to the content
   const Type* type = nullptr;
   const WireLimit* limit = nullptr;  // null: not repeated
+  uint32_t limit_index = 0;          // index of `limit` among the limits of the plan
 };
 
 struct WirePlan::Type {
@@ -120,7 +122,7 @@ struct WirePlan::Scan {
   uint64_t memory = 0;
   uint32_t fields = 0;
   uint32_t unknown = 0;
-  absl::flat_hash_map<const WireLimit*, uint32_t> counts;
+  absl::InlinedVector<uint32_t, 16> counts;  // values of the fields of each limit; grows with the largest index
 
   absl::Status message(const Type& type);
   absl::Status field(const Type& type, uint32_t tag);
@@ -131,7 +133,8 @@ struct WirePlan::Scan {
   bool skip(Wire wire, uint32_t* bytes);
 };
 
-// Skips the value of a field. Groups are refused: no message of this protocol has one, and they may nest.
+// Skips the value of a field. Returns false for an invalid value and for a group: no message of this protocol has
+// groups, and groups may nest.
 bool WirePlan::Scan::skip(Wire wire, uint32_t* bytes) {
   uint64_t value = 0;
   uint32_t length = 0;
@@ -163,12 +166,14 @@ absl::Status WirePlan::Scan::unknown_field(Wire wire) {
 
 absl::Status WirePlan::Scan::count(const Field& field) {
   if (field.limit == nullptr) return absl::OkStatus();
-  const uint32_t values = ++counts[field.limit];
+  if (counts.size() <= field.limit_index) counts.resize(field.limit_index + 1);
+  const uint32_t values = ++counts[field.limit_index];
   if (values <= field.limit->max) return absl::OkStatus();
   return refuse_limit(field.limit->path, field.limit->limit, field.limit->max, values);
 }
 
-// A column is packed or has one value for each tag; both forms are legal.
+// Counts the memory of a field of a column. The field contains all values of the column (packed) or a single value;
+// both forms are legal.
 absl::Status WirePlan::Scan::column(const Field& field, Wire wire) {
   uint32_t bytes = 0;
   if (!skip(wire, &bytes)) return no_message();
@@ -263,6 +268,7 @@ WirePlan::Field WirePlan::make_field(const FieldDescriptor& field, const std::ve
                                   [&](const WireLimit& limit) { return field.full_name() == limit.field; });
     LOCUS_CHECK_EQ(field.full_name(), row == limits.end() ? "a field with a row in the limits" : row->field);
     plan.limit = &*row;
+    plan.limit_index = static_cast<uint32_t>(row - limits.begin());
   }
   if (field.cpp_type() == FieldDescriptor::CPPTYPE_STRING) {
     plan.kind = Field::Kind::kString;

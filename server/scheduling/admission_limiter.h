@@ -3,8 +3,8 @@
 // max_in_all().
 //
 // A fair limiter keeps a third more permits than one owner may hold for owners that hold few: while max() or more
-// permits are used, only owners that hold less than 1 / kSmallShare of this reserve get another one. So an owner that
-// is alone gets max() permits, and one that keeps them all does not shut others out.
+// permits are used, only owners that hold less than 1 / kSmallShare of this reserve get another permit. So a single
+// owner gets max() permits, but does not shut others out while it keeps them.
 //
 // Threads: every member may be called from any thread. Invariants: used() permits exist, used() <= max_in_all(), and no
 // owner holds more than max() permits.

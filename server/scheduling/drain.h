@@ -1,4 +1,4 @@
-// State of a shutdown: first draining (no new work is accepted), then, after the grace period, ended (all work stops).
+// State of a shutdown: first draining (no new work is accepted), then ended (all work stops), after a grace period.
 // Listeners are called when draining begins, so that blocked threads can wake up.
 //
 // Threads: every member may be called from any thread, but begin() and end() must not be called from a listener.

@@ -9,7 +9,8 @@ namespace locus::server {
 namespace {
 
 constexpr uint32_t kMemoryRetryMs = 200;
-// Shares of the limit that are kept free for the lines that are refused later: growth leaves 1/8, moves leave 3/32.
+// Shares of the limit that are kept free for lines that are refused later: lines up to kInserts leave 1/8, moves leave
+// 3/32.
 constexpr uint64_t kShareKeptFromGrowth = 8;
 constexpr uint64_t kShareKeptFromMoves = 32;
 constexpr uint64_t kPartsKeptFromMoves = 3;
@@ -50,7 +51,8 @@ uint64_t MemoryBudget::ceiling(MemoryLine line) const {
   return limit_;
 }
 
-// Counts claims that end during the measurement twice rather than not at all: an overestimate is safe.
+// Measures the memory of the process. A claim that ends during the measurement is counted twice rather than not at all,
+// because an overestimate is safe.
 void MemoryBudget::measure() {
   const uint64_t ended = ended_since_.load();
   claimed_then_.store(claimed_.load());
@@ -65,7 +67,8 @@ bool MemoryBudget::fits(MemoryLine line, uint64_t bytes) const {
   return sum <= most && bytes <= most - sum;
 }
 
-// Claims first and checks then, so that two claims at once cannot both take the last room. Both may fail, though.
+// Adds the claim before the check, so that two concurrent claims cannot both take the last free bytes. Instead, both
+// may fail.
 bool MemoryBudget::try_claim(MemoryLine line, uint64_t bytes) {
   if (bytes > limit_) return false;
   claimed_.fetch_add(bytes);
@@ -77,7 +80,8 @@ bool MemoryBudget::try_claim(MemoryLine line, uint64_t bytes) {
   return false;
 }
 
-// Subtracts the claims at the last measurement from the measured memory, so that claims do not make the share smaller.
+// Subtracts from the measured memory the claims that existed at the last measurement, so that claims do not make the
+// share smaller.
 uint64_t MemoryBudget::connection_share() const {
   const uint64_t measured = measured_.load();
   const uint64_t unclaimed = measured - std::min(measured, claimed_then_.load());
@@ -86,7 +90,7 @@ uint64_t MemoryBudget::connection_share() const {
 
 uint64_t MemoryBudget::reserve() const { return std::clamp(limit_ / kReserveShare, kMinReserve, kMaxReserve); }
 
-// Compares the reserve only with claims that use it: other claims, however many, do not fill it.
+// Claims `bytes` from the reserve if there is room in it. Only claims that use the reserve fill it.
 bool MemoryBudget::try_reserve(MemoryLine line, uint64_t bytes, uint64_t owner) {
   if (line < MemoryLine::kMoves || bytes > kSmallClaim) return false;
   const auto found = reserved_.find(owner);

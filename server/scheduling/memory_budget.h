@@ -49,7 +49,7 @@ inline constexpr size_t kMemoryLines = 8;
 absl::string_view memory_line_name(MemoryLine line);
 
 class MemoryBudget {
-  using Owner = std::optional<uint64_t>;  // of a claim that uses the reserve
+  using Owner = std::optional<uint64_t>;  // client whose claim uses the reserve
 
  public:
   // Function that returns the bytes that the process uses.
@@ -100,10 +100,10 @@ class MemoryBudget {
   MemoryBudget(const MemoryBudget&) = delete;
   MemoryBudget& operator=(const MemoryBudget&) = delete;
 
-  // Claims `bytes`, the most memory that the work may add at any time. Returns RESOURCE_EXHAUSTED, naming `field` and
-  // the limit memory_bytes, if that would exceed the ceiling of `line`. The refusal has a delay after which to retry,
-  // unless `bytes` alone exceed the ceiling. `owner` is an id of the client for which the
-  // work is done, such as Caller::client().
+  // Claims `bytes`, the maximum memory that the work may add. Returns RESOURCE_EXHAUSTED, naming `field` and the limit
+  // memory_bytes, if that would exceed the ceiling of `line`. The refusal has a delay after which to retry, unless
+  // `bytes` alone exceed the ceiling. `owner` is the id of the client for which the work is done, such as
+  // Caller::client().
   absl::StatusOr<Claim> claim(MemoryLine line, absl::string_view field, uint64_t bytes, uint64_t owner = 0)
       LOCUS_EXCLUDES(mutex_);
   // Claims `bytes` for work that is never refused, because it frees memory.
@@ -111,7 +111,8 @@ class MemoryBudget {
 
   // Measures the process. Call it periodically.
   void refresh() LOCUS_EXCLUDES(mutex_);
-  // Returns whether a claim was refused since the last call that may succeed when memory is freed.
+  // Returns whether, since the previous use of this function, a claim was refused that could succeed once memory is
+  // freed.
   bool take_shortage() { return shortage_.exchange(false); }
 
   uint64_t limit() const { return limit_; }
@@ -119,7 +120,7 @@ class MemoryBudget {
   uint64_t ceiling(MemoryLine line) const;
   // Returns the bytes that the process uses now.
   uint64_t used() const LOCUS_EXCLUDES(mutex_);
-  // Returns an upper bound of the memory in use: the last measurement plus all claims that it may lack.
+  // Returns an upper bound of the memory in use: the last measurement plus all claims whose memory it may not include.
   uint64_t taken() const { return measured_.load() + ended_since_.load() + claimed_.load(); }
   // Returns the result of the last measurement.
   uint64_t measured() const { return measured_.load(); }

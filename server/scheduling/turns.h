@@ -1,5 +1,5 @@
-// Lets a few threads at once do long work that is outside the fair share of queries, such as visiting all objects of a
-// scene. The others wait, so the work occupies a bounded number of cores however many callers ask for it.
+// Limits the number of threads that at the same time do long work outside of the query scheduler, such as visiting all
+// objects of a scene. Other threads wait, so the work occupies a bounded number of cores.
 //
 // Threads: any. Waiting threads are blocked; they take their turns in no particular order.
 #ifndef LOCUS_SERVER_SCHEDULING_TURNS_H_
@@ -18,7 +18,7 @@ class Turns {
     for (uint32_t i = 0; i < max; ++i) free_.post();
   }
 
-  // A turn, from the constructor, which waits for it, to the destructor. The Turns must outlive it.
+  // Holds one turn. The constructor waits for the turn, the destructor ends it. The Turns must outlive the Turn.
   class Turn {
    public:
     explicit Turn(Turns& turns) : turns_(turns) { turns_.free_.wait(); }

@@ -98,7 +98,7 @@ class UpdateQueue {
     bool busy = false;           // a thread is applying batches
     SteadyTime retry_at = {};    // time of the next attempt, while readers stall the scene
     SteadyTime stalled_at = {};  // start of the stall
-    absl::Status late;           // error that began the stall, OK if there is no stall; used by the busy thread only
+    absl::Status late;           // error that began the stall, or OK; used by the busy thread only
   };
   using Group = std::vector<PendingUpdate*>;
 

@@ -33,7 +33,8 @@ absl::Status check_options(const SecurityOptions& options) {
   return absl::OkStatus();
 }
 
-// Returns the name of a user; the user's number if there is no name, or if the name could be another user's number.
+// Returns the name of a user; the user's number if the user has no name, or has a name of digits only, which could be
+// mistaken for another user's number.
 std::string user_name(uint32_t uid) {
   std::string buffer(kPasswdBytes, '\0');
   passwd entry;
@@ -74,7 +75,7 @@ absl::string_view bearer_of_header(absl::string_view value) {
 struct AccessControl::State {
   AccessRules rules;
   TokenTable tokens;
-  std::vector<IdentityPtr> token_identities;  // one for each of tokens.entries()
+  std::vector<IdentityPtr> token_identities;  // in the order of tokens.entries()
   std::optional<JwtVerifier> jwt;
   std::vector<std::string> warnings;
 };

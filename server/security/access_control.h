@@ -27,7 +27,7 @@
 
 namespace locus::server {
 
-// Credentials of one call: what proves the caller's identity. The views are borrowed during authenticate().
+// Credentials of one call, which prove the caller's identity. authenticate() borrows the views.
 struct Credentials {
   absl::string_view bearer;            // see bearer_of_header(); empty = none
   absl::string_view certificate_name;  // of the verified client certificate: first URI SAN, else first DNS SAN, else CN
@@ -50,12 +50,12 @@ class AccessControl {
   AccessControl(const AccessControl&) = delete;
   AccessControl& operator=(const AccessControl&) = delete;
 
-  // Returns whether callers are distinguished at all; otherwise everybody is `anonymous` and may do everything.
+  // Returns whether access control is on; if it is off, every caller is `anonymous` and may do everything.
   bool enabled() const { return enabled_; }
 
-  // Returns the identity that the credentials prove. A bearer token is used rather than a certificate, and a
-  // certificate rather than a user; without credentials the identity is `anonymous`. Returns UNAUTHENTICATED for a
-  // bearer token or JWT that is not accepted, with a text that does not say whether the token's id exists.
+  // Returns the identity that the credentials prove. A bearer credential takes precedence over a certificate, and a
+  // certificate over a user; without credentials the identity is `anonymous`. Returns UNAUTHENTICATED for a bearer
+  // token or JWT that is not accepted, with a text that does not say whether the token's id exists.
   absl::StatusOr<IdentityPtr> authenticate(const Credentials& credentials) const;
 
   // Returns the current rules. Takes less than 50 ns. Keep the pointer for one decision, not for a stream.
@@ -67,16 +67,15 @@ class AccessControl {
   // expired; a JWT until it expires or its key is removed from the file.
   bool still_valid(const Identity& identity) const;
 
-  // Reads all files again, and opens the audit file anew. If any file has a mistake, everything stays as it was and the
-  // error is returned. Otherwise publishes the new state, then calls the functions of on_change(). One reload runs at a
-  // time.
+  // Reads all files again, and opens the audit file anew. If any file has a mistake, keeps the old state and returns
+  // the error. Otherwise publishes the new state, then calls the functions of on_change(). One reload runs at a time.
   absl::Status reload();
   // Adds a function that reload() calls after each change, on its thread. It must not call reload() or on_change().
   void on_change(std::function<void()> listener);
 
   // Returns the files to watch (see file_watcher.h).
   std::vector<std::string> files() const;
-  // Returns what the last reading of the files found to be unwise, one sentence each.
+  // Returns the warnings about the files in use, one sentence each, for example that others can read a token file.
   std::vector<std::string> warnings() const;
   // Returns the audit log; nullptr if there is none.
   AuditLog* audit() const { return audit_.get(); }
@@ -84,7 +83,7 @@ class AccessControl {
   AuditUpdates* audit_updates() const { return audit_updates_.get(); }
 
  private:
-  struct State;  // everything that one reading of the files gave
+  struct State;  // rules, tokens and keys from one reading of the files
 
   AccessControl(const SecurityOptions& options, Clock clock);
   absl::StatusOr<std::shared_ptr<const State>> read() const;

@@ -3,11 +3,11 @@
 // The access file is text. `#` at the beginning of a line or of a word begins a comment. Each line is one of
 //   grant PRINCIPAL RIGHT[,RIGHT...] [SCENE-PATTERN...]    grant token:ci read,update arena-* lobby
 //   quota PRINCIPAL NAME=VALUE...                          quota token:* queries_per_s=50000 open_streams=16
-// PRINCIPAL is the text of a principal, in which `*` and `?` are wildcards, or for a quota of each connection
-// `connection:*`. Rights to scenes (read, update, admin) need scene patterns, rights to the server have none; the names
-// are in rights.h and quota.h. What no line grants is refused. Of several quotas for the same caller and name, the last
-// one counts. A connection has quotas of rates, bytes_in_flight and open_streams only. `burst_s=SECONDS` says how many
-// seconds of an unused rate may be used at once.
+// PRINCIPAL is the text of a principal, in which `*` and `?` are wildcards. A quota may also have `connection:*`, which
+// means each connection. Rights to scenes (read, update, admin) need scene patterns, rights to the server have none;
+// the names are in rights.h and quota.h. Calls that no line grants are refused. If several lines set the same quota for
+// a caller, the last line counts. Connections can have only quotas of rates, bytes_in_flight and open_streams.
+// `burst_s=SECONDS` says how many seconds of an unused rate may be used at once.
 #ifndef LOCUS_SERVER_SECURITY_ACCESS_FILE_H_
 #define LOCUS_SERVER_SECURITY_ACCESS_FILE_H_
 
@@ -43,8 +43,8 @@ class AccessRules {
   bool allows(const Identity& identity, Right right) const { return allows(identity, right, {}); }
   // Returns whether the identity has a right to every scene, by a grant with the pattern `*`.
   bool allows_all(const Identity& identity, Right right) const;
-  // Returns whether the identity has the right to the server, or to all scenes that match some pattern, whether or not
-  // such a scene exists.
+  // Returns whether any grant gives the identity this right. For a right to scenes, no scene that matches the grant's
+  // patterns need exist.
   bool allows_any(const Identity& identity, Right right) const;
   // Returns whether the identity has any right at all.
   bool knows(const Identity& identity) const;
@@ -69,7 +69,7 @@ class AccessRules {
     double burst_s = 0;  // 0 = not set
   };
 
-  // Calls `visit` with each grant of a principal until it returns true; returns whether it did.
+  // Calls `visit` with each grant of a principal until `visit` returns true. Returns whether a call returned true.
   template <class Visit>
   bool any_grant(absl::string_view principal, const Visit& visit) const;
   void add(Grant grant);

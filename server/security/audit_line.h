@@ -14,7 +14,7 @@ struct AuditEntry {
   int64_t unix_ms = 0;    // milliseconds since 1970
   std::string principal;  // identity of the caller, such as token:ci
   std::string peer;       // address and port that the call came from
-  std::string address;    // address by which callers are counted; not written
+  std::string address;    // key by which refused callers are counted; not written
   std::string rpc;        // full method path, or the HTTP page
   std::string subject;    // scene or mesh; empty = none
   absl::StatusCode code = absl::StatusCode::kOk;

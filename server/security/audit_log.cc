@@ -9,7 +9,7 @@
 namespace locus::server {
 namespace {
 
-// Time in which the refusals of a caller are counted together.
+// Length of the window of time in which the refusals of a caller are counted together.
 constexpr std::chrono::seconds kTallyWindow{1};
 
 void cut(std::string& text) {
@@ -21,7 +21,7 @@ void cut(std::string& text) {
 // Entries that the writer took from the queue at once.
 struct AuditLog::Batch {
   std::deque<AuditEntry> entries;
-  std::vector<AuditEntry> notes;  // what the tally counted
+  std::vector<AuditEntry> notes;  // one for each caller with refusals that were only counted
   std::array<Dropped, kKinds> dropped;
   bool reopen = false;
 };
@@ -91,7 +91,7 @@ bool AuditLog::has_work() const {
   return !queue_.empty() || dropped_[kChange].entries > 0 || dropped_[kRefusal].entries > 0 || reopen_;
 }
 
-// Waits for work. Returns false if there is none and the writer is to stop.
+// Waits for work and moves it to `batch`. Returns false if there is no work left and the writer must stop.
 bool AuditLog::take_batch(Batch& batch) {
   MutexLock lock(mutex_);
   bool window_over = false;
@@ -116,7 +116,7 @@ bool AuditLog::take_batch(Batch& batch) {
 // Writes the lines of a batch. Returns the number of entries that the disk refused.
 uint64_t AuditLog::write_batch(const Batch& batch) {
   if (batch.reopen)
-    for (const auto& file : files_) (void)file->reopen();  // if it fails, the file opened before is used further
+    for (const auto& file : files_) (void)file->reopen();  // after a failure the old file stays in use
   uint64_t refused = 0;
   for (const AuditEntry& entry : batch.entries)
     refused += files_[kind_of(entry)]->append(audit_line(entry)).ok() ? 0 : 1;
@@ -128,7 +128,7 @@ uint64_t AuditLog::write_batch(const Batch& batch) {
     note.code = absl::StatusCode::kResourceExhausted;
     note.text =
         absl::StrCat(batch.dropped[kind].entries, " entries are missing here: they came faster than the disk writes");
-    (void)files_[kind]->append(audit_line(note));  // lost() has counted them
+    (void)files_[kind]->append(audit_line(note));  // lost_ includes these entries already
   }
   return refused;
 }

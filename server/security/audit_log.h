@@ -1,7 +1,7 @@
 // Audit log: each change is one line of JSON in FILE, each refusal one in FILE.refused. The files are separate, because
 // otherwise many refusals could rotate the lines of changes away. A caller's refusals beyond a few a second are counted
 // instead (refusal_tally.h). Callers never wait for the disk: one thread writes the lines of a bounded queue. If the
-// queue was full, a line says how many lines were dropped. Refusals may fill half of the queue.
+// queue was full, a line reports how many lines were dropped. Refusals may fill only half of the queue.
 //
 // The files have mode 0600. When one reaches the given size it is renamed to FILE.1, FILE.1 to FILE.2 and so on; four
 // older files are kept. Threads: every member may be called from any thread. A line is written whole or not at all,
@@ -34,7 +34,7 @@ class AuditLog {
   // Opens or creates the files and starts the writer. Returns the error of a file that cannot be opened.
   static absl::StatusOr<std::unique_ptr<AuditLog>> open(const std::string& file, uint64_t max_bytes,
                                                         size_t max_queue = kMaxAuditQueue);
-  // Writes what is queued and stops the writer.
+  // Writes the queued entries and stops the writer.
   ~AuditLog();
   AuditLog(const AuditLog&) = delete;
   AuditLog& operator=(const AuditLog&) = delete;
@@ -53,10 +53,10 @@ class AuditLog {
   enum Kind : uint8_t { kChange, kRefusal };
   static constexpr size_t kKinds = 2;
   using Files = std::array<std::unique_ptr<RotatedFile>, kKinds>;  // by Kind
-  // Entries that were dropped since the last line that says so.
+  // Entries that were dropped since the last line that reports dropped entries.
   struct Dropped {
     uint64_t entries = 0;
-    int64_t last_ms = 0;  // time of the last of them
+    int64_t last_ms = 0;  // time of the last dropped entry
   };
   struct Batch;
 
@@ -77,7 +77,7 @@ class AuditLog {
   uint64_t written_ LOCUS_GUARDED_BY(mutex_) = 0;  // entries ever taken from the queue and written or lost
   std::array<Dropped, kKinds> dropped_ LOCUS_GUARDED_BY(mutex_);
   RefusalTally tally_ LOCUS_GUARDED_BY(mutex_);
-  std::optional<std::chrono::steady_clock::time_point> tally_ends_ LOCUS_GUARDED_BY(mutex_);  // if it counted anything
+  std::optional<std::chrono::steady_clock::time_point> tally_ends_ LOCUS_GUARDED_BY(mutex_);  // set while tally_ counts
   uint64_t lost_ LOCUS_GUARDED_BY(mutex_) = 0;
   bool reopen_ LOCUS_GUARDED_BY(mutex_) = false;
   bool stopping_ LOCUS_GUARDED_BY(mutex_) = false;

@@ -1,8 +1,8 @@
-// Accepted updates of objects in the audit log: too frequent for a line each, they are counted by principal and scene,
-// and each minute one line says how many there were.
+// Counts accepted updates of objects for the audit log. Updates are too frequent for one line each, so each minute one
+// line for each principal and scene reports how many updates there were.
 //
 // Threads: every member may be called from any thread. Counting takes 0.2 us. Invariant: at most kMaxAuditedPairs pairs
-// are kept; with one more, all are written early.
+// of principal and scene are kept; before one more is added, the lines of all pairs are written.
 #ifndef LOCUS_SERVER_SECURITY_AUDIT_UPDATES_H_
 #define LOCUS_SERVER_SECURITY_AUDIT_UPDATES_H_
 
@@ -23,26 +23,26 @@ struct AuditedUpdate {
   absl::string_view peer;
   absl::string_view rpc;  // full method path
   absl::string_view scene;
-  uint64_t items = 0;  // objects that it changed
+  uint64_t items = 0;  // number of objects that the update changed
 };
 
 class AuditUpdates {
  public:
-  // `log` must outlive the result.
+  // `log` must outlive this object.
   explicit AuditUpdates(AuditLog& log) : log_(log) {}
-  // Writes what is counted.
+  // Writes all counts to the log.
   ~AuditUpdates() { write_all(); }
   AuditUpdates(const AuditUpdates&) = delete;
   AuditUpdates& operator=(const AuditUpdates&) = delete;
 
   // Counts an update at the time `unix_ms`, milliseconds since 1970.
   void count(const AuditedUpdate& update, int64_t unix_ms) LOCUS_EXCLUDES(mutex_);
-  // Writes what is counted if the first of it was counted a minute ago. Call it at least every few seconds.
+  // Writes all counts to the log if the first update was counted at least a minute ago. Call it every few seconds.
   void tick(int64_t unix_ms) LOCUS_EXCLUDES(mutex_);
 
  private:
   struct Sum {
-    std::string peer;  // of the last update, as `rpc`
+    std::string peer;  // `peer` and `rpc` of the last update
     std::string rpc;
     uint64_t batches = 0;
     uint64_t items = 0;

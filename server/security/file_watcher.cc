@@ -57,7 +57,7 @@ FileWatcher::~FileWatcher() {
   thread_.join();
 }
 
-// Returns true after the pause, false if the watcher is to stop.
+// Waits for the pause. Returns false if the watcher must stop.
 bool FileWatcher::wait() {
   const auto deadline = std::chrono::steady_clock::now() + pause_;
   MutexLock lock(mutex_);

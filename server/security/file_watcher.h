@@ -1,6 +1,6 @@
-// Watches a few files by looking at them periodically, which also detects files that are replaced by renaming and works
-// on every file system. A change is reported when the files have looked the same twice in a row, so that a file that is
-// being written is not read half-done. A change that could not be handled is reported again until it could.
+// Watches a few files by polling them, which also detects files that are replaced by renaming and works on every file
+// system. A change is reported when two successive looks find the same state, so that a file is not read while it is
+// being written. A change that could not be handled is reported again until it is handled.
 //
 // Threads: one thread looks and calls the function; it ends in the destructor.
 #ifndef LOCUS_SERVER_SECURITY_FILE_WATCHER_H_
@@ -33,14 +33,14 @@ struct FileMark {
 // Returns the state of a file, following symbolic links.
 FileMark mark_of(const std::string& file);
 
-// Decides when a change is to be reported, without a thread. One thread at a time.
+// Decides when a change must be reported. Starts no thread; one thread at a time may use it.
 class FileChanges {
  public:
   using Mark = std::function<FileMark(const std::string& file)>;
   FileChanges(std::vector<std::string> files, Mark mark = mark_of);
 
-  // Looks at all files. Returns true if they differ from those last reported, and have not changed since the previous
-  // look.
+  // Looks at all files. Returns true if their state differs from the last reported state and has not changed since the
+  // previous look.
   bool look();
 
  private:

@@ -9,7 +9,7 @@
 namespace locus::server {
 namespace {
 
-// Users that a namespace without a map of its own has: all but the invalid one.
+// Number of users that are mapped if no user is hidden: all 32-bit ids except the invalid one.
 constexpr uint64_t kAllUsers = 0xFFFFFFFF;
 
 }  // namespace

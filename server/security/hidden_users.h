@@ -1,4 +1,5 @@
-// Finds out whether the kernel can tell the users of unix sockets apart here. A pure function; any thread.
+// Finds out whether the kernel can distinguish the users of unix sockets in this user namespace. A pure function; any
+// thread.
 #ifndef LOCUS_SERVER_SECURITY_HIDDEN_USERS_H_
 #define LOCUS_SERVER_SECURITY_HIDDEN_USERS_H_
 
@@ -7,8 +8,8 @@
 namespace locus::server {
 
 // Returns whether a user namespace shows some users of the machine as the user `nobody`. `uid_map` is the text of
-// /proc/self/uid_map: lines of a first user inside, a first user outside, and a number of users. An empty or malformed
-// text hides nobody.
+// /proc/self/uid_map: lines of a first user inside, a first user outside, and a number of users. Returns false for an
+// empty or malformed text.
 bool hides_users(absl::string_view uid_map);
 
 }  // namespace locus::server

@@ -33,8 +33,8 @@ using IdentityPtr = std::shared_ptr<const Identity>;
 // Returns the identity of callers without credentials.
 const IdentityPtr& anonymous_identity();
 
-// Returns the principal of a name: the kind's prefix and the name, in which `%XX` stands for each byte that is no
-// printable ASCII character or is a space, `%`, `*` or `?`. Two names never have the same principal. Returns
+// Returns the principal of a name: the kind's prefix, then the name. In the name, `%XX` replaces each space, `%`, `*`,
+// `?` and byte that is not a printable ASCII character. Two names never have the same principal. Returns
 // INVALID_ARGUMENT if the name is empty or the principal longer than kMaxPrincipalBytes. Not for kAnonymous.
 absl::StatusOr<std::string> principal_of(IdentityKind kind, absl::string_view name);
 

@@ -15,7 +15,7 @@
 namespace locus::server {
 namespace {
 
-constexpr size_t kMaxTriedKeys = 4;       // keys that one JWT may be checked against
+constexpr size_t kMaxTriedKeys = 4;       // maximum number of keys that are tried for one JWT
 constexpr double kMaxUnixSeconds = 1e11;  // year 5138: far below what int64_t holds
 
 absl::Status not_accepted(absl::string_view why) {
@@ -66,7 +66,7 @@ int64_t end_of(const json_t* claims) {
   return static_cast<int64_t>(json_number_value(json_object_get(claims, "exp"))) + kJwtSkewSeconds;
 }
 
-// Header of a JWT as far as it is used.
+// Members of a JWT's header that are used.
 struct JwtHeader {
   SignatureAlgorithm algorithm = SignatureAlgorithm::kRs256;
   std::optional<std::string> key_id;

@@ -12,7 +12,7 @@
 
 namespace locus::server {
 
-// Subject of a quota. The first three are rates, in units a second; the others are amounts in use at a time.
+// Quantity that a quota limits. The first three are rates, in units a second; the others are amounts in use at a time.
 enum class QuotaKind : uint8_t {
   kQueries,        // queries of batches
   kWork,           // nodes, cells and primitive tests that queries visited
@@ -20,7 +20,7 @@ enum class QuotaKind : uint8_t {
   kBytesInFlight,  // memory claimed by calls in progress: parsed requests, their work, replies not yet taken
   kOpenStreams,
   kObjects,       // objects in the scenes that the identity created
-  kScenes,        // scenes that it created
+  kScenes,        // scenes that the identity created
   kMeshBytes,     // memory of the meshes that it uploaded; a content with several names counts for each name
   kHistoryBytes,  // sum of history_bytes of the scenes that it created: the most that their histories may take
 };
@@ -31,7 +31,7 @@ inline constexpr std::array<absl::string_view, kQuotaKinds> kQuotaNames = {
 
 constexpr absl::string_view quota_name(QuotaKind kind) { return kQuotaNames[static_cast<size_t>(kind)]; }
 constexpr bool is_rate(QuotaKind kind) { return kind <= QuotaKind::kUpdateItems; }
-// Returns whether a connection can have a quota of the kind: the others count what stays when a connection ends.
+// Returns whether a connection can have a quota of the kind. The other kinds count things that outlive connections.
 constexpr bool is_of_connections(QuotaKind kind) { return kind <= QuotaKind::kOpenStreams; }
 // Returns the kind of a name such as "open_streams"; nullopt if there is none.
 std::optional<QuotaKind> quota_named(absl::string_view name);

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kNanosecondsPerSecond = 1e9;
 constexpr uint64_t kWindow = 1'000'000'000;   // minimum time in nanoseconds over which a mean is computed
-constexpr size_t kEvictionLooks = 64;         // accounts that a new subject may look at to find one that is idle
+constexpr size_t kEvictionLooks = 64;         // maximum number of accounts that evict_one() examines
 constexpr uint32_t kFullTableRetryMs = 1000;  // buckets of idle subjects are full again after some seconds
 constexpr uint32_t kBytesRetryMs = 10;        // bytes in flight are released within milliseconds
 constexpr double kMaxRetryMs = 3'600'000;
@@ -42,7 +42,7 @@ absl::Status refuse_quota(absl::string_view subject, QuotaKind kind, double limi
                 refusal);
 }
 
-// Returns the refusal of `asked`, for a rate whose bucket holds only `level`.
+// Returns the refusal of the amount `asked` of a rate whose bucket contains only `level`.
 absl::Status refuse_rate(absl::string_view subject, const Quota& quota, QuotaKind kind, double level, double asked) {
   const double rate = quota.of(kind);
   if (rate == 0) return refuse_quota(subject, kind, rate, asked, "nothing is allowed", 0);
@@ -56,7 +56,7 @@ absl::Status refuse_rate(absl::string_view subject, const Quota& quota, QuotaKin
   return refuse_quota(subject, kind, rate, asked, absl::StrCat("try again in ", retry, " ms"), retry);
 }
 
-// Returns what a caller can do about an amount that is used up.
+// Returns advice for a caller whose quota of an amount is used up.
 absl::string_view advice_for(QuotaKind kind, bool waiting_helps) {
   switch (kind) {
     case QuotaKind::kBytesInFlight:
@@ -242,7 +242,7 @@ Quotas::Account* Quotas::add(absl::string_view subject, uint64_t now) {
   return &account;
 }
 
-// Removes an idle account among the next few. Returns whether there was one.
+// Removes the first idle account among the next kEvictionLooks accounts. Returns false if none of them is idle.
 bool Quotas::evict_one(uint64_t now) {
   for (size_t looks = std::min(kEvictionLooks, accounts_.size()); looks > 0; --looks) {
     hand_ = (hand_ + 1) % accounts_.size();
@@ -254,7 +254,7 @@ bool Quotas::evict_one(uint64_t now) {
   return false;
 }
 
-// Removes an account; the last one takes its place.
+// Removes the account at `slot` and moves the last account there.
 void Quotas::remove(size_t slot) {
   slots_.erase(accounts_[slot].subject);
   if (slot + 1 != accounts_.size()) {
@@ -264,7 +264,8 @@ void Quotas::remove(size_t slot) {
   accounts_.pop_back();
 }
 
-// Fills the buckets for the time since the last call, and ends windows that are long enough.
+// Fills the buckets for the time since they were filled last. Ends each window that is at least kWindow long and
+// computes its mean rate.
 void Quotas::fill(Account& account, uint64_t now) {
   const double elapsed = seconds_between(account.filled, now);
   account.filled = std::max(account.filled, now);
@@ -286,7 +287,7 @@ bool Quotas::is_idle(const Account& account) {
   return std::all_of(account.in_use.begin(), account.in_use.end(), [](double used) { return used == 0; });
 }
 
-// Asks for the quota again. A rate that was unlimited so far begins with a full bucket.
+// Reads the subject's quota again. The bucket of a rate that was unlimited until now begins full.
 void Quotas::adopt_quota(Account& account, uint64_t generation) const {
   account.quota = quota_of_(account.subject);
   account.generation = generation;

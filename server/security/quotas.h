@@ -1,5 +1,5 @@
-// Counts what identities and connections use and refuses what exceeds their quotas: token buckets for rates, counters
-// for amounts.
+// Counts the use of quotas by identities and connections, and refuses uses that exceed a quota. Rates are counted by
+// token buckets, amounts by counters.
 //
 // A subject is the principal of an identity, or `connection:PEER`. Threads: every member may be called from any thread;
 // calls take about 0.1 us under one mutex. Time is an argument, in nanoseconds of a steady clock. Subjects that use
@@ -16,7 +16,6 @@
 #include <vector>
 
 #include "absl/container/flat_hash_map.h"
-#include "absl/container/inlined_vector.h"
 #include "absl/functional/function_ref.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
@@ -33,7 +32,7 @@ struct QuotaUse {
   // For a rate, the mean per second over the last second or more; for an amount, the amount in use now.
   double used = 0;
   double limit = kNoQuota;  // kNoQuota = unlimited
-  double available = 0;     // what may be used at once; negative = overdrawn
+  double available = 0;     // amount that may be used at once; negative = overdrawn
 };
 struct SubjectUse {
   std::string subject;
@@ -50,22 +49,23 @@ class Quotas {
 
   explicit Quotas(QuotaOf quota_of, size_t max_subjects = kMaxQuotaSubjects);
 
-  // Takes `amount` from a quota. An amount of a rate is gone; an amount in use must be given back by release(). Returns
-  // RESOURCE_EXHAUSTED naming the quota, its value, the amount, and when to try again. With `amount` 0, checks that a
-  // rate is not overdrawn.
+  // Takes `amount` from a quota. An amount in use must be released by release() later; an amount of a rate is used up.
+  // Returns RESOURCE_EXHAUSTED naming the quota, its value, the amount, and when to try again. With `amount` 0, checks
+  // that a rate is not overdrawn.
   absl::Status take(absl::string_view subject, QuotaKind kind, double amount, uint64_t now) LOCUS_EXCLUDES(mutex_);
   absl::Status take(const Identity& identity, QuotaKind kind, double amount, uint64_t now) {
     return take(identity.principal, kind, amount, now);
   }
-  // Function that returns how much of a quota is in use besides the amounts that were taken here. Called with the mutex
-  // held.
+  // Function that returns how much of a quota is in use in addition to the amounts that were taken from this object.
+  // Called with the mutex held.
   using Besides = absl::FunctionRef<double()>;
-  // Takes `amount` of an amount in use from each of the subjects, or from none: see take(). The amount is given back
-  // when the result is destroyed. What `besides` returns is in use too.
+  // Takes `amount` from the quota of each subject or, if one quota does not suffice, from none, and returns the error
+  // of take(). `kind` must be an amount in use. The result releases the amount when it is destroyed. The result of
+  // `besides` counts as in use too.
   absl::StatusOr<QuotaHold> hold(
       absl::Span<const std::string> subjects, QuotaKind kind, double amount, uint64_t now,
       Besides besides = [] { return 0.0; }) LOCUS_EXCLUDES(mutex_);
-  // Like hold(), but takes the amount whatever the quotas.
+  // Takes the amount like hold(), but even if the quotas do not suffice.
   QuotaHold hold_anyway(absl::Span<const std::string> subjects, QuotaKind kind, double amount, uint64_t now)
       LOCUS_EXCLUDES(mutex_);
 
@@ -73,14 +73,14 @@ class Quotas {
   // calls of take() are refused until the rate has recovered, or enough of the amount in use was released. Counts
   // nothing if the subject is new and the table full.
   void charge(absl::string_view subject, QuotaKind kind, double amount, uint64_t now) LOCUS_EXCLUDES(mutex_);
-  // Gives back an amount in use. Not for rates.
+  // Releases an amount in use, so that it can be taken again. Not for rates.
   void release(absl::string_view subject, QuotaKind kind, double amount) LOCUS_EXCLUDES(mutex_);
   // Forgets a subject, for example a closed connection.
   void forget(absl::string_view subject) LOCUS_EXCLUDES(mutex_);
 
-  // Makes each subject ask for its quota again at its next use; call it when the rules have changed.
+  // Makes the quota of each subject be read again at the subject's next use. Call it when the rules have changed.
   void refresh() { generation_.fetch_add(1, std::memory_order_relaxed); }
-  // Returns the use of all subjects, ascending by name, and that of one subject, which may be unknown.
+  // Return the use of all subjects, in ascending order of names, and the use of one subject, which may be unknown.
   std::vector<SubjectUse> usage(uint64_t now) const LOCUS_EXCLUDES(mutex_);
   SubjectUse use_of(absl::string_view subject, uint64_t now) const LOCUS_EXCLUDES(mutex_);
 
@@ -90,7 +90,7 @@ class Quotas {
   struct Bucket {
     double level = kNoQuota;
     double window_used = 0;  // taken since window_start
-    double last_rate = 0;    // mean per second of the window before
+    double last_rate = 0;    // mean per second of the previous window
     uint64_t window_start = 0;
   };
   struct Account {
@@ -99,7 +99,7 @@ class Quotas {
     uint64_t generation = 0;
     uint64_t filled = 0;  // time up to which the buckets are filled
     std::array<Bucket, kRates> buckets;
-    std::array<double, kQuotaKinds> in_use{};  // quotas that limit an amount in use: the amount
+    std::array<double, kQuotaKinds> in_use{};  // amounts in use; 0 for rates
   };
 
   absl::Status take_locked(absl::string_view subject, QuotaKind kind, double amount, uint64_t now, Besides besides)
@@ -125,7 +125,7 @@ class Quotas {
   size_t hand_ LOCUS_GUARDED_BY(mutex_) = 0;  // account at which the next eviction begins its search
 };
 
-// Amount of a quota that subjects have in use, given back when destroyed. An empty hold has taken nothing. Must not
+// Amount of a quota that subjects have in use; the destructor releases it. An empty hold has taken nothing. Must not
 // outlive the Quotas. One thread at a time.
 class QuotaHold {
  public:
@@ -140,7 +140,7 @@ class QuotaHold {
   }
   ~QuotaHold() { shrink(0); }
 
-  // Reduces the amount. Does nothing if it is smaller.
+  // Reduces the amount to `amount`. Does nothing if the hold has less.
   void shrink(double amount) {
     if (quotas_ == nullptr || amount >= amount_) return;
     for (const std::string& subject : subjects_) quotas_->release(subject, kind_, amount_ - amount);
@@ -153,7 +153,7 @@ class QuotaHold {
       : quotas_(&quotas), subjects_(subjects.begin(), subjects.end()), kind_(kind), amount_(amount) {}
 
   Quotas* quotas_ = nullptr;
-  absl::InlinedVector<std::string, 2> subjects_;
+  std::vector<std::string> subjects_;
   QuotaKind kind_ = QuotaKind::kBytesInFlight;
   double amount_ = 0;
 };

@@ -1,6 +1,6 @@
-// Limits the lines that refusals write to the audit log: each caller's first refusals in a window of time are written,
-// the others are only counted, and one line says how many they were. So a stranger who is refused ten thousand times a
-// second writes a few lines a second.
+// Limits the number of lines about refusals in the audit log: the first refusals of each caller in a window of time are
+// written, the others are only counted, and one line reports their number. So a stranger who is refused ten thousand
+// times a second causes only a few lines a second.
 //
 // One thread at a time. The window ends when its owner says so. Invariant: at most kMaxCallers callers are counted
 // separately; the others share one count.
@@ -18,13 +18,13 @@ namespace locus::server {
 
 class RefusalTally {
  public:
-  static constexpr uint32_t kMaxLines = 4;   // lines of one caller in a window, and of all that share a count
+  static constexpr uint32_t kMaxLines = 4;   // lines in a window for each count, of a caller or shared
   static constexpr size_t kMaxCallers = 64;  // callers with a count of their own in a window
 
-  // Counts a refusal. Returns whether it is to be written. A caller is a principal at an address.
+  // Counts a refusal. Returns whether the refusal must be written. A caller is a pair of principal and address.
   bool count(const AuditEntry& refusal);
 
-  // Ends the window. Returns an entry for each caller of whom refusals were not written, with their number.
+  // Ends the window. For each count with refusals that were not written, returns an entry with their number.
   std::vector<AuditEntry> end_window();
 
  private:

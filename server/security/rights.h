@@ -12,8 +12,8 @@
 
 namespace locus::server {
 
-// Right that a grant gives. The first three are rights to scenes, each including those before it; the others concern
-// the server as a whole.
+// Right that a grant gives. The first three are rights to scenes, and each of them includes the rights before it. The
+// others are rights to the server as a whole.
 enum class Right : uint8_t { kRead, kUpdate, kAdmin, kMeshes, kBackup, kMetrics, kReflection };
 inline constexpr size_t kRights = 7;
 inline constexpr std::array<absl::string_view, kRights> kRightNames = {"read",   "update",  "admin",     "meshes",

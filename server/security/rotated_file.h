@@ -24,7 +24,7 @@ class RotatedFile {
 
   // Appends a line, whole or not at all. Renames the files first if the line would exceed the maximum size.
   absl::Status append(absl::string_view line);
-  // Opens the file by its name again. If that fails, the file opened before is used further.
+  // Opens the file by its name again. If that fails, the old file stays in use.
   absl::Status reopen();
 
  private:

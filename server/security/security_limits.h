@@ -22,7 +22,7 @@ inline constexpr int64_t kJwtSkewSeconds = 60;  // maximum difference of the clo
 
 inline constexpr size_t kMaxQuotaSubjects = 65536;        // identities and connections whose use is counted
 inline constexpr size_t kMaxAuditQueue = 4096;            // audit lines that wait for the writer
-inline constexpr size_t kMaxAuditedPairs = 1024;          // principals and scenes whose updates are counted together
+inline constexpr size_t kMaxAuditedPairs = 1024;          // pairs of principal and scene whose updates are counted
 inline constexpr size_t kMaxAuditTextBytes = 1024;        // each text of an audit line
 inline constexpr uint32_t kAuditFiles = 5;                // audit files kept: the current one and four older ones
 inline constexpr uint32_t kFileWatchMilliseconds = 500;   // pause between two looks at the watched files

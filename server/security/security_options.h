@@ -1,4 +1,5 @@
-// Options of access control: the files that say who may do what, and the file that records it. Plain data.
+// Options of access control: the files that define which caller may do what, and the audit file, which records changes
+// and refusals. Plain data.
 #ifndef LOCUS_SERVER_SECURITY_SECURITY_OPTIONS_H_
 #define LOCUS_SERVER_SECURITY_SECURITY_OPTIONS_H_
 
@@ -16,13 +17,13 @@ struct SecurityOptions {
   // File of the tokens that are accepted (see token_file.h); empty = none.
   std::string token_file;
 
-  // JSON Web Key Set with the public keys of those who issue JWTs (see jwt.h); empty = JWTs are not accepted.
+  // JSON Web Key Set with the public keys of the issuers of JWTs (see jwt.h); empty = JWTs are not accepted.
   std::string jwks_file;
 
   // Audience that a JWT must name; required with `jwks_file`.
   std::string jwt_audience;
 
-  // Issuer that a JWT must name; empty = any that signs with a key of `jwks_file`.
+  // Issuer that a JWT must name; empty = any issuer that signs with a key of `jwks_file`.
   std::string jwt_issuer;
 
   // File to which each change is appended as a line of JSON; refusals are appended to `audit_file`.refused (see

@@ -15,7 +15,7 @@ namespace locus::server {
 namespace {
 
 constexpr int kMinRsaBits = 2048;
-constexpr int kMaxRsaBits = 8192;  // verification takes time quadratic in it
+constexpr int kMaxRsaBits = 8192;  // verification takes time quadratic in the size
 constexpr size_t kMaxKeyDerBytes = 4096;
 constexpr size_t kEs256HalfBytes = 32;  // a signature is two numbers of this size
 
@@ -89,7 +89,8 @@ EVP_PKEY* to_openssl(jwk_t* jwk) {
   return d2i_PUBKEY(nullptr, &position, static_cast<long>(size));
 }
 
-// Returns an error for a key that is of another type than it says, too weak or too slow, or not on its curve.
+// Returns an error if the key does not have the type that its JSON names, is too weak or too slow, or is not on its
+// curve.
 absl::Status check_key(EVP_PKEY* key, const KeyType& type) {
   if (key == nullptr || EVP_PKEY_get_base_id(key) != type.openssl_type)
     return absl::InvalidArgumentError("its public key is malformed");

@@ -24,8 +24,8 @@ std::optional<SignatureAlgorithm> signature_algorithm_named(absl::string_view na
 
 class SignatureKey {
  public:
-  // Reads a JSON Web Key. Returns UNIMPLEMENTED, saying why, for a key of another type or for another use, which is to
-  // be skipped, and INVALID_ARGUMENT for one that is private, secret, too weak or wrong.
+  // Reads a JSON Web Key. Returns UNIMPLEMENTED with the reason for a key of another type or for another use, which the
+  // caller should skip. Returns INVALID_ARGUMENT for a key that is private, secret, too weak or wrong.
   static absl::StatusOr<SignatureKey> read(const json_t* jwk);
 
   SignatureAlgorithm algorithm() const { return algorithm_; }

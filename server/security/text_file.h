@@ -1,5 +1,4 @@
-// Reads small text files that decide who may do what, and replaces them atomically. Functions without state; any
-// thread.
+// Reads the small text files of access control, and replaces them atomically. Functions without state; any thread.
 #ifndef LOCUS_SERVER_SECURITY_TEXT_FILE_H_
 #define LOCUS_SERVER_SECURITY_TEXT_FILE_H_
 

@@ -73,7 +73,7 @@ absl::StatusOr<Certificates> parse_certificates(const std::string& path, const s
   const BioPtr reader = reader_of(text);
   Certificates all;
   while (X509* certificate = PEM_read_bio_X509(reader.get(), nullptr, nullptr, nullptr)) all.emplace_back(certificate);
-  // The list ends where no further certificate begins; every other error is one in a certificate.
+  // PEM_R_NO_START_LINE only means that no further certificate follows; any other error is an error in a certificate.
   if (ERR_GET_REASON(ERR_peek_last_error()) != PEM_R_NO_START_LINE)
     return bad_tls_file(path, absl::StrCat("has a certificate that cannot be read: ", openssl_reason()));
   ERR_clear_error();
@@ -93,7 +93,7 @@ absl::StatusOr<KeyPtr> parse_key(const std::string& path, const std::string& tex
   return bad_tls_file(path, absl::StrCat("has no private key in PEM: ", reason));
 }
 
-// Gives certificate and key to a context of TLS, which refuses keys that are too short, for example.
+// Tries the certificates and the key in a TLS context, which refuses keys that are too short, for example.
 absl::Status try_in_context(const TlsFiles& files, Certificates& chain, EVP_PKEY& key) {
   const ContextPtr context(SSL_CTX_new(TLS_method()));
   if (context == nullptr) return absl::InternalError(openssl_reason());

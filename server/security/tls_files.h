@@ -1,5 +1,5 @@
-// Reads the files of TLS and checks them as the library of TLS will use them, so that a bad file is found with a reason
-// before anything depends on it. Functions without state; any thread.
+// Reads the files of TLS and checks them with the TLS library, so that a bad file is refused with a reason before it is
+// used. Functions without state; any thread.
 #ifndef LOCUS_SERVER_SECURITY_TLS_FILES_H_
 #define LOCUS_SERVER_SECURITY_TLS_FILES_H_
 
@@ -15,9 +15,9 @@ namespace locus::server {
 
 // Paths of the files.
 struct TlsFiles {
-  std::string certificate;  // the server's certificate, followed by those that lead to its root
+  std::string certificate;  // the server's certificate, followed by its intermediate certificates
   std::string key;          // the key of the server's certificate, not encrypted
-  std::string client_ca;    // certificates of which one must have signed each client's; empty = clients need none
+  std::string client_ca;    // CA certificates that sign client certificates; empty = clients need none
 };
 
 // Contents of the files, in PEM.
@@ -37,8 +37,8 @@ absl::StatusOr<TlsContents> read_tls_files(const TlsFiles& files);
 // certificate. Otherwise returns INVALID_ARGUMENT, which names the file and the reason.
 absl::Status check_tls_contents(const TlsFiles& files, const TlsContents& contents);
 
-// Returns warnings about contents that servers can use: certificates that have expired, are not yet valid, or do not
-// follow from each other.
+// Returns warnings about contents that servers can use: certificates that have expired, are not yet valid, or are not
+// followed by the certificate of their issuer.
 std::vector<std::string> warnings_about(const TlsFiles& files, const TlsContents& contents);
 
 // Returns the time in seconds since 1970 from which the first certificate in `pem` is no longer valid; 0 if there is no

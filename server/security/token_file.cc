@@ -83,7 +83,7 @@ bool parse_hash(absl::string_view word, TokenHash& hash) {
   return true;
 }
 
-// Parses a line. Its errors repeat no word of it, which could be a secret in the wrong place.
+// Parses a line. Error texts repeat no word of the line, because a word could be a secret in the wrong place.
 absl::StatusOr<TokenEntry> parse_entry(absl::string_view file, size_t number, absl::string_view line) {
   const std::vector<absl::string_view> words =
       absl::StrSplit(line, absl::MaxSplits(absl::ByAnyChar(" \t"), 4), absl::AllowEmpty());
@@ -113,7 +113,8 @@ absl::string_view first_word(absl::string_view line) { return line.substr(0, lin
 
 bool is_expired(const TokenEntry& entry, int64_t now) { return entry.expires && now >= *entry.expires; }
 
-// Lock of a token file against other writers: a file beside it, which stays. Released when destroyed.
+// Lock of a token file against other writers, by a lock file beside it. The destructor releases the lock; the lock file
+// is never deleted.
 class WriterLock {
  public:
   static absl::StatusOr<WriterLock> acquire(const std::string& file) {
@@ -179,7 +180,7 @@ absl::StatusOr<TokenTable> TokenTable::read(const std::string& file, std::vector
 }
 
 const TokenEntry* TokenTable::find(absl::string_view token, int64_t now) const {
-  static constexpr TokenHash kNobody{};  // compared for unknown ids, so that they take as long
+  static constexpr TokenHash kNobody{};  // makes an unknown id take as long as a known id
   const absl::string_view id = id_of(token);
   if (id.empty()) return nullptr;
   const TokenHash hash = hash_of(token);

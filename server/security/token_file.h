@@ -1,5 +1,5 @@
-// Tokens that locusd accepts, by the file that lists their hashes. A token is `locus_`, its id, `_` and 43 characters
-// base64url of 32 random bytes. The file has one line for each token, and `#` begins a comment line:
+// Tokens that locusd accepts. A file lists their hashes. A token is `locus_`, its id, `_` and 43 characters base64url
+// of 32 random bytes. The file has one line for each token, and `#` begins a comment line:
 //   ID SHA256-HEX CREATED EXPIRES [COMMENT]
 // SHA256-HEX is the hash of the whole token; CREATED and EXPIRES are UTC times like 2024-05-31T12:00:00Z or dates, and
 // EXPIRES may be `never`. An id has 1 to 63 of a-z, 0-9 and -, and begins and ends with a letter or digit.
@@ -27,7 +27,7 @@ struct TokenEntry {
   std::string id;
   TokenHash hash{};
   int64_t created = 0;             // seconds since 1970
-  std::optional<int64_t> expires;  // first second in which it is no longer valid; nullopt = never
+  std::optional<int64_t> expires;  // first second in which the token is not valid; nullopt = never
   std::string comment;
 };
 
@@ -56,10 +56,10 @@ class TokenTable {
   absl::flat_hash_map<std::string, size_t> numbers_;  // positions in entries_, by id
 };
 
-// Returns whether a bearer text has the beginning of a token.
+// Returns whether a bearer credential begins like a token.
 bool is_token(absl::string_view bearer);
 
-// Returns a new token of an id, from the system's random numbers.
+// Returns a new token with the id `id` and random bytes from OpenSSL.
 std::string new_token(absl::string_view id);
 
 // Returns the line of a token file, with its final newline.

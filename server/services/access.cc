@@ -19,7 +19,8 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 
-// Interval at which running calls check whether their credentials have expired, and the audit log writes counts.
+// Interval at which running calls check whether their credentials have expired, and at which due counts are written to
+// the audit log.
 constexpr milliseconds kRecheckInterval{500};
 // Interval at which the files are examined. A change takes effect when two successive examinations find the same state.
 constexpr milliseconds kWatchInterval{200};
@@ -95,7 +96,7 @@ void Access::reload() { report(control_->reload()); }
 
 bool Access::reload_watched() {
   const absl::Status status = control_->reload();
-  // The first reading repeats that of open() and is no news if it succeeds.
+  // Do not report a first reading without mistakes: open() has read and reported the same files before.
   const bool is_news = status.ok() ? read_by_watcher_ : status != last_reading_;
   read_by_watcher_ = true;
   last_reading_ = status;

@@ -1,8 +1,8 @@
 // Access control of a server: reads the files of identities, rights and quotas, reads them again when they change, and
 // makes running calls check their rights after each change and once their credentials expire.
 //
-// Threads: reload() from any thread. Between start() and stop(), one thread watches the files and another one looks for
-// expired credentials.
+// Threads: reload() from any thread. Between start() and stop(), one thread watches the files, and another one makes
+// calls check for expired credentials.
 #ifndef LOCUS_SERVER_SERVICES_ACCESS_H_
 #define LOCUS_SERVER_SERVICES_ACCESS_H_
 
@@ -29,21 +29,22 @@ class Access {
   Access(const Access&) = delete;
   Access& operator=(const Access&) = delete;
 
-  // Reads the files once more and starts to watch them, and to write what the audit log counts. `recheck_calls` makes
-  // every running call check its rights; it is called after each change, and twice a second because credentials expire.
+  // Starts to watch the files, which reads them once more, and to write the counts of updates to the audit log.
+  // `recheck_calls` must make every running call check its rights. It is called after each change, and twice a second
+  // because credentials expire.
   void start(std::function<void()> recheck_calls);
   // Ends the threads. `recheck_calls` is not called afterwards.
   void stop();
 
-  // Reads the files again. If one has a mistake, everything stays as it was, and the mistake is logged as an error.
+  // Reads the files again. If a file has a mistake, keeps the old rules and logs the mistake as an error.
   void reload();
 
  private:
   Access(RpcState& state, std::unique_ptr<AccessControl> control) : state_(state), control_(std::move(control)) {}
   // Logs the result of reading the files.
   void report(const absl::Status& status) const;
-  // Reads the files again for the watcher. Returns whether they had no mistake. Logs a mistake once, although the
-  // watcher repeats a failed reading each second.
+  // Reads the files again for the watcher. Returns false if a file has a mistake. Logs the same mistake only once,
+  // because the watcher repeats a failed reading each second.
   bool reload_watched();
   void run_clock() LOCUS_EXCLUDES(mutex_);
   // Calls recheck_ unless stop() was called.

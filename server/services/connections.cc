@@ -39,7 +39,8 @@ AcceptorOptions acceptor_options(const ServerConfig& config) {
   return options;
 }
 
-// Streams that a connection may have in memory beyond the open ones: they have ended, but are not destroyed yet.
+// Maximum number of streams of a connection that have ended but are not destroyed yet. They are allowed in addition to
+// the open streams.
 constexpr uint64_t kEndedStreams = 512;
 
 FloodLimits flood_limits(const ServerConfig& config, uint32_t streams) {
@@ -117,7 +118,7 @@ absl::StatusOr<std::unique_ptr<Connections>> Connections::listen(const ServerCon
 void Connections::add_to(grpc::ServerBuilder& builder, uint32_t streams) {
   max_streams_ = streams;
   builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, static_cast<int>(streams));
-  builder.AddChannelArgument(GRPC_ARG_ENABLE_CHANNELZ, 1);  // counts streams
+  builder.AddChannelArgument(GRPC_ARG_ENABLE_CHANNELZ, 1);  // for StreamCounter
   builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS,
                              static_cast<int>(config_.handshake_timeout_s) * 1000);
   intake_ = std::make_unique<ConnectionIntake>(

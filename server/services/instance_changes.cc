@@ -17,7 +17,8 @@ namespace {
 // Size in bytes up to which a change that only removes instances is never refused for lack of memory.
 constexpr uint64_t kSmallChangeBytes = 64u << 10;
 
-// Most memory in bytes of one id in the response: in the results of the change, in the message, and in its bytes.
+// Maximum memory in bytes for one id of the response: in the results of the change, in the message, and in the
+// message's bytes.
 constexpr uint64_t kReplyBytesAPlacement = 40;
 
 // Interval at which a waiting call checks whether its caller has given up.
@@ -109,7 +110,7 @@ absl::StatusOr<std::shared_ptr<OwnedChange>> read_change(const Registry& registr
 
 using SharedClaim = std::shared_ptr<const CallMemory>;
 
-// Claims memory for the change before anything is allocated for it: for its copy while it is queued, for checking it,
+// Claims memory for the change before any memory is allocated for it: for the queued copy of the change, for its check,
 // and for building the new set of instances. A small change that only removes instances is never refused.
 absl::StatusOr<SharedClaim> make_room(const Caller& caller, const Scene& scene,
                                       const v1::ChangeInstancesRequest& request) {

@@ -97,8 +97,8 @@ bool send_mesh(const Registry::NamedMesh& mesh, const TakeMeshPiece& take) {
   return pieces.finish();
 }
 
-// Returns the most memory in bytes that a download needs at any time: a copy of the vertices, into which they are
-// unpacked, and one piece as a message, whose columns double as they grow, and as bytes.
+// Returns the maximum memory in bytes that a download needs at any time: an unpacked copy of the vertices, and one
+// piece, both as a message, whose columns double as they grow, and as bytes.
 uint64_t download_cost(const StaticMesh& mesh) {
   const uint64_t columns =
       uint64_t{kTripleBytes} * mesh.vertex_count() + uint64_t{kTripleBytes} * mesh.triangle_count();

@@ -168,7 +168,7 @@ v1::Mesh describe_mesh(const Registry& registry, const std::string& name, MeshPt
 absl::Status reuse(Host& host, const Caller& caller, const std::string& name, const std::vector<MeshPart>& parts,
                    const StaticMesh& known, v1::UploadMeshResponse& response) {
   const MeshPtr shared = StaticMesh::share(name, parts, known, creator_name(caller));
-  CallMemory room;  // both are empty if `name` is known too, because then nothing new is stored
+  CallMemory room;  // `room` and `quota` stay empty if `name` exists: then nothing new is stored
   QuotaHold quota;
   if (!host.registry.find_mesh(name, "mesh").ok()) {
     ASSIGN_OR_RETURN(quota, hold_mesh_bytes(host, shared->creator(), shared->bytes()));
@@ -217,7 +217,8 @@ absl::StatusOr<MeshPtr> build(Host& host, const std::string& name, MeshUpload::C
   return built;
 }
 
-// Answers the upload of a mesh that is complete: builds its tree, unless its content is known, and registers it.
+// Answers an upload that is complete: builds the mesh's tree, unless its content is known already, and registers the
+// mesh.
 absl::Status add_mesh(Host& host, const Caller& caller, MeshUpload& upload, v1::UploadMeshResponse& response) {
   ASSIGN_OR_RETURN(MeshUpload::Complete complete, upload.finish());
   if (const MeshPtr known = host.registry.find_content(complete.sha256); known != nullptr)
@@ -242,7 +243,8 @@ absl::Status receive_mesh(Host& host, const Caller& caller, MessageStream& strea
   const uint64_t columns = upload_cost(message.vertex_count(), message.triangle_count()) + parts_cost(upload.parts());
   const uint64_t tree = tree_cost(message.triangle_count());
   RETURN_IF_ERROR(hold_mesh_bytes(host, creator_name(caller), kMinTriangleBytes * message.triangle_count()).status());
-  // Both are claimed now, so that a mesh that has arrived can be built.
+  // Claim the memory of the tree now too, so that building the mesh cannot fail for lack of memory after it has
+  // arrived.
   ASSIGN_OR_RETURN(const CallMemory room, caller.claim(MemoryLine::kUploads, "triangle_count", columns));
   ASSIGN_OR_RETURN(const CallMemory build_room, caller.claim(MemoryLine::kBuilds, "triangle_count", tree));
   RETURN_IF_ERROR(upload.append(message));

@@ -53,7 +53,7 @@ absl::Status QueryWork::take_quotas() const {
   return slot_.caller().take_quota(QuotaKind::kWork, 0);  // refused while the rate is overdrawn
 }
 
-// Charges the work of queries that failed or were given up too, as it was done.
+// Ends the work with `status`. Also charges work on queries that failed or were given up, because it was done.
 void QueryWork::answer(absl::Status status) {
   ticket_.reset();
   if (run_ != nullptr) slot_.caller().charge_quota(QuotaKind::kWork, static_cast<double>(run_->work_done()));
@@ -121,7 +121,8 @@ void QueryWork::give_up() {
   answer(slot_.caller().stop());
 }
 
-// Claims the memory of the answer only now, so that parked batches keep none from others.
+// Runs the pinned batch. The memory of the answer is claimed only here, so that parked batches claim no memory for
+// answers.
 void QueryWork::run() {
   if (absl::Status status = slot_.claim_answer(max_encoded_reply_bytes(batch_)); !status.ok())
     return answer(std::move(status));
@@ -149,7 +150,7 @@ void QueryWork::run_deferred() { progress_ = host_.scheduler.run_inline(*this); 
 
 void QueryWork::on_deferred_done() {
   if (progress_ == Progress::kDone) return finished(true);
-  submit(host_.scheduler.options().inline_nanoseconds);  // run_inline() has used up this budget already
+  submit(host_.scheduler.options().inline_nanoseconds);  // run_inline() has already used this much time
 }
 
 void QueryWork::submit(uint64_t nanoseconds) {

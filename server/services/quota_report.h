@@ -1,5 +1,5 @@
-// Quotas and how much of them is in use: what callers hold now (server/security/quotas.h) together with what they
-// created (core/scene/registry.h). No state; any thread.
+// Reports quotas and their use: the amounts that callers hold now (server/security/quotas.h) plus the amounts of the
+// data that they created (core/scene/registry.h). No state; any thread.
 #ifndef LOCUS_SERVER_SERVICES_QUOTA_REPORT_H_
 #define LOCUS_SERVER_SERVICES_QUOTA_REPORT_H_
 
@@ -19,7 +19,8 @@ namespace locus::server {
 absl::Status get_quotas(const Host& host, const Caller& caller, const v1::GetQuotasRequest& request,
                         v1::GetQuotasResponse& response);
 
-// Returns for each quota that somebody has, by its name, the largest share of it that an identity or connection uses.
+// Returns the name of each quota that any subject has, and the largest share of it that one identity or connection
+// uses.
 std::vector<std::pair<std::string, double>> largest_quota_shares(const Host& host);
 
 }  // namespace locus::server

@@ -25,7 +25,8 @@ constexpr std::array kReflectedServices = {"grpc.health.v1.Health",  "grpc.refle
                                            "locus.v1.QueryService",  "locus.v1.SceneService",
                                            "locus.v1.ServerService", "locus.v1.UpdateService"};
 
-// Most memory in bytes of a response: the largest file as a message, all files as bytes, and the response's own bytes.
+// Maximum memory in bytes of a response: the largest file as a message, all files as bytes, and the response's own
+// bytes.
 constexpr uint64_t kReplyBytes = 256u << 10;
 
 // Adds `file` and all files that it imports, each once.
@@ -73,9 +74,9 @@ void answer_question(const ReflectionRequest& request, ReflectionResponse& respo
   }
 }
 
-// Refuses a long question before it is looked up and repeated: the descriptor pool searches for each prefix of a name
-// that ends before a dot, in time that grows with the square of the length, under a lock that all threads share.
-// Counts unknown fields too, because the response repeats them.
+// Refuses a long request before its name is looked up and before the response repeats it. A lookup in the descriptor
+// pool tries each prefix of the name that ends before a dot. This takes time quadratic in the length, under a lock that
+// all threads share. Unknown fields count too, because the response repeats them.
 absl::Status check_length(const ReflectionRequest& request) {
   const size_t bytes = request.ByteSizeLong();
   if (bytes <= kMaxReflectionRequestBytes) return absl::OkStatus();

@@ -1,5 +1,5 @@
-// Functions with which calls find a scene, wait for a revision of the scene, and wait for its readers. No state; any
-// thread.
+// Functions that find the scene of a call, wait for a revision of the scene, and wait for the scene's readers. No
+// state; any thread.
 #ifndef LOCUS_SERVER_SERVICES_SCENE_ACCESS_H_
 #define LOCUS_SERVER_SERVICES_SCENE_ACCESS_H_
 
@@ -28,9 +28,9 @@ absl::StatusOr<CallMemory> claim_copy(const Caller& caller, uint64_t bytes, Memo
 absl::StatusOr<SnapshotPin> wait_for(const Scene& scene, const View& view, SteadyTime until, const Caller& caller);
 
 // Waits until every reader whose pin on a snapshot of the scene was revoked has released the pin. Once the wait has
-// taken longer than a second, calls Scene::revoke_overdue_readers() repeatedly. Calls `stop` every 50 ms and, if its
-// status is not OK, returns this status; instead of DEADLINE_EXCEEDED, returns the scene's error, which names the limit
-// pinned_bytes.
+// taken longer than a second, calls Scene::revoke_overdue_readers() repeatedly. Calls `stop` every 50 ms. If `stop`
+// returns DEADLINE_EXCEEDED, returns the scene's error, which names the limit pinned_bytes; returns any other error of
+// `stop` unchanged.
 absl::Status wait_for_readers(Scene& scene, const std::function<absl::Status()>& stop);
 
 }  // namespace locus::server

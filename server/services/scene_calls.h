@@ -17,7 +17,7 @@ namespace locus::server {
 absl::Status change_instances(Host& host, const Caller& caller, const v1::ChangeInstancesRequest& request,
                               MessageStream& stream);
 
-// Returns OK unless the caller has used up its quota of work, to which describe() and dump_scene() add.
+// Returns OK unless the caller has used up its quota of work. describe() and dump_scene() charge this quota.
 absl::Status check_work(const Caller& caller);
 
 // Returns the description of a scene, with the number of its pending changes. If the scene has changed since its last

@@ -13,8 +13,8 @@
 namespace locus::server {
 namespace {
 
-// Maximum number of things (objects and instances) in a piece, and maximum size in bytes of a thing: its entries in the
-// columns, the protobuf tags and lengths of a new run, and a mesh's name.
+// Maximum number of things (objects and instances) in a piece, and maximum size in bytes of a thing. The size includes
+// the thing's entries in the columns, the protobuf tags and lengths of a new run, and a mesh's name.
 constexpr size_t kThingsPerPiece = 16384;
 constexpr size_t kMaxBytesPerThing = 8 + 24 + 16 + 16 + 4 + 8 + 8 + 64 + limits::kMaxNameLength;
 static_assert(kThingsPerPiece * kMaxBytesPerThing <= limits::kDefaultReplyBytes);
@@ -164,8 +164,8 @@ bool dump_snapshot(const SceneSnapshot& snapshot, const DumpOrder& order, const 
   return dump.finish();
 }
 
-// Returns the most memory in bytes that a dump of the snapshot needs at any time: the sorted lists of its objects and
-// instances, and one piece as a message, whose columns double as they grow, and as bytes.
+// Returns the maximum memory in bytes that a dump of the snapshot needs at any time: the sorted lists of its objects
+// and instances, and one piece, both as a message, whose columns double as they grow, and as bytes.
 uint64_t dump_cost(const SceneSnapshot& snapshot) {
   const uint64_t things = snapshot.objects.size() + snapshot.statics->size();
   return things * sizeof(GridRef) + 3 * std::min<uint64_t>(things, kThingsPerPiece) * kMaxBytesPerThing;

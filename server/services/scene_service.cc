@@ -155,7 +155,7 @@ absl::StatusOr<Registry::CreatedScene> add_scene(Host& host, const v1::CreateSce
   const size_t scenes = host.registry.scene_count();
   if (scenes >= host.config.max_scenes && !host.registry.find_scene(request.name()).ok())
     return refuse_full("name", "scenes", host.config.max_scenes, static_cast<double>(scenes + 1), 0);
-  std::vector<QuotaHold> quotas;  // until the registry counts the scene
+  std::vector<QuotaHold> quotas;  // held until the registry counts the scene
   if (absl::IsNotFound(host.registry.find_scene(request.name()).status())) {
     ASSIGN_OR_RETURN(quotas, hold_scene(host, spec));
   }
@@ -280,7 +280,7 @@ v1::Scene describe(Host& host, const Caller& caller, const Scene& scene) {
   std::optional<SceneSummary> summary = scene.known_summary();
   if (!summary) {
     const Turns::Turn turn(host.scene_visits);
-    summary = scene.known_summary();  // another call may have made it while this one waited
+    summary = scene.known_summary();  // another call may have computed it meanwhile
     if (!summary) {
       summary = scene.summary();
       caller.charge_quota(QuotaKind::kWork, static_cast<double>(summary->objects));

@@ -35,7 +35,8 @@ using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 using std::chrono::system_clock;
 
-// Calls of the health and reflection services of one connection. These services have limits of their own.
+// Maximum number of calls of the health and reflection services on one connection. These services have limits of their
+// own.
 constexpr uint32_t kOtherCalls = kMaxHealthWatchers + kMaxHealthChecks + kMaxReflections;
 // Interval in milliseconds between keepalive pings to clients, and maximum delay of the answer to a ping. The pings
 // detect clients whose machine is unreachable. The streams of such clients would otherwise stay open for ever.
@@ -78,7 +79,8 @@ void set_limits(const ServerConfig& config, grpc::ServerBuilder& builder) {
   builder.SetResourceQuota(quota);
   builder.SetMaxReceiveMessageSize(static_cast<int>(config.max_receive_bytes));
   builder.SetMaxSendMessageSize(-1);
-  // A compressed message of a few megabytes could inflate to gigabytes: gRPC refuses it, or leaves it as it is.
+  // gRPC must not inflate messages, because a few megabytes could become gigabytes. It refuses compressed messages or,
+  // with accept_compression, passes them on compressed.
   builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_GZIP, config.accept_compression);
   builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_DEFLATE, false);
   builder.AddChannelArgument(GRPC_ARG_ENABLE_PER_MESSAGE_DECOMPRESSION, 0);
@@ -178,7 +180,7 @@ void Server::reload() {
 void Server::drain(milliseconds grace) {
   const steady_clock::time_point deadline = steady_clock::now() + grace;
   Host& host = parts_->host;
-  // New connections are accepted until the end, so that probes hear that the server is not serving.
+  // New connections are accepted until the end, so that probes get the answer that the server is not serving.
   parts_->health_service.not_serving();
   host.drain.begin();
   parts_->access->stop();

@@ -14,7 +14,7 @@
 namespace locus::server {
 namespace {
 
-// Bytes of a listed item error in an ack, its text included.
+// Maximum bytes of one listed item error in an ack, including its text.
 constexpr uint64_t kBytesAnItemError = 192;
 constexpr uint64_t kBytesAnAck = 256;
 

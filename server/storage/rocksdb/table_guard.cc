@@ -43,7 +43,7 @@ std::optional<Handle> read_handle(absl::string_view bytes) {
   return size ? std::optional(Handle{*offset, *size}) : std::nullopt;
 }
 
-// End of a table file. Verifies the checksums of the metaindex and properties blocks.
+// The last blocks of a table file. Verifies the checksums of the metaindex and properties blocks.
 class Tail {
  public:
   Tail(rocksdb::FSRandomAccessFile& file, uint64_t size) : file_(file), size_(size) {}
