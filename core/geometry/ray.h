@@ -60,7 +60,8 @@ inline constexpr double kObjectPad = 0x1p-40;    // predicates of moving objects
 template <class S>
 class SlabRay {
  public:
-  SlabRay(const Ray<S>& ray, double pad)
+  // Always inlined, because a call of its own takes 27 instructions more for each ray.
+  [[gnu::always_inline]] SlabRay(const Ray<S>& ray, double pad)
       : origin_(ray.origin),
         direction_(ray.direction),
         pad_(static_cast<S>(pad)),

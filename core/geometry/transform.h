@@ -23,9 +23,9 @@ struct Transform {
 // up to limits::kMaxQuaternionDeviation; scale > 0.
 Transform make_transform(Vec3d translation, const Quaternion& quaternion, float scale);
 
-// Returns the world bounds of a box in mesh axes, grown by about 2^-40 of the magnitudes of the translation and of the
-// scaled box, to cover the rounding errors of this function. So the result for a part of a mesh may exceed the result
-// for the whole mesh only by these errors.
+// Returns world bounds that contain a box in mesh axes. The bounds are grown by about 2^-40 of the magnitudes of the
+// translation and of the scaled box, which covers the rounding errors of this function. The bounds of a part of a mesh
+// lie within the bounds of the whole mesh, except for rounding errors.
 Aabbd bounds_to_world(const Transform& transform, const Aabbf& mesh_box);
 
 }  // namespace locus

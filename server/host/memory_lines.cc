@@ -9,11 +9,11 @@ namespace locus::server {
 namespace {
 
 constexpr uint64_t kPinnedShare = 4;
-// The allocator may keep 1 / kCacheShare of the limit, and at least kMinCacheBytes.
+// The allocator may keep free memory up to 1 / kCacheShare of the limit, or up to kMinCacheBytes if that is more.
 constexpr uint64_t kCacheShare = 8;
 constexpr uint64_t kMinCacheBytes = uint64_t{64} << 20;
-// gRPC's buffers may take 1 / kNetworkShare of the limit, and at least kMinNetworkBytes, which is enough for a few of
-// the largest messages. Inserts and uploads leave the same share free (MemoryBudget::ceiling()).
+// gRPC's buffers may take up to 1 / kNetworkShare of the limit, or up to kMinNetworkBytes if that is more, which is
+// enough for a few of the largest messages. Inserts and uploads leave the same share free (MemoryBudget::ceiling()).
 constexpr uint64_t kNetworkShare = 8;
 constexpr uint64_t kMinNetworkBytes = uint64_t{64} << 20;
 

@@ -76,9 +76,9 @@ void QueryWork::look() {
   wait();
 }
 
-// Returns the error for a batch whose revision will not be published any more, because the call has ended or because a
-// draining server accepts no updates. A draining server ends a stream only after all messages of the stream are
-// answered, so on a stream this is the error of one message only.
+// Returns the error for a query batch that stops waiting for its revision, because the call has ended or because the
+// server drains and accepts no more updates. When the server drains, a message of a stream gets another error than a
+// unary call, because the stream ends only after all its messages are answered.
 absl::Status QueryWork::no_longer() const {
   RETURN_IF_ERROR(slot_.caller().stop());
   if (!slot_.stream()) return draining();

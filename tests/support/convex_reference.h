@@ -56,7 +56,8 @@ class SolidReference {
  public:
   explicit SolidReference(const Shape& shape) : shape_(shape) {}
 
-  // Returns the gauge at `offset` from the shape's position, in world axes.
+  // Returns the gauge of the solid (see the top of the file) at a point. `offset` is the point relative to the shape's
+  // position, in world axes.
   Real gauge(Vec3r offset) const {
     const Vec3r p = turned_back(shape_.rotation, offset);
     const Vec3r size = to_real(shape_.size);

@@ -95,7 +95,8 @@ inline GridBall cull_ball_of(const Brick& brick, const Balld& ball) {
   for (int axis = 0; axis < 3; ++axis) cull.center[axis] = static_cast<float>(center[axis]);
   if (planted(PlantedBug::kGridBallMargin))
     return {{cull.center[0], cull.center[1], cull.center[2]}, static_cast<float>(ball.radius)};
-  // The kernel's differences, squares and their sum have an error of less than 4 * 2^-24 of the distance.
+  // Rounding in the kernel's differences, squares and sums together changes the distance by less than 4 * 2^-24 of
+  // itself. The widening below, in units of kCullEpsilon = 2^-20, is larger.
   cull.radius = static_cast<float>((ball.radius + cull_epsilon(brick) + 4 * double{kCullEpsilon} * magnitude) *
                                    (1 + 2 * double{kCullEpsilon}));
   return cull;

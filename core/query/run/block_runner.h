@@ -1,9 +1,9 @@
-// Runner of consecutive queries of one block on one thread. Writes dense rows and bytes directly into the reply's
-// columns. Collects counted rows in memory of its own, since their positions in the reply depend on how many rows the
-// earlier chunks have.
+// Runs a chunk of a block: consecutive queries, on one thread. The output depends on the RowLayout of the block. Rows
+// of kDense and bytes of kBytes are written directly into the reply's columns. Rows of kCounted are collected in memory
+// of the runner, since their positions in the reply depend on how many rows the earlier chunks have.
 //
-// Threads: a runner belongs to one thread. Invariant: the runner has at most max_rows_ counted rows, and, for a counted
-// block, one row count for each query that was run.
+// Threads: a runner belongs to one thread. Invariant: the runner has at most max_rows_ rows of kCounted and, for a
+// block with this layout, one row count for each query that was run.
 #ifndef LOCUS_CORE_QUERY_RUN_BLOCK_RUNNER_H_
 #define LOCUS_CORE_QUERY_RUN_BLOCK_RUNNER_H_
 

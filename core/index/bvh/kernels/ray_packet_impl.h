@@ -16,9 +16,9 @@
 namespace locus {
 namespace {
 
-// Returns whether eight rays are coherent. Coherent rays have the same octant and the same projection axis z, which
-// Packet requires. For speed, they must also have directions within a narrow cone, and origins that are close to each
-// other compared to `magnitude`, the largest |coordinate| of the mesh.
+// Returns whether eight rays are coherent. Packet requires that their directions lie in the same octant and have their
+// largest component along the same mesh axis. For speed, the directions must also lie within a narrow cone, and the
+// origins must be close to each other compared to `magnitude`, the largest |coordinate| of the mesh.
 static inline bool are_coherent(const PreparedRays& rays, float magnitude) {
   constexpr float kMaxSpread = 0.03f;
   const auto differ = [&](uint32_t column, float max_difference) {

@@ -88,8 +88,9 @@ static inline RayColumns columns_of(const KernelRay* rays, size_t count) {
   return columns;
 }
 
-// Projection axes of eight rays. Given the components of eight vectors on the mesh axes, along() returns their
-// components on the projection axis z, first() on x and second() on y.
+// Projection axes of eight rays. The projection axis z of a ray is the mesh axis of its direction's largest component;
+// its projection axes x and y are the two other mesh axes. Given the components of eight vectors on the mesh axes,
+// first(), second() and along() return their components on the projection axes x, y and z.
 class Projection {
  public:
   inline Projection(const Floats8* direction, const KernelRay* rays, size_t count) {
