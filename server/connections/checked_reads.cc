@@ -26,6 +26,7 @@ struct WatchedSocket {
   uint64_t cookie = 0;
   std::shared_ptr<Connection> connection;
   FrameCheck check;
+  bool is_refused = false;
 };
 
 // Watched sockets of the process whose descriptors have the same remainder modulo kShards.
@@ -71,6 +72,12 @@ void CheckedReads::watch(int descriptor, std::shared_ptr<Connection> connection)
                                  WatchedSocket{this, cookie_of(descriptor), std::move(connection), FrameCheck()});
 }
 
+void CheckedReads::forget(int descriptor) {
+  Shard& shard = shard_of(descriptor);
+  const MutexLock lock(shard.mutex);
+  shard.sockets.erase(descriptor);
+}
+
 bool CheckedReads::accept(int descriptor, const msghdr& message, size_t count) {
   if (descriptor < 0) return true;
   Shard& shard = shard_of(descriptor);
@@ -82,10 +89,11 @@ bool CheckedReads::accept(int descriptor, const msghdr& message, size_t count) {
     shard.sockets.erase(found);
     return true;
   }
+  if (socket.is_refused) return false;
   const char* reason = refusal(socket.check, message, count);
   if (reason == nullptr) return true;
+  socket.is_refused = true;
   socket.owner->on_refused_(*socket.connection, reason);
-  shard.sockets.erase(found);
   return false;
 }
 

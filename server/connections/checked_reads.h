@@ -35,6 +35,9 @@ class CheckedReads {
   // Begins to check the reads from `descriptor`, the socket of `connection`, from which nothing was read yet.
   void watch(int descriptor, std::shared_ptr<Connection> connection);
 
+  // Stops checking the reads from `descriptor`, which is now another socket.
+  static void forget(int descriptor);
+
   // Checks `count` bytes that were read from `descriptor` into `message`. Returns false if the bytes are refused; then
   // `on_refused` was called, and the transport must not get the bytes. Costs about 0.1 us for a watched descriptor.
   static bool accept(int descriptor, const msghdr& message, size_t count);

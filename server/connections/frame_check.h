@@ -27,11 +27,15 @@ class FrameCheck {
   static constexpr uint64_t kMaxBlockBytes = 64 << 10;
   // Maximum CONTINUATION frames of a block. A client needs one for each 16 KiB after the first.
   static constexpr uint32_t kMaxContinuations = 8;
-  // Cancelled calls in excess of half of all calls, and frames that carry nothing: the number of each that is accepted
-  // in a second, and the number that is accepted at once. A client cancels all its open calls at once if they reach
-  // their deadlines together.
+  // Cancelled calls in excess of half of all calls, frames that carry nothing, and PING frames in excess of the other
+  // frames of calls: the number of each that is accepted in a second, and the number that is accepted at once. A client
+  // may cancel all its open calls at once, because they reach their deadlines together; clients in Go send a PING after
+  // each piece of a reply.
   static constexpr double kPerSecond = 1000;
   static constexpr double kBurst = 1000;
+  // Maximum calls that begin in the bytes of one read. gRPC creates all of them before it accepts the first one, and a
+  // client may have fewer open calls.
+  static constexpr uint32_t kMaxCallsOfRead = 2048;
 
   // Checks the next bytes of the connection, which were read at `now`. Returns null if they are accepted, otherwise the
   // reason for which the connection must be closed, a constant; later results have no meaning.
@@ -43,6 +47,8 @@ class FrameCheck {
 
   // Checks a frame whose header is complete. Returns as refusal() does.
   const char* begin_frame();
+  // Counts a frame of HEADERS. Only a frame with a new stream number of a client begins a call.
+  void begin_headers();
   // Subtracts from both counts what is accepted in the time since the last read.
   void let_time_pass(Time now);
 
@@ -51,10 +57,13 @@ class FrameCheck {
   size_t frame_header_size_ = 0;  // bytes of the next frame's header that have arrived
   uint64_t block_bytes_ = 0;
   uint32_t continuations_ = 0;
-  // Counts that are never below 0: cancelled calls, less half of all calls and kPerSecond for each second; and frames
-  // that carry nothing, less kPerSecond for each second.
+  uint32_t last_stream_ = 0;    // number of the last stream that began a call
+  uint32_t calls_of_read_ = 0;  // calls that began in the current read
+  // Counts that are never below 0, each less kPerSecond for each second: cancelled calls, less half of all calls;
+  // frames that carry nothing; and PING frames, less the frames that begin calls, carry data, or update windows.
   double cancelled_ = 0;
   double empty_ = 0;
+  double pings_ = 0;
   Time last_;  // time of the last read
 };
 

@@ -10,6 +10,7 @@
 #include <memory>
 
 #include "absl/strings/string_view.h"
+#include "core/base/check.h"
 #include "server/connections/checked_reads.h"
 #include "server/connections/frame_check.h"
 
@@ -27,11 +28,13 @@ struct TlsChecks {
 
 std::atomic<const TlsChecks*> tls_checks{nullptr};  // null until check_tls_reads()
 
+// Returns whether the peers have agreed on a protocol. gRPC offers h2 and grpc-exp, which are both HTTP/2; the HTTP
+// port offers none.
 bool has_chosen_http2(const SSL* ssl) {
   const unsigned char* name = nullptr;
   unsigned int size = 0;
   SSL_get0_alpn_selected(ssl, &name, &size);
-  return absl::string_view(reinterpret_cast<const char*>(name), size) == "h2";
+  return size > 0;
 }
 
 // Checks bytes that were read from a TLS connection. Returns false if they are refused.
@@ -52,6 +55,9 @@ bool accept(SSL* ssl, absl::string_view bytes) {
 }  // namespace
 
 void check_tls_reads(OnRefused on_refused) {
+  // Otherwise gRPC would call the original functions, for example because it is linked statically.
+  LOCUS_CHECK(dlsym(RTLD_DEFAULT, "recvmsg") == reinterpret_cast<void*>(&recvmsg));
+  LOCUS_CHECK(dlsym(RTLD_DEFAULT, "SSL_read") == reinterpret_cast<void*>(&SSL_read));
   static const TlsChecks kChecks{on_refused, SSL_get_ex_new_index(0, nullptr, nullptr, nullptr, free_check)};
   tls_checks.store(&kChecks);
 }

@@ -136,7 +136,11 @@ void Connections::start(grpc::Server& server) {
   AcceptorHooks hooks;
   hooks.hand_over = [this](int descriptor, const std::shared_ptr<Connection>& connection) {
     const bool is_plain = tls_ == nullptr || connection->peer().uid;
-    if (is_plain) reads_->watch(descriptor, connection);
+    if (is_plain) {
+      reads_->watch(descriptor, connection);
+    } else {
+      CheckedReads::forget(descriptor);
+    }
     intake_->hand_over(descriptor, *connection);
   };
   hooks.refused = log_refused;

@@ -5,6 +5,8 @@
 #include <grpcpp/server_builder.h>
 
 #include <algorithm>
+#include <future>
+#include <thread>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -38,6 +40,10 @@ using std::chrono::system_clock;
 // Maximum number of calls of the health and reflection services on one connection. These services have limits of their
 // own.
 constexpr uint32_t kOtherCalls = kMaxHealthWatchers + kMaxHealthChecks + kMaxReflections;
+// Maximum number of bytes that gRPC reads from a connection at once.
+constexpr int kMaxReadBytes = 256 << 10;
+// Time after which the connections are closed when gRPC has not ended by itself.
+constexpr std::chrono::seconds kCloseAfter{2};
 // Interval in milliseconds between keepalive pings to clients, and maximum delay of the answer to a ping. The pings
 // detect clients whose machine is unreachable. The streams of such clients would otherwise stay open for ever.
 constexpr int kPingEveryMs = 30'000;
@@ -84,6 +90,9 @@ void set_limits(const ServerConfig& config, grpc::ServerBuilder& builder) {
   builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_GZIP, config.accept_compression);
   builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_DEFLATE, false);
   builder.AddChannelArgument(GRPC_ARG_ENABLE_PER_MESSAGE_DECOMPRESSION, 0);
+  // gRPC handles all frames of a read before it reports the first call. A read of 4 MiB, the default maximum, may
+  // contain calls that take a gigabyte. Reads of 32 KiB made large messages 10 to 20 % slower.
+  builder.AddChannelArgument(GRPC_ARG_TCP_MAX_READ_CHUNK_SIZE, kMaxReadBytes);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kPingEveryMs);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kPingAnswerMs);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
@@ -189,8 +198,17 @@ void Server::drain(milliseconds grace) {
   parts_->connections->stop_accepting();
   host.drain.end();
   parts_->health_service.end();
-  parts_->grpc->Shutdown(system_clock::now() + (idle ? kLastWords : milliseconds(0)));
+  const milliseconds last_words = idle ? milliseconds(kLastWords) : milliseconds(0);
+  // gRPC waits without a limit for a client that does not read what was sent to it.
+  std::promise<void> ended;
+  std::thread closer([&host, last_words, future = ended.get_future()] {
+    if (future.wait_for(last_words + kCloseAfter) == std::future_status::ready) return;
+    host.connections.close_if([](const Connection&) { return true; }, "the server ends");
+  });
+  parts_->grpc->Shutdown(system_clock::now() + last_words);
   parts_->grpc->Wait();
+  ended.set_value();
+  closer.join();
   parts_->io->stop();
   parts_->http.reset();
   parts_->ended = true;

@@ -70,7 +70,7 @@ class Row:
         if not self.served:
             found.append("the victim is not served afterwards")
         answered, calls = self.answered()
-        if not self.deaths and answered < MIN_ANSWERED * calls:
+        if not self.deaths and answered < max(1, MIN_ANSWERED * calls):
             found.append(f"only {answered} of the victim's {calls} calls were answered")
         if self.stuck:
             found.append("the attack did not end")

@@ -94,11 +94,15 @@ TEST_F(ConnectionsTest, AFloodOfContinuationsIsClosed) {
 
 // The block is far below what the flood guard accepts, so only the check of headers can close the connection.
 TEST_F(ConnectionsTest, ABlockOfHeadersThatIsTooLongClosesItsConnectionAtOnce) {
-  RawSocket attacker = opened();
-  EXPECT_TRUE(attacker.send(http2_frame(kHeaders, 0, 1, headers_of("/locus.v1.QueryService/Query"))));
+  const std::string begin = http2_frame(kHeaders, 0, 1, headers_of("/locus.v1.QueryService/Query"));
   const std::string part = http2_frame(kContinuation, 0, 1, header("name", std::string(100, 'v')));
+  RawSocket honest = opened();
+  EXPECT_TRUE(honest.send(begin + repeated(part, server::FrameCheck::kMaxContinuations)));
+  RawSocket attacker = opened();
+  EXPECT_TRUE(attacker.send(begin));
   attacker.send(repeated(part, server::FrameCheck::kMaxContinuations + 1));
   EXPECT_TRUE(wait_until([&] { return !attacker.discard(); }));
+  EXPECT_TRUE(honest.discard()) << "the older connection, which is as silent, must still be open";
   EXPECT_TRUE(victim_is_served());
 }
 

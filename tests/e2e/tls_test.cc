@@ -1,7 +1,7 @@
 #include <gmock/gmock.h>
 #include <openssl/bio.h>
 #include <openssl/ssl.h>
-#include <sys/socket.h>
+#include <poll.h>
 
 #include <algorithm>
 #include <array>
@@ -90,27 +90,24 @@ TEST_F(TlsTest, OnlyClientsWithACertificateOfTheClientCaAreServed) {
   EXPECT_FALSE(get_server(channel_to(running.address(), root, expired), std::chrono::seconds(2)).ok());
 }
 
-// A TLS connection that has chosen HTTP/2 and sends bytes of its own making.
+// A TLS connection of a client that offers one protocol and sends bytes of its own making.
 class RawTlsSocket {
  public:
-  explicit RawTlsSocket(const std::string& address) {
-    constexpr std::array<unsigned char, 3> kHttp2{2, 'h', '2'};
-    EXPECT_EQ(SSL_CTX_set_alpn_protos(context_.get(), kHttp2.data(), kHttp2.size()), 0);
+  RawTlsSocket(const std::string& address, const std::string& protocol) {
+    const std::string offer = static_cast<char>(protocol.size()) + protocol;
+    EXPECT_EQ(SSL_CTX_set_alpn_protos(context_.get(), reinterpret_cast<const unsigned char*>(offer.data()),
+                                      static_cast<unsigned>(offer.size())),
+              0);
     BIO_set_conn_hostname(connection_.get(), address.c_str());
     EXPECT_EQ(BIO_do_connect(connection_.get()), 1);
-    const timeval timeout{60, 0};
-    setsockopt(static_cast<int>(BIO_get_fd(connection_.get(), nullptr)), SOL_SOCKET, SO_RCVTIMEO, &timeout,
-               sizeof timeout);
   }
   bool send(const std::string& bytes) {
     return BIO_write(connection_.get(), bytes.data(), static_cast<int>(bytes.size())) == static_cast<int>(bytes.size());
   }
-  // Reads until the server closes the connection. Returns false if it sends nothing for a minute.
-  bool wait_closed() {
-    std::array<char, 4096> bytes;
-    while (BIO_read(connection_.get(), bytes.data(), bytes.size()) > 0) {
-    }
-    return BIO_should_retry(connection_.get()) == 0;
+  // Returns whether the server has not closed the connection.
+  bool is_open() {
+    pollfd end{static_cast<int>(BIO_get_fd(connection_.get(), nullptr)), POLLRDHUP, 0};
+    return poll(&end, 1, 0) == 0;
   }
 
  private:
@@ -118,16 +115,21 @@ class RawTlsSocket {
   const std::unique_ptr<BIO, decltype(&BIO_free_all)> connection_{BIO_new_ssl_connect(context_.get()), &BIO_free_all};
 };
 
+// gRPC accepts two names of HTTP/2.
 TEST_F(TlsTest, ABlockOfHeadersThatIsTooLongClosesItsConnection) {
   const RunningServer running(config(false));
   constexpr uint8_t kHeaders = 1, kContinuation = 9;
   std::string frames = kHttp2Opening + http2_frame(kHeaders, 0, 1, "");
   for (uint32_t frame = 0; frame < server::FrameCheck::kMaxContinuations; ++frame)
     frames += http2_frame(kContinuation, 0, 1, "");
-  RawTlsSocket attacker(running.address());
-  ASSERT_TRUE(attacker.send(frames));
-  EXPECT_TRUE(attacker.send(http2_frame(kContinuation, 0, 1, "")));
-  EXPECT_TRUE(attacker.wait_closed());
+  for (const char* protocol : {"h2", "grpc-exp"}) {
+    RawTlsSocket honest(running.address(), protocol), attacker(running.address(), protocol);
+    EXPECT_TRUE(honest.send(frames));
+    EXPECT_TRUE(attacker.send(frames));
+    EXPECT_TRUE(attacker.send(http2_frame(kContinuation, 0, 1, "")));
+    EXPECT_TRUE(wait_until([&] { return !attacker.is_open(); }));
+    EXPECT_TRUE(honest.is_open()) << protocol << ": the older connection, which is as silent, must still be open";
+  }
   EXPECT_TRUE(get_server(channel_to(running.address(), authority_.certificate())).ok());
 }
 

@@ -26,17 +26,31 @@ std::string repeated(const std::string& text, size_t times) {
   return all;
 }
 
-std::string call() { return http2_frame(kHeaders, kEndHeaders, 1, "headers") + http2_frame(kData, kEndStream, 1, ""); }
-std::string cancelled_call() { return call() + http2_frame(kReset, 0, 1, kCancel); }
-
 // A connection that has sent its preface.
 class FrameCheckTest : public ::testing::Test {
  protected:
   FrameCheckTest() { EXPECT_TRUE(accepts(kHttp2Opening)); }
   bool accepts(const std::string& bytes) { return check_.refusal(bytes, now_) == nullptr; }
 
+  std::string call() {
+    stream_ += 2;
+    return http2_frame(kHeaders, kEndHeaders, stream_, "headers") + http2_frame(kData, kEndStream, stream_, "");
+  }
+  std::string cancel() const { return http2_frame(kReset, 0, stream_, kCancel); }
+  std::string cancelled_call() {
+    const std::string begin = call();
+    return begin + cancel();
+  }
+  // Returns whether `count` calls are accepted that are all cancelled, each in a read of its own.
+  bool accepts_cancelled(int count) {
+    for (int i = 0; i < count; ++i)
+      if (!accepts(cancelled_call())) return false;
+    return true;
+  }
+
   FrameCheck check_;
   FrameCheck::Time now_{seconds(100)};
+  uint32_t stream_ = 99;
 };
 
 TEST_F(FrameCheckTest, BlocksUpToTheMaximaAreAccepted) {
@@ -70,20 +84,45 @@ TEST_F(FrameCheckTest, OtherFramesAreSkippedWhateverTheyContain) {
 }
 
 TEST_F(FrameCheckTest, CallsThatAreCancelledAtOnceAreRefusedAfterTwiceTheBurst) {
-  EXPECT_TRUE(accepts(repeated(cancelled_call(), static_cast<size_t>(2 * FrameCheck::kBurst) - 1)));
-  EXPECT_FALSE(accepts(cancelled_call()));
+  EXPECT_TRUE(accepts_cancelled(static_cast<int>(2 * FrameCheck::kBurst) - 1));
+  EXPECT_FALSE(accepts_cancelled(1));
+}
+
+TEST_F(FrameCheckTest, HeadersThatBeginNoCallDoNotPayForCancelledCalls) {
+  int accepted = 0;
+  const std::string trailers = http2_frame(kHeaders, kEndHeaders | kEndStream, 1, "");
+  const std::string even = http2_frame(kHeaders, kEndHeaders | kEndStream, 2, "");
+  while (accepted < 5000 && accepts(cancelled_call() + trailers + even)) ++accepted;
+  EXPECT_LT(accepted, 2 * FrameCheck::kBurst);
 }
 
 TEST_F(FrameCheckTest, AClientMayCancelEveryOtherCallForEver) {
-  for (int round = 0; round < 100; ++round) ASSERT_TRUE(accepts(repeated(call() + cancelled_call(), 1000)));
+  for (int round = 0; round < 100'000; ++round) ASSERT_TRUE(accepts(call()) && accepts(cancelled_call()));
 }
 
 TEST_F(FrameCheckTest, AClientMayCancelAllCallsAtAModerateRate) {
-  for (int round = 0; round < 100; ++round, now_ += seconds(1)) ASSERT_TRUE(accepts(repeated(cancelled_call(), 1900)));
+  for (int round = 0; round < 100; ++round, now_ += seconds(1)) ASSERT_TRUE(accepts_cancelled(1900));
 }
 
-TEST_F(FrameCheckTest, AllOpenCallsMayBeCancelledTogether) {
-  EXPECT_TRUE(accepts(repeated(call(), 1000) + repeated(http2_frame(kReset, 0, 1, kCancel), 1000)));
+TEST_F(FrameCheckTest, ManyOpenCallsMayBeCancelledTogether) {
+  for (int i = 0; i < 1000; ++i) ASSERT_TRUE(accepts(call()));
+  EXPECT_TRUE(accepts(repeated(cancel(), 1000)));
+}
+
+TEST_F(FrameCheckTest, AReadWithMoreCallsThanAClientMayOpenIsRefused) {
+  std::string calls;
+  for (uint32_t i = 0; i < FrameCheck::kMaxCallsOfRead; ++i) calls += call();
+  EXPECT_TRUE(accepts(calls));
+  calls.clear();
+  for (uint32_t i = 0; i <= FrameCheck::kMaxCallsOfRead; ++i) calls += call();
+  EXPECT_FALSE(accepts(calls));
+}
+
+// grpc-go sends a PING for each reply, to measure the connection.
+TEST_F(FrameCheckTest, APingAfterEachReplyIsAccepted) {
+  const std::string ping = http2_frame(kPing, 0, 0, "12345678"), update = http2_frame(kWindowUpdate, 0, 0, "1234");
+  for (int i = 0; i < 100'000; ++i) ASSERT_TRUE(accepts(call() + ping));
+  for (int i = 0; i < 100'000; ++i) ASSERT_TRUE(accepts(update + ping));
 }
 
 TEST_F(FrameCheckTest, FloodsOfFramesThatCarryNothingAreRefused) {
@@ -93,7 +132,7 @@ TEST_F(FrameCheckTest, FloodsOfFramesThatCarryNothingAreRefused) {
     FrameCheck check;
     const auto most = static_cast<size_t>(FrameCheck::kBurst) - 1;  // the opening has a frame of SETTINGS
     EXPECT_EQ(check.refusal(kHttp2Opening + repeated(frame, most), now_), nullptr);
-    EXPECT_NE(check.refusal(frame, now_), nullptr);
+    EXPECT_NE(check.refusal(frame + frame, now_), nullptr);
   }
 }
 
