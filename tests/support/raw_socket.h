@@ -60,6 +60,7 @@ class RawSocket {
   }
 
   bool connected() const { return connected_; }
+  int descriptor() const { return fd_; }
   // Sends all bytes. Returns false if the server has closed the connection.
   bool send(const std::string& bytes) {
     for (size_t sent = 0; sent < bytes.size();) {
