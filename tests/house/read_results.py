@@ -2,7 +2,7 @@
 
 ctest reports a test as "not run" if its program is missing, if its fixture failed, or if it skipped itself; only the
 last is a skip here. A test that Python's unittest skipped within a passing test gets its own line, and so does each
-attack that a passing group skipped.
+attack of which a passing group skipped all or some steps.
 """
 import re
 import sys
@@ -23,7 +23,9 @@ def skipped_within(case):
 
 
 def left_out(case):
-    return re.findall(r"^skipped: ([\w-]+): not survived yet", case.findtext("system-out") or "", re.MULTILINE)
+    output = case.findtext("system-out") or ""
+    return re.findall(r"^skipped: ([\w-]+): not survived yet", output, re.MULTILINE) + \
+        [f"{name}: {what}" for name, what in re.findall(r"^\d+MiB ([\w-]+): skipped: (.*)$", output, re.MULTILINE)]
 
 
 def main(path):

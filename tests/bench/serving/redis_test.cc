@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "absl/strings/match.h"
+
 namespace locus::bench::serving {
 namespace {
 
@@ -30,7 +32,8 @@ TEST(RedisTest, EveryPrefixOfAReplyIsIncomplete) {
 
 TEST(RedisTest, AStartedServerAnswersSearchesAndReportsErrors) {
   const auto redis = Redis::start();
-  if (!redis.ok()) GTEST_SKIP() << redis.status();
+  if (absl::StrContains(redis.status().message(), "is not installed")) GTEST_SKIP() << redis.status();
+  ASSERT_TRUE(redis.ok()) << redis.status();
   (*redis)->run({redis_command({"GEOADD", "key", "0", "0", "a", "0.001", "0", "b", "1", "1", "c"})}, 1, 1);
   EXPECT_EQ((*redis)->counted(), 3u);
   const std::string search = redis_command({"GEOSEARCH", "key", "FROMLONLAT", "0", "0", "BYRADIUS", "1000", "m"});

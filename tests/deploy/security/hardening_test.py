@@ -87,9 +87,10 @@ class MutualTlsTest(unittest.TestCase):
         os.mkdir(os.path.join(root, "bin"))
         for program in ("locus", "locusd"):  # the user may not be allowed to read BIN
             shutil.copy(os.path.join(BIN, program), os.path.join(root, "bin"))
-        self.server, self.client = Machine(root, "server"), Machine(root, "client")
-        for machine in (self.server, self.client):
-            self.addCleanup(machine.stop)
+        self.server = Machine(root, "server")
+        self.addCleanup(self.server.stop)
+        self.client = Machine(root, "client")
+        self.addCleanup(self.client.stop)
         self.check(self.server, f"ip link add cable type veth peer name cable netns {self.client.keeper.pid}", user=False)
         for machine, address in ((self.server, SERVER), (self.client, CLIENT)):
             self.check(machine, f"ip address add {address}/24 dev cable && ip link set cable up", user=False)
@@ -139,8 +140,10 @@ class MutualTlsTest(unittest.TestCase):
         token = query.split(" query ")[0]
         insert = f"{token} insert arena-1 ball --id 1 --at 0,0,0 --radius 1"
         self.assertIn("lacks the right update to scene 'arena-1'", self.refuse(self.client, insert))
-        self.refuse(self.client, "locus -a locus.internal:7575 --ca ca.pem --token-file ci.token scene list")
-        self.refuse(self.client, "locus -a locus.internal:7575 scene list")
+        without_certificate = "locus -a locus.internal:7575 --ca ca.pem --token-file ci.token scene list"
+        for command in (without_certificate, "locus -a locus.internal:7575 scene list"):
+            self.assertIn("no connection to locus.internal:7575: the server ended", self.refuse(self.client, command))
+        self.check(self.client, listing)
 
 
 if __name__ == "__main__":
