@@ -25,6 +25,8 @@ using google::protobuf::io::CodedInputStream;
 
 // Repeated fields double their capacity as they grow.
 constexpr uint64_t kGrowth = 2;
+// Bytes of a column's header and of the first values' room, in addition to kGrowth times its values.
+constexpr uint64_t kColumnBytes = 16;
 // Bytes of a string object with its allocation, and of an entry in a list of pointers with the allocation that it
 // points to.
 constexpr uint64_t kStringBytes = 64;
@@ -173,13 +175,13 @@ absl::Status WirePlan::Scan::count(const Field& field) {
 }
 
 // Counts the memory of a field of a column. The field contains all values of the column (packed) or a single value;
-// both forms are legal.
+// both forms are legal. Each field is charged kColumnBytes, although the fields of a column share one header.
 absl::Status WirePlan::Scan::column(const Field& field, Wire wire) {
   uint32_t bytes = 0;
   if (!skip(wire, &bytes)) return no_message();
   const bool packed = wire == Wire::kDelimited;
   const uint64_t shortest = field.wire == Wire::kVarint ? 1 : field.value_bytes;
-  memory += kGrowth * field.value_bytes * (packed ? bytes / shortest : 1);
+  memory += kColumnBytes + kGrowth * field.value_bytes * (packed ? bytes / shortest : 1);
   return absl::OkStatus();
 }
 

@@ -82,6 +82,25 @@ TEST(WirePlanTest, AMessageNeedsNoMoreMemoryThanTheScanSays) {
   EXPECT_GE(*scan<v1::CreateSceneRequest>(bytes), parsed.SpaceUsedLong() - sizeof(parsed));
 }
 
+// Protobuf gives a repeated field a header, and room for several values with the first one.
+TEST(WirePlanTest, ShortColumnsNeedNoMoreMemoryThanTheScanSays) {
+  const uint64_t empty = v1::QueryBlock().SpaceUsedLong();
+  for (int values = 1; values <= 40; ++values) {
+    std::string fixed32, fixed64, varints;
+    for (int i = 0; i < values; ++i) {
+      fixed32 += "\x2D" + std::string(4, '\x01');  // masks
+      fixed64 += "\x31" + std::string(8, '\x01');  // ignore_groups
+      varints += "\x20\x01";                       // columns
+    }
+    for (const std::string& bytes : {fixed32, fixed64, varints, fixed32 + fixed64 + varints}) {
+      v1::QueryBlock block;
+      ASSERT_TRUE(block.ParseFromString(bytes));
+      ASSERT_GE(block.masks_size() + block.ignore_groups_size() + block.columns_size(), values);
+      EXPECT_LE(block.SpaceUsedLong() - empty, *scan<v1::QueryBlock>(bytes)) << values << " values";
+    }
+  }
+}
+
 TEST(WirePlanTest, EmptySubMessagesAreCountedBeforeTheyExist) {
   const std::string empty_insert(std::string("\x32\x00", 2));
   const std::string lists = repeat(empty_insert, limits::kMaxUpdateLists + 1);
