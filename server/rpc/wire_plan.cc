@@ -33,8 +33,9 @@ constexpr uint64_t kStringBytes = 64;
 constexpr uint64_t kPointerBytes = 32;
 // Bytes of a map's node in addition to the key and the value.
 constexpr uint64_t kMapNodeBytes = 64;
-// Bytes that Protobuf keeps for an unknown field in addition to its content.
-constexpr uint64_t kUnknownBytes = 64;
+// Bytes that Protobuf keeps for an unknown field in addition to its content: the set of unknown fields of its message
+// (40), two entries in that set (32), and a string object with the room of its allocation that is not used (48).
+constexpr uint64_t kUnknownBytes = 128;
 
 // Types of values on the wire, with Protobuf's numbers.
 enum class Wire : uint8_t { kVarint = 0, kFixed64 = 1, kDelimited = 2, kStartGroup = 3, kEndGroup = 4, kFixed32 = 5 };

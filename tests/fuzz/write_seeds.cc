@@ -199,6 +199,7 @@ void write_updates(const SeedWriter& seeds) {
     (*create.mutable_spec()->mutable_labels())[std::to_string(label)] = "x";
   seeds.write("wire", "too_many_labels", create.SerializeAsString());
   seeds.write("wire", "short_column", "\x3D\xA6\x3D\x08\x0A");  // one value of a repeated field
+  seeds.write("wire", "unknown_field", "\x7A\x10" + std::string(16, 'x'));
 }
 
 // Frames after the size of the pieces in which they are read, which is 3.

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <google/protobuf/descriptor.h>
+#include <google/protobuf/unknown_field_set.h>
 #include <grpcpp/support/slice.h>
 #include <gtest/gtest.h>
 
@@ -97,6 +98,19 @@ TEST(WirePlanTest, ShortColumnsNeedNoMoreMemoryThanTheScanSays) {
       ASSERT_TRUE(block.ParseFromString(bytes));
       ASSERT_GE(block.masks_size() + block.ignore_groups_size() + block.columns_size(), values);
       EXPECT_LE(block.SpaceUsedLong() - empty, *scan<v1::QueryBlock>(bytes)) << values << " values";
+    }
+  }
+}
+
+TEST(WirePlanTest, UnknownFieldsNeedNoMoreMemoryThanTheScanSays) {
+  const uint64_t empty = v1::QueryBlock().SpaceUsedLong();
+  for (int fields = 1; fields <= 40; ++fields) {
+    for (size_t length = 0; length <= 64; ++length) {
+      const std::string bytes = repeat(delimited(15, std::string(length, 'x')), static_cast<size_t>(fields));
+      v1::QueryBlock block;
+      ASSERT_TRUE(block.ParseFromString(bytes));
+      ASSERT_EQ(block.GetReflection()->GetUnknownFields(block).field_count(), fields);
+      EXPECT_LE(block.SpaceUsedLong() - empty, *scan<v1::QueryBlock>(bytes)) << fields << " of " << length << " bytes";
     }
   }
 }
