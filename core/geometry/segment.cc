@@ -71,6 +71,20 @@ double squared_distance_to_segment(Vec3d point, Vec3d half_axis) {
   return squared_length(cross(point, half_axis)) / aa;
 }
 
+double squared_distance_segments(Vec3d offset, Vec3d half_axis, Vec3d other_half_axis) {
+  double least = std::min(squared_distance_to_segment(offset + other_half_axis, half_axis),
+                          squared_distance_to_segment(offset - other_half_axis, half_axis));
+  least = std::min(least, squared_distance_to_segment(half_axis - offset, other_half_axis));
+  least = std::min(least, squared_distance_to_segment(-half_axis - offset, other_half_axis));
+  const Vec3d normal = cross(half_axis, other_half_axis);
+  const double nn = squared_length(normal);
+  if (nn == 0) return least;
+  const double s = dot(cross(offset, other_half_axis), normal) / nn;
+  const double t = dot(cross(offset, half_axis), normal) / nn;
+  if (std::abs(s) > 1 || std::abs(t) > 1) return least;
+  return std::min(least, squared_length(offset + other_half_axis * t - half_axis * s));
+}
+
 bool segment_meets_box(Vec3d center, Vec3d half_axis, Vec3d half) {
   const Vec3d a = abs(half_axis);
   const Vec3d across = abs(cross(center, half_axis));

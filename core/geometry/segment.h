@@ -1,6 +1,6 @@
-// Distances between a segment and a point or a box. The segment consists of the points s * half_axis, -1 <= s <= 1,
-// relative to its midpoint; with a zero half axis it is a point. The argument `point` is relative to the midpoint, too.
-// Pure functions; any thread.
+// Distances between a segment and a point, a segment or a box. The segment consists of the points s * half_axis, -1 <=
+// s <= 1, relative to its midpoint; with a zero half axis it is a point. The argument `point` is relative to the
+// midpoint, too. Pure functions; any thread.
 #ifndef LOCUS_CORE_GEOMETRY_SEGMENT_H_
 #define LOCUS_CORE_GEOMETRY_SEGMENT_H_
 
@@ -15,6 +15,13 @@ Vec3d nearest_on_segment(Vec3d point, Vec3d half_axis);
 // distance is computed by a cross product and one division: exact if the result is a small integer, otherwise the error
 // of the distance is a few roundings of |point|.
 double squared_distance_to_segment(Vec3d point, Vec3d half_axis);
+
+// Returns the squared distance between two segments. `offset` is the midpoint of the second relative to the midpoint of
+// the first. The minimum of the four distances between an end and the other segment and, if the lines are nearest
+// inside of both segments, of the distance between these two points. Since every candidate is a distance between points
+// of the segments, cancellation for nearly parallel segments never makes the result too small.
+// Source: Ericson, Real-Time Collision Detection, 2005, 5.1.9.
+double squared_distance_segments(Vec3d offset, Vec3d half_axis, Vec3d other_half_axis);
 
 // Returns whether the segment with midpoint `center` meets the closed box of half extents `half` around the origin:
 // separating axis test over six axes, without division.

@@ -1,0 +1,25 @@
+// Distance between a segment and a triangle. A triangle is a closed surface; a triangle without area is a segment or a
+// point. The segment consists of the points center + s * half_axis, -1 <= s <= 1; with a zero half axis it is a point.
+// Pure functions in double; O(1); any thread.
+#ifndef LOCUS_CORE_GEOMETRY_SEGMENT_TRIANGLE_H_
+#define LOCUS_CORE_GEOMETRY_SEGMENT_TRIANGLE_H_
+
+#include "core/geometry/vec3.h"
+
+namespace locus {
+
+// Returns whether the segment crosses the triangle, by the signs of five volumes. Two triangles that share an edge
+// compute volumes of this edge of equal magnitude, so a segment cannot pass between them. A segment that only touches
+// the triangle, or lies in its plane, may be reported either way.
+// Source: Moller, Trumbore, Fast, Minimum Storage Ray/Triangle Intersection, 1997, for the volumes.
+bool segment_crosses_triangle(Vec3d center, Vec3d half_axis, Vec3d a, Vec3d b, Vec3d c);
+
+// Returns the squared distance between the segment and the triangle: 0 if they cross, else the minimum of the distances
+// from the ends of the segment to the triangle, and from the segment to the three edges. The result is never less than
+// the exact one by more than a few roundings of the coordinates.
+// Source: Ericson, Real-Time Collision Detection, 2005, 5.1.10.
+double squared_distance_segment_triangle(Vec3d center, Vec3d half_axis, Vec3d a, Vec3d b, Vec3d c);
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_GEOMETRY_SEGMENT_TRIANGLE_H_
