@@ -89,6 +89,27 @@ BoxBlock& BoxBlock::rotations(absl::Span<const float> rotations) {
   return *this;
 }
 
+CapsuleBlock& CapsuleBlock::detail(v1::StaticDetail detail) {
+  capsules_->set_detail(detail);
+  return *this;
+}
+
+CapsuleBlock& CapsuleBlock::capsule(const Float3& start, const Float3& end, float radius, const Filter& filter) {
+  filter_row(capsules_->starts_size() / 3, filter);
+  append_triple(*capsules_->mutable_starts(), start);
+  append_triple(*capsules_->mutable_ends(), end);
+  capsules_->add_radii(radius);
+  return *this;
+}
+
+CapsuleBlock& CapsuleBlock::capsules(absl::Span<const float> starts, absl::Span<const float> ends,
+                                     absl::Span<const float> radii) {
+  append(*capsules_->mutable_starts(), starts);
+  append(*capsules_->mutable_ends(), ends);
+  append(*capsules_->mutable_radii(), radii);
+  return *this;
+}
+
 NearestBlock& NearestBlock::k(uint32_t count) {
   nearest_->set_k(count);
   return *this;

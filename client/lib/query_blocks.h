@@ -152,6 +152,21 @@ class BoxBlock : public BlockBuilder<BoxBlock> {
   v1::Boxes* boxes_;
 };
 
+class CapsuleBlock : public BlockBuilder<CapsuleBlock> {
+ public:
+  explicit CapsuleBlock(v1::QueryBlock& block) : BlockBuilder(block), capsules_(block.mutable_capsules()) {}
+
+  CapsuleBlock& detail(v1::StaticDetail detail);
+  // Appends a capsule: all points at a distance of at most `radius` from the segment from `start` to `end`.
+  CapsuleBlock& capsule(const Float3& start, const Float3& end, float radius, const Filter& filter = {});
+  // Appends N capsules: 3N floats of starts, 3N floats of ends, and N radii. If this call adds all capsules of the
+  // block, `ends` may instead contain three floats for all capsules, and `radii` one radius for all.
+  CapsuleBlock& capsules(absl::Span<const float> starts, absl::Span<const float> ends, absl::Span<const float> radii);
+
+ private:
+  v1::Capsules* capsules_;
+};
+
 // Block that finds the objects and instances nearest to points. The rows of a query ascend by distance, which is in
 // column t.
 class NearestBlock : public BlockBuilder<NearestBlock> {

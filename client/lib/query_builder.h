@@ -32,6 +32,7 @@ class QueryBuilder {
   RayBlock rays() { return RayBlock(*batch_.add_blocks()); }
   BallBlock balls() { return BallBlock(*batch_.add_blocks()); }
   BoxBlock boxes() { return BoxBlock(*batch_.add_blocks()); }
+  CapsuleBlock capsules() { return CapsuleBlock(*batch_.add_blocks()); }
   NearestBlock nearest() { return NearestBlock(*batch_.add_blocks()); }
   LookupBlock lookup() { return LookupBlock(*batch_.add_blocks()); }
 

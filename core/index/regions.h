@@ -1,6 +1,6 @@
-// Regions: the culling tests of ball and box queries, in the scalar type S of an index. A region has axis-aligned
-// bounds and a test of overlap with boxes; the visitors apply the exact tests to values. Immutable; cheap to copy; any
-// thread.
+// Regions: the culling tests of ball, box and capsule queries, in the scalar type S of an index. A region has
+// axis-aligned bounds and a test of overlap with boxes; the visitors apply the exact tests to values. Immutable; cheap
+// to copy; any thread.
 #ifndef LOCUS_CORE_INDEX_REGIONS_H_
 #define LOCUS_CORE_INDEX_REGIONS_H_
 
@@ -10,6 +10,7 @@
 
 #include "core/base/check.h"
 #include "core/geometry/ball.h"
+#include "core/geometry/capsule.h"
 #include "core/geometry/obb.h"
 
 namespace locus {
@@ -48,19 +49,42 @@ class BallRegion {
   Aabb<S> bounds_;
 };
 
-// Region of a box, which may be rotated: overlaps() returns true for the boxes that overlap the axis-aligned bounds of
-// the box, compared exactly.
+// Region of the axis-aligned bounds of a box, which may be rotated, or of a capsule: overlaps() returns true for the
+// boxes that overlap these bounds, compared exactly.
 template <std::floating_point S>
 class BoxRegion {
  public:
-  explicit BoxRegion(const Obb<S>& box) : exact_(bounds_of(box)), bounds_(internal::rounded_outward<S>(exact_)) {}
+  explicit BoxRegion(const Obb<S>& box) : BoxRegion(bounds_of(box)) {}
+  explicit BoxRegion(const Capsule& capsule) : BoxRegion(bounds_of(capsule)) {}
 
   const Aabb<S>& bounds() const { return bounds_; }
   bool overlaps(const Aabb<S>& box) const { return locus::overlaps(exact_, to_double(box)); }
 
  private:
+  explicit BoxRegion(const Aabbd& bounds) : exact_(bounds), bounds_(internal::rounded_outward<S>(exact_)) {}
+
   Aabbd exact_;
   Aabb<S> bounds_;
+};
+
+// Region of a capsule: overlaps() returns true for the boxes that may_reach() accepts, and for no box that the bounds
+// of the capsule do not overlap. Not monotone: near the surface of the capsule, rounding decides. So a visitor may use
+// it only to cull values whose own test is stricter by more than this rounding.
+class CapsuleRegion {
+ public:
+  explicit CapsuleRegion(const Capsule& capsule)
+      : capsule_(capsule), exact_(bounds_of(capsule)), bounds_(internal::rounded_outward<float>(exact_)) {}
+
+  const Aabbf& bounds() const { return bounds_; }
+  bool overlaps(const Aabbf& box) const {
+    const Aabbd wide = to_double(box);
+    return locus::overlaps(exact_, wide) && may_reach(capsule_, wide);
+  }
+
+ private:
+  Capsule capsule_;
+  Aabbd exact_;
+  Aabbf bounds_;
 };
 
 }  // namespace locus

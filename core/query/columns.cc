@@ -23,6 +23,7 @@ struct ServedColumns {
   }
   ColumnSet operator()(const BallColumns&) const { return overlap(); }
   ColumnSet operator()(const BoxColumns&) const { return overlap(); }
+  ColumnSet operator()(const CapsuleColumns&) const { return overlap(); }
   ColumnSet operator()(const NearestColumns&) const {
     return {Column::kT,     Column::kId,  Column::kTriangle, Column::kPoint,
             Column::kGroup, Column::kTag, Column::kLayers,   Column::kPose};
@@ -42,6 +43,7 @@ struct DefaultColumns {
   }
   ColumnSet operator()(const BallColumns& balls) const { return overlap(balls.detail); }
   ColumnSet operator()(const BoxColumns& boxes) const { return overlap(boxes.detail); }
+  ColumnSet operator()(const CapsuleColumns& capsules) const { return overlap(capsules.detail); }
   ColumnSet operator()(const NearestColumns&) const { return {Column::kT, Column::kId, Column::kTriangle}; }
   ColumnSet operator()(const LookupColumns&) const { return {Column::kId, Column::kPose}; }
   static ColumnSet overlap(StaticDetail detail) {
@@ -58,6 +60,7 @@ struct LayoutOf {
   }
   RowLayout operator()(const BallColumns&) const { return RowLayout::kCounted; }
   RowLayout operator()(const BoxColumns&) const { return RowLayout::kCounted; }
+  RowLayout operator()(const CapsuleColumns&) const { return RowLayout::kCounted; }
   RowLayout operator()(const NearestColumns&) const { return RowLayout::kCounted; }
   RowLayout operator()(const LookupColumns& lookup) const {
     return lookup.groups.empty() ? RowLayout::kDense : RowLayout::kCounted;

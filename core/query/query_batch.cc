@@ -167,6 +167,15 @@ class BlockCheck {
     return check_rotations(boxes.rotations);
   }
 
+  absl::Status check_kind(const CapsuleColumns& capsules) const {
+    RETURN_IF_ERROR(check_length(capsules.starts.size(), 3, ColumnNeed::kEach, "capsules.starts"));
+    RETURN_IF_ERROR(check_length(capsules.ends.size(), 3, ColumnNeed::kEachOrOne, "capsules.ends"));
+    RETURN_IF_ERROR(check_length(capsules.radii.size(), 1, ColumnNeed::kEachOrOne, "capsules.radii"));
+    RETURN_IF_ERROR(check_points(capsules.starts, "capsules.starts"));
+    RETURN_IF_ERROR(check_points(capsules.ends, "capsules.ends"));
+    return check_sizes(capsules.radii, 1, "capsules.radii");
+  }
+
   absl::Status check_rotations(absl::Span<const float> values) const {
     for (size_t i = 0; i + 3 < values.size(); i += 4) {
       const double deviation = unit_deviation({values[i], values[i + 1], values[i + 2], values[i + 3]});
@@ -205,6 +214,7 @@ struct CountQueries {
   size_t operator()(const RayColumns& rays) const { return rays.origins.size() / 3; }
   size_t operator()(const BallColumns& balls) const { return balls.centers.size() / 3; }
   size_t operator()(const BoxColumns& boxes) const { return boxes.centers.size() / 3; }
+  size_t operator()(const CapsuleColumns& capsules) const { return capsules.starts.size() / 3; }
   size_t operator()(const NearestColumns& nearest) const { return nearest.points.size() / 3; }
   size_t operator()(const LookupColumns& lookup) const {
     return lookup.groups.empty() ? lookup.ids.size() : lookup.groups.size();

@@ -80,6 +80,13 @@ struct BoxColumns {
   StaticDetail detail = StaticDetail::kInstances;
 };
 
+struct CapsuleColumns {
+  absl::Span<const float> starts;  // N entries x y z, relative to the frame: one end of the inner segment
+  absl::Span<const float> ends;    // N entries x y z, or one for all capsules, relative to the frame: the other end
+  absl::Span<const float> radii;   // N entries, or one for all capsules; >= 0
+  StaticDetail detail = StaticDetail::kInstances;
+};
+
 struct NearestColumns {
   absl::Span<const float> points;         // N entries x y z, relative to the frame
   absl::Span<const float> max_distances;  // maximum distance of a row, >= 0; default: +inf
@@ -103,11 +110,11 @@ struct QueryBlock {
   absl::Span<const uint64_t> ignore_groups;  // group that each query ignores; default: 0, no group
   absl::Span<const uint64_t> ignore_ids;     // at most limits::kMaxIgnoredIds ids that every query of the block ignores
   uint32_t max_results = 0;                  // maximum number of rows per query; 0: limits::kDefaultMaxResults
-  Id after_id = kNoId;                       // lower bound, exclusive, of the ids returned for balls, boxes and groups
+  Id after_id = kNoId;                       // lower bound, exclusive, of the ids returned for overlaps and groups
   absl::Span<const uint64_t> as_of_ticks;    // tick of each query; default: the snapshot's latest state
   absl::Span<const float> as_of_fractions;   // fraction of the way to the next tick, >= 0 and < 1; default: 0
   OutsideHistory outside = OutsideHistory::kReject;
-  std::variant<RayColumns, BallColumns, BoxColumns, LookupColumns, NearestColumns> kind;
+  std::variant<RayColumns, BallColumns, BoxColumns, LookupColumns, NearestColumns, CapsuleColumns> kind;
 };
 
 // Returns the kind of the block. The value of a BlockKind is the index of its alternative in QueryBlock::kind, as
@@ -120,6 +127,7 @@ static_assert(std::is_same_v<ColumnsOf<BlockKind::kBall>, BallColumns>);
 static_assert(std::is_same_v<ColumnsOf<BlockKind::kBox>, BoxColumns>);
 static_assert(std::is_same_v<ColumnsOf<BlockKind::kLookup>, LookupColumns>);
 static_assert(std::is_same_v<ColumnsOf<BlockKind::kNearest>, NearestColumns>);
+static_assert(std::is_same_v<ColumnsOf<BlockKind::kCapsule>, CapsuleColumns>);
 static_assert(std::variant_size_v<decltype(QueryBlock::kind)> == kBlockKinds);
 
 struct QueryBatch {

@@ -63,6 +63,16 @@ absl::Status read_kind(const v1::Boxes& boxes, const std::string& field, QueryBl
   return status;
 }
 
+absl::Status read_kind(const v1::Capsules& capsules, const std::string& field, QueryBlock* out) {
+  CapsuleColumns columns;
+  columns.starts = span_of(capsules.starts());
+  columns.ends = span_of(capsules.ends());
+  columns.radii = span_of(capsules.radii());
+  const absl::Status status = read_enum(capsules.detail(), kDetails, field + ".capsules.detail", &columns.detail);
+  out->kind = columns;
+  return status;
+}
+
 absl::Status read_kind(const v1::Nearest& nearest, const std::string& field, QueryBlock* out) {
   NearestColumns columns;
   columns.points = span_of(nearest.points());
@@ -91,7 +101,7 @@ absl::Status read_kind(const v1::QueryBlock& block, const std::string& field, Qu
     case v1::QueryBlock::kLookup:
       return read_kind(block.lookup(), field, out);
     case v1::QueryBlock::kCapsules:
-      return not_served(field + ".capsules");
+      return read_kind(block.capsules(), field, out);
     case v1::QueryBlock::kFrustums:
       return not_served(field + ".frustums");
     case v1::QueryBlock::kSweeps:
@@ -104,7 +114,7 @@ absl::Status read_kind(const v1::QueryBlock& block, const std::string& field, Qu
       break;
   }
   return refuse_argument(Reason::kMalformed, field, {},
-                         "a block needs one kind of query: rays, balls, boxes, lookup or nearest");
+                         "a block needs one kind of query: rays, balls, boxes, capsules, lookup or nearest");
 }
 
 absl::Status read_columns(const v1::QueryBlock& block, const std::string& field, ColumnSet* out) {

@@ -16,7 +16,7 @@
 namespace locus::server {
 
 // Kinds of queries with similar cost.
-enum class CostKind : uint8_t { kRayFirst, kRayAny, kRayAll, kBall, kBox, kNearest, kLookup, kLookupGroups };
+enum class CostKind : uint8_t { kRayFirst, kRayAny, kRayAll, kBall, kBox, kNearest, kLookup, kLookupGroups, kCapsule };
 CostKind cost_kind(const QueryBlock& block);
 
 class CostEstimates {

@@ -61,6 +61,15 @@ v1::QueryBatch box_at(float x, float half) {
   return batch;
 }
 
+v1::QueryBatch capsule_between(float from, float to, float radius) {
+  v1::QueryBatch batch;
+  v1::Capsules* capsules = batch.add_blocks()->mutable_capsules();
+  fill(capsules->mutable_starts(), {from, 0.f, 0.f});
+  fill(capsules->mutable_ends(), {to, 0.f, 0.f});
+  capsules->add_radii(radius);
+  return batch;
+}
+
 TEST_F(QueryRpcTest, AReplyNamesTheRevisionThatItSaw) {
   const v1::QueryResult result = ask({});
   EXPECT_EQ(result.revision(), 2u);
@@ -94,6 +103,8 @@ TEST_F(QueryRpcTest, RaysFindTheFirstAnyAndAllHits) {
 TEST_F(QueryRpcTest, OverlapsListObjectsAndInstancesInOneOrder) {
   EXPECT_THAT(ask(ball_at(9, 0.5f)).blocks(0).ids(), ElementsAre(3u, 100u));
   EXPECT_THAT(ask(box_at(6, 3)).blocks(0).ids(), ElementsAre(1u, 2u, 3u, 100u));
+  EXPECT_THAT(ask(capsule_between(3, 9, 0.5f)).blocks(0).ids(), ElementsAre(1u, 2u, 3u, 100u));
+  EXPECT_THAT(ask(capsule_between(9, 9, 0.5f)).blocks(0).ids(), ElementsAre(3u, 100u));
   v1::QueryBatch triangles = ball_at(9, 0.5f);
   triangles.mutable_blocks(0)->mutable_balls()->set_detail(v1::STATIC_DETAIL_TRIANGLES_SORTED);
   triangles.mutable_blocks(0)->set_source(v1::SOURCE_STATIC);
@@ -278,6 +289,8 @@ TEST_F(QueryRpcTest, WrongValuesRefuseTheBatchAndAreNamed) {
   refused(points, "nearest.points", length, {}, [](auto* block) { block->mutable_nearest()->add_points(1); });
   const v1::QueryBatch boxes = box_at(0, 1);
   refused(boxes, "boxes.half_extents", range, 0, [](auto* block) { block->mutable_boxes()->set_half_extents(2, -1); });
+  refused(capsule_between(0, 1, 1), "capsules.radii", range, 0,
+          [](auto* block) { block->mutable_capsules()->set_radii(0, -1); });
   refused(boxes, "boxes.rotations", range, 0, [](auto* block) {
     fill(block->mutable_boxes()->mutable_rotations(), {0.f, 0.f, 0.f, 3.f});
   });
@@ -327,7 +340,6 @@ TEST_F(QueryRpcTest, KindsAndFieldsThatAreNotServedAreNamed) {
     spoil(batch.mutable_blocks(0));
     expect_query_refused(batch, {grpc::StatusCode::UNIMPLEMENTED, v1::REASON_NOT_SERVED, "blocks[0]." + field});
   };
-  refused("capsules", [](auto* block) { block->mutable_capsules(); });
   refused("frustums", [](auto* block) { block->mutable_frustums(); });
   refused("sweeps", [](auto* block) { block->mutable_sweeps(); });
   refused("sight", [](auto* block) { block->mutable_sight(); });

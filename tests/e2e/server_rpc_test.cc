@@ -29,8 +29,9 @@ TEST_F(ServerRpcTest, TheServerReportsItsVersionAndFeatures) {
   const v1::GetServerResponse server = get_server(stubs());
   EXPECT_EQ(server.version(), LOCUS_VERSION);
   EXPECT_EQ(server.instruction_set(), instruction_set());
-  EXPECT_THAT(server.features(), ::testing::ElementsAre("as_of", "balls", "boxes", "download_mesh", "history",
-                                                        "latest_wins", "lookup", "nearest", "rays", "static_from"));
+  EXPECT_THAT(server.features(),
+              ::testing::ElementsAre("as_of", "balls", "boxes", "capsules", "download_mesh", "history", "latest_wins",
+                                     "lookup", "nearest", "rays", "static_from"));
 }
 
 TEST_F(ServerRpcTest, LimitsAreListedInOrderWithTheirUse) {

@@ -16,9 +16,9 @@ namespace locus::test {
 // columns are used.
 struct OwnedBlock {
   QueryBlock settings;
-  std::vector<float> points;  // origins of rays, centres of balls and boxes, or points of nearest queries
-  std::vector<float> sizes;   // directions of rays, radii of balls, or half extents of boxes
-  std::vector<float> extras;  // t_max of rays, rotations of boxes, or maximum distances of nearest queries
+  std::vector<float> points;  // origins of rays, centres of balls and boxes, starts of capsules, or points of nearest
+  std::vector<float> sizes;   // directions of rays, radii of balls, half extents of boxes, or ends of capsules
+  std::vector<float> extras;  // t_max of rays, rotations of boxes, radii of capsules, or maximum distances of nearest
   std::vector<uint64_t> ids;  // ids of lookups
   std::vector<uint64_t> groups;
   std::vector<uint32_t> masks;
@@ -71,6 +71,11 @@ struct OwnedBlock {
     boxes.centers = points;
     boxes.half_extents = sizes;
     boxes.rotations = extras;
+  }
+  void fill(CapsuleColumns& capsules) const {
+    capsules.starts = points;
+    capsules.ends = sizes;
+    capsules.radii = extras;
   }
   void fill(NearestColumns& nearest) const {
     nearest.points = points;

@@ -194,6 +194,9 @@ class QueryOracle {
   static bool meets(const Balld& ball, const Aabbd& bounds) { return reaches(ball, bounds); }
   static bool meets(const Obbd& box, const Aabbd& bounds) { return overlaps(bounds_of(box), bounds); }
   static bool meets(const Balld& ball, const Shape& shape) { return ball_overlaps(ball, shape); }
+  static bool meets(const Capsule& capsule, const Aabbd& bounds) { return reaches(capsule, bounds); }
+  static bool meets(const Capsule& capsule, const Shape& shape) { return capsule_overlaps(capsule, shape); }
+  static bool meets(const Capsule& capsule, const Triangle& triangle) { return capsule_overlaps(capsule, triangle); }
   static bool meets(const Obbd& box, const Shape& shape) { return box_overlaps(box, shape); }
   static bool meets(const Ballf& ball, const Triangle& triangle) { return ball_overlaps(ball, triangle); }
   static bool meets(const Obbf& box, const Triangle& triangle) { return box_overlaps(box, triangle); }
@@ -204,13 +207,28 @@ class QueryOracle {
     return {to_float(transform.point_to_mesh(box.center)), to_float(box.half * (1.0 / transform.scale)),
             compose(inverse(transform.rotation), box.rotation)};
   }
+  static Capsule in_mesh(const Capsule& capsule, const Transform& transform) {
+    return {transform.point_to_mesh(capsule.center),
+            transform.rotation.to_local(capsule.half_axis) * (1.0 / transform.scale),
+            capsule.radius * (1.0 / transform.scale)};
+  }
+  static double reach(const Capsule& capsule) {
+    return max_component(abs(capsule.center)) + max_component(abs(capsule.half_axis)) + capsule.radius;
+  }
   static double reach(const Balld& ball) { return max_component(abs(ball.center)) + ball.radius; }
   static double reach(const Obbd& box) { return max_component(abs(box.center)) + 2 * max_component(box.half); }
+
+  // Returns whether a solid meets the bounds of an instance; for a capsule, its bounds decide.
+  static bool may_meet(const Capsule& capsule, const Aabbd& bounds) { return overlaps(bounds_of(capsule), bounds); }
+  template <class Solid>
+  static bool may_meet(const Solid& solid, const Aabbd& bounds) {
+    return meets(solid, bounds);
+  }
 
   template <class Solid>
   void overlap_rows(const QueryBlock& block, StaticDetail detail, const Solid& solid, const Instance& instance,
                     Rows& rows) const {
-    if (!meets(solid, instance.bounds)) return;
+    if (!may_meet(solid, instance.bounds)) return;
     const PlacedTriangles placed(instance);
     const LoosePlacedTriangles loose(instance, reach(solid));
     const auto mesh_solid = in_mesh(solid, instance.transform);
@@ -264,6 +282,15 @@ class QueryOracle {
         box.rotation = rotation_of({q[0], q[1], q[2], q[3]});
       }
       answer_overlap(block, boxes.detail, box, i, result);
+    }
+  }
+
+  void answer_kind(const QueryBlock& block, const CapsuleColumns& capsules, BlockResult& result) const {
+    for (size_t i = 0; i < capsules.starts.size() / 3; ++i) {
+      const Vec3d start = point(block, capsules.starts, i);
+      const Vec3d end = point(block, capsules.ends, capsules.ends.size() == 3 ? 0 : i);
+      const Capsule capsule{(start + end) * 0.5, (end - start) * 0.5, entry_for(capsules.radii, i, 0.0f)};
+      answer_overlap(block, capsules.detail, capsule, i, result);
     }
   }
 
@@ -366,6 +393,7 @@ class QueryOracle {
     ColumnSet operator()(const RayColumns&) const { return {Column::kT, Column::kId, Column::kTriangle}; }
     ColumnSet operator()(const BallColumns& balls) const { return of(balls.detail); }
     ColumnSet operator()(const BoxColumns& boxes) const { return of(boxes.detail); }
+    ColumnSet operator()(const CapsuleColumns& capsules) const { return of(capsules.detail); }
     ColumnSet operator()(const LookupColumns&) const { return {Column::kId, Column::kPose}; }
     ColumnSet operator()(const NearestColumns&) const { return {Column::kT, Column::kId, Column::kTriangle}; }
     static ColumnSet of(StaticDetail detail) {

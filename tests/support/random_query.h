@@ -213,6 +213,26 @@ inline OwnedBlock box_block(const QueryScene& scene, const SceneSketch& sketch, 
   return block;
 }
 
+// Capsules around and between the places of the sketch's balls: points, short, long, along an axis, and flat.
+inline OwnedBlock capsule_block(const QueryScene& scene, const SceneSketch& sketch, Random& random) {
+  OwnedBlock block = block_at(sketch, random);
+  block.settings.kind = CapsuleColumns{{}, {}, {}, random_detail(random)};
+  for (const Balld& ball : sketch.balls) {
+    append_point(block, ball.center);
+    Vec3d way = random.whole_vector(3);
+    if (random.chance(0.3)) way = random.vector(random.magnitude(-5, 10));
+    if (random.chance(0.2)) way = notable_point(sketch, random) - ball.center;
+    const std::vector<float> starts = block.points;
+    append_point(block, ball.center + way);
+    block.sizes.insert(block.sizes.end(), block.points.end() - 3, block.points.end());
+    block.points = starts;
+    block.extras.push_back(random.chance(0.1) ? 0 : static_cast<float>(std::min(ball.radius, 1e9)));
+  }
+  add_common(scene, random, block);
+  add_columns(kOverlapColumns, random, block);
+  return block;
+}
+
 inline OwnedBlock nearest_block(const QueryScene& scene, const SceneSketch& sketch, Random& random) {
   OwnedBlock block = block_at(sketch, random);
   constexpr uint32_t kCounts[] = {0, 1, 2, 5, 16, limits::kMaxNearest};
@@ -258,6 +278,7 @@ inline QueryScene query_scene(const SceneSketch& sketch, Random& random) {
   if (!sketch.boxes.empty()) scene.blocks.push_back(internal::box_block(scene, sketch, random));
   if (!sketch.placements.empty()) scene.blocks.push_back(internal::nearest_block(scene, sketch, random));
   scene.blocks.push_back(internal::lookup_block(scene, random));
+  if (!sketch.balls.empty()) scene.blocks.push_back(internal::capsule_block(scene, sketch, random));
   return scene;
 }
 

@@ -1,4 +1,4 @@
-"""Query batches: blocks of rays, balls, boxes, nearest queries and lookups in columns, answered at one revision."""
+"""Query batches: blocks of rays, balls, boxes, capsules, nearest queries and lookups in columns, answered at one revision."""
 from __future__ import annotations
 
 from typing import NamedTuple, Optional, Sequence
@@ -10,7 +10,8 @@ from .values import Revision
 
 _REQUEST, _BATCH, _VIEW = schema.numbers("QueryRequest"), schema.numbers("QueryBatch"), schema.numbers("View")
 _BLOCK = schema.numbers("QueryBlock")
-_KINDS = {name: schema.numbers(name.capitalize()) for name in ("rays", "balls", "boxes", "lookup", "nearest")}
+_KINDS = {name: schema.numbers(name.capitalize()) for name in ("rays", "balls", "boxes", "capsules", "lookup",
+                                                                     "nearest")}
 
 
 class Block(NamedTuple):
@@ -148,6 +149,19 @@ class QueryBatch:
         new.first("centers", centers, FLOAT32, 3)
         new.column("half_extents", half_extents, FLOAT32, 3)
         new.column("rotations", rotations, FLOAT32, 4)
+        new.options(detail=detail)
+        return self._add(new, block)
+
+    def capsules(self, starts: ColumnLike, ends: ColumnLike, radii: ColumnLike, *,
+                 detail: StaticDetail = StaticDetail.INSTANCES, block: Block = Block()) -> "QueryBatch":
+        """Adds a block of N capsules, to find the objects and instances that overlap them. A capsule is all points at a
+        distance of at most its radius from a segment. `starts`: 3N float32; `ends`: 3N float32 or three; `radii`: N
+        float32 or one, 0 .. 1e9.
+        """
+        new = _NewBlock(self._blocks, "capsules")
+        new.first("starts", starts, FLOAT32, 3)
+        new.column("ends", ends, FLOAT32, 3)
+        new.column("radii", radii, FLOAT32)
         new.options(detail=detail)
         return self._add(new, block)
 

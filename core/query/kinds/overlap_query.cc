@@ -4,6 +4,7 @@
 
 #include "core/base/check.h"
 #include "core/base/planted_bug.h"
+#include "core/geometry/segment.h"
 #include "core/index/regions.h"
 #include "core/query/kinds/placed_triangle.h"
 #include "core/query/kinds/triangle_search.h"
@@ -37,6 +38,7 @@ ObjectBounds object_bounds(const GridRef& object, double displacement_bound) {
 
 // Operations on a ball, in world axes and in the mesh axes of an instance, for the templates below.
 struct BallShape {
+  static constexpr bool kHasKernels = true;
   using World = Balld;
   using Mesh = Ballf;
   using WorldRegion = BallRegion<double>;
@@ -62,6 +64,7 @@ struct BallShape {
 
 // Operations on a box, with the same members as BallShape.
 struct BoxShape {
+  static constexpr bool kHasKernels = true;
   using World = Obbd;
   using Mesh = Obbf;
   using WorldRegion = BoxRegion<double>;
@@ -85,6 +88,38 @@ struct BoxShape {
   static bool overlaps_triangle(const Obbf& box, const Triangle& triangle) { return box_overlaps(box, triangle); }
 };
 
+// Operations on a capsule, with the same members as BallShape. A capsule stays in double in mesh axes.
+struct CapsuleShape {
+  static constexpr bool kHasKernels = false;
+  using World = Capsule;
+  using Mesh = Capsule;
+  using WorldRegion = BoxRegion<double>;
+  using MeshRegion = CapsuleRegion;
+
+  static Capsule to_mesh(const Capsule& capsule, const Transform& transform) {
+    const double inverse_scale = 1.0 / transform.scale;
+    return {transform.point_to_mesh(capsule.center), transform.rotation.to_local(capsule.half_axis) * inverse_scale,
+            capsule.radius * inverse_scale};
+  }
+  static double extent(const Capsule& capsule) {
+    return max_component(abs(capsule.center)) + max_component(abs(capsule.half_axis)) + capsule.radius;
+  }
+  static std::optional<Balld> as_ball(const Capsule&) { return std::nullopt; }
+  static bool overlaps_bounds(const Capsule& capsule, const Aabbd& bounds) { return reaches(capsule, bounds); }
+  static bool overlaps_object(const Capsule& capsule, const Shape& shape) { return capsule_overlaps(capsule, shape); }
+  static Verdict verdict(const Capsule& capsule, const ObjectBounds& object) {
+    const double squared = squared_distance_to_segment(object.position - capsule.center, capsule.half_axis);
+    const double epsilon = internal::kBoundsGrowth * extent(capsule);
+    const double far = capsule.radius + object.extent + object.displacement_bound + epsilon;
+    const double near = capsule.radius + object.inner_radius - object.displacement_bound - epsilon;
+    if (squared > far * far) return Verdict::kDisjoint;
+    return near > 0 && squared < near * near ? Verdict::kOverlaps : Verdict::kUndecided;
+  }
+  static bool overlaps_triangle(const Capsule& capsule, const Triangle& triangle) {
+    return capsule_overlaps(capsule, triangle);
+  }
+};
+
 // Returns the region of the grid in which to search for objects.
 template <class Kind>
 GridRegion search_region(const SceneAtTime& moment, const typename Kind::World& shape, const OverlapOptions& options) {
@@ -94,7 +129,7 @@ GridRegion search_region(const SceneAtTime& moment, const typename Kind::World& 
   return moment.region(region.bounds(), options.precision == Precision::kExact ? Kind::as_ball(shape) : std::nullopt);
 }
 
-// Visitor of the moving objects that one ball or box may overlap.
+// Visitor of the moving objects that one ball, box or capsule may overlap.
 template <class Kind>
 class ObjectRows {
  public:
@@ -161,7 +196,7 @@ class OverlapRows {
   size_t found_ = 0;
 };
 
-// Exact test of one ball or box against single triangles of one instance.
+// Exact test of one solid against single triangles of one instance.
 template <class Kind>
 class ExactOverlapTest {
  public:
@@ -242,7 +277,7 @@ class PlacedBounds {
   OverlapRows rows_;
 };
 
-// Visitor of the instances that one ball or box may overlap.
+// Visitor of the instances that one ball, box or capsule may overlap.
 template <class Kind>
 class InstanceSearch {
  public:
@@ -272,10 +307,12 @@ class InstanceSearch {
   void visit_exactly(const Instance& instance, OverlapRows& rows) {
     const TriangleBvh& tree = instance.mesh->tree();
     const ExactOverlapTest<Kind> exact(shape_, instance);
-    const typename Kind::Mesh& shape = exact.mesh_shape();
-    if (task_.uses_region_kernels() && TriangleSearch<typename Kind::Mesh>::served(tree, shape) &&
-        exact.placed().bounds_follow(to_double(shape.center), Kind::size(shape)))
-      return search(tree, shape, rows);
+    if constexpr (Kind::kHasKernels) {
+      const typename Kind::Mesh& shape = exact.mesh_shape();
+      if (task_.uses_region_kernels() && TriangleSearch<typename Kind::Mesh>::served(tree, shape) &&
+          exact.placed().bounds_follow(to_double(shape.center), Kind::size(shape)))
+        return search(tree, shape, rows);
+    }
     ExactTriangles<Kind> visitor(task_, exact, rows);
     task_.visit_region(tree, visitor);
   }
@@ -363,12 +400,21 @@ OverlapAnswer run_box(QueryTask& task, const SceneAtTime& moment, const Obbd& bo
   return run_overlap<BoxShape>(task, moment, box, options, filter);
 }
 
+OverlapAnswer run_capsule(QueryTask& task, const SceneAtTime& moment, const Capsule& capsule,
+                          const OverlapOptions& options, const Filter& filter) {
+  return run_overlap<CapsuleShape>(task, moment, capsule, options, filter);
+}
+
 GridRegion ball_region(const SceneAtTime& moment, const Balld& ball, const OverlapOptions& options) {
   return search_region<BallShape>(moment, ball, options);
 }
 
 GridRegion box_region(const SceneAtTime& moment, const Obbd& box, const OverlapOptions& options) {
   return search_region<BoxShape>(moment, box, options);
+}
+
+GridRegion capsule_region(const SceneAtTime& moment, const Capsule& capsule, const OverlapOptions& options) {
+  return search_region<CapsuleShape>(moment, capsule, options);
 }
 
 Balld ball_of(const QueryBlock& block, const BallColumns& balls, size_t i) {
@@ -387,6 +433,13 @@ Obbd box_of(const QueryBlock& block, const BoxColumns& boxes, size_t i) {
   const float* q = rotations.entry(i);
   box.rotation = rotation_of(Quaternion{q[0], q[1], q[2], q[3]});
   return box;
+}
+
+Capsule capsule_of(const QueryBlock& block, const CapsuleColumns& capsules, size_t i) {
+  LOCUS_DCHECK_LT(3 * i, capsules.starts.size());
+  const Vec3d start = block.frame + read_vec3d(ColumnReader<float>(capsules.starts, 3).entry(i));
+  const Vec3d end = block.frame + read_vec3d(ColumnReader<float>(capsules.ends, 3).entry(i));
+  return {(start + end) * 0.5, (end - start) * 0.5, ColumnReader<float>(capsules.radii, 1).value(i, 0)};
 }
 
 }  // namespace locus

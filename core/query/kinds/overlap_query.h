@@ -1,9 +1,10 @@
-// Search for the objects, and the instances or their triangles, that overlap one ball or box. Rows ascend by id. Free
-// functions; any thread may call them with a QueryTask of its own.
+// Search for the objects, and the instances or their triangles, that overlap one ball, box or capsule. Rows ascend by
+// id. Free functions; any thread may call them with a QueryTask of its own.
 #ifndef LOCUS_CORE_QUERY_KINDS_OVERLAP_QUERY_H_
 #define LOCUS_CORE_QUERY_KINDS_OVERLAP_QUERY_H_
 
 #include "core/geometry/ball.h"
+#include "core/geometry/capsule.h"
 #include "core/geometry/obb.h"
 #include "core/query/kinds/lowest_rows.h"
 #include "core/query/kinds/query_task.h"
@@ -22,21 +23,26 @@ struct OverlapOptions {
 // Returns the options of a block. A max_results of 0 becomes limits::kDefaultMaxResults.
 OverlapOptions overlap_options(const QueryBlock& block, StaticDetail detail);
 
-// Answer one ball or box query, given in world axes. Objects are searched as of `moment`, which the answer borrows. The
-// memory of OverlapAnswer::objects belongs to `task` and is valid until the next query of the task. Cost: visits of the
-// nodes, cells and primitives that overlap the ball or box, and the sorting of the rows.
+// Answer one ball, box or capsule query, given in world axes. Objects are searched as of `moment`, which the answer
+// borrows. The memory of OverlapAnswer::objects belongs to `task` and is valid until the next query of the task. Cost:
+// visits of the nodes, cells and primitives that overlap the solid, and the sorting of the rows.
 OverlapAnswer run_ball(QueryTask& task, const SceneAtTime& moment, const Balld& ball, const OverlapOptions& options,
                        const Filter& filter);
 OverlapAnswer run_box(QueryTask& task, const SceneAtTime& moment, const Obbd& box, const OverlapOptions& options,
                       const Filter& filter);
+OverlapAnswer run_capsule(QueryTask& task, const SceneAtTime& moment, const Capsule& capsule,
+                          const OverlapOptions& options, const Filter& filter);
 
-// Return the region of the grid of objects that run_ball() or run_box() searches; for QueryTask::walk_regions().
+// Return the region of the grid of objects that run_ball(), run_box() or run_capsule() searches; for
+// QueryTask::walk_regions().
 GridRegion ball_region(const SceneAtTime& moment, const Balld& ball, const OverlapOptions& options);
 GridRegion box_region(const SceneAtTime& moment, const Obbd& box, const OverlapOptions& options);
+GridRegion capsule_region(const SceneAtTime& moment, const Capsule& capsule, const OverlapOptions& options);
 
-// Return the ball or box of query `i` of a block, in world axes.
+// Return the ball, box or capsule of query `i` of a block, in world axes.
 Balld ball_of(const QueryBlock& block, const BallColumns& balls, size_t i);
 Obbd box_of(const QueryBlock& block, const BoxColumns& boxes, size_t i);
+Capsule capsule_of(const QueryBlock& block, const CapsuleColumns& capsules, size_t i);
 
 }  // namespace locus
 

@@ -79,6 +79,10 @@ size_t BlockRunner::run_queries(const Columns& columns, size_t begin, size_t end
     walk_regions(columns, begin, end, [&](size_t i, const OverlapOptions& options) {
       return box_region(times_.of(i), box_of(block_, columns, i), options);
     });
+  if constexpr (std::is_same_v<Columns, CapsuleColumns>)
+    walk_regions(columns, begin, end, [&](size_t i, const OverlapOptions& options) {
+      return capsule_region(times_.of(i), capsule_of(block_, columns, i), options);
+    });
   for (size_t i = begin; i < end; ++i) {
     if (i != begin && should_split()) return i;
     run_query(columns, i);
@@ -188,6 +192,14 @@ void BlockRunner::run_query(const BoxColumns& boxes, size_t i) {
   if (!task_.ended())
     answer = run_box(task_, times_.of(i), box_of(block_, boxes, i), overlap_options(block_, boxes.detail),
                      Filter(block_, i));
+  append_rows(answer, i);
+}
+
+void BlockRunner::run_query(const CapsuleColumns& capsules, size_t i) {
+  OverlapAnswer answer;
+  if (!task_.ended())
+    answer = run_capsule(task_, times_.of(i), capsule_of(block_, capsules, i), overlap_options(block_, capsules.detail),
+                         Filter(block_, i));
   append_rows(answer, i);
 }
 

@@ -52,6 +52,7 @@ class BlockRunner {
   void walk_regions(const Columns& columns, size_t begin, size_t end, const RegionOf& region_of);
   void run_query(const BallColumns& balls, size_t i);
   void run_query(const BoxColumns& boxes, size_t i);
+  void run_query(const CapsuleColumns& capsules, size_t i);
   void run_query(const LookupColumns& lookup, size_t i);
   void run_query(const NearestColumns& nearest, size_t i);
   void write_ray(const RayColumns& rays, const RayAnswer& answer, size_t i);

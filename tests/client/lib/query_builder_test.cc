@@ -68,6 +68,24 @@ TEST(QueryBuilderTest, WholeSpansAppend) {
   EXPECT_THAT(block.ignore_groups(), ElementsAre(7));
 }
 
+TEST(QueryBuilderTest, CapsulesAreAppendedOneByOneAndInColumns) {
+  QueryBuilder builder;
+  builder.capsules()
+      .detail(v1::STATIC_DETAIL_TRIANGLES)
+      .capsule({1, 2, 3}, {4, 5, 6}, 7)
+      .capsule({0, 0, 0}, {0, 0, 1}, 2);
+  const std::vector<float> starts = {1, 1, 1, 2, 2, 2}, ends = {3, 3, 3}, radii = {0.5f};
+  builder.capsules().capsules(starts, ends, radii);
+  const v1::QueryBatch batch = builder.build();
+  EXPECT_EQ(batch.blocks(0).capsules().detail(), v1::STATIC_DETAIL_TRIANGLES);
+  EXPECT_THAT(batch.blocks(0).capsules().starts(), ElementsAre(1, 2, 3, 0, 0, 0));
+  EXPECT_THAT(batch.blocks(0).capsules().ends(), ElementsAre(4, 5, 6, 0, 0, 1));
+  EXPECT_THAT(batch.blocks(0).capsules().radii(), ElementsAre(7, 2));
+  EXPECT_THAT(batch.blocks(1).capsules().starts(), ElementsAre(1, 1, 1, 2, 2, 2));
+  EXPECT_THAT(batch.blocks(1).capsules().ends(), ElementsAre(3, 3, 3));
+  EXPECT_THAT(batch.blocks(1).capsules().radii(), ElementsAre(0.5f));
+}
+
 TEST(QueryBuilderTest, BlocksKeepTheirOrderAndTheirOwnSettings) {
   QueryBuilder builder;
   BallBlock balls = builder.balls();

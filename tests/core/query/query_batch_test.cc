@@ -54,6 +54,13 @@ OwnedBlock twenty_boxes() {
   return block;
 }
 
+OwnedBlock twenty_capsules() {
+  OwnedBlock block = twenty_boxes();
+  block.settings.kind = CapsuleColumns();
+  block.extras.assign(20, 1);
+  return block;
+}
+
 Refusal refusal_for(const std::vector<OwnedBlock>& blocks) {
   const absl::Status status = check_batch(batch_of(blocks));
   EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << status;
@@ -70,8 +77,8 @@ void expect_refusal(const OwnedBlock& block, Reason reason, const std::string& f
 }
 
 TEST(CheckBatchTest, ValidBlocksPass) {
-  for (const OwnedBlock& block : {twenty_rays(), twenty_balls(), twenty_boxes(), twenty_points(), lookup_of_ids({1}),
-                                  lookup_of_groups({1}), rays_along_x(RayMode::kAny, {})})
+  for (const OwnedBlock& block : {twenty_rays(), twenty_balls(), twenty_boxes(), twenty_capsules(), twenty_points(),
+                                  lookup_of_ids({1}), lookup_of_groups({1}), rays_along_x(RayMode::kAny, {})})
     EXPECT_TRUE(status_with(block).ok());
 }
 
@@ -218,6 +225,22 @@ struct Column20 {
   bool one_for_all, none;
 };
 
+TEST(CheckBatchTest, CapsulesLieWithinTheWorldAndHaveRadii) {
+  OwnedBlock block = twenty_capsules();
+  block.points[59] = kInf;
+  expect_refusal(block, Reason::kNotFinite, "capsules.starts", 19);
+  block = twenty_capsules();
+  block.sizes[3 * 4] = kNan;
+  expect_refusal(block, Reason::kNotFinite, "capsules.ends", 4);
+  block.sizes[3 * 4] = 2e9f;
+  expect_refusal(block, Reason::kOutOfRange, "capsules.ends", 4);
+  block = twenty_capsules();
+  block.extras[7] = -1;
+  expect_refusal(block, Reason::kOutOfRange, "capsules.radii", 7);
+  block.extras[7] = kNan;
+  expect_refusal(block, Reason::kNotFinite, "capsules.radii", 7);
+}
+
 TEST(CheckBatchTest, ColumnsHaveNEntriesOrOneOrIfOptionalNone) {
   const auto sizes = [](OwnedBlock& b) -> std::vector<float>& { return b.sizes; };
   const auto extras = [](OwnedBlock& b) -> std::vector<float>& { return b.extras; };
@@ -226,6 +249,8 @@ TEST(CheckBatchTest, ColumnsHaveNEntriesOrOneOrIfOptionalNone) {
                               {"balls.radii", twenty_balls, sizes, 1, true, false},
                               {"boxes.half_extents", twenty_boxes, sizes, 3, true, false},
                               {"boxes.rotations", twenty_boxes, extras, 4, true, true},
+                              {"capsules.ends", twenty_capsules, sizes, 3, true, false},
+                              {"capsules.radii", twenty_capsules, extras, 1, true, false},
                               {"nearest.max_distances", twenty_points, extras, 1, true, true}};
   for (const Column20& c : columns) {
     OwnedBlock block = c.block();

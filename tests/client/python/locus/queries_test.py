@@ -120,6 +120,18 @@ class AnswersEqualTheCommandLineTest(DaemonTest):
                    for word in (f"--at={text(center)}", f"--radius={radius!r}")]
         self.check_overlaps("ball", options, QueryBatch().balls(centers, radii))
 
+    def test_capsules(self):
+        starts, ends = triples(self.cloud(20)), triples(self.cloud(20))
+        balls, points, capsules, reversed_capsules = self.ask(
+            QueryBatch().balls(starts, 2).capsules(starts, starts, 2).capsules(starts, ends, 2).capsules(ends, starts, 2))
+        self.assertEqual(listed(points.ids), listed(balls.ids))
+        self.assertEqual(listed(points.counts), listed(balls.counts))
+        self.assertEqual(listed(capsules.ids), listed(reversed_capsules.ids))
+        for query in range(20):
+            self.assertLessEqual(set(balls.ids[balls.rows_of(query)].tolist()),
+                                 set(capsules.ids[capsules.rows_of(query)].tolist()))
+        self.assertGreater(len(capsules.ids), len(balls.ids))
+
     def test_triangles_of_balls(self):
         options = [word for height in range(-5, 5) for word in (f"--at=0,0,{height}",)] + ["--radius=6", "--detail", "sorted"]
         centers = [(0, 0, height) for height in range(-5, 5)]
