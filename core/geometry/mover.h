@@ -1,0 +1,53 @@
+// Solid that moves in a straight line without turning: a ball, a capsule or a box. Plain data; any thread.
+#ifndef LOCUS_CORE_GEOMETRY_MOVER_H_
+#define LOCUS_CORE_GEOMETRY_MOVER_H_
+
+#include <cstdint>
+
+#include "core/geometry/rotation.h"
+
+namespace locus {
+
+enum class MoverKind : uint8_t { kBall, kCapsule, kBox };
+
+// The solid covers the time 0 <= t <= 1; its centre is at start + t * way. A zero way is legal.
+struct Mover {
+  MoverKind kind = MoverKind::kBall;
+  Vec3d start;
+  Vec3d way;
+  double radius = 0;  // ball and capsule: > 0
+  Vec3d half_axis;    // capsule: from the centre to one end of the inner segment; zero for a ball
+  Vec3d half;         // box: half extents along its own axes, >= 0
+  Rotation rotation;  // box: rotates its own axes to the axes of `start`
+};
+
+// Treatment of a primitive that the mover touches at t = 0. kHit: a hit at t = 0. kApproach: a hit at t = 0 if the way
+// goes against the contact's normal, otherwise ignored. kPass: ignored.
+enum class AtStart : uint8_t { kHit, kApproach, kPass };
+
+// Contact of a mover with a primitive.
+struct Contact {
+  // Distance from the primitive to the mover's centre or inner segment; for a box, to the box. Negative inside an
+  // object: minus the length of the shortest way out.
+  double distance = 0;
+  Vec3d point;   // point of the primitive; if the solids touch, within rounding a point of both
+  Vec3d normal;  // unit vector from the primitive to the mover
+};
+
+// Returns half the size of the mover's axis-aligned bounds.
+inline Vec3d extent_of(const Mover& mover) {
+  const Vec3d radius{mover.radius, mover.radius, mover.radius};
+  switch (mover.kind) {
+    case MoverKind::kBall:
+      return radius;
+    case MoverKind::kCapsule:
+      return abs(mover.half_axis) + radius;
+    case MoverKind::kBox:
+      return mover.rotation.extent_to_world(mover.half);
+  }
+  return {};
+}
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_GEOMETRY_MOVER_H_

@@ -1,0 +1,37 @@
+// Nearest points of a segment and a primitive: a segment, a triangle or a box. The segment consists of the points s *
+// half_axis, -1 <= s <= 1; with a zero half axis it is the origin, a point. All positions are relative to the segment's
+// midpoint. Pure functions in double: products, sums, quotients in a fixed order; O(1); any thread.
+#ifndef LOCUS_CORE_GEOMETRY_NEAREST_PAIR_H_
+#define LOCUS_CORE_GEOMETRY_NEAREST_PAIR_H_
+
+#include <limits>
+
+#include "core/geometry/vec3.h"
+
+namespace locus {
+
+// A point of the segment and a point of the primitive at the least distance; equal, up to rounding, if both meet.
+struct NearestPair {
+  double squared_distance = std::numeric_limits<double>::infinity();
+  Vec3d on_segment;
+  Vec3d on_primitive;
+
+  Vec3d offset() const { return on_segment - on_primitive; }
+};
+
+// Returns the nearest points of two segments. `center` and `other_half_axis` describe the primitive.
+// Source: Ericson, Real-Time Collision Detection, 2005, 5.1.9.
+NearestPair nearest_to_segment(Vec3d half_axis, Vec3d center, Vec3d other_half_axis);
+
+// Returns the nearest points of the segment and the triangle with corners a, b and c, which may have no area.
+// Source: Ericson, Real-Time Collision Detection, 2005, 5.1.10.
+NearestPair nearest_to_triangle(Vec3d half_axis, Vec3d a, Vec3d b, Vec3d c);
+
+// Returns the nearest points of the segment and the box of half extents `half` around `center`, in the box's own axes.
+// The distance to the box is convex along the segment; its minimum lies at one of at most eight breakpoints or inside
+// one of the seven ranges between them.
+NearestPair nearest_to_box(Vec3d half_axis, Vec3d center, Vec3d half);
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_GEOMETRY_NEAREST_PAIR_H_

@@ -1,0 +1,126 @@
+#include "core/geometry/round_sweep.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/check.h"
+
+namespace locus {
+namespace {
+
+// Epsilons of touches(), relative to the sizes and positions at the time, and to the way covered so far.
+constexpr double kPlaceEpsilon = 0x1p-44, kWayEpsilon = 0x1p-48;
+// Limit of the steps of Newton's method. A grazing contact halves the remaining time in each step, which reaches the
+// epsilon after about half as many.
+constexpr int kMaxSteps = 64;
+
+double size_of(Vec3d v) { return max_component(abs(v)); }
+
+// Returns `direction` with length 1, on the side against `motion`. A zero direction is replaced by minus `motion` and,
+// if that is zero too, by the z axis.
+Vec3d against(Vec3d direction, Vec3d motion) {
+  if (direction == Vec3d{}) return motion == Vec3d{} ? Vec3d{0, 0, 1} : normalized(-motion);
+  return normalized(dot(direction, motion) > 0 ? -direction : direction);
+}
+
+}  // namespace
+
+RoundSweep RoundSweep::to_segment(Vec3d half_axis, double radius, Vec3d center, Vec3d other_half_axis, Vec3d velocity) {
+  RoundSweep sweep(Primitive::kSegment, half_axis, radius, velocity);
+  sweep.a_ = center;
+  sweep.b_ = other_half_axis;
+  sweep.size_ = size_of(half_axis) + size_of(other_half_axis);
+  return sweep;
+}
+
+RoundSweep RoundSweep::to_triangle(Vec3d half_axis, double radius, Vec3d a, Vec3d b, Vec3d c, Vec3d velocity) {
+  RoundSweep sweep(Primitive::kTriangle, half_axis, radius, velocity);
+  sweep.a_ = a;
+  sweep.b_ = b;
+  sweep.c_ = c;
+  sweep.size_ = size_of(half_axis) + std::max(size_of(b - a), size_of(c - a));
+  return sweep;
+}
+
+RoundSweep RoundSweep::to_box(Vec3d half_axis, double radius, Vec3d center, Vec3d half, Vec3d velocity) {
+  RoundSweep sweep(Primitive::kBox, half_axis, radius, velocity);
+  sweep.a_ = center;
+  sweep.b_ = half;
+  sweep.size_ = size_of(half_axis) + size_of(half);
+  return sweep;
+}
+
+NearestPair RoundSweep::pair_at(double t) const {
+  const Vec3d moved = velocity_ * t;
+  switch (primitive_) {
+    case Primitive::kSegment:
+      return nearest_to_segment(half_axis_, a_ + moved, b_);
+    case Primitive::kTriangle:
+      return nearest_to_triangle(half_axis_, a_ + moved, b_ + moved, c_ + moved);
+    case Primitive::kBox:
+      return nearest_to_box(half_axis_, a_ + moved, b_);
+  }
+  return {};
+}
+
+bool RoundSweep::touches(const NearestPair& pair, double t) const {
+  const double epsilon =
+      kPlaceEpsilon * (size_of(pair.on_primitive) + size_ + radius_) + kWayEpsilon * t * size_of(velocity_);
+  const double reach = radius_ + epsilon;
+  return pair.squared_distance <= reach * reach;
+}
+
+std::optional<double> RoundSweep::first_contact(double limit) const {
+  LOCUS_DCHECK_GE(radius_, 0.0);
+  double t = 0;
+  for (int step = 0; step < kMaxSteps; ++step) {
+    const NearestPair pair = pair_at(t);
+    if (touches(pair, t)) return t;
+    const double distance = std::sqrt(pair.squared_distance);
+    // Speed at which the distance decreases: the primitive moves along the offset.
+    const double approach = dot(pair.offset(), velocity_) / distance;
+    if (!(approach > 0)) return std::nullopt;
+    t += (distance - radius_) / approach;
+    if (!(t <= limit)) return std::nullopt;
+  }
+  return t;  // within the precision of t: reported rather than missed
+}
+
+RoundSweep::Separation RoundSweep::separation_at(double t) const {
+  const NearestPair pair = pair_at(t);
+  const double distance = std::sqrt(pair.squared_distance);
+  // A distance of rounding errors has no direction.
+  if (distance > kPlaceEpsilon * (size_of(pair.on_primitive) + size_))
+    return {distance, pair.offset() * (1 / distance), pair};
+  return way_out_at(t, pair);
+}
+
+RoundSweep::Separation RoundSweep::way_out_at(double t, const NearestPair& pair) const {
+  const Vec3d motion = -velocity_;
+  if (primitive_ == Primitive::kSegment) return {0, against(cross(half_axis_, b_), motion), pair};
+  if (primitive_ == Primitive::kTriangle) return {0, against(cross(b_ - a_, c_ - a_), motion), pair};
+  // The shortest way out of a box is along one of its axes or square to one of them and to the segment: these are the
+  // normals of the faces of the box swept along the segment.
+  const Vec3d offset = -(a_ + velocity_ * t);  // of the segment's midpoint from the box's centre
+  double depth = std::numeric_limits<double>::infinity();
+  Vec3d best;
+  for (int i = 0; i < 6; ++i) {
+    Vec3d unit;
+    unit[i % 3] = 1;
+    Vec3d axis = unit;
+    if (i >= 3) {
+      axis = cross(half_axis_, unit);
+      const double length = std::sqrt(squared_length(axis));
+      if (length <= kPlaceEpsilon * size_of(half_axis_)) continue;
+      axis = axis * (1 / length);
+    }
+    const double along = dot(axis, offset);
+    const double exit = dot(abs(axis), b_) + std::abs(dot(axis, half_axis_)) - std::abs(along);
+    if (!(exit < depth)) continue;
+    depth = exit;
+    best = along == 0 ? against(axis, motion) : along > 0 ? axis : -axis;
+  }
+  return {-std::max(depth, 0.0), best, pair};
+}
+
+}  // namespace locus

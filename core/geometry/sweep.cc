@@ -1,0 +1,144 @@
+#include "core/geometry/sweep.h"
+
+#include <algorithm>
+
+#include "core/base/check.h"
+#include "core/geometry/box_sweep.h"
+#include "core/geometry/round_sweep.h"
+
+namespace locus {
+namespace {
+
+Vec3d center_at(const Mover& mover, double t) { return mover.start + mover.way * t; }
+
+bool is_round(const Shape& shape) { return shape.kind == ShapeKind::kBall || shape.kind == ShapeKind::kCapsule; }
+
+// Motion of a mover and a shape of which at least one is round. The segment of the RoundSweep is the mover's centre or
+// inner segment; if the mover is a box, it is the shape's.
+struct RoundMotion {
+  RoundSweep sweep;
+  Rotation axes;        // rotates the axes of `sweep` to those of the mover
+  double shape_radius;  // part of the sweep's radius that belongs to the shape
+  bool is_reversed;     // true if the segment is the shape's
+};
+
+RoundMotion round_motion(const Mover& mover, const Shape& shape) {
+  const Rotation rotation = shape.kind == ShapeKind::kBall ? Rotation() : rotation_of(shape.rotation);
+  const double shape_radius = is_round(shape) ? shape.radius : 0;
+  const Vec3d inner = shape.kind == ShapeKind::kCapsule ? rotation.to_world(to_double(shape.size)) : Vec3d{};
+  const Vec3d offset = shape.position - mover.start;
+  if (mover.kind == MoverKind::kBox) {
+    const Rotation& axes = mover.rotation;
+    return {RoundSweep::to_box(axes.to_local(inner), shape_radius, axes.to_local(-offset), mover.half,
+                               axes.to_local(mover.way)),
+            axes, shape_radius, true};
+  }
+  if (shape.kind == ShapeKind::kBox)
+    return {RoundSweep::to_box(rotation.to_local(mover.half_axis), mover.radius, rotation.to_local(offset),
+                               to_double(shape.size), rotation.to_local(-mover.way)),
+            rotation, 0, false};
+  return {RoundSweep::to_segment(mover.half_axis, mover.radius + shape_radius, offset, inner, -mover.way), Rotation(),
+          shape_radius, false};
+}
+
+Contact contact_of(const RoundMotion& motion, const Mover& mover, const Shape& shape, double t) {
+  const RoundSweep::Separation separation = motion.sweep.separation_at(t);
+  const Vec3d direction = motion.axes.to_world(separation.direction);
+  const Vec3d normal = motion.is_reversed ? -direction : direction;
+  const Vec3d core = motion.is_reversed ? shape.position + motion.axes.to_world(separation.pair.on_segment)
+                                        : center_at(mover, t) + motion.axes.to_world(separation.pair.on_primitive);
+  const double depth_of_point = std::clamp(separation.distance, 0.0, motion.shape_radius);
+  return {separation.distance - motion.shape_radius, core + normal * depth_of_point, normal};
+}
+
+RoundSweep round_sweep(const Mover& mover, const TriangleCorners& corners) {
+  return RoundSweep::to_triangle(mover.half_axis, mover.radius, corners[0] - mover.start, corners[1] - mover.start,
+                                 corners[2] - mover.start, -mover.way);
+}
+
+// Returns the corners relative to the centre of a box at time t, in the box's own axes.
+TriangleCorners in_box(const Mover& box, const TriangleCorners& corners, double t) {
+  TriangleCorners local;
+  for (size_t i = 0; i < local.size(); ++i) local[i] = box.rotation.to_local(corners[i] - center_at(box, t));
+  return local;
+}
+
+std::optional<BoxOverlap> box_overlap(const Mover& box, const TriangleCorners& corners) {
+  const TriangleCorners local = in_box(box, corners, 0);
+  return overlap_with_triangle(box.half, local[0], local[1], local[2], box.rotation.to_local(-box.way));
+}
+
+// Returns the overlap of a box with a shape that is not round: a box or a point.
+std::optional<BoxOverlap> box_overlap(const Mover& box, const Shape& shape) {
+  LOCUS_DCHECK(!is_round(shape));
+  const Vec3d half = shape.kind == ShapeKind::kBox ? to_double(shape.size) : Vec3d{};
+  return overlap_with_box(box.half, box.rotation.to_local(shape.position - box.start), half,
+                          compose(inverse(box.rotation), rotation_of(shape.rotation)), box.rotation.to_local(-box.way));
+}
+
+// Returns the first moment of an overlap in 0 .. limit.
+std::optional<double> first_moment(const std::optional<BoxOverlap>& overlap, double limit) {
+  if (!overlap || overlap->time.far < 0 || !(overlap->time.near <= limit)) return std::nullopt;
+  return std::max(overlap->time.near, 0.0);
+}
+
+Contact contact_of(const std::optional<BoxOverlap>& overlap, const Mover& box, Vec3d shared, double t) {
+  const Vec3d normal = overlap ? box.rotation.to_world(overlap->normal) : Vec3d{0, 0, 1};
+  return {overlap ? -overlap->depth : 0, center_at(box, t) + box.rotation.to_world(shared), normal};
+}
+
+// Applies `at_start` to the first moment of contact with a primitive.
+template <class Primitive>
+std::optional<double> with_rule(std::optional<double> t, const Mover& mover, const Primitive& primitive,
+                                AtStart at_start) {
+  if (!t || *t > 0 || at_start == AtStart::kHit) return t;
+  if (at_start == AtStart::kPass || !(dot(contact_at(mover, primitive, 0).normal, mover.way) < 0)) return std::nullopt;
+  return t;
+}
+
+}  // namespace
+
+Mover mover_to_mesh(const Mover& mover, const Transform& transform) {
+  const double inverse_scale = 1.0 / transform.scale;
+  Mover result = mover;
+  result.start = transform.point_to_mesh(mover.start);
+  result.way = transform.direction_to_mesh(mover.way);
+  result.radius = mover.radius * inverse_scale;
+  result.half_axis = transform.direction_to_mesh(mover.half_axis);
+  result.half = mover.half * inverse_scale;
+  result.rotation = compose(inverse(transform.rotation), mover.rotation);
+  return result;
+}
+
+std::optional<double> first_contact(const Mover& mover, const Shape& shape, AtStart at_start, double limit) {
+  const bool is_polytope = mover.kind == MoverKind::kBox && !is_round(shape);
+  const std::optional<double> t = is_polytope ? first_moment(box_overlap(mover, shape), limit)
+                                              : round_motion(mover, shape).sweep.first_contact(limit);
+  return with_rule(t, mover, shape, at_start);
+}
+
+std::optional<double> first_contact(const Mover& mover, const TriangleCorners& triangle, AtStart at_start,
+                                    double limit) {
+  const std::optional<double> t = mover.kind == MoverKind::kBox ? first_moment(box_overlap(mover, triangle), limit)
+                                                                : round_sweep(mover, triangle).first_contact(limit);
+  return with_rule(t, mover, triangle, at_start);
+}
+
+Contact contact_at(const Mover& mover, const Shape& shape, double t) {
+  if (mover.kind != MoverKind::kBox || is_round(shape)) return contact_of(round_motion(mover, shape), mover, shape, t);
+  const Vec3d center = mover.rotation.to_local(shape.position - center_at(mover, t));
+  const Vec3d half = shape.kind == ShapeKind::kBox ? to_double(shape.size) : Vec3d{};
+  const Rotation rotation = compose(inverse(mover.rotation), rotation_of(shape.rotation));
+  return contact_of(box_overlap(mover, shape), mover, shared_point(mover.half, center, half, rotation), t);
+}
+
+Contact contact_at(const Mover& mover, const TriangleCorners& triangle, double t) {
+  if (mover.kind == MoverKind::kBox) {
+    const TriangleCorners local = in_box(mover, triangle, t);
+    return contact_of(box_overlap(mover, triangle), mover, shared_point(mover.half, local[0], local[1], local[2]), t);
+  }
+  const RoundSweep::Separation separation = round_sweep(mover, triangle).separation_at(t);
+  return {separation.distance, center_at(mover, t) + separation.pair.on_primitive, separation.direction};
+}
+
+}  // namespace locus
