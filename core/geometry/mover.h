@@ -30,7 +30,9 @@ struct Contact {
   // Distance from the primitive to the mover's centre or inner segment; for a box, to the box. Negative inside an
   // object: minus the length of the shortest way out.
   double distance = 0;
-  Vec3d point;   // point of the primitive; if the solids touch, within rounding a point of both
+  // Point of the primitive, relative to the mover's start, so that it keeps its digits far from the origin. If the
+  // solids touch, it is within rounding a point of both.
+  Vec3d point;
   Vec3d normal;  // unit vector from the primitive to the mover
 };
 

@@ -60,12 +60,16 @@ inline constexpr double kObjectPad = 0x1p-40;    // predicates of moving objects
 template <class S>
 class SlabRay {
  public:
-  // Always inlined, because a call of its own takes 27 instructions more for each ray.
-  [[gnu::always_inline]] SlabRay(const Ray<S>& ray, double pad)
+  // `reach` widens every box by at least this length on each side, in addition to the pad, for the path of a solid of
+  // this size; only with a `pad` > 0. Always inlined, because a call of its own takes 27 instructions more for each
+  // ray.
+  [[gnu::always_inline]] SlabRay(const Ray<S>& ray, double pad, double reach = 0)
       : origin_(ray.origin),
         direction_(ray.direction),
         pad_(static_cast<S>(pad)),
         magnitude_(max_component(abs(ray.origin))) {
+    // The factor covers the rounding of a float, and the pad of the reach itself.
+    if (reach != 0) magnitude_ += static_cast<S>(reach * (1 + 0x1p-18) / pad);
     LOCUS_DCHECK_GT(max_component(abs(ray.direction)), S{0});
     LOCUS_DCHECK_GE(pad_, S{0});
     const S smallest = static_cast<S>(1e-18) * max_component(abs(ray.direction));

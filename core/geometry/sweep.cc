@@ -9,8 +9,6 @@
 namespace locus {
 namespace {
 
-Vec3d center_at(const Mover& mover, double t) { return mover.start + mover.way * t; }
-
 bool is_round(const Shape& shape) { return shape.kind == ShapeKind::kBall || shape.kind == ShapeKind::kCapsule; }
 
 // Motion of a mover and a shape of which at least one is round. The segment of the RoundSweep is the mover's centre or
@@ -45,26 +43,27 @@ Contact contact_of(const RoundMotion& motion, const Mover& mover, const Shape& s
   const RoundSweep::Separation separation = motion.sweep.separation_at(t);
   const Vec3d direction = motion.axes.to_world(separation.direction);
   const Vec3d normal = motion.is_reversed ? -direction : direction;
-  const Vec3d core = motion.is_reversed ? shape.position + motion.axes.to_world(separation.pair.on_segment)
-                                        : center_at(mover, t) + motion.axes.to_world(separation.pair.on_primitive);
+  const Vec3d core = motion.is_reversed
+                         ? shape.position - mover.start + motion.axes.to_world(separation.pair.on_segment)
+                         : mover.way * t + motion.axes.to_world(separation.pair.on_primitive);
   const double depth_of_point = std::clamp(separation.distance, 0.0, motion.shape_radius);
   return {separation.distance - motion.shape_radius, core + normal * depth_of_point, normal};
 }
 
-RoundSweep round_sweep(const Mover& mover, const TriangleCorners& corners) {
+RoundSweep round_sweep(const Mover& mover, const Corners& corners) {
   return RoundSweep::to_triangle(mover.half_axis, mover.radius, corners[0] - mover.start, corners[1] - mover.start,
                                  corners[2] - mover.start, -mover.way);
 }
 
 // Returns the corners relative to the centre of a box at time t, in the box's own axes.
-TriangleCorners in_box(const Mover& box, const TriangleCorners& corners, double t) {
-  TriangleCorners local;
-  for (size_t i = 0; i < local.size(); ++i) local[i] = box.rotation.to_local(corners[i] - center_at(box, t));
+Corners in_box(const Mover& box, const Corners& corners, double t) {
+  Corners local;
+  for (size_t i = 0; i < local.size(); ++i) local[i] = box.rotation.to_local(corners[i] - box.start - box.way * t);
   return local;
 }
 
-std::optional<BoxOverlap> box_overlap(const Mover& box, const TriangleCorners& corners) {
-  const TriangleCorners local = in_box(box, corners, 0);
+std::optional<BoxOverlap> box_overlap(const Mover& box, const Corners& corners) {
+  const Corners local = in_box(box, corners, 0);
   return overlap_with_triangle(box.half, local[0], local[1], local[2], box.rotation.to_local(-box.way));
 }
 
@@ -84,7 +83,7 @@ std::optional<double> first_moment(const std::optional<BoxOverlap>& overlap, dou
 
 Contact contact_of(const std::optional<BoxOverlap>& overlap, const Mover& box, Vec3d shared, double t) {
   const Vec3d normal = overlap ? box.rotation.to_world(overlap->normal) : Vec3d{0, 0, 1};
-  return {overlap ? -overlap->depth : 0, center_at(box, t) + box.rotation.to_world(shared), normal};
+  return {overlap ? -overlap->depth : 0, box.way * t + box.rotation.to_world(shared), normal};
 }
 
 // Applies `at_start` to the first moment of contact with a primitive.
@@ -117,8 +116,7 @@ std::optional<double> first_contact(const Mover& mover, const Shape& shape, AtSt
   return with_rule(t, mover, shape, at_start);
 }
 
-std::optional<double> first_contact(const Mover& mover, const TriangleCorners& triangle, AtStart at_start,
-                                    double limit) {
+std::optional<double> first_contact(const Mover& mover, const Corners& triangle, AtStart at_start, double limit) {
   const std::optional<double> t = mover.kind == MoverKind::kBox ? first_moment(box_overlap(mover, triangle), limit)
                                                                 : round_sweep(mover, triangle).first_contact(limit);
   return with_rule(t, mover, triangle, at_start);
@@ -126,19 +124,19 @@ std::optional<double> first_contact(const Mover& mover, const TriangleCorners& t
 
 Contact contact_at(const Mover& mover, const Shape& shape, double t) {
   if (mover.kind != MoverKind::kBox || is_round(shape)) return contact_of(round_motion(mover, shape), mover, shape, t);
-  const Vec3d center = mover.rotation.to_local(shape.position - center_at(mover, t));
+  const Vec3d center = mover.rotation.to_local(shape.position - mover.start - mover.way * t);
   const Vec3d half = shape.kind == ShapeKind::kBox ? to_double(shape.size) : Vec3d{};
   const Rotation rotation = compose(inverse(mover.rotation), rotation_of(shape.rotation));
   return contact_of(box_overlap(mover, shape), mover, shared_point(mover.half, center, half, rotation), t);
 }
 
-Contact contact_at(const Mover& mover, const TriangleCorners& triangle, double t) {
+Contact contact_at(const Mover& mover, const Corners& triangle, double t) {
   if (mover.kind == MoverKind::kBox) {
-    const TriangleCorners local = in_box(mover, triangle, t);
+    const Corners local = in_box(mover, triangle, t);
     return contact_of(box_overlap(mover, triangle), mover, shared_point(mover.half, local[0], local[1], local[2]), t);
   }
   const RoundSweep::Separation separation = round_sweep(mover, triangle).separation_at(t);
-  return {separation.distance, center_at(mover, t) + separation.pair.on_primitive, separation.direction};
+  return {separation.distance, mover.way * t + separation.pair.on_primitive, separation.direction};
 }
 
 }  // namespace locus

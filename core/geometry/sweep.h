@@ -9,7 +9,6 @@
 #ifndef LOCUS_CORE_GEOMETRY_SWEEP_H_
 #define LOCUS_CORE_GEOMETRY_SWEEP_H_
 
-#include <array>
 #include <optional>
 
 #include "core/geometry/mover.h"
@@ -19,24 +18,17 @@
 
 namespace locus {
 
-// Corners of a triangle, in the axes of the mover.
-using TriangleCorners = std::array<Vec3d, 3>;
-inline TriangleCorners corners_of(const Triangle& triangle) {
-  return {to_double(triangle.a), to_double(triangle.b), to_double(triangle.c)};
-}
-
 // Returns the mover in mesh axes. Time is the same in both axes.
 Mover mover_to_mesh(const Mover& mover, const Transform& transform);
 
 // Return the first moment of contact in 0 .. limit, or nullopt. `at_start` selects the result for a primitive that is
 // touched at t = 0.
 std::optional<double> first_contact(const Mover& mover, const Shape& shape, AtStart at_start, double limit = 1);
-std::optional<double> first_contact(const Mover& mover, const TriangleCorners& triangle, AtStart at_start,
-                                    double limit = 1);
+std::optional<double> first_contact(const Mover& mover, const Corners& triangle, AtStart at_start, double limit = 1);
 
 // Return the contact at time t, at which the solids touch. Also defined if they do not.
 Contact contact_at(const Mover& mover, const Shape& shape, double t);
-Contact contact_at(const Mover& mover, const TriangleCorners& triangle, double t);
+Contact contact_at(const Mover& mover, const Corners& triangle, double t);
 
 }  // namespace locus
 

@@ -4,6 +4,7 @@
 #ifndef LOCUS_CORE_GEOMETRY_TRIANGLE_H_
 #define LOCUS_CORE_GEOMETRY_TRIANGLE_H_
 
+#include <array>
 #include <cstdint>
 
 #include "core/geometry/aabb.h"
@@ -16,6 +17,11 @@ struct Triangle {
 
   friend constexpr bool operator==(const Triangle&, const Triangle&) = default;
 };
+
+// Corners of a triangle in double, in any axes.
+using Corners = std::array<Vec3d, 3>;
+
+constexpr Corners corners_of(const Triangle& t) { return {to_double(t.a), to_double(t.b), to_double(t.c)}; }
 
 constexpr Aabbf bounds_of(const Triangle& t) { return {min(min(t.a, t.b), t.c), max(max(t.a, t.b), t.c)}; }
 

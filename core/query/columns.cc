@@ -21,6 +21,11 @@ struct ServedColumns {
     return {Column::kT,     Column::kId,    Column::kTriangle, Column::kUv,     Column::kNormal,
             Column::kPoint, Column::kGroup, Column::kTag,      Column::kLayers, Column::kPose};
   }
+  ColumnSet operator()(const SweepColumns& sweeps) const {
+    if (sweeps.mode == RayMode::kAny) return {};
+    return {Column::kT,     Column::kId,  Column::kTriangle, Column::kNormal, Column::kPoint,
+            Column::kGroup, Column::kTag, Column::kLayers,   Column::kPose};
+  }
   ColumnSet operator()(const BallColumns&) const { return overlap(); }
   ColumnSet operator()(const BoxColumns&) const { return overlap(); }
   ColumnSet operator()(const CapsuleColumns&) const { return overlap(); }
@@ -41,6 +46,10 @@ struct DefaultColumns {
     if (rays.mode == RayMode::kAny) return {};
     return {Column::kT, Column::kId, Column::kTriangle};
   }
+  ColumnSet operator()(const SweepColumns& sweeps) const {
+    if (sweeps.mode == RayMode::kAny) return {};
+    return {Column::kT, Column::kId, Column::kTriangle};
+  }
   ColumnSet operator()(const BallColumns& balls) const { return overlap(balls.detail); }
   ColumnSet operator()(const BoxColumns& boxes) const { return overlap(boxes.detail); }
   ColumnSet operator()(const CapsuleColumns& capsules) const { return overlap(capsules.detail); }
@@ -53,11 +62,13 @@ struct DefaultColumns {
 };
 
 struct LayoutOf {
-  RowLayout operator()(const RayColumns& rays) const {
-    return rays.mode == RayMode::kFirst ? RowLayout::kDense
-           : rays.mode == RayMode::kAny ? RowLayout::kBytes
-                                        : RowLayout::kCounted;
+  static RowLayout of_mode(RayMode mode) {
+    return mode == RayMode::kFirst ? RowLayout::kDense
+           : mode == RayMode::kAny ? RowLayout::kBytes
+                                   : RowLayout::kCounted;
   }
+  RowLayout operator()(const RayColumns& rays) const { return of_mode(rays.mode); }
+  RowLayout operator()(const SweepColumns& sweeps) const { return of_mode(sweeps.mode); }
   RowLayout operator()(const BallColumns&) const { return RowLayout::kCounted; }
   RowLayout operator()(const BoxColumns&) const { return RowLayout::kCounted; }
   RowLayout operator()(const CapsuleColumns&) const { return RowLayout::kCounted; }

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "core/base/column.h"
@@ -164,7 +165,7 @@ class BlockCheck {
     RETURN_IF_ERROR(check_length(boxes.rotations.size(), 4, ColumnNeed::kOptional, "boxes.rotations"));
     RETURN_IF_ERROR(check_points(boxes.centers, "boxes.centers"));
     RETURN_IF_ERROR(check_sizes(boxes.half_extents, 3, "boxes.half_extents"));
-    return check_rotations(boxes.rotations);
+    return check_rotations(boxes.rotations, "boxes.rotations");
   }
 
   absl::Status check_kind(const CapsuleColumns& capsules) const {
@@ -176,12 +177,53 @@ class BlockCheck {
     return check_sizes(capsules.radii, 1, "capsules.radii");
   }
 
-  absl::Status check_rotations(absl::Span<const float> values) const {
+  absl::Status check_kind(const SweepColumns& sweeps) const {
+    RETURN_IF_ERROR(check_length(sweeps.starts.size(), 3, ColumnNeed::kEach, "sweeps.starts"));
+    RETURN_IF_ERROR(check_length(sweeps.ends.size(), 3, ColumnNeed::kEachOrOne, "sweeps.ends"));
+    RETURN_IF_ERROR(check_points(sweeps.starts, "sweeps.starts"));
+    RETURN_IF_ERROR(check_points(sweeps.ends, "sweeps.ends"));
+    return sweeps.half_extents.empty() ? check_round_movers(sweeps) : check_box_movers(sweeps);
+  }
+
+  absl::Status check_round_movers(const SweepColumns& sweeps) const {
+    if (!sweeps.rotations.empty())
+      return refuse_argument(Reason::kMalformed, name("sweeps.rotations"), {}, "need half_extents: only boxes turn");
+    RETURN_IF_ERROR(check_length(sweeps.radii.size(), 1, ColumnNeed::kEachOrOne, "sweeps.radii"));
+    RETURN_IF_ERROR(check_length(sweeps.half_axes.size(), 3, ColumnNeed::kOptional, "sweeps.half_axes"));
+    RETURN_IF_ERROR(check_sizes(sweeps.radii, 1, "sweeps.radii"));
+    for (size_t i = 0; i < sweeps.radii.size(); ++i)
+      if (sweeps.radii[i] == 0)
+        return wrong(Reason::kOutOfRange, "sweeps.radii", i, "must not be 0: ask rays for moving points");
+    for (size_t i = 0; i < sweeps.half_axes.size(); ++i) {
+      const float value = sweeps.half_axes[i];
+      if (!std::isfinite(value)) return wrong(Reason::kNotFinite, "sweeps.half_axes", i / 3, "needs finite numbers");
+      if (std::abs(value) > limits::kMaxCoordinate)
+        return wrong(Reason::kOutOfRange, "sweeps.half_axes", i / 3, "must lie within +-1e9");
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status check_box_movers(const SweepColumns& sweeps) const {
+    for (const auto& [values, field] :
+         {std::pair{sweeps.radii, "sweeps.radii"}, {sweeps.half_axes, "sweeps.half_axes"}})
+      if (!values.empty())
+        return refuse_argument(Reason::kMalformed, name(field), {}, "must be absent if half_extents are given");
+    RETURN_IF_ERROR(check_length(sweeps.half_extents.size(), 3, ColumnNeed::kEachOrOne, "sweeps.half_extents"));
+    RETURN_IF_ERROR(check_length(sweeps.rotations.size(), 4, ColumnNeed::kOptional, "sweeps.rotations"));
+    RETURN_IF_ERROR(check_sizes(sweeps.half_extents, 3, "sweeps.half_extents"));
+    for (size_t i = 0; i + 2 < sweeps.half_extents.size(); i += 3)
+      if (sweeps.half_extents[i] == 0 && sweeps.half_extents[i + 1] == 0 && sweeps.half_extents[i + 2] == 0)
+        return wrong(Reason::kOutOfRange, "sweeps.half_extents", i / 3,
+                     "must not all be 0: ask rays for moving points");
+    return check_rotations(sweeps.rotations, "sweeps.rotations");
+  }
+
+  absl::Status check_rotations(absl::Span<const float> values, absl::string_view field) const {
     for (size_t i = 0; i + 3 < values.size(); i += 4) {
       const double deviation = unit_deviation({values[i], values[i + 1], values[i + 2], values[i + 3]});
-      if (!std::isfinite(deviation)) return wrong(Reason::kNotFinite, "boxes.rotations", i / 4, "needs finite numbers");
+      if (!std::isfinite(deviation)) return wrong(Reason::kNotFinite, field, i / 4, "needs finite numbers");
       if (deviation > limits::kMaxQuaternionDeviation)
-        return wrong(Reason::kOutOfRange, "boxes.rotations", i / 4, "must be a quaternion (x, y, z, w) of unit length");
+        return wrong(Reason::kOutOfRange, field, i / 4, "must be a quaternion (x, y, z, w) of unit length");
     }
     return absl::OkStatus();
   }
@@ -215,6 +257,7 @@ struct CountQueries {
   size_t operator()(const BallColumns& balls) const { return balls.centers.size() / 3; }
   size_t operator()(const BoxColumns& boxes) const { return boxes.centers.size() / 3; }
   size_t operator()(const CapsuleColumns& capsules) const { return capsules.starts.size() / 3; }
+  size_t operator()(const SweepColumns& sweeps) const { return sweeps.starts.size() / 3; }
   size_t operator()(const NearestColumns& nearest) const { return nearest.points.size() / 3; }
   size_t operator()(const LookupColumns& lookup) const {
     return lookup.groups.empty() ? lookup.ids.size() : lookup.groups.size();

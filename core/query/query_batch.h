@@ -18,6 +18,7 @@
 #include "core/base/block_kind.h"
 #include "core/base/ids.h"
 #include "core/base/limits.h"
+#include "core/geometry/mover.h"
 #include "core/geometry/ray.h"
 
 namespace locus {
@@ -87,6 +88,18 @@ struct CapsuleColumns {
   StaticDetail detail = StaticDetail::kInstances;
 };
 
+// Solids that move from `starts` to `ends`: balls (radii), capsules (radii and half axes) or boxes (half extents).
+struct SweepColumns {
+  absl::Span<const float> starts;        // N entries x y z, relative to the frame: centres at t = 0
+  absl::Span<const float> ends;          // N entries x y z, or one for all sweeps: centres at t = 1
+  absl::Span<const float> radii;         // balls and capsules: N entries, or one for all; > 0
+  absl::Span<const float> half_axes;     // capsules: N entries x y z, or one for all; centre to an end of the axis
+  absl::Span<const float> half_extents;  // boxes: N entries x y z, or one for all; >= 0, not all 0
+  absl::Span<const float> rotations;     // boxes: quaternions x y z w; default: no rotation
+  RayMode mode = RayMode::kFirst;
+  AtStart at_start = AtStart::kHit;
+};
+
 struct NearestColumns {
   absl::Span<const float> points;         // N entries x y z, relative to the frame
   absl::Span<const float> max_distances;  // maximum distance of a row, >= 0; default: +inf
@@ -114,7 +127,7 @@ struct QueryBlock {
   absl::Span<const uint64_t> as_of_ticks;    // tick of each query; default: the snapshot's latest state
   absl::Span<const float> as_of_fractions;   // fraction of the way to the next tick, >= 0 and < 1; default: 0
   OutsideHistory outside = OutsideHistory::kReject;
-  std::variant<RayColumns, BallColumns, BoxColumns, LookupColumns, NearestColumns, CapsuleColumns> kind;
+  std::variant<RayColumns, BallColumns, BoxColumns, LookupColumns, NearestColumns, CapsuleColumns, SweepColumns> kind;
 };
 
 // Returns the kind of the block. The value of a BlockKind is the index of its alternative in QueryBlock::kind, as
@@ -128,6 +141,7 @@ static_assert(std::is_same_v<ColumnsOf<BlockKind::kBox>, BoxColumns>);
 static_assert(std::is_same_v<ColumnsOf<BlockKind::kLookup>, LookupColumns>);
 static_assert(std::is_same_v<ColumnsOf<BlockKind::kNearest>, NearestColumns>);
 static_assert(std::is_same_v<ColumnsOf<BlockKind::kCapsule>, CapsuleColumns>);
+static_assert(std::is_same_v<ColumnsOf<BlockKind::kSweep>, SweepColumns>);
 static_assert(std::variant_size_v<decltype(QueryBlock::kind)> == kBlockKinds);
 
 struct QueryBatch {

@@ -13,7 +13,7 @@ namespace {
 constexpr double kBlockNanoseconds = 500;
 // Estimated nanoseconds of a query before the first measurement, indexed by CostKind. Measured on scenes of 100,000
 // triangles and 10,000 objects.
-constexpr std::array<double, 9> kFirstGuess = {300, 200, 1000, 1000, 1000, 2000, 100, 20'000, 5000};
+constexpr std::array<double, 10> kFirstGuess = {300, 200, 1000, 1000, 1000, 2000, 100, 20'000, 5000, 2000};
 constexpr double kMin = 1, kMax = 1e12;
 constexpr size_t kProbes = 8;
 // A measurement of n queries has the weight n / kForgetQueries in the new estimate, clamped to kMinWeight ..
@@ -35,6 +35,7 @@ struct KindOf {
   CostKind operator()(const BallColumns&) const { return CostKind::kBall; }
   CostKind operator()(const BoxColumns&) const { return CostKind::kBox; }
   CostKind operator()(const CapsuleColumns&) const { return CostKind::kCapsule; }
+  CostKind operator()(const SweepColumns&) const { return CostKind::kSweep; }
   CostKind operator()(const NearestColumns&) const { return CostKind::kNearest; }
   CostKind operator()(const LookupColumns& lookup) const {
     return lookup.groups.empty() ? CostKind::kLookup : CostKind::kLookupGroups;

@@ -16,7 +16,18 @@
 namespace locus::server {
 
 // Kinds of queries with similar cost.
-enum class CostKind : uint8_t { kRayFirst, kRayAny, kRayAll, kBall, kBox, kNearest, kLookup, kLookupGroups, kCapsule };
+enum class CostKind : uint8_t {
+  kRayFirst,
+  kRayAny,
+  kRayAll,
+  kBall,
+  kBox,
+  kNearest,
+  kLookup,
+  kLookupGroups,
+  kCapsule,
+  kSweep
+};
 CostKind cost_kind(const QueryBlock& block);
 
 class CostEstimates {

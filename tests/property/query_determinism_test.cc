@@ -48,6 +48,9 @@ std::vector<OwnedBlock> lengthened(const std::vector<OwnedBlock>& blocks, size_t
     repeat(block.points, 3);
     repeat(block.sizes, std::holds_alternative<BallColumns>(block.settings.kind) ? 1 : 3);
     repeat(block.extras, std::holds_alternative<BoxColumns>(block.settings.kind) ? 4 : 1);
+    repeat(block.half_axes, 3);
+    repeat(block.half_extents, 3);
+    repeat(block.rotations, 4);
     for (auto* column : {&block.ids, &block.groups, &block.ignore_groups}) repeat(*column, 1);
     repeat(block.masks, 1);
   }
@@ -147,7 +150,8 @@ TEST(QueryDeterminismTest, ADistantFrameGivesTheHitsOfTheSceneAtTheOrigin) {
       block.settings.frame = {};
       block.settings.precision = Precision::kExact;
       for (float& x : block.points) x = std::round(x * 16) / 16;
-      if (std::holds_alternative<CapsuleColumns>(block.settings.kind))
+      if (std::holds_alternative<CapsuleColumns>(block.settings.kind) ||
+          std::holds_alternative<SweepColumns>(block.settings.kind))
         for (float& x : block.sizes) x = std::round(x * 16) / 16;
     }
     for (Object& object : scene.world.objects)

@@ -26,14 +26,18 @@ using Found = std::map<std::pair<Id, uint32_t>, FoundRow>;  // key: id and trian
 
 inline bool is_lookup(const OwnedBlock& block) { return std::holds_alternative<LookupColumns>(block.settings.kind); }
 
-// Returns the rows of each query at `precision`, with detail kTriangles for nearest queries and mode kAll for rays.
-// Raises the maximum number of results, so that no answer is truncated.
+// Returns the rows of each query at `precision`, with detail kTriangles for nearest queries and mode kAll for rays and
+// sweeps. Raises the maximum number of results, so that no answer is truncated.
 inline std::vector<Found> found_by(const SceneSnapshot& snapshot, OwnedBlock block, Precision precision) {
   block.settings.precision = precision;
   block.settings.max_results = limits::kMaxMaxResults;
   block.settings.columns = {Column::kId, Column::kTriangle};
   if (auto* rays = std::get_if<RayColumns>(&block.settings.kind); rays != nullptr) {
     rays->mode = RayMode::kAll;
+    block.settings.columns.add(Column::kT);
+  }
+  if (auto* sweeps = std::get_if<SweepColumns>(&block.settings.kind); sweeps != nullptr) {
+    sweeps->mode = RayMode::kAll;
     block.settings.columns.add(Column::kT);
   }
   if (auto* nearest = std::get_if<NearestColumns>(&block.settings.kind); nearest != nullptr) {

@@ -16,10 +16,16 @@ namespace locus::test {
 // columns are used.
 struct OwnedBlock {
   QueryBlock settings;
-  std::vector<float> points;  // origins of rays, centres of balls and boxes, starts of capsules, or points of nearest
-  std::vector<float> sizes;   // directions of rays, radii of balls, half extents of boxes, or ends of capsules
-  std::vector<float> extras;  // t_max of rays, rotations of boxes, radii of capsules, or maximum distances of nearest
-  std::vector<uint64_t> ids;  // ids of lookups
+  // Origins of rays, centres of balls and boxes, starts of capsules and sweeps, or points of nearest.
+  std::vector<float> points;
+  // Directions of rays, radii of balls, half extents of boxes, or ends of capsules and sweeps.
+  std::vector<float> sizes;
+  // t_max of rays, rotations of boxes, radii of capsules and sweeps, or maximum distances of nearest.
+  std::vector<float> extras;
+  std::vector<float> half_axes;     // sweeps
+  std::vector<float> half_extents;  // sweeps
+  std::vector<float> rotations;     // sweeps
+  std::vector<uint64_t> ids;        // ids of lookups
   std::vector<uint64_t> groups;
   std::vector<uint32_t> masks;
   std::vector<uint64_t> ignore_groups;
@@ -48,6 +54,9 @@ struct OwnedBlock {
     cut(part.points, 3, n, begin, end);
     cut(part.sizes, width_of_sizes, n, begin, end);
     cut(part.extras, width_of_extras, n, begin, end);
+    cut(part.half_axes, 3, n, begin, end);
+    cut(part.half_extents, 3, n, begin, end);
+    cut(part.rotations, 4, n, begin, end);
     cut(part.ids, 1, n, begin, end);
     cut(part.groups, 1, n, begin, end);
     cut(part.masks, 1, n, begin, end);
@@ -76,6 +85,14 @@ struct OwnedBlock {
     capsules.starts = points;
     capsules.ends = sizes;
     capsules.radii = extras;
+  }
+  void fill(SweepColumns& sweeps) const {
+    sweeps.starts = points;
+    sweeps.ends = sizes;
+    sweeps.radii = extras;
+    sweeps.half_axes = half_axes;
+    sweeps.half_extents = half_extents;
+    sweeps.rotations = rotations;
   }
   void fill(NearestColumns& nearest) const {
     nearest.points = points;

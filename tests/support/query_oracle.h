@@ -11,6 +11,8 @@
 #include <tuple>
 #include <vector>
 
+#include "core/geometry/sweep.h"
+#include "core/geometry/swept_bounds.h"
 #include "core/query/kinds/placed_triangle.h"
 #include "tests/support/run_batch.h"
 
@@ -52,7 +54,8 @@ class QueryOracle {
     const Object* object = nullptr;
     const Instance* instance = nullptr;
     float u = 0, v = 0;
-    Vec3d normal;  // nearest queries only: vector to the nearest point
+    Vec3d normal;  // nearest queries: vector to the nearest point
+    Vec3d place;   // sweeps only: point of contact, relative to the start
   };
   using Rows = std::vector<Row>;
 
@@ -102,7 +105,7 @@ class QueryOracle {
     const LoosePlacedTriangles loose(instance);
     for (uint32_t number = 0; number < instance.mesh->triangle_count(); ++number) {
       const Triangle triangle = instance.mesh->triangle(number);
-      Row row{kInfinity, instance.id, number, 0, nullptr, &instance, 0, 0, {}};
+      Row row{kInfinity, instance.id, number, 0, nullptr, &instance, 0, 0, {}, {}};
       const std::optional<float> own = entry_of(slabs, loose.bounds_of_triangle(triangle));
       const std::optional<TriangleHit> hit = ray.hit(triangle);
       if (own && hit) {
@@ -129,7 +132,7 @@ class QueryOracle {
 
   void hit_on(const Object& object, const Question& question, Rows& rows) const {
     const ObjectRay ray(Rayd{question.origin, question.direction}, question.inside);
-    Row row{0, object.id, kNoTriangle, 0, &object, nullptr, 0, 0, {}};
+    Row row{0, object.id, kNoTriangle, 0, &object, nullptr, 0, 0, {}, {}};
     if (question.conservative) {
       const std::optional<float> t = entry_of(ray.slabs(), bounds_of(object.shape));
       if (!t) return;
@@ -182,11 +185,113 @@ class QueryOracle {
       if (rays.mode == RayMode::kAll) {
         count(block, rows, i, result);
       } else {
-        rows.resize(1, Row{std::numeric_limits<float>::infinity(), 0, kNoTriangle, 0, nullptr, nullptr, 0, 0, {}});
+        rows.resize(1, Row{std::numeric_limits<float>::infinity(), 0, kNoTriangle, 0, nullptr, nullptr, 0, 0, {}, {}});
       }
       for (const Row& row : rows) {
         write(row, block, result);
         write_surface(row, block, question, result);
+      }
+    }
+  }
+
+  Mover mover_of(const QueryBlock& block, const SweepColumns& sweeps, size_t i) const {
+    const auto triple = [i](absl::Span<const float> column) {
+      const float* v = &column[column.size() == 3 ? 0 : 3 * i];
+      return Vec3d{v[0], v[1], v[2]};
+    };
+    Mover mover;
+    mover.start = point(block, sweeps.starts, i);
+    mover.way = triple(sweeps.ends) - triple(sweeps.starts);
+    mover.radius = entry_for(sweeps.radii, i, 0.0f);
+    if (!sweeps.half_axes.empty()) {
+      mover.kind = MoverKind::kCapsule;
+      mover.half_axis = triple(sweeps.half_axes);
+    } else if (!sweeps.half_extents.empty()) {
+      mover.kind = MoverKind::kBox;
+      mover.half = triple(sweeps.half_extents);
+      if (!sweeps.rotations.empty()) {
+        const float* q = &sweeps.rotations[sweeps.rotations.size() == 4 ? 0 : 4 * i];
+        mover.rotation = rotation_of({q[0], q[1], q[2], q[3]});
+      }
+    }
+    return mover;
+  }
+
+  // Adds the rows of an instance. `normal` and `place` of a row are set from its contact.
+  void swept(const QueryBlock& block, const SweepColumns& sweeps, const Mover& mover, const Instance& instance,
+             Rows& rows) const {
+    const bool by_bounds = block.precision == Precision::kConservative;
+    const SweptBounds path(mover, kInstancePad), tight(mover, kObjectPad);
+    const std::optional<double> whole = path.entry(instance.bounds);
+    if (!whole) return;
+    const Mover in_mesh = mover_to_mesh(mover, instance.transform);
+    const PlacedTriangles placed(instance);
+    const LoosePlacedTriangles loose(instance);
+    for (uint32_t number = 0; number < instance.mesh->triangle_count(); ++number) {
+      const Triangle triangle = instance.mesh->triangle(number);
+      Row row{kInfinity, instance.id, number, 0, nullptr, &instance, 0, 0, {}, {}};
+      const std::optional<double> t = first_contact(in_mesh, corners_of(triangle), sweeps.at_start);
+      const std::optional<double> own = path.entry(loose.bounds_of_triangle(triangle));
+      if (t && own) {
+        row.t = entry_of(std::max({*t, *own, *whole}));
+        const Contact contact = contact_at(in_mesh, corners_of(triangle), *t);
+        row.normal = normalized(instance.transform.rotation.to_world(contact.normal));
+        row.place = instance.transform.rotation.to_world(contact.point) * double{instance.transform.scale};
+      }
+      if (by_bounds) {
+        const std::optional<double> entered = tight.entry(placed.bounds_of_triangle(triangle));
+        if (entered) row.t = std::min(row.t, entry_of(*entered));
+      }
+      if (row.t < kInfinity) rows.push_back(row);
+    }
+  }
+
+  void swept(const QueryBlock& block, const SweepColumns& sweeps, const Mover& mover, const Object& object,
+             Rows& rows) const {
+    const std::optional<double> entered = SweptBounds(mover, kObjectPad).entry(bounds_of(object.shape));
+    if (!entered) return;
+    Row row{entry_of(*entered), object.id, kNoTriangle, 0, &object, nullptr, 0, 0, {}, {}};
+    if (block.precision == Precision::kExact) {
+      const std::optional<double> t = first_contact(mover, object.shape, sweeps.at_start);
+      if (!t) return;
+      row.t = std::max(row.t, entry_of(*t));
+      const Contact contact = contact_at(mover, object.shape, *t);
+      row.normal = contact.normal;
+      row.place = contact.point;
+    }
+    rows.push_back(row);
+  }
+
+  void answer_kind(const QueryBlock& block, const SweepColumns& sweeps, BlockResult& result) const {
+    for (size_t i = 0; i < sweeps.starts.size() / 3; ++i) {
+      const Mover mover = mover_of(block, sweeps, i);
+      Rows rows;
+      for (const Instance* instance : instances_)
+        if (block.source != Source::kDynamic && wanted(block, i, *instance))
+          swept(block, sweeps, mover, *instance, rows);
+      for (const Object& object : objects_)
+        if (block.source != Source::kStatic && wanted(block, i, object)) swept(block, sweeps, mover, object, rows);
+      std::erase_if(rows, [](const Row& row) { return row.t > 1; });
+      std::sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) {
+        return std::tie(a.t, a.id, a.triangle) < std::tie(b.t, b.id, b.triangle);
+      });
+      if (sweeps.mode == RayMode::kAny) {
+        result.hits.push_back(rows.empty() ? '\0' : '\1');
+        continue;
+      }
+      if (sweeps.mode == RayMode::kAll)
+        count(block, rows, i, result);
+      else
+        rows.resize(1, Row{kInfinity, 0, kNoTriangle, 0, nullptr, nullptr, 0, 0, {}, {}});
+      const bool by_bounds = block.precision == Precision::kConservative;
+      for (Row& row : rows) {
+        if (by_bounds) row.normal = {};
+        if (by_bounds && row.id != 0) row.place = mover.way * double{row.t};
+        write(row, block, result);
+        const ColumnSet columns = columns_of(block);
+        if (columns.has(Column::kNormal)) write_vector(to_float(row.normal), result.normals);
+        if (columns.has(Column::kPoint))
+          write_vector(row.id == 0 ? Vec3f{} : to_float(mover.start - block.frame + row.place), result.points);
       }
     }
   }
@@ -238,7 +343,7 @@ class QueryOracle {
       const bool exactly = meets(mesh_solid, triangle) && meets(solid, loose.bounds_of_triangle(triangle));
       const bool by_bounds = block.precision == Precision::kConservative;
       if (!exactly && !(by_bounds && meets(solid, placed.bounds_of_triangle(triangle)))) continue;
-      Row row{0, instance.id, kNoTriangle, 0, nullptr, &instance, 0, 0, {}};
+      Row row{0, instance.id, kNoTriangle, 0, nullptr, &instance, 0, 0, {}, {}};
       if (detail != StaticDetail::kInstances) row.triangle = number;
       if (detail == StaticDetail::kTriangles) row.storage = storage[number];
       rows.push_back(row);
@@ -257,7 +362,7 @@ class QueryOracle {
       if (block.source == Source::kStatic || object.id <= block.after_id || !wanted(block, i, object)) continue;
       if (!meets(solid, bounds_of(object.shape))) continue;
       if (block.precision == Precision::kExact && !meets(solid, object.shape)) continue;
-      rows.push_back({0, object.id, kNoTriangle, 0, &object, nullptr, 0, 0, {}});
+      rows.push_back({0, object.id, kNoTriangle, 0, &object, nullptr, 0, 0, {}, {}});
     }
     std::sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) {
       return std::tie(a.id, a.storage, a.triangle) < std::tie(b.id, b.storage, b.triangle);
@@ -298,9 +403,9 @@ class QueryOracle {
     const auto rows_of = [&](const auto& wants) {
       Rows rows;
       for (const Instance* instance : instances_)
-        if (wants(*instance)) rows.push_back({0, instance->id, kNoTriangle, 0, nullptr, instance, 0, 0, {}});
+        if (wants(*instance)) rows.push_back({0, instance->id, kNoTriangle, 0, nullptr, instance, 0, 0, {}, {}});
       for (const Object& object : objects_)
-        if (wants(object)) rows.push_back({0, object.id, kNoTriangle, 0, &object, nullptr, 0, 0, {}});
+        if (wants(object)) rows.push_back({0, object.id, kNoTriangle, 0, &object, nullptr, 0, 0, {}, {}});
       std::sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.id < b.id; });
       return rows;
     };
@@ -336,7 +441,7 @@ class QueryOracle {
     Rows own;
     for (uint32_t number = 0; number < instance.mesh->triangle_count(); ++number) {
       const auto [squared, way] = way_to(point, instance, instance.mesh->triangle(number), conservative);
-      own.push_back({entry_of(std::sqrt(squared)), instance.id, number, 0, nullptr, &instance, 0, 0, way});
+      own.push_back({entry_of(std::sqrt(squared)), instance.id, number, 0, nullptr, &instance, 0, 0, way, {}});
     }
     const auto nearer = [](const Row& a, const Row& b) {
       return std::tie(a.t, a.triangle) < std::tie(b.t, b.triangle);
@@ -351,7 +456,7 @@ class QueryOracle {
     Shape around = object.shape;
     around.position = around.position - point;
     const Vec3d way = conservative ? nearest_in(point, bounds) - point : nearest_on_shape({}, around);
-    rows.push_back({entry_of(away), object.id, kNoTriangle, 0, &object, nullptr, 0, 0, way});
+    rows.push_back({entry_of(away), object.id, kNoTriangle, 0, &object, nullptr, 0, 0, way, {}});
   }
 
   void answer_kind(const QueryBlock& block, const NearestColumns& nearest, BlockResult& result) const {
@@ -391,6 +496,7 @@ class QueryOracle {
 
   struct Defaults {
     ColumnSet operator()(const RayColumns&) const { return {Column::kT, Column::kId, Column::kTriangle}; }
+    ColumnSet operator()(const SweepColumns&) const { return {Column::kT, Column::kId, Column::kTriangle}; }
     ColumnSet operator()(const BallColumns& balls) const { return of(balls.detail); }
     ColumnSet operator()(const BoxColumns& boxes) const { return of(boxes.detail); }
     ColumnSet operator()(const CapsuleColumns& capsules) const { return of(capsules.detail); }

@@ -138,6 +138,9 @@ void add_columns(const Column (&served)[kCount], Random& random, OwnedBlock& blo
 inline constexpr Column kRayColumns[] = {Column::kT,      Column::kId,    Column::kTriangle, Column::kUv,
                                          Column::kNormal, Column::kPoint, Column::kGroup,    Column::kTag,
                                          Column::kLayers, Column::kPose};
+inline constexpr Column kSweepColumns[] = {Column::kT,      Column::kId,     Column::kTriangle,
+                                           Column::kNormal, Column::kPoint,  Column::kGroup,
+                                           Column::kTag,    Column::kLayers, Column::kPose};
 inline constexpr Column kOverlapColumns[] = {Column::kId,  Column::kTriangle, Column::kGroup,
                                              Column::kTag, Column::kLayers,   Column::kPose};
 inline constexpr Column kNearestColumns[] = {Column::kT,     Column::kId,  Column::kTriangle, Column::kPoint,
@@ -233,6 +236,43 @@ inline OwnedBlock capsule_block(const QueryScene& scene, const SceneSketch& sket
   return block;
 }
 
+// Balls, capsules or boxes that move along the sketch's rays, towards the places of its balls, or rest.
+inline OwnedBlock sweep_block(const QueryScene& scene, const SceneSketch& sketch, Random& random) {
+  OwnedBlock block = block_at(sketch, random);
+  constexpr RayMode kModes[] = {RayMode::kFirst, RayMode::kFirst, RayMode::kAny, RayMode::kAll};
+  constexpr AtStart kRules[] = {AtStart::kHit, AtStart::kApproach, AtStart::kPass};
+  constexpr MoverKind kKinds[] = {MoverKind::kBall, MoverKind::kCapsule, MoverKind::kBox};
+  SweepColumns sweeps;
+  sweeps.mode = random.pick(kModes);
+  sweeps.at_start = random.pick(kRules);
+  block.settings.kind = sweeps;
+  const MoverKind kind = random.pick(kKinds);
+  const auto add = [&](Vec3d start, Vec3d end, double size) {
+    append_point(block, start);
+    const std::vector<float> starts = block.points;
+    append_point(block, random.chance(0.1) ? start : end);
+    block.sizes.insert(block.sizes.end(), block.points.end() - 3, block.points.end());
+    block.points = starts;
+    const auto length = static_cast<float>(std::clamp(size, 1e-6, 1e9));
+    if (kind != MoverKind::kBox) block.extras.push_back(length);
+    if (kind == MoverKind::kCapsule) append(block.half_axes, to_float(random.whole_vector(2) * double{length} * 0.5));
+    if (kind == MoverKind::kBox) append(block.half_extents, Vec3f{length, random.chance(0.2) ? 0 : length, length / 2});
+  };
+  for (const Balld& ball : sketch.balls) {
+    add(ball.center, random.chance(0.5) ? notable_point(sketch, random) : ball.center + random.whole_vector(4),
+        random.chance(0.5) ? ball.radius : ball.radius * 0.125);
+  }
+  if (kind == MoverKind::kBox && random.chance(0.6)) {
+    for (size_t i = random.chance(0.5) ? 1 : block.points.size() / 3; i > 0; --i) {
+      const Quaternion q = random.rotation();
+      block.rotations.insert(block.rotations.end(), {q.x, q.y, q.z, q.w});
+    }
+  }
+  add_common(scene, random, block);
+  if (sweeps.mode != RayMode::kAny) add_columns(kSweepColumns, random, block);
+  return block;
+}
+
 inline OwnedBlock nearest_block(const QueryScene& scene, const SceneSketch& sketch, Random& random) {
   OwnedBlock block = block_at(sketch, random);
   constexpr uint32_t kCounts[] = {0, 1, 2, 5, 16, limits::kMaxNearest};
@@ -278,7 +318,10 @@ inline QueryScene query_scene(const SceneSketch& sketch, Random& random) {
   if (!sketch.boxes.empty()) scene.blocks.push_back(internal::box_block(scene, sketch, random));
   if (!sketch.placements.empty()) scene.blocks.push_back(internal::nearest_block(scene, sketch, random));
   scene.blocks.push_back(internal::lookup_block(scene, random));
-  if (!sketch.balls.empty()) scene.blocks.push_back(internal::capsule_block(scene, sketch, random));
+  if (!sketch.balls.empty()) {
+    scene.blocks.push_back(internal::capsule_block(scene, sketch, random));
+    for (int i = 0; i < 2; ++i) scene.blocks.push_back(internal::sweep_block(scene, sketch, random));
+  }
   return scene;
 }
 

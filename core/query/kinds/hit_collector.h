@@ -1,5 +1,5 @@
-// Collector of the best hits of one ray. limit() is the largest t at which a hit may still be retained. This limit
-// decreases as hits are found, so that ray searches skip everything beyond the limit. A collector belongs to one
+// Collector of the best hits of one ray or sweep. limit() is the largest t at which a hit may still be retained. This
+// limit decreases as hits are found, so that ray searches skip everything beyond the limit. A collector belongs to one
 // thread.
 #ifndef LOCUS_CORE_QUERY_KINDS_HIT_COLLECTOR_H_
 #define LOCUS_CORE_QUERY_KINDS_HIT_COLLECTOR_H_
@@ -23,12 +23,13 @@ namespace locus {
 // limit_ is the t of the front. limit_ never increases.
 class HitCollector {
  public:
-  explicit HitCollector(const RayRequest& request)
-      : mode_(request.mode),
+  explicit HitCollector(const RayRequest& request) : HitCollector(request.mode, request.max_results, request.t_max) {}
+  HitCollector(RayMode mode, uint32_t max_results, float t_max)
+      : mode_(mode),
         // Retains one more hit than requested: the answer is truncated if this additional hit exists. The order in
         // which hits are found therefore does not matter.
-        capacity_(request.mode == RayMode::kAll ? size_t{request.max_results} + 1 : 1),
-        limit_(request.t_max) {}
+        capacity_(mode == RayMode::kAll ? size_t{max_results} + 1 : 1),
+        limit_(t_max) {}
 
   // Returns the largest t at which a hit may still be retained. Once the collector is full, a hit at exactly this t is
   // retained only if it precedes the last retained hit in the order of nearer().

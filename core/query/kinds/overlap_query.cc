@@ -425,14 +425,8 @@ Balld ball_of(const QueryBlock& block, const BallColumns& balls, size_t i) {
 
 Obbd box_of(const QueryBlock& block, const BoxColumns& boxes, size_t i) {
   LOCUS_DCHECK_LT(3 * i, boxes.centers.size());
-  Obbd box{block.frame + read_vec3d(ColumnReader<float>(boxes.centers, 3).entry(i)),
-           read_vec3d(ColumnReader<float>(boxes.half_extents, 3).entry(i)),
-           {}};
-  const ColumnReader<float> rotations(boxes.rotations, 4);
-  if (!rotations.given()) return box;
-  const float* q = rotations.entry(i);
-  box.rotation = rotation_of(Quaternion{q[0], q[1], q[2], q[3]});
-  return box;
+  return {block.frame + read_vec3d(ColumnReader<float>(boxes.centers, 3).entry(i)),
+          read_vec3d(ColumnReader<float>(boxes.half_extents, 3).entry(i)), rotation_entry(boxes.rotations, i)};
 }
 
 Capsule capsule_of(const QueryBlock& block, const CapsuleColumns& capsules, size_t i) {

@@ -7,16 +7,11 @@
 #ifndef LOCUS_CORE_QUERY_KINDS_PLACED_TRIANGLE_H_
 #define LOCUS_CORE_QUERY_KINDS_PLACED_TRIANGLE_H_
 
-#include <array>
-
 #include "core/base/check.h"
 #include "core/base/planted_bug.h"
 #include "core/scene/statics/instance.h"
 
 namespace locus {
-
-// Corners of a triangle in world axes.
-using Corners = std::array<Vec3d, 3>;
 
 // Returns the corners of `triangle` in world axes.
 inline Corners corners_of(const Transform& transform, const Triangle& triangle) {

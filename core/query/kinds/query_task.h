@@ -45,6 +45,14 @@ class Filter {
   absl::Span<const uint64_t> ignored_ids_;
 };
 
+// Returns the rotation of query `i` in an optional column of quaternions x, y, z, w; the identity if there is none.
+inline Rotation rotation_entry(absl::Span<const float> rotations, size_t i) {
+  const ColumnReader<float> reader(rotations, 4);
+  if (!reader.given()) return {};
+  const float* q = reader.entry(i);
+  return rotation_of(Quaternion{q[0], q[1], q[2], q[3]});
+}
+
 // Work budget and cancellation of one batch, shared by all threads that work on it. Thread-safe.
 class BatchControl {
  public:

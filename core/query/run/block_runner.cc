@@ -5,6 +5,7 @@
 
 #include "core/query/kinds/lookup_query.h"
 #include "core/query/kinds/ray_query.h"
+#include "core/query/kinds/sweep_query.h"
 #include "core/query/run/rows.h"
 
 namespace locus {
@@ -95,10 +96,15 @@ size_t BlockRunner::run_queries(const Columns& columns, size_t begin, size_t end
 
 // Writes the hits of query `i` to the columns `to`, beginning at row `row`. Computes the surface columns (uv, normal
 // and point) only if the block returns one of them, which is rare.
-void BlockRunner::write_hits(const RayColumns& rays, absl::Span<const Hit> hits, size_t i, const RowSpans& to,
+template <class Columns>
+void BlockRunner::write_hits(const Columns& columns, absl::Span<const Hit> hits, size_t i, const RowSpans& to,
                              size_t row) {
   for (size_t k = 0; k < hits.size(); ++k) write_row(hits[k], to, row + k);
-  if (to.uvs == nullptr && to.normals == nullptr && to.points == nullptr) return;
+  if (to.uvs != nullptr || to.normals != nullptr || to.points != nullptr) write_surfaces(columns, hits, i, to, row);
+}
+
+void BlockRunner::write_surfaces(const RayColumns& rays, absl::Span<const Hit> hits, size_t i, const RowSpans& to,
+                                 size_t row) {
   const Winding winding = task_.snapshot().winding;
   // The surface columns of a miss are zero, so the request of the ray is not needed.
   const bool is_miss = hits.empty() || hits.front().id == kNoId;
@@ -106,10 +112,17 @@ void BlockRunner::write_hits(const RayColumns& rays, absl::Span<const Hit> hits,
   for (size_t k = 0; k < hits.size(); ++k) write_surface(request, block_.frame, hits[k], winding, to, row + k);
 }
 
-void BlockRunner::append_counted(const RayColumns& rays, const RayAnswer& answer, size_t i) {
+void BlockRunner::write_surfaces(const SweepColumns& sweeps, absl::Span<const Hit> hits, size_t i, const RowSpans& to,
+                                 size_t row) {
+  const SweepRequest request = sweep_request(block_, sweeps, i);
+  for (size_t k = 0; k < hits.size(); ++k) write_contact(request, block_.frame, hits[k], to, row + k);
+}
+
+template <class Columns>
+void BlockRunner::append_counted(const Columns& columns, const RayAnswer& answer, size_t i) {
   const absl::Span<const Hit> hits = answer.hits;
   const size_t kept = std::min<uint64_t>(hits.size(), max_rows_ - rows_);
-  write_hits(rays, hits.subspan(0, kept), i, add_rows(result_, columns_, kept), 0);
+  write_hits(columns, hits.subspan(0, kept), i, add_rows(result_, columns_, kept), 0);
   count_rows(kept, answer.truncated || kept < hits.size(), i);
 }
 
@@ -150,7 +163,7 @@ size_t BlockRunner::run_queries(const RayColumns& rays, size_t begin, size_t end
     const size_t last = std::min<size_t>(end, first + output_.rays_per_call.load(std::memory_order_relaxed));
     const uint64_t before = work_done();
     const RayAnswers answers = run_rays(task_, block_, rays, times_, task_.snapshot().winding, first, last);
-    for (size_t i = first; i < last; ++i) write_ray(rays, answers[i - first], i);
+    for (size_t i = first; i < last; ++i) write_answer(rays, answers[i - first], i);
     adapt_rays_per_call(last - first, work_done() - before);
     first = last;
   }
@@ -168,15 +181,22 @@ void BlockRunner::adapt_rays_per_call(size_t rays, uint64_t work) {
   output_.rays_per_call.store(static_cast<uint32_t>(next), std::memory_order_relaxed);
 }
 
-void BlockRunner::write_ray(const RayColumns& rays, const RayAnswer& answer, size_t i) {
-  if (rays.mode == RayMode::kAll) return append_counted(rays, answer, i);
+template <class Columns>
+void BlockRunner::write_answer(const Columns& columns, const RayAnswer& answer, size_t i) {
+  if (columns.mode == RayMode::kAll) return append_counted(columns, answer, i);
   if (answer.truncated) result_.truncated.push_back(static_cast<uint32_t>(i));
-  if (rays.mode == RayMode::kAny) {
+  if (columns.mode == RayMode::kAny) {
     output_.hits[i] = answer.hits.empty() ? '\0' : '\1';
     return;
   }
   const Hit miss;
-  write_hits(rays, {answer.hits.empty() ? &miss : answer.hits.data(), 1}, i, output_.rows, i);
+  write_hits(columns, {answer.hits.empty() ? &miss : answer.hits.data(), 1}, i, output_.rows, i);
+}
+
+void BlockRunner::run_query(const SweepColumns& sweeps, size_t i) {
+  RayAnswer answer;
+  if (!task_.ended()) answer = run_sweep(task_, times_.of(i), sweep_request(block_, sweeps, i), Filter(block_, i));
+  write_answer(sweeps, answer, i);
 }
 
 void BlockRunner::run_query(const BallColumns& balls, size_t i) {

@@ -55,9 +55,16 @@ class BlockRunner {
   void run_query(const CapsuleColumns& capsules, size_t i);
   void run_query(const LookupColumns& lookup, size_t i);
   void run_query(const NearestColumns& nearest, size_t i);
-  void write_ray(const RayColumns& rays, const RayAnswer& answer, size_t i);
-  void write_hits(const RayColumns& rays, absl::Span<const Hit> hits, size_t i, const RowSpans& to, size_t row);
-  void append_counted(const RayColumns& rays, const RayAnswer& answer, size_t i);
+  void run_query(const SweepColumns& sweeps, size_t i);
+  // Columns of the following functions: RayColumns or SweepColumns.
+  template <class Columns>
+  void write_answer(const Columns& columns, const RayAnswer& answer, size_t i);
+  template <class Columns>
+  void write_hits(const Columns& columns, absl::Span<const Hit> hits, size_t i, const RowSpans& to, size_t row);
+  template <class Columns>
+  void append_counted(const Columns& columns, const RayAnswer& answer, size_t i);
+  void write_surfaces(const RayColumns& rays, absl::Span<const Hit> hits, size_t i, const RowSpans& to, size_t row);
+  void write_surfaces(const SweepColumns& sweeps, absl::Span<const Hit> hits, size_t i, const RowSpans& to, size_t row);
   void append_rows(const OverlapAnswer& answer, size_t i);
   void append_runs(const OverlapAnswer& answer, size_t i);
   void look_up_groups_at(const LookupColumns& lookup, size_t i);

@@ -89,6 +89,17 @@ void write_surface(const RayRequest& request, Vec3d frame, const Hit& hit, Windi
   write_point(to.points, row, point.x, point.y, point.z);
 }
 
+void write_contact(const SweepRequest& request, Vec3d frame, const Hit& hit, const RowSpans& to, size_t row) {
+  Vec3f normal, point;
+  if (hit.id != kNoId) {
+    const Contact contact = contact_of(request, hit);
+    normal = to_float(contact.normal);
+    point = to_float(request.mover.start - frame + contact.point);
+  }
+  if (to.normals != nullptr) write_point(to.normals, row, normal.x, normal.y, normal.z);
+  if (to.points != nullptr) write_point(to.points, row, point.x, point.y, point.z);
+}
+
 void write_nearest_point(const NearestRequest& request, Vec3d frame, const Hit& hit, const RowSpans& to, size_t row) {
   if (to.points == nullptr) return;
   const Vec3f point = to_float(request.point - frame + nearest_offset(request, hit));

@@ -7,6 +7,7 @@
 #include "core/query/kinds/hit.h"
 #include "core/query/kinds/nearest_query.h"
 #include "core/query/kinds/ray_query.h"
+#include "core/query/kinds/sweep_query.h"
 #include "core/query/query_batch.h"
 #include "core/query/run/answer_sink.h"
 
@@ -24,6 +25,9 @@ void write_object_rows(absl::Span<const FoundObject> objects, const SceneAtTime&
 void write_surface(const RayRequest& request, Vec3d frame, const Hit& hit, Winding winding, const RowSpans& to,
                    size_t row);
 
+// Writes those of the columns normal and point that the block returns, for a hit of a sweep. The point is relative to
+// `frame`.
+void write_contact(const SweepRequest& request, Vec3d frame, const Hit& hit, const RowSpans& to, size_t row);
 // Writes the column point of a nearest query's row, relative to `frame`, if the block returns this column.
 void write_nearest_point(const NearestRequest& request, Vec3d frame, const Hit& hit, const RowSpans& to, size_t row);
 
