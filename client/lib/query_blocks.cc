@@ -110,6 +110,69 @@ CapsuleBlock& CapsuleBlock::capsules(absl::Span<const float> starts, absl::Span<
   return *this;
 }
 
+SweepBlock& SweepBlock::mode(v1::RayMode mode) {
+  sweeps_->set_mode(mode);
+  return *this;
+}
+
+SweepBlock& SweepBlock::at_start(v1::AtStart at_start) {
+  sweeps_->set_at_start(at_start);
+  return *this;
+}
+
+int SweepBlock::append_path(const Float3& start, const Float3& end, const Filter& filter) {
+  const int rows_before = sweeps_->starts_size() / 3;
+  append_triple(*sweeps_->mutable_starts(), start);
+  append_triple(*sweeps_->mutable_ends(), end);
+  filter_row(rows_before, filter);
+  return rows_before;
+}
+
+SweepBlock& SweepBlock::ball(const Float3& start, const Float3& end, float radius, const Filter& filter) {
+  append_path(start, end, filter);
+  sweeps_->add_radii(radius);
+  return *this;
+}
+
+SweepBlock& SweepBlock::capsule(const Float3& start, const Float3& end, const Float3& half_axis, float radius,
+                                const Filter& filter) {
+  append_triple(*sweeps_->mutable_half_axes(), half_axis);
+  return ball(start, end, radius, filter);
+}
+
+SweepBlock& SweepBlock::box(const Float3& start, const Float3& end, const Float3& half_extents,
+                            const Rotation& rotation, const Filter& filter) {
+  append_triple(*sweeps_->mutable_half_extents(), half_extents);
+  append_rotation_row(*sweeps_->mutable_rotations(), append_path(start, end, filter), rotation);
+  return *this;
+}
+
+SweepBlock& SweepBlock::sweeps(absl::Span<const float> starts, absl::Span<const float> ends) {
+  append(*sweeps_->mutable_starts(), starts);
+  append(*sweeps_->mutable_ends(), ends);
+  return *this;
+}
+
+SweepBlock& SweepBlock::radii(absl::Span<const float> radii) {
+  assign(*sweeps_->mutable_radii(), radii);
+  return *this;
+}
+
+SweepBlock& SweepBlock::half_axes(absl::Span<const float> half_axes) {
+  assign(*sweeps_->mutable_half_axes(), half_axes);
+  return *this;
+}
+
+SweepBlock& SweepBlock::half_extents(absl::Span<const float> half_extents) {
+  assign(*sweeps_->mutable_half_extents(), half_extents);
+  return *this;
+}
+
+SweepBlock& SweepBlock::rotations(absl::Span<const float> rotations) {
+  assign(*sweeps_->mutable_rotations(), rotations);
+  return *this;
+}
+
 NearestBlock& NearestBlock::k(uint32_t count) {
   nearest_->set_k(count);
   return *this;

@@ -1,6 +1,6 @@
-// Builders of one block of a query batch: rays, balls, boxes, nearest or lookup, with the settings that all kinds
-// share. QueryBuilder returns these builders, which are valid until QueryBuilder::build(). The builders check nothing:
-// the server refuses an invalid batch as a whole, naming block, column and index. Not thread-safe.
+// Builders of one block of a query batch: rays, balls, boxes, capsules, sweeps, nearest or lookup, with the settings
+// that all kinds share. QueryBuilder returns these builders, which are valid until QueryBuilder::build(). The builders
+// check nothing: the server refuses an invalid batch as a whole, naming block, column and index. Not thread-safe.
 //
 // Let N be the number of queries of a block. A per-query column (t_max, max_distances, masks, ignored groups,
 // rotations) is either filled row by row, or set as a whole column, which has N entries, one entry for all queries, or
@@ -165,6 +165,40 @@ class CapsuleBlock : public BlockBuilder<CapsuleBlock> {
 
  private:
   v1::Capsules* capsules_;
+};
+
+// Sweeps: solids that move in a straight line from a start to an end. All solids of a block are of one kind: balls,
+// capsules or boxes. Default mode: FIRST.
+class SweepBlock : public BlockBuilder<SweepBlock> {
+ public:
+  explicit SweepBlock(v1::QueryBlock& block) : BlockBuilder(block), sweeps_(block.mutable_sweeps()) {}
+
+  SweepBlock& mode(v1::RayMode mode);
+  // Sets the treatment of what a solid touches at its start; by default, a hit at t = 0.
+  SweepBlock& at_start(v1::AtStart at_start);
+  // Append a ball, a capsule or a box whose centre moves from `start` to `end`. `half_axis` is the vector from the
+  // centre of the capsule to one end of its inner segment.
+  SweepBlock& ball(const Float3& start, const Float3& end, float radius, const Filter& filter = {});
+  SweepBlock& capsule(const Float3& start, const Float3& end, const Float3& half_axis, float radius,
+                      const Filter& filter = {});
+  SweepBlock& box(const Float3& start, const Float3& end, const Float3& half_extents, const Rotation& rotation = {},
+                  const Filter& filter = {});
+  // Appends N sweeps: 3N floats of starts and 3N floats of ends; if this call adds all sweeps of the block, `ends` may
+  // instead contain three floats for all. The solids are set by the functions below.
+  SweepBlock& sweeps(absl::Span<const float> starts, absl::Span<const float> ends);
+  // Set the column of the solids: N entries, or one for all sweeps. Balls have radii; capsules have radii and half
+  // axes, of three floats each; boxes have half extents, of three floats each, and optionally rotations, of four floats
+  // each: unit quaternions x, y, z, w.
+  SweepBlock& radii(absl::Span<const float> radii);
+  SweepBlock& half_axes(absl::Span<const float> half_axes);
+  SweepBlock& half_extents(absl::Span<const float> half_extents);
+  SweepBlock& rotations(absl::Span<const float> rotations);
+
+ private:
+  // Appends what all solids have in common. Returns the number of sweeps before.
+  int append_path(const Float3& start, const Float3& end, const Filter& filter);
+
+  v1::Sweeps* sweeps_;
 };
 
 // Block that finds the objects and instances nearest to points. The rows of a query ascend by distance, which is in

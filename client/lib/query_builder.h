@@ -33,6 +33,7 @@ class QueryBuilder {
   BallBlock balls() { return BallBlock(*batch_.add_blocks()); }
   BoxBlock boxes() { return BoxBlock(*batch_.add_blocks()); }
   CapsuleBlock capsules() { return CapsuleBlock(*batch_.add_blocks()); }
+  SweepBlock sweeps() { return SweepBlock(*batch_.add_blocks()); }
   NearestBlock nearest() { return NearestBlock(*batch_.add_blocks()); }
   LookupBlock lookup() { return LookupBlock(*batch_.add_blocks()); }
 

@@ -68,8 +68,8 @@ class ResultRows {
   std::vector<size_t> begins_;  // first row of each query, followed by the total number of rows
 };
 
-// View of the rows of rays of mode FIRST (one row per ray, a miss has id 0) and ALL (rows ascend by t), and of nearest
-// queries (rows ascend by distance). Needs the columns T and ID, which are returned by default.
+// View of the rows of rays and sweeps of mode FIRST (one row per query, a miss has id 0) and ALL (rows ascend by t),
+// and of nearest queries (rows ascend by distance). Needs the columns T and ID, which are returned by default.
 class RayHits {
  public:
   static absl::StatusOr<RayHits> of(const v1::BlockResult& block);
@@ -89,7 +89,7 @@ class RayHits {
   ResultRows rows_;
 };
 
-// View of the result of rays of mode ANY: one byte per ray.
+// View of the result of rays and sweeps of mode ANY: one byte per query.
 class AnyHits {
  public:
   static absl::StatusOr<AnyHits> of(const v1::BlockResult& block);
@@ -103,8 +103,8 @@ class AnyHits {
   const v1::BlockResult* block_;
 };
 
-// View of the rows of balls and boxes: for each query a span of ids, and of triangles if requested. Needs the column
-// ID, which is returned by default.
+// View of the rows of balls, boxes and capsules: for each query a span of ids, and of triangles if requested. Needs the
+// column ID, which is returned by default.
 class Overlaps {
  public:
   static absl::StatusOr<Overlaps> of(const v1::BlockResult& block);

@@ -16,12 +16,14 @@ constexpr std::array kRayModes = {RayMode::kFirst, RayMode::kFirst, RayMode::kAn
 constexpr std::array kCulls = {Cull::kNone, Cull::kNone, Cull::kBack, Cull::kFront};
 constexpr std::array kInsides = {Inside::kSolid, Inside::kSolid, Inside::kHollow, Inside::kSkip};
 constexpr std::array kOutsides = {OutsideHistory::kReject, OutsideHistory::kReject, OutsideHistory::kClamp};
+constexpr std::array kAtStarts = {AtStart::kHit, AtStart::kHit, AtStart::kApproach, AtStart::kPass};
 constexpr std::array kDetails = {StaticDetail::kInstances, StaticDetail::kInstances, StaticDetail::kTriangles,
                                  StaticDetail::kTrianglesSorted};
 
 static_assert(kSources.size() == v1::Source_ARRAYSIZE && kPrecisions.size() == v1::Precision_ARRAYSIZE);
 static_assert(kRayModes.size() == v1::RayMode_ARRAYSIZE && kCulls.size() == v1::Cull_ARRAYSIZE);
 static_assert(kOutsides.size() == v1::OutsideHistory_ARRAYSIZE);
+static_assert(kAtStarts.size() == v1::AtStart_ARRAYSIZE);
 static_assert(kInsides.size() == v1::Inside_ARRAYSIZE && kDetails.size() == v1::StaticDetail_ARRAYSIZE);
 static_assert(static_cast<int>(kLastColumn) == v1::COLUMN_POSE && v1::Column_ARRAYSIZE == v1::COLUMN_POSE + 1);
 
@@ -73,6 +75,20 @@ absl::Status read_kind(const v1::Capsules& capsules, const std::string& field, Q
   return status;
 }
 
+absl::Status read_kind(const v1::Sweeps& sweeps, const std::string& field, QueryBlock* out) {
+  SweepColumns columns;
+  columns.starts = span_of(sweeps.starts());
+  columns.ends = span_of(sweeps.ends());
+  columns.radii = span_of(sweeps.radii());
+  columns.half_axes = span_of(sweeps.half_axes());
+  columns.half_extents = span_of(sweeps.half_extents());
+  columns.rotations = span_of(sweeps.rotations());
+  absl::Status status = read_enum(sweeps.mode(), kRayModes, field + ".sweeps.mode", &columns.mode);
+  if (status.ok()) status = read_enum(sweeps.at_start(), kAtStarts, field + ".sweeps.at_start", &columns.at_start);
+  out->kind = columns;
+  return status;
+}
+
 absl::Status read_kind(const v1::Nearest& nearest, const std::string& field, QueryBlock* out) {
   NearestColumns columns;
   columns.points = span_of(nearest.points());
@@ -105,7 +121,7 @@ absl::Status read_kind(const v1::QueryBlock& block, const std::string& field, Qu
     case v1::QueryBlock::kFrustums:
       return not_served(field + ".frustums");
     case v1::QueryBlock::kSweeps:
-      return not_served(field + ".sweeps");
+      return read_kind(block.sweeps(), field, out);
     case v1::QueryBlock::kNearest:
       return read_kind(block.nearest(), field, out);
     case v1::QueryBlock::kSight:
@@ -114,7 +130,7 @@ absl::Status read_kind(const v1::QueryBlock& block, const std::string& field, Qu
       break;
   }
   return refuse_argument(Reason::kMalformed, field, {},
-                         "a block needs one kind of query: rays, balls, boxes, capsules, lookup or nearest");
+                         "a block needs one kind of query: rays, balls, boxes, capsules, sweeps, lookup or nearest");
 }
 
 absl::Status read_columns(const v1::QueryBlock& block, const std::string& field, ColumnSet* out) {

@@ -123,7 +123,7 @@ void get_server(Host& host, v1::GetServerResponse& response) {
   response.set_instruction_set(std::string(instruction_set()));
   for (const absl::string_view feature :
        {"as_of", "backup", "balls", "boxes", "capsules", "download_mesh", "durability_local", "history", "latest_wins",
-        "lookup", "nearest", "rays", "static_from"})
+        "lookup", "nearest", "rays", "static_from", "sweeps"})
     if (serves(host, feature)) response.add_features(std::string(feature));
   for (const NamedLimit& limit : limits_of(host)) {
     v1::Limit* out = response.add_limits();

@@ -113,6 +113,36 @@ TEST_F(QueryRpcTest, OverlapsListObjectsAndInstancesInOneOrder) {
   EXPECT_THAT(result.blocks(0).triangles(), ElementsAre(8u, 9u));
 }
 
+v1::QueryBatch ball_moving(float from, float to, float radius) {
+  v1::QueryBatch batch;
+  v1::Sweeps* sweeps = batch.add_blocks()->mutable_sweeps();
+  fill(sweeps->mutable_starts(), {from, 0.f, 0.f});
+  fill(sweeps->mutable_ends(), {to, 0.f, 0.f});
+  sweeps->add_radii(radius);
+  return batch;
+}
+
+TEST_F(QueryRpcTest, SweepsFindWhatAMovingSolidTouches) {
+  v1::QueryBatch batch = ball_moving(0, 10, 0.5f);
+  v1::QueryBlock& block = *batch.mutable_blocks(0);
+  block.set_source(v1::SOURCE_DYNAMIC);
+  const v1::BlockResult first = ask(batch).blocks(0);
+  ASSERT_EQ(first.ids_size(), 1);
+  EXPECT_EQ(first.ids(0), 1u);
+  block.mutable_sweeps()->set_mode(v1::RAY_MODE_ALL);
+  for (const v1::Column column : {v1::COLUMN_T, v1::COLUMN_ID, v1::COLUMN_NORMAL, v1::COLUMN_POINT})
+    block.add_columns(column);
+  const v1::BlockResult all = ask(batch).blocks(0);
+  EXPECT_THAT(all.ids(), ElementsAre(1u, 2u, 3u));
+  EXPECT_EQ(all.t(0), first.t(0));
+  EXPECT_EQ(all.normals(0), -1);
+  // The ball's front touches where its centre is half a unit behind.
+  EXPECT_FLOAT_EQ(all.points(0), 10 * all.t(0) + 0.5f);
+  block.clear_columns();
+  block.mutable_sweeps()->set_mode(v1::RAY_MODE_ANY);
+  EXPECT_EQ(ask(batch).blocks(0).hits(), std::string(1, '\1'));
+}
+
 TEST_F(QueryRpcTest, NearestListsObjectsAndInstancesByDistance) {
   v1::QueryBatch batch = points_near({10.f, 0.f, 0.f});
   EXPECT_THAT(ask(batch).blocks(0).ids(), ElementsAre(3u));
@@ -291,6 +321,23 @@ TEST_F(QueryRpcTest, WrongValuesRefuseTheBatchAndAreNamed) {
   refused(boxes, "boxes.half_extents", range, 0, [](auto* block) { block->mutable_boxes()->set_half_extents(2, -1); });
   refused(capsule_between(0, 1, 1), "capsules.radii", range, 0,
           [](auto* block) { block->mutable_capsules()->set_radii(0, -1); });
+  const v1::QueryBatch sweeps = ball_moving(0, 1, 1);
+  refused(sweeps, "sweeps.radii", range, 0, [](auto* block) { block->mutable_sweeps()->set_radii(0, 0); });
+  refused(sweeps, "sweeps.radii", length, {}, [](auto* block) { block->mutable_sweeps()->clear_radii(); });
+  refused(sweeps, "sweeps.ends", length, {}, [](auto* block) { block->mutable_sweeps()->add_ends(1); });
+  refused(sweeps, "sweeps.radii", v1::REASON_MALFORMED, {}, [](auto* block) {
+    fill(block->mutable_sweeps()->mutable_half_extents(), {1.f, 1.f, 1.f});
+  });
+  refused(sweeps, "sweeps.rotations", v1::REASON_MALFORMED, {}, [](auto* block) {
+    fill(block->mutable_sweeps()->mutable_rotations(), {0.f, 0.f, 0.f, 1.f});
+  });
+  refused(sweeps, "sweeps.half_extents", range, 0, [](auto* block) {
+    block->mutable_sweeps()->clear_radii();
+    fill(block->mutable_sweeps()->mutable_half_extents(), {0.f, 0.f, 0.f});
+  });
+  refused(sweeps, "sweeps.half_axes", v1::REASON_NOT_FINITE, 0, [](auto* block) {
+    fill(block->mutable_sweeps()->mutable_half_axes(), {0.f, std::numeric_limits<float>::quiet_NaN(), 1.f});
+  });
   refused(boxes, "boxes.rotations", range, 0, [](auto* block) {
     fill(block->mutable_boxes()->mutable_rotations(), {0.f, 0.f, 0.f, 3.f});
   });
@@ -341,7 +388,6 @@ TEST_F(QueryRpcTest, KindsAndFieldsThatAreNotServedAreNamed) {
     expect_query_refused(batch, {grpc::StatusCode::UNIMPLEMENTED, v1::REASON_NOT_SERVED, "blocks[0]." + field});
   };
   refused("frustums", [](auto* block) { block->mutable_frustums(); });
-  refused("sweeps", [](auto* block) { block->mutable_sweeps(); });
   refused("sight", [](auto* block) { block->mutable_sight(); });
 }
 

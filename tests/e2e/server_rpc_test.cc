@@ -31,7 +31,7 @@ TEST_F(ServerRpcTest, TheServerReportsItsVersionAndFeatures) {
   EXPECT_EQ(server.instruction_set(), instruction_set());
   EXPECT_THAT(server.features(),
               ::testing::ElementsAre("as_of", "balls", "boxes", "capsules", "download_mesh", "history", "latest_wins",
-                                     "lookup", "nearest", "rays", "static_from"));
+                                     "lookup", "nearest", "rays", "static_from", "sweeps"));
 }
 
 TEST_F(ServerRpcTest, LimitsAreListedInOrderWithTheirUse) {

@@ -12,8 +12,8 @@ __path__ = pkgutil.extend_path(__path__, __name__)
 from .client import DEFAULT_ADDRESS, Client, connect
 from .columns import ColumnLike, Values
 from .connection import Retry
-from .enums import (Column, Cull, Inside, OutsideHistory, OverloadPolicy, Precision, RayMode, Reason, SceneState, Source,
-                    StaticDetail, Winding)
+from .enums import (AtStart, Column, Cull, Inside, OutsideHistory, OverloadPolicy, Precision, RayMode, Reason, SceneState,
+                    Source, StaticDetail, Winding)
 from .errors import LocusError
 from .meshes import InstanceChange, MeshColumns, PlacedInstances
 from .queries import Block, QueryBatch
@@ -24,7 +24,7 @@ from .updates import UpdateBatch
 from .values import Ack, ItemError, Limit, Mesh, MeshPart, Quota, Revision, Scene, Server, Work
 
 __all__ = [
-    "Ack", "Block", "BlockResult", "Client", "Column", "ColumnLike", "Cull", "DEFAULT_ADDRESS", "Inside",
+    "Ack", "AtStart", "Block", "BlockResult", "Client", "Column", "ColumnLike", "Cull", "DEFAULT_ADDRESS", "Inside",
     "InstanceChange", "ItemError", "Limit", "LocusError", "Mesh", "MeshColumns", "MeshPart", "NO_TRIANGLE",
     "OutsideHistory", "OverloadPolicy", "PlacedInstances", "Precision", "QueryBatch", "QueryResult", "QueryStream",
     "Quota", "RayMode", "Reason", "Retry", "Revision", "Scene", "SceneState", "Server", "Source", "StaticDetail",

@@ -1,17 +1,17 @@
-"""Query batches: blocks of rays, balls, boxes, capsules, nearest queries and lookups in columns, answered at one revision."""
+"""Query batches: blocks of rays, sweeps, overlaps, nearest queries and lookups in columns, answered at one revision."""
 from __future__ import annotations
 
 from typing import NamedTuple, Optional, Sequence
 
 from . import columns, schema, wire
 from .columns import FLOAT32, UINT32, UINT64, ColumnLike
-from .enums import Column, Cull, Inside, OutsideHistory, Precision, RayMode, Source, StaticDetail
+from .enums import AtStart, Column, Cull, Inside, OutsideHistory, Precision, RayMode, Source, StaticDetail
 from .values import Revision
 
 _REQUEST, _BATCH, _VIEW = schema.numbers("QueryRequest"), schema.numbers("QueryBatch"), schema.numbers("View")
 _BLOCK = schema.numbers("QueryBlock")
 _KINDS = {name: schema.numbers(name.capitalize()) for name in ("rays", "balls", "boxes", "capsules", "lookup",
-                                                                     "nearest")}
+                                                                     "nearest", "sweeps")}
 
 
 class Block(NamedTuple):
@@ -21,8 +21,8 @@ class Block(NamedTuple):
     - `frame`: three floats, added to every position of the block. Column POINT of the result is relative to the frame,
       column POSE is absolute.
     - `source`: search static instances, moving objects or both; `precision`: exact shapes or their bounds.
-    - `columns`: columns to return for each row, by default T, ID and TRIANGLE for rays and nearest queries, ID for balls
-      and boxes (TRIANGLE too if their detail is triangles), ID and POSE for lookups.
+    - `columns`: columns to return for each row, by default T, ID and TRIANGLE for rays, sweeps and nearest queries, ID for
+      balls, boxes and capsules (TRIANGLE too if their detail is triangles), ID and POSE for lookups.
     - `masks`: N uint32 or one; only objects and instances with (layers & mask) != 0 are found.
     - `ignore_groups`: N uint64 or one; the query ignores objects and instances of this group.
     - `ignore_ids`: at most 64 uint64 ids to ignore, for the whole block.
@@ -163,6 +163,26 @@ class QueryBatch:
         new.column("ends", ends, FLOAT32, 3)
         new.column("radii", radii, FLOAT32)
         new.options(detail=detail)
+        return self._add(new, block)
+
+    def sweeps(self, starts: ColumnLike, ends: ColumnLike, radii: ColumnLike = None, *, half_axes: ColumnLike = None,
+               half_extents: ColumnLike = None, rotations: ColumnLike = None, mode: RayMode = RayMode.FIRST,
+               at_start: AtStart = AtStart.HIT, block: Block = Block()) -> "QueryBatch":
+        """Adds a block of N solids that move in a straight line: balls (`radii`), capsules (`radii` and `half_axes`) or
+        boxes (`half_extents`). Column T contains the first moment of contact, 0 .. 1. `starts`: 3N float32; `ends`: 3N
+        float32 or three, both of the centre; `radii`: N float32 or one, above 0; `half_axes`: 3N float32 or three, from
+        the centre to one end of the inner segment; `half_extents`: 3N float32 or three, along the box's own axes;
+        `rotations`: 4N float32 or four, unit quaternions x, y, z, w, for boxes; `at_start`: treatment of what the solid
+        touches at t = 0.
+        """
+        new = _NewBlock(self._blocks, "sweeps")
+        new.first("starts", starts, FLOAT32, 3)
+        new.column("ends", ends, FLOAT32, 3)
+        new.column("radii", radii, FLOAT32)
+        new.column("half_axes", half_axes, FLOAT32, 3)
+        new.column("half_extents", half_extents, FLOAT32, 3)
+        new.column("rotations", rotations, FLOAT32, 4)
+        new.options(mode=mode, at_start=at_start)
         return self._add(new, block)
 
     def nearest(self, points: ColumnLike, *, k: int = 1, max_distances: ColumnLike = None,

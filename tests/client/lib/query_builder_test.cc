@@ -86,6 +86,35 @@ TEST(QueryBuilderTest, CapsulesAreAppendedOneByOneAndInColumns) {
   EXPECT_THAT(batch.blocks(1).capsules().radii(), ElementsAre(0.5f));
 }
 
+TEST(QueryBuilderTest, SweepsAreAppendedOneByOneAndInColumns) {
+  QueryBuilder builder;
+  builder.sweeps()
+      .mode(v1::RAY_MODE_ALL)
+      .at_start(v1::AT_START_APPROACH)
+      .capsule({1, 2, 3}, {4, 5, 6}, {0, 0, 2}, 7)
+      .capsule({0, 0, 0}, {0, 0, 1}, {0, 1, 0}, 2, {.mask = 4});
+  builder.sweeps().box({1, 1, 1}, {2, 2, 2}, {1, 2, 3}).box({1, 1, 1}, {2, 2, 2}, {1, 2, 3}, {0, 0, 1, 0});
+  const std::vector<float> starts = {1, 1, 1, 2, 2, 2}, ends = {3, 3, 3}, radii = {0.5f};
+  builder.sweeps().sweeps(starts, ends).radii(radii);
+  const v1::QueryBatch batch = builder.build();
+  const v1::Sweeps& capsules = batch.blocks(0).sweeps();
+  EXPECT_EQ(capsules.mode(), v1::RAY_MODE_ALL);
+  EXPECT_EQ(capsules.at_start(), v1::AT_START_APPROACH);
+  EXPECT_THAT(capsules.starts(), ElementsAre(1, 2, 3, 0, 0, 0));
+  EXPECT_THAT(capsules.ends(), ElementsAre(4, 5, 6, 0, 0, 1));
+  EXPECT_THAT(capsules.half_axes(), ElementsAre(0, 0, 2, 0, 1, 0));
+  EXPECT_THAT(capsules.radii(), ElementsAre(7, 2));
+  EXPECT_THAT(batch.blocks(0).masks(), ElementsAre(0xFFFFFFFFu, 4u));
+  const v1::Sweeps& boxes = batch.blocks(1).sweeps();
+  EXPECT_THAT(boxes.half_extents(), ElementsAre(1, 2, 3, 1, 2, 3));
+  EXPECT_THAT(boxes.rotations(), ElementsAre(0, 0, 0, 1, 0, 0, 1, 0));
+  EXPECT_EQ(boxes.radii_size(), 0);
+  const v1::Sweeps& balls = batch.blocks(2).sweeps();
+  EXPECT_THAT(balls.starts(), ElementsAre(1, 1, 1, 2, 2, 2));
+  EXPECT_THAT(balls.ends(), ElementsAre(3, 3, 3));
+  EXPECT_THAT(balls.radii(), ElementsAre(0.5f));
+}
+
 TEST(QueryBuilderTest, BlocksKeepTheirOrderAndTheirOwnSettings) {
   QueryBuilder builder;
   BallBlock balls = builder.balls();

@@ -55,7 +55,7 @@ TEST_F(TopTest, OnceAsJsonIsOneDocument) {
   ASSERT_EQ(top["scenes"].size(), 1u);
   EXPECT_EQ(top["scenes"][0]["scene"], "world");
   EXPECT_EQ(top["scenes"][0]["objects"], 5);
-  EXPECT_EQ(top["queries"].size(), 6u);
+  EXPECT_EQ(top["queries"].size(), 7u);
 }
 
 TEST_F(TopTest, OnceAsATableNamesTheSceneAndHasNoEscapes) {

@@ -6,7 +6,7 @@ import struct
 import unittest
 
 import locus
-from locus import Block, Column, QueryBatch, RayMode, StaticDetail, schema, wire
+from locus import AtStart, Block, Column, QueryBatch, RayMode, StaticDetail, schema, wire
 from support import DaemonTest, floats, listed, number
 
 SEED = 11
@@ -131,6 +131,20 @@ class AnswersEqualTheCommandLineTest(DaemonTest):
             self.assertLessEqual(set(balls.ids[balls.rows_of(query)].tolist()),
                                  set(capsules.ids[capsules.rows_of(query)].tolist()))
         self.assertGreater(len(capsules.ids), len(balls.ids))
+
+    def test_sweeps(self):
+        starts, ends = triples(self.cloud(20)), triples(self.cloud(20))
+        batch = QueryBatch().rays(starts, [b - a for start, end in zip(starts, ends) for a, b in zip(start, end)], t_max=1)
+        batch.sweeps(starts, ends, 0.001).sweeps(starts, ends, 0.001, half_axes=(0, 0, 2))
+        batch.sweeps(starts, ends, half_extents=(1, 2, 3), rotations=(0.6, 0, 0, 0.8), mode=RayMode.ANY)
+        batch.sweeps(starts, ends, 2, at_start=AtStart.PASS, mode=RayMode.ALL)
+        rays, balls, capsules, boxes, passing = self.ask(batch)
+        for query in range(20):
+            self.assertLessEqual(balls.t[query], rays.t[query])
+            self.assertLessEqual(capsules.t[query], balls.t[query])
+            self.assertLessEqual(capsules.ids[query] != 0, boxes.hits[query] != 0)
+        self.assertGreater(len(passing.ids), 0)
+        self.assertGreater(min(passing.t), 0)
 
     def test_triangles_of_balls(self):
         options = [word for height in range(-5, 5) for word in (f"--at=0,0,{height}",)] + ["--radius=6", "--detail", "sorted"]
