@@ -15,6 +15,7 @@
 #include "tests/bench/frame/report.h"
 #include "tests/bench/frame/suite.h"
 #include "tests/bench/log/log_suite.h"
+#include "tests/bench/queries/queries_suite.h"
 #include "tests/bench/serving/serving_suite.h"
 #include "tests/bench/static/static_suite.h"
 
@@ -28,6 +29,7 @@ std::vector<Suite> suites() {
        run_static_suite},
       {"dynamic", "moving objects: moves, queries, memory and readers during writes, compared with Bullet and others",
        dynamic::run_dynamic_suite},
+      {"queries", "sweeps through one level, as whole batches, compared with Bullet", queries::run_queries_suite},
       {"serving", "a server and its client on the loopback, compared with work in process, plain sockets and Redis",
        serving::run_serving_suite},
       {"log", "update batches on their way to the disk, compared with appending to a file", log::run_log_suite},

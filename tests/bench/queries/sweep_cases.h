@@ -1,0 +1,47 @@
+// Cases of the suite `queries` in which solids move through one mesh: FIRST, PASS, compared with Bullet's
+// convexSweepTest, which passes what a solid starts in.
+#ifndef LOCUS_TESTS_BENCH_QUERIES_SWEEP_CASES_H_
+#define LOCUS_TESTS_BENCH_QUERIES_SWEEP_CASES_H_
+
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "absl/types/span.h"
+#include "core/geometry/mover.h"
+#include "tests/bench/frame/suite.h"
+#include "tests/bench/static/bench_mesh.h"
+
+namespace locus::bench::queries {
+
+// Sweeps of one case: all have the same solid, unrotated, whose numbers are floats.
+struct SweepWork {
+  Mover solid;
+  std::vector<float> starts;  // 3 per sweep
+  std::vector<float> ends;
+
+  size_t size() const { return starts.size() / 3; }
+};
+
+// Result of one sweep; t is 2 for a miss.
+struct SweepHit {
+  float t = 2;
+  Vec3f normal;
+};
+
+// Another library that answers the sweeps of a mesh, one by one.
+class SweepPeer {
+ public:
+  virtual ~SweepPeer() = default;
+  // Answers sweeps [begin, end) of `work`.
+  virtual void sweep(const SweepWork& work, size_t begin, size_t end, SweepHit* hits) = 0;
+};
+
+// Returns Bullet as a peer. The mesh must outlive it.
+std::unique_ptr<SweepPeer> bullet_sweeps(const BenchMesh& mesh);
+
+void run_sweep_cases(const Options& options, const Progress& progress, const BenchMesh& mesh, Report& report);
+
+}  // namespace locus::bench::queries
+
+#endif  // LOCUS_TESTS_BENCH_QUERIES_SWEEP_CASES_H_
