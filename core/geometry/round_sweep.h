@@ -51,6 +51,9 @@ class RoundSweep {
   RoundSweep(Primitive primitive, Vec3d half_axis, double radius, Vec3d velocity)
       : primitive_(primitive), half_axis_(half_axis), radius_(radius), velocity_(velocity) {}
 
+  // Returns a lower bound of the first contact with a triangle, from its plane; infinity if the plane stays out of
+  // reach up to `limit`.
+  double plane_bound(double limit) const;
   Separation way_out_at(double t, const NearestPair& pair) const;
 
   Primitive primitive_;

@@ -289,9 +289,10 @@ class QueryOracle {
         if (by_bounds && row.id != 0) row.place = mover.way * double{row.t};
         write(row, block, result);
         const ColumnSet columns = columns_of(block);
-        if (columns.has(Column::kNormal)) write_vector(to_float(row.normal), result.normals);
+        if (columns.has(Column::kNormal)) write_vector(to_float(row.normal + Vec3d{}), result.normals);
         if (columns.has(Column::kPoint))
-          write_vector(row.id == 0 ? Vec3f{} : to_float(mover.start - block.frame + row.place), result.points);
+          write_vector(row.id == 0 ? Vec3f{} : to_float(mover.start - block.frame + row.place + Vec3d{}),
+                       result.points);
       }
     }
   }

@@ -17,6 +17,7 @@
 #include "core/geometry/triangle.h"
 #include "core/index/bvh/box_distances.h"
 #include "core/index/bvh/bvh_build.h"
+#include "core/index/bvh/path_boxes.h"
 #include "core/index/bvh/tree_topology.h"
 #include "core/index/bvh/triangle_tree.h"
 #include "core/index/bvh/triangle_writer.h"
@@ -75,6 +76,11 @@ class TriangleBvh {
   template <RayVisitor<Triangle> Visitor>
   void visit_ray(const SlabRay<float>& slabs, Visitor& visitor, Work& work) const;
 
+  // Passes to `visitor` the triangles whose own boxes `path` enters at visitor.limit() or before, roughly from near to
+  // far. The magnitude of `path` must be that of bounds(). Allocates no memory.
+  template <RayVisitor<Triangle> Visitor>
+  void visit_path(const PathBoxes& path, Visitor& visitor, Work& work) const;
+
   // Passes to `visitor` the triangles whose own bounds visitor.overlaps() accepts, in storage order. Allocates no
   // memory.
   template <RegionVisitor<Triangle> Visitor>
@@ -109,9 +115,9 @@ class TriangleBvh {
             {node.bounds[3][slot], node.bounds[4][slot], node.bounds[5][slot]}};
   }
   Interval<float> node_interval(const SlabRay<float>& slabs, const Aabbf& box) const;
-  // Pushes the children whose squared distance from the point is at most `limit`; distances[slot] is the squared
-  // distance of the child in `slot`. The nearest child is pushed last, so that it is popped first. Returns the new top
-  // of the stack.
+  // Pushes the children whose distance is at most `limit`; distances[slot] is the distance of the child in `slot`: the
+  // squared distance from a point, or the t at which a path enters. The nearest child is pushed last, so that it is
+  // popped first. Returns the new top of the stack.
   static Pending* push_near(const TriangleNode& node, const float (&distances)[kTreeWidth], float limit, Pending* top);
   // Pushes the children that the ray may hit at t <= `limit`, the nearest child last. Returns the new top of the stack.
   Pending* push_hit(const TriangleNode& node, const SlabRay<float>& slabs, float limit, Pending* top) const;
@@ -157,6 +163,35 @@ void TriangleBvh::visit_ray(const SlabRay<float>& slabs, Visitor& visitor, Work&
     }
     const TriangleBlock& block = arrays_.blocks[now.child & ~kBlockBit];
     for (uint32_t lane = 0; lane < block.count; ++lane) {
+      ++work.tests;
+      if (!visitor.visit(triangle(block, lane))) return;
+    }
+  }
+}
+
+template <RayVisitor<Triangle> Visitor>
+void TriangleBvh::visit_path(const PathBoxes& path, Visitor& visitor, Work& work) const {
+  if (size() == 0) return;
+  Pending stack[kTreeStack];
+  Pending* top = stack;
+  *top++ = {0, -std::numeric_limits<float>::infinity()};
+  float nears[kTreeWidth];
+  while (top != stack) {
+    const Pending now = *--top;
+    // The limit may have decreased since the push.
+    if (now.near > visitor.limit()) continue;
+    if ((now.child & kBlockBit) == 0) {
+      ++work.nodes;
+      const TriangleNode& node = arrays_.nodes[now.child];
+      path.to_boxes(node.bounds, nears);
+      top = push_near(node, nears, std::min(visitor.limit(), std::numeric_limits<float>::max()), top);
+      LOCUS_DCHECK_LE(top - stack, kMaxPending);
+      continue;
+    }
+    const TriangleBlock& block = arrays_.blocks[now.child & ~kBlockBit];
+    path.to_triangles(block.vertices, nears);
+    for (uint32_t lane = 0; lane < block.count; ++lane) {
+      if (nears[lane] == PathBoxes::kMissed || nears[lane] > visitor.limit()) continue;
       ++work.tests;
       if (!visitor.visit(triangle(block, lane))) return;
     }

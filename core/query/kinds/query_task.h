@@ -132,6 +132,13 @@ class QueryTask {
       index.visit_region(visitor, work_);
   }
   template <class Index, class Visitor>
+  void visit_path(const Index& index, const PathBoxes& path, Visitor& visitor) {
+    if (brute_force_)
+      visit_all(index, visitor);
+    else
+      index.visit_path(path, visitor, work_);
+  }
+  template <class Index, class Visitor>
   void visit_nearest(const Index& index, const Vec3d& point, Visitor& visitor) {
     if (brute_force_)
       visit_all(index, visitor);

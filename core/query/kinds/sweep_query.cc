@@ -22,17 +22,17 @@ double search_limit(const SweptBounds& path, const HitCollector& collector) {
 // Returns a limit for first_contact(): every contact at t <= 1 that rounds to at most `limit` is within it.
 double contact_limit(float limit) { return std::min(raised(limit), 1.0); }
 
-// Path of a mover in mesh axes, for searches of a tree in float. The way is scaled by a power of two, so that no
+// Path of a mover's bounds through the tree of a mesh, in float. The way is scaled by a power of two, so that no
 // product over- or underflows; t in units of the scaled way is "scaled".
 class MeshPath {
  public:
-  explicit MeshPath(const Mover& mover)
+  // `magnitude` is the largest |coordinate| of the mesh.
+  MeshPath(const Mover& mover, float magnitude)
       : is_resting_(mover.way == Vec3d{}),
         exponent_(is_resting_ ? 0 : exponent_of(mover.way)),
-        slabs_(Rayf{to_float(mover.start), to_float(is_resting_ ? Vec3d{1, 0, 0} : scaled(mover.way, exponent_))},
-               kTrianglePad, max_component(extent_of(mover))) {}
+        boxes_(mover.start, is_resting_ ? Vec3d{1, 0, 0} : scaled(mover.way, exponent_), extent_of(mover), magnitude) {}
 
-  const SlabRay<float>& slabs() const { return slabs_; }
+  const PathBoxes& boxes() const { return boxes_; }
   // Returns the largest scaled near value of a box that may hold a hit at t <= `limit`.
   float to_scaled(float limit) const {
     if (is_resting_) return 0;
@@ -42,10 +42,9 @@ class MeshPath {
   }
   // Returns the t, at least 0, at which the path enters `box`, or nullopt.
   std::optional<double> entry(const Aabbf& box) const {
-    const Interval<float> interval = slabs_.interval(box);
-    if (!(interval.near <= interval.far) || interval.far < 0) return std::nullopt;
-    if (is_resting_) return interval.near <= 0 ? std::optional<double>(0) : std::nullopt;
-    return std::ldexp(double{std::max(interval.near, 0.0f)}, -exponent_);
+    const std::optional<float> near = boxes_.entry(box);
+    if (!near || (is_resting_ && *near > 0)) return std::nullopt;
+    return is_resting_ ? 0 : std::ldexp(double{std::max(*near, 0.0f)}, -exponent_);
   }
 
  private:
@@ -60,7 +59,7 @@ class MeshPath {
 
   bool is_resting_;
   int exponent_;
-  SlabRay<float> slabs_;
+  PathBoxes boxes_;
 };
 
 // Exact test of one sweep against single triangles of one instance.
@@ -69,7 +68,7 @@ class ExactSweepTest {
   // `path` is the sweep in world axes. `nearest` is the t at which the sweep enters the instance's bounds.
   ExactSweepTest(const SweepRequest& request, const SweptBounds& path, const Instance& instance, double nearest)
       : mover_(mover_to_mesh(request.mover, instance.transform)),
-        mesh_path_(mover_),
+        mesh_path_(mover_, magnitude(instance.mesh->bounds())),
         path_(path),
         at_start_(request.at_start),
         placed_(instance),
@@ -79,10 +78,10 @@ class ExactSweepTest {
   // Returns the t of the first contact, rounded to float; nullopt if there is none up to `limit`. A hit also requires
   // that the mover's bounds meet the triangle's bounds, in mesh axes and in the world, and is not before.
   std::optional<float> hit(const Triangle& triangle, float limit) const {
-    const std::optional<double> near = mesh_path_.entry(bounds_of(triangle));
-    if (!near) return std::nullopt;
     const std::optional<double> t = first_contact(mover_, corners_of(triangle), at_start_, contact_limit(limit));
     if (!t) return std::nullopt;
+    const std::optional<double> near = mesh_path_.entry(bounds_of(triangle));
+    if (!near) return std::nullopt;
     const std::optional<double> entered = path_.entry(placed_.bounds_of_triangle(triangle));
     if (!entered) return std::nullopt;
     return rounded_distance(std::max({*t, *near, *entered, nearest_}));
@@ -188,7 +187,7 @@ class SweptInstances {
       task_.visit_region(instance.mesh->tree(), visitor);
     } else {
       SweptTriangles visitor(task_, exact, instance, collector_);
-      task_.visit_ray(instance.mesh->tree(), exact.mesh_path().slabs(), visitor);
+      task_.visit_path(instance.mesh->tree(), exact.mesh_path().boxes(), visitor);
     }
     return !task_.ended() && !collector_.done();
   }

@@ -93,8 +93,9 @@ void write_contact(const SweepRequest& request, Vec3d frame, const Hit& hit, con
   Vec3f normal, point;
   if (hit.id != kNoId) {
     const Contact contact = contact_of(request, hit);
-    normal = to_float(contact.normal);
-    point = to_float(request.mover.start - frame + contact.point);
+    // Adding 0 turns -0 into 0, so that equal results have equal bytes.
+    normal = to_float(contact.normal + Vec3d{});
+    point = to_float(request.mover.start - frame + contact.point + Vec3d{});
   }
   if (to.normals != nullptr) write_point(to.normals, row, normal.x, normal.y, normal.z);
   if (to.points != nullptr) write_point(to.points, row, point.x, point.y, point.z);
