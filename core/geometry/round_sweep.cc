@@ -70,26 +70,9 @@ bool RoundSweep::touches(const NearestPair& pair, double t) const {
   return pair.squared_distance <= reach * reach;
 }
 
-double RoundSweep::plane_bound(double limit) const {
-  // Heights above the plane through the segment's midpoint, times the length of the normal.
-  const Vec3d ab = b_ - a_, ac = c_ - a_;
-  const Vec3d normal = cross(ab, ac);
-  const double height = dot(normal, a_), speed = dot(normal, velocity_);
-  // Bound of the rounding of normal and height.
-  const double epsilon = kPlaceEpsilon * size_of(ab) * size_of(ac) *
-                         (size_of(a_) + size_ + radius_ + std::min(limit, 1.0) * size_of(velocity_));
-  const double reach = radius_ * std::sqrt(squared_length(normal)) + std::abs(dot(normal, half_axis_)) + epsilon;
-  const double gap = std::abs(height) - reach;
-  if (gap <= 0) return 0;
-  const double approach = height > 0 ? -speed : speed;
-  if (!(approach > 0)) return std::numeric_limits<double>::infinity();
-  return gap / approach;
-}
-
-std::optional<double> RoundSweep::first_contact(double limit) const {
+std::optional<double> RoundSweep::first_contact(double limit, double from) const {
   LOCUS_DCHECK_GE(radius_, 0.0);
-  double t = primitive_ == Primitive::kTriangle ? plane_bound(limit) : 0;
-  if (!(t <= limit)) return std::nullopt;
+  double t = from;
   for (int step = 0; step < kMaxSteps; ++step) {
     const NearestPair pair = pair_at(t);
     const bool is_contact = touches(pair, t);

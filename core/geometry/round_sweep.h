@@ -33,8 +33,8 @@ class RoundSweep {
   bool touches(const NearestPair& pair, double t) const;
   // Returns the first t in 0 .. limit at which the distance is at most the radius, or nullopt. The result is less than
   // the exact moment by at most the epsilon of touches() divided by the speed of approach, and never greater except for
-  // rounding.
-  std::optional<double> first_contact(double limit) const;
+  // rounding. `from` >= 0 is a lower bound of the result, at which the search begins.
+  std::optional<double> first_contact(double limit, double from = 0) const;
   // Returns the contact's direction from the primitive to the segment at time t, of length 1, and the signed distance:
   // negative if the segment meets a box. Where the two sets meet, the direction is the shortest way out; if there are
   // several, or none is defined, the one against the segment's motion.
@@ -51,9 +51,6 @@ class RoundSweep {
   RoundSweep(Primitive primitive, Vec3d half_axis, double radius, Vec3d velocity)
       : primitive_(primitive), half_axis_(half_axis), radius_(radius), velocity_(velocity) {}
 
-  // Returns a lower bound of the first contact with a triangle, from its plane; infinity if the plane stays out of
-  // reach up to `limit`.
-  double plane_bound(double limit) const;
   Separation way_out_at(double t, const NearestPair& pair) const;
 
   Primitive primitive_;

@@ -1,6 +1,8 @@
 #include "core/geometry/sweep.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "core/base/check.h"
 #include "core/geometry/box_sweep.h"
@@ -48,6 +50,25 @@ Contact contact_of(const RoundMotion& motion, const Mover& mover, const Shape& s
                          : mover.way * t + motion.axes.to_world(separation.pair.on_primitive);
   const double depth_of_point = std::clamp(separation.distance, 0.0, motion.shape_radius);
   return {separation.distance - motion.shape_radius, core + normal * depth_of_point, normal};
+}
+
+// Returns a lower bound of the first contact of a ball or capsule with a triangle, whose corners are relative to the
+// mover's start: the moment at which the mover reaches the triangle's plane. Returns infinity if it stays away from it.
+inline double plane_bound(const Mover& mover, Vec3d a, Vec3d b, Vec3d c) {
+  const Vec3d ab = b - a, ac = c - a;
+  const Vec3d normal = cross(ab, ac);
+  // Height of the plane above the mover's centre, times the length of the normal, and its rate.
+  const double height = dot(normal, a), rate = -dot(normal, mover.way);
+  constexpr double kEpsilon = 0x1p-44;  // covers the rounding of the normal and of the heights
+  const double size = max_component(max(abs(ab), abs(ac)));
+  const double epsilon =
+      kEpsilon * size * size *
+      (max_component(abs(a) + abs(mover.way)) + size + max_component(abs(mover.half_axis)) + mover.radius);
+  const double rest = std::abs(height) - std::abs(dot(normal, mover.half_axis)) - epsilon;
+  if (rest <= 0 || rest * rest <= mover.radius * mover.radius * squared_length(normal)) return 0;
+  const double approach = height > 0 ? -rate : rate;
+  if (!(approach > 0)) return std::numeric_limits<double>::infinity();
+  return (rest - mover.radius * std::sqrt(squared_length(normal))) / approach;
 }
 
 RoundSweep round_sweep(const Mover& mover, const Corners& corners) {
@@ -117,9 +138,12 @@ std::optional<double> first_contact(const Mover& mover, const Shape& shape, AtSt
 }
 
 std::optional<double> first_contact(const Mover& mover, const Corners& triangle, AtStart at_start, double limit) {
-  const std::optional<double> t = mover.kind == MoverKind::kBox ? first_moment(box_overlap(mover, triangle), limit)
-                                                                : round_sweep(mover, triangle).first_contact(limit);
-  return with_rule(t, mover, triangle, at_start);
+  if (mover.kind == MoverKind::kBox)
+    return with_rule(first_moment(box_overlap(mover, triangle), limit), mover, triangle, at_start);
+  const double from =
+      plane_bound(mover, triangle[0] - mover.start, triangle[1] - mover.start, triangle[2] - mover.start);
+  if (!(from <= limit)) return std::nullopt;
+  return with_rule(round_sweep(mover, triangle).first_contact(limit, from), mover, triangle, at_start);
 }
 
 Contact contact_at(const Mover& mover, const Shape& shape, double t) {
