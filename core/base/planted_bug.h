@@ -22,6 +22,9 @@ enum class PlantedBug {
   kNearestTreePad,     // distances to boxes of triangles are compared in float without the pad
   kWidePlacedBounds,   // world bounds of an instance's triangles are grown by a rounding error of float, not double
   kPlacedBoundsAlone,  // CONSERVATIVE ball and box queries lose exact hits outside a triangle's world bounds
+  kCapsuleCap,         // a capsule has no caps: its inner segment ends where the caps begin
+  kEndlessCapsule,     // a capsule is an endless cylinder
+  kSweepStart,         // a sweep ignores what it touches at its start
   // The ray kernels:
   kKernelEdgeBound,   // the signs of edge functions are computed in float without an error bound
   kKernelTBound,      // t is compared with the limit in float without an error bound

@@ -1,5 +1,7 @@
 #include "core/geometry/capsule.h"
 
+#include <cmath>
+
 #include "core/base/planted_bug.h"
 #include "core/geometry/segment.h"
 #include "core/geometry/segment_triangle.h"
@@ -25,21 +27,29 @@ double epsilon_of(const Capsule& capsule, const Aabbd& box) {
          (max_component(abs(capsule.center)) + max_component(abs(capsule.half_axis)) + capsule.radius + magnitude(box));
 }
 
+// Returns the half axis of the capsule, or the one that a planted bug takes for it.
+Vec3d half_axis_of(const Capsule& capsule) {
+  if (planted(PlantedBug::kEndlessCapsule)) return capsule.half_axis * 1e3;
+  if (!planted(PlantedBug::kCapsuleCap)) return capsule.half_axis;
+  const double length = std::sqrt(squared_length(capsule.half_axis));
+  return capsule.half_axis * (length > capsule.radius ? 1 - capsule.radius / length : 0);
+}
+
 // Returns the squared distance from the capsule's inner segment to the core of the shape: the centre of a ball, the
 // inner segment of a capsule, and for other shapes the shape itself.
 double squared_distance_to_core(const Capsule& capsule, const Shape& shape) {
   const Vec3d offset = shape.position - capsule.center;
-  const Vec3d size = to_double(shape.size);
+  const Vec3d size = to_double(shape.size), half_axis = half_axis_of(capsule);
   switch (shape.kind) {
     case ShapeKind::kPoint:
     case ShapeKind::kBall:
-      return squared_distance_to_segment(offset, capsule.half_axis);
+      return squared_distance_to_segment(offset, half_axis);
     case ShapeKind::kBox: {
       const Rotation rotation = rotation_of(shape.rotation);
-      return squared_distance_segment_box(rotation.to_local(-offset), rotation.to_local(capsule.half_axis), size);
+      return squared_distance_segment_box(rotation.to_local(-offset), rotation.to_local(half_axis), size);
     }
     case ShapeKind::kCapsule:
-      return squared_distance_segments(offset, capsule.half_axis, rotation_of(shape.rotation).to_world(size));
+      return squared_distance_segments(offset, half_axis, rotation_of(shape.rotation).to_world(size));
   }
   return std::numeric_limits<double>::infinity();
 }
@@ -79,7 +89,7 @@ bool capsule_overlaps(const Capsule& capsule, const Shape& shape) {
 
 bool capsule_overlaps(const Capsule& capsule, const Triangle& triangle) {
   if (!overlaps(bounds_of(capsule), to_double(bounds_of(triangle)))) return false;
-  const double squared = squared_distance_segment_triangle(capsule.center, capsule.half_axis, to_double(triangle.a),
+  const double squared = squared_distance_segment_triangle(capsule.center, half_axis_of(capsule), to_double(triangle.a),
                                                            to_double(triangle.b), to_double(triangle.c));
   const double limit = capsule.radius * capsule.radius;
   return planted(PlantedBug::kStrictTie) ? squared < limit : squared <= limit;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/base/check.h"
+#include "core/base/planted_bug.h"
 
 namespace locus {
 namespace {
@@ -76,7 +77,7 @@ std::optional<double> RoundSweep::first_contact(double limit, double from) const
   for (int step = 0; step < kMaxSteps; ++step) {
     const NearestPair pair = pair_at(t);
     const bool is_contact = touches(pair, t);
-    if (is_contact && t == 0) return t;
+    if (is_contact && t == 0) return planted(PlantedBug::kSweepStart) ? std::nullopt : std::optional<double>(t);
     const double distance = std::sqrt(pair.squared_distance);
     // Speed at which the distance decreases: the primitive moves along the offset.
     const double approach = dot(pair.offset(), velocity_) / distance;

@@ -16,6 +16,7 @@
 #include "tests/support/rewind_lockstep.h"
 #include "tests/support/scene_lockstep.h"
 #include "tests/support/scene_search.h"
+#include "tests/support/sweep_trials.h"
 
 namespace locus::test {
 namespace {
@@ -100,6 +101,9 @@ constexpr Trial kTrials[] = {
     {"RewindThatForgetsTheWayBack", PlantedBug::kRewindFastBox, compare_rewinds_of_busy_ticks_with_model},
     {"PlacedBoundsAsWideAsFloatRounds", PlantedBug::kWidePlacedBounds, compare_conservative_answers_with_bounds},
     {"PlacedBoundsAlone", PlantedBug::kPlacedBoundsAlone, compare_conservative_overlaps_with_exact},
+    {"CapsuleWithoutCaps", PlantedBug::kCapsuleCap, sweep_difference},
+    {"CapsuleWithoutEnds", PlantedBug::kEndlessCapsule, sweep_difference},
+    {"SweepThatIgnoresItsStart", PlantedBug::kSweepStart, sweep_difference},
 #ifdef LOCUS_X86_KERNELS
     {"KernelWithoutEdgeBound", PlantedBug::kKernelEdgeBound, compare_kernels_with_list},
     {"KernelWithoutTBound", PlantedBug::kKernelTBound, compare_kernels_with_list},

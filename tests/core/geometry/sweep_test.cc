@@ -5,77 +5,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/geometry/capsule.h"
-#include "core/geometry/triangle_overlap.h"
-#include "tests/support/random.h"
-#include "tests/support/random_shape.h"
-#include "tests/support/triangle_reference.h"
+#include "tests/support/sweep_trials.h"
 
 namespace locus {
 namespace {
 
 using test::Random;
-
-constexpr MoverKind kMoverKinds[] = {MoverKind::kBall, MoverKind::kCapsule, MoverKind::kBox};
-
-// Returns whether the mover at time t, larger by `by` on every side, shares a point with a primitive, according to the
-// predicates of overlap queries.
-template <class Primitive>
-bool overlaps_at(const Mover& mover, double t, double by, const Primitive& primitive) {
-  const Vec3d center = mover.start + mover.way * t;
-  if (mover.kind != MoverKind::kBox) {
-    if (mover.radius + by < 0) return false;
-    return capsule_overlaps(Capsule{center, mover.half_axis, mover.radius + by}, primitive);
-  }
-  const Vec3d half = mover.half + Vec3d{by, by, by};
-  if (std::min({half.x, half.y, half.z}) < 0) return false;
-  if constexpr (std::is_same_v<Primitive, Triangle>)
-    return box_overlaps(Obbf{to_float(center), to_float(half), mover.rotation}, primitive);
-  else
-    return box_overlaps(Obbd{center, half, mover.rotation}, primitive);
-}
-
-Mover random_mover(Random& random, MoverKind kind, Vec3d target, double size) {
-  Mover mover;
-  mover.kind = kind;
-  const double away = size * random.magnitude(-3, 3);
-  mover.start = target + random.vector(away);
-  mover.way = (target + random.vector(size) - mover.start) * random.between(0.2, 2);
-  if (random.chance(0.1)) mover.way[static_cast<int>(random.below(3))] = 0;
-  if (random.chance(0.02)) mover.way = {};
-  const double scale = size * random.magnitude(-5, 1);
-  if (kind != MoverKind::kBox) mover.radius = scale * random.between(0.01, 1);
-  if (kind == MoverKind::kCapsule) mover.half_axis = random.vector(scale * random.between(0, 3));
-  if (kind != MoverKind::kBox) return mover;
-  for (int axis = 0; axis < 3; ++axis) mover.half[axis] = scale * random.between(0.01, 1);
-  if (random.chance(0.7)) mover.rotation = rotation_of(random.rotation());
-  return mover;
-}
-
-double magnitude_of(const Mover& mover, Vec3d position, double size) {
-  return max_component(abs(mover.start)) + max_component(abs(mover.way)) + max_component(abs(position)) + size +
-         max_component(extent_of(mover));
-}
-
-// Compares a sweep with the overlap predicates at single moments. Returns whether the sweep hits after its start.
-template <class Primitive, class Stored>
-bool compare_with_overlaps(const Mover& mover, const Primitive& primitive, const Stored& stored, double epsilon,
-                           Random& random, const std::string& what) {
-  const std::optional<double> t = first_contact(mover, primitive, AtStart::kHit);
-  const double end = t.value_or(1);
-  for (int sample = 0; sample < 24; ++sample) {
-    const double before = end * (sample == 0 ? 0 : sample == 1 ? 1 - 1e-9 : random.between(0, 1));
-    if (before == end && t) continue;
-    EXPECT_FALSE(overlaps_at(mover, before, -epsilon, stored)) << what << ": an overlap at " << before << " is missed";
-  }
-  if (!t) return false;
-  EXPECT_GE(*t, 0) << what;
-  EXPECT_LE(*t, 1) << what;
-  EXPECT_TRUE(overlaps_at(mover, *t, epsilon, stored)) << what << ": no contact at " << *t;
-  const std::optional<double> passed = first_contact(mover, primitive, AtStart::kPass);
-  EXPECT_EQ(passed.has_value(), *t > 0) << what;
-  return *t > 0;
-}
 
 // Checks that the contact's point belongs to both solids, and that a plane through it separates them.
 template <class Primitive, class Stored>
@@ -105,22 +40,17 @@ TEST(SweepTest, TrianglesAgreeWithOverlapsAtSingleMoments) {
   Random random(kSeed);
   int hits = 0;
   for (int i = 0; i < 15000; ++i) {
-    const Triangle triangle = test::random_triangle(random);
-    const MoverKind kind = random.pick(kMoverKinds);
-    const double size = test::size_of(triangle);
-    const Vec3d target = to_double(triangle.a);
-    const Mover mover = random_mover(random, kind, target, size);
-    // The overlap of a box is tested in float.
-    const double epsilon = magnitude_of(mover, target, size) * (kind == MoverKind::kBox ? 1e-5 : 1e-9);
+    const auto trial = test::triangle_trial(random);
     const std::string what = "seed " + std::to_string(kSeed) + " case " + std::to_string(i);
-    const Corners corners = corners_of(triangle);
-    if (compare_with_overlaps(mover, corners, triangle, epsilon, random, what)) {
-      ++hits;
-      check_contact(mover, corners, triangle, epsilon, what);
-      const Contact contact = contact_at(mover, corners, *first_contact(mover, corners, AtStart::kHit));
-      for (const Vec3d corner : corners)
-        EXPECT_LE(dot(contact.normal, corner - mover.start - contact.point), 10 * epsilon) << what;
-    }
+    ASSERT_EQ(test::sweep_fault(trial, random), "") << what;
+    const Corners corners = corners_of(trial.primitive);
+    const std::optional<double> t = first_contact(trial.mover, corners, AtStart::kHit);
+    if (!t || *t == 0) continue;
+    ++hits;
+    check_contact(trial.mover, corners, trial.primitive, trial.epsilon, what);
+    const Contact contact = contact_at(trial.mover, corners, *t);
+    for (const Vec3d corner : corners)
+      ASSERT_LE(dot(contact.normal, corner - trial.mover.start - contact.point), 10 * trial.epsilon) << what;
     ASSERT_FALSE(HasFailure()) << what;
   }
   EXPECT_GT(hits, 2000);
@@ -131,15 +61,13 @@ TEST(SweepTest, ShapesAgreeWithOverlapsAtSingleMoments) {
   Random random(kSeed);
   int hits = 0;
   for (int i = 0; i < 15000; ++i) {
-    const Shape shape = test::random_shape(random, random.pick(test::kShapeKinds), random.magnitude(-2, 10));
-    const double size = 0.01 + max_component(to_double(shape.size)) + shape.radius;
-    const Mover mover = random_mover(random, random.pick(kMoverKinds), shape.position, size);
-    const double epsilon = magnitude_of(mover, shape.position, size) * 1e-9;
+    const auto trial = test::shape_trial(random);
     const std::string what = "seed " + std::to_string(kSeed) + " case " + std::to_string(i);
-    if (compare_with_overlaps(mover, shape, shape, epsilon, random, what)) {
-      ++hits;
-      check_contact(mover, shape, shape, epsilon, what);
-    }
+    ASSERT_EQ(test::sweep_fault(trial, random), "") << what;
+    const std::optional<double> t = first_contact(trial.mover, trial.primitive, AtStart::kHit);
+    if (!t || *t == 0) continue;
+    ++hits;
+    check_contact(trial.mover, trial.primitive, trial.primitive, trial.epsilon, what);
     ASSERT_FALSE(HasFailure()) << what;
   }
   EXPECT_GT(hits, 2000);
