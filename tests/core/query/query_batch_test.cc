@@ -61,6 +61,20 @@ OwnedBlock twenty_capsules() {
   return block;
 }
 
+OwnedBlock twenty_sweeps() {
+  OwnedBlock block = twenty_capsules();
+  block.settings.kind = SweepColumns();
+  return block;
+}
+
+OwnedBlock twenty_box_sweeps() {
+  OwnedBlock block = twenty_sweeps();
+  block.extras.clear();
+  block.half_extents.assign(60, 1);
+  for (int i = 0; i < 20; ++i) block.rotations.insert(block.rotations.end(), {0, 0, 0, 1});
+  return block;
+}
+
 Refusal refusal_for(const std::vector<OwnedBlock>& blocks) {
   const absl::Status status = check_batch(batch_of(blocks));
   EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << status;
@@ -77,8 +91,9 @@ void expect_refusal(const OwnedBlock& block, Reason reason, const std::string& f
 }
 
 TEST(CheckBatchTest, ValidBlocksPass) {
-  for (const OwnedBlock& block : {twenty_rays(), twenty_balls(), twenty_boxes(), twenty_capsules(), twenty_points(),
-                                  lookup_of_ids({1}), lookup_of_groups({1}), rays_along_x(RayMode::kAny, {})})
+  for (const OwnedBlock& block :
+       {twenty_rays(), twenty_balls(), twenty_boxes(), twenty_capsules(), twenty_points(), twenty_sweeps(),
+        twenty_box_sweeps(), lookup_of_ids({1}), lookup_of_groups({1}), rays_along_x(RayMode::kAny, {})})
     EXPECT_TRUE(status_with(block).ok());
 }
 
@@ -239,6 +254,44 @@ TEST(CheckBatchTest, CapsulesLieWithinTheWorldAndHaveRadii) {
   expect_refusal(block, Reason::kOutOfRange, "capsules.radii", 7);
   block.extras[7] = kNan;
   expect_refusal(block, Reason::kNotFinite, "capsules.radii", 7);
+}
+
+TEST(CheckBatchTest, SweepsAreBallsCapsulesOrBoxes) {
+  OwnedBlock block = twenty_sweeps();
+  block.points[59] = kInf;
+  expect_refusal(block, Reason::kNotFinite, "sweeps.starts", 19);
+  block = twenty_sweeps();
+  block.sizes[3 * 4] = 2e9f;
+  expect_refusal(block, Reason::kOutOfRange, "sweeps.ends", 4);
+  block = twenty_sweeps();
+  block.extras[7] = 0;
+  expect_refusal(block, Reason::kOutOfRange, "sweeps.radii", 7);
+  block.extras[7] = kNan;
+  expect_refusal(block, Reason::kNotFinite, "sweeps.radii", 7);
+  block = twenty_sweeps();
+  block.half_axes.assign(60, 1);
+  EXPECT_TRUE(status_with(block).ok());
+  block.half_axes[5] = kNan;
+  expect_refusal(block, Reason::kNotFinite, "sweeps.half_axes", 1);
+  block.half_axes[5] = -2e9f;
+  expect_refusal(block, Reason::kOutOfRange, "sweeps.half_axes", 1);
+  block = twenty_sweeps();
+  block.rotations.assign(4, 0.5f);
+  expect_refusal(block, Reason::kMalformed, "sweeps.rotations", -1);
+  block = twenty_box_sweeps();
+  block.half_extents[9] = block.half_extents[10] = 0;
+  EXPECT_TRUE(status_with(block).ok());
+  block.half_extents[11] = 0;
+  expect_refusal(block, Reason::kOutOfRange, "sweeps.half_extents", 3);
+  block = twenty_box_sweeps();
+  block.rotations[7] = 3;
+  expect_refusal(block, Reason::kOutOfRange, "sweeps.rotations", 1);
+  block = twenty_box_sweeps();
+  block.extras = {1};
+  expect_refusal(block, Reason::kMalformed, "sweeps.radii", -1);
+  block = twenty_box_sweeps();
+  block.half_axes = {1, 1, 1};
+  expect_refusal(block, Reason::kMalformed, "sweeps.half_axes", -1);
 }
 
 TEST(CheckBatchTest, ColumnsHaveNEntriesOrOneOrIfOptionalNone) {
