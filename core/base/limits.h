@@ -43,6 +43,15 @@ inline constexpr uint32_t kMaxIgnoredIds = 64;        // ids that the queries of
 inline constexpr uint32_t kDefaultMaxResults = 1024;  // results per query if the block sets no max_results
 inline constexpr uint32_t kMaxMaxResults = 1u << 20;  // largest max_results of a block
 inline constexpr uint32_t kMaxNearest = 65536;        // number of values that a nearest query can request
+inline constexpr uint32_t kMinPlanes = 4;             // planes of a convex region
+inline constexpr uint32_t kDefaultPlanes = 6;
+inline constexpr uint32_t kMaxPlanes = 32;
+inline constexpr uint32_t kMaxSightSamples = 255;         // sample points of a target
+inline constexpr uint32_t kMaxSightEyes = 16;             // eyes of a viewer
+inline constexpr uint32_t kMaxSightSegments = 4'194'304;  // segments from an eye to a sample, per query batch
+inline constexpr uint32_t kMaxPairNeighbours = 1024;  // nearest objects that a query of pairs returns of each object
+inline constexpr uint32_t kMaxCellPlanes = 64;        // planes of a cell of free space
+inline constexpr uint32_t kDefaultCellPlanes = 32;
 // Default maximum size of a reply in bytes. gRPC clients refuse messages over 4 MiB by default.
 inline constexpr uint32_t kDefaultReplyBytes = 4'000'000;
 inline constexpr uint32_t kMaxReplyBytes = 64u << 20;
@@ -85,6 +94,7 @@ static_assert(kMaxBlocks <= kMaxQueries);
 static_assert(kDefaultHistoryBytes <= kMaxHistoryBytes);
 static_assert(kDefaultMaxResults <= kMaxMaxResults);
 static_assert(kMaxNearest <= kMaxMaxResults);
+static_assert(kMaxCellPlanes < kMaxMaxResults);
 static_assert(kDefaultReplyBytes < 4u << 20, "clients refuse messages over 4 MiB by default");
 static_assert(kDefaultReplyBytes <= kMaxReplyBytes);
 static_assert(kBackupPieceBytes < kDefaultReplyBytes / 2, "a path and a hash fit into the same message");

@@ -10,9 +10,10 @@ namespace {
 constexpr uint64_t kBlockOverhead = 256;
 constexpr uint64_t kReplyOverhead = 256;
 // Upper bounds of encoded sizes for each query, in bytes: its row count, its index in the list of truncated queries,
-// and its effective time.
+// its effective time, and its index in the list of queries without an anchor.
 constexpr uint64_t kCountBytes = 4;
 constexpr uint64_t kTruncatedBytes = 4;
+constexpr uint64_t kAnchorBytes = 4;
 constexpr uint64_t kTimeBytes = 16;  // tick, fraction, and the index of the query in the list of clamped queries
 
 struct ServedColumns {
@@ -29,6 +30,18 @@ struct ServedColumns {
   ColumnSet operator()(const BallColumns&) const { return overlap(); }
   ColumnSet operator()(const BoxColumns&) const { return overlap(); }
   ColumnSet operator()(const CapsuleColumns&) const { return overlap(); }
+  ColumnSet operator()(const FrustumColumns&) const { return overlap(); }
+  ColumnSet operator()(const SightColumns&) const { return {}; }
+  ColumnSet operator()(const ContainsColumns&) const {
+    return {Column::kId, Column::kGroup, Column::kTag, Column::kLayers, Column::kPose};
+  }
+  ColumnSet operator()(const PairColumns&) const {
+    return {Column::kT, Column::kId, Column::kOther, Column::kGroup, Column::kTag, Column::kLayers, Column::kPose};
+  }
+  ColumnSet operator()(const CellColumns&) const {
+    return {Column::kT,     Column::kId,  Column::kTriangle, Column::kNormal, Column::kPoint,
+            Column::kGroup, Column::kTag, Column::kLayers,   Column::kPose};
+  }
   ColumnSet operator()(const NearestColumns&) const {
     return {Column::kT,     Column::kId,  Column::kTriangle, Column::kPoint,
             Column::kGroup, Column::kTag, Column::kLayers,   Column::kPose};
@@ -53,6 +66,16 @@ struct DefaultColumns {
   ColumnSet operator()(const BallColumns& balls) const { return overlap(balls.detail); }
   ColumnSet operator()(const BoxColumns& boxes) const { return overlap(boxes.detail); }
   ColumnSet operator()(const CapsuleColumns& capsules) const { return overlap(capsules.detail); }
+  ColumnSet operator()(const FrustumColumns& frustums) const { return overlap(frustums.detail); }
+  ColumnSet operator()(const SightColumns&) const { return {}; }
+  ColumnSet operator()(const ContainsColumns&) const { return {Column::kId}; }
+  ColumnSet operator()(const PairColumns& pairs) const {
+    if (pairs.count == 0) return {Column::kId, Column::kOther};
+    return {Column::kT, Column::kId, Column::kOther};
+  }
+  ColumnSet operator()(const CellColumns&) const {
+    return {Column::kT, Column::kId, Column::kTriangle, Column::kNormal};
+  }
   ColumnSet operator()(const NearestColumns&) const { return {Column::kT, Column::kId, Column::kTriangle}; }
   ColumnSet operator()(const LookupColumns&) const { return {Column::kId, Column::kPose}; }
   static ColumnSet overlap(StaticDetail detail) {
@@ -72,6 +95,11 @@ struct LayoutOf {
   RowLayout operator()(const BallColumns&) const { return RowLayout::kCounted; }
   RowLayout operator()(const BoxColumns&) const { return RowLayout::kCounted; }
   RowLayout operator()(const CapsuleColumns&) const { return RowLayout::kCounted; }
+  RowLayout operator()(const FrustumColumns&) const { return RowLayout::kCounted; }
+  RowLayout operator()(const SightColumns&) const { return RowLayout::kMatrix; }
+  RowLayout operator()(const ContainsColumns&) const { return RowLayout::kCounted; }
+  RowLayout operator()(const PairColumns&) const { return RowLayout::kCounted; }
+  RowLayout operator()(const CellColumns&) const { return RowLayout::kCounted; }
   RowLayout operator()(const NearestColumns&) const { return RowLayout::kCounted; }
   RowLayout operator()(const LookupColumns& lookup) const {
     return lookup.groups.empty() ? RowLayout::kDense : RowLayout::kCounted;
@@ -83,10 +111,23 @@ struct LayoutOf {
 ColumnSet served_columns(const QueryBlock& block) { return std::visit(ServedColumns(), block.kind); }
 
 ColumnSet returned_columns(const QueryBlock& block) {
+  if (block.count_only) return {};
   return block.columns.empty() ? std::visit(DefaultColumns(), block.kind) : block.columns;
 }
 
 RowLayout row_layout(const QueryBlock& block) { return std::visit(LayoutOf(), block.kind); }
+
+size_t bytes_per_query(const QueryBlock& block) {
+  const auto* const sight = std::get_if<SightColumns>(&block.kind);
+  return sight == nullptr ? 1 : sight->bytes_per_viewer();
+}
+
+uint64_t max_rows_per_query(const QueryBlock& block) {
+  if (const auto* const nearest = std::get_if<NearestColumns>(&block.kind)) return std::max(1u, nearest->count);
+  if (const auto* const cells = std::get_if<CellColumns>(&block.kind))
+    return 1 + (cells->max_planes == 0 ? limits::kDefaultCellPlanes : cells->max_planes);
+  return block.max_results == 0 ? limits::kDefaultMaxResults : block.max_results;
+}
 
 uint64_t reply_limit(const QueryBatch& batch) {
   return batch.max_reply_bytes == 0 ? limits::kDefaultReplyBytes : batch.max_reply_bytes;
@@ -96,11 +137,12 @@ uint64_t fixed_reply_bytes(const QueryBatch& batch) {
   uint64_t bytes = kReplyOverhead;
   for (const QueryBlock& block : batch.blocks) {
     const RowLayout layout = row_layout(block);
-    const uint64_t query_bytes = layout == RowLayout::kDense   ? row_bytes(returned_columns(block))
-                                 : layout == RowLayout::kBytes ? 1
-                                                               : kCountBytes;
+    const uint64_t query_bytes = layout == RowLayout::kDense     ? row_bytes(returned_columns(block))
+                                 : layout == RowLayout::kCounted ? kCountBytes
+                                                                 : bytes_per_query(block);
     const uint64_t time_bytes = block.as_of_ticks.empty() ? 0 : kTimeBytes;
-    bytes += kBlockOverhead + query_count(block) * (query_bytes + kTruncatedBytes + time_bytes);
+    const uint64_t anchor_bytes = block.anchor_ids.empty() ? 0 : kAnchorBytes;
+    bytes += kBlockOverhead + query_count(block) * (query_bytes + kTruncatedBytes + time_bytes + anchor_bytes);
   }
   return bytes;
 }
@@ -109,10 +151,7 @@ uint64_t max_encoded_reply_bytes(const QueryBatch& batch) {
   uint64_t bytes = fixed_reply_bytes(batch);
   for (const QueryBlock& block : batch.blocks) {
     if (row_layout(block) != RowLayout::kCounted) continue;
-    const uint64_t rows = block.max_results == 0 ? limits::kDefaultMaxResults : block.max_results;
-    const auto* const nearest = std::get_if<NearestColumns>(&block.kind);
-    bytes += query_count(block) * (nearest == nullptr ? rows : std::max(1u, nearest->count)) *
-             row_bytes(returned_columns(block));
+    bytes += query_count(block) * max_rows_per_query(block) * row_bytes(returned_columns(block));
   }
   return std::min(bytes, reply_limit(batch));
 }

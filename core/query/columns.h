@@ -31,6 +31,7 @@ struct ColumnArrays {
   Array<uint32_t> layers{};
   Array<double> positions{};
   Array<float> rotations{};
+  Array<uint64_t> others{};
 };
 
 // Entry of kColumnArrays: the result column `column` stores `width` values for each result row in the array that get()
@@ -58,12 +59,13 @@ inline constexpr auto kColumnArrays = std::make_tuple(
     ColumnArray{Column::kTag, 1, [](auto& arrays) -> auto& { return arrays.tags; }},
     ColumnArray{Column::kLayers, 1, [](auto& arrays) -> auto& { return arrays.layers; }},
     ColumnArray{Column::kPose, 3, [](auto& arrays) -> auto& { return arrays.positions; }},
-    ColumnArray{Column::kPose, 4, [](auto& arrays) -> auto& { return arrays.rotations; }});
+    ColumnArray{Column::kPose, 4, [](auto& arrays) -> auto& { return arrays.rotations; }},
+    ColumnArray{Column::kOther, 1, [](auto& arrays) -> auto& { return arrays.others; }});
 // clang-format on
 
 // Column names indexed by the value of Column: the protocol's names without the prefix "COLUMN_".
-inline constexpr std::array<absl::string_view, 11> kColumnNames = {
-    "UNSPECIFIED", "T", "ID", "TRIANGLE", "UV", "NORMAL", "POINT", "GROUP", "TAG", "LAYERS", "POSE"};
+inline constexpr std::array<absl::string_view, 12> kColumnNames = {
+    "UNSPECIFIED", "T", "ID", "TRIANGLE", "UV", "NORMAL", "POINT", "GROUP", "TAG", "LAYERS", "POSE", "OTHER"};
 static_assert(kColumnNames.size() == static_cast<size_t>(kLastColumn) + 1);
 
 // Calls visit() with each entry of kColumnArrays, in the order of the table.
@@ -105,9 +107,14 @@ ColumnSet served_columns(const QueryBlock& block);
 ColumnSet returned_columns(const QueryBlock& block);
 
 // Layout of a block's result. kDense has one row per query, also for a miss. kBytes has one byte per query and no rows.
-// kCounted has any number of rows per query, and a column with the number of rows of each query.
-enum class RowLayout : uint8_t { kDense, kBytes, kCounted };
+// kMatrix has the same number of bytes, bytes_per_query(), for each query and no rows. kCounted has any number of rows
+// per query, and a column with the number of rows of each query; with count_only, only this column.
+enum class RowLayout : uint8_t { kDense, kBytes, kMatrix, kCounted };
 RowLayout row_layout(const QueryBlock& block);
+// Returns the number of bytes of each query of a kBytes or kMatrix block.
+size_t bytes_per_query(const QueryBlock& block);
+// Returns the maximum number of rows of each query of a kCounted block.
+uint64_t max_rows_per_query(const QueryBlock& block);
 
 // Returns an upper bound of the encoded size of a reply in bytes, without the rows of kCounted blocks: dense rows, row
 // counts, effective times, lists of truncated queries, and field headers.

@@ -24,6 +24,9 @@ class BlockCheck {
     n_ = query_count(block_);
     RETURN_IF_ERROR(check_common());
     RETURN_IF_ERROR(check_columns_of_kind());
+    RETURN_IF_ERROR(check_anchors());
+    if (block_.count_only && (row_layout(block_) != RowLayout::kCounted || block_kind(block_) == BlockKind::kCell))
+      return refuse_argument(Reason::kMalformed, name("count_only"), {}, "this kind of query has no counts");
     return std::visit([this](const auto& kind) { return check_kind(kind); }, block_.kind);
   }
 
@@ -60,6 +63,34 @@ class BlockCheck {
     return absl::OkStatus();
   }
 
+  absl::Status check_anchors() const {
+    const absl::Span<const uint64_t> anchors = block_.anchor_ids;
+    if (anchors.empty()) return absl::OkStatus();
+    const BlockKind kind = block_kind(block_);
+    if (kind == BlockKind::kLookup || kind == BlockKind::kPairs)
+      return refuse_argument(Reason::kMalformed, name("anchor_ids"), {}, "this kind of query has no positions");
+    RETURN_IF_ERROR(check_length(anchors.size(), 1, ColumnNeed::kEach, "anchor_ids"));
+    for (size_t i = 0; i < anchors.size(); ++i)
+      if (anchors[i] == kNoId) return wrong(Reason::kOutOfRange, "anchor_ids", i, "0 is not an id");
+    return absl::OkStatus();
+  }
+
+  // Checks the columns of a position in the order of rows. `kind` is the name of the kind's message.
+  absl::Status check_after(const AfterColumns& after, const char* kind) const {
+    const auto field = [kind](absl::string_view column) { return absl::StrCat(kind, ".", column); };
+    if (after.ts.empty() && after.ids.empty() && after.triangles.empty()) return absl::OkStatus();
+    RETURN_IF_ERROR(check_length(after.ts.size(), 1, ColumnNeed::kOptional, field("after_ts")));
+    RETURN_IF_ERROR(check_length(after.ids.size(), 1, ColumnNeed::kOptional, field("after_ids")));
+    RETURN_IF_ERROR(check_length(after.triangles.size(), 1, ColumnNeed::kOptional, field("after_triangles")));
+    if (after.ts.empty() && !after.ids.empty())
+      return refuse_argument(Reason::kMalformed, name(field("after_ids")), {}, "need after_ts");
+    if (after.ids.empty() && !after.triangles.empty())
+      return refuse_argument(Reason::kMalformed, name(field("after_triangles")), {}, "need after_ids");
+    for (size_t i = 0; i < after.ts.size(); ++i)
+      if (std::isnan(after.ts[i])) return wrong(Reason::kNotFinite, field("after_ts"), i, "must be a number");
+    return absl::OkStatus();
+  }
+
   absl::Status check_columns_of_kind() const {
     const ColumnSet served = served_columns(block_);
     for (int value = 1; value <= static_cast<int>(kLastColumn); ++value)
@@ -80,18 +111,27 @@ class BlockCheck {
     bool all = values.size() % 3 == 0;
     for (size_t i = 0; i + 2 < values.size(); i += 3)
       for (int axis = 0; axis < 3; ++axis)
-        all &= std::abs(block_.frame[axis] + double{values[i + static_cast<size_t>(axis)]}) <= limits::kMaxCoordinate;
+        all &= std::abs(origin()[axis] + double{values[i + static_cast<size_t>(axis)]}) <= limits::kMaxCoordinate;
     return all;
   }
+  // Returns the point from which positions count, as far as it is known: for anchored queries the world's origin, so
+  // that an offset is checked by itself.
+  Vec3d origin() const { return block_.anchor_ids.empty() ? block_.frame : Vec3d{}; }
 
-  // Checks that points, given relative to the frame, are finite and lie within the world.
-  absl::Status check_points(absl::Span<const float> values, absl::string_view field) const {
-    if (all_within_world(values)) return absl::OkStatus();
+  // Checks that points, given relative to the frame or an anchor, are finite and lie within the world. A query has
+  // `points_each` points.
+  absl::Status check_points(absl::Span<const float> values, absl::string_view field, size_t points_each = 1) const {
+    return check_points_from(origin(), values, field, points_each);
+  }
+  absl::Status check_points_from(Vec3d origin, absl::Span<const float> values, absl::string_view field,
+                                 size_t points_each) const {
+    if (origin == this->origin() && all_within_world(values)) return absl::OkStatus();
     for (size_t i = 0; i < values.size(); ++i) {
-      if (!std::isfinite(values[i])) return wrong(Reason::kNotFinite, field, i / 3, "needs finite numbers");
-      const double world = block_.frame[static_cast<int>(i % 3)] + double{values[i]};
+      const size_t query = i / (3 * points_each);
+      if (!std::isfinite(values[i])) return wrong(Reason::kNotFinite, field, query, "needs finite numbers");
+      const double world = origin[static_cast<int>(i % 3)] + double{values[i]};
       if (std::abs(world) > limits::kMaxCoordinate)
-        return wrong(Reason::kOutOfRange, field, i / 3, "must lie within +-1e9 in the world");
+        return wrong(Reason::kOutOfRange, field, query, "must lie within +-1e9 in the world");
     }
     return absl::OkStatus();
   }
@@ -149,6 +189,7 @@ class BlockCheck {
     RETURN_IF_ERROR(check_length(rays.t_max.size(), 1, ColumnNeed::kOptional, "rays.t_max"));
     RETURN_IF_ERROR(check_points(rays.origins, "rays.origins"));
     RETURN_IF_ERROR(check_distance_limits(rays.t_max, "rays.t_max"));
+    RETURN_IF_ERROR(check_after(rays.after, "rays"));
     return check_directions(rays.directions);
   }
 
@@ -234,7 +275,79 @@ class BlockCheck {
     if (nearest.count > limits::kMaxNearest)
       return refuse_limit(name("nearest.k"), "nearest", limits::kMaxNearest, nearest.count);
     RETURN_IF_ERROR(check_points(nearest.points, "nearest.points"));
+    RETURN_IF_ERROR(check_after(nearest.after, "nearest"));
     return check_distance_limits(nearest.max_distances, "nearest.max_distances");
+  }
+
+  absl::Status check_kind(const FrustumColumns& frustums) const {
+    const bool by_planes = frustums.view_projections.empty();
+    if (!by_planes && !frustums.planes.empty())
+      return refuse_argument(Reason::kMalformed, name("frustums"), {}, "give either planes or view_projections");
+    if (!by_planes && frustums.planes_each != 0)
+      return refuse_argument(Reason::kMalformed, name("frustums.planes_each"), {}, "needs planes");
+    if (frustums.planes_each != 0 &&
+        (frustums.planes_each < limits::kMinPlanes || frustums.planes_each > limits::kMaxPlanes))
+      return refuse_limit(name("frustums.planes_each"), "planes", limits::kMaxPlanes, frustums.planes_each);
+    const absl::string_view field = by_planes ? "frustums.planes" : "frustums.view_projections";
+    const absl::Span<const float> values = by_planes ? frustums.planes : frustums.view_projections;
+    const size_t width = by_planes ? 4 * frustums.planes_per_region() : 16;
+    RETURN_IF_ERROR(check_length(values.size(), width, ColumnNeed::kEach, field));
+    for (size_t i = 0; i < values.size(); ++i)
+      if (!std::isfinite(values[i])) return wrong(Reason::kNotFinite, field, i / width, "needs finite numbers");
+    return absl::OkStatus();
+  }
+
+  absl::Status check_kind(const ContainsColumns& contains) const {
+    RETURN_IF_ERROR(check_length(contains.points.size(), 3, ColumnNeed::kEach, "contains.points"));
+    return check_points(contains.points, "contains.points");
+  }
+
+  absl::Status check_kind(const SightColumns& sight) const {
+    if (sight.samples > limits::kMaxSightSamples)
+      return refuse_limit(name("sight.samples_per_target"), "sight_samples", limits::kMaxSightSamples, sight.samples);
+    if (sight.eyes > limits::kMaxSightEyes)
+      return refuse_limit(name("sight.eyes_per_viewer"), "sight_eyes", limits::kMaxSightEyes, sight.eyes);
+    const size_t eyes = sight.eyes_per_viewer(), samples = sight.samples_per_target(), targets = sight.target_count();
+    RETURN_IF_ERROR(check_length(sight.viewers.size(), 3 * eyes, ColumnNeed::kEach, "sight.viewers"));
+    RETURN_IF_ERROR(check_column(sight.targets.size(), 3 * samples, targets, ColumnNeed::kEach,
+                                 {"blocks", index_, "sight.targets"}));
+    if (sight.pairwise && targets != n_)
+      return refuse_argument(Reason::kColumnLength, name("sight.targets"), {},
+                             absl::StrCat("pairwise needs as many targets as viewers, ", n_, ", not ", targets));
+    RETURN_IF_ERROR(check_length(sight.viewer_groups.size(), 1, ColumnNeed::kOptional, "sight.viewer_groups"));
+    RETURN_IF_ERROR(check_column(sight.target_groups.size(), 1, targets, ColumnNeed::kOptional,
+                                 {"blocks", index_, "sight.target_groups"}));
+    RETURN_IF_ERROR(check_length(sight.max_distances.size(), 1, ColumnNeed::kOptional, "sight.max_distances"));
+    RETURN_IF_ERROR(check_points(sight.viewers, "sight.viewers", eyes));
+    RETURN_IF_ERROR(check_points_from(block_.frame, sight.targets, "sight.targets", samples));
+    return check_distance_limits(sight.max_distances, "sight.max_distances");
+  }
+
+  absl::Status check_kind(const PairColumns& pairs) const {
+    const float distance = pairs.max_distance;
+    if (std::isnan(distance))
+      return refuse_argument(Reason::kNotFinite, name("pairs.max_distance"), {}, "must be a number");
+    const bool endless = std::isinf(distance) && pairs.count != 0;
+    if (distance < 0 || (distance > limits::kMaxCoordinate && !endless))
+      return refuse_argument(Reason::kOutOfRange, name("pairs.max_distance"), {},
+                             "must lie between 0 and 1e9, or be infinite with k");
+    if (pairs.count > limits::kMaxPairNeighbours)
+      return refuse_limit(name("pairs.k"), "pair_neighbours", limits::kMaxPairNeighbours, pairs.count);
+    if (pairs.after_other != 0 && block_.after_id == kNoId)
+      return refuse_argument(Reason::kMalformed, name("pairs.after_other"), {}, "needs after_id");
+    return absl::OkStatus();
+  }
+
+  absl::Status check_kind(const CellColumns& cells) const {
+    RETURN_IF_ERROR(check_length(cells.points.size(), 3, ColumnNeed::kEach, "cells.points"));
+    RETURN_IF_ERROR(check_length(cells.max_distances.size(), 1, ColumnNeed::kEachOrOne, "cells.max_distances"));
+    if (cells.max_planes > limits::kMaxCellPlanes)
+      return refuse_limit(name("cells.max_planes"), "cell_planes", limits::kMaxCellPlanes, cells.max_planes);
+    RETURN_IF_ERROR(check_points(cells.points, "cells.points"));
+    RETURN_IF_ERROR(check_sizes(cells.max_distances, 1, "cells.max_distances"));
+    for (size_t i = 0; i < cells.max_distances.size(); ++i)
+      if (cells.max_distances[i] == 0) return wrong(Reason::kOutOfRange, "cells.max_distances", i, "must not be 0");
+    return absl::OkStatus();
   }
 
   absl::Status check_kind(const LookupColumns& lookup) const {
@@ -259,10 +372,34 @@ struct CountQueries {
   size_t operator()(const CapsuleColumns& capsules) const { return capsules.starts.size() / 3; }
   size_t operator()(const SweepColumns& sweeps) const { return sweeps.starts.size() / 3; }
   size_t operator()(const NearestColumns& nearest) const { return nearest.points.size() / 3; }
+  size_t operator()(const FrustumColumns& frustums) const {
+    return frustums.view_projections.empty() ? frustums.planes.size() / (4 * frustums.planes_per_region())
+                                             : frustums.view_projections.size() / 16;
+  }
+  size_t operator()(const SightColumns& sight) const { return sight.viewer_count(); }
+  size_t operator()(const ContainsColumns& contains) const { return contains.points.size() / 3; }
+  size_t operator()(const PairColumns&) const { return 1; }
+  size_t operator()(const CellColumns& cells) const { return cells.points.size() / 3; }
   size_t operator()(const LookupColumns& lookup) const {
     return lookup.groups.empty() ? lookup.ids.size() : lookup.groups.size();
   }
 };
+
+// Returns the number of segments from an eye to a sample in all blocks; at most 2^64 - 1. Every factor is below 2^32,
+// and a column has fewer than 2^32 entries.
+uint64_t sight_segments(const QueryBatch& batch) {
+  uint64_t segments = 0;
+  for (const QueryBlock& block : batch.blocks) {
+    const auto* const sight = std::get_if<SightColumns>(&block.kind);
+    if (sight == nullptr) continue;
+    const uint64_t eyes = sight->viewers.size() / 3;
+    const uint64_t samples = sight->pairwise ? sight->samples_per_target() : sight->targets.size() / 3;
+    if (samples != 0 && eyes > (uint64_t{1} << 62) / samples) return ~uint64_t{0};
+    segments += eyes * samples;
+    if (segments > uint64_t{1} << 62) return ~uint64_t{0};
+  }
+  return segments;
+}
 
 }  // namespace
 
@@ -275,6 +412,8 @@ absl::Status check_batch(const QueryBatch& batch) {
   for (const QueryBlock& block : batch.blocks) queries += query_count(block);
   if (queries > limits::kMaxQueries)
     return refuse_limit("blocks", "queries", limits::kMaxQueries, static_cast<double>(queries));
+  if (const uint64_t segments = sight_segments(batch); segments > limits::kMaxSightSegments)
+    return refuse_limit("blocks", "sight_segments", limits::kMaxSightSegments, static_cast<double>(segments));
   if (batch.max_reply_bytes > limits::kMaxReplyBytes)
     return refuse_limit("max_reply_bytes", "reply_bytes", limits::kMaxReplyBytes, batch.max_reply_bytes);
   for (size_t i = 0; i < batch.blocks.size(); ++i) RETURN_IF_ERROR(BlockCheck(batch.blocks[i], i).run());

@@ -28,6 +28,7 @@ enum class Precision : uint8_t { kExact, kConservative };
 enum class OutsideHistory : uint8_t { kReject, kClamp };
 enum class RayMode : uint8_t { kFirst, kAny, kAll };
 enum class StaticDetail : uint8_t { kInstances, kTriangles, kTrianglesSorted };
+enum class ClipDepth : uint8_t { kZeroToOne, kMinusOneToOne };
 
 // Result columns that a block may request. The values equal those of the protocol's enum Column.
 enum class Column : uint8_t {
@@ -41,8 +42,9 @@ enum class Column : uint8_t {
   kTag = 8,
   kLayers = 9,
   kPose = 10,
+  kOther = 11,
 };
-inline constexpr Column kLastColumn = Column::kPose;
+inline constexpr Column kLastColumn = Column::kOther;
 
 // Set of result columns, one bit each.
 class ColumnSet {
@@ -59,6 +61,15 @@ class ColumnSet {
   uint32_t bits_ = 0;
 };
 
+// Position in the order of rows (t, id, triangle): only rows behind it are returned. Each column has an entry for each
+// query, one for all queries, or none. If `ts` has no entry, all rows are returned. Without ids, rows at t itself are
+// not returned; without triangles, neither are rows of the id at t.
+struct AfterColumns {
+  absl::Span<const float> ts;            // not NaN
+  absl::Span<const uint64_t> ids;        // only with ts
+  absl::Span<const uint32_t> triangles;  // only with ids
+};
+
 struct RayColumns {
   absl::Span<const float> origins;     // N entries x y z, relative to the frame
   absl::Span<const float> directions;  // N entries x y z, or one for all rays; no entry is the zero vector
@@ -66,6 +77,7 @@ struct RayColumns {
   RayMode mode = RayMode::kFirst;
   Cull cull = Cull::kNone;
   Inside inside = Inside::kSolid;
+  AfterColumns after = {};
 };
 
 struct BallColumns {
@@ -105,6 +117,57 @@ struct NearestColumns {
   absl::Span<const float> max_distances;  // maximum distance of a row, >= 0; default: +inf
   uint32_t count = 0;                     // maximum number of rows per query; 0 means 1
   StaticDetail detail = StaticDetail::kInstances;
+  AfterColumns after = {};
+};
+
+// Convex regions, given by planes or by view-projection matrices: exactly one of the two columns has entries.
+struct FrustumColumns {
+  absl::Span<const float> planes;            // planes_each planes nx ny nz d for each region, relative to the frame
+  absl::Span<const float> view_projections;  // 16 numbers for each region, column-major
+  uint32_t planes_each = 0;                  // 4 .. 32; 0 means 6
+  ClipDepth clip_depth = ClipDepth::kZeroToOne;
+  StaticDetail detail = StaticDetail::kInstances;
+
+  size_t planes_per_region() const { return planes_each == 0 ? 6 : planes_each; }
+};
+
+struct ContainsColumns {
+  absl::Span<const float> points;  // N entries x y z, relative to the frame
+};
+
+// Viewers and targets; each viewer is a query.
+struct SightColumns {
+  absl::Span<const float> viewers;           // `eyes` points x y z for each viewer, relative to the frame
+  absl::Span<const uint64_t> viewer_groups;  // default: 0, no group
+  absl::Span<const float> targets;           // `samples` points x y z for each target, relative to the frame
+  absl::Span<const uint64_t> target_groups;  // an entry for each target, one for all targets, or none; default: 0
+  absl::Span<const float> max_distances;     // >= 0; default: +inf
+  uint32_t samples = 0;                      // sample points of each target, 1 .. 255; 0 means 1
+  uint32_t eyes = 0;                         // eyes of each viewer, 1 .. 16; 0 means 1
+  bool pairwise = false;                     // viewer i looks only at target i
+
+  size_t samples_per_target() const { return samples == 0 ? 1 : samples; }
+  size_t eyes_per_viewer() const { return eyes == 0 ? 1 : eyes; }
+  size_t viewer_count() const { return viewers.size() / (3 * eyes_per_viewer()); }
+  size_t target_count() const { return targets.size() / (3 * samples_per_target()); }
+  // Returns the number of result bytes of each viewer.
+  size_t bytes_per_viewer() const { return pairwise ? 1 : target_count(); }
+};
+
+// Pairs of objects within a distance of each other. A block of this kind has one query.
+struct PairColumns {
+  float max_distance = 0;    // inclusive, >= 0; +inf is allowed with count
+  Layers first_mask = 0;     // 0 means all layers
+  Layers second_mask = 0;    // 0 means all layers
+  uint32_t count = 0;        // number of nearest objects of each object; 0: every pair has one row
+  uint64_t after_other = 0;  // with QueryBlock::after_id: only rows behind (after_id, after_other)
+};
+
+// Convex free space around points.
+struct CellColumns {
+  absl::Span<const float> points;         // N entries x y z, relative to the frame
+  absl::Span<const float> max_distances;  // N entries, or one for all points; > 0, at most limits::kMaxCoordinate
+  uint32_t max_planes = 0;                // 1 .. limits::kMaxCellPlanes; 0 means limits::kDefaultCellPlanes
 };
 
 // Lookup by id or by group. Each id has one result row. Each group has a row count, and one result row for each of its
@@ -127,7 +190,11 @@ struct QueryBlock {
   absl::Span<const uint64_t> as_of_ticks;    // tick of each query; default: the snapshot's latest state
   absl::Span<const float> as_of_fractions;   // fraction of the way to the next tick, >= 0 and < 1; default: 0
   OutsideHistory outside = OutsideHistory::kReject;
-  std::variant<RayColumns, BallColumns, BoxColumns, LookupColumns, NearestColumns, CapsuleColumns, SweepColumns> kind;
+  absl::Span<const uint64_t> anchor_ids;  // N ids: positions count from this object or instance, which is not found
+  bool count_only = false;                // only the number of rows of each query is returned
+  using Kind = std::variant<RayColumns, BallColumns, BoxColumns, LookupColumns, NearestColumns, CapsuleColumns,
+                            SweepColumns, FrustumColumns, SightColumns, ContainsColumns, PairColumns, CellColumns>;
+  Kind kind;
 };
 
 // Returns the kind of the block. The value of a BlockKind is the index of its alternative in QueryBlock::kind, as
@@ -142,6 +209,11 @@ static_assert(std::is_same_v<ColumnsOf<BlockKind::kLookup>, LookupColumns>);
 static_assert(std::is_same_v<ColumnsOf<BlockKind::kNearest>, NearestColumns>);
 static_assert(std::is_same_v<ColumnsOf<BlockKind::kCapsule>, CapsuleColumns>);
 static_assert(std::is_same_v<ColumnsOf<BlockKind::kSweep>, SweepColumns>);
+static_assert(std::is_same_v<ColumnsOf<BlockKind::kFrustum>, FrustumColumns>);
+static_assert(std::is_same_v<ColumnsOf<BlockKind::kSight>, SightColumns>);
+static_assert(std::is_same_v<ColumnsOf<BlockKind::kContains>, ContainsColumns>);
+static_assert(std::is_same_v<ColumnsOf<BlockKind::kPairs>, PairColumns>);
+static_assert(std::is_same_v<ColumnsOf<BlockKind::kCell>, CellColumns>);
 static_assert(std::variant_size_v<decltype(QueryBlock::kind)> == kBlockKinds);
 
 struct QueryBatch {

@@ -9,6 +9,12 @@
 namespace locus::server {
 namespace {
 
+// Kinds of queries that are in the protocol but not served yet are false.
+struct Served {
+  bool frustums = false, sight = false, contains = false, pairs = false, cells = false;
+};
+constexpr Served kServed;
+
 // Tables from the number of a protocol enum to the core's value; number 0 maps to the default.
 constexpr std::array kSources = {Source::kBoth, Source::kBoth, Source::kStatic, Source::kDynamic};
 constexpr std::array kPrecisions = {Precision::kExact, Precision::kExact, Precision::kConservative};
@@ -17,15 +23,16 @@ constexpr std::array kCulls = {Cull::kNone, Cull::kNone, Cull::kBack, Cull::kFro
 constexpr std::array kInsides = {Inside::kSolid, Inside::kSolid, Inside::kHollow, Inside::kSkip};
 constexpr std::array kOutsides = {OutsideHistory::kReject, OutsideHistory::kReject, OutsideHistory::kClamp};
 constexpr std::array kAtStarts = {AtStart::kHit, AtStart::kHit, AtStart::kApproach, AtStart::kPass};
+constexpr std::array kClipDepths = {ClipDepth::kZeroToOne, ClipDepth::kZeroToOne, ClipDepth::kMinusOneToOne};
 constexpr std::array kDetails = {StaticDetail::kInstances, StaticDetail::kInstances, StaticDetail::kTriangles,
                                  StaticDetail::kTrianglesSorted};
 
 static_assert(kSources.size() == v1::Source_ARRAYSIZE && kPrecisions.size() == v1::Precision_ARRAYSIZE);
 static_assert(kRayModes.size() == v1::RayMode_ARRAYSIZE && kCulls.size() == v1::Cull_ARRAYSIZE);
 static_assert(kOutsides.size() == v1::OutsideHistory_ARRAYSIZE);
-static_assert(kAtStarts.size() == v1::AtStart_ARRAYSIZE);
+static_assert(kAtStarts.size() == v1::AtStart_ARRAYSIZE && kClipDepths.size() == v1::ClipDepth_ARRAYSIZE);
 static_assert(kInsides.size() == v1::Inside_ARRAYSIZE && kDetails.size() == v1::StaticDetail_ARRAYSIZE);
-static_assert(static_cast<int>(kLastColumn) == v1::COLUMN_POSE && v1::Column_ARRAYSIZE == v1::COLUMN_POSE + 1);
+static_assert(static_cast<int>(kLastColumn) == v1::COLUMN_OTHER && v1::Column_ARRAYSIZE == v1::COLUMN_OTHER + 1);
 
 template <class T, size_t kCount>
 absl::Status read_enum(int number, const std::array<T, kCount>& values, absl::string_view field, T* out) {
@@ -34,11 +41,18 @@ absl::Status read_enum(int number, const std::array<T, kCount>& values, absl::st
   return absl::OkStatus();
 }
 
+// Returns the position of rays or nearest queries in the order of rows.
+template <class Kind>
+AfterColumns after_of(const Kind& kind) {
+  return {span_of(kind.after_ts()), span_of(kind.after_ids()), span_of(kind.after_triangles())};
+}
+
 absl::Status read_kind(const v1::Rays& rays, const std::string& field, QueryBlock* out) {
   RayColumns columns;
   columns.origins = span_of(rays.origins());
   columns.directions = span_of(rays.directions());
   columns.t_max = span_of(rays.t_max());
+  columns.after = after_of(rays);
   absl::Status status = read_enum(rays.mode(), kRayModes, field + ".rays.mode", &columns.mode);
   if (status.ok()) status = read_enum(rays.cull(), kCulls, field + ".rays.cull", &columns.cull);
   if (status.ok()) status = read_enum(rays.inside(), kInsides, field + ".rays.inside", &columns.inside);
@@ -94,9 +108,52 @@ absl::Status read_kind(const v1::Nearest& nearest, const std::string& field, Que
   columns.points = span_of(nearest.points());
   columns.max_distances = span_of(nearest.max_distances());
   columns.count = nearest.k();
+  columns.after = after_of(nearest);
   const absl::Status status = read_enum(nearest.detail(), kDetails, field + ".nearest.detail", &columns.detail);
   out->kind = columns;
   return status;
+}
+
+absl::Status read_kind(const v1::Frustums& frustums, const std::string& field, QueryBlock* out) {
+  FrustumColumns columns;
+  columns.planes = span_of(frustums.planes());
+  columns.view_projections = span_of(frustums.view_projections());
+  columns.planes_each = frustums.planes_each();
+  absl::Status status =
+      read_enum(frustums.clip_depth(), kClipDepths, field + ".frustums.clip_depth", &columns.clip_depth);
+  if (status.ok()) status = read_enum(frustums.detail(), kDetails, field + ".frustums.detail", &columns.detail);
+  out->kind = columns;
+  return status;
+}
+
+absl::Status read_kind(const v1::Sight& sight, QueryBlock* out) {
+  SightColumns columns;
+  columns.viewers = span_of(sight.viewers());
+  columns.viewer_groups = span_of(sight.viewer_groups());
+  columns.targets = span_of(sight.targets());
+  columns.target_groups = span_of(sight.target_groups());
+  columns.max_distances = span_of(sight.max_distances());
+  columns.samples = sight.samples_per_target();
+  columns.eyes = sight.eyes_per_viewer();
+  columns.pairwise = sight.pairwise();
+  out->kind = columns;
+  return absl::OkStatus();
+}
+
+absl::Status read_kind(const v1::Contains& contains, QueryBlock* out) {
+  out->kind = ContainsColumns{span_of(contains.points())};
+  return absl::OkStatus();
+}
+
+absl::Status read_kind(const v1::Pairs& pairs, QueryBlock* out) {
+  out->kind =
+      PairColumns{pairs.max_distance(), pairs.first_mask(), pairs.second_mask(), pairs.k(), pairs.after_other()};
+  return absl::OkStatus();
+}
+
+absl::Status read_kind(const v1::Cells& cells, QueryBlock* out) {
+  out->kind = CellColumns{span_of(cells.points()), span_of(cells.max_distances()), cells.max_planes()};
+  return absl::OkStatus();
 }
 
 absl::Status read_kind(const v1::Lookup& lookup, const std::string& field, QueryBlock* out) {
@@ -119,13 +176,24 @@ absl::Status read_kind(const v1::QueryBlock& block, const std::string& field, Qu
     case v1::QueryBlock::kCapsules:
       return read_kind(block.capsules(), field, out);
     case v1::QueryBlock::kFrustums:
-      return not_served(field + ".frustums");
+      if (!kServed.frustums) return not_served(field + ".frustums");
+      return read_kind(block.frustums(), field, out);
     case v1::QueryBlock::kSweeps:
       return read_kind(block.sweeps(), field, out);
     case v1::QueryBlock::kNearest:
       return read_kind(block.nearest(), field, out);
     case v1::QueryBlock::kSight:
-      return not_served(field + ".sight");
+      if (!kServed.sight) return not_served(field + ".sight");
+      return read_kind(block.sight(), out);
+    case v1::QueryBlock::kContains:
+      if (!kServed.contains) return not_served(field + ".contains");
+      return read_kind(block.contains(), out);
+    case v1::QueryBlock::kPairs:
+      if (!kServed.pairs) return not_served(field + ".pairs");
+      return read_kind(block.pairs(), out);
+    case v1::QueryBlock::kCells:
+      if (!kServed.cells) return not_served(field + ".cells");
+      return read_kind(block.cells(), out);
     case v1::QueryBlock::KIND_NOT_SET:
       break;
   }
@@ -157,6 +225,8 @@ absl::Status read_block(const v1::QueryBlock& block, const std::string& field, Q
   out->ignore_ids = span_of(block.ignore_ids());
   out->max_results = block.max_results();
   out->after_id = block.after_id();
+  out->anchor_ids = span_of(block.anchor_ids());
+  out->count_only = block.count_only();
   return read_columns(block, field, &out->columns);
 }
 

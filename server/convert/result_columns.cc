@@ -23,7 +23,8 @@ constexpr auto kFields = std::make_tuple([](v1::BlockResult& to) { return to.mut
                                          [](v1::BlockResult& to) { return to.mutable_tags(); },       //
                                          [](v1::BlockResult& to) { return to.mutable_layers(); },     //
                                          [](v1::BlockResult& to) { return to.mutable_positions(); },  //
-                                         [](v1::BlockResult& to) { return to.mutable_rotations(); });
+                                         [](v1::BlockResult& to) { return to.mutable_rotations(); },  //
+                                         [](v1::BlockResult& to) { return to.mutable_others(); });
 static_assert(std::tuple_size_v<decltype(kFields)> == std::tuple_size_v<decltype(kColumnArrays)>);
 
 // Calls visit(array, field) for each array of a result and the protocol's field for it.
@@ -59,6 +60,12 @@ char* ResultColumns::add_hits(size_t number, size_t queries) {
   return hits.data() + (hits.size() - queries);
 }
 
+char* ResultColumns::add_matrix(size_t number, size_t bytes) {
+  std::string& matrix = *block(number).mutable_sight();
+  matrix.resize(matrix.size() + bytes);
+  return matrix.data() + (matrix.size() - bytes);
+}
+
 uint32_t* ResultColumns::add_counts(size_t number, size_t queries) {
   return grow(*block(number).mutable_counts(), queries);
 }
@@ -74,6 +81,10 @@ TimeSpans ResultColumns::add_times(size_t number, size_t queries) {
 
 uint32_t* ResultColumns::add_clamped(size_t number, size_t queries) {
   return grow(*block(number).mutable_clamped(), queries);
+}
+
+uint32_t* ResultColumns::add_unanchored(size_t number, size_t queries) {
+  return grow(*block(number).mutable_unanchored(), queries);
 }
 
 }  // namespace locus::server

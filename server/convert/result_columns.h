@@ -16,10 +16,12 @@ class ResultColumns final : public AnswerSink {
 
   RowSpans add_rows(size_t block, ColumnSet columns, size_t rows) override;
   char* add_hits(size_t block, size_t queries) override;
+  char* add_matrix(size_t block, size_t bytes) override;
   uint32_t* add_counts(size_t block, size_t queries) override;
   uint32_t* add_truncated(size_t block, size_t queries) override;
   TimeSpans add_times(size_t block, size_t queries) override;
   uint32_t* add_clamped(size_t block, size_t queries) override;
+  uint32_t* add_unanchored(size_t block, size_t queries) override;
 
  private:
   v1::BlockResult& block(size_t index) { return *result_.mutable_blocks(static_cast<int>(index)); }

@@ -13,7 +13,9 @@ namespace {
 constexpr double kBlockNanoseconds = 500;
 // Estimated nanoseconds of a query before the first measurement, indexed by CostKind. Measured on scenes of 100,000
 // triangles and 10,000 objects.
-constexpr std::array<double, 10> kFirstGuess = {300, 200, 1000, 1000, 1000, 2000, 100, 20'000, 5000, 2000};
+constexpr std::array<double, 15> kFirstGuess = {300,  200,  1000, 1000, 1000, 2000,       100,   20'000,
+                                                5000, 2000, 5000, 200,  1000, 50'000'000, 20'000};
+static_assert(kFirstGuess.size() == static_cast<size_t>(CostKind::kCell) + 1);
 constexpr double kMin = 1, kMax = 1e12;
 constexpr size_t kProbes = 8;
 // A measurement of n queries has the weight n / kForgetQueries in the new estimate, clamped to kMinWeight ..
@@ -36,6 +38,11 @@ struct KindOf {
   CostKind operator()(const BoxColumns&) const { return CostKind::kBox; }
   CostKind operator()(const CapsuleColumns&) const { return CostKind::kCapsule; }
   CostKind operator()(const SweepColumns&) const { return CostKind::kSweep; }
+  CostKind operator()(const FrustumColumns&) const { return CostKind::kFrustum; }
+  CostKind operator()(const SightColumns&) const { return CostKind::kSight; }
+  CostKind operator()(const ContainsColumns&) const { return CostKind::kContains; }
+  CostKind operator()(const PairColumns&) const { return CostKind::kPairs; }
+  CostKind operator()(const CellColumns&) const { return CostKind::kCell; }
   CostKind operator()(const NearestColumns&) const { return CostKind::kNearest; }
   CostKind operator()(const LookupColumns& lookup) const {
     return lookup.groups.empty() ? CostKind::kLookup : CostKind::kLookupGroups;

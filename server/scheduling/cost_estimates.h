@@ -26,7 +26,12 @@ enum class CostKind : uint8_t {
   kLookup,
   kLookupGroups,
   kCapsule,
-  kSweep
+  kSweep,
+  kFrustum,
+  kSight,
+  kContains,
+  kPairs,
+  kCell
 };
 CostKind cost_kind(const QueryBlock& block);
 

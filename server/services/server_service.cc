@@ -94,6 +94,12 @@ std::vector<NamedLimit> limits_of(const Host& host) {
       {"nearest", limits::kMaxNearest},
       {"objects", limits::kMaxObjects},
       {"page_size", limits::kMaxPageSize},
+      {"pair_neighbours", limits::kMaxPairNeighbours},
+      {"cell_planes", limits::kMaxCellPlanes},
+      {"planes", limits::kMaxPlanes},
+      {"sight_eyes", limits::kMaxSightEyes},
+      {"sight_samples", limits::kMaxSightSamples},
+      {"sight_segments", limits::kMaxSightSegments},
       {"pending_changes", limits::kMaxPendingChanges},
       {"pinned_bytes",
        static_cast<double>(host.config.pinned_limit != 0 ? host.config.pinned_limit : limits::kPinnedBytes)},
@@ -122,8 +128,8 @@ void get_server(Host& host, v1::GetServerResponse& response) {
   response.set_version(kVersion);
   response.set_instruction_set(std::string(instruction_set()));
   for (const absl::string_view feature :
-       {"as_of", "backup", "balls", "boxes", "capsules", "download_mesh", "durability_local", "history", "latest_wins",
-        "lookup", "nearest", "rays", "static_from", "sweeps"})
+       {"after_t", "anchors", "as_of", "backup", "balls", "boxes", "capsules", "count_only", "download_mesh",
+        "durability_local", "history", "latest_wins", "lookup", "nearest", "rays", "static_from", "sweeps"})
     if (serves(host, feature)) response.add_features(std::string(feature));
   for (const NamedLimit& limit : limits_of(host)) {
     v1::Limit* out = response.add_limits();

@@ -45,14 +45,7 @@ std::vector<OwnedBlock> lengthened(const std::vector<OwnedBlock>& blocks, size_t
       const auto once = column;
       for (size_t i = 1; i < times; ++i) column.insert(column.end(), once.begin(), once.end());
     };
-    repeat(block.points, 3);
-    repeat(block.sizes, std::holds_alternative<BallColumns>(block.settings.kind) ? 1 : 3);
-    repeat(block.extras, std::holds_alternative<BoxColumns>(block.settings.kind) ? 4 : 1);
-    repeat(block.half_axes, 3);
-    repeat(block.half_extents, 3);
-    repeat(block.rotations, 4);
-    for (auto* column : {&block.ids, &block.groups, &block.ignore_groups}) repeat(*column, 1);
-    repeat(block.masks, 1);
+    block.for_each_column(repeat);
   }
   return result;
 }
@@ -102,8 +95,11 @@ TEST(QueryDeterminismTest, AFullReplyIsTruncatedAtTheSameRowForAnyNumberOfThread
 void append(const BlockResult& part, size_t first_query, BlockResult& whole) {
   const auto add = [](const auto& from, auto& to) { to.insert(to.end(), from.begin(), from.end()); };
   for (const uint32_t query : part.truncated) whole.truncated.push_back(query + static_cast<uint32_t>(first_query));
+  for (const uint32_t query : part.unanchored) whole.unanchored.push_back(query + static_cast<uint32_t>(first_query));
   add(part.counts, whole.counts);
   add(part.hits, whole.hits);
+  add(part.matrix, whole.matrix);
+  add(part.others, whole.others);
   add(part.t, whole.t);
   add(part.ids, whole.ids);
   add(part.triangles, whole.triangles);

@@ -16,17 +16,24 @@ namespace locus::test {
 // columns are used.
 struct OwnedBlock {
   QueryBlock settings;
-  // Origins of rays, centres of balls and boxes, starts of capsules and sweeps, or points of nearest.
+  // Origins of rays, centres of balls and boxes, starts of capsules and sweeps, points of nearest, contains and cells,
+  // eyes of sight, or planes of frustums.
   std::vector<float> points;
-  // Directions of rays, radii of balls, half extents of boxes, or ends of capsules and sweeps.
+  // Directions of rays, radii of balls, half extents of boxes, ends of capsules and sweeps, or targets of sight.
   std::vector<float> sizes;
-  // t_max of rays, rotations of boxes, radii of capsules and sweeps, or maximum distances of nearest.
+  // t_max of rays, rotations of boxes, radii of capsules and sweeps, maximum distances of nearest, cells and sight, or
+  // matrices of frustums.
   std::vector<float> extras;
-  std::vector<float> half_axes;     // sweeps
-  std::vector<float> half_extents;  // sweeps
-  std::vector<float> rotations;     // sweeps
-  std::vector<uint64_t> ids;        // ids of lookups
-  std::vector<uint64_t> groups;
+  std::vector<float> half_axes;         // sweeps
+  std::vector<float> half_extents;      // sweeps
+  std::vector<float> rotations;         // sweeps
+  std::vector<uint64_t> ids;            // ids of lookups
+  std::vector<uint64_t> groups;         // groups of lookups, or of the viewers of sight
+  std::vector<uint64_t> target_groups;  // sight
+  std::vector<float> after_ts;          // rays and nearest
+  std::vector<uint64_t> after_ids;
+  std::vector<uint32_t> after_triangles;
+  std::vector<uint64_t> anchor_ids;
   std::vector<uint32_t> masks;
   std::vector<uint64_t> ignore_groups;
   std::vector<uint64_t> ignore_ids;
@@ -39,6 +46,7 @@ struct OwnedBlock {
     block.masks = masks;
     block.ignore_groups = ignore_groups;
     block.ignore_ids = ignore_ids;
+    block.anchor_ids = anchor_ids;
     block.as_of_ticks = as_of_ticks;
     block.as_of_fractions = as_of_fractions;
     std::visit([this](auto& kind) { fill(kind); }, block.kind);
@@ -48,22 +56,36 @@ struct OwnedBlock {
   // Returns a block of the queries `begin` to `end` - 1. Columns with one entry for all queries are copied unchanged.
   OwnedBlock part(size_t begin, size_t end) const {
     const size_t n = query_count(view());
-    const auto width_of_sizes = std::holds_alternative<BallColumns>(settings.kind) ? size_t{1} : size_t{3};
-    const auto width_of_extras = std::holds_alternative<BoxColumns>(settings.kind) ? size_t{4} : size_t{1};
     OwnedBlock part = *this;
-    cut(part.points, 3, n, begin, end);
-    cut(part.sizes, width_of_sizes, n, begin, end);
-    cut(part.extras, width_of_extras, n, begin, end);
-    cut(part.half_axes, 3, n, begin, end);
-    cut(part.half_extents, 3, n, begin, end);
-    cut(part.rotations, 4, n, begin, end);
-    cut(part.ids, 1, n, begin, end);
-    cut(part.groups, 1, n, begin, end);
-    cut(part.masks, 1, n, begin, end);
-    cut(part.ignore_groups, 1, n, begin, end);
-    cut(part.as_of_ticks, 1, n, begin, end);
-    cut(part.as_of_fractions, 1, n, begin, end);
+    part.for_each_column([&](auto& column, size_t width) {
+      if (column.size() != n * width || n == 1) return;
+      column = {column.begin() + static_cast<std::ptrdiff_t>(begin * width),
+                column.begin() + static_cast<std::ptrdiff_t>(end * width)};
+    });
     return part;
+  }
+
+  // Calls visit(column, width) for each column with `width` values for each query.
+  template <class Visit>
+  void for_each_column(const Visit& visit) {
+    const QueryBlock::Kind& kind = settings.kind;
+    const auto* const frustums = std::get_if<FrustumColumns>(&kind);
+    const auto* const sight = std::get_if<SightColumns>(&kind);
+    const size_t points_each = sight == nullptr ? 1 : sight->eyes_per_viewer();
+    visit(points, frustums == nullptr ? 3 * points_each : 4 * frustums->planes_per_region());
+    if (sight == nullptr) {
+      visit(sizes, std::holds_alternative<BallColumns>(kind) ? 1 : 3);
+    } else if (sight->pairwise) {
+      visit(sizes, 3 * sight->samples_per_target());
+      visit(target_groups, 1);
+    }
+    visit(extras, std::holds_alternative<BoxColumns>(kind) ? 4 : frustums == nullptr ? 1 : 16);
+    visit(half_axes, 3);
+    visit(half_extents, 3);
+    visit(rotations, 4);
+    for (auto* column : {&ids, &groups, &after_ids, &anchor_ids, &ignore_groups, &as_of_ticks}) visit(*column, 1);
+    for (auto* column : {&after_triangles, &masks}) visit(*column, 1);
+    for (auto* column : {&after_ts, &as_of_fractions}) visit(*column, 1);
   }
 
  private:
@@ -71,6 +93,7 @@ struct OwnedBlock {
     rays.origins = points;
     rays.directions = sizes;
     rays.t_max = extras;
+    rays.after = {after_ts, after_ids, after_triangles};
   }
   void fill(BallColumns& balls) const {
     balls.centers = points;
@@ -97,16 +120,28 @@ struct OwnedBlock {
   void fill(NearestColumns& nearest) const {
     nearest.points = points;
     nearest.max_distances = extras;
+    nearest.after = {after_ts, after_ids, after_triangles};
+  }
+  void fill(FrustumColumns& frustums) const {
+    frustums.planes = points;
+    frustums.view_projections = extras;
+  }
+  void fill(SightColumns& sight) const {
+    sight.viewers = points;
+    sight.viewer_groups = groups;
+    sight.targets = sizes;
+    sight.target_groups = target_groups;
+    sight.max_distances = extras;
+  }
+  void fill(ContainsColumns& contains) const { contains.points = points; }
+  void fill(PairColumns& /*pairs*/) const {}
+  void fill(CellColumns& cells) const {
+    cells.points = points;
+    cells.max_distances = extras;
   }
   void fill(LookupColumns& lookup) const {
     lookup.ids = ids;
     lookup.groups = groups;
-  }
-  template <class T>
-  static void cut(std::vector<T>& column, size_t width, size_t n, size_t begin, size_t end) {
-    if (column.size() != n * width || n == 1) return;
-    column = std::vector<T>(column.begin() + static_cast<std::ptrdiff_t>(begin * width),
-                            column.begin() + static_cast<std::ptrdiff_t>(end * width));
   }
 };
 
@@ -147,20 +182,26 @@ std::string column_difference(const char* name, const Column& got, const Column&
 // not compare the work.
 inline std::string difference(const BlockResult& got, const BlockResult& expected) {
   using internal::column_difference;
-  for (std::string what :
-       {column_difference("counts", got.counts, expected.counts),
-        column_difference("truncated", got.truncated, expected.truncated),
-        column_difference("hits", got.hits, expected.hits), column_difference("ids", got.ids, expected.ids),
-        column_difference("triangles", got.triangles, expected.triangles), column_difference("t", got.t, expected.t),
-        column_difference("uvs", got.uvs, expected.uvs), column_difference("normals", got.normals, expected.normals),
-        column_difference("points", got.points, expected.points),
-        column_difference("groups", got.groups, expected.groups), column_difference("tags", got.tags, expected.tags),
-        column_difference("layers", got.layers, expected.layers),
-        column_difference("positions", got.positions, expected.positions),
-        column_difference("rotations", got.rotations, expected.rotations),
-        column_difference("resolved_ticks", got.resolved_ticks, expected.resolved_ticks),
-        column_difference("resolved_fractions", got.resolved_fractions, expected.resolved_fractions),
-        column_difference("clamped", got.clamped, expected.clamped)}) {
+  for (std::string what : {column_difference("counts", got.counts, expected.counts),
+                           column_difference("truncated", got.truncated, expected.truncated),
+                           column_difference("hits", got.hits, expected.hits),
+                           column_difference("matrix", got.matrix, expected.matrix),
+                           column_difference("others", got.others, expected.others),
+                           column_difference("unanchored", got.unanchored, expected.unanchored),
+                           column_difference("ids", got.ids, expected.ids),
+                           column_difference("triangles", got.triangles, expected.triangles),
+                           column_difference("t", got.t, expected.t),
+                           column_difference("uvs", got.uvs, expected.uvs),
+                           column_difference("normals", got.normals, expected.normals),
+                           column_difference("points", got.points, expected.points),
+                           column_difference("groups", got.groups, expected.groups),
+                           column_difference("tags", got.tags, expected.tags),
+                           column_difference("layers", got.layers, expected.layers),
+                           column_difference("positions", got.positions, expected.positions),
+                           column_difference("rotations", got.rotations, expected.rotations),
+                           column_difference("resolved_ticks", got.resolved_ticks, expected.resolved_ticks),
+                           column_difference("resolved_fractions", got.resolved_fractions, expected.resolved_fractions),
+                           column_difference("clamped", got.clamped, expected.clamped)}) {
     if (!what.empty()) return what;
   }
   return "";

@@ -14,50 +14,44 @@
 #include "core/geometry/sweep.h"
 #include "core/geometry/swept_bounds.h"
 #include "core/query/kinds/placed_triangle.h"
-#include "tests/support/run_batch.h"
+#include "tests/support/oracle_cell.h"
+#include "tests/support/oracle_contains.h"
+#include "tests/support/oracle_frustum.h"
+#include "tests/support/oracle_pairs.h"
+#include "tests/support/oracle_scene.h"
+#include "tests/support/oracle_sight.h"
 
 namespace locus::test {
 
-class QueryOracle {
+class QueryOracle : public OracleScene {
  public:
-  explicit QueryOracle(const SceneSnapshot& snapshot) : clockwise_(snapshot.winding == Winding::kClockwise) {
-    for (const Instance& instance : snapshot.statics->tree().values()) {
-      instances_.push_back(&instance);
-      std::vector<uint32_t>& storage = storage_[instance.mesh.get()];
-      if (!storage.empty()) continue;
-      storage.resize(instance.mesh->tree().size());
-      uint32_t position = 0;
-      instance.mesh->tree().for_each([&](const Triangle& triangle) { storage[triangle.number] = position++; });
-    }
-    snapshot.objects.for_each([this](const Object& object) { objects_.push_back(object); });
-  }
-  // Makes an oracle that uses `objects`, the objects of another time, instead of the objects of the snapshot.
-  QueryOracle(const SceneSnapshot& snapshot, std::vector<Object> objects) : QueryOracle(snapshot) {
-    objects_ = std::move(objects);
-  }
+  using OracleScene::OracleScene;
 
   // Answers a block without a limit on the size of the reply.
   BlockResult answer(const QueryBlock& block) const {
-    BlockResult result;
-    std::visit([&](const auto& kind) { answer_kind(block, kind, result); }, block.kind);
+    BlockResult result = block.count_only ? counts_of(block) : rows_of(block);
+    for (size_t i = 0; i < block.anchor_ids.size(); ++i)
+      if (is_unanchored(block, i)) result.unanchored.push_back(static_cast<uint32_t>(i));
     return result;
   }
 
  private:
-  static constexpr float kInfinity = std::numeric_limits<float>::infinity();
-
-  struct Row {
-    float t = 0;
-    Id id = 0;
-    uint32_t triangle = kNoTriangle;
-    uint32_t storage = 0;
-    const Object* object = nullptr;
-    const Instance* instance = nullptr;
-    float u = 0, v = 0;
-    Vec3d normal;  // nearest queries: vector to the nearest point
-    Vec3d place;   // sweeps only: point of contact, relative to the start
-  };
-  using Rows = std::vector<Row>;
+  BlockResult rows_of(const QueryBlock& block) const {
+    BlockResult result;
+    std::visit([&](const auto& kind) { answer_kind(block, kind, result); }, block.kind);
+    return result;
+  }
+  // Returns only the counts of the rows that there would be without any limit.
+  BlockResult counts_of(QueryBlock block) const {
+    block.count_only = false;
+    block.max_results = std::numeric_limits<uint32_t>::max();
+    block.columns = {Column::kId};
+    if (auto* const nearest = std::get_if<NearestColumns>(&block.kind))
+      nearest->count = std::numeric_limits<uint32_t>::max();
+    BlockResult counts;
+    counts.counts = rows_of(block).counts;
+    return counts;
+  }
 
   struct Question {  // a ray query
     Vec3d origin, direction;
@@ -66,34 +60,6 @@ class QueryOracle {
     Inside inside;
     bool conservative;
   };
-
-  static float entry_of(double near) {
-    return near <= 0 ? 0.0f
-                     : static_cast<float>(std::min(near, static_cast<double>(std::numeric_limits<float>::max())));
-  }
-
-  static std::optional<float> entry_of(const SlabRay<double>& slabs, const Aabbd& bounds) {
-    const Interval<double> own = slabs.interval(bounds);
-    if (own.near <= own.far && own.far >= 0) return entry_of(own.near);
-    return std::nullopt;
-  }
-
-  static Vec3d point(const QueryBlock& block, absl::Span<const float> column, size_t i) {
-    return block.frame + Vec3d{column[3 * i], column[3 * i + 1], column[3 * i + 2]};
-  }
-  template <class T>
-  static T entry_for(absl::Span<const T> column, size_t i, T fallback) {
-    return column.empty() ? fallback : column[column.size() == 1 ? 0 : i];
-  }
-
-  template <class Item>
-  static bool wanted(const QueryBlock& block, size_t i, const Item& item) {
-    const uint32_t mask = entry_for(block.masks, i, 0xFFFFFFFFu);
-    const uint64_t group = entry_for(block.ignore_groups, i, uint64_t{0});
-    for (const uint64_t id : block.ignore_ids)
-      if (id == item.id) return false;
-    return (item.layers & mask) > 0 && (group == 0 || group != item.group);
-  }
 
   void hits_on(const Instance& instance, const Question& question, Rows& rows) const {
     const SlabRay<double> slabs(Rayd{question.origin, question.direction}, kInstancePad);
@@ -168,6 +134,7 @@ class QueryOracle {
       for (const Object& object : objects_)
         if (wanted(block, i, object)) hit_on(object, question, rows);
     std::erase_if(rows, [&](const Row& row) { return row.t > question.t_max; });
+    keep_behind(std::get<RayColumns>(block.kind).after, i, rows);
     std::sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) {
       return std::tie(a.t, a.id, a.triangle) < std::tie(b.t, b.id, b.triangle);
     });
@@ -297,6 +264,12 @@ class QueryOracle {
     }
   }
 
+  // Kinds with an oracle in a file of its own.
+  template <class Columns>
+  void answer_kind(const QueryBlock& block, const Columns& columns, BlockResult& result) const {
+    answer_block(*this, block, columns, result);
+  }
+
   static bool meets(const Balld& ball, const Aabbd& bounds) { return reaches(ball, bounds); }
   static bool meets(const Obbd& box, const Aabbd& bounds) { return overlaps(bounds_of(box), bounds); }
   static bool meets(const Balld& ball, const Shape& shape) { return ball_overlaps(ball, shape); }
@@ -394,7 +367,7 @@ class QueryOracle {
   void answer_kind(const QueryBlock& block, const CapsuleColumns& capsules, BlockResult& result) const {
     for (size_t i = 0; i < capsules.starts.size() / 3; ++i) {
       const Vec3d start = point(block, capsules.starts, i);
-      const Vec3d end = point(block, capsules.ends, capsules.ends.size() == 3 ? 0 : i);
+      const Vec3d end = point(block, capsules.ends, i);
       const Capsule capsule{(start + end) * 0.5, (end - start) * 0.5, entry_for(capsules.radii, i, 0.0f)};
       answer_overlap(block, capsules.detail, capsule, i, result);
     }
@@ -473,6 +446,7 @@ class QueryOracle {
         if (block.source != Source::kStatic && wanted(block, i, object)) near_row(from, object, conservative, rows);
       const float farthest = entry_for(nearest.max_distances, i, std::numeric_limits<float>::infinity());
       std::erase_if(rows, [&](const Row& row) { return row.t > farthest; });
+      keep_behind(nearest.after, i, rows);
       std::sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) {
         return std::tie(a.t, a.id, a.triangle) < std::tie(b.t, b.id, b.triangle);
       });
@@ -486,63 +460,6 @@ class QueryOracle {
     }
   }
 
-  static void count(const QueryBlock& block, Rows& rows, size_t i, BlockResult& result) {
-    const size_t most = block.max_results == 0 ? 1024 : block.max_results;
-    if (rows.size() > most) {
-      rows.resize(most);
-      result.truncated.push_back(static_cast<uint32_t>(i));
-    }
-    result.counts.push_back(static_cast<uint32_t>(rows.size()));
-  }
-
-  struct Defaults {
-    ColumnSet operator()(const RayColumns&) const { return {Column::kT, Column::kId, Column::kTriangle}; }
-    ColumnSet operator()(const SweepColumns&) const { return {Column::kT, Column::kId, Column::kTriangle}; }
-    ColumnSet operator()(const BallColumns& balls) const { return of(balls.detail); }
-    ColumnSet operator()(const BoxColumns& boxes) const { return of(boxes.detail); }
-    ColumnSet operator()(const CapsuleColumns& capsules) const { return of(capsules.detail); }
-    ColumnSet operator()(const LookupColumns&) const { return {Column::kId, Column::kPose}; }
-    ColumnSet operator()(const NearestColumns&) const { return {Column::kT, Column::kId, Column::kTriangle}; }
-    static ColumnSet of(StaticDetail detail) {
-      return detail == StaticDetail::kInstances ? ColumnSet{Column::kId} : ColumnSet{Column::kId, Column::kTriangle};
-    }
-  };
-  static ColumnSet columns_of(const QueryBlock& block) {
-    return block.columns.empty() ? std::visit(Defaults(), block.kind) : block.columns;
-  }
-
-  template <class Item>
-  static void write_labels(const Item& item, ColumnSet columns, BlockResult& result) {
-    if (columns.has(Column::kGroup)) result.groups.push_back(item.group);
-    if (columns.has(Column::kTag)) result.tags.push_back(item.tag);
-    if (columns.has(Column::kLayers)) result.layers.push_back(item.layers);
-  }
-
-  static void write(const Row& row, const QueryBlock& block, BlockResult& result) {
-    const ColumnSet columns = columns_of(block);
-    if (columns.has(Column::kT)) result.t.push_back(row.t);
-    if (columns.has(Column::kId)) result.ids.push_back(row.id);
-    if (columns.has(Column::kTriangle)) result.triangles.push_back(row.triangle);
-    Vec3d position;
-    Quaternion rotation{0, 0, 0, 0};
-    if (row.object != nullptr) {
-      write_labels(*row.object, columns, result);
-      position = row.object->shape.position;
-      rotation = row.object->shape.rotation;
-    } else if (row.instance != nullptr) {
-      write_labels(*row.instance, columns, result);
-      position = row.instance->transform.translation;
-      rotation = row.instance->transform.quaternion;
-    } else {
-      Object nothing;
-      nothing.layers = 0;
-      write_labels(nothing, columns, result);
-    }
-    if (!columns.has(Column::kPose)) return;
-    result.positions.insert(result.positions.end(), {position.x, position.y, position.z});
-    result.rotations.insert(result.rotations.end(), {rotation.x, rotation.y, rotation.z, rotation.w});
-  }
-
   static void write_surface(const Row& row, const QueryBlock& block, const Question& question, BlockResult& result) {
     const ColumnSet columns = columns_of(block);
     if (columns.has(Column::kUv)) result.uvs.insert(result.uvs.end(), {row.u, row.v});
@@ -551,13 +468,6 @@ class QueryOracle {
     const Vec3d place = question.origin - block.frame + question.direction * double{row.t};
     write_vector(row.id == 0 ? Vec3f{} : to_float(place), result.points);
   }
-
-  static void write_vector(Vec3f v, std::vector<float>& column) { column.insert(column.end(), {v.x, v.y, v.z}); }
-
-  const bool clockwise_;
-  std::vector<const Instance*> instances_;
-  std::vector<Object> objects_;
-  std::map<const StaticMesh*, std::vector<uint32_t>> storage_;
 };
 
 }  // namespace locus::test

@@ -112,6 +112,23 @@ inline void append_point(OwnedBlock& block, Vec3d world) {
   append(block.points, offset);
 }
 
+// Gives the queries of some blocks anchors: objects and instances of the scene, and ids that may be unknown. The
+// positions of the queries become offsets from there.
+inline void add_anchors(const QueryScene& scene, Random& random, OwnedBlock& block) {
+  const BlockKind kind = block_kind(block.settings);
+  const size_t n = query_count(block.view());
+  if (n == 0 || kind == BlockKind::kLookup || kind == BlockKind::kPairs || random.chance(0.85)) return;
+  for (size_t i = 0; i < n; ++i) {
+    Id id = 1 + random.below(30);
+    if (!scene.world.objects.empty() && random.chance(0.7)) id = random.pick(scene.world.objects).id;
+    if (!scene.world.instances.empty() && random.chance(0.2)) id = random.pick(scene.world.instances).id;
+    block.anchor_ids.push_back(id);
+  }
+  QueryBatch batch;
+  batch.blocks = {block.view()};
+  if (!check_batch(batch).ok()) block.anchor_ids.clear();  // offsets from a frame may exceed those from an anchor
+}
+
 inline void add_common(const QueryScene& scene, Random& random, OwnedBlock& block) {
   const size_t n = block.points.size() / 3;
   QueryBlock& settings = block.settings;
@@ -126,6 +143,21 @@ inline void add_common(const QueryScene& scene, Random& random, OwnedBlock& bloc
     for (size_t i = entries(); i > 0; --i) block.ignore_groups.push_back(random.below(5));
   if (random.chance(0.2) && !scene.world.objects.empty())
     for (int i = 0; i < 3; ++i) block.ignore_ids.push_back(random.pick(scene.world.objects).id);
+  add_anchors(scene, random, block);
+  if (row_layout(block.view()) == RowLayout::kCounted && random.chance(0.15)) settings.count_only = true;
+}
+
+// Gives some rays and nearest queries a position behind which they continue: a hit of another block, or any.
+inline void add_after(Random& random, OwnedBlock& block) {
+  if (random.chance(0.7)) return;
+  constexpr float kTs[] = {-1, 0, 0.5f, 1, 1, 2, 3, 5, std::numeric_limits<float>::infinity()};
+  const size_t n = block.points.size() / 3;
+  const auto entries = [&] { return random.chance(0.5) ? n : size_t{1}; };
+  for (size_t i = entries(); i > 0; --i) block.after_ts.push_back(random.pick(kTs));
+  if (random.chance(0.3)) return;
+  for (size_t i = entries(); i > 0; --i) block.after_ids.push_back(random.below(20));
+  if (random.chance(0.3)) return;
+  for (size_t i = entries(); i > 0; --i) block.after_triangles.push_back(static_cast<uint32_t>(random.below(20)));
 }
 
 template <size_t kCount>
@@ -178,6 +210,7 @@ inline OwnedBlock ray_block(const QueryScene& scene, const SceneSketch& sketch, 
     for (size_t i = random.chance(0.5) ? 1 : block.points.size() / 3; i > 0; --i)
       block.extras.push_back(random.pick(kEnds));
   }
+  add_after(random, block);
   add_common(scene, random, block);
   if (rays.mode != RayMode::kAny) add_columns(kRayColumns, random, block);
   return block;
@@ -284,6 +317,7 @@ inline OwnedBlock nearest_block(const QueryScene& scene, const SceneSketch& sket
     for (size_t i = random.chance(0.5) ? 1 : block.points.size() / 3; i > 0; --i)
       block.extras.push_back(random.pick(kEnds));
   }
+  add_after(random, block);
   add_common(scene, random, block);
   add_columns(kNearestColumns, random, block);
   return block;

@@ -20,12 +20,14 @@ namespace locus::test {
 
 // Rows of one block, with the members of the protocol's BlockResult.
 struct BlockResult : CollectedRows {
-  std::string hits;  // mode ANY only: one byte per query, 0 or 1
+  std::string hits;    // mode ANY only: one byte per query, 0 or 1
+  std::string matrix;  // sight only: one byte for each viewer and target
   // Set only for blocks with as_of_ticks: the effective time of each query, and in `clamped` the ascending indices of
   // the queries whose time was outside the history, so that the nearest recorded time was used.
   std::vector<uint64_t> resolved_ticks;
   std::vector<float> resolved_fractions;
   std::vector<uint32_t> clamped;
+  std::vector<uint32_t> unanchored;
   // Cost of the block. It may differ between equal results, because it depends on the index structures.
   Work work;
   uint64_t nanoseconds = 0;  // measured by RunOptions::work_clock, summed over all threads
@@ -54,6 +56,7 @@ class BatchResultSink final : public AnswerSink {
     return locus::add_rows(result_.blocks.at(block), columns, rows);
   }
   char* add_hits(size_t block, size_t queries) override { return grow(result_.blocks.at(block).hits, queries); }
+  char* add_matrix(size_t block, size_t bytes) override { return grow(result_.blocks.at(block).matrix, bytes); }
   uint32_t* add_counts(size_t block, size_t queries) override { return grow(result_.blocks.at(block).counts, queries); }
   uint32_t* add_truncated(size_t block, size_t queries) override {
     return grow(result_.blocks.at(block).truncated, queries);
@@ -64,6 +67,9 @@ class BatchResultSink final : public AnswerSink {
   }
   uint32_t* add_clamped(size_t block, size_t queries) override {
     return grow(result_.blocks.at(block).clamped, queries);
+  }
+  uint32_t* add_unanchored(size_t block, size_t queries) override {
+    return grow(result_.blocks.at(block).unanchored, queries);
   }
 
  private:

@@ -35,8 +35,10 @@ constexpr uint32_t kMaxPerBucket = 16;
 
 }  // namespace
 
-void FoundObjects::restart(size_t max_count) {
+void FoundObjects::restart(size_t max_count, CountOnly count_only) {
   max_count_ = max_count;
+  count_only_ = count_only;
+  count_ = 0;
   truncated_ = false;
   clear_scratch(found_);
   LOCUS_DCHECK_CALL(check_invariants());

@@ -13,21 +13,26 @@
 
 namespace locus {
 
+// Choice of a query between its rows and only their number.
+enum class CountOnly : uint8_t { kNo, kYes };
+
 struct FoundObject {
   Id id = kNoId;
   GridRef object;
 };
 
-// Invariant: between calls, found_ has at most 2 * max_count_ objects. Memory: found_ and bucketed_ together have at
-// most about 3 * max_count_ objects.
+// Invariant: between calls, found_ has at most 2 * max_count_ objects, and none if objects are only counted. Memory:
+// found_ and bucketed_ together have at most about 3 * max_count_ objects.
 class FoundObjects {
  public:
-  // Clears the collector for the next query, which retains at most `max_count` objects.
-  void restart(size_t max_count);
+  // Clears the collector for the next query, which retains at most `max_count` objects, or none with `count_only`.
+  void restart(size_t max_count, CountOnly count_only = CountOnly::kNo);
 
   // Adds an object. Precondition: no object with its id was added since restart().
   void offer(const GridRef& object) {
     LOCUS_DCHECK_NE(object.entry().id, kNoId);
+    ++count_;
+    if (count_only_ == CountOnly::kYes) return;
     found_.push_back({object.entry().id, object});
     if (found_.size() > 2 * max_count_) keep_lowest();
     LOCUS_DCHECK_CALL(check_invariants());
@@ -36,6 +41,8 @@ class FoundObjects {
   absl::Span<const FoundObject> finish();
   // Returns whether more than `max_count` objects were added, so that some were dropped. Call it after finish().
   bool truncated() const { return truncated_; }
+  // Returns the number of objects that were added since restart().
+  uint64_t count() const { return count_; }
 
  private:
   void check_invariants() const { LOCUS_DCHECK_LE(found_.size(), 2 * max_count_); }
@@ -47,6 +54,8 @@ class FoundObjects {
   bool sort_by_bucket();
 
   size_t max_count_ = 0;
+  CountOnly count_only_ = CountOnly::kNo;
+  uint64_t count_ = 0;
   bool truncated_ = false;
   std::vector<FoundObject> found_;
   std::vector<FoundObject> bucketed_;  // temporary memory of sort_by_bucket()

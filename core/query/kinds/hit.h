@@ -7,7 +7,9 @@
 #include <tuple>
 
 #include "core/base/check.h"
+#include "core/base/column.h"
 #include "core/base/ids.h"
+#include "core/query/query_batch.h"
 #include "core/scene/snapshot/scene_at_time.h"
 #include "core/scene/statics/instance.h"
 
@@ -36,6 +38,24 @@ inline Hit hit_on(const GridRef& object, float t, const SceneAtTime& moment) {
   return {t, object.entry().id, kNoTriangle, object, nullptr, &moment};
 }
 inline Hit hit_on(const Instance& instance, float t) { return {t, instance.id, kNoTriangle, GridRef(), &instance}; }
+
+// Position in the order of rows (t, id, triangle).
+struct RowPosition {
+  float t = -std::numeric_limits<float>::infinity();  // below the t of every row
+  Id id = std::numeric_limits<Id>::max();
+  uint32_t triangle = kNoTriangle;
+
+  // Returns the position of query `i` in columns that have passed check_batch().
+  static RowPosition of(const AfterColumns& columns, size_t i) {
+    RowPosition position;
+    position.t = ColumnReader<float>(columns.ts, 1).value(i, position.t);
+    position.id = ColumnReader<uint64_t>(columns.ids, 1).value(i, position.id);
+    position.triangle = ColumnReader<uint32_t>(columns.triangles, 1).value(i, position.triangle);
+    return position;
+  }
+  // Returns whether `hit` is behind this position.
+  bool is_before(const Hit& hit) const { return std::tie(t, id, triangle) < std::tie(hit.t, hit.id, hit.triangle); }
+};
 
 // Returns whether `a` comes before `b` in the order of hits: nearer first, then lower id, then lower triangle.
 inline bool nearer(const Hit& a, const Hit& b) {

@@ -20,12 +20,16 @@ namespace locus {
 
 // Bounded set of the first hits in the order of nearer(). Invariants: the collector has at most capacity_ hits. Once
 // the collector has capacity_ hits, the hits form a heap whose front is the last hit in the order of nearer(), and
-// limit_ is the t of the front. limit_ never increases.
+// limit_ is the t of the front. limit_ never increases. With count_only, the collector only counts hits.
 class HitCollector {
  public:
-  explicit HitCollector(const RayRequest& request) : HitCollector(request.mode, request.max_results, request.t_max) {}
-  HitCollector(RayMode mode, uint32_t max_results, float t_max)
+  explicit HitCollector(const RayRequest& request)
+      : HitCollector(request.mode, request.max_results, request.t_max, request.count_only, request.after) {}
+  // `count_only` needs the mode kAll. Hits that are not behind `after` are ignored.
+  HitCollector(RayMode mode, uint32_t max_results, float t_max, bool count_only, const RowPosition& after)
       : mode_(mode),
+        count_only_(count_only),
+        after_(after),
         // Retains one more hit than requested: the answer is truncated if this additional hit exists. The order in
         // which hits are found therefore does not matter.
         capacity_(mode == RayMode::kAll ? size_t{max_results} + 1 : 1),
@@ -40,7 +44,11 @@ class HitCollector {
   bool offer(const Hit& hit) {
     LOCUS_DCHECK_NE(hit.id, kNoId);
     LOCUS_DCHECK(!(hit.t < 0));
-    if (!(hit.t <= limit_)) return true;
+    if (!(hit.t <= limit_) || !after_.is_before(hit)) return true;
+    if (count_only_) {
+      ++answer_.count;
+      return true;
+    }
     if (answer_.hits.size() == capacity_) {
       if (!nearer(hit, answer_.hits.front())) return true;
       std::pop_heap(answer_.hits.begin(), answer_.hits.end(), nearer);
@@ -87,6 +95,8 @@ class HitCollector {
   }
 
   const RayMode mode_;
+  const bool count_only_;
+  const RowPosition after_;
   const size_t capacity_;
   float limit_;
   bool is_heap_ = false;  // true once answer_.hits has capacity_ elements

@@ -41,8 +41,9 @@ class Rounds {
       for (const SlabRay<double>& slabs : slabs_) walks_.emplace_back(instances, slabs);
     stops_.reserve(rays.size());
     if (mode() != RayMode::kAll) return;
-    // One row more than requested shows that the result is truncated.
-    max_rows_ = std::min(kMaxRows, rays.front().request.max_results + 1);
+    // One row more than requested shows that the result is truncated. A count has no limit.
+    const RayRequest& request = rays.front().request;
+    max_rows_ = request.count_only ? kMaxRows : std::min(kMaxRows, request.max_results + 1);
     rows_ = std::make_unique_for_overwrite<KernelRow[]>(rays.size() * max_rows_);
   }
 
@@ -161,7 +162,8 @@ class Rounds {
   void offer_all(const Stop& stop, const KernelHit& found, const KernelRow* rows) {
     if (found.verdict == KernelVerdict::kMiss) return;
     PendingRay& ray = rays_[stop.ray];
-    const bool may_be_more = found.number == max_rows_ && max_rows_ <= ray.request.max_results;
+    const bool may_be_more =
+        found.number == max_rows_ && (ray.request.count_only || max_rows_ <= ray.request.max_results);
     const KernelRow* const end = rows + found.number;
     const auto before = [&](const KernelRow& row) { return row.t < stop.nearest; };
     if (found.verdict == KernelVerdict::kUndecided || may_be_more || std::any_of(rows, end, before))

@@ -14,7 +14,7 @@ absl::flat_hash_map<Group, OverlapAnswer> look_up_groups(QueryTask& task, const 
                                                          absl::Span<const uint64_t> groups,
                                                          const OverlapOptions& options) {
   absl::flat_hash_map<Group, LowestRows> rows;
-  for (const Group group : groups) rows.emplace(group, LowestRows(options.max_results, false));
+  for (const Group group : groups) rows.emplace(group, LowestRows(options.max_results, false, options.count_only));
   const auto offer = [&](const auto& labels, const auto& make_hit) {
     ++task.work().tests;
     if (!task.count_test() || labels.id <= options.after_id) return;

@@ -14,6 +14,8 @@ bool lower_run_id(const RowRun& a, const RowRun& b) { return a.row.id < b.row.id
 
 void LowestRows::offer(const Hit& row) {
   LOCUS_DCHECK_NE(row.id, kNoId);
+  ++answer_.count;
+  if (count_only_ == CountOnly::kYes) return;
   answer_.runs.push_back({row});
   ++rows_;
   if (rows_ > 2 * max_results_) keep_lowest();
@@ -23,6 +25,8 @@ void LowestRows::offer(const Hit& row) {
 void LowestRows::offer(const Hit& row, absl::Span<const uint32_t> triangles) {
   LOCUS_DCHECK_NE(row.id, kNoId);
   if (triangles.empty()) return;
+  answer_.count += triangles.size();
+  if (count_only_ == CountOnly::kYes) return;
   if (answer_.runs.empty() || answer_.runs.back().row.id != row.id)
     answer_.runs.push_back({row, answer_.triangles.size(), 0});
   answer_.runs.back().triangle_count += triangles.size();
@@ -59,7 +63,8 @@ bool LowestRows::in_order() const {
 
 void LowestRows::keep_lowest() {
   if (rows_ <= max_results_ && in_order()) return;
-  const OverlapAnswer all = std::exchange(answer_, {{}, {}, {}, answer_.truncated || rows_ > max_results_});
+  const OverlapAnswer all =
+      std::exchange(answer_, {{}, {}, {}, answer_.count, answer_.truncated || rows_ > max_results_});
   std::vector<RowRun> runs = all.runs;
   // An instance may have two runs: a run that an earlier call of keep_lowest() made, and a run with the triangles that
   // were added after that call. The stable sort preserves their order.

@@ -29,6 +29,7 @@ struct OverlapAnswer {
   // `objects` is empty, and `runs` contains the rows of objects, too. The memory belongs to the QueryTask and is valid
   // until the next query of the task.
   absl::Span<const FoundObject> objects;
+  uint64_t count = 0;      // number of rows of a query that only counts; it has no runs and no objects
   bool truncated = false;  // more rows were found than are returned
 
   absl::Span<const uint32_t> triangles_of(const RowRun& run) const {
@@ -37,13 +38,13 @@ struct OverlapAnswer {
 };
 
 // Bounded collection of the rows with the lowest ids. The triangles of an instance are in storage order, or ascending
-// by index if `sorted_triangles` is true. Invariants: rows_ is the number of rows of all runs; after keep_lowest()
-// rows_ is at most max_results_, and the runs ascend by id. Memory: twice max_results_ rows plus the rows of one
-// offer().
+// by index if `sorted_triangles` is true. With CountOnly::kYes rows are only counted. Invariants: rows_ is the number
+// of rows of all runs; after keep_lowest() rows_ is at most max_results_, and the runs ascend by id. Memory: twice
+// max_results_ rows plus the rows of one offer().
 class LowestRows {
  public:
-  explicit LowestRows(uint32_t max_results, bool sorted_triangles)
-      : max_results_(max_results), sorted_triangles_(sorted_triangles) {}
+  explicit LowestRows(uint32_t max_results, bool sorted_triangles, CountOnly count_only = CountOnly::kNo)
+      : max_results_(max_results), sorted_triangles_(sorted_triangles), count_only_(count_only) {}
 
   // Adds a row without a triangle.
   void offer(const Hit& row);
@@ -64,6 +65,7 @@ class LowestRows {
 
   const size_t max_results_;
   const bool sorted_triangles_;
+  const CountOnly count_only_;
   size_t rows_ = 0;
   OverlapAnswer answer_;
 };

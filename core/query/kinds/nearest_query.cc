@@ -22,7 +22,9 @@ double squared_limit_of(float farthest) { return squared_limit(raised(farthest))
 class NearestRows {
  public:
   explicit NearestRows(const NearestRequest& request)
-      : count_(request.count),
+      : count_only_(request.count_only),
+        after_(request.after),
+        count_(request.count),
         in_order_(request.count <= kMaxInOrder),
         farthest_(request.max_distance),
         limit_(squared_limit_of(farthest_)) {
@@ -39,7 +41,11 @@ class NearestRows {
 
   void offer(const Hit& row) {
     LOCUS_DCHECK_NE(row.id, kNoId);
-    if (!(row.t <= farthest_)) return;
+    if (!(row.t <= farthest_) || !after_.is_before(row)) return;
+    if (count_only_) {
+      ++answer_count_;
+      return;
+    }
     if (rows_.size() == count_) {
       if (!nearer(row, last())) return;
       if (!in_order_) std::pop_heap(rows_.begin(), rows_.end(), nearer);
@@ -54,10 +60,10 @@ class NearestRows {
     LOCUS_DCHECK_CALL(check_invariants());
   }
 
-  std::vector<Hit> finish() {
+  NearestAnswer finish() {
     if (!in_order_) std::sort_heap(rows_.begin(), rows_.end(), nearer);
     LOCUS_DCHECK(std::is_sorted(rows_.begin(), rows_.end(), nearer));
-    return std::move(rows_);
+    return {std::move(rows_), answer_count_};
   }
 
  private:
@@ -81,10 +87,13 @@ class NearestRows {
     *at = row;
   }
 
+  const bool count_only_;
+  const RowPosition after_;
   const size_t count_;
   const bool in_order_;
   float farthest_;
   double limit_;
+  uint64_t answer_count_ = 0;
   std::vector<Hit> rows_;
 };
 
@@ -272,19 +281,21 @@ class InstancesNear {
 
 }  // namespace
 
-NearestRequest nearest_request(const QueryBlock& block, const NearestColumns& nearest, size_t i) {
+NearestRequest nearest_request(const QueryBlock& block, Vec3d origin, const NearestColumns& nearest, size_t i) {
   LOCUS_DCHECK_LT(3 * i, nearest.points.size());
   const float* offset = ColumnReader<float>(nearest.points, 3).entry(i);
-  return {block.frame + Vec3d{offset[0], offset[1], offset[2]},
+  return {origin + Vec3d{offset[0], offset[1], offset[2]},
           ColumnReader<float>(nearest.max_distances, 1).value(i, std::numeric_limits<float>::infinity()),
           std::max(1u, nearest.count),
           nearest.detail != StaticDetail::kInstances,
+          block.count_only,
+          RowPosition::of(nearest.after, i),
           block.source,
           block.precision};
 }
 
-std::vector<Hit> run_nearest(QueryTask& task, const SceneAtTime& moment, const NearestRequest& request,
-                             const Filter& filter) {
+NearestAnswer run_nearest(QueryTask& task, const SceneAtTime& moment, const NearestRequest& request,
+                          const Filter& filter) {
   NearestRows rows(request);
   if (request.source != Source::kStatic) {
     ObjectsNear visitor(task, moment, request, filter, rows);

@@ -20,19 +20,27 @@ struct NearestRequest {
   float max_distance;   // largest distance of a row, inclusive; may be +inf
   uint32_t count;       // maximum number of rows, at least 1
   bool every_triangle;  // true: one row per triangle; false: one row per instance, for its nearest triangle
+  bool count_only;      // only the number of rows within max_distance is returned; `count` has no effect
+  RowPosition after;    // only rows behind this position are returned
   Source source;
   Precision precision;
 };
 
-// Returns the request of query `i` of a block.
-NearestRequest nearest_request(const QueryBlock& block, const NearestColumns& nearest, size_t i);
+// Returns the request of query `i` of a block, whose positions count from `origin`.
+NearestRequest nearest_request(const QueryBlock& block, Vec3d origin, const NearestColumns& nearest, size_t i);
+
+// Rows in order or, with count_only, only their number.
+struct NearestAnswer {
+  std::vector<Hit> rows;
+  uint64_t count = 0;
+};
 
 // Returns the nearest rows in order. Hit::t is the distance, and Hit::triangle the nearest triangle of an instance
 // (with every_triangle, the row's triangle). Objects are searched as of `moment`, which the rows borrow. Cost: one
 // visit for each node and cell that is at most as far away as the last returned row, and O(log count) for each inserted
 // row.
-std::vector<Hit> run_nearest(QueryTask& task, const SceneAtTime& moment, const NearestRequest& request,
-                             const Filter& filter);
+NearestAnswer run_nearest(QueryTask& task, const SceneAtTime& moment, const NearestRequest& request,
+                          const Filter& filter);
 
 // Returns the vector from request.point to the nearest point of the row's object or triangle, or, for a CONSERVATIVE
 // query, to the nearest point of the bounds of this object or triangle. The vector is zero if request.point lies

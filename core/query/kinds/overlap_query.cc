@@ -136,7 +136,7 @@ class ObjectRows {
   ObjectRows(QueryTask& task, const SceneAtTime& moment, const typename Kind::World& shape,
              const OverlapOptions& options, const Filter& filter)
       : task_(task), moment_(moment), shape_(shape), options_(options), filter_(filter), found_(task.found_objects()) {
-    found_.restart(options.max_results);
+    found_.restart(options.max_results, options.count_only);
   }
 
   Aabbd bounds() const { return typename Kind::WorldRegion(shape_).bounds(); }
@@ -172,7 +172,11 @@ class ObjectRows {
 class OverlapRows {
  public:
   OverlapRows(const Instance& instance, const OverlapOptions& options, LowestRows& rows)
-      : instance_(instance), detail_(options.detail), max_results_(options.max_results), rows_(rows) {}
+      : instance_(instance),
+        detail_(options.detail),
+        count_only_(options.count_only),
+        max_results_(options.max_results),
+        rows_(rows) {}
 
   // Offers triangles that overlap the query. Returns false if the search of this instance can stop, because later
   // triangles would add no rows.
@@ -183,7 +187,7 @@ class OverlapRows {
     }
     rows_.offer(hit_on(instance_, 0), triangles);
     found_ += triangles.size();
-    return detail_ != StaticDetail::kTriangles || found_ <= max_results_;
+    return detail_ != StaticDetail::kTriangles || found_ <= max_results_ || count_only_ == CountOnly::kYes;
   }
 
   bool offer(const Triangle& triangle) { return offer({&triangle.number, 1}); }
@@ -191,6 +195,7 @@ class OverlapRows {
  private:
   const Instance& instance_;
   const StaticDetail detail_;
+  const CountOnly count_only_;
   const uint32_t max_results_;
   LowestRows& rows_;
   size_t found_ = 0;
@@ -347,6 +352,8 @@ class InstanceSearch {
 OverlapAnswer with_objects(OverlapAnswer instances, FoundObjects& found, const SceneAtTime& moment,
                            const OverlapOptions& options) {
   const absl::Span<const FoundObject> objects = found.finish();
+  instances.count += found.count();
+  if (options.count_only == CountOnly::kYes) return instances;
   if (instances.runs.empty()) {
     instances.objects = objects;
     instances.truncated |= found.truncated();
@@ -370,7 +377,7 @@ template <class Kind>
 OverlapAnswer run_overlap(QueryTask& task, const SceneAtTime& moment, const typename Kind::World& shape,
                           const OverlapOptions& options, const Filter& filter) {
   LOCUS_DCHECK_GE(options.max_results, 1u);
-  LowestRows rows(options.max_results, options.detail == StaticDetail::kTrianglesSorted);
+  LowestRows rows(options.max_results, options.detail == StaticDetail::kTrianglesSorted, options.count_only);
   if (options.source != Source::kDynamic) {
     InstanceSearch<Kind> search(task, shape, options, filter, rows);
     task.visit_region(task.snapshot().statics->tree(), search);
@@ -387,7 +394,8 @@ OverlapAnswer run_overlap(QueryTask& task, const SceneAtTime& moment, const type
 
 OverlapOptions overlap_options(const QueryBlock& block, StaticDetail detail) {
   const uint32_t max_results = block.max_results == 0 ? limits::kDefaultMaxResults : block.max_results;
-  return {block.source, block.precision, detail, max_results, block.after_id};
+  return {block.source, block.precision, detail,
+          max_results,  block.after_id,  block.count_only ? CountOnly::kYes : CountOnly::kNo};
 }
 
 OverlapAnswer run_ball(QueryTask& task, const SceneAtTime& moment, const Balld& ball, const OverlapOptions& options,
@@ -417,22 +425,22 @@ GridRegion capsule_region(const SceneAtTime& moment, const Capsule& capsule, con
   return search_region<CapsuleShape>(moment, capsule, options);
 }
 
-Balld ball_of(const QueryBlock& block, const BallColumns& balls, size_t i) {
+Balld ball_of(Vec3d origin, const BallColumns& balls, size_t i) {
   LOCUS_DCHECK_LT(3 * i, balls.centers.size());
-  return {block.frame + read_vec3d(ColumnReader<float>(balls.centers, 3).entry(i)),
+  return {origin + read_vec3d(ColumnReader<float>(balls.centers, 3).entry(i)),
           ColumnReader<float>(balls.radii, 1).value(i, 0)};
 }
 
-Obbd box_of(const QueryBlock& block, const BoxColumns& boxes, size_t i) {
+Obbd box_of(Vec3d origin, const BoxColumns& boxes, size_t i) {
   LOCUS_DCHECK_LT(3 * i, boxes.centers.size());
-  return {block.frame + read_vec3d(ColumnReader<float>(boxes.centers, 3).entry(i)),
+  return {origin + read_vec3d(ColumnReader<float>(boxes.centers, 3).entry(i)),
           read_vec3d(ColumnReader<float>(boxes.half_extents, 3).entry(i)), rotation_entry(boxes.rotations, i)};
 }
 
-Capsule capsule_of(const QueryBlock& block, const CapsuleColumns& capsules, size_t i) {
+Capsule capsule_of(Vec3d origin, const CapsuleColumns& capsules, size_t i) {
   LOCUS_DCHECK_LT(3 * i, capsules.starts.size());
-  const Vec3d start = block.frame + read_vec3d(ColumnReader<float>(capsules.starts, 3).entry(i));
-  const Vec3d end = block.frame + read_vec3d(ColumnReader<float>(capsules.ends, 3).entry(i));
+  const Vec3d start = origin + read_vec3d(ColumnReader<float>(capsules.starts, 3).entry(i));
+  const Vec3d end = origin + read_vec3d(ColumnReader<float>(capsules.ends, 3).entry(i));
   return {(start + end) * 0.5, (end - start) * 0.5, ColumnReader<float>(capsules.radii, 1).value(i, 0)};
 }
 

@@ -18,6 +18,7 @@ struct OverlapOptions {
   StaticDetail detail;
   uint32_t max_results;
   Id after_id;
+  CountOnly count_only;
 };
 
 // Returns the options of a block. A max_results of 0 becomes limits::kDefaultMaxResults.
@@ -39,10 +40,10 @@ GridRegion ball_region(const SceneAtTime& moment, const Balld& ball, const Overl
 GridRegion box_region(const SceneAtTime& moment, const Obbd& box, const OverlapOptions& options);
 GridRegion capsule_region(const SceneAtTime& moment, const Capsule& capsule, const OverlapOptions& options);
 
-// Return the ball, box or capsule of query `i` of a block, in world axes.
-Balld ball_of(const QueryBlock& block, const BallColumns& balls, size_t i);
-Obbd box_of(const QueryBlock& block, const BoxColumns& boxes, size_t i);
-Capsule capsule_of(const QueryBlock& block, const CapsuleColumns& capsules, size_t i);
+// Return the ball, box or capsule of query `i` of a block, in world axes. Its positions count from `origin`.
+Balld ball_of(Vec3d origin, const BallColumns& balls, size_t i);
+Obbd box_of(Vec3d origin, const BoxColumns& boxes, size_t i);
+Capsule capsule_of(Vec3d origin, const CapsuleColumns& capsules, size_t i);
 
 }  // namespace locus
 

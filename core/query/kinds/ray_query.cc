@@ -81,9 +81,11 @@ class InstanceVisitor {
   HitCollector& collector_;
 };
 
-// Returns whether the vector kernels trace the rays of `block` through the instances.
-bool uses_kernels(const QueryTask& task, const QueryBlock& block) {
-  return block.precision == Precision::kExact && block.source != Source::kDynamic && task.ray_kernels() != nullptr;
+// Returns whether the vector kernels trace the rays of `block` through the instances. They return the first hits of a
+// mesh, not the first ones behind a position.
+bool uses_kernels(const QueryTask& task, const QueryBlock& block, const RayColumns& columns) {
+  return columns.after.ts.empty() && block.precision == Precision::kExact && block.source != Source::kDynamic &&
+         task.ray_kernels() != nullptr;
 }
 
 // Converts `cull` from the scene's `winding` to the counter-clockwise winding in which triangles are stored.
@@ -94,10 +96,10 @@ Cull stored_cull(Cull cull, Winding winding) {
 
 }  // namespace
 
-RayRequest ray_request(const QueryBlock& block, const RayColumns& rays, Winding winding, size_t i) {
+RayRequest ray_request(const QueryBlock& block, Vec3d origin, const RayColumns& rays, Winding winding, size_t i) {
   LOCUS_DCHECK_LT(3 * i, rays.origins.size());
   RayRequest request;
-  request.origin = block.frame + read_vec3d(ColumnReader<float>(rays.origins, 3).entry(i));
+  request.origin = origin + read_vec3d(ColumnReader<float>(rays.origins, 3).entry(i));
   request.direction = read_vec3d(ColumnReader<float>(rays.directions, 3).entry(i));
   request.t_max = ColumnReader<float>(rays.t_max, 1).value(i, std::numeric_limits<float>::infinity());
   request.mode = rays.mode;
@@ -106,16 +108,21 @@ RayRequest ray_request(const QueryBlock& block, const RayColumns& rays, Winding 
   request.source = block.source;
   request.precision = block.precision;
   request.max_results = block.max_results == 0 ? limits::kDefaultMaxResults : block.max_results;
+  request.count_only = block.count_only;
+  request.after = RowPosition::of(rays.after, i);
   return request;
 }
 
 RayAnswers run_rays(QueryTask& task, const QueryBlock& block, const RayColumns& columns, const QueryTimes& times,
-                    Winding winding, size_t begin, size_t end) {
+                    const QueryOrigins& origins, Winding winding, size_t begin, size_t end) {
   LOCUS_DCHECK_LT(begin, end);
   std::vector<PendingRay> rays;
   rays.reserve(end - begin);
-  for (size_t i = begin; i < end; ++i) rays.emplace_back(ray_request(block, columns, winding, i), Filter(block, i));
-  const bool by_kernels = uses_kernels(task, block);
+  for (size_t i = begin; i < end; ++i) {
+    rays.emplace_back(ray_request(block, origins.of(i), columns, winding, i), Filter(block, i));
+    if (origins.is_unanchored(i)) rays.back().filter.accept_nothing();
+  }
+  const bool by_kernels = uses_kernels(task, block, columns);
   if (by_kernels) trace_meshes(task, rays);
   RayAnswers answers;
   answers.reserve(rays.size());

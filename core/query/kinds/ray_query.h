@@ -7,6 +7,7 @@
 
 #include "absl/container/inlined_vector.h"
 #include "core/query/kinds/hit.h"
+#include "core/query/kinds/query_origins.h"
 #include "core/query/kinds/query_task.h"
 #include "core/query/kinds/query_times.h"
 
@@ -22,22 +23,25 @@ struct RayRequest {
   Source source;
   Precision precision;
   uint32_t max_results;  // kAll only
+  bool count_only;       // kAll only
+  RowPosition after;     // only rows behind this position are returned
 };
 
-// Returns the request of query `i` of a block of rays. Converts the block's cull from the scene's `winding` to the
-// stored counter-clockwise winding.
-RayRequest ray_request(const QueryBlock& block, const RayColumns& rays, Winding winding, size_t i);
+// Returns the request of query `i` of a block of rays, whose positions count from `origin`. Converts the block's cull
+// from the scene's `winding` to the stored counter-clockwise winding.
+RayRequest ray_request(const QueryBlock& block, Vec3d origin, const RayColumns& rays, Winding winding, size_t i);
 
 struct RayAnswer {
   absl::InlinedVector<Hit, 1> hits;  // kFirst and kAny: at most one; kAll: in the order of nearer()
   bool truncated = false;            // kAll: more hits exist; any mode: the batch ended during the search
+  uint64_t count = 0;                // count_only: number of hits; `hits` is then empty
 };
 using RayAnswers = std::vector<RayAnswer>;
 
 // Answers queries [begin, end) of a block. The answers borrow `times`. One call for many rays is faster than many
 // calls, because the kernels trace many rays together.
 RayAnswers run_rays(QueryTask& task, const QueryBlock& block, const RayColumns& rays, const QueryTimes& times,
-                    Winding winding, size_t begin, size_t end);
+                    const QueryOrigins& origins, Winding winding, size_t begin, size_t end);
 
 // Surface at a hit: barycentric weights of the triangle's second (u) and third (v) vertex, and the unit normal of the
 // triangle's front side or of the object's outside.

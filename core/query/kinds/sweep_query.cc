@@ -248,12 +248,12 @@ double moment_of(const std::optional<double>& first, const Hit& hit) { return fi
 
 }  // namespace
 
-SweepRequest sweep_request(const QueryBlock& block, const SweepColumns& sweeps, size_t i) {
+SweepRequest sweep_request(const QueryBlock& block, Vec3d origin, const SweepColumns& sweeps, size_t i) {
   LOCUS_DCHECK_LT(3 * i, sweeps.starts.size());
   SweepRequest request;
   Mover& mover = request.mover;
   const Vec3d start = read_vec3d(ColumnReader<float>(sweeps.starts, 3).entry(i));
-  mover.start = block.frame + start;
+  mover.start = origin + start;
   mover.way = read_vec3d(ColumnReader<float>(sweeps.ends, 3).entry(i)) - start;
   mover.radius = ColumnReader<float>(sweeps.radii, 1).value(i, 0);
   if (!sweeps.half_axes.empty()) {
@@ -270,11 +270,12 @@ SweepRequest sweep_request(const QueryBlock& block, const SweepColumns& sweeps, 
   request.source = block.source;
   request.precision = block.precision;
   request.max_results = block.max_results == 0 ? limits::kDefaultMaxResults : block.max_results;
+  request.count_only = block.count_only;
   return request;
 }
 
 RayAnswer run_sweep(QueryTask& task, const SceneAtTime& moment, const SweepRequest& request, const Filter& filter) {
-  HitCollector collector(request.mode, request.max_results, 1);
+  HitCollector collector(request.mode, request.max_results, 1, request.count_only, RowPosition());
   if (request.source != Source::kDynamic) {
     SweptInstances visitor(task, request, filter, collector);
     task.visit_ray(task.snapshot().statics->tree(), visitor.slabs(), visitor);

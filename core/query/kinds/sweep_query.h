@@ -16,10 +16,11 @@ struct SweepRequest {
   Source source;
   Precision precision;
   uint32_t max_results;  // kAll only
+  bool count_only;       // kAll only
 };
 
-// Returns the request of query `i` of a block of sweeps.
-SweepRequest sweep_request(const QueryBlock& block, const SweepColumns& sweeps, size_t i);
+// Returns the request of query `i` of a block of sweeps, whose positions count from `origin`.
+SweepRequest sweep_request(const QueryBlock& block, Vec3d origin, const SweepColumns& sweeps, size_t i);
 
 // Answers one sweep. Objects are searched as of `moment`, which the answer borrows. Cost: visits of the nodes, cells
 // and primitives near the path up to the last reported hit.

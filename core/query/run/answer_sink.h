@@ -30,6 +30,8 @@ class AnswerSink {
   virtual RowSpans add_rows(size_t block, ColumnSet columns, size_t rows) = 0;
   // Appends one byte for each query of the block. The caller writes 1 for a hit and 0 for a miss.
   virtual char* add_hits(size_t block, size_t queries) = 0;
+  // Appends `bytes` bytes to the matrix of the block. The caller writes bytes_per_query() bytes for each query.
+  virtual char* add_matrix(size_t block, size_t bytes) = 0;
   // Appends `queries` entries to the row counts of the block. The caller writes the number of rows of each query.
   virtual uint32_t* add_counts(size_t block, size_t queries) = 0;
   // Appends `queries` entries to the list of truncated queries of the block. The caller writes their indices in the
@@ -41,6 +43,9 @@ class AnswerSink {
   // Appends `queries` entries to the list of clamped queries of the block: queries that requested a time outside the
   // history and are answered at the nearest retained time. The caller writes their indices in the block, ascending.
   virtual uint32_t* add_clamped(size_t block, size_t queries) = 0;
+  // Appends `queries` entries to the list of queries of the block without an anchor. The caller writes their indices in
+  // the block, ascending.
+  virtual uint32_t* add_unanchored(size_t block, size_t queries) = 0;
 };
 
 }  // namespace locus

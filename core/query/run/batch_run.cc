@@ -71,10 +71,15 @@ void BatchRun::add_block(QueryTimes times) {
   const size_t index = blocks_.size();
   const QueryBlock& block = batch_.blocks[index];
   const size_t queries = query_count(block);
-  Block& to = blocks_.emplace_back(std::move(times), queries, max_chunk_queries(block));
+  Block& to = blocks_.emplace_back(snapshot_, block, std::move(times), queries, max_chunk_queries(block));
   if (row_layout(block) == RowLayout::kDense)
     to.output.rows = answer_.add_rows(index, returned_columns(block), queries);
-  if (row_layout(block) == RowLayout::kBytes) to.output.hits = answer_.add_hits(index, queries);
+  if (row_layout(block) == RowLayout::kBytes) to.output.bytes = answer_.add_hits(index, queries);
+  if (row_layout(block) == RowLayout::kMatrix)
+    to.output.bytes = answer_.add_matrix(index, queries * bytes_per_query(block));
+  const std::vector<uint32_t>& unanchored = to.origins.unanchored();
+  if (!unanchored.empty())
+    std::copy(unanchored.begin(), unanchored.end(), answer_.add_unanchored(index, unanchored.size()));
   write_times(to.times, index, queries, answer_);
 }
 
@@ -157,7 +162,7 @@ void BatchRun::skip_empty_blocks() {
 size_t BatchRun::run(Chunk& chunk) {
   Block& block = blocks_[chunk.block];
   QueryTask task(snapshot_, control_, options_.brute_force);
-  BlockRunner runner(task, batch_.blocks[chunk.block], block.times, block.output,
+  BlockRunner runner(task, batch_.blocks[chunk.block], block.times, block.origins, block.output,
                      free_bytes_.load(std::memory_order_relaxed));
   const size_t reached = runner.run(chunk.begin, chunk.end);
   chunk.rows = runner.take_rows();
@@ -222,6 +227,7 @@ void BatchRun::write(const Chunk& chunk) {
 // Writes the counts and rows of a chunk. Drops rows that do not fit the reply and lists their queries as truncated.
 void BatchRun::write_counted(const Chunk& chunk) {
   LOCUS_DCHECK_EQ(chunk.rows.counts.size(), chunk.end - chunk.begin);
+  if (batch_.blocks[chunk.block].count_only) return write_counts(chunk);
   const ColumnSet columns = returned_columns(batch_.blocks[chunk.block]);
   const uint32_t bytes = row_bytes(columns);
   uint64_t free_bytes = free_bytes_.load(std::memory_order_relaxed);
@@ -250,6 +256,13 @@ void BatchRun::write_counted(const Chunk& chunk) {
   LOCUS_DCHECK(cut == chunk.rows.truncated.end());
   LOCUS_DCHECK_LE(free_bytes, free_bytes_.load(std::memory_order_relaxed));
   free_bytes_.store(free_bytes, std::memory_order_relaxed);
+}
+
+// Writes the counts of a chunk of a block with count_only, which has no rows.
+void BatchRun::write_counts(const Chunk& chunk) {
+  const std::vector<uint32_t>&counts = chunk.rows.counts, &cut = chunk.rows.truncated;
+  std::copy(counts.begin(), counts.end(), answer_.add_counts(chunk.block, counts.size()));
+  if (!cut.empty()) std::copy(cut.begin(), cut.end(), answer_.add_truncated(chunk.block, cut.size()));
 }
 
 Progress BatchRun::progress() {

@@ -25,6 +25,7 @@
 #include "absl/status/statusor.h"
 #include "core/base/check.h"
 #include "core/base/mutex.h"
+#include "core/query/kinds/query_origins.h"
 #include "core/query/kinds/query_task.h"
 #include "core/query/kinds/query_times.h"
 #include "core/query/query_batch.h"
@@ -89,10 +90,11 @@ class BatchRun {
 
  private:
   struct Block {
-    Block(QueryTimes&& resolved, size_t count, size_t max_chunk)
-        : times(std::move(resolved)), queries(count), max_chunk_queries(max_chunk) {}
+    Block(const SceneSnapshot& snapshot, const QueryBlock& block, QueryTimes&& resolved, size_t count, size_t max_chunk)
+        : times(std::move(resolved)), origins(snapshot, block, times), queries(count), max_chunk_queries(max_chunk) {}
 
     const QueryTimes times;
+    const QueryOrigins origins;
     const size_t queries;
     const size_t max_chunk_queries;
     BlockOutput output;
@@ -140,6 +142,7 @@ class BatchRun {
   void write_out() LOCUS_EXCLUDES(mutex_);
   void write(const Chunk& chunk);
   void write_counted(const Chunk& chunk);
+  void write_counts(const Chunk& chunk);
   // Returns the progress that work() reports to its caller. Returns kDone only once.
   Progress progress() LOCUS_REQUIRES(mutex_);
   uint64_t now() const { return options_.clock ? options_.clock() : 0; }

@@ -1,6 +1,7 @@
 #include "core/query/run/block_runner.h"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "core/query/kinds/lookup_query.h"
@@ -23,15 +24,18 @@ constexpr uint64_t kMinRaysPerCall = 8, kMaxRaysPerCall = 128, kMaxRaysOfManyHit
 
 }  // namespace
 
-BlockRunner::BlockRunner(QueryTask& task, const QueryBlock& block, const QueryTimes& times, BlockOutput& output,
-                         uint64_t max_bytes)
+BlockRunner::BlockRunner(QueryTask& task, const QueryBlock& block, const QueryTimes& times, const QueryOrigins& origins,
+                         BlockOutput& output, uint64_t max_bytes)
     : task_(task),
       block_(block),
       times_(times),
+      origins_(origins),
       output_(output),
       columns_(returned_columns(block)),
       max_rows_(max_bytes / std::max(1u, row_bytes(columns_)) + 1) {
-  LOCUS_DCHECK(row_layout(block) != RowLayout::kBytes || output.hits != nullptr);
+  const RowLayout layout = row_layout(block);
+  LOCUS_DCHECK(layout == RowLayout::kDense || layout == RowLayout::kCounted || bytes_per_query(block) == 0 ||
+               output.bytes != nullptr);
 }
 
 size_t BlockRunner::run(size_t begin, size_t end) {
@@ -63,6 +67,8 @@ bool BlockRunner::should_split() const { return work_done() >= kChunkWork && gro
 
 template <class Columns, class RegionOf>
 void BlockRunner::walk_regions(const Columns& columns, size_t begin, size_t end, const RegionOf& region_of) {
+  // A walk searches a region for every query, but a query without an anchor searches none.
+  if (!origins_.unanchored().empty()) return;
   if (block_.source == Source::kStatic || !RegionWalk::pays(task_.snapshot().objects.grid())) return;
   const OverlapOptions options = overlap_options(block_, columns.detail);
   // Copies `region_of`: the walk calls the function during later queries, when the caller's function object no longer
@@ -74,19 +80,22 @@ template <class Columns>
 size_t BlockRunner::run_queries(const Columns& columns, size_t begin, size_t end) {
   if constexpr (std::is_same_v<Columns, BallColumns>)
     walk_regions(columns, begin, end, [&](size_t i, const OverlapOptions& options) {
-      return ball_region(times_.of(i), ball_of(block_, columns, i), options);
+      return ball_region(times_.of(i), ball_of(origins_.of(i), columns, i), options);
     });
   if constexpr (std::is_same_v<Columns, BoxColumns>)
     walk_regions(columns, begin, end, [&](size_t i, const OverlapOptions& options) {
-      return box_region(times_.of(i), box_of(block_, columns, i), options);
+      return box_region(times_.of(i), box_of(origins_.of(i), columns, i), options);
     });
   if constexpr (std::is_same_v<Columns, CapsuleColumns>)
     walk_regions(columns, begin, end, [&](size_t i, const OverlapOptions& options) {
-      return capsule_region(times_.of(i), capsule_of(block_, columns, i), options);
+      return capsule_region(times_.of(i), capsule_of(origins_.of(i), columns, i), options);
     });
   for (size_t i = begin; i < end; ++i) {
     if (i != begin && should_split()) return i;
-    run_query(columns, i);
+    if (origins_.is_unanchored(i))
+      write_nothing(i);
+    else
+      run_query(columns, i);
     if (!task_.ended()) continue;
     const auto query = static_cast<uint32_t>(i);
     if (result_.truncated.empty() || result_.truncated.back() != query) result_.truncated.push_back(query);
@@ -108,18 +117,19 @@ void BlockRunner::write_surfaces(const RayColumns& rays, absl::Span<const Hit> h
   const Winding winding = task_.snapshot().winding;
   // The surface columns of a miss are zero, so the request of the ray is not needed.
   const bool is_miss = hits.empty() || hits.front().id == kNoId;
-  const RayRequest request = is_miss ? RayRequest() : ray_request(block_, rays, winding, i);
+  const RayRequest request = is_miss ? RayRequest() : ray_request(block_, origins_.of(i), rays, winding, i);
   for (size_t k = 0; k < hits.size(); ++k) write_surface(request, block_.frame, hits[k], winding, to, row + k);
 }
 
 void BlockRunner::write_surfaces(const SweepColumns& sweeps, absl::Span<const Hit> hits, size_t i, const RowSpans& to,
                                  size_t row) {
-  const SweepRequest request = sweep_request(block_, sweeps, i);
+  const SweepRequest request = sweep_request(block_, origins_.of(i), sweeps, i);
   for (size_t k = 0; k < hits.size(); ++k) write_contact(request, block_.frame, hits[k], to, row + k);
 }
 
 template <class Columns>
 void BlockRunner::append_counted(const Columns& columns, const RayAnswer& answer, size_t i) {
+  if (block_.count_only) return write_count(answer.count);
   const absl::Span<const Hit> hits = answer.hits;
   const size_t kept = std::min<uint64_t>(hits.size(), max_rows_ - rows_);
   write_hits(columns, hits.subspan(0, kept), i, add_rows(result_, columns_, kept), 0);
@@ -127,6 +137,7 @@ void BlockRunner::append_counted(const Columns& columns, const RayAnswer& answer
 }
 
 void BlockRunner::append_rows(const OverlapAnswer& answer, size_t i) {
+  if (block_.count_only) return write_count(answer.count);
   if (answer.objects.empty()) return append_runs(answer, i);
   const size_t kept = std::min<uint64_t>(answer.objects.size(), max_rows_ - rows_);
   write_object_rows(answer.objects.subspan(0, kept), times_.of(i), add_rows(result_, columns_, kept));
@@ -157,12 +168,31 @@ void BlockRunner::count_rows(size_t rows, bool cut, size_t i) {
   if (cut) result_.truncated.push_back(static_cast<uint32_t>(i));
 }
 
+void BlockRunner::write_count(uint64_t rows) {
+  LOCUS_DCHECK(block_.count_only);
+  result_.counts.push_back(static_cast<uint32_t>(std::min<uint64_t>(rows, std::numeric_limits<uint32_t>::max())));
+}
+
+void BlockRunner::write_nothing(size_t i) {
+  switch (row_layout(block_)) {
+    case RowLayout::kDense:
+      return write_miss(output_.rows, i);
+    case RowLayout::kBytes:
+    case RowLayout::kMatrix:
+      std::fill_n(output_.bytes + i * bytes_per_query(block_), bytes_per_query(block_), '\0');
+      return;
+    case RowLayout::kCounted:
+      result_.counts.push_back(0);
+      return;
+  }
+}
+
 size_t BlockRunner::run_queries(const RayColumns& rays, size_t begin, size_t end) {
   for (size_t first = begin; first < end;) {
     if (first != begin && should_split()) return first;
     const size_t last = std::min<size_t>(end, first + output_.rays_per_call.load(std::memory_order_relaxed));
     const uint64_t before = work_done();
-    const RayAnswers answers = run_rays(task_, block_, rays, times_, task_.snapshot().winding, first, last);
+    const RayAnswers answers = run_rays(task_, block_, rays, times_, origins_, task_.snapshot().winding, first, last);
     for (size_t i = first; i < last; ++i) write_answer(rays, answers[i - first], i);
     adapt_rays_per_call(last - first, work_done() - before);
     first = last;
@@ -186,7 +216,7 @@ void BlockRunner::write_answer(const Columns& columns, const RayAnswer& answer, 
   if (columns.mode == RayMode::kAll) return append_counted(columns, answer, i);
   if (answer.truncated) result_.truncated.push_back(static_cast<uint32_t>(i));
   if (columns.mode == RayMode::kAny) {
-    output_.hits[i] = answer.hits.empty() ? '\0' : '\1';
+    output_.bytes[i] = answer.hits.empty() ? '\0' : '\1';
     return;
   }
   const Hit miss;
@@ -195,14 +225,15 @@ void BlockRunner::write_answer(const Columns& columns, const RayAnswer& answer, 
 
 void BlockRunner::run_query(const SweepColumns& sweeps, size_t i) {
   RayAnswer answer;
-  if (!task_.ended()) answer = run_sweep(task_, times_.of(i), sweep_request(block_, sweeps, i), Filter(block_, i));
+  if (!task_.ended())
+    answer = run_sweep(task_, times_.of(i), sweep_request(block_, origins_.of(i), sweeps, i), Filter(block_, i));
   write_answer(sweeps, answer, i);
 }
 
 void BlockRunner::run_query(const BallColumns& balls, size_t i) {
   OverlapAnswer answer;
   if (!task_.ended())
-    answer = run_ball(task_, times_.of(i), ball_of(block_, balls, i), overlap_options(block_, balls.detail),
+    answer = run_ball(task_, times_.of(i), ball_of(origins_.of(i), balls, i), overlap_options(block_, balls.detail),
                       Filter(block_, i));
   append_rows(answer, i);
 }
@@ -210,7 +241,7 @@ void BlockRunner::run_query(const BallColumns& balls, size_t i) {
 void BlockRunner::run_query(const BoxColumns& boxes, size_t i) {
   OverlapAnswer answer;
   if (!task_.ended())
-    answer = run_box(task_, times_.of(i), box_of(block_, boxes, i), overlap_options(block_, boxes.detail),
+    answer = run_box(task_, times_.of(i), box_of(origins_.of(i), boxes, i), overlap_options(block_, boxes.detail),
                      Filter(block_, i));
   append_rows(answer, i);
 }
@@ -218,15 +249,17 @@ void BlockRunner::run_query(const BoxColumns& boxes, size_t i) {
 void BlockRunner::run_query(const CapsuleColumns& capsules, size_t i) {
   OverlapAnswer answer;
   if (!task_.ended())
-    answer = run_capsule(task_, times_.of(i), capsule_of(block_, capsules, i), overlap_options(block_, capsules.detail),
-                         Filter(block_, i));
+    answer = run_capsule(task_, times_.of(i), capsule_of(origins_.of(i), capsules, i),
+                         overlap_options(block_, capsules.detail), Filter(block_, i));
   append_rows(answer, i);
 }
 
 void BlockRunner::run_query(const NearestColumns& nearest, size_t i) {
-  const NearestRequest request = nearest_request(block_, nearest, i);
-  std::vector<Hit> rows;
-  if (!task_.ended()) rows = run_nearest(task_, times_.of(i), request, Filter(block_, i));
+  const NearestRequest request = nearest_request(block_, origins_.of(i), nearest, i);
+  NearestAnswer answer;
+  if (!task_.ended()) answer = run_nearest(task_, times_.of(i), request, Filter(block_, i));
+  if (block_.count_only) return write_count(answer.count);
+  const std::vector<Hit>& rows = answer.rows;
   const size_t kept = std::min<uint64_t>(rows.size(), max_rows_ - rows_);
   const RowSpans to = add_rows(result_, columns_, kept);
   for (size_t row = 0; row < kept; ++row) {
@@ -235,6 +268,16 @@ void BlockRunner::run_query(const NearestColumns& nearest, size_t i) {
   }
   count_rows(kept, kept < rows.size(), i);
 }
+
+void BlockRunner::run_query(const FrustumColumns& /*frustums*/, size_t i) { write_nothing(i); }
+
+void BlockRunner::run_query(const SightColumns& /*sight*/, size_t i) { write_nothing(i); }
+
+void BlockRunner::run_query(const ContainsColumns& /*contains*/, size_t i) { write_nothing(i); }
+
+void BlockRunner::run_query(const PairColumns& /*pairs*/, size_t i) { write_nothing(i); }
+
+void BlockRunner::run_query(const CellColumns& /*cells*/, size_t i) { write_nothing(i); }
 
 // Looks up all groups of the block in one scan of the objects, at the effective time of query `i`. Does nothing if the
 // last lookup was at the same time, so that consecutive queries with equal times share one lookup.
@@ -249,7 +292,7 @@ void BlockRunner::run_query(const LookupColumns& lookup, size_t i) {
   if (lookup.groups.empty()) return write_row(look_up(task_.snapshot(), times_.of(i), lookup.ids[i]), output_.rows, i);
   look_up_groups_at(lookup, i);
   const OverlapAnswer& answer = groups_[lookup.groups[i]];
-  append_runs(answer, i);
+  append_rows(answer, i);
 }
 
 }  // namespace locus

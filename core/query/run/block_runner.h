@@ -3,7 +3,7 @@
 // of the runner, since their positions in the reply depend on how many rows the earlier chunks have.
 //
 // Threads: a runner belongs to one thread. Invariant: the runner has at most max_rows_ rows of kCounted and, for a
-// block with this layout, one row count for each query that was run.
+// block with this layout, one row count for each query that was run; with count_only it has only row counts.
 #ifndef LOCUS_CORE_QUERY_RUN_BLOCK_RUNNER_H_
 #define LOCUS_CORE_QUERY_RUN_BLOCK_RUNNER_H_
 
@@ -20,8 +20,8 @@ namespace locus {
 
 // Output columns of a block, and the state that its chunks share.
 struct BlockOutput {
-  RowSpans rows;         // kDense blocks: rows of all queries
-  char* hits = nullptr;  // kBytes blocks: one byte per query; otherwise null
+  RowSpans rows;          // kDense blocks: rows of all queries
+  char* bytes = nullptr;  // kBytes and kMatrix blocks: bytes_per_query() bytes per query; otherwise null
   // Number of rays for the next call of the kernels. More rays per call increase the throughput, but a call cannot be
   // interrupted.
   std::atomic<uint32_t> rays_per_call{64};
@@ -31,8 +31,8 @@ class BlockRunner {
  public:
   // Borrows all arguments. `max_bytes` is the free space of the reply in bytes: counted rows that exceed this space
   // could not be written out, so the runner drops them and lists their queries as truncated.
-  BlockRunner(QueryTask& task, const QueryBlock& block, const QueryTimes& times, BlockOutput& output,
-              uint64_t max_bytes);
+  BlockRunner(QueryTask& task, const QueryBlock& block, const QueryTimes& times, const QueryOrigins& origins,
+              BlockOutput& output, uint64_t max_bytes);
 
   // Answers queries [begin, end) in order. Stops early, but after at least one query, if the queries turn out to be
   // expensive. Returns the index of the first query that is not answered. Precondition: begin < end. Call it once.
@@ -56,6 +56,11 @@ class BlockRunner {
   void run_query(const LookupColumns& lookup, size_t i);
   void run_query(const NearestColumns& nearest, size_t i);
   void run_query(const SweepColumns& sweeps, size_t i);
+  void run_query(const FrustumColumns& frustums, size_t i);
+  void run_query(const SightColumns& sight, size_t i);
+  void run_query(const ContainsColumns& contains, size_t i);
+  void run_query(const PairColumns& pairs, size_t i);
+  void run_query(const CellColumns& cells, size_t i);
   // Columns of the following functions: RayColumns or SweepColumns.
   template <class Columns>
   void write_answer(const Columns& columns, const RayAnswer& answer, size_t i);
@@ -69,6 +74,10 @@ class BlockRunner {
   void append_runs(const OverlapAnswer& answer, size_t i);
   void look_up_groups_at(const LookupColumns& lookup, size_t i);
   void count_rows(size_t rows, bool cut, size_t i);
+  // Records the number of rows of query `i` of a block with count_only.
+  void write_count(uint64_t rows);
+  // Writes the answer of a query without rows.
+  void write_nothing(size_t i);
   // Returns the work so far as the number of nodes, cells, tests and rows, which does not depend on the speed of the
   // machine.
   uint64_t work_done() const;
@@ -80,6 +89,7 @@ class BlockRunner {
   QueryTask& task_;
   const QueryBlock& block_;
   const QueryTimes& times_;
+  const QueryOrigins& origins_;
   BlockOutput& output_;
   const ColumnSet columns_;
   const uint64_t max_rows_;

@@ -60,6 +60,13 @@ void write_row(const Hit& hit, const RowSpans& to, size_t row) {
   if (has_labels(to)) write_labels(hit, to, row);
 }
 
+void write_miss(const RowSpans& to, size_t row) {
+  write_row(Hit(), to, row);
+  if (to.uvs != nullptr) std::fill_n(to.uvs + 2 * row, 2, 0.0f);
+  if (to.normals != nullptr) std::fill_n(to.normals + 3 * row, 3, 0.0f);
+  if (to.points != nullptr) std::fill_n(to.points + 3 * row, 3, 0.0f);
+}
+
 void write_triangle_rows(const Hit& hit, absl::Span<const uint32_t> triangles, const RowSpans& to, size_t row) {
   if (to.ids != nullptr) std::fill_n(to.ids + row, triangles.size(), hit.id);
   if (to.triangles != nullptr) std::copy(triangles.begin(), triangles.end(), to.triangles + row);

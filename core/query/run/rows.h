@@ -15,6 +15,8 @@ namespace locus {
 
 // Writes the columns of row `row` that are common to all kinds of queries. A default-constructed hit is a miss.
 void write_row(const Hit& hit, const RowSpans& to, size_t row);
+// Writes all columns of a row without a hit.
+void write_miss(const RowSpans& to, size_t row);
 // Writes one row of a ball or box query for each of `triangles`, starting at row `row`. All columns except the triangle
 // have the values of `hit`.
 void write_triangle_rows(const Hit& hit, absl::Span<const uint32_t> triangles, const RowSpans& to, size_t row);

