@@ -3,6 +3,15 @@
 namespace locus::client {
 namespace {
 
+// Sets the position of rays or nearest queries in the order of rows.
+template <class Kind>
+void set_after(Kind& kind, absl::Span<const float> ts, absl::Span<const uint64_t> ids,
+               absl::Span<const uint32_t> triangles) {
+  assign(*kind.mutable_after_ts(), ts);
+  assign(*kind.mutable_after_ids(), ids);
+  assign(*kind.mutable_after_triangles(), triangles);
+}
+
 template <class T>
 void append(google::protobuf::RepeatedField<T>& column, absl::Span<const T> values) {
   column.Add(values.begin(), values.end());
@@ -42,6 +51,12 @@ RayBlock& RayBlock::rays(absl::Span<const float> origins, absl::Span<const float
 
 RayBlock& RayBlock::t_max(absl::Span<const float> t_max) {
   assign(*rays_->mutable_t_max(), t_max);
+  return *this;
+}
+
+RayBlock& RayBlock::after(absl::Span<const float> ts, absl::Span<const uint64_t> ids,
+                          absl::Span<const uint32_t> triangles) {
+  set_after(*rays_, ts, ids, triangles);
   return *this;
 }
 
@@ -198,6 +213,124 @@ NearestBlock& NearestBlock::points(absl::Span<const float> points) {
 
 NearestBlock& NearestBlock::max_distances(absl::Span<const float> distances) {
   assign(*nearest_->mutable_max_distances(), distances);
+  return *this;
+}
+
+NearestBlock& NearestBlock::after(absl::Span<const float> ts, absl::Span<const uint64_t> ids,
+                                  absl::Span<const uint32_t> triangles) {
+  set_after(*nearest_, ts, ids, triangles);
+  return *this;
+}
+
+FrustumBlock& FrustumBlock::detail(v1::StaticDetail detail) {
+  frustums_->set_detail(detail);
+  return *this;
+}
+
+FrustumBlock& FrustumBlock::planes(absl::Span<const float> planes, uint32_t planes_each) {
+  append(*frustums_->mutable_planes(), planes);
+  frustums_->set_planes_each(planes_each);
+  return *this;
+}
+
+FrustumBlock& FrustumBlock::view_projections(absl::Span<const float> matrices, v1::ClipDepth clip_depth) {
+  append(*frustums_->mutable_view_projections(), matrices);
+  frustums_->set_clip_depth(clip_depth);
+  return *this;
+}
+
+ContainsBlock& ContainsBlock::point(const Float3& point, const Filter& filter) {
+  filter_row(contains_->points_size() / 3, filter);
+  append_triple(*contains_->mutable_points(), point);
+  return *this;
+}
+
+ContainsBlock& ContainsBlock::points(absl::Span<const float> points) {
+  append(*contains_->mutable_points(), points);
+  return *this;
+}
+
+SightBlock& SightBlock::viewer(const Float3& eye, uint64_t group) {
+  append_row<uint64_t>(*sight_->mutable_viewer_groups(), sight_->viewers_size() / 3, group, 0);
+  append_triple(*sight_->mutable_viewers(), eye);
+  return *this;
+}
+
+SightBlock& SightBlock::target(const Float3& sample, uint64_t group) {
+  append_row<uint64_t>(*sight_->mutable_target_groups(), sight_->targets_size() / 3, group, 0);
+  append_triple(*sight_->mutable_targets(), sample);
+  return *this;
+}
+
+SightBlock& SightBlock::viewers(absl::Span<const float> points, uint32_t eyes) {
+  append(*sight_->mutable_viewers(), points);
+  sight_->set_eyes_per_viewer(eyes);
+  return *this;
+}
+
+SightBlock& SightBlock::targets(absl::Span<const float> points, uint32_t samples) {
+  append(*sight_->mutable_targets(), points);
+  sight_->set_samples_per_target(samples);
+  return *this;
+}
+
+SightBlock& SightBlock::viewer_groups(absl::Span<const uint64_t> groups) {
+  assign(*sight_->mutable_viewer_groups(), groups);
+  return *this;
+}
+
+SightBlock& SightBlock::target_groups(absl::Span<const uint64_t> groups) {
+  assign(*sight_->mutable_target_groups(), groups);
+  return *this;
+}
+
+SightBlock& SightBlock::max_distances(absl::Span<const float> distances) {
+  assign(*sight_->mutable_max_distances(), distances);
+  return *this;
+}
+
+SightBlock& SightBlock::pairwise() {
+  sight_->set_pairwise(true);
+  return *this;
+}
+
+PairBlock& PairBlock::max_distance(float distance) {
+  pairs_->set_max_distance(distance);
+  return *this;
+}
+
+PairBlock& PairBlock::layers(uint32_t first_mask, uint32_t second_mask) {
+  pairs_->set_first_mask(first_mask);
+  pairs_->set_second_mask(second_mask);
+  return *this;
+}
+
+PairBlock& PairBlock::k(uint32_t count) {
+  pairs_->set_k(count);
+  return *this;
+}
+
+PairBlock& PairBlock::after_pair(uint64_t id, uint64_t other) {
+  block_->set_after_id(id);
+  pairs_->set_after_other(other);
+  return *this;
+}
+
+CellBlock& CellBlock::max_planes(uint32_t planes) {
+  cells_->set_max_planes(planes);
+  return *this;
+}
+
+CellBlock& CellBlock::point(const Float3& point, float max_distance, const Filter& filter) {
+  filter_row(cells_->points_size() / 3, filter);
+  append_triple(*cells_->mutable_points(), point);
+  cells_->add_max_distances(max_distance);
+  return *this;
+}
+
+CellBlock& CellBlock::points(absl::Span<const float> points, absl::Span<const float> max_distances) {
+  append(*cells_->mutable_points(), points);
+  append(*cells_->mutable_max_distances(), max_distances);
   return *this;
 }
 

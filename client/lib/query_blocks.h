@@ -1,6 +1,7 @@
-// Builders of one block of a query batch: rays, balls, boxes, capsules, sweeps, nearest or lookup, with the settings
-// that all kinds share. QueryBuilder returns these builders, which are valid until QueryBuilder::build(). The builders
-// check nothing: the server refuses an invalid batch as a whole, naming block, column and index. Not thread-safe.
+// Builders of one block of a query batch: rays, balls, boxes, capsules, sweeps, frustums, points to contain, sight,
+// nearest, pairs, cells or lookup, with the settings that all kinds share. QueryBuilder returns these builders, which
+// are valid until QueryBuilder::build(). The builders check nothing: the server refuses an invalid batch as a whole,
+// naming block, column and index. Not thread-safe.
 //
 // Let N be the number of queries of a block. A per-query column (t_max, max_distances, masks, ignored groups,
 // rotations) is either filled row by row, or set as a whole column, which has N entries, one entry for all queries, or
@@ -75,6 +76,17 @@ class BlockBuilder {
     block_->set_after_id(id);
     return derived();
   }
+  // Sets an object or instance for each query, from which the positions of the query count, and which the query does
+  // not find: N ids. Points in the result stay relative to the frame.
+  Derived& anchors(absl::Span<const uint64_t> ids) {
+    assign(*block_->mutable_anchor_ids(), ids);
+    return derived();
+  }
+  // Requests only the number of rows of each query, without a maximum.
+  Derived& count_only() {
+    block_->set_count_only(true);
+    return derived();
+  }
   // Sets the time of each query. `ticks` has N entries or one for all queries. `fractions` contains fractions of the
   // time from a query's tick to the next tick, at least 0 and less than 1: N entries, one for all queries, or none.
   Derived& as_of(absl::Span<const uint64_t> ticks, absl::Span<const float> fractions = {}) {
@@ -116,6 +128,10 @@ class RayBlock : public BlockBuilder<RayBlock> {
   RayBlock& rays(absl::Span<const float> origins, absl::Span<const float> directions);
   // Sets the whole column of the maximum t, inclusive: N entries, or one for all rays.
   RayBlock& t_max(absl::Span<const float> t_max);
+  // Restricts the result to hits behind (t, id, triangle), to continue after a truncated result: N entries each, or one
+  // for all rays. Without ids, hits at t itself are left out.
+  RayBlock& after(absl::Span<const float> ts, absl::Span<const uint64_t> ids = {},
+                  absl::Span<const uint32_t> triangles = {});
 
  private:
   v1::Rays* rays_;
@@ -217,9 +233,102 @@ class NearestBlock : public BlockBuilder<NearestBlock> {
   NearestBlock& points(absl::Span<const float> points);
   // Sets the whole column of maximum distances, inclusive: N entries, or one for all points.
   NearestBlock& max_distances(absl::Span<const float> distances);
+  // Restricts the result to rows behind (distance, id, triangle), as RayBlock::after().
+  NearestBlock& after(absl::Span<const float> ts, absl::Span<const uint64_t> ids = {},
+                      absl::Span<const uint32_t> triangles = {});
 
  private:
   v1::Nearest* nearest_;
+};
+
+// Convex regions, given by planes or by view-projection matrices. Not both in one block.
+class FrustumBlock : public BlockBuilder<FrustumBlock> {
+ public:
+  explicit FrustumBlock(v1::QueryBlock& block) : BlockBuilder(block), frustums_(block.mutable_frustums()) {}
+
+  FrustumBlock& detail(v1::StaticDetail detail);
+  // Appends regions of `planes_each` planes, 4 .. 32: four floats nx, ny, nz, d each. A point p is inside of a plane if
+  // n.p + d >= 0. All regions of a block have the same number of planes.
+  FrustumBlock& planes(absl::Span<const float> planes, uint32_t planes_each = 6);
+  // Appends the views of cameras: column-major matrices of 16 floats.
+  FrustumBlock& view_projections(absl::Span<const float> matrices,
+                                 v1::ClipDepth clip_depth = v1::CLIP_DEPTH_ZERO_TO_ONE);
+
+ private:
+  v1::Frustums* frustums_;
+};
+
+// Block that finds the objects and closed meshes that contain points.
+class ContainsBlock : public BlockBuilder<ContainsBlock> {
+ public:
+  explicit ContainsBlock(v1::QueryBlock& block) : BlockBuilder(block), contains_(block.mutable_contains()) {}
+
+  ContainsBlock& point(const Float3& point, const Filter& filter = {});
+  // Appends N points: 3N floats.
+  ContainsBlock& points(absl::Span<const float> points);
+
+ private:
+  v1::Contains* contains_;
+};
+
+// Block that asks which targets each viewer sees. The settings that are per query, such as masks, are per viewer.
+class SightBlock : public BlockBuilder<SightBlock> {
+ public:
+  explicit SightBlock(v1::QueryBlock& block) : BlockBuilder(block), sight_(block.mutable_sight()) {}
+
+  // Appends a viewer with one eye, or a target with one sample point, of a group (0: none) that does not block its
+  // sight.
+  SightBlock& viewer(const Float3& eye, uint64_t group = 0);
+  SightBlock& target(const Float3& sample, uint64_t group = 0);
+  // Append viewers of `eyes` eyes, 1 .. 16, and targets of `samples` sample points, 1 .. 255: three floats for each
+  // point. All viewers of a block have the same number of eyes, all targets the same number of samples.
+  SightBlock& viewers(absl::Span<const float> points, uint32_t eyes = 1);
+  SightBlock& targets(absl::Span<const float> points, uint32_t samples = 1);
+  // Set the whole column of groups: an entry for each viewer or target, or one for all.
+  SightBlock& viewer_groups(absl::Span<const uint64_t> groups);
+  SightBlock& target_groups(absl::Span<const uint64_t> groups);
+  // Sets the whole column of maximum distances of sight, inclusive: an entry for each viewer, or one for all.
+  SightBlock& max_distances(absl::Span<const float> distances);
+  // Asks only whether viewer i sees target i.
+  SightBlock& pairwise();
+
+ private:
+  v1::Sight* sight_;
+};
+
+// Block that finds pairs of objects near each other; it is one query.
+class PairBlock : public BlockBuilder<PairBlock> {
+ public:
+  explicit PairBlock(v1::QueryBlock& block) : BlockBuilder(block), pairs_(block.mutable_pairs()) {}
+
+  // Sets the maximum distance between the solids, inclusive; 0 finds objects that touch.
+  PairBlock& max_distance(float distance);
+  // Sets the layers of the first and of the second object; by default all layers.
+  PairBlock& layers(uint32_t first_mask, uint32_t second_mask);
+  // Requests the `count` nearest objects of each first object, instead of all pairs.
+  PairBlock& k(uint32_t count);
+  // Continues behind the pair (id, other) of a truncated result.
+  PairBlock& after_pair(uint64_t id, uint64_t other);
+
+ private:
+  v1::Pairs* pairs_;
+};
+
+// Block that asks for the convex free space around points.
+class CellBlock : public BlockBuilder<CellBlock> {
+ public:
+  explicit CellBlock(v1::QueryBlock& block) : BlockBuilder(block), cells_(block.mutable_cells()) {}
+
+  // Sets the maximum number of planes of a space, up to 64; 0 = 32.
+  CellBlock& max_planes(uint32_t planes);
+  // Appends a point, around which the space within `max_distance` is asked.
+  CellBlock& point(const Float3& point, float max_distance, const Filter& filter = {});
+  // Appends N points: 3N floats, and N maximum distances. If this call adds all points of the block, `max_distances`
+  // may instead contain one for all points.
+  CellBlock& points(absl::Span<const float> points, absl::Span<const float> max_distances);
+
+ private:
+  v1::Cells* cells_;
 };
 
 // Block that looks up objects and instances either by ids, with one row for each id in the order of the ids, or by

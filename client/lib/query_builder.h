@@ -34,6 +34,11 @@ class QueryBuilder {
   BoxBlock boxes() { return BoxBlock(*batch_.add_blocks()); }
   CapsuleBlock capsules() { return CapsuleBlock(*batch_.add_blocks()); }
   SweepBlock sweeps() { return SweepBlock(*batch_.add_blocks()); }
+  FrustumBlock frustums() { return FrustumBlock(*batch_.add_blocks()); }
+  ContainsBlock contains() { return ContainsBlock(*batch_.add_blocks()); }
+  SightBlock sight() { return SightBlock(*batch_.add_blocks()); }
+  PairBlock pairs() { return PairBlock(*batch_.add_blocks()); }
+  CellBlock cells() { return CellBlock(*batch_.add_blocks()); }
   NearestBlock nearest() { return NearestBlock(*batch_.add_blocks()); }
   LookupBlock lookup() { return LookupBlock(*batch_.add_blocks()); }
 

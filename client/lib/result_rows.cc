@@ -27,7 +27,8 @@ std::vector<ColumnLength> lengths_of(const v1::BlockResult& block) {
           {"tags", block.tags_size(), 1},
           {"layers", block.layers_size(), 1},
           {"positions", block.positions_size(), 3},
-          {"rotations", block.rotations_size(), 4}};
+          {"rotations", block.rotations_size(), 4},
+          {"others", block.others_size(), 1}};
 }
 
 absl::Status contradiction(absl::string_view what) {
@@ -76,6 +77,11 @@ bool ResultRows::truncated(size_t query) const {
 bool ResultRows::clamped(size_t query) const {
   const auto& clamped = block_->clamped();
   return std::binary_search(clamped.begin(), clamped.end(), query);
+}
+
+bool ResultRows::unanchored(size_t query) const {
+  const auto& unanchored = block_->unanchored();
+  return std::binary_search(unanchored.begin(), unanchored.end(), query);
 }
 
 absl::StatusOr<RayHits> RayHits::of(const v1::BlockResult& block) {
@@ -127,6 +133,32 @@ absl::Span<const uint32_t> Overlaps::triangles(size_t query) const {
   const RowRange range = rows_.rows_of(query);
   if (rows_.triangles().empty()) return {};
   return rows_.triangles().subspan(range.begin, range.size());
+}
+
+absl::StatusOr<SightMatrix> SightMatrix::of(const v1::BlockResult& block, size_t viewers, size_t targets) {
+  if (block.sight().size() != viewers * targets) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("this block has ", block.sight().size(), " bytes of sight, not ", viewers, " x ", targets));
+  }
+  return SightMatrix(block, targets);
+}
+
+absl::StatusOr<FreeSpaces> FreeSpaces::of(const v1::BlockResult& block) {
+  ASSIGN_OR_RETURN(ResultRows rows, ResultRows::of(block));
+  if (rows.t().size() != rows.rows() || rows.ids().size() != rows.rows()) {
+    return absl::InvalidArgumentError("cells need the columns T and ID: ask for them, or for the default columns");
+  }
+  return FreeSpaces(std::move(rows));
+}
+
+float FreeSpaces::radius(size_t query) const {
+  const RowRange range = rows_.rows_of(query);
+  return range.size() > 0 ? rows_.t()[range.begin] : 0;
+}
+
+RowRange FreeSpaces::planes(size_t query) const {
+  const RowRange range = rows_.rows_of(query);
+  return {range.size() > 0 ? range.begin + 1 : range.end, range.end};
 }
 
 }  // namespace locus::client

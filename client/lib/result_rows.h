@@ -45,6 +45,8 @@ class ResultRows {
   // Returns whether the query's time was outside the recorded history, so that it was answered at the nearest recorded
   // time.
   bool clamped(size_t query) const;
+  // Returns whether the query has no rows because its anchor is unknown at its time, or too far out.
+  bool unanchored(size_t query) const;
 
   // Return columns with one entry per row. A column that was not requested is empty.
   absl::Span<const float> t() const { return block_->t(); }
@@ -53,6 +55,8 @@ class ResultRows {
   absl::Span<const uint64_t> groups() const { return block_->groups(); }
   absl::Span<const uint64_t> tags() const { return block_->tags(); }
   absl::Span<const uint32_t> layers() const { return block_->layers(); }
+  // Returns the second object of each pair.
+  absl::Span<const uint64_t> others() const { return block_->others(); }
   // Return columns with several values per row: 2 for uvs, 4 for rotations, 3 for normals, points and positions. A
   // column that was not requested is empty.
   absl::Span<const float> uvs() const { return block_->uvs(); }
@@ -103,8 +107,8 @@ class AnyHits {
   const v1::BlockResult* block_;
 };
 
-// View of the rows of balls, boxes and capsules: for each query a span of ids, and of triangles if requested. Needs the
-// column ID, which is returned by default.
+// View of the rows of overlap queries and of points to contain: for each query a span of ids, and of triangles if
+// requested. Needs the column ID, which is returned by default.
 class Overlaps {
  public:
   static absl::StatusOr<Overlaps> of(const v1::BlockResult& block);
@@ -118,6 +122,44 @@ class Overlaps {
 
  private:
   explicit Overlaps(ResultRows rows) : rows_(std::move(rows)) {}
+
+  ResultRows rows_;
+};
+
+// View of the result of sight: a byte for each viewer and target, or for each viewer of a pairwise block.
+class SightMatrix {
+ public:
+  // Returns a view of the answer to `viewers` viewers and `targets` targets; for a pairwise block, `targets` is 1.
+  // Returns INVALID_ARGUMENT if the block has another number of bytes.
+  static absl::StatusOr<SightMatrix> of(const v1::BlockResult& block, size_t viewers, size_t targets);
+
+  // Returns how many samples of the target the viewer sees, at most 255.
+  uint32_t seen(size_t viewer, size_t target) const {
+    return static_cast<uint8_t>(block_->sight()[viewer * targets_ + target]);
+  }
+
+ private:
+  SightMatrix(const v1::BlockResult& block, size_t targets) : block_(&block), targets_(targets) {}
+
+  const v1::BlockResult* block_;
+  size_t targets_;
+};
+
+// View of the result of cells: the convex free space around each point. Needs the columns T and ID, which are returned
+// by default.
+class FreeSpaces {
+ public:
+  static absl::StatusOr<FreeSpaces> of(const v1::BlockResult& block);
+
+  const ResultRows& rows() const { return rows_; }
+  size_t size() const { return rows_.queries(); }
+  // Returns the radius of the ball that bounds the space; 0 if the point lies in or on something.
+  float radius(size_t query) const;
+  // Returns the rows of the planes of the space, for the columns of rows().
+  RowRange planes(size_t query) const;
+
+ private:
+  explicit FreeSpaces(ResultRows rows) : rows_(std::move(rows)) {}
 
   ResultRows rows_;
 };

@@ -12,11 +12,11 @@ __path__ = pkgutil.extend_path(__path__, __name__)
 from .client import DEFAULT_ADDRESS, Client, connect
 from .columns import ColumnLike, Values
 from .connection import Retry
-from .enums import (AtStart, Column, Cull, Inside, OutsideHistory, OverloadPolicy, Precision, RayMode, Reason, SceneState,
+from .enums import (AtStart, ClipDepth, Column, Cull, Inside, OutsideHistory, OverloadPolicy, Precision, RayMode, Reason, SceneState,
                     Source, StaticDetail, Winding)
 from .errors import LocusError
 from .meshes import InstanceChange, MeshColumns, PlacedInstances
-from .queries import Block, QueryBatch
+from .queries import After, Block, QueryBatch
 from .query_stream import QueryStream
 from .results import NO_TRIANGLE, BlockResult, QueryResult
 from .update_stream import UpdateStream
@@ -24,7 +24,8 @@ from .updates import UpdateBatch
 from .values import Ack, ItemError, Limit, Mesh, MeshPart, Quota, Revision, Scene, Server, Work
 
 __all__ = [
-    "Ack", "AtStart", "Block", "BlockResult", "Client", "Column", "ColumnLike", "Cull", "DEFAULT_ADDRESS", "Inside",
+    "Ack", "After", "AtStart", "Block", "BlockResult", "Client", "ClipDepth", "Column", "ColumnLike", "Cull",
+    "DEFAULT_ADDRESS", "Inside",
     "InstanceChange", "ItemError", "Limit", "LocusError", "Mesh", "MeshColumns", "MeshPart", "NO_TRIANGLE",
     "OutsideHistory", "OverloadPolicy", "PlacedInstances", "Precision", "QueryBatch", "QueryResult", "QueryStream",
     "Quota", "RayMode", "Reason", "Retry", "Revision", "Scene", "SceneState", "Server", "Source", "StaticDetail",

@@ -1,17 +1,19 @@
-"""Query batches: blocks of rays, sweeps, overlaps, nearest queries and lookups in columns, answered at one revision."""
+"""Query batches: blocks of rays, sweeps, overlaps, sight, nearest queries and more in columns, answered at one revision."""
 from __future__ import annotations
 
+import struct
 from typing import NamedTuple, Optional, Sequence
 
 from . import columns, schema, wire
 from .columns import FLOAT32, UINT32, UINT64, ColumnLike
-from .enums import AtStart, Column, Cull, Inside, OutsideHistory, Precision, RayMode, Source, StaticDetail
+from .enums import AtStart, ClipDepth, Column, Cull, Inside, OutsideHistory, Precision, RayMode, Source, StaticDetail
 from .values import Revision
 
 _REQUEST, _BATCH, _VIEW = schema.numbers("QueryRequest"), schema.numbers("QueryBatch"), schema.numbers("View")
 _BLOCK = schema.numbers("QueryBlock")
-_KINDS = {name: schema.numbers(name.capitalize()) for name in ("rays", "balls", "boxes", "capsules", "lookup",
-                                                                     "nearest", "sweeps")}
+_KINDS = {name: schema.numbers(name.capitalize())
+          for name in ("rays", "balls", "boxes", "capsules", "cells", "contains", "frustums", "lookup", "nearest", "pairs",
+                       "sight", "sweeps")}
 
 
 class Block(NamedTuple):
@@ -22,7 +24,8 @@ class Block(NamedTuple):
       column POSE is absolute.
     - `source`: search static instances, moving objects or both; `precision`: exact shapes or their bounds.
     - `columns`: columns to return for each row, by default T, ID and TRIANGLE for rays, sweeps and nearest queries, ID for
-      balls, boxes and capsules (TRIANGLE too if their detail is triangles), ID and POSE for lookups.
+      balls, boxes, capsules, frustums and contains (TRIANGLE too if their detail is triangles), ID and POSE for lookups,
+      ID and OTHER for pairs (T too with `k`), T, ID, TRIANGLE and NORMAL for cells.
     - `masks`: N uint32 or one; only objects and instances with (layers & mask) != 0 are found.
     - `ignore_groups`: N uint64 or one; the query ignores objects and instances of this group.
     - `ignore_ids`: at most 64 uint64 ids to ignore, for the whole block.
@@ -31,6 +34,8 @@ class Block(NamedTuple):
     - `as_of_ticks`: N uint64 or one; the query sees objects as they were at the end of this tick. `as_of_fractions`: N
       float32 or one, 0 <= f < 1, only with `as_of_ticks`: fraction f of the time from that tick to the next one.
       `outside_history`: handling of times that are not in the history; they are refused by default.
+    - `anchor_ids`: N uint64; positions of a query count from where this object or instance is, which is not found itself.
+    - `count_only`: return only the number of rows of each query, without a maximum.
     """
 
     frame: Optional[ColumnLike] = None
@@ -45,6 +50,8 @@ class Block(NamedTuple):
     as_of_ticks: ColumnLike = None
     as_of_fractions: ColumnLike = None
     outside_history: OutsideHistory = OutsideHistory.UNSPECIFIED
+    anchor_ids: ColumnLike = None
+    count_only: bool = False
 
     def write(self, block: wire.Parts, path: str, count: int) -> None:
         """Appends the settings to a QueryBlock of `count` queries, named `path` in errors. Defaults add no bytes."""
@@ -74,6 +81,20 @@ class Block(NamedTuple):
             block.add(_BLOCK["as_of_fractions"], fractions)
         if self.outside_history:
             block.add_varint(_BLOCK["outside_history"], self.outside_history)
+        if self.anchor_ids is not None:
+            block.add(_BLOCK["anchor_ids"], columns.borrow_for(path + "anchor_ids", self.anchor_ids, UINT64, count))
+        if self.count_only:
+            block.add_varint(_BLOCK["count_only"], 1)
+
+
+class After(NamedTuple):
+    """Position in the order of rows (t, id, triangle) behind which rays and nearest queries continue: N numbers each, or
+    one for all. Without `ids`, rows at t itself are left out; `triangles` need `ids`.
+    """
+
+    ts: ColumnLike
+    ids: ColumnLike = None
+    triangles: ColumnLike = None
 
 
 class QueryBatch:
@@ -115,15 +136,16 @@ class QueryBatch:
 
     def rays(self, origins: ColumnLike, directions: ColumnLike, *, t_max: ColumnLike = None,
              mode: RayMode = RayMode.FIRST, cull: Cull = Cull.NONE, inside: Inside = Inside.SOLID,
-             block: Block = Block()) -> "QueryBatch":
+             after: Optional[After] = None, block: Block = Block()) -> "QueryBatch":
         """Adds a block of N rays. `origins`: 3N float32; `directions`: 3N float32 or three, vectors of any length but
         zero. Directions are not normalized: the unit of t is the length of the direction. `t_max`: N float32 or one,
-        the maximum t, inclusive, +infinity by default.
+        the maximum t, inclusive, +infinity by default; `after`: only hits behind this position.
         """
         new = _NewBlock(self._blocks, "rays")
         new.first("origins", origins, FLOAT32, 3)
         new.column("directions", directions, FLOAT32, 3)
         new.column("t_max", t_max, FLOAT32)
+        new.after(after)
         if mode is not RayMode.FIRST or cull is not Cull.NONE or inside is not Inside.SOLID:
             new.options(mode=mode, cull=cull, inside=inside)
         return self._add(new, block)
@@ -186,16 +208,93 @@ class QueryBatch:
         return self._add(new, block)
 
     def nearest(self, points: ColumnLike, *, k: int = 1, max_distances: ColumnLike = None,
-                detail: StaticDetail = StaticDetail.INSTANCES, block: Block = Block()) -> "QueryBatch":
+                detail: StaticDetail = StaticDetail.INSTANCES, after: Optional[After] = None,
+                block: Block = Block()) -> "QueryBatch":
         """Adds a block of N points, to find the nearest objects and instances. `points`: 3N float32; `k`: maximum
         number of rows per point, by ascending distance. Column T contains the distance: 0 inside an object; for a mesh
         always the distance to its surface. `max_distances`: N float32 or one, inclusive, +infinity by default;
-        `detail`: INSTANCES returns one row per instance, for its nearest triangle.
+        `detail`: INSTANCES returns one row per instance, for its nearest triangle; `after`: only rows behind this position.
         """
         new = _NewBlock(self._blocks, "nearest")
         new.first("points", points, FLOAT32, 3)
         new.column("max_distances", max_distances, FLOAT32)
+        new.after(after)
         new.options(k=k, detail=detail)
+        return self._add(new, block)
+
+    def frustums(self, planes: ColumnLike, *, planes_each: int = 6, detail: StaticDetail = StaticDetail.INSTANCES,
+                 block: Block = Block()) -> "QueryBatch":
+        """Adds a block of N convex regions, to find the objects and instances that overlap them. `planes`: float32
+        nx, ny, nz, d of `planes_each` planes, 4 .. 32, for each region; a point p is inside of a plane if n.p + d >= 0.
+        """
+        new = _NewBlock(self._blocks, "frustums")
+        new.first("planes", planes, FLOAT32, 4 * planes_each)
+        new.options(planes_each=planes_each, detail=detail)
+        return self._add(new, block)
+
+    def views(self, view_projections: ColumnLike, *, clip_depth: ClipDepth = ClipDepth.ZERO_TO_ONE,
+              detail: StaticDetail = StaticDetail.INSTANCES, block: Block = Block()) -> "QueryBatch":
+        """Adds a block of the views of N cameras, to find the objects and instances in view. `view_projections`: 16N
+        float32, column-major matrices from positions to clip coordinates.
+        """
+        new = _NewBlock(self._blocks, "frustums")
+        new.first("view_projections", view_projections, FLOAT32, 16)
+        new.options(clip_depth=clip_depth, detail=detail)
+        return self._add(new, block)
+
+    def contains(self, points: ColumnLike, *, block: Block = Block()) -> "QueryBatch":
+        """Adds a block of N points, to find the objects and the instances of closed meshes that contain them. `points`:
+        3N float32.
+        """
+        new = _NewBlock(self._blocks, "contains")
+        new.first("points", points, FLOAT32, 3)
+        return self._add(new, block)
+
+    def sight(self, viewers: ColumnLike, targets: ColumnLike, *, eyes: int = 1, samples: int = 1,
+              viewer_groups: ColumnLike = None, target_groups: ColumnLike = None, max_distances: ColumnLike = None,
+              pairwise: bool = False, block: Block = Block()) -> "QueryBatch":
+        """Adds a block of V viewers that look at M targets; BlockResult.sight has a byte for each viewer and target.
+        `viewers`: float32, `eyes` points for each viewer; `targets`: float32, `samples` points for each target;
+        `viewer_groups`: V uint64 or one, `target_groups`: M uint64 or one, groups that do not block the sight of this
+        viewer, or of this target; `max_distances`: V float32 or one, inclusive; `pairwise`: viewer i looks at target i
+        only.
+        """
+        new = _NewBlock(self._blocks, "sight")
+        new.first("viewers", viewers, FLOAT32, 3 * eyes)
+        new.column("viewer_groups", viewer_groups, UINT64)
+        new.column("max_distances", max_distances, FLOAT32)
+        viewer_count = new.count
+        new.first("targets", targets, FLOAT32, 3 * samples)
+        new.column("target_groups", target_groups, UINT64)
+        new.count = viewer_count
+        new.options(eyes_per_viewer=eyes, samples_per_target=samples, pairwise=pairwise)
+        return self._add(new, block)
+
+    def pairs(self, max_distance: float = 0.0, *, first_mask: int = 0, second_mask: int = 0, k: int = 0,
+              after_other: int = 0, block: Block = Block()) -> "QueryBatch":
+        """Adds one query for the pairs of objects within `max_distance` of each other; 0 finds objects that touch.
+        `first_mask`, `second_mask`: layers of the two objects, 0 = all; `k`: the k nearest objects of each object instead
+        of all pairs; `after_other` with Block.after_id: only rows behind this pair.
+        """
+        new = _NewBlock(self._blocks, "pairs")
+        new.count = 1
+        new.numbers(max_distance=max_distance)
+        new.masks(first_mask=first_mask, second_mask=second_mask)
+        new.options(k=k)
+        if after_other:
+            new.kind.add_fixed64(_KINDS["pairs"]["after_other"], after_other)
+        return self._add(new, block)
+
+    def cells(self, points: ColumnLike, max_distances: ColumnLike, *, max_planes: int = 32,
+              block: Block = Block()) -> "QueryBatch":
+        """Adds a block of N points, to get the convex free space around them. `points`: 3N float32; `max_distances`: N
+        float32 or one, above 0. The first row of a point has id 0, and as T the radius of the ball that bounds the
+        space; each further row is a plane. A point in or on something has no rows.
+        """
+        new = _NewBlock(self._blocks, "cells")
+        new.first("points", points, FLOAT32, 3)
+        new.column("max_distances", max_distances, FLOAT32)
+        new.options(max_planes=max_planes)
         return self._add(new, block)
 
     def lookup(self, ids: ColumnLike, *, block: Block = Block()) -> "QueryBatch":
@@ -254,6 +353,25 @@ class _NewBlock:
         if value is not None:
             path = f"{self.path}{self.name}.{name}"
             self.kind.add(_KINDS[self.name][name], columns.borrow_for(path, value, number_type, self.count, width))
+
+    def after(self, after: Optional[After]) -> None:
+        """Adds the position behind which the queries continue."""
+        if after is not None:
+            self.column("after_ts", after.ts, FLOAT32)
+            self.column("after_ids", after.ids, UINT64)
+            self.column("after_triangles", after.triangles, UINT32)
+
+    def numbers(self, **fields: float) -> None:
+        """Adds the kind's fields that are single floats. Fields that are 0 are omitted."""
+        for name, value in fields.items():
+            if value:
+                self.kind.add_fixed32(_KINDS[self.name][name], struct.unpack("<I", struct.pack("<f", value))[0])
+
+    def masks(self, **fields: int) -> None:
+        """Adds the kind's fields that are single fixed32 numbers. Fields that are 0 are omitted."""
+        for name, value in fields.items():
+            if value:
+                self.kind.add_fixed32(_KINDS[self.name][name], value)
 
     def options(self, **fields: int) -> None:
         """Adds the kind's fields that are not columns. Fields that are 0 are omitted."""

@@ -23,7 +23,7 @@ _IN_RESPONSE = schema.numbers("QueryResponse")["result"]
 _COUNTS = _BLOCK["counts"]
 _ROW_BYTES = tuple((_BLOCK[name], size) for name, size in (
     ("ids", 8), ("t", 4), ("triangles", 4), ("uvs", 8), ("normals", 12), ("points", 12), ("groups", 8), ("tags", 8),
-    ("layers", 4), ("positions", 24)))
+    ("layers", 4), ("positions", 24), ("others", 8)))
 
 
 class _Column:
@@ -71,10 +71,14 @@ class BlockResult:
         self._rows: Optional[int] = None
 
     counts = _Column("Number of rows of each query: N uint32; empty if every query has one row (rays FIRST, lookups of "
-                     "ids) or none (rays ANY).", UINT32, by_row=False)
+                     "ids) or none (rays ANY, sight).", UINT32, by_row=False)
     truncated = _Column("Indices of the queries that have more rows than are reported: uint32, ascending.",
                         UINT32, by_row=False)
     hits = _Column("Rays ANY: N uint8, 1 if the ray has a hit, else 0.", UINT8, by_row=False)
+    sight = _Column("Sight: VM uint8, viewer by viewer, the number of the target's samples that are seen; with `pairwise` "
+                    "V uint8.", UINT8, by_row=False)
+    unanchored = _Column("Indices of the queries without rows because their anchor is unknown: uint32, ascending.",
+                         UINT32, by_row=False)
     t = _Column("R float32. Rays: t, whose unit is the length of the ray's direction; +infinity for a miss. Nearest: "
                 "the distance.", FLOAT32)
     ids = _Column("R uint64 ids of objects and instances; 0 for a miss.", UINT64)
@@ -90,6 +94,8 @@ class BlockResult:
     positions = _Column("3R float64: an object's centre or an instance's translation, absolute; 0 for a miss.",
                         FLOAT64, 3)
     rotations = _Column("4R float32: the rotation as stored, x, y, z, w; 0 for a miss.", FLOAT32, 4)
+
+    others = _Column("R uint64 ids of the second object of each pair.", UINT64)
 
     resolved_ticks = _Column("N uint64: the effective tick of each query; empty without `as_of_ticks`.", UINT64,
                              by_row=False)

@@ -156,6 +156,73 @@ TEST(QueryBuilderTest, PointsAreAddedByRowOrAsAColumn) {
   EXPECT_THAT(batch.blocks(1).nearest().max_distances(), ElementsAre(8));
 }
 
+TEST(QueryBuilderTest, AnchorsCountsAndPagesAreSettingsOfABlock) {
+  QueryBuilder builder;
+  builder.rays().ray({0, 0, 0}, {1, 0, 0}).anchors({{7}}).after({{2.5f}}, {{8}}, {{9}});
+  builder.nearest().point({0, 0, 0}).after({{3}}).count_only();
+  const v1::QueryBatch batch = builder.build();
+  EXPECT_THAT(batch.blocks(0).anchor_ids(), ElementsAre(7));
+  EXPECT_FALSE(batch.blocks(0).count_only());
+  EXPECT_THAT(batch.blocks(0).rays().after_ts(), ElementsAre(2.5f));
+  EXPECT_THAT(batch.blocks(0).rays().after_ids(), ElementsAre(8));
+  EXPECT_THAT(batch.blocks(0).rays().after_triangles(), ElementsAre(9));
+  EXPECT_TRUE(batch.blocks(1).count_only());
+  EXPECT_THAT(batch.blocks(1).nearest().after_ts(), ElementsAre(3));
+}
+
+TEST(QueryBuilderTest, RegionsArePlanesOrMatrices) {
+  QueryBuilder builder;
+  const std::vector<float> planes(16, 1), matrix(16, 2);
+  builder.frustums().planes(planes, 4).detail(v1::STATIC_DETAIL_TRIANGLES);
+  builder.frustums().view_projections(matrix, v1::CLIP_DEPTH_MINUS_ONE_TO_ONE);
+  const v1::QueryBatch batch = builder.build();
+  EXPECT_EQ(batch.blocks(0).frustums().planes_size(), 16);
+  EXPECT_EQ(batch.blocks(0).frustums().planes_each(), 4u);
+  EXPECT_EQ(batch.blocks(0).frustums().detail(), v1::STATIC_DETAIL_TRIANGLES);
+  EXPECT_EQ(batch.blocks(1).frustums().view_projections(15), 2);
+  EXPECT_EQ(batch.blocks(1).frustums().clip_depth(), v1::CLIP_DEPTH_MINUS_ONE_TO_ONE);
+}
+
+TEST(QueryBuilderTest, ViewersAndTargetsAreAddedByRowOrAsColumns) {
+  QueryBuilder builder;
+  builder.sight().viewer({1, 2, 3}).viewer({4, 5, 6}, 9).target({7, 8, 9}, 1).max_distances({{50}}).pairwise();
+  const std::vector<float> eyes(12, 1), samples(9, 2);
+  builder.sight().viewers(eyes, 2).targets(samples, 3).viewer_groups({{1, 2}}).target_groups({{3}});
+  const v1::QueryBatch batch = builder.build();
+  const v1::Sight& rows = batch.blocks(0).sight();
+  EXPECT_THAT(rows.viewers(), ElementsAre(1, 2, 3, 4, 5, 6));
+  EXPECT_THAT(rows.viewer_groups(), ElementsAre(0, 9));
+  EXPECT_THAT(rows.targets(), ElementsAre(7, 8, 9));
+  EXPECT_THAT(rows.target_groups(), ElementsAre(1));
+  EXPECT_THAT(rows.max_distances(), ElementsAre(50));
+  EXPECT_TRUE(rows.pairwise());
+  const v1::Sight& columns = batch.blocks(1).sight();
+  EXPECT_EQ(columns.eyes_per_viewer(), 2u);
+  EXPECT_EQ(columns.samples_per_target(), 3u);
+  EXPECT_THAT(columns.viewer_groups(), ElementsAre(1, 2));
+  EXPECT_THAT(columns.target_groups(), ElementsAre(3));
+}
+
+TEST(QueryBuilderTest, PairsCellsAndPointsToContain) {
+  QueryBuilder builder;
+  builder.pairs().max_distance(2).layers(1, 6).k(3).after_pair(10, 11);
+  builder.cells().max_planes(12).point({1, 2, 3}, 40, {.mask = 2});
+  builder.contains().point({1, 2, 3}).point({4, 5, 6}, {.ignore_group = 3});
+  const v1::QueryBatch batch = builder.build();
+  EXPECT_EQ(batch.blocks(0).pairs().max_distance(), 2);
+  EXPECT_EQ(batch.blocks(0).pairs().first_mask(), 1u);
+  EXPECT_EQ(batch.blocks(0).pairs().second_mask(), 6u);
+  EXPECT_EQ(batch.blocks(0).pairs().k(), 3u);
+  EXPECT_EQ(batch.blocks(0).after_id(), 10u);
+  EXPECT_EQ(batch.blocks(0).pairs().after_other(), 11u);
+  EXPECT_EQ(batch.blocks(1).cells().max_planes(), 12u);
+  EXPECT_THAT(batch.blocks(1).cells().points(), ElementsAre(1, 2, 3));
+  EXPECT_THAT(batch.blocks(1).cells().max_distances(), ElementsAre(40));
+  EXPECT_THAT(batch.blocks(1).masks(), ElementsAre(2));
+  EXPECT_THAT(batch.blocks(2).contains().points(), ElementsAre(1, 2, 3, 4, 5, 6));
+  EXPECT_THAT(batch.blocks(2).ignore_groups(), ElementsAre(0, 3));
+}
+
 TEST(QueryBuilderTest, ViewsNameEpochAndRevision) {
   QueryBuilder builder;
   const v1::QueryBatch later = builder.at_least({4, 12}).max_work(3).explain().max_reply_bytes(5).build();

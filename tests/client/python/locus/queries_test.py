@@ -313,6 +313,38 @@ class RequestBytesTest(unittest.TestCase):
         self.assertEqual(found, wanted)
         self.assertEqual(schema.message("QueryBatch").FromString(batch.batch_bytes()), wanted.batch)
 
+    def test_kinds_beyond_rays_and_overlaps_have_the_numbers_of_the_schema(self):
+        batch = QueryBatch()
+        batch.frustums([[1] * 16], planes_each=4, detail=StaticDetail.TRIANGLES)
+        batch.views([2] * 32, clip_depth=locus.ClipDepth.MINUS_ONE_TO_ONE)
+        batch.contains([1, 2, 3], block=Block(anchor_ids=[7], count_only=True))
+        batch.sight([1] * 12, [2] * 9, eyes=2, samples=3, viewer_groups=[4, 5], target_groups=6, max_distances=[7, 8],
+                    pairwise=True)
+        batch.pairs(2.5, first_mask=1, second_mask=6, k=3, after_other=11, block=Block(after_id=10))
+        batch.cells([1, 2, 3], 40, max_planes=12)
+        batch.nearest([1, 2, 3], after=locus.After([2.5], [8], [9]))
+        found = schema.message("QueryBatch").FromString(batch.batch_bytes())
+        wanted = schema.message("QueryBatch")()
+        blocks = wanted.blocks
+        floats = lambda *values: struct.pack(f"<{len(values)}f", *values)
+        blocks.add().frustums.MergeFrom(schema.message("Frustums")(planes=floats(*[1] * 16), planes_each=4, detail=2))
+        blocks.add().frustums.MergeFrom(schema.message("Frustums")(view_projections=floats(*[2] * 32), clip_depth=2,
+                                                                   detail=1))
+        anchored = blocks.add(anchor_ids=struct.pack("<Q", 7), count_only=True)
+        anchored.contains.points = floats(1, 2, 3)
+        blocks.add().sight.MergeFrom(schema.message("Sight")(
+            viewers=floats(*[1] * 12), viewer_groups=struct.pack("<2Q", 4, 5), targets=floats(*[2] * 9),
+            target_groups=struct.pack("<Q", 6), samples_per_target=3, eyes_per_viewer=2, max_distances=floats(7, 8),
+            pairwise=True))
+        pairs = blocks.add(after_id=10)
+        pairs.pairs.MergeFrom(schema.message("Pairs")(max_distance=2.5, first_mask=1, second_mask=6, k=3, after_other=11))
+        blocks.add().cells.MergeFrom(schema.message("Cells")(points=floats(1, 2, 3), max_distances=floats(40),
+                                                             max_planes=12))
+        blocks.add().nearest.MergeFrom(schema.message("Nearest")(
+            points=floats(1, 2, 3), k=1, detail=1, after_ts=floats(2.5), after_ids=struct.pack("<Q", 8),
+            after_triangles=struct.pack("<I", 9)))
+        self.assertEqual(found, wanted)
+
     def test_an_empty_block_keeps_its_kind(self):
         found = schema.message("QueryRequest").FromString(QueryBatch().balls([], []).request_bytes("arena"))
         self.assertEqual(found.batch.blocks[0].WhichOneof("kind"), "balls")
