@@ -9,10 +9,12 @@
 #include <utility>
 #include <vector>
 
+#include "tests/support/generated_meshes.h"
 #include "tests/support/grid_scenes.h"
 #include "tests/support/owned_block.h"
 #include "tests/support/query_world.h"
 #include "tests/support/scene_sketch.h"
+#include "tests/support/small_world.h"
 
 namespace locus::test {
 
@@ -71,6 +73,34 @@ inline void add_instances(const SceneSketch& sketch, Random& random, QueryWorld&
     const Transform transform = make_transform(placed.translation, placed.rotation, placed.scale);
     return magnitude(bounds_to_world(transform, placed.mesh->bounds())) > 1.9e9;
   });
+}
+
+// Adds instances of a closed mesh: a bumpy sphere, or a cube with corners on whole coordinates, often with a smaller
+// one inside that is turned over, so that it makes a cavity.
+inline void add_closed_meshes(const SceneSketch& sketch, Random& random, QueryWorld& world) {
+  if (sketch.placements.empty() || random.chance(0.5)) return;
+  std::vector<Triangle> shell;
+  if (random.chance(0.5)) {
+    shell = bumpy_sphere(4, 0.2, random.below(1000));
+  } else {
+    const StaticMeshPtr cube = cube_mesh();
+    for (uint32_t number = 0; number < cube->triangle_count(); ++number) shell.push_back(cube->triangle(number));
+  }
+  if (random.chance(0.5)) {
+    const size_t outer = shell.size();
+    const float scale = random.chance(0.5) ? 0.5f : 1.0f;
+    for (size_t i = 0; i < outer; ++i)
+      shell.push_back({shell[i].a * scale, shell[i].c * scale, shell[i].b * scale, static_cast<uint32_t>(outer + i)});
+  }
+  const StaticMeshPtr mesh = mesh_of(shell);
+  for (uint64_t copy = random.below(3); copy < 3; ++copy) {
+    PlacedMesh placed;
+    placed.mesh = mesh;
+    placed.translation = random.pick(sketch.placements).center + random.whole_vector(2);
+    if (random.chance(0.4)) placed.rotation = random.rotation();
+    if (random.chance(0.5)) placed.scale = static_cast<float>(random.magnitude(-2, 5));
+    if (max_component(abs(placed.translation)) <= limits::kMaxCoordinate / 2) world.instances.push_back(placed);
+  }
 }
 
 inline void add_objects(const SceneSketch& sketch, Random& random, QueryWorld& world) {
@@ -177,6 +207,8 @@ inline constexpr Column kOverlapColumns[] = {Column::kId,  Column::kTriangle, Co
                                              Column::kTag, Column::kLayers,   Column::kPose};
 inline constexpr Column kNearestColumns[] = {Column::kT,     Column::kId,  Column::kTriangle, Column::kPoint,
                                              Column::kGroup, Column::kTag, Column::kLayers,   Column::kPose};
+inline constexpr Column kContainsColumns[] = {Column::kId, Column::kGroup, Column::kTag, Column::kLayers,
+                                              Column::kPose};
 inline constexpr Column kLookupColumns[] = {Column::kId, Column::kGroup, Column::kTag, Column::kLayers, Column::kPose};
 
 inline OwnedBlock block_at(const SceneSketch& sketch, Random& random) {
@@ -323,6 +355,25 @@ inline OwnedBlock nearest_block(const QueryScene& scene, const SceneSketch& sket
   return block;
 }
 
+// Points at and near notable places, and in, on and near the instances of closed meshes.
+inline OwnedBlock contains_block(const QueryScene& scene, const SceneSketch& sketch, Random& random) {
+  OwnedBlock block = block_at(sketch, random);
+  block.settings.kind = ContainsColumns{};
+  for (int i = 0; i < 4; ++i) append_point(block, notable_point(sketch, random));
+  for (const PlacedMesh& placed : scene.world.instances) {
+    if (!placed.mesh->is_closed()) continue;
+    const Transform transform = make_transform(placed.translation, placed.rotation, placed.scale);
+    const Triangle triangle = placed.mesh->triangle(static_cast<uint32_t>(random.below(placed.mesh->triangle_count())));
+    Vec3d point = to_double(triangle.a);
+    if (random.chance(0.7)) point = (point + to_double(triangle.b)) * 0.5;
+    if (random.chance(0.5)) point = point * random.magnitude(-3, 1);
+    append_point(block, transform.point_to_world(point));
+  }
+  add_common(scene, random, block);
+  add_columns(kContainsColumns, random, block);
+  return block;
+}
+
 inline OwnedBlock lookup_block(const QueryScene& scene, Random& random) {
   OwnedBlock block;
   block.settings.kind = LookupColumns{};
@@ -346,6 +397,7 @@ inline QueryScene query_scene(const SceneSketch& sketch, Random& random) {
   scene.world.winding = random.chance(0.3) ? Winding::kClockwise : Winding::kCounterClockwise;
   internal::add_instances(sketch, random, scene.world);
   internal::add_objects(sketch, random, scene.world);
+  internal::add_closed_meshes(sketch, random, scene.world);
   internal::label(random, scene.world);
   for (int i = 0; i < 3; ++i) scene.blocks.push_back(internal::ray_block(scene, sketch, random));
   if (!sketch.balls.empty()) scene.blocks.push_back(internal::ball_block(scene, sketch, random));
@@ -356,6 +408,7 @@ inline QueryScene query_scene(const SceneSketch& sketch, Random& random) {
     scene.blocks.push_back(internal::capsule_block(scene, sketch, random));
     for (int i = 0; i < 2; ++i) scene.blocks.push_back(internal::sweep_block(scene, sketch, random));
   }
+  scene.blocks.push_back(internal::contains_block(scene, sketch, random));
   return scene;
 }
 

@@ -348,7 +348,25 @@ class InstanceSearch {
   LowestRows& rows_;
 };
 
-// Merges the rows of instances with the found objects. Returns at most options.max_results rows, ascending by id.
+template <class Kind>
+OverlapAnswer run_overlap(QueryTask& task, const SceneAtTime& moment, const typename Kind::World& shape,
+                          const OverlapOptions& options, const Filter& filter) {
+  LOCUS_DCHECK_GE(options.max_results, 1u);
+  LowestRows rows(options.max_results, options.detail == StaticDetail::kTrianglesSorted, options.count_only);
+  if (options.source != Source::kDynamic) {
+    InstanceSearch<Kind> search(task, shape, options, filter, rows);
+    task.visit_region(task.snapshot().statics->tree(), search);
+  }
+  if (options.source != Source::kStatic && !task.ended()) {
+    ObjectRows<Kind> search(task, moment, shape, options, filter);
+    task.visit_objects_in_region(moment, search);
+    return with_objects(rows.finish(), task.found_objects(), moment, options);
+  }
+  return rows.finish();
+}
+
+}  // namespace
+
 OverlapAnswer with_objects(OverlapAnswer instances, FoundObjects& found, const SceneAtTime& moment,
                            const OverlapOptions& options) {
   const absl::Span<const FoundObject> objects = found.finish();
@@ -372,25 +390,6 @@ OverlapAnswer with_objects(OverlapAnswer instances, FoundObjects& found, const S
   both.truncated |= instances.truncated || found.truncated();
   return both;
 }
-
-template <class Kind>
-OverlapAnswer run_overlap(QueryTask& task, const SceneAtTime& moment, const typename Kind::World& shape,
-                          const OverlapOptions& options, const Filter& filter) {
-  LOCUS_DCHECK_GE(options.max_results, 1u);
-  LowestRows rows(options.max_results, options.detail == StaticDetail::kTrianglesSorted, options.count_only);
-  if (options.source != Source::kDynamic) {
-    InstanceSearch<Kind> search(task, shape, options, filter, rows);
-    task.visit_region(task.snapshot().statics->tree(), search);
-  }
-  if (options.source != Source::kStatic && !task.ended()) {
-    ObjectRows<Kind> search(task, moment, shape, options, filter);
-    task.visit_objects_in_region(moment, search);
-    return with_objects(rows.finish(), task.found_objects(), moment, options);
-  }
-  return rows.finish();
-}
-
-}  // namespace
 
 OverlapOptions overlap_options(const QueryBlock& block, StaticDetail detail) {
   const uint32_t max_results = block.max_results == 0 ? limits::kDefaultMaxResults : block.max_results;

@@ -34,6 +34,11 @@ OverlapAnswer run_box(QueryTask& task, const SceneAtTime& moment, const Obbd& bo
 OverlapAnswer run_capsule(QueryTask& task, const SceneAtTime& moment, const Capsule& capsule,
                           const OverlapOptions& options, const Filter& filter);
 
+// Returns the rows of instances merged with the objects that the last search of `found` has found: at most
+// options.max_results rows, ascending by id. With count_only, adds the numbers of rows.
+OverlapAnswer with_objects(OverlapAnswer instances, FoundObjects& found, const SceneAtTime& moment,
+                           const OverlapOptions& options);
+
 // Return the region of the grid of objects that run_ball(), run_box() or run_capsule() searches; for
 // QueryTask::walk_regions().
 GridRegion ball_region(const SceneAtTime& moment, const Balld& ball, const OverlapOptions& options);

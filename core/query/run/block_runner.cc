@@ -4,6 +4,7 @@
 #include <limits>
 #include <utility>
 
+#include "core/query/kinds/contains_query.h"
 #include "core/query/kinds/lookup_query.h"
 #include "core/query/kinds/ray_query.h"
 #include "core/query/kinds/sweep_query.h"
@@ -273,7 +274,14 @@ void BlockRunner::run_query(const FrustumColumns& /*frustums*/, size_t i) { writ
 
 void BlockRunner::run_query(const SightColumns& /*sight*/, size_t i) { write_nothing(i); }
 
-void BlockRunner::run_query(const ContainsColumns& /*contains*/, size_t i) { write_nothing(i); }
+void BlockRunner::run_query(const ContainsColumns& contains, size_t i) {
+  OverlapAnswer answer;
+  const Vec3d point = origins_.of(i) + read_vec3d(ColumnReader<float>(contains.points, 3).entry(i));
+  if (!task_.ended())
+    answer = run_contains(task_, times_.of(i), point, overlap_options(block_, StaticDetail::kInstances),
+                          Filter(block_, i));
+  append_rows(answer, i);
+}
 
 void BlockRunner::run_query(const PairColumns& /*pairs*/, size_t i) { write_nothing(i); }
 

@@ -5,6 +5,7 @@
 
 #include "core/base/check.h"
 #include "core/base/status_macros.h"
+#include "core/mesh/open_edges.h"
 
 namespace locus {
 namespace {
@@ -60,6 +61,7 @@ std::shared_ptr<const StaticMesh> StaticMesh::share(std::string name, std::vecto
 void StaticMesh::Content::keep_columns(const TriangleMesh& mesh) {
   vertex_count = static_cast<uint32_t>(mesh.vertices().size() / 3);
   zero_area_count = mesh.zero_area_count();
+  open_edges = count_open_edges(mesh.vertices(), mesh.indices());
   indices = PackedIndices(mesh.indices());
   std::vector<bool> used(vertex_count);
   for (const uint32_t index : mesh.indices()) used[index] = true;

@@ -59,6 +59,9 @@ class StaticMesh {
   uint32_t vertex_count() const { return content_->vertex_count; }
   uint32_t triangle_count() const { return static_cast<uint32_t>(tree().size()); }
   uint32_t zero_area_count() const { return content_->zero_area_count; }
+  // Returns the number of open edges: see count_open_edges(). A mesh without open edges is closed and has an inside.
+  uint64_t open_edges() const { return content_->open_edges; }
+  bool is_closed() const { return open_edges() == 0; }
   // Returns the bounds of all triangles.
   const Aabbf& bounds() const { return tree().bounds(); }
   const std::vector<MeshPart>& parts() const { return parts_; }
@@ -92,6 +95,7 @@ class StaticMesh {
     std::vector<UnusedVertex> unused_vertices;
     uint32_t vertex_count = 0;
     uint32_t zero_area_count = 0;
+    uint64_t open_edges = 0;
 
     void keep_columns(const TriangleMesh& mesh);
     void number_blocks();

@@ -1,0 +1,18 @@
+// Search for the objects that contain a point, and the instances of closed meshes that wind around it. Rows ascend by
+// id. Free functions; any thread may call them with a QueryTask of its own.
+#ifndef LOCUS_CORE_QUERY_KINDS_CONTAINS_QUERY_H_
+#define LOCUS_CORE_QUERY_KINDS_CONTAINS_QUERY_H_
+
+#include "core/query/kinds/overlap_query.h"
+
+namespace locus {
+
+// Answers one query for a point in world axes. Objects are searched as of `moment`, which the answer borrows; the
+// memory of OverlapAnswer::objects belongs to `task` and is valid until its next query. Cost: visits of the nodes and
+// triangles that a ray from the point along the x axis of each mesh passes, and of the cells around the point.
+OverlapAnswer run_contains(QueryTask& task, const SceneAtTime& moment, Vec3d point, const OverlapOptions& options,
+                           const Filter& filter);
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_QUERY_KINDS_CONTAINS_QUERY_H_
