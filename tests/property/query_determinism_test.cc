@@ -147,7 +147,8 @@ TEST(QueryDeterminismTest, ADistantFrameGivesTheHitsOfTheSceneAtTheOrigin) {
       block.settings.precision = Precision::kExact;
       for (float& x : block.points) x = std::round(x * 16) / 16;
       if (std::holds_alternative<CapsuleColumns>(block.settings.kind) ||
-          std::holds_alternative<SweepColumns>(block.settings.kind))
+          std::holds_alternative<SweepColumns>(block.settings.kind) ||
+          std::holds_alternative<SightColumns>(block.settings.kind))
         for (float& x : block.sizes) x = std::round(x * 16) / 16;
     }
     for (Object& object : scene.world.objects)

@@ -19,7 +19,6 @@
 #include "tests/support/oracle_frustum.h"
 #include "tests/support/oracle_pairs.h"
 #include "tests/support/oracle_scene.h"
-#include "tests/support/oracle_sight.h"
 
 namespace locus::test {
 
@@ -260,6 +259,50 @@ class QueryOracle : public OracleScene {
         if (columns.has(Column::kPoint))
           write_vector(row.id == 0 ? Vec3f{} : to_float(mover.start - block.frame + row.place + Vec3d{}),
                        result.points);
+      }
+    }
+  }
+
+  // Returns whether an instance or object that blocks the viewer's sight of the target meets the segment.
+  bool is_blocked(const QueryBlock& block, const SightColumns& sight, size_t viewer, size_t target,
+                  const Question& segment) const {
+    const Group own = entry_for(sight.viewer_groups, viewer, Group{0});
+    const Group other = entry_for(sight.target_groups, target, Group{0});
+    const auto blocks = [&](const auto& item) {
+      return wanted(block, viewer, item) && (item.group == 0 || (item.group != own && item.group != other));
+    };
+    Rows rows;
+    for (const Instance* instance : instances_)
+      if (block.source != Source::kDynamic && blocks(*instance)) hits_on(*instance, segment, rows);
+    for (const Object& object : objects_)
+      if (block.source != Source::kStatic && blocks(object)) hit_on(object, segment, rows);
+    return std::any_of(rows.begin(), rows.end(), [](const Row& row) { return row.t <= 1; });
+  }
+
+  char seen_samples(const QueryBlock& block, const SightColumns& sight, size_t viewer, size_t target) const {
+    const size_t eyes = sight.eyes_per_viewer(), samples = sight.samples_per_target();
+    int seen = 0;
+    for (size_t k = 0; k < samples; ++k) {
+      bool is_seen = false;
+      for (size_t e = 0; e < eyes; ++e) {
+        const float* const from = &sight.viewers[3 * (viewer * eyes + e)];
+        const float* const to = &sight.targets[3 * (target * samples + k)];
+        const Vec3d eye = origin(block, viewer) + Vec3d{from[0], from[1], from[2]};
+        const Vec3d way = block.frame + Vec3d{to[0], to[1], to[2]} - eye;
+        if (std::sqrt(dot(way, way)) > double{entry_for(sight.max_distances, viewer, kInfinity)}) continue;
+        const Question segment{eye, way, 1, Cull::kNone, Inside::kSolid, block.precision == Precision::kConservative};
+        is_seen |= way == Vec3d{} || !is_blocked(block, sight, viewer, target, segment);
+      }
+      seen += is_seen ? 1 : 0;
+    }
+    return static_cast<char>(seen);
+  }
+
+  void answer_kind(const QueryBlock& block, const SightColumns& sight, BlockResult& result) const {
+    for (size_t viewer = 0; viewer < sight.viewer_count(); ++viewer) {
+      for (size_t target = 0; target < sight.target_count(); ++target) {
+        if (sight.pairwise && target != viewer) continue;
+        result.matrix.push_back(is_unanchored(block, viewer) ? '\0' : seen_samples(block, sight, viewer, target));
       }
     }
   }

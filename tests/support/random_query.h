@@ -160,7 +160,7 @@ inline void add_anchors(const QueryScene& scene, Random& random, OwnedBlock& blo
 }
 
 inline void add_common(const QueryScene& scene, Random& random, OwnedBlock& block) {
-  const size_t n = block.points.size() / 3;
+  const size_t n = query_count(block.view());
   QueryBlock& settings = block.settings;
   settings.source = random.chance(0.6) ? Source::kBoth : random.chance(0.5) ? Source::kStatic : Source::kDynamic;
   settings.precision = random.chance(0.3) ? Precision::kConservative : Precision::kExact;
@@ -374,6 +374,43 @@ inline OwnedBlock contains_block(const QueryScene& scene, const SceneSketch& ske
   return block;
 }
 
+// Viewers and targets at and near notable places, some at the same point, with groups that occur in the scene.
+inline OwnedBlock sight_block(const QueryScene& scene, const SceneSketch& sketch, Random& random) {
+  OwnedBlock block = block_at(sketch, random);
+  SightColumns sight;
+  sight.eyes = static_cast<uint32_t>(random.whole(0, 2));
+  sight.samples = static_cast<uint32_t>(random.whole(0, 3));
+  sight.pairwise = random.chance(0.3);
+  block.settings.kind = sight;
+  const size_t viewers = 1 + random.below(4),
+               targets = sight.pairwise ? viewers : 1 + random.below(random.chance(0.1) ? 60 : 6);
+  const auto add = [&](size_t points) {
+    for (; points > 0; --points) {
+      Vec3d point = notable_point(sketch, random);
+      // Eighths, which a distant frame represents exactly.
+      if (random.chance(0.6)) point = point + random.whole_vector(20) * 0.125;
+      append_point(block, point);
+    }
+  };
+  add(targets * sight.samples_per_target());
+  block.sizes.swap(block.points);
+  add(viewers * sight.eyes_per_viewer());
+  if (random.chance(0.1)) std::copy_n(block.sizes.begin(), 3, block.points.begin());
+  const auto random_groups = [&](size_t n) {
+    std::vector<uint64_t> groups;
+    if (random.chance(0.5))
+      for (size_t i = random.chance(0.5) ? n : 1; i > 0; --i) groups.push_back(random.below(4));
+    return groups;
+  };
+  block.groups = random_groups(viewers);
+  block.target_groups = random_groups(targets);
+  if (random.chance(0.3))
+    for (size_t i = random.chance(0.5) ? 1 : viewers; i > 0; --i)
+      block.extras.push_back(static_cast<float>(random.magnitude(-2, 10)));
+  add_common(scene, random, block);
+  return block;
+}
+
 inline OwnedBlock lookup_block(const QueryScene& scene, Random& random) {
   OwnedBlock block;
   block.settings.kind = LookupColumns{};
@@ -409,6 +446,7 @@ inline QueryScene query_scene(const SceneSketch& sketch, Random& random) {
     for (int i = 0; i < 2; ++i) scene.blocks.push_back(internal::sweep_block(scene, sketch, random));
   }
   scene.blocks.push_back(internal::contains_block(scene, sketch, random));
+  scene.blocks.push_back(internal::sight_block(scene, sketch, random));
   return scene;
 }
 

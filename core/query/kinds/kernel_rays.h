@@ -22,6 +22,7 @@ struct PendingRay {
   RayRequest request;
   Filter filter;
   HitCollector collector;
+  bool is_cut = false;  // the batch ended before the search of this ray was complete
 };
 
 // Finds the hits of each ray on static instances and offers them to the ray's collector. Preconditions: all rays have

@@ -8,6 +8,7 @@
 #define LOCUS_CORE_QUERY_KINDS_QUERY_TASK_H_
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <functional>
 #include <optional>
@@ -29,24 +30,31 @@ class Filter {
  public:
   Filter(const QueryBlock& block, size_t query)
       : mask_(ColumnReader<uint32_t>(block.masks, 1).value(query, kAllLayers)),
-        ignored_group_(ColumnReader<uint64_t>(block.ignore_groups, 1).value(query, 0)),
+        ignored_groups_{ColumnReader<uint64_t>(block.ignore_groups, 1).value(query, 0)},
         anchor_(block.anchor_ids.empty() ? kNoId : block.anchor_ids[query]),
         ignored_ids_(block.ignore_ids) {}
 
+  // Makes the filter ignore two more groups; 0: none. A later call replaces these groups.
+  void ignore(Group first, Group second) {
+    ignored_groups_[1] = first;
+    ignored_groups_[2] = second;
+  }
   // Makes the filter accept nothing, for a query that has no answer.
   void accept_nothing() { mask_ = 0; }
   template <class Item>
   bool accepts(const Item& item) const {
     if ((item.layers & mask_) == 0) return false;
-    if (ignored_group_ != 0 && item.group == ignored_group_) return false;
+    if (item.group != 0 &&
+        std::find(ignored_groups_.begin(), ignored_groups_.end(), item.group) != ignored_groups_.end())
+      return false;
     if (item.id == anchor_) return false;
     return std::find(ignored_ids_.begin(), ignored_ids_.end(), item.id) == ignored_ids_.end();
   }
 
  private:
   Layers mask_;
-  Group ignored_group_;
-  Id anchor_;  // 0, which is no id, without an anchor
+  std::array<Group, 3> ignored_groups_;  // 0: none
+  Id anchor_;                            // 0, which is no id, without an anchor
   absl::Span<const uint64_t> ignored_ids_;
 };
 

@@ -81,11 +81,10 @@ class InstanceVisitor {
   HitCollector& collector_;
 };
 
-// Returns whether the vector kernels trace the rays of `block` through the instances. They return the first hits of a
-// mesh, not the first ones behind a position.
-bool uses_kernels(const QueryTask& task, const QueryBlock& block, const RayColumns& columns) {
-  return columns.after.ts.empty() && block.precision == Precision::kExact && block.source != Source::kDynamic &&
-         task.ray_kernels() != nullptr;
+// Returns whether the vector kernels trace `ray` through the instances. They return the first hits of a mesh, not the
+// first ones behind a position.
+bool uses_kernels(const QueryTask& task, const RayRequest& ray) {
+  return !ray.after.is_given() && ray.precision == Precision::kExact && task.ray_kernels() != nullptr;
 }
 
 // Converts `cull` from the scene's `winding` to the counter-clockwise winding in which triangles are stored.
@@ -113,6 +112,29 @@ RayRequest ray_request(const QueryBlock& block, Vec3d origin, const RayColumns& 
   return request;
 }
 
+void find_hits(QueryTask& task, std::vector<PendingRay>& rays,
+               absl::FunctionRef<const SceneAtTime&(size_t)> moment_of) {
+  if (rays.empty()) return;
+  const Source source = rays.front().request.source;
+  // The columns of a block have the position for all rays, or for none; the kernels need rays without one.
+  const bool by_kernels =
+      std::all_of(rays.begin(), rays.end(), [&](const PendingRay& ray) { return uses_kernels(task, ray.request); });
+  if (by_kernels && source != Source::kDynamic) trace_meshes(task, rays);
+  for (size_t i = 0; i < rays.size(); ++i) {
+    PendingRay& ray = rays[i];
+    if (!by_kernels && source != Source::kDynamic && !task.ended()) {
+      InstanceVisitor visitor(task, ray.request, ray.filter, ray.collector);
+      task.visit_ray(task.snapshot().statics->tree(), visitor.slabs(), visitor);
+    }
+    if (source != Source::kStatic && !ray.collector.done() && !task.ended()) {
+      const SceneAtTime& moment = moment_of(i);
+      ObjectVisitor visitor(task, moment, ray.request, ray.filter, ray.collector);
+      if (moment.objects().grid().size() != 0) task.visit_objects_on_ray(moment, visitor.slabs(), visitor);
+    }
+    ray.is_cut = task.ended();
+  }
+}
+
 RayAnswers run_rays(QueryTask& task, const QueryBlock& block, const RayColumns& columns, const QueryTimes& times,
                     const QueryOrigins& origins, Winding winding, size_t begin, size_t end) {
   LOCUS_DCHECK_LT(begin, end);
@@ -122,24 +144,12 @@ RayAnswers run_rays(QueryTask& task, const QueryBlock& block, const RayColumns& 
     rays.emplace_back(ray_request(block, origins.of(i), columns, winding, i), Filter(block, i));
     if (origins.is_unanchored(i)) rays.back().filter.accept_nothing();
   }
-  const bool by_kernels = uses_kernels(task, block, columns);
-  if (by_kernels) trace_meshes(task, rays);
+  find_hits(task, rays, [&](size_t i) -> const SceneAtTime& { return times.of(begin + i); });
   RayAnswers answers;
   answers.reserve(rays.size());
-  for (size_t i = begin; i < end; ++i) {
-    PendingRay& ray = rays[i - begin];
-    if (!by_kernels && block.source != Source::kDynamic && !task.ended()) {
-      InstanceVisitor visitor(task, ray.request, ray.filter, ray.collector);
-      task.visit_ray(task.snapshot().statics->tree(), visitor.slabs(), visitor);
-    }
-    const SceneAtTime& moment = times.of(i);
-    const bool has_objects = block.source != Source::kStatic && moment.objects().grid().size() != 0;
-    if (has_objects && !ray.collector.done() && !task.ended()) {
-      ObjectVisitor visitor(task, moment, ray.request, ray.filter, ray.collector);
-      task.visit_objects_on_ray(moment, visitor.slabs(), visitor);
-    }
+  for (PendingRay& ray : rays) {
     answers.push_back(ray.collector.finish());
-    answers.back().truncated |= task.ended();
+    answers.back().truncated |= ray.is_cut;
   }
   LOCUS_DCHECK_EQ(answers.size(), end - begin);
   return answers;

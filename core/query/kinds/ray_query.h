@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "absl/container/inlined_vector.h"
+#include "absl/functional/function_ref.h"
 #include "core/query/kinds/hit.h"
 #include "core/query/kinds/query_origins.h"
 #include "core/query/kinds/query_task.h"
@@ -42,6 +43,13 @@ using RayAnswers = std::vector<RayAnswer>;
 // calls, because the kernels trace many rays together.
 RayAnswers run_rays(QueryTask& task, const QueryBlock& block, const RayColumns& rays, const QueryTimes& times,
                     const QueryOrigins& origins, Winding winding, size_t begin, size_t end);
+
+struct PendingRay;
+
+// Finds the hits of rays that all have the same mode, precision and source, and offers them to their collectors.
+// moment_of(i) returns the objects at the time of ray i. Sets is_cut for rays whose search is not complete because the
+// batch ended.
+void find_hits(QueryTask& task, std::vector<PendingRay>& rays, absl::FunctionRef<const SceneAtTime&(size_t)> moment_of);
 
 // Surface at a hit: barycentric weights of the triangle's second (u) and third (v) vertex, and the unit normal of the
 // triangle's front side or of the object's outside.

@@ -7,6 +7,7 @@
 #include "core/query/kinds/contains_query.h"
 #include "core/query/kinds/lookup_query.h"
 #include "core/query/kinds/ray_query.h"
+#include "core/query/kinds/sight_query.h"
 #include "core/query/kinds/sweep_query.h"
 #include "core/query/run/rows.h"
 
@@ -272,14 +273,19 @@ void BlockRunner::run_query(const NearestColumns& nearest, size_t i) {
 
 void BlockRunner::run_query(const FrustumColumns& /*frustums*/, size_t i) { write_nothing(i); }
 
-void BlockRunner::run_query(const SightColumns& /*sight*/, size_t i) { write_nothing(i); }
+void BlockRunner::run_query(const SightColumns& sight, size_t i) {
+  const size_t bytes = sight.bytes_per_viewer();
+  char* const to = output_.bytes + i * bytes;
+  std::fill_n(to, bytes, '\0');
+  if (!task_.ended()) look(task_, times_.of(i), block_, sight, origins_.of(i), i, {to, bytes});
+}
 
 void BlockRunner::run_query(const ContainsColumns& contains, size_t i) {
   OverlapAnswer answer;
   const Vec3d point = origins_.of(i) + read_vec3d(ColumnReader<float>(contains.points, 3).entry(i));
   if (!task_.ended())
-    answer = run_contains(task_, times_.of(i), point, overlap_options(block_, StaticDetail::kInstances),
-                          Filter(block_, i));
+    answer =
+        run_contains(task_, times_.of(i), point, overlap_options(block_, StaticDetail::kInstances), Filter(block_, i));
   append_rows(answer, i);
 }
 

@@ -15,6 +15,9 @@
 
 namespace locus {
 
+// Value of KernelRay::hint without a hint.
+inline constexpr uint32_t kNoBlock = 0xFFFFFFFFu;
+
 // Ray in mesh axes. Precondition: the origin is finite, and the largest |component| of the direction is within
 // kMinKernelDirection .. kMaxKernelDirection; otherwise the kernels may miss hits or report hits that do not exist.
 struct KernelRay {
@@ -26,6 +29,9 @@ struct KernelRay {
   // True if the transform to mesh axes had no rotation. A zero component of the direction is then exact, so a triangle
   // perpendicular to the axis of this component is exactly edge-on.
   bool unrotated = false;
+  // any() only: index of the block to test first, or kNoBlock: a block that probably has a triangle that the ray hits.
+  // The answer does not depend on it.
+  uint32_t hint = kNoBlock;
 };
 
 inline constexpr double kMinKernelDirection = 0x1p-20;
@@ -42,8 +48,10 @@ enum class KernelVerdict : uint8_t { kMiss, kHit, kUndecided };
 
 // Answer to one ray.
 struct KernelHit {
-  float t;          // in units of the ray's direction; valid for first() only
-  uint32_t number;  // first(): lowest number of the triangles hit at t; all(): number of rows written
+  float t;  // in units of the ray's direction; valid for first() only
+  // first(): lowest number of the triangles hit at t; all(): number of rows written; any(): index of the block with a
+  // triangle that the ray hits.
+  uint32_t number;
   KernelVerdict verdict;
   uint32_t nodes;  // number of nodes opened
   uint32_t tests;  // number of triangles tested

@@ -117,6 +117,13 @@ class RayStream {
     flight.nodes = flight.tests = 0;
     flight.found = flight.undecided = false;
     flight.waiting[0] = kNoChild;
+    if constexpr (kAny) {
+      if (rays_[index].hint != kNoBlock) {
+        flight.now = rays_[index].hint | kBlockBit;
+        flight.waiting[flight.top++] = 0;  // the root, if the block has no triangle that the ray hits
+        return next_steps.add(slot, kBlock);
+      }
+    }
     next_steps.add(slot, kNode);
   }
 
@@ -184,7 +191,10 @@ class RayStream {
   inline void resolve(uint32_t slot, WorkList& next_steps) {
     const OpenedBlock& opened = opened_[slot];
     InFlightRay& flight = flights_[slot];
-    if (kAny && opened.results.certain != 0) flight.found = true;
+    if (kAny && opened.results.certain != 0) {
+      flight.found = true;
+      flight.number = opened.index;
+    }
     const float limit = flight.limit;
     if (!kAny || !flight.found) decide_candidates(flight, opened);
     if (flight.tests > kMaxKernelTests) flight.undecided = true;
@@ -200,7 +210,7 @@ class RayStream {
       const Verdict verdict = decide(block, lane, rays_[flight.index], flight.ray);
       if (verdict.verdict == KernelVerdict::kUndecided) flight.undecided = true;
       if (verdict.verdict != KernelVerdict::kHit) continue;
-      record_hit(flight, {verdict.t, number_of(tree_, block, lane)});
+      record_hit(flight, {verdict.t, kAny ? opened.index : number_of(tree_, block, lane)});
     }
   }
 

@@ -209,7 +209,7 @@ class Packet {
       const auto i = static_cast<uint32_t>(__builtin_ctz(rays));
       const BlockResults results = test_block<kAny>(block, PreparedRay(*prepared_, i), limits_[i], rays_[i]);
       if (results.certain != 0) {
-        record_any_hit(i);
+        record_any_hit(i, block);
         continue;
       }
       for (uint32_t candidates = results.candidates; candidates != 0; candidates &= candidates - 1u)
@@ -238,7 +238,7 @@ class Packet {
         if ((certain >> i & 1u) == 0)
           resolve(block, static_cast<int>(lane), i);
         else if (kAny)
-          record_any_hit(i);
+          record_any_hit(i, block);
         else
           add_candidate(i, {&block, lane, earliest[i]}, latest[i]);
         if (limits_[i] < 0) rays &= ~(1u << i);
@@ -302,12 +302,15 @@ class Packet {
     const Verdict verdict = decide(block, lane, rays_[i], PreparedRay(*prepared_, i));
     if (verdict.verdict == KernelVerdict::kUndecided) give_up(i);
     if (verdict.verdict != KernelVerdict::kHit) return;
-    record_hit(i, verdict.t, number_of(*tree_, block, lane));
+    record_hit(i, verdict.t, kAny ? index_of(block) : number_of(*tree_, block, lane));
   }
 
-  // Records that ray `i` hits a triangle, so that it needs no more tests (kAny only).
-  inline void record_any_hit(uint32_t i) {
+  inline uint32_t index_of(const TriangleBlock& block) const { return static_cast<uint32_t>(&block - tree_->blocks); }
+
+  // Records that ray `i` hits a triangle of `block`, so that it needs no more tests (kAny only).
+  inline void record_any_hit(uint32_t i, const TriangleBlock& block) {
     hits_[i].verdict = KernelVerdict::kHit;
+    hits_[i].number = index_of(block);
     limits_[i] = kNever;
   }
 

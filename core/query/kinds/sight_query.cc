@@ -1,0 +1,326 @@
+#include "core/query/kinds/sight_query.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "core/base/check.h"
+#include "core/base/planted_bug.h"
+#include "core/query/kinds/instance_rays.h"
+#include "core/query/kinds/kernel_rays.h"
+
+namespace locus {
+namespace {
+
+// Segment from an eye to a sample point.
+struct Segment {
+  uint32_t target;  // index of the target's byte in the answer
+  uint32_t sample;  // index of the sample point in the block
+  Vec3d way;        // from the eye to the sample
+  uint32_t hint;    // block of the tree of the searched mesh that probably blocks this segment, or kNoBlock
+  bool is_blocked = false;
+};
+
+// Search of the segments of one viewer, eye after eye: samples that an eye sees are not searched again for the next
+// eye. All segments of an eye start at one point, so the transform of the eye to the axes of a mesh is shared, and
+// neighbouring segments are often blocked by the same triangles: the block of triangles that blocked the last one is
+// tested first. That decides no answer, only the order of tests.
+class Look {
+ public:
+  Look(QueryTask& task, const SceneAtTime& moment, const QueryBlock& block, const SightColumns& sight, size_t viewer)
+      : task_(task),
+        moment_(moment),
+        block_(block),
+        sight_(sight),
+        viewer_(viewer),
+        viewer_group_(
+            planted(PlantedBug::kOwnGroupBlocks) ? 0 : ColumnReader<uint64_t>(sight.viewer_groups, 1).value(viewer, 0)),
+        filter_(block, viewer),
+        max_distance_(
+            ColumnReader<float>(sight.max_distances, 1).value(viewer, std::numeric_limits<float>::infinity())) {}
+
+  // Adds the samples that are seen from `eye` and from none of the eyes before.
+  void from(Vec3d eye, absl::Span<char> seen) {
+    eye_ = eye;
+    gather(seen);
+    if (uses_kernels()) {
+      for (const Instance& instance : task_.snapshot().statics->tree().values()) trace(instance);
+    } else if (block_.source != Source::kDynamic) {
+      search_rays(Source::kStatic);
+    }
+    std::erase_if(segments_, [](const Segment& segment) { return segment.is_blocked; });
+    if (block_.source != Source::kStatic && moment_.objects().grid().size() != 0) {
+      search_rays(Source::kDynamic);
+      std::erase_if(segments_, [](const Segment& segment) { return segment.is_blocked; });
+    }
+    if (task_.ended()) return;
+    for (const Segment& segment : segments_) see(segment.target, segment.sample, seen);
+  }
+
+ private:
+  // Maximum number of instances of which each is searched for all segments. More instances are found by the tree over
+  // instances, segment by segment.
+  static constexpr size_t kFewInstances = 8;
+  // Number of segments of the first samples that are searched at once. The next ones begin with the blocks that blocked
+  // these.
+  static constexpr size_t kSegmentsAtOnce = 16;
+  // Maximum number of segments in one call of a kernel or of find_hits(), which cannot be interrupted.
+  static constexpr size_t kMaxAtOnce = 128;
+
+  bool uses_kernels() const {
+    return block_.precision == Precision::kExact && block_.source != Source::kDynamic &&
+           task_.ray_kernels() != nullptr && task_.snapshot().statics->size() <= kFewInstances;
+  }
+
+  size_t samples() const { return sight_.samples_per_target(); }
+  Group group_of(uint32_t target) const {
+    const ColumnReader<uint64_t> groups(sight_.target_groups, 1);
+    return groups.value(sight_.pairwise ? viewer_ : target, 0);
+  }
+  // Returns the filter of a segment: what it accepts blocks the segment.
+  Filter filter_of(uint32_t target) const {
+    Filter filter = filter_;
+    filter.ignore(viewer_group_, group_of(target));
+    return filter;
+  }
+
+  void see(uint32_t target, uint32_t sample, absl::Span<char> seen) {
+    ++seen[target];
+    if (sight_.eyes_per_viewer() > 1) is_seen_[sample] = 1;
+  }
+
+  // Collects the segments from the eye to the samples that are not seen yet, sorted by target so that neighbouring
+  // targets have similar directions. Samples at the eye itself are seen, samples too far away are not.
+  void gather(absl::Span<char> seen) {
+    segments_.clear();
+    if (sight_.eyes_per_viewer() > 1 && is_seen_.empty()) is_seen_.resize(sight_.targets.size() / 3);
+    const size_t first = sight_.pairwise ? viewer_ * samples() : 0;
+    for (uint32_t target = 0; target < seen.size(); ++target) {
+      for (size_t k = 0; k < samples(); ++k) {
+        const auto sample = static_cast<uint32_t>(first + target * samples() + k);
+        if (!is_seen_.empty() && is_seen_[sample] != 0) continue;
+        const Vec3d way = block_.frame + read_vec3d(&sight_.targets[size_t{3} * sample]) - eye_;
+        if (way == Vec3d{})
+          see(target, sample, seen);
+        else if (std::sqrt(squared_length(way)) <= double{max_distance_})
+          segments_.push_back({target, sample, way, kNoBlock});
+      }
+    }
+    sort_by_direction();
+  }
+
+  // Sorts the segments by the direction of their target's first segment: by octant of the direction's largest
+  // component, then along a curve of 8 x 8 squares.
+  void sort_by_direction() {
+    constexpr size_t kFew = 32;
+    if (segments_.size() < kFew) return;
+    keys_.clear();
+    for (size_t i = 0; i < segments_.size(); ++i) {
+      const bool starts = i == 0 || segments_[i].target != segments_[i - 1].target;
+      const uint32_t key = starts ? direction_key(segments_[i].way) : static_cast<uint32_t>(keys_.back() >> 32);
+      keys_.push_back(uint64_t{key} << 32 | i);
+    }
+    std::sort(keys_.begin(), keys_.end());
+    sorted_.clear();
+    for (const uint64_t key : keys_) sorted_.push_back(segments_[static_cast<uint32_t>(key)]);
+    segments_.swap(sorted_);
+  }
+
+  static uint32_t direction_key(Vec3d way) {
+    const Vec3d size = abs(way);
+    const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+    const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+    const auto cell = [&](int other) {
+      const double part = (way[other] / size[axis] + 1) * 4;
+      return static_cast<uint32_t>(std::clamp(part, 0.0, 7.0));
+    };
+    uint32_t curve = 0;
+    for (uint32_t bit = 0; bit < 3; ++bit)
+      curve |= (cell(u) >> bit & 1u) << (2 * bit) | (cell(v) >> bit & 1u) << (2 * bit + 1);
+    return (static_cast<uint32_t>(axis) * 2 + (way[axis] < 0 ? 1u : 0u)) << 6 | curve;
+  }
+
+  // Searches the segments that are not blocked yet in one instance: first one segment of each target, then the others,
+  // which begin with the block that blocked the first one.
+  void trace(const Instance& instance) {
+    if (task_.ended() || !task_.count_test() || !filter_of_viewer().accepts(instance)) return;
+    open_.clear();
+    for (uint32_t i = 0; i < segments_.size(); ++i) {
+      Segment& segment = segments_[i];
+      segment.hint = kNoBlock;
+      if (!segment.is_blocked && (instance.group == 0 || instance.group != group_of(segment.target)))
+        open_.push_back(i);
+    }
+    const Vec3d origin = instance.transform.point_to_mesh(eye_);
+    uint32_t hint = kNoBlock;
+    // The first open segment of each target.
+    now_.clear();
+    const auto starts_target = [&](size_t k) {
+      return k == 0 || segments_[open_[k]].target != segments_[open_[k - 1]].target;
+    };
+    for (size_t k = 0; k < open_.size(); ++k) {
+      if (!starts_target(k)) continue;
+      segments_[open_[k]].hint = hint;
+      now_.push_back(open_[k]);
+      if (now_.size() < kSegmentsAtOnce) continue;
+      hint = trace(instance, origin, hint);
+      now_.clear();
+    }
+    trace(instance, origin, hint);
+    // The other ones.
+    now_.clear();
+    uint32_t first = 0;
+    for (size_t k = 0; k < open_.size(); ++k) {
+      if (starts_target(k)) {
+        first = open_[k];
+        continue;
+      }
+      segments_[open_[k]].hint = segments_[first].hint;
+      now_.push_back(open_[k]);
+      if (now_.size() < kMaxAtOnce) continue;
+      trace(instance, origin, hint);
+      now_.clear();
+    }
+    trace(instance, origin, hint);
+  }
+
+  Filter filter_of_viewer() const {
+    Filter filter = filter_;
+    filter.ignore(viewer_group_, 0);
+    return filter;
+  }
+
+  // Searches the segments of now_ in one instance by a kernel. Sets the hint of a blocked segment to the block that
+  // blocks it, and returns the hint of the last blocked one, or `hint`.
+  uint32_t trace(const Instance& instance, Vec3d origin, uint32_t hint) {
+    if (now_.empty() || task_.ended()) return hint;
+    const TriangleTree tree = instance.mesh->tree().tree();
+    const double extent = max_component(abs(origin)) + double{tree.magnitude};
+    const bool is_within = contains(instance.bounds, eye_);
+    kernel_rays_.clear();
+    kernel_segments_.clear();
+    for (const uint32_t i : now_) {
+      Segment& segment = segments_[i];
+      float nearest = 0;
+      if (!is_within) {
+        const SlabRay<double> slabs(Rayd{eye_, segment.way}, kInstancePad);
+        const std::optional<float> entered = entry(slabs, instance.bounds);
+        if (!entered || *entered > 1) continue;
+        nearest = *entered;
+      }
+      const Vec3d direction = instance.transform.direction_to_mesh(segment.way);
+      const double longest = max_component(abs(direction));
+      if (!(longest >= kMinKernelDirection && longest <= kMaxKernelDirection && extent >= kMinKernelReach &&
+            extent <= kMaxKernelReach)) {
+        trace_one(instance, nearest, segment);
+        continue;
+      }
+      kernel_rays_.push_back({{origin.x, origin.y, origin.z},
+                              {direction.x, direction.y, direction.z},
+                              1,
+                              true,
+                              true,
+                              instance.transform.quaternion.is_identity(),
+                              segment.hint});
+      kernel_segments_.push_back({i, nearest});
+    }
+    return run_kernel(instance, tree, hint);
+  }
+
+  uint32_t run_kernel(const Instance& instance, const TriangleTree& tree, uint32_t hint) {
+    if (kernel_rays_.empty()) return hint;
+    hits_.resize(kernel_rays_.size());
+    task_.ray_kernels()->any(tree, kernel_rays_.data(), hits_.data(), hits_.size());
+    uint64_t tests = 0;
+    for (const KernelHit& hit : hits_) {
+      task_.work().nodes += hit.nodes;
+      tests += hit.tests;
+    }
+    task_.work().tests += tests;
+    task_.count_tests(tests);
+    for (size_t k = 0; k < hits_.size(); ++k) {
+      const KernelHit& hit = hits_[k];
+      Segment& segment = segments_[kernel_segments_[k].index];
+      segment.hint = kNoBlock;
+      if (hit.verdict == KernelVerdict::kMiss) continue;
+      if (hit.verdict == KernelVerdict::kUndecided || hit.t < kernel_segments_[k].nearest) {
+        trace_one(instance, kernel_segments_[k].nearest, segment);
+        continue;
+      }
+      segment.is_blocked = true;
+      hint = segment.hint = hit.number;
+    }
+    return hint;
+  }
+
+  // Searches one segment in one instance, triangle by triangle. `nearest` is the t at which it enters the instance.
+  void trace_one(const Instance& instance, float nearest, Segment& segment) {
+    const SlabRay<double> slabs(Rayd{eye_, segment.way}, kInstancePad);
+    HitCollector collector(request_of(segment, Source::kStatic));
+    trace_instance(task_, request_of(segment, Source::kStatic), slabs, instance, nearest, collector);
+    segment.is_blocked = collector.done();
+  }
+
+  RayRequest request_of(const Segment& segment, Source source) const {
+    RayRequest request{};
+    request.origin = eye_;
+    request.direction = segment.way;
+    request.t_max = 1;
+    request.mode = RayMode::kAny;
+    request.source = source;
+    request.precision = block_.precision;
+    request.max_results = 1;
+    return request;
+  }
+
+  // Searches the segments as rays of mode ANY among the instances or the objects.
+  void search_rays(Source source) {
+    for (size_t begin = 0; begin < segments_.size() && !task_.ended(); begin += kMaxAtOnce) {
+      const size_t end = std::min(segments_.size(), begin + kMaxAtOnce);
+      rays_.clear();
+      for (size_t i = begin; i < end; ++i)
+        rays_.emplace_back(request_of(segments_[i], source), filter_of(segments_[i].target));
+      find_hits(task_, rays_, [this](size_t) -> const SceneAtTime& { return moment_; });
+      for (size_t i = begin; i < end; ++i) segments_[i].is_blocked = rays_[i - begin].collector.done();
+    }
+  }
+
+  struct KernelSegment {
+    uint32_t index;  // in segments_
+    float nearest;   // t at which the segment enters the instance
+  };
+
+  QueryTask& task_;
+  const SceneAtTime& moment_;
+  const QueryBlock& block_;
+  const SightColumns& sight_;
+  const size_t viewer_;
+  const Group viewer_group_;
+  const Filter filter_;
+  const float max_distance_;
+  Vec3d eye_;
+  std::vector<uint8_t> is_seen_;  // for each sample point; only for viewers with several eyes
+  std::vector<Segment> segments_, sorted_;
+  std::vector<uint64_t> keys_;
+  std::vector<uint32_t> open_, now_;  // indices in segments_
+  std::vector<KernelRay> kernel_rays_;
+  std::vector<KernelSegment> kernel_segments_;
+  std::vector<KernelHit> hits_;
+  std::vector<PendingRay> rays_;
+};
+
+}  // namespace
+
+void look(QueryTask& task, const SceneAtTime& moment, const QueryBlock& block, const SightColumns& sight, Vec3d origin,
+          size_t i, absl::Span<char> seen) {
+  LOCUS_DCHECK_EQ(seen.size(), sight.bytes_per_viewer());
+  Look look(task, moment, block, sight, i);
+  const size_t eyes = sight.eyes_per_viewer();
+  for (size_t eye = 0; eye < eyes && !task.ended(); ++eye)
+    look.from(origin + read_vec3d(&sight.viewers[3 * (i * eyes + eye)]), seen);
+}
+
+}  // namespace locus
