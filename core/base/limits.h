@@ -46,6 +46,7 @@ inline constexpr uint32_t kMaxNearest = 65536;        // number of values that a
 inline constexpr uint32_t kMinPlanes = 4;             // planes of a convex region
 inline constexpr uint32_t kDefaultPlanes = 6;
 inline constexpr uint32_t kMaxPlanes = 32;
+inline constexpr uint32_t kMaxRegionPlanes = 131'072;     // planes of all convex regions of a query batch
 inline constexpr uint32_t kMaxSightSamples = 255;         // sample points of a target
 inline constexpr uint32_t kMaxSightEyes = 16;             // eyes of a viewer
 inline constexpr uint32_t kMaxSightSegments = 4'194'304;  // segments from an eye to a sample, per query batch

@@ -15,7 +15,7 @@ int sign_of(double value) { return (value > 0) - (value < 0); }
 // Exchanging u and v exactly reverses the sign.
 int orientation(Vec3d point, Vec3d u, Vec3d v, int axis) {
   const int x = (axis + 1) % 3, y = (axis + 2) % 3;
-  // The same order of the ends for both triangles of an edge.
+  // Orders the ends equally for both triangles of an edge.
   const bool swapped = std::pair(u[x], u[y]) > std::pair(v[x], v[y]);
   if (swapped) std::swap(u, v);
   const double left = (u[x] - point[x]) * (v[y] - point[y]), right = (u[y] - point[y]) * (v[x] - point[x]);

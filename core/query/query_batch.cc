@@ -11,6 +11,7 @@
 #include "core/base/status_macros.h"
 #include "core/geometry/rotation.h"
 #include "core/query/columns.h"
+#include "core/query/kinds/frustum_planes.h"
 
 namespace locus {
 namespace {
@@ -294,7 +295,23 @@ class BlockCheck {
     RETURN_IF_ERROR(check_length(values.size(), width, ColumnNeed::kEach, field));
     for (size_t i = 0; i < values.size(); ++i)
       if (!std::isfinite(values[i])) return wrong(Reason::kNotFinite, field, i / width, "needs finite numbers");
+    for (size_t i = 0; i < n_; ++i) RETURN_IF_ERROR(check_region(frustums, field, i));
     return absl::OkStatus();
+  }
+
+  // Checks that region `i` has an interior point. A region that counts from an anchor is checked at the world's origin.
+  absl::Status check_region(const FrustumColumns& frustums, absl::string_view field, size_t i) const {
+    const FrustumPlanes planes(frustums, i);
+    switch (planes.fault()) {
+      case FrustumPlanes::Fault::kNone:
+        break;
+      case FrustumPlanes::Fault::kZeroNormal:
+        return wrong(Reason::kOutOfRange, field, i, "has a plane without a normal that excludes everything");
+      case FrustumPlanes::Fault::kSingular:
+        return wrong(Reason::kOutOfRange, field, i, "must be a matrix whose determinant is not 0");
+    }
+    if (ConvexRegion::make(origin(), planes.planes())) return absl::OkStatus();
+    return wrong(Reason::kOutOfRange, field, i, "must have a point inside of all planes and the world");
   }
 
   absl::Status check_kind(const ContainsColumns& contains) const {
@@ -401,6 +418,15 @@ uint64_t sight_segments(const QueryBatch& batch) {
   return segments;
 }
 
+// Returns the number of planes of the convex regions in all blocks.
+uint64_t region_planes(const QueryBatch& batch) {
+  uint64_t planes = 0;
+  for (const QueryBlock& block : batch.blocks)
+    if (const auto* const frustums = std::get_if<FrustumColumns>(&block.kind))
+      planes += frustums->planes.size() / 4 + frustums->view_projections.size() / 16 * limits::kDefaultPlanes;
+  return planes;
+}
+
 }  // namespace
 
 size_t query_count(const QueryBlock& block) { return std::visit(CountQueries(), block.kind); }
@@ -412,6 +438,8 @@ absl::Status check_batch(const QueryBatch& batch) {
   for (const QueryBlock& block : batch.blocks) queries += query_count(block);
   if (queries > limits::kMaxQueries)
     return refuse_limit("blocks", "queries", limits::kMaxQueries, static_cast<double>(queries));
+  if (const uint64_t planes = region_planes(batch); planes > limits::kMaxRegionPlanes)
+    return refuse_limit("blocks", "region_planes", limits::kMaxRegionPlanes, static_cast<double>(planes));
   if (const uint64_t segments = sight_segments(batch); segments > limits::kMaxSightSegments)
     return refuse_limit("blocks", "sight_segments", limits::kMaxSightSegments, static_cast<double>(segments));
   if (batch.max_reply_bytes > limits::kMaxReplyBytes)

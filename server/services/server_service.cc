@@ -97,6 +97,7 @@ std::vector<NamedLimit> limits_of(const Host& host) {
       {"pair_neighbours", limits::kMaxPairNeighbours},
       {"cell_planes", limits::kMaxCellPlanes},
       {"planes", limits::kMaxPlanes},
+      {"region_planes", limits::kMaxRegionPlanes},
       {"sight_eyes", limits::kMaxSightEyes},
       {"sight_samples", limits::kMaxSightSamples},
       {"sight_segments", limits::kMaxSightSegments},

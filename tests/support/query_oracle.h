@@ -13,10 +13,10 @@
 
 #include "core/geometry/sweep.h"
 #include "core/geometry/swept_bounds.h"
+#include "core/query/kinds/frustum_planes.h"
 #include "core/query/kinds/placed_triangle.h"
 #include "tests/support/oracle_cell.h"
 #include "tests/support/oracle_contains.h"
-#include "tests/support/oracle_frustum.h"
 #include "tests/support/oracle_pairs.h"
 #include "tests/support/oracle_scene.h"
 
@@ -320,6 +320,9 @@ class QueryOracle : public OracleScene {
   static bool meets(const Capsule& capsule, const Shape& shape) { return capsule_overlaps(capsule, shape); }
   static bool meets(const Capsule& capsule, const Triangle& triangle) { return capsule_overlaps(capsule, triangle); }
   static bool meets(const Obbd& box, const Shape& shape) { return box_overlaps(box, shape); }
+  static bool meets(const ConvexRegion& region, const Aabbd& bounds) { return may_overlap(region, bounds); }
+  static bool meets(const ConvexRegion& region, const Shape& shape) { return region_overlaps(region, shape); }
+  static bool meets(const RegionInMesh& region, const Triangle& triangle) { return region.overlaps(triangle); }
   static bool meets(const Ballf& ball, const Triangle& triangle) { return ball_overlaps(ball, triangle); }
   static bool meets(const Obbf& box, const Triangle& triangle) { return box_overlaps(box, triangle); }
   static Ballf in_mesh(const Balld& ball, const Transform& transform) {
@@ -337,6 +340,7 @@ class QueryOracle : public OracleScene {
   static double reach(const Capsule& capsule) {
     return max_component(abs(capsule.center)) + max_component(abs(capsule.half_axis)) + capsule.radius;
   }
+  static double reach(const ConvexRegion& region) { return max_component(abs(region.origin())); }
   static double reach(const Balld& ball) { return max_component(abs(ball.center)) + ball.radius; }
   static double reach(const Obbd& box) { return max_component(abs(box.center)) + 2 * max_component(box.half); }
 
@@ -353,7 +357,12 @@ class QueryOracle : public OracleScene {
     if (!may_meet(solid, instance.bounds)) return;
     const PlacedTriangles placed(instance);
     const LoosePlacedTriangles loose(instance, reach(solid));
-    const auto mesh_solid = in_mesh(solid, instance.transform);
+    const auto mesh_solid = [&] {
+      if constexpr (std::is_same_v<Solid, ConvexRegion>)
+        return RegionInMesh(solid, instance.transform, magnitude(instance.mesh->bounds()));
+      else
+        return in_mesh(solid, instance.transform);
+    }();
     const std::vector<uint32_t>& storage = storage_.at(instance.mesh.get());
     for (uint32_t number = 0; number < instance.mesh->triangle_count(); ++number) {
       const Triangle triangle = instance.mesh->triangle(number);
@@ -413,6 +422,16 @@ class QueryOracle : public OracleScene {
       const Vec3d end = point(block, capsules.ends, i);
       const Capsule capsule{(start + end) * 0.5, (end - start) * 0.5, entry_for(capsules.radii, i, 0.0f)};
       answer_overlap(block, capsules.detail, capsule, i, result);
+    }
+  }
+
+  void answer_kind(const QueryBlock& block, const FrustumColumns& frustums, BlockResult& result) const {
+    for (size_t i = 0; i < query_count(block); ++i) {
+      const auto region = ConvexRegion::make(origin(block, i), FrustumPlanes(frustums, i).planes());
+      if (region && !is_unanchored(block, i))
+        answer_overlap(block, frustums.detail, *region, i, result);
+      else
+        result.counts.push_back(0);
     }
   }
 

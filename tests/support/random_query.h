@@ -355,6 +355,42 @@ inline OwnedBlock nearest_block(const QueryScene& scene, const SceneSketch& sket
   return block;
 }
 
+// Convex regions around the sketch's balls: boxes, rotated and sheared boxes, and hulls of random planes, through
+// notable points often; at times without some planes. Regions without an interior point are left out.
+inline OwnedBlock frustum_block(const QueryScene& scene, const SceneSketch& sketch, Random& random) {
+  OwnedBlock block = block_at(sketch, random);
+  FrustumColumns frustums;
+  constexpr uint32_t kPlanes[] = {0, 0, 4, 8, 12};
+  frustums.planes_each = random.pick(kPlanes);
+  frustums.detail = random_detail(random);
+  block.settings.kind = frustums;
+  for (const Balld& ball : sketch.balls) {
+    const std::vector<float> before = block.points;
+    const Vec3d center = ball.center - block.settings.frame;
+    const Rotation rotation = random.chance(0.5) ? Rotation{} : rotation_of(random.rotation());
+    for (size_t k = 0; k < frustums.planes_per_region(); ++k) {
+      Vec3d normal;
+      normal[static_cast<int>(k / 2 % 3)] = k % 2 == 0 ? 1 : -1;
+      normal = rotation.to_world(normal);
+      if (k >= 6 || random.chance(0.2)) normal = normal + random.vector(0.7);
+      const Vec3d through = random.chance(0.2) ? notable_point(sketch, random) - block.settings.frame
+                                               : center - normal * std::min(ball.radius, 1e9);
+      const double length = random.chance(0.3) ? random.magnitude(-5, 5) : 1;
+      append(block.points, to_float(normal * length));
+      block.points.push_back(static_cast<float>(-dot(normal, through) * length));
+      if (random.chance(0.05)) std::fill_n(block.points.end() - 4, 3, 0.0f), block.points.back() = 1;
+    }
+    const size_t n = query_count(block.view());
+    const OwnedBlock last = block.part(n - 1, n);
+    QueryBatch batch;
+    batch.blocks = {last.view()};
+    if (!check_batch(batch).ok()) block.points = before;
+  }
+  add_common(scene, random, block);
+  add_columns(kOverlapColumns, random, block);
+  return block;
+}
+
 // Points at and near notable places, and in, on and near the instances of closed meshes.
 inline OwnedBlock contains_block(const QueryScene& scene, const SceneSketch& sketch, Random& random) {
   OwnedBlock block = block_at(sketch, random);
@@ -445,6 +481,7 @@ inline QueryScene query_scene(const SceneSketch& sketch, Random& random) {
     scene.blocks.push_back(internal::capsule_block(scene, sketch, random));
     for (int i = 0; i < 2; ++i) scene.blocks.push_back(internal::sweep_block(scene, sketch, random));
   }
+  if (!sketch.balls.empty()) scene.blocks.push_back(internal::frustum_block(scene, sketch, random));
   scene.blocks.push_back(internal::contains_block(scene, sketch, random));
   scene.blocks.push_back(internal::sight_block(scene, sketch, random));
   return scene;

@@ -12,8 +12,8 @@ __path__ = pkgutil.extend_path(__path__, __name__)
 from .client import DEFAULT_ADDRESS, Client, connect
 from .columns import ColumnLike, Values
 from .connection import Retry
-from .enums import (AtStart, ClipDepth, Column, Cull, Inside, OutsideHistory, OverloadPolicy, Precision, RayMode, Reason, SceneState,
-                    Source, StaticDetail, Winding)
+from .enums import (AtStart, ClipDepth, Column, Cull, Inside, OutsideHistory, OverloadPolicy, Precision, RayMode, Reason,
+                    SceneState, Source, StaticDetail, Winding)
 from .errors import LocusError
 from .meshes import InstanceChange, MeshColumns, PlacedInstances
 from .queries import After, Block, QueryBatch

@@ -44,7 +44,8 @@ struct BallShape {
   using WorldRegion = BallRegion<double>;
   using MeshRegion = BallRegion<float>;
 
-  static Ballf to_mesh(const Balld& ball, const Transform& transform) {
+  static Ballf to_mesh(const Balld& ball, const Instance& instance) {
+    const Transform& transform = instance.transform;
     return {to_float(transform.point_to_mesh(ball.center)), static_cast<float>(ball.radius / transform.scale)};
   }
   static double size(const Ballf& ball) { return ball.radius; }
@@ -70,7 +71,8 @@ struct BoxShape {
   using WorldRegion = BoxRegion<double>;
   using MeshRegion = BoxRegion<float>;
 
-  static Obbf to_mesh(const Obbd& box, const Transform& transform) {
+  static Obbf to_mesh(const Obbd& box, const Instance& instance) {
+    const Transform& transform = instance.transform;
     return {to_float(transform.point_to_mesh(box.center)), to_float(box.half * (1.0 / transform.scale)),
             compose(inverse(transform.rotation), box.rotation)};
   }
@@ -96,7 +98,8 @@ struct CapsuleShape {
   using WorldRegion = BoxRegion<double>;
   using MeshRegion = CapsuleRegion;
 
-  static Capsule to_mesh(const Capsule& capsule, const Transform& transform) {
+  static Capsule to_mesh(const Capsule& capsule, const Instance& instance) {
+    const Transform& transform = instance.transform;
     const double inverse_scale = 1.0 / transform.scale;
     return {transform.point_to_mesh(capsule.center), transform.rotation.to_local(capsule.half_axis) * inverse_scale,
             capsule.radius * inverse_scale};
@@ -118,6 +121,58 @@ struct CapsuleShape {
   static bool overlaps_triangle(const Capsule& capsule, const Triangle& triangle) {
     return capsule_overlaps(capsule, triangle);
   }
+};
+
+// Culling tests of a convex region in world axes, and in the axes of a mesh.
+class ConvexWorldRegion {
+ public:
+  explicit ConvexWorldRegion(const ConvexRegion& region) : region_(region) {}
+  Aabbd bounds() const { return region_.bounds(); }
+  bool overlaps(const Aabbd& box) const { return may_overlap(region_, box); }
+
+ private:
+  const ConvexRegion& region_;
+};
+class ConvexMeshRegion {
+ public:
+  explicit ConvexMeshRegion(const RegionInMesh& region) : region_(region) {}
+  static Aabbf bounds() {
+    constexpr float kInfinity = Aabbf::kInfinity;
+    return {{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}};
+  }
+  bool overlaps(const Aabbf& box) const { return region_.may_overlap(box); }
+
+ private:
+  const RegionInMesh& region_;
+};
+
+// Operations on a convex region, with the same members as BallShape.
+struct RegionShape {
+  static constexpr bool kHasKernels = false;
+  using World = ConvexRegion;
+  using Mesh = RegionInMesh;
+  using WorldRegion = ConvexWorldRegion;
+  using MeshRegion = ConvexMeshRegion;
+
+  static Mesh to_mesh(const ConvexRegion& region, const Instance& instance) {
+    return Mesh(region, instance.transform, magnitude(instance.mesh->bounds()));
+  }
+  static double extent(const ConvexRegion& region) { return max_component(abs(region.origin())); }
+  static std::optional<Balld> as_ball(const ConvexRegion&) { return std::nullopt; }
+  static bool overlaps_bounds(const ConvexRegion& region, const Aabbd& bounds) { return may_overlap(region, bounds); }
+  static bool overlaps_object(const ConvexRegion& region, const Shape& shape) { return region_overlaps(region, shape); }
+  static Verdict verdict(const ConvexRegion& region, const ObjectBounds& object) {
+    switch (side_of_ball(region, object.position, object.extent, object.displacement_bound)) {
+      case RegionSide::kInside:
+        return Verdict::kOverlaps;
+      case RegionSide::kOutside:
+        return Verdict::kDisjoint;
+      case RegionSide::kUndecided:
+        break;
+    }
+    return Verdict::kUndecided;
+  }
+  static bool overlaps_triangle(const Mesh& region, const Triangle& triangle) { return region.overlaps(triangle); }
 };
 
 // Returns the region of the grid in which to search for objects.
@@ -206,7 +261,7 @@ template <class Kind>
 class ExactOverlapTest {
  public:
   ExactOverlapTest(const typename Kind::World& world_shape, const Instance& instance)
-      : shape_(Kind::to_mesh(world_shape, instance.transform)),
+      : shape_(Kind::to_mesh(world_shape, instance)),
         world_shape_(world_shape),
         placed_(instance, Kind::extent(world_shape)) {}
 
@@ -410,6 +465,11 @@ OverlapAnswer run_box(QueryTask& task, const SceneAtTime& moment, const Obbd& bo
 OverlapAnswer run_capsule(QueryTask& task, const SceneAtTime& moment, const Capsule& capsule,
                           const OverlapOptions& options, const Filter& filter) {
   return run_overlap<CapsuleShape>(task, moment, capsule, options, filter);
+}
+
+OverlapAnswer run_region(QueryTask& task, const SceneAtTime& moment, const ConvexRegion& region,
+                         const OverlapOptions& options, const Filter& filter) {
+  return run_overlap<RegionShape>(task, moment, region, options, filter);
 }
 
 GridRegion ball_region(const SceneAtTime& moment, const Balld& ball, const OverlapOptions& options) {

@@ -1,10 +1,11 @@
-// Search for the objects, and the instances or their triangles, that overlap one ball, box or capsule. Rows ascend by
-// id. Free functions; any thread may call them with a QueryTask of its own.
+// Search for the objects, and the instances or their triangles, that overlap one ball, box, capsule or convex region.
+// Rows ascend by id. Free functions; any thread may call them with a QueryTask of its own.
 #ifndef LOCUS_CORE_QUERY_KINDS_OVERLAP_QUERY_H_
 #define LOCUS_CORE_QUERY_KINDS_OVERLAP_QUERY_H_
 
 #include "core/geometry/ball.h"
 #include "core/geometry/capsule.h"
+#include "core/geometry/convex_region.h"
 #include "core/geometry/obb.h"
 #include "core/query/kinds/lowest_rows.h"
 #include "core/query/kinds/query_task.h"
@@ -24,15 +25,18 @@ struct OverlapOptions {
 // Returns the options of a block. A max_results of 0 becomes limits::kDefaultMaxResults.
 OverlapOptions overlap_options(const QueryBlock& block, StaticDetail detail);
 
-// Answer one ball, box or capsule query, given in world axes. Objects are searched as of `moment`, which the answer
-// borrows. The memory of OverlapAnswer::objects belongs to `task` and is valid until the next query of the task. Cost:
-// visits of the nodes, cells and primitives that overlap the solid, and the sorting of the rows.
+// Answer one ball, box, capsule or region query, given in world axes. Objects are searched as of `moment`, which the
+// answer borrows. The memory of OverlapAnswer::objects belongs to `task` and is valid until the next query of the task.
+// Cost: visits of the nodes, cells and primitives that overlap the solid, and the sorting of the rows.
 OverlapAnswer run_ball(QueryTask& task, const SceneAtTime& moment, const Balld& ball, const OverlapOptions& options,
                        const Filter& filter);
 OverlapAnswer run_box(QueryTask& task, const SceneAtTime& moment, const Obbd& box, const OverlapOptions& options,
                       const Filter& filter);
 OverlapAnswer run_capsule(QueryTask& task, const SceneAtTime& moment, const Capsule& capsule,
                           const OverlapOptions& options, const Filter& filter);
+
+OverlapAnswer run_region(QueryTask& task, const SceneAtTime& moment, const ConvexRegion& region,
+                         const OverlapOptions& options, const Filter& filter);
 
 // Returns the rows of instances merged with the objects that the last search of `found` has found: at most
 // options.max_results rows, ascending by id. With count_only, adds the numbers of rows.

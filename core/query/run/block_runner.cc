@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/query/kinds/contains_query.h"
+#include "core/query/kinds/frustum_planes.h"
 #include "core/query/kinds/lookup_query.h"
 #include "core/query/kinds/ray_query.h"
 #include "core/query/kinds/sight_query.h"
@@ -271,7 +272,15 @@ void BlockRunner::run_query(const NearestColumns& nearest, size_t i) {
   count_rows(kept, kept < rows.size(), i);
 }
 
-void BlockRunner::run_query(const FrustumColumns& /*frustums*/, size_t i) { write_nothing(i); }
+void BlockRunner::run_query(const FrustumColumns& frustums, size_t i) {
+  const std::optional<ConvexRegion> region = ConvexRegion::make(origins_.of(i), FrustumPlanes(frustums, i).planes());
+  // A region that counts from an anchor may lie outside of the world.
+  if (!region) return write_nothing(i);
+  OverlapAnswer answer;
+  if (!task_.ended())
+    answer = run_region(task_, times_.of(i), *region, overlap_options(block_, frustums.detail), Filter(block_, i));
+  append_rows(answer, i);
+}
 
 void BlockRunner::run_query(const SightColumns& sight, size_t i) {
   const size_t bytes = sight.bytes_per_viewer();

@@ -1,0 +1,92 @@
+// Convex regions of space, bounded by planes, and their overlaps with shapes and triangles. A region is given relative
+// to an origin in world axes, so that it is as precise far out as at the world's origin; it is cut by the world's box.
+// Pure functions in double; any thread.
+//
+// A point is within a plane if n.p + d >= -e, where e is 2^-40 of the magnitudes of n.p and d: a point that rounding
+// moves off a plane is on it. Two solids overlap if they share a point by this test. Every overlap also requires that
+// the bounds of the shape or triangle may_overlap() the region, so that culling by any superset of these bounds never
+// changes a result.
+// Source: Sutherland, Hodgman, Reentrant Polygon Clipping, 1974.
+#ifndef LOCUS_CORE_GEOMETRY_CONVEX_REGION_H_
+#define LOCUS_CORE_GEOMETRY_CONVEX_REGION_H_
+
+#include <array>
+#include <cstddef>
+#include <optional>
+
+#include "absl/types/span.h"
+#include "core/base/limits.h"
+#include "core/geometry/shape.h"
+#include "core/geometry/transform.h"
+#include "core/geometry/triangle.h"
+
+namespace locus {
+
+// Half-space of the points p with normal.p + offset >= 0.
+struct Plane {
+  Vec3d normal;  // of length 1, inwards
+  double offset = 0;
+};
+
+// Returns the plane with the normal and offset divided by the length of the normal, which must not be zero.
+Plane normalized_plane(Vec3d normal, double offset);
+
+// Convex region. Invariant: the region has an interior point.
+class ConvexRegion {
+ public:
+  // Makes the region of the points whose offsets from `origin` lie within all planes and which lie within the world.
+  // Returns nullopt if the region has no interior point. At most limits::kMaxPlanes planes. O(planes^2).
+  static std::optional<ConvexRegion> make(Vec3d origin, absl::Span<const Plane> planes);
+
+  Vec3d origin() const { return origin_; }
+  // Returns the planes, relative to origin().
+  absl::Span<const Plane> planes() const { return {planes_.data(), count_}; }
+  // Returns a point of the interior, relative to origin().
+  Vec3d interior() const { return interior_; }
+  // Returns bounds of the region in world axes, not tight.
+  const Aabbd& bounds() const { return bounds_; }
+
+ private:
+  ConvexRegion() = default;
+
+  Vec3d origin_;
+  // The given planes, then those sides of the world's box that the region reaches.
+  std::array<Plane, limits::kMaxPlanes + 6> planes_;
+  size_t count_ = 0;
+  Vec3d interior_;
+  Aabbd bounds_;
+};
+
+// Returns false if the box lies outside of the region's bounds, or wholly outside of one of its planes. Monotone: true
+// for every box that contains a box for which it is true.
+bool may_overlap(const ConvexRegion& region, const Aabbd& box);
+
+// Returns whether the region shares a point with the shape, a closed solid.
+bool region_overlaps(const ConvexRegion& region, const Shape& shape);
+
+// Relation of a ball to a region. Tells most objects apart without their exact shape.
+enum class RegionSide { kInside, kOutside, kUndecided };
+// Returns kOutside if a ball lies wholly outside of a plane, and kInside if its centre lies within all planes, both by
+// more than rounding and than `slack`. `center` is in world axes.
+RegionSide side_of_ball(const ConvexRegion& region, Vec3d center, double radius, double slack);
+
+// The planes of a region in the axes of a mesh, and how far a corner of the mesh may be off a plane and count as on it.
+class RegionInMesh {
+ public:
+  // `magnitude` is the largest |coordinate| of the mesh.
+  RegionInMesh(const ConvexRegion& region, const Transform& transform, float magnitude);
+
+  // Returns false only if the box lies wholly outside of one plane.
+  bool may_overlap(const Aabbf& box) const;
+  // Returns whether the region shares a point with the triangle, a closed surface.
+  bool overlaps(const Triangle& triangle) const;
+
+ private:
+  std::array<Plane, limits::kMaxPlanes + 6> planes_;
+  std::array<double, limits::kMaxPlanes + 6> epsilons_;
+  size_t count_ = 0;
+};
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_GEOMETRY_CONVEX_REGION_H_

@@ -1,0 +1,37 @@
+// Planes of one query of a block of convex regions, from its columns. Plain data; any thread.
+#ifndef LOCUS_CORE_QUERY_KINDS_FRUSTUM_PLANES_H_
+#define LOCUS_CORE_QUERY_KINDS_FRUSTUM_PLANES_H_
+
+#include <array>
+
+#include "absl/types/span.h"
+#include "core/geometry/convex_region.h"
+#include "core/query/query_batch.h"
+
+namespace locus {
+
+class FrustumPlanes {
+ public:
+  // kZeroNormal: a plane has no normal and a negative offset. kSingular: the determinant of the matrix is 0.
+  enum class Fault : uint8_t { kNone, kZeroNormal, kSingular };
+
+  // Reads the planes of region `i`, relative to its origin, from finite columns. A plane without a normal that excludes
+  // nothing is left out. The planes of a matrix are sums of its rows, computed in double.
+  // Source: Gribb, Hartmann, Fast Extraction of Viewing Frustum Planes from the World-View-Projection Matrix, 2001.
+  FrustumPlanes(const FrustumColumns& frustums, size_t i);
+
+  absl::Span<const Plane> planes() const { return {planes_.data(), count_}; }
+  Fault fault() const { return fault_; }
+
+ private:
+  void add(Vec3d normal, double offset);
+  void read_matrix(const float* matrix, ClipDepth clip_depth);
+
+  std::array<Plane, limits::kMaxPlanes> planes_;
+  size_t count_ = 0;
+  Fault fault_ = Fault::kNone;
+};
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_QUERY_KINDS_FRUSTUM_PLANES_H_

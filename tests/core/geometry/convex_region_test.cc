@@ -1,0 +1,242 @@
+// Convex regions and their overlaps, judged by points: a shape and a region share a point if a search that descends to
+// the nearest common point, in long double, finds one.
+#include "core/geometry/convex_region.h"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "tests/support/random.h"
+#include "tests/support/random_shape.h"
+#include "tests/support/real.h"
+#include "tests/support/test_scale.h"
+
+namespace locus::test {
+namespace {
+
+using Planes = std::vector<Plane>;
+
+Planes box_planes(Vec3d center, Vec3d half, const Rotation& rotation = {}) {
+  Planes planes;
+  for (int axis = 0; axis < 3; ++axis)
+    for (const double side : {-1.0, 1.0}) {
+      Vec3d normal;
+      normal[axis] = -side;
+      normal = rotation.to_world(normal);
+      planes.push_back(normalized_plane(normal, half[axis] - dot(normal, center)));
+    }
+  return planes;
+}
+
+// Returns the planes of a view from `eye` along +x, rotated: near and far planes, and sides of slope `slope`.
+Planes view_planes(Vec3d eye, double slope, double near, double far, const Rotation& rotation) {
+  Planes planes;
+  const auto add = [&](Vec3d normal, double offset) {
+    const Vec3d n = rotation.to_world(normal);
+    planes.push_back(normalized_plane(n, offset - dot(n, eye)));
+  };
+  add({1, 0, 0}, -near);
+  add({-1, 0, 0}, far);
+  for (const double side : {-1.0, 1.0}) {
+    add({slope, side, 0}, 0);
+    add({slope, 0, side}, 0);
+  }
+  return planes;
+}
+
+ConvexRegion region_of(const Planes& planes, Vec3d origin = {}) {
+  const std::optional<ConvexRegion> region = ConvexRegion::make(origin, planes);
+  LOCUS_CHECK(region.has_value());
+  return *region;
+}
+
+Shape ball(Vec3d position, float radius) {
+  Shape shape;
+  shape.kind = radius == 0 ? ShapeKind::kPoint : ShapeKind::kBall;
+  shape.position = position;
+  shape.radius = radius;
+  return shape;
+}
+
+Shape box(Vec3d position, Vec3f half, Quaternion rotation = {}) {
+  Shape shape;
+  shape.kind = ShapeKind::kBox;
+  shape.position = position;
+  shape.size = half;
+  shape.rotation = rotation;
+  return shape;
+}
+
+TEST(ConvexRegionTest, ABoxOfPlanesIsABox) {
+  const ConvexRegion region = region_of(box_planes({1, 2, 3}, {1, 1, 1}));
+  EXPECT_TRUE(region_overlaps(region, ball({2, 3, 4}, 0)));
+  EXPECT_FALSE(region_overlaps(region, ball({2.001, 3, 4}, 0)));
+  EXPECT_TRUE(region_overlaps(region, ball({4, 2, 3}, 2)));
+  EXPECT_FALSE(region_overlaps(region, ball({4, 2, 3}, 1.999f)));
+  // Off an edge by (3, 4), and off a corner by (2, 3, 6).
+  EXPECT_TRUE(region_overlaps(region, ball({5, 7, 3}, 5)));
+  EXPECT_FALSE(region_overlaps(region, ball({5, 7, 3}, 4.999f)));
+  EXPECT_TRUE(region_overlaps(region, ball({4, 6, 10}, 7)));
+  EXPECT_FALSE(region_overlaps(region, ball({4, 6, 10}, 6.999f)));
+}
+
+TEST(ConvexRegionTest, APlaneThatTouchesIsWithin) {
+  const ConvexRegion region = region_of(box_planes({0, 0, 0}, {1, 1, 1}));
+  EXPECT_TRUE(region_overlaps(region, box({3, 0, 0}, {2, 1, 1})));
+  EXPECT_FALSE(region_overlaps(region, box({3.001, 0, 0}, {2, 1, 1})));
+}
+
+TEST(ConvexRegionTest, ARegionWithoutAnInteriorPointIsNone) {
+  Planes planes = box_planes({0, 0, 0}, {1, 1, 1});
+  planes.push_back(normalized_plane({1, 0, 0}, -1));
+  EXPECT_FALSE(ConvexRegion::make({}, planes).has_value());
+  planes.back() = normalized_plane({1, 0, 0}, -2);
+  EXPECT_FALSE(ConvexRegion::make({}, planes).has_value());
+  planes.back() = normalized_plane({1, 0, 0}, -0.999);
+  EXPECT_TRUE(ConvexRegion::make({}, planes).has_value());
+  EXPECT_FALSE(ConvexRegion::make({}, Planes{normalized_plane({1, 0, 0}, -1e10)}).has_value());
+}
+
+TEST(ConvexRegionTest, SmallRegionsFarOutHaveTightBounds) {
+  const Vec3d origin{5e8, -7e8, 3e8};
+  const ConvexRegion region = region_of(box_planes({0.25, 0, 0}, {0.001, 0.002, 0.003}), origin);
+  EXPECT_LT(max_component(region.bounds().extent()), 0.02);
+  EXPECT_TRUE(region_overlaps(region, ball(origin + Vec3d{0.25, 0, 0}, 0)));
+  EXPECT_FALSE(region_overlaps(region, ball(origin + Vec3d{0.26, 0, 0}, 0)));
+}
+
+TEST(ConvexRegionTest, AHalfSpaceReachesTheEdgeOfTheWorld) {
+  const ConvexRegion region = region_of({normalized_plane({0, 0, 3}, -3)});
+  EXPECT_TRUE(region_overlaps(region, ball({9e8, -9e8, 1}, 0)));
+  EXPECT_TRUE(region_overlaps(region, ball({1e9, 1e9, 1e9}, 0)));
+  EXPECT_FALSE(region_overlaps(region, ball({9e8, -9e8, 0.999}, 0)));
+}
+
+TEST(ConvexRegionTest, ARegionInsideOfABoxOverlapsIt) {
+  const ConvexRegion region = region_of(box_planes({1, 1, 1}, {0.1, 0.1, 0.1}));
+  EXPECT_TRUE(region_overlaps(region, box({0, 0, 0}, {5, 5, 5})));
+  EXPECT_FALSE(region_overlaps(region, box({-6, 0, 0}, {5, 5, 5})));
+}
+
+// Returns the point of the region nearest to `point` in long double, by Dykstra's alternating projections.
+// Source: Boyle, Dykstra, A Method for Finding Projections onto the Intersection of Convex Sets in Hilbert Spaces,
+// 1986.
+Vec3r projected(const ConvexRegion& region, Vec3r point) {
+  std::vector<Vec3r> corrections(region.planes().size());
+  Vec3r at = point;
+  for (int round = 0; round < 400; ++round) {
+    const Vec3r before = at;
+    for (size_t i = 0; i < corrections.size(); ++i) {
+      const Plane& plane = region.planes()[i];
+      const Vec3r from = at + corrections[i], normal = to_real(plane.normal);
+      const Real value = dot(normal, from) + Real{plane.offset};
+      at = value < 0 ? from - normal * value : from;
+      corrections[i] = from - at;
+    }
+    if (length(at - before) < 1e-13L * (1 + length(point)) && round > 20) break;
+  }
+  return at;
+}
+
+// Returns the distance from the shape's core to the region: from the centre of a ball, or the least distance of many
+// points of the solid of a box or the inner segment of a capsule, refined around the best.
+Real core_distance(const ConvexRegion& region, const Shape& shape) {
+  const auto distance_of = [&](Vec3r local) {
+    const Vec3r point = to_real(shape.position) + turned(shape.rotation, local);
+    return length(projected(region, point) - point);
+  };
+  if (shape.kind == ShapeKind::kPoint || shape.kind == ShapeKind::kBall) return distance_of({});
+  // The distance is convex, so alternating between the region and the solid converges to the least one.
+  Vec3r local;
+  Real best = distance_of(local);
+  for (int round = 0; round < 3000; ++round) {
+    const Vec3r before = local;
+    const Vec3r point = to_real(shape.position) + turned(shape.rotation, local);
+    const Vec3r wanted = turned_back(shape.rotation, projected(region, point) - to_real(shape.position));
+    const Vec3r size = to_real(to_double(shape.size));
+    if (shape.kind == ShapeKind::kBox) {
+      for (int axis = 0; axis < 3; ++axis) local[axis] = std::clamp(wanted[axis], -size[axis], size[axis]);
+    } else {
+      const Real squared = dot(size, size);
+      local = size * (squared == 0 ? Real{0} : std::clamp(dot(wanted, size) / squared, Real{-1}, Real{1}));
+    }
+    best = std::min(best, distance_of(local));
+    if (length(local - before) < 1e-9L || best < 1e-9L) break;
+  }
+  return best;
+}
+
+TEST(ConvexRegionTest, RandomShapesOverlapWhereTheyShareAPoint) {
+  size_t overlapping = 0, apart = 0, unsure = 0;
+  for (uint64_t seed = 0; seed < scaled_count(500); ++seed) {
+    Random random(seed);
+    const Rotation rotation = rotation_of(random.rotation());
+    const Planes planes =
+        random.chance(0.5) ? box_planes(random.vector(3), random.positive_vector(2) + Vec3d{0.1, 0.1, 0.1}, rotation)
+                           : view_planes(random.vector(3), random.between(0.2, 2), 0.1, random.between(1, 8), rotation);
+    const ConvexRegion region = region_of(planes);
+    Shape shape = random_shape(random, random.pick(kShapeKinds), 5);
+    for (int axis = 0; axis < 3; ++axis) shape.size[axis] = random.float_between(0, 2);
+    shape.radius = random.float_between(0.1, 2);
+    if (shape.kind == ShapeKind::kPoint) shape.radius = 0;
+    const Real radius = shape.kind == ShapeKind::kBox ? Real{0} : Real{shape.radius};
+    const Real distance = core_distance(region, shape) - radius;
+    const bool found = region_overlaps(region, shape);
+    (found ? overlapping : apart) += 1;
+    // The reference converges to about this distance.
+    if (std::abs(distance) < 1e-3L) {
+      ++unsure;
+      continue;
+    }
+    ASSERT_EQ(found, distance < 0 || core_distance(region, shape) < 1e-6L)
+        << "seed " << seed << ", " << double(distance);
+  }
+  EXPECT_GT(overlapping, scaled_count(70));
+  EXPECT_GT(apart, scaled_count(70));
+  EXPECT_LT(unsure, scaled_count(300));
+}
+
+TEST(ConvexRegionTest, RandomTrianglesOverlapWhereTheyShareAPoint) {
+  size_t overlapping = 0, apart = 0;
+  for (uint64_t seed = 0; seed < scaled_count(1'000); ++seed) {
+    Random random(seed);
+    const ConvexRegion region = region_of(view_planes(random.vector(3), random.between(0.2, 2), 0.1,
+                                                      random.between(1, 8), rotation_of(random.rotation())));
+    const Vec3d center = random.vector(5);
+    const Triangle triangle{to_float(center + random.vector(2)), to_float(center + random.vector(2)),
+                            to_float(center + random.vector(2)), 0};
+    const Transform none = make_transform({}, {}, 1);
+    const bool found = RegionInMesh(region, none, 10).overlaps(triangle);
+    // Alternates between the region and the triangle's plane, edges and corners by fine barycentric steps.
+    Real best = 1e9L;
+    constexpr int kSteps = 24;
+    for (int u = 0; u <= kSteps; ++u)
+      for (int v = 0; u + v <= kSteps; ++v) {
+        const Real s = Real{1} * u / kSteps, t = Real{1} * v / kSteps;
+        const Vec3r point = to_real(triangle.a) * (1 - s - t) + to_real(triangle.b) * s + to_real(triangle.c) * t;
+        best = std::min(best, length(projected(region, point) - point));
+      }
+    (found ? overlapping : apart) += 1;
+    // A sample within the region proves an overlap; samples are at most this far from any point of the triangle.
+    ASSERT_TRUE(found || best > 1e-9L) << "seed " << seed;
+    ASSERT_TRUE(!found || best < 8.0L / kSteps) << "seed " << seed;
+  }
+  EXPECT_GT(overlapping, scaled_count(100));
+  EXPECT_GT(apart, scaled_count(100));
+}
+
+TEST(ConvexRegionTest, TheSideOfABallAgreesWithItsOverlap) {
+  for (uint64_t seed = 0; seed < scaled_count(20'000); ++seed) {
+    Random random(seed);
+    const Vec3d origin = random.chance(0.5) ? Vec3d{} : random.vector(1e8);
+    const ConvexRegion region = region_of(
+        view_planes(random.vector(3), random.between(0.2, 2), 0.1, 5, rotation_of(random.rotation())), origin);
+    const Shape shape = ball(origin + random.vector(6), static_cast<float>(random.between(0.01, 3)));
+    const RegionSide side = side_of_ball(region, shape.position, double{shape.radius}, 0);
+    if (side == RegionSide::kUndecided) continue;
+    ASSERT_EQ(region_overlaps(region, shape), side == RegionSide::kInside) << "seed " << seed;
+  }
+}
+
+}  // namespace
+}  // namespace locus::test
