@@ -11,7 +11,7 @@ namespace {
 
 // Kinds of queries that are in the protocol but not served yet are false.
 struct Served {
-  bool frustums = false, sight = false, contains = false, pairs = false, cells = false;
+  bool pairs = false, cells = false;
 };
 constexpr Served kServed;
 
@@ -176,17 +176,14 @@ absl::Status read_kind(const v1::QueryBlock& block, const std::string& field, Qu
     case v1::QueryBlock::kCapsules:
       return read_kind(block.capsules(), field, out);
     case v1::QueryBlock::kFrustums:
-      if (!kServed.frustums) return not_served(field + ".frustums");
       return read_kind(block.frustums(), field, out);
     case v1::QueryBlock::kSweeps:
       return read_kind(block.sweeps(), field, out);
     case v1::QueryBlock::kNearest:
       return read_kind(block.nearest(), field, out);
     case v1::QueryBlock::kSight:
-      if (!kServed.sight) return not_served(field + ".sight");
       return read_kind(block.sight(), out);
     case v1::QueryBlock::kContains:
-      if (!kServed.contains) return not_served(field + ".contains");
       return read_kind(block.contains(), out);
     case v1::QueryBlock::kPairs:
       if (!kServed.pairs) return not_served(field + ".pairs");
@@ -198,7 +195,8 @@ absl::Status read_kind(const v1::QueryBlock& block, const std::string& field, Qu
       break;
   }
   return refuse_argument(Reason::kMalformed, field, {},
-                         "a block needs one kind of query: rays, balls, boxes, capsules, sweeps, lookup or nearest");
+                         "a block needs one kind of query: rays, balls, boxes, capsules, frustums, contains, sweeps, "
+                         "sight, nearest or lookup");
 }
 
 absl::Status read_columns(const v1::QueryBlock& block, const std::string& field, ColumnSet* out) {

@@ -128,6 +128,7 @@ v1::Mesh to_proto(const Registry::NamedMesh& mesh) {
   out.set_vertices(mesh.mesh->vertex_count());
   out.set_triangles(mesh.mesh->triangle_count());
   out.set_zero_area_triangles(mesh.mesh->zero_area_count());
+  out.set_open_edges(mesh.mesh->open_edges());
   out.set_bytes(mesh.mesh->bytes());
   out.set_uses(mesh.uses);
   for (const MeshPart& part : mesh.mesh->parts()) {

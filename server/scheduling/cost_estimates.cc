@@ -49,6 +49,15 @@ struct KindOf {
   }
 };
 
+// Returns the number of units of the block's cost: its queries or, for sight, its segments.
+double units_of(const QueryBlock& block) {
+  const auto* const sight = std::get_if<SightColumns>(&block.kind);
+  const auto queries = static_cast<double>(query_count(block));
+  if (sight == nullptr) return queries;
+  return queries *
+         static_cast<double>(sight->eyes_per_viewer() * sight->samples_per_target() * sight->bytes_per_viewer());
+}
+
 uint64_t packed(uint32_t tag, double nanoseconds) {
   return uint64_t{tag} << 32 | std::bit_cast<uint32_t>(static_cast<float>(nanoseconds));
 }
@@ -87,12 +96,12 @@ double CostEstimates::nanoseconds_a_query(uint64_t scene, const QueryBlock& bloc
 uint64_t CostEstimates::nanoseconds(uint64_t scene, const QueryBatch& batch) const {
   double sum = 0;
   for (const QueryBlock& block : batch.blocks)
-    sum += kBlockNanoseconds + static_cast<double>(query_count(block)) * nanoseconds_a_query(scene, block);
+    sum += kBlockNanoseconds + units_of(block) * nanoseconds_a_query(scene, block);
   return static_cast<uint64_t>(std::min(sum, kMax));
 }
 
 void CostEstimates::learn(uint64_t scene, const QueryBlock& block, uint64_t nanoseconds) {
-  const auto queries = static_cast<double>(query_count(block));
+  const double queries = units_of(block);
   if (queries == 0) return;
   const double seen = std::clamp(static_cast<double>(nanoseconds) / queries, kMin, kMax);
   const Slot slot = slot_of(scene, block);

@@ -39,8 +39,8 @@ class CostEstimates {
  public:
   static constexpr size_t kEntries = 16384;
 
-  // Returns the estimate for one query of the block. `scene` is any number that identifies the scene, such as its
-  // epoch.
+  // Returns the estimate for one query of the block; for sight, for one segment from an eye to a sample. `scene` is any
+  // number that identifies the scene, such as its epoch.
   double nanoseconds_a_query(uint64_t scene, const QueryBlock& block) const;
 
   // Returns the estimate for a whole batch.

@@ -143,6 +143,56 @@ TEST_F(QueryRpcTest, SweepsFindWhatAMovingSolidTouches) {
   EXPECT_EQ(ask(batch).blocks(0).hits(), std::string(1, '\1'));
 }
 
+TEST_F(QueryRpcTest, FrustumsFindWhatIsInView) {
+  v1::QueryBatch batch;
+  v1::Frustums* frustums = batch.add_blocks()->mutable_frustums();
+  // The box from (2, -1, -1) to (7, 1, 1).
+  fill(frustums->mutable_planes(), {1.f, 0.f,  0.f, -2.f, -1.f, 0.f, 0.f, 7.f, 0.f, 1.f, 0.f,  1.f,
+                                    0.f, -1.f, 0.f, 1.f,  0.f,  0.f, 1.f, 1.f, 0.f, 0.f, -1.f, 1.f});
+  EXPECT_THAT(ask(batch).blocks(0).ids(), ElementsAre(1u, 2u));
+  frustums->clear_planes();
+  // A matrix that maps the box from (2, -1, 0) to (7, 1, 1) to -w .. w, -w .. w, 0 .. w.
+  fill(frustums->mutable_view_projections(),
+       {0.4f, 0.f, 0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 0.f, 0.f, 1.f, 0.f, -1.8f, 0.f, 0.f, 1.f});
+  EXPECT_THAT(ask(batch).blocks(0).ids(), ElementsAre(1u, 2u));
+  frustums->mutable_view_projections()->Set(0, 0);
+  expect_query_refused(
+      batch, {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_OUT_OF_RANGE, "blocks[0].frustums.view_projections"});
+}
+
+TEST_F(QueryRpcTest, ContainsFindsTheSolidsAroundPoints) {
+  v1::QueryBatch batch;
+  fill(batch.add_blocks()->mutable_contains()->mutable_points(), {3.5f, 0.f, 0.f, 0.f, 50.f, 0.f});
+  const v1::QueryResult result = ask(batch);
+  EXPECT_THAT(result.blocks(0).counts(), ElementsAre(1u, 0u));
+  EXPECT_THAT(result.blocks(0).ids(), ElementsAre(1u));
+}
+
+TEST_F(QueryRpcTest, SightIsAMatrixOfBytes) {
+  v1::QueryBatch batch;
+  v1::Sight* sight = batch.add_blocks()->mutable_sight();
+  fill(sight->mutable_viewers(), {0.f, 0.f, 0.f, 4.5f, 0.f, 0.f});
+  fill(sight->mutable_targets(), {1.f, 0.f, 0.f, 4.6f, 0.f, 0.f});
+  EXPECT_EQ(ask(batch).blocks(0).sight(), std::string("\1\0\0\1", 4));
+  sight->set_pairwise(true);
+  EXPECT_EQ(ask(batch).blocks(0).sight(), std::string("\1\1", 2));
+}
+
+TEST_F(QueryRpcTest, AnchorsCountsAndPagesAreServed) {
+  v1::QueryBatch batch = ball_at(0, 2.5f);
+  batch.mutable_blocks(0)->add_anchor_ids(2);
+  EXPECT_THAT(ask(batch).blocks(0).ids(), ElementsAre(1u, 3u));
+  batch.mutable_blocks(0)->set_anchor_ids(0, 77);
+  EXPECT_THAT(ask(batch).blocks(0).unanchored(), ElementsAre(0u));
+  batch.mutable_blocks(0)->set_anchor_ids(0, 2);
+  batch.mutable_blocks(0)->set_count_only(true);
+  EXPECT_THAT(ask(batch).blocks(0).counts(), ElementsAre(2u));
+  EXPECT_THAT(ask(batch).blocks(0).ids(), IsEmpty());
+  v1::QueryBatch page = ray_along_x();
+  page.mutable_blocks(0)->mutable_rays()->add_after_ts(2);
+  EXPECT_THAT(ask(page).blocks(0).ids(), ElementsAre(2u));
+}
+
 TEST_F(QueryRpcTest, NearestListsObjectsAndInstancesByDistance) {
   v1::QueryBatch batch = points_near({10.f, 0.f, 0.f});
   EXPECT_THAT(ask(batch).blocks(0).ids(), ElementsAre(3u));
@@ -387,8 +437,8 @@ TEST_F(QueryRpcTest, KindsAndFieldsThatAreNotServedAreNamed) {
     spoil(batch.mutable_blocks(0));
     expect_query_refused(batch, {grpc::StatusCode::UNIMPLEMENTED, v1::REASON_NOT_SERVED, "blocks[0]." + field});
   };
-  refused("frustums", [](auto* block) { block->mutable_frustums(); });
-  refused("sight", [](auto* block) { block->mutable_sight(); });
+  refused("pairs", [](auto* block) { block->mutable_pairs(); });
+  refused("cells", [](auto* block) { block->mutable_cells(); });
 }
 
 TEST_F(QueryRpcTest, LimitsOfABatchAreNamedWithWhatWasAsked) {

@@ -30,8 +30,9 @@ TEST_F(ServerRpcTest, TheServerReportsItsVersionAndFeatures) {
   EXPECT_EQ(server.version(), LOCUS_VERSION);
   EXPECT_EQ(server.instruction_set(), instruction_set());
   EXPECT_THAT(server.features(),
-              ::testing::ElementsAre("as_of", "balls", "boxes", "capsules", "download_mesh", "history", "latest_wins",
-                                     "lookup", "nearest", "rays", "static_from", "sweeps"));
+              ::testing::ElementsAre("after_t", "anchors", "as_of", "balls", "boxes", "capsules", "contains",
+                                     "count_only", "download_mesh", "frustums", "history", "latest_wins", "lookup",
+                                     "nearest", "rays", "sight", "static_from", "sweeps"));
 }
 
 TEST_F(ServerRpcTest, LimitsAreListedInOrderWithTheirUse) {
