@@ -11,7 +11,7 @@
 #include "core/base/status_macros.h"
 #include "core/geometry/rotation.h"
 #include "core/query/columns.h"
-#include "core/query/kinds/frustum_planes.h"
+#include "core/query/frustum_planes.h"
 
 namespace locus {
 namespace {

@@ -13,7 +13,7 @@
 
 #include "core/geometry/sweep.h"
 #include "core/geometry/swept_bounds.h"
-#include "core/query/kinds/frustum_planes.h"
+#include "core/query/frustum_planes.h"
 #include "core/query/kinds/placed_triangle.h"
 #include "tests/support/oracle_cell.h"
 #include "tests/support/oracle_contains.h"

@@ -4,8 +4,8 @@
 #include <limits>
 #include <utility>
 
+#include "core/query/frustum_planes.h"
 #include "core/query/kinds/contains_query.h"
-#include "core/query/kinds/frustum_planes.h"
 #include "core/query/kinds/lookup_query.h"
 #include "core/query/kinds/ray_query.h"
 #include "core/query/kinds/sight_query.h"

@@ -1,4 +1,4 @@
-#include "core/query/kinds/frustum_planes.h"
+#include "core/query/frustum_planes.h"
 
 #include <utility>
 

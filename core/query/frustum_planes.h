@@ -1,6 +1,6 @@
 // Planes of one query of a block of convex regions, from its columns. Plain data; any thread.
-#ifndef LOCUS_CORE_QUERY_KINDS_FRUSTUM_PLANES_H_
-#define LOCUS_CORE_QUERY_KINDS_FRUSTUM_PLANES_H_
+#ifndef LOCUS_CORE_QUERY_FRUSTUM_PLANES_H_
+#define LOCUS_CORE_QUERY_FRUSTUM_PLANES_H_
 
 #include <array>
 
@@ -34,4 +34,4 @@ class FrustumPlanes {
 
 }  // namespace locus
 
-#endif  // LOCUS_CORE_QUERY_KINDS_FRUSTUM_PLANES_H_
+#endif  // LOCUS_CORE_QUERY_FRUSTUM_PLANES_H_
