@@ -11,12 +11,30 @@
 
 #include <optional>
 
+#include "core/geometry/ball.h"
+#include "core/geometry/capsule.h"
 #include "core/geometry/mover.h"
 #include "core/geometry/shape.h"
 #include "core/geometry/transform.h"
 #include "core/geometry/triangle.h"
 
 namespace locus {
+
+// Return a ball or a capsule as a mover that rests. Its contact_at() time 0 measures from the centre or inner segment.
+inline Mover resting(const Balld& ball) {
+  Mover mover;
+  mover.start = ball.center;
+  mover.radius = ball.radius;
+  return mover;
+}
+inline Mover resting(const Capsule& capsule) {
+  Mover mover;
+  mover.kind = MoverKind::kCapsule;
+  mover.start = capsule.center;
+  mover.half_axis = capsule.half_axis;
+  mover.radius = capsule.radius;
+  return mover;
+}
 
 // Returns the mover in mesh axes. Time is the same in both axes.
 Mover mover_to_mesh(const Mover& mover, const Transform& transform);

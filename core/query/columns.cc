@@ -27,9 +27,9 @@ struct ServedColumns {
     return {Column::kT,     Column::kId,  Column::kTriangle, Column::kNormal, Column::kPoint,
             Column::kGroup, Column::kTag, Column::kLayers,   Column::kPose};
   }
-  ColumnSet operator()(const BallColumns&) const { return overlap(); }
+  ColumnSet operator()(const BallColumns&) const { return contact(); }
   ColumnSet operator()(const BoxColumns&) const { return overlap(); }
-  ColumnSet operator()(const CapsuleColumns&) const { return overlap(); }
+  ColumnSet operator()(const CapsuleColumns&) const { return contact(); }
   ColumnSet operator()(const FrustumColumns&) const { return overlap(); }
   ColumnSet operator()(const SightColumns&) const { return {}; }
   ColumnSet operator()(const ContainsColumns&) const {
@@ -43,11 +43,16 @@ struct ServedColumns {
             Column::kGroup, Column::kTag, Column::kLayers,   Column::kPose};
   }
   ColumnSet operator()(const NearestColumns&) const {
-    return {Column::kT,     Column::kId,  Column::kTriangle, Column::kPoint,
-            Column::kGroup, Column::kTag, Column::kLayers,   Column::kPose};
+    return {Column::kT,     Column::kId,    Column::kTriangle, Column::kUv,     Column::kNormal,
+            Column::kPoint, Column::kGroup, Column::kTag,      Column::kLayers, Column::kPose};
   }
   ColumnSet operator()(const LookupColumns&) const {
     return {Column::kId, Column::kGroup, Column::kTag, Column::kLayers, Column::kPose};
+  }
+  static ColumnSet contact() {
+    ColumnSet columns = overlap();
+    for (const Column column : {Column::kT, Column::kPoint, Column::kNormal}) columns.add(column);
+    return columns;
   }
   static ColumnSet overlap() {
     return {Column::kId, Column::kTriangle, Column::kGroup, Column::kTag, Column::kLayers, Column::kPose};

@@ -11,6 +11,7 @@
 #include <tuple>
 #include <vector>
 
+#include "core/geometry/nearest_pair.h"
 #include "core/geometry/sweep.h"
 #include "core/geometry/swept_bounds.h"
 #include "core/query/frustum_planes.h"
@@ -394,7 +395,55 @@ class QueryOracle : public OracleScene {
       return std::tie(a.id, a.storage, a.triangle) < std::tie(b.id, b.storage, b.triangle);
     });
     count(block, rows, i, result);
-    for (const Row& row : rows) write(row, block, result);
+    for (const Row& row : rows) {
+      write(row, block, result);
+      if constexpr (std::is_same_v<Solid, Balld> || std::is_same_v<Solid, Capsule>)
+        write_contact(row, block, solid, result);
+    }
+  }
+
+  // Writes the contact of a ball or capsule with the object or the triangle of a row; for a whole instance, with the
+  // nearest triangle that it overlaps.
+  template <class Solid>
+  static void write_contact(const Row& row, const QueryBlock& block, const Solid& solid, BlockResult& result) {
+    const ColumnSet columns = columns_of(block);
+    if (!columns.has(Column::kT) && !columns.has(Column::kNormal) && !columns.has(Column::kPoint)) return;
+    Hit hit;
+    const Mover mover = resting(solid);
+    Contact contact;
+    const bool exactly = block.precision == Precision::kExact;
+    if (row.object != nullptr && exactly) {
+      contact = contact_at(mover, row.object->shape, 0);
+    } else if (row.instance != nullptr && exactly) {
+      const Transform& transform = row.instance->transform;
+      const Mover local = mover_to_mesh(mover, transform);
+      const auto mesh_solid = in_mesh(solid, transform);
+      const LoosePlacedTriangles loose(*row.instance, reach(solid));
+      contact.distance = std::numeric_limits<double>::infinity();
+      for (uint32_t number = 0; number < row.instance->mesh->triangle_count(); ++number) {
+        const Triangle triangle = row.instance->mesh->triangle(number);
+        if (row.triangle != kNoTriangle && row.triangle != number) continue;
+        if (!meets(mesh_solid, triangle) || !meets(solid, loose.bounds_of_triangle(triangle))) continue;
+        const Contact one = contact_at(local, corners_of(triangle), 0);
+        if (one.distance < contact.distance) contact = one;
+      }
+      contact.distance *= double{transform.scale};
+      contact.point = transform.rotation.to_world(contact.point) * double{transform.scale};
+      contact.normal = normalized(transform.rotation.to_world(contact.normal));
+    } else {
+      const Aabbd bounds =
+          row.object != nullptr ? bounds_of(row.object->shape)
+          : row.triangle == kNoTriangle
+              ? row.instance->bounds
+              : PlacedTriangles(*row.instance).bounds_of_triangle(row.instance->mesh->triangle(row.triangle));
+      const NearestPair pair = nearest_to_box(mover.half_axis, (bounds.min + bounds.max) * 0.5 - mover.start,
+                                              (bounds.max - bounds.min) * 0.5);
+      contact = {std::sqrt(pair.squared_distance), pair.on_primitive, {}};
+    }
+    if (columns.has(Column::kT)) result.t.back() = static_cast<float>(contact.distance) + 0.0f;
+    if (columns.has(Column::kNormal)) write_vector(to_float(contact.normal + Vec3d{}), result.normals);
+    if (columns.has(Column::kPoint))
+      write_vector(to_float(mover.start - block.frame + contact.point + Vec3d{}), result.points);
   }
 
   void answer_kind(const QueryBlock& block, const BallColumns& balls, BlockResult& result) const {
@@ -486,6 +535,31 @@ class QueryOracle : public OracleScene {
     rows.insert(rows.end(), own.begin(), own.end());
   }
 
+  // Returns the unit vector from the nearest point of a row; `row.normal` is the way to it.
+  static Vec3d away(const Row& row, bool conservative) {
+    if (conservative) return {};
+    if (row.normal != Vec3d{}) return normalized(-row.normal) + Vec3d{};
+    if (row.instance == nullptr) return {};
+    const Corners corners = corners_of(row.instance->transform, row.instance->mesh->triangle(row.triangle));
+    const Vec3d front = cross(corners[1] - corners[0], corners[2] - corners[0]);
+    return squared_length(front) > 0 ? normalized(front) + Vec3d{} : Vec3d{};
+  }
+
+  // Writes the weights of the nearest point in its triangle: parts of the triangle's area.
+  static void write_weights(Vec3d from, const Row& row, bool conservative, BlockResult& result) {
+    float u = 0, v = 0;
+    if (row.instance != nullptr && !conservative) {
+      const Corners corners = corners_of(row.instance->transform, row.instance->mesh->triangle(row.triangle));
+      const Vec3d ab = corners[1] - corners[0], ac = corners[2] - corners[0], front = cross(ab, ac);
+      const Vec3d along = row.normal - (corners[0] - from);
+      if (squared_length(front) > 0) {
+        u = static_cast<float>(std::clamp(dot(cross(along, ac), front) / dot(front, front), 0.0, 1.0)) + 0.0f;
+        v = static_cast<float>(std::clamp(dot(cross(ab, along), front) / dot(front, front), 0.0, 1.0)) + 0.0f;
+      }
+    }
+    result.uvs.insert(result.uvs.end(), {u, v});
+  }
+
   static void near_row(Vec3d point, const Object& object, bool conservative, Rows& rows) {
     const Aabbd bounds = bounds_of(object.shape);
     const double away = conservative ? std::sqrt(squared_distance(point, bounds)) : distance(point, object.shape);
@@ -518,6 +592,8 @@ class QueryOracle : public OracleScene {
         write(row, block, result);
         if (columns_of(block).has(Column::kPoint))
           write_vector(to_float(from - block.frame + row.normal), result.points);
+        if (columns_of(block).has(Column::kNormal)) write_vector(to_float(away(row, conservative)), result.normals);
+        if (columns_of(block).has(Column::kUv)) write_weights(from, row, conservative, result);
       }
     }
   }

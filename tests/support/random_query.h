@@ -205,8 +205,9 @@ inline constexpr Column kSweepColumns[] = {Column::kT,      Column::kId,     Col
                                            Column::kTag,    Column::kLayers, Column::kPose};
 inline constexpr Column kOverlapColumns[] = {Column::kId,  Column::kTriangle, Column::kGroup,
                                              Column::kTag, Column::kLayers,   Column::kPose};
-inline constexpr Column kNearestColumns[] = {Column::kT,     Column::kId,  Column::kTriangle, Column::kPoint,
-                                             Column::kGroup, Column::kTag, Column::kLayers,   Column::kPose};
+inline constexpr Column kContactColumns[] = {Column::kT,      Column::kId,     Column::kTriangle,
+                                             Column::kNormal, Column::kPoint,  Column::kGroup,
+                                             Column::kTag,    Column::kLayers, Column::kPose};
 inline constexpr Column kContainsColumns[] = {Column::kId, Column::kGroup, Column::kTag, Column::kLayers,
                                               Column::kPose};
 inline constexpr Column kLookupColumns[] = {Column::kId, Column::kGroup, Column::kTag, Column::kLayers, Column::kPose};
@@ -262,7 +263,7 @@ inline OwnedBlock ball_block(const QueryScene& scene, const SceneSketch& sketch,
     block.sizes.push_back(static_cast<float>(std::min(ball.radius, 1e9)));
   }
   add_common(scene, random, block);
-  add_columns(kOverlapColumns, random, block);
+  add_columns(kContactColumns, random, block);
   return block;
 }
 
@@ -297,7 +298,7 @@ inline OwnedBlock capsule_block(const QueryScene& scene, const SceneSketch& sket
     block.extras.push_back(random.chance(0.1) ? 0 : static_cast<float>(std::min(ball.radius, 1e9)));
   }
   add_common(scene, random, block);
-  add_columns(kOverlapColumns, random, block);
+  add_columns(kContactColumns, random, block);
   return block;
 }
 
@@ -351,7 +352,7 @@ inline OwnedBlock nearest_block(const QueryScene& scene, const SceneSketch& sket
   }
   add_after(random, block);
   add_common(scene, random, block);
-  add_columns(kNearestColumns, random, block);
+  add_columns(kRayColumns, random, block);
   return block;
 }
 

@@ -308,20 +308,35 @@ NearestAnswer run_nearest(QueryTask& task, const SceneAtTime& moment, const Near
   return rows.finish();
 }
 
-Vec3d nearest_offset(const NearestRequest& request, const Hit& row) {
+NearestSurface nearest_surface(const NearestRequest& request, const Hit& row) {
   const Vec3d point = request.point;
   const bool conservative = request.precision == Precision::kConservative;
+  NearestSurface surface;
   if (row.object) {
     Shape shape = row.object_shape();
-    if (conservative) return nearest_in(point, bounds_of(shape)) - point;
+    if (conservative) return {nearest_in(point, bounds_of(shape)) - point, {}};
     // Compute with coordinates relative to `point`, which avoids cancellation far from the world's origin.
     shape.position = shape.position - point;
-    return nearest_on_shape({}, shape);
+    surface.offset = nearest_on_shape({}, shape);
+    if (surface.offset != Vec3d{}) surface.normal = normalized(-surface.offset);
+    return surface;
   }
   LOCUS_DCHECK(row.instance != nullptr);
   const Corners corners = corners_of(row.instance->transform, row.instance->mesh->triangle(row.triangle));
-  if (conservative) return nearest_in(point, PlacedTriangles(*row.instance).bounds_of_corners(corners)) - point;
-  return nearest_on_triangle({}, corners[0] - point, corners[1] - point, corners[2] - point);
+  if (conservative) return {nearest_in(point, PlacedTriangles(*row.instance).bounds_of_corners(corners)) - point, {}};
+  const Vec3d a = corners[0] - point, ab = corners[1] - corners[0], ac = corners[2] - corners[0];
+  surface.offset = nearest_on_triangle({}, a, corners[1] - point, corners[2] - point);
+  const Vec3d front = cross(ab, ac), along = surface.offset - a;
+  const double area = squared_length(front);
+  if (area > 0) {
+    surface.u = static_cast<float>(std::clamp(dot(cross(along, ac), front) / area, 0.0, 1.0)) + 0.0f;
+    surface.v = static_cast<float>(std::clamp(dot(cross(ab, along), front) / area, 0.0, 1.0)) + 0.0f;
+  }
+  if (surface.offset != Vec3d{})
+    surface.normal = normalized(-surface.offset);
+  else if (area > 0)
+    surface.normal = normalized(front);
+  return surface;
 }
 
 }  // namespace locus

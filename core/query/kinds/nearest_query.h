@@ -42,10 +42,15 @@ struct NearestAnswer {
 NearestAnswer run_nearest(QueryTask& task, const SceneAtTime& moment, const NearestRequest& request,
                           const Filter& filter);
 
-// Returns the vector from request.point to the nearest point of the row's object or triangle, or, for a CONSERVATIVE
-// query, to the nearest point of the bounds of this object or triangle. The vector is zero if request.point lies
-// inside. The vector is computed again from the stored object or triangle, since a Hit does not store it.
-Vec3d nearest_offset(const NearestRequest& request, const Hit& row);
+// Nearest point of a row's object or triangle or, for a CONSERVATIVE query, of its bounds.
+struct NearestSurface {
+  Vec3d offset;        // from request.point to the nearest point; zero if request.point lies inside
+  Vec3d normal;        // unit vector from the nearest point to request.point; if they are equal, the front of the
+                       // triangle, or zero for an object; zero if CONSERVATIVE
+  float u = 0, v = 0;  // weights of the triangle's second and third vertex; 0 for an object and if CONSERVATIVE
+};
+// Returns the nearest point, computed again from the stored object or triangle, since a Hit does not store it.
+NearestSurface nearest_surface(const NearestRequest& request, const Hit& row);
 
 }  // namespace locus
 

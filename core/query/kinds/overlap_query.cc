@@ -1,10 +1,14 @@
 #include "core/query/kinds/overlap_query.h"
 
+#include <cmath>
+#include <limits>
 #include <optional>
 
 #include "core/base/check.h"
 #include "core/base/planted_bug.h"
+#include "core/geometry/nearest_pair.h"
 #include "core/geometry/segment.h"
+#include "core/geometry/sweep.h"
 #include "core/index/regions.h"
 #include "core/query/kinds/placed_triangle.h"
 #include "core/query/kinds/triangle_search.h"
@@ -403,6 +407,44 @@ class InstanceSearch {
   LowestRows& rows_;
 };
 
+// Visitor of the triangles of one instance that keeps the nearest one that the solid overlaps.
+template <class Kind>
+class NearestOverlapping {
+ public:
+  NearestOverlapping(QueryTask& task, const ExactOverlapTest<Kind>& exact, const Mover& mover)
+      : task_(task), region_(exact.mesh_shape()), exact_(exact), mover_(mover) {}
+
+  Aabbf bounds() const { return region_.bounds(); }
+  bool overlaps(const Aabbf& box) const { return region_.overlaps(box); }
+  bool visit(const Triangle& triangle) {
+    if (!task_.count_test()) return false;
+    if (!exact_.overlaps(triangle)) return true;
+    const double distance = contact_at(mover_, corners_of(triangle), 0).distance;
+    if (distance > least_ || (distance == least_ && triangle.number > nearest_)) return true;
+    least_ = distance;
+    nearest_ = triangle.number;
+    return true;
+  }
+  uint32_t nearest() const { return nearest_; }
+
+ private:
+  QueryTask& task_;
+  const typename Kind::MeshRegion region_;
+  const ExactOverlapTest<Kind>& exact_;
+  const Mover& mover_;
+  double least_ = std::numeric_limits<double>::infinity();
+  uint32_t nearest_ = kNoTriangle;
+};
+
+template <class Kind>
+uint32_t search_nearest(QueryTask& task, const typename Kind::World& solid, const Instance& instance) {
+  const ExactOverlapTest<Kind> exact(solid, instance);
+  const Mover mover = mover_to_mesh(resting(solid), instance.transform);
+  NearestOverlapping<Kind> visitor(task, exact, mover);
+  task.visit_region(instance.mesh->tree(), visitor);
+  return visitor.nearest();
+}
+
 template <class Kind>
 OverlapAnswer run_overlap(QueryTask& task, const SceneAtTime& moment, const typename Kind::World& shape,
                           const OverlapOptions& options, const Filter& filter) {
@@ -421,6 +463,38 @@ OverlapAnswer run_overlap(QueryTask& task, const SceneAtTime& moment, const type
 }
 
 }  // namespace
+
+Contact overlap_contact(const Mover& solid, Precision precision, const Hit& hit, uint32_t triangle) {
+  if (precision == Precision::kConservative) {
+    Aabbd bounds;
+    if (hit.object)
+      bounds = bounds_of(hit.object_shape());
+    else if (triangle == kNoTriangle)
+      bounds = hit.instance->bounds;
+    else
+      bounds = PlacedTriangles(*hit.instance).bounds_of_triangle(hit.instance->mesh->triangle(triangle));
+    const Vec3d center = (bounds.min + bounds.max) * 0.5 - solid.start;
+    const NearestPair pair = nearest_to_box(solid.half_axis, center, bounds.extent() * 0.5);
+    return {std::sqrt(pair.squared_distance), pair.on_primitive, {}};
+  }
+  if (hit.object) return contact_at(solid, hit.object_shape(), 0);
+  // The batch ended before the nearest triangle was found.
+  if (triangle == kNoTriangle) return {};
+  const Transform& transform = hit.instance->transform;
+  Contact contact = contact_at(mover_to_mesh(solid, transform), corners_of(hit.instance->mesh->triangle(triangle)), 0);
+  contact.distance *= double{transform.scale};
+  contact.point = transform.rotation.to_world(contact.point) * double{transform.scale};
+  contact.normal = normalized(transform.rotation.to_world(contact.normal));
+  return contact;
+}
+
+uint32_t nearest_overlapping(QueryTask& task, const Balld& solid, const Instance& instance) {
+  return search_nearest<BallShape>(task, solid, instance);
+}
+
+uint32_t nearest_overlapping(QueryTask& task, const Capsule& solid, const Instance& instance) {
+  return search_nearest<CapsuleShape>(task, solid, instance);
+}
 
 OverlapAnswer with_objects(OverlapAnswer instances, FoundObjects& found, const SceneAtTime& moment,
                            const OverlapOptions& options) {

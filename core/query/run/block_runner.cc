@@ -4,6 +4,7 @@
 #include <limits>
 #include <utility>
 
+#include "core/geometry/sweep.h"
 #include "core/query/frustum_planes.h"
 #include "core/query/kinds/contains_query.h"
 #include "core/query/kinds/lookup_query.h"
@@ -147,6 +148,32 @@ void BlockRunner::append_rows(const OverlapAnswer& answer, size_t i) {
   count_rows(kept, answer.truncated || kept < answer.objects.size(), i);
 }
 
+template <class Solid>
+void BlockRunner::append_contacts(const OverlapAnswer& answer, const Solid& solid, size_t i) {
+  const uint64_t before = rows_;
+  append_rows(answer, i);
+  const bool wanted = columns_.has(Column::kT) || columns_.has(Column::kNormal) || columns_.has(Column::kPoint);
+  if (wanted && rows_ != before) write_contacts(answer, solid, i, rows_ - before);
+}
+
+// Writes the contacts of the last `rows` rows, which are the first rows of `answer`.
+template <class Solid>
+void BlockRunner::write_contacts(const OverlapAnswer& answer, const Solid& solid, size_t i, size_t rows) {
+  const RowSpans to = last_rows(result_, columns_, rows);
+  const Mover mover = resting(solid);
+  size_t row = 0;
+  const auto write = [&](const Hit& hit, uint32_t triangle) {
+    if (row < rows) write_overlap_contact(mover, block_.precision, block_.frame, hit, triangle, to, row++);
+  };
+  for (const FoundObject& found : answer.objects) write(hit_on(found.object, 0, times_.of(i)), kNoTriangle);
+  for (const RowRun& run : answer.runs) {
+    for (const uint32_t triangle : answer.triangles_of(run)) write(run.row, triangle);
+    if (run.triangle_count != 0 || row >= rows) continue;
+    const bool searched = !run.row.object && block_.precision == Precision::kExact;
+    write(run.row, searched ? nearest_overlapping(task_, solid, *run.row.instance) : kNoTriangle);
+  }
+}
+
 void BlockRunner::append_runs(const OverlapAnswer& answer, size_t i) {
   size_t all = 0;
   for (const RowRun& run : answer.runs) all += run.rows();
@@ -235,10 +262,10 @@ void BlockRunner::run_query(const SweepColumns& sweeps, size_t i) {
 
 void BlockRunner::run_query(const BallColumns& balls, size_t i) {
   OverlapAnswer answer;
+  const Balld ball = ball_of(origins_.of(i), balls, i);
   if (!task_.ended())
-    answer = run_ball(task_, times_.of(i), ball_of(origins_.of(i), balls, i), overlap_options(block_, balls.detail),
-                      Filter(block_, i));
-  append_rows(answer, i);
+    answer = run_ball(task_, times_.of(i), ball, overlap_options(block_, balls.detail), Filter(block_, i));
+  append_contacts(answer, ball, i);
 }
 
 void BlockRunner::run_query(const BoxColumns& boxes, size_t i) {
@@ -251,10 +278,10 @@ void BlockRunner::run_query(const BoxColumns& boxes, size_t i) {
 
 void BlockRunner::run_query(const CapsuleColumns& capsules, size_t i) {
   OverlapAnswer answer;
+  const Capsule capsule = capsule_of(origins_.of(i), capsules, i);
   if (!task_.ended())
-    answer = run_capsule(task_, times_.of(i), capsule_of(origins_.of(i), capsules, i),
-                         overlap_options(block_, capsules.detail), Filter(block_, i));
-  append_rows(answer, i);
+    answer = run_capsule(task_, times_.of(i), capsule, overlap_options(block_, capsules.detail), Filter(block_, i));
+  append_contacts(answer, capsule, i);
 }
 
 void BlockRunner::run_query(const NearestColumns& nearest, size_t i) {
@@ -267,7 +294,7 @@ void BlockRunner::run_query(const NearestColumns& nearest, size_t i) {
   const RowSpans to = add_rows(result_, columns_, kept);
   for (size_t row = 0; row < kept; ++row) {
     write_row(rows[row], to, row);
-    write_nearest_point(request, block_.frame, rows[row], to, row);
+    write_nearest_surface(request, block_.frame, rows[row], to, row);
   }
   count_rows(kept, kept < rows.size(), i);
 }

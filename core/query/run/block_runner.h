@@ -72,6 +72,11 @@ class BlockRunner {
   void write_surfaces(const SweepColumns& sweeps, absl::Span<const Hit> hits, size_t i, const RowSpans& to, size_t row);
   void append_rows(const OverlapAnswer& answer, size_t i);
   void append_runs(const OverlapAnswer& answer, size_t i);
+  // Appends the rows of a ball or capsule query, and the columns of their contacts.
+  template <class Solid>
+  void append_contacts(const OverlapAnswer& answer, const Solid& solid, size_t i);
+  template <class Solid>
+  void write_contacts(const OverlapAnswer& answer, const Solid& solid, size_t i, size_t rows);
   void look_up_groups_at(const LookupColumns& lookup, size_t i);
   void count_rows(size_t rows, bool cut, size_t i);
   // Records the number of rows of query `i` of a block with count_only.

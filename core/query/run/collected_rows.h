@@ -31,6 +31,16 @@ inline RowSpans add_rows(CollectedRows& collected, ColumnSet columns, size_t row
   return spans;
 }
 
+// Returns pointers to the first of the last `rows` rows in each column of `columns`, valid like those of add_rows().
+inline RowSpans last_rows(CollectedRows& collected, ColumnSet columns, size_t rows) {
+  RowSpans spans;
+  for_each_column_array([&](const auto& array) {
+    auto& values = array.get(collected);
+    if (columns.has(array.column)) array.get(spans) = values.data() + (values.size() - array.width * rows);
+  });
+  return spans;
+}
+
 }  // namespace locus
 
 #endif  // LOCUS_CORE_QUERY_RUN_COLLECTED_ROWS_H_

@@ -108,10 +108,25 @@ void write_contact(const SweepRequest& request, Vec3d frame, const Hit& hit, con
   if (to.points != nullptr) write_point(to.points, row, point.x, point.y, point.z);
 }
 
-void write_nearest_point(const NearestRequest& request, Vec3d frame, const Hit& hit, const RowSpans& to, size_t row) {
-  if (to.points == nullptr) return;
-  const Vec3f point = to_float(request.point - frame + nearest_offset(request, hit));
-  write_point(to.points, row, point.x, point.y, point.z);
+void write_overlap_contact(const Mover& solid, Precision precision, Vec3d frame, const Hit& hit, uint32_t triangle,
+                           const RowSpans& to, size_t row) {
+  const Contact contact = overlap_contact(solid, precision, hit, triangle);
+  // Adding 0 turns -0 into 0, so that equal results have equal bytes.
+  if (to.t != nullptr) to.t[row] = static_cast<float>(contact.distance) + 0.0f;
+  const Vec3f normal = to_float(contact.normal + Vec3d{});
+  const Vec3f point = to_float(solid.start - frame + contact.point + Vec3d{});
+  if (to.normals != nullptr) write_point(to.normals, row, normal.x, normal.y, normal.z);
+  if (to.points != nullptr) write_point(to.points, row, point.x, point.y, point.z);
+}
+
+void write_nearest_surface(const NearestRequest& request, Vec3d frame, const Hit& hit, const RowSpans& to, size_t row) {
+  if (to.points == nullptr && to.normals == nullptr && to.uvs == nullptr) return;
+  const NearestSurface surface = nearest_surface(request, hit);
+  const Vec3f point = to_float(request.point - frame + surface.offset);
+  const Vec3f normal = to_float(surface.normal + Vec3d{});
+  if (to.points != nullptr) write_point(to.points, row, point.x, point.y, point.z);
+  if (to.normals != nullptr) write_point(to.normals, row, normal.x, normal.y, normal.z);
+  if (to.uvs != nullptr) std::copy_n(std::array{surface.u, surface.v}.begin(), 2, to.uvs + 2 * row);
 }
 
 }  // namespace locus

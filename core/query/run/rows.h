@@ -3,6 +3,7 @@
 #ifndef LOCUS_CORE_QUERY_RUN_ROWS_H_
 #define LOCUS_CORE_QUERY_RUN_ROWS_H_
 
+#include "core/geometry/mover.h"
 #include "core/query/kinds/found_objects.h"
 #include "core/query/kinds/hit.h"
 #include "core/query/kinds/nearest_query.h"
@@ -27,11 +28,18 @@ void write_object_rows(absl::Span<const FoundObject> objects, const SceneAtTime&
 void write_surface(const RayRequest& request, Vec3d frame, const Hit& hit, Winding winding, const RowSpans& to,
                    size_t row);
 
+// Writes those of the columns t, normal and point that the block returns, for a row of a ball or capsule query.
+// `solid` is the ball or capsule as a mover that rests, in world axes; `triangle` is the triangle to measure,
+// kNoTriangle for an object or with CONSERVATIVE for the bounds of a whole instance. The point is relative to `frame`.
+void write_overlap_contact(const Mover& solid, Precision precision, Vec3d frame, const Hit& hit, uint32_t triangle,
+                           const RowSpans& to, size_t row);
+
 // Writes those of the columns normal and point that the block returns, for a hit of a sweep. The point is relative to
 // `frame`.
 void write_contact(const SweepRequest& request, Vec3d frame, const Hit& hit, const RowSpans& to, size_t row);
-// Writes the column point of a nearest query's row, relative to `frame`, if the block returns this column.
-void write_nearest_point(const NearestRequest& request, Vec3d frame, const Hit& hit, const RowSpans& to, size_t row);
+// Writes those of the columns uv, normal and point that the block returns, for a row of a nearest query. The point is
+// relative to `frame`.
+void write_nearest_surface(const NearestRequest& request, Vec3d frame, const Hit& hit, const RowSpans& to, size_t row);
 
 }  // namespace locus
 
