@@ -25,6 +25,8 @@ enum class PlantedBug {
   kCapsuleCap,         // a capsule has no caps: its inner segment ends where the caps begin
   kEndlessCapsule,     // a capsule is an endless cylinder
   kSweepStart,         // a sweep ignores what it touches at its start
+  kPairBothSides,      // a pair of objects is found from both of its sides
+  kCellBeyond,         // a cell of free space has planes for what lies beyond other planes
   kMatrixRow,          // a plane of a view is computed from the wrong row of its matrix
   kOwnGroupBlocks,     // the group of a viewer blocks its sight
   kClosedEdge,         // a ray that counts crossings of a mesh meets both ends of an edge

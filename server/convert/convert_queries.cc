@@ -9,12 +9,6 @@
 namespace locus::server {
 namespace {
 
-// Kinds of queries that are in the protocol but not served yet are false.
-struct Served {
-  bool pairs = false, cells = false;
-};
-constexpr Served kServed;
-
 // Tables from the number of a protocol enum to the core's value; number 0 maps to the default.
 constexpr std::array kSources = {Source::kBoth, Source::kBoth, Source::kStatic, Source::kDynamic};
 constexpr std::array kPrecisions = {Precision::kExact, Precision::kExact, Precision::kConservative};
@@ -186,17 +180,15 @@ absl::Status read_kind(const v1::QueryBlock& block, const std::string& field, Qu
     case v1::QueryBlock::kContains:
       return read_kind(block.contains(), out);
     case v1::QueryBlock::kPairs:
-      if (!kServed.pairs) return not_served(field + ".pairs");
       return read_kind(block.pairs(), out);
     case v1::QueryBlock::kCells:
-      if (!kServed.cells) return not_served(field + ".cells");
       return read_kind(block.cells(), out);
     case v1::QueryBlock::KIND_NOT_SET:
       break;
   }
   return refuse_argument(Reason::kMalformed, field, {},
                          "a block needs one kind of query: rays, balls, boxes, capsules, frustums, contains, sweeps, "
-                         "sight, nearest or lookup");
+                         "sight, nearest, pairs, cells or lookup");
 }
 
 absl::Status read_columns(const v1::QueryBlock& block, const std::string& field, ColumnSet* out) {

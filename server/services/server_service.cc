@@ -128,26 +128,11 @@ std::vector<NamedLimit> limits_of(const Host& host) {
 void get_server(Host& host, v1::GetServerResponse& response) {
   response.set_version(kVersion);
   response.set_instruction_set(std::string(instruction_set()));
-  for (const absl::string_view feature : {"after_t",
-                                          "anchors",
-                                          "as_of",
-                                          "backup",
-                                          "balls",
-                                          "boxes",
-                                          "capsules",
-                                          "contains",
-                                          "count_only",
-                                          "download_mesh",
-                                          "durability_local",
-                                          "frustums",
-                                          "history",
-                                          "latest_wins",
-                                          "lookup",
-                                          "nearest",
-                                          "rays",
-                                          "sight",
-                                          "static_from",
-                                          "sweeps"})
+  for (const absl::string_view feature :
+       {"after_t",  "anchors", "as_of",       "backup",     "balls",         "boxes",
+        "capsules", "cells",   "contains",    "count_only", "download_mesh", "durability_local",
+        "frustums", "history", "latest_wins", "lookup",     "nearest",       "pairs",
+        "rays",     "sight",   "static_from", "sweeps"})
     if (serves(host, feature)) response.add_features(std::string(feature));
   for (const NamedLimit& limit : limits_of(host)) {
     v1::Limit* out = response.add_limits();

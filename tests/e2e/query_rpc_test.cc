@@ -178,6 +178,23 @@ TEST_F(QueryRpcTest, SightIsAMatrixOfBytes) {
   EXPECT_EQ(ask(batch).blocks(0).sight(), std::string("\1\1", 2));
 }
 
+TEST_F(QueryRpcTest, PairsAndCellsAreRows) {
+  v1::QueryBatch batch;
+  batch.add_blocks()->mutable_pairs()->set_max_distance(1);
+  batch.mutable_blocks(0)->mutable_pairs()->set_k(1);
+  const v1::BlockResult pairs = ask(batch).blocks(0);
+  EXPECT_THAT(pairs.ids(), ElementsAre(1u, 2u, 3u, 4u));
+  EXPECT_THAT(pairs.others(), ElementsAre(2u, 1u, 2u, 3u));
+  EXPECT_THAT(pairs.t(), ElementsAre(1.f, 1.f, 1.f, 1.f));
+  v1::QueryBatch free;
+  v1::Cells* cells = free.add_blocks()->mutable_cells();
+  fill(cells->mutable_points(), {4.5f, 0.f, 0.f});
+  cells->add_max_distances(3);
+  const v1::BlockResult space = ask(free).blocks(0);
+  EXPECT_THAT(space.ids(), ElementsAre(0u, 1u, 2u));
+  EXPECT_THAT(space.t(), ElementsAre(3.f, 0.5f, 0.5f));
+}
+
 TEST_F(QueryRpcTest, AnchorsCountsAndPagesAreServed) {
   v1::QueryBatch batch = ball_at(0, 2.5f);
   batch.mutable_blocks(0)->add_anchor_ids(2);
@@ -429,16 +446,6 @@ TEST_F(QueryRpcTest, WrongFormRefusesTheBatchAndIsNamed) {
     block->mutable_lookup()->add_ids(1);
     block->mutable_lookup()->add_groups(1);
   });
-}
-
-TEST_F(QueryRpcTest, KindsAndFieldsThatAreNotServedAreNamed) {
-  const auto refused = [this](const std::string& field, const std::function<void(v1::QueryBlock*)>& spoil) {
-    v1::QueryBatch batch = ray_along_x();
-    spoil(batch.mutable_blocks(0));
-    expect_query_refused(batch, {grpc::StatusCode::UNIMPLEMENTED, v1::REASON_NOT_SERVED, "blocks[0]." + field});
-  };
-  refused("pairs", [](auto* block) { block->mutable_pairs(); });
-  refused("cells", [](auto* block) { block->mutable_cells(); });
 }
 
 TEST_F(QueryRpcTest, LimitsOfABatchAreNamedWithWhatWasAsked) {

@@ -11,6 +11,7 @@
 #include "tests/support/edge_on_cases.h"
 #include "tests/support/grid_comparison.h"
 #include "tests/support/kernel_trials.h"
+#include "tests/support/kind_trials.h"
 #include "tests/support/placed_scenes.h"
 #include "tests/support/region_trials.h"
 #include "tests/support/rewind_lockstep.h"
@@ -104,6 +105,11 @@ constexpr Trial kTrials[] = {
     {"CapsuleWithoutCaps", PlantedBug::kCapsuleCap, sweep_difference},
     {"CapsuleWithoutEnds", PlantedBug::kEndlessCapsule, sweep_difference},
     {"SweepThatIgnoresItsStart", PlantedBug::kSweepStart, sweep_difference},
+    {"CrossingsWithBothEndsOfAnEdge", PlantedBug::kClosedEdge, contains_difference},
+    {"ViewWithAWrongRowOfItsMatrix", PlantedBug::kMatrixRow, view_difference},
+    {"PairsFromBothSides", PlantedBug::kPairBothSides, pair_difference},
+    {"CellWithPlanesBeyondOthers", PlantedBug::kCellBeyond, cell_difference},
+    {"SightThatTheOwnGroupBlocks", PlantedBug::kOwnGroupBlocks, sight_difference},
 #ifdef LOCUS_X86_KERNELS
     {"KernelWithoutEdgeBound", PlantedBug::kKernelEdgeBound, compare_kernels_with_list},
     {"KernelWithoutTBound", PlantedBug::kKernelTBound, compare_kernels_with_list},

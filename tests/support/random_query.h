@@ -174,7 +174,8 @@ inline void add_common(const QueryScene& scene, Random& random, OwnedBlock& bloc
   if (random.chance(0.2) && !scene.world.objects.empty())
     for (int i = 0; i < 3; ++i) block.ignore_ids.push_back(random.pick(scene.world.objects).id);
   add_anchors(scene, random, block);
-  if (row_layout(block.view()) == RowLayout::kCounted && random.chance(0.15)) settings.count_only = true;
+  const bool has_counts = row_layout(block.view()) == RowLayout::kCounted && block_kind(settings) != BlockKind::kCell;
+  if (has_counts && random.chance(0.15)) settings.count_only = true;
 }
 
 // Gives some rays and nearest queries a position behind which they continue: a hit of another block, or any.
@@ -208,6 +209,11 @@ inline constexpr Column kOverlapColumns[] = {Column::kId,  Column::kTriangle, Co
 inline constexpr Column kContactColumns[] = {Column::kT,      Column::kId,     Column::kTriangle,
                                              Column::kNormal, Column::kPoint,  Column::kGroup,
                                              Column::kTag,    Column::kLayers, Column::kPose};
+inline constexpr Column kPairColumns[] = {Column::kT,   Column::kId,     Column::kOther, Column::kGroup,
+                                          Column::kTag, Column::kLayers, Column::kPose};
+inline constexpr Column kCellColumns[] = {Column::kT,      Column::kId,     Column::kTriangle,
+                                          Column::kNormal, Column::kPoint,  Column::kGroup,
+                                          Column::kTag,    Column::kLayers, Column::kPose};
 inline constexpr Column kContainsColumns[] = {Column::kId, Column::kGroup, Column::kTag, Column::kLayers,
                                               Column::kPose};
 inline constexpr Column kLookupColumns[] = {Column::kId, Column::kGroup, Column::kTag, Column::kLayers, Column::kPose};
@@ -448,6 +454,39 @@ inline OwnedBlock sight_block(const QueryScene& scene, const SceneSketch& sketch
   return block;
 }
 
+// Pairs within a distance, at times behind a pair, of some layers, or the nearest objects of each.
+inline OwnedBlock pair_block(const QueryScene& scene, Random& random) {
+  OwnedBlock block;
+  PairColumns pairs;
+  constexpr float kDistances[] = {0, 0, 0.5f, 1, 2, 5, 100, 1e9f};
+  constexpr uint32_t kCounts[] = {0, 0, 1, 2, 7};
+  pairs.max_distance = random.pick(kDistances);
+  pairs.count = random.pick(kCounts);
+  if (pairs.count != 0 && random.chance(0.3)) pairs.max_distance = std::numeric_limits<float>::infinity();
+  if (random.chance(0.3)) pairs.first_mask = random_layers(random);
+  if (random.chance(0.3)) pairs.second_mask = random_layers(random);
+  block.settings.kind = pairs;
+  add_common(scene, random, block);
+  if (block.settings.after_id != kNoId && random.chance(0.5) && !scene.world.objects.empty())
+    std::get<PairColumns>(block.settings.kind).after_other = random.pick(scene.world.objects).id;
+  add_columns(kPairColumns, random, block);
+  return block;
+}
+
+// Cells around the sketch's balls and points between them.
+inline OwnedBlock cell_block(const QueryScene& scene, const SceneSketch& sketch, Random& random) {
+  OwnedBlock block = block_at(sketch, random);
+  constexpr uint32_t kPlanes[] = {0, 0, 1, 3, 64};
+  block.settings.kind = CellColumns{{}, {}, random.pick(kPlanes)};
+  for (const Balld& ball : sketch.balls) {
+    append_point(block, ball.center + random.whole_vector(4) * (random.chance(0.5) ? 0.5 : 0.0));
+    block.extras.push_back(static_cast<float>(std::clamp(ball.radius * random.magnitude(-1, 6), 1e-3, 1e9)));
+  }
+  add_common(scene, random, block);
+  add_columns(kCellColumns, random, block);
+  return block;
+}
+
 inline OwnedBlock lookup_block(const QueryScene& scene, Random& random) {
   OwnedBlock block;
   block.settings.kind = LookupColumns{};
@@ -485,6 +524,8 @@ inline QueryScene query_scene(const SceneSketch& sketch, Random& random) {
   if (!sketch.balls.empty()) scene.blocks.push_back(internal::frustum_block(scene, sketch, random));
   scene.blocks.push_back(internal::contains_block(scene, sketch, random));
   scene.blocks.push_back(internal::sight_block(scene, sketch, random));
+  scene.blocks.push_back(internal::pair_block(scene, random));
+  if (!sketch.balls.empty()) scene.blocks.push_back(internal::cell_block(scene, sketch, random));
   return scene;
 }
 

@@ -6,8 +6,10 @@
 
 #include "core/geometry/sweep.h"
 #include "core/query/frustum_planes.h"
+#include "core/query/kinds/cell_query.h"
 #include "core/query/kinds/contains_query.h"
 #include "core/query/kinds/lookup_query.h"
+#include "core/query/kinds/pair_query.h"
 #include "core/query/kinds/ray_query.h"
 #include "core/query/kinds/sight_query.h"
 #include "core/query/kinds/sweep_query.h"
@@ -325,9 +327,28 @@ void BlockRunner::run_query(const ContainsColumns& contains, size_t i) {
   append_rows(answer, i);
 }
 
-void BlockRunner::run_query(const PairColumns& /*pairs*/, size_t i) { write_nothing(i); }
+void BlockRunner::run_query(const PairColumns& pairs, size_t i) {
+  PairAnswer answer;
+  if (!task_.ended()) answer = run_pairs(task_, times_.of(i), block_, pairs);
+  if (block_.count_only) return write_count(answer.count);
+  const size_t kept = std::min<uint64_t>(answer.rows.size(), max_rows_ - rows_);
+  const RowSpans to = add_rows(result_, columns_, kept);
+  for (size_t row = 0; row < kept; ++row) {
+    write_row(answer.rows[row].first, to, row);
+    if (to.others != nullptr) to.others[row] = answer.rows[row].other;
+  }
+  count_rows(kept, answer.truncated || kept < answer.rows.size(), i);
+}
 
-void BlockRunner::run_query(const CellColumns& /*cells*/, size_t i) { write_nothing(i); }
+void BlockRunner::run_query(const CellColumns& cells, size_t i) {
+  const CellRequest request = cell_request(block_, origins_.of(i), cells, i);
+  CellAnswer answer;
+  if (!task_.ended()) answer = run_cell(task_, times_.of(i), request, Filter(block_, i));
+  const size_t rows = answer.is_free ? 1 + answer.planes.size() : 0;
+  const size_t kept = std::min<uint64_t>(rows, max_rows_ - rows_);
+  write_cell(answer, request.point - block_.frame, add_rows(result_, columns_, kept), kept);
+  count_rows(kept, answer.truncated || kept < rows, i);
+}
 
 // Looks up all groups of the block in one scan of the objects, at the effective time of query `i`. Does nothing if the
 // last lookup was at the same time, so that consecutive queries with equal times share one lookup.

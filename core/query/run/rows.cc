@@ -4,6 +4,8 @@
 #include <array>
 #include <limits>
 
+#include "core/query/kinds/overlap_query.h"
+
 namespace locus {
 namespace {
 
@@ -117,6 +119,24 @@ void write_overlap_contact(const Mover& solid, Precision precision, Vec3d frame,
   const Vec3f point = to_float(solid.start - frame + contact.point + Vec3d{});
   if (to.normals != nullptr) write_point(to.normals, row, normal.x, normal.y, normal.z);
   if (to.points != nullptr) write_point(to.points, row, point.x, point.y, point.z);
+}
+
+void write_cell(const CellAnswer& cell, Vec3d point, const RowSpans& to, size_t rows) {
+  for (size_t row = 0; row < rows; ++row) {
+    Hit hit;
+    hit.t = cell.radius;
+    Vec3d offset, direction;
+    if (row > 0) {
+      const CellPlane& plane = cell.planes[row - 1];
+      hit = plane.row;
+      offset = plane.offset;
+      direction = plane.normal;
+    }
+    write_row(hit, to, row);
+    const Vec3f normal = to_float(direction + Vec3d{}), at = to_float(point + offset);
+    if (to.normals != nullptr) write_point(to.normals, row, normal.x, normal.y, normal.z);
+    if (to.points != nullptr) write_point(to.points, row, at.x, at.y, at.z);
+  }
 }
 
 void write_nearest_surface(const NearestRequest& request, Vec3d frame, const Hit& hit, const RowSpans& to, size_t row) {

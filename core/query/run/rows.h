@@ -4,6 +4,7 @@
 #define LOCUS_CORE_QUERY_RUN_ROWS_H_
 
 #include "core/geometry/mover.h"
+#include "core/query/kinds/cell_query.h"
 #include "core/query/kinds/found_objects.h"
 #include "core/query/kinds/hit.h"
 #include "core/query/kinds/nearest_query.h"
@@ -40,6 +41,10 @@ void write_contact(const SweepRequest& request, Vec3d frame, const Hit& hit, con
 // Writes those of the columns uv, normal and point that the block returns, for a row of a nearest query. The point is
 // relative to `frame`.
 void write_nearest_surface(const NearestRequest& request, Vec3d frame, const Hit& hit, const RowSpans& to, size_t row);
+
+// Writes the first `rows` rows of a cell, beginning at row 0: the ball, then the planes. `point` is the query's point,
+// relative to the block's frame.
+void write_cell(const CellAnswer& cell, Vec3d point, const RowSpans& to, size_t rows);
 
 }  // namespace locus
 

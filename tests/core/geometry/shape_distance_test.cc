@@ -1,102 +1,104 @@
-// Distances of points to shapes, compared with references that find the nearest point by numerical search.
-#include "core/geometry/shape.h"
-#include "gtest/gtest.h"
-#include "tests/support/convex_reference.h"
-#include "tests/support/random_shape.h"
+// Distances between shapes, judged by alternating projections in long double.
+#include "core/geometry/shape_distance.h"
 
-namespace locus {
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tests/support/random.h"
+#include "tests/support/random_shape.h"
+#include "tests/support/real.h"
+#include "tests/support/test_scale.h"
+
+namespace locus::test {
 namespace {
 
-using test::Random;
-using test::Real;
-using test::SolidReference;
-using test::to_real;
-using test::Vec3r;
-
-class PointShapeTest : public testing::TestWithParam<ShapeKind> {};
-
-Real reference_distance(Vec3d point, const Shape& shape) {
-  const SolidReference solid(shape);
-  return std::max(solid.distance_to_core(to_real(point) - to_real(shape.position)) - solid.core_radius(), Real{0});
-}
-
-TEST_P(PointShapeTest, DistanceAgreesWithTheReference) {
-  constexpr uint64_t kSeed = 51;
-  Random random(kSeed + static_cast<uint64_t>(GetParam()));
-  int inside = 0;
-  for (int i = 0; i < 50000; ++i) {
-    const Shape shape = test::random_shape(random, GetParam(), i % 4 == 0 ? 1e6 : 10);
-    const double size = test::largest_size(shape);
-    const Vec3d point = shape.position + random.vector(1) * (size * random.magnitude(-3, 3));
-    const double actual = distance(point, shape);
-    const Real expected = reference_distance(point, shape);
-    const double epsilon = 1e-12 * (static_cast<double>(expected) + size) + 1e-15 * max_component(abs(point));
-    ASSERT_NEAR(actual, static_cast<double>(expected), epsilon) << "seed " << kSeed << " case " << i;
-    inside += actual == 0;
+// Returns the point of the solid nearest to `point`.
+Vec3r nearest_of(const Shape& shape, Vec3r point) {
+  const Vec3r local = turned_back(shape.rotation, point - to_real(shape.position));
+  const Vec3r size = to_real(to_double(shape.size));
+  Vec3r core;
+  if (shape.kind == ShapeKind::kBox) {
+    for (int axis = 0; axis < 3; ++axis) core[axis] = std::clamp(local[axis], -size[axis], size[axis]);
+    return to_real(shape.position) + turned(shape.rotation, core);
   }
-  EXPECT_EQ(inside > 1000, GetParam() != ShapeKind::kPoint);
+  const Real squared = dot(size, size);
+  if (shape.kind == ShapeKind::kCapsule && squared > 0)
+    core = size * std::clamp(dot(local, size) / squared, Real{-1}, Real{1});
+  const Real radius = shape.kind == ShapeKind::kPoint ? Real{0} : Real{shape.radius};
+  const Vec3r away = local - core;
+  const Real far = length(away);
+  const Vec3r at = far <= radius ? local : core + away * (radius / far);
+  return to_real(shape.position) + turned(shape.rotation, at);
 }
 
-TEST_P(PointShapeTest, DistancesOnALatticeAreTheNearestFloats) {
-  constexpr uint64_t kSeed = 52;
-  Random random(kSeed + static_cast<uint64_t>(GetParam()));
-  int touching = 0;
-  for (int i = 0; i < 100000; ++i) {
-    const Shape shape = test::lattice_shape(random, GetParam(), 2);
-    const Vec3d point = random.whole_vector(8);
-    const Real expected = reference_distance(point, shape);
-    ASSERT_EQ(static_cast<float>(distance(point, shape)), static_cast<float>(expected < 1e-9L ? 0 : expected))
-        << "seed " << kSeed << " case " << i;
-    const SolidReference solid(shape);
-    touching += std::abs(solid.gauge(to_real(point - shape.position))) < 1e-9L;
+Real reference(const Shape& a, const Shape& b) {
+  Vec3r on_a = to_real(a.position), on_b;
+  Real before = 1e30L;
+  for (int round = 0; round < 20'000; ++round) {
+    on_b = nearest_of(b, on_a);
+    on_a = nearest_of(a, on_b);
+    const Real now = length(on_a - on_b);
+    if (before - now < 1e-12L && round > 5) break;
+    before = now;
   }
-  EXPECT_GT(touching, 10);
+  return length(on_a - on_b);
 }
 
-TEST_P(PointShapeTest, TheNearestPointIsInTheSolidAtTheDistance) {
-  constexpr uint64_t kSeed = 53;
-  Random random(kSeed + static_cast<uint64_t>(GetParam()));
-  for (int i = 0; i < 50000; ++i) {
-    const Shape shape = test::random_shape(random, GetParam(), 10);
-    const double size = test::largest_size(shape);
-    const Vec3d point = shape.position + random.vector(1) * (size * random.magnitude(-3, 3));
-    const Vec3d nearest = nearest_on_shape(point, shape);
-    const double gap = std::sqrt(squared_length(point - nearest));
-    const double epsilon = 1e-12 * (gap + size) + 1e-14;
-    ASSERT_NEAR(gap, distance(point, shape), epsilon) << "seed " << kSeed << " case " << i;
-    ASSERT_LE(static_cast<double>(reference_distance(nearest, shape)), epsilon) << "seed " << kSeed << " case " << i;
+Shape shape_near(Random& random, double size) {
+  Shape shape = random_shape(random, random.pick(kShapeKinds), size);
+  for (int axis = 0; axis < 3; ++axis) shape.size[axis] = random.chance(0.1) ? 0.0f : random.float_between(0, 2);
+  shape.radius = random.float_between(0, 1.5f);
+  return shape;
+}
+
+TEST(ShapeDistanceTest, RandomShapesAreAsFarApartAsTheirNearestPoints) {
+  size_t apart = 0;
+  for (uint64_t seed = 0; seed < scaled_count(4'000); ++seed) {
+    Random random(seed);
+    const Shape a = shape_near(random, 3), b = shape_near(random, 3);
+    const double found = distance_between(a, b);
+    const Real expected = reference(a, b);
+    apart += expected > 0.01L ? 1 : 0;
+    // Alternating projections approach the distance from above, slowly where the solids barely meet.
+    ASSERT_LE(found, double(expected) + 1e-6) << "seed " << seed;
+    ASSERT_GE(found, double(expected) - 2e-3 - 1e-3 * double(expected)) << "seed " << seed;
+    ASSERT_NEAR(distance_between(b, a), found, 1e-9) << "seed " << seed;
+    ASSERT_GE(found, distance_between(bounds_of(a), bounds_of(b))) << "seed " << seed;
   }
+  EXPECT_GT(apart, scaled_count(1'000));
 }
 
-TEST_P(PointShapeTest, TheDistanceIsNeverLessThanThatToTheBounds) {
-  constexpr uint64_t kSeed = 54;
-  Random random(kSeed);
-  for (int i = 0; i < 50000; ++i) {
-    const Shape shape = test::random_shape(random, GetParam(), random.magnitude(0, 20));
-    const Vec3d point = shape.position + random.vector(test::largest_size(shape) * random.magnitude(-3, 30));
-    ASSERT_GE(distance(point, shape), std::sqrt(squared_distance(point, bounds_of(shape))))
-        << "seed " << kSeed << " case " << i;
-  }
+Shape shape(ShapeKind kind, Vec3d position, Vec3f size, float radius = 0) {
+  Shape result;
+  result.kind = kind;
+  result.position = position;
+  result.size = size;
+  result.radius = radius;
+  return result;
 }
 
-INSTANTIATE_TEST_SUITE_P(EveryKind, PointShapeTest, testing::ValuesIn(test::kShapeKinds));
-
-TEST(PointShapeValueTest, APointInsideASolidIsItsOwnNearestPoint) {
-  const Vec3d point = {0.1, 0.2, 0.3};
-  for (const ShapeKind kind : {ShapeKind::kBall, ShapeKind::kBox, ShapeKind::kCapsule}) {
-    const Shape shape{kind, {0, 0, 0}, {0, 0, 0.6f, 0.8f}, {1, 1, 1}, 1};
-    EXPECT_EQ(distance(point, shape), 0);
-    EXPECT_EQ(nearest_on_shape(point, shape), point);
-  }
+TEST(ShapeDistanceTest, WholeNumbersAreExact) {
+  const Shape box = shape(ShapeKind::kBox, {0, 0, 0}, {1, 1, 1}), ball = shape(ShapeKind::kBall, {4, 5, 1}, {}, 2);
+  EXPECT_EQ(distance_between(box, ball), 3);
+  EXPECT_EQ(distance_between(box, shape(ShapeKind::kBox, {4, 5, 0}, {0, 0, 5})), 5);
+  EXPECT_EQ(distance_between(box, shape(ShapeKind::kBox, {2, 0, 0}, {1, 1, 1})), 0);
+  EXPECT_EQ(
+      distance_between(shape(ShapeKind::kCapsule, {0, 0, 0}, {5, 0, 0}, 1), shape(ShapeKind::kPoint, {2, 4, 0}, {})),
+      3);
+  EXPECT_EQ(distance_between(shape(ShapeKind::kCapsule, {0, 0, 0}, {5, 0, 0}, 1),
+                             shape(ShapeKind::kCapsule, {0, 0, 7}, {0, 5, 0}, 2)),
+            4);
 }
 
-TEST(PointShapeValueTest, A345TriangleIsExactFarFromTheOrigin) {
-  const Vec3d far = {1e9, -1e9, 5e8};
-  const Vec3d point = far + Vec3d{4, 5, 0};
-  EXPECT_EQ(distance(point, {ShapeKind::kBox, far, {}, {1, 1, 1}, 0}), 5);
-  EXPECT_EQ(nearest_on_shape(point, {ShapeKind::kBox, far, {}, {1, 1, 1}, 0}), (far + Vec3d{1, 1, 0}));
-  EXPECT_EQ(distance(far + Vec3d{3, 4, 0}, {ShapeKind::kPoint, far, {}, {9, 9, 9}, 9}), 5);
+TEST(ShapeDistanceTest, TheLeastExtentIsThatOfTheFarthestPoint) {
+  EXPECT_EQ(least_along({1, 0, 0}, shape(ShapeKind::kBall, {5, 0, 0}, {}, 2)), 3);
+  EXPECT_EQ(least_along({0, 1, 0}, shape(ShapeKind::kBox, {0, 5, 0}, {1, 2, 3})), 3);
+  EXPECT_EQ(least_along({0, 0, 1}, shape(ShapeKind::kCapsule, {0, 0, 9}, {0, 0, -4}, 1)), 4);
+  EXPECT_EQ(least_along({0, 0, -1}, Aabbd{{-1, -1, -1}, {1, 1, 4}}), -4);
+  EXPECT_EQ(least_along({1, 0, 0}, Corners{Vec3d{3, 0, 0}, Vec3d{-2, 1, 1}, Vec3d{5, 5, 5}}), -2);
 }
 
 }  // namespace
-}  // namespace locus
+}  // namespace locus::test

@@ -1,0 +1,151 @@
+// Comparisons of containment, views and sight with simple references, on random cases. For the tests of these kinds and
+// for the proof that they can fail.
+#ifndef LOCUS_TESTS_SUPPORT_KIND_TRIALS_H_
+#define LOCUS_TESTS_SUPPORT_KIND_TRIALS_H_
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "core/geometry/point_in_mesh.h"
+#include "core/query/frustum_planes.h"
+#include "tests/support/owned_block.h"
+#include "tests/support/random.h"
+#include "tests/support/small_world.h"
+#include "tests/support/test_scale.h"
+
+namespace locus::test {
+
+// Returns the first point whose winding in an octahedron is wrong. The points are eighths, so that rays meet edges and
+// corners of the triangles.
+inline std::string contains_difference() {
+  std::vector<Triangle> octahedron;
+  for (int octant = 0; octant < 8; ++octant) {
+    const auto side = [octant](int bit) { return (octant >> bit & 1) != 0 ? -1.0f : 1.0f; };
+    const Triangle face{{side(0), 0, 0}, {0, side(1), 0}, {0, 0, side(2)}, 0};
+    octahedron.push_back(side(0) * side(1) * side(2) > 0 ? face : turned_over(face));
+  }
+  for (int cell = 0; cell < 21 * 21 * 21; ++cell) {
+    const Vec3d point = Vec3d{double(cell % 21) - 10, double(cell / 21 % 21) - 10, double(cell / 441) - 10} * 0.125;
+    int winding = 0;
+    bool on_surface = false;
+    for (const Triangle& triangle : octahedron) {
+      const Crossing found = crossing(point, triangle);
+      winding += found.winding;
+      on_surface |= found.on_surface;
+    }
+    const double from_center = std::abs(point.x) + std::abs(point.y) + std::abs(point.z);
+    if (on_surface != (from_center == 1) || (!on_surface && winding != (from_center < 1 ? 1 : 0)))
+      return "winding " + std::to_string(winding) + " at cell " + std::to_string(cell);
+  }
+  return "";
+}
+
+// Returns the first point that is within the planes of a random view, but not within its clip coordinates, or the other
+// way round.
+inline std::string view_difference() {
+  for (uint64_t seed = 0; seed < scaled_count(300); ++seed) {
+    Random random(seed);
+    // A perspective projection along -z after a random rotation and translation.
+    const double near = random.between(0.1, 1), far = near + random.between(1, 20);
+    const double across = random.between(0.5, 2), up = random.between(0.5, 2);
+    const Rotation rotation = rotation_of(random.rotation());
+    const Vec3d eye = random.vector(5);
+    const bool opengl = random.chance(0.5);
+    const double z = opengl ? -(far + near) / (far - near) : -far / (far - near);
+    const double w = opengl ? -2 * far * near / (far - near) : -far * near / (far - near);
+    const std::array<Vec3d, 3> axes = {rotation.to_local({1, 0, 0}), rotation.to_local({0, 1, 0}),
+                                       rotation.to_local({0, 0, 1})};  // columns of the rotation to view axes
+    std::vector<float> matrix;
+    const auto add_column = [&](Vec3d view, double one) {
+      for (const double value : {across * view.x, up * view.y, z * view.z + w * one, -view.z})
+        matrix.push_back(static_cast<float>(value));
+    };
+    for (const Vec3d& axis : axes) add_column(axis, 0);
+    add_column(rotation.to_local(-eye), 1);
+    FrustumColumns frustums;
+    frustums.view_projections = matrix;
+    frustums.clip_depth = opengl ? ClipDepth::kMinusOneToOne : ClipDepth::kZeroToOne;
+    const FrustumPlanes planes(frustums, 0);
+    for (int i = 0; i < 100; ++i) {
+      const Vec3d point = eye + random.vector(25);
+      std::array<double, 4> clip{};
+      for (size_t row = 0; row < 4; ++row)
+        clip[row] = matrix[row] * point.x + matrix[4 + row] * point.y + matrix[8 + row] * point.z + matrix[12 + row];
+      const auto [cx, cy, cz, cw] = clip;
+      const double margin = std::min({cw + cx, cw - cx, cw + cy, cw - cy, opengl ? cw + cz : cz, cw - cz});
+      bool within = true;
+      for (const Plane& plane : planes.planes()) within &= dot(plane.normal, point) + plane.offset >= 0;
+      if (std::abs(margin) > 1e-6 && within != (margin > 0)) return "seed " + std::to_string(seed);
+    }
+  }
+  return "";
+}
+
+// Returns a description of the first viewer that does not see past the members of its own group, or of the target's.
+inline std::string sight_difference() {
+  for (uint64_t seed = 0; seed < scaled_count(50); ++seed) {
+    Random random(seed);
+    QueryWorld world;
+    Object own = ball_object(1, {2, 0, 0}), other = ball_object(2, {6, 0, 0});
+    own.group = 1 + random.below(3);
+    other.group = 4 + random.below(3);
+    PlacedMesh wall = placed(3, wall_mesh(), {4, 0, 0});
+    wall.group = random.chance(0.5) ? own.group : other.group;
+    world.objects = {own, other};
+    world.instances = {wall};
+    OwnedBlock block;
+    block.settings.kind = SightColumns{};
+    block.points = {0, 0, 0};
+    block.sizes = {9, 0, 0};
+    block.groups = {own.group};
+    block.target_groups = {other.group};
+    if (run_block(*snapshot_of(world), block).matrix != std::string(1, '\1')) return "seed " + std::to_string(seed);
+    block.groups = {0};
+    if (run_block(*snapshot_of(world), block).matrix != std::string(1, '\0')) return "seed " + std::to_string(seed);
+  }
+  return "";
+}
+
+// Returns a description of the first row of balls on a line whose pairs are not its neighbours, each once.
+inline std::string pair_difference() {
+  for (size_t balls = 2; balls < 20; ++balls) {
+    QueryWorld world;
+    for (size_t i = 0; i < balls; ++i)
+      world.objects.push_back(ball_object(1 + i, {3.0 * static_cast<double>(i), 0, 0}));
+    OwnedBlock block;
+    PairColumns pairs;
+    pairs.max_distance = 1.5f;
+    block.settings.kind = pairs;
+    const BlockResult result = run_block(*snapshot_of(world), block);
+    if (result.ids.size() != balls - 1) return std::to_string(result.ids.size()) + " pairs";
+    for (size_t i = 0; i + 1 < balls; ++i)
+      if (result.ids[i] != i + 1 || result.others[i] != i + 2) return "pair " + std::to_string(i);
+  }
+  return "";
+}
+
+// Returns a description if the space before a wall of many triangles has more planes than the wall and what is in
+// front.
+inline std::string cell_difference() {
+  std::vector<Triangle> wall;
+  for (int y = -8; y < 8; ++y)
+    for (int z = -8; z < 8; ++z) {
+      const auto at = [&](int dy, int dz) { return Vec3f{5, static_cast<float>(y + dy), static_cast<float>(z + dz)}; };
+      wall.push_back({at(0, 0), at(1, 0), at(1, 1), static_cast<uint32_t>(wall.size())});
+      wall.push_back({at(0, 0), at(1, 1), at(0, 1), static_cast<uint32_t>(wall.size())});
+    }
+  QueryWorld world;
+  world.instances = {placed(1, mesh_of(wall))};
+  world.objects = {ball_object(2, {-4, 0, 0})};
+  OwnedBlock block;
+  block.settings.kind = CellColumns{};
+  block.points = {0.25f, 0.25f, 0.25f};
+  block.extras = {9};
+  const BlockResult result = run_block(*snapshot_of(world), block);
+  return result.counts[0] == 3 ? "" : std::to_string(result.counts[0]) + " rows";
+}
+
+}  // namespace locus::test
+
+#endif  // LOCUS_TESTS_SUPPORT_KIND_TRIALS_H_
