@@ -203,6 +203,8 @@ absl::Status check(const QueryOptions& options, const BulkOptions& bulk) {
   status.Update(at_most_one(options.past.as_of, "--as-of"));
   if (status.ok() && options.after_id.value != 0)
     return usage_error("--after-id continues one truncated answer; it cannot be combined with an input");
+  if (status.ok() && (!options.anchors.empty() || options.count_only))
+    return usage_error("--anchor and --count-only cannot be combined with an input");
   if (status.ok() && bulk.follow && options.exactly) return usage_error("give --exactly or --follow, not both");
   return status;
 }

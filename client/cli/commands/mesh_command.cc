@@ -21,10 +21,15 @@ struct MeshOptions {
 };
 
 Json mesh_summary(const v1::Mesh& mesh) {
-  return {{"name", mesh.name()},         {"triangles", mesh.triangles()},
-          {"vertices", mesh.vertices()}, {"uses", mesh.uses()},
-          {"parts", mesh.parts_size()},  {"zero_area_triangles", mesh.zero_area_triangles()},
-          {"bytes", mesh.bytes()},       {"sha256", absl::BytesToHexString(mesh.sha256())}};
+  return {{"name", mesh.name()},
+          {"triangles", mesh.triangles()},
+          {"vertices", mesh.vertices()},
+          {"uses", mesh.uses()},
+          {"parts", mesh.parts_size()},
+          {"zero_area_triangles", mesh.zero_area_triangles()},
+          {"open_edges", mesh.open_edges()},
+          {"bytes", mesh.bytes()},
+          {"sha256", absl::BytesToHexString(mesh.sha256())}};
 }
 
 absl::Status list_meshes(const MeshOptions&, Context& context) {
@@ -37,6 +42,7 @@ absl::Status list_meshes(const MeshOptions&, Context& context) {
   for (const v1::Mesh& mesh : meshes) {
     Json row = mesh_summary(mesh);
     row.erase("sha256");
+    row.erase("open_edges");
     report.rows.push_back(std::move(row));
   }
   context.write(report);

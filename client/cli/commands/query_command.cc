@@ -24,23 +24,31 @@ absl::StatusOr<v1::QueryResult> ask_block(const QueryOptions& options, client::Q
 absl::Status ask_and_report(const QueryOptions& options, client::QueryBuilder& builder, const RowLayout& layout,
                             const std::string& rows_name, Context& context) {
   ASSIGN_OR_RETURN(const v1::QueryResult result, ask_block(options, builder, context));
-  ASSIGN_OR_RETURN(std::vector<Json> rows, rows_json(result.blocks(0), layout));
   Report report;
   report.head = result_head(result);
   report.rows_name = rows_name;
-  report.rows = std::move(rows);
-  report.keys = row_keys(layout);
+  if (options.count_only) {
+    const std::string query = layout.query.empty() ? "query" : layout.query;
+    for (int i = 0; i < result.blocks(0).counts_size(); ++i)
+      report.rows.push_back({{query, i}, {"count", result.blocks(0).counts(i)}});
+    report.keys = {query, "count"};
+  } else {
+    ASSIGN_OR_RETURN(report.rows, rows_json(result.blocks(0), layout));
+    report.keys = row_keys(layout);
+  }
   context.write(report);
   return absl::OkStatus();
 }
 
 void add_query_command(CLI::App& parent, Context& context) {
   CLI::App& command =
-      *parent.add_subcommand("query", "Ask what rays hit, what balls and boxes touch, and what is nearest");
+      *parent.add_subcommand("query", "Ask what rays hit, what solids touch, who sees whom, and what is nearest");
   command.footer(R"(Examples:
   locus query ray arena --from 0,1,0 --dir 0,0,-1
   locus query ball arena --at 0,0,0 --radius 10
   locus query box arena --at 0,0,0 --half 5,5,5
+  locus query sweep arena --from 0,1,0 --to 9,1,0 --radius 0.4
+  locus query sight arena --viewer 0,1.7,0 --target 20,1.5,3
   locus query nearest arena --at 0,0,0 --k 5
   locus query ray arena --from 0,1,0 --dir 0,0,-1 --as-of 120+0.5
   locus -o csv query ray arena --from-csv rays.csv > hits.csv)");
@@ -48,7 +56,14 @@ void add_query_command(CLI::App& parent, Context& context) {
   add_query_ray(command, context);
   add_query_ball(command, context);
   add_query_box(command, context);
+  add_query_capsule(command, context);
+  add_query_sweep(command, context);
+  add_query_frustum(command, context);
+  add_query_contains(command, context);
+  add_query_sight(command, context);
   add_query_nearest(command, context);
+  add_query_pairs(command, context);
+  add_query_cell(command, context);
 }
 
 }  // namespace locus::cli

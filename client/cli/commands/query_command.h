@@ -16,7 +16,14 @@ namespace locus::cli {
 void add_query_ray(CLI::App& parent, Context& context);
 void add_query_ball(CLI::App& parent, Context& context);
 void add_query_box(CLI::App& parent, Context& context);
+void add_query_capsule(CLI::App& parent, Context& context);
+void add_query_sweep(CLI::App& parent, Context& context);
+void add_query_frustum(CLI::App& parent, Context& context);
+void add_query_contains(CLI::App& parent, Context& context);
+void add_query_sight(CLI::App& parent, Context& context);
 void add_query_nearest(CLI::App& parent, Context& context);
+void add_query_pairs(CLI::App& parent, Context& context);
+void add_query_cell(CLI::App& parent, Context& context);
 
 // Sends a batch of one block and returns the result. Returns DATA_LOSS if the result does not have exactly one block.
 absl::StatusOr<v1::QueryResult> ask_block(const QueryOptions& options, client::QueryBuilder& builder, Context& context);

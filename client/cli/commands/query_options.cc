@@ -15,7 +15,7 @@ const NamedValues<v1::Column>& column_names() {
       {"t", v1::COLUMN_T},         {"id", v1::COLUMN_ID},         {"triangle", v1::COLUMN_TRIANGLE},
       {"uv", v1::COLUMN_UV},       {"normal", v1::COLUMN_NORMAL}, {"point", v1::COLUMN_POINT},
       {"group", v1::COLUMN_GROUP}, {"tag", v1::COLUMN_TAG},       {"layers", v1::COLUMN_LAYERS},
-      {"pose", v1::COLUMN_POSE}};
+      {"pose", v1::COLUMN_POSE},   {"other", v1::COLUMN_OTHER}};
   return names;
 }
 
@@ -40,6 +40,9 @@ void add_filter_options(CLI::App& command, QueryOptions& options) {
   add_repeatable(command, "--ignore-group", options.ignore_groups, "GROUP",
                  "Ignore a group; one for each query, or one for all");
   add_repeatable(command, "--ignore-id", options.ignore_ids, "ID", "Ignore an id; at most 64");
+  add_repeatable(command, "--anchor", options.anchors, "ID",
+                 "Count positions from this object, which is ignored; one for each query");
+  command.add_flag("--count-only", options.count_only, "Report only the number of rows of each query");
 }
 
 void add_view_options(CLI::App& command, QueryOptions& options) {
@@ -59,7 +62,7 @@ void add_query_options(CLI::App& command, QueryOptions& options) {
       ->type_name("ROWS");
   command
       .add_option("--columns", options.columns,
-                  "What to show: t, id, triangle, uv, normal, point, group, tag, layers, pose")
+                  "What to show: t, id, triangle, uv, normal, point, group, tag, layers, pose, other")
       ->type_name("NAMES")
       ->delimiter(',')
       ->allow_extra_args(false)

@@ -23,6 +23,8 @@ struct QueryOptions {
   std::vector<Number64> masks;
   std::vector<Number64> ignore_groups;
   std::vector<Number64> ignore_ids;
+  std::vector<Number64> anchors;
+  bool count_only = false;
   uint32_t max_results = 0;
   Number64 after_id;
   PastOptions past;
@@ -59,7 +61,9 @@ void apply_to_block(const QueryOptions& options, Block& block) {
       .ignore_groups(values_of(options.ignore_groups))
       .ignore_ids(values_of(options.ignore_ids))
       .max_results(options.max_results)
-      .after_id(options.after_id.value);
+      .after_id(options.after_id.value)
+      .anchors(values_of(options.anchors));
+  if (options.count_only) block.count_only();
   apply_to_block(options.past, block);
 }
 

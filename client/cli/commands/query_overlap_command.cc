@@ -29,6 +29,15 @@ struct BoxOptions {
   v1::StaticDetail detail = v1::STATIC_DETAIL_UNSPECIFIED;
 };
 
+struct CapsuleOptions {
+  QueryOptions query;
+  BulkOptions bulk;
+  std::vector<Triple> from;
+  std::vector<Triple> to;
+  std::vector<double> radii;
+  v1::StaticDetail detail = v1::STATIC_DETAIL_UNSPECIFIED;
+};
+
 // Returns the columns to request and show: ids always, and triangles if the detail makes each row a triangle.
 std::vector<v1::Column> columns_of(const QueryOptions& options, v1::StaticDetail detail) {
   std::vector<v1::Column> columns = {v1::COLUMN_ID};
@@ -102,6 +111,32 @@ absl::Status query_boxes_of_input(const BoxOptions& options, Context& context) {
   return run_bulk_query(query, options.query, options.bulk, context);
 }
 
+enum CapsuleField : size_t { kCapsuleFrom, kCapsuleWay, kCapsuleRadius, kCapsuleFilter };
+
+absl::Status query_capsules_of_input(const CapsuleOptions& options, Context& context) {
+  absl::Status checked = check(options.query, options.bulk);
+  if (checked.ok() && (!options.from.empty() || !options.to.empty()))
+    checked = usage_error("give --from and --to or an input with its columns, not both");
+  checked.Update(at_most_one(options.radii, "--radius"));
+  if (!checked.ok()) return checked;
+  BulkQuery query = bulk_query(options, "capsule");
+  query.schema = {{.name = "from", .kind = FieldKind::kCoordinate, .parts = "xyz", .required = true},
+                  {.name = "way", .parts = "xyz", .required = true},
+                  column_or_option({.name = "radius", .required = true}, options.radii, "--radius")};
+  add_filter_fields(options.query, query.schema);
+  query.add_block = [&](const BlockRows& rows, client::QueryBuilder& builder) {
+    const std::vector<RowColumn>& columns = rows.batch.columns;
+    client::CapsuleBlock block = builder.capsules();
+    apply_to_block(options.query, block);
+    block.frame(rows.frame).columns(query.layout.columns).detail(options.detail);
+    std::vector<float> ends = float_column(columns[kCapsuleWay], rows.rows, {0, 0, 0}, {});
+    for (size_t i = 0; i < ends.size(); ++i) ends[i] += rows.offsets[i];
+    block.capsules(rows.offsets, ends, float_column(columns[kCapsuleRadius], rows.rows, {0}, floats_of(options.radii)));
+    apply_filter_columns(options.query, rows, kCapsuleFilter, block);
+  };
+  return run_bulk_query(query, options.query, options.bulk, context);
+}
+
 absl::Status query_ball(const BallOptions& options, Context& context) {
   if (options.bulk.given()) return query_balls_of_input(options, context);
   RETURN_IF_ERROR(check(options.bulk));
@@ -134,6 +169,27 @@ absl::Status query_box(const BoxOptions& options, Context& context) {
   return ask_and_report(options.query, builder, layout, "found", context);
 }
 
+// The ends of all capsules are offsets from the frame of their first positions.
+absl::Status query_capsule(const CapsuleOptions& options, Context& context) {
+  if (options.bulk.given()) return query_capsules_of_input(options, context);
+  RETURN_IF_ERROR(check(options.bulk));
+  if (options.from.empty() || options.to.empty() || options.radii.empty())
+    return usage_error("give --from, --to and --radius, or rows with --from-csv or --from-ndjson");
+  std::vector<Triple> all = options.from;
+  all.insert(all.end(), options.to.begin(), options.to.end());
+  const FramedPositions at = framed(all);
+  const absl::Span<const float> offsets = at.offsets;
+  const RowLayout layout = {
+      .query = "capsule", .columns = columns_of(options.query, options.detail), .frame = at.frame};
+  client::QueryBuilder builder;
+  client::CapsuleBlock block = builder.capsules();
+  block.frame(at.frame).columns(layout.columns).detail(options.detail);
+  block.capsules(offsets.subspan(0, 3 * options.from.size()), offsets.subspan(3 * options.from.size()),
+                 floats_of(options.radii));
+  apply_to_block(options.query, block);
+  return ask_and_report(options.query, builder, layout, "found", context);
+}
+
 // Adds the options of an overlap query: --detail, --after-id, and the options that all queries have.
 template <class Options>
 void add_overlap_options(CLI::App& command, Options& options) {
@@ -153,6 +209,7 @@ void add_query_ball(CLI::App& parent, Context& context) {
   locus query ball arena --at 0,0,0 --radius 10
   locus query ball arena --at 0,0,0 --at 50,0,0 --radius 2.5 --source dynamic --columns group,tag
   locus query ball arena --at 1,2,3 --radius 0 --detail triangles
+  locus query ball arena --at 0,0,0 --anchor 7 --radius 10 --count-only
   locus -o csv query ball arena --from-csv balls.csv > found.csv
 
 Rows: at.x,at.y,at.z,radius[,mask,ignore_group] or {"at": [0,0,0], "radius": 10}; an option given once stands for a
@@ -161,6 +218,23 @@ column. All rows are answered at one revision; see --follow.)");
   add_repeatable(command, "--radius", options->radii, "R", "Its radius, one for each or one for all");
   add_overlap_options(command, *options);
   run_or_check_when_chosen(command, options, context, query_ball);
+}
+
+void add_query_capsule(CLI::App& parent, Context& context) {
+  const auto options = std::make_shared<CapsuleOptions>();
+  CLI::App& command = *parent.add_subcommand("capsule", "Ask what capsules touch");
+  command.footer(R"(Examples:
+  locus query capsule arena --from 0,0.4,0 --to 0,1.4,0 --radius 0.4
+  locus query capsule arena --from 0,0,0 --to 9,0,0 --radius 1 --columns t,normal,point --source static
+
+t is the distance from the inner segment, negative inside an object: radius - t says how deep. Rows:
+from.x,from.y,from.z,way.x,way.y,way.z,radius[,mask,ignore_group] or {"from": [0,0,0], "way": [0,1,0], "radius": 0.4},
+where way leads from the first end to the other; an option given once stands for a column.)");
+  add_repeatable(command, "--from", options->from, "X,Y,Z", "One end of its inner segment; repeat for more capsules");
+  add_repeatable(command, "--to", options->to, "X,Y,Z", "The other end, one for each or one for all");
+  add_repeatable(command, "--radius", options->radii, "R", "Its radius, one for each or one for all");
+  add_overlap_options(command, *options);
+  run_or_check_when_chosen(command, options, context, query_capsule);
 }
 
 void add_query_box(CLI::App& parent, Context& context) {

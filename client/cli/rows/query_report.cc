@@ -47,6 +47,8 @@ void add_column(const ResultRows& rows, size_t row, bool hit, v1::Column column,
       return add("tag", !rows.tags().empty(), [&] { return id_json(rows.tags()[row]); });
     case v1::COLUMN_LAYERS:
       return add("layers", !rows.layers().empty(), [&] { return Json(rows.layers()[row]); });
+    case v1::COLUMN_OTHER:
+      return add("other", !rows.others().empty(), [&] { return id_json(rows.others()[row]); });
     case v1::COLUMN_POSE:
       add("position", !rows.positions().empty(), [&] { return doubles_json(rows.positions().subspan(row * 3, 3)); });
       return add("rotation", !rows.rotations().empty(),
@@ -57,18 +59,11 @@ void add_column(const ResultRows& rows, size_t row, bool hit, v1::Column column,
 }
 
 const std::vector<std::string>& keys_of(v1::Column column) {
-  static const auto& keys =
-      *new std::map<v1::Column, std::vector<std::string>>{{v1::COLUMN_T, {"t"}},
-                                                          {v1::COLUMN_ID, {"id"}},
-                                                          {v1::COLUMN_TRIANGLE, {"triangle"}},
-                                                          {v1::COLUMN_UV, {"uv"}},
-                                                          {v1::COLUMN_NORMAL, {"normal"}},
-                                                          {v1::COLUMN_POINT, {"point"}},
-                                                          {v1::COLUMN_GROUP, {"group"}},
-                                                          {v1::COLUMN_TAG, {"tag"}},
-                                                          {v1::COLUMN_LAYERS, {"layers"}},
-                                                          {v1::COLUMN_UNSPECIFIED, {}},
-                                                          {v1::COLUMN_POSE, {"position", "rotation"}}};
+  static const auto& keys = *new std::map<v1::Column, std::vector<std::string>>{
+      {v1::COLUMN_T, {"t"}},         {v1::COLUMN_ID, {"id"}},         {v1::COLUMN_TRIANGLE, {"triangle"}},
+      {v1::COLUMN_UV, {"uv"}},       {v1::COLUMN_NORMAL, {"normal"}}, {v1::COLUMN_POINT, {"point"}},
+      {v1::COLUMN_GROUP, {"group"}}, {v1::COLUMN_TAG, {"tag"}},       {v1::COLUMN_LAYERS, {"layers"}},
+      {v1::COLUMN_OTHER, {"other"}}, {v1::COLUMN_UNSPECIFIED, {}},    {v1::COLUMN_POSE, {"position", "rotation"}}};
   const auto found = keys.find(column);
   return found == keys.end() ? keys.at(v1::COLUMN_UNSPECIFIED) : found->second;
 }
@@ -115,6 +110,7 @@ Json result_head(const v1::QueryResult& result) {
     for (const uint32_t query : block.truncated()) head["truncated"].push_back(query);
     for (Json& time : resolved_json(block)) head["as_of"].push_back(std::move(time));
     for (const uint32_t query : block.clamped()) head["clamped"].push_back(query);
+    for (const uint32_t query : block.unanchored()) head["unanchored"].push_back(query);
   }
   if (result.has_work()) head["work"] = work_json(result.work());
   return head;

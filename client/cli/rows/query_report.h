@@ -21,7 +21,7 @@ struct RowLayout {
 };
 
 // Returns the rows of one block. `layout` selects their keys among t, id, triangle, uv, normal, point, group, tag,
-// layers, position and rotation. In the row of a miss all these keys are null.
+// layers, other, position and rotation. In the row of a miss all these keys are null.
 absl::StatusOr<std::vector<Json>> rows_json(const v1::BlockResult& block, const RowLayout& layout);
 
 // Returns the keys of rows_json() for this layout, in their order.
@@ -30,8 +30,8 @@ std::vector<std::string> row_keys(const RowLayout& layout);
 Json work_json(const v1::Work& work);
 
 // Returns the head of a report: epoch, revision and tick; the indices of truncated queries; for queries about the past,
-// their effective times and the indices of the queries whose times were clamped; and the work, if the server reported
-// it.
+// their effective times and the indices of the queries whose times were clamped; the indices of queries without an
+// anchor; and the work, if the server reported it.
 Json result_head(const v1::QueryResult& result);
 
 }  // namespace locus::cli

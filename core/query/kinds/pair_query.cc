@@ -61,7 +61,7 @@ class FirstPairs {
   PairAnswer answer_;
 };
 
-// What all searches of one block have in common.
+// State that all searches of one block have in common.
 struct PairSearch {
   QueryTask& task;
   const SceneAtTime& moment;
