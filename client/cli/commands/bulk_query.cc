@@ -189,6 +189,10 @@ client::Double3 frame_of(double x, double y, double z) {
           std::round(z / kFrameGrid) * kFrameGrid};
 }
 
+Field at_field() {
+  return {.name = "at", .kind = FieldKind::kCoordinate, .parts = "xyz", .aliases = {"position"}, .required = true};
+}
+
 void add_filter_fields(const QueryOptions& options, RowSchema& schema) {
   schema.push_back(column_or_option({.name = "mask", .kind = FieldKind::kBits}, options.masks, "--mask"));
   schema.push_back(

@@ -47,6 +47,9 @@ struct BulkQuery {
 // position by less than 0.0005.
 client::Double3 frame_of(double x, double y, double z);
 
+// Returns the field of a point, in the columns "at" or "position".
+Field at_field();
+
 // Appends the fields that every kind of query has, mask and ignore_group, to the schema.
 void add_filter_fields(const QueryOptions& options, RowSchema& schema);
 // Sets the columns for mask and ignore_group of a block. `first` is the index of mask in the schema; ignore_group

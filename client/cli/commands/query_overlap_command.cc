@@ -53,10 +53,6 @@ std::vector<v1::Column> columns_of(const QueryOptions& options, v1::StaticDetail
 enum BallField : size_t { kBallAt, kBallRadius, kBallFilter };
 enum BoxField : size_t { kBoxAt, kBoxHalf, kBoxRotation, kBoxFilter };
 
-Field at_field() {
-  return {.name = "at", .kind = FieldKind::kCoordinate, .parts = "xyz", .aliases = {"position"}, .required = true};
-}
-
 template <class Options>
 absl::Status check_input(const Options& options) {
   absl::Status checked = check(options.query, options.bulk);

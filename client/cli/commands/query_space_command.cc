@@ -49,10 +49,6 @@ absl::Status query_frustum(const FrustumOptions& options, Context& context) {
   return ask_and_report(options.query, builder, layout, "found", context);
 }
 
-Field at_field() {
-  return {.name = "at", .kind = FieldKind::kCoordinate, .parts = "xyz", .aliases = {"position"}, .required = true};
-}
-
 absl::Status check_input(const PointOptions& options) {
   absl::Status checked = check(options.query, options.bulk);
   if (checked.ok() && !options.at.empty()) checked = usage_error("give --at or an input with its columns, not both");
