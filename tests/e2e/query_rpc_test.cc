@@ -157,7 +157,7 @@ TEST_F(QueryRpcTest, FrustumsFindWhatIsInView) {
   EXPECT_THAT(ask(batch).blocks(0).ids(), ElementsAre(1u, 2u));
   frustums->mutable_view_projections()->Set(0, 0);
   expect_query_refused(
-      batch, {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_OUT_OF_RANGE, "blocks[0].frustums.view_projections"});
+      batch, {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_OUT_OF_RANGE, "blocks[0].frustums.view_projections", 0});
 }
 
 TEST_F(QueryRpcTest, ContainsFindsTheSolidsAroundPoints) {
@@ -434,12 +434,12 @@ TEST_F(QueryRpcTest, WrongFormRefusesTheBatchAndIsNamed) {
           [](auto* block) { block->mutable_nearest()->set_detail(static_cast<v1::StaticDetail>(4)); });
   refused(".columns", 1, [](auto* block) {
     block->add_columns(v1::COLUMN_ID);
-    block->add_columns(static_cast<v1::Column>(11));
+    block->add_columns(static_cast<v1::Column>(99));
   });
   refused(".columns", 0, [](auto* block) { block->add_columns(v1::COLUMN_UNSPECIFIED); });
   refused(".columns", {}, [](auto* block) {
     block->mutable_balls();
-    block->add_columns(v1::COLUMN_T);
+    block->add_columns(v1::COLUMN_UV);
   });
   refused(".lookup", {}, [](auto* block) { block->mutable_lookup(); });
   refused(".lookup", {}, [](auto* block) {
