@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "client/cli/run.h"
+#include "core/base/block_kind.h"
 #include "server/security/token_file.h"
 #include "tests/support/rpc_test.h"
 #include "tests/support/temporary_folder.h"
@@ -55,7 +56,7 @@ TEST_F(TopTest, OnceAsJsonIsOneDocument) {
   ASSERT_EQ(top["scenes"].size(), 1u);
   EXPECT_EQ(top["scenes"][0]["scene"], "world");
   EXPECT_EQ(top["scenes"][0]["objects"], 5);
-  EXPECT_EQ(top["queries"].size(), 7u);
+  EXPECT_EQ(top["queries"].size(), kBlockKinds);
 }
 
 TEST_F(TopTest, OnceAsATableNamesTheSceneAndHasNoEscapes) {
