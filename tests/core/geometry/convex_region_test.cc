@@ -202,7 +202,7 @@ TEST(ConvexRegionTest, RandomTrianglesOverlapWhereTheyShareAPoint) {
     Random random(seed);
     const ConvexRegion region = region_of(view_planes(random.vector(3), random.between(0.2, 2), 0.1,
                                                       random.between(1, 8), rotation_of(random.rotation())));
-    const Vec3d center = random.vector(5);
+    const Vec3d center = random.vector(3);
     const Triangle triangle{to_float(center + random.vector(2)), to_float(center + random.vector(2)),
                             to_float(center + random.vector(2)), 0};
     const Transform none = make_transform({}, {}, 1);
