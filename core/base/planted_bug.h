@@ -30,6 +30,7 @@ enum class PlantedBug {
   kMatrixRow,          // a plane of a view is computed from the wrong row of its matrix
   kOwnGroupBlocks,     // the group of a viewer blocks its sight
   kClosedEdge,         // a ray that counts crossings of a mesh meets both ends of an edge
+  kCrossingInDouble,   // signs of crossings that double leaves in doubt are those of double
   // The ray kernels:
   kKernelEdgeBound,   // the signs of edge functions are computed in float without an error bound
   kKernelTBound,      // t is compared with the limit in float without an error bound

@@ -20,6 +20,8 @@ class DoubleDouble {
 
   // Returns the nearest double.
   constexpr double rounded() const { return high_; }
+  // Returns the difference between the number and rounded(), exactly.
+  constexpr double error() const { return low_; }
   // Returns the sign of the number: -1, 0 or 1.
   constexpr int sign() const { return (high_ > 0) - (high_ < 0); }
 

@@ -1,89 +1,134 @@
 #include "core/geometry/point_in_mesh.h"
 
+#include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include "core/base/planted_bug.h"
-#include "core/geometry/double_double.h"
+#include "core/geometry/exact_sum.h"
 
 namespace locus {
 namespace {
 
+// Bounds of the errors of an area and of a volume, relative to the sums of the magnitudes of their products.
+constexpr double kAreaBound = 0x1p-50, kVolumeBound = 0x1p-49;
+
 int sign_of(double value) { return (value > 0) - (value < 0); }
 
+// Returns corner - point, exactly.
+DoubleDouble difference(double corner, double point) { return DoubleDouble(corner) - DoubleDouble(point); }
+
+// Adds the product of two differences to `sum`, or its negative.
+template <int kMaxSummands>
+void add_product(DoubleDouble a, DoubleDouble b, double factor, ExactSum<kMaxSummands>& sum) {
+  for (const double x : {a.error(), a.rounded()})
+    for (const double y : {b.error(), b.rounded()})
+      if (x != 0 && y != 0) sum.add(DoubleDouble(x) * DoubleDouble(factor * y));
+}
+
 // Returns the sign of the area of the triangle (u, v, point), projected along `axis`: 1 if it is counter-clockwise.
-// Exchanging u and v exactly reverses the sign.
-int orientation(Vec3d point, Vec3d u, Vec3d v, int axis) {
+__attribute__((noinline)) int exact_orientation(Vec3d point, Vec3d u, Vec3d v, int axis) {
   const int x = (axis + 1) % 3, y = (axis + 2) % 3;
-  // Orders the ends equally for both triangles of an edge.
-  const bool swapped = std::pair(u[x], u[y]) > std::pair(v[x], v[y]);
-  if (swapped) std::swap(u, v);
-  const double left = (u[x] - point[x]) * (v[y] - point[y]), right = (u[y] - point[y]) * (v[x] - point[x]);
-  const double area = left - right;
-  // Each factor has one rounding error, each product another, and the difference a last one.
-  int sign = sign_of(area);
-  if (!(std::abs(area) > 0x1p-50 * (std::abs(left) + std::abs(right)))) {
-    using Number = DoubleDouble;
-    const Number exact = (Number(u[x]) - Number(point[x])) * (Number(v[y]) - Number(point[y])) -
-                         (Number(u[y]) - Number(point[y])) * (Number(v[x]) - Number(point[x]));
-    sign = exact.sign();
+  ExactSum<16> sum;
+  add_product(difference(u[x], point[x]), difference(v[y], point[y]), 1, sum);
+  add_product(difference(u[y], point[y]), difference(v[x], point[x]), -1, sum);
+  return sum.sign();
+}
+
+// Returns the same, with the differences of u and v from the point in double. Each has one rounding error, each product
+// another, and the difference a last one: 2^-51 in total. A product is 0 only if a difference is.
+int orientation(Vec3d point, Vec3d u, Vec3d v, Vec3d from_u, Vec3d from_v, int axis) {
+  const int x = (axis + 1) % 3, y = (axis + 2) % 3;
+  const double left = from_u[x] * from_v[y], right = from_u[y] * from_v[x], area = left - right;
+  const double magnitude = std::abs(left) + std::abs(right);
+  if (std::abs(area) > kAreaBound * magnitude || planted(PlantedBug::kCrossingInDouble)) return sign_of(area);
+  return magnitude == 0 ? 0 : exact_orientation(point, u, v, axis);
+}
+
+// Returns the sign of the volume (a - point) . ((b - point) x (c - point)).
+__attribute__((noinline)) int exact_side(Vec3d point, const Corners& corners) {
+  ExactSum<192> sum;
+  for (size_t i = 0; i < 3; ++i) {
+    const Vec3d a = corners[i], b = corners[(i + 1) % 3], c = corners[(i + 2) % 3];
+    const DoubleDouble along = difference(a.x, point.x);
+    for (const double x : {along.error(), along.rounded()}) {
+      if (x == 0) continue;
+      const auto add = [&](DoubleDouble y, DoubleDouble z, double sign) {
+        for (const double p : {y.error(), y.rounded()}) {
+          const DoubleDouble product = DoubleDouble(x) * DoubleDouble(sign * p);
+          add_product(product, z, 1, sum);
+        }
+      };
+      add(difference(b.y, point.y), difference(c.z, point.z), 1);
+      add(difference(b.z, point.z), difference(c.y, point.y), -1);
+    }
   }
-  return swapped ? -sign : sign;
+  return sum.sign();
 }
 
-// Returns the sign of the volume (a - point) . ((b - point) x (c - point)): 1 if the triangle appears clockwise from
-// the point, that is, if the point is behind it.
-int side(Vec3d point, const Corners& corners) {
-  const Vec3d a = corners[0] - point, b = corners[1] - point, c = corners[2] - point;
-  const double bc = b.y * c.z - b.z * c.y, ca = c.y * a.z - c.z * a.y, ab = a.y * b.z - a.z * b.y;
-  const double volume = a.x * bc + b.x * ca + c.x * ab;
-  const double magnitude = std::abs(a.x) * (std::abs(b.y * c.z) + std::abs(b.z * c.y)) +
-                           std::abs(b.x) * (std::abs(c.y * a.z) + std::abs(c.z * a.y)) +
-                           std::abs(c.x) * (std::abs(a.y * b.z) + std::abs(a.z * b.y));
-  if (std::abs(volume) > 0x1p-49 * magnitude) return sign_of(volume);
-  using Exact = Vec3<DoubleDouble>;
-  const auto from = [&](Vec3d corner) {
-    return Exact{DoubleDouble(corner.x) - DoubleDouble(point.x), DoubleDouble(corner.y) - DoubleDouble(point.y),
-                 DoubleDouble(corner.z) - DoubleDouble(point.z)};
-  };
-  return dot(from(corners[0]), cross(from(corners[1]), from(corners[2]))).sign();
+// Returns the same, with the differences of the corners from the point in double: 1 if the triangle appears clockwise
+// from the point, that is, if the point is behind it. Three differences, a product of two of them and their difference,
+// a product and two sums round once each: 2^-50 in total.
+int side(Vec3d point, const Corners& corners, const Vec3d (&from)[3]) {
+  const Vec3d a = from[0], b = from[1], c = from[2];
+  const double yz[3] = {b.y * c.z, c.y * a.z, a.y * b.z}, zy[3] = {b.z * c.y, c.z * a.y, a.z * b.y};
+  const double volume = a.x * (yz[0] - zy[0]) + b.x * (yz[1] - zy[1]) + c.x * (yz[2] - zy[2]);
+  const double magnitude = std::abs(a.x) * (std::abs(yz[0]) + std::abs(zy[0])) +
+                           std::abs(b.x) * (std::abs(yz[1]) + std::abs(zy[1])) +
+                           std::abs(c.x) * (std::abs(yz[2]) + std::abs(zy[2]));
+  if (std::abs(volume) > kVolumeBound * magnitude || planted(PlantedBug::kCrossingInDouble)) return sign_of(volume);
+  return magnitude == 0 ? 0 : exact_side(point, corners);
 }
 
-// Returns whether `point`, in the plane of the triangle, lies on the triangle: in each projection it is inside, and it
-// lies within the bounds. For a triangle without area, which is a segment or a point, this decides too: off the
-// segment, but within its bounds, the signs of the two directions differ in a projection.
-bool is_inside(Vec3d point, const Corners& corners) {
+// Returns whether `point`, in the plane of the triangle and within its bounds, lies on the triangle: in each projection
+// it is inside. For a triangle without area, which is a segment or a point, this decides too: off the segment, but
+// within its bounds, the signs of the two directions differ in a projection.
+bool is_inside(Vec3d point, const Corners& corners, const Vec3d (&from)[3]) {
   for (int axis = 0; axis < 3; ++axis) {
-    const int ab = orientation(point, corners[0], corners[1], axis),
-              bc = orientation(point, corners[1], corners[2], axis),
-              ca = orientation(point, corners[2], corners[0], axis);
-    if ((ab > 0 || bc > 0 || ca > 0) && (ab < 0 || bc < 0 || ca < 0)) return false;
+    int least = 1, most = -1;
+    for (size_t i = 0; i < 3; ++i) {
+      const size_t next = i == 2 ? 0 : i + 1;
+      const int sign = orientation(point, corners[i], corners[next], from[i], from[next], axis);
+      least = std::min(least, sign);
+      most = std::max(most, sign);
+    }
+    if (least < 0 && most > 0) return false;
   }
   return true;
 }
 
-// Returns the winding of the triangle, projected along the x axis, around the point.
-int projected_winding(Vec3d point, const Corners& corners) {
+// Returns the winding of the triangle, projected along the x axis, around the point: exact signs for the edges at the
+// height of the point only.
+__attribute__((noinline)) int exact_projected_winding(Vec3d point, const Corners& corners, const Vec3d (&from)[3]) {
   int winding = 0;
-  for (int i = 0; i < 3; ++i) {
-    const Vec3d u = corners[static_cast<size_t>(i)], v = corners[static_cast<size_t>((i + 1) % 3)];
-    // An edge includes its lower end and not its upper one.
+  for (size_t i = 0; i < 3; ++i) {
+    const size_t next = i == 2 ? 0 : i + 1;
+    // An edge includes its lower end and not its upper one. The sign of a difference is exact.
+    const double u = from[i].y, v = from[next].y;
     const bool closed = planted(PlantedBug::kClosedEdge);
-    const bool rises = u.y <= point.y && (closed ? v.y >= point.y : v.y > point.y);
-    const bool falls = v.y <= point.y && (closed ? u.y >= point.y : u.y > point.y);
-    if (rises && orientation(point, u, v, 0) > 0) ++winding;
-    if (falls && orientation(point, u, v, 0) < 0) --winding;
+    const bool rises = u <= 0 && (closed ? v >= 0 : v > 0), falls = v <= 0 && (closed ? u >= 0 : u > 0);
+    if (!rises && !falls) continue;
+    const int sign = orientation(point, corners[i], corners[next], from[i], from[next], 0);
+    winding += (rises && sign > 0 ? 1 : 0) - (falls && sign < 0 ? 1 : 0);
   }
   return winding;
 }
 
-}  // namespace
-
-Vec3d without_tiny_coordinates(Vec3d point) {
-  for (int axis = 0; axis < 3; ++axis)
-    if (std::abs(point[axis]) < 0x1p-250) point[axis] = 0;
-  return point;
+// Returns the same. Decides in double and without branches if all signs are certain.
+int projected_winding(Vec3d point, const Corners& corners, const Vec3d (&from)[3]) {
+  if (planted(PlantedBug::kClosedEdge)) return exact_projected_winding(point, corners, from);
+  int winding = 0;
+  bool certain = true;
+  for (size_t i = 0; i < 3; ++i) {
+    const Vec3d u = from[i], v = from[i == 2 ? 0 : i + 1];
+    const double left = u.y * v.z, right = u.z * v.y, area = left - right;
+    certain &= std::abs(area) > kAreaBound * (std::abs(left) + std::abs(right));
+    const int rises = (u.y <= 0) & (v.y > 0), falls = (v.y <= 0) & (u.y > 0);
+    winding += (rises & (area > 0)) - (falls & (area < 0));
+  }
+  return certain ? winding : exact_projected_winding(point, corners, from);
 }
+
+}  // namespace
 
 Crossing crossing(Vec3d point, const Triangle& triangle) {
   const Aabbf bounds = bounds_of(triangle);
@@ -91,10 +136,12 @@ Crossing crossing(Vec3d point, const Triangle& triangle) {
       point.x > bounds.max.x)
     return {};
   const Corners corners = corners_of(triangle);
-  const int winding = projected_winding(point, corners);
+  const Vec3d from[3] = {corners[0] - point, corners[1] - point, corners[2] - point};
+  const int winding = projected_winding(point, corners, from);
   if (point.x < bounds.min.x) return {winding, false};
-  const int behind = side(point, corners);
-  if (behind == 0) return {0, is_inside(point, corners)};
+  const int behind = side(point, corners, from);
+  // The point may also be on an edge or a corner that is not counted, or on a triangle parallel to the ray.
+  if (behind == 0) return {0, is_inside(point, corners, from)};
   return {winding * behind > 0 ? winding : 0, false};
 }
 

@@ -106,6 +106,7 @@ constexpr Trial kTrials[] = {
     {"CapsuleWithoutEnds", PlantedBug::kEndlessCapsule, sweep_difference},
     {"SweepThatIgnoresItsStart", PlantedBug::kSweepStart, sweep_difference},
     {"CrossingsWithBothEndsOfAnEdge", PlantedBug::kClosedEdge, contains_difference},
+    {"CrossingsDecidedInDouble", PlantedBug::kCrossingInDouble, crossing_difference},
     {"ViewWithAWrongRowOfItsMatrix", PlantedBug::kMatrixRow, view_difference},
     {"PairsFromBothSides", PlantedBug::kPairBothSides, pair_difference},
     {"CellWithPlanesBeyondOthers", PlantedBug::kCellBeyond, cell_difference},

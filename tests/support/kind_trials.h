@@ -9,6 +9,7 @@
 
 #include "core/geometry/point_in_mesh.h"
 #include "core/query/frustum_planes.h"
+#include "tests/support/exact_crossing.h"
 #include "tests/support/owned_block.h"
 #include "tests/support/random.h"
 #include "tests/support/small_world.h"
@@ -37,6 +38,17 @@ inline std::string contains_difference() {
     const double from_center = std::abs(point.x) + std::abs(point.y) + std::abs(point.z);
     if (on_surface != (from_center == 1) || (!on_surface && winding != (from_center < 1 ? 1 : 0)))
       return "winding " + std::to_string(winding) + " at cell " + std::to_string(cell);
+  }
+  return "";
+}
+
+// Returns the first seed of a point near a triangle whose crossing differs from that in integers.
+inline std::string crossing_difference() {
+  for (uint64_t seed = 0; seed < scaled_count(20'000); ++seed) {
+    Random random(seed);
+    const NearTrial trial = near_trial(random);
+    const Crossing found = crossing(trial.point, trial.triangle), exact = exact_crossing(trial.point, trial.triangle);
+    if (found.winding != exact.winding || found.on_surface != exact.on_surface) return "seed " + std::to_string(seed);
   }
   return "";
 }

@@ -1,5 +1,5 @@
-// Crossings of triangles by a ray along the x axis, judged by the solid angles of triangles in long double, and on
-// surfaces by construction.
+// Crossings of triangles by a ray along the x axis, judged by the solid angles of triangles in long double, by
+// large integers, and on surfaces by construction.
 #include "core/geometry/point_in_mesh.h"
 
 #include <gtest/gtest.h>
@@ -8,6 +8,7 @@
 #include <numbers>
 #include <vector>
 
+#include "tests/support/exact_crossing.h"
 #include "tests/support/generated_meshes.h"
 #include "tests/support/random.h"
 #include "tests/support/real.h"
@@ -153,6 +154,35 @@ TEST(PointInMeshTest, TrianglesWithoutAreaAreSegmentsAndPoints) {
   const Triangle point{{1, 1, 1}, {1, 1, 1}, {1, 1, 1}, 0};
   EXPECT_TRUE(crossing({1, 1, 1}, point).on_surface);
   EXPECT_FALSE(crossing({1, 1, 0.5}, point).on_surface);
+}
+
+TEST(PointInMeshTest, CrossingsNearPlanesAndEdgesEqualThoseOfIntegers) {
+  int on_surface = 0, crossed = 0;
+  for (uint64_t seed = 0; seed < scaled_count(100'000); ++seed) {
+    Random random(seed);
+    const NearTrial trial = near_trial(random);
+    const Crossing found = crossing(trial.point, trial.triangle);
+    const Crossing expected = exact_crossing(trial.point, trial.triangle);
+    ASSERT_EQ(found.winding, expected.winding) << "seed " << seed;
+    ASSERT_EQ(found.on_surface, expected.on_surface) << "seed " << seed;
+    on_surface += expected.on_surface ? 1 : 0;
+    crossed += expected.winding != 0 ? 1 : 0;
+  }
+  EXPECT_GT(on_surface, 100);
+  EXPECT_GT(crossed, 100);
+}
+
+// A plane through three whole points, and points whose distance from it is below the resolution of 106 bits: the sign
+// of the volume is that of the last step.
+TEST(PointInMeshTest, PointsOneStepAwayFromASlopingFaceAreOnTheirSide) {
+  const Triangle triangle{{0x1p23f, 0, 0}, {0, 0x1p23f, 0}, {0, 0, 0x1p23f}, 0};
+  const double third = 0x1p23 / 4 + 0x1p-30, rest = 0x1p23 - 2 * third;
+  EXPECT_TRUE(crossing({third, third, rest}, triangle).on_surface);
+  const Crossing below = crossing({std::nextafter(third, 0), third, rest}, triangle),
+                 above = crossing({std::nextafter(third, 0x1p24), third, rest}, triangle);
+  EXPECT_FALSE(below.on_surface || above.on_surface);
+  EXPECT_EQ(std::abs(below.winding), 1);
+  EXPECT_EQ(above.winding, 0);
 }
 
 TEST(PointInMeshTest, PointsOneStepAwayFromAFaceAreOnTheirSide) {
