@@ -23,7 +23,9 @@ BulkAnswers::BulkAnswers(const BulkQuery& query, bool follow, Context& context)
       context_(context),
       report_(context.out(), context.options().format,
               {.rows_name = query.rows_name,
-               .keys = query.any ? std::vector<std::string>{query.layout.query, "hit"} : row_keys(query.layout),
+               .keys = query.answer == BulkAnswer::kHits   ? std::vector<std::string>{query.layout.query, "hit"}
+                       : query.answer == BulkAnswer::kSeen ? std::vector<std::string>{query.layout.query, "seen"}
+                                                           : row_keys(query.layout),
                .width_rows = kAnswerWidthRows}) {}
 
 absl::Status BulkAnswers::write(const v1::QueryResult& result, const SentRows& sent,
@@ -50,7 +52,13 @@ absl::Status BulkAnswers::write_block(const v1::BlockResult& block, size_t rows,
     if (truncated_++ < kListedTruncated) truncated_rows_.push_back(layout.first_query + query);
   }
   clamped_ += static_cast<size_t>(block.clamped_size());
-  if (query_.any) {
+  if (query_.answer == BulkAnswer::kSeen) {
+    ASSIGN_OR_RETURN(const client::SightMatrix matrix, client::SightMatrix::of(block, rows, 1));
+    for (size_t i = 0; i < rows; ++i)
+      report_.add({{layout.query, layout.first_query + i}, {"seen", matrix.seen(i, 0) != 0}});
+    return absl::OkStatus();
+  }
+  if (query_.answer == BulkAnswer::kHits) {
     ASSIGN_OR_RETURN(const client::AnyHits hits, client::AnyHits::of(block));
     if (hits.size() != rows) return no_fit();
     for (size_t i = 0; i < rows; ++i) report_.add({{layout.query, layout.first_query + i}, {"hit", hits.hit(i)}});

@@ -20,18 +20,9 @@ constexpr double kFrameGrid = 16384;
 
 bool is_exact_float(double value) { return static_cast<double>(static_cast<float>(value)) == value; }
 
-std::vector<float> offsets_of(const RowColumn& positions, RowSpan rows, const client::Double3& frame) {
-  std::vector<float> offsets;
-  offsets.reserve(3 * (rows.end - rows.begin));
-  for (size_t row = rows.begin; row < rows.end; ++row) {
-    offsets.push_back(static_cast<float>(positions.numbers[3 * row] - frame.x));
-    offsets.push_back(static_cast<float>(positions.numbers[3 * row + 1] - frame.y));
-    offsets.push_back(static_cast<float>(positions.numbers[3 * row + 2] - frame.z));
-  }
-  return offsets;
-}
-
-client::Double3 frame_of_row(const RowColumn& positions, size_t row) {
+client::Double3 frame_of_row(const BulkQuery& query, const RowBatch& batch, size_t row) {
+  if (!query.has_position) return {};
+  const RowColumn& positions = batch.columns[0];
   return frame_of(positions.numbers[3 * row], positions.numbers[3 * row + 1], positions.numbers[3 * row + 2]);
 }
 
@@ -118,11 +109,13 @@ class BulkQueryRun {
     message.sent.first_row = batch.first_row + begin;
     const size_t first = begin;
     while (begin < batch.rows() && message.frames.size() < limits::kMaxBlocks) {
-      const client::Double3 frame = frame_of_row(batch.columns[0], begin);
+      const client::Double3 frame = frame_of_row(query_, batch, begin);
       size_t end = begin + 1;
-      while (end < batch.rows() && same(frame_of_row(batch.columns[0], end), frame)) ++end;
+      while (end < batch.rows() && same(frame_of_row(query_, batch, end), frame)) ++end;
       const RowSpan rows = {begin, end};
-      query_.add_block({batch, rows, frame, offsets_of(batch.columns[0], rows, frame)}, builder);
+      BlockRows block = {batch, rows, frame, {}};
+      if (query_.has_position) block.offsets = offsets_of(batch.columns[0], rows, frame);
+      query_.add_block(block, builder);
       message.frames.push_back(frame);
       message.sent.list_starts.push_back(begin - first);
       begin = end;
@@ -187,6 +180,17 @@ client::Double3 frame_of(double x, double y, double z) {
   if (is_exact_float(x) && is_exact_float(y) && is_exact_float(z)) return {};
   return {std::round(x / kFrameGrid) * kFrameGrid, std::round(y / kFrameGrid) * kFrameGrid,
           std::round(z / kFrameGrid) * kFrameGrid};
+}
+
+std::vector<float> offsets_of(const RowColumn& positions, RowSpan rows, const client::Double3& frame) {
+  std::vector<float> offsets;
+  offsets.reserve(3 * (rows.end - rows.begin));
+  for (size_t row = rows.begin; row < rows.end; ++row) {
+    offsets.push_back(static_cast<float>(positions.numbers[3 * row] - frame.x));
+    offsets.push_back(static_cast<float>(positions.numbers[3 * row + 1] - frame.y));
+    offsets.push_back(static_cast<float>(positions.numbers[3 * row + 2] - frame.z));
+  }
+  return offsets;
 }
 
 Field at_field() {

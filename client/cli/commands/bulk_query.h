@@ -30,15 +30,23 @@ struct BlockRows {
   const RowBatch& batch;
   RowSpan rows;
   client::Double3 frame;
-  std::vector<float> offsets;  // 3 per row: the position (field 0 of the schema) relative to `frame`
+  std::vector<float> offsets;  // 3 per row: the position (field 0 of the schema) relative to `frame`; empty without
+};
+
+// What a row of the answer is.
+enum class BulkAnswer {
+  kRows,  // the requested columns
+  kHits,  // rays and sweeps in mode ANY: `hit`
+  kSeen,  // pairwise sight: `seen`
 };
 
 // Properties of a bulk query that depend on the kind of query.
 struct BulkQuery {
-  RowSchema schema;  // field 0 must be the position
+  RowSchema schema;  // field 0 must be the position, if the query has one
   RowLayout layout;
   std::string rows_name;
-  bool any = false;  // rays in mode ANY: rows have only `hit`
+  BulkAnswer answer = BulkAnswer::kRows;
+  bool has_position = true;  // without, the frame of all rows is the origin
   std::function<void(const BlockRows& rows, client::QueryBuilder& builder)> add_block;
 };
 
@@ -46,6 +54,9 @@ struct BulkQuery {
 // float. Otherwise it is the nearest point of a grid of spacing 16,384, so that rounding the offset to float moves the
 // position by less than 0.0005.
 client::Double3 frame_of(double x, double y, double z);
+
+// Returns the positions of field `column` relative to the frame, 3 for each row.
+std::vector<float> offsets_of(const RowColumn& positions, RowSpan rows, const client::Double3& frame);
 
 // Returns the field of a point, in the columns "at" or "position".
 Field at_field();

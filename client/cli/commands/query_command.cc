@@ -4,6 +4,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/cli/commands.h"
+#include "client/lib/result_rows.h"
 #include "core/base/status_macros.h"
 
 namespace locus::cli {
@@ -36,6 +37,19 @@ absl::Status ask_and_report(const QueryOptions& options, client::QueryBuilder& b
     ASSIGN_OR_RETURN(report.rows, rows_json(result.blocks(0), layout));
     report.keys = row_keys(layout);
   }
+  context.write(report);
+  return absl::OkStatus();
+}
+
+absl::Status ask_and_report_any(const QueryOptions& options, client::QueryBuilder& builder, const std::string& query,
+                                Context& context) {
+  ASSIGN_OR_RETURN(const v1::QueryResult result, ask_block(options, builder, context));
+  ASSIGN_OR_RETURN(const client::AnyHits hits, client::AnyHits::of(result.blocks(0)));
+  Report report;
+  report.head = result_head(result);
+  report.rows_name = query + "s";
+  report.keys = {query, "hit"};
+  for (size_t i = 0; i < hits.size(); ++i) report.rows.push_back({{query, i}, {"hit", hits.hit(i)}});
   context.write(report);
   return absl::OkStatus();
 }

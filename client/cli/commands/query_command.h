@@ -33,6 +33,11 @@ absl::StatusOr<v1::QueryResult> ask_block(const QueryOptions& options, client::Q
 absl::Status ask_and_report(const QueryOptions& options, client::QueryBuilder& builder, const RowLayout& layout,
                             const std::string& rows_name, Context& context);
 
+// Sends a batch of one block of rays or sweeps in mode ANY and writes for each whether it hits. `query` is the key of
+// the query's index: "ray".
+absl::Status ask_and_report_any(const QueryOptions& options, client::QueryBuilder& builder, const std::string& query,
+                                Context& context);
+
 }  // namespace locus::cli
 
 #endif  // LOCUS_CLIENT_CLI_COMMANDS_QUERY_COMMAND_H_

@@ -23,11 +23,9 @@ struct NearestOptions {
 
 // Returns the layout of the report's rows: distance (column T) and id always, then the requested columns.
 RowLayout layout_of(const NearestOptions& options) {
-  RowLayout layout = {.query = "query", .columns = {v1::COLUMN_T, v1::COLUMN_ID}};
-  std::vector<v1::Column> more = options.query.columns;
-  if (more.empty()) more = {v1::COLUMN_TRIANGLE, v1::COLUMN_POINT};
-  layout.columns.insert(layout.columns.end(), more.begin(), more.end());
-  return layout;
+  return {
+      .query = "query",
+      .columns = columns_behind({v1::COLUMN_T, v1::COLUMN_ID}, options.query, {v1::COLUMN_TRIANGLE, v1::COLUMN_POINT})};
 }
 
 void apply_to_points(const NearestOptions& options, const RowLayout& layout, const client::Double3& frame,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "client/cli/choices.h"
 #include "client/cli/default_scene.h"
@@ -80,6 +81,25 @@ void add_detail_option(CLI::App& command, v1::StaticDetail& detail) {
       ->transform(choices(details));
 }
 
+void add_after_id_option(CLI::App& command, QueryOptions& options) {
+  command.add_option("--after-id", options.after_id, "Return only higher ids, to continue a truncated answer")
+      ->type_name("ID");
+}
+
+std::vector<v1::Column> columns_behind(std::vector<v1::Column> first, const QueryOptions& options,
+                                       const std::vector<v1::Column>& otherwise) {
+  const std::vector<v1::Column>& more = options.columns.empty() ? otherwise : options.columns;
+  first.insert(first.end(), more.begin(), more.end());
+  return first;
+}
+
+std::vector<v1::Column> overlap_columns(const QueryOptions& options, v1::StaticDetail detail) {
+  std::vector<v1::Column> first = {v1::COLUMN_ID};
+  if (detail == v1::STATIC_DETAIL_TRIANGLES || detail == v1::STATIC_DETAIL_TRIANGLES_SORTED)
+    first.push_back(v1::COLUMN_TRIANGLE);
+  return columns_behind(std::move(first), options);
+}
+
 absl::Status check(const QueryOptions& options) {
   if (options.at_least && options.exactly) return usage_error("give --at-least or --exactly, not both");
   return absl::OkStatus();
@@ -109,6 +129,14 @@ FramedPositions framed(const std::vector<Triple>& positions) {
     result.offsets.push_back(static_cast<float>(position.z - result.frame.z));
   }
   return result;
+}
+
+FramedPaths framed(const std::vector<Triple>& starts, const std::vector<Triple>& ends) {
+  std::vector<Triple> all = starts;
+  all.insert(all.end(), ends.begin(), ends.end());
+  const FramedPositions at = framed(all);
+  const auto middle = at.offsets.begin() + static_cast<ptrdiff_t>(3 * starts.size());
+  return {at.frame, {at.offsets.begin(), middle}, {middle, at.offsets.end()}};
 }
 
 }  // namespace locus::cli

@@ -38,8 +38,19 @@ struct QueryOptions {
 // Adds the argument SCENE and the options shared by all queries.
 void add_query_options(CLI::App& command, QueryOptions& options);
 
-// Adds the option --detail, for the commands ball, box and nearest.
+// Adds the option --detail, for the queries about solids and nearest.
 void add_detail_option(CLI::App& command, v1::StaticDetail& detail);
+
+// Adds the option --after-id, for the queries whose rows are in the order of ids.
+void add_after_id_option(CLI::App& command, QueryOptions& options);
+
+// Returns the columns to request and show: `first`, then those of --columns, or `otherwise` without that option.
+std::vector<v1::Column> columns_behind(std::vector<v1::Column> first, const QueryOptions& options,
+                                       const std::vector<v1::Column>& otherwise = {});
+
+// Returns the columns of a query for what a solid touches: ids always, and triangles if the detail makes each row a
+// triangle.
+std::vector<v1::Column> overlap_columns(const QueryOptions& options, v1::StaticDetail detail);
 
 // Returns a usage error if options exclude each other.
 absl::Status check(const QueryOptions& options);
@@ -75,6 +86,14 @@ struct FramedPositions {
   std::vector<float> offsets;
 };
 FramedPositions framed(const std::vector<Triple>& positions);
+
+// Starts and ends as offsets from one frame.
+struct FramedPaths {
+  client::Double3 frame;
+  std::vector<float> starts;
+  std::vector<float> ends;
+};
+FramedPaths framed(const std::vector<Triple>& starts, const std::vector<Triple>& ends);
 
 }  // namespace locus::cli
 

@@ -38,16 +38,6 @@ struct CapsuleOptions {
   v1::StaticDetail detail = v1::STATIC_DETAIL_UNSPECIFIED;
 };
 
-// Returns the columns to request and show: ids always, and triangles if the detail makes each row a triangle.
-std::vector<v1::Column> columns_of(const QueryOptions& options, v1::StaticDetail detail) {
-  std::vector<v1::Column> columns = {v1::COLUMN_ID};
-  if (detail == v1::STATIC_DETAIL_TRIANGLES || detail == v1::STATIC_DETAIL_TRIANGLES_SORTED) {
-    columns.push_back(v1::COLUMN_TRIANGLE);
-  }
-  columns.insert(columns.end(), options.columns.begin(), options.columns.end());
-  return columns;
-}
-
 // Indices of the fields in the schemas of bulk rows. kBallFilter and kBoxFilter are each the index of the first field
 // that add_filter_fields() appends.
 enum BallField : size_t { kBallAt, kBallRadius, kBallFilter };
@@ -63,7 +53,7 @@ absl::Status check_input(const Options& options) {
 template <class Options>
 BulkQuery bulk_query(const Options& options, const char* kind) {
   return {.schema = {at_field()},
-          .layout = {.query = kind, .columns = columns_of(options.query, options.detail)},
+          .layout = {.query = kind, .columns = overlap_columns(options.query, options.detail)},
           .rows_name = "found",
           .add_block = {}};
 }
@@ -140,7 +130,8 @@ absl::Status query_ball(const BallOptions& options, Context& context) {
     return usage_error("give --at and --radius, or rows with --from-csv or --from-ndjson");
   }
   const FramedPositions at = framed(options.at);
-  const RowLayout layout = {.query = "ball", .columns = columns_of(options.query, options.detail), .frame = at.frame};
+  const RowLayout layout = {
+      .query = "ball", .columns = overlap_columns(options.query, options.detail), .frame = at.frame};
   client::QueryBuilder builder;
   client::BallBlock block = builder.balls();
   block.frame(at.frame).columns(layout.columns).detail(options.detail);
@@ -156,7 +147,8 @@ absl::Status query_box(const BoxOptions& options, Context& context) {
     return usage_error("give --at and --half, or rows with --from-csv or --from-ndjson");
   }
   const FramedPositions at = framed(options.at);
-  const RowLayout layout = {.query = "box", .columns = columns_of(options.query, options.detail), .frame = at.frame};
+  const RowLayout layout = {
+      .query = "box", .columns = overlap_columns(options.query, options.detail), .frame = at.frame};
   client::QueryBuilder builder;
   client::BoxBlock block = builder.boxes();
   block.frame(at.frame).columns(layout.columns).detail(options.detail);
@@ -171,17 +163,13 @@ absl::Status query_capsule(const CapsuleOptions& options, Context& context) {
   RETURN_IF_ERROR(check(options.bulk));
   if (options.from.empty() || options.to.empty() || options.radii.empty())
     return usage_error("give --from, --to and --radius, or rows with --from-csv or --from-ndjson");
-  std::vector<Triple> all = options.from;
-  all.insert(all.end(), options.to.begin(), options.to.end());
-  const FramedPositions at = framed(all);
-  const absl::Span<const float> offsets = at.offsets;
+  const FramedPaths at = framed(options.from, options.to);
   const RowLayout layout = {
-      .query = "capsule", .columns = columns_of(options.query, options.detail), .frame = at.frame};
+      .query = "capsule", .columns = overlap_columns(options.query, options.detail), .frame = at.frame};
   client::QueryBuilder builder;
   client::CapsuleBlock block = builder.capsules();
   block.frame(at.frame).columns(layout.columns).detail(options.detail);
-  block.capsules(offsets.subspan(0, 3 * options.from.size()), offsets.subspan(3 * options.from.size()),
-                 floats_of(options.radii));
+  block.capsules(at.starts, at.ends, floats_of(options.radii));
   apply_to_block(options.query, block);
   return ask_and_report(options.query, builder, layout, "found", context);
 }
@@ -190,8 +178,7 @@ absl::Status query_capsule(const CapsuleOptions& options, Context& context) {
 template <class Options>
 void add_overlap_options(CLI::App& command, Options& options) {
   add_detail_option(command, options.detail);
-  command.add_option("--after-id", options.query.after_id, "Return only higher ids, to continue a truncated answer")
-      ->type_name("ID");
+  add_after_id_option(command, options.query);
   add_bulk_query_options(command, options.bulk);
   add_query_options(command, options.query);
 }

@@ -10,7 +10,6 @@
 #include "client/cli/commands/bulk_query.h"
 #include "client/cli/commands/query_command.h"
 #include "client/cli/failure.h"
-#include "client/lib/result_rows.h"
 #include "core/base/status_macros.h"
 
 namespace locus::cli {
@@ -27,26 +26,13 @@ struct RayOptions {
   v1::Inside inside = v1::INSIDE_UNSPECIFIED;
 };
 
-absl::Status report_any(const RayOptions& options, client::QueryBuilder& builder, Context& context) {
-  ASSIGN_OR_RETURN(const v1::QueryResult result, ask_block(options.query, builder, context));
-  ASSIGN_OR_RETURN(const client::AnyHits hits, client::AnyHits::of(result.blocks(0)));
-  Report report;
-  report.head = result_head(result);
-  report.rows_name = "rays";
-  report.keys = {"ray", "hit"};
-  for (size_t ray = 0; ray < hits.size(); ++ray) report.rows.push_back({{"ray", ray}, {"hit", hits.hit(ray)}});
-  context.write(report);
-  return absl::OkStatus();
-}
-
 // Returns the layout of the report's rows: t and id always, since they distinguish a hit from a miss, then the
 // requested columns.
 RowLayout layout_of(const RayOptions& options) {
-  RowLayout layout = {.query = "ray", .columns = {v1::COLUMN_T, v1::COLUMN_ID}};
+  RowLayout layout = {.query = "ray"};
   layout.dense = options.mode == v1::RAY_MODE_FIRST;
-  std::vector<v1::Column> more = options.query.columns;
-  if (more.empty()) more = {v1::COLUMN_TRIANGLE, v1::COLUMN_POINT, v1::COLUMN_NORMAL};
-  layout.columns.insert(layout.columns.end(), more.begin(), more.end());
+  layout.columns = columns_behind({v1::COLUMN_T, v1::COLUMN_ID}, options.query,
+                                  {v1::COLUMN_TRIANGLE, v1::COLUMN_POINT, v1::COLUMN_NORMAL});
   return layout;
 }
 
@@ -67,8 +53,10 @@ absl::Status query_rays_of_input(const RayOptions& options, Context& context) {
   checked.Update(at_most_one(options.t_max, "--max-t"));
   if (!checked.ok()) return checked;
   BulkQuery query = {.schema = {}, .layout = layout_of(options), .rows_name = "hits", .add_block = {}};
-  query.any = options.mode == v1::RAY_MODE_ANY;
-  if (query.any) query.rows_name = "rays";
+  if (options.mode == v1::RAY_MODE_ANY) {
+    query.answer = BulkAnswer::kHits;
+    query.rows_name = "rays";
+  }
   query.schema = {{.name = "from", .kind = FieldKind::kCoordinate, .parts = "xyz", .required = true},
                   column_or_option({.name = "dir", .parts = "xyz", .required = true}, options.directions, "--dir"),
                   column_or_option({.name = "max_t", .kind = FieldKind::kDistance}, options.t_max, "--max-t")};
@@ -98,7 +86,7 @@ absl::Status query_ray(const RayOptions& options, Context& context) {
   client::RayBlock block = builder.rays();
   apply_to_rays(options, layout, from.frame, block);
   block.rays(from.offsets, floats_of(options.directions)).t_max(floats_of(options.t_max));
-  if (options.mode == v1::RAY_MODE_ANY) return report_any(options, builder, context);
+  if (options.mode == v1::RAY_MODE_ANY) return ask_and_report_any(options.query, builder, "ray", context);
   return ask_and_report(options.query, builder, layout, "hits", context);
 }
 

@@ -1,9 +1,11 @@
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "client/cli/arguments.h"
 #include "client/cli/commands.h"
+#include "client/cli/commands/bulk_query.h"
 #include "client/cli/commands/query_command.h"
 #include "client/cli/failure.h"
 #include "client/lib/result_rows.h"
@@ -15,6 +17,7 @@ namespace {
 
 struct SightOptions {
   QueryOptions query;
+  BulkOptions bulk;
   std::vector<Triple> viewers;
   std::vector<Triple> targets;
   std::vector<Number64> viewer_groups;
@@ -33,19 +36,54 @@ struct PairOptions {
   Number64 after_other;
 };
 
+enum SightField : size_t { kEye, kTarget, kViewerGroup, kTargetGroup, kSightDistance, kSightFilter };
+
+absl::Status query_sight_of_input(const SightOptions& options, Context& context) {
+  absl::Status checked = check(options.query, options.bulk);
+  if (checked.ok() && (!options.viewers.empty() || !options.targets.empty() || options.samples != 1))
+    checked = usage_error("give --viewer, --target and --samples or an input with its columns, not both");
+  checked.Update(at_most_one(options.viewer_groups, "--viewer-group"));
+  checked.Update(at_most_one(options.target_groups, "--target-group"));
+  checked.Update(at_most_one(options.max_distances, "--max-distance"));
+  RETURN_IF_ERROR(checked);
+  BulkQuery query = {.schema = {}, .layout = {.query = "sight"}, .rows_name = "sight", .add_block = {}};
+  query.answer = BulkAnswer::kSeen;
+  query.schema = {
+      {.name = "viewer", .kind = FieldKind::kCoordinate, .parts = "xyz", .required = true},
+      {.name = "target", .kind = FieldKind::kCoordinate, .parts = "xyz", .required = true},
+      column_or_option({.name = "viewer_group", .kind = FieldKind::kId}, options.viewer_groups, "--viewer-group"),
+      column_or_option({.name = "target_group", .kind = FieldKind::kId}, options.target_groups, "--target-group"),
+      column_or_option({.name = "max_distance", .kind = FieldKind::kDistance}, options.max_distances,
+                       "--max-distance")};
+  add_filter_fields(options.query, query.schema);
+  query.add_block = [&](const BlockRows& rows, client::QueryBuilder& builder) {
+    const std::vector<RowColumn>& columns = rows.batch.columns;
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
+    client::SightBlock block = builder.sight();
+    apply_to_block(options.query, block);
+    block.frame(rows.frame).pairwise().viewers(rows.offsets);
+    block.targets(offsets_of(columns[kTarget], rows.rows, rows.frame));
+    block.viewer_groups(id_column(columns[kViewerGroup], rows.rows, 0, values_of(options.viewer_groups)));
+    block.target_groups(id_column(columns[kTargetGroup], rows.rows, 0, values_of(options.target_groups)));
+    block.max_distances(
+        float_column(columns[kSightDistance], rows.rows, {kInfinity}, floats_of(options.max_distances)));
+    apply_filter_columns(options.query, rows, kSightFilter, block);
+  };
+  return run_bulk_query(query, options.query, options.bulk, context);
+}
+
 absl::Status query_sight(const SightOptions& options, Context& context) {
-  if (options.viewers.empty() || options.targets.empty()) return usage_error("give --viewer and --target");
+  if (options.bulk.given()) return query_sight_of_input(options, context);
+  RETURN_IF_ERROR(check(options.bulk));
+  if (options.viewers.empty() || options.targets.empty())
+    return usage_error("give --viewer and --target, or rows with --from-csv or --from-ndjson");
   if (options.samples == 0 || options.targets.size() % options.samples != 0)
     return usage_error("give --samples points with --target for each target");
-  std::vector<Triple> all = options.viewers;
-  all.insert(all.end(), options.targets.begin(), options.targets.end());
-  const FramedPositions at = framed(all);
-  const absl::Span<const float> offsets = at.offsets;
+  const FramedPaths at = framed(options.viewers, options.targets);
   client::QueryBuilder builder;
   client::SightBlock block = builder.sight();
   apply_to_block(options.query, block);
-  block.frame(at.frame).viewers(offsets.subspan(0, 3 * options.viewers.size()));
-  block.targets(offsets.subspan(3 * options.viewers.size()), options.samples);
+  block.frame(at.frame).viewers(at.starts).targets(at.ends, options.samples);
   block.viewer_groups(values_of(options.viewer_groups)).target_groups(values_of(options.target_groups));
   block.max_distances(floats_of(options.max_distances));
   if (options.pairwise) block.pairwise();
@@ -66,8 +104,7 @@ absl::Status query_sight(const SightOptions& options, Context& context) {
 }
 
 absl::Status query_pairs(const PairOptions& options, Context& context) {
-  RowLayout layout = {.columns = {v1::COLUMN_ID, v1::COLUMN_OTHER, v1::COLUMN_T}};
-  layout.columns.insert(layout.columns.end(), options.query.columns.begin(), options.query.columns.end());
+  const RowLayout layout = {.columns = columns_behind({v1::COLUMN_ID, v1::COLUMN_OTHER, v1::COLUMN_T}, options.query)};
   client::QueryBuilder builder;
   client::PairBlock block = builder.pairs();
   apply_to_block(options.query, block);
@@ -86,8 +123,11 @@ void add_query_sight(CLI::App& parent, Context& context) {
   locus query sight arena --viewer 0,1.7,0 --target 20,1.5,3
   locus query sight arena --viewer 0,1.7,0 --viewer-group 4 --target 20,1.5,3 --target-group 9 --max-distance 100
   locus query sight arena --viewer 0,1.7,0 --target 20,0.3,3 --target 20,1,3 --target 20,1.7,3 --samples 3
+  locus -o csv query sight arena --from-csv pairs.csv > seen.csv
 
-The answer has the number of seen points for each viewer and target. A viewer's and a target's own group do not block.)");
+The answer has the number of seen points for each viewer and target. A viewer's and a target's own group do not block.
+Rows: viewer.x,viewer.y,viewer.z,target.x,target.y,target.z[,viewer_group,target_group,max_distance,mask,ignore_group]
+or {"viewer": [0,1.7,0], "target": [20,1.5,3]}: whether this viewer sees this target.)");
   add_repeatable(command, "--viewer", options->viewers, "X,Y,Z", "An eye; repeat for more viewers");
   add_repeatable(command, "--target", options->targets, "X,Y,Z", "A point of a target; repeat for more");
   command.add_option("--samples", options->samples, "Points of each target, up to 255 [1]")->type_name("POINTS");
@@ -98,6 +138,7 @@ The answer has the number of seen points for each viewer and target. A viewer's 
   add_repeatable(command, "--max-distance", options->max_distances, "D",
                  "How far a viewer sees; one for each, or one for all [inf]");
   command.add_flag("--pairwise", options->pairwise, "Ask only whether viewer i sees target i");
+  add_bulk_query_options(command, options->bulk);
   add_query_options(command, options->query);
   run_or_check_when_chosen(command, options, context, query_sight);
 }

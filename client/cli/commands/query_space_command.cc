@@ -17,6 +17,7 @@ namespace {
 
 struct FrustumOptions {
   QueryOptions query;
+  BulkOptions bulk;
   std::vector<Quaternion> planes;
   std::vector<double> matrix;
   v1::ClipDepth clip_depth = v1::CLIP_DEPTH_UNSPECIFIED;
@@ -31,13 +32,35 @@ struct PointOptions {
   uint32_t max_planes = 0;
 };
 
+// Reads a matrix from each row.
+absl::Status query_views_of_input(const FrustumOptions& options, Context& context) {
+  absl::Status checked = check(options.query, options.bulk);
+  if (checked.ok() && (!options.planes.empty() || !options.matrix.empty()))
+    checked = usage_error("give --plane, --view or an input with its columns, not both");
+  RETURN_IF_ERROR(checked);
+  BulkQuery query = {.schema = {{.name = "view", .parts = "0123456789abcdef", .required = true}},
+                     .layout = {.query = "frustum", .columns = overlap_columns(options.query, options.detail)},
+                     .rows_name = "found",
+                     .add_block = {}};
+  query.has_position = false;
+  add_filter_fields(options.query, query.schema);
+  query.add_block = [&](const BlockRows& rows, client::QueryBuilder& builder) {
+    client::FrustumBlock block = builder.frustums();
+    apply_to_block(options.query, block);
+    block.columns(query.layout.columns).detail(options.detail);
+    block.view_projections(float_column(rows.batch.columns[0], rows.rows, std::vector<float>(16), {}),
+                           options.clip_depth);
+    apply_filter_columns(options.query, rows, 1, block);
+  };
+  return run_bulk_query(query, options.query, options.bulk, context);
+}
+
 absl::Status query_frustum(const FrustumOptions& options, Context& context) {
-  if (options.planes.empty() == options.matrix.empty()) return usage_error("give --plane, or --view with 16 numbers");
-  std::vector<v1::Column> columns = {v1::COLUMN_ID};
-  if (options.detail == v1::STATIC_DETAIL_TRIANGLES || options.detail == v1::STATIC_DETAIL_TRIANGLES_SORTED)
-    columns.push_back(v1::COLUMN_TRIANGLE);
-  columns.insert(columns.end(), options.query.columns.begin(), options.query.columns.end());
-  const RowLayout layout = {.query = "frustum", .columns = columns};
+  if (options.bulk.given()) return query_views_of_input(options, context);
+  RETURN_IF_ERROR(check(options.bulk));
+  if (options.planes.empty() == options.matrix.empty())
+    return usage_error("give --plane, --view with 16 numbers, or rows with --from-csv or --from-ndjson");
+  const RowLayout layout = {.query = "frustum", .columns = overlap_columns(options.query, options.detail)};
   client::QueryBuilder builder;
   client::FrustumBlock block = builder.frustums();
   apply_to_block(options.query, block);
@@ -57,9 +80,7 @@ absl::Status check_input(const PointOptions& options) {
 }
 
 RowLayout layout_of_contains(const PointOptions& options) {
-  RowLayout layout = {.query = "point", .columns = {v1::COLUMN_ID}};
-  layout.columns.insert(layout.columns.end(), options.query.columns.begin(), options.query.columns.end());
-  return layout;
+  return {.query = "point", .columns = columns_behind({v1::COLUMN_ID}, options.query)};
 }
 
 absl::Status query_contains(const PointOptions& options, Context& context) {
@@ -88,11 +109,9 @@ absl::Status query_contains(const PointOptions& options, Context& context) {
 }
 
 RowLayout layout_of_cell(const PointOptions& options) {
-  RowLayout layout = {.query = "cell", .columns = {v1::COLUMN_T, v1::COLUMN_ID}};
-  std::vector<v1::Column> more = options.query.columns;
-  if (more.empty()) more = {v1::COLUMN_TRIANGLE, v1::COLUMN_NORMAL, v1::COLUMN_POINT};
-  layout.columns.insert(layout.columns.end(), more.begin(), more.end());
-  return layout;
+  return {.query = "cell",
+          .columns = columns_behind({v1::COLUMN_T, v1::COLUMN_ID}, options.query,
+                                    {v1::COLUMN_TRIANGLE, v1::COLUMN_NORMAL, v1::COLUMN_POINT})};
 }
 
 absl::Status query_cell(const PointOptions& options, Context& context) {
@@ -135,7 +154,8 @@ void add_query_frustum(CLI::App& parent, Context& context) {
   locus query frustum arena --view 1,0,0,0,0,1,0,0,0,0,-1,-1,0,0,-0.1,0 --source dynamic
 
 A point p is inside of a plane nx,ny,nz,d if n.p + d is 0 or more; a region has 4 to 32 planes. A view is a
-column-major matrix from positions to clip coordinates.)");
+column-major matrix from positions to clip coordinates. Rows: view.0,view.1, ... view.9,view.a, ... view.f
+[,mask,ignore_group], or {"view": [16 numbers]}.)");
   add_repeatable(command, "--plane", options->planes, "NX,NY,NZ,D", "A plane of the region; repeat for each");
   command.add_option("--view", options->matrix, "A view-projection matrix: 16 numbers, column by column")
       ->type_name("NUMBERS")
@@ -147,8 +167,8 @@ column-major matrix from positions to clip coordinates.)");
       ->type_name("DEPTH")
       ->transform(choices(depths));
   add_detail_option(command, options->detail);
-  command.add_option("--after-id", options->query.after_id, "Return only higher ids, to continue a truncated answer")
-      ->type_name("ID");
+  add_after_id_option(command, options->query);
+  add_bulk_query_options(command, options->bulk);
   add_query_options(command, options->query);
   run_or_check_when_chosen(command, options, context, query_frustum);
 }
@@ -164,8 +184,7 @@ void add_query_contains(CLI::App& parent, Context& context) {
 A mesh without open edges (see `locus mesh show`) is closed and contains what it winds around. Rows:
 at.x,at.y,at.z[,mask,ignore_group] or {"at": [0,0,0]}.)");
   add_repeatable(command, "--at", options->at, "X,Y,Z", "A point; repeat for more");
-  command.add_option("--after-id", options->query.after_id, "Return only higher ids, to continue a truncated answer")
-      ->type_name("ID");
+  add_after_id_option(command, options->query);
   add_bulk_query_options(command, options->bulk);
   add_query_options(command, options->query);
   run_or_check_when_chosen(command, options, context, query_contains);

@@ -8,7 +8,6 @@
 #include "client/cli/commands/bulk_query.h"
 #include "client/cli/commands/query_command.h"
 #include "client/cli/failure.h"
-#include "client/lib/result_rows.h"
 #include "core/base/status_macros.h"
 
 namespace locus::cli {
@@ -28,11 +27,10 @@ struct SweepOptions {
 };
 
 RowLayout layout_of(const SweepOptions& options) {
-  RowLayout layout = {.query = "sweep", .columns = {v1::COLUMN_T, v1::COLUMN_ID}};
+  RowLayout layout = {.query = "sweep"};
   layout.dense = options.mode == v1::RAY_MODE_FIRST;
-  std::vector<v1::Column> more = options.query.columns;
-  if (more.empty()) more = {v1::COLUMN_TRIANGLE, v1::COLUMN_POINT, v1::COLUMN_NORMAL};
-  layout.columns.insert(layout.columns.end(), more.begin(), more.end());
+  layout.columns = columns_behind({v1::COLUMN_T, v1::COLUMN_ID}, options.query,
+                                  {v1::COLUMN_TRIANGLE, v1::COLUMN_POINT, v1::COLUMN_NORMAL});
   return layout;
 }
 
@@ -44,19 +42,6 @@ void apply_to_sweeps(const SweepOptions& options, const RowLayout& layout, const
   if (options.mode != v1::RAY_MODE_ANY) block.columns(layout.columns);
   block.half_axes(floats_of(options.half_axes)).half_extents(floats_of(options.half_extents));
   block.rotations(floats_of(options.rotations));
-}
-
-absl::Status report_any(const SweepOptions& options, client::QueryBuilder& builder, Context& context) {
-  ASSIGN_OR_RETURN(const v1::QueryResult result, ask_block(options.query, builder, context));
-  ASSIGN_OR_RETURN(const client::AnyHits hits, client::AnyHits::of(result.blocks(0)));
-  Report report;
-  report.head = result_head(result);
-  report.rows_name = "sweeps";
-  report.keys = {"sweep", "hit"};
-  for (size_t sweep = 0; sweep < hits.size(); ++sweep)
-    report.rows.push_back({{"sweep", sweep}, {"hit", hits.hit(sweep)}});
-  context.write(report);
-  return absl::OkStatus();
 }
 
 enum SweepField : size_t { kSweepFrom, kSweepWay, kSweepRadius, kSweepFilter };
@@ -71,8 +56,10 @@ absl::Status query_sweeps_of_input(const SweepOptions& options, Context& context
   checked.Update(at_most_one(options.rotations, "--rotation"));
   if (!checked.ok()) return checked;
   BulkQuery query = {.schema = {}, .layout = layout_of(options), .rows_name = "hits", .add_block = {}};
-  query.any = options.mode == v1::RAY_MODE_ANY;
-  if (query.any) query.rows_name = "sweeps";
+  if (options.mode == v1::RAY_MODE_ANY) {
+    query.answer = BulkAnswer::kHits;
+    query.rows_name = "sweeps";
+  }
   const bool boxes = !options.half_extents.empty();
   query.schema = {{.name = "from", .kind = FieldKind::kCoordinate, .parts = "xyz", .required = true},
                   {.name = "way", .parts = "xyz", .required = true},
@@ -96,18 +83,15 @@ absl::Status query_sweep(const SweepOptions& options, Context& context) {
   RETURN_IF_ERROR(check(options.bulk));
   if (options.from.empty() || options.to.empty() || (options.radii.empty() && options.half_extents.empty()))
     return usage_error("give --from, --to and --radius or --half, or rows with --from-csv or --from-ndjson");
-  std::vector<Triple> all = options.from;
-  all.insert(all.end(), options.to.begin(), options.to.end());
-  const FramedPositions at = framed(all);
-  const absl::Span<const float> offsets = at.offsets;
+  const FramedPaths at = framed(options.from, options.to);
   RowLayout layout = layout_of(options);
   layout.frame = at.frame;
   client::QueryBuilder builder;
   client::SweepBlock block = builder.sweeps();
   apply_to_sweeps(options, layout, at.frame, block);
-  block.sweeps(offsets.subspan(0, 3 * options.from.size()), offsets.subspan(3 * options.from.size()));
+  block.sweeps(at.starts, at.ends);
   block.radii(floats_of(options.radii));
-  if (options.mode == v1::RAY_MODE_ANY) return report_any(options, builder, context);
+  if (options.mode == v1::RAY_MODE_ANY) return ask_and_report_any(options.query, builder, "sweep", context);
   return ask_and_report(options.query, builder, layout, "hits", context);
 }
 
