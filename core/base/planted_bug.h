@@ -60,6 +60,21 @@ enum class PlantedBug {
   kRegionEdgeScale,   // edges are not scaled up, so that products of their components may underflow
   kRegionRange,       // boxes and blocks so small that products of coordinates underflow are tested in float
   kRegionTurnedNode,  // boxes of nodes are tested against a rotated box without a pad
+  // Access control:
+  kRightLeftOut,         // a grant of any right to a scene grants every right to it
+  kSceneLeftOut,         // a grant for some scenes grants its rights to every scene
+  kUpdateIsAdmin,        // the right to update includes the right to administer
+  kGlobTooWide,          // a pattern matches every text that begins like it
+  kTokenByPrefix,        // only the beginning of a token, its id, is compared
+  kTokenNeverExpires,    // the time at which a token expires is ignored
+  kRevokedTokenStays,    // the streams of a revoked token are still valid
+  kReloadUnnoticed,      // a reload changes the rules, but not their generation
+  kJwtNeverExpires,      // the claim exp is ignored
+  kJwtForAnyone,         // the claim aud is ignored
+  kJwtWithoutAlgorithm,  // a JWT whose algorithm is `none` needs no signature
+  kJwtAnySignature,      // the signature is not compared
+  kJwtKeyOfAnotherKind,  // a key verifies algorithms that it is not for
+  kUserFromAfar,         // the user of a peer counts on every connection
 };
 
 #ifdef LOCUS_PLANT_BUGS

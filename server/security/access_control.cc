@@ -10,6 +10,7 @@
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/strip.h"
+#include "core/base/planted_bug.h"
 #include "core/base/refusal.h"
 #include "core/base/status_macros.h"
 #include "server/security/jwt.h"
@@ -139,7 +140,8 @@ absl::StatusOr<IdentityPtr> AccessControl::authenticate(const Credentials& crede
   if (!credentials.bearer.empty()) return check_bearer(credentials.bearer);
   if (!credentials.certificate_name.empty())
     return named_identity(IdentityKind::kCertificate, credentials.certificate_name);
-  if (credentials.unix_uid && credentials.local) return user(*credentials.unix_uid);
+  if (credentials.unix_uid && (credentials.local || planted(PlantedBug::kUserFromAfar)))
+    return user(*credentials.unix_uid);
   return anonymous_identity();
 }
 
@@ -172,6 +174,7 @@ bool AccessControl::still_valid(const Identity& identity) const {
     case IdentityKind::kUser:
       return true;
     case IdentityKind::kToken:
+      if (planted(PlantedBug::kRevokedTokenStays)) return true;
       return state()->tokens.contains(absl::StripPrefix(identity.principal, kTokenPrincipal), identity.credential,
                                       clock_());
     case IdentityKind::kJwt: {
@@ -191,7 +194,7 @@ absl::Status AccessControl::reload() {
     MutexLock users_lock(users_mutex_);
     users_.clear();
   }
-  generation_.fetch_add(1, std::memory_order_release);
+  if (!planted(PlantedBug::kReloadUnnoticed)) generation_.fetch_add(1, std::memory_order_release);
   for (const std::function<void()>& listener : listeners_) listener();
   return absl::OkStatus();
 }

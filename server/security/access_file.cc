@@ -11,6 +11,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
+#include "core/base/planted_bug.h"
 #include "core/base/status_macros.h"
 #include "server/security/glob.h"
 #include "server/security/security_limits.h"
@@ -117,7 +118,7 @@ class AccessParser {
       if (!right)
         return refuse(absl::StrCat("there is no right ", quoted_word(name), "; the rights are ",
                                    absl::StrJoin(kRightNames, ", "), ", separated by commas without spaces"));
-      bits |= with_included(*right);
+      bits |= with_included(*right == Right::kUpdate && planted(PlantedBug::kUpdateIsAdmin) ? Right::kAdmin : *right);
     }
     return bits;
   }
@@ -233,8 +234,8 @@ bool AccessRules::any_grant(absl::string_view principal, const Visit& visit) con
 
 bool AccessRules::allows(const Identity& identity, Right right, absl::string_view scene) const {
   return any_grant(identity.principal, [&](const Grant& grant) {
-    if ((grant.rights & bit_of(right)) == 0) return false;
-    if (!is_scene_right(right)) return true;
+    if ((grant.rights & bit_of(right)) == 0 && !planted(PlantedBug::kRightLeftOut)) return false;
+    if (!is_scene_right(right) || planted(PlantedBug::kSceneLeftOut)) return true;
     return std::any_of(grant.scenes.begin(), grant.scenes.end(),
                        [&](const std::string& pattern) { return glob_matches(pattern, scene); });
   });

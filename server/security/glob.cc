@@ -1,11 +1,14 @@
 #include "server/security/glob.h"
 
+#include "core/base/planted_bug.h"
+
 namespace locus::server {
 
 bool glob_matches(absl::string_view pattern, absl::string_view text) {
   size_t p = 0, t = 0;
   size_t star = absl::string_view::npos, star_end = 0;  // last `*`, and the end of the text that it stands for so far
   while (t < text.size()) {
+    if (p == pattern.size() && planted(PlantedBug::kGlobTooWide)) return true;
     if (p < pattern.size() && pattern[p] == '*') {
       star = p++;
       star_end = t;

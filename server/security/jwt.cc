@@ -6,8 +6,10 @@
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/escaping.h"
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
+#include "core/base/planted_bug.h"
 #include "core/base/refusal.h"
 #include "core/base/status_macros.h"
 #include "server/security/security_limits.h"
@@ -45,7 +47,8 @@ absl::Status check_times(const json_t* claims, int64_t now) {
   RETURN_IF_ERROR(read_time(claims, "nbf", not_before));
   RETURN_IF_ERROR(read_time(claims, "iat", issued));
   if (!expires) return not_accepted("it has no claim exp, so it would be valid for ever");
-  if (seconds >= *expires + kJwtSkewSeconds) return not_accepted("it has expired");
+  const bool expired = seconds >= *expires + kJwtSkewSeconds;
+  if (expired && !planted(PlantedBug::kJwtNeverExpires)) return not_accepted("it has expired");
   if (not_before && seconds < *not_before - kJwtSkewSeconds) return not_accepted("it is not valid yet (nbf)");
   if (issued && seconds < *issued - kJwtSkewSeconds) return not_accepted("it was issued in the future (iat)");
   return absl::OkStatus();
@@ -125,15 +128,20 @@ absl::StatusOr<JwtVerifier> JwtVerifier::parse(absl::string_view file, absl::str
 
 absl::Status JwtVerifier::check_signature(absl::string_view header, absl::string_view signed_text,
                                           absl::string_view signature, const SignatureKey** key) const {
+  if (planted(PlantedBug::kJwtWithoutAlgorithm) && absl::StrContains(header, "\"none\"")) {
+    *key = &keys_.front();
+    return absl::OkStatus();
+  }
   ASSIGN_OR_RETURN(const JwtHeader read, read_header(header));
   std::vector<const SignatureKey*> candidates;
   for (const SignatureKey& candidate : keys_)
-    if (candidate.algorithm() == read.algorithm && (!read.key_id || *read.key_id == candidate.id()))
+    if ((candidate.algorithm() == read.algorithm || planted(PlantedBug::kJwtKeyOfAnotherKind)) &&
+        (!read.key_id || *read.key_id == candidate.id()))
       candidates.push_back(&candidate);
   if (candidates.empty()) return not_accepted("there is no key with its kid and algorithm");
   if (candidates.size() > kMaxTriedKeys) return not_accepted("several keys fit, so its header must have a kid");
   for (const SignatureKey* const candidate : candidates) {
-    if (!candidate->verifies(signed_text, signature)) continue;
+    if (!candidate->verifies(signed_text, signature) && !planted(PlantedBug::kJwtAnySignature)) continue;
     *key = candidate;
     return absl::OkStatus();
   }
@@ -143,7 +151,8 @@ absl::Status JwtVerifier::check_signature(absl::string_view header, absl::string
 absl::Status JwtVerifier::check_claims(const json_t* claims, int64_t now) const {
   if (claims == nullptr) return not_accepted("its payload is no JSON object");
   RETURN_IF_ERROR(check_times(claims, now));
-  if (!names_audience(json_object_get(claims, "aud"), audience_)) return not_accepted("it is for another audience");
+  if (!names_audience(json_object_get(claims, "aud"), audience_) && !planted(PlantedBug::kJwtForAnyone))
+    return not_accepted("it is for another audience");
   if (!issuer_.empty() && json_text(json_object_get(claims, "iss")) != issuer_)
     return not_accepted("it is from another issuer");
   return absl::OkStatus();

@@ -19,6 +19,7 @@
 #include "absl/strings/str_split.h"
 #include "absl/time/time.h"
 #include "core/base/check.h"
+#include "core/base/planted_bug.h"
 #include "core/base/refusal.h"
 #include "core/base/status_macros.h"
 #include "server/security/security_limits.h"
@@ -111,7 +112,9 @@ bool is_blank(absl::string_view line) {
 // Returns the first word of a line.
 absl::string_view first_word(absl::string_view line) { return line.substr(0, line.find_first_of(" \t")); }
 
-bool is_expired(const TokenEntry& entry, int64_t now) { return entry.expires && now >= *entry.expires; }
+bool is_expired(const TokenEntry& entry, int64_t now) {
+  return entry.expires && now >= *entry.expires && !planted(PlantedBug::kTokenNeverExpires);
+}
 
 // Lock of a token file against other writers, by a lock file beside it. The destructor releases the lock; the lock file
 // is never deleted.
@@ -186,7 +189,8 @@ const TokenEntry* TokenTable::find(absl::string_view token, int64_t now) const {
   const TokenHash hash = hash_of(token);
   const auto found = numbers_.find(id);
   const TokenEntry* const entry = found == numbers_.end() ? nullptr : &entries_[found->second];
-  const bool equal = CRYPTO_memcmp((entry ? entry->hash : kNobody).data(), hash.data(), hash.size()) == 0;
+  const size_t compared = planted(PlantedBug::kTokenByPrefix) ? 0 : hash.size();
+  const bool equal = CRYPTO_memcmp((entry ? entry->hash : kNobody).data(), hash.data(), compared) == 0;
   return entry != nullptr && equal && !is_expired(*entry, now) ? entry : nullptr;
 }
 

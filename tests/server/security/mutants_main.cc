@@ -1,0 +1,74 @@
+// Main function of the security tests that are linked with planted bugs: runs all tests once without a bug, where they
+// must pass, and once with each bug, where at least one must fail. Each run is a process of its own. Exits 0 if every
+// bug is caught.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <iterator>
+
+#include "core/base/planted_bug.h"
+
+namespace locus::server {
+namespace {
+
+struct Mutant {
+  const char* name;
+  PlantedBug bug;
+};
+
+constexpr Mutant kMutants[] = {
+    {"RightLeftOut", PlantedBug::kRightLeftOut},
+    {"SceneLeftOut", PlantedBug::kSceneLeftOut},
+    {"UpdateIsAdmin", PlantedBug::kUpdateIsAdmin},
+    {"GlobTooWide", PlantedBug::kGlobTooWide},
+    {"TokenByPrefix", PlantedBug::kTokenByPrefix},
+    {"TokenNeverExpires", PlantedBug::kTokenNeverExpires},
+    {"RevokedTokenStays", PlantedBug::kRevokedTokenStays},
+    {"ReloadUnnoticed", PlantedBug::kReloadUnnoticed},
+    {"JwtNeverExpires", PlantedBug::kJwtNeverExpires},
+    {"JwtForAnyone", PlantedBug::kJwtForAnyone},
+    {"JwtWithoutAlgorithm", PlantedBug::kJwtWithoutAlgorithm},
+    {"JwtAnySignature", PlantedBug::kJwtAnySignature},
+    {"JwtKeyOfAnotherKind", PlantedBug::kJwtKeyOfAnotherKind},
+    {"UserFromAfar", PlantedBug::kUserFromAfar},
+};
+
+// Returns the exit code of all tests with a bug: 0 if they pass, 1 if one fails, otherwise the run did not come to its
+// end. Their output goes to /dev/null if a failure is expected.
+int result_with(PlantedBug bug) {
+  std::fflush(stdout);
+  const pid_t child = fork();
+  if (child == 0) {
+    planted_bug = bug;
+    if (bug != PlantedBug::kNone && std::freopen("/dev/null", "w", stdout) == nullptr) std::_Exit(2);
+    std::_Exit(RUN_ALL_TESTS());
+  }
+  int status = 0;
+  if (child < 0 || waitpid(child, &status, 0) != child || !WIFEXITED(status)) return -1;
+  return WEXITSTATUS(status);
+}
+
+int run() {
+  if (result_with(PlantedBug::kNone) != 0) {
+    std::puts("the tests fail without a planted bug");
+    return 1;
+  }
+  int missed = 0;
+  for (const Mutant& mutant : kMutants) {
+    const bool caught = result_with(mutant.bug) == 1;
+    std::printf("%s: %s\n", mutant.name, caught ? "caught" : "MISSED");
+    missed += caught ? 0 : 1;
+  }
+  std::printf("mutants of access control: %zu, missed: %d\n", std::size(kMutants), missed);
+  return missed == 0 ? 0 : 1;
+}
+
+}  // namespace
+}  // namespace locus::server
+
+int main(int argc, char** argv) {
+  ::testing::InitGoogleTest(&argc, argv);
+  return locus::server::run();
+}
