@@ -140,6 +140,7 @@ void get_server(Host& host, v1::GetServerResponse& response) {
     out->set_value(limit.value);
     out->set_used(limit.used);
   }
+  response.set_insecure(host.config.insecure);
 }
 
 }  // namespace

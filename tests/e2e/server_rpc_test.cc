@@ -35,6 +35,14 @@ TEST_F(ServerRpcTest, TheServerReportsItsVersionAndFeatures) {
                                      "nearest", "pairs", "rays", "sight", "static_from", "sweeps"));
 }
 
+TEST_F(ServerRpcTest, AServerThatWasStartedInsecureSaysSo) {
+  EXPECT_FALSE(get_server(stubs()).insecure());
+  server::ServerConfig config = test_config();
+  config.insecure = true;
+  RunningServer insecure(config);
+  EXPECT_TRUE(get_server(insecure.stubs()).insecure());
+}
+
 TEST_F(ServerRpcTest, LimitsAreListedInOrderWithTheirUse) {
   const v1::GetServerResponse server = get_server(stubs());
   std::vector<std::string> names;

@@ -20,6 +20,7 @@ absl::Status version(const VersionOptions& options, Context& context) {
     ASSIGN_OR_RETURN(const v1::GetServerResponse server, client->get_server());
     report.head["server_version"] = server.version();
     report.head["instruction_set"] = server.instruction_set();
+    report.head["insecure"] = server.insecure();
     report.head["features"] = Json::array();
     for (const std::string& feature : server.features()) report.head["features"].push_back(feature);
   }

@@ -150,18 +150,20 @@ class Quota:
 
 @dataclasses.dataclass(frozen=True)
 class Server:
-    """Description of the server; `limits` maps names to limits."""
+    """Description of the server; `limits` maps names to limits. `insecure`: it was started with --insecure."""
 
     version: str
     instruction_set: str
     features: Tuple[str, ...]
     limits: Dict[str, Limit]
+    insecure: bool = False
 
     @classmethod
     def of(cls, message: Any) -> "Server":
         """Converts the protocol's GetServerResponse."""
         limits = {limit.name: Limit(limit.value, limit.used) for limit in message.limits}
-        return cls(message.version, message.instruction_set, tuple(message.features), limits)
+        return cls(message.version, message.instruction_set, tuple(message.features), limits,
+                   message.insecure)
 
 
 @dataclasses.dataclass(frozen=True)
