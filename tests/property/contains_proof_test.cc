@@ -173,10 +173,8 @@ class Trial {
     if ((std::lround(winding) != 0) != found) note("winding " + std::to_string(winding), tally);
   }
 
-  bool is_exactly_inside(Vec3d point) const {
+  bool is_exactly_inside(const Vec3d& point) const {
     int winding = 0;
-    for (int axis = 0; axis < 3; ++axis)
-      if (std::abs(point[axis]) < 0x1p-40) point[axis] = 0;
     for (const Triangle& triangle : mesh_) {
       const Crossing found = exact_crossing(point, triangle);
       if (found.on_surface) return true;
