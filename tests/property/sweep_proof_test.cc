@@ -1,0 +1,201 @@
+// No sweep misses and none hits too early: balls, capsules and boxes move past the triangles of placed meshes, and the
+// answers of the query engine are compared with a search in long double. A hundred thousand sweeps in each run, ten
+// million in the long run, or as many as LOCUS_PROOF_SWEEPS says.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdio>
+#include <cstdlib>
+#include <mutex>
+#include <thread>
+
+#include "tests/support/generated_meshes.h"
+#include "tests/support/proof/real_sweep.h"
+#include "tests/support/small_world.h"
+#include "tests/support/test_scale.h"
+#include "tests/support/triangle_reference.h"
+
+namespace locus::test {
+namespace {
+
+constexpr uint64_t kSeed = 718;
+constexpr size_t kSweepsOfAMesh = 300;
+
+struct SweepTally {
+  uint64_t sweeps = 0, hits = 0, faults = 0;
+  std::string first_fault;
+
+  void note(const std::string& fault) {
+    if (faults++ == 0) first_fault = fault;
+  }
+};
+
+std::vector<Triangle> random_mesh(Random& random) {
+  const uint64_t seed = random.next();
+  if (random.chance(0.3)) return bumpy_sphere(6, 0.3, seed);
+  if (random.chance(0.3)) return box_city(3, seed);
+  std::vector<Triangle> mesh;
+  const Vec3f home = to_float(random.vector(4));
+  while (mesh.size() < 60) {
+    const Triangle t = random_triangle(random);
+    const float scale = static_cast<float>(2 / std::max(size_of(t), 1e-6));
+    const Vec3f place = home + to_float(random.vector(4));
+    mesh.push_back({(t.a - t.a) * scale + place, (t.b - t.a) * scale + place, (t.c - t.a) * scale + place});
+  }
+  number_in_order(mesh);
+  return mesh;
+}
+
+// One placed mesh and the sweeps that are asked about.
+class SweepTrial {
+ public:
+  explicit SweepTrial(uint64_t seed) : seed_(seed), random_(seed), mesh_(random_mesh(random_)) {
+    PlacedMesh placed;
+    placed.id = 1;
+    placed.mesh = mesh_of(mesh_);
+    if (random_.chance(0.7)) {
+      placed.rotation = random_.rotation();
+      placed.scale = static_cast<float>(random_.magnitude(-4, 4));
+      placed.translation = random_.vector(random_.magnitude(0, 16));
+    }
+    QueryWorld world;
+    world.instances = {placed};
+    snapshot_ = snapshot_of(world);
+    transform_ = &snapshot_->statics->find(1)->transform;
+    for (const Triangle& triangle : mesh_)
+      triangles_.emplace_back(RealCorners{world_of(triangle.a), world_of(triangle.b), world_of(triangle.c)});
+  }
+
+  void run(SweepTally& tally) {
+    for (const MoverKind kind : {MoverKind::kBall, MoverKind::kCapsule, MoverKind::kBox}) run(kind, tally);
+  }
+
+ private:
+  Vec3r world_of(Vec3f corner) const {
+    return turned(transform_->quaternion, to_real(corner)) * Real{transform_->scale} + to_real(transform_->translation);
+  }
+
+  // Adds a sweep that passes near a triangle. Its way is at most eight times as long as its start's distance from the
+  // frame and its size together, so that the rounding of t to float is within the promised error.
+  void add_sweep(MoverKind kind, OwnedBlock& block) {
+    const Triangle& target = random_.pick(mesh_);
+    const double scale = transform_->scale, size = scale * random_.magnitude(-7, 1);
+    const Vec3d near =
+        transform_->point_to_world(to_double(target.a) * random_.unit() + to_double(target.b) * random_.unit() * 0.5) -
+        transform_->translation + random_.vector(size);
+    const Vec3d start = near + random_.vector(scale * random_.magnitude(-2, 4));
+    Vec3d way = (near - start) * random_.between(0.3, 3);
+    if (random_.chance(0.1)) way[random_.whole(0, 2)] = 0;
+    const Vec3f from = to_float(start), to = to_float(start + way);
+    block.points.insert(block.points.end(), {from.x, from.y, from.z});
+    block.sizes.insert(block.sizes.end(), {to.x, to.y, to.z});
+    const auto three = [&](Vec3f v, std::vector<float>& column) { column.insert(column.end(), {v.x, v.y, v.z}); };
+    if (kind != MoverKind::kBox) block.extras.push_back(static_cast<float>(size * random_.between(0.01, 1)));
+    if (kind == MoverKind::kCapsule) three(to_float(random_.vector(size * 2)), block.half_axes);
+    if (kind != MoverKind::kBox) return;
+    const auto side = [&] { return static_cast<float>(size * random_.between(0.01, 1)); };
+    three({side(), side(), side()}, block.half_extents);
+    const Quaternion q = random_.rotation();
+    block.rotations.insert(block.rotations.end(), {q.x, q.y, q.z, q.w});
+  }
+
+  void run(MoverKind kind, SweepTally& tally) {
+    OwnedBlock block;
+    block.settings.kind = SweepColumns{};
+    block.settings.frame = transform_->translation;
+    block.settings.columns = {Column::kT, Column::kId};
+    for (size_t i = 0; i < kSweepsOfAMesh; ++i) add_sweep(kind, block);
+    const BlockResult result = run_block(*snapshot_, block);
+    for (size_t i = 0; i < kSweepsOfAMesh; ++i) {
+      const RealMover mover = mover_of(kind, block, i);
+      ++tally.sweeps;
+      tally.hits += result.ids[i] != 0 ? 1 : 0;
+      std::optional<Real> found;
+      if (result.ids[i] != 0) found = result.t[i];
+      if (std::string fault = fault_of(mover, found); !fault.empty())
+        tally.note("seed " + std::to_string(seed_) + " kind " + std::to_string(static_cast<int>(kind)) + " sweep " +
+                   std::to_string(i) + ": " + fault);
+    }
+  }
+
+  RealMover mover_of(MoverKind kind, const OwnedBlock& block, size_t i) const {
+    RealMover mover;
+    mover.kind = kind;
+    const auto at = [i](const std::vector<float>& column) {
+      return Vec3r{column[3 * i], column[3 * i + 1], column[3 * i + 2]};
+    };
+    mover.start = at(block.points) + to_real(transform_->translation);
+    mover.way = at(block.sizes) - at(block.points);
+    if (kind != MoverKind::kBox) mover.radius = block.extras[i];
+    if (kind == MoverKind::kCapsule) mover.half_axis = at(block.half_axes);
+    if (kind != MoverKind::kBox) return mover;
+    mover.half = at(block.half_extents);
+    const float* const q = &block.rotations[4 * i];
+    for (int axis = 0; axis < 3; ++axis) {
+      Vec3r unit_axis;
+      unit_axis[axis] = 1;
+      mover.axes[static_cast<size_t>(axis)] = turned({q[0], q[1], q[2], q[3]}, unit_axis);
+    }
+    return mover;
+  }
+
+  // Returns how an answer breaks the promise: the mover shrunk by e touches something e or more before it, or the mover
+  // grown by e touches nothing there; e is 2^-20 of the start's distance from the origin and the mover's size.
+  std::string fault_of(const RealMover& mover, std::optional<Real> found) const {
+    const Real e = 0x1p-20L * (length(mover.start) + mover.size()), way = length(mover.way);
+    const Real before = !found ? 1 : way == 0 ? -1 : *found - e / way;
+    bool touches = false;
+    for (const SweptTriangle& triangle : triangles_) {
+      if (!triangle.is_near(mover, e)) continue;
+      if (triangle.is_overlapped(mover, -e, before))
+        return found ? "a contact before " + std::to_string(static_cast<double>(*found)) : std::string("a miss");
+      touches = touches || (found && triangle.gap(mover, *found, e) <= 0);
+    }
+    if (!found || touches) return "";
+    return "nothing is touched at " + std::to_string(static_cast<double>(*found));
+  }
+
+  const uint64_t seed_;
+  Random random_;
+  const std::vector<Triangle> mesh_;
+  SnapshotPtr snapshot_;
+  const Transform* transform_ = nullptr;
+  std::vector<SweptTriangle> triangles_;
+};
+
+// Asks at least `sweeps` sweeps on all processors.
+void expect_no_fault(uint64_t sweeps) {
+  const uint64_t meshes = (sweeps + 3 * kSweepsOfAMesh - 1) / (3 * kSweepsOfAMesh);
+  std::atomic<uint64_t> next{0};
+  std::mutex mutex;
+  SweepTally all;
+  std::vector<std::thread> threads;
+  for (unsigned thread = 0; thread < std::max(1u, std::thread::hardware_concurrency()); ++thread)
+    threads.emplace_back([&] {
+      SweepTally own;
+      for (uint64_t i = next++; i < meshes; i = next++) SweepTrial(kSeed + i).run(own);
+      const std::lock_guard lock(mutex);
+      all.sweeps += own.sweeps;
+      all.hits += own.hits;
+      all.faults += own.faults;
+      if (all.first_fault.empty()) all.first_fault = own.first_fault;
+    });
+  for (std::thread& thread : threads) thread.join();
+  std::printf("proof: %llu sweeps past %llu meshes, %llu hits: %llu faults; seed %llu\n",
+              static_cast<unsigned long long>(all.sweeps), static_cast<unsigned long long>(meshes),
+              static_cast<unsigned long long>(all.hits), static_cast<unsigned long long>(all.faults),
+              static_cast<unsigned long long>(kSeed));
+  EXPECT_EQ(all.faults, 0u) << all.first_fault;
+  EXPECT_GE(all.sweeps, sweeps);
+  EXPECT_GT(all.hits, sweeps / 4) << "too few sweeps hit to prove anything";
+}
+
+TEST(SweepProofTest, NoSweepMissesAndNoneHitsTooEarly) { expect_no_fault(scaled_count(100'000)); }
+
+TEST(LongSweepProofTest, NoSweepMissesAndNoneHitsTooEarly) {
+  const char* const text = std::getenv("LOCUS_PROOF_SWEEPS");
+  expect_no_fault(text == nullptr ? 10'000'000 : static_cast<uint64_t>(std::strtod(text, nullptr)));
+}
+
+}  // namespace
+}  // namespace locus::test
