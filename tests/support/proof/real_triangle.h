@@ -34,8 +34,7 @@ class RealTriangle {
   explicit RealTriangle(const Triangle& triangle)
       : RealTriangle(to_real(triangle.a), to_real(triangle.b), to_real(triangle.c)) {}
   RealTriangle(Vec3r a, Vec3r b, Vec3r c)
-      : corners_{a, b, c},
-        normal_(unit(cross(corners_[1] - corners_[0], corners_[2] - corners_[0]))) {
+      : corners_{a, b, c}, normal_(unit(cross(corners_[1] - corners_[0], corners_[2] - corners_[0]))) {
     for (int i = 0; i < 3; ++i) inward_[i] = unit(cross(normal_, corners_[(i + 1) % 3] - corners_[i]));
   }
 
