@@ -22,15 +22,17 @@ Json point_json(const ResultRows& rows, size_t row, const client::Double3& frame
 Json triangle_json(uint32_t triangle) { return triangle == client::kNoTriangle ? Json() : Json(triangle); }
 
 // Sets the key or keys of `column` in `json`, the report's row for row `row` of the answer. The value is null for a
-// miss, and for a column that the answer does not contain.
-void add_column(const ResultRows& rows, size_t row, bool hit, v1::Column column, const client::Double3& frame,
-                Json& json) {
+// row without an id, which is a miss or the ball of a cell, and for a column that the answer does not contain; the t of
+// a cell's ball is its radius.
+void add_column(const ResultRows& rows, size_t row, const RowLayout& layout, v1::Column column, Json& json) {
+  const bool hit = rows.ids().empty() || rows.ids()[row] != 0;
   const auto add = [&](const char* key, bool present, const auto& value) {
     json[key] = hit && present ? value() : Json();
   };
   switch (column) {
     case v1::COLUMN_T:
-      return add("t", !rows.t().empty(), [&] { return float_json(rows.t()[row]); });
+      json["t"] = (hit || !layout.dense) && !rows.t().empty() ? float_json(rows.t()[row]) : Json();
+      return;
     case v1::COLUMN_ID:
       return add("id", !rows.ids().empty(), [&] { return id_json(rows.ids()[row]); });
     case v1::COLUMN_TRIANGLE:
@@ -40,7 +42,7 @@ void add_column(const ResultRows& rows, size_t row, bool hit, v1::Column column,
     case v1::COLUMN_NORMAL:
       return add("normal", !rows.normals().empty(), [&] { return floats_json(rows.normals().subspan(row * 3, 3)); });
     case v1::COLUMN_POINT:
-      return add("point", !rows.points().empty(), [&] { return point_json(rows, row, frame); });
+      return add("point", !rows.points().empty(), [&] { return point_json(rows, row, layout.frame); });
     case v1::COLUMN_GROUP:
       return add("group", !rows.groups().empty(), [&] { return id_json(rows.groups()[row]); });
     case v1::COLUMN_TAG:
@@ -89,10 +91,9 @@ absl::StatusOr<std::vector<Json>> rows_json(const v1::BlockResult& block, const 
     const client::RowRange range = rows.rows_of(query);
     for (size_t row = range.begin; row < range.end; ++row) {
       Json json = Json::object();
-      const bool hit = rows.ids().empty() || rows.ids()[row] != 0;
       if (!layout.query.empty()) json[layout.query] = layout.first_query + query;
-      if (layout.dense) json["hit"] = hit;
-      for (const v1::Column column : layout.columns) add_column(rows, row, hit, column, layout.frame, json);
+      if (layout.dense) json["hit"] = rows.ids().empty() || rows.ids()[row] != 0;
+      for (const v1::Column column : layout.columns) add_column(rows, row, layout, column, json);
       result.push_back(std::move(json));
     }
   }

@@ -136,7 +136,7 @@ TEST_F(QueryCommandTest, RowsOfAFileAreAnsweredLikeOptions) {
   const TestFile points("at.x,at.y,at.z,max_distance\n2.5,0,0,4\n0,0,0.5,4\n", "points.csv");
   EXPECT_EQ(csv_of({"contains", "world", "--from-csv", inside.path()}), "point,id\n1,7\n");
   EXPECT_EQ(csv_of({"cell", "world", "--from-csv", points.path(), "--columns", "id"}),
-            "cell,t,id\n0,4.0,0\n0,1.5,7\n0,1.5,8\n");
+            "cell,t,id\n0,4.0,\n0,1.5,7\n0,1.5,8\n");
   EXPECT_THAT(refusal_of({"sight", "world", "--from-csv", sight.path(), "--viewer", "0,0,0"}), HasSubstr("not both"));
 }
 
