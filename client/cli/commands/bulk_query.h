@@ -33,7 +33,7 @@ struct BlockRows {
   std::vector<float> offsets;  // 3 per row: the position (field 0 of the schema) relative to `frame`; empty without
 };
 
-// What a row of the answer is.
+// Content of a row of the answer.
 enum class BulkAnswer {
   kRows,  // the requested columns
   kHits,  // rays and sweeps in mode ANY: `hit`
