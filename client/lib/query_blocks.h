@@ -223,7 +223,7 @@ class NearestBlock : public BlockBuilder<NearestBlock> {
  public:
   explicit NearestBlock(v1::QueryBlock& block) : BlockBuilder(block), nearest_(block.mutable_nearest()) {}
 
-  // Sets the maximum number of rows per point, up to 65,536; 0 = 1.
+  // Sets the maximum number of rows per point, up to 65,536; 0 means 1.
   NearestBlock& k(uint32_t count);
   // Sets the detail of the rows. INSTANCES reports an instance once, with its nearest triangle.
   NearestBlock& detail(v1::StaticDetail detail);

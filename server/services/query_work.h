@@ -78,7 +78,7 @@ class QueryWork final : private QueryJob, private DeferredTask {
   absl::Status read(const std::string& scene, const v1::QueryBatch& batch);
   void answer(absl::Status status);
 
-  // Pins the revision that the view names and calls run(), or parks the batch until that revision is published.
+  // Pins the revision named by the view, then calls run(), or parks the batch until that revision is published.
   void look();
   void wait();
   // Removes the timer and the watch. Returns true if the wait is over. Returns false if woken() was already posted: the

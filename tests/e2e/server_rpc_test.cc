@@ -73,7 +73,8 @@ TEST_F(ServerRpcTest, OpenStreamsCountAsUsed) {
 
 TEST_F(ServerRpcTest, HealthAnswersServingForTheServerAndEachService) {
   for (const std::string service : {"", "locus.v1.QueryService", "locus.v1.SceneService"}) {
-    // Bytes of HealthCheckRequest{service = 1} and HealthCheckResponse{status = 1: SERVING}.
+    // Both messages are encoded by hand: `service` is field 1 of HealthCheckRequest, `status` is field 1 of
+    // HealthCheckResponse, and SERVING is 1.
     const std::string request =
         service.empty() ? "" : std::string("\x0a") + static_cast<char>(service.size()) + service;
     const RawReply reply = raw_call(stubs().channel, "/grpc.health.v1.Health/Check", request);

@@ -158,7 +158,8 @@ def rooms_use_their_namespace(tree):
         opened = OUTER_NAMESPACE.findall(code)
         if not opened and posixpath.basename(path) not in ("main.cc", "status_macros.h"):
             problems.append(f"{path}: has nothing in namespace {expected}")
-        # Headers of core may open inner namespaces such as locus::internal; those of other rooms may not.
+        # A file opens the namespace of its top-level folder, or one inside it. That of core is locus, so core must not
+        # open the namespaces of the other folders.
         for name in opened:
             inside = name == expected or name.startswith(expected + "::")
             nested = name != "locus" and "locus" not in name.split("::")[0] and expected in opened

@@ -1,6 +1,6 @@
 // A query of precision CONSERVATIVE finds everything that the same query of precision EXACT finds, at the same distance
-// or nearer. If it finds further triangles of instances, it meets the bounds of each of them in world axes, also far
-// from the origin.
+// or nearer. It may also find triangles of instances that the EXACT query does not, but only triangles whose bounds in
+// world axes it meets. Both hold for scenes far from the world's origin too.
 #include <gtest/gtest.h>
 
 #include "tests/support/conservative_answers.h"

@@ -75,8 +75,8 @@ class SweepTrial {
     return turned(transform_->quaternion, to_real(corner)) * Real{transform_->scale} + to_real(transform_->translation);
   }
 
-  // Adds a sweep that passes near a triangle. Its way is at most eight times as long as its start's distance from the
-  // frame and its size together, so that the rounding of t to float is within the promised error.
+  // Adds a sweep that passes near a triangle. Its path is about as long as the start's distance from the triangle, so
+  // that the rounding of t to float stays within the promised error.
   void add_sweep(MoverKind kind, OwnedBlock& block) {
     const Triangle& target = random_.pick(mesh_);
     const double scale = transform_->scale, size = scale * random_.magnitude(-7, 1);
@@ -163,7 +163,7 @@ class SweepTrial {
   std::vector<SweptTriangle> triangles_;
 };
 
-// Asks at least `sweeps` sweeps on all processors.
+// Runs at least `sweeps` sweeps in total, on one thread for each processor, and expects that no answer is wrong.
 void expect_no_fault(uint64_t sweeps) {
   const uint64_t meshes = (sweeps + 3 * kSweepsOfAMesh - 1) / (3 * kSweepsOfAMesh);
   std::atomic<uint64_t> next{0};

@@ -105,7 +105,8 @@ class QueryOracle : public RayOracle {
     }
   }
 
-  // Returns whether the primitive of `row` lies on or beyond `plane`, by the product's predicate for single primitives.
+  // Returns whether the primitive of `row` lies on or beyond `plane`, with the predicates that queries apply to single
+  // triangles and shapes.
   static bool is_beyond_plane(const Row& plane, const Row& row, Vec3d from, const QueryBlock& block) {
     const CellPlane cell{{}, plane.normal, normalized(plane.normal)};
     if (row.instance != nullptr) {

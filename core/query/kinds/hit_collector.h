@@ -25,7 +25,7 @@ class HitCollector {
  public:
   explicit HitCollector(const RayRequest& request)
       : HitCollector(request.mode, request.max_results, request.t_max, request.count_only, request.after) {}
-  // `count_only` needs the mode kAll. Hits that are not behind `after` are ignored.
+  // `count_only` needs the mode kAll. Hits that do not follow `after` in the order of rows are ignored.
   HitCollector(RayMode mode, uint32_t max_results, float t_max, bool count_only, const RowPosition& after)
       : mode_(mode),
         count_only_(count_only),

@@ -158,8 +158,8 @@ absl::Status copy_mesh(const Database& source, const MeshHealth& found, Copier& 
     absl::Status parts = row.parts ? copy_mesh_chunks(source, row.sha256, *row.parts, copier) : absl::OkStatus();
     if (!parts.ok() && !absl::IsDataLoss(parts)) return parts;
     repaired.parts_dropped = !parts.ok();
-    // If the parts are damaged, store the mesh without parts: a row without `parts` means that the content's chunks
-    // include the parts, but this content was stored without any.
+    // If the chunks of the parts are damaged, write the row without `parts`. A reader of such a row looks for the parts
+    // in the chunks of the content; those of this content have none, so the mesh has no parts.
     if (repaired.parts_dropped) row.parts = std::nullopt;
     put_row(content, with_checksum(content, encode(found.content)), result, copier);
     const std::string key = mesh_key(found.name);

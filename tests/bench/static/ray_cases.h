@@ -7,7 +7,7 @@
 
 namespace locus::bench {
 
-// Returns whether the filter selects a case that has peers.
+// Returns whether the filter selects at least one ray case in which other libraries are measured too.
 bool wants_ray_peers(const Options& options, const BenchMesh& mesh);
 
 // Runs ray/incoherent/first, ray/incoherent/any, ray/short/first, ray/short/any, ray/camera/first.

@@ -1,4 +1,5 @@
-// Tests of certificates by gRPC itself: a server and clients that use them.
+// Tests that gRPC accepts the certificates that `locus cert` makes, and rejects others: each test starts a server with
+// TLS and connects clients to it.
 #include "client/cli/security/certificates.h"
 
 #include <gmock/gmock.h>
