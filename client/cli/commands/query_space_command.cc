@@ -80,7 +80,7 @@ absl::Status check_input(const PointOptions& options) {
 }
 
 RowLayout layout_of_contains(const PointOptions& options) {
-  return {.query = "point", .columns = columns_behind({v1::COLUMN_ID}, options.query)};
+  return {.query = "query", .columns = columns_behind({v1::COLUMN_ID}, options.query)};
 }
 
 absl::Status query_contains(const PointOptions& options, Context& context) {

@@ -12,6 +12,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "absl/strings/strip.h"
+#include "core/base/check.h"
 #include "core/base/limits.h"
 
 namespace locus::cli {
@@ -63,7 +64,9 @@ std::string fault_of(FieldKind kind, double value) {
 
 }  // namespace
 
-RowBuilder::RowBuilder(const RowSchema& schema) : schema_(schema), values_(schema.size()) {}
+RowBuilder::RowBuilder(const RowSchema& schema) : schema_(schema), values_(schema.size()) {
+  for (const Field& field : schema) LOCUS_CHECK_LE(field.size(), kMaxParts);
+}
 
 RowBatch RowBuilder::empty_batch(uint64_t first_row) const {
   RowBatch batch;

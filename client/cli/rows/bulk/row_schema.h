@@ -26,10 +26,12 @@ enum class FieldKind {
   kWord,        // one of Field::words, stored as its index in that list
 };
 
+constexpr size_t kMaxParts = 16;  // maximum number of parts of a vector
+
 struct Field {
   std::string name;
   FieldKind kind = FieldKind::kFloat;
-  std::string parts = {};  // names of a vector's parts, "xyz" or "xyzw"; empty for one value
+  std::string parts = {};  // names of a vector's parts, such as "xyz"; empty for one value
   std::vector<std::string> aliases = {};
   bool required = false;
   std::string option = {};  // option given for all rows, so the input must not have this column; empty = none
