@@ -4,6 +4,11 @@
 // one batch or several batches, in which the same object can move far and back, be replaced, teleport, be removed and
 // be inserted again. For the random tests, which expect no difference, and for the tests of planted bugs, which expect
 // one.
+//
+// The trials before commit 476c028 did not see the fault of PlantedBug::kRewindFastBox, by which a rewind missed an
+// object that moved twice in one tick: ticks had several batches, but only by rare chance did an object move far in one
+// batch and back near its start in a later one. Also, all queries aimed at current positions, and none at the positions
+// between two ticks that the objects had at the queried time.
 #ifndef LOCUS_TESTS_SUPPORT_REWIND_LOCKSTEP_H_
 #define LOCUS_TESTS_SUPPORT_REWIND_LOCKSTEP_H_
 
