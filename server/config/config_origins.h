@@ -1,5 +1,5 @@
-// Lists the options that the daemon would run with, and the origin of each value, without running the daemon. The list
-// shows operators why a daemon behaves as it does. Functions without state; any thread.
+// Lists the value and the origin of each option of the daemon, without starting the daemon. The list shows operators
+// why a daemon behaves as it does. Functions without state; any thread.
 #ifndef LOCUS_SERVER_CONFIG_CONFIG_ORIGINS_H_
 #define LOCUS_SERVER_CONFIG_CONFIG_ORIGINS_H_
 

@@ -51,7 +51,7 @@ Examples:
 Try it: locus health; locus limits; locus scene create demo; locus top
 /metrics, /healthz and /readyz are served on 127.0.0.1:7576, over TLS with --tls-cert;
 with access control, /metrics needs a token or certificate with the right `metrics`.
-What it would run with and why: locusd config
+Values of all options, and their origin: locusd config
 It ends on SIGTERM or SIGINT once calls in work are done, with exit code 0; a
 second signal ends it at once.)";
 
@@ -379,8 +379,8 @@ void add_maintenance(CLI::App& app, std::optional<Maintenance>& chosen) {
   }
   CLI::App& config =
       *app.add_subcommand("config",
-                          "Print every option that locusd would run with here, and where its value comes from:\n"
-                          "flag, environment variable, file and line, or default. Starts nothing.");
+                          "Print the value that each option has with these flags, this environment and this file,\n"
+                          "and its origin: flag, environment variable, file and line, or default. Starts nothing.");
   config.footer(
       "A flag wins over the environment (LOCUS_...), which wins over the file. Defaults that follow\n"
       "the machine, threads and memory-limit, are printed with their values here.\n\n"
