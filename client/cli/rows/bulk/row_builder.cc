@@ -12,7 +12,6 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "absl/strings/strip.h"
-#include "core/base/check.h"
 #include "core/base/limits.h"
 
 namespace locus::cli {
@@ -65,7 +64,7 @@ std::string fault_of(FieldKind kind, double value) {
 }  // namespace
 
 RowBuilder::RowBuilder(const RowSchema& schema) : schema_(schema), values_(schema.size()) {
-  for (const Field& field : schema) LOCUS_CHECK_LE(field.size(), kMaxParts);
+  for (size_t i = 0; i < schema.size(); ++i) values_[i].numbers.resize(schema[i].size());
 }
 
 RowBatch RowBuilder::empty_batch(uint64_t first_row) const {
@@ -75,7 +74,13 @@ RowBatch RowBuilder::empty_batch(uint64_t first_row) const {
   return batch;
 }
 
-void RowBuilder::start() { std::fill(values_.begin(), values_.end(), Value{}); }
+void RowBuilder::start() {
+  for (Value& value : values_) {
+    std::fill(value.numbers.begin(), value.numbers.end(), 0);
+    value.integer = 0;
+    value.parts_given = 0;
+  }
+}
 
 absl::Status RowBuilder::wrong(const Slot& slot, absl::string_view what) const {
   return absl::InvalidArgumentError(absl::StrCat(slot_name(schema_, slot), ": ", what));
@@ -141,7 +146,7 @@ absl::Status RowBuilder::finish(uint64_t line, RowBatch& batch) {
     if (holds_integer(schema_[i].kind)) {
       column.integers.push_back(value.integer);
     } else {
-      column.numbers.insert(column.numbers.end(), value.numbers.begin(), value.numbers.begin() + schema_[i].size());
+      column.numbers.insert(column.numbers.end(), value.numbers.begin(), value.numbers.end());
     }
   }
   batch.lines.push_back(line);

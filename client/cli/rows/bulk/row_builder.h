@@ -17,7 +17,7 @@ namespace locus::cli {
 
 class RowBuilder {
  public:
-  // Borrows the schema, whose vectors have at most kMaxParts parts.
+  // Borrows the schema, whose vectors have at most 32 parts.
   explicit RowBuilder(const RowSchema& schema);
 
   // Returns an empty batch with the schema's columns.
@@ -36,7 +36,7 @@ class RowBuilder {
 
  private:
   struct Value {
-    std::array<double, kMaxParts> numbers{};
+    std::vector<double> numbers;  // one for each part
     uint64_t integer = 0;
     uint32_t parts_given = 0;  // bit i: part i has a value
   };

@@ -26,8 +26,6 @@ enum class FieldKind {
   kWord,        // one of Field::words, stored as its index in that list
 };
 
-constexpr size_t kMaxParts = 16;  // maximum number of parts of a vector
-
 struct Field {
   std::string name;
   FieldKind kind = FieldKind::kFloat;
