@@ -5,7 +5,6 @@
 #ifndef LOCUS_CLIENT_CLI_ROWS_BULK_ROW_BUILDER_H_
 #define LOCUS_CLIENT_CLI_ROWS_BULK_ROW_BUILDER_H_
 
-#include <array>
 #include <cstdint>
 #include <vector>
 
