@@ -2,6 +2,8 @@
 
 #include "absl/strings/str_cat.h"
 #include "tests/bench/frame/peer_library.h"
+#include "tests/bench/queries/cell_cases.h"
+#include "tests/bench/queries/object_cases.h"
 #include "tests/bench/queries/sweep_cases.h"
 #include "tests/bench/static/bench_mesh.h"
 #include "tests/bench/static/mesh_list.h"
@@ -16,7 +18,9 @@ absl::Status run_queries_suite(const Options& options, const Progress& progress,
     if (!mesh.ok()) return mesh.status();
     report.notes.push_back(absl::StrCat("mesh ", mesh->name, ": ", mesh->triangles.size(), " triangles"));
     run_sweep_cases(options, progress, *mesh, report);
+    run_cell_cases(options, progress, *mesh, report);
   }
+  run_object_cases(options, progress, report);
   return absl::OkStatus();
 }
 
