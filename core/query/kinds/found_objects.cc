@@ -1,10 +1,10 @@
 #include "core/query/kinds/found_objects.h"
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <limits>
 
+#include "absl/container/inlined_vector.h"
 #include "core/base/scratch.h"
 
 namespace locus {
@@ -25,10 +25,9 @@ void insertion_sort(std::vector<FoundObject>& found) {
 
 // Maximum number of objects that are sorted by insertion without buckets.
 constexpr size_t kFew = 12;
-// Maximum number of objects for the bucket sort: if their ids are evenly distributed, each of the 256 buckets contains
-// about four of them.
-constexpr size_t kMaxBucketed = 1024;
-constexpr int kBucketBits = 8;
+// Minimum of the binary logarithm of the number of buckets. There are at most half as many buckets as objects, and more
+// than a quarter, or 2^kMinBucketBits: if ids are evenly distributed, a bucket contains two to four objects.
+constexpr int kMinBucketBits = 8;
 // Maximum number of objects in one bucket. If a bucket has more objects, the ids are unevenly distributed, and
 // std::sort() is used.
 constexpr uint32_t kMaxPerBucket = 16;
@@ -66,7 +65,7 @@ void FoundObjects::keep_lowest() {
 // whose branches would be mispredicted half of the time for ids in random order. The distribution leaves the objects
 // almost sorted, so that insertion_sort() is fast.
 void FoundObjects::sort() {
-  if (found_.size() <= kFew || (found_.size() <= kMaxBucketed && sort_by_bucket())) return insertion_sort(found_);
+  if (found_.size() <= kFew || sort_by_bucket()) return insertion_sort(found_);
   std::sort(found_.begin(), found_.end(), lower_id);
 }
 
@@ -76,8 +75,9 @@ bool FoundObjects::sort_by_bucket() {
     lowest = std::min(lowest, object.id);
     highest = std::max(highest, object.id);
   }
-  const int shift = std::max(static_cast<int>(std::bit_width(highest - lowest)) - kBucketBits, 0);
-  std::array<uint32_t, size_t{1} << kBucketBits> buckets{};
+  const int bits = std::max(static_cast<int>(std::bit_width(found_.size())) - 2, kMinBucketBits);
+  const int shift = std::max(static_cast<int>(std::bit_width(highest - lowest)) - bits, 0);
+  absl::InlinedVector<uint32_t, size_t{1} << kMinBucketBits> buckets(size_t{1} << bits);
   for (const FoundObject& object : found_) ++buckets[(object.id - lowest) >> shift];
   uint32_t before = 0, largest = 0;
   for (uint32_t& bucket : buckets) {

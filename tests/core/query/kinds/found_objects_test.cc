@@ -53,6 +53,19 @@ void expect_in_order(std::vector<Id> ids) {
   EXPECT_FALSE(found.truncated());
 }
 
+TEST(FoundObjectsTest, ManyObjectsAscendById) {
+  Random random(7);
+  std::vector<Id> even, uneven;
+  for (Id id = 1; id <= 20'000; ++id) {
+    even.push_back(id * 5);
+    uneven.push_back(id % 2 == 0 ? id : (id << 40));
+  }
+  random.shuffle(even);
+  random.shuffle(uneven);
+  expect_in_order(even);
+  expect_in_order(uneven);
+}
+
 TEST(FoundObjectsTest, WithoutOffersTheResultIsEmpty) {
   FoundObjects found;
   found.restart(10);
