@@ -1,64 +1,96 @@
 #include "core/query/kinds/pair_query.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <tuple>
+#include <utility>
 
 #include "core/base/check.h"
 #include "core/base/planted_bug.h"
 #include "core/geometry/shape_distance.h"
+#include "core/index/hash_grid/kernels/grid_dispatch.h"
 #include "core/query/kinds/hit_collector.h"
 
 namespace locus {
 namespace {
 
-// Order of the rows of one block, and their position behind which the answer begins.
-struct PairOrder {
-  bool by_distance;  // with k: (id, t, other); otherwise (id, other)
-
-  bool operator()(const PairRow& a, const PairRow& b) const {
-    const float ta = by_distance ? a.first.t : 0, tb = by_distance ? b.first.t : 0;
-    return std::tie(a.first.id, ta, a.other) < std::tie(b.first.id, tb, b.other);
-  }
+// Second object of a row, and the distance.
+struct Partner {
+  Id other;
+  float t;
 };
 
-// Collector of the first rows in order. Invariant: it has at most 2 * max_rows_ + 1 rows, and after keep_first() at
-// most max_rows_.
+// Orders of the rows of one object: by other, or with k by (t, other).
+bool lower_other(const Partner& a, const Partner& b) { return a.other < b.other; }
+bool nearer_partner(const Partner& a, const Partner& b) { return std::tie(a.t, a.other) < std::tie(b.t, b.other); }
+
+// Collector of the first rows in order. The rows of one object are offered at once, as a run, so that only runs are
+// sorted. Invariant: between calls it has at most 2 * max_rows_ rows.
 class FirstPairs {
  public:
-  FirstPairs(PairOrder order, size_t max_rows, bool count_only)
-      : order_(order), max_rows_(max_rows), count_only_(count_only) {}
+  FirstPairs(size_t max_rows, bool count_only) : max_rows_(max_rows), count_only_(count_only) {}
 
-  void offer(const PairRow& row) {
-    ++answer_.count;
-    if (count_only_) return;
-    answer_.rows.push_back(row);
-    if (answer_.rows.size() > 2 * max_rows_) keep_first();
+  // Offers rows of one object, in order. No object may be offered twice.
+  void offer(const GridRef& object, absl::Span<const Partner> partners) {
+    count_ += partners.size();
+    if (count_only_ || partners.empty()) return;
+    runs_.push_back({object.entry().id, object, partners_.size(), partners.size()});
+    partners_.insert(partners_.end(), partners.begin(), partners.end());
+    if (partners_.size() > 2 * max_rows_) keep_first();
   }
   // Returns whether rows of an object with this id can still be among the first rows.
   bool has_room_for(Id id) const { return count_only_ || id <= last_id_; }
-  PairAnswer finish() {
-    if (!count_only_) keep_first();
-    std::sort(answer_.rows.begin(), answer_.rows.end(), order_);
-    return std::move(answer_);
+  // Returns the first rows in order, found at `moment`.
+  PairAnswer finish(const SceneAtTime& moment) {
+    keep_first();
+    PairAnswer answer;
+    answer.count = count_;
+    answer.truncated = truncated_;
+    answer.rows.reserve(partners_.size());
+    for (const Run& run : runs_) {
+      for (const Partner& partner : absl::MakeConstSpan(partners_).subspan(run.begin, run.count))
+        answer.rows.push_back({hit_on(run.object, partner.t, moment), partner.other});
+    }
+    return answer;
   }
 
  private:
+  struct Run {
+    Id id;
+    GridRef object;
+    size_t begin, count;
+  };
+
+  // Puts the rows in order and drops those behind the first max_rows_.
   void keep_first() {
-    if (answer_.rows.size() <= max_rows_) return;
-    answer_.truncated = true;
-    const auto last = answer_.rows.begin() + static_cast<std::ptrdiff_t>(max_rows_);
-    std::nth_element(answer_.rows.begin(), last - 1, answer_.rows.end(), order_);
-    last_id_ = (last - 1)->first.id;
-    answer_.rows.erase(last, answer_.rows.end());
+    std::sort(runs_.begin(), runs_.end(), [](const Run& a, const Run& b) { return a.id < b.id; });
+    std::vector<Partner> kept;
+    kept.reserve(std::min(partners_.size(), max_rows_));
+    size_t runs = 0;
+    for (; runs < runs_.size() && kept.size() < max_rows_; ++runs) {
+      Run& run = runs_[runs];
+      const auto from = partners_.begin() + static_cast<std::ptrdiff_t>(run.begin);
+      run.begin = kept.size();
+      run.count = std::min(run.count, max_rows_ - kept.size());
+      kept.insert(kept.end(), from, from + static_cast<std::ptrdiff_t>(run.count));
+    }
+    if (kept.size() < partners_.size()) {
+      truncated_ = true;
+      last_id_ = runs_[runs - 1].id;
+    }
+    runs_.resize(runs);
+    partners_ = std::move(kept);
   }
 
-  const PairOrder order_;
   const size_t max_rows_;
   const bool count_only_;
   Id last_id_ = std::numeric_limits<Id>::max();
-  PairAnswer answer_;
+  std::vector<Run> runs_;
+  std::vector<Partner> partners_;
+  uint64_t count_ = 0;
+  bool truncated_ = false;
 };
 
 // State that all searches of one block have in common.
@@ -69,11 +101,25 @@ struct PairSearch {
   const Layers first_mask, second_mask;
   const float max_distance;
   const bool conservative;
+  const Id after_id, after_other;
 
   bool may_be_first(const GridEntry& entry) const { return (entry.layers & first_mask) != 0; }
   bool may_be_second(const GridEntry& entry) const { return (entry.layers & second_mask) != 0; }
   static bool are_apart(const GridEntry& a, const GridEntry& b) {
     return a.id != b.id && (a.group == 0 || a.group != b.group);
+  }
+  // Returns whether (a, b) may be a row without k: `a` has the lower id, and the row is behind (after_id, after_other).
+  // Does not apply the filter.
+  bool may_be_row(const GridEntry& a, const GridEntry& b) const {
+    if (b.id <= a.id && !(planted(PlantedBug::kPairBothSides) && b.id != a.id)) return false;
+    if (a.id == after_id && b.id <= after_other) return false;
+    return are_apart(a, b) && ((may_be_first(a) && may_be_second(b)) || (may_be_first(b) && may_be_second(a)));
+  }
+  // Returns bounds of the objects within the distance of an object.
+  Aabbd reach_of(const Shape& shape) const {
+    const Aabbd own = bounds_of(shape);
+    const double reach = raised(max_distance);
+    return grown(own, reach + 0x1p-40 * (magnitude(own) + reach));
   }
   // Returns the rounded distance between two objects. The lower id comes first, so that both orders give one result.
   float distance(Id a_id, const Shape& a, Id b_id, const Shape& b) const {
@@ -82,35 +128,20 @@ struct PairSearch {
   }
 };
 
-// Visitor of the objects within the distance of one object.
+// Visitor of all objects that finds those within the distance of one object, for brute force.
 class Partners {
  public:
-  // Adds the pairs of `object` with objects of higher ids to `rows`, behind the position (after_id, after_other).
-  Partners(const PairSearch& search, const GridRef& object, Id after_id, Id after_other, FirstPairs& rows)
-      : search_(search),
-        object_(object),
-        shape_(search.moment.shape(object)),
-        after_id_(after_id),
-        after_other_(after_other),
-        rows_(rows) {
-    const Aabbd own = bounds_of(shape_);
-    const double reach = raised(search.max_distance);
-    bounds_ = grown(own, reach + 0x1p-40 * (magnitude(own) + reach));
-  }
+  Partners(const PairSearch& search, const GridRef& object, std::vector<Partner>& rows)
+      : search_(search), object_(object), shape_(search.moment.shape(object)), rows_(rows) {}
 
-  const Aabbd& bounds() const { return bounds_; }
-  GridRegion region() const { return search_.moment.region(bounds_, std::nullopt); }
+  Aabbd bounds() const { return search_.reach_of(shape_); }
+  GridRegion region() const { return search_.moment.region(bounds(), std::nullopt); }
   bool visit(const GridRef& other) {
     if (!search_.task.count_test()) return false;
     const GridEntry &a = object_.entry(), &b = other.entry();
-    if (b.id <= a.id && !(planted(PlantedBug::kPairBothSides) && b.id != a.id)) return true;
-    if (a.id == after_id_ && b.id <= after_other_) return true;
-    if (!PairSearch::are_apart(a, b) || !search_.filter.accepts(b)) return true;
-    if (!(search_.may_be_first(a) && search_.may_be_second(b)) &&
-        !(search_.may_be_first(b) && search_.may_be_second(a)))
-      return true;
+    if (!search_.may_be_row(a, b) || !search_.filter.accepts(b)) return true;
     const float distance = search_.distance(a.id, shape_, b.id, search_.moment.shape(other));
-    if (distance <= search_.max_distance) rows_.offer({hit_on(object_, distance, search_.moment), b.id});
+    if (distance <= search_.max_distance) rows_.push_back({b.id, distance});
     return true;
   }
 
@@ -118,9 +149,130 @@ class Partners {
   const PairSearch& search_;
   const GridRef object_;
   const Shape shape_;
-  const Id after_id_, after_other_;
-  FirstPairs& rows_;
-  Aabbd bounds_;
+  std::vector<Partner>& rows_;
+};
+
+// Search for the pairs of a group of neighbouring objects: visits the objects near any of them once, collects these in
+// float columns and culls them by a kernel for each object of the group. add() objects, then search().
+class PairGroup {
+ public:
+  explicit PairGroup(const PairSearch& search) : search_(search), kernels_(active_grid_kernels()) {
+    members_.reserve(kMembers);
+  }
+
+  bool empty() const { return members_.empty(); }
+  // Adds an object, unless the group is full or the object too far from it. Returns whether it was added. Objects of
+  // different bricks are never in one group.
+  bool add(const GridRef& object) {
+    if (members_.size() == kMembers || (!empty() && members_.front().object.brick() != object.brick())) return false;
+    const Shape shape = search_.moment.shape(object);
+    const Aabbd reach = search_.reach_of(shape);
+    const Aabbd bounds = empty() ? reach : merge(bounds_, reach);
+    // The search visits all objects in `bounds`. A larger group of objects far apart would visit too many.
+    if (!empty() && volume(bounds) > kMaxWaste * (volumes_ + volume(reach))) return false;
+    bounds_ = bounds;
+    volumes_ = empty() ? volume(reach) : volumes_ + volume(reach);
+    members_.push_back({object, shape, {}});
+    return true;
+  }
+  // Offers the rows of all objects of the group and empties it.
+  void search(FirstPairs& rows) {
+    if (empty()) return;
+    center_ = (bounds_.min + bounds_.max) * 0.5;
+    for (size_t i = 0; i < members_.size(); ++i) balls_[i] = ball_of(members_[i]);
+    search_.task.visit_objects_in_region(search_.moment, *this);
+    test_candidates();
+    for (Member& member : members_) {
+      std::sort(member.rows.begin(), member.rows.end(), lower_other);
+      rows.offer(member.object, member.rows);
+    }
+    members_.clear();
+  }
+
+  const Aabbd& bounds() const { return bounds_; }
+  GridRegion region() const { return search_.moment.region(bounds_, std::nullopt); }
+  bool visit(const GridRef& object) {
+    if (!search_.filter.accepts(object.entry())) return search_.task.count_test();
+    const Vec3d position = search_.moment.between() ? search_.moment.shape(object).position : object.entry().position;
+    const Vec3f local = to_float(position - center_);
+    x_[count_] = local.x, y_[count_] = local.y, z_[count_] = local.z;
+    extent_[count_] = static_cast<float>(extent_of(object) * (1 + kCullGrowth));
+    candidates_[count_++] = object;
+    return count_ < kCandidates || test_candidates();
+  }
+
+ private:
+  static constexpr size_t kMembers = 32;
+  static constexpr uint32_t kCandidates = GridRows::kMaxValues;
+  static constexpr double kMaxWaste = 4;
+  // Rounding of the columns, of the balls and in the kernel changes a distance by less than 2^-20 of the coordinates,
+  // relative to the centre, and of the extents.
+  static constexpr double kCullGrowth = 0x1p-18;
+
+  struct Member {
+    GridRef object;
+    Shape shape;
+    std::vector<Partner> rows;
+  };
+
+  static double volume(const Aabbd& box) {
+    const Vec3d size = box.max - box.min;
+    return size.x * size.y * size.z;
+  }
+  // Returns an upper bound of the distance from the position to any point of the solid or, with CONSERVATIVE, of its
+  // bounds, up to rounding.
+  double extent_of(const GridRef& object) const {
+    return object.reach() * (search_.conservative ? double{kDiagonal} : 1.0);
+  }
+  // Returns the ball around the position of a member that the ball of every candidate within the distance meets, as the
+  // kernel computes it.
+  GridBall ball_of(const Member& member) const {
+    const Vec3d center = member.shape.position - center_;
+    const double extent = extent_of(member.object);
+    const double reach = raised(search_.max_distance) + extent;
+    const double rounding =
+        kCullGrowth * (max_component(abs(center)) + reach) + internal::kBoundsGrowth * magnitude(bounds_) + 0x1p-60;
+    const double radius = (reach + rounding) * (1 + kCullGrowth);
+    const Vec3f local = to_float(center);
+    return {{local.x, local.y, local.z},
+            static_cast<float>(std::min(radius, double{std::numeric_limits<float>::max()}))};
+  }
+  // Tests the collected candidates with each member. Returns false if the query must end.
+  bool test_candidates() {
+    const GridRows all = {x_, y_, z_, extent_, nullptr, 1, {0}, {count_}};
+    for (size_t i = 0; i < members_.size(); ++i) {
+      uint32_t slots[GridRows::kMaxValues + internal::GridBlock::kLanes];
+      const uint32_t kept = kernels_.cull_ball(all, balls_[i], slots);
+      const uint32_t vectors = count_ / internal::GridBlock::kLanes + 1;
+      search_.task.work().cells += vectors;
+      if (!search_.task.count_tests(vectors)) break;
+      for (uint32_t k = 0; k < kept; ++k) test(members_[i], candidates_[slots[k]]);
+    }
+    count_ = 0;
+    return !search_.task.ended();
+  }
+  void test(Member& member, const GridRef& other) {
+    const GridEntry &a = member.object.entry(), &b = other.entry();
+    if (!search_.may_be_row(a, b)) return;
+    ++search_.task.work().tests;
+    if (!search_.task.count_test()) return;
+    const float distance = search_.distance(a.id, member.shape, b.id, search_.moment.shape(other));
+    if (distance <= search_.max_distance) member.rows.push_back({b.id, distance});
+  }
+
+  const PairSearch& search_;
+  const GridKernels& kernels_;
+  std::vector<Member> members_;
+  Aabbd bounds_;        // of all objects within the distance of a member
+  double volumes_ = 0;  // sum of the volumes of these bounds for each member
+  Vec3d center_;        // origin of the columns
+  std::array<GridBall, kMembers> balls_;
+  // Columns of the candidates, padded to whole vectors.
+  float x_[kCandidates + internal::GridBlock::kLanes] = {}, y_[kCandidates + internal::GridBlock::kLanes] = {},
+                         z_[kCandidates + internal::GridBlock::kLanes] = {},
+                         extent_[kCandidates + internal::GridBlock::kLanes] = {};
+  std::array<GridRef, kCandidates> candidates_;
+  uint32_t count_ = 0;
 };
 
 // Visitor of the objects near one object that keeps the nearest.
@@ -146,18 +298,18 @@ class NearestPartners {
     if (!PairSearch::are_apart(a, b) || !search_.filter.accepts(b) || !search_.may_be_second(b)) return true;
     const float distance = search_.distance(a.id, shape_, b.id, search_.moment.shape(other));
     if (!(distance <= farthest_)) return true;
-    rows_.push_back({hit_on(object_, distance, search_.moment), b.id});
-    std::push_heap(rows_.begin(), rows_.end(), PairOrder{true});
+    rows_.push_back({b.id, distance});
+    std::push_heap(rows_.begin(), rows_.end(), nearer_partner);
     if (rows_.size() > count_) {
-      std::pop_heap(rows_.begin(), rows_.end(), PairOrder{true});
+      std::pop_heap(rows_.begin(), rows_.end(), nearer_partner);
       rows_.pop_back();
     }
-    if (rows_.size() == count_) farthest_ = rows_.front().first.t;
+    if (rows_.size() == count_) farthest_ = rows_.front().t;
     return true;
   }
   // Returns the rows in order; call it once.
-  std::vector<PairRow> finish() {
-    std::sort_heap(rows_.begin(), rows_.end(), PairOrder{true});
+  std::vector<Partner> finish() {
+    std::sort_heap(rows_.begin(), rows_.end(), nearer_partner);
     return std::move(rows_);
   }
 
@@ -176,14 +328,29 @@ class NearestPartners {
   const double extent_;
   const size_t count_;
   float farthest_;
-  std::vector<PairRow> rows_;  // a heap whose front is the last row
+  std::vector<Partner> rows_;  // a heap whose front is the last row
 };
 
-// Offers the rows behind the row with `after_other`, or all rows if there is no such row.
-void offer_behind(const std::vector<PairRow>& rows, Id after_other, FirstPairs& first) {
-  auto begin = std::find_if(rows.begin(), rows.end(), [&](const PairRow& row) { return row.other == after_other; });
-  begin = begin == rows.end() ? rows.begin() : begin + 1;
-  for (; begin != rows.end(); ++begin) first.offer(*begin);
+// Returns the rows behind the row with `after_other`, or all rows if there is no such row.
+absl::Span<const Partner> behind(absl::Span<const Partner> rows, Id after_other) {
+  const auto at = std::find_if(rows.begin(), rows.end(), [&](const Partner& row) { return row.other == after_other; });
+  return at == rows.end() ? rows : rows.subspan(static_cast<size_t>(at - rows.begin()) + 1);
+}
+
+// Searches the partners of one object: all within the distance, or with k the nearest.
+void search_object(const PairSearch& search, const GridRef& object, uint32_t count, FirstPairs& rows) {
+  if (count == 0) {
+    std::vector<Partner> found;
+    Partners visitor(search, object, found);
+    search.task.visit_objects_in_region(search.moment, visitor);
+    std::sort(found.begin(), found.end(), lower_other);
+    rows.offer(object, found);
+  } else if (search.may_be_first(object.entry())) {
+    NearestPartners visitor(search, object, count);
+    search.task.visit_objects_near(search.moment, visitor.position(), visitor);
+    const std::vector<Partner> found = visitor.finish();
+    rows.offer(object, behind(found, object.entry().id == search.after_id ? search.after_other : kNoId));
+  }
 }
 
 }  // namespace
@@ -197,9 +364,12 @@ PairAnswer run_pairs(QueryTask& task, const SceneAtTime& moment, const QueryBloc
                           mask(pairs.first_mask),
                           mask(pairs.second_mask),
                           pairs.max_distance,
-                          block.precision == Precision::kConservative};
-  FirstPairs rows({pairs.count != 0}, block.max_results == 0 ? limits::kDefaultMaxResults : block.max_results,
-                  block.count_only);
+                          block.precision == Precision::kConservative,
+                          block.after_id,
+                          pairs.after_other};
+  FirstPairs rows(block.max_results == 0 ? limits::kDefaultMaxResults : block.max_results, block.count_only);
+  PairGroup group(search);
+  const bool by_groups = pairs.count == 0 && task.uses_region_kernels();
   moment.objects().grid().for_each([&](const GridRef& object) {
     const GridEntry& entry = object.entry();
     ++task.work().tests;
@@ -207,17 +377,16 @@ PairAnswer run_pairs(QueryTask& task, const SceneAtTime& moment, const QueryBloc
     // The rows of after_id itself go on behind after_other.
     const bool is_behind = entry.id > block.after_id || (entry.id == block.after_id && pairs.after_other != 0);
     if (!is_behind || !rows.has_room_for(entry.id) || !search.filter.accepts(entry)) return true;
-    if (pairs.count == 0) {
-      Partners visitor(search, object, block.after_id, pairs.after_other, rows);
-      task.visit_objects_in_region(moment, visitor);
-    } else if (search.may_be_first(entry)) {
-      NearestPartners visitor(search, object, pairs.count);
-      task.visit_objects_near(moment, visitor.position(), visitor);
-      offer_behind(visitor.finish(), entry.id == block.after_id ? pairs.after_other : kNoId, rows);
+    if (!by_groups) {
+      search_object(search, object, pairs.count, rows);
+    } else if (!group.add(object)) {
+      group.search(rows);
+      group.add(object);
     }
     return !task.ended();
   });
-  PairAnswer answer = rows.finish();
+  if (!task.ended()) group.search(rows);
+  PairAnswer answer = rows.finish(moment);
   answer.truncated |= task.ended();
   return answer;
 }

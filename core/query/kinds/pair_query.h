@@ -23,7 +23,8 @@ struct PairAnswer {
 };
 
 // Answers the query of a block of pairs. Objects are searched as of `moment`, which the answer borrows. Cost: a search
-// of the objects around each object; memory: at most twice the maximum number of rows.
+// of the objects around each group of up to 32 objects, and a float test of those found with each object of the group;
+// with k a search around each object. Memory: at most twice the maximum number of rows and the rows of one group.
 PairAnswer run_pairs(QueryTask& task, const SceneAtTime& moment, const QueryBlock& block, const PairColumns& pairs);
 
 }  // namespace locus

@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
+#include "core/geometry/segment.h"
 #include "tests/support/random.h"
 #include "tests/support/random_shape.h"
 #include "tests/support/real.h"
@@ -98,6 +100,25 @@ TEST(ShapeDistanceTest, TheLeastExtentIsThatOfTheFarthestPoint) {
   EXPECT_EQ(least_along({0, 0, 1}, shape(ShapeKind::kCapsule, {0, 0, 9}, {0, 0, -4}, 1)), 4);
   EXPECT_EQ(least_along({0, 0, -1}, Aabbd{{-1, -1, -1}, {1, 1, 4}}), -4);
   EXPECT_EQ(least_along({1, 0, 0}, Corners{Vec3d{3, 0, 0}, Vec3d{-2, 1, 1}, Vec3d{5, 5, 5}}), -2);
+}
+
+TEST(ShapeDistanceTest, BallsAndPointsAreMeasuredLikeSegmentsOfLengthZero) {
+  Random random(12);
+  for (int trial = 0; trial < 20'000; ++trial) {
+    const double size = random.pick(std::vector<double>{1e-3, 1, 1e6});
+    Shape shapes[2];
+    for (Shape& shape : shapes) {
+      shape.kind = random.between(0, 1) < 0.5 ? ShapeKind::kPoint : ShapeKind::kBall;
+      shape.position = random.vector(size);
+      shape.radius = static_cast<float>(random.between(0, 1));
+    }
+    if (trial % 3 == 0) shapes[1].position.x = shapes[0].position.x;
+    if (trial % 6 == 0) shapes[1].position.y = shapes[0].position.y;
+    double apart = std::sqrt(squared_distance_segments(shapes[1].position - shapes[0].position, {}, {}));
+    for (const Shape& shape : shapes) apart -= shape.kind == ShapeKind::kBall ? double{shape.radius} : 0;
+    const double expected = std::max(apart, distance_between(bounds_of(shapes[0]), bounds_of(shapes[1])));
+    EXPECT_EQ(distance_between(shapes[0], shapes[1]), expected);
+  }
 }
 
 }  // namespace

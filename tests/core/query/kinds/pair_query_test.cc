@@ -4,8 +4,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 
+#include "tests/support/random.h"
+#include "tests/support/run_batch.h"
 #include "tests/support/small_world.h"
 
 namespace locus::test {
@@ -94,6 +97,29 @@ TEST(PairQueryTest, InstancesAreNotSearched) {
   QueryWorld world;
   world.instances = {placed(1, wall_mesh()), placed(2, wall_mesh())};
   EXPECT_THAT(run_block(*snapshot_of(world), pairs_within(10)).ids, IsEmpty());
+}
+
+// Rows of balls along the axis x, each exactly as far from the next as the query asks, at places that floats round.
+TEST(PairQueryTest, PairsExactlyAtTheDistanceAreFound) {
+  Random random(31);
+  QueryWorld world;
+  const auto fine = [&random](double size) { return std::round(random.between(-size, size) * 0x1p30) * 0x1p-30; };
+  for (Id row = 0; row < 50; ++row) {
+    const Vec3d start = {fine(300), fine(300), fine(300)};
+    for (Id i = 0; i < 20; ++i)
+      world.objects.push_back(ball_object(row * 20 + i + 1, start + Vec3d{7.0 * static_cast<double>(i), 0, 0}));
+  }
+  const OwnedBlock block = pairs_within(5);
+  RunOptions list;
+  list.brute_force = true;
+  const SnapshotPtr snapshot = snapshot_of(world);
+  QueryBatch batch;
+  batch.blocks.push_back(block.settings);
+  const absl::StatusOr<BatchResult> found = run_batch(*snapshot, batch, {}), all = run_batch(*snapshot, batch, list);
+  ASSERT_TRUE(found.ok() && all.ok());
+  EXPECT_GE(found->blocks[0].ids.size(), 50u * 19);
+  EXPECT_EQ(found->blocks[0].ids, all->blocks[0].ids);
+  EXPECT_EQ(found->blocks[0].others, all->blocks[0].others);
 }
 
 }  // namespace
