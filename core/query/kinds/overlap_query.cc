@@ -1,12 +1,10 @@
 #include "core/query/kinds/overlap_query.h"
 
-#include <cmath>
 #include <limits>
 #include <optional>
 
 #include "core/base/check.h"
 #include "core/base/planted_bug.h"
-#include "core/geometry/nearest_pair.h"
 #include "core/geometry/segment.h"
 #include "core/geometry/sweep.h"
 #include "core/index/regions.h"
@@ -463,30 +461,6 @@ OverlapAnswer run_overlap(QueryTask& task, const SceneAtTime& moment, const type
 }
 
 }  // namespace
-
-Contact overlap_contact(const Mover& solid, Precision precision, const Hit& hit, uint32_t triangle) {
-  if (precision == Precision::kConservative) {
-    Aabbd bounds;
-    if (hit.object)
-      bounds = bounds_of(hit.object_shape());
-    else if (triangle == kNoTriangle)
-      bounds = hit.instance->bounds;
-    else
-      bounds = PlacedTriangles(*hit.instance).bounds_of_triangle(hit.instance->mesh->triangle(triangle));
-    const Vec3d center = (bounds.min + bounds.max) * 0.5 - solid.start;
-    const NearestPair pair = nearest_to_box(solid.half_axis, center, bounds.extent() * 0.5);
-    return {std::sqrt(pair.squared_distance), pair.on_primitive, {}};
-  }
-  if (hit.object) return contact_at(solid, hit.object_shape(), 0);
-  // The batch ended before the nearest triangle was found.
-  if (triangle == kNoTriangle) return {};
-  const Transform& transform = hit.instance->transform;
-  Contact contact = contact_at(mover_to_mesh(solid, transform), corners_of(hit.instance->mesh->triangle(triangle)), 0);
-  contact.distance *= double{transform.scale};
-  contact.point = transform.rotation.to_world(contact.point) * double{transform.scale};
-  contact.normal = normalized(transform.rotation.to_world(contact.normal));
-  return contact;
-}
 
 uint32_t nearest_overlapping(QueryTask& task, const Balld& solid, const Instance& instance) {
   return search_nearest<BallShape>(task, solid, instance);

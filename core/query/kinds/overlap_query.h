@@ -6,7 +6,6 @@
 #include "core/geometry/ball.h"
 #include "core/geometry/capsule.h"
 #include "core/geometry/convex_region.h"
-#include "core/geometry/mover.h"
 #include "core/geometry/obb.h"
 #include "core/query/kinds/lowest_rows.h"
 #include "core/query/kinds/query_task.h"
@@ -44,11 +43,6 @@ OverlapAnswer run_region(QueryTask& task, const SceneAtTime& moment, const Conve
 // `solid` is in world axes.
 uint32_t nearest_overlapping(QueryTask& task, const Balld& solid, const Instance& instance);
 uint32_t nearest_overlapping(QueryTask& task, const Capsule& solid, const Instance& instance);
-
-// Returns the contact of a ball or capsule, as a mover that rests, with the object or the triangle of a row, in world
-// axes: see Contact. With CONSERVATIVE, the distance and the nearest point of its bounds, or of the bounds of the
-// instance if `triangle` is kNoTriangle; the normal is then zero.
-Contact overlap_contact(const Mover& solid, Precision precision, const Hit& hit, uint32_t triangle);
 
 // Returns the rows of instances merged with the objects that the last search of `found` has found: at most
 // options.max_results rows, ascending by id. With count_only, adds the numbers of rows.

@@ -4,7 +4,7 @@
 #include <array>
 #include <limits>
 
-#include "core/query/kinds/overlap_query.h"
+#include "core/query/kinds/overlap_contact.h"
 
 namespace locus {
 namespace {
