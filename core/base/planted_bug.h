@@ -75,6 +75,14 @@ enum class PlantedBug {
   kJwtAnySignature,      // the signature is not compared
   kJwtKeyOfAnotherKind,  // a key verifies algorithms that it is not for
   kUserFromAfar,         // the user of a peer counts on every connection
+  // The nearest kernels:
+  kNearestError,      // bounds of distances to triangles are computed in float without an error bound
+  kNearestPad,        // the distance between the point and its rounded place is ignored
+  kNearestBoxLimit,   // squared distances to boxes are compared in float without a pad
+  kNearestFloor,      // squares that may underflow are compared without the pad for underflow
+  kNearestSlack,      // only triangles exactly as near as the nearest one are candidates
+  kNearestOtherLane,  // a triangle that is not nearer than another one of its block is no candidate
+  kNearestMeasure,    // the plane of a sliver is measured like that of other triangles
 };
 
 #ifdef LOCUS_PLANT_BUGS

@@ -6,6 +6,7 @@ import subprocess
 FORMATTED_ENDINGS = (".h", ".cc")
 PURE_LIBRARIES = ("core/liblocus_core.a", "server/liblocus_server_core.a", "server/liblocus_security.a")
 FILES_A_CALL = 50
+KERNEL_NAMES = ("ray_kernels_", "region_kernels_", "nearest_kernels_", "grid_kernels_")
 
 
 class Skip(Exception):
@@ -45,7 +46,7 @@ def kernels_export_one_symbol(build):
     if build is None:
         raise Skip("no build folder was given")
     objects = [os.path.join(folder, name) for folder, _, names in os.walk(os.path.join(build, "core"))
-               for name in names if name.startswith(("ray_kernels_", "region_kernels_", "grid_kernels_")) and name.endswith(".o")]
+               for name in names if name.startswith(KERNEL_NAMES) and name.endswith(".o")]
     with open(os.path.join(build, "CMakeCache.txt"), encoding="utf-8") as cache:
         settings = cache.read()
     if not objects or "CMAKE_BUILD_TYPE:STRING=Release" not in settings:

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "core/base/planted_bug.h"
+#include "core/index/bvh/kernels/nearest_kernels.h"
 #include "core/index/bvh/kernels/ray_kernels.h"
 #include "core/index/bvh/kernels/region_kernels.h"
 #include "tests/support/conservative_answers.h"
@@ -12,6 +13,7 @@
 #include "tests/support/grid_comparison.h"
 #include "tests/support/kernel_trials.h"
 #include "tests/support/kind_trials.h"
+#include "tests/support/nearest_trials.h"
 #include "tests/support/placed_scenes.h"
 #include "tests/support/region_trials.h"
 #include "tests/support/rewind_lockstep.h"
@@ -78,6 +80,13 @@ std::string compare_region_kernels_with_list() {
     if (const std::string what = trial.difference(region_kernels_avx2()); !what.empty()) return what;
   return "";
 }
+
+std::string compare_nearest_kernels_with_list() {
+  static const std::vector<NearestTrial>* const kTrials = new std::vector<NearestTrial>(all_nearest_trials());
+  for (const NearestTrial& trial : *kTrials)
+    if (const std::string what = trial.difference(nearest_kernels_avx2()); !what.empty()) return what;
+  return "";
+}
 #endif
 
 struct Trial {
@@ -137,12 +146,20 @@ constexpr Trial kTrials[] = {
     {"RegionKernelWithoutScaleOfEdges", PlantedBug::kRegionEdgeScale, compare_region_kernels_with_list},
     {"RegionKernelThatDecidesWhatUnderflows", PlantedBug::kRegionRange, compare_region_kernels_with_list},
     {"RegionKernelWithoutPadOfTurnedBoxes", PlantedBug::kRegionTurnedNode, compare_region_kernels_with_list},
+    {"NearestKernelWithoutErrorBound", PlantedBug::kNearestError, compare_nearest_kernels_with_list},
+    {"NearestKernelWithoutPadOfThePoint", PlantedBug::kNearestPad, compare_nearest_kernels_with_list},
+    {"NearestKernelWithoutPadOfBoxes", PlantedBug::kNearestBoxLimit, compare_nearest_kernels_with_list},
+    {"NearestKernelThatTrustsSquaresThatUnderflow", PlantedBug::kNearestFloor, compare_nearest_kernels_with_list},
+    {"NearestKernelWithoutSlack", PlantedBug::kNearestSlack, compare_nearest_kernels_with_list},
+    {"NearestKernelThatKeepsOneLaneLess", PlantedBug::kNearestOtherLane, compare_nearest_kernels_with_list},
+    {"NearestKernelThatTrustsNormalsOfSlivers", PlantedBug::kNearestMeasure, compare_nearest_kernels_with_list},
 #endif
 };
 
 bool can_run(const Trial& trial) {
 #ifdef LOCUS_X86_KERNELS
-  if (trial.comparison == compare_kernels_with_list || trial.comparison == compare_region_kernels_with_list)
+  if (trial.comparison == compare_kernels_with_list || trial.comparison == compare_region_kernels_with_list ||
+      trial.comparison == compare_nearest_kernels_with_list)
     return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi2");
 #endif
   return trial.comparison != nullptr;

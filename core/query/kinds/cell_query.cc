@@ -62,7 +62,7 @@ CellAnswer run_cell(QueryTask& task, const SceneAtTime& moment, const CellReques
   NearestRequest nearest{request.point,  request.max_distance, kFirstRows, true, false, {},
                          request.source, request.precision};
   while (true) {
-    const std::vector<Hit> rows = run_nearest(task, moment, nearest, filter).rows;
+    const absl::InlinedVector<Hit, 1> rows = run_nearest(task, moment, nearest, filter).rows;
     for (const Hit& row : rows) {
       const Vec3d offset = nearest_surface(nearest, row).offset;
       if (row.t == 0 || offset == Vec3d{}) return {};

@@ -8,6 +8,7 @@
 #include "core/base/check.h"
 #include "core/geometry/point_triangle.h"
 #include "core/query/kinds/hit_collector.h"
+#include "core/query/kinds/nearest_triangles.h"
 #include "core/query/kinds/placed_triangle.h"
 
 namespace locus {
@@ -82,8 +83,8 @@ class NearestRows {
   void insert(const Hit& row) {
     rows_.push_back(row);
     if (!in_order_) return std::push_heap(rows_.begin(), rows_.end(), nearer);
-    auto at = rows_.end() - 1;
-    for (; at != rows_.begin() && nearer(row, *(at - 1)); --at) *at = *(at - 1);
+    Hit* at = &rows_.back();
+    for (; at != rows_.data() && nearer(row, *(at - 1)); --at) *at = *(at - 1);
     *at = row;
   }
 
@@ -94,7 +95,7 @@ class NearestRows {
   float farthest_;
   double limit_;
   uint64_t answer_count_ = 0;
-  std::vector<Hit> rows_;
+  absl::InlinedVector<Hit, 1> rows_;
 };
 
 // Visitor of the moving objects that may be nearest to the point of one query.
@@ -143,9 +144,9 @@ class NearestInstanceRows {
 
   // Offers a triangle at the squared distance `squared`. The reported distance is at least the distance to the
   // instance's bounds, because the tree over instances may cull by the distance to these bounds.
-  void offer(const Triangle& triangle, double squared) {
+  void offer(uint32_t triangle, double squared) {
     Hit row = hit_on(instance_, rounded_distance(std::sqrt(std::max(squared, squared_bounds_distance_))));
-    row.triangle = triangle.number;
+    row.triangle = triangle;
     if (request_.every_triangle) {
       rows_.offer(row);
       shrink(rows_.farthest());
@@ -190,7 +191,7 @@ class TrianglesNear {
   double limit() const {
     if (rows_.farthest() != farthest_) {
       farthest_ = rows_.farthest();
-      limit_ = squared_limit((raised(farthest_) + epsilon_) / transform_.scale);
+      limit_ = squared_limit(mesh_limit());
     }
     return limit_;
   }
@@ -199,11 +200,32 @@ class TrianglesNear {
     const Corners corners = corners_of(transform_, triangle);
     const double to_bounds = squared_distance(point_, placed_.bounds_of_corners(corners));
     if (to_bounds > rows_.limit()) return true;
-    rows_.offer(triangle, std::max(to_bounds, squared_distance(point_, corners[0], corners[1], corners[2])));
+    rows_.offer(triangle.number, std::max(to_bounds, squared_distance(point_, corners[0], corners[1], corners[2])));
     return true;
   }
 
+  // Visits the triangles near `point`, the query's point in mesh axes, by the vector kernels, with the same result as
+  // QueryTask::visit_nearest(). Precondition: NearestSearch::served(tree, point).
+  void search(const TriangleBvh& tree, Vec3d point, NearestSearch::Find find) {
+    // The rows of two triangles are equally near if the distances in world axes are equal after rounding to float: the
+    // distances in mesh axes then differ by twice epsilon_, in world units, and by the rounding.
+    const double slack = 2 * (epsilon_ + std::numeric_limits<float>::min()) / transform_.scale;
+    NearestSearch search(tree, point, mesh_limit(), find, slack);
+    NearestSearch::Squared squared;
+    while (!search.over()) {
+      search.next();
+      task_.work().nodes += search.nodes();
+      task_.work().tests += search.tests();
+      search.measure(point_, transform_, placed_.epsilon(), squared);
+      for (uint32_t i = 0; i < search.found(); ++i) rows_.offer(search.number(i), squared[i]);
+      search.lower_limit(mesh_limit());
+      if (!task_.count_tests(search.tests())) return;
+    }
+  }
+
  private:
+  // Returns the limit of distances in mesh axes.
+  double mesh_limit() const { return (raised(rows_.farthest()) + epsilon_) / transform_.scale; }
   // Returns an upper bound of the difference between a distance in world axes and the scaled distance in mesh axes. The
   // bound covers the rounding errors of the transformations, which are relative to the magnitudes of their operands,
   // and the rounding error of the distance to a triangle, which is at most 2^-30 of the triangle's size (the worst case
@@ -237,7 +259,7 @@ class PlacedBoundsNear {
   }
   bool visit(const Triangle& triangle) {
     if (!task_.count_test()) return false;
-    rows_.offer(triangle, squared_distance(point_, placed_.bounds_of_triangle(triangle)));
+    rows_.offer(triangle.number, squared_distance(point_, placed_.bounds_of_triangle(triangle)));
     return true;
   }
 
@@ -266,7 +288,12 @@ class InstancesNear {
       task_.visit_region(tree, visitor);
     } else {
       TrianglesNear visitor(task_, request_, instance, rows);
-      task_.visit_nearest(tree, instance.transform.point_to_mesh(request_.point), visitor);
+      const Vec3d point = instance.transform.point_to_mesh(request_.point);
+      if (task_.uses_kernels() && NearestSearch::served(tree, point))
+        visitor.search(tree, point,
+                       request_.every_triangle ? NearestSearch::Find::kEvery : NearestSearch::Find::kNearest);
+      else
+        task_.visit_nearest(tree, point, visitor);
     }
     rows.finish();
     return !task_.ended();

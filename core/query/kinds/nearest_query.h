@@ -8,8 +8,7 @@
 #ifndef LOCUS_CORE_QUERY_KINDS_NEAREST_QUERY_H_
 #define LOCUS_CORE_QUERY_KINDS_NEAREST_QUERY_H_
 
-#include <vector>
-
+#include "absl/container/inlined_vector.h"
 #include "core/query/kinds/hit.h"
 #include "core/query/kinds/query_task.h"
 
@@ -31,7 +30,7 @@ NearestRequest nearest_request(const QueryBlock& block, Vec3d origin, const Near
 
 // Rows in order or, with count_only, only their number.
 struct NearestAnswer {
-  std::vector<Hit> rows;
+  absl::InlinedVector<Hit, 1> rows;
   uint64_t count = 0;
 };
 

@@ -371,7 +371,7 @@ class InstanceSearch {
     const ExactOverlapTest<Kind> exact(shape_, instance);
     if constexpr (Kind::kHasKernels) {
       const typename Kind::Mesh& shape = exact.mesh_shape();
-      if (task_.uses_region_kernels() && TriangleSearch<typename Kind::Mesh>::served(tree, shape) &&
+      if (task_.uses_kernels() && TriangleSearch<typename Kind::Mesh>::served(tree, shape) &&
           exact.placed().bounds_follow(to_double(shape.center), Kind::size(shape)))
         return search(tree, shape, rows);
     }

@@ -369,7 +369,7 @@ PairAnswer run_pairs(QueryTask& task, const SceneAtTime& moment, const QueryBloc
                           pairs.after_other};
   FirstPairs rows(block.max_results == 0 ? limits::kDefaultMaxResults : block.max_results, block.count_only);
   PairGroup group(search);
-  const bool by_groups = pairs.count == 0 && task.uses_region_kernels();
+  const bool by_groups = pairs.count == 0 && task.uses_kernels();
   moment.objects().grid().for_each([&](const GridRef& object) {
     const GridEntry& entry = object.entry();
     ++task.work().tests;

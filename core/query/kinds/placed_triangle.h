@@ -45,6 +45,8 @@ class PlacedTriangles {
     return bounds_of_corners(corners_of(transform_, triangle));
   }
   Aabbd bounds_of_corners(const Corners& corners) const { return grown_around(corners, epsilon_); }
+  // Returns the length by which the bounds of a triangle are grown.
+  double epsilon() const { return epsilon_; }
 
   // Returns bounds in world axes that contain bounds_of_triangle() of every triangle within `box`, which is in mesh
   // axes. The result is grown by twice the epsilon of a triangle's bounds.

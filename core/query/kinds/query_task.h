@@ -125,8 +125,8 @@ class QueryTask {
   // Returns the collector of found objects, which successive ball and box queries reuse.
   FoundObjects& found_objects() { return found_objects_; }
 
-  // Returns whether ball and box queries may use the vector kernels.
-  bool uses_region_kernels() const { return !brute_force_; }
+  // Returns whether ball, box and nearest queries may use the vector kernels.
+  bool uses_kernels() const { return !brute_force_; }
 
   // Call the visitor for every value of `index` that may match the query: the values that the index structure finds,
   // or, with brute force, all values.

@@ -291,7 +291,7 @@ void BlockRunner::run_query(const NearestColumns& nearest, size_t i) {
   NearestAnswer answer;
   if (!task_.ended()) answer = run_nearest(task_, times_.of(i), request, Filter(block_, i));
   if (block_.count_only) return write_count(answer.count);
-  const std::vector<Hit>& rows = answer.rows;
+  const absl::Span<const Hit> rows = answer.rows;
   const size_t kept = std::min<uint64_t>(rows.size(), max_rows_ - rows_);
   const RowSpans to = add_rows(result_, columns_, kept);
   for (size_t row = 0; row < kept; ++row) {

@@ -18,4 +18,12 @@ const RegionKernels* active_region_kernels() {
   return nullptr;
 }
 
+const NearestKernels* active_nearest_kernels() {
+#ifdef LOCUS_X86_KERNELS
+  if (active_instruction_set() == InstructionSet::kAvx2) return &nearest_kernels_avx2();
+  if (active_instruction_set() == InstructionSet::kSse4) return &nearest_kernels_sse4();
+#endif
+  return nullptr;
+}
+
 }  // namespace locus

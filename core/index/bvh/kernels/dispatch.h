@@ -1,8 +1,9 @@
-// Selection of the ray and region kernels for the instruction set that this process uses.
+// Selection of the ray, region and nearest kernels for the instruction set that this process uses.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_DISPATCH_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_DISPATCH_H_
 
 #include "core/base/instruction_set.h"
+#include "core/index/bvh/kernels/nearest_kernels.h"
 #include "core/index/bvh/kernels/ray_kernels.h"
 #include "core/index/bvh/kernels/region_kernels.h"
 
@@ -11,6 +12,7 @@ namespace locus {
 // Return the kernels of active_instruction_set(); null for InstructionSet::kPortable. Thread-safe.
 const RayKernels* active_ray_kernels();
 const RegionKernels* active_region_kernels();
+const NearestKernels* active_nearest_kernels();
 
 }  // namespace locus
 

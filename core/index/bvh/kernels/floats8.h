@@ -14,6 +14,19 @@
 namespace locus {
 namespace {
 
+// Key of a slot that is visited, greater than every other key.
+constexpr uint32_t kVisitedKey = 0xFFFFFFFFu;
+
+// Returns the greatest key of a slot whose distance is at most `limit`, which is finite and not negative.
+static inline uint32_t greatest_key(float limit) {
+  return static_cast<uint32_t>(_mm_cvtsi128_si32(_mm_castps_si128(_mm_set_ss(limit)))) | 7u;
+}
+
+// Returns the distance of a slot, rounded down by less than 2^-20 of its value, from its key.
+static inline float distance_of(uint32_t key) {
+  return _mm_cvtss_f32(_mm_castsi128_ps(_mm_cvtsi32_si128(static_cast<int>(key & ~7u))));
+}
+
 // Prefetches the cache lines of the `bytes` bytes of memory that begin at `from`.
 static inline void prefetch(const void* from, int bytes) {
   for (int line = 0; line < bytes; line += 64) _mm_prefetch(static_cast<const char*>(from) + line, _MM_HINT_T0);

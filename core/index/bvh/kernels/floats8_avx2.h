@@ -128,6 +128,41 @@ static inline uint32_t pack_sorted(const TriangleNode& node, Floats8 near, Float
   return static_cast<uint32_t>(__builtin_popcount(set));
 }
 
+// Returns the least of the eight lanes.
+static inline float least(Floats8 a) {
+  const __m128 half = _mm_min_ps(_mm256_castps256_ps128(a.v), _mm256_extractf128_ps(a.v, 1));
+  const __m128 pair = _mm_min_ps(half, _mm_movehl_ps(half, half));
+  return _mm_cvtss_f32(_mm_min_ss(pair, _mm_movehdup_ps(pair)));
+}
+
+// Keys of the eight slots of a node: see keys_of().
+struct Keys8 {
+  __m256i v;
+
+  static inline Keys8 load(const uint32_t* from) { return {_mm256_load_si256(reinterpret_cast<const __m256i*>(from))}; }
+  inline void store(uint32_t* to) const { _mm256_store_si256(reinterpret_cast<__m256i*>(to), v); }
+};
+
+// Returns a key for each slot, which orders slots by `distances`, none of which is negative, then by number: the bits
+// of the distance, the lowest three of which are replaced by the slot.
+static inline Keys8 keys_of(Floats8 distances) {
+  const __m256i bits = _mm256_andnot_si256(_mm256_set1_epi32(7), _mm256_castps_si256(distances.v));
+  return {_mm256_or_si256(bits, _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7))};
+}
+
+// Returns the least of the eight keys.
+static inline uint32_t least_key(Keys8 keys) {
+  const __m128i half = _mm_min_epu32(_mm256_castsi256_si128(keys.v), _mm256_extracti128_si256(keys.v, 1));
+  const __m128i pair = _mm_min_epu32(half, _mm_shuffle_epi32(half, _MM_SHUFFLE(1, 0, 3, 2)));
+  return static_cast<uint32_t>(
+      _mm_cvtsi128_si32(_mm_min_epu32(pair, _mm_shuffle_epi32(pair, _MM_SHUFFLE(2, 3, 0, 1)))));
+}
+
+// Returns the keys with kVisitedKey in place of `key`.
+static inline Keys8 without(Keys8 keys, uint32_t key) {
+  return {_mm256_or_si256(keys.v, _mm256_cmpeq_epi32(keys.v, _mm256_set1_epi32(static_cast<int>(key))))};
+}
+
 // Packs both `children` and `nears`: takes the eight elements that begin at index `from`, keeps those whose bits are
 // set in `set`, and moves them, in the same order, to the indices from `to` on. Precondition: `to` <= `from`. May read
 // and write eight elements of each array.

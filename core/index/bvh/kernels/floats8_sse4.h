@@ -111,6 +111,45 @@ static inline uint32_t pack_sorted(const TriangleNode& node, Floats8 near, Float
   return count;
 }
 
+static inline float least(Floats8 a) {
+  const __m128 half = _mm_min_ps(a.low, a.high);
+  const __m128 pair = _mm_min_ps(half, _mm_movehl_ps(half, half));
+  return _mm_cvtss_f32(_mm_min_ss(pair, _mm_movehdup_ps(pair)));
+}
+
+struct Keys8 {
+  __m128i low, high;
+
+  static inline Keys8 load(const uint32_t* from) {
+    const auto* const at = reinterpret_cast<const __m128i*>(from);
+    return {_mm_load_si128(at), _mm_load_si128(at + 1)};
+  }
+  inline void store(uint32_t* to) const {
+    auto* const at = reinterpret_cast<__m128i*>(to);
+    _mm_store_si128(at, low);
+    _mm_store_si128(at + 1, high);
+  }
+};
+
+static inline Keys8 keys_of(Floats8 distances) {
+  const __m128i clear = _mm_set1_epi32(7);
+  return {_mm_or_si128(_mm_andnot_si128(clear, _mm_castps_si128(distances.low)), _mm_setr_epi32(0, 1, 2, 3)),
+          _mm_or_si128(_mm_andnot_si128(clear, _mm_castps_si128(distances.high)), _mm_setr_epi32(4, 5, 6, 7))};
+}
+
+static inline uint32_t least_key(Keys8 keys) {
+  const __m128i half = _mm_min_epu32(keys.low, keys.high);
+  const __m128i pair = _mm_min_epu32(half, _mm_shuffle_epi32(half, _MM_SHUFFLE(1, 0, 3, 2)));
+  return static_cast<uint32_t>(
+      _mm_cvtsi128_si32(_mm_min_epu32(pair, _mm_shuffle_epi32(pair, _MM_SHUFFLE(2, 3, 0, 1)))));
+}
+
+static inline Keys8 without(Keys8 keys, uint32_t key) {
+  const __m128i visited = _mm_set1_epi32(static_cast<int>(key));
+  return {_mm_or_si128(keys.low, _mm_cmpeq_epi32(keys.low, visited)),
+          _mm_or_si128(keys.high, _mm_cmpeq_epi32(keys.high, visited))};
+}
+
 static inline void pack_entries(uint32_t* children, float* nears, uint32_t from, uint32_t set, uint32_t to) {
   for (uint32_t entry = 0; entry < kTreeWidth; ++entry) {
     if ((set >> entry & 1u) == 0) continue;

@@ -41,8 +41,8 @@
 #define LOCUS_CORE_INDEX_BVH_KERNELS_REGION_BALL_IMPL_H_
 
 #include "core/base/planted_bug.h"
-#include "core/index/bvh/kernels/floats8.h"
 #include "core/index/bvh/kernels/region_kernels.h"
+#include "core/index/bvh/kernels/vector8.h"
 
 namespace locus {
 namespace {
@@ -67,33 +67,12 @@ static inline float square_floor() { return planted(PlantedBug::kRegionFloor) ? 
 // Returns the error bound `bound`, or 0 if `bug` is planted: a test then shows that the bound is needed.
 static inline float bound_unless(PlantedBug bug, float bound) { return planted(bug) ? 0 : bound; }
 
-// Eight vectors of three components.
-struct Vector8 {
-  Floats8 x, y, z;
-
-  static inline Vector8 splat(const float* three) {
-    return {Floats8::splat(three[0]), Floats8::splat(three[1]), Floats8::splat(three[2])};
-  }
-  static inline Vector8 load(const float (*rows)[kTreeWidth]) {
-    return {Floats8::load(rows[0]), Floats8::load(rows[1]), Floats8::load(rows[2])};
-  }
-  friend inline Vector8 operator-(Vector8 a, Vector8 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-};
-
-static inline Floats8 dot(Vector8 a, Vector8 b) { return multiply_add(a.x, b.x, multiply_add(a.y, b.y, a.z * b.z)); }
-
-static inline Vector8 cross(Vector8 a, Vector8 b) {
-  return {multiply_subtract(a.y, b.z, a.z * b.y), multiply_subtract(a.z, b.x, a.x * b.z),
-          multiply_subtract(a.x, b.y, a.y * b.x)};
-}
-
 // Returns the squared distance from a point to an edge. `offset` is the vector from the start of the edge to the point,
 // `edge` the vector along the edge, `along` their dot product and `length` the squared length of `edge`.
 static inline Floats8 squared_distance_to_edge(Vector8 offset, Vector8 edge, Floats8 along, Floats8 length) {
   // If the edge has length 0, the quotient 0 / 0 is NaN, and maximum() returns its second operand, zero.
   const Floats8 foot = minimum(maximum(along / length, Floats8::splat(0)), Floats8::splat(1));
-  const Vector8 rest = {subtract_product(offset.x, foot, edge.x), subtract_product(offset.y, foot, edge.y),
-                        subtract_product(offset.z, foot, edge.z)};
+  const Vector8 rest = subtract_product(offset, foot, edge);
   return dot(rest, rest);
 }
 

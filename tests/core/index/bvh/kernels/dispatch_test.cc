@@ -10,9 +10,11 @@ TEST(DispatchTest, KernelsAreThoseOfTheInstructionSetInUse) {
     ASSERT_TRUE(use_instruction_set(name).ok()) << name;
     ASSERT_EQ(active_ray_kernels() == nullptr, name == kPortable);
     ASSERT_EQ(active_region_kernels() == nullptr, name == kPortable);
+    ASSERT_EQ(active_nearest_kernels() == nullptr, name == kPortable);
     if (name == kPortable) continue;
     EXPECT_EQ(active_ray_kernels()->name, name);
     EXPECT_EQ(active_region_kernels()->name, name);
+    EXPECT_EQ(active_nearest_kernels()->name, name);
   }
   ASSERT_TRUE(use_instruction_set("").ok());
 }

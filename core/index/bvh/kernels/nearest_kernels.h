@@ -1,0 +1,91 @@
+// Nearest kernels: vector code that finds the triangles of one mesh's tree that may be nearest to a point; tests eight
+// boxes or triangles at a time. The kernels of each instruction set are in an object file of their own. A kernel
+// computes in float, for each triangle, a lower and an upper bound of its distance, and returns as candidates all
+// triangles that these bounds do not exclude. A second function measures the candidates in double, in the arithmetic of
+// core/geometry/point_triangle.h, so that the result equals a test of all triangles. The kernels are used by
+// core/query/kinds/nearest_query.cc. Plain data; functions without state, safe from any thread.
+#ifndef LOCUS_CORE_INDEX_BVH_KERNELS_NEAREST_KERNELS_H_
+#define LOCUS_CORE_INDEX_BVH_KERNELS_NEAREST_KERNELS_H_
+
+#include <cstddef>
+#include <cstdint>
+
+#include "core/index/bvh/triangle_tree.h"
+
+namespace locus {
+
+// Upper limit of the sum of a point's largest |coordinate| and TriangleTree::magnitude.
+inline constexpr float kMaxNearestReach = 0x1p29f;
+// Number of tested triangles after which a call of a kernel pauses, so that its caller can check deadlines and
+// cancellation.
+inline constexpr uint32_t kMaxNearestTests = 4096;
+// Maximum of NearestVisit::room.
+inline constexpr uint32_t kMaxCandidates = 64;
+// Maximum number of levels of a tree: limits::kMaxBvhDepth.
+inline constexpr uint32_t kMaxNearestGroups = 64;
+
+// Triangle that may be nearest: lane `lane` of TriangleTree::blocks[block].
+struct NearestCandidate {
+  uint32_t block, lane;
+  float low;  // lower bound of the distance
+};
+
+// Point in mesh axes, the state of a visit of one tree between two calls, and the candidates of the last call.
+struct NearestVisit {
+  float point[3];  // finite; see kMaxNearestReach
+  float pad;       // >= 0: upper bound of the distance between `point` and the point that the caller means
+  // Distance from the caller's point in mesh axes, >= 0: triangles that are farther away are not needed. The caller may
+  // lower it between two calls; see also `closest`.
+  float limit;
+  // True if only the nearest triangle is needed. The kernel then lowers `limit` itself to the least upper bound b of a
+  // distance that it finds, raised to b * (1 + 2^-19) + `slack`. False if all triangles within `limit` are needed.
+  bool closest;
+  float slack;     // only with `closest`; >= 0
+  uint32_t room;   // number of candidates, 1 to kMaxCandidates, from which on a call pauses
+  uint32_t found;  // number of candidates of the last call; their `low` is at most `limit`
+  uint32_t nodes;  // number of nodes opened by the last call
+  uint32_t tests;  // number of triangles tested by the last call
+  NearestCandidate candidates[kMaxCandidates + kTreeWidth];
+  uint32_t next;  // node to open next; kNoChild for the nearest child in the groups
+  uint32_t top;   // number of groups
+  // Opened nodes whose children are not all visited, one on each level: indices of the nodes, and for each slot the key
+  // of the child, which orders it by its distance, or kVisitedKey.
+  uint32_t groups[kMaxNearestGroups];
+  alignas(32) uint32_t keys[kMaxNearestGroups][kTreeWidth];
+
+  // Begins a visit at the root.
+  void start() { next = top = 0; }
+  // Returns whether the visit is complete, so that no further call is needed.
+  bool over() const { return next == kNoChild && top == 0; }
+};
+
+// Query's point and the placement of the mesh, in world axes: world = translation + scale * (rotation * mesh).
+struct NearestPlacement {
+  double point[3];
+  double translation[3];
+  double rotation[9];  // rows of the matrix
+  double scale;
+  double epsilon;  // by which the bounds of a placed triangle are grown
+};
+
+// Kernels of one instruction set.
+// - run() continues a visit until it is complete, `room` candidates were found, or at least kMaxNearestTests triangles
+//   were tested. Over all calls for a visit, each triangle within the last `limit` is a candidate once.
+// - measure() writes the squared distance of each candidate from the point, in world axes and in double: the value of
+//   squared_distance() in core/geometry/point_triangle.h or, if it is greater, that to the triangle's bounds. The
+//   results equal those of these functions, bit for bit.
+struct NearestKernels {
+  const char* name;  // name of the instruction set
+  void (*run)(const TriangleTree&, NearestVisit&);
+  void (*measure)(const TriangleTree&, const NearestPlacement&, const NearestCandidate*, uint32_t count,
+                  double* squared);
+};
+
+// Return the kernels of one instruction set. Each function is the only symbol that its object file exports.
+// Precondition: the processor supports the instruction set.
+const NearestKernels& nearest_kernels_avx2();
+const NearestKernels& nearest_kernels_sse4();
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_INDEX_BVH_KERNELS_NEAREST_KERNELS_H_
