@@ -62,6 +62,22 @@ Mesh torus(int sides, double inner) {
   return mesh;
 }
 
+// Returns houses whose triangles are counter-clockwise as seen from outside, unlike those of box_city().
+Mesh houses(int side, uint64_t seed) {
+  constexpr size_t kTrianglesOfAHouse = 12;
+  Mesh mesh = box_city(side, seed);
+  for (size_t begin = 0; begin < mesh.size(); begin += kTrianglesOfAHouse) {
+    Vec3d center;
+    for (size_t i = begin; i < begin + kTrianglesOfAHouse; ++i)
+      center = center + (to_double(mesh[i].a) + to_double(mesh[i].b) + to_double(mesh[i].c)) * (1.0 / 36);
+    for (size_t i = begin; i < begin + kTrianglesOfAHouse; ++i) {
+      const Vec3d a = to_double(mesh[i].a), normal = cross(to_double(mesh[i].b) - a, to_double(mesh[i].c) - a);
+      if (dot(normal, a - center) < 0) std::swap(mesh[i].b, mesh[i].c);
+    }
+  }
+  return mesh;
+}
+
 // Returns a random closed mesh: a sphere, a torus or houses, alone, with a cavity, doubled, beside one that is turned
 // over, or crossing another one.
 Mesh random_mesh(Random& random) {
@@ -78,7 +94,7 @@ Mesh random_mesh(Random& random) {
       shell = torus(10, random.between(0.1, 0.6));
       break;
     default:
-      shell = box_city(2, seed);
+      shell = houses(2, seed);
   }
   Mesh mesh = shell;
   const uint64_t form = random.below(6);

@@ -58,14 +58,12 @@ inline void append_wall(std::vector<Triangle>& triangles, const Placement& place
   append_quad(triangles, at(-u - v), at(u - v), at(u + v), at(v - u));
 }
 
-// Appends the walls of a box, which are counter-clockwise as seen from outside.
 inline void append_closed_box(std::vector<Triangle>& triangles, const Placement& placement) {
   for (int axis = 0; axis < 3; ++axis) {
     Vec3d side;
     side[axis] = placement.half[axis];
     append_wall(triangles, placement, side, axis);
     append_wall(triangles, placement, -side, axis);
-    std::for_each(triangles.end() - 2, triangles.end(), [](Triangle& t) { std::swap(t.b, t.c); });
   }
 }
 
