@@ -191,7 +191,7 @@ TEST(ConvexRegionTest, RandomShapesOverlapWhereTheyShareAPoint) {
     ASSERT_EQ(found, distance < 0 || core_distance(region, shape) < 1e-6L)
         << "seed " << seed << ", " << double(distance);
   }
-  EXPECT_GT(overlapping, scaled_count(70));
+  EXPECT_GT(overlapping, scaled_count(40));
   EXPECT_GT(apart, scaled_count(70));
   EXPECT_LT(unsure, scaled_count(300));
 }
