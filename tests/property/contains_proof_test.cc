@@ -162,7 +162,7 @@ class Trial {
     if (random_.chance(0.6)) point = (a + b) * 0.5;
     if (random_.chance(0.5)) point = a * 0.25 + b * 0.25 + c * 0.5;
     if (random_.chance(0.3)) point = (a + to_double(other.a)) * 0.5;
-    // On a line along an axis through a corner.
+    // Moves the point along an axis, often off the mesh on a line through a corner.
     if (random_.chance(0.5)) point[random_.whole(0, 2)] = random_.between(-1.5, 1.5);
     if (random_.chance(0.5)) point = point + random_.vector(random_.magnitude(-20, 1));
     return point;

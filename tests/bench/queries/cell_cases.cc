@@ -5,12 +5,9 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
-#include "core/base/check.h"
 #include "tests/bench/frame/race.h"
-#include "tests/bench/frame/results_hash.h"
+#include "tests/bench/queries/query_run.h"
 #include "tests/bench/static/workload.h"
-#include "tests/support/query_world.h"
-#include "tests/support/run_batch.h"
 
 namespace locus::bench::queries {
 namespace {
@@ -23,17 +20,10 @@ constexpr float kDistance = 0.05f;  // as a part of the mesh's diagonal
 constexpr uint64_t kSeed = 521;
 
 test::BlockResult answer(const CellWork& work, size_t points, bool brute_force) {
-  QueryBatch batch;
-  batch.max_reply_bytes = limits::kMaxReplyBytes;
-  QueryBlock& block = batch.blocks.emplace_back();
+  QueryBlock block;
   block.kind = CellColumns{absl::MakeConstSpan(work.points).first(3 * points), {&work.distance, 1}, kPlanes};
   block.source = work.source;
-  LOCUS_CHECK(check_batch(batch).ok());
-  RunOptions options;
-  options.brute_force = brute_force;
-  absl::StatusOr<test::BatchResult> result = test::run_batch(*work.snapshot, batch, options);
-  LOCUS_CHECK(result.ok());
-  return std::move(result->blocks[0]);
+  return answer_of(*work.snapshot, std::move(block), brute_force);
 }
 
 }  // namespace
@@ -50,12 +40,7 @@ void run_cells(const Options& options, const std::string& name, const CellWork& 
     hash.add(ours.ids[i]);
     hash.add(std::bit_cast<uint32_t>(ours.t[i]));
   }
-  Cell cell;
-  cell.suite = "queries";
-  cell.case_name = name;
-  cell.metric = "ns/cell";
-  cell.results_hash = hash.text();
-  add_cells(contestants, times, cell, report);
+  add_cells(contestants, times, cell_of(name, "ns/cell", hash), report);
   const auto begins_with = [](const auto& all, const auto& part) {
     return all.size() >= part.size() && std::equal(part.begin(), part.end(), all.begin());
   };
@@ -69,12 +54,7 @@ void run_cell_cases(const Options& options, const Progress& progress, const Benc
   const std::string name = absl::StrCat("cell/32/", mesh.name);
   if (!options.filter.wants(name)) return;
   progress(name);
-  test::QueryWorld world;
-  test::PlacedMesh placed;
-  placed.id = 1;
-  placed.mesh = test::mesh_of(mesh.triangles);
-  world.instances = {placed};
-  CellWork work{test::snapshot_of(world), Source::kStatic, {}, kDistance * mesh.diagonal};
+  CellWork work{scene_of(mesh), Source::kStatic, {}, kDistance * mesh.diagonal};
   for (const RayQuery& ray : random_rays(mesh, options.quick ? kQuickPoints : kPoints, kSeed, 1))
     work.points.insert(work.points.end(), {ray.origin.x, ray.origin.y, ray.origin.z});
   run_cells(options, name, work, report);

@@ -5,16 +5,13 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
-#include "core/base/check.h"
 #include "core/geometry/point_in_mesh.h"
 #include "core/mesh/open_edges.h"
 #include "tests/bench/frame/bar.h"
 #include "tests/bench/frame/peer_library.h"
 #include "tests/bench/frame/race.h"
-#include "tests/bench/frame/results_hash.h"
+#include "tests/bench/queries/query_run.h"
 #include "tests/bench/static/workload.h"
-#include "tests/support/query_world.h"
-#include "tests/support/run_batch.h"
 
 namespace locus::bench::queries {
 namespace {
@@ -61,26 +58,16 @@ constexpr ContainsCase kCases[] = {{"contains/bounds", points_in_bounds, 5},
 // Locus: the mesh as the only instance of a scene, queried by whole batches.
 class OurPoints {
  public:
-  explicit OurPoints(const BenchMesh& mesh) {
-    test::QueryWorld world;
-    test::PlacedMesh placed;
-    placed.id = 1;
-    placed.mesh = test::mesh_of(mesh.triangles);
-    world.instances = {placed};
-    snapshot_ = test::snapshot_of(world);
-  }
+  explicit OurPoints(const BenchMesh& mesh) : snapshot_(scene_of(mesh)) {}
 
   void contains(absl::Span<const float> points, uint8_t* answers) const {
-    QueryBatch batch;
-    batch.blocks.emplace_back().kind = ContainsColumns{points};
-    LOCUS_CHECK(check_batch(batch).ok());
-    const absl::StatusOr<test::BatchResult> result = test::run_batch(*snapshot_, batch, {});
-    LOCUS_CHECK(result.ok());
-    for (const uint32_t count : result->blocks[0].counts) *answers++ = static_cast<uint8_t>(count);
+    QueryBlock block;
+    block.kind = ContainsColumns{points};
+    for (const uint32_t count : answer_of(*snapshot_, block).counts) *answers++ = static_cast<uint8_t>(count);
   }
 
  private:
-  SnapshotPtr snapshot_;
+  const SnapshotPtr snapshot_;
 };
 
 // Returns the answer for one point by the crossings of every triangle.
@@ -128,12 +115,7 @@ void run_case(const Options& options, const ContainsCase& one, const BenchMesh& 
   const auto times = race(contestants, chunks, options.rounds, thread_seconds);
   ResultsHash hash;
   for (const uint8_t answer : our_answers) hash.add(uint32_t{answer});
-  Cell cell;
-  cell.suite = "queries";
-  cell.case_name = name;
-  cell.metric = "ns/point";
-  cell.results_hash = hash.text();
-  add_cells(contestants, times, cell, report);
+  add_cells(contestants, times, cell_of(name, "ns/point", hash), report);
   compare(name, mesh, points, our_answers, their_answers, report);
   if (peer != nullptr && one.bar != 0) note_bar(report, one.bar);
 }

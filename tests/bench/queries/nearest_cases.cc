@@ -13,10 +13,8 @@
 #include "tests/bench/frame/bar.h"
 #include "tests/bench/frame/peer_library.h"
 #include "tests/bench/frame/race.h"
-#include "tests/bench/frame/results_hash.h"
+#include "tests/bench/queries/query_run.h"
 #include "tests/bench/static/workload.h"
-#include "tests/support/query_world.h"
-#include "tests/support/run_batch.h"
 
 namespace locus::bench::queries {
 namespace {
@@ -54,14 +52,7 @@ std::vector<Vec3f> points_of(const NearestCase& one, const BenchMesh& mesh, size
 // Locus: the mesh as the only instance of a scene, queried by whole batches.
 class OurScene {
  public:
-  explicit OurScene(const BenchMesh& mesh) {
-    test::QueryWorld world;
-    test::PlacedMesh placed;
-    placed.id = 1;
-    placed.mesh = test::mesh_of(mesh.triangles);
-    world.instances = {placed};
-    snapshot_ = test::snapshot_of(world);
-  }
+  explicit OurScene(const BenchMesh& mesh) : snapshot_(scene_of(mesh)) {}
 
   void nearest(absl::Span<const Vec3f> points, NearestTriangle* answers) const {
     NearestColumns columns;
@@ -83,16 +74,13 @@ class OurScene {
  private:
   template <class Columns>
   test::BlockResult run(const Columns& columns, ColumnSet wanted) const {
-    QueryBatch batch;
-    batch.blocks.emplace_back().kind = columns;
-    batch.blocks[0].columns = wanted;
-    LOCUS_CHECK(check_batch(batch).ok());
-    absl::StatusOr<test::BatchResult> result = test::run_batch(*snapshot_, batch, {});
-    LOCUS_CHECK(result.ok());
-    return std::move(result->blocks[0]);
+    QueryBlock block;
+    block.kind = columns;
+    block.columns = wanted;
+    return answer_of(*snapshot_, std::move(block));
   }
 
-  SnapshotPtr snapshot_;
+  const SnapshotPtr snapshot_;
 };
 
 // Returns the nearest triangle, found by testing every triangle. The distance is rounded to float before the
@@ -145,12 +133,7 @@ void run_case(const Options& options, const NearestCase& one, const BenchMesh& m
     hash.add(std::bit_cast<uint32_t>(answer.distance));
     hash.add(answer.triangle);
   }
-  Cell cell;
-  cell.suite = "queries";
-  cell.case_name = name;
-  cell.metric = "ns/point";
-  cell.results_hash = hash.text();
-  add_cells(contestants, times, cell, report);
+  add_cells(contestants, times, cell_of(name, "ns/point", hash), report);
   check(name, mesh, points, our_answers, report);
   if (peer == nullptr) return;
   note_bar(report, kBar);

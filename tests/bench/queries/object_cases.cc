@@ -8,15 +8,13 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "client/cli/levels/generate/splitmix64.h"
-#include "core/base/check.h"
 #include "core/geometry/shape_distance.h"
 #include "tests/bench/frame/bar.h"
 #include "tests/bench/frame/peer_library.h"
 #include "tests/bench/frame/race.h"
-#include "tests/bench/frame/results_hash.h"
 #include "tests/bench/queries/cell_cases.h"
+#include "tests/bench/queries/query_run.h"
 #include "tests/support/query_world.h"
-#include "tests/support/run_batch.h"
 
 namespace locus::bench::queries {
 namespace {
@@ -66,24 +64,7 @@ struct Arena {
 
 test::BlockResult answer(const SceneSnapshot& snapshot, QueryBlock block, bool brute_force = false) {
   block.source = Source::kDynamic;
-  QueryBatch batch;
-  batch.max_reply_bytes = limits::kMaxReplyBytes;
-  batch.blocks.push_back(std::move(block));
-  LOCUS_CHECK(check_batch(batch).ok());
-  RunOptions options;
-  options.brute_force = brute_force;
-  absl::StatusOr<test::BatchResult> result = test::run_batch(snapshot, batch, options);
-  LOCUS_CHECK(result.ok());
-  return std::move(result->blocks[0]);
-}
-
-Cell cell_of(const std::string& name, const char* metric, const ResultsHash& hash) {
-  Cell cell;
-  cell.suite = "queries";
-  cell.case_name = name;
-  cell.metric = metric;
-  cell.results_hash = hash.text();
-  return cell;
+  return answer_of(snapshot, std::move(block), brute_force);
 }
 
 // Returns the pairs in order, found by measuring the objects of all adjacent cubes.

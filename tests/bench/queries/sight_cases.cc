@@ -10,7 +10,7 @@
 #include "core/base/check.h"
 #include "tests/bench/frame/bar.h"
 #include "tests/bench/frame/race.h"
-#include "tests/bench/frame/results_hash.h"
+#include "tests/bench/queries/query_run.h"
 #include "tests/support/query_world.h"
 #include "tests/support/run_batch.h"
 
@@ -210,12 +210,7 @@ void run_case(const Options& options, const SightCase& one, const BenchMesh& mes
     differing += matrix[i] != expected;
     seen += static_cast<size_t>(expected);
   }
-  Cell cell;
-  cell.suite = "queries";
-  cell.case_name = name;
-  cell.metric = "ns/segment";
-  cell.results_hash = hash.text();
-  add_cells(contestants, times, cell, report);
+  add_cells(contestants, times, cell_of(name, "ns/segment", hash), report);
   if (differing != 0)
     report.disagreements.push_back(
         absl::StrFormat("%s: %d of %d targets differ from rays of mode ANY", name, differing, matrix.size()));

@@ -4,18 +4,16 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
-#include "core/base/check.h"
 #include "core/geometry/sweep.h"
 #include "tests/bench/frame/bar.h"
 #include "tests/bench/frame/peer_library.h"
 #include "tests/bench/frame/race.h"
-#include "tests/bench/frame/results_hash.h"
+#include "tests/bench/queries/query_run.h"
 #include "tests/bench/static/workload.h"
-#include "tests/support/query_world.h"
-#include "tests/support/run_batch.h"
 
 namespace locus::bench::queries {
 namespace {
@@ -63,14 +61,7 @@ SweepWork work_of(const SweepCase& one, const BenchMesh& mesh, size_t count) {
 // Locus: the mesh as the only instance of a scene, queried by whole batches.
 class OurSweeps {
  public:
-  explicit OurSweeps(const BenchMesh& mesh) {
-    test::QueryWorld world;
-    test::PlacedMesh placed;
-    placed.id = 1;
-    placed.mesh = test::mesh_of(mesh.triangles);
-    world.instances = {placed};
-    snapshot_ = test::snapshot_of(world);
-  }
+  explicit OurSweeps(const BenchMesh& mesh) : snapshot_(scene_of(mesh)) {}
 
   void sweep(const SweepWork& work, size_t begin, size_t end, SweepHit* hits) const {
     const float radius = static_cast<float>(work.solid.radius);
@@ -82,16 +73,14 @@ class OurSweeps {
     if (work.solid.kind == MoverKind::kCapsule) columns.half_axes = {&axis.x, 3};
     if (work.solid.kind == MoverKind::kBox) columns.half_extents = {&half.x, 3};
     columns.at_start = AtStart::kPass;
-    QueryBatch batch;
-    batch.blocks.emplace_back().kind = columns;
-    LOCUS_CHECK(check_batch(batch).ok());
-    const absl::StatusOr<test::BatchResult> result = test::run_batch(*snapshot_, batch, {});
-    LOCUS_CHECK(result.ok());
-    for (size_t i = begin; i < end; ++i) hits[i].t = std::min(result->blocks[0].t[i - begin], 2.0f);
+    QueryBlock block;
+    block.kind = columns;
+    const test::BlockResult result = answer_of(*snapshot_, std::move(block));
+    for (size_t i = begin; i < end; ++i) hits[i].t = std::min(result.t[i - begin], 2.0f);
   }
 
  private:
-  SnapshotPtr snapshot_;
+  const SnapshotPtr snapshot_;
 };
 
 // Returns the first contact of sweep `i`, found by testing every triangle.
@@ -131,12 +120,7 @@ void run_case(const Options& options, const SweepCase& one, const BenchMesh& mes
     hash.add(std::bit_cast<uint32_t>(hit.t));
     hits += hit.t <= 1;
   }
-  Cell cell;
-  cell.suite = "queries";
-  cell.case_name = name;
-  cell.metric = "ns/sweep";
-  cell.results_hash = hash.text();
-  add_cells(contestants, times, cell, report);
+  add_cells(contestants, times, cell_of(name, "ns/sweep", hash), report);
   for (size_t i = 0; i < std::min(kProvedSweeps, work.size()); ++i)
     if (proved(mesh, work, i) != our_hits[i].t)
       report.disagreements.push_back(absl::StrFormat("%s: sweep %d hits at %g, a test of all triangles at %g", name, i,
