@@ -26,6 +26,7 @@ enum class PlantedBug {
   kEndlessCapsule,     // a capsule is an endless cylinder
   kSweepStart,         // a sweep ignores what it touches at its start
   kPairBothSides,      // a pair of objects is found from both of its sides
+  kPairCullExtent,     // the cull of pairs ignores the extent of the first object
   kCellBeyond,         // a cell of free space has planes for what lies beyond other planes
   kMatrixRow,          // a plane of a view is computed from the wrong row of its matrix
   kOwnGroupBlocks,     // the group of a viewer blocks its sight

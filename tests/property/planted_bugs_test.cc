@@ -118,6 +118,7 @@ constexpr Trial kTrials[] = {
     {"CrossingsDecidedInDouble", PlantedBug::kCrossingInDouble, crossing_difference},
     {"ViewWithAWrongRowOfItsMatrix", PlantedBug::kMatrixRow, view_difference},
     {"PairsFromBothSides", PlantedBug::kPairBothSides, pair_difference},
+    {"PairsCulledWithoutExtent", PlantedBug::kPairCullExtent, pair_difference},
     {"CellWithPlanesBeyondOthers", PlantedBug::kCellBeyond, cell_difference},
     {"SightThatTheOwnGroupBlocks", PlantedBug::kOwnGroupBlocks, sight_difference},
 #ifdef LOCUS_X86_KERNELS

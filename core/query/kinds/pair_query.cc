@@ -228,7 +228,7 @@ class PairGroup {
   // kernel computes it.
   GridBall ball_of(const Member& member) const {
     const Vec3d center = member.shape.position - center_;
-    const double extent = extent_of(member.object);
+    const double extent = planted(PlantedBug::kPairCullExtent) ? 0 : extent_of(member.object);
     const double reach = raised(search_.max_distance) + extent;
     const double rounding =
         kCullGrowth * (max_component(abs(center)) + reach) + internal::kBoundsGrowth * magnitude(bounds_) + 0x1p-60;
