@@ -5,6 +5,7 @@
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "client/cli/failure.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 
@@ -14,7 +15,7 @@ absl::StatusOr<client::Client*> Context::connect() {
     return usage_error("only insert, move and remove are allowed between begin and commit");
   }
   if (client_) return client_.get();
-  if (!connection_mistake_.ok()) return connection_mistake_;
+  RETURN_IF_ERROR(connection_mistake_);
   client::ClientOptions options;
   options.credentials = options_.connection.credentials;
   if (options_.timeout_seconds) {
@@ -29,7 +30,7 @@ absl::StatusOr<client::Client*> Context::connect() {
     return absl::UnavailableError(
         absl::StrCat("nothing answers at ", address(), ": start one with `locusd`, or give --address"));
   }
-  if (!client.ok()) return client.status();
+  RETURN_IF_ERROR(client.status());
   client_ = *std::move(client);
   return client_.get();
 }

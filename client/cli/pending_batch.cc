@@ -4,6 +4,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/cli/failure.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 
@@ -17,8 +18,7 @@ absl::Status PendingBatch::add(const std::string& scene, const v1::UpdateBatch& 
   if (line.inserts_size() > 0 && batch_.inserts_size() > 0 && line.upsert() != batch_.upsert()) {
     return usage_error("all inserts of a batch have --upsert, or none has");
   }
-  const absl::Status ordered = check_order(line);
-  if (!ordered.ok()) return ordered;
+  RETURN_IF_ERROR(check_order(line));
   remember(line);
   scene_ = scene;
   batch_.MergeFrom(line);

@@ -110,8 +110,8 @@ absl::StatusOr<BackupSize> download_backup(v1::ServerService::StubInterface& stu
   while (received.ok() && reader->Read(&message)) received = receiver.receive(message);
   if (!received.ok()) context.TryCancel();
   const absl::Status end = to_absl_status(reader->Finish());
-  if (!received.ok()) return received;
-  if (!end.ok()) return end;
+  RETURN_IF_ERROR(received);
+  RETURN_IF_ERROR(end);
   return receiver.finish();
 }
 

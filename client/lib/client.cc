@@ -53,7 +53,7 @@ absl::StatusOr<Response> call(Stub& stub, const CallPlan& plan, const Request& r
   absl::Status status = attempts();
   // A server that refuses the token has changed nothing, so even a call that is not repeatable may be sent again.
   if (absl::IsUnauthenticated(status) && plan.authorization.has_newer(token)) status = attempts();
-  if (!status.ok()) return status;
+  RETURN_IF_ERROR(status);
   return response;
 }
 
@@ -92,8 +92,7 @@ absl::StatusOr<std::unique_ptr<Client>> Client::connect(absl::string_view addres
   ASSIGN_OR_RETURN(std::shared_ptr<Authorization> authorization, Authorization::make(options.credentials, target));
   ASSIGN_OR_RETURN(const auto credentials, channel_credentials(options.credentials));
   std::shared_ptr<grpc::Channel> channel = open_channel(target, options, credentials);
-  const absl::Status connected = await_connection(channel, target, options);
-  if (!connected.ok()) return connected;
+  RETURN_IF_ERROR(await_connection(channel, target, options));
   std::shared_ptr<grpc::Channel> bulk = open_channel(target, options, credentials);
   auto connection = std::make_unique<Connection>(
       Connection{target, options, std::move(authorization), channel, bulk, v1::ServerService::NewStub(channel),

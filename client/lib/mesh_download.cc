@@ -6,6 +6,7 @@
 #include "absl/strings/str_cat.h"
 #include "client/lib/status.h"
 #include "client/lib/transfers.h"
+#include "core/base/status_macros.h"
 #include "grpcpp/client_context.h"
 
 namespace locus::client {
@@ -99,8 +100,8 @@ absl::StatusOr<DownloadedMesh> download_mesh(v1::SceneService::StubInterface& st
   while (received.ok() && reader->Read(&message)) received = receiver.receive(message);
   if (!received.ok()) context.TryCancel();
   const absl::Status end = to_absl_status(reader->Finish());
-  if (!received.ok()) return received;
-  if (!end.ok()) return end;
+  RETURN_IF_ERROR(received);
+  RETURN_IF_ERROR(end);
   return receiver.finish();
 }
 

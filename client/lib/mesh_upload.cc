@@ -6,6 +6,7 @@
 #include "absl/strings/str_cat.h"
 #include "client/lib/status.h"
 #include "client/lib/transfers.h"
+#include "core/base/status_macros.h"
 #include "grpcpp/client_context.h"
 
 namespace locus::client {
@@ -70,8 +71,7 @@ class Sender {
 
 absl::StatusOr<v1::UploadMeshResponse> upload_mesh(v1::SceneService::StubInterface& stub, const MeshColumns& mesh,
                                                    const CallHeader& header, const UploadProgress& progress) {
-  const absl::Status checked = check(mesh);
-  if (!checked.ok()) return checked;
+  RETURN_IF_ERROR(check(mesh));
   grpc::ClientContext context;
   prepare(context, header);
   v1::UploadMeshResponse response;
@@ -82,8 +82,7 @@ absl::StatusOr<v1::UploadMeshResponse> upload_mesh(v1::SceneService::StubInterfa
                         sender.send(mesh.indices, &v1::UploadMeshRequest::mutable_indices);
   // If a write fails, the server has already answered, and Finish() returns its answer.
   if (all_sent) writer->WritesDone();
-  const absl::Status status = to_absl_status(writer->Finish());
-  if (!status.ok()) return status;
+  RETURN_IF_ERROR(to_absl_status(writer->Finish()));
   return response;
 }
 

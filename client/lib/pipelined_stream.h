@@ -33,6 +33,7 @@
 #include "client/lib/connection.h"
 #include "client/lib/retry.h"
 #include "client/lib/status.h"
+#include "core/base/status_macros.h"
 #include "grpcpp/client_context.h"
 #include "grpcpp/support/client_callback.h"
 
@@ -278,7 +279,7 @@ class PipelinedStream {
     absl::Status end = *attempt_->end();
     const uint64_t token = attempt_->token();
     attempt_.reset();
-    if (!fatal_.ok()) return fatal_;
+    RETURN_IF_ERROR(fatal_);
     if (broken_off_) return absl::CancelledError("the stream was broken off");
     if (closing_ && items_.empty()) return absl::OkStatus();
     if (silent) return absl::UnavailableError("the server answered nothing for as long as the stream is patient");

@@ -211,7 +211,7 @@ absl::Status back_up(Host& host, const Caller& caller, MessageStream& stream) {
     take_batch_priority(host.config.batch_priority);
     sent = send_copy(path / kCopy, take);
   }).join();
-  if (!sent.ok()) return sent.status();
+  RETURN_IF_ERROR(sent.status());
   if (*sent) return absl::OkStatus();
   const absl::Status status = caller.stop();
   return status.ok() ? absl::CancelledError("the caller stopped reading") : status;

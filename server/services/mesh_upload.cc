@@ -191,8 +191,7 @@ absl::StatusOr<bool> answer_early(Host& host, const Caller& caller, const MeshUp
   if (!upload.announced()) return false;
   const MeshPtr known = host.registry.find_content(*upload.announced());
   if (known != nullptr && upload.has_counts_of(*known)) {
-    const absl::Status status = reuse(host, caller, upload.name(), upload.parts(), *known, response);
-    if (!status.ok()) return status;
+    RETURN_IF_ERROR(reuse(host, caller, upload.name(), upload.parts(), *known, response));
     return true;
   }
   if (named.ok()) {

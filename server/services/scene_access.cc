@@ -54,7 +54,7 @@ absl::Status wait_for_readers(Scene& scene, const std::function<absl::Status()>&
     if (late.ok()) return late;
     absl::Status stopped = stop();
     if (stopped.code() == absl::StatusCode::kDeadlineExceeded) return late;
-    if (!stopped.ok()) return stopped;
+    RETURN_IF_ERROR(stopped);
     if (now - start > kReadersMayTake) scene.revoke_overdue_readers();
   }
 }

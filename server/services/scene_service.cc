@@ -134,7 +134,7 @@ absl::Status delete_scene(const Caller& caller, Host& host, const v1::DeleteScen
   // A damaged scene can still be deleted.
   if (status.ok() || absl::IsDataLoss(status)) status = host.registry.delete_scene(request.name());
   if (status.code() == absl::StatusCode::kNotFound && request.if_present()) return absl::OkStatus();
-  if (!status.ok()) return status;
+  RETURN_IF_ERROR(status);
   if (scene.ok()) host.changes.forget((*scene)->latest()->epoch);
   log(LogLevel::kInfo, "scene deleted", {{"scene", request.name()}});
   return absl::OkStatus();

@@ -168,10 +168,10 @@ absl::StatusOr<uint64_t> RocksdbLog::append(SceneKey key, absl::Span<const LogEn
   RETURN_IF_ERROR(check_free_space("appending", bytes));
 
   MutexLock lock(scene.writing);
-  const auto start = scenes_.begin_append(scene, entries.front().epoch, database_->db().GetLatestSequenceNumber());
-  if (!start.ok()) return start.status();
+  ASSIGN_OR_RETURN(const auto start,
+                   scenes_.begin_append(scene, entries.front().epoch, database_->db().GetLatestSequenceNumber()));
   rocksdb::WriteBatch batch(bytes + entries.size() * kBatchOverhead);
-  Position at = start->written;
+  Position at = start.written;
   for (const LogEntry& entry : entries) {
     LOCUS_CHECK_EQ(entry.epoch, entries.front().epoch);
     const std::string record_key = log_key(key, ++at.sequence);
@@ -182,9 +182,9 @@ absl::StatusOr<uint64_t> RocksdbLog::append(SceneKey key, absl::Span<const LogEn
     const rocksdb::Slice parts[] = {head, slice_of(entry.bytes), checksum_bytes};
     LOCUS_CHECK(batch.Put(database_->log(), rocksdb::SliceParts(&key_part, 1), rocksdb::SliceParts(parts, 3)).ok());
   }
-  for (uint64_t possibly_written = at.sequence + 1; possibly_written <= start->possibly_written_end; ++possibly_written)
+  for (uint64_t possibly_written = at.sequence + 1; possibly_written <= start.possibly_written_end; ++possibly_written)
     LOCUS_CHECK(batch.Delete(database_->log(), log_key(key, possibly_written)).ok());
-  LOCUS_DCHECK_EQ(at.sequence, start->written.sequence + entries.size());
+  LOCUS_DCHECK_EQ(at.sequence, start.written.sequence + entries.size());
   const bool synced = level == AckLevel::kLocal;
   if (absl::Status status = database_->write(batch, synced && options_.sync); !status.ok()) {
     scenes_.fail_append(scene, at.sequence);

@@ -240,7 +240,7 @@ absl::Status RocksdbLog::read_snapshot(SceneKey key, ChunkSink sink) const {
     MutexLock lock(catalogue_mutex_);
     row = row_of(key);
   }
-  if (!row.ok()) return row.status();
+  RETURN_IF_ERROR(row.status());
   absl::Status status =
       read_chunks(*database_, database_->snapshot(), snapshot_prefix(key, row->snapshot_id), row->snapshot, sink);
   if (!absl::IsDataLoss(status)) return status;

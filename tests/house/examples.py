@@ -134,6 +134,9 @@ BAD_EXAMPLES = {
                               {"core/index/README.md": "x\n" * 61}],
     "PicturesAreFewAndSmall": [{"deploy/other.png": "x"}, {"core/logo.jpg": "x"},
                                {"deploy/quickstart.png": "x" * (300 * 1024 + 1)}],
+    "StatusesReturnByMacro": [source("absl::Status step() {\n" + body + "\n}") for body in (
+        "  if (!done.ok()) return done;", "  if (!read.ok()) return read.status();", "  if (!a.ok()) {\n    return a;\n  }",
+        "  if (absl::Status status = read(); !status.ok()) return status;", "  if (!a.ok()) return std::move(a).status();")],
     "NothingIsLeftUnfinished": [source("// TO" + "DO: later\n"), {"deploy/run.sh": "# FIX" + "ME\n"},
                                 {"proto/README.md": "XX" + "X\n"}],
     "NoPathOfAMachine": [{"deploy/run.sh": "cd /wo" + "rk/main\n"}, {"README.md": "see ../sha" + "red/design\n"},

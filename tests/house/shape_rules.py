@@ -110,6 +110,22 @@ def each_line(tree, pattern, message):
             for number, line in enumerate(text.split("\n"), 1) for match in pattern.finditer(line)]
 
 
+# A status that is returned as it is. Groups: the variable's name, and its name in the returned expression.
+WRITTEN_OUT_RETURN = re.compile(r"if \((?:[^;{}]*; )?!(\w+)\.ok\(\)\)\s*\{?\s*return (?:std::move\()?\1\)?(?:\.status\(\))?;")
+
+
+def statuses_return_by_macro(tree):
+    """Finds returns that RETURN_IF_ERROR or ASSIGN_OR_RETURN would write, except statuses of other libraries."""
+    problems = []
+    for path in tree.code("core", "server", "client"):
+        text = re.sub(r"(?m)^\s*//.*", "", tree.files[path])
+        for match in WRITTEN_OUT_RETURN.finditer(text):
+            foreign = re.search(rf"\b(?:rocksdb|grpc)::Status {match.group(1)}\b", text[:match.end()])
+            if path != "core/base/status_macros.h" and not foreign:
+                problems.append(f"{path}: write RETURN_IF_ERROR or ASSIGN_OR_RETURN: {match.group()}")
+    return problems
+
+
 def nothing_is_left_unfinished(tree):
     return each_line(tree, UNFINISHED, "unfinished work")
 
@@ -176,6 +192,7 @@ RULES = {
     "TopLevelIsClosed": top_level_is_closed,
     "RoomsHaveShortReadmes": rooms_have_short_readmes,
     "PicturesAreFewAndSmall": pictures_are_few_and_small,
+    "StatusesReturnByMacro": statuses_return_by_macro,
     "NothingIsLeftUnfinished": nothing_is_left_unfinished,
     "NoPathOfAMachine": no_path_of_a_machine,
     "TestsMirrorTheSources": tests_mirror_the_sources,

@@ -78,7 +78,7 @@ absl::StatusOr<std::vector<Checksum>> read_checksums(const std::string& backup) 
   if (absl::IsNotFound(read))
     return absl::NotFoundError(
         absl::StrCat(backup, " is no backup, or one that was interrupted: it has no ", kChecksumFile));
-  if (!read.ok()) return read;
+  RETURN_IF_ERROR(read);
   absl::StatusOr<std::vector<Checksum>> checksums = parse_checksums(text);
   if (checksums.ok()) return checksums;
   return absl::DataLossError(

@@ -18,13 +18,12 @@ struct BackupOptions {
 absl::Status back_up(const BackupOptions& options, Context& context) {
   PartialDirectory directory(options.directory, TargetRule::kNothing);
   RETURN_IF_ERROR(directory.check());
-  const absl::StatusOr<client::Client*> client = context.connect();
-  if (!client.ok()) return client.status();
+  ASSIGN_OR_RETURN(client::Client* const client, context.connect());
   ProgressLine line("backing up", context);
   BackupWriter writer(directory, line.progress());
-  const absl::StatusOr<client::BackupSize> size = (*client)->backup(writer);
+  const absl::StatusOr<client::BackupSize> size = client->backup(writer);
   line.clear();
-  if (!size.ok()) return size.status();
+  RETURN_IF_ERROR(size.status());
   RETURN_IF_ERROR(writer.finish());
   Report report;
   report.head = {{"directory", directory.target()}, {"files", size->files}, {"bytes", size->bytes}};

@@ -38,8 +38,7 @@ absl::Status BulkAnswers::write(const v1::QueryResult& result, const SentRows& s
     RowLayout layout = query_.layout;
     layout.frame = frames[i];
     layout.first_query = sent.first_row + sent.list_starts[i];
-    const absl::Status written = write_block(result.blocks(static_cast<int>(i)), end - sent.list_starts[i], layout);
-    if (!written.ok()) return written;
+    RETURN_IF_ERROR(write_block(result.blocks(static_cast<int>(i)), end - sent.list_starts[i], layout));
   }
   context_.out().flush();
   if (!context_.out()) return absl::UnknownError("cannot write the output");

@@ -40,12 +40,11 @@ class BulkUpdateRun {
     // pipe can be read only once.
     if (context_.lines() == Lines::kScriptCheck) return absl::OkStatus();
     ASSIGN_OR_RETURN(const std::unique_ptr<RowReader> reader, open_rows(bulk_, update_.schema));
-    const absl::StatusOr<client::Client*> client = context_.connect();
-    if (!client.ok()) return client.status();
+    ASSIGN_OR_RETURN(client::Client* const client, context_.connect());
     reader_ = reader.get();
     client::UpdateStreamOptions options;
     options.max_in_flight = static_cast<int>(kBulkWindow);
-    stream_ = (*client)->update_stream(scene_, options);
+    stream_ = client->update_stream(scene_, options);
     absl::Status status = send_all();
     // Even after an error, wait for the acks of all batches in flight, since the report counts their items.
     while (!timed_out_ && !in_flight_.empty()) status.Update(take_front());

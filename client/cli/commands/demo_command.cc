@@ -155,8 +155,8 @@ absl::Status check_other(const client::Client& client, const DemoOptions& option
   const v1::QueryBatch batch = mixed_batch(world, options.seed + 77);
   const absl::StatusOr<v1::QueryResult> here = client.query(options.scene, batch);
   const absl::StatusOr<v1::QueryResult> there = other->query(options.scene, batch);
-  if (!here.ok()) return here.status();
-  if (!there.ok()) return there.status();
+  RETURN_IF_ERROR(here.status());
+  RETURN_IF_ERROR(there.status());
   uint64_t different = 0;
   for (int i = 0; i < here->blocks_size(); ++i)
     if (here->blocks(i).SerializeAsString() != there->blocks(i).SerializeAsString()) ++different;

@@ -58,7 +58,7 @@ absl::StatusOr<Json> read_scene(const ExportOptions& options, SceneExport& file,
   };
   const absl::Status read = client.dump(dump_request(options.scene, options.view, context), take);
   if (context.progress() == Progress::kLive) context.err() << "\r\x1b[K" << std::flush;
-  if (!read.ok()) return read;
+  RETURN_IF_ERROR(read);
   if (file.things() == 0)
     return absl::FailedPreconditionError(absl::StrCat("scene ", options.scene, " has nothing to export"));
   return head;

@@ -28,9 +28,8 @@ std::string name_of(client::Health health) {
 }
 
 absl::Status health(const HealthOptions& options, Context& context) {
-  const absl::StatusOr<client::Client*> client = context.connect();
-  if (!client.ok()) return client.status();
-  ASSIGN_OR_RETURN(const client::Health health, (*client)->health(options.service));
+  ASSIGN_OR_RETURN(client::Client* const client, context.connect());
+  ASSIGN_OR_RETURN(const client::Health health, client->health(options.service));
   Report report;
   report.head = {{"address", context.address()}, {"status", name_of(health)}};
   context.write(report);

@@ -183,7 +183,7 @@ absl::Status insert_rows(const InsertOptions& options, Context& context) {
   checked.Update(at_most_one(options.layers, "--layers"));
   checked.Update(at_most_one(options.groups, "--group"));
   checked.Update(at_most_one(options.tags, "--tag"));
-  if (!checked.ok()) return checked;
+  RETURN_IF_ERROR(checked);
   const BulkUpdate update = {
       .schema = schema_of(options),
       .check_row = [&](const RowBatch& batch, size_t row) { return check_row(options, batch, row); },
@@ -198,8 +198,7 @@ absl::Status insert(const InsertOptions& options, Context& context) {
   if (options.ids.empty() || options.at.empty()) {
     return usage_error("give --id and --at, or rows with --from-csv or --from-ndjson");
   }
-  const absl::Status checked = check_measures(options);
-  if (!checked.ok()) return checked;
+  RETURN_IF_ERROR(check_measures(options));
   return apply_and_report(options.scene, batch_of(options), context);
 }
 

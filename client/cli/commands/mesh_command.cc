@@ -86,8 +86,7 @@ absl::Status download(const MeshOptions& options, Context& context) {
 
 absl::Status delete_mesh(const MeshOptions& options, Context& context) {
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());
-  const absl::Status deleted = client->delete_mesh(options.name);
-  if (!deleted.ok()) return deleted;
+  RETURN_IF_ERROR(client->delete_mesh(options.name));
   Report report;
   report.head["deleted"] = options.name;
   context.write(report);

@@ -76,8 +76,7 @@ void add_placement_options(CLI::App& command, PlacementOptions& options) {
 absl::Status upload_and_place(const PlacementOptions& options, const ImportedLevel& level, Context& context) {
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());
   if (options.create) {
-    const absl::Status created = create_scene(options.scene, *client);
-    if (!created.ok()) return created;
+    RETURN_IF_ERROR(create_scene(options.scene, *client));
   }
   Report report;
   report.rows_name = "meshes";

@@ -57,7 +57,7 @@ absl::Status move_rows(const MoveOptions& options, Context& context) {
     checked = usage_error("give --id and --to or an input with their columns, not both");
   }
   checked.Update(at_most_one(options.rotations, "--rotation"));
-  if (!checked.ok()) return checked;
+  RETURN_IF_ERROR(checked);
   const BulkUpdate update = {
       .schema = {{.name = "id", .kind = FieldKind::kId, .required = true},
                  {.name = "to",

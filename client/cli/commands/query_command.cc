@@ -11,8 +11,7 @@ namespace locus::cli {
 
 absl::StatusOr<v1::QueryResult> ask_block(const QueryOptions& options, client::QueryBuilder& builder,
                                           Context& context) {
-  const absl::Status checked = check(options);
-  if (!checked.ok()) return checked;
+  RETURN_IF_ERROR(check(options));
   apply_to_batch(options, context, builder);
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());
   absl::StatusOr<v1::QueryResult> result = client->query(options.scene, builder.build());

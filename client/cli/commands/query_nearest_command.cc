@@ -40,7 +40,7 @@ absl::Status query_points_of_input(const NearestOptions& options, Context& conte
   absl::Status checked = check(options.query, options.bulk);
   if (checked.ok() && !options.at.empty()) checked = usage_error("give --at or an input with its columns, not both");
   checked.Update(at_most_one(options.max_distances, "--max-distance"));
-  if (!checked.ok()) return checked;
+  RETURN_IF_ERROR(checked);
   BulkQuery query = {.schema = {}, .layout = layout_of(options), .rows_name = "found", .add_block = {}};
   query.schema = {
       {.name = "at", .kind = FieldKind::kCoordinate, .parts = "xyz", .aliases = {"position"}, .required = true},

@@ -61,7 +61,7 @@ BulkQuery bulk_query(const Options& options, const char* kind) {
 absl::Status query_balls_of_input(const BallOptions& options, Context& context) {
   absl::Status checked = check_input(options);
   checked.Update(at_most_one(options.radii, "--radius"));
-  if (!checked.ok()) return checked;
+  RETURN_IF_ERROR(checked);
   BulkQuery query = bulk_query(options, "ball");
   query.schema.push_back(column_or_option({.name = "radius", .required = true}, options.radii, "--radius"));
   add_filter_fields(options.query, query.schema);
@@ -79,7 +79,7 @@ absl::Status query_boxes_of_input(const BoxOptions& options, Context& context) {
   absl::Status checked = check_input(options);
   checked.Update(at_most_one(options.half_extents, "--half"));
   checked.Update(at_most_one(options.rotations, "--rotation"));
-  if (!checked.ok()) return checked;
+  RETURN_IF_ERROR(checked);
   BulkQuery query = bulk_query(options, "box");
   query.schema.push_back(column_or_option(
       {.name = "half", .parts = "xyz", .aliases = {"half_extents"}, .required = true}, options.half_extents, "--half"));
@@ -104,7 +104,7 @@ absl::Status query_capsules_of_input(const CapsuleOptions& options, Context& con
   if (checked.ok() && (!options.from.empty() || !options.to.empty()))
     checked = usage_error("give --from and --to or an input with its columns, not both");
   checked.Update(at_most_one(options.radii, "--radius"));
-  if (!checked.ok()) return checked;
+  RETURN_IF_ERROR(checked);
   BulkQuery query = bulk_query(options, "capsule");
   query.schema = {{.name = "from", .kind = FieldKind::kCoordinate, .parts = "xyz", .required = true},
                   {.name = "way", .parts = "xyz", .required = true},

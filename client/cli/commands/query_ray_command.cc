@@ -51,7 +51,7 @@ absl::Status query_rays_of_input(const RayOptions& options, Context& context) {
     checked = usage_error("give --from or an input with its columns, not both");
   checked.Update(at_most_one(options.directions, "--dir"));
   checked.Update(at_most_one(options.t_max, "--max-t"));
-  if (!checked.ok()) return checked;
+  RETURN_IF_ERROR(checked);
   BulkQuery query = {.schema = {}, .layout = layout_of(options), .rows_name = "hits", .add_block = {}};
   if (options.mode == v1::RAY_MODE_ANY) {
     query.answer = BulkAnswer::kHits;

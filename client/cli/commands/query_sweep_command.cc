@@ -54,7 +54,7 @@ absl::Status query_sweeps_of_input(const SweepOptions& options, Context& context
   checked.Update(at_most_one(options.half_axes, "--half-axis"));
   checked.Update(at_most_one(options.half_extents, "--half"));
   checked.Update(at_most_one(options.rotations, "--rotation"));
-  if (!checked.ok()) return checked;
+  RETURN_IF_ERROR(checked);
   BulkQuery query = {.schema = {}, .layout = layout_of(options), .rows_name = "hits", .add_block = {}};
   if (options.mode == v1::RAY_MODE_ANY) {
     query.answer = BulkAnswer::kHits;

@@ -173,7 +173,7 @@ absl::Status render(const RenderOptions& given, Context& context) {
       cast_rays(*client, camera, size, options.cast, progress_line(options, size.pixels(), context));
   const absl::Duration took = absl::Now() - start;
   if (context.progress() == Progress::kLive) context.err() << "\r\x1b[K" << std::flush;
-  if (!cast.ok()) return cast.status();
+  RETURN_IF_ERROR(cast.status());
   Report report;
   report.head = head_of(options, camera, *cast, took);
   const Picture picture = paint(options, cast->image, camera, report.head);

@@ -20,7 +20,7 @@ absl::Status verify(const RestoreOptions& options, Context& context) {
   ProgressLine line("verifying", context);
   const absl::StatusOr<client::BackupSize> size = read_backup(options.backup, nullptr, line.progress());
   line.clear();
-  if (!size.ok()) return size.status();
+  RETURN_IF_ERROR(size.status());
   Report report;
   report.head = {{"backup", options.backup}, {"files", size->files}, {"bytes", size->bytes}, {"whole", true}};
   context.write(report);
@@ -37,7 +37,7 @@ absl::Status restore(const RestoreOptions& options, Context& context) {
   ProgressLine line("restoring", context);
   const absl::StatusOr<client::BackupSize> size = read_backup(options.backup, &copy, line.progress());
   line.clear();
-  if (!size.ok()) return size.status();
+  RETURN_IF_ERROR(size.status());
   RETURN_IF_ERROR(copy.keep());
   Report report;
   report.head = {{"data_dir", copy.target()}, {"files", size->files}, {"bytes", size->bytes}};

@@ -112,8 +112,7 @@ absl::Status run(const RunOptions& options, Context& context) {
   ASSIGN_OR_RETURN(const Variables variables, variables_from(options.settings));
   ASSIGN_OR_RETURN(const Script script, read_script(options.file));
   ScriptCounts checked;
-  const absl::Status mistake = check_script(script, variables, context, checked);
-  if (!mistake.ok()) return mistake;
+  RETURN_IF_ERROR(check_script(script, variables, context, checked));
   if (options.dry_run) {
     write_checked(script, checked, context);
     return absl::OkStatus();

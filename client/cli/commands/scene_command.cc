@@ -96,8 +96,7 @@ Report description_of(const v1::Scene& scene) {
 }
 
 absl::Status create(const CreateOptions& options, Context& context) {
-  const auto labels = parse_labels(options.labels);
-  if (!labels.ok()) return labels.status();
+  ASSIGN_OR_RETURN(const auto labels, parse_labels(options.labels));
   v1::CreateSceneRequest request;
   request.set_name(options.name);
   request.set_if_absent(options.if_absent);
@@ -106,7 +105,7 @@ absl::Status create(const CreateOptions& options, Context& context) {
   request.mutable_spec()->set_history_ticks(options.history_ticks);
   request.mutable_spec()->set_history_bytes(options.history_bytes);
   request.mutable_spec()->set_overload(options.overload);
-  request.mutable_spec()->mutable_labels()->insert(labels->begin(), labels->end());
+  request.mutable_spec()->mutable_labels()->insert(labels.begin(), labels.end());
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());
   ASSIGN_OR_RETURN(const v1::Scene scene, client->create_scene(request));
   context.remember_own(options.name, {scene.epoch(), scene.revision()});
@@ -115,10 +114,9 @@ absl::Status create(const CreateOptions& options, Context& context) {
 }
 
 absl::Status list_scenes(const ListOptions& options, Context& context) {
-  const auto labels = parse_labels(options.labels);
-  if (!labels.ok()) return labels.status();
+  ASSIGN_OR_RETURN(const auto labels, parse_labels(options.labels));
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());
-  ASSIGN_OR_RETURN(const std::vector<v1::Scene> scenes, client->list_scenes(*labels));
+  ASSIGN_OR_RETURN(const std::vector<v1::Scene> scenes, client->list_scenes(labels));
   Report report;
   report.rows_name = "scenes";
   report.no_rows = "no scenes";
@@ -141,8 +139,7 @@ absl::Status delete_scene(const DeleteOptions& options, Context& context) {
   request.set_name(options.name);
   request.set_if_present(options.if_present);
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());
-  const absl::Status deleted = client->delete_scene(request);
-  if (!deleted.ok()) return deleted;
+  RETURN_IF_ERROR(client->delete_scene(request));
   context.forget_own(options.name);
   Report report;
   report.head["deleted"] = options.name;

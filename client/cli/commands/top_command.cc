@@ -100,14 +100,11 @@ absl::Status top(const TopOptions& options, Context& context) {
   if (options.json) context.options().format = Format::kJson;
   const bool live = !options.once && isatty(STDOUT_FILENO) == 1 && context.options().format == Format::kTable;
   const EndSignals end_signals;
-  absl::StatusOr<Scraped> before = scrape(options, context);
-  if (!before.ok()) return before.status();
+  ASSIGN_OR_RETURN(Scraped before, scrape(options, context));
   while (end_signals.wait(options.interval)) {
-    absl::StatusOr<Scraped> now = scrape(options, context);
-    if (!now.ok()) return now.status();
+    ASSIGN_OR_RETURN(Scraped now, scrape(options, context));
     if (live) context.out() << kClearScreen;
-    write(context,
-          top_figures(before->samples, now->samples, std::chrono::duration<double>(now->at - before->at).count()));
+    write(context, top_figures(before.samples, now.samples, std::chrono::duration<double>(now.at - before.at).count()));
     context.out().flush();
     if (options.once || !context.out()) break;
     before = std::move(now);

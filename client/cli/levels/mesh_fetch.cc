@@ -3,12 +3,12 @@
 #include <utility>
 
 #include "client/lib/client.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 
 absl::StatusOr<ImportedMesh> fetch_mesh(const std::string& name, Context& context) {
-  const absl::StatusOr<client::Client*> client = context.connect();
-  if (!client.ok()) return client.status();
+  ASSIGN_OR_RETURN(client::Client* const client, context.connect());
   client::DownloadProgress progress;
   if (context.progress() == Progress::kLive) {
     progress = [&](uint64_t received, uint64_t total) {
@@ -17,9 +17,9 @@ absl::StatusOr<ImportedMesh> fetch_mesh(const std::string& name, Context& contex
                     << " MiB" << std::flush;
     };
   }
-  absl::StatusOr<client::DownloadedMesh> mesh = (*client)->download_mesh(name, progress);
+  absl::StatusOr<client::DownloadedMesh> mesh = client->download_mesh(name, progress);
   if (context.progress() == Progress::kLive) context.err() << "\r\x1b[K" << std::flush;
-  if (!mesh.ok()) return mesh.status();
+  RETURN_IF_ERROR(mesh.status());
   ImportedMesh result;
   result.name = name;
   result.vertices = std::move(mesh->vertices);

@@ -62,9 +62,8 @@ absl::StatusOr<std::vector<Value>> read_arguments(Cursor& cursor, const Variable
   std::vector<Value> values;
   cursor.skip_blanks();
   while (cursor.peek() != end) {
-    Answer value = read_sum(cursor, variables);
-    if (!value.ok()) return value.status();
-    values.push_back(*std::move(value));
+    ASSIGN_OR_RETURN(Value value, read_sum(cursor, variables));
+    values.push_back(std::move(value));
     cursor.skip_blanks();
     if (cursor.peek() != end && !cursor.accept(","))
       return expected(absl::StrCat("`", std::string(1, end), "`"), cursor);
@@ -85,8 +84,7 @@ Answer read_bare(Cursor& cursor, const Variables& variables) {
   if (name == "true" || name == "false") return Value::of(Json(name == "true"));
   if (name == "null") return Value::of(Json());
   if (!cursor.accept("(")) return Value::of(Json(name));
-  const absl::Status opened = cursor.open();
-  if (!opened.ok()) return opened;
+  RETURN_IF_ERROR(cursor.open());
   Answer value = read_call(cursor, variables, name);
   cursor.close();
   return value;
@@ -107,9 +105,8 @@ Answer list_of(std::vector<Value> values) {
 Answer read_list(Cursor& cursor, const Variables& variables) {
   std::vector<Value> values;
   do {
-    Answer value = read_sum(cursor, variables);
-    if (!value.ok()) return value.status();
-    values.push_back(*std::move(value));
+    ASSIGN_OR_RETURN(Value value, read_sum(cursor, variables));
+    values.push_back(std::move(value));
     cursor.skip_blanks();
   } while (cursor.accept(","));
   return list_of(std::move(values));
@@ -118,11 +115,10 @@ Answer read_list(Cursor& cursor, const Variables& variables) {
 // Reads an expression in brackets. Precondition: the cursor is at the opening bracket.
 Answer read_enclosed(Cursor& cursor, const Variables& variables) {
   const absl::string_view end = cursor.next() == '(' ? ")" : "}";
-  const absl::Status opened = cursor.open();
-  if (!opened.ok()) return opened;
+  RETURN_IF_ERROR(cursor.open());
   Answer value = read_list(cursor, variables);
   cursor.close();
-  if (!value.ok()) return value;
+  RETURN_IF_ERROR(value.status());
   cursor.skip_blanks();
   return cursor.accept(end) ? std::move(value) : Answer(expected(absl::StrCat("`", end, "`"), cursor));
 }
@@ -158,9 +154,8 @@ Answer read_chain(Cursor& cursor, const Variables& variables, absl::string_view 
     cursor.skip_blanks();
     if (cursor.ended() || !absl::StrContains(signs, cursor.peek()) || absl::StartsWith(cursor.rest(), "->")) break;
     const char sign = cursor.next();
-    const Answer right = read(cursor, variables);
-    if (!right.ok()) return right;
-    left = calculate(sign, *left, *right);
+    ASSIGN_OR_RETURN(const Value right, read(cursor, variables));
+    left = calculate(sign, *left, right);
   }
   return left;
 }
@@ -175,11 +170,10 @@ Answer read_sum(Cursor& cursor, const Variables& variables) {
 
 // Reads the rest of `[index]` and applies it to `value`. Precondition: the cursor is behind the opening bracket.
 Answer read_entry(Cursor& cursor, const Variables& variables, const Value& value) {
-  const absl::Status opened = cursor.open();
-  if (!opened.ok()) return opened;
+  RETURN_IF_ERROR(cursor.open());
   const Answer index = read_sum(cursor, variables);
   cursor.close();
-  if (!index.ok()) return index;
+  RETURN_IF_ERROR(index.status());
   cursor.skip_blanks();
   if (!cursor.accept("]")) return expected("`]`", cursor);
   if (!index->known()) return Value::unknown();
@@ -204,7 +198,7 @@ Answer read_path(Cursor& cursor, const Variables& variables, Value value) {
     } else {
       return value;
     }
-    if (!part.ok()) return part;
+    RETURN_IF_ERROR(part.status());
     value = *std::move(part);
   }
 }
@@ -222,15 +216,14 @@ Answer read_braced_variable(Cursor& cursor, const Variables& variables) {
   if (name.empty()) return expected("a name behind `${`", cursor);
   const Value* const variable = variables.find(name);
   // If the variable is not defined, the path is parsed and ignored.
-  const Answer value = read_path(cursor, variables, variable == nullptr ? Value::unknown() : *variable);
-  if (!value.ok()) return value;
+  ASSIGN_OR_RETURN(const Value value, read_path(cursor, variables, variable == nullptr ? Value::unknown() : *variable));
   if (cursor.accept("}")) return variable == nullptr ? Answer(not_defined(name)) : value;
   if (!cursor.accept(":-")) return expected("`}` or `:-`", cursor);
   const size_t length = cursor.rest().find('}');
   if (length == absl::string_view::npos) return absl::InvalidArgumentError("`${` is not closed: } is missing");
   std::string standby(cursor.rest().substr(0, length));
   cursor.move_to(cursor.at() + length + 1);
-  return variable == nullptr || is_missing(*value) ? Value::of(Json(std::move(standby))) : value;
+  return variable == nullptr || is_missing(value) ? Value::of(Json(std::move(standby))) : value;
 }
 
 }  // namespace

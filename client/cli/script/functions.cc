@@ -16,7 +16,7 @@ using Arguments = std::vector<Value>;
 using Answer = absl::StatusOr<Value>;
 
 Answer value_of(const absl::StatusOr<Number>& number) {
-  if (!number.ok()) return number.status();
+  RETURN_IF_ERROR(number.status());
   return Value::of(*number);
 }
 

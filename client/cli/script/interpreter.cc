@@ -97,10 +97,9 @@ absl::Status Interpreter::set(const std::string& name, Value value) {
 
 absl::StatusOr<Value> Interpreter::read_value(const std::string& text) const {
   Cursor cursor(text);
-  absl::StatusOr<Value> value = read_expression(cursor, variables_);
-  if (!value.ok()) return value;
-  const absl::Status ended = at_end(cursor);
-  return ended.ok() ? std::move(value) : ended;
+  ASSIGN_OR_RETURN(Value value, read_expression(cursor, variables_));
+  RETURN_IF_ERROR(at_end(cursor));
+  return value;
 }
 
 absl::Status Interpreter::let(const std::string& text) {

@@ -47,11 +47,9 @@ absl::StatusOr<Value> read_double_quoted(Cursor& cursor, const Variables& variab
       ASSIGN_OR_RETURN(const Value value,
                        cursor.accept("$") ? read_variable(cursor, variables) : read_braces(cursor, variables));
       known &= value.known();
-      const absl::Status appended = append_value(text, value);
-      if (!appended.ok()) return appended;
+      RETURN_IF_ERROR(append_value(text, value));
     } else if (cursor.accept("\\")) {
-      const absl::Status read = read_escape(cursor, text);
-      if (!read.ok()) return read;
+      RETURN_IF_ERROR(read_escape(cursor, text));
     } else {
       text += cursor.next();
     }
@@ -76,8 +74,7 @@ absl::Status append_value(std::string& text, const Value& value) {
 
 absl::StatusOr<Value> read_quoted_text(Cursor& cursor, const Variables& variables) {
   if (cursor.next() == '\'') return read_single_quoted(cursor);
-  const absl::Status opened = cursor.open();
-  if (!opened.ok()) return opened;
+  RETURN_IF_ERROR(cursor.open());
   absl::StatusOr<Value> text = read_double_quoted(cursor, variables);
   cursor.close();
   return text;

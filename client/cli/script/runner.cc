@@ -29,8 +29,7 @@ class Runner {
                           place_of(script_, statement));
       }
       const absl::StatusOr<size_t> following = step(next);
-      const absl::Status counted = count(statement, following.status());
-      if (!counted.ok()) return counted;
+      RETURN_IF_ERROR(count(statement, following.status()));
       next = following.ok() ? *following : behind_failed(next);
     }
     return absl::OkStatus();
@@ -133,7 +132,7 @@ absl::Status run_script(const Script& script, const Variables& variables, AfterF
   const absl::Status status = Runner(script, variables, after, context, counts).run();
   context.set_lines(lines);
   context.pending_batch().reset();
-  if (!status.ok()) return status;
+  RETURN_IF_ERROR(status);
   const uint64_t bad = counts.failed + counts.broken;
   return bad == 0 ? absl::OkStatus() : told(absl::FailedPreconditionError(absl::StrCat(bad, " lines failed")));
 }

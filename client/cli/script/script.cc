@@ -11,6 +11,7 @@
 #include "absl/strings/strip.h"
 #include "client/cli/failure.h"
 #include "client/cli/script/script_limits.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -70,8 +71,7 @@ absl::StatusOr<Statement> parse_expect_error(absl::string_view rest) {
 absl::StatusOr<std::optional<Statement>> parse_line(absl::string_view line) {
   line = absl::StripAsciiWhitespace(line);
   if (line.empty() || line.front() == '#') return std::nullopt;
-  const absl::Status checked = check_characters(line);
-  if (!checked.ok()) return checked;
+  RETURN_IF_ERROR(check_characters(line));
   absl::string_view rest = line;
   const std::string word = take_first_word(rest);
   if (word == kExpectError) return parse_expect_error(rest);

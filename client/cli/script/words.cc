@@ -23,8 +23,7 @@ absl::StatusOr<Word> read_word(Cursor& cursor, const Variables& variables) {
   while (!ends_word(cursor)) {
     if (absl::StrContains("$'\"{", cursor.peek())) {
       ASSIGN_OR_RETURN(const Value value, read_part(cursor, variables));
-      const absl::Status appended = append_value(word.text, value);
-      if (!appended.ok()) return appended;
+      RETURN_IF_ERROR(append_value(word.text, value));
       word.bare = false;
       continue;
     }

@@ -110,7 +110,7 @@ absl::StatusOr<SavedContexts> read_contexts(const std::string& path) {
   if (path.empty()) return SavedContexts();
   const absl::StatusOr<SecurityFile> file = read_security_file(path);
   if (absl::IsNotFound(file.status())) return SavedContexts();
-  if (!file.ok()) return file.status();
+  RETURN_IF_ERROR(file.status());
   return parse_contexts(path, file->text);
 }
 

@@ -117,7 +117,7 @@ absl::StatusOr<std::string> create_token(const std::string& file, absl::string_v
   ASSIGN_OR_RETURN(const FileLock lock, FileLock::acquire(file));
   absl::StatusOr<SecurityFile> content = read_token_file(file);
   if (absl::IsNotFound(content.status())) content = SecurityFile();
-  if (!content.ok()) return content.status();
+  RETURN_IF_ERROR(content.status());
   ASSIGN_OR_RETURN(const std::vector<TokenLine> lines, parse_tokens(file, content->text, now));
   if (has_id(lines, id)) return absl::AlreadyExistsError(absl::StrCat(file, " already has a token ", id));
   ASSIGN_OR_RETURN(const std::string token, random_token(id));

@@ -135,8 +135,7 @@ absl::Status open_damaged(const StorageOptions& options, const rocksdb::Status& 
   {
     std::unique_ptr<Database> reader;
     if (!Database::open(wanted, OpenMode::kReadOnlyLenient, reader).ok()) return unopenable(options, why.ToString());
-    absl::Status recorded = verify_and_record(*reader, expected, opened);
-    if (!recorded.ok()) return recorded;
+    RETURN_IF_ERROR(verify_and_record(*reader, expected, opened));
   }
   rocksdb::Status status = Database::open(wanted, OpenMode::kLenient, opened.database);
   if (!status.ok()) return unopenable(options, status.ToString());
@@ -190,9 +189,7 @@ absl::StatusOr<OpenedDirectory> open_directory(const StorageOptions& options) {
   LOCUS_DCHECK(options.env != nullptr && options.reserve_bytes.has_value());
   OpenedDirectory opened;
   RETURN_IF_ERROR(make_folder(*options.env, options.path));
-  auto lock = DirectoryLock::acquire(*options.env, options.path);
-  if (!lock.ok()) return lock.status();
-  opened.lock = *std::move(lock);
+  ASSIGN_OR_RETURN(opened.lock, DirectoryLock::acquire(*options.env, options.path));
   const std::string repaired = absl::StrCat(options.path, "/", kRepairedFolder);
   if (options.env->FileExists(repaired).ok())
     return absl::FailedPreconditionError(
@@ -212,19 +209,17 @@ absl::StatusOr<OpenedDirectory> open_directory(const StorageOptions& options) {
     if (expected != nullptr) {
       const absl::Status list = check_file_list(*options.env, wanted.folder, *expected);
       if (absl::IsDataLoss(list)) return unopenable(options, list.message());
-      if (!list.ok()) return list;
+      RETURN_IF_ERROR(list);
     }
     rocksdb::Status status = sync_logs(*options.env, wanted.folder);
     if (status.ok()) status = Database::open(wanted, OpenMode::kStrict, opened.database);
     if (!status.ok()) {
       if (!is_damage(status)) return open_error(options, status);
-      absl::Status found = open_damaged(options, status, expected, opened);
-      if (!found.ok()) return found;
+      RETURN_IF_ERROR(open_damaged(options, status, expected, opened));
       expected = &opened.durable_marker;
     }
   }
-  absl::Status recorded = verify_and_record(*opened.database, expected, opened);
-  if (!recorded.ok()) return recorded;
+  RETURN_IF_ERROR(verify_and_record(*opened.database, expected, opened));
   if (!opened.damage_report.has_format) return unopenable(options, "its catalogue is lost");
   return opened;
 }

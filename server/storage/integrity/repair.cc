@@ -77,7 +77,7 @@ absl::Status copy_records(const Database& source, const SceneRow& row, Position&
         failed = copier.write_if_large();
         return failed;
       });
-  if (!failed.ok()) return failed;
+  RETURN_IF_ERROR(failed);
   return absl::IsDataLoss(read) ? absl::OkStatus() : read;
 }
 
@@ -218,7 +218,7 @@ absl::Status install_repaired(const StorageOptions& options, std::string& kept_a
     if (!fs::exists(repaired / part)) continue;  // moved by an earlier, interrupted call
     absl::Status done = move_if_exists(here / part, fs::path(kept_at) / part);
     if (done.ok()) done = move_if_exists(repaired / part, here / part);
-    if (!done.ok()) return done;
+    RETURN_IF_ERROR(done);
   }
   status = sync_folder(env, kept_at);
   if (status.ok()) status = sync_folder(env, here.string());
@@ -284,8 +284,7 @@ absl::StatusOr<RepairReport> repair(const StorageOptions& given) {
   const std::string folder = absl::StrCat(options.path, "/", kRepairedFolder);
   RepairReport report;
   if (!fs::exists(options.path)) return absl::NotFoundError(absl::StrCat(options.path, " is no data directory"));
-  const auto lock = DirectoryLock::acquire(*options.env, options.path);
-  if (!lock.ok()) return lock.status();
+  ASSIGN_OR_RETURN(const auto lock, DirectoryLock::acquire(*options.env, options.path));
   if (fs::exists(absl::StrCat(folder, "/", kReadyName))) {
     std::string kept_at;
     RETURN_IF_ERROR(install_repaired(options, kept_at));
@@ -295,12 +294,11 @@ absl::StatusOr<RepairReport> repair(const StorageOptions& given) {
   const absl::StatusOr<DurableMarker> durable_marker = DurableMarkerFile::read(*options.env, options.path);
   const DurableMarker* expected = durable_marker.ok() ? &*durable_marker : nullptr;
   {
-    const auto source = open_source(options, expected, folder);
-    if (!source.ok()) return source.status();
-    ASSIGN_OR_RETURN(const DamageReport damage_report, verify(**source, expected, Depth::kEverything));
+    ASSIGN_OR_RETURN(const auto source, open_source(options, expected, folder));
+    ASSIGN_OR_RETURN(const DamageReport damage_report, verify(*source, expected, Depth::kEverything));
     report.found = report_of(damage_report);
     if (report.found.intact() && !fs::exists(folder)) return report;
-    if (absl::Status status = make_copy(**source, damage_report, expected, options, folder, report); !status.ok()) {
+    if (absl::Status status = make_copy(*source, damage_report, expected, options, folder, report); !status.ok()) {
       fs::remove_all(folder, failed);
       return status;
     }

@@ -168,9 +168,8 @@ absl::Status find_scenes(const DurableMarker* expected, const CatalogueState& ca
   }
   for (auto& [key, scene] : scenes) {
     const auto scene_marker = scene_markers.find(key);
-    absl::Status disk = verify_scene(scene, scene_marker == scene_markers.end() ? nullptr : scene_marker->second,
-                                     expected, catalogue, database, depth);
-    if (!disk.ok()) return disk;
+    RETURN_IF_ERROR(verify_scene(scene, scene_marker == scene_markers.end() ? nullptr : scene_marker->second, expected,
+                                 catalogue, database, depth));
     found.scenes.push_back(std::move(scene));
   }
   return absl::OkStatus();
@@ -224,7 +223,7 @@ absl::StatusOr<DamageReport> verify(const Database& database, const DurableMarke
   }
   absl::Status disk = find_scenes(durable_marker, catalogue, database, depth, found);
   if (disk.ok()) disk = find_meshes(database, depth, found);
-  if (!disk.ok()) return disk;
+  RETURN_IF_ERROR(disk);
   return found;
 }
 

@@ -52,7 +52,7 @@ class Caster {
     // Wait for all answers even after a failure, since their callbacks write into this object.
     const absl::Status flushed = stream->flush();
     if (absl::Status status = outcome(); !status.ok()) return in_words(status);
-    if (!flushed.ok()) return flushed;
+    RETURN_IF_ERROR(flushed);
     return std::move(result_);
   }
 

@@ -20,6 +20,7 @@
 #include "client/cli/levels/import/import_error.h"
 #include "client/cli/levels/import/sanitized_build.h"
 #include "client/cli/levels/import/syscall_filter.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -217,7 +218,7 @@ absl::StatusOr<ChildAnswer> collect(Child& child, absl::string_view what, const 
     case Child::Reading::kEnded:
       break;
   }
-  if (const absl::Status error = error_of(status, what, limits); !error.ok()) return error;
+  RETURN_IF_ERROR(error_of(status, what, limits));
   if (bytes.empty()) return failure("gave no answer", what);
   const bool filtered = bytes.front() == kFiltered;
   bytes.erase(0, 1);

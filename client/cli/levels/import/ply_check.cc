@@ -192,9 +192,8 @@ absl::StatusOr<uint64_t> check_ply(absl::string_view bytes) {
     if (element.name == "face") faces += std::min(element.count, UINT64_MAX - faces);
   }
   const absl::string_view body = bytes.substr(header.body);
-  const absl::Status status =
-      header.encoding == PlyEncoding::kAscii ? check_ascii_body(header, body) : check_binary_body(header, body);
-  if (!status.ok()) return status;
+  RETURN_IF_ERROR(header.encoding == PlyEncoding::kAscii ? check_ascii_body(header, body)
+                                                         : check_binary_body(header, body));
   RETURN_IF_ERROR(check_counts({vertices, faces}));
   return faces;
 }

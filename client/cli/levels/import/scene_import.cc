@@ -277,9 +277,8 @@ absl::StatusOr<ImportedLevel> import_scene(const LevelFiles& files, const Import
 
   LevelBuilder builder(options.scale);
   RETURN_IF_ERROR(add_nodes(*scene, builder));
-  absl::StatusOr<ImportedLevel> level = std::move(builder).finish(file_stem(files.name));
-  if (!level.ok()) return level;
-  level->source_format = format_name(files.name);
+  ASSIGN_OR_RETURN(ImportedLevel level, std::move(builder).finish(file_stem(files.name)));
+  level.source_format = format_name(files.name);
   const FaceCounts left = count_faces(*scene);
   add_notes(found, left.faces - left.points_and_lines, *level);
   return level;

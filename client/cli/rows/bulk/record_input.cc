@@ -4,6 +4,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/strip.h"
+#include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
@@ -25,7 +26,7 @@ absl::StatusOr<Arrival> RecordInput::next(Record& record, std::optional<Clock::t
       const auto left = std::chrono::ceil<std::chrono::milliseconds>(*pause_at - Clock::now());
       if (!input_.ready_within(std::max(left, std::chrono::milliseconds(0)))) return Arrival::kPause;
     }
-    if (const absl::StatusOr<bool> more = read_more(); !more.ok()) return more.status();
+    RETURN_IF_ERROR(read_more().status());
     if (!ended_) continue;
     if (in_quotes_) return absl::InvalidArgumentError("a quote is opened and not closed");
     if (begin_ == buffer_.size()) return Arrival::kEnd;
@@ -60,7 +61,7 @@ absl::StatusOr<bool> RecordInput::read_more() {
   buffer_.resize(had + kChunkBytes);
   const absl::StatusOr<size_t> count = input_.read(absl::MakeSpan(buffer_).subspan(had));
   buffer_.resize(had + (count.ok() ? *count : 0));
-  if (!count.ok()) return count.status();
+  RETURN_IF_ERROR(count.status());
   ended_ = *count == 0;
   return !ended_;
 }

@@ -100,14 +100,13 @@ absl::StatusOr<ImportedLevel> import_bsp(absl::string_view bytes, const std::str
       add_listed_triangles(file, face, builder);
     }
   }
-  absl::StatusOr<ImportedLevel> level = std::move(builder).finish(name);
-  if (!level.ok()) return level;
-  level->source_format = "Quake 3 BSP";
+  ASSIGN_OR_RETURN(ImportedLevel level, std::move(builder).finish(name));
+  level.source_format = "Quake 3 BSP";
   if (patches > 0) {
-    level->notes.push_back(absl::StrCat(patches, " curved faces were cut into ", options.patch_subdivisions, " x ",
-                                        options.patch_subdivisions, " quads for each 3 x 3 patch."));
+    level.notes.push_back(absl::StrCat(patches, " curved faces were cut into ", options.patch_subdivisions, " x ",
+                                       options.patch_subdivisions, " quads for each 3 x 3 patch."));
   }
-  if (billboards > 0) level->notes.push_back(absl::StrCat(billboards, " billboards were skipped."));
+  if (billboards > 0) level.notes.push_back(absl::StrCat(billboards, " billboards were skipped."));
   return level;
 }
 
