@@ -123,8 +123,7 @@ class Replay {
     if (const auto* joined = std::get_if<Record::Joined>(&content); joined != nullptr) {
       std::vector<const UpdateBatch*> batches;
       for (const UpdateBatch& batch : joined->batches) batches.push_back(&batch);
-      writer_.apply_joined(batches);
-      return absl::OkStatus();
+      return writer_.apply_joined(batches, [] { return absl::OkStatus(); }).status();
     }
     return apply(std::get<Record::Change>(content));
   }

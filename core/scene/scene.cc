@@ -128,16 +128,6 @@ absl::StatusOr<UpdateAck> Scene::apply(const UpdateBatch& batch, Deadline until)
   return std::move(acks.front());
 }
 
-// Does not log the leading batches that are not new, because the writer table returns their acks without a change of
-// the scene. Logs all batches from the first new batch on, because applying a batch may make a later batch of the same
-// writer new.
-absl::Status Scene::log_each(absl::Span<const UpdateBatch* const> batches) {
-  if (!journal_.on()) return absl::OkStatus();
-  const WriterTable& writers = writer_.writers();
-  while (!batches.empty() && !writers.is_new(batches.front()->writer, batches.front()->batch)) batches.remove_prefix(1);
-  return journal_.append_each(writer_.epoch(), batches);
-}
-
 absl::StatusOr<Scene::Acks> Scene::apply_each(absl::Span<const UpdateBatch* const> batches, Deadline until) {
   Acks acks;
   const std::vector<const UpdateBatch*> good = well_formed(batches, acks);
@@ -148,29 +138,31 @@ absl::StatusOr<Scene::Acks> Scene::apply_each(absl::Span<const UpdateBatch* cons
     const MutexLock lock(writer_mutex_);
     RETURN_IF_ERROR(check_open());
     if (pins_->over_budget()) continue;  // another batch exceeded the budget after the wait
-    RETURN_IF_ERROR(log_each(good));
-    // Logged batches must be applied, so there is no error return after this point.
-    auto next = good.begin();
+    absl::Span<const UpdateBatch* const> rest = good;
+    bool logged = false;
     for (absl::StatusOr<UpdateAck>& ack : acks) {
       if (!ack.ok()) continue;
-      absl::StatusOr<SceneWriter::Applied> applied = writer_.apply(**next++);
-      if (applied.ok() && applied->snapshot != nullptr) publish(applied->snapshot);
-      if (applied.ok())
-        ack = std::move(applied->ack);
-      else
-        ack = applied.status();
+      absl::StatusOr<SceneWriter::Admission> admission = writer_.admit(*rest.front());
+      // Logs all batches from the first new batch on, because applying a batch may make a later batch of the same
+      // writer new. Earlier batches are answered without a change of the scene. Logged batches must be applied, so
+      // there is no error return after the append.
+      if (!logged && admission.ok() && !*admission) {
+        RETURN_IF_ERROR(journal_.append_each(writer_.epoch(), rest));
+        logged = true;
+      }
+      ack = answer(*rest.front(), std::move(admission));
+      rest.remove_prefix(1);
     }
     return acks;
   }
 }
 
-absl::Status Scene::log_joined(absl::Span<const UpdateBatch* const> batches) {
-  if (!journal_.on()) return absl::OkStatus();
-  // If none of the batches is new, no batch will be applied, and nothing needs to be logged.
-  const bool any_new = std::any_of(batches.begin(), batches.end(), [this](const UpdateBatch* batch) {
-    return writer_.writers().is_new(batch->writer, batch->batch);
-  });
-  return any_new ? journal_.append_joined(writer_.epoch(), batches) : absl::OkStatus();
+absl::StatusOr<UpdateAck> Scene::answer(const UpdateBatch& batch, absl::StatusOr<SceneWriter::Admission> admission) {
+  RETURN_IF_ERROR(admission.status());
+  if (*admission) return **std::move(admission);
+  ASSIGN_OR_RETURN(SceneWriter::Applied applied, writer_.apply_new(batch));
+  if (applied.snapshot != nullptr) publish(applied.snapshot);
+  return std::move(applied.ack);
 }
 
 absl::StatusOr<Scene::Acks> Scene::apply_joined(absl::Span<const UpdateBatch* const> batches, Deadline until) {
@@ -181,8 +173,10 @@ absl::StatusOr<Scene::Acks> Scene::apply_joined(absl::Span<const UpdateBatch* co
     const MutexLock lock(writer_mutex_);
     RETURN_IF_ERROR(check_open());
     if (pins_->over_budget()) continue;
-    RETURN_IF_ERROR(log_joined(good));
-    SceneWriter::Joined joined = writer_.apply_joined(good);
+    const auto log = [&journal = journal_, epoch = writer_.epoch(), &good] {
+      return journal.append_joined(epoch, good);
+    };
+    ASSIGN_OR_RETURN(SceneWriter::Joined joined, writer_.apply_joined(good, log));
     LOCUS_DCHECK_EQ(joined.acks.size(), good.size());
     if (joined.snapshot != nullptr) publish(joined.snapshot);
     auto next = joined.acks.begin();

@@ -232,8 +232,10 @@ class Scene {
   absl::Status admit_change(const StaticChange& change) LOCUS_EXCLUDES(mutex_);
   void leave_change(const StaticChange& change, const absl::Status& result) LOCUS_EXCLUDES(mutex_);
   absl::Status check_kept(const StaticChange& change) const;
-  absl::Status log_each(absl::Span<const UpdateBatch* const> batches) LOCUS_REQUIRES(writer_mutex_);
-  absl::Status log_joined(absl::Span<const UpdateBatch* const> batches) LOCUS_REQUIRES(writer_mutex_);
+  // Returns the ack or error of a batch with the result `admission` of SceneWriter::admit(). Applies a new batch and
+  // publishes its revision.
+  absl::StatusOr<UpdateAck> answer(const UpdateBatch& batch, absl::StatusOr<SceneWriter::Admission> admission)
+      LOCUS_REQUIRES(writer_mutex_);
   void count_joined(const Acks& acks) LOCUS_EXCLUDES(mutex_);
   absl::StatusOr<InstanceChange> build_and_publish(const StaticChange& change) LOCUS_REQUIRES(change_mutex_)
       LOCUS_EXCLUDES(writer_mutex_, mutex_);

@@ -95,18 +95,27 @@ SnapshotPtr SceneWriter::replace_statics(std::shared_ptr<const StaticSet> static
   return snapshot;
 }
 
-UpdateAck SceneWriter::ack_now() const {
-  UpdateAck ack;
+void SceneWriter::set_revision(UpdateAck& ack) const {
   ack.epoch = epoch_;
   ack.revision = revision_;
   ack.tick = tick_;
-  return ack;
+}
+
+absl::StatusOr<SceneWriter::Admission> SceneWriter::admit(const UpdateBatch& batch) const {
+  LOCUS_DCHECK(check_form(batch).ok());
+  ASSIGN_OR_RETURN(Admission known, writers_.admit(batch.writer, batch.batch));
+  if (known && known->epoch == 0) set_revision(*known);
+  return known;
 }
 
 absl::StatusOr<SceneWriter::Applied> SceneWriter::apply(const UpdateBatch& batch) {
-  LOCUS_DCHECK(check_form(batch).ok());
-  ASSIGN_OR_RETURN(std::optional<UpdateAck> known, writers_.admit(batch.writer, batch.batch));
-  if (known) return Applied{old_ack(*std::move(known)), nullptr};
+  ASSIGN_OR_RETURN(Admission known, admit(batch));
+  if (known) return Applied{*std::move(known), nullptr};
+  return apply_new(batch);
+}
+
+absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_new(const UpdateBatch& batch) {
+  LOCUS_DCHECK(writers_.admit(batch.writer, batch.batch).ok() && !*writers_.admit(batch.writer, batch.batch));
   const bool teleports = recorder_.on() && std::any_of(batch.moves.begin(), batch.moves.end(),
                                                        [](const MoveColumns& move) { return move.teleport; });
   absl::StatusOr<Applied> result = MoveApplier::serves(batch) && !teleports ? apply_moves(batch) : apply_changes(batch);
@@ -133,10 +142,7 @@ absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_moves(const UpdateBatch&
   moves_.run(objects_, batch);
   RETURN_IF_ERROR(fill_ack(batch, moves_, result));
   result.snapshot = publish_moves(batch);
-  const UpdateAck now = ack_now();
-  result.ack.epoch = now.epoch;
-  result.ack.revision = now.revision;
-  result.ack.tick = now.tick;
+  set_revision(result.ack);
   return result;
 }
 
@@ -157,7 +163,8 @@ absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_changes(const UpdateBatc
   return result;
 }
 
-SceneWriter::Joined SceneWriter::apply_joined(absl::Span<const UpdateBatch* const> batches) {
+absl::StatusOr<SceneWriter::Joined> SceneWriter::apply_joined(absl::Span<const UpdateBatch* const> batches,
+                                                              absl::FunctionRef<absl::Status()> log) {
   Joined joined;
   std::vector<bool> is_new;
   const UpdateBatch* any_new = nullptr;
@@ -166,8 +173,9 @@ SceneWriter::Joined SceneWriter::apply_joined(absl::Span<const UpdateBatch* cons
     LOCUS_DCHECK(check_form(*batch).ok() && may_join(*batches.front(), *batch));
     const absl::StatusOr<std::optional<UpdateAck>> known = writers_.admit(batch->writer, batch->batch);
     is_new.push_back(known.ok() && !*known);
-    joined.acks.push_back(known.ok() ? absl::StatusOr<UpdateAck>(UpdateAck()) : known.status());
+    joined.acks.push_back(known.ok() ? absl::StatusOr<UpdateAck>(known->value_or(UpdateAck())) : known.status());
     if (!is_new.back()) continue;
+    if (any_new == nullptr) RETURN_IF_ERROR(log());
     any_new = batch;
     moves_.add(objects_, *batch);
     UpdateAck& ack = *joined.acks.back();
@@ -180,12 +188,14 @@ SceneWriter::Joined SceneWriter::apply_joined(absl::Span<const UpdateBatch* cons
   }
   moves_.finish(objects_);
   if (any_new != nullptr) joined.snapshot = publish_moves(*any_new);
-  for (size_t i = 0; i < batches.size(); ++i)
-    if (is_new[i]) record_ack(*batches[i], *joined.acks[i]);
-  // A duplicate is answered last: it may repeat an earlier element of `batches`, whose ack is complete only now.
-  for (size_t i = 0; i < batches.size(); ++i)
-    if (!is_new[i] && joined.acks[i].ok())
-      joined.acks[i] = old_ack(**writers_.admit(batches[i]->writer, batches[i]->batch));
+  for (size_t i = 0; i < batches.size(); ++i) {
+    // The ack of a duplicate has no epoch if it repeats an earlier element of `batches`, whose revision is known only
+    // now, or if the writer table has dropped it.
+    if (is_new[i])
+      record_ack(*batches[i], *joined.acks[i]);
+    else if (joined.acks[i].ok() && joined.acks[i]->epoch == 0)
+      set_revision(*joined.acks[i]);
+  }
   LOCUS_DCHECK_CALL(check_invariants());
   return joined;
 }
@@ -211,17 +221,8 @@ SnapshotPtr SceneWriter::publish_moves(const UpdateBatch& batch) {
 }
 
 void SceneWriter::record_ack(const UpdateBatch& batch, UpdateAck& ack) {
-  ack.epoch = epoch_;
-  ack.revision = revision_;
-  ack.tick = tick_;
+  set_revision(ack);
   writers_.record(batch.writer, batch.batch, ack);
-}
-
-UpdateAck SceneWriter::old_ack(UpdateAck known) const {
-  if (known.epoch != 0) return known;
-  UpdateAck ack = ack_now();
-  ack.duplicate = true;
-  return ack;
 }
 
 uint64_t SceneWriter::tick_of(const UpdateBatch& batch) const {
@@ -248,9 +249,7 @@ void SceneWriter::publish_changes(const UpdateBatch& batch, bool changes, Applie
     tick_ = tick;
     result.snapshot = next_revision();
   }
-  result.ack.epoch = epoch_;
-  result.ack.revision = revision_;
-  result.ack.tick = tick_;
+  set_revision(result.ack);
 }
 
 }  // namespace locus

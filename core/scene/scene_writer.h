@@ -7,8 +7,10 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
+#include "absl/functional/function_ref.h"
 #include "absl/status/statusor.h"
 #include "core/base/check.h"
 #include "core/base/limits.h"
@@ -31,22 +33,33 @@ class SceneWriter {
   // Returns a writer that continues from `state`. Returns DATA_LOSS if an id occurs twice in `state`.
   static absl::StatusOr<SceneWriter> restore(SceneState state, Winding winding, const HistoryOptions& history);
 
+  // The ack of a batch that was applied before, or nullopt if the batch is new.
+  using Admission = std::optional<UpdateAck>;
+  // Returns the ack of a batch that was applied before, marked as duplicate, or nullopt if the batch is new. If the
+  // writer table has dropped the ack, returns one with the current revision. Returns FAILED_PRECONDITION BATCH_GAP if
+  // an earlier batch of the writer is missing. Precondition: the batch has passed check_form().
+  absl::StatusOr<Admission> admit(const UpdateBatch& batch) const;
+
   struct Applied {
     UpdateAck ack;
     SnapshotPtr snapshot;  // null when nothing changed
   };
-  // Applies one batch. Precondition: the batch has passed check_form(). The ack lists refused items; with
+  // Applies one batch. Precondition: admit() has returned nullopt for the batch. The ack lists refused items; with
   // all_or_nothing, one refused item refuses the whole batch. Returns RESOURCE_EXHAUSTED if the scene would have too
-  // many objects, and FAILED_PRECONDITION BATCH_GAP if an earlier batch of the writer is missing.
+  // many objects.
+  absl::StatusOr<Applied> apply_new(const UpdateBatch& batch);
+  // Calls admit(), and then apply_new() if the batch is new. Returns the errors of both.
   absl::StatusOr<Applied> apply(const UpdateBatch& batch);
 
   struct Joined {
     std::vector<absl::StatusOr<UpdateAck>> acks;  // one entry for each batch
     SnapshotPtr snapshot;                         // null when nothing changed
   };
-  // Applies the batches in order, as one revision. Preconditions: each batch has passed check_form(), and may_join() is
-  // true for the first batch and each other batch.
-  Joined apply_joined(absl::Span<const UpdateBatch* const> batches);
+  // Applies the batches in order, as one revision. Calls log() before the first new batch is applied, and not if no
+  // batch is new; if log() returns an error, applies nothing and returns the error. Preconditions: each batch has
+  // passed check_form(), and may_join() is true for the first batch and each other batch.
+  absl::StatusOr<Joined> apply_joined(absl::Span<const UpdateBatch* const> batches,
+                                      absl::FunctionRef<absl::Status()> log);
 
   // Makes the next revision, which has the instances `statics`, and returns its snapshot.
   SnapshotPtr replace_statics(std::shared_ptr<const StaticSet> statics);
@@ -85,7 +98,8 @@ class SceneWriter {
   void check_invariants() const;
   SnapshotPtr freeze();
   SnapshotPtr next_revision();
-  UpdateAck ack_now() const;
+  // Sets the epoch, revision and tick of `ack` to the current values.
+  void set_revision(UpdateAck& ack) const;
   // Moves the counts and errors of `applier` into the ack of `result`. Returns an error if the batch is all_or_nothing
   // and an item was refused.
   template <class Applier>
@@ -106,9 +120,6 @@ class SceneWriter {
   // Sets the epoch, revision and tick of the ack of an applied batch to the current values, and stores the ack in the
   // writer table.
   void record_ack(const UpdateBatch& batch, UpdateAck& ack);
-  // Returns the ack of a duplicate batch: `known`, which the writer table returned, or, if the table has dropped the
-  // ack, an ack with the current revision.
-  UpdateAck old_ack(UpdateAck known) const;
   // Applies a batch of any kind with BatchApplier.
   absl::StatusOr<Applied> apply_changes(const UpdateBatch& batch);
   // Returns true if the batch drops history.

@@ -137,8 +137,11 @@ class RecoveryLockstep {
     if (log_->appends() > appends + 1) return "more than one append";
     if (!acks.ok()) {
       const WriterTable writers = model_->freeze().writers;
-      while (!writers.is_new(deeds.front().batches[0].writer, deeds.front().batches[0].batch))
-        deeds.erase(deeds.begin());
+      const auto is_new = [&writers](const UpdateBatch& batch) {
+        const absl::StatusOr<std::optional<UpdateAck>> known = writers.admit(batch.writer, batch.batch);
+        return known.ok() && !*known;
+      };
+      while (!is_new(deeds.front().batches[0])) deeds.erase(deeds.begin());
     }
     std::string what;
     if (!logged(acks.status(), std::move(deeds), before, what)) return what;

@@ -44,12 +44,6 @@ absl::StatusOr<std::optional<UpdateAck>> WriterTable::admit(uint64_t writer, uin
   return std::optional<UpdateAck>(std::move(ack));
 }
 
-bool WriterTable::is_new(uint64_t writer, uint64_t batch) const {
-  if (writer == 0) return true;
-  const auto known = writers_.find(writer);
-  return batch == (known == writers_.end() ? 0 : known->second.batch) + 1;
-}
-
 void WriterTable::record(uint64_t writer, uint64_t batch, const UpdateAck& ack) {
   if (writer == 0) return;
   LOCUS_DCHECK_NE(batch, uint64_t{0});

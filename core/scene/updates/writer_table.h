@@ -27,8 +27,6 @@ class WriterTable {
   // batch was applied before, returns its ack, marked as duplicate, or, if the ack is not stored, an empty ack that is
   // marked as duplicate. Returns FAILED_PRECONDITION BATCH_GAP if an earlier batch is missing.
   absl::StatusOr<std::optional<UpdateAck>> admit(uint64_t writer, uint64_t batch) const;
-  // Returns true if admit() would return nullopt. Faster than admit().
-  bool is_new(uint64_t writer, uint64_t batch) const;
   // Stores the number and the ack of the latest batch of a writer. Evicts another writer, or drops all acks, if a limit
   // would be exceeded. Does nothing for writer 0.
   void record(uint64_t writer, uint64_t batch, const UpdateAck& ack);

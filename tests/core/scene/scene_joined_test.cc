@@ -100,6 +100,18 @@ TEST_F(SceneJoinedTest, SeveralBatchesOfOneWriterAreAppliedOnceEach) {
   EXPECT_EQ(apply(numbered(with(move_to({1}, {3, 0, 0})), 5, 3)).revision, before + 2);
 }
 
+TEST_F(SceneJoinedTest, ADuplicateGetsItsAckAlthoughALaterBatchEvictsItsWriter) {
+  for (uint64_t writer = 1; writer <= limits::kMaxWriters; ++writer)
+    apply(numbered(with(move_to({1}, {0, 0, 0})), writer, 1));
+  const uint64_t before = revision();
+  const auto acks = join({numbered(with(move_to({1}, {0, 0, 0})), 1, 1),
+                          numbered(with(move_to({2}, {1, 0, 0})), limits::kMaxWriters + 1, 1)});
+  EXPECT_TRUE(acks[0].duplicate);
+  EXPECT_EQ(acks[0].revision, before);
+  EXPECT_EQ(acks[0].applied, 1u);
+  EXPECT_EQ(acks[1].revision, before + 1);
+}
+
 TEST_F(SceneJoinedTest, ABatchWithAGapBeforeItIsRefusedAlone) {
   const auto acks = try_to_join({numbered(with(move_to({1}, {1, 0, 0})), 5, 1),
                                  numbered(with(move_to({1}, {3, 0, 0})), 5, 3), with(move_to({2}, {1, 0, 0}))});
