@@ -8,11 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "absl/strings/escaping.h"
 #include "absl/strings/str_split.h"
 #include "absl/time/clock.h"
 #include "client/cli/run.h"
-#include "client/lib/sha256.h"
+#include "tests/support/sha256_hex.h"
 #include "tests/support/temporary_folder.h"
 
 namespace locus::test {
@@ -26,13 +25,6 @@ std::string run_token(const std::vector<std::string>& arguments) {
   cli::Context context(out, err, cli::Progress::kSilent);
   EXPECT_EQ(cli::run_line(arguments, context), cli::ExitCode::kOk) << err.str();
   return out.str();
-}
-
-std::string sha256_hex(const std::string& text) {
-  client::Sha256Hasher hasher;
-  hasher.add(text);
-  const client::Sha256 hash = hasher.finish();
-  return absl::BytesToHexString({reinterpret_cast<const char*>(hash.data()), hash.size()});
 }
 
 std::vector<std::string> lines_of(const std::string& file) {

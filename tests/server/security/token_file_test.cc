@@ -3,7 +3,6 @@
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <openssl/sha.h>
 #include <sys/stat.h>
 
 #include <set>
@@ -11,12 +10,12 @@
 #include <thread>
 #include <vector>
 
-#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
 #include "server/security/security_limits.h"
 #include "server/security/text_file.h"
 #include "tests/support/random.h"
+#include "tests/support/sha256_hex.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test_scale.h"
 
@@ -28,15 +27,9 @@ using testing::HasSubstr;
 constexpr int64_t kNow = 1'700'000'000;
 const std::string kSecret(43, 'a');
 
-std::string hash_hex(const std::string& token) {
-  uint8_t hash[SHA256_DIGEST_LENGTH];
-  SHA256(reinterpret_cast<const uint8_t*>(token.data()), token.size(), hash);
-  return absl::BytesToHexString({reinterpret_cast<const char*>(hash), sizeof hash});
-}
-
 // Returns the line of a token whose secret is kSecret.
 std::string line(const std::string& id, const std::string& expires = "never") {
-  return absl::StrCat(id, " ", hash_hex(absl::StrCat("locus_", id, "_", kSecret)), " 2023-01-01 ", expires,
+  return absl::StrCat(id, " ", test::sha256_hex(absl::StrCat("locus_", id, "_", kSecret)), " 2023-01-01 ", expires,
                       " made here\n");
 }
 
@@ -86,7 +79,7 @@ TEST_F(TokenFileTest, OnlyTheWholeTokenIsFound) {
 TEST_F(TokenFileTest, AHashThatAgreesOnlyAtItsBeginningIsRefused) {
   const std::string token = "locus_ci_" + kSecret;
   for (size_t at = 1; at < 64; ++at) {
-    std::string hash = hash_hex(token);
+    std::string hash = test::sha256_hex(token);
     hash[at] = hash[at] == '0' ? '1' : '0';
     EXPECT_EQ(table("ci " + hash + " 2023-01-01 never\n").find(token, kNow), nullptr) << at;
   }
@@ -247,7 +240,7 @@ TEST_F(TokenFileTest, FilesBeyondTheLimitsAreRefused) {
   std::string comments;
   for (size_t i = 0; i < kMaxTokens; ++i) comments += "#\n";
   EXPECT_FALSE(TokenTable::parse("f", comments + line("ci")).ok());
-  EXPECT_FALSE(TokenTable::parse("f", "#" + std::string(kMaxSecurityFileBytes, 'a')).ok());
+  EXPECT_FALSE(TokenTable::parse("f", absl::StrCat("#", std::string(kMaxSecurityFileBytes, 'a'))).ok());
 }
 
 }  // namespace

@@ -7,11 +7,10 @@
 #include <fstream>
 #include <thread>
 
-#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
 #include "client/cli/security/private_file.h"
-#include "client/lib/sha256.h"
+#include "tests/support/sha256_hex.h"
 #include "tests/support/temporary_folder.h"
 
 namespace locus::cli {
@@ -40,12 +39,8 @@ TEST_F(TokenWriterTest, TheFileHasTheHashOfTheTokenAndNotTheToken) {
   ASSERT_TRUE(token.ok()) << token.status();
   EXPECT_THAT(*token, MatchesRegex("locus_lobby_[A-Za-z0-9_-]+"));
   EXPECT_EQ(token->size(), strlen("locus_lobby_") + 43);
-  client::Sha256Hasher hasher;
-  hasher.add(*token);
-  const client::Sha256 hash = hasher.finish();
-  EXPECT_EQ(text(),
-            absl::StrCat("lobby ", absl::BytesToHexString({reinterpret_cast<const char*>(hash.data()), hash.size()}),
-                         " 2024-05-29T12:00:00Z 2024-05-30T12:00:00Z first floor\n"));
+  EXPECT_EQ(text(), absl::StrCat("lobby ", test::sha256_hex(*token),
+                                 " 2024-05-29T12:00:00Z 2024-05-30T12:00:00Z first floor\n"));
   struct stat status {};
   ASSERT_EQ(::stat(file_.c_str(), &status), 0);
   EXPECT_EQ(status.st_mode & 07777, 0600u);

@@ -2,16 +2,14 @@
 #ifndef LOCUS_TESTS_CLIENT_CLI_LEVELS_GENERATE_MESH_FACTS_H_
 #define LOCUS_TESTS_CLIENT_CLI_LEVELS_GENERATE_MESH_FACTS_H_
 
-#include <openssl/evp.h>
-
 #include <array>
 #include <cstdint>
-#include <cstdio>
 #include <cstring>
 #include <string>
 #include <unordered_set>
 
 #include "client/cli/levels/import/imported_mesh.h"
+#include "tests/support/sha256_hex.h"
 
 namespace locus::cli::testing {
 
@@ -58,15 +56,7 @@ inline std::string bytes_hash(const ImportedMesh& mesh) {
   std::memcpy(bytes.data(), mesh.vertices.data(), mesh.vertices.size() * sizeof(float));
   std::memcpy(bytes.data() + mesh.vertices.size() * sizeof(float), mesh.indices.data(),
               mesh.indices.size() * sizeof(uint32_t));
-  std::array<unsigned char, 32> hash{};
-  EVP_Digest(bytes.data(), bytes.size(), hash.data(), nullptr, EVP_sha256(), nullptr);
-  std::string text;
-  for (const unsigned char byte : hash) {
-    std::array<char, 3> digits{};
-    std::snprintf(digits.data(), digits.size(), "%02x", byte);
-    text += digits.data();
-  }
-  return text;
+  return test::sha256_hex(bytes);
 }
 
 }  // namespace locus::cli::testing
