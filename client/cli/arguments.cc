@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
 #include "absl/strings/strip.h"
+#include "core/base/check.h"
 
 namespace locus::cli {
 namespace {
@@ -71,7 +72,10 @@ std::vector<uint64_t> values_of(const std::vector<Number64>& numbers) {
 std::vector<uint32_t> values32_of(const std::vector<Number64>& numbers) {
   std::vector<uint32_t> values;
   values.reserve(numbers.size());
-  for (const Number64& number : numbers) values.push_back(static_cast<uint32_t>(number.value));
+  for (const Number64& number : numbers) {
+    LOCUS_DCHECK_LE(number.value, uint64_t{std::numeric_limits<uint32_t>::max()});
+    values.push_back(static_cast<uint32_t>(number.value));
+  }
   return values;
 }
 

@@ -1,6 +1,7 @@
 #include "client/lib/backup.h"
 
 #include <algorithm>
+#include <cassert>
 #include <vector>
 
 #include "absl/strings/str_split.h"
@@ -39,7 +40,18 @@ absl::Status BackupPaths::add(const std::string& path) {
     folders_.insert(folder);
     if (folders_.size() > kMaxBackupFiles) return absl::InvalidArgumentError("has more folders than a backup may have");
   }
-  return files_.insert(path).second ? absl::OkStatus() : absl::InvalidArgumentError("comes twice");
+  const bool added = files_.insert(path).second;
+  assert(check_invariants(path));
+  return added ? absl::OkStatus() : absl::InvalidArgumentError("comes twice");
+}
+
+bool BackupPaths::check_invariants(const std::string& path) const {
+  bool holds = files_.contains(path) && !folders_.contains(path);
+  for (size_t slash = path.find('/'); slash != std::string::npos; slash = path.find('/', slash + 1)) {
+    const std::string folder = path.substr(0, slash);
+    holds = holds && folders_.contains(folder) && !files_.contains(folder);
+  }
+  return holds;
 }
 
 }  // namespace locus::client

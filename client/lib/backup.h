@@ -61,6 +61,9 @@ class BackupPaths {
   absl::Status add(const std::string& path);
 
  private:
+  // Returns whether the invariant of the class comment holds for `path` and the folders that contain it.
+  bool check_invariants(const std::string& path) const;
+
   std::set<std::string> files_;
   std::set<std::string> folders_;
 };

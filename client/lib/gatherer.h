@@ -8,6 +8,7 @@
 #define LOCUS_CLIENT_LIB_GATHERER_H_
 
 #include <algorithm>
+#include <cassert>
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
@@ -50,6 +51,7 @@ class Gatherer {
     changed_.wait(lock, [this] { return items_ < max_items_; });
     if (items_++ == 0) due_ = Clock::now() + max_delay_;
     add_to(batch_);
+    assert(check_invariants());
     if (items_ == 1 || items_ == max_items_) changed_.notify_all();
   }
 
@@ -65,6 +67,9 @@ class Gatherer {
  private:
   using Clock = std::chrono::steady_clock;
 
+  // Returns whether the batch that is being gathered is within its limit. The caller holds the lock.
+  bool check_invariants() const { return items_ <= max_items_; }
+
   bool is_due() const { return items_ == max_items_ || (items_ > 0 && (ending_ || Clock::now() >= due_)); }
 
   void run() {
@@ -78,6 +83,7 @@ class Gatherer {
       }
       Batch batch = std::exchange(batch_, Batch());
       items_ = 0;
+      assert(!sending_ && check_invariants());
       sending_ = true;
       changed_.notify_all();
       lock.unlock();

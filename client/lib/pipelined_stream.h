@@ -13,6 +13,7 @@
 #define LOCUS_CLIENT_LIB_PIPELINED_STREAM_H_
 
 #include <algorithm>
+#include <cassert>
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
@@ -217,6 +218,13 @@ class PipelinedStream {
     } else if (closing_ && items_.empty()) {
       attempt_->end_writes();
     }
+    assert(check_invariants());
+  }
+
+  // Returns whether the invariants of the class comment hold. O(items). Precondition: the caller holds the lock.
+  bool check_invariants() const {
+    return items_.size() <= max_in_flight_ && (!ended_ || items_.empty()) &&
+           std::is_partitioned(items_.begin(), items_.end(), [](const Item& item) { return item.written; });
   }
 
   // Completes the request that `response` answers. Ignores a response that matches no item: the request was renumbered
@@ -317,6 +325,7 @@ class PipelinedStream {
   void finish(std::unique_lock<std::mutex>& lock, const absl::Status& end) {
     ended_ = end;
     Items unanswered = std::exchange(items_, Items());
+    assert(check_invariants());
     for (Item& item : unanswered) complete(lock, item.done, end);
     changed_.notify_all();
   }

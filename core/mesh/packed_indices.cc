@@ -32,6 +32,7 @@ PackedIndices::PackedIndices(absl::Span<const uint32_t> indices) {
 uint32_t PackedIndices::Reader::next() {
   uint64_t code = 0;
   for (int shift = 0;; shift += 7) {
+    LOCUS_DCHECK(next_ < end_);
     const uint64_t byte = *next_++;
     code |= (byte & (kMore - 1)) << shift;
     if ((byte & kMore) == 0) break;

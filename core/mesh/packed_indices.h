@@ -24,13 +24,14 @@ class PackedIndices {
   // moved.
   class Reader {
    public:
-    explicit Reader(const PackedIndices& packed) : next_(packed.bytes_.data()) {}
+    explicit Reader(const PackedIndices& packed) : next_(packed.bytes_.data()), end_(next_ + packed.bytes_.size()) {}
 
     // Returns the next index. Precondition: the list has an index that next() has not returned yet.
     uint32_t next();
 
    private:
     const uint8_t* next_;
+    const uint8_t* end_;
     int64_t next_unused_ = 0;  // one more than the largest index so far
   };
 

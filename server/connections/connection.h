@@ -14,6 +14,7 @@
 #include <string>
 #include <utility>
 
+#include "core/base/check.h"
 #include "core/base/mutex.h"
 
 namespace locus::server {
@@ -64,7 +65,10 @@ class Connection {
     metadata_bytes_.fetch_add(metadata_bytes, std::memory_order_relaxed);
     calls_open_.fetch_add(1, std::memory_order_relaxed);
   }
-  void call_ended() { calls_open_.fetch_sub(1, std::memory_order_relaxed); }
+  void call_ended() {
+    const uint64_t open = calls_open_.fetch_sub(1, std::memory_order_relaxed);
+    LOCUS_DCHECK_GT(open, 0u);
+  }
   // Counts a call that the peer ended before its answer. Closes the connection at once if, since begin_cancel_window(),
   // the peer has cancelled more than kMaxCancelled calls, and more calls than it let finish. The periodic checks of the
   // guard would detect this too late, because gRPC accepts calls very fast.

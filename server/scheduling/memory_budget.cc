@@ -96,10 +96,11 @@ bool MemoryBudget::try_reserve(MemoryLine line, uint64_t bytes, uint64_t owner) 
   const auto found = reserved_.find(owner);
   const uint64_t of_owner = bytes + (found == reserved_.end() ? 0 : found->second);
   if (reserved_in_all_ + bytes > reserve() || of_owner > reserve() / kReserveOwners) return false;
-  reserved_[owner] = of_owner;
+  if (bytes > 0) reserved_[owner] = of_owner;
   reserved_in_all_ += bytes;
   claimed_.fetch_add(bytes);
   lines_[static_cast<size_t>(line)].fetch_add(bytes);
+  LOCUS_DCHECK_CALL(check_invariants(owner));
   return true;
 }
 
@@ -166,7 +167,20 @@ void MemoryBudget::end(MemoryLine line, Owner reserve_owner, uint64_t bytes) {
   MutexLock lock(mutex_);
   reserved_in_all_ -= bytes;
   const auto reserved = reserved_.find(*reserve_owner);
+  LOCUS_DCHECK(reserved != reserved_.end());
+  LOCUS_DCHECK_LE(bytes, reserved->second);
   if ((reserved->second -= bytes) == 0) reserved_.erase(reserved);
+  LOCUS_DCHECK_CALL(check_invariants(*reserve_owner));
+}
+
+void MemoryBudget::check_invariants(uint64_t owner) const {
+  LOCUS_CHECK_LE(reserved_in_all_, reserve());
+  LOCUS_CHECK_EQ(reserved_.empty(), reserved_in_all_ == 0);
+  const auto reserved = reserved_.find(owner);
+  if (reserved == reserved_.end()) return;
+  LOCUS_CHECK_LT(uint64_t{0}, reserved->second);
+  LOCUS_CHECK_LE(reserved->second, reserved_in_all_);
+  LOCUS_CHECK_LE(reserved->second, reserve() / kReserveOwners);
 }
 
 }  // namespace locus::server

@@ -138,6 +138,8 @@ class MemoryBudget {
   // Claims of at most this many bytes may use the reserve.
   static constexpr uint64_t kSmallClaim = 64u << 10;
 
+  // Checks the sums of the reserve for the claims of `owner`. O(1). The other sums change without a lock.
+  void check_invariants(uint64_t owner) const LOCUS_REQUIRES(mutex_);
   bool try_claim(MemoryLine line, uint64_t bytes);
   bool try_reserve(MemoryLine line, uint64_t bytes, uint64_t owner) LOCUS_REQUIRES(mutex_);
   uint64_t reserve() const;

@@ -1,6 +1,7 @@
 #include "server/security/audit_updates.h"
 
 #include "absl/strings/str_cat.h"
+#include "core/base/check.h"
 
 namespace locus::server {
 namespace {
@@ -26,9 +27,12 @@ void AuditUpdates::count(const AuditedUpdate& update, int64_t unix_ms) {
     sum.last_ms = unix_ms;
     ++sum.batches;
     sum.items += update.items;
+    LOCUS_DCHECK_CALL(check_invariants());
   }
   write(early);
 }
+
+void AuditUpdates::check_invariants() const { LOCUS_CHECK_LE(sums_.size(), kMaxAuditedPairs); }
 
 void AuditUpdates::tick(int64_t unix_ms) {
   Sums due;

@@ -51,6 +51,8 @@ class AuditUpdates {
   };
   using Sums = absl::flat_hash_map<std::pair<std::string, std::string>, Sum>;
 
+  // Checks the invariant of the class comment. O(1).
+  void check_invariants() const LOCUS_REQUIRES(mutex_);
   void write_all() LOCUS_EXCLUDES(mutex_);
   void write(const Sums& sums);
 

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/check.h"
 
 namespace locus::server {
 
@@ -15,7 +16,12 @@ bool RefusalTally::count(const AuditEntry& refusal) {
     caller.last.principal = "others";
     caller.last.address.clear();
   }
+  LOCUS_DCHECK_CALL(check_invariants());
   return ++caller.refusals <= kMaxLines;
+}
+
+void RefusalTally::check_invariants() const {
+  LOCUS_CHECK_LE(callers_.size(), callers_.contains("") ? kMaxCallers + 1 : kMaxCallers);
 }
 
 std::vector<AuditEntry> RefusalTally::end_window() {
@@ -30,6 +36,7 @@ std::vector<AuditEntry> RefusalTally::end_window() {
         absl::StrCat(caller.refusals - kMaxLines, " more refusals were not written, the last of them: ", note.text);
   }
   callers_.clear();
+  LOCUS_DCHECK_CALL(check_invariants());
   return notes;
 }
 

@@ -28,6 +28,8 @@ class RefusalTally {
   std::vector<AuditEntry> end_window();
 
  private:
+  // Checks the invariant of the class comment. O(1).
+  void check_invariants() const;
   struct Caller {
     uint64_t refusals = 0;
     AuditEntry last;

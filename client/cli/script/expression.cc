@@ -8,6 +8,7 @@
 #include "client/cli/script/arithmetic.h"
 #include "client/cli/script/functions.h"
 #include "client/cli/script/quoted_text.h"
+#include "core/base/check.h"
 #include "core/base/status_macros.h"
 
 namespace locus::cli {
@@ -114,6 +115,7 @@ Answer read_list(Cursor& cursor, const Variables& variables) {
 
 // Reads an expression in brackets. Precondition: the cursor is at the opening bracket.
 Answer read_enclosed(Cursor& cursor, const Variables& variables) {
+  LOCUS_DCHECK(cursor.peek() == '(' || cursor.peek() == '{');
   const absl::string_view end = cursor.next() == '(' ? ")" : "}";
   RETURN_IF_ERROR(cursor.open());
   Answer value = read_list(cursor, variables);

@@ -5,6 +5,7 @@
 #include "client/cli/script/expression.h"
 #include "client/cli/script/script_limits.h"
 #include "client/cli/unknown_values.h"
+#include "core/base/check.h"
 #include "core/base/status_macros.h"
 
 namespace locus::cli {
@@ -73,6 +74,7 @@ absl::Status append_value(std::string& text, const Value& value) {
 }
 
 absl::StatusOr<Value> read_quoted_text(Cursor& cursor, const Variables& variables) {
+  LOCUS_DCHECK(cursor.peek() == '"' || cursor.peek() == '\'');
   if (cursor.next() == '\'') return read_single_quoted(cursor);
   RETURN_IF_ERROR(cursor.open());
   absl::StatusOr<Value> text = read_double_quoted(cursor, variables);

@@ -53,6 +53,7 @@ absl::StatusOr<std::shared_ptr<const StaticMesh>> StaticMesh::restore(std::strin
 
 std::shared_ptr<const StaticMesh> StaticMesh::share(std::string name, std::vector<MeshPart> parts,
                                                     const StaticMesh& other, std::string creator) {
+  LOCUS_DCHECK(check_parts(parts, other.triangle_count()).ok());
   std::shared_ptr<StaticMesh> mesh(new StaticMesh(std::move(name), std::move(parts), other.content_));
   mesh->creator_ = std::move(creator);
   return mesh;

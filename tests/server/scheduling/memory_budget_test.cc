@@ -155,6 +155,13 @@ TEST_F(MemoryBudgetTest, SmallClaimsHaveAReserveThatIsBounded) {
   EXPECT_TRUE(budget.claim(MemoryLine::kReplies, "", 64u << 10, 0).ok());
 }
 
+TEST_F(MemoryBudgetTest, AnEmptyClaimSucceedsInAFullProcessAndUsesNoReserve) {
+  used_ = kLimit;
+  MemoryBudget budget(kLimit, meter());
+  for (uint64_t owner = 0; owner < 100; ++owner) EXPECT_TRUE(budget.claim(MemoryLine::kMoves, "", 0, owner).ok());
+  EXPECT_EQ(budget.taken(), kLimit);
+}
+
 TEST_F(MemoryBudgetTest, OrdinaryClaimsLeaveTheReserveToOthers) {
   constexpr uint64_t kLarge = uint64_t{1} << 30;
   MemoryBudget budget(kLarge, meter());

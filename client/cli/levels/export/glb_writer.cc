@@ -8,6 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "core/base/check.h"
 #include "core/base/status_macros.h"
 
 namespace locus::cli {
@@ -124,6 +125,7 @@ Json GlbWriter::add_primitive(const ImportedMesh& mesh, size_t first_index, size
 }
 
 absl::Status GlbWriter::set_mesh(size_t mesh_index, const ImportedMesh& mesh) {
+  LOCUS_DCHECK_LT(mesh_index, meshes_.size());
   // Check the size before copying. `bytes` is a lower bound of the file's size, since vertices that several parts share
   // are copied once for each of these parts.
   const uint64_t bytes = bytes_.size() + (mesh.vertices.size() + mesh.indices.size()) * sizeof(float) + kFrameBytes;
@@ -155,6 +157,7 @@ void GlbWriter::append_node(const Json& node) {
 }
 
 absl::Status GlbWriter::add_node(const std::string& name, const GlbPlace& place, size_t mesh, const Json& extras) {
+  LOCUS_DCHECK_LT(mesh, meshes_.size());
   RETURN_IF_ERROR(ensure_room(1));
   Json node = place_json(name, place);
   node["mesh"] = mesh;
@@ -175,6 +178,7 @@ absl::Status GlbWriter::add_group(const std::string& name, const GlbPlace& place
   append_node(node);
   for (const Child& child : children) {
     Json drawing = place_json(name, child.place);
+    LOCUS_DCHECK_LT(child.mesh, meshes_.size());
     drawing["mesh"] = child.mesh;
     append_node(drawing);
   }
@@ -198,6 +202,7 @@ std::string GlbWriter::json() const {
 }
 
 absl::StatusOr<uint64_t> GlbWriter::write(const std::string& path) const {
+  for (const Json& mesh : meshes_) LOCUS_DCHECK(!mesh.is_null());
   const std::string text = json();
   const uint64_t bytes = kFrameBytes + text.size() + bytes_.size();
   if (bytes > kMaxExportBytes) return too_large(bytes);

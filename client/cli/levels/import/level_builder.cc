@@ -12,6 +12,7 @@
 #include "client/cli/levels/import/clean_text.h"
 #include "client/cli/levels/import/import_error.h"
 #include "client/cli/levels/import/import_limits.h"
+#include "core/base/check.h"
 #include "core/base/status_macros.h"
 
 namespace locus::cli {
@@ -86,7 +87,10 @@ uint32_t LevelBuilder::add_vertex(const std::array<double, 3>& position) {
   return static_cast<uint32_t>(positions_.size() - 1);
 }
 
-void LevelBuilder::add_triangle(uint32_t a, uint32_t b, uint32_t c) { indices_.insert(indices_.end(), {a, b, c}); }
+void LevelBuilder::add_triangle(uint32_t a, uint32_t b, uint32_t c) {
+  LOCUS_DCHECK(a < positions_.size() && b < positions_.size() && c < positions_.size());
+  indices_.insert(indices_.end(), {a, b, c});
+}
 
 absl::StatusOr<LevelBuilder::Box> LevelBuilder::bounds() const {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();

@@ -280,7 +280,7 @@ absl::StatusOr<ImportedLevel> import_scene(const LevelFiles& files, const Import
   ASSIGN_OR_RETURN(ImportedLevel level, std::move(builder).finish(file_stem(files.name)));
   level.source_format = format_name(files.name);
   const FaceCounts left = count_faces(*scene);
-  add_notes(found, left.faces - left.points_and_lines, *level);
+  add_notes(found, left.faces - left.points_and_lines, level);
   return level;
 }
 
