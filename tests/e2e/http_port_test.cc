@@ -1,6 +1,7 @@
 // The HTTP port of the real daemon: metrics of calls, and health while it starts, serves and drains.
 #include "tests/support/daemon_process.h"
 #include "tests/support/http_get.h"
+#include "tests/support/kept_daemon.h"
 #include "tests/support/rpc_test.h"
 
 namespace locus::test {
@@ -25,15 +26,6 @@ class HttpPortTest : public ::testing::Test {
 
   TemporaryFolder folder_;
 };
-
-void create_scene(Stubs& stubs, const std::string& name) {
-  grpc::ClientContext context;
-  set_timeout(context);
-  v1::CreateSceneRequest request;
-  request.set_name(name);
-  v1::CreateSceneResponse response;
-  ASSERT_TRUE(stubs.scenes->CreateScene(&context, request, &response).ok());
-}
 
 TEST_F(HttpPortTest, MetricsCountCallsAndDescribeScenes) {
   DaemonProcess daemon(options(), log());

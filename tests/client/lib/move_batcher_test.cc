@@ -14,7 +14,7 @@ namespace {
 using ::testing::ElementsAre;
 using testing::FakeServer;
 
-constexpr absl::Duration kLong = absl::Hours(1);
+constexpr absl::Duration kMoveDelay = absl::Hours(1);
 
 class MoveBatcherTest : public ::testing::Test {
  protected:
@@ -29,7 +29,7 @@ class MoveBatcherTest : public ::testing::Test {
 };
 
 TEST_F(MoveBatcherTest, MovesAddedTogetherAreOneMessageInOrder) {
-  MoveBatcher moves(client_->update_stream("arena"), {.max_items = 100, .max_delay = kLong});
+  MoveBatcher moves(client_->update_stream("arena"), {.max_items = 100, .max_delay = kMoveDelay});
   for (const uint64_t id : {7u, 8u, 7u}) moves.move(id, Float3{static_cast<float>(id), 0, 0});
   ASSERT_TRUE(moves.flush().ok());
   EXPECT_EQ(server_.updates.applied().size(), 1u);
@@ -40,7 +40,7 @@ TEST_F(MoveBatcherTest, MovesAddedTogetherAreOneMessageInOrder) {
 
 TEST_F(MoveBatcherTest, AFullMessageIsSentAndTheNextOneStarted) {
   {
-    MoveBatcher moves(client_->update_stream("arena"), {.max_items = 10, .max_delay = kLong});
+    MoveBatcher moves(client_->update_stream("arena"), {.max_items = 10, .max_delay = kMoveDelay});
     for (uint64_t id = 1; id <= 25; ++id) moves.move(id, Float3{0, 0, 0});
   }
   EXPECT_EQ(server_.updates.applied().size(), 3u);

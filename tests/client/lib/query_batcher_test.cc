@@ -15,7 +15,7 @@ namespace {
 using ::testing::ElementsAre;
 using testing::FakeServer;
 
-constexpr absl::Duration kLong = absl::Hours(1);
+constexpr absl::Duration kQueryDelay = absl::Hours(1);
 
 // Returns the answer of the fake server: a ray hits the object whose id equals the x of the ray's origin, and a ball of
 // radius r finds the ids 1 to r.
@@ -56,7 +56,7 @@ class QueryBatcherTest : public ::testing::Test {
 TEST_F(QueryBatcherTest, QueriesAddedTogetherAreSentInOneMessageAndGetTheirOwnAnswers) {
   std::vector<absl::StatusOr<SingleHit>> hits;
   std::vector<uint64_t> ids;
-  QueryBatcher batcher(client_->query_stream("arena"), {.limits = {.max_items = 100, .max_delay = kLong}});
+  QueryBatcher batcher(client_->query_stream("arena"), {.limits = {.max_items = 100, .max_delay = kQueryDelay}});
   for (const float x : {1.0f, 2.0f, 3.0f}) batcher.ray({.origin = {x, 0, 0}, .direction = {0, 0, 1}}, to(hits));
   batcher.ball({.center = {0, 0, 0}, .radius = 4}, [&](absl::StatusOr<std::vector<uint64_t>> found) { ids = *found; });
   batcher.flush();
@@ -73,7 +73,7 @@ TEST_F(QueryBatcherTest, QueriesAddedTogetherAreSentInOneMessageAndGetTheirOwnAn
 
 TEST_F(QueryBatcherTest, AFullMessageIsSentAtOnce) {
   std::promise<uint64_t> last;
-  QueryBatcher batcher(client_->query_stream("arena"), {.limits = {.max_items = 2, .max_delay = kLong}});
+  QueryBatcher batcher(client_->query_stream("arena"), {.limits = {.max_items = 2, .max_delay = kQueryDelay}});
   batcher.ray({.origin = {1, 0, 0}, .direction = {0, 0, 1}}, [](absl::StatusOr<SingleHit>) {});
   batcher.ray({.origin = {2, 0, 0}, .direction = {0, 0, 1}},
               [&](absl::StatusOr<SingleHit> hit) { last.set_value(hit->id); });
@@ -124,7 +124,7 @@ TEST_F(QueryBatcherTest, AnAnswerThatDoesNotMatchTheQueriesIsDataLoss) {
 TEST_F(QueryBatcherTest, TheDestructorWaitsForAllAnswers) {
   std::vector<absl::StatusOr<SingleHit>> hits;
   {
-    QueryBatcher batcher(client_->query_stream("arena"), {.limits = {.max_items = 8, .max_delay = kLong}});
+    QueryBatcher batcher(client_->query_stream("arena"), {.limits = {.max_items = 8, .max_delay = kQueryDelay}});
     for (int i = 0; i < 20; ++i) batcher.ray({.origin = {1, 0, 0}, .direction = {0, 0, 1}}, to(hits));
   }
   EXPECT_EQ(hits.size(), 20u);

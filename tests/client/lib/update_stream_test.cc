@@ -17,7 +17,7 @@ using ::testing::Each;
 using ::testing::ElementsAre;
 using testing::FakeServer;
 
-constexpr RetryPolicy kQuick = {
+constexpr RetryPolicy kQuickReconnect = {
     .max_attempts = 20, .first_backoff = absl::Milliseconds(1), .max_backoff = absl::Milliseconds(20)};
 
 v1::UpdateBatch batch_of_tick(uint64_t tick) {
@@ -56,7 +56,7 @@ class UpdateStreamTest : public ::testing::Test {
   }
 
   std::unique_ptr<UpdateStream> open(int max_in_flight = 8) {
-    return client_->update_stream("arena", {.max_in_flight = max_in_flight, .reconnect = kQuick});
+    return client_->update_stream("arena", {.max_in_flight = max_in_flight, .reconnect = kQuickReconnect});
   }
 
   void send_ticks(UpdateStream& stream, uint64_t last, Outcomes& outcomes) {
