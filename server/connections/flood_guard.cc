@@ -64,7 +64,7 @@ bool cancels_too_many(const FloodSample& sample, const FloodLimits& limits, Floo
 
 }  // namespace
 
-FloodVerdict judge(const FloodSample& sample, const FloodLimits& limits, FloodBudget& budget) {
+FloodVerdict assess(const FloodSample& sample, const FloodLimits& limits, FloodBudget& budget) {
   if (sample.streams > limits.streams) return FloodVerdict::kTooManyStreams;
   const double seconds = std::chrono::duration<double>(sample.time - budget.last.time).count();
   const double received = received_bytes(sample.received, budget.last.received);
@@ -185,7 +185,7 @@ void FloodGuard::look_at(const std::shared_ptr<Watched>& watched) {
     connection.begin_cancel_window();
   }
   if (must_count(sample, *watched)) sample.streams = count_streams_(connection);
-  const FloodVerdict verdict = judge(sample, limits_, watched->budget);
+  const FloodVerdict verdict = assess(sample, limits_, watched->budget);
   if (watched->budget.unexplained > kAlertBytes) alert_until_ = sample.time + kAlertTime;
   const char* reason = nullptr;
   switch (verdict) {

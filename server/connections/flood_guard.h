@@ -23,7 +23,7 @@
 
 namespace locus::server {
 
-// Budgets of one connection. See judge().
+// Budgets of one connection. See assess().
 struct FloodLimits {
   uint64_t bytes_per_second = uint64_t{1} << 20;  // unexplained bytes that are always accepted
   uint64_t burst_bytes = uint64_t{4} << 20;       // unexplained bytes that are accepted at once
@@ -55,11 +55,11 @@ struct FloodBudget {
 
 enum class FloodVerdict : uint8_t { kHonest, kTooManyBytes, kTooManyCancelled, kTooManyStreams };
 
-// Judges a connection by its sample, and updates `budget`. Before the first call, `last` and `second_begin` of the
+// Assesses a connection by its sample, and updates `budget`. Before the first call, `last` and `second_begin` of the
 // budget must be the sample at the time when the connection was accepted. Received bytes are explained by the metadata
 // of calls, by messages with their frames, and by written bytes, for which the peer sends window updates. A segment
 // counts as at least 64 bytes, because a small segment costs as much work.
-FloodVerdict judge(const FloodSample& sample, const FloodLimits& limits, FloodBudget& budget);
+FloodVerdict assess(const FloodSample& sample, const FloodLimits& limits, FloodBudget& budget);
 
 class FloodGuard {
  public:

@@ -118,7 +118,7 @@ absl::StatusOr<Expectation> read_expectation(absl::string_view text, const Varia
   return expectation;
 }
 
-absl::Status judge(const Expectation& expectation) {
+absl::Status verify(const Expectation& expectation) {
   const absl::StatusOr<bool> held = holds(expectation);
   if (held.ok() && *held) return absl::OkStatus();
   std::string message = absl::StrCat("expected ", expectation.text);

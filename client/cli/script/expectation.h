@@ -28,7 +28,7 @@ absl::StatusOr<Expectation> read_expectation(absl::string_view text, const Varia
 // Checks the expectation. Returns FAILED_PRECONDITION with the expected and the actual value if it is not met. Ids
 // compare exactly; texts that are numbers compare as numbers; a column of several rows compares as a list.
 // Precondition: no value is unknown.
-absl::Status judge(const Expectation& expectation);
+absl::Status verify(const Expectation& expectation);
 
 }  // namespace locus::cli
 

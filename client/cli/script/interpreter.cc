@@ -146,13 +146,13 @@ absl::Status Interpreter::commit(const Statement& statement) {
     outcome = pending.scene().empty() ? mistake(absl::InvalidArgumentError("the batch is empty"))
                                       : apply_and_report(pending.scene(), pending.batch(), context_);
   }
-  if (!statement.reason.empty()) return judge_failure(statement.reason, outcome);
+  if (!statement.reason.empty()) return verify_failure(statement.reason, outcome);
   return outcome.ok() && !target->empty() ? mistake(keep_result(*target)) : outcome;
 }
 
 absl::Status Interpreter::expect(const std::string& text) const {
   ASSIGN_OR_RETURN(const Expectation expectation, read_expectation(text, variables_));
-  return checks_only() ? absl::OkStatus() : judge(expectation);
+  return checks_only() ? absl::OkStatus() : verify(expectation);
 }
 
 absl::Status Interpreter::echo(const std::string& text) {
@@ -210,7 +210,7 @@ absl::Status Interpreter::command(const Statement& statement) {
   }
   context_.take_report();
   const absl::Status outcome = run_script_line(texts_of(*words), context_);
-  if (!statement.reason.empty()) return judge_failure(statement.reason, outcome);
+  if (!statement.reason.empty()) return verify_failure(statement.reason, outcome);
   if (!outcome.ok() || target->empty()) return outcome;
   return mistake(keep_result(*target));
 }
@@ -222,7 +222,7 @@ absl::Status Interpreter::keep_result(const std::string& name) {
   return set(name, Value::of(std::move(report)));
 }
 
-absl::Status Interpreter::judge_failure(const std::string& reason, const absl::Status& outcome) const {
+absl::Status Interpreter::verify_failure(const std::string& reason, const absl::Status& outcome) const {
   if (checks_only()) return reason == "USAGE" ? absl::OkStatus() : outcome;
   if (outcome.ok()) return absl::FailedPreconditionError(absl::StrCat("expected ", reason, ", but it succeeded"));
   const std::string found = failure_name(outcome);

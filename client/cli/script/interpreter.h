@@ -51,7 +51,7 @@ class Interpreter {
   absl::Status sleep(const std::string& text) const;
   absl::Status command(const Statement& statement);
   absl::Status keep_result(const std::string& name);
-  absl::Status judge_failure(const std::string& reason, const absl::Status& outcome) const;
+  absl::Status verify_failure(const std::string& reason, const absl::Status& outcome) const;
   absl::StatusOr<Value> read_value(const std::string& text) const;
   // Returns the error for a mistake in the script itself: see execute().
   absl::Status mistake(const absl::Status& status) const;

@@ -55,7 +55,7 @@ FloodVerdict verdict_of(const Traffic& traffic, int seconds) {
   FloodBudget budget;
   budget.last.time = std::chrono::steady_clock::time_point();
   for (milliseconds time{100}; time <= std::chrono::seconds(seconds); time += milliseconds(100))
-    if (const FloodVerdict verdict = judge(sample_at(traffic, time), {}, budget); verdict != FloodVerdict::kHonest)
+    if (const FloodVerdict verdict = assess(sample_at(traffic, time), {}, budget); verdict != FloodVerdict::kHonest)
       return verdict;
   return FloodVerdict::kHonest;
 }
@@ -126,11 +126,11 @@ TEST(FloodGuardTest, AMessageMayArriveInFullBeforeItIsRead) {
   for (int message = 0; message < 20; ++message) {
     sample.time += milliseconds(100);
     sample.received.bytes += static_cast<uint64_t>(8 * 32 * kMiB);  // eight uploads at once
-    EXPECT_EQ(judge(sample, {}, budget), FloodVerdict::kHonest) << message;
+    EXPECT_EQ(assess(sample, {}, budget), FloodVerdict::kHonest) << message;
     sample.time += milliseconds(100);
     sample.counts.messages_read += 8;
     sample.counts.message_bytes += static_cast<uint64_t>(8 * 32 * kMiB);
-    EXPECT_EQ(judge(sample, {}, budget), FloodVerdict::kHonest) << message;
+    EXPECT_EQ(assess(sample, {}, budget), FloodVerdict::kHonest) << message;
     EXPECT_EQ(budget.unexplained, 0);
   }
 }
@@ -140,10 +140,10 @@ TEST(FloodGuardTest, CallsDoNotJustifyLaterBytes) {
   FloodSample sample;
   sample.counts.calls_begun = 1'000'000;  // justify 1 GB of frames, which never came
   sample.time += milliseconds(1000);
-  EXPECT_EQ(judge(sample, {}, budget), FloodVerdict::kHonest);
+  EXPECT_EQ(assess(sample, {}, budget), FloodVerdict::kHonest);
   sample.received.bytes += static_cast<uint64_t>(40 * kMiB);
   sample.time += milliseconds(100);
-  EXPECT_EQ(judge(sample, {}, budget), FloodVerdict::kTooManyBytes);
+  EXPECT_EQ(assess(sample, {}, budget), FloodVerdict::kTooManyBytes);
 }
 
 TEST(FloodGuardTest, AUnaryMessageMayArriveBeforeItsCallIsReported) {
@@ -152,7 +152,7 @@ TEST(FloodGuardTest, AUnaryMessageMayArriveBeforeItsCallIsReported) {
   for (int call = 1; call <= 20; ++call) {
     sample.received.bytes += static_cast<uint64_t>(32 * kMiB);
     sample.time += milliseconds(20);
-    EXPECT_EQ(judge(sample, {}, budget), FloodVerdict::kHonest) << call;
+    EXPECT_EQ(assess(sample, {}, budget), FloodVerdict::kHonest) << call;
     ++sample.counts.calls_begun;
     ++sample.counts.messages_read;
     sample.counts.message_bytes += static_cast<uint64_t>(32 * kMiB);
@@ -165,13 +165,13 @@ TEST(FloodGuardTest, UnaryMessagesOfAllStreamsMayArriveAtTheSameTime) {
   sample.streams = 2;  // of calls that are not reported yet
   sample.received.bytes = static_cast<uint64_t>(60 * kMiB);
   sample.time += milliseconds(100);
-  EXPECT_EQ(judge(sample, {}, budget), FloodVerdict::kHonest);
+  EXPECT_EQ(assess(sample, {}, budget), FloodVerdict::kHonest);
   sample.streams.reset();  // not counted now, since little has arrived
   sample.time += milliseconds(20);
-  EXPECT_EQ(judge(sample, {}, budget), FloodVerdict::kHonest);
+  EXPECT_EQ(assess(sample, {}, budget), FloodVerdict::kHonest);
   sample.streams = 0;
   sample.time += milliseconds(20);
-  EXPECT_EQ(judge(sample, {}, budget), FloodVerdict::kTooManyBytes);
+  EXPECT_EQ(assess(sample, {}, budget), FloodVerdict::kTooManyBytes);
 }
 
 TEST(FloodGuardTest, MoreStreamsThanMayBeOpenAreTooMany) {
@@ -180,9 +180,9 @@ TEST(FloodGuardTest, MoreStreamsThanMayBeOpenAreTooMany) {
   FloodBudget budget;
   FloodSample sample;
   sample.streams = 100;
-  EXPECT_EQ(judge(sample, limits, budget), FloodVerdict::kHonest);
+  EXPECT_EQ(assess(sample, limits, budget), FloodVerdict::kHonest);
   sample.streams = 101;
-  EXPECT_EQ(judge(sample, limits, budget), FloodVerdict::kTooManyStreams);
+  EXPECT_EQ(assess(sample, limits, budget), FloodVerdict::kTooManyStreams);
 }
 
 // Counts what a guard asks, and answers with a constant.
@@ -235,7 +235,7 @@ TEST(FloodGuardTest, TheKernelsCounterOfSegmentsMayWrap) {
   FloodSample sample;
   sample.time += milliseconds(100);
   sample.received.segments = 0x10;
-  EXPECT_EQ(judge(sample, {}, budget), FloodVerdict::kHonest);
+  EXPECT_EQ(assess(sample, {}, budget), FloodVerdict::kHonest);
 }
 
 }  // namespace

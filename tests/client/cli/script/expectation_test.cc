@@ -16,7 +16,7 @@ using ::testing::StartsWith;
 std::string verdict(const std::string& text) {
   const absl::StatusOr<Expectation> expectation = read_expectation(text, testing::some_variables());
   if (!expectation.ok()) return "form: " + std::string(expectation.status().message());
-  return std::string(judge(*expectation).message());
+  return std::string(verify(*expectation).message());
 }
 
 TEST(ExpectationTest, NumbersCompareInEveryWay) {
