@@ -19,7 +19,7 @@
 namespace locus::test {
 namespace {
 
-constexpr uint64_t kSeed = 618;
+constexpr uint64_t kContainsSeed = 618;
 
 using Mesh = std::vector<Triangle>;
 
@@ -212,7 +212,7 @@ class Trial {
 
 void expect_no_fault(uint64_t meshes, size_t points) {
   Tally tally;
-  for (uint64_t i = 0; i < meshes; ++i) Trial(kSeed + i).run(points, tally);
+  for (uint64_t i = 0; i < meshes; ++i) Trial(kContainsSeed + i).run(points, tally);
   EXPECT_EQ(tally.faults, 0u) << tally.first_fault;
   EXPECT_GT(tally.inside, tally.points / 10);
   EXPECT_GT(tally.at_surface, tally.points / 100);
@@ -222,7 +222,7 @@ void expect_no_fault(uint64_t meshes, size_t points) {
       static_cast<unsigned long long>(tally.points), static_cast<unsigned long long>(meshes),
       absl::StrJoin(instruction_sets(), ", ").c_str(), static_cast<unsigned long long>(tally.inside),
       static_cast<unsigned long long>(tally.at_surface), static_cast<unsigned long long>(tally.faults),
-      static_cast<unsigned long long>(kSeed));
+      static_cast<unsigned long long>(kContainsSeed));
 }
 
 TEST(ContainsProofTest, ClosedMeshesContainWhatTheyWindAround) { expect_no_fault(scaled_count(200), 100); }

@@ -11,16 +11,16 @@
 namespace locus::test {
 namespace {
 
-constexpr uint64_t kSeed = 4;
+constexpr uint64_t kLeakSeed = 4;
 
 void expect_no_leak(int finer, uint64_t rays_of_each) {
-  const LeakProof proof(kSeed, meshes_with_an_inside(finer, kSeed));
+  const LeakProof proof(kLeakSeed, meshes_with_an_inside(finer, kLeakSeed));
   LeakTally sum;
   int families = 0;
   for (const double scale : {1e-3, 1.0, 1e3}) {
     for (const double distance : {0.0, 1e3, 1e6}) {
       const LeakTally tally = proof.run(scale, distance, rays_of_each);
-      EXPECT_EQ(tally.leaks, 0u) << "scale " << scale << ", distance " << distance << ", seed " << kSeed << "\n"
+      EXPECT_EQ(tally.leaks, 0u) << "scale " << scale << ", distance " << distance << ", seed " << kLeakSeed << "\n"
                                  << absl::StrJoin(tally.first_leaks, "\n");
       EXPECT_GE(tally.rays, rays_of_each);
       sum.add(tally);
@@ -33,7 +33,7 @@ void expect_no_leak(int finer, uint64_t rays_of_each) {
       "proof: %d scales and distances, %llu rays at corners and edges from inside, each as first, any and all "
       "hits by %s: %llu leaks; seed %llu\n",
       families, static_cast<unsigned long long>(sum.rays), absl::StrJoin(instruction_sets(), ", ").c_str(),
-      static_cast<unsigned long long>(sum.leaks), static_cast<unsigned long long>(kSeed));
+      static_cast<unsigned long long>(sum.leaks), static_cast<unsigned long long>(kLeakSeed));
 }
 
 TEST(LeakProofTest, NoRayLeavesAClosedMesh) { expect_no_leak(0, scaled_count(8'000)); }
@@ -44,7 +44,7 @@ TEST(LongLeakProofTest, NoRayLeavesAClosedMesh) { expect_no_leak(1, 1'000'000); 
 // of each edge is outside the ball in which rays start.
 TEST(LeakProofTest, ItsMeshesAreClosedAroundTheirInside) {
   for (const ClosedMesh& mesh :
-       {icosphere(3, 0.1, 0, kSeed), icosphere(3, 0.02, 0x1p-12, kSeed), small_blob(5'000, kSeed)}) {
+       {icosphere(3, 0.1, 0, kLeakSeed), icosphere(3, 0.02, 0x1p-12, kLeakSeed), small_blob(5'000, kLeakSeed)}) {
     std::map<std::array<float, 6>, int> edges;
     for (const Triangle& triangle : mesh.triangles) {
       const Vec3f corners[] = {triangle.a, triangle.b, triangle.c};
@@ -61,9 +61,9 @@ TEST(LeakProofTest, ItsMeshesAreClosedAroundTheirInside) {
 
 // Verifies that the proof reports rays that leave a mesh from which five triangles were removed.
 TEST(LeakProofTest, AHoleIsFound) {
-  ClosedMesh sphere = icosphere(3, 0.01, 0, kSeed);
+  ClosedMesh sphere = icosphere(3, 0.01, 0, kLeakSeed);
   sphere.triangles.resize(sphere.triangles.size() - 5);
-  EXPECT_GT(LeakProof(kSeed, {sphere}).run(1, 1e3, 4'000).leaks, 0u);
+  EXPECT_GT(LeakProof(kLeakSeed, {sphere}).run(1, 1e3, 4'000).leaks, 0u);
 }
 
 }  // namespace

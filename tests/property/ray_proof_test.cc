@@ -12,7 +12,7 @@
 namespace locus::test {
 namespace {
 
-constexpr uint64_t kSeed = 4;
+constexpr uint64_t kRaySeed = 4;
 
 uint64_t number_from(const char* variable, uint64_t otherwise) {
   const char* const text = std::getenv(variable);
@@ -29,10 +29,10 @@ void expect_a_clean_run(uint64_t rays, uint64_t seed) {
   EXPECT_LT(tally.undecidable, rays / 20) << "too few answers were judged to prove anything";
 }
 
-TEST(RayProofTest, NoRayMissesAndNoneHitsWhatIsNotThere) { expect_a_clean_run(scaled_count(1'000'000), kSeed); }
+TEST(RayProofTest, NoRayMissesAndNoneHitsWhatIsNotThere) { expect_a_clean_run(scaled_count(1'000'000), kRaySeed); }
 
 TEST(LongRayProofTest, NoRayMissesAndNoneHitsWhatIsNotThere) {
-  expect_a_clean_run(number_from("LOCUS_PROOF_RAYS", 100'000'000), number_from("LOCUS_PROOF_SEED", kSeed));
+  expect_a_clean_run(number_from("LOCUS_PROOF_RAYS", 100'000'000), number_from("LOCUS_PROOF_SEED", kRaySeed));
 }
 
 }  // namespace

@@ -18,7 +18,7 @@
 namespace locus::test {
 namespace {
 
-constexpr uint64_t kSeed = 718;
+constexpr uint64_t kSweepSeed = 718;
 constexpr size_t kSweepsOfAMesh = 300;
 
 struct SweepTally {
@@ -173,7 +173,7 @@ void expect_no_fault(uint64_t sweeps) {
   for (unsigned thread = 0; thread < std::max(1u, std::thread::hardware_concurrency()); ++thread)
     threads.emplace_back([&] {
       SweepTally own;
-      for (uint64_t i = next++; i < meshes; i = next++) SweepTrial(kSeed + i).run(own);
+      for (uint64_t i = next++; i < meshes; i = next++) SweepTrial(kSweepSeed + i).run(own);
       const std::lock_guard lock(mutex);
       all.sweeps += own.sweeps;
       all.hits += own.hits;
@@ -184,7 +184,7 @@ void expect_no_fault(uint64_t sweeps) {
   std::printf("proof: %llu sweeps past %llu meshes, %llu hits: %llu faults; seed %llu\n",
               static_cast<unsigned long long>(all.sweeps), static_cast<unsigned long long>(meshes),
               static_cast<unsigned long long>(all.hits), static_cast<unsigned long long>(all.faults),
-              static_cast<unsigned long long>(kSeed));
+              static_cast<unsigned long long>(kSweepSeed));
   EXPECT_EQ(all.faults, 0u) << all.first_fault;
   EXPECT_GE(all.sweeps, sweeps);
   EXPECT_GT(all.hits, sweeps / 4) << "too few sweeps hit to prove anything";

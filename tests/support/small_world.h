@@ -10,6 +10,13 @@
 
 namespace locus::test {
 
+inline Object point_object(Id id, Vec3d position) {
+  Object object;
+  object.id = id;
+  object.shape.position = position;
+  return object;
+}
+
 inline Object ball_object(Id id, Vec3d position, float radius = 1) {
   Object object;
   object.id = id;

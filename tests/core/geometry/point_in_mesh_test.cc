@@ -19,13 +19,13 @@ namespace {
 
 using Mesh = std::vector<Triangle>;
 
-struct Inside {
+struct Containment {
   int winding = 0;
   bool on_surface = false;
 };
 
-Inside inside(Vec3d point, const Mesh& mesh) {
-  Inside result;
+Containment inside(Vec3d point, const Mesh& mesh) {
+  Containment result;
   for (const Triangle& triangle : mesh) {
     const Crossing found = crossing(without_tiny_coordinates(point), triangle);
     result.winding += found.winding;
@@ -94,7 +94,7 @@ TEST(PointInMeshTest, WindingEqualsTheSumOfSolidAngles) {
     for (int i = 0; i < 50; ++i) {
       const Vec3d point = random.vector(1.6);
       const Real angle = winding_by_angles(point, mesh);
-      const Inside found = inside(point, mesh);
+      const Containment found = inside(point, mesh);
       ASSERT_FALSE(found.on_surface) << "seed " << seed;
       ASSERT_EQ(found.winding, static_cast<int>(std::lround(angle))) << "seed " << seed << ", angle " << angle;
     }
@@ -122,7 +122,7 @@ TEST(PointInMeshTest, LatticesAreDecidedWhereRaysMeetEdgesAndCorners) {
         ++cells;
         full += within && filled[static_cast<size_t>((cell[0] * kSide + cell[1]) * kSide + cell[2])] ? 1 : 0;
       }
-      const Inside found = inside(point, mesh);
+      const Containment found = inside(point, mesh);
       ASSERT_EQ(found.on_surface, full != 0 && full != cells) << "seed " << seed;
       const int winding = full == 0 ? 0 : 1;
       ASSERT_TRUE(found.on_surface || found.winding == winding) << "seed " << seed;

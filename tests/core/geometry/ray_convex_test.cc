@@ -142,22 +142,22 @@ std::vector<Vec3d> signs_of_each_axis() {
   return signs;
 }
 
-struct Fraction {  // denominator > 0
+struct Rational {  // denominator > 0
   int64_t numerator, denominator;
-  friend bool operator<(Fraction a, Fraction b) { return a.numerator * b.denominator < b.numerator * a.denominator; }
+  friend bool operator<(Rational a, Rational b) { return a.numerator * b.denominator < b.numerator * a.denominator; }
 };
 
 // Returns whether a ray hits a box around the origin, by a slab test in integer arithmetic, without rounding.
 bool exact_hit(const int64_t (&o)[3], const int64_t (&d)[3], const int64_t (&half)[3]) {
-  Fraction near{-1000000, 1}, far{1000000, 1};
+  Rational near{-1000000, 1}, far{1000000, 1};
   for (int axis = 0; axis < 3; ++axis) {
     if (d[axis] == 0) {
       if (std::abs(o[axis]) > half[axis]) return false;
       continue;
     }
     const int64_t sign = d[axis] < 0 ? -1 : 1;
-    const Fraction entry{-half[axis] - sign * o[axis], sign * d[axis]};
-    const Fraction exit{half[axis] - sign * o[axis], sign * d[axis]};
+    const Rational entry{-half[axis] - sign * o[axis], sign * d[axis]};
+    const Rational exit{half[axis] - sign * o[axis], sign * d[axis]};
     near = std::max(near, entry);
     far = std::min(far, exit);
   }

@@ -8,11 +8,10 @@
 #include "core/base/refusal.h"
 #include "core/query/query_batch.h"
 #include "tests/support/owned_block.h"
+#include "tests/support/special_floats.h"
 
 namespace locus::test {
 namespace {
-
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN(), kInf = std::numeric_limits<float>::infinity();
 
 // Expects that check_batch() refuses the block with an error that names `field` and `index`; -1: no index.
 void expect_refusal(const OwnedBlock& block, Reason reason, const std::string& field, int index) {
@@ -72,7 +71,7 @@ OwnedBlock four_cells() {
 
 TEST(CheckKindsTest, ValidBlocksAreAccepted) {
   for (const OwnedBlock& block : {two_cubes(), two_viewers_three_targets(), points(ContainsColumns{}), pairs({}),
-                                  four_cells(), pairs({kInf, 0, 0, 3, 0})})
+                                  four_cells(), pairs({kInfinity, 0, 0, 3, 0})})
     EXPECT_TRUE(is_accepted(block)) << block.settings.kind.index();
 }
 
@@ -94,7 +93,7 @@ TEST(CheckKindsTest, Frustums) {
   block = {};
   block.settings.kind = FrustumColumns{};
   block.extras.assign(32, 1);
-  block.extras[20] = kInf;
+  block.extras[20] = kInfinity;
   expect_refusal(block, Reason::kNotFinite, "frustums.view_projections", 1);
   block.extras.assign(17, 1);
   expect_refusal(block, Reason::kColumnLength, "frustums.view_projections", -1);
@@ -156,7 +155,7 @@ TEST(CheckKindsTest, Contains) {
 TEST(CheckKindsTest, Pairs) {
   expect_refusal(pairs({kNan}), Reason::kNotFinite, "pairs.max_distance", -1);
   expect_refusal(pairs({-1}), Reason::kOutOfRange, "pairs.max_distance", -1);
-  expect_refusal(pairs({kInf}), Reason::kOutOfRange, "pairs.max_distance", -1);
+  expect_refusal(pairs({kInfinity}), Reason::kOutOfRange, "pairs.max_distance", -1);
   expect_refusal(pairs({1, 0, 0, 1025}), Reason::kLimit, "pairs.k", -1);
   expect_refusal(pairs({1, 0, 0, 0, 7}), Reason::kMalformed, "pairs.after_other", -1);
 }
@@ -167,7 +166,7 @@ TEST(CheckKindsTest, Cells) {
   expect_refusal(block, Reason::kColumnLength, "cells.max_distances", -1);
   block.extras = {1, 1, 0, 1};
   expect_refusal(block, Reason::kOutOfRange, "cells.max_distances", 2);
-  block.extras = {kInf};
+  block.extras = {kInfinity};
   expect_refusal(block, Reason::kNotFinite, "cells.max_distances", 0);
   block = four_cells();
   block.settings.kind = CellColumns{{}, {}, 65};

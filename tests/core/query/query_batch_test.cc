@@ -8,12 +8,10 @@
 
 #include "core/base/refusal.h"
 #include "tests/support/small_world.h"
+#include "tests/support/special_floats.h"
 
 namespace locus::test {
 namespace {
-
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-constexpr float kInf = std::numeric_limits<float>::infinity();
 
 // Returns two valid blocks, followed by `last`, the block that is tested.
 std::vector<OwnedBlock> three_blocks(OwnedBlock last) {
@@ -105,7 +103,7 @@ TEST(CheckBatchTest, TheMessageNamesFieldAndIndex) {
 }
 
 TEST(CheckBatchTest, RayValuesThatAreNotFiniteAreRefused) {
-  for (const float wrong : {kNan, kInf, -kInf}) {
+  for (const float wrong : {kNan, kInfinity, -kInfinity}) {
     OwnedBlock block = twenty_rays();
     block.points[19 * 3 + 2] = wrong;
     expect_refusal(block, Reason::kNotFinite, "rays.origins", 19);
@@ -129,14 +127,14 @@ TEST(CheckBatchTest, DenormalDirectionsPass) {
 
 TEST(CheckBatchTest, TMaxMayBeInfiniteButNotNegativeOrNan) {
   OwnedBlock block = twenty_rays();
-  block.extras[3] = kInf;
+  block.extras[3] = kInfinity;
   block.extras[4] = 0;
   EXPECT_TRUE(status_with(block).ok());
   block.extras[7] = kNan;
   expect_refusal(block, Reason::kNotFinite, "rays.t_max", 7);
   block.extras[7] = -std::numeric_limits<float>::denorm_min();
   expect_refusal(block, Reason::kOutOfRange, "rays.t_max", 7);
-  block.extras[7] = -kInf;
+  block.extras[7] = -kInfinity;
   expect_refusal(block, Reason::kOutOfRange, "rays.t_max", 7);
 }
 
@@ -144,7 +142,7 @@ TEST(CheckBatchTest, RadiiMustBeFiniteAndNotNegative) {
   OwnedBlock block = twenty_balls();
   block.sizes[11] = kNan;
   expect_refusal(block, Reason::kNotFinite, "balls.radii", 11);
-  block.sizes[11] = kInf;
+  block.sizes[11] = kInfinity;
   expect_refusal(block, Reason::kNotFinite, "balls.radii", 11);
   block.sizes[11] = -1;
   expect_refusal(block, Reason::kOutOfRange, "balls.radii", 11);
@@ -167,17 +165,17 @@ TEST(CheckBatchTest, CentersMustBeFinite) {
   balls.points[4] = kNan;
   expect_refusal(balls, Reason::kNotFinite, "balls.centers", 1);
   OwnedBlock boxes = twenty_boxes();
-  boxes.points[59] = kInf;
+  boxes.points[59] = kInfinity;
   expect_refusal(boxes, Reason::kNotFinite, "boxes.centers", 19);
 }
 
 TEST(CheckBatchTest, MaxDistancesMayBeInfiniteButNotNegativeOrNan) {
   OwnedBlock block = twenty_points();
-  block.extras[11] = kInf;
+  block.extras[11] = kInfinity;
   EXPECT_TRUE(status_with(block).ok());
   block.extras[11] = kNan;
   expect_refusal(block, Reason::kNotFinite, "nearest.max_distances", 11);
-  for (const float wrong : {-kInf, -1.0f}) {
+  for (const float wrong : {-kInfinity, -1.0f}) {
     block.extras[11] = wrong;
     expect_refusal(block, Reason::kOutOfRange, "nearest.max_distances", 11);
   }
@@ -210,7 +208,7 @@ TEST(CheckBatchTest, RotationsMustBeOfUnitLengthWithinAThousandth) {
   }
   w = kNan;
   expect_refusal(block, Reason::kNotFinite, "boxes.rotations", 6);
-  w = kInf;
+  w = kInfinity;
   expect_refusal(block, Reason::kNotFinite, "boxes.rotations", 6);
 }
 
@@ -242,7 +240,7 @@ struct Column20 {
 
 TEST(CheckBatchTest, CapsulesLieWithinTheWorldAndHaveRadii) {
   OwnedBlock block = twenty_capsules();
-  block.points[59] = kInf;
+  block.points[59] = kInfinity;
   expect_refusal(block, Reason::kNotFinite, "capsules.starts", 19);
   block = twenty_capsules();
   block.sizes[3 * 4] = kNan;
@@ -258,7 +256,7 @@ TEST(CheckBatchTest, CapsulesLieWithinTheWorldAndHaveRadii) {
 
 TEST(CheckBatchTest, SweepsAreBallsCapsulesOrBoxes) {
   OwnedBlock block = twenty_sweeps();
-  block.points[59] = kInf;
+  block.points[59] = kInfinity;
   expect_refusal(block, Reason::kNotFinite, "sweeps.starts", 19);
   block = twenty_sweeps();
   block.sizes[3 * 4] = 2e9f;

@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "client/cli/run.h"
+#include "tests/support/cli_outcome.h"
 #include "tests/support/fake_log.h"
 #include "tests/support/kept_daemon.h"
 #include "tests/support/rpc_test.h"
@@ -15,12 +16,6 @@ namespace locus::test {
 namespace {
 
 using ::testing::HasSubstr;
-
-struct Outcome {
-  cli::ExitCode code;
-  std::string out;
-  std::string err;
-};
 
 Outcome run(const std::string& address, std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), {"--address", address});

@@ -8,6 +8,7 @@
 #include "client/cli/levels/import/import_file.h"
 #include "client/cli/run.h"
 #include "tests/client/cli/levels/export/glb_file.h"
+#include "tests/support/cli_outcome.h"
 #include "tests/support/rpc_test.h"
 
 namespace locus::test {
@@ -15,12 +16,6 @@ namespace {
 
 using cli::Json;
 using ::testing::HasSubstr;
-
-struct Outcome {
-  cli::ExitCode code;
-  std::string out;
-  std::string err;
-};
 
 class SceneFilesTest : public RpcTest {
  protected:

@@ -7,6 +7,7 @@
 #include "client/cli/run.h"
 #include "core/base/block_kind.h"
 #include "server/security/token_file.h"
+#include "tests/support/cli_outcome.h"
 #include "tests/support/rpc_test.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test_certificates.h"
@@ -22,12 +23,6 @@ server::ServerConfig with_http() {
   config.http_listen = "127.0.0.1:0";
   return config;
 }
-
-struct Outcome {
-  cli::ExitCode code;
-  std::string out;
-  std::string err;
-};
 
 Outcome run_top(const std::string& address, const std::vector<std::string>& more) {
   std::vector<std::string> arguments = {"top", "--metrics-address", address, "--interval", "0.1"};

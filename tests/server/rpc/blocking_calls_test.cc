@@ -21,15 +21,15 @@ using server::IoThreads;
 using server::RpcState;
 
 constexpr const char* kSmall = "/test.Service/Small";
-constexpr const char* kBulky = "/test.Service/Bulky";  // its response fits no flow control window
-constexpr size_t kBulkyBytes = 3u << 20;
+constexpr const char* kLargeReply = "/test.Service/Bulky";  // its response fits no flow control window
+constexpr size_t kLargeReplyBytes = 3u << 20;
 constexpr uint32_t kMaxCalls = 2;
 
 // A server with the two methods, at most kMaxCalls calls of one connection, and a client with one connection.
 class BlockingCallsTest : public ::testing::Test {
  protected:
   BlockingCallsTest() {
-    calls_.add({method(kSmall, 1), method(kBulky, kBulkyBytes)});
+    calls_.add({method(kSmall, 1), method(kLargeReply, kLargeReplyBytes)});
     grpc::ServerBuilder builder;
     int port = 0;
     builder.AddListeningPort("127.0.0.1:0", grpc::InsecureServerCredentials(), &port);
@@ -94,16 +94,16 @@ TEST_F(BlockingCallsTest, ACallWhoseMessageDoesNotComeEnds) {
 
 TEST_F(BlockingCallsTest, AnAnswerThatNobodyReadsKeepsNoPermit) {
   for (uint32_t i = 0; i < 4 * kMaxCalls; ++i) {
-    silent_.emplace_back(channel_, kBulky).send();
-    wait_until([&] { return claimed() >= (i + 1) * kBulkyBytes && state_.calls.used() == 0; });
+    silent_.emplace_back(channel_, kLargeReply).send();
+    wait_until([&] { return claimed() >= (i + 1) * kLargeReplyBytes && state_.calls.used() == 0; });
   }
   EXPECT_TRUE(raw_call(channel_, kSmall, "").status.ok());
 }
 
 TEST_F(BlockingCallsTest, AnAnswerThatNobodyReadsReturnsItsMemoryAfterAWhile) {
   state_.stall_limit = std::chrono::milliseconds(1);
-  silent_.emplace_back(channel_, kBulky).send();
-  wait_until([&] { return claimed() >= kBulkyBytes; });
+  silent_.emplace_back(channel_, kLargeReply).send();
+  wait_until([&] { return claimed() >= kLargeReplyBytes; });
   wait_until([&] { return claimed() == 0; });
 }
 

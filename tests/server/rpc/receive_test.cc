@@ -12,7 +12,7 @@
 namespace locus::server {
 namespace {
 
-grpc::ByteBuffer buffer_of(const std::string& bytes, size_t slice_bytes = 1 << 20) {
+grpc::ByteBuffer in_slices(const std::string& bytes, size_t slice_bytes = 1 << 20) {
   std::vector<grpc::Slice> slices;
   for (size_t at = 0; at < bytes.size(); at += slice_bytes) slices.emplace_back(bytes.substr(at, slice_bytes));
   if (slices.empty()) slices.emplace_back(std::string());
@@ -30,7 +30,7 @@ v1::StreamQueriesRequest sample_query() {
 TEST(ReceiveTest, AnEnvelopeHasTheNumbersAndNamesOfAMessageButNotItsBatch) {
   for (const size_t slice_bytes : {1u, 7u, 1u << 20}) {
     v1::StreamQueriesRequest envelope;
-    ASSERT_TRUE(parse_envelope(buffer_of(sample_query().SerializeAsString(), slice_bytes), envelope));
+    ASSERT_TRUE(parse_envelope(in_slices(sample_query().SerializeAsString(), slice_bytes), envelope));
     EXPECT_EQ(envelope.scene(), "world");
     EXPECT_EQ(envelope.sequence(), 77u);
     EXPECT_FALSE(envelope.has_batch());
@@ -40,29 +40,29 @@ TEST(ReceiveTest, AnEnvelopeHasTheNumbersAndNamesOfAMessageButNotItsBatch) {
 TEST(ReceiveTest, LongTextsAreLeftOutAndTooManyFieldsAreRefused) {
   v1::StreamQueriesRequest request = sample_query(), envelope;
   request.set_scene(std::string(1000, 'x'));
-  ASSERT_TRUE(parse_envelope(buffer_of(request.SerializeAsString()), envelope));
+  ASSERT_TRUE(parse_envelope(in_slices(request.SerializeAsString()), envelope));
   EXPECT_EQ(envelope.scene(), "");
   EXPECT_EQ(envelope.sequence(), 77u);
   request.clear_scene();
   std::string repeated;
   while (repeated.size() < 4096) repeated += request.SerializeAsString();
-  EXPECT_TRUE(parse_envelope(buffer_of(repeated), envelope));
+  EXPECT_TRUE(parse_envelope(in_slices(repeated), envelope));
   request.clear_batch();
   repeated.clear();
   while (repeated.size() < 4096) repeated += request.SerializeAsString();
-  EXPECT_FALSE(parse_envelope(buffer_of(repeated), envelope));
+  EXPECT_FALSE(parse_envelope(in_slices(repeated), envelope));
 }
 
 TEST(ReceiveTest, DamagedBytesHaveNoEnvelopeOrAnotherOne) {
   const std::string good = sample_query().SerializeAsString();
   v1::StreamQueriesRequest envelope;
-  for (size_t length = 0; length < 20; ++length) parse_envelope(buffer_of(good.substr(0, length)), envelope);
-  EXPECT_FALSE(parse_envelope(buffer_of(good.substr(0, good.size() - 1)), envelope));
+  for (size_t length = 0; length < 20; ++length) parse_envelope(in_slices(good.substr(0, length)), envelope);
+  EXPECT_FALSE(parse_envelope(in_slices(good.substr(0, good.size() - 1)), envelope));
   for (uint64_t seed = 1; seed <= 1000; ++seed) {
     test::Random random(seed);
     std::string damaged = good;
     damaged[random.below(damaged.size())] = static_cast<char>(random.next());
-    parse_envelope(buffer_of(damaged), envelope);
+    parse_envelope(in_slices(damaged), envelope);
   }
 }
 

@@ -13,7 +13,7 @@ namespace locus::server {
 namespace {
 
 // Limit whose ceiling for growth is kCeiling.
-constexpr uint64_t kLimit = 3657;
+constexpr uint64_t kLimitBytes = 3657;
 constexpr uint64_t kCeiling = 3200;
 
 class MemoryBudgetTest : public testing::Test {
@@ -46,8 +46,8 @@ TEST_F(MemoryBudgetTest, AConnectionMayHoldHalfOfWhatIsLeftForClaims) {
 }
 
 TEST_F(MemoryBudgetTest, RefusedClaimsAreCountedForEachLine) {
-  used_ = kLimit;
-  MemoryBudget budget(kLimit, meter());
+  used_ = kLimitBytes;
+  MemoryBudget budget(kLimitBytes, meter());
   EXPECT_FALSE(budget.claim(MemoryLine::kDumps, "", 100).ok());
   EXPECT_FALSE(budget.claim(MemoryLine::kDumps, "", 100).ok());
   EXPECT_EQ(budget.refused(MemoryLine::kDumps), 2u);
@@ -56,14 +56,14 @@ TEST_F(MemoryBudgetTest, RefusedClaimsAreCountedForEachLine) {
 
 TEST_F(MemoryBudgetTest, WorkFitsUpToTheLimitAndNotBeyond) {
   used_ = 1200;
-  MemoryBudget budget(kLimit, meter());
+  MemoryBudget budget(kLimitBytes, meter());
   EXPECT_TRUE(budget.claim(MemoryLine::kUploads, "inserts", 2000).ok());
   EXPECT_FALSE(budget.claim(MemoryLine::kUploads, "inserts", 2001).ok());
 }
 
 TEST_F(MemoryBudgetTest, ARefusalNamesTheLimitAndWhatToDo) {
   used_ = 3000;
-  MemoryBudget budget(kLimit, meter());
+  MemoryBudget budget(kLimitBytes, meter());
   const absl::Status status = budget.claim(MemoryLine::kUploads, "inserts", 500).status();
   EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted);
   EXPECT_THAT(std::string(status.message()), testing::HasSubstr("--memory-limit"));
@@ -72,12 +72,12 @@ TEST_F(MemoryBudgetTest, ARefusalNamesTheLimitAndWhatToDo) {
   EXPECT_EQ(refusal->reason, Reason::kLimit);
   EXPECT_EQ(refusal->field, "inserts");
   EXPECT_EQ(refusal->limit, "memory_bytes");
-  EXPECT_EQ(refusal->limit_value, kLimit);
+  EXPECT_EQ(refusal->limit_value, kLimitBytes);
   EXPECT_EQ(refusal->asked, 3500);
 }
 
 TEST_F(MemoryBudgetTest, AClaimCountsUntilTheWorkEnds) {
-  MemoryBudget budget(kLimit, meter());
+  MemoryBudget budget(kLimitBytes, meter());
   std::optional<MemoryBudget::Claim> first(*budget.claim(MemoryLine::kUploads, "mesh", 3000));
   EXPECT_FALSE(budget.claim(MemoryLine::kUploads, "mesh", 300).ok());
   first.reset();
@@ -85,7 +85,7 @@ TEST_F(MemoryBudgetTest, AClaimCountsUntilTheWorkEnds) {
 }
 
 TEST_F(MemoryBudgetTest, MemoryUsedByEndedWorkCountsAfterwards) {
-  MemoryBudget budget(kLimit, meter());
+  MemoryBudget budget(kLimitBytes, meter());
   EXPECT_TRUE(budget.claim(MemoryLine::kUploads, "mesh", 3000).ok());
   used_ = 2500;
   EXPECT_FALSE(budget.claim(MemoryLine::kUploads, "mesh", 800).ok());
@@ -94,14 +94,14 @@ TEST_F(MemoryBudgetTest, MemoryUsedByEndedWorkCountsAfterwards) {
 
 TEST_F(MemoryBudgetTest, MemoryIsMeasuredBeforeWorkIsRefused) {
   used_ = 3000;
-  MemoryBudget budget(kLimit, meter());
+  MemoryBudget budget(kLimitBytes, meter());
   used_ = 2000;
   EXPECT_TRUE(budget.claim(MemoryLine::kUploads, "inserts", 1200).ok());
   EXPECT_FALSE(budget.take_shortage());
 }
 
 TEST_F(MemoryBudgetTest, WorkLargerThanTheLimitIsNoShortage) {
-  MemoryBudget budget(kLimit, meter());
+  MemoryBudget budget(kLimitBytes, meter());
   EXPECT_FALSE(budget.claim(MemoryLine::kUploads, "mesh", kCeiling + 1).ok());
   EXPECT_FALSE(budget.claim(MemoryLine::kUploads, "mesh", UINT64_MAX).ok());
   EXPECT_FALSE(budget.take_shortage());
@@ -109,7 +109,7 @@ TEST_F(MemoryBudgetTest, WorkLargerThanTheLimitIsNoShortage) {
 
 TEST_F(MemoryBudgetTest, ARefusedClaimIsAShortageThatIsReportedOnce) {
   used_ = 3300;
-  MemoryBudget budget(kLimit, meter());
+  MemoryBudget budget(kLimitBytes, meter());
   for (int i = 0; i < 3; ++i) EXPECT_FALSE(budget.claim(MemoryLine::kUploads, "mesh", 60).ok());
   EXPECT_TRUE(budget.take_shortage());
   EXPECT_FALSE(budget.take_shortage());
@@ -135,8 +135,8 @@ TEST_F(MemoryBudgetTest, GrowthIsRefusedFirstThenMovesThenQueries) {
 }
 
 TEST_F(MemoryBudgetTest, SmallClaimsHaveAReserveThatIsBounded) {
-  used_ = 2 * kLimit;
-  MemoryBudget budget(kLimit, meter());
+  used_ = 2 * kLimitBytes;
+  MemoryBudget budget(kLimitBytes, meter());
   std::vector<MemoryBudget::Claim> claims;
   for (uint64_t owner = 0; owner < 4; ++owner) {
     for (int i = 0; i < 16; ++i) {  // 1 MiB each
@@ -183,7 +183,7 @@ TEST_F(MemoryBudgetTest, OrdinaryClaimsLeaveTheReserveToOthers) {
 }
 
 TEST_F(MemoryBudgetTest, AClaimCanShrinkAndMove) {
-  MemoryBudget budget(kLimit, meter());
+  MemoryBudget budget(kLimitBytes, meter());
   MemoryBudget::Claim claim = *budget.claim(MemoryLine::kUploads, "mesh", 3000);
   claim.shrink(100);
   claim.shrink(500);
@@ -197,13 +197,13 @@ TEST_F(MemoryBudgetTest, AClaimCanShrinkAndMove) {
 }
 
 TEST_F(MemoryBudgetTest, SmallWorkIsMeasuredRarely) {
-  MemoryBudget budget(kLimit, meter());
+  MemoryBudget budget(kLimitBytes, meter());
   for (int i = 0; i < 1000; ++i) EXPECT_TRUE(budget.claim(MemoryLine::kUploads, "inserts", 1).ok());
   EXPECT_LT(measurements_, 20);
 }
 
 TEST_F(MemoryBudgetTest, ManyThreadsNeverClaimMoreThanTheLimit) {
-  MemoryBudget budget(kLimit, meter());
+  MemoryBudget budget(kLimitBytes, meter());
   std::vector<std::thread> threads;
   Mutex mutex;
   uint64_t claimed = 0;

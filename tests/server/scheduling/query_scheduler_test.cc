@@ -18,7 +18,7 @@ namespace {
 
 using testing::HasSubstr;
 
-constexpr uint64_t kTurn = 100'000;
+constexpr uint64_t kSchedulerTurn = 100'000;
 constexpr uint64_t kSmall = 200'000, kLarge = 2'000'000;
 
 // Clock of this thread, in nanoseconds; it advances only while a job works on this thread.
@@ -27,7 +27,7 @@ thread_local uint64_t worked_here = 0;
 SchedulerOptions options_of(uint32_t threads) {
   SchedulerOptions options;
   options.threads = threads;
-  options.turn_nanoseconds = kTurn;
+  options.turn_nanoseconds = kSchedulerTurn;
   options.clock = [] { return worked_here; };
   return options;
 }
@@ -147,7 +147,7 @@ TEST(QuerySchedulerTest, TheRestOfAnInlineRunCanBeQueued) {
   QueryScheduler scheduler(options_of(1));
   TurnsJob job(5);
   EXPECT_EQ(scheduler.run_inline(job), Progress::kMore);
-  ASSERT_TRUE(scheduler.submit(job, 1, kTurn / 2).ok());
+  ASSERT_TRUE(scheduler.submit(job, 1, kSchedulerTurn / 2).ok());
   job.wait();
   EXPECT_EQ(scheduler.stats().inline_done, 0u);
 }

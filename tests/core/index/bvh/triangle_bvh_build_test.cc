@@ -18,7 +18,7 @@
 namespace locus::test {
 namespace {
 
-TriangleBvh build(const std::vector<Triangle>& triangles, const BvhOptions& options = {}) {
+TriangleBvh build_mesh(const std::vector<Triangle>& triangles, const BvhOptions& options = {}) {
   absl::StatusOr<TriangleBvh> tree = TriangleBvh::build(triangles, options);
   EXPECT_TRUE(tree.ok()) << tree.status();
   return tree.ok() ? *std::move(tree) : TriangleBvh();
@@ -29,16 +29,16 @@ std::vector<Triangle> large_mesh() { return bumpy_sphere(130, 0.05, 6); }
 
 TEST(TriangleBvhBuildTest, AnyNumberOfThreadsGivesTheSameBytes) {
   const std::vector<Triangle> triangles = large_mesh();
-  const TriangleBvh alone = build(triangles);
+  const TriangleBvh alone = build_mesh(triangles);
   for (const size_t threads : {1, 2, 3, 8}) {
     SCOPED_TRACE(threads);
     BvhOptions options;
     options.parallel_for = on_threads(threads);
-    expect_equal_bytes(build(triangles, options), alone);
+    expect_equal_bytes(build_mesh(triangles, options), alone);
   }
   BvhOptions options;
   options.parallel_for = backwards();
-  expect_equal_bytes(build(triangles, options), alone);
+  expect_equal_bytes(build_mesh(triangles, options), alone);
 }
 
 TEST(TriangleBvhBuildTest, CoincidentTrianglesGiveTheSameBytesOnAnyThreadsToo) {
@@ -46,7 +46,7 @@ TEST(TriangleBvhBuildTest, CoincidentTrianglesGiveTheSameBytesOnAnyThreadsToo) {
   number_in_order(triangles);
   BvhOptions options;
   options.parallel_for = on_threads(3);
-  expect_equal_bytes(build(triangles, options), build(triangles));
+  expect_equal_bytes(build_mesh(triangles, options), build_mesh(triangles));
 }
 
 // Cancels a build at one task, for every seventh task of the build: the result must be CANCELLED each time.
@@ -94,7 +94,7 @@ TEST(TriangleBvhBuildTest, ALargeTriangleGetsABlockOfItsOwn) {
   }
   triangles.push_back({{-900, -1000, 0}, {1100, -1000, 0}, {100, 1000, 0}});
   number_in_order(triangles);
-  const TriangleBvh built = build(triangles);
+  const TriangleBvh built = build_mesh(triangles);
   ASSERT_EQ(built.block_count(), 3u);
   const TriangleTree tree = built.tree();
   for (size_t block = 0; block < 3; ++block)
@@ -129,7 +129,7 @@ struct TreeCost {
 // Returns the cost of a tree: its SAH cost, its size, and the mean work of finding the first hits of incoherent rays
 // that start within the tree's bounds.
 TreeCost cost_of(const std::vector<Triangle>& triangles, const BvhOptions& options = {}) {
-  const TriangleBvh tree = build(triangles, options);
+  const TriangleBvh tree = build_mesh(triangles, options);
   std::unordered_set<uint32_t> first_of_block;
   for (size_t block = 0; block < tree.block_count(); ++block)
     first_of_block.insert(tree.tree().numbers[tree.tree().blocks[block].first]);

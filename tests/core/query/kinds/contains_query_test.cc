@@ -32,7 +32,7 @@ StaticMeshPtr closed_cube(float size, bool inwards = false) {
   return mesh_of(triangles);
 }
 
-SnapshotPtr small_world() {
+SnapshotPtr mesh_and_solids() {
   QueryWorld world;
   world.instances = {placed(10, closed_cube(1)), placed(11, wall_mesh())};
   world.objects = {ball_object(1, {5, 0, 0}), box_object(2, {5, 1, 0})};
@@ -48,18 +48,19 @@ BlockResult ask(const SnapshotPtr& snapshot, std::vector<float> points, QueryBlo
 }
 
 TEST(ContainsQueryTest, ObjectsAndClosedMeshesAreInOneOrder) {
-  const BlockResult result = ask(small_world(), {0, 0.5f, 0, 5, 0.5f, 0, 9, 9, 9});
+  const BlockResult result = ask(mesh_and_solids(), {0, 0.5f, 0, 5, 0.5f, 0, 9, 9, 9});
   EXPECT_THAT(result.counts, ElementsAre(1u, 2u, 0u));
   EXPECT_THAT(result.ids, ElementsAre(10u, 1u, 2u));
 }
 
 TEST(ContainsQueryTest, AnOpenMeshContainsNothing) {
   EXPECT_EQ(wall_mesh()->open_edges(), 3u);
-  EXPECT_THAT(ask(small_world(), {0, -4, 0}).counts, ElementsAre(0u));
+  EXPECT_THAT(ask(mesh_and_solids(), {0, -4, 0}).counts, ElementsAre(0u));
 }
 
 TEST(ContainsQueryTest, TheSurfaceBelongsToTheMesh) {
-  EXPECT_THAT(ask(small_world(), {1, 0, 0, 1, 1, 1, 1, 1, 0.5f, 1.0001f, 0, 0}).counts, ElementsAre(1u, 1u, 1u, 0u));
+  EXPECT_THAT(ask(mesh_and_solids(), {1, 0, 0, 1, 1, 1, 1, 1, 0.5f, 1.0001f, 0, 0}).counts,
+              ElementsAre(1u, 1u, 1u, 0u));
 }
 
 TEST(ContainsQueryTest, AShellTurnedOverInsideIsACavity) {

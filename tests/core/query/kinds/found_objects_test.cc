@@ -18,7 +18,7 @@ using ::testing::IsEmpty;
 class Block {
  public:
   explicit Block(const std::vector<Id>& ids) : block_(static_cast<uint32_t>(ids.size()), false) {
-    const internal::GridBlock::Places places(block_, {});
+    const locus::internal::GridBlock::Places places(block_, {});
     for (uint32_t slot = 0; slot < ids.size(); ++slot) {
       GridEntry entry;
       entry.id = ids[slot];
@@ -31,7 +31,7 @@ class Block {
   }
 
  private:
-  internal::GridBlock block_;
+  locus::internal::GridBlock block_;
 };
 
 std::vector<Id> ids_of(absl::Span<const FoundObject> objects) {

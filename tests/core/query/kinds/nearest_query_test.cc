@@ -15,13 +15,6 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-Object point_object(Id id, Vec3d position) {
-  Object object;
-  object.id = id;
-  object.shape.position = position;
-  return object;
-}
-
 // Returns a world with the instances 4 and 5 of a mesh whose walls are at x = 0, 10 and 20, and with objects at x = -4,
 // -2 and 6. Instance 5 is displaced by 3 along x.
 QueryWorld mixed_world() {

@@ -14,13 +14,6 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-Object point_object(Id id, Vec3d position) {
-  Object object;
-  object.id = id;
-  object.shape.position = position;
-  return object;
-}
-
 // Returns a mesh of ten walls of one triangle each: triangle n is at x = 7 * n mod 10.
 StaticMeshPtr ten_walls() {
   std::vector<Triangle> walls;
@@ -28,7 +21,7 @@ StaticMeshPtr ten_walls() {
   return mesh_of(walls);
 }
 
-QueryWorld mixed_world() {
+QueryWorld walls_and_solids() {
   QueryWorld world;
   world.instances = {placed(4, ten_walls()), placed(kChosenIdBit | 1, ten_walls())};
   world.objects = {ball_object(9, {0, 0, 0}), ball_object(2, {1, 0, 0}), box_object(6, {2, 0, 0})};
@@ -36,7 +29,7 @@ QueryWorld mixed_world() {
 }
 
 TEST(OverlapQueryTest, RowsAscendByIdOverInstancesAndObjects) {
-  const SnapshotPtr snapshot = snapshot_of(mixed_world());
+  const SnapshotPtr snapshot = snapshot_of(walls_and_solids());
   for (const OwnedBlock& block : {one_ball({0, 0, 0}, 4), one_box({0, 0, 0}, {4, 4, 4})}) {
     const BlockResult result = run_block(*snapshot, block);
     EXPECT_THAT(result.counts, ElementsAre(5));
@@ -49,13 +42,13 @@ TEST(OverlapQueryTest, AnInstanceIsOneRowForAnyNumberOfTrianglesFound) {
   OwnedBlock block = one_ball({0, 0, 0}, 100);
   block.settings.columns = {Column::kId, Column::kTriangle};
   block.settings.source = Source::kStatic;
-  const BlockResult result = run_block(*snapshot_of(mixed_world()), block);
+  const BlockResult result = run_block(*snapshot_of(walls_and_solids()), block);
   EXPECT_THAT(result.ids, ElementsAre(4, kChosenIdBit | 1));
   EXPECT_THAT(result.triangles, ElementsAre(kNoTriangle, kNoTriangle));
 }
 
 TEST(OverlapQueryTest, TrianglesAreInStorageOrder) {
-  const SnapshotPtr snapshot = snapshot_of(mixed_world());
+  const SnapshotPtr snapshot = snapshot_of(walls_and_solids());
   OwnedBlock block = one_ball({0, 0, 0}, 100, StaticDetail::kTriangles);
   block.settings.source = Source::kStatic;
   const BlockResult result = run_block(*snapshot, block);
@@ -71,14 +64,14 @@ TEST(OverlapQueryTest, TrianglesAreInStorageOrder) {
 
 TEST(OverlapQueryTest, SortedTrianglesAscend) {
   OwnedBlock block = one_box({5, 0, 0}, {1.5f, 1, 1}, StaticDetail::kTrianglesSorted);
-  const BlockResult result = run_block(*snapshot_of(mixed_world()), block);
+  const BlockResult result = run_block(*snapshot_of(walls_and_solids()), block);
   EXPECT_THAT(result.ids, ElementsAre(4, 4, 4, kChosenIdBit | 1, kChosenIdBit | 1, kChosenIdBit | 1));
   EXPECT_THAT(result.triangles, ElementsAre(2, 5, 8, 2, 5, 8));  // the triangles at x = 4, 5 and 6
 }
 
 TEST(OverlapQueryTest, ObjectsAreOneRowAmongTriangles) {
   const OwnedBlock block = one_box({2, 0, 0}, {0.25f, 0.25f, 0.25f}, StaticDetail::kTrianglesSorted);
-  const BlockResult result = run_block(*snapshot_of(mixed_world()), block);
+  const BlockResult result = run_block(*snapshot_of(walls_and_solids()), block);
   EXPECT_THAT(result.ids, ElementsAre(2, 4, 6, kChosenIdBit | 1));
   EXPECT_THAT(result.triangles, ElementsAre(kNoTriangle, 6, kNoTriangle, 6));
 }
@@ -170,7 +163,7 @@ TEST(OverlapQueryTest, PagingByAfterIdGivesTheRowsOfOneLargeQuery) {
 }
 
 TEST(OverlapQueryTest, SourceRestrictsTheSearchToStaticOrDynamic) {
-  const SnapshotPtr snapshot = snapshot_of(mixed_world());
+  const SnapshotPtr snapshot = snapshot_of(walls_and_solids());
   OwnedBlock block = one_ball({0, 0, 0}, 4);
   block.settings.source = Source::kStatic;
   EXPECT_THAT(run_block(*snapshot, block).ids, ElementsAre(4, kChosenIdBit | 1));

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "tests/support/small_world.h"
+#include "tests/support/special_floats.h"
 
 namespace locus::test {
 namespace {
@@ -14,13 +15,11 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-constexpr float kInf = std::numeric_limits<float>::infinity();
-
 TEST(RayQueryTest, AMissIsARowWithInfiniteTAndZeros) {
   OwnedBlock block = rays_along_x(RayMode::kFirst);
   for (int number = 1; number <= 10; ++number) block.settings.columns.add(static_cast<Column>(number));
   const BlockResult result = run_block(*snapshot_of({}), block);
-  EXPECT_THAT(result.t, ElementsAre(kInf));
+  EXPECT_THAT(result.t, ElementsAre(kInfinity));
   EXPECT_THAT(result.ids, ElementsAre(0));
   EXPECT_THAT(result.triangles, ElementsAre(0xFFFFFFFFu));
   EXPECT_THAT(result.uvs, ElementsAre(0, 0));
@@ -38,7 +37,7 @@ TEST(RayQueryTest, FirstIsDenseWithMissesBetweenHits) {
   QueryWorld world;
   world.objects = {ball_object(7, {5, 0, 0})};
   const BlockResult result = run_block(*snapshot_of(world), rays_along_x(RayMode::kFirst, {0, 0, 0, 0, 9, 0, 2, 0, 0}));
-  EXPECT_THAT(result.t, ElementsAre(4, kInf, 2));
+  EXPECT_THAT(result.t, ElementsAre(4, kInfinity, 2));
   EXPECT_THAT(result.ids, ElementsAre(7, 0, 7));
   EXPECT_THAT(result.triangles, ElementsAre(kNoTriangle, kNoTriangle, kNoTriangle));
 }
@@ -167,7 +166,7 @@ TEST(RayQueryTest, AHitExactlyAtTMaxCounts) {
         EXPECT_EQ(at.hits + before.hits, std::string("\1\0", 2));
       } else {
         EXPECT_EQ(at.t[0], 4);
-        EXPECT_TRUE(before.t.empty() || before.t[0] == kInf);
+        EXPECT_TRUE(before.t.empty() || before.t[0] == kInfinity);
       }
     }
   }
@@ -402,10 +401,10 @@ class FarHitTest : public ::testing::TestWithParam<Precision> {
 constexpr float kLargest = std::numeric_limits<float>::max();
 
 TEST_P(FarHitTest, AHitBeyondTheLargestFloatIsReportedAtTheLargestFloat) {
-  const BlockResult first = answer(RayMode::kFirst, kInf);
+  const BlockResult first = answer(RayMode::kFirst, kInfinity);
   EXPECT_THAT(first.t, ElementsAre(kLargest));
   EXPECT_THAT(first.ids, ElementsAre(2));
-  const BlockResult all = answer(RayMode::kAll, kInf);
+  const BlockResult all = answer(RayMode::kAll, kInfinity);
   EXPECT_THAT(all.t, ElementsAre(kLargest, kLargest, kLargest));
   EXPECT_THAT(all.ids, ElementsAre(2, 3, 9));
 }
@@ -414,7 +413,7 @@ TEST_P(FarHitTest, AHitBeyondTheLargestFloatIsWithinATMaxOfThatValueAndBeyondAny
   EXPECT_EQ(answer(RayMode::kAny, kLargest).hits, "\1");
   EXPECT_THAT(answer(RayMode::kFirst, kLargest).ids, ElementsAre(2));
   EXPECT_EQ(answer(RayMode::kAny, std::nextafter(kLargest, 0.0f)).hits, std::string("\0", 1));
-  EXPECT_THAT(answer(RayMode::kFirst, std::nextafter(kLargest, 0.0f)).t, ElementsAre(kInf));
+  EXPECT_THAT(answer(RayMode::kFirst, std::nextafter(kLargest, 0.0f)).t, ElementsAre(kInfinity));
 }
 
 TEST_P(FarHitTest, AHitBeyondTheLargestFloatHasItsPointAtTheLargestFloat) {

@@ -15,7 +15,7 @@
 namespace locus::test {
 namespace {
 
-SnapshotPtr small_world() {
+SnapshotPtr wall_and_ball() {
   QueryWorld world;
   PlacedMesh wall = placed(100, wall_mesh(), {4, 0, 0});
   wall.group = 7;
@@ -34,7 +34,7 @@ OwnedBlock looks(std::vector<float> viewers, std::vector<float> targets, SightCo
   return block;
 }
 
-std::vector<int> ask(const OwnedBlock& block, const SnapshotPtr& snapshot = small_world()) {
+std::vector<int> ask(const OwnedBlock& block, const SnapshotPtr& snapshot = wall_and_ball()) {
   const BlockResult result = run_block(*snapshot, block);
   std::vector<int> seen;
   for (const char byte : result.matrix) seen.push_back(static_cast<uint8_t>(byte));

@@ -12,7 +12,7 @@
 namespace locus::test {
 namespace {
 
-constexpr uint64_t kObjects = 500;
+constexpr uint64_t kMovers = 500;
 
 // Returns whether object `id` exists at `tick`. At tick t, an existing object i is at (t, i, 0).
 bool lives(uint64_t id, uint64_t tick) { return id % 7 != tick % 7; }
@@ -20,7 +20,7 @@ bool lives(uint64_t id, uint64_t tick) { return id % 7 != tick % 7; }
 void apply_tick(Scene& scene, uint64_t tick) {
   std::vector<uint64_t> ids, removed;
   std::vector<double> places;
-  for (uint64_t id = 1; id <= kObjects; ++id) {
+  for (uint64_t id = 1; id <= kMovers; ++id) {
     if (!lives(id, tick) && tick > 1 && lives(id, tick - 1)) removed.push_back(id);
     if (!lives(id, tick)) continue;
     ids.push_back(id);
@@ -42,7 +42,7 @@ void expect_past(const SceneSnapshot& snapshot, Random& random) {
   const uint64_t tick = oldest + random.below(snapshot.tick - oldest + 1);
   const float fraction = tick == snapshot.tick || random.chance(0.3) ? 0 : 0.5f;
   const SceneAtTime moment = find_scene_at(snapshot, {tick, fraction}).value();
-  const uint64_t id = 1 + random.below(kObjects);
+  const uint64_t id = 1 + random.below(kMovers);
   const double x = static_cast<double>(tick) + (fraction != 0 && lives(id, tick + 1) ? 0.5 : 0);
   size_t found = 0;
   Work work;

@@ -1,17 +1,14 @@
 // Tests static changes: the removals and placements of a change become one revision or are refused together.
 #include "core/scene/statics/static_set.h"
 
-#include <limits>
 #include <thread>
 
 #include "core/base/limits.h"
 #include "tests/support/scene_fixture.h"
+#include "tests/support/special_floats.h"
 
 namespace locus::test {
 namespace {
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 class StaticSetTest : public SceneFixture {
  protected:

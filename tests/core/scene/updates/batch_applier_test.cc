@@ -2,18 +2,14 @@
 // batch omits, and rounding.
 #include "core/scene/updates/batch_applier.h"
 
-#include <limits>
-
 #include "core/base/limits.h"
 #include "core/scene/scene_writer.h"
 #include "tests/support/random.h"
 #include "tests/support/scene_fixture.h"
+#include "tests/support/special_floats.h"
 
 namespace locus::test {
 namespace {
-
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 class BatchApplierTest : public SceneFixture {
  protected:

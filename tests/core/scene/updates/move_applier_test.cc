@@ -1,10 +1,9 @@
 // Tests MoveApplier, the fast path for batches of moves: its effects and acks equal those of BatchApplier.
 #include "core/scene/updates/move_applier.h"
 
-#include <limits>
-
 #include "tests/support/random.h"
 #include "tests/support/scene_fixture.h"
+#include "tests/support/special_floats.h"
 
 namespace locus::test {
 namespace {
@@ -65,7 +64,6 @@ TEST_F(MoveApplierTest, AllOrNothingRefusesTheBatchAndChangesNothing) {
 
 TEST_F(MoveApplierTest, GivesTheSameResultAsBatchApplier) {
   Random random(5);
-  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
   Scene other("other", {}, kEpoch, StaticSet::empty());
   ASSERT_TRUE(other.apply(with(points({1, 2, 3}, {1, 1, 1, 2, 2, 2, 3, 3, 3}))).ok());
   for (int round = 0; round < 500; ++round) {

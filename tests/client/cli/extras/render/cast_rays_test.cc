@@ -14,7 +14,7 @@ namespace {
 using ::testing::Each;
 using ::testing::HasSubstr;
 
-constexpr ImageSize kSize = {120, 100};  // so many pixels that their rays are more than one batch
+constexpr ImageSize kLargeSize = {120, 100};  // so many pixels that their rays are more than one batch
 
 // Scene, far from the world's origin, with a ball above the ground of a city. The camera looks down from above.
 class CastRaysTest : public ::testing::Test {
@@ -35,12 +35,12 @@ class CastRaysTest : public ::testing::Test {
   }
 
   CastResult cast() {
-    absl::StatusOr<CastResult> result = cast_rays(server_.client(), camera_, kSize, options_);
+    absl::StatusOr<CastResult> result = cast_rays(server_.client(), camera_, kLargeSize, options_);
     EXPECT_TRUE(result.ok()) << result.status();
-    return result.ok() ? *std::move(result) : CastResult{RayImage(kSize)};
+    return result.ok() ? *std::move(result) : CastResult{RayImage(kLargeSize)};
   }
 
-  static size_t middle() { return kSize.width * (kSize.height / 2) + kSize.width / 2; }
+  static size_t middle() { return kLargeSize.width * (kLargeSize.height / 2) + kLargeSize.width / 2; }
   static constexpr double kOut = 123456789.25;
 
   RenderServer server_;
@@ -57,7 +57,7 @@ TEST_F(CastRaysTest, EveryPixelHoldsTheHitOfItsRay) {
   EXPECT_NEAR(result.image.t[0], 40, 1e-5);
   EXPECT_EQ(result.image.ids[0], 1u);
   EXPECT_EQ(result.image.normals[0], (Vec3f{0, 0, 1}));
-  EXPECT_EQ(result.image.hits(), kSize.pixels());
+  EXPECT_EQ(result.image.hits(), kLargeSize.pixels());
   EXPECT_TRUE(result.image.work.empty());
 }
 
@@ -80,7 +80,7 @@ TEST_F(CastRaysTest, LivePicturesSeeTheLatestRevision) {
 
 TEST_F(CastRaysTest, ADroppedRevisionIsExplained) {
   for (int i = 0; i < 70; ++i) move_ball(10 + 0.1 * i);
-  const absl::Status status = cast_rays(server_.client(), camera_, kSize, options_).status();
+  const absl::Status status = cast_rays(server_.client(), camera_, kLargeSize, options_).status();
   EXPECT_EQ(status.code(), absl::StatusCode::kOutOfRange);
   EXPECT_THAT(status.message(), HasSubstr("the scene changed faster than its picture was taken"));
   EXPECT_THAT(status.message(), HasSubstr("--live"));
@@ -88,10 +88,11 @@ TEST_F(CastRaysTest, ADroppedRevisionIsExplained) {
 
 TEST_F(CastRaysTest, ErrorsOfTheServerAreReturned) {
   options_.scene = "nowhere";
-  EXPECT_EQ(cast_rays(server_.client(), camera_, kSize, options_).status().code(), absl::StatusCode::kNotFound);
+  EXPECT_EQ(cast_rays(server_.client(), camera_, kLargeSize, options_).status().code(), absl::StatusCode::kNotFound);
   options_.scene = "arena";
   camera_.eye.x = 2e9;
-  EXPECT_EQ(cast_rays(server_.client(), camera_, kSize, options_).status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(cast_rays(server_.client(), camera_, kLargeSize, options_).status().code(),
+            absl::StatusCode::kInvalidArgument);
 }
 
 TEST_F(CastRaysTest, SourceMaskAndCullSelectTheHits) {
@@ -113,7 +114,7 @@ TEST_F(CastRaysTest, WorkIsReportedForEachRayAndChangesNoAnswer) {
   const RayImage with = cast().image;
   EXPECT_EQ(depth_sha256(with), depth_sha256(without));
   EXPECT_EQ(ids_sha256(with), ids_sha256(without));
-  ASSERT_EQ(with.work.size(), kSize.pixels());
+  ASSERT_EQ(with.work.size(), kLargeSize.pixels());
   for (const RayWork& work : with.work) EXPECT_GT(work.nodes + work.tests, 0u);
   EXPECT_GT(with.work[middle()].cells, 0u);
 }
@@ -127,7 +128,7 @@ TEST_F(CastRaysTest, OrthographicRaysStartInAPlane) {
   // The ball, 4 units wide, covers pi 2^2 of the picture's 8 x 9.6 square units.
   uint64_t ball = 0;
   for (const uint64_t id : image.ids) ball += id == 7;
-  EXPECT_NEAR(static_cast<double>(ball) / static_cast<double>(kSize.pixels()), 4 * M_PI / (8 * 9.6), 0.005);
+  EXPECT_NEAR(static_cast<double>(ball) / static_cast<double>(kLargeSize.pixels()), 4 * M_PI / (8 * 9.6), 0.005);
 }
 
 TEST_F(CastRaysTest, ProgressNeverDecreasesOrExceedsTheTotal) {
@@ -135,11 +136,11 @@ TEST_F(CastRaysTest, ProgressNeverDecreasesOrExceedsTheTotal) {
   int calls = 0;
   const auto progress = [&](uint64_t done) {
     EXPECT_GE(done, last);
-    EXPECT_LE(done, kSize.pixels());
+    EXPECT_LE(done, kLargeSize.pixels());
     last = done;
     ++calls;
   };
-  ASSERT_TRUE(cast_rays(server_.client(), camera_, kSize, options_, progress).ok());
+  ASSERT_TRUE(cast_rays(server_.client(), camera_, kLargeSize, options_, progress).ok());
   EXPECT_EQ(calls, 2);
 }
 

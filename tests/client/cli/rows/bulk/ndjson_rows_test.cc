@@ -11,7 +11,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-const RowSchema& schema() {
+const RowSchema& ray_schema() {
   static const auto& schema =
       *new RowSchema{{.name = "from", .kind = FieldKind::kCoordinate, .parts = "xyz", .required = true},
                      {.name = "max_t", .kind = FieldKind::kDistance},
@@ -21,9 +21,9 @@ const RowSchema& schema() {
 }
 
 absl::Status read(absl::string_view text, RowBatch& batch) {
-  RowBuilder builder(schema());
+  RowBuilder builder(ray_schema());
   if (batch.columns.empty()) batch = builder.empty_batch(0);
-  return read_ndjson_row(schema(), text, 1, builder, batch);
+  return read_ndjson_row(ray_schema(), text, 1, builder, batch);
 }
 
 std::string refusal(absl::string_view text) {

@@ -10,7 +10,7 @@ namespace {
 
 using ::testing::ElementsAre;
 
-const RowSchema& schema() {
+const RowSchema& schema_of_all_kinds() {
   static const auto& schema =
       *new RowSchema{{.name = "at", .kind = FieldKind::kCoordinate, .parts = "xyz", .required = true},
                      {.name = "max_t", .kind = FieldKind::kDistance},
@@ -24,14 +24,14 @@ const RowSchema& schema() {
 constexpr size_t kMaxT = 1, kId = 2, kMask = 3, kRadius = 4, kShape = 5;
 
 std::string refusal(size_t field, absl::string_view text) {
-  RowBuilder builder(schema());
+  RowBuilder builder(schema_of_all_kinds());
   builder.start();
-  const Slot slot = schema()[field].parts.empty() ? Slot{field} : Slot{field, 1};
+  const Slot slot = schema_of_all_kinds()[field].parts.empty() ? Slot{field} : Slot{field, 1};
   return std::string(builder.put_text(slot, text).message());
 }
 
 TEST(RowBuilderTest, TextIsConvertedToTheKindOfItsField) {
-  RowBuilder builder(schema());
+  RowBuilder builder(schema_of_all_kinds());
   RowBatch batch = builder.empty_batch(0);
   builder.start();
   for (const size_t part : {0u, 1u, 2u}) ASSERT_TRUE(builder.put_text({0, part}, "-1e9").ok());
@@ -77,13 +77,13 @@ TEST(RowBuilderTest, IdsMustBeExactIntegers) {
   for (const char* text : {"-1", "1.0", "1e3", "18446744073709551616", "0x", "0x1G", ""}) {
     EXPECT_NE(refusal(kId, text).find("is no whole number from 0 to 18446744073709551615"), std::string::npos) << text;
   }
-  RowBuilder builder(schema());
+  RowBuilder builder(schema_of_all_kinds());
   builder.start();
   EXPECT_FALSE(builder.put_number({kId}, 7.0).ok()) << "a float may have lost digits";
 }
 
 TEST(RowBuilderTest, AnIncompleteRowIsNotAppended) {
-  RowBuilder builder(schema());
+  RowBuilder builder(schema_of_all_kinds());
   RowBatch batch = builder.empty_batch(0);
   builder.start();
   EXPECT_EQ(builder.finish(1, batch).message(), "at: is missing");
@@ -95,7 +95,7 @@ TEST(RowBuilderTest, AnIncompleteRowIsNotAppended) {
 }
 
 TEST(RowBuilderTest, MissingValuesAreMarkedAsNotGiven) {
-  RowBuilder builder(schema());
+  RowBuilder builder(schema_of_all_kinds());
   RowBatch batch = builder.empty_batch(0);
   for (const bool with_radius : {true, false}) {
     builder.start();

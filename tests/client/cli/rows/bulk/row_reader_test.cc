@@ -15,12 +15,12 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::EndsWith;
 
-RowSchema schema() { return {{.name = "to", .kind = FieldKind::kCoordinate, .parts = "xyz", .required = true}}; }
+RowSchema target_schema() { return {{.name = "to", .kind = FieldKind::kCoordinate, .parts = "xyz", .required = true}}; }
 
 RowReader reader_of(const std::string& path, RowFormat format = RowFormat::kCsv) {
   absl::StatusOr<ByteInput> input = ByteInput::open(path);
   EXPECT_TRUE(input.ok()) << input.status();
-  return RowReader(*std::move(input), format, schema());
+  return RowReader(*std::move(input), format, target_schema());
 }
 
 TEST(RowReaderTest, BatchesHaveTheLinesAndIndicesOfTheirRows) {

@@ -8,6 +8,7 @@
 
 #include "core/index/bvh/kernels/dispatch.h"
 #include "tests/support/nearest_trials.h"
+#include "tests/support/vector_sets.h"
 
 namespace locus::test {
 namespace {
@@ -87,14 +88,8 @@ TEST_P(NearestKernelsTest, TrianglesBeyondALoweredLimitAreNoCandidates) {
   EXPECT_LT(found, 16u);
 }
 
-std::vector<std::string> with_kernels() {
-  std::vector<std::string> names = instruction_sets();
-  names.pop_back();
-  return names;
-}
-
 GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(NearestKernelsTest);
-INSTANTIATE_TEST_SUITE_P(InstructionSets, NearestKernelsTest, ::testing::ValuesIn(with_kernels()),
+INSTANTIATE_TEST_SUITE_P(InstructionSets, NearestKernelsTest, ::testing::ValuesIn(sets_with_vector_kernels()),
                          [](const auto& instance) { return instance.param; });
 
 }  // namespace

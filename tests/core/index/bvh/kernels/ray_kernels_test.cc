@@ -12,6 +12,7 @@
 
 #include "core/index/bvh/kernels/dispatch.h"
 #include "tests/support/kernel_trials.h"
+#include "tests/support/vector_sets.h"
 
 namespace locus::test {
 namespace {
@@ -137,14 +138,8 @@ TEST_P(RayKernelsTest, ARayThatTestsTooManyTrianglesIsLeftUndecided) {
   }
 }
 
-std::vector<std::string> with_kernels() {
-  std::vector<std::string> names = instruction_sets();
-  names.pop_back();
-  return names;
-}
-
 GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(RayKernelsTest);
-INSTANTIATE_TEST_SUITE_P(InstructionSets, RayKernelsTest, ::testing::ValuesIn(with_kernels()),
+INSTANTIATE_TEST_SUITE_P(InstructionSets, RayKernelsTest, ::testing::ValuesIn(sets_with_vector_kernels()),
                          [](const auto& instance) { return instance.param; });
 
 }  // namespace

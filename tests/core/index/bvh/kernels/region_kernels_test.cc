@@ -11,6 +11,7 @@
 #include "core/query/kinds/triangle_search.h"
 #include "tests/support/random_region.h"
 #include "tests/support/test_scale.h"
+#include "tests/support/vector_sets.h"
 
 namespace locus::test {
 namespace {
@@ -250,14 +251,8 @@ TEST_P(RegionKernelsTest, RegionsWithoutRoomForTheirNumbersAreNotAnswered) {
   }
 }
 
-std::vector<std::string> with_kernels() {
-  std::vector<std::string> names = instruction_sets();
-  names.pop_back();
-  return names;
-}
-
 GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(RegionKernelsTest);
-INSTANTIATE_TEST_SUITE_P(InstructionSets, RegionKernelsTest, ::testing::ValuesIn(with_kernels()),
+INSTANTIATE_TEST_SUITE_P(InstructionSets, RegionKernelsTest, ::testing::ValuesIn(sets_with_vector_kernels()),
                          [](const auto& instance) { return instance.param; });
 
 }  // namespace
