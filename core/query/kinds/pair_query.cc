@@ -156,15 +156,13 @@ class Partners {
 // float columns and culls them by a kernel for each object of the group. add() objects, then search().
 class PairGroup {
  public:
-  explicit PairGroup(const PairSearch& search) : search_(search), kernels_(active_grid_kernels()) {
-    members_.reserve(kMembers);
-  }
+  explicit PairGroup(const PairSearch& search) : search_(search), kernels_(active_grid_kernels()) {}
 
-  bool empty() const { return members_.empty(); }
+  bool empty() const { return size_ == 0; }
   // Adds an object, unless the group is full or the object too far from it. Returns whether it was added. Objects of
   // different bricks are never in one group.
   bool add(const GridRef& object) {
-    if (members_.size() == kMembers || (!empty() && members_.front().object.brick() != object.brick())) return false;
+    if (size_ == kMembers || (!empty() && members_.front().object.brick() != object.brick())) return false;
     const Shape shape = search_.moment.shape(object);
     const Aabbd reach = search_.reach_of(shape);
     const Aabbd bounds = empty() ? reach : merge(bounds_, reach);
@@ -172,21 +170,23 @@ class PairGroup {
     if (!empty() && volume(bounds) > kMaxWaste * (volumes_ + volume(reach))) return false;
     bounds_ = bounds;
     volumes_ = empty() ? volume(reach) : volumes_ + volume(reach);
-    members_.push_back({object, shape, {}});
+    Member& member = members_[size_++];
+    member.object = object, member.shape = shape;
     return true;
   }
   // Offers the rows of all objects of the group and empties it.
   void search(FirstPairs& rows) {
     if (empty()) return;
     center_ = (bounds_.min + bounds_.max) * 0.5;
-    for (size_t i = 0; i < members_.size(); ++i) balls_[i] = ball_of(members_[i]);
+    for (size_t i = 0; i < size_; ++i) balls_[i] = ball_of(members_[i]);
     search_.task.visit_objects_in_region(search_.moment, *this);
     test_candidates();
-    for (Member& member : members_) {
+    for (Member& member : absl::MakeSpan(members_.data(), size_)) {
       std::sort(member.rows.begin(), member.rows.end(), lower_other);
       rows.offer(member.object, member.rows);
+      member.rows.clear();
     }
-    members_.clear();
+    size_ = 0;
   }
 
   const Aabbd& bounds() const { return bounds_; }
@@ -212,7 +212,7 @@ class PairGroup {
   struct Member {
     GridRef object;
     Shape shape;
-    std::vector<Partner> rows;
+    std::vector<Partner> rows;  // empty between two searches, which keep its memory
   };
 
   static double volume(const Aabbd& box) {
@@ -240,7 +240,7 @@ class PairGroup {
   // Tests the collected candidates with each member. Returns false if the query must end.
   bool test_candidates() {
     const GridRows all = {x_, y_, z_, extent_, nullptr, 1, {0}, {count_}};
-    for (size_t i = 0; i < members_.size(); ++i) {
+    for (size_t i = 0; i < size_; ++i) {
       uint32_t slots[GridRows::kMaxValues + internal::GridBlock::kLanes];
       const uint32_t kept = kernels_.cull_ball(all, balls_[i], slots);
       const uint32_t vectors = count_ / internal::GridBlock::kLanes + 1;
@@ -262,7 +262,8 @@ class PairGroup {
 
   const PairSearch& search_;
   const GridKernels& kernels_;
-  std::vector<Member> members_;
+  std::array<Member, kMembers> members_;
+  size_t size_ = 0;     // number of members
   Aabbd bounds_;        // of all objects within the distance of a member
   double volumes_ = 0;  // sum of the volumes of these bounds for each member
   Vec3d center_;        // origin of the columns
