@@ -29,14 +29,14 @@ class MeshPath {
   // `magnitude` is the largest |coordinate| of the mesh.
   MeshPath(const Mover& mover, float magnitude)
       : is_resting_(mover.way == Vec3d{}),
-        exponent_(is_resting_ ? 0 : exponent_of(mover.way)),
-        boxes_(mover.start, is_resting_ ? Vec3d{1, 0, 0} : scaled(mover.way, exponent_), extent_of(mover), magnitude) {}
+        scale_(is_resting_ ? 1 : scale_of(mover.way)),
+        boxes_(mover.start, is_resting_ ? Vec3d{1, 0, 0} : mover.way * (1 / scale_), extent_of(mover), magnitude) {}
 
   const PathBoxes& boxes() const { return boxes_; }
   // Returns the largest scaled near value of a box that may hold a hit at t <= `limit`.
   float to_scaled(float limit) const {
     if (is_resting_) return 0;
-    const double scaled = std::ldexp(raised(limit), exponent_);
+    const double scaled = raised(limit) * scale_;
     constexpr float kLargest = std::numeric_limits<float>::max();
     return scaled >= kLargest ? std::numeric_limits<float>::infinity() : next_above(static_cast<float>(scaled));
   }
@@ -44,21 +44,20 @@ class MeshPath {
   std::optional<double> entry(const Aabbf& box) const {
     const std::optional<float> near = boxes_.entry(box);
     if (!near || (is_resting_ && *near > 0)) return std::nullopt;
-    return is_resting_ ? 0 : std::ldexp(double{std::max(*near, 0.0f)}, -exponent_);
+    return is_resting_ ? 0 : double{std::max(*near, 0.0f)} * (1 / scale_);
   }
 
  private:
-  static int exponent_of(Vec3d way) {
+  // Returns the power of two above the largest |component| of the way. Products with it and with its reciprocal change
+  // only exponents, which are far from the limits of double.
+  static double scale_of(Vec3d way) {
     int exponent = 0;
     (void)std::frexp(max_component(abs(way)), &exponent);
-    return exponent;
-  }
-  static Vec3d scaled(Vec3d way, int exponent) {
-    return {std::ldexp(way.x, -exponent), std::ldexp(way.y, -exponent), std::ldexp(way.z, -exponent)};
+    return std::ldexp(1.0, exponent);
   }
 
   bool is_resting_;
-  int exponent_;
+  double scale_;
   PathBoxes boxes_;
 };
 
