@@ -6,6 +6,7 @@
 #include "tests/bench/queries/contains_cases.h"
 #include "tests/bench/queries/nearest_cases.h"
 #include "tests/bench/queries/object_cases.h"
+#include "tests/bench/queries/overlap_cases.h"
 #include "tests/bench/queries/sight_cases.h"
 #include "tests/bench/queries/sweep_cases.h"
 #include "tests/bench/static/bench_mesh.h"
@@ -25,6 +26,7 @@ absl::Status run_queries_suite(const Options& options, const Progress& progress,
     run_cell_cases(options, progress, *mesh, report);
     run_sight_cases(options, progress, *mesh, report);
     run_nearest_cases(options, progress, *mesh, report);
+    run_overlap_cases(options, progress, *mesh, report);
   }
   run_object_cases(options, progress, report);
   return absl::OkStatus();
