@@ -21,11 +21,11 @@ Aabb<S> random_box(Random& random, double size) {
 // Returns a box that contains `box`; many of its coordinates differ by only one representable number.
 template <class S>
 Aabb<S> superset(const Aabb<S>& box, Random& random) {
-  constexpr S kInfinity = std::numeric_limits<S>::infinity();
+  constexpr S kInf = std::numeric_limits<S>::infinity();
   Aabb<S> larger = box;
   for (int axis = 0; axis < 3; ++axis) {
-    if (random.chance(0.3)) larger.min[axis] = std::nextafter(larger.min[axis], -kInfinity);
-    if (random.chance(0.3)) larger.max[axis] = std::nextafter(larger.max[axis], kInfinity);
+    if (random.chance(0.3)) larger.min[axis] = std::nextafter(larger.min[axis], -kInf);
+    if (random.chance(0.3)) larger.max[axis] = std::nextafter(larger.max[axis], kInf);
     if (random.chance(0.1)) larger.max[axis] += static_cast<S>(random.unit());
   }
   return larger;
