@@ -156,10 +156,10 @@ TEST_F(MemoryBudgetTest, SmallClaimsHaveAReserveThatIsBounded) {
 }
 
 TEST_F(MemoryBudgetTest, AnEmptyClaimSucceedsInAFullProcessAndUsesNoReserve) {
-  used_ = kLimit;
-  MemoryBudget budget(kLimit, meter());
+  used_ = kLimitBytes;
+  MemoryBudget budget(kLimitBytes, meter());
   for (uint64_t owner = 0; owner < 100; ++owner) EXPECT_TRUE(budget.claim(MemoryLine::kMoves, "", 0, owner).ok());
-  EXPECT_EQ(budget.taken(), kLimit);
+  EXPECT_EQ(budget.taken(), kLimitBytes);
 }
 
 TEST_F(MemoryBudgetTest, OrdinaryClaimsLeaveTheReserveToOthers) {
