@@ -32,6 +32,9 @@ enum class PlantedBug {
   kOwnGroupBlocks,     // the group of a viewer blocks its sight
   kClosedEdge,         // a ray that counts crossings of a mesh meets both ends of an edge
   kCrossingInDouble,   // signs of crossings that double leaves in doubt are those of double
+  kCrossingMirror,     // a half line that descends counts crossings like one that ascends
+  kHalfLineRounding,   // boxes are compared with the point rounded to the nearest float
+  kHalfLineStart,      // a half line does not meet a box that ends exactly at its start
   // The ray kernels:
   kKernelEdgeBound,   // the signs of edge functions are computed in float without an error bound
   kKernelTBound,      // t is compared with the limit in float without an error bound
@@ -84,6 +87,12 @@ enum class PlantedBug {
   kNearestSlack,      // only triangles exactly as near as the nearest one are candidates
   kNearestOtherLane,  // a triangle that is not nearer than another one of its block is no candidate
   kNearestMeasure,    // the plane of a sliver is measured like that of other triangles
+  // The crossing kernels:
+  kCrossingError,  // areas are compared with 0 in float without an error bound
+  kCrossingPad,    // the difference between the point and the rounded point is ignored
+  kCrossingFloor,  // products that may underflow are compared without the pad for underflow
+  kCrossingNear,   // a triangle whose bounds contain the start of the half line counts like one beyond it
+  kCrossingTop,    // the vertex of a triangle that is highest across the half line is not on the surface
 };
 
 #ifdef LOCUS_PLANT_BUGS

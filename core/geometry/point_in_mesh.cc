@@ -128,6 +128,13 @@ int projected_winding(Vec3d point, const Corners& corners, const Vec3d (&from)[3
   return certain ? winding : exact_projected_winding(point, corners, from);
 }
 
+// Returns a point or vertex in axes in which `line` runs along the x axis: rotated and, if it is descending, mirrored.
+template <class Vec>
+Vec along_x(Vec at, HalfLine line) {
+  const auto along = at[line.axis];
+  return {line.descending ? -along : along, at[(line.axis + 1) % 3], at[(line.axis + 2) % 3]};
+}
+
 }  // namespace
 
 Crossing crossing(Vec3d point, const Triangle& triangle) {
@@ -143,6 +150,14 @@ Crossing crossing(Vec3d point, const Triangle& triangle) {
   // The point may also be on an edge or a corner that is not counted, or on a triangle parallel to the ray.
   if (behind == 0) return {0, is_inside(point, corners, from)};
   return {winding * behind > 0 ? winding : 0, false};
+}
+
+Crossing crossing(Vec3d point, const Triangle& triangle, HalfLine line) {
+  const Triangle along{along_x(triangle.a, line), along_x(triangle.b, line), along_x(triangle.c, line), 0};
+  Crossing found = crossing(along_x(point, line), along);
+  // The mirror image of a triangle is clockwise if the triangle is counter-clockwise.
+  if (line.descending && !planted(PlantedBug::kCrossingMirror)) found.winding = -found.winding;
+  return found;
 }
 
 }  // namespace locus

@@ -1,13 +1,21 @@
-// Winding of a closed mesh around a point, by the crossings of a ray along the x axis. The winding number is the sum of
-// the crossings of all triangles that the ray meets: 0 outside, 1 or -1 inside, depending on the orientation of the
-// mesh. Pure functions; any thread.
+// Winding of a closed mesh around a point, by the crossings of a half line that is parallel to an axis. The winding
+// number is the sum of the crossings of all triangles that the half line meets: 0 outside, 1 or -1 inside, depending on
+// the orientation of the mesh. Pure functions; any thread.
 //
 // Every sign is exact: computed in double where an error bound proves it, otherwise as an exact sum. So the sum is the
-// winding number of the stored mesh around the given point. Edges are half-open: an edge includes its lower end in y
-// and not its upper one, and no point that is exactly on it. Triangles that share an edge therefore count it with
-// opposite signs, and the sum is right if the ray meets edges or corners, or runs along faces. Source: Haines, Point in
-// Polygon Strategies, Graphics Gems IV, 1994, for the rule of half-open edges; Shewchuk, Adaptive Precision
-// Floating-Point Arithmetic and Fast Robust Geometric Predicates, 1997, for filters and exact signs.
+// winding number of the stored mesh around the given point. Edges are half-open: in the projection along x, an edge
+// includes its lower end in y and not its upper one, and no point that is exactly on it. Triangles that share an edge
+// therefore count it with opposite signs, and the sum is right if the half line meets edges or corners, or runs along
+// faces. Source: Haines, Point in Polygon Strategies, Graphics Gems IV, 1994, for the rule of half-open edges;
+// Shewchuk, Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates, 1997, for filters and
+// exact signs.
+//
+// Every half line results in the same sum, unless the point is on the surface. Proof: the rule of half-open edges
+// treats the point as if it were moved by (0, d * d, -d) for an infinitely small d > 0. The half line from the moved
+// point meets no edge or corner, so the sum is the winding number around the moved point. This is the winding number
+// around the point itself, because the surface is closed and does not contain the point. A half line along another axis
+// moves the point in another direction, to which the same applies. Whether the point is on the surface is determined
+// separately: the bounds of a triangle that contains the point also contain the start of every half line.
 #ifndef LOCUS_CORE_GEOMETRY_POINT_IN_MESH_H_
 #define LOCUS_CORE_GEOMETRY_POINT_IN_MESH_H_
 
@@ -17,9 +25,15 @@
 
 namespace locus {
 
+// Direction of a half line that begins at a point in mesh axes.
+struct HalfLine {
+  int axis = 0;             // axis to which the half line is parallel: 0 for x, 1 for y, 2 for z
+  bool descending = false;  // it runs towards lower coordinates
+};
+
 // Contribution of one triangle.
 struct Crossing {
-  int winding = 0;          // 1 or -1 if the ray crosses the triangle, else 0
+  int winding = 0;          // 1 or -1 if the half line crosses the triangle, else 0
   bool on_surface = false;  // the point lies on the triangle, which includes its edges and vertices
 };
 
@@ -30,8 +44,9 @@ inline Vec3d without_tiny_coordinates(Vec3d point) {
   return {kept(point.x), kept(point.y), kept(point.z)};
 }
 
-// Returns the crossing of the ray from `point` along the x axis with a triangle.
+// Returns the crossing of the half line from `point` with a triangle. The default is a half line along the x axis.
 Crossing crossing(Vec3d point, const Triangle& triangle);
+Crossing crossing(Vec3d point, const Triangle& triangle, HalfLine line);
 
 }  // namespace locus
 

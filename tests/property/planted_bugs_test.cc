@@ -5,10 +5,12 @@
 #include <gtest/gtest.h>
 
 #include "core/base/planted_bug.h"
+#include "core/index/bvh/kernels/crossing_kernels.h"
 #include "core/index/bvh/kernels/nearest_kernels.h"
 #include "core/index/bvh/kernels/ray_kernels.h"
 #include "core/index/bvh/kernels/region_kernels.h"
 #include "tests/support/conservative_answers.h"
+#include "tests/support/crossing_trials.h"
 #include "tests/support/edge_on_cases.h"
 #include "tests/support/grid_comparison.h"
 #include "tests/support/kernel_trials.h"
@@ -65,6 +67,17 @@ std::string compare_conservative_answers_with_bounds() { return search_placed_sc
 
 std::string compare_conservative_overlaps_with_exact() { return search_placed_scenes(touching_scene, superset_fault); }
 
+const std::vector<CrossingTrial>& crossing_trials() {
+  static const std::vector<CrossingTrial>* const kTrials = new std::vector<CrossingTrial>(all_crossing_trials());
+  return *kTrials;
+}
+
+std::string compare_half_lines_with_list() {
+  for (const CrossingTrial& trial : crossing_trials())
+    if (std::string what = trial.difference(); !what.empty()) return what;
+  return "";
+}
+
 #ifdef LOCUS_X86_KERNELS
 // Tests only one instruction set, because the kernels of all instruction sets are compiled from one source.
 std::string compare_kernels_with_list() {
@@ -85,6 +98,12 @@ std::string compare_nearest_kernels_with_list() {
   static const std::vector<NearestTrial>* const kTrials = new std::vector<NearestTrial>(all_nearest_trials());
   for (const NearestTrial& trial : *kTrials)
     if (const std::string what = trial.difference(nearest_kernels_avx2()); !what.empty()) return what;
+  return "";
+}
+
+std::string compare_crossing_kernels_with_list() {
+  for (const CrossingTrial& trial : crossing_trials())
+    if (std::string what = trial.difference(crossing_kernels_avx2()); !what.empty()) return what;
   return "";
 }
 #endif
@@ -116,6 +135,9 @@ constexpr Trial kTrials[] = {
     {"SweepThatIgnoresItsStart", PlantedBug::kSweepStart, sweep_difference},
     {"CrossingsWithBothEndsOfAnEdge", PlantedBug::kClosedEdge, contains_difference},
     {"CrossingsDecidedInDouble", PlantedBug::kCrossingInDouble, crossing_difference},
+    {"CrossingsOfAHalfLineInTheMirror", PlantedBug::kCrossingMirror, contains_difference},
+    {"HalfLineFromTheRoundedPoint", PlantedBug::kHalfLineRounding, compare_half_lines_with_list},
+    {"HalfLineWithoutItsStart", PlantedBug::kHalfLineStart, compare_half_lines_with_list},
     {"ViewWithAWrongRowOfItsMatrix", PlantedBug::kMatrixRow, view_difference},
     {"PairsFromBothSides", PlantedBug::kPairBothSides, pair_difference},
     {"PairsCulledWithoutExtent", PlantedBug::kPairCullExtent, pair_difference},
@@ -154,13 +176,18 @@ constexpr Trial kTrials[] = {
     {"NearestKernelWithoutSlack", PlantedBug::kNearestSlack, compare_nearest_kernels_with_list},
     {"NearestKernelThatKeepsOneLaneLess", PlantedBug::kNearestOtherLane, compare_nearest_kernels_with_list},
     {"NearestKernelThatTrustsNormalsOfSlivers", PlantedBug::kNearestMeasure, compare_nearest_kernels_with_list},
+    {"CrossingKernelWithoutErrorBound", PlantedBug::kCrossingError, compare_crossing_kernels_with_list},
+    {"CrossingKernelWithoutPadOfThePoint", PlantedBug::kCrossingPad, compare_crossing_kernels_with_list},
+    {"CrossingKernelThatTrustsProductsThatUnderflow", PlantedBug::kCrossingFloor, compare_crossing_kernels_with_list},
+    {"CrossingKernelThatIgnoresSides", PlantedBug::kCrossingNear, compare_crossing_kernels_with_list},
+    {"CrossingKernelWithoutHighestVertices", PlantedBug::kCrossingTop, compare_crossing_kernels_with_list},
 #endif
 };
 
 bool can_run(const Trial& trial) {
 #ifdef LOCUS_X86_KERNELS
   if (trial.comparison == compare_kernels_with_list || trial.comparison == compare_region_kernels_with_list ||
-      trial.comparison == compare_nearest_kernels_with_list)
+      trial.comparison == compare_nearest_kernels_with_list || trial.comparison == compare_crossing_kernels_with_list)
     return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi2");
 #endif
   return trial.comparison != nullptr;

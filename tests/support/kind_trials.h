@@ -10,6 +10,7 @@
 #include "core/geometry/point_in_mesh.h"
 #include "core/query/frustum_planes.h"
 #include "tests/support/exact_crossing.h"
+#include "tests/support/half_lines.h"
 #include "tests/support/owned_block.h"
 #include "tests/support/random.h"
 #include "tests/support/small_world.h"
@@ -17,8 +18,8 @@
 
 namespace locus::test {
 
-// Returns the first point whose winding in an octahedron is wrong. The points are eighths, so that rays meet edges and
-// corners of the triangles.
+// Returns the first point whose winding in an octahedron is wrong on a half line. The points are eighths, so that half
+// lines meet edges and corners of the triangles.
 inline std::string contains_difference() {
   std::vector<Triangle> octahedron;
   for (int octant = 0; octant < 8; ++octant) {
@@ -28,16 +29,18 @@ inline std::string contains_difference() {
   }
   for (int cell = 0; cell < 21 * 21 * 21; ++cell) {
     const Vec3d point = Vec3d{double(cell % 21) - 10, double(cell / 21 % 21) - 10, double(cell / 441) - 10} * 0.125;
-    int winding = 0;
-    bool on_surface = false;
-    for (const Triangle& triangle : octahedron) {
-      const Crossing found = crossing(point, triangle);
-      winding += found.winding;
-      on_surface |= found.on_surface;
-    }
     const double from_center = std::abs(point.x) + std::abs(point.y) + std::abs(point.z);
-    if (on_surface != (from_center == 1) || (!on_surface && winding != (from_center < 1 ? 1 : 0)))
-      return "winding " + std::to_string(winding) + " at cell " + std::to_string(cell);
+    for (const HalfLine line : kHalfLines) {
+      int winding = 0;
+      bool on_surface = false;
+      for (const Triangle& triangle : octahedron) {
+        const Crossing found = crossing(point, triangle, line);
+        winding += found.winding;
+        on_surface |= found.on_surface;
+      }
+      if (on_surface != (from_center == 1) || (!on_surface && winding != (from_center < 1 ? 1 : 0)))
+        return "winding " + std::to_string(winding) + " at cell " + std::to_string(cell);
+    }
   }
   return "";
 }

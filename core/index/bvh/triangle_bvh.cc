@@ -83,6 +83,33 @@ absl::StatusOr<TriangleBvh> TriangleBvh::restore(const TreeTopology& topology, u
 void TriangleBvh::set_bounds(const Aabbf& bounds) {
   bounds_ = bounds;
   magnitude_ = magnitude(bounds);
+  const Vec3d extent = to_double(bounds.max) - to_double(bounds.min);
+  // The probability that a random line through the bounds meets a box is the ratio of their cross sections.
+  Vec3d boxes_met;
+  for (const TriangleNode& node : nodes()) {
+    for (int slot = 0; slot < kTreeWidth && node.child[slot] != kNoChild; ++slot) {
+      const Aabbf child = box(node, slot);
+      const Vec3d size = to_double(child.max) - to_double(child.min);
+      for (int axis = 0; axis < 3; ++axis) boxes_met[axis] += size[(axis + 1) % 3] * size[(axis + 2) % 3];
+    }
+  }
+  for (int axis = 0; axis < 3; ++axis) boxes_a_unit_[axis] = boxes_met[axis] / (extent.x * extent.y * extent.z);
+}
+
+HalfLine TriangleBvh::cheapest_half_line(const Vec3d& point) const {
+  HalfLine best;
+  double least = std::numeric_limits<double>::infinity();
+  for (const bool descending : {false, true}) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const double length =
+          descending ? point[axis] - double{bounds_.min[axis]} : double{bounds_.max[axis]} - point[axis];
+      const double boxes = length * boxes_a_unit_[axis];
+      if (boxes >= least) continue;
+      least = boxes;
+      best = {axis, descending};
+    }
+  }
+  return best;
 }
 
 void TriangleBvh::check_invariants() const {

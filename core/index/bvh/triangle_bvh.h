@@ -8,6 +8,7 @@
 #ifndef LOCUS_CORE_INDEX_BVH_TRIANGLE_BVH_H_
 #define LOCUS_CORE_INDEX_BVH_TRIANGLE_BVH_H_
 
+#include <bit>
 #include <limits>
 
 #include "absl/status/statusor.h"
@@ -17,6 +18,7 @@
 #include "core/geometry/triangle.h"
 #include "core/index/bvh/box_distances.h"
 #include "core/index/bvh/bvh_build.h"
+#include "core/index/bvh/half_line_boxes.h"
 #include "core/index/bvh/path_boxes.h"
 #include "core/index/bvh/tree_topology.h"
 #include "core/index/bvh/triangle_tree.h"
@@ -81,6 +83,13 @@ class TriangleBvh {
   template <RayVisitor<Triangle> Visitor>
   void visit_path(const PathBoxes& path, Visitor& visitor, Work& work) const;
 
+  // Returns the half line from `point` that is expected to meet the fewest boxes of nodes and blocks.
+  HalfLine cheapest_half_line(const Vec3d& point) const;
+  // Passes to visitor.visit() the triangles whose own bounds the half line meets, until it returns false. The order is
+  // the order of the kernels in crossing_kernels.h. Allocates no memory.
+  template <class Visitor>
+  void visit_half_line(const HalfLineBoxes& line, Visitor& visitor, Work& work) const;
+
   // Passes to `visitor` the triangles whose own bounds visitor.overlaps() accepts, in storage order. Allocates no
   // memory.
   template <RegionVisitor<Triangle> Visitor>
@@ -102,6 +111,7 @@ class TriangleBvh {
     float near;
   };
 
+  // Sets the bounds of the tree, and the members that depend on them. The arrays must be complete.
   void set_bounds(const Aabbf& bounds);
   // Verifies, in debug builds, the storage order of nodes, blocks and triangles, and the ranges, boxes and slot orders
   // of all nodes. O(size).
@@ -128,6 +138,9 @@ class TriangleBvh {
   TriangleArrays arrays_;
   Aabbf bounds_;
   float magnitude_ = 0;
+  // For each axis, the expected number of boxes of nodes and blocks that a random line through bounds(), parallel to
+  // the axis, meets for each unit of its length within bounds().
+  Vec3d boxes_a_unit_;
 };
 
 inline Triangle TriangleBvh::triangle(const TriangleBlock& block, uint32_t lane) const {
@@ -194,6 +207,34 @@ void TriangleBvh::visit_path(const PathBoxes& path, Visitor& visitor, Work& work
       if (nears[lane] == PathBoxes::kMissed || nears[lane] > visitor.limit()) continue;
       ++work.tests;
       if (!visitor.visit(triangle(block, lane))) return;
+    }
+  }
+}
+
+template <class Visitor>
+void TriangleBvh::visit_half_line(const HalfLineBoxes& line, Visitor& visitor, Work& work) const {
+  if (size() == 0) return;
+  uint32_t nodes[kTreeStack], blocks[kMaxLineBlocks];
+  uint32_t top = 0, found = 0;
+  nodes[top++] = 0;
+  while (top != 0) {
+    for (found = 0; top != 0 && found <= kMaxLineBlocks - kTreeWidth;) {
+      const TriangleNode& node = arrays_.nodes[nodes[--top]];
+      ++work.nodes;
+      const uint32_t met = line.boxes_met(node.bounds);
+      for (int slot = kTreeWidth; slot-- > 0;) {
+        if ((met >> slot & 1) == 0) continue;
+        const uint32_t child = node.child[slot];
+        ((child & kBlockBit) != 0 ? blocks[found++] : nodes[top++]) = child & ~kBlockBit;
+      }
+      LOCUS_DCHECK_LE(top, uint32_t{kMaxPending});
+    }
+    for (uint32_t i = 0; i < found; ++i) {
+      const TriangleBlock& block = arrays_.blocks[blocks[i]];
+      for (uint32_t met = line.triangles_met(block.vertices) & ((1u << block.count) - 1); met != 0; met &= met - 1) {
+        ++work.tests;
+        if (!visitor.visit(triangle(block, static_cast<uint32_t>(std::countr_zero(met))))) return;
+      }
     }
   }
 }

@@ -14,6 +14,9 @@ inline constexpr int kTreeWidth = 8;  // maximum number of children of a node, a
 // beyond the last pending child.
 inline constexpr int kTreeStack = 64 * (kTreeWidth - 1) + 1 + kTreeWidth;
 
+// Length of the array of blocks that a visit of a half line collects before it tests their triangles.
+inline constexpr uint32_t kMaxLineBlocks = 64;
+
 // Bit of TriangleNode::child that is set if the child is a block and clear if it is a node. The other bits are the
 // index of the block or node.
 inline constexpr uint32_t kBlockBit = 0x80000000u;

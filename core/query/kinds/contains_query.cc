@@ -1,24 +1,22 @@
 #include "core/query/kinds/contains_query.h"
 
-#include <limits>
-
 #include "core/geometry/point_in_mesh.h"
 #include "core/index/regions.h"
+#include "core/query/kinds/winding_search.h"
 
 namespace locus {
 namespace {
 
-// Visitor of the triangles of one mesh that a ray along the x axis may cross. Sums the crossings until the point is
-// found to lie on the surface.
+// Visitor of the triangles of one mesh that a half line may cross. Sums the crossings until the point is found to lie
+// on the surface.
 class Crossings {
  public:
   // `point` is in mesh axes.
-  Crossings(QueryTask& task, Vec3d point) : task_(task), point_(point) {}
+  Crossings(QueryTask& task, Vec3d point, HalfLine line) : task_(task), point_(point), line_(line) {}
 
-  static float limit() { return std::numeric_limits<float>::infinity(); }
   bool visit(const Triangle& triangle) {
     if (!task_.count_test()) return false;
-    const Crossing found = crossing(point_, triangle);
+    const Crossing found = crossing(point_, triangle, line_);
     winding_ += found.winding;
     on_surface_ = found.on_surface;
     return !on_surface_;
@@ -28,6 +26,7 @@ class Crossings {
  private:
   QueryTask& task_;
   const Vec3d point_;
+  const HalfLine line_;
   int64_t winding_ = 0;
   bool on_surface_ = false;
 };
@@ -52,10 +51,24 @@ class InstancesAround {
  private:
   bool winds_around(const Instance& instance) {
     const Vec3d point = without_tiny_coordinates(instance.transform.point_to_mesh(ball_.center));
-    const PathBoxes ray(point, {1, 0, 0}, {}, magnitude(instance.mesh->bounds()));
-    Crossings crossings(task_, point);
-    task_.visit_path(instance.mesh->tree(), ray, crossings);
+    const TriangleBvh& tree = instance.mesh->tree();
+    const HalfLine line = tree.cheapest_half_line(point);
+    if (task_.uses_kernels() && WindingSearch::served(tree)) return search(tree, point, line);
+    Crossings crossings(task_, point, line);
+    task_.visit_half_line(tree, HalfLineBoxes(point, line), crossings);
     return !task_.ended() && crossings.contained();
+  }
+
+  // Does the same by the vector kernels.
+  bool search(const TriangleBvh& tree, Vec3d point, HalfLine line) {
+    WindingSearch search(tree, point, line);
+    while (!search.over()) {
+      search.next();
+      task_.work().nodes += search.nodes();
+      task_.work().tests += search.tests();
+      if (!task_.count_tests(search.tests())) return false;
+    }
+    return search.winds_around();
   }
 
   QueryTask& task_;

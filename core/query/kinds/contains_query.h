@@ -9,7 +9,7 @@ namespace locus {
 
 // Answers one query for a point in world axes. Objects are searched as of `moment`, which the answer borrows; the
 // memory of OverlapAnswer::objects belongs to `task` and is valid until its next query. Cost: visits of the nodes and
-// triangles that a ray from the point along the x axis of each mesh passes, and of the cells around the point.
+// triangles that a half line from the point to a side of each mesh passes, and of the cells around the point.
 OverlapAnswer run_contains(QueryTask& task, const SceneAtTime& moment, Vec3d point, const OverlapOptions& options,
                            const Filter& filter);
 

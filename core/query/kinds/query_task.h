@@ -125,7 +125,7 @@ class QueryTask {
   // Returns the collector of found objects, which successive ball and box queries reuse.
   FoundObjects& found_objects() { return found_objects_; }
 
-  // Returns whether ball, box and nearest queries may use the vector kernels.
+  // Returns whether ball, box, contains and nearest queries may use the vector kernels.
   bool uses_kernels() const { return !brute_force_; }
 
   // Call the visitor for every value of `index` that may match the query: the values that the index structure finds,
@@ -150,6 +150,13 @@ class QueryTask {
       visit_all(index, visitor);
     else
       index.visit_path(path, visitor, work_);
+  }
+  template <class Visitor>
+  void visit_half_line(const TriangleBvh& tree, const HalfLineBoxes& line, Visitor& visitor) {
+    if (brute_force_)
+      visit_all(tree, visitor);
+    else
+      tree.visit_half_line(line, visitor, work_);
   }
   template <class Index, class Visitor>
   void visit_nearest(const Index& index, const Vec3d& point, Visitor& visitor) {

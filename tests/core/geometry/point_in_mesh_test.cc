@@ -1,4 +1,4 @@
-// Crossings of triangles by a ray along the x axis, judged by the solid angles of triangles in long double, by
+// Crossings of triangles by half lines, judged by the solid angles of triangles in long double, by
 // large integers, and on surfaces by construction.
 #include "core/geometry/point_in_mesh.h"
 
@@ -10,6 +10,7 @@
 
 #include "tests/support/exact_crossing.h"
 #include "tests/support/generated_meshes.h"
+#include "tests/support/half_lines.h"
 #include "tests/support/random.h"
 #include "tests/support/real.h"
 #include "tests/support/test_scale.h"
@@ -24,10 +25,10 @@ struct Containment {
   bool on_surface = false;
 };
 
-Containment inside(Vec3d point, const Mesh& mesh) {
+Containment inside(Vec3d point, const Mesh& mesh, HalfLine line = {}) {
   Containment result;
   for (const Triangle& triangle : mesh) {
-    const Crossing found = crossing(without_tiny_coordinates(point), triangle);
+    const Crossing found = crossing(without_tiny_coordinates(point), triangle, line);
     result.winding += found.winding;
     result.on_surface |= found.on_surface;
   }
@@ -94,9 +95,11 @@ TEST(PointInMeshTest, WindingEqualsTheSumOfSolidAngles) {
     for (int i = 0; i < 50; ++i) {
       const Vec3d point = random.vector(1.6);
       const Real angle = winding_by_angles(point, mesh);
-      const Containment found = inside(point, mesh);
-      ASSERT_FALSE(found.on_surface) << "seed " << seed;
-      ASSERT_EQ(found.winding, static_cast<int>(std::lround(angle))) << "seed " << seed << ", angle " << angle;
+      for (const HalfLine line : kHalfLines) {
+        const Containment found = inside(point, mesh, line);
+        ASSERT_FALSE(found.on_surface) << "seed " << seed;
+        ASSERT_EQ(found.winding, static_cast<int>(std::lround(angle))) << "seed " << seed << ", angle " << angle;
+      }
     }
   }
 }
@@ -122,10 +125,12 @@ TEST(PointInMeshTest, LatticesAreDecidedWhereRaysMeetEdgesAndCorners) {
         ++cells;
         full += within && filled[static_cast<size_t>((cell[0] * kSide + cell[1]) * kSide + cell[2])] ? 1 : 0;
       }
-      const Containment found = inside(point, mesh);
-      ASSERT_EQ(found.on_surface, full != 0 && full != cells) << "seed " << seed;
       const int winding = full == 0 ? 0 : 1;
-      ASSERT_TRUE(found.on_surface || found.winding == winding) << "seed " << seed;
+      for (const HalfLine line : kHalfLines) {
+        const Containment found = inside(point, mesh, line);
+        ASSERT_EQ(found.on_surface, full != 0 && full != cells) << "seed " << seed;
+        ASSERT_TRUE(found.on_surface || found.winding == winding) << "seed " << seed;
+      }
     }
   }
 }

@@ -26,4 +26,12 @@ const NearestKernels* active_nearest_kernels() {
   return nullptr;
 }
 
+const CrossingKernels* active_crossing_kernels() {
+#ifdef LOCUS_X86_KERNELS
+  if (active_instruction_set() == InstructionSet::kAvx2) return &crossing_kernels_avx2();
+  if (active_instruction_set() == InstructionSet::kSse4) return &crossing_kernels_sse4();
+#endif
+  return nullptr;
+}
+
 }  // namespace locus

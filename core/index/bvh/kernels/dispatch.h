@@ -1,8 +1,9 @@
-// Selection of the ray, region and nearest kernels for the instruction set that this process uses.
+// Selection of the ray, region, nearest and crossing kernels for the instruction set that this process uses.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_DISPATCH_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_DISPATCH_H_
 
 #include "core/base/instruction_set.h"
+#include "core/index/bvh/kernels/crossing_kernels.h"
 #include "core/index/bvh/kernels/nearest_kernels.h"
 #include "core/index/bvh/kernels/ray_kernels.h"
 #include "core/index/bvh/kernels/region_kernels.h"
@@ -13,6 +14,7 @@ namespace locus {
 const RayKernels* active_ray_kernels();
 const RegionKernels* active_region_kernels();
 const NearestKernels* active_nearest_kernels();
+const CrossingKernels* active_crossing_kernels();
 
 }  // namespace locus
 

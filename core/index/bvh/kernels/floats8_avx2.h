@@ -64,6 +64,9 @@ static inline uint32_t below(Floats8 a, Floats8 b) {
   return static_cast<uint32_t>(_mm256_movemask_ps(_mm256_cmp_ps(a.v, b.v, _CMP_LT_OQ)));
 }
 
+// Returns the sign bits of the lanes as such a mask: those of a mask for select().
+static inline uint32_t signs_of(Floats8 a) { return static_cast<uint32_t>(_mm256_movemask_ps(a.v)); }
+
 // Table with one row for each bit mask of eight lanes. A row begins with the indices of the lanes in the mask, in
 // increasing order. Computed at compile time.
 struct PackTable {

@@ -68,6 +68,7 @@ static inline Floats8 horizontal_max(Floats8 a) {
 static inline uint32_t lanes_of(__m128 low, __m128 high) {
   return static_cast<uint32_t>(_mm_movemask_ps(low) | _mm_movemask_ps(high) << 4);
 }
+static inline uint32_t signs_of(Floats8 a) { return lanes_of(a.low, a.high); }
 static inline uint32_t at_most(Floats8 a, Floats8 b) {
   return lanes_of(_mm_cmple_ps(a.low, b.low), _mm_cmple_ps(a.high, b.high));
 }

@@ -1,0 +1,174 @@
+// Traversal of the crossing kernels, compiled once for each instruction set by the .cc file that includes it. A
+// traversal first opens nodes and collects the blocks that the half line meets. Then it tests the blocks one by one.
+// The two phases alternate, so that mispredicted branches of one phase do not delay the other. The comparisons of
+// coordinates are exact: see half_line_floats.h. Only areas are computed.
+//
+// Let u and v be the ends of an edge, projected along the half line, and relative to the point p. The edge is to the
+// left or to the right of p by the sign of the area u.y v.z - u.z v.y. Error of an area, with e = 2^-24: the bounds of
+// the triangle contain p, so |u.y|, |u.z|, |v.y| and |v.z| are at most E, the extent of the block. The rounded point
+// differs from p by at most `pad` on each axis, so the error of a difference is at most n = pad + e (E + pad). The
+// errors of the differences change the two products by 4 E n + 2 n^2 in total; the roundings of the two products and of
+// their difference add 4 e (E + n)^2. The sum is below 9 e (E + pad)^2 + 5 pad (E + pad). The bound is 16 e (E + pad)^2
+// + 16 pad (E + pad), which covers its own roundings too. It is infinite if a product may overflow, so that no sign is
+// certain. Products that underflow add at most 2^-147, which 2^-120 covers.
+//
+// A triangle has no edge, or one rising and one falling edge, at the height of the point: with one end at the point's
+// height or below, and one above. If both edges have a certain sign, the triangle's winding in the projection is known.
+// If it is 0, the point is off the triangle, because the two edges are the ends of the triangle's section at that
+// height. Otherwise the point may be on the triangle only if the bounds reach back to the point.
+#ifndef LOCUS_CORE_INDEX_BVH_KERNELS_CROSSING_KERNELS_IMPL_H_
+#define LOCUS_CORE_INDEX_BVH_KERNELS_CROSSING_KERNELS_IMPL_H_
+
+#include "core/base/planted_bug.h"
+#include "core/index/bvh/kernels/crossing_kernels.h"
+#include "core/index/bvh/kernels/floats8.h"
+
+namespace locus {
+namespace {
+
+// Returns the error bound `bound`, or 0 if `bug` is planted: a test then shows that the bound is needed.
+static inline float unless(PlantedBug bug, float bound) { return planted(bug) ? 0 : bound; }
+
+static inline uint32_t count_of(uint32_t lanes) { return static_cast<uint32_t>(__builtin_popcount(lanes)); }
+
+// One coordinate of the three vertices of eight triangles.
+struct Coordinates8 {
+  Floats8 a, b, c;
+
+  static inline Coordinates8 load(const TriangleBlock& block, int axis) {
+    return {Floats8::load(block.vertices[axis]), Floats8::load(block.vertices[axis + 3]),
+            Floats8::load(block.vertices[axis + 6])};
+  }
+  inline Floats8 least() const { return minimum(minimum(a, b), c); }
+  inline Floats8 greatest() const { return maximum(maximum(a, b), c); }
+  friend inline Coordinates8 operator-(Coordinates8 v, Floats8 from) { return {v.a - from, v.b - from, v.c - from}; }
+  friend inline Coordinates8 operator*(Coordinates8 v, Floats8 by) { return {v.a * by, v.b * by, v.c * by}; }
+};
+
+// Edges of eight triangles at the height of the point: masks of the triangles whose rising edge has the point on its
+// left, whose falling edge has the point on its right, and of those for which a sign is not certain.
+struct Edges {
+  uint32_t up = 0, down = 0, doubtful = 0;
+
+  // Adds the edge from u to v. `low_u` and `low_v` are the triangles in which the end is not above the point.
+  __attribute__((always_inline)) inline void add(uint32_t low_u, uint32_t low_v, Floats8 area, float error) {
+    const uint32_t left = below(Floats8::splat(error), area), right = below(area, Floats8::splat(-error));
+    up |= low_u & ~low_v & left;
+    down |= low_v & ~low_u & right;
+    doubtful |= (low_u ^ low_v) & ~(left | right);
+  }
+};
+
+// State of a call.
+class CrossingWalk {
+ public:
+  inline CrossingWalk(const TriangleTree& tree, CrossingVisit& visit)
+      : tree_(tree),
+        visit_(visit),
+        line_(visit.line),
+        first_((line_.axis + 1) % 3),
+        second_((line_.axis + 2) % 3),
+        way_(Floats8::splat(line_.way)),
+        along_high_(Floats8::splat(line_.along_high)),
+        low_{Floats8::splat(line_.low[0]), Floats8::splat(line_.low[1])},
+        high_{Floats8::splat(line_.high[0]), Floats8::splat(line_.high[1])},
+        top_(visit.top) {}
+
+  inline void run() {
+    bool more = true;
+    while (more && top_ != 0 && nodes_ + tests_ < kMaxCrossingWork) {
+      open_nodes();
+      for (uint32_t i = 0; i < found_ && more; ++i) more = test(tree_.blocks[blocks_[i] & ~kBlockBit]);
+    }
+    visit_.winding += line_.way < 0 ? -winding_ : winding_;
+    visit_.on_surface = !more;
+    visit_.top = more ? top_ : 0;
+    visit_.nodes = nodes_;
+    visit_.tests = tests_;
+    visit_.judged = judged_;
+  }
+
+ private:
+  // Opens nodes until none is waiting, or there is no room for the blocks of another node.
+  __attribute__((always_inline)) inline void open_nodes() {
+    const int ends = line_.way > 0 ? line_.axis + 3 : line_.axis;
+    for (found_ = 0; top_ != 0 && found_ <= kMaxLineBlocks - kTreeWidth;) {
+      const TriangleNode& node = tree_.nodes[visit_.waiting[--top_]];
+      ++nodes_;
+      const Floats8 across = bit_and(bit_and(greater_equal_mask(low_[0], Floats8::load(node.bounds[first_])),
+                                             greater_equal_mask(Floats8::load(node.bounds[first_ + 3]), high_[0])),
+                                     bit_and(greater_equal_mask(low_[1], Floats8::load(node.bounds[second_])),
+                                             greater_equal_mask(Floats8::load(node.bounds[second_ + 3]), high_[1])));
+      const Floats8 along = greater_equal_mask(Floats8::load(node.bounds[ends]) * way_, along_high_);
+      const uint32_t met = signs_of(bit_and(across, along)), met_blocks = met & block_slots(node);
+      const uint32_t met_nodes = met & ~met_blocks;
+      pack_falling(node, met_blocks, 0, 0, blocks_ + found_);
+      pack_falling(node, met_nodes, 0, 0, visit_.waiting + top_);
+      found_ += count_of(met_blocks);
+      top_ += count_of(met_nodes);
+    }
+  }
+
+  // Adds the crossings of the triangles of a block. Returns false if the point lies on one of them.
+  __attribute__((always_inline)) inline bool test(const TriangleBlock& block) {
+    const Coordinates8 first = Coordinates8::load(block, first_), second = Coordinates8::load(block, second_);
+    const Coordinates8 along = Coordinates8::load(block, line_.axis) * way_;
+    const uint32_t low_a = at_most(first.a, low_[0]), low_b = at_most(first.b, low_[0]),
+                   low_c = at_most(first.c, low_[0]);
+    const Floats8 within = bit_and(
+        bit_and(greater_equal_mask(first.greatest(), high_[0]), greater_equal_mask(along.greatest(), along_high_)),
+        bit_and(greater_equal_mask(low_[1], second.least()), greater_equal_mask(second.greatest(), high_[1])));
+    const uint32_t lanes = (1u << block.count) - 1u, met = signs_of(within) & (low_a | low_b | low_c) & lanes;
+    if (met == 0) return true;
+    const float pad = unless(PlantedBug::kCrossingPad, line_.pad), reach = 2 * (block.extent + pad);
+    const float error = unless(PlantedBug::kCrossingError, 0x1p-22f * (reach * reach)) + 8 * pad * reach +
+                        unless(PlantedBug::kCrossingFloor, 0x1p-120f);
+    const Coordinates8 y = first - Floats8::splat(line_.rounded[0]), z = second - Floats8::splat(line_.rounded[1]);
+    Edges edges;
+    edges.add(low_a, low_b, multiply_subtract(y.a, z.b, z.a * y.b), error);
+    edges.add(low_b, low_c, multiply_subtract(y.b, z.c, z.b * y.c), error);
+    edges.add(low_c, low_a, multiply_subtract(y.c, z.a, z.c * y.a), error);
+    uint32_t near = at_most(along.least(), Floats8::splat(line_.along_low));
+    if (planted(PlantedBug::kCrossingNear)) near = 0;
+    const uint32_t crossing = edges.up ^ edges.down, without_edges = ~((low_a ^ low_b) | (low_b ^ low_c));
+    const uint32_t maybe_on = planted(PlantedBug::kCrossingTop) ? crossing : crossing | without_edges;
+    const uint32_t undecided = met & (edges.doubtful | (near & maybe_on)), decided = met & ~undecided;
+    winding_ += static_cast<int64_t>(count_of(edges.up & decided)) - count_of(edges.down & decided);
+    if (__builtin_expect(undecided != 0, 0)) return judge(block, met, undecided);
+    tests_ += count_of(met);
+    return true;
+  }
+
+  // Adds the crossings of the triangles in the mask `undecided`, and counts those in the mask `met`. Returns false if
+  // the point lies on a triangle.
+  inline bool judge(const TriangleBlock& block, uint32_t met, uint32_t undecided) {
+    for (; undecided != 0; undecided &= undecided - 1u) {
+      const auto lane = static_cast<uint32_t>(__builtin_ctz(undecided));
+      ++judged_;
+      const int found = visit_.judge.crossing(visit_.judge.context, block, lane);
+      if (found == kOnTriangle) {
+        tests_ += count_of(met & ((2u << lane) - 1u));
+        return false;
+      }
+      visit_.winding += found;
+    }
+    tests_ += count_of(met);
+    return true;
+  }
+
+  const TriangleTree& tree_;
+  CrossingVisit& visit_;
+  const HalfLineFloats line_;
+  const int first_, second_;  // the axes across the half line
+  const Floats8 way_, along_high_, low_[2], high_[2];
+  uint32_t top_, found_ = 0, nodes_ = 0, tests_ = 0, judged_ = 0;
+  int64_t winding_ = 0;                          // as if the half line were ascending
+  alignas(32) uint32_t blocks_[kMaxLineBlocks];  // met blocks that are not tested yet: `found_` elements
+};
+
+static void sum_crossings(const TriangleTree& tree, CrossingVisit& visit) { CrossingWalk(tree, visit).run(); }
+
+}  // namespace
+}  // namespace locus
+
+#endif  // LOCUS_CORE_INDEX_BVH_KERNELS_CROSSING_KERNELS_IMPL_H_
