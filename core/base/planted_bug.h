@@ -90,7 +90,6 @@ enum class PlantedBug {
   // The crossing kernels:
   kCrossingError,  // areas are compared with 0 in float without an error bound
   kCrossingPad,    // the difference between the point and the rounded point is ignored
-  kCrossingFloor,  // products that may underflow are compared without the pad for underflow
   kCrossingNear,   // a triangle whose bounds contain the start of the half line counts like one beyond it
   kCrossingTop,    // the vertex of a triangle that is highest across the half line is not on the surface
 };

@@ -121,8 +121,7 @@ class CrossingWalk {
     const uint32_t lanes = (1u << block.count) - 1u, met = signs_of(within) & (low_a | low_b | low_c) & lanes;
     if (met == 0) return true;
     const float pad = unless(PlantedBug::kCrossingPad, line_.pad), reach = 2 * (block.extent + pad);
-    const float error = unless(PlantedBug::kCrossingError, 0x1p-22f * (reach * reach)) + 8 * pad * reach +
-                        unless(PlantedBug::kCrossingFloor, 0x1p-120f);
+    const float error = unless(PlantedBug::kCrossingError, 0x1p-22f * (reach * reach)) + 8 * pad * reach + 0x1p-120f;
     const Coordinates8 y = first - Floats8::splat(line_.rounded[0]), z = second - Floats8::splat(line_.rounded[1]);
     Edges edges;
     edges.add(low_a, low_b, multiply_subtract(y.a, z.b, z.a * y.b), error);
