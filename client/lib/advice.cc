@@ -7,7 +7,7 @@
 namespace locus::client {
 namespace {
 
-// Advice for a failed connection: `remedy` is given if gRPC's error message contains `symptom`.
+// Pair of texts: if gRPC's error message for a failed connection contains `symptom`, the advice is `remedy`.
 struct Advice {
   absl::string_view symptom;
   absl::string_view remedy;
@@ -19,7 +19,7 @@ struct Advice {
 constexpr absl::string_view kClosedAtOnce =
     "the server ended the connection at once: it may require TLS, or a client certificate that it knows";
 
-// Ordered: the first match is used.
+// Advice for failed handshakes. The order matters: the first entry whose symptom matches is used.
 constexpr Advice kOnHandshakes[] = {
     {": Permission denied",
      "permission denied: the socket's file admits other users only; the server's operator can set --unix-mode and "

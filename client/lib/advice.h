@@ -1,5 +1,5 @@
-// Advice for errors of identity and encryption, whose own messages suggest no remedy. Internal to the library.
-// Functions without state; any thread.
+// Advice for failed authentication and encryption, because gRPC's own messages for these errors suggest no remedy.
+// Internal to the library. Functions without state; any thread.
 #ifndef LOCUS_CLIENT_LIB_ADVICE_H_
 #define LOCUS_CLIENT_LIB_ADVICE_H_
 
@@ -15,7 +15,7 @@ namespace locus::client {
 // Returns an empty string if no server answered or for any other cause.
 std::string advice_on_handshake(absl::string_view message);
 
-// Returns advice for an error without details from the server; empty if there is no advice.
+// Returns advice for an error to which the server attached no details; empty if there is no advice.
 std::string advice_on(absl::StatusCode code, absl::string_view message);
 
 }  // namespace locus::client

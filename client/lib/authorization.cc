@@ -91,8 +91,8 @@ Authorization::Stamp Authorization::stamp_of(const std::string& file) {
   return {status.st_ino, status.st_size, status.st_mtim.tv_sec, status.st_mtim.tv_nsec};
 }
 
-// Reads the file's stamp before its content, so that the next call notices a change in between. Precondition: the
-// caller holds the lock.
+// Reads the token file. Takes the file's stamp before it reads the content: if the file changes between these two
+// steps, the stored stamp is outdated, so the next call reads the file again. Precondition: the caller holds the lock.
 absl::Status Authorization::read() {
   stamp_ = stamp_of(file_);
   ASSIGN_OR_RETURN(std::string token, read_token(file_));

@@ -22,11 +22,11 @@ namespace locus::client {
 
 inline constexpr size_t kMaxTokenBytes = 8192;
 
-// Returns whether these options ask for TLS.
+// Returns whether `options` ask for TLS.
 bool uses_tls(const CredentialOptions& options);
 
-// Returns whether data for the gRPC target `target` never leaves this machine. This is true for a unix socket,
-// `localhost`, an address that begins with 127, and [::1].
+// Returns whether data that is sent to the gRPC target `target` stays on this machine. True for a unix socket,
+// `localhost`, an IPv4 address that begins with 127, and [::1].
 bool stays_on_this_machine(absl::string_view target);
 
 // The token of one client, which has none if no token was configured. Thread-safe; streams share ownership.
@@ -39,8 +39,9 @@ class Authorization {
   static absl::StatusOr<std::shared_ptr<Authorization>> make(const CredentialOptions& options,
                                                              const std::string& target);
 
-  // Adds the metadata entry `authorization` to a call. Reads the token file again if it has changed; keeps the old
-  // token if the file cannot be read. Returns the number of the token: 1 for the first, 2 for the next, ...
+  // Adds the metadata entry `authorization` to a call. Reads the token file again if the file has changed, and keeps
+  // the old token if the file cannot be read. Returns the number of the token that was added; tokens are numbered 1, 2,
+  // ... in the order in which they were read.
   uint64_t add_to(grpc::ClientContext& context);
 
   // Returns the value of the header `authorization`; empty without a token.

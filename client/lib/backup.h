@@ -24,8 +24,8 @@ struct BackupSize {
   uint64_t bytes = 0;
 };
 
-// Completely received file of a backup: its path, its size in bytes, and its SHA-256, which equals the SHA-256 that the
-// server sent.
+// File of a backup that was received completely: its path, its size in bytes, and its SHA-256, which was verified to
+// equal the SHA-256 that the server sent.
 struct BackupFile {
   std::string path;
   uint64_t bytes = 0;
@@ -54,10 +54,11 @@ class BackupSink {
 // Set of the validated file paths of one backup. Not thread-safe. Invariant: no path is both in files_ and in folders_.
 class BackupPaths {
  public:
-  // Validates `path` and adds it. Returns INVALID_ARGUMENT if the path is empty, longer than kMaxBackupPathLength, or
-  // not made of names separated by single slashes; if a name is `.` or `..`; if the path contains `\` or a control
-  // character; if it was added before, is a folder of another path, or has another path as its folder; or if there are
-  // too many files or folders. The error message is a predicate such as "is empty", which callers put behind the path.
+  // Validates `path` and adds it to the set. Returns INVALID_ARGUMENT in these cases: the path is empty, longer than
+  // kMaxBackupPathLength, or not made of names separated by single slashes; a name is `.` or `..`; the path contains
+  // `\` or a control character; the path was added before, is a folder of another path, or has another path as its
+  // folder; there are too many files or folders. The error message is a predicate such as "is empty", so callers
+  // prepend the path.
   absl::Status add(const std::string& path);
 
  private:

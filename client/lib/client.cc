@@ -51,7 +51,7 @@ absl::StatusOr<Response> call(Stub& stub, const CallPlan& plan, const Request& r
     return plan.repeat == Repeat::kNever ? attempt() : with_retries(plan.retry, deadline, attempt);
   };
   absl::Status status = attempts();
-  // A server that refuses the token has changed nothing, so even a call that is not repeatable may be sent again.
+  // Repeat even a call that is not safe to repeat: a server that refuses the token has changed nothing.
   if (absl::IsUnauthenticated(status) && plan.authorization.has_newer(token)) status = attempts();
   RETURN_IF_ERROR(status);
   return response;
@@ -78,7 +78,7 @@ struct Client::Connection {
   CallPlan repeatable(absl::string_view scene = {}) const {
     return {*authorization, options.deadline, options.retry, Repeat::kWhenUnavailable, scene};
   }
-  // Returns the header of a call that ends `timeout` after now.
+  // Returns the header of a call whose deadline is `timeout` from now.
   CallHeader header(absl::Duration timeout, absl::string_view scene = {}) const {
     return {*authorization, absl::Now() + timeout, scene};
   }

@@ -10,9 +10,9 @@
 //
 // Errors are absl::Status with the server's code and message; error_of() (client/lib/status.h) returns the server's
 // structured error. UNAVAILABLE means that no server answered or that the server is draining. After DEADLINE_EXCEEDED
-// the outcome of a change is unknown. Calls that change nothing are retried within their deadline, on UNAVAILABLE, and
-// on RESOURCE_EXHAUSTED with a retry hint. An update is retried only if it carries `writer` and `batch`. No other call
-// is ever retried.
+// the outcome of a change is unknown. Calls that change nothing are retried until their deadline if they fail with
+// UNAVAILABLE, or with RESOURCE_EXHAUSTED and a retry hint of the server. An update is retried only if its batch has
+// `writer` and `batch`, by which the server recognizes a repeated batch. No other call is ever retried.
 #ifndef LOCUS_CLIENT_LIB_CLIENT_H_
 #define LOCUS_CLIENT_LIB_CLIENT_H_
 
@@ -75,10 +75,10 @@ class Client {
   absl::StatusOr<std::vector<v1::IdentityQuotas>> get_quotas(v1::GetQuotasRequest request = {}) const;
   // Returns the health of the whole server, or of one service given by its full name. Retried.
   absl::StatusOr<Health> health(absl::string_view service = "") const;
-  // Passes a consistent copy of the server's data directory to `sink`, in this thread, and returns the copy's size. Not
-  // retried; to try again, call backup() with a new sink. Returns DATA_LOSS if the received files differ from the
-  // server's announcement (number of files, sizes, hashes) or if a path leads out of the backup, and UNIMPLEMENTED if
-  // the server has no data directory.
+  // Passes a consistent copy of the server's data directory to `sink`, in this thread, and returns the size of the
+  // copy. Not retried; to try again, call backup() with a new sink. Returns DATA_LOSS if the received files differ from
+  // the server's announcement (number of files, sizes, hashes) or if a path is invalid (BackupPaths::add). Returns
+  // UNIMPLEMENTED if the server has no data directory.
   absl::StatusOr<BackupSize> backup(BackupSink& sink) const;
 
   // Create, read, list and delete scenes. get_scene() and list_scenes() are retried; create_scene() and delete_scene()

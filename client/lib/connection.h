@@ -1,5 +1,5 @@
-// Functions that open a gRPC channel and report a wrong address or a failed TLS handshake at once, with a clear
-// message, and that prepare the calls on the channel. Internal to the library.
+// Functions that open a gRPC channel, prepare the calls on it, and report a wrong address or a failed TLS handshake at
+// once with a clear message. Internal to the library.
 #ifndef LOCUS_CLIENT_LIB_CONNECTION_H_
 #define LOCUS_CLIENT_LIB_CONNECTION_H_
 
@@ -41,17 +41,17 @@ std::shared_ptr<grpc::Channel> open_channel(const std::string& target, const Cli
 absl::Status await_connection(const std::shared_ptr<grpc::Channel>& channel, const std::string& target,
                               const ClientOptions& options);
 
-// Values that a call has besides its request.
+// Parameters of a call that are sent as metadata or as deadline, beside the request.
 struct CallHeader {
   Authorization& authorization;
   absl::Time deadline = absl::InfiniteFuture();
   absl::string_view scene = {};  // empty = the call concerns no scene
 };
 
-// Prepares the context of a call: sets its deadline, and adds the metadata entries `authorization` and `x-scene`, which
-// routers use to find the server of a scene. Adds no `x-scene` if the scene's name is invalid: gRPC would abort the
-// process for bytes that are illegal in metadata, whereas the server refuses the invalid name in the request with a
-// helpful message. Returns the number of the token (see Authorization::add_to).
+// Prepares the context of a call: sets its deadline, and adds the metadata entries `authorization` and `x-scene`.
+// Routers use `x-scene` to find the server of a scene. If the scene's name is invalid, `x-scene` is omitted: gRPC would
+// abort the process for bytes that are illegal in metadata, whereas the server refuses the same name in the request
+// with a helpful message. Returns the number of the token (see Authorization::add_to).
 uint64_t prepare(grpc::ClientContext& context, const CallHeader& header);
 
 }  // namespace locus::client

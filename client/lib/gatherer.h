@@ -1,5 +1,5 @@
-// Gatherer of small items from many callers into one batch, which is sent when it is full or its first item has waited
-// for the maximum delay. Internal to the library: base of QueryBatcher and MoveBatcher.
+// Gatherer of small items from many callers into one batch. A batch is sent when it is full, or when its first item has
+// waited for the maximum delay. Internal to the library: base of QueryBatcher and MoveBatcher.
 //
 // Threads: add() and flush() may be called from any thread; the gatherer calls `send` in a thread of its own, one batch
 // after another, without a lock held, so `send` may block. While `send` blocks, add() blocks as soon as the next batch
@@ -31,7 +31,7 @@ class Gatherer {
         send_(std::move(send)),
         thread_([this] { run(); }) {}
 
-  // Sends the items that were added and waits until `send` has returned.
+  // Sends the items that were added, and waits until `send` has returned for them.
   ~Gatherer() {
     {
       std::lock_guard lock(mutex_);
@@ -43,8 +43,8 @@ class Gatherer {
   Gatherer(const Gatherer&) = delete;
   Gatherer& operator=(const Gatherer&) = delete;
 
-  // Waits while the batch is full, then calls add_to(batch) with the lock held. add_to() must add one item to the
-  // batch.
+  // Adds one item: waits while the batch is full, then calls add_to(batch) with the lock held. The callback `add_to`
+  // must add exactly one item to the batch.
   template <class AddTo>
   void add(const AddTo& add_to) {
     std::unique_lock lock(mutex_);
@@ -55,7 +55,8 @@ class Gatherer {
     if (items_ == 1 || items_ == max_items_) changed_.notify_all();
   }
 
-  // Sends the gathered items at once, and blocks until `send` has returned for all items that were added before.
+  // Sends the gathered items at once, and blocks until `send` has returned for all items that were added before this
+  // call.
   void flush() {
     std::unique_lock lock(mutex_);
     const uint64_t target = sent_ + (sending_ ? 1 : 0) + (items_ > 0 ? 1 : 0);

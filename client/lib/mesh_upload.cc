@@ -12,7 +12,7 @@
 namespace locus::client {
 namespace {
 
-// Number of values of a column per message: a little under 1 MiB including its encoding.
+// Number of values of a column in one message, chosen so that the encoded message is a little smaller than 1 MiB.
 constexpr size_t kValuesPerMessage = (1u << 18) - 1024;
 static_assert(kValuesPerMessage % 3 == 0, "messages end between triples");
 

@@ -28,7 +28,8 @@ enum class Lane {
   kBulk,     // large messages: streams by default, uploads, downloads, dumps, backups
 };
 
-// Encryption of a connection, and proofs of the client's identity. Files are in PEM format and are read by connect().
+// Options for the encryption of a connection, and the credentials of the client. Files are in PEM format and are read
+// by connect().
 struct CredentialOptions {
   // Encrypts the connection with TLS. Implied by ca_file, certificate_file and server_name.
   bool tls = false;
@@ -46,8 +47,9 @@ struct CredentialOptions {
   // unary call that was refused because of an old token is repeated once with the new one.
   std::string token = {};
   std::string token_file = {};
-  // True: the token is also sent to other machines without TLS, where everyone on the way can read it. False: connect()
-  // returns FAILED_PRECONDITION for such an address.
+  // True: the token may also be sent unencrypted to other machines, so everyone who can read the network traffic can
+  // read the token. False: connect() returns FAILED_PRECONDITION for an address to which a token would be sent
+  // unencrypted.
   bool allow_token_without_tls = false;
 };
 
@@ -56,8 +58,8 @@ struct ClientOptions {
   CredentialOptions credentials;
   // Maximum duration of connect().
   absl::Duration connect_timeout = absl::Seconds(10);
-  // False: connect() fails as soon as an attempt is refused, so that a wrong address is reported at once. True:
-  // connect() retries until connect_timeout, for servers that are just starting.
+  // False: connect() fails as soon as one attempt to connect is refused, so that a wrong address is reported at once.
+  // True: connect() retries until connect_timeout has passed, for servers that are just starting.
   bool wait_for_server = false;
   // Maximum duration of a call including its retries. Raise it for large query batches on slow machines.
   absl::Duration deadline = absl::Seconds(10);

@@ -26,7 +26,8 @@ CertificatePtr next_certificate(BIO* reader) {
   return {PEM_read_bio_X509(reader, nullptr, nullptr, nullptr), &X509_free};
 }
 
-// Tells OpenSSL that there is no password, so that OpenSSL does not ask for one on the terminal.
+// Password callback of OpenSSL. Returns the code for "no password", so that OpenSSL does not ask for a password on the
+// terminal.
 int no_password(char*, int, int, void*) { return -1; }
 
 }  // namespace

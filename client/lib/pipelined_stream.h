@@ -53,7 +53,8 @@ class PipelinedStream {
   using Reactor = grpc::ClientBidiReactor<Request, Response>;
 
   struct Item {
-    std::shared_ptr<Request> request;  // replaced, never modified: a write in progress may still read the old request
+    // Replaced, never modified, when the request is renumbered: a write in progress may still read the old request.
+    std::shared_ptr<Request> request;
     Callback done;
     bool written = false;  // whether the request's write on the current call has begun
   };
@@ -69,8 +70,8 @@ class PipelinedStream {
     virtual void number(Request& request) = 0;
     // Converts a response into the outcome of its request.
     virtual absl::StatusOr<Result> outcome_of(Response& response) = 0;
-    // Handles the outcome of an item that was at `position` and has been removed from `items`. May renumber the later
-    // items, which now begin at `position`. A returned error ends the stream.
+    // Handles the outcome of an item that was at index `position` of `items` and has been removed. May renumber the
+    // later items, the first of which is now at `position`. If an error is returned, the stream ends with this error.
     virtual absl::Status answered(const absl::StatusOr<Result>& outcome, Items& items, size_t position) = 0;
   };
 
@@ -139,13 +140,13 @@ class PipelinedStream {
 
   // Maximum time for which close() waits until the server ends the call. After this time close() cancels the call.
   static constexpr std::chrono::seconds kCloseTimeout{5};
-  // Maximum duration of one wait for a response, after which wait_for_end() waits again. Without this maximum, the time
-  // at which the wait ends would overflow if the patience is unlimited.
+  // Maximum duration of one wait on the condition variable for a response; wait_for_end() then waits again. The maximum
+  // is needed because the end of the wait would overflow if the patience is unlimited.
   static constexpr std::chrono::hours kLongestWait{1};
 
-  // One gRPC call. A hold (AddHold) prevents gRPC from finishing the call while other threads may still start writes;
-  // OnReadDone() removes the hold after the failed read at the end of the call. Members are guarded by the stream's
-  // lock, except `response_`, which only the read in progress and OnReadDone() use.
+  // One gRPC call. A hold (AddHold) prevents gRPC from finishing the call while other threads may still start writes.
+  // OnReadDone() removes the hold when a read fails, which means that the call has ended. The stream's lock guards all
+  // members except `response_`, which only the read in progress and OnReadDone() use.
   class Attempt final : public Reactor {
    public:
     explicit Attempt(PipelinedStream& stream)
@@ -227,8 +228,8 @@ class PipelinedStream {
            std::is_partitioned(items_.begin(), items_.end(), [](const Item& item) { return item.written; });
   }
 
-  // Completes the request that `response` answers. Ignores a response that matches no item: the request was renumbered
-  // in the meantime and is sent again.
+  // Completes the request that `response` answers. Ignores a response whose sequence number matches no item: its
+  // request was renumbered in the meantime and is sent again.
   void receive(Response& response) {
     std::unique_lock lock(mutex_);
     const auto item = std::find_if(items_.begin(), items_.end(), [&](const Item& candidate) {
@@ -314,8 +315,8 @@ class PipelinedStream {
     return true;
   }
 
-  // Returns the wait before the next call, or nothing if the stream ends with `end`. A connection that is lost while no
-  // request is unanswered does not count as a failure.
+  // Returns the wait before the next call; nothing if the stream must not open another call and ends with `end`. If the
+  // connection is lost while no request is unanswered, the loss does not count as a failure.
   std::optional<absl::Duration> wait_before_next(const absl::Status& end) {
     if (broken_off_ || !fatal_.ok() || end.ok() || !worth_reconnecting(end)) return std::nullopt;
     if (items_.empty()) return absl::ZeroDuration();
@@ -345,7 +346,9 @@ class PipelinedStream {
   Backoff backoff_;
   const std::shared_ptr<Authorization> authorization_;
   Items items_;
-  Clock::time_point last_response_;   // time of the last response, or start of the wait for the first response
+  // Start of the current wait for a response: the time of the last response, of the start of the call, or of the first
+  // request after all earlier requests were answered, whichever is latest.
+  Clock::time_point last_response_;
   std::unique_ptr<Attempt> attempt_;  // the call in progress
   int running_callbacks_ = 0;         // number of callbacks that have begun and not returned
   bool closing_ = false;

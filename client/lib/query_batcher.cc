@@ -8,7 +8,7 @@
 namespace locus::client {
 namespace {
 
-// Queries of one message. The message's first block has the rays, its second block the balls; a block without queries
+// Queries of one message. In the message the rays are the first block and the balls the second; a block without queries
 // is omitted.
 struct Gathered {
   std::vector<SingleRay> rays;

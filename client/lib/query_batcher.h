@@ -1,6 +1,6 @@
-// Batcher of single queries from many callers: queries that arrive within a short time are sent in one message, and
-// each is answered by its own callback. For game code with scattered queries; code that has a thousand queries at once
-// builds a batch of them with QueryBuilder instead.
+// Batcher of single queries from many callers. Queries that arrive within a short time are sent in one message, and
+// each query has a callback for its answer. For game code with scattered queries; code that has a thousand queries at
+// once builds one batch of them with QueryBuilder instead.
 //
 //   locus::client::QueryBatcher batcher(client->query_stream("arena", {.lane = locus::client::Lane::kLatency}));
 //   batcher.ray({{0, 1, 0}, {0, 0, -1}}, [](auto hit) { if (hit.ok() && hit->id != 0) shoot(hit->id, hit->t); });
@@ -62,9 +62,9 @@ class QueryBatcher {
   QueryBatcher(const QueryBatcher&) = delete;
   QueryBatcher& operator=(const QueryBatcher&) = delete;
 
-  // Add a query. Its callback is called exactly once, with the answer or with the error of the message that carried the
+  // Add a query. The callback is called exactly once, with the answer or with the error of the message that carried the
   // query. If one query has an invalid value, for example one that is not finite, the server refuses all queries of the
-  // same message. Both functions block while `max_items` queries wait because the server does not keep up.
+  // same message. Both functions block while `max_items` queries are waiting to be sent.
   void ray(const SingleRay& ray, HitCallback on_hit);
   void ball(const SingleBall& ball, IdsCallback on_ids);
 

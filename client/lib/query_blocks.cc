@@ -3,7 +3,7 @@
 namespace locus::client {
 namespace {
 
-// Sets the position of rays or nearest queries in the order of rows.
+// Sets the row after which the results of rays or nearest queries continue.
 template <class Kind>
 void set_after(Kind& kind, absl::Span<const float> ts, absl::Span<const uint64_t> ids,
                absl::Span<const uint32_t> triangles) {

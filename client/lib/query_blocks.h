@@ -1,7 +1,7 @@
-// Builders of one block of a query batch: rays, balls, boxes, capsules, sweeps, frustums, points to contain, sight,
-// nearest, pairs, cells or lookup, with the settings that all kinds share. QueryBuilder returns these builders, which
-// are valid until QueryBuilder::build(). The builders check nothing: the server refuses an invalid batch as a whole,
-// naming block, column and index. Not thread-safe.
+// Builders of one block of a query batch: rays, balls, boxes, capsules, sweeps, frustums, contains, sight, nearest,
+// pairs, cells or lookup, with the settings that all kinds share. QueryBuilder returns these builders; they are valid
+// until QueryBuilder::build(). The builders check nothing: if a value is invalid, the server refuses the whole batch
+// with an error that names block, column and index. Not thread-safe.
 //
 // Let N be the number of queries of a block. A per-query column (t_max, max_distances, masks, ignored groups,
 // rotations) is either filled row by row, or set as a whole column, which has N entries, one entry for all queries, or
@@ -31,8 +31,8 @@ struct Filter {
 template <class Derived>
 class BlockBuilder {
  public:
-  // Sets the frame, which is added to every position of the block. Points in the block's result are relative to the
-  // frame; poses are absolute.
+  // Sets the frame: the origin that the server adds to every position of the block. Points in the block's result are
+  // relative to the frame, but poses are absolute.
   Derived& frame(const Double3& origin) {
     v1::Vec3d& frame = *block_->mutable_frame();
     frame.set_x(origin.x);
@@ -61,7 +61,7 @@ class BlockBuilder {
     assign(*block_->mutable_ignore_groups(), groups);
     return derived();
   }
-  // Sets the ids that the whole block ignores, at most 64.
+  // Sets the ids that all queries of the block ignore, at most 64 ids.
   Derived& ignore_ids(absl::Span<const uint64_t> ids) {
     assign(*block_->mutable_ignore_ids(), ids);
     return derived();
@@ -71,18 +71,18 @@ class BlockBuilder {
     block_->set_max_results(rows);
     return derived();
   }
-  // Restricts the result to rows with ids above `id`, to continue after a truncated result.
+  // Restricts the result to rows whose id is greater than `id`, to continue after a truncated result.
   Derived& after_id(uint64_t id) {
     block_->set_after_id(id);
     return derived();
   }
-  // Sets an object or instance for each query, from which the positions of the query count, and which the query does
-  // not find: N ids. Points in the result stay relative to the frame.
+  // Sets the anchor of each query: N ids of objects or instances. The positions of a query are relative to the position
+  // of its anchor, and the query does not find its anchor. Points in the result stay relative to the frame.
   Derived& anchors(absl::Span<const uint64_t> ids) {
     assign(*block_->mutable_anchor_ids(), ids);
     return derived();
   }
-  // Requests only the number of rows of each query, without a maximum.
+  // Requests only the number of rows of each query; max_results() does not limit this number.
   Derived& count_only() {
     block_->set_count_only(true);
     return derived();
@@ -94,7 +94,7 @@ class BlockBuilder {
     assign(*block_->mutable_as_of_fractions(), fractions);
     return derived();
   }
-  // Sets the handling of times outside the history; by default the server refuses such times.
+  // Sets how times outside the recorded history are handled; by default the server refuses them.
   Derived& outside_history(v1::OutsideHistory outside) {
     block_->set_outside_history(outside);
     return derived();
@@ -128,8 +128,8 @@ class RayBlock : public BlockBuilder<RayBlock> {
   RayBlock& rays(absl::Span<const float> origins, absl::Span<const float> directions);
   // Sets the whole column of the maximum t, inclusive: N entries, or one for all rays.
   RayBlock& t_max(absl::Span<const float> t_max);
-  // Restricts the result to hits behind (t, id, triangle), to continue after a truncated result: N entries each, or one
-  // for all rays. Without ids, hits at t itself are left out.
+  // Restricts the result to hits that follow (t, id, triangle) in the order of rows, to continue after a truncated
+  // result: N entries each, or one for all rays. Without ids, hits with the same t are left out.
   RayBlock& after(absl::Span<const float> ts, absl::Span<const uint64_t> ids = {},
                   absl::Span<const uint32_t> triangles = {});
 
@@ -190,7 +190,7 @@ class SweepBlock : public BlockBuilder<SweepBlock> {
   explicit SweepBlock(v1::QueryBlock& block) : BlockBuilder(block), sweeps_(block.mutable_sweeps()) {}
 
   SweepBlock& mode(v1::RayMode mode);
-  // Sets the treatment of what a solid touches at its start; by default, a hit at t = 0.
+  // Sets how objects and triangles that the solid touches at its start are treated; by default they are hits at t = 0.
   SweepBlock& at_start(v1::AtStart at_start);
   // Append a ball, a capsule or a box whose centre moves from `start` to `end`. `half_axis` is the vector from the
   // centre of the capsule to one end of its inner segment.
@@ -202,16 +202,17 @@ class SweepBlock : public BlockBuilder<SweepBlock> {
   // Appends N sweeps: 3N floats of starts and 3N floats of ends; if this call adds all sweeps of the block, `ends` may
   // instead contain three floats for all. The solids are set by the functions below.
   SweepBlock& sweeps(absl::Span<const float> starts, absl::Span<const float> ends);
-  // Set the column of the solids: N entries, or one for all sweeps. Balls have radii; capsules have radii and half
-  // axes, of three floats each; boxes have half extents, of three floats each, and optionally rotations, of four floats
-  // each: unit quaternions x, y, z, w.
+  // Set the columns that describe the moving solids: N entries, or one for all sweeps. Balls need radii. Capsules need
+  // radii and half axes (three floats each). Boxes need half extents (three floats each) and may have rotations (unit
+  // quaternions, four floats each: x, y, z, w).
   SweepBlock& radii(absl::Span<const float> radii);
   SweepBlock& half_axes(absl::Span<const float> half_axes);
   SweepBlock& half_extents(absl::Span<const float> half_extents);
   SweepBlock& rotations(absl::Span<const float> rotations);
 
  private:
-  // Appends what all solids have in common. Returns the number of sweeps before.
+  // Appends start, end and filter, which sweeps of all solids have. Returns the number of sweeps that the block had
+  // before.
   int append_path(const Float3& start, const Float3& end, const Filter& filter);
 
   v1::Sweeps* sweeps_;
@@ -225,7 +226,7 @@ class NearestBlock : public BlockBuilder<NearestBlock> {
 
   // Sets the maximum number of rows per point, up to 65,536; 0 means 1.
   NearestBlock& k(uint32_t count);
-  // Sets the detail of the rows. INSTANCES reports an instance once, with its nearest triangle.
+  // Sets whether a row is an instance or a triangle. INSTANCES reports an instance once, with its nearest triangle.
   NearestBlock& detail(v1::StaticDetail detail);
   NearestBlock& point(const Float3& point, float max_distance = std::numeric_limits<float>::infinity(),
                       const Filter& filter = {});
@@ -233,7 +234,7 @@ class NearestBlock : public BlockBuilder<NearestBlock> {
   NearestBlock& points(absl::Span<const float> points);
   // Sets the whole column of maximum distances, inclusive: N entries, or one for all points.
   NearestBlock& max_distances(absl::Span<const float> distances);
-  // Restricts the result to rows behind (distance, id, triangle), as RayBlock::after().
+  // Restricts the result to rows that follow (distance, id, triangle). The parameters are those of RayBlock::after().
   NearestBlock& after(absl::Span<const float> ts, absl::Span<const uint64_t> ids = {},
                       absl::Span<const uint32_t> triangles = {});
 
@@ -241,16 +242,17 @@ class NearestBlock : public BlockBuilder<NearestBlock> {
   v1::Nearest* nearest_;
 };
 
-// Convex regions, given by planes or by view-projection matrices. Not both in one block.
+// Block that finds what overlaps convex regions. A region is given by planes or by a view-projection matrix; one block
+// cannot mix both.
 class FrustumBlock : public BlockBuilder<FrustumBlock> {
  public:
   explicit FrustumBlock(v1::QueryBlock& block) : BlockBuilder(block), frustums_(block.mutable_frustums()) {}
 
   FrustumBlock& detail(v1::StaticDetail detail);
-  // Appends regions of `planes_each` planes, 4 .. 32: four floats nx, ny, nz, d each. A point p is inside of a plane if
-  // n.p + d >= 0. All regions of a block have the same number of planes.
+  // Appends regions of `planes_each` planes, 4 .. 32. A plane is four floats nx, ny, nz, d, and a point p is inside the
+  // plane if n.p + d >= 0. All regions of a block have the same number of planes.
   FrustumBlock& planes(absl::Span<const float> planes, uint32_t planes_each = 6);
-  // Appends the views of cameras: column-major matrices of 16 floats.
+  // Appends the views of cameras: column-major matrices of 16 floats from positions to clip coordinates.
   FrustumBlock& view_projections(absl::Span<const float> matrices,
                                  v1::ClipDepth clip_depth = v1::CLIP_DEPTH_ZERO_TO_ONE);
 
@@ -271,13 +273,14 @@ class ContainsBlock : public BlockBuilder<ContainsBlock> {
   v1::Contains* contains_;
 };
 
-// Block that asks which targets each viewer sees. The settings that are per query, such as masks, are per viewer.
+// Block that asks which targets each viewer sees. Settings with one entry per query, such as masks, have one entry per
+// viewer here.
 class SightBlock : public BlockBuilder<SightBlock> {
  public:
   explicit SightBlock(v1::QueryBlock& block) : BlockBuilder(block), sight_(block.mutable_sight()) {}
 
-  // Appends a viewer with one eye, or a target with one sample point, of a group (0: none) that does not block its
-  // sight.
+  // Append a viewer with one eye, or a target with one sample point. Objects and instances of the viewer's or target's
+  // `group` do not block the sight between the two; group 0 = none.
   SightBlock& viewer(const Float3& eye, uint64_t group = 0);
   SightBlock& target(const Float3& sample, uint64_t group = 0);
   // Append viewers of `eyes` eyes, 1 .. 16, and targets of `samples` sample points, 1 .. 255: three floats for each
@@ -289,14 +292,14 @@ class SightBlock : public BlockBuilder<SightBlock> {
   SightBlock& target_groups(absl::Span<const uint64_t> groups);
   // Sets the whole column of maximum distances of sight, inclusive: an entry for each viewer, or one for all.
   SightBlock& max_distances(absl::Span<const float> distances);
-  // Asks only whether viewer i sees target i.
+  // Restricts the block to the pairs of viewer i and target i, instead of every viewer and every target.
   SightBlock& pairwise();
 
  private:
   v1::Sight* sight_;
 };
 
-// Block that finds pairs of objects near each other; it is one query.
+// Block that finds pairs of objects near each other. The whole block is one query.
 class PairBlock : public BlockBuilder<PairBlock> {
  public:
   explicit PairBlock(v1::QueryBlock& block) : BlockBuilder(block), pairs_(block.mutable_pairs()) {}
@@ -307,7 +310,7 @@ class PairBlock : public BlockBuilder<PairBlock> {
   PairBlock& layers(uint32_t first_mask, uint32_t second_mask);
   // Requests the `count` nearest objects of each first object, instead of all pairs.
   PairBlock& k(uint32_t count);
-  // Continues behind the pair (id, other) of a truncated result.
+  // Restricts the result to pairs that follow (id, other), to continue after a truncated result.
   PairBlock& after_pair(uint64_t id, uint64_t other);
 
  private:
@@ -319,9 +322,9 @@ class CellBlock : public BlockBuilder<CellBlock> {
  public:
   explicit CellBlock(v1::QueryBlock& block) : BlockBuilder(block), cells_(block.mutable_cells()) {}
 
-  // Sets the maximum number of planes of a space, up to 64; 0 = 32.
+  // Sets the maximum number of planes that bound a space, up to 64; 0 = 32.
   CellBlock& max_planes(uint32_t planes);
-  // Appends a point, around which the space within `max_distance` is asked.
+  // Appends a point. The answer is the free space around the point, at most `max_distance` in radius.
   CellBlock& point(const Float3& point, float max_distance, const Filter& filter = {});
   // Appends N points: 3N floats, and N maximum distances. If this call adds all points of the block, `max_distances`
   // may instead contain one for all points.

@@ -28,8 +28,8 @@ struct QueryStreamOptions {
   int max_in_flight = 8;
   // Reconnection after a broken connection. Every answer resets the count of attempts.
   RetryPolicy reconnect = {};
-  // Maximum time without any answer while batches are unanswered; after that the connection counts as broken. Must be
-  // longer than the largest batch takes.
+  // Maximum time without any answer while batches are unanswered. After this time the connection counts as broken. Must
+  // be longer than the server needs for the largest batch.
   absl::Duration patience = absl::Seconds(10);
   // Connection of the stream. Use kLatency for small batches whose answers are needed quickly.
   Lane lane = Lane::kBulk;

@@ -35,8 +35,8 @@ absl::Status contradiction(absl::string_view what) {
   return absl::DataLossError(absl::StrCat("the server's answer contradicts itself: ", what));
 }
 
-// Returns the number of rows of a block without row counts, derived from the first column that is present; 0 if no
-// column is present.
+// Returns the number of rows of a block that has no column of row counts. The number is derived from the first column
+// that is present; it is 0 if no column is present.
 size_t dense_rows(const std::vector<ColumnLength>& columns) {
   for (const ColumnLength& column : columns) {
     if (column.entries > 0) return static_cast<size_t>(column.entries / column.per_row);

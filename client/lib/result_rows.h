@@ -45,7 +45,8 @@ class ResultRows {
   // Returns whether the query's time was outside the recorded history, so that it was answered at the nearest recorded
   // time.
   bool clamped(size_t query) const;
-  // Returns whether the query has no rows because its anchor is unknown at its time, or too far out.
+  // Returns whether the query has no rows because of its anchor: the anchor does not exist at the query's time, or a
+  // position of the query would lie outside the world.
   bool unanchored(size_t query) const;
 
   // Return columns with one entry per row. A column that was not requested is empty.
@@ -72,8 +73,9 @@ class ResultRows {
   std::vector<size_t> begins_;  // first row of each query, followed by the total number of rows
 };
 
-// View of the rows of rays and sweeps of mode FIRST (one row per query, a miss has id 0) and ALL (rows ascend by t),
-// and of nearest queries (rows ascend by distance). Needs the columns T and ID, which are returned by default.
+// View of the rows of rays and sweeps, and of nearest queries, whose rows ascend by distance. In mode FIRST there is
+// one row per query, and a miss has id 0; in mode ALL the rows of a query ascend by t. Needs the columns T and ID,
+// which are returned by default.
 class RayHits {
  public:
   static absl::StatusOr<RayHits> of(const v1::BlockResult& block);
@@ -107,7 +109,7 @@ class AnyHits {
   const v1::BlockResult* block_;
 };
 
-// View of the rows of overlap queries and of points to contain: for each query a span of ids, and of triangles if
+// View of the rows of overlap and contains queries: for each query a span of ids, and a span of triangles if they were
 // requested. Needs the column ID, which is returned by default.
 class Overlaps {
  public:
@@ -126,7 +128,7 @@ class Overlaps {
   ResultRows rows_;
 };
 
-// View of the result of sight: a byte for each viewer and target, or for each viewer of a pairwise block.
+// View of the result of a sight block: one byte for each viewer and target, or for each viewer of a pairwise block.
 class SightMatrix {
  public:
   // Returns a view of the answer to `viewers` viewers and `targets` targets; for a pairwise block, `targets` is 1.
@@ -145,17 +147,18 @@ class SightMatrix {
   size_t targets_;
 };
 
-// View of the result of cells: the convex free space around each point. Needs the columns T and ID, which are returned
-// by default.
+// View of the result of a cell block: the convex free space around each point. Needs the columns T and ID, which are
+// returned by default.
 class FreeSpaces {
  public:
   static absl::StatusOr<FreeSpaces> of(const v1::BlockResult& block);
 
   const ResultRows& rows() const { return rows_; }
   size_t size() const { return rows_.queries(); }
-  // Returns the radius of the ball that bounds the space; 0 if the point lies in or on something.
+  // Returns the radius of the ball that bounds the space; 0 if there is no space, because the point lies in or on an
+  // object or a triangle.
   float radius(size_t query) const;
-  // Returns the rows of the planes of the space, for the columns of rows().
+  // Returns the range of the rows that are planes of the space, as indices into the columns of rows().
   RowRange planes(size_t query) const;
 
  private:

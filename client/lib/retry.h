@@ -16,8 +16,8 @@ class Backoff {
  public:
   explicit Backoff(const RetryPolicy& policy) : policy_(policy) {}
 
-  // Counts a failure. Returns the wait before the next attempt, which is at least the wait that the server requested,
-  // or nothing if all attempts of the policy are used up.
+  // Counts a failure. Returns the wait before the next attempt; this wait is at least the wait that the server
+  // requested. Returns nothing if all attempts that the policy allows are used up.
   std::optional<absl::Duration> after_failure(const absl::Status& failure);
   // Resets the count of failures after a success, so that the wait after the next failure is first_backoff again.
   void reset() { failures_ = 0; }

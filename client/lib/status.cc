@@ -17,7 +17,7 @@ absl::StatusCode code_of(int code) {
   return code > 0 && code <= kLastCode ? static_cast<absl::StatusCode>(code) : absl::StatusCode::kUnknown;
 }
 
-// Converts a status without details, to whose message it adds advice.
+// Converts a status without details, and appends advice to its message.
 absl::Status with_advice(const grpc::Status& status) {
   const absl::StatusCode code = code_of(status.error_code());
   const std::string advice = advice_on(code, status.error_message());

@@ -13,16 +13,16 @@
 
 namespace locus::client {
 
-// Performs Client::upload_mesh with this stub. The first message has the hash and the counts but no columns, so that a
-// server that already has the mesh can answer before any column is sent.
+// Implements Client::upload_mesh with this stub. The first message has the hash and the counts but no columns, so that
+// a server that already has the mesh can answer before any column is sent.
 absl::StatusOr<v1::UploadMeshResponse> upload_mesh(v1::SceneService::StubInterface& stub, const MeshColumns& mesh,
                                                    const CallHeader& header, const UploadProgress& progress);
 
-// Performs one attempt of Client::download_mesh, which repeats failed attempts.
+// Implements one attempt of Client::download_mesh; Client::download_mesh repeats failed attempts.
 absl::StatusOr<DownloadedMesh> download_mesh(v1::SceneService::StubInterface& stub, absl::string_view name,
                                              const CallHeader& header, const DownloadProgress& progress);
 
-// Performs Client::backup with this stub. Fails with DEADLINE_EXCEEDED after the header's deadline.
+// Implements Client::backup with this stub. Fails with DEADLINE_EXCEEDED after the header's deadline.
 absl::StatusOr<BackupSize> download_backup(v1::ServerService::StubInterface& stub, BackupSink& sink,
                                            const CallHeader& header);
 

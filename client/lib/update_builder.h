@@ -2,11 +2,11 @@
 // checks nothing: the server checks each item, and the ack lists the refused items. Not thread-safe. build() resets the
 // builder.
 //
-// Inserted rows with the same shape and kind of position (relative or absolute) share one Insert message, in the order
-// in which they were added. Moves stay in the order in which they were added, since the later of two moves of one
-// object wins: a move that needs other columns than the previous one (with or without rotation, relative or absolute
-// position), or is of another MoveKind, begins a new Move message. A relabel that sets other kinds of labels than the
-// previous relabel begins a new Relabel message.
+// Inserted rows with the same shape and kind of position (relative or absolute) share one Insert message and keep the
+// order in which they were added. Moves always stay in the order in which they were added, since the later of two moves
+// of one object wins. Therefore a move begins a new Move message if its MoveKind or its columns (with or without
+// rotation, relative or absolute position) differ from those of the previous move. A relabel begins a new Relabel
+// message if it sets other kinds of labels than the previous relabel.
 #ifndef LOCUS_CLIENT_LIB_UPDATE_BUILDER_H_
 #define LOCUS_CLIENT_LIB_UPDATE_BUILDER_H_
 

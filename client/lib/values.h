@@ -19,8 +19,8 @@ struct Double3 {
 
 // Position of an object: a Float3 is relative to the batch's frame, a Double3 is absolute.
 struct Position {
-  Position(const Float3& relative) : value{relative.x, relative.y, relative.z} {}  // NOLINT: meant to convert
-  Position(const Double3& world) : value(world), absolute(true) {}                 // NOLINT: meant to convert
+  Position(const Float3& relative) : value{relative.x, relative.y, relative.z} {}  // NOLINT: implicit on purpose
+  Position(const Double3& world) : value(world), absolute(true) {}                 // NOLINT: implicit on purpose
 
   Double3 value;  // a relative position is converted without rounding
   bool absolute = false;
