@@ -1,5 +1,5 @@
-// Types for option values as typed on a command line: triples, quaternions, ids. The option parser (CLI11) reads a
-// value through operator>>, which sets failbit unless the whole text has the expected form. Plain data.
+// Types for option values in the form in which users type them: triples, quaternions, ids. The option parser (CLI11)
+// reads a value with operator>>, which sets failbit unless the whole text has the expected form. Plain data.
 #ifndef LOCUS_CLIENT_CLI_ARGUMENTS_H_
 #define LOCUS_CLIENT_CLI_ARGUMENTS_H_
 
@@ -45,8 +45,8 @@ std::vector<float> floats_of(const std::vector<Triple>& triples);
 std::vector<double> doubles_of(const std::vector<Triple>& triples);
 std::vector<float> floats_of(const std::vector<Quaternion>& quaternions);
 
-// Adds an option that may be given several times, with one value each time, so that one command line can describe a
-// batch.
+// Adds an option that may be given several times, with one value each time, so that a command line can contain several
+// items of a batch.
 template <class T>
 CLI::Option* add_repeatable(CLI::App& command, const std::string& name, std::vector<T>& values, const std::string& type,
                             const std::string& description) {

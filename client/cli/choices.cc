@@ -10,8 +10,8 @@
 namespace locus::cli {
 namespace {
 
-// Prefix of the validator's name. The allowed words follow the prefix in the name, and choices_of() reads them from
-// there. CLI11 never prints the name.
+// Prefix of the name of the validator that choices() returns. In this name the prefix is followed by the allowed words,
+// so that choices_of() can read the words from the name. CLI11 never prints the name.
 constexpr char kName[] = "choices:";
 
 }  // namespace
@@ -31,7 +31,7 @@ CLI::Validator choices(const std::vector<std::string>& words) { return translate
 std::vector<std::string> choices_of(CLI::Option& option) {
   for (int i = 0;; ++i) {
     const CLI::Validator* validator = nullptr;
-    try {  // CLI11 reports the end of the list only by an exception
+    try {  // CLI11 throws OptionNotFound if `i` is beyond the last validator
       validator = option.get_validator(i);
     } catch (const CLI::OptionNotFound&) {
       return {};

@@ -1,6 +1,6 @@
-// Options that accept only a few words. Used instead of CLI11's own checks, because a program cannot read the allowed
-// words out of those checks: shell completion, manual pages and error messages need the words, which choices_of()
-// returns.
+// Options that accept only a few words. CLI11's own checks do not let a program read the allowed words, but shell
+// completion, manual pages and error messages need them. Therefore these options use choices(), and choices_of()
+// returns the words.
 #ifndef LOCUS_CLIENT_CLI_CHOICES_H_
 #define LOCUS_CLIENT_CLI_CHOICES_H_
 

@@ -1,5 +1,5 @@
-// Commands and options of the command-line parser as plain data, from which shell completions and manual pages are
-// written. The data is read from the parser itself, so that completions and manual pages always agree with the program.
+// Commands and options of the command-line parser as plain data. Shell completions and manual pages are written from
+// this data. The data is read from the parser itself, so completions and manual pages always agree with the program.
 // Throws nothing.
 #ifndef LOCUS_CLIENT_CLI_COMMAND_WORDS_H_
 #define LOCUS_CLIENT_CLI_COMMAND_WORDS_H_

@@ -1,5 +1,6 @@
-// Functions that add the commands to the parser. Each function adds a command's options, help and examples to `parent`,
-// and a callback that runs the command through `context` after the line was parsed. `context` must outlive the parser.
+// Functions that add the commands to the parser. Each function adds to `parent` a command with its options, help and
+// examples, and a callback that runs the command through `context` when a line with this command was parsed. `context`
+// must outlive the parser.
 #ifndef LOCUS_CLIENT_CLI_COMMANDS_H_
 #define LOCUS_CLIENT_CLI_COMMANDS_H_
 
@@ -36,9 +37,8 @@ void add_context_command(CLI::App& parent, Context& context);
 void add_token_command(CLI::App& parent, Context& context);
 void add_cert_command(CLI::App& parent, Context& context);
 
-// Sets the parser callback of `command`, which CLI11 calls if the line contains this command: it runs `run(options,
-// context)`, which returns an absl::Status. While a script is only checked (Lines::kScriptCheck), the callback does
-// nothing.
+// Sets the callback that CLI11 calls if the parsed line contains `command`. The callback runs `run(options, context)`,
+// which returns an absl::Status. While a script is only checked (Lines::kScriptCheck), the callback does nothing.
 template <class Options, class Run>
 void run_when_chosen(CLI::App& command, std::shared_ptr<Options> options, Context& context, Run run) {
   command.callback([options, &context, run] {
@@ -46,9 +46,9 @@ void run_when_chosen(CLI::App& command, std::shared_ptr<Options> options, Contex
   });
 }
 
-// Sets the callback like run_when_chosen(), for a command that has no side effects before Context::connect(). While a
-// script is only checked, `run` is called too. Its call of connect() then fails, so only usage errors (for example
-// options that exclude each other) are reported.
+// Sets the callback like run_when_chosen(), for a command that has no side effects before it calls Context::connect().
+// While a script is only checked, `run` is called too; connect() then fails, so the call reports only usage errors, for
+// example options that exclude each other.
 template <class Options, class Run>
 void run_or_check_when_chosen(CLI::App& command, std::shared_ptr<Options> options, Context& context, Run run) {
   command.callback([options, &context, run] {

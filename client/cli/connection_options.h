@@ -1,5 +1,6 @@
-// Global options that choose the server and the credentials for the connection to it. An option is taken from the line,
-// else from its environment variable, else from a named context. For run.h and Context. Functions without state.
+// Global options that choose the server and the credentials for the connection to it. The value of an option comes from
+// the command line, else from the option's environment variable, else from a named context. For run.h and Context.
+// Functions without state.
 #ifndef LOCUS_CLIENT_CLI_CONNECTION_OPTIONS_H_
 #define LOCUS_CLIENT_CLI_CONNECTION_OPTIONS_H_
 
@@ -25,9 +26,9 @@ inline constexpr const char* kConnectionOptionNames[] = {"--address", "--context
 // Adds the options to the parser, with their environment variables.
 void add_connection_options(CLI::App& app, ConnectionOptions& options);
 
-// Fills in the options that neither the line nor the environment gives, from the named context or, if no address is
-// given, from the default context. `app` has parsed the line; `path` is the contexts file. Returns NOT_FOUND for an
-// unknown name, INVALID_ARGUMENT for a malformed file.
+// Fills in the options that neither the command line nor the environment gives. Their values come from the named
+// context or, if no address is given, from the default context. `app` has parsed the line; `path` is the contexts file.
+// Returns NOT_FOUND for an unknown name, INVALID_ARGUMENT for a malformed file.
 absl::Status complete_from_context(const CLI::App& app, const std::string& path, ConnectionOptions& options);
 
 }  // namespace locus::cli

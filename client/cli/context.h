@@ -26,12 +26,13 @@ struct GlobalOptions {
   Format format = Format::kTable;
 };
 
-// Choice whether to write progress lines to `err`. A progress line overwrites itself, so it suits only a terminal.
+// Choice whether progress lines are written to the error stream. A progress line overwrites itself, so it suits only a
+// terminal.
 enum class Progress { kSilent, kLive };
 
 // Source of the lines that run through a context: the program's own command line, a script, or the check of a script
-// before it runs. The check parses every line but sends nothing. A script's connection is chosen before the script
-// starts.
+// before it runs. During the check every line is parsed, but nothing is sent. A script does not choose its connection:
+// the options before `run` on the program's command line do.
 enum class Lines { kProgram, kScript, kScriptCheck };
 
 class Context {
@@ -44,8 +45,8 @@ class Context {
   std::ostream& err() { return err_; }
   Progress progress() const { return progress_; }
 
-  // Returns the address of the server. Call it after the line was parsed, since the line, the environment or a named
-  // context can set the address.
+  // Returns the address of the server. Must be called after the line was parsed, since the line, the environment or a
+  // named context can set the address.
   const std::string& address() const { return options_.connection.address; }
 
   // Returns the connection to address(); the first call opens it. Errors: UNAVAILABLE, with advice, if no
@@ -56,7 +57,8 @@ class Context {
   // Writes `report` to out() in the format of options().
   void write(const Report& report);
 
-  // Makes write() store each report for take_report(). For scripts, which use the values of reports.
+  // Makes write() also store each report, so that take_report() can return it. For scripts, which use the values of
+  // reports.
   void keep_reports() { keeps_reports_ = true; }
   bool keeps_reports() const { return keeps_reports_; }
   // Returns the report that write() stored last, and removes it from the context. Returns null if write() was not
@@ -77,8 +79,8 @@ class Context {
   // Returns the path of the file of named contexts; empty = there is none.
   const std::string& contexts_path() const { return contexts_path_; }
   void set_contexts_path(std::string path) { contexts_path_ = std::move(path); }
-  // Stores the result of reading the named context. If it is an error, connect() returns it; commands that do not
-  // connect still work.
+  // Stores the result of reading the named context. If the result is an error, connect() returns this error; commands
+  // that do not connect still work.
   void set_connection_mistake(absl::Status mistake) { connection_mistake_ = std::move(mistake); }
   const absl::Status& connection_mistake() const { return connection_mistake_; }
 

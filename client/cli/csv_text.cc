@@ -9,7 +9,7 @@
 namespace locus::cli {
 namespace {
 
-// Returns one letter for each column that `key` is split into; empty if `key` is a single column.
+// Returns one letter for each column into which `key` is split, for example "xyz"; empty if `key` is a single column.
 const std::string& parts_of(const std::string& key) {
   static const auto& parts = *new std::map<std::string, std::string>{
       {"at", "xyz"},    {"axis", "xyz"},     {"dir", "xyz"}, {"from", "xyz"},       {"half", "xyz"},
@@ -32,8 +32,8 @@ std::string cell(const Json& value) {
   return quoted_if_needed(json_line(value));
 }
 
-// Appends `parts` cells for a key that is split into columns. If `value` is not a vector of that size (some reports use
-// the same key for another type of value), it is written whole into the first cell and the other cells stay empty.
+// Appends `parts` cells for a key that is split into columns. Some reports use the same key for another type of value:
+// if `value` is not a vector of that size, it is written whole into the first cell, and the other cells stay empty.
 void append_parts(const Json& value, size_t parts, std::vector<std::string>& cells) {
   const bool vector = value.is_array() && value.size() == parts;
   for (size_t i = 0; i < parts; ++i) cells.push_back(vector ? cell(value[i]) : i == 0 ? cell(value) : "");

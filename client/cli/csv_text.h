@@ -1,8 +1,8 @@
 // Rows as csv text (RFC 4180, but lines end with a line feed only). For the report stream. Functions without state.
 //
-// Only the keys of a row decide its columns, never its values, so that the header is the same for every result. A key
-// that names a vector is split (`normal.x,normal.y,normal.z`, `uv.u,uv.v`, `rotation.x` .. `rotation.w`); any other key
-// is one column, in which a list or an object is one cell of JSON text.
+// The columns of a row depend only on its keys, never on its values, so that the header is the same for every result. A
+// key that names a vector is split into several columns (`normal.x,normal.y,normal.z`, `uv.u,uv.v`, `rotation.x` ..
+// `rotation.w`). Any other key is one column; a list or an object in such a column is one cell of JSON text.
 #ifndef LOCUS_CLIENT_CLI_CSV_TEXT_H_
 #define LOCUS_CLIENT_CLI_CSV_TEXT_H_
 
@@ -17,8 +17,8 @@ namespace locus::cli {
 std::string csv_header(const std::vector<std::string>& keys);
 
 // Returns the line of one row, without a line feed. Null and absent values are empty cells. A text is quoted if it
-// contains a comma, a quote or a line break or has a blank at either end. The empty text is quoted too, which
-// distinguishes it from null.
+// contains a comma, a quote or a line break, or has a blank at either end. An empty text is written as two quotes, to
+// distinguish it from null.
 std::string csv_line(const Json& row, const std::vector<std::string>& keys);
 
 }  // namespace locus::cli

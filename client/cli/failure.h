@@ -15,7 +15,8 @@ namespace locus::cli {
 
 enum class ExitCode { kOk = 0, kFailed = 1, kUsage = 2, kUnreachable = 3, kDenied = 4, kNotFound = 5 };
 
-// Returns a usage error, with exit code kUsage: for a command line that the parser accepted but that makes no sense.
+// Returns a usage error, with exit code kUsage, for a command line that the parser accepted but whose values or options
+// do not fit together.
 absl::Status usage_error(absl::string_view message);
 
 // Marks an error as already printed. run_line() then does not print it again, but the exit code still depends on it.

@@ -29,7 +29,8 @@ int main(int argc, char** argv) {
   const Progress progress = isatty(STDERR_FILENO) != 0 ? Progress::kLive : Progress::kSilent;
   locus::cli::Context context(std::cout, std::cerr, progress);
   context.set_contexts_path(locus::cli::default_contexts_path());
-  // No option passes a token directly, because other users of the machine can see the arguments of a process.
+  // Take the token from the environment. No option passes a token directly, because other users of the machine can see
+  // the arguments of a process.
   if (const char* const token = std::getenv("LOCUS_TOKEN")) context.options().connection.credentials.token = token;
   if (const char* const scene = std::getenv("LOCUS_SCENE")) context.use_scene(scene);
   const std::vector<std::string> arguments(argv + 1, argv + argc);

@@ -1,5 +1,5 @@
 // Reports: the only form in which commands write answers. A report has a head (facts about the whole answer) and rows.
-// It is printed as an aligned table, as one JSON document, as one JSON object per line, or as csv. Plain data and
+// A report is printed as an aligned table, as one JSON document, as one JSON object per line, or as csv. Plain data and
 // functions without state. Rows that arrive one after another are written through client/cli/report_stream.h.
 //
 // In JSON, ids, groups, tags and epochs are strings, since many JSON readers round 64-bit integers; revisions, ticks

@@ -2,8 +2,8 @@
 // commands `begin` and `commit` and the lines between them. Not thread-safe.
 //
 // Invariant: the batch has the same effect as running its lines one by one. The server applies removes, then inserts,
-// then moves, then relabels, so the lines that change one object must be in this order; add() refuses a line that is
-// not.
+// then moves, then relabels. Therefore the lines that change one object must be in this order, and add() refuses a line
+// that breaks the order.
 #ifndef LOCUS_CLIENT_CLI_PENDING_BATCH_H_
 #define LOCUS_CLIENT_CLI_PENDING_BATCH_H_
 

@@ -82,8 +82,7 @@ std::optional<Refusal> run_with_default_scene(const std::vector<std::string>& ar
 }
 
 // Makes the parser refuse --timeout and the options of the connection, and ignore their environment variables. For
-// lines of a script: all of them use the one connection whose options stand before `run` on the command line of
-// `locus`.
+// lines of a script: all lines use one connection, whose options stand before `run` on the program's command line.
 void restrict_to_script(CLI::App& app) {
   std::vector<const char*> names(std::begin(kConnectionOptionNames), std::end(kConnectionOptionNames));
   names.push_back("--timeout");
@@ -175,8 +174,8 @@ absl::Status run_script_line(const std::vector<std::string>& arguments, Context&
   context.finish(absl::OkStatus());
   const std::optional<Refusal> refusal = run_with_default_scene(arguments, context);
   context.options() = before;
-  // While a script is only checked, a value may be a placeholder, which can be invalid or conflict with other options.
-  // Ignore errors of lines with placeholders.
+  // While a script is only checked, placeholders stand for unknown values. A placeholder can be invalid, or conflict
+  // with other options, although the real value would not. Therefore ignore errors of lines with placeholders.
   const bool guessed = context.lines() == Lines::kScriptCheck && has_unknown(arguments);
   if (!refusal) return guessed ? absl::OkStatus() : context.outcome();
   if (refusal->code != 0) {

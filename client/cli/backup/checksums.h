@@ -24,9 +24,8 @@ struct Checksum {
 // Returns one line per file: the file's SHA-256 in lower case hexadecimal, two spaces, the file's path.
 std::string checksum_text(const std::vector<Checksum>& checksums);
 
-// Parses a text in the format of checksum_text(). Returns DATA_LOSS, with the number of the line, for any deviation
-// from this format, so that a changed byte of SHA256SUMS is detected, and for a path that is repeated or leads out of
-// the backup.
+// Parses a text in the format of checksum_text(). Returns DATA_LOSS, with the number of the line, if a line deviates
+// from this format in any byte, or if its path is repeated or leads out of the backup.
 absl::StatusOr<std::vector<Checksum>> parse_checksums(absl::string_view text);
 
 }  // namespace locus::cli

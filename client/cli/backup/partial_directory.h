@@ -21,13 +21,13 @@ namespace locus::cli {
 // missing file permission does not give PERMISSION_DENIED, because that code is reserved for denials by the server.
 absl::Status file_error(absl::string_view doing, const std::string& path, int error);
 
-// Rule for the target before the directory is made: kNothing requires that the target does not exist, kNothingOrEmpty
-// also allows an empty directory.
+// Condition that the target must satisfy before the directory is made. kNothing: the target does not exist.
+// kNothingOrEmpty: the target does not exist, or is an empty directory.
 enum class TargetRule { kNothing, kNothingOrEmpty };
 
 class PartialDirectory {
  public:
-  // Stores the paths; does not access the file system.
+  // Stores the arguments; does not access the file system.
   PartialDirectory(const std::string& target, TargetRule rule);
   ~PartialDirectory();
   PartialDirectory(const PartialDirectory&) = delete;
@@ -37,7 +37,7 @@ class PartialDirectory {
   const std::string& target() const { return target_; }
   const std::string& partial() const { return partial_; }
 
-  // Returns FAILED_PRECONDITION if the rule forbids the file or directory at the target, or if TARGET.partial exists.
+  // Returns FAILED_PRECONDITION if the target does not satisfy the rule, or if TARGET.partial exists.
   absl::Status check() const;
   // Calls check() and creates TARGET.partial, accessible to its owner only. Returns RESOURCE_EXHAUSTED if less than
   // `bytes` bytes are free on the disk.
@@ -50,7 +50,7 @@ class PartialDirectory {
   absl::Status write(absl::string_view bytes);
   absl::Status close_file();
 
-  // Completes the directory: syncs its folders to disk and renames TARGET.partial to TARGET, after which the destructor
+  // Completes the directory: syncs its folders to disk and renames TARGET.partial to TARGET. After that the destructor
   // removes nothing. Preconditions: make() succeeded, and no file is open.
   absl::Status keep();
 

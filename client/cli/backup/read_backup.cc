@@ -28,7 +28,8 @@ constexpr size_t kNamedProblems = 5;
 // path and a line feed.
 constexpr uint64_t kMaxChecksumBytes = client::kMaxBackupFiles * (client::kMaxBackupPathLength + 67);
 
-// Damage found in a backup: counts the damaged files and names the first kNamedProblems of them.
+// Collector of the damage found in a backup: counts the damaged files and stores the names of the first kNamedProblems
+// of them.
 class Problems {
  public:
   void add(absl::string_view path, absl::string_view what) {

@@ -10,8 +10,8 @@
 namespace locus::cli {
 namespace {
 
-constexpr size_t kAnswerWidthRows = 1000;    // column widths of a table are computed from this many first rows
-constexpr uint64_t kListedTruncated = 1000;  // maximum number of row indices in the report
+constexpr size_t kAnswerWidthRows = 1000;    // number of first rows that determine a table's column widths
+constexpr uint64_t kListedTruncated = 1000;  // maximum number of truncated queries that the report lists
 
 absl::Status no_fit() { return absl::DataLossError("the server's answer does not match the query"); }
 

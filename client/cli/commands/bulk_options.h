@@ -21,11 +21,11 @@ namespace locus::cli {
 
 inline constexpr uint32_t kDefaultBulkBatch = 8192;
 inline constexpr uint32_t kMaxBulkBatch = 65536;
-// Maximum number of batches that are sent and not yet answered. Memory holds at most these batches and the batch that
-// the reader is filling.
+// Maximum number of batches that are sent and not yet answered. It limits memory: no other batch is held except the one
+// that the reader is filling.
 inline constexpr size_t kBulkWindow = 4;
-// Deadline of one batch if --timeout is not given, in seconds. It is longer than the deadline of a single call, since a
-// batch waits for the batches before it.
+// Deadline of one batch, in seconds, if --timeout is not given. It is longer than the deadline of a single call,
+// because a batch waits until the batches before it are answered.
 inline constexpr double kBulkAnswerSeconds = 60;
 
 struct BulkOptions {
@@ -44,8 +44,9 @@ void add_bulk_query_options(CLI::App& command, BulkOptions& options);
 // Returns a usage error if bulk options exclude each other, or if --batch or --follow is given without an input.
 absl::Status check(const BulkOptions& options);
 
-// Returns `field` for use in a schema. `values` are the values of the command-line option named `option`. If `values`
-// is not empty, the option sets this field for all rows, so the input must not have the column.
+// Returns `field` for use in a schema. `values` are the values of the command-line option `option`. If `values` is not
+// empty, the option determines this field for all rows, so the returned field forbids a column of this name in the
+// input.
 template <class T>
 Field column_or_option(Field field, const std::vector<T>& values, const std::string& option) {
   if (values.empty()) return field;
@@ -54,8 +55,8 @@ Field column_or_option(Field field, const std::vector<T>& values, const std::str
   return field;
 }
 
-// Returns the usage error for an option that has several values. With bulk input an option may have only one value,
-// which applies to all rows.
+// Returns the usage error for an option that was given several values together with bulk input. With bulk input an
+// option may have only one value, which applies to all rows.
 absl::Status several_values(const std::string& option);
 // Returns several_values(option) if `values` has more than one value, otherwise OK.
 template <class T>
@@ -73,8 +74,8 @@ struct RowSpan {
 };
 
 // Return the values of `column` for `rows` in the types of the protocol. A row without a value gets `absent` (one
-// value, or one for each part of a vector). If no row of the whole batch has a value, return `otherwise`, which is
-// usually the value of the option of the same name, or empty.
+// value, or one for each part of a vector). If no row of the whole batch has a value, return `otherwise`: usually the
+// value of the option of the same name, or an empty vector.
 std::vector<float> float_column(const RowColumn& column, RowSpan rows, const std::vector<float>& absent,
                                 std::vector<float> otherwise);
 std::vector<uint64_t> id_column(const RowColumn& column, RowSpan rows, uint64_t absent,
@@ -86,8 +87,8 @@ std::vector<double> positions_of(const RowColumn& column, RowSpan rows);
 // Returns `status` with its message replaced by `message`; code and payloads are kept.
 absl::Status in_words(const absl::Status& status, const std::string& message);
 
-// Returns `status`, the server's error about the batch `sent`, with "INPUT:LINE: " prepended. LINE is the line of the
-// item that the error names. If the error names no item, LINE is the range of the batch's lines.
+// Returns `status`, the server's error for the batch `sent`, with "INPUT:LINE: " prepended to its message. LINE is the
+// line of the item that the error names. If the error names no item, LINE is the range of all lines of the batch.
 absl::Status refused_rows(const absl::Status& status, const std::string& input, const SentRows& sent);
 
 // Write and clear the progress line "12345 WHAT" on the error stream. Do nothing if Context::progress() is not

@@ -42,8 +42,8 @@ class BulkQueryRun {
     reader_ = reader.get();
     stream_ = client->query_stream(options_.scene, {.max_in_flight = static_cast<int>(kBulkWindow), .reconnect = {}});
     absl::Status status = ask_all();
-    // After an error of the input, still wait for the answers to the batches already sent. After an error of the
-    // server, do not wait: only the answers before the error are written.
+    // After an error of the input, still write the answers to the batches that were already sent. After an error of the
+    // server, do not wait for further answers.
     while (!refused_ && !in_flight_.empty()) status.Update(write_front());
     answers_.end();
     hide_rows(context_);
@@ -65,7 +65,8 @@ class BulkQueryRun {
     while (true) {
       const Patience patience = in_flight_.empty() ? Patience::kWait : Patience::kPause;
       ASSIGN_OR_RETURN(const BatchEnd end, reader_->next(bulk_.batch.value_or(kDefaultBulkBatch), patience, batch));
-      // If the input has no rows, send one empty batch, which checks that the scene exists and returns its revision.
+      // If the input has no rows, send one empty batch: the server checks that the scene exists, and returns its
+      // revision.
       if (batch.rows() > 0 || (end == BatchEnd::kEnd && !asked)) {
         asked = true;
         RETURN_IF_ERROR(send(batch));
@@ -125,8 +126,9 @@ class BulkQueryRun {
     return begin;
   }
 
-  // Writes the answers at the front of the queue that have arrived. If the input has no data ready or has ended, waits
-  // for all answers instead, so that a process that feeds a pipe row by row receives the answers to its rows.
+  // Writes the answers that have arrived, in the order of the queue, up to the first that has not arrived. If the input
+  // has no data ready or has ended, waits for all answers instead: a process that feeds rows through a pipe may wait
+  // for their answers before it sends more rows.
   absl::Status write_answers(BatchEnd end) {
     while (!in_flight_.empty()) {
       if (end == BatchEnd::kFull &&

@@ -4,12 +4,12 @@
 //
 // Without `follow`, all rows are answered at one revision: the options select the revision of the first batch, and
 // every later batch requests exactly the revision of the first answer. The server retains a bounded number of
-// revisions; when the server drops that revision, the run ends with OUT_OF_RANGE after the answers received so far.
-// With `follow`, each batch is answered at the scene's newest revision, which is at least the newest revision among the
-// earlier answers.
+// revisions. If it drops the requested revision, the run ends with OUT_OF_RANGE after the answers received so far. With
+// `follow`, each batch is answered at the scene's newest revision, so revisions never decrease from one answer to the
+// next.
 //
-// The answer to a row does not depend on the other rows of its batch, because the row's frame is a function of the
-// row's position only (frame_of).
+// The answer to a row does not depend on the other rows of its batch, because the frame used for a row depends only on
+// the position in this row (frame_of).
 #ifndef LOCUS_CLIENT_CLI_COMMANDS_BULK_QUERY_H_
 #define LOCUS_CLIENT_CLI_COMMANDS_BULK_QUERY_H_
 
@@ -46,7 +46,7 @@ struct BulkQuery {
   RowLayout layout;
   std::string rows_name;
   BulkAnswer answer = BulkAnswer::kRows;
-  bool has_position = true;  // without, the frame of all rows is the origin
+  bool has_position = true;  // false: the frame of all rows is the origin
   std::function<void(const BlockRows& rows, client::QueryBuilder& builder)> add_block;
 };
 
@@ -63,8 +63,8 @@ Field at_field();
 
 // Appends the fields that every kind of query has, mask and ignore_group, to the schema.
 void add_filter_fields(const QueryOptions& options, RowSchema& schema);
-// Sets the columns for mask and ignore_group of a block. `first` is the index of mask in the schema; ignore_group
-// follows it.
+// Sets the columns for mask and ignore_group of a block from the rows. `first` is the index of the field mask in the
+// schema; the field ignore_group follows it.
 template <class Block>
 void apply_filter_columns(const QueryOptions& options, const BlockRows& rows, size_t first, Block& block) {
   block.masks(bits_column(rows.batch.columns[first], rows.rows, client::kEveryMask, values32_of(options.masks)));
@@ -74,9 +74,9 @@ void apply_filter_columns(const QueryOptions& options, const BlockRows& rows, si
 // Returns a usage error for query options that cannot be combined with rows from an input.
 absl::Status check(const QueryOptions& options, const BulkOptions& bulk);
 
-// Reads rows, sends queries and writes answers until the input ends. The message of an error in the input names the
-// line of the input. After any error, the answers that precede the error have been written; if there are any, the
-// error's message contains the number of answered rows.
+// Reads rows, sends queries and writes answers until the input ends. If a row is invalid, the error's message names the
+// line of the input. Before any error is returned, the answers to earlier rows are written; the message then contains
+// the number of answered rows, if there are any.
 absl::Status run_bulk_query(const BulkQuery& query, const QueryOptions& options, const BulkOptions& bulk,
                             Context& context);
 

@@ -65,7 +65,8 @@ class BulkUpdateRun {
     while (true) {
       const Patience patience = in_flight_.empty() ? Patience::kWait : Patience::kPause;
       ASSIGN_OR_RETURN(const BatchEnd end, reader_->next(bulk_.batch.value_or(kDefaultBulkBatch), patience, batch));
-      // If the input has no rows, send one empty batch, which checks that the scene exists and returns its revision.
+      // If the input has no rows, send one empty batch: the server checks that the scene exists, and returns its
+      // revision.
       if (batch.rows() > 0 || (end == BatchEnd::kEnd && batches_ == 0 && in_flight_.empty())) {
         RETURN_IF_ERROR(send(batch));
       }

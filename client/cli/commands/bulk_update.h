@@ -29,10 +29,10 @@ struct BulkUpdate {
   std::function<v1::UpdateBatch(const RowBatch& batch)> batch_of;
 };
 
-// Reads rows and sends updates until the input ends, and writes one report. As soon as an ack arrives, its refused
-// items are written as rows (line, id, reason); the keys applied, refused, batches, revision, tick and epoch follow at
-// the end. Returns the first error. Without such an error, returns the error of refused_items() if the server refused
-// items, otherwise OK.
+// Reads rows and sends updates until the input ends, and writes one report. When an ack arrives, the items that it
+// lists as refused are written at once as rows (line, id, reason). The report ends with applied, refused, batches,
+// revision, tick and epoch. Returns the first error. Without such an error, returns the error of refused_items() if the
+// server refused items, otherwise OK.
 absl::Status run_bulk_update(const BulkUpdate& update, const std::string& scene, const BulkOptions& bulk,
                              Context& context);
 

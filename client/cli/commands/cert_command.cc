@@ -31,8 +31,8 @@ std::string in_folder(const CertOptions& options, absl::string_view name) {
   return absl::StrCat(options.folder, "/", name);
 }
 
-// Writes the report: the paths of the certificate BASE.pem and of the key BASE.key, and under the key `use` the command
-// `next`, which uses these files.
+// Writes the report: the paths of the certificate BASE.pem and of the key BASE.key, and `next`, a command that uses
+// these two files, under the key `use`.
 void write_made(Context& context, const std::string& base, const std::string& use, const std::string& next) {
   Report report;
   report.head = {{"certificate", absl::StrCat(base, ".pem")}, {"key", absl::StrCat(base, ".key")}, {use, next}};
@@ -40,7 +40,7 @@ void write_made(Context& context, const std::string& base, const std::string& us
 }
 
 absl::Status make_authority(const CertOptions& options, Context& context) {
-  std::error_code ignored;  // if this fails, write_certificate() reports that the folder is missing
+  std::error_code ignored;  // write_certificate() reports a missing folder
   std::filesystem::create_directories(options.folder, ignored);
   ASSIGN_OR_RETURN(
       const CertificatePair made,

@@ -36,7 +36,7 @@ struct DemoOptions {
   std::string compare;
 };
 
-// Table of the demo's results; counts wrong answers.
+// Table of the demo's results. It also counts the wrong answers of all rows.
 class DemoTable {
  public:
   void add(const std::string& what, Json rest) {

@@ -14,7 +14,7 @@ namespace locus::cli {
 namespace {
 
 constexpr char kRowsName[] = "things";
-constexpr size_t kDumpWidthRows = 1000;  // column widths of a table are computed from this many first rows
+constexpr size_t kDumpWidthRows = 1000;  // number of first rows that determine a table's column widths
 
 struct DumpOptions {
   std::string scene;
@@ -22,7 +22,7 @@ struct DumpOptions {
 };
 
 // Dumps a scene. Writes each row when it arrives. In a script (Context::keeps_reports()), collects all rows in one
-// report instead, since later lines of the script can use them.
+// report instead, so that later lines of the script can use the rows.
 absl::Status dump(const DumpOptions& options, Context& context) {
   RETURN_IF_ERROR(check(options.view));
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());

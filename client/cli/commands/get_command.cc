@@ -31,8 +31,8 @@ const std::vector<v1::Column>& columns() {
   return columns;
 }
 
-// Returns a batch with a block of the requested ids, then a block of the requested groups. The batch omits the block of
-// ids if no id is requested, and the block of groups if no group is requested.
+// Returns a batch with a block that looks up the requested ids, and then a block that looks up the requested groups. A
+// block with nothing to look up is omitted.
 v1::QueryBatch batch_of(const GetOptions& options, const Context& context) {
   client::QueryBuilder builder;
   see_own(options.scene, context, builder);

@@ -34,8 +34,9 @@ struct InsertOptions {
   bool upsert = false;
 };
 
-// Returns a usage error unless exactly the measures of the shape are given: --radius of a ball or capsule, --half of a
-// box, --axis of a capsule. The parser cannot check this, since all measures are optional to it.
+// Returns a usage error unless exactly the options that the shape needs are given: --radius for a ball or capsule,
+// --half for a box, --axis for a capsule. The parser cannot check this, because each of these options is optional to
+// the parser.
 absl::Status check_measures(const InsertOptions& options) {
   struct Measure {
     const char* name;
@@ -134,7 +135,7 @@ absl::Status check_row(const InsertOptions& options, const RowBatch& batch, size
   return absl::OkStatus();
 }
 
-// Adds `rows` of `batch`, which all have the same shape, to the update as one Insert.
+// Adds the rows `rows` of `batch`, which all have the same shape, to the update as one Insert message.
 void add_rows(const InsertOptions& options, const RowBatch& batch, RowSpan rows, client::UpdateBuilder& builder) {
   const std::vector<RowColumn>& columns = batch.columns;
   const std::vector<uint64_t> ids = id_column(columns[kId], rows, 0, {});

@@ -9,8 +9,8 @@
 namespace locus::cli {
 namespace {
 
-// Returns the callback that updates the progress line of an upload. The line is not cleared when everything is sent,
-// since the server then builds the tree, which takes longest.
+// Returns the callback that updates the progress line of an upload. The line stays on the terminal after everything is
+// sent, because the server then builds the mesh's tree, which takes longest.
 client::UploadProgress progress_line(const std::string& name, Context& context) {
   if (context.progress() == Progress::kSilent) return {};
   return [&context, name](uint64_t sent, uint64_t total) {

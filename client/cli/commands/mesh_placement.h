@@ -27,9 +27,9 @@ struct PlacementOptions {
 // Adds the options shared by the import and generate commands. Does not add the argument SCENE.
 void add_placement_options(CLI::App& command, PlacementOptions& options);
 
-// Uploads all meshes, then places an instance of each mesh in one atomic change, at the level's recentre translation
-// plus `at`. Writes a report with a row per mesh. Writes progress to the error stream if Context::progress() is
-// Progress::kLive.
+// Uploads all meshes, then places an instance of each mesh in one atomic change. The position of the instances is the
+// level's recentre translation plus `at`. Writes a report with a row per mesh. Writes progress to the error stream if
+// Context::progress() is Progress::kLive.
 absl::Status upload_and_place(const PlacementOptions& options, const ImportedLevel& level, Context& context);
 
 }  // namespace locus::cli

@@ -32,8 +32,8 @@ client::MoveKind kind_of(const MoveOptions& options) {
 // Indices of the fields in the schema of bulk rows.
 enum MoveField : size_t { kMoveId, kMoveTo, kMoveRotation };
 
-// Returns the update for the rows of `batch`. Rows with a rotation and rows without one go to different Moves, since a
-// Move has rotations either for all of its objects or for none.
+// Returns the update for the rows of `batch`. Rows with a rotation and rows without one go to different Move messages,
+// since a Move message has rotations either for all of its objects or for none.
 v1::UpdateBatch batch_of_rows(const MoveOptions& options, const RowBatch& batch) {
   client::UpdateBuilder builder;
   if (options.tick) builder.tick(*options.tick);

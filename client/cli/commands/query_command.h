@@ -33,8 +33,8 @@ absl::StatusOr<v1::QueryResult> ask_block(const QueryOptions& options, client::Q
 absl::Status ask_and_report(const QueryOptions& options, client::QueryBuilder& builder, const RowLayout& layout,
                             const std::string& rows_name, Context& context);
 
-// Sends a batch of one block of rays or sweeps in mode ANY and writes for each whether it hits. `query` is the key of
-// the query's index: "ray".
+// Sends a batch of one block of rays or sweeps in mode ANY, and writes for each ray or sweep whether it hits something.
+// `query` is the report's key for the index of the ray or sweep, for example "ray".
 absl::Status ask_and_report_any(const QueryOptions& options, client::QueryBuilder& builder, const std::string& query,
                                 Context& context);
 

@@ -20,8 +20,8 @@ const NamedValues<v1::Column>& column_names() {
   return names;
 }
 
-// Returns whether `value` is exactly representable as a float; if a coordinate is not, framed() sends a frame other
-// than the origin. Also returns true for NaN and infinity, so that they do not change the frame, and the server's error
+// Returns whether `value` is exactly representable as a float. If a coordinate is not, framed() chooses a frame other
+// than the origin. Returns true for NaN and infinity too: they then do not change the frame, and the server's error
 // names the position that contains them.
 bool is_float(double value) { return !std::isfinite(value) || static_cast<double>(static_cast<float>(value)) == value; }
 

@@ -38,32 +38,33 @@ struct QueryOptions {
 // Adds the argument SCENE and the options shared by all queries.
 void add_query_options(CLI::App& command, QueryOptions& options);
 
-// Adds the option --detail, for the queries about solids and nearest.
+// Adds the option --detail, for queries that report objects and instances that a solid overlaps, and for nearest
+// queries.
 void add_detail_option(CLI::App& command, v1::StaticDetail& detail);
 
-// Adds the option --after-id, for the queries whose rows are in the order of ids.
+// Adds the option --after-id, for queries whose rows are in ascending order of ids.
 void add_after_id_option(CLI::App& command, QueryOptions& options);
 
-// Returns the columns to request and show: `first`, then those of --columns, or `otherwise` without that option.
+// Returns the columns to request and show: `first`, followed by the columns of --columns, or by `otherwise` if
+// --columns is not given.
 std::vector<v1::Column> columns_behind(std::vector<v1::Column> first, const QueryOptions& options,
                                        const std::vector<v1::Column>& otherwise = {});
 
-// Returns the columns of a query for what a solid touches: ids always, and triangles if the detail makes each row a
-// triangle.
+// Returns the columns of an overlap query: ids always, and triangles if the detail makes each row a triangle.
 std::vector<v1::Column> overlap_columns(const QueryOptions& options, v1::StaticDetail detail);
 
 // Returns a usage error if options exclude each other.
 absl::Status check(const QueryOptions& options);
 
-// Makes the batch require at least the last revision of `scene` that was acknowledged through this context, so that the
-// batch sees the caller's own changes. Does nothing if no change was acknowledged.
+// Makes the batch see the changes that this context has made to `scene`: requires at least the revision of the last of
+// these changes that was acknowledged. Does nothing if no change was acknowledged.
 void see_own(const std::string& scene, const Context& context, client::QueryBuilder& builder);
 
 // Sets the batch's revision, work budget and explain flag from the options. Without --at-least and --exactly, calls
 // see_own().
 void apply_to_batch(const QueryOptions& options, const Context& context, client::QueryBuilder& builder);
 
-// Sets those options of a block that all kinds of query share. The caller sets the block's kind and columns.
+// Sets those options of a block that all kinds of query share. The caller must set the block's kind and columns.
 template <class Block>
 void apply_to_block(const QueryOptions& options, Block& block) {
   block.source(options.source)
@@ -87,7 +88,7 @@ struct FramedPositions {
 };
 FramedPositions framed(const std::vector<Triple>& positions);
 
-// Starts and ends as offsets from one frame.
+// Starts and ends of movements or segments as float offsets from one frame, which is chosen as in FramedPositions.
 struct FramedPaths {
   client::Double3 frame;
   std::vector<float> starts;

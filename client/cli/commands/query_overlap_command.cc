@@ -157,7 +157,7 @@ absl::Status query_box(const BoxOptions& options, Context& context) {
   return ask_and_report(options.query, builder, layout, "found", context);
 }
 
-// The ends of all capsules are offsets from the frame of their first positions.
+// Queries capsules. Both ends of all capsules are sent as offsets from one frame.
 absl::Status query_capsule(const CapsuleOptions& options, Context& context) {
   if (options.bulk.given()) return query_capsules_of_input(options, context);
   RETURN_IF_ERROR(check(options.bulk));

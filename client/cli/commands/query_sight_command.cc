@@ -11,7 +11,7 @@
 #include "client/lib/result_rows.h"
 #include "core/base/status_macros.h"
 
-// The commands `locus query sight` and `locus query pairs`, which ask about relations of many things to each other.
+// The commands `locus query sight` and `locus query pairs`, which query relations between several things.
 namespace locus::cli {
 namespace {
 

@@ -11,7 +11,7 @@
 #include "client/lib/result_rows.h"
 #include "core/base/status_macros.h"
 
-// The commands `locus query frustum`, `contains` and `cell`, which ask about regions and points of space.
+// The commands `locus query frustum`, `contains` and `cell`, which query regions and points of space.
 namespace locus::cli {
 namespace {
 
@@ -32,7 +32,7 @@ struct PointOptions {
   uint32_t max_planes = 0;
 };
 
-// Reads a matrix from each row.
+// Queries the views of cameras that are given as rows of the input, one matrix per row.
 absl::Status query_views_of_input(const FrustumOptions& options, Context& context) {
   absl::Status checked = check(options.query, options.bulk);
   if (checked.ok() && (!options.planes.empty() || !options.matrix.empty()))

@@ -34,7 +34,7 @@ RowLayout layout_of(const SweepOptions& options) {
   return layout;
 }
 
-// Sets all of the block but the paths.
+// Sets the settings and columns of a sweep block, except its paths and radii.
 void apply_to_sweeps(const SweepOptions& options, const RowLayout& layout, const client::Double3& frame,
                      client::SweepBlock& block) {
   apply_to_block(options.query, block);

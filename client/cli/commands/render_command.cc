@@ -21,7 +21,7 @@
 namespace locus::cli {
 namespace {
 
-constexpr uint64_t kMaxRenderRays = uint64_t{1} << 24;  // limits the memory: 28 bytes per ray, 52 if work is reported
+constexpr uint64_t kMaxRenderRays = uint64_t{1} << 24;  // limits memory: 28 bytes per ray, 52 if work is reported
 constexpr ImageSize kDefaultSize = {960, 540};
 constexpr ImageSize kDefaultHeatSize = {480, 270};  // smaller, since reporting the work of a ray makes it slower
 
@@ -68,7 +68,7 @@ absl::Status check_line(const RenderOptions& options) {
   return check_png_path(options.out);
 }
 
-// Returns the bounds of what the picture shows: one object or instance (--at), or the whole scene. Sets
+// Returns the bounds of what the picture must show: the object or instance given by --at, or the whole scene. Sets
 // options.cast.revision to the scene's current revision.
 absl::StatusOr<Aabbd> find_target(RenderOptions& options, const client::Client& client) {
   ASSIGN_OR_RETURN(const v1::Scene scene, client.get_scene(options.cast.scene));
@@ -97,7 +97,7 @@ std::vector<double> heat_of(const RayImage& image, Heat heat) {
   return values;
 }
 
-// Paints the requested kind of picture. Adds the range of values that its colours represent to `head`.
+// Paints the requested kind of picture. If the colours represent values, adds the range of these values to `head`.
 Picture paint(const RenderOptions& options, const RayImage& image, const Camera& camera, Json& head) {
   if (options.heat != Heat::kNone) {
     const std::vector<double> values = heat_of(image, options.heat);

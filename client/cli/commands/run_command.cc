@@ -47,8 +47,8 @@ struct RunOptions {
   bool dry_run = false;
 };
 
-// Reads a whole script. Stops after more than kMaxScriptBytes, which is enough for the caller to refuse the script as
-// too long.
+// Reads a whole script. Stops when more than kMaxScriptBytes are read, which is enough for the caller to detect and
+// refuse a script that is too long.
 absl::StatusOr<std::string> read_all(std::istream& in, const std::string& name) {
   std::string text;
   std::vector<char> part(size_t{1} << 16);

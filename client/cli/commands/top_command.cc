@@ -42,8 +42,8 @@ absl::StatusOr<Scraped> scrape(const TopOptions& options, Context& context) {
   return Scraped{steady_clock::now(), std::move(samples)};
 }
 
-// Guard that blocks SIGINT, SIGTERM and SIGHUP during its lifetime. The signals then end the loop through wait(),
-// instead of killing the program in the middle of a line.
+// Guard that blocks SIGINT, SIGTERM and SIGHUP during its lifetime. These signals then make wait() return false, which
+// ends the loop, instead of killing the program in the middle of a line.
 class EndSignals {
  public:
   EndSignals() {

@@ -26,8 +26,8 @@ struct ViewOptions {
 // Adds the options --objects, --instances, --at-least, --exactly and --epoch.
 void add_view_options(CLI::App& command, ViewOptions& options);
 
-// Returns the kinds of things to read: objects and instances if --objects and --instances are both given or both
-// absent.
+// Returns the kinds of things to read: only objects with --objects, only instances with --instances, and both if both
+// options are given or neither is.
 Things things_of(const ViewOptions& options);
 
 // Returns a usage error if options exclude each other.

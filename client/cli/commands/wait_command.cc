@@ -43,8 +43,8 @@ Report report_of(const v1::Scene& scene) {
   return report;
 }
 
-// Polls the scene until no change of instances is being built and options.revision, if given, is reached. The interval
-// grows, since a build takes from milliseconds to minutes.
+// Polls the scene until no change of instances is being built and, if options.revision is given, until this revision is
+// reached. The polling interval grows, because a build can take from milliseconds to minutes.
 absl::Status wait(const WaitOptions& options, Context& context) {
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());
   const absl::Time end = absl::Now() + absl::Seconds(options.seconds);

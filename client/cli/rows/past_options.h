@@ -1,4 +1,4 @@
-// Options of queries about the past: the times, and the handling of times outside the recorded history. For the query
+// Options of queries about past times: the times, and how times outside the recorded history are handled. For the query
 // and get commands. Plain data and functions without state.
 #ifndef LOCUS_CLIENT_CLI_ROWS_PAST_OPTIONS_H_
 #define LOCUS_CLIENT_CLI_ROWS_PAST_OPTIONS_H_

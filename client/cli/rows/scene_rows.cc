@@ -14,8 +14,8 @@ void read(const Repeated& column, int row, std::array<typename Repeated::value_t
   for (size_t i = 0; i < kCount; ++i) (*to)[i] = column.Get(row * static_cast<int>(kCount) + static_cast<int>(i));
 }
 
-// Returns whether each column that objects and instances share has the right number of entries for the ids. Every valid
-// message of a dump has this property.
+// Returns whether each column that objects and instances have in common has the right number of entries for the number
+// of ids. Every valid message of a dump satisfies this.
 template <class Run, class Positions>
 bool has_shared_columns(const Run& run, const Positions& positions) {
   const int rows = run.ids_size();

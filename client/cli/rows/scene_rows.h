@@ -45,12 +45,12 @@ enum class Things { kAll, kObjects, kInstances };
 bool is_among(Things things, ThingKind kind);
 
 // Returns the keys of thing_row(), in order: id, shape or mesh, at, rotation, scale, radius, half, axis, layers, group,
-// tag. They are named like the options of the insert command, so that the rows of objects can be inserted again. With
-// Things::kAll the first key is kind, "object" or "instance".
+// tag. The keys equal the names of the options of the insert command, so that dumped rows of objects can be inserted
+// again. With Things::kAll, these keys are preceded by kind, whose value is "object" or "instance".
 const std::vector<std::string>& thing_keys(Things things);
 
-// Returns `thing` as a row of a report. `things` is the choice for the whole report: with kAll the row begins with the
-// key kind. Keys that do not apply to the thing's kind are absent, for example radius for a box.
+// Returns `thing` as a row of a report. `things` is the choice for the whole report; with kAll the row begins with the
+// key kind. A key that does not apply to the thing's kind is absent, for example radius for a box.
 Json thing_row(const SceneThing& thing, Things things);
 
 }  // namespace locus::cli

@@ -23,7 +23,7 @@ absl::StatusOr<Number> of_numbers(char sign, const Number& x, const Number& y) {
   }
 }
 
-// Calculates part by part, for two vectors or for a vector and a number.
+// Applies the operator `sign` to two vectors, or to a vector and a number, part by part.
 Answer by_parts(char sign, const Operand& a, const Operand& b) {
   const auto part = [](const Operand& operand, size_t i) {
     const Vector* const vector = std::get_if<Vector>(&operand);

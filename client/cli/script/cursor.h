@@ -1,5 +1,5 @@
 // Reading position in a line of a script, shared by the functions that parse expressions and words. Borrows the text.
-// Only reading advances the cursor, so after an error it stands at the text that could not be parsed.
+// The cursor advances only past text that was parsed, so after an error it stands at the text that could not be parsed.
 #ifndef LOCUS_CLIENT_CLI_SCRIPT_CURSOR_H_
 #define LOCUS_CLIENT_CLI_SCRIPT_CURSOR_H_
 
@@ -27,14 +27,14 @@ class Cursor {
   absl::string_view rest() const { return text_.substr(at_); }
   absl::string_view since(size_t begin) const { return text_.substr(begin, at_ - begin); }
 
-  // Advances past `token` if it comes next. Returns whether it did.
+  // Advances past `token` if the text at the cursor begins with it. Returns whether it does.
   bool accept(absl::string_view token) {
     const bool found = absl::StartsWith(rest(), token);
     if (found) at_ += token.size();
     return found;
   }
 
-  // Skips blanks. A comment that follows is removed, so that the line ends where the comment begins.
+  // Skips blanks. If a comment follows, removes it, so that the line ends where the comment begins.
   void skip_blanks() {
     while (peek() == ' ' || peek() == '\t') ++at_;
     if (peek() == '#') text_ = text_.substr(0, at_);
@@ -54,7 +54,8 @@ class Cursor {
     return ended() ? "the end of the line" : absl::StrCat("`", rest().substr(0, kShownBytes), "`");
   }
 
-  // Counts open brackets and quotes, so that recursion is bounded by kMaxExpressionDepth. Call close() for each open().
+  // Counts the open brackets and quotes and returns an error beyond kMaxExpressionDepth, so that recursion is bounded.
+  // Each call of open() needs a call of close().
   absl::Status open() {
     if (++depth_ <= kMaxExpressionDepth) return absl::OkStatus();
     return absl::InvalidArgumentError(absl::StrCat("nested deeper than ", kMaxExpressionDepth));

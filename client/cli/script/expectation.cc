@@ -57,7 +57,7 @@ absl::StatusOr<bool> contains(const Json& whole, const Json& part) {
   }
   ASSIGN_OR_RETURN(const std::string text, text_of(Value::of(part)));
   if (whole.is_string()) return absl::StrContains(whole.get_ref<const std::string&>(), text);
-  return equal(whole, part);  // a column of one row
+  return equal(whole, part);  // `whole` is a column with one row
 }
 
 // Compares two numbers, or two vectors part by part.
@@ -122,7 +122,7 @@ absl::Status verify(const Expectation& expectation) {
   const absl::StatusOr<bool> held = holds(expectation);
   if (held.ok() && *held) return absl::OkStatus();
   std::string message = absl::StrCat("expected ", expectation.text);
-  // Show the value of an expression with variables on the right side too.
+  // If the right side is an expression with variables, show its value too.
   if (absl::StrContains(expectation.right_text, "$")) {
     absl::StrAppend(&message, ", which is ", shown(expectation.right));
   }

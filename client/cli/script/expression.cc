@@ -41,8 +41,9 @@ absl::StatusOr<Number> read_number(Cursor& cursor) {
   return absl::InvalidArgumentError(absl::StrCat("`", cursor.since(begin), "` is not a number of at most 64 bits"));
 }
 
-// Reads a number, or a list of three or more numbers separated by commas without blanks, whose integers stay exact. Of
-// two numbers only the first is read, since the comma may separate arguments, as in min(1,2).
+// Reads a number, or a list of three or more numbers separated by commas without blanks; integers stay exact. If only
+// two numbers follow each other, only the first is read, because the comma may separate the arguments of a function, as
+// in min(1,2).
 Answer read_numbers(Cursor& cursor) {
   Json numbers = Json::array();
   size_t behind_first = 0;
@@ -91,7 +92,7 @@ Answer read_bare(Cursor& cursor, const Variables& variables) {
   return value;
 }
 
-// Returns the only value unchanged, or several values as a list of numbers.
+// Returns a single value unchanged, and several values as a list of numbers.
 Answer list_of(std::vector<Value> values) {
   if (values.size() == 1) return std::move(values.front());
   Json list = Json::array();
@@ -148,7 +149,7 @@ Answer read_unary(Cursor& cursor, const Variables& variables) {
   return calculate('*', Value::of(Json(-1)), *value);
 }
 
-// Reads operands with `read`, separated by any of `signs`, and applies these operators from left to right.
+// Reads operands with `read`, separated by operators from `signs`, and applies the operators from left to right.
 template <class Read>
 Answer read_chain(Cursor& cursor, const Variables& variables, absl::string_view signs, Read read) {
   Answer left = read(cursor, variables);
@@ -170,7 +171,8 @@ Answer read_sum(Cursor& cursor, const Variables& variables) {
   return read_chain(cursor, variables, "+-", read_product);
 }
 
-// Reads the rest of `[index]` and applies it to `value`. Precondition: the cursor is behind the opening bracket.
+// Reads the index and the closing bracket of `[index]`, and applies the index to `value`. Precondition: the cursor is
+// behind the opening bracket.
 Answer read_entry(Cursor& cursor, const Variables& variables, const Value& value) {
   RETURN_IF_ERROR(cursor.open());
   const Answer index = read_sum(cursor, variables);
@@ -205,7 +207,7 @@ Answer read_path(Cursor& cursor, const Variables& variables, Value value) {
   }
 }
 
-// Returns whether `value` is null or a column without rows, so that a default replaces it.
+// Returns whether `value` must be replaced by a default: it is null or a column without rows.
 bool is_missing(const Value& value) {
   if (value.kind == Value::Kind::kColumn && value.result->rows.empty()) return true;
   const absl::StatusOr<Json> json = value.known() ? plain(value) : Json(0);
@@ -217,7 +219,7 @@ Answer read_braced_variable(Cursor& cursor, const Variables& variables) {
   const std::string name = cursor.read_name();
   if (name.empty()) return expected("a name behind `${`", cursor);
   const Value* const variable = variables.find(name);
-  // If the variable is not defined, the path is parsed and ignored.
+  // If the variable is not defined, parse its path nevertheless and ignore the result.
   ASSIGN_OR_RETURN(const Value value, read_path(cursor, variables, variable == nullptr ? Value::unknown() : *variable));
   if (cursor.accept("}")) return variable == nullptr ? Answer(not_defined(name)) : value;
   if (!cursor.accept(":-")) return expected("`}` or `:-`", cursor);

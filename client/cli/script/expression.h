@@ -19,9 +19,9 @@
 
 namespace locus::cli {
 
-// Reads and evaluates an expression; stops at the first text that cannot continue it. Returns INVALID_ARGUMENT with the
-// text found in place of an operand, or the errors of number.h and value.h for operations that are not possible. Cost:
-// linear in the text.
+// Reads and evaluates an expression; stops at the first text that cannot continue it. If an operand is missing, returns
+// INVALID_ARGUMENT with the text found in its place. If an operation is not possible, returns the error of number.h or
+// value.h. Cost: linear in the text.
 absl::StatusOr<Value> read_expression(Cursor& cursor, const Variables& variables);
 
 // Reads `{list}`. Precondition: the cursor is at the opening brace.

@@ -31,7 +31,7 @@ std::vector<std::string> texts_of(const std::vector<Word>& words) {
   return texts;
 }
 
-// Removes `-> NAME` from the end of `words` and returns the name; empty if there is none.
+// Removes `-> NAME` from the end of `words` and returns the name; returns an empty text if `words` does not end so.
 absl::StatusOr<std::string> take_target(std::vector<Word>& words) {
   for (size_t i = 0; i < words.size(); ++i) {
     if (!words[i].bare || words[i].text != "->") continue;

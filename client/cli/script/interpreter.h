@@ -36,8 +36,8 @@ class Interpreter {
   absl::StatusOr<Repetition> read_repetition(const Statement& statement) const;
   absl::Status set(const std::string& name, Value value);
 
-  // Variables set between enter_loop() and leave_loop() are unknown while checking, because a later round of the loop
-  // may set them again.
+  // Mark the begin and the end of a loop. While a script is checked, variables that are set inside a loop have unknown
+  // values, because a later round of the loop may set them again.
   void enter_loop() { ++loops_; }
   void leave_loop() { --loops_; }
 

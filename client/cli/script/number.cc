@@ -31,8 +31,8 @@ int order(T a, T b) {
   return a < b ? -1 : (a > b ? 1 : 0);
 }
 
-// Compares without rounding: splits `b` into its integer part, which fits 128 bits after the range check, and its
-// fraction.
+// Compares an integer and a double without rounding: splits `b` into its fraction and its integer part, which fits 128
+// bits after the range check.
 int compare_exactly(absl::int128 a, double b) {
   if (std::abs(b) >= 0x1p65) return b > 0 ? -1 : 1;
   const double whole = std::trunc(b);
@@ -102,7 +102,7 @@ absl::StatusOr<Number> subtract(const Number& a, const Number& b) {
 
 absl::StatusOr<Number> multiply(const Number& a, const Number& b) {
   if (!are_integers(a, b)) return finite(real(a) * real(b));
-  // Refuse early: a product beyond this limit may not even fit 128 bits.
+  // Check the product as a double first: beyond this limit the exact product may not even fit 128 bits.
   if (std::abs(real(a) * real(b)) > 0x1p65) return absl::OutOfRangeError("the result needs more than 64 bits");
   return in_range(integer(a) * integer(b));
 }

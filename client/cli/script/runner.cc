@@ -52,8 +52,8 @@ class Runner {
     return status.ok() ? absl::StatusOr<size_t>(place + 1) : status;
   }
 
-  // Returns the index of the statement that follows the failed one. If the failed statement opens a block, skips the
-  // block.
+  // Returns the index of the statement with which the run continues after statement `place` failed. If the failed
+  // statement opens a block, the whole block is skipped.
   size_t behind_failed(size_t place) const {
     const Statement& statement = script_.statements[place];
     const bool opens = statement.verb == Verb::kRepeat || statement.verb == Verb::kBegin;
@@ -93,7 +93,7 @@ class Runner {
     return interpreter_.set(loop.counter, Value::of(Json(loop.done)));
   }
 
-  // Counts the result of a statement and prints an error. Returns the error if the run must end.
+  // Counts the result of a statement, and prints its error if there is one. Returns the error if the run must end.
   absl::Status count(const Statement& statement, const absl::Status& status) {
     if (is_expectation(statement)) ++(status.ok() ? counts_.passed : counts_.failed);
     if (status.ok()) return status;

@@ -1,4 +1,4 @@
-// Runs a whole script: checks every line, then runs the lines with loops, and counts results. For the run command.
+// Runner of a whole script: checks every line, then runs the lines with loops, and counts results. For the run command.
 // Functions without state.
 #ifndef LOCUS_CLIENT_CLI_SCRIPT_RUNNER_H_
 #define LOCUS_CLIENT_CLI_SCRIPT_RUNNER_H_
@@ -21,14 +21,15 @@ struct ScriptCounts {
   uint64_t broken = 0;  // other lines that failed
 };
 
-// Checks every line as if it ran, including its command's options, with unknown results and one round of each loop.
-// Sends nothing and needs no server. Returns a usage error that begins with name:line for the first mistake.
+// Checks every line as if it ran, including the options of its command. The results of commands are unknown, and each
+// loop has one round. Sends nothing and needs no server. Returns a usage error that begins with name:line for the first
+// mistake.
 absl::Status check_script(const Script& script, const Variables& variables, Context& context, ScriptCounts& counts);
 
-// Runs a checked script. Writes the error of each failed line, with name:line, to the context's error stream at once.
-// The first failure ends the run. With kGoOn the run continues after failures, unless the server cannot be reached, and
-// the function returns FAILED_PRECONDITION at the end if lines have failed. A batch that is still open when the run
-// ends is dropped, and none of its changes are sent.
+// Runs a checked script. When a line fails, writes its error, with name:line, to the context's error stream at once.
+// With kStop, the first failure ends the run. With kGoOn the run continues after failures, unless the server cannot be
+// reached, and the function returns FAILED_PRECONDITION at the end if lines have failed. If a batch is still open when
+// the run ends, the batch is dropped and none of its changes are sent.
 absl::Status run_script(const Script& script, const Variables& variables, AfterFailure after, Context& context,
                         ScriptCounts& counts);
 

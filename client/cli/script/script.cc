@@ -26,7 +26,7 @@ const std::map<std::string, Verb>& verbs() {
   return table;
 }
 
-// Removes the first word, and the blanks behind it, from `text`. Returns the word.
+// Removes the first word, and the blanks behind this word, from `text`. Returns the word.
 std::string take_first_word(absl::string_view& text) {
   const size_t end = std::min(text.find_first_of(" \t"), text.size());
   std::string word(text.substr(0, end));
@@ -88,8 +88,8 @@ bool fits_in_batch(const Statement& statement) {
   return word == "insert" || word == "move" || word == "remove";
 }
 
-// Matcher of the begin and end of blocks; stores the open blocks. A batch may contain repeat blocks, and a repeat block
-// may contain batches, but a batch contains no batch.
+// Matcher of the begin and end of blocks. It stores the open blocks. A batch may contain repeat blocks, and a repeat
+// block may contain batches, but a batch may not contain a batch.
 class Blocks {
  public:
   explicit Blocks(std::vector<Statement>& statements) : statements_(statements) {}
@@ -118,7 +118,7 @@ class Blocks {
     }
   }
 
-  // Returns the index of the last statement whose block is open; nullopt if all blocks are closed.
+  // Returns the index of the statement that opened the innermost open block; nullopt if all blocks are closed.
   std::optional<size_t> left_open() const { return open_.empty() ? std::nullopt : std::optional<size_t>(open_.back()); }
 
  private:

@@ -1,5 +1,5 @@
-// Limits of the size of a script and of its work. For the parser and the runner of scripts. Errors name the limit's
-// value.
+// Limits of the size of a script and of the work it causes. For the parser and the runner of scripts. The error for an
+// exceeded limit contains the limit's value.
 #ifndef LOCUS_CLIENT_CLI_SCRIPT_SCRIPT_LIMITS_H_
 #define LOCUS_CLIENT_CLI_SCRIPT_SCRIPT_LIMITS_H_
 
@@ -18,7 +18,8 @@ inline constexpr uint64_t kMaxLinesRun = 1'000'000;
 inline constexpr size_t kMaxVariables = 1'000;
 // Maximum size of a word or text after substitution.
 inline constexpr size_t kMaxTextBytes = size_t{1} << 20;
-// Maximum nesting of parentheses, indexes, calls and quoted texts. The reader of expressions recurses to this depth.
+// Maximum nesting of parentheses, indexes, calls and quoted texts; the parser of expressions recurses at most this
+// deep.
 inline constexpr int kMaxExpressionDepth = 64;
 inline constexpr double kMaxSleepSeconds = 3600;
 

@@ -36,7 +36,7 @@ absl::StatusOr<Value> field_of_result(const Value& value, const std::string& nam
   if (!report.rows_name.empty()) {
     if (name == report.rows_name) return Value::of(Json(report.rows));
     if (name == "count") return Value::of(Json(report.rows.size()));
-    // Without rows the report does not list its columns, so treat the name as an empty column.
+    // A report without rows does not list its columns, so treat every unknown name as a column without rows.
     if (report.rows.empty()) return Value{.kind = Value::Kind::kColumn, .result = value.result, .column = name};
   }
   return absl::NotFoundError(absl::StrCat("there is no field ", name, "; there are ", fields_of(report)));
@@ -77,8 +77,8 @@ absl::Status is_something_else(const Value& value, absl::string_view wanted) {
   return absl::InvalidArgumentError(absl::StrCat(shown(value), " is not ", wanted));
 }
 
-// Returns plain(value), but INVALID_ARGUMENT for a column with no row or with several rows, since it is not clear which
-// entry is meant.
+// Returns plain(value), except for a column that has no row or several rows: then returns INVALID_ARGUMENT, because it
+// is not clear which entry is meant.
 absl::StatusOr<Json> single(const Value& value) {
   if (value.kind == Value::Kind::kColumn && value.result->rows.size() != 1) {
     return absl::InvalidArgumentError(absl::StrCat(value.column, " has ", value.result->rows.size(),

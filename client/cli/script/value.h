@@ -50,7 +50,8 @@ absl::StatusOr<Value> entry_of(const Value& value, const Number& index);
 // Returns the number of entries of a list, of rows of a column, or of bytes of a text.
 absl::StatusOr<uint64_t> size_of(const Value& value);
 
-// Returns a column with one row as its entry, any other column as a list. Returns INVALID_ARGUMENT for a whole result.
+// Returns a value as JSON: a column with one row as the entry of this row, any other column as a list. Returns
+// INVALID_ARGUMENT for a whole result.
 absl::StatusOr<Json> plain(const Value& value);
 
 // Operand of a calculation. The conversions return INVALID_ARGUMENT, with a description of the value, if the value does

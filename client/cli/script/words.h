@@ -1,5 +1,5 @@
-// Splits a line of a script into words as a shell does, and substitutes variables and expressions. For statements.
-// Functions without state.
+// Parser that splits a line of a script into words as a shell does, and substitutes variables and expressions. For
+// statements. Functions without state.
 #ifndef LOCUS_CLIENT_CLI_SCRIPT_WORDS_H_
 #define LOCUS_CLIENT_CLI_SCRIPT_WORDS_H_
 

@@ -38,7 +38,8 @@ using Extension = std::unique_ptr<X509_EXTENSION, FreedBy<X509_EXTENSION_free>>;
 using BigNumber = std::unique_ptr<BIGNUM, FreedBy<BN_free>>;
 
 constexpr size_t kMaxCommonName = 64;
-constexpr long kSecondsBeforeNow = 300;  // validity begins earlier than now, since other machines' clocks may be behind
+// Validity begins this much earlier than now, since the clocks of other machines may be behind.
+constexpr long kSecondsBeforeNow = 300;
 
 absl::Status openssl_error() {
   char text[256] = "";
@@ -58,8 +59,8 @@ bool is_ip_address(const std::string& text) {
   return inet_pton(AF_INET, text.c_str(), &unused) == 1 || inet_pton(AF_INET6, text.c_str(), &unused) == 1;
 }
 
-// Checks the names. A host name or an address that passes contains no comma, which would begin another name in
-// OpenSSL's extension texts.
+// Checks the names of the certificate. A host name or an address with a comma is refused, because a comma would begin
+// another name in OpenSSL's extension texts.
 absl::Status check_names(const CertificatePlan& plan) {
   const std::string& common = plan.common_name;
   if (common.empty() || common.size() > kMaxCommonName ||
@@ -102,7 +103,7 @@ bool extend_for_use(X509* certificate, X509* issuer, const CertificatePlan& plan
          extend(certificate, issuer, NID_authority_key_identifier, "keyid");
 }
 
-// Gives the certificate a random serial number of 127 bits, its validity, key and names.
+// Sets a random serial number of 127 bits, the validity, the key and the names of the certificate.
 bool fill_in(X509* certificate, X509* issuer, EVP_PKEY* key, const CertificatePlan& plan) {
   constexpr int kSerialBits = 127;
   const BigNumber serial(BN_new());

@@ -27,12 +27,12 @@ struct CertificatePlan {
   int days = 90;                            // validity from now
 };
 
-// Makes a key and a certificate for it, signed by `authority`, or by the new key itself if the plan is an authority's
-// (then `authority` is ignored). Returns INVALID_ARGUMENT for a malformed name or address, or if the authority's
-// certificate and key do not match.
+// Makes a key and a certificate for this key. The certificate is signed by `authority`. If the plan is for an
+// authority, the certificate is signed by the new key itself, and `authority` is ignored. Returns INVALID_ARGUMENT for
+// a malformed name or address, or if the authority's certificate and key do not match.
 absl::StatusOr<CertificatePair> make_certificate(const CertificatePlan& plan, const CertificatePair& authority);
 
-// Writes BASE.pem with mode 0644 and BASE.key with mode 0600. Returns ALREADY_EXISTS, without a change, if either
+// Writes BASE.pem with mode 0644 and BASE.key with mode 0600. Returns ALREADY_EXISTS, without a change, if either file
 // exists.
 absl::Status write_certificate(const std::string& base, const CertificatePair& made);
 // Reads BASE.pem and BASE.key.

@@ -40,8 +40,8 @@ class Descriptor {
   const int number_;
 };
 
-// Gives an open file the owner and the group of the file at `path`, if that file exists: when root replaces a file, its
-// owner must still be able to read it.
+// Gives an open file the owner and the group of the file at `path`, if there is one. When root replaces a file of
+// another user, this user must still be able to read the file.
 absl::Status keep_owner(int descriptor, const std::string& path) {
   struct stat old {
   }, made{};

@@ -31,8 +31,9 @@ absl::StatusOr<SecurityFile> read_security_file(const std::string& path);
 // Creates a file and syncs it to disk. Returns ALREADY_EXISTS, without a change, if the file exists.
 absl::Status create_security_file(const std::string& path, const SecurityFile& content);
 
-// Replaces the file, or creates it if it does not exist. Readers see either the old or the new content. The owner and
-// the group stay; returns FAILED_PRECONDITION, without a change, if this process may not keep them.
+// Replaces the file, or creates it if it does not exist. Readers see either the old or the new content. The new file
+// has the owner and the group of the old one; returns FAILED_PRECONDITION, without a change, if this process is not
+// permitted to set them.
 absl::Status replace_security_file(const std::string& path, const SecurityFile& content);
 
 // Lock of a file against other writers. The lock is the file PATH.lock, which is never deleted. The destructor releases

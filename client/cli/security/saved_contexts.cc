@@ -28,8 +28,8 @@ constexpr ContextField kContextFields[] = {
     {"cert", &SavedContext::cert},       {"key", &SavedContext::key}, {"token_file", &SavedContext::token_file},
 };
 
-// Stores one line `key = value` in `section`, or in `contexts` before the first section. Returns an error if the line
-// is not valid.
+// Stores the option of one line `key = value` in `section`, or in `contexts` if the line is before the first section.
+// Returns an error if the line is not valid.
 absl::Status store_line(absl::string_view line, SavedContext* section, SavedContexts& contexts) {
   const std::pair<absl::string_view, absl::string_view> parts = absl::StrSplit(line, absl::MaxSplits('=', 1));
   const absl::string_view key = absl::StripAsciiWhitespace(parts.first);

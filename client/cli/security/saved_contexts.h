@@ -55,7 +55,7 @@ absl::Status write_contexts(const std::string& path, const SavedContexts& contex
 // Returns the context of this name. Returns NOT_FOUND with the names that exist.
 absl::StatusOr<SavedContext> find_context(const SavedContexts& contexts, const std::string& name);
 
-// Returns OK if the name has 1 to 63 of a-z, A-Z, 0-9, `-`, `_` and `.`.
+// Returns OK if the name has 1 to 63 characters of a-z, A-Z, 0-9, `-`, `_` and `.`.
 absl::Status check_context_name(absl::string_view name);
 
 }  // namespace locus::cli

@@ -1,6 +1,6 @@
-// Token files of locusd: making, listing and revoking bearer tokens. For `locus token`. A token is `locus_`, its id,
-// `_` and 43 characters base64url of 32 random bytes. The file has one line for each token, with its SHA-256 instead of
-// the token itself, and `#` begins a comment line:
+// Token files of locusd: functions that make, list and revoke bearer tokens. For `locus token`. A token is `locus_`,
+// its id, `_` and 43 characters: 32 random bytes in base64url. The file has one line for each token. It contains the
+// token's SHA-256 instead of the token itself. A line that begins with `#` is a comment. The form of a token's line is:
 //   ID SHA256-HEX CREATED EXPIRES-or-never [COMMENT]
 // CREATED and EXPIRES are UTC times such as 2024-05-31T12:00:00Z. An id has 1 to 63 of a-z, 0-9 and -, and does not
 // begin or end with -. Functions without state; several processes may change one file at the same time.
@@ -19,7 +19,7 @@
 
 namespace locus::cli {
 
-inline constexpr size_t kMaxTokenLines = 10'000;  // lines of a token file with comments; locusd refuses a longer file
+inline constexpr size_t kMaxTokenLines = 10'000;  // lines including comments; locusd refuses a longer file
 inline constexpr size_t kMaxTokenId = 63;
 
 // Line of a token file, without its hash.
@@ -34,9 +34,9 @@ struct TokenLine {
 // Parses a duration such as 12h, 30d or 8w, at most 100 years. Returns INVALID_ARGUMENT for any other text.
 absl::StatusOr<absl::Duration> parse_lifetime(absl::string_view text);
 
-// Adds a new token to the file, which is made with mode 0600 if there is none, and returns the token. Without
+// Adds a new token to the file and returns the token. If the file does not exist, it is created with mode 0600. Without
 // `lifetime` the token never expires. Returns ALREADY_EXISTS if the id is listed, INVALID_ARGUMENT if the id or the
-// comment is malformed, FAILED_PRECONDITION if others may write the file or locusd could not read it.
+// comment is malformed, FAILED_PRECONDITION if other users may write the file or if locusd could not read the new file.
 absl::StatusOr<std::string> create_token(const std::string& file, absl::string_view id, absl::Time now,
                                          std::optional<absl::Duration> lifetime, absl::string_view comment);
 

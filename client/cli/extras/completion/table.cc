@@ -47,8 +47,8 @@ void add_option_lines(const std::vector<OptionWords>& options, std::vector<std::
   }
 }
 
-// Returns the options that `command` accepts: the command's own options, then the options of the commands above it,
-// except options that the command redefines under the same name.
+// Returns the options that `command` accepts: the command's own options, followed by the options of the commands above
+// it. An option that the command redefines under the same name appears only once.
 std::vector<OptionWords> options_in_reach(const CommandWords& command, const std::vector<OptionWords>& above) {
   std::vector<OptionWords> options = command.options;
   for (const OptionWords& option : above) {

@@ -10,8 +10,9 @@ namespace {
 
 bool before(const FirstHit& a, const FirstHit& b) { return (a <=> b) < 0; }
 
-// Returns the t at which the ray enters the instance's world bounds, or nullopt if it misses them. If a triangle of the
-// instance is hit at a smaller t, the hit is reported at the returned t, as in the server.
+// Returns the t at which the ray enters the world bounds of the instance, or nullopt if the ray misses these bounds.
+// This t is a lower bound for the reported hits: if rounding gives a triangle of the instance a smaller t, the hit is
+// reported at the entry, as the server does.
 std::optional<float> entry(const Rayd& ray, const CheckedInstance& instance) {
   const Interval<double> interval =
       SlabRay<double>(ray, kInstancePad).interval(bounds_to_world(instance.transform, instance.mesh_bounds));

@@ -40,8 +40,8 @@ class FirstError {
   absl::Status status_ LOCUS_GUARDED_BY(mutex_);
 };
 
-// Sampler of batches from a run of unknown length: stores every stride-th batch. When there are more than kSamplesAKind
-// samples, it drops every second one and doubles the stride, so that the samples stay evenly spread.
+// Sampler of batches from a run of unknown length. It stores every stride-th batch. When it has more than kSamplesAKind
+// samples, it drops every second one and doubles the stride, so that the samples stay evenly spread over the run.
 class Sampler {
  public:
   explicit Sampler(std::vector<Sample>& samples) : samples_(samples) {}
@@ -61,7 +61,8 @@ class Sampler {
   size_t stride_ = 1;
 };
 
-// Sends one batch of each kind in turn, each batch after the answer to the previous batch, until `done` is set.
+// Sends query batches of all kinds in rotation until `done` is set. Each batch is sent after the answer to the previous
+// one.
 absl::Status ask(const client::Client& client, const DemoWorld& world, const LoadOptions& options,
                  const std::vector<DemoKind>& kinds, const std::atomic<bool>& done, LoadResult& result) {
   const std::unique_ptr<client::QueryStream> stream = client.query_stream(options.scene);
@@ -90,7 +91,7 @@ absl::Status check_ack(const v1::UpdateAck& ack) {
   return absl::InternalError(absl::StrCat(ack.refused(), " moves of a tick were refused"));
 }
 
-// Sends one batch per tick, which moves every object, at options.ticks_a_second. Then waits for all acks.
+// Sends one batch per tick, which moves every object, at a rate of options.ticks_a_second. Then waits for all acks.
 absl::Status write(const client::Client& client, const DemoWorld& world, const LoadOptions& options,
                    LoadResult& result) {
   const std::unique_ptr<client::UpdateStream> stream = client.update_stream(options.scene);

@@ -1,5 +1,5 @@
-// Query batches of `locus demo`, and a checker that compares their answers with brute force. Functions without state,
-// and a checker that is not thread-safe.
+// Query batches of `locus demo`, and a checker that compares the answers to them with brute force. The functions have
+// no state; the checker is not thread-safe.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_DEMO_DEMO_QUERIES_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_DEMO_DEMO_QUERIES_H_
 

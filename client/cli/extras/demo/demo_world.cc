@@ -9,7 +9,7 @@
 namespace locus::cli {
 namespace {
 
-constexpr float kInset = 0.98f;  // objects move within this fraction of the level's size, inside its walls
+constexpr float kInset = 0.98f;  // fraction of the level's size within which objects move, inside its walls
 
 locus::Quaternion random_rotation(DemoRandom& random) {
   for (;;) {
@@ -18,8 +18,8 @@ locus::Quaternion random_rotation(DemoRandom& random) {
   }
 }
 
-// Returns the position at `tick` of a point that moves between -half and half and reverses at both ends. It is computed
-// directly from the tick, so that rounding errors do not accumulate from tick to tick.
+// Returns the position at `tick` of a point that moves between -half and half and reverses at both ends. The position
+// is computed directly from the tick, so that rounding errors do not accumulate from tick to tick.
 float bounce(float start, float velocity, uint64_t tick, float half) {
   if (half <= 0) return 0;
   const double period = 4.0 * half;

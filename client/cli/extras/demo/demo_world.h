@@ -1,5 +1,5 @@
-// Moving objects of `locus demo`. An object's pose is a pure function of its index and the tick, so that every answer
-// can be checked against the objects at its tick. Immutable after construction.
+// Moving objects of `locus demo`. An object's pose is a pure function of its index and the tick, so that an answer can
+// be checked against the objects at the answer's tick. Immutable after construction.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_DEMO_DEMO_WORLD_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_DEMO_DEMO_WORLD_H_
 

@@ -14,7 +14,7 @@ using Corner = std::array<float, 3>;
 
 Corner key_of(Vec3f v) { return {v.x, v.y, v.z}; }
 
-// Edge of a mesh, and for each triangle at the edge its third vertex.
+// Edge of a mesh, and the third vertex of each triangle that has this edge.
 struct Edge {
   Vec3f from, to;
   std::vector<Vec3f> opposite;
@@ -38,13 +38,13 @@ std::vector<Edge> shared_edges(const std::vector<Triangle>& triangles) {
   return shared;
 }
 
-// Returns the unit direction from the edge towards `point`, perpendicular to the edge. Returns nullopt if the triangle
-// of the edge and `point` is a sliver.
+// Returns the unit vector that is perpendicular to the edge and points towards `point`. Returns nullopt if the triangle
+// of the edge and `point` is a sliver, or if the edge is too short.
 std::optional<Vec3d> across(const Edge& edge, Vec3f point) {
   const Vec3d along = to_double(edge.to) - to_double(edge.from);
   const Vec3d to_point = to_double(point) - to_double(edge.from);
   const double length = std::sqrt(squared_length(along));
-  // Refuse edges as short as the rounding error of a ray.
+  // Refuse an edge whose length is near the rounding error of a ray's coordinates.
   if (length <= 1e-5 * max_component(abs(to_double(edge.from)))) return std::nullopt;
   const Vec3d unit = along * (1 / length);
   const Vec3d rest = to_point - unit * dot(to_point, unit);
@@ -58,8 +58,8 @@ struct Aim {
   Vec3d away;  // offset of the ray's origin from the target
 };
 
-// Chooses a target on the edge and an origin for a ray to it. As seen from the origin, the two triangles at the edge
-// lie on different sides of the edge. Returns nullopt if no such origin was found.
+// Chooses a target on the edge and an origin for a ray to this target, such that the two triangles at the edge lie on
+// different sides of the edge when seen from the origin. Returns nullopt if the chosen origin does not satisfy this.
 std::optional<Aim> aim(const Edge& edge, DemoRandom& random) {
   const std::optional<Vec3d> left = across(edge, edge.opposite[0]);
   const std::optional<Vec3d> right = across(edge, edge.opposite[1]);
@@ -73,8 +73,8 @@ std::optional<Aim> aim(const Edge& edge, DemoRandom& random) {
   const Vec3d jitter = *left * (0.4 * random.sign()) + along * (0.3 * random.sign() / length);
   away = normalized(away) + jitter;
   if (random.unit() < 0.5f) away = -away;
-  // Require that, as seen from the origin, the triangles lie on different sides of the edge and neither is nearly
-  // edge-on.
+  // Require that, seen from the origin, the two triangles lie on different sides of the edge and neither is nearly
+  // edge-on (parallel to the ray).
   const Vec3d front = cross(along * (1 / length), normalized(away));
   if (!(dot(front, *left) * dot(front, *right) < -0.05)) return std::nullopt;
   const double weight = 0.02 + 0.96 * random.unit();  // keeps the target away from the edge's end points
@@ -89,7 +89,7 @@ EdgeRays aim_at_edges(const std::vector<Triangle>& triangles, size_t count, uint
   EdgeRays rays;
   const std::vector<Edge> edges = shared_edges(triangles);
   DemoRandom random(seed);
-  // Bound the loop, since it would not end for a mesh of slivers only.
+  // Limit the number of attempts, since the loop would not end for a mesh of slivers only.
   const size_t tries = 20 * count;
   for (size_t i = 0; !edges.empty() && i < tries && rays.size() < count; ++i) {
     const std::optional<Aim> aimed = aim(edges[i % edges.size()], random);

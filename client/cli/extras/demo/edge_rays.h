@@ -1,5 +1,5 @@
-// Test rays aimed at edges shared by two triangles: because of rounding errors, a fast intersection test can miss both
-// triangles at such an edge. As seen from the origin of a ray, the two triangles lie on different sides of the edge, so
+// Test rays aimed at edges shared by two triangles. Because of rounding errors, a fast intersection test can miss both
+// triangles at such an edge. Seen from the origin of a ray, the two triangles lie on different sides of the edge, so
 // the ray must hit one of them.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_DEMO_EDGE_RAYS_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_DEMO_EDGE_RAYS_H_
@@ -11,8 +11,8 @@
 
 namespace locus::cli {
 
-// Rays as interleaved x, y, z in mesh axes. The target on the edge is at t = 1, so every ray must have a hit at t <= 1
-// + kEdgeAllowance.
+// Rays as interleaved x, y, z in mesh axes. A ray reaches its target on the edge at t = 1, so it must have a hit at t
+// <= 1 + kEdgeAllowance.
 struct EdgeRays {
   std::vector<float> origins;
   std::vector<float> directions;
@@ -20,7 +20,7 @@ struct EdgeRays {
   size_t size() const { return origins.size() / 3; }
 };
 
-// Tolerance in t for the rounding of the target to float, large enough for the flattest angle of incidence that
+// Tolerance in t, because the target is rounded to float. It is large enough for the flattest angle of incidence that
 // aim_at_edges() chooses.
 inline constexpr float kEdgeAllowance = 1e-3f;
 

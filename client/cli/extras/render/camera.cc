@@ -8,7 +8,7 @@
 namespace locus::cli {
 namespace {
 
-constexpr double kParallel = 1e-6;  // directions at an angle with a smaller sine count as parallel
+constexpr double kParallel = 1e-6;  // directions count as parallel if the sine of the angle between them is smaller
 
 bool is_direction(Vec3d v) { return is_finite(v) && max_component(abs(v)) > 0; }
 
@@ -29,7 +29,7 @@ absl::StatusOr<ViewAxes> view_axes(Vec3d forward, Vec3d up) {
 }
 
 double half_height_of(double degrees) {
-  // Round to float, since math libraries differ in the last bit of a tangent; rounding hides the difference.
+  // Round to float: math libraries differ in the last bits of a tangent, and rounding hides the difference.
   return static_cast<float>(std::tan(degrees * (std::numbers::pi / 360)));
 }
 

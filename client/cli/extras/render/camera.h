@@ -2,7 +2,7 @@
 // without state; threads may share a camera.
 //
 // The rays are bit-identical on every machine: they are computed in double with only +, -, *, / and square roots, and
-// rounded to float once. Math libraries differ in tangents, so the tangent of the angle of view is rounded to float
+// then rounded to float once. The tangent of the angle of view, in which math libraries differ, is rounded to float
 // immediately, which hides the difference.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_RENDER_CAMERA_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_RENDER_CAMERA_H_
@@ -36,15 +36,15 @@ struct Camera {
   Vec3d eye;  // position in world coordinates
   ViewAxes axes;
   Projection projection = Projection::kPerspective;
-  // Half the height of the image in world units: at distance 1 from the eye for perspective, at any distance for
-  // orthographic projection.
+  // Half the height of the image in world units. For perspective projection this is the height at distance 1 from the
+  // eye; for orthographic projection the height is the same at every distance.
   double half_height = 1;
 };
 
 struct CameraRay {
   Vec3f origin;  // relative to the eye; 0 in perspective projection
-  // Direction, scaled so that its component along the view's forward axis is 1. The t of a hit is therefore its depth:
-  // the distance in world units from the plane through the eye perpendicular to the view.
+  // Direction, scaled so that its component along the view's forward axis is 1. Therefore the t of a hit is its depth:
+  // the distance in world units from the plane through the eye that is perpendicular to the forward axis.
   Vec3f direction;
 };
 

@@ -1,5 +1,5 @@
-// Options of `locus render` that describe the camera, and the camera made from them. Plain data and functions without
-// state.
+// Options of `locus render` that describe the camera, and a function that makes the camera from these options. Plain
+// data and functions without state.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_RENDER_CAMERA_OPTIONS_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_RENDER_CAMERA_OPTIONS_H_
 
@@ -30,11 +30,11 @@ std::istream& operator>>(std::istream& in, ImageSize& size);
 
 void add_camera_options(CLI::App& command, CameraOptions& options);
 
-// Returns a usage error if options contradict each other or leave the view without a direction. Sends nothing.
+// Returns a usage error if options contradict each other or do not determine the direction of the view. Sends nothing.
 absl::Status check(const CameraOptions& options);
 
-// Returns the camera that the options describe. `target` is the bounding box to be framed, which must not be empty.
-// Returns a usage error if the view has no direction or --up is parallel to it.
+// Returns the camera that the options describe. `target` is the bounding box that the picture must show; it must not be
+// empty. Returns a usage error if the direction of the view is undefined or parallel to --up.
 absl::StatusOr<Camera> camera_of(const CameraOptions& options, const Aabbd& target, const ImageSize& size);
 
 }  // namespace locus::cli

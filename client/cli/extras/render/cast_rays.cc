@@ -17,11 +17,11 @@ namespace locus::cli {
 namespace {
 
 constexpr uint64_t kRaysPerBatch = 8192;
-constexpr uint64_t kReportedRaysPerBatch = 256;  // one block per ray: the maximum number of blocks of a batch
+constexpr uint64_t kReportedRaysPerBatch = 256;  // one block per ray; equals the maximum number of blocks of a batch
 constexpr int kBatchesInFlight = 6;
 constexpr std::array<v1::Column, 4> kColumns = {v1::COLUMN_T, v1::COLUMN_ID, v1::COLUMN_TRIANGLE, v1::COLUMN_NORMAL};
 
-// Range of consecutive pixels in the image's order: row by row from the upper left.
+// Range of consecutive pixels. Pixels are numbered row by row from the upper left.
 struct PixelRange {
   uint64_t begin = 0;
   uint64_t end = 0;
@@ -70,8 +70,8 @@ class Caster {
     return builder.build();
   }
 
-  // Adds a block with the rays of `range`. The block's frame is the eye, so that float precision does not suffer if the
-  // eye is far from the origin.
+  // Adds a block with the rays of `range`. The frame of the block is the eye, so that the float offsets stay precise
+  // even if the eye is far from the origin.
   void add_block(const PixelRange& range, client::QueryBuilder& builder) const {
     std::vector<float> origins;
     std::vector<float> directions;
@@ -90,8 +90,8 @@ class Caster {
     block.rays(origins, directions);
   }
 
-  // Copies an answer into the image. Threads write disjoint ranges of the image, so only the revisions and the tick of
-  // the result need the lock.
+  // Copies an answer into the image. Different answers are written to disjoint ranges of the image, so the lock is
+  // needed only for the revisions and the tick of the result.
   absl::Status take(const PixelRange& range, const v1::QueryResult& answer) {
     const bool reported = options_.work == WorkReport::kReported;
     const uint64_t rays_per_block = reported ? 1 : range.size();

@@ -21,8 +21,8 @@ enum class Moment {
   kLive,  // each batch at the newest revision, which is at least CastOptions::revision
 };
 
-// Choice whether the server reports the work of each ray. With kReported every ray is a block of its own, which costs
-// several times more.
+// Choice whether the server reports the work of each ray. With kReported each ray is sent as a block of its own,
+// because the server reports work per block; this takes several times longer.
 enum class WorkReport { kNone, kReported };
 
 struct CastOptions {
@@ -46,7 +46,7 @@ struct CastResult {
 // Callback for progress. It is called from time to time in the caller's thread with the number of rays answered so far.
 using CastProgress = std::function<void(uint64_t done)>;
 
-// Sends all rays and waits until every ray is answered. Returns the errors of the server. If the server has dropped the
+// Sends all rays and waits until every ray is answered. Returns the errors of the server; if the server has dropped the
 // revision, returns OUT_OF_RANGE with an explanation. Returns DATA_LOSS if the columns of an answer do not match the
 // request. Memory: 28 bytes per pixel, 52 if the work is reported.
 absl::StatusOr<CastResult> cast_rays(const client::Client& client, const Camera& camera, const ImageSize& size,

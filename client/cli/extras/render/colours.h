@@ -1,5 +1,5 @@
-// Colours for values and for ids. For the painters. Functions without state, bit-identical on every machine, since the
-// only libm function that they use is the square root.
+// Colours for values and for ids. For the painters. Functions without state. Their results are bit-identical on every
+// machine, because the only function of the math library that they use is the square root.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_RENDER_COLOURS_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_RENDER_COLOURS_H_
 
@@ -9,7 +9,8 @@
 
 namespace locus::cli {
 
-// Colour in linear light, each component 0 .. 1. Unlike stored colours, it may be added and averaged.
+// Colour in linear light, each component 0 .. 1. Linear colours may be added and averaged, unlike colours of type
+// Colour, which are gamma-encoded.
 struct Light {
   double red = 0, green = 0, blue = 0;
 
@@ -17,15 +18,15 @@ struct Light {
   friend Light operator*(Light a, double s) { return {a.red * s, a.green * s, a.blue * s}; }
 };
 
-// Convert between linear light and stored colours with a gamma of 2, which is close to the gamma of sRGB. Light is
+// Convert between linear light and gamma-encoded colours. The gamma is 2, which is close to the gamma of sRGB. Light is
 // clamped to 0 .. 1.
 Colour colour_of(Light light);
 Light light_of(Colour colour);
 
 // Return the colour for x from a colour map that goes from dark at 0 to bright at 1. x is clamped to 0 .. 1; NaN counts
-// as 0. The maps are perceptually uniform and readable by the colour-blind: ten points of viridis (for distances) or of
-// inferno (for costs), interpolated linearly. Source: Smith and van der Walt, the colour maps of matplotlib 2.0 (2015,
-// CC0).
+// as 0. The maps are perceptually uniform and readable by the colour-blind: viridis (for distances) and inferno (for
+// costs), each given by ten points between which colours are interpolated linearly. Source: Smith and van der Walt, the
+// colour maps of matplotlib 2.0 (2015, CC0).
 Colour viridis(double x);
 Colour inferno(double x);
 

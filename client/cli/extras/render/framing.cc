@@ -8,7 +8,7 @@
 namespace locus::cli {
 namespace {
 
-// Ratio of a box's longest side to its largest |coordinate|, up to which the box is treated as a point.
+// Largest ratio of a box's longest side to its largest absolute coordinate for which the box is treated as a point.
 constexpr double kSmallestExtent = 1e-9;
 
 std::array<Vec3d, 8> corners_of(const Aabbd& box) {
@@ -20,8 +20,9 @@ std::array<Vec3d, 8> corners_of(const Aabbd& box) {
 }
 
 // Maxima over all corners of a box. A corner is (x, y, z) in the view's axes (right, up, forward) relative to the box's
-// centre, and w is the slope of the view's edge. `right` is the maximum of x - w z, `left` the maximum of -x - w z,
-// `up` and `down` are the same maxima with y instead of x, and `near` is the maximum of -z.
+// centre. w is the slope of the edge of the view: half the width of the picture at distance 1, and 0 for orthographic
+// projection. `right` is the maximum of x - w z, `left` the maximum of -x - w z; `up` and `down` are the same maxima
+// with y instead of x, and with half the height; `near` is the maximum of -z.
 struct Reach {
   double right = -std::numeric_limits<double>::infinity();
   double left = right, up = right, down = right, near = right;

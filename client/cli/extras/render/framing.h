@@ -1,5 +1,5 @@
-// Placement of a camera at the nearest position from which the whole of a box is in the picture. For `locus render`
-// without --eye. Functions without state.
+// Placement of a camera at the nearest position from which the whole of a box is visible. For `locus render` without
+// --eye. Functions without state.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_RENDER_FRAMING_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_RENDER_FRAMING_H_
 
@@ -11,12 +11,12 @@ namespace locus::cli {
 // Properties of a camera other than its position and axes.
 struct Lens {
   Projection projection = Projection::kPerspective;
-  double half_height = 1;  // as Camera::half_height; orthographic: 0 = chosen to fit the box
+  double half_height = 1;  // as in Camera; 0 = chosen so that the box fits (orthographic only)
   double aspect = 1;       // width / height of the image
   double margin = 1.05;    // ratio of the picture's size to the size of the box in it
 };
 
-// Returns the unit direction of a view obliquely from above, about 35 degrees downward. `up` must not be zero. If `up`
+// Returns the unit direction of a view that looks down obliquely, at about 35 degrees. `up` must not be zero. If `up`
 // is z, the view is towards +x, +y and -z.
 Vec3d three_quarter_view(Vec3d up);
 

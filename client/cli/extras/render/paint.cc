@@ -54,8 +54,8 @@ class Shader {
     return colour_of(Light{0.012, 0.020, 0.040} * (1 - down) + Light{0.055, 0.075, 0.110} * down);
   }
 
-  // Returns `light` mixed with haze in proportion to the distance t, so that near and far surfaces differ in colour
-  // where they overlap in the picture.
+  // Returns `light` mixed with haze in proportion to the distance t, so that a near and a far surface that are adjacent
+  // in the picture differ in colour.
   Light hazy(Light light, float t) const {
     const double range = depths_.max - depths_.min;
     const double haze = range > 0 ? kMaxHaze * (double{t} - depths_.min) / range : 0;
@@ -72,8 +72,8 @@ class Shader {
     return power;
   }
 
-  // Returns the factor by which a pixel is darkened if it is at an edge: below 1 if a neighbouring pixel shows a
-  // surface further behind, or if the surface bends sharply there.
+  // Returns the factor by which a pixel is darkened because it is at an edge. The factor is below 1 if a neighbouring
+  // pixel shows a surface further behind, or if the surface bends sharply between the two pixels.
   double edge(size_t pixel, uint32_t column, uint32_t row) const {
     double factor = 1;
     const uint32_t width = image_.size.width;

@@ -26,7 +26,7 @@ struct Picture {
 };
 
 // Returns FAILED_PRECONDITION if `path` does not end in .png, if it is a folder, or if its parent folder does not
-// exist. Call it before the picture is computed, which takes long.
+// exist. Commands call this function first, because computing the picture takes long.
 absl::Status check_png_path(const std::string& path);
 
 // Writes a PNG in sRGB with 8 bits per channel. Replaces an existing file. Returns FAILED_PRECONDITION if the file

@@ -34,8 +34,8 @@ absl::Status check_there(const client::Client& client, const std::string& scene,
   return result.blocks(0).ids(0) == id ? absl::OkStatus() : not_found(scene, id, "");
 }
 
-// Returns the slab of `box` between side `side` and its cut `cut`. Cut c is inward from the side by (c + 1) / 16 of the
-// box's size along that axis.
+// Returns the slab of `box` between its side `side` and the plane `cut`, which is parallel to this side. Cut c is
+// inward from the side by (c + 1) / 16 of the box's size along that axis.
 Aabbd slab_of(const Aabbd& box, int side, int cut) {
   const int axis = side / 2;
   Aabbd slab = box;
@@ -48,8 +48,8 @@ Aabbd slab_of(const Aabbd& box, int side, int cut) {
   return slab;
 }
 
-// Returns for each slab of `box`, ordered by side and then by cut, whether the object or instance `id` overlaps it.
-// Slabs are sent relative to the box's centre, so that float precision increases as the box shrinks.
+// Returns for each slab of `box`, ordered by side and then by cut, whether the object or instance `id` overlaps the
+// slab. Slabs are sent relative to the box's centre, so that float precision increases as the box shrinks.
 absl::StatusOr<std::vector<bool>> ask_slabs(const client::Client& client, const std::string& scene,
                                             const client::Revision& revision, uint64_t id, const Aabbd& box) {
   const Vec3d frame = (box.min + box.max) * 0.5;
@@ -86,8 +86,8 @@ Aabbd widened(const Aabbd& box) {
   return {box.min - Vec3d{epsilon, epsilon, epsilon}, box.max + Vec3d{epsilon, epsilon, epsilon}};
 }
 
-// Returns the box with each side moved inward past the slabs that the thing does not overlap, then widened by
-// kWidening. `reached` is the result of ask_slabs().
+// Returns the box after one round: each side is moved inward past the slabs that the object or instance does not
+// overlap, then the box is widened by kWidening. `reached` is the result of ask_slabs().
 Aabbd narrowed(const Aabbd& box, const std::vector<bool>& reached) {
   Aabbd result = box;
   for (int side = 0; side < kSides; ++side) {

@@ -1,5 +1,5 @@
-// HTTP GET of one page, with a maximum size and a timeout. The only user of libcurl. A function without state, but it
-// must be called by one thread at a time.
+// HTTP GET of one page, with a maximum size and a timeout. No other file of the product uses libcurl. The function has
+// no state, but only one thread at a time may call it.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_TOP_HTTP_GET_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_TOP_HTTP_GET_H_
 

@@ -12,8 +12,8 @@ bool is_name(char c, bool first) {
   return absl::ascii_isalpha(c) || c == '_' || c == ':' || (!first && absl::ascii_isdigit(c));
 }
 
-// Tokenizer of one line. Each member function consumes one kind of token from the front of `rest_`, the rest of the
-// line, if the token is present.
+// Tokenizer of one line. `rest_` is the part of the line that has not been read. Each member function checks whether
+// its kind of token is at the front of `rest_`, and removes the token if it is.
 class Line {
  public:
   explicit Line(absl::string_view text) : rest_(text) {}

@@ -28,7 +28,7 @@ struct MetricSample {
   absl::string_view label(absl::string_view key) const;
 };
 
-// Returns all samples in the order of the text; ignores comments and timestamps. Returns INVALID_ARGUMENT, with the
+// Returns all samples in the order of the text, without comments and timestamps. Returns INVALID_ARGUMENT, with the
 // number of the line, if a line is not in the format or has more than kMaxMetricLabels labels. Returns
 // RESOURCE_EXHAUSTED if the text exceeds kMaxMetricSamples or kMaxMetricLineBytes.
 absl::StatusOr<std::vector<MetricSample>> parse_metrics(absl::string_view text);

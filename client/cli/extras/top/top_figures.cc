@@ -47,7 +47,7 @@ Json rate(double before, double now, double seconds) {
   return number(std::round((now - before) / seconds * 10) / 10);
 }
 
-// Histogram: maps each bucket's upper bound in seconds to the number of durations up to it.
+// Histogram: maps the upper bound of each bucket, in seconds, to the number of durations that are at most this long.
 using Buckets = std::map<double, double>;
 
 Buckets buckets_of(const MetricSamples& samples, absl::string_view name, const Key& of) {

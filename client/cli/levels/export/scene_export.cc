@@ -92,8 +92,8 @@ absl::Status SceneExport::add_shape(const SceneThing& thing, Part part, const st
   return writer_.add_node(object_name(thing), place, mesh, facts_of(thing));
 }
 
-// Adds a capsule as a group of a tube and two domes. A single capsule mesh is not enough, since scaling it cannot give
-// capsules of all proportions.
+// Adds a capsule as a group of a tube and two domes. One mesh of a capsule would not be enough: scaling it to other
+// proportions would deform its domes.
 absl::Status SceneExport::add_capsule(const SceneThing& thing) {
   const std::array<float, 3>& axis = thing.size;
   const double length = std::sqrt(double{axis[0]} * axis[0] + double{axis[1]} * axis[1] + double{axis[2]} * axis[2]);

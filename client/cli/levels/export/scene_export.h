@@ -1,9 +1,9 @@
 // Converter of a scene's objects and instances ("things") to nodes and meshes of a GLB file. For the export command.
 // One object exports one file in one thread.
 //
-// The node of an instance draws the instance's mesh, which is written once. The node of an object draws the unit shape
-// of the object's kind, scaled to the object's size. A size of 0 is drawn as kMinDrawnSize, since editors cannot handle
-// a scale of 0.
+// The node of an instance draws the instance's mesh; each mesh is written once, however many instances use it. The node
+// of an object draws the unit shape of the object's kind, scaled to the object's size. A size of 0 is replaced by
+// kMinDrawnSize, since editors cannot handle a scale of 0.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_EXPORT_SCENE_EXPORT_H_
 #define LOCUS_CLIENT_CLI_LEVELS_EXPORT_SCENE_EXPORT_H_
 
@@ -23,9 +23,9 @@ inline constexpr float kMinDrawnSize = 1e-6f;
 // Half extent of the marker that is drawn for a point.
 inline constexpr float kPointMarkSize = 0.05f;
 
-// Returns the translation to subtract from every position before the position is rounded to float. Let c be the centre
-// of the bounds, rounded to whole units. The translation is c if the largest absolute coordinate of c is greater than 8
-// times the longest side of the bounds, and zero otherwise.
+// Returns the translation that must be subtracted from every position before the position is rounded to float. Let c be
+// the centre of the bounds, rounded to whole units. The translation is c if the largest absolute coordinate of c is
+// greater than 8 times the longest side of the bounds, and zero otherwise.
 std::array<double, 3> recentre_of(const std::array<double, 3>& min, const std::array<double, 3>& max);
 
 class SceneExport {

@@ -14,7 +14,7 @@ constexpr uint64_t kBoxTriangles = 12;
 // All lengths are integers in half metres, so that every coordinate is a multiple of 0.5 m and exact in float.
 constexpr int64_t kLotPitch = 48;      // distance from a lot to the next: lot and street
 constexpr int64_t kMinWidth = 10;      // minimum width of a building
-constexpr int64_t kWidthChoices = 27;  // number of widths; the widest leaves a street of 12
+constexpr int64_t kWidthChoices = 27;  // number of possible widths; the widest building leaves a street of 12 (6 m)
 constexpr int64_t kMinHeight = 6;      // minimum height of a step (a box of a building)
 constexpr int64_t kHeightChoices = 55;
 constexpr int64_t kGroundDepth = 4;
@@ -38,7 +38,7 @@ void append_box(const Box& box, ImportedMesh& mesh) {
   for (uint8_t corner : kCorners) mesh.indices.push_back(first + corner);
 }
 
-// Returns the number of boxes on each lot. The sum of these numbers is `boxes`.
+// Returns the number of boxes on each lot. The sum over all lots is `boxes`.
 std::vector<uint8_t> plan_lots(uint64_t boxes, SplitMix64& random) {
   std::vector<uint8_t> lots;
   while (boxes > 0) {

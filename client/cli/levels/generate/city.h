@@ -1,5 +1,5 @@
-// Generator of a city of boxes. For trying the server without a level file, and for tests that need known geometry. A
-// function without state.
+// Generator of a city of boxes. It is used to try the server without a level file, and by tests that need known
+// geometry. A function without state.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_GENERATE_CITY_H_
 #define LOCUS_CLIENT_CLI_LEVELS_GENERATE_CITY_H_
 

@@ -1,5 +1,5 @@
-// Smooth seeded noise in 3-D, bit-identical on every machine: uses only integers and +, -, * and floor of doubles. For
-// terrain and blob. Functions without state.
+// Smooth seeded noise in three dimensions. It is bit-identical on every machine, because it uses only integers and the
+// operations +, -, * and floor on doubles. For terrain and blob. Functions without state.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_GENERATE_GRADIENT_NOISE_H_
 #define LOCUS_CLIENT_CLI_LEVELS_GENERATE_GRADIENT_NOISE_H_
 

@@ -1,5 +1,5 @@
-// Generator of hills. For trying the server with open ground, and for tests that need a large connected surface. A
-// function without state.
+// Generator of hills. It is used to try the server with open ground, and by tests that need a large connected surface.
+// A function without state.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_GENERATE_TERRAIN_H_
 #define LOCUS_CLIENT_CLI_LEVELS_GENERATE_TERRAIN_H_
 

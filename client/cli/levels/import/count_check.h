@@ -1,6 +1,6 @@
-// Counts of the vertices and triangles of OBJ and STL files, and a check of these counts. The importer checks a file
-// before assimp reads it, since assimp needs about ten times the memory of the result. For the scene importer.
-// Functions without state. PLY files have a check of their own: ply_check.h.
+// Counts of the vertices and triangles of OBJ and STL files, and a check that these counts are within the limits. The
+// counts are checked before assimp reads a file, because assimp needs about ten times the memory of the result. For the
+// scene importer. Functions without state. PLY files have a check of their own: ply_check.h.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_COUNT_CHECK_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_COUNT_CHECK_H_
 

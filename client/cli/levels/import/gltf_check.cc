@@ -24,8 +24,9 @@ absl::Status damaged_gltf(absl::string_view what) {
   return absl::InvalidArgumentError(absl::StrCat("damaged glTF: ", what, "; export the file again"));
 }
 
-// Handler of the JSON parser's events. It builds no tree: it keeps only the path to the current value, the children of
-// the nodes, and the URIs of the buffers. A call that returns false ends parsing and has set `status_`.
+// Handler of the JSON parser's events. It builds no tree of the document. It stores only the path to the current value,
+// the children of the nodes, and the URIs of the buffers. A handler function that returns false ends the parsing; it
+// has then set `status_`.
 class GltfHandler final : public nlohmann::json_sax<nlohmann::json> {
  public:
   const absl::Status& status() const { return status_; }
@@ -165,9 +166,9 @@ uint32_t read_word(absl::string_view bytes, size_t at) {
   return value;
 }
 
-// Returns the JSON part of a file. In a GLB file of either version it begins at byte 20, and its length is at byte 12.
-// Version 2 has a file header of 12 bytes (magic, version, length) and a chunk header of 8 bytes (length of the JSON,
-// type). Version 1 has one header of 20 bytes: magic, version, length, length of the JSON, format.
+// Returns the JSON part of a file. In a GLB file of either version the JSON begins at byte 20, and its length is stored
+// at byte 12. In version 2 a file header of 12 bytes (magic, version, length) is followed by a chunk header of 8 bytes
+// (length of the JSON, type). Version 1 has one header of 20 bytes: magic, version, length, length of the JSON, format.
 absl::StatusOr<absl::string_view> json_part(absl::string_view bytes) {
   constexpr size_t kHeader = 20;
   if (bytes.substr(0, 4) != "glTF") return bytes;

@@ -38,8 +38,8 @@ constexpr int kThrownExit = 103;
 
 constexpr absl::string_view kRemedy = "the file is damaged or made to do harm; export it again or convert it to GLB";
 
-// Functions of the child. They run after a fork of a process that may have other threads, so they use no lock that
-// another thread could hold. malloc() is safe: the C library resets its locks in the child.
+// Functions that run in the child. The child is forked from a process that may have other threads, so these functions
+// use no lock that another thread could hold. malloc() is safe, because the C library resets its locks in the child.
 
 bool set_limit(__rlimit_resource resource, uint64_t value) {
   const rlimit limit{value, value};
@@ -59,7 +59,7 @@ uint64_t used_address_space() {
 }
 
 bool limit_resources(const ChildLimits& limits) {
-  const uint64_t used = used_address_space();  // read now: no file can be opened after setrlimit()
+  const uint64_t used = used_address_space();  // read now, because no file can be opened after the limits are set
   // The kernel sends SIGXCPU at the soft limit, and SIGKILL at the hard limit.
   const rlimit processor{limits.cpu_seconds, limits.cpu_seconds + 1};
   const bool limited = set_limit(RLIMIT_CORE, 0) && set_limit(RLIMIT_FSIZE, 0) && set_limit(RLIMIT_NOFILE, 0) &&
@@ -69,8 +69,8 @@ bool limit_resources(const ChildLimits& limits) {
          set_limit(RLIMIT_DATA, used + limits.memory_bytes);
 }
 
-// Restores the default action of these signals and unblocks all signals. Leaves the handlers of other signals, such as
-// SIGSEGV, through which sanitizers report errors.
+// Restores the default action of the signals listed here, and unblocks all signals. The handlers of other signals stay,
+// for example that of SIGSEGV, because sanitizers report errors through them.
 void reset_signals() {
   for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGXCPU, SIGXFSZ, SIGUSR1, SIGUSR2, SIGALRM})
     signal(number, SIG_DFL);
@@ -116,9 +116,9 @@ void send(const char* bytes, size_t size) {
   _exit(0);
 }
 
-// Functions of the parent.
+// Functions and types of the parent.
 
-// Child process. The destructor kills it if it still runs, and reaps it.
+// Child process. If it still runs, the destructor kills it; the destructor always waits for its end (reaps it).
 class Child {
  public:
   Child(pid_t pid, int pipe_end) : pid_(pid), pipe_end_(pipe_end) {}
@@ -141,8 +141,8 @@ class Child {
   }
 
   enum class Reading { kEnded, kTimeout, kTooLong, kFailed };
-  // Appends the child's output to `bytes` until the child ends, a read fails, `bytes` would exceed `max_bytes`, or the
-  // time `until` is reached.
+  // Appends the child's output to `bytes`. Stops when the child ends, a read fails, `bytes` would exceed `max_bytes`,
+  // or the time `until` is reached.
   Reading read_all(uint64_t max_bytes, Clock::time_point until, std::string& bytes) {
     std::array<char, 1 << 16> chunk;
     while (true) {

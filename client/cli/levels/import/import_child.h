@@ -1,7 +1,7 @@
-// Child process that reads untrusted bytes: with limited memory, time and files, and with a filter of system calls. It
-// is a fork of the calling process, so it has the bytes to read in its memory, and it returns its answer over a pipe.
-// The child cannot change the memory of the caller, and the caller does not trust the child's answer. Used by
-// import_file(). Thread-safe. README.md says why a plain fork is enough.
+// Child process that reads untrusted bytes, with limited memory, time and files, and with a filter of system calls. The
+// child is a fork of the calling process, so its memory already contains the bytes to read. It returns its answer
+// through a pipe. The child cannot change the memory of the caller, and the caller does not trust the child's answer.
+// Used by import_file(). Thread-safe. README.md explains why a fork without exec is enough.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_IMPORT_CHILD_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_IMPORT_CHILD_H_
 
@@ -15,7 +15,7 @@
 namespace locus::cli {
 
 struct ChildLimits {
-  uint64_t memory_bytes = kImportMemoryBase;  // address space besides the caller's; unlimited in sanitizer builds
+  uint64_t memory_bytes = kImportMemoryBase;  // address space beyond the caller's; unlimited in sanitizer builds
   uint32_t seconds = kMaxImportSeconds;
   uint32_t cpu_seconds = kMaxImportCpuSeconds;
 };

@@ -1,6 +1,6 @@
-// Limits of the importers. A file that exceeds a limit is refused with an error that names the limit: see exceeds() in
-// import_error.h. The limits on parts, part names and listed entries refuse nothing: see their comments. Constants
-// only.
+// Limits of the importers. A file that exceeds a limit is refused with an error that names the limit (exceeds() in
+// import_error.h). Exceptions are the limits on parts, part names and listed entries: beyond them, the result is merged
+// or truncated as their comments say. Constants only.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_IMPORT_LIMITS_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_IMPORT_LIMITS_H_
 
@@ -38,25 +38,26 @@ inline constexpr double kMaxImportCoordinate = 1e9;
 inline constexpr size_t kMaxImportNotes = 64;
 inline constexpr size_t kMaxImportTextBytes = 8192;
 
-// Time and memory of the child process that reads a file. The memory limit is kImportMemoryBase + kImportMemoryFactor *
-// file size, at most kMaxImportMemory. It grows with the size of the file, so that a small file cannot take all memory
-// of the machine.
+// Limits of time and memory of the child process that reads a file. The memory limit is kImportMemoryBase +
+// kImportMemoryFactor * file size, at most kMaxImportMemory. It depends on the size of the file, so that a small file
+// cannot take all memory of the machine.
 inline constexpr uint32_t kMaxImportSeconds = 300;
 inline constexpr uint32_t kMaxImportCpuSeconds = 300;
 inline constexpr uint64_t kImportMemoryBase = uint64_t{2} << 30;
 inline constexpr uint64_t kImportMemoryFactor = 64;
 inline constexpr uint64_t kMaxImportMemory = uint64_t{32} << 30;
 
-// Quake 3. Maximum size of a level in bytes: thirty times the largest level that the Quake 3 compiler writes.
+// Limits of Quake 3 levels. The maximum size in bytes is thirty times the largest level that the Quake 3 compiler
+// writes.
 inline constexpr size_t kMaxBspBytes = size_t{256} << 20;
 inline constexpr size_t kMaxBspTriangles = size_t{1} << 24;
 inline constexpr int kMaxPatchSubdivisions = 64;
 
-// Archives.
+// Limits of archives.
 inline constexpr int64_t kMaxArchiveEntries = int64_t{1} << 16;
 inline constexpr size_t kMaxEntryNameBytes = 1024;
-// Maximum ratio of a level's unpacked size to its packed size, for levels of more than kMinJudgedBytes. Levels of games
-// reach about 10; bytes that are all equal reach about 1000.
+// Maximum ratio of a level's unpacked size to its packed size, for levels of more than kMinJudgedBytes unpacked bytes.
+// Levels of games reach a ratio of about 10; bytes that are all equal reach about 1000.
 inline constexpr uint64_t kMaxArchiveRatio = 200;
 inline constexpr size_t kMinJudgedBytes = size_t{1} << 20;
 // Maximum number of archive entries that a message lists, and maximum total length of their names in bytes.

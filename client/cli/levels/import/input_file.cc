@@ -44,8 +44,8 @@ absl::StatusOr<std::string> read_input_file(const std::string& path, uint64_t ma
   std::error_code error;
   std::string bytes(std::filesystem::file_size(path, error), '\0');
   std::ifstream file(path, std::ios::binary);
-  // Check the number of bytes read: if the file shrank after its size was determined, the rest of `bytes` would be
-  // zeros.
+  // Check the number of bytes read. If the file has shrunk since its size was determined, the end of `bytes` would
+  // contain zeros.
   if (error || !file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()))) {
     return absl::InvalidArgumentError(absl::StrCat("cannot read ", path, " to its end: try again"));
   }

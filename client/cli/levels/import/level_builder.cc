@@ -18,7 +18,7 @@
 namespace locus::cli {
 namespace {
 
-// A level is recentred if its distance from the origin exceeds its size by more than this factor. At factor 8, float
+// A level is recentred if its distance from the origin is more than this factor times its size. At a factor of 8, float
 // coordinates relative to the origin lose three of their 24 bits.
 constexpr double kFarRatio = 8;
 
@@ -99,7 +99,7 @@ absl::StatusOr<LevelBuilder::Box> LevelBuilder::bounds() const {
   for (uint32_t index : indices_) {
     const std::array<double, 3>& position = positions_[index];
     for (size_t axis = 0; axis < 3; ++axis) {
-      // Negate the comparison so that NaN is refused too.
+      // Negate the comparison, so that NaN is refused too.
       if (!(std::abs(position[axis]) <= kMaxImportCoordinate)) {
         return absl::InvalidArgumentError(
             absl::StrCat("vertex ", index, " is at (", position[0], ", ", position[1], ", ", position[2],

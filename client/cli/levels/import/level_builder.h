@@ -1,6 +1,6 @@
-// Builder of one upload-ready mesh from the triangles of one file. Coordinates are collected in double and rounded
-// once, and names of parts are sanitized, so that they can be sent and printed. For the importers. Each builder is used
-// by one thread. Invariant: every index added is below the number of vertices added.
+// Builder of one upload-ready mesh from the triangles of one file. Coordinates are collected in double and rounded to
+// float once. Names of parts are sanitized, so that they can be sent and printed. For the importers. Each builder is
+// used by one thread. Invariant: every index added is below the number of vertices added.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_LEVEL_BUILDER_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_LEVEL_BUILDER_H_
 

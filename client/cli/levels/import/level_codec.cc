@@ -44,7 +44,7 @@ class AnswerWriter {
   std::string bytes_;
 };
 
-// Reader that returns zeros and empty values after the first error.
+// Reader that returns zeros and empty values once an error has occurred.
 class AnswerReader {
  public:
   explicit AnswerReader(absl::string_view bytes) : rest_(bytes) {}
@@ -103,7 +103,7 @@ void write_mesh(const ImportedMesh& mesh, AnswerWriter& writer) {
 
 bool is_valid(const ImportedMesh& mesh) {
   bool valid = !mesh.indices.empty();
-  // A coordinate may be twice the maximum, since recentring moves a level by up to the maximum along each axis.
+  // Allow twice the maximum: recentring moves a coordinate by up to the maximum.
   for (const float coordinate : mesh.vertices) valid &= std::abs(coordinate) <= 2 * kMaxImportCoordinate;
   for (const uint32_t index : mesh.indices) valid &= index < mesh.vertices.size() / 3;
   for (size_t i = 0; i < mesh.parts.size(); ++i) {

@@ -10,13 +10,13 @@
 
 namespace locus::cli {
 
-// Returns the bytes of a level or of an error. Texts are truncated to kMaxImportTextBytes, notes after kMaxImportNotes
-// are left out.
+// Returns the bytes of a level or of an error. Texts are truncated to kMaxImportTextBytes; only the first
+// kMaxImportNotes notes are encoded.
 std::string encode_level(const absl::StatusOr<ImportedLevel>& level);
 
-// Returns the level or the error that encode_level() encoded. The bytes are untrusted: a level that is returned has the
-// invariants of imported_mesh.h and is within the limits, and texts have no control characters. Returns
-// INVALID_ARGUMENT for any other bytes. Cost: linear.
+// Returns the level or the error that encode_level() encoded. The bytes are untrusted, so they are checked: a returned
+// level has the invariants of imported_mesh.h and is within the limits, and texts have no control characters. Returns
+// INVALID_ARGUMENT for bytes that fail the check. Cost: linear.
 absl::StatusOr<ImportedLevel> decode_level(absl::string_view bytes);
 
 }  // namespace locus::cli

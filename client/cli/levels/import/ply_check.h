@@ -1,4 +1,4 @@
-// Check of a PLY file before assimp reads it. The check is needed because assimp 5.2 reads a triangle strip as a single
+// Check of a PLY file before assimp reads the file. It is needed because assimp 5.2 reads a triangle strip as a single
 // face, and fills a truncated body with stale data instead of refusing it. For the scene importer. A function without
 // state.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_PLY_CHECK_H_
@@ -12,8 +12,8 @@
 namespace locus::cli {
 
 // Verifies that the body of the PLY file is complete. Returns the number of faces that the header declares; the caller
-// must compare it with the number that assimp reads. Returns INVALID_ARGUMENT that names the element for a damaged
-// header, triangle strips or a truncated body. The bytes are untrusted. Cost: linear.
+// must compare this number with the number of faces that assimp reads. Returns INVALID_ARGUMENT for a damaged header,
+// triangle strips or a truncated body; the message names the element. The bytes are untrusted. Cost: linear.
 absl::StatusOr<uint64_t> check_ply(absl::string_view bytes);
 
 }  // namespace locus::cli

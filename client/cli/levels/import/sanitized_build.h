@@ -1,5 +1,6 @@
-// Constant that is true if the program is built with a sanitizer. A sanitizer reserves more address space than any
-// limit allows, and reports errors by system calls that the filter would forbid. For the child process of an import.
+// Constant that is true if the program is built with a sanitizer. The limits of the child process of an import are then
+// relaxed: a sanitizer reserves more address space than any limit allows, and reports errors by system calls that the
+// filter would forbid.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_SANITIZED_BUILD_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_SANITIZED_BUILD_H_
 

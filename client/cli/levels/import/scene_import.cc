@@ -70,7 +70,7 @@ absl::Status refusal(absl::string_view what) {
   return absl::InvalidArgumentError(absl::StrCat(what, "; export the file again or convert it to GLB"));
 }
 
-// File system of assimp that has only the files of one level, in memory.
+// File system for assimp that contains only the files of one level, in memory.
 class MemoryFiles final : public Assimp::IOSystem {
  public:
   // Borrows the files.
@@ -95,8 +95,8 @@ class MemoryFiles final : public Assimp::IOSystem {
   const LevelFiles& files_;
 };
 
-// Parses the file with assimp. assimp throws on some damaged files and on exhausted memory; this function converts its
-// exceptions to errors.
+// Parses the file with assimp. assimp throws exceptions for some damaged files and when memory is exhausted; this
+// function converts them to errors.
 absl::StatusOr<const aiScene*> parse(Assimp::Importer& importer, const LevelFiles& files) {
   const aiScene* scene = nullptr;
   importer.SetIOHandler(new MemoryFiles(files));  // owned by the importer

@@ -20,9 +20,9 @@ struct ReleaseFilter {
 };
 using Filter = std::unique_ptr<std::remove_pointer_t<scmp_filter_ctx>, ReleaseFilter>;
 
-// Calls that are always allowed: memory, clocks, random numbers, locks and signal handlers of the process, and exit. A
-// filter cannot inspect memory behind pointer arguments, but none of these calls reaches a file, another process or the
-// network.
+// System calls that are always allowed. They concern memory, clocks, random numbers, locks, signal handlers and the
+// exit of the process. A filter cannot inspect memory behind pointer arguments, but none of these calls reaches a file,
+// another process or the network.
 constexpr int kAllowed[] = {SCMP_SYS(munmap),          SCMP_SYS(mremap),       SCMP_SYS(brk),
                             SCMP_SYS(madvise),         SCMP_SYS(futex),        SCMP_SYS(clock_gettime),
                             SCMP_SYS(gettimeofday),    SCMP_SYS(getrandom),    SCMP_SYS(getpid),
@@ -30,8 +30,8 @@ constexpr int kAllowed[] = {SCMP_SYS(munmap),          SCMP_SYS(mremap),       S
                             SCMP_SYS(rt_sigaction),    SCMP_SYS(rt_sigreturn), SCMP_SYS(sysinfo),
                             SCMP_SYS(restart_syscall), SCMP_SYS(exit),         SCMP_SYS(exit_group)};
 
-// Calls that fail with EPERM. The C library tries them, for example to choose the size of a buffer or to print why it
-// aborts, and continues if they fail.
+// System calls that fail with EPERM instead of killing the process. The C library tries them, for example to choose the
+// size of a buffer or to print why it aborts, and continues if they fail.
 constexpr int kRefused[] = {SCMP_SYS(open),      SCMP_SYS(openat),     SCMP_SYS(stat),   SCMP_SYS(fstat),
                             SCMP_SYS(lstat),     SCMP_SYS(newfstatat), SCMP_SYS(statx),  SCMP_SYS(access),
                             SCMP_SYS(faccessat), SCMP_SYS(readlink),   SCMP_SYS(ioctl),  SCMP_SYS(lseek),
@@ -52,7 +52,7 @@ bool add_rules(scmp_filter_ctx filter, int descriptor) {
   const auto number = static_cast<scmp_datum_t>(descriptor);
   added &= add_rule(filter, SCMP_ACT_ALLOW, SCMP_SYS(write), {{0, SCMP_CMP_EQ, number, 0}});
   added &= add_rule(filter, kRefuse, SCMP_SYS(write), {{0, SCMP_CMP_NE, number, 0}});
-  // Allow only memory that belongs to no file and is not executable.
+  // Allow mmap() and mprotect() only without execution rights, and mmap() only for memory that belongs to no file.
   const scmp_arg_cmp no_exec = {2, SCMP_CMP_MASKED_EQ, PROT_EXEC, 0};
   const scmp_arg_cmp no_file = {3, SCMP_CMP_MASKED_EQ, MAP_ANONYMOUS, MAP_ANONYMOUS};
   added &= add_rule(filter, SCMP_ACT_ALLOW, SCMP_SYS(mmap), {no_exec, no_file});

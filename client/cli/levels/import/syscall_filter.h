@@ -1,5 +1,5 @@
-// Filter of system calls for the process that reads an untrusted file, by libseccomp. For import_child.cc. Only
-// syscall_filter.cc includes libseccomp. Changes the calling process.
+// Filter of system calls, made with libseccomp, for the process that reads an untrusted file. For import_child.cc. Only
+// syscall_filter.cc includes libseccomp. The function changes the calling process.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_SYSCALL_FILTER_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_SYSCALL_FILTER_H_
 

@@ -10,8 +10,8 @@
 namespace locus::cli {
 namespace {
 
-// Handler of the JSON parser's events, one call per token. A call that returns false ends parsing and has set
-// `status_`.
+// Handler of the JSON parser's events, with one function per token. A function that returns false ends the parsing; it
+// has then set `status_`.
 class RowHandler final : public nlohmann::json_sax<nlohmann::json> {
  public:
   RowHandler(const RowSchema& schema, RowBuilder& builder) : schema_(schema), builder_(builder) {}

@@ -40,8 +40,9 @@ absl::StatusOr<Arrival> RecordInput::next(Record& record, std::optional<Clock::t
   return Arrival::kRecord;
 }
 
-// Scans for the end of a record. Returns true if [begin_, scanned_) is a complete record including its line end. A
-// quote within a quoted field is written twice, so a line break is quoted if the number of quotes before it is odd.
+// Scans for the end of a record. Returns true if [begin_, scanned_) is a complete record including its line end. A line
+// break is inside a quoted field if the number of quotes before it is odd; this holds because a quote within a quoted
+// field is written twice.
 bool RecordInput::find_end() {
   while (scanned_ < buffer_.size()) {
     const char c = buffer_[scanned_++];

@@ -34,7 +34,7 @@ class RecordInput {
 
   // Reads the next record. With `pause_at`, returns kPause if no data is available by that time. Returns
   // INVALID_ARGUMENT for a record of more than kMaxRecordBytes or an unclosed quote, or the error of ByteInput::read().
-  // The caller must add name() and line() to the message of INVALID_ARGUMENT, which contains neither.
+  // The message of INVALID_ARGUMENT contains neither the input nor the line, so the caller must add name() and line().
   absl::StatusOr<Arrival> next(Record& record, std::optional<Clock::time_point> pause_at);
 
   const std::string& name() const { return input_.name(); }

@@ -1,5 +1,5 @@
-// Reader of csv or ndjson rows, batch by batch. For the commands that accept rows, which use the readers in this folder
-// only through RowReader. Not thread-safe. Holds at most one batch and one read buffer in memory.
+// Reader of csv or ndjson rows, batch by batch. For the commands that accept rows; of the readers in this folder they
+// use only RowReader. Not thread-safe. Holds at most one batch and one read buffer in memory.
 #ifndef LOCUS_CLIENT_CLI_ROWS_BULK_ROW_READER_H_
 #define LOCUS_CLIENT_CLI_ROWS_BULK_ROW_READER_H_
 
@@ -19,8 +19,8 @@ namespace locus::cli {
 
 enum class RowFormat { kCsv, kNdjson };
 
-// Time that a batch waits for more rows after its first row. After this time the batch ends as soon as the input has no
-// data ready, so that rows of a slow input are not held back.
+// Time, counted from the first row of a batch, for which the reader waits for more rows. After this time the batch ends
+// as soon as the input has no data ready, so that rows of a slow input are not held back.
 inline constexpr std::chrono::milliseconds kRowPause{50};
 
 enum class BatchEnd {
@@ -29,7 +29,8 @@ enum class BatchEnd {
   kEnd,    // the input has ended
 };
 
-// Behaviour of next() while the batch is still empty: wait for the first row, or return kPause after kRowPause.
+// Behaviour of next() while the batch is still empty. kWait: waits for the first row. kPause: returns BatchEnd::kPause
+// after kRowPause.
 enum class Patience { kWait, kPause };
 
 class RowReader {

@@ -32,7 +32,8 @@ struct Field {
   std::string parts = {};  // names of a vector's parts, such as "xyz"; empty for one value
   std::vector<std::string> aliases = {};
   bool required = false;
-  std::string option = {};  // option given for all rows, so the input must not have this column; empty = none
+  // Option that sets this field for all rows, so that the input must not have the column; empty = none.
+  std::string option = {};
   std::vector<std::string> words = {};
 
   size_t size() const { return parts.empty() ? 1 : parts.size(); }
@@ -40,8 +41,8 @@ struct Field {
 
 using RowSchema = std::vector<Field>;
 
-// Position of a value: the index of a field in the schema and, for one part of a vector, the index of the part. A slot
-// without `part` is the whole field.
+// Reference to a field of the schema or to one part of a vector field: the index of the field, and the index of the
+// part. A slot without `part` refers to the whole field.
 struct Slot {
   size_t field = 0;
   std::optional<size_t> part = std::nullopt;
@@ -56,9 +57,9 @@ std::string slot_name(const RowSchema& schema, const Slot& slot);
 // Returns the names of all csv columns of the schema, for messages: "from.x, from.y, ...".
 std::string known_columns(const RowSchema& schema);
 
-// Values of one field for all rows of a batch. The field's kind determines whether `numbers` (Field::size() entries per
-// row) or `integers` (one entry per row) is filled. `given` has one entry per row: 1 if the row has a value, otherwise
-// 0. For a row without a value, the entries of `numbers` or `integers` are 0.
+// Values of one field for all rows of a batch. Depending on the field's kind, either `numbers` (Field::size() entries
+// per row) or `integers` (one entry per row) is filled. `given` has one entry per row: 1 if the row has a value,
+// otherwise 0. If a row has no value, its entries in `numbers` or `integers` are 0.
 struct RowColumn {
   std::vector<double> numbers;
   std::vector<uint64_t> integers;

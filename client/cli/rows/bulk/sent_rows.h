@@ -1,5 +1,5 @@
-// Line numbers of the rows in a sent batch, used to find the input line of the item that a server's error names. For
-// the commands that send rows. Plain data and lookups.
+// Line numbers of the rows in a sent batch. They are used to find the input line of an item that the server's error
+// names. For the commands that send rows. Plain data and lookups.
 #ifndef LOCUS_CLIENT_CLI_ROWS_BULK_SENT_ROWS_H_
 #define LOCUS_CLIENT_CLI_ROWS_BULK_SENT_ROWS_H_
 
@@ -20,8 +20,9 @@ struct SentRows {
 
   size_t rows() const { return lines.size(); }
 
-  // Returns the line of entry `index` of one of the batch's lists. `field` is the path of the list in a server's error
-  // ("moves[3].ids", "blocks[0].rays.directions", "remove_ids"). Returns nullopt if no row belongs to that entry.
+  // Returns the line of entry `index` of one of the batch's lists. `field` is the path of the list as the server's
+  // error gives it ("moves[3].ids", "blocks[0].rays.directions", "remove_ids"). Returns nullopt if no row belongs to
+  // that entry.
   std::optional<uint64_t> line_of(absl::string_view field, size_t index) const;
 
   // Returns the range of the batch's lines for messages, as "17" or "17-8208"; empty if the batch has no rows.

@@ -14,7 +14,8 @@ PatchPoint bezier_curve_point(const PatchPoint& a, const PatchPoint& b, const Pa
   const double weight_sum = static_cast<double>(steps) * steps;
   PatchPoint point;
   for (size_t axis = 0; axis < 3; ++axis) {
-    // Add the terms of the end points first. That sum is commutative, so the reversed curve is rounded identically.
+    // Add the terms of the two end points first. Swapping the end points does not change this sum, so the reversed
+    // curve is rounded identically.
     point[axis] = ((a[axis] * weight_a + c[axis] * weight_c) + b[axis] * weight_b) / weight_sum;
   }
   return point;
@@ -27,7 +28,7 @@ PatchGrid tessellate_patch(std::span<const PatchPoint> controls, size_t width, s
   grid.height = (height - 1) / 2 * steps + 1;
   grid.points.reserve(grid.width * grid.height);
   for (size_t y = 0; y < grid.height; ++y) {
-    // A row of points shared by two patches is evaluated as the last row (step `steps`) of the first patch.
+    // A row of control points that two patches share is evaluated as the last row (step `steps`) of the first patch.
     const size_t patch_y = y == 0 ? 0 : (y - 1) / steps;
     const int step_y = static_cast<int>(y - patch_y * steps);
     for (size_t x = 0; x < grid.width; ++x) {

@@ -31,8 +31,9 @@ uint64_t triangles_of(const BspFace& face, int subdivisions) {
   return 0;
 }
 
-// Checks the total number of triangles before any triangle is built. Without this check a small file could take
-// unbounded memory, since many of its faces can share the same meshverts.
+// Checks the total number of triangles before any triangle is built. Without this check a small file could cause
+// unbounded memory use, since many faces of a file can share the same meshverts (entries of its list of triangle
+// corners).
 absl::Status check_triangles(const BspFile& file, int subdivisions) {
   uint64_t total = 0;
   for (size_t i = 0; i < file.faces.size(); ++i) {

@@ -111,7 +111,7 @@ absl::StatusOr<size_t> choose_level(const std::vector<LevelEntry>& levels, const
       absl::StrCat("no level ", entry, " in ", path, ": choose one of ", listing(names_of(levels))));
 }
 
-// Returns RESOURCE_EXHAUSTED if a level of `bytes` unpacked bytes so far exceeds a limit.
+// Returns RESOURCE_EXHAUSTED if a level of which `bytes` bytes have been unpacked so far exceeds a limit.
 absl::Status check_unpacked(uint64_t bytes, const LevelEntry& level, const std::string& path) {
   if (bytes > kMaxBspBytes) {
     return exceeds(absl::StrCat(level.name, " in ", path), "more bytes unpacked", "level_bytes", kMaxBspBytes,
