@@ -55,7 +55,8 @@ def mirror(files: descriptor_pb2.FileDescriptorSet) -> descriptor_pb2.FileDescri
 
 
 def health() -> descriptor_pb2.FileDescriptorProto:
-    """Returns the file of grpc.health.v1.Health/Check, which Debian does not ship. The status is declared as an int32.
+    """Returns the description of grpc.health.v1.Health/Check, whose file Debian does not ship. The status is declared
+    as int32.
     """
     file = descriptor_pb2.FileDescriptorProto(name="grpc/health/v1/health.proto", package="grpc.health.v1",
                                               syntax="proto3")
@@ -77,7 +78,8 @@ def commented(text: str, indent: str) -> List[str]:
 
 
 def enum_lines(file: descriptor_pb2.FileDescriptorProto) -> Iterator[str]:
-    """Yields the Python source of a file's enums. The prefix that repeats the enum's name is removed from its members.
+    """Yields the Python source of a file's enums. The names of their members are written without the prefix that
+    repeats the enum's name.
     """
     text = comments(file)
     for index, enum in enumerate(file.enum_type):

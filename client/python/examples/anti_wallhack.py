@@ -2,8 +2,9 @@
 
     PYTHONPATH=build/release/python /usr/bin/python3 anti_wallhack.py [ADDRESS]
 
-A matrix of sight answers for all pairs of players in one call. Each player is a group of its own, so that its body does
-not block its sight; three sample points on each body tell a head above a wall from a hidden player.
+One call queries the sight between all pairs of players, which is returned as a matrix. Each player has its own group,
+so that the body of a player does not block its sight. Each body has three sample points, so that a player whose head is
+above a wall counts as seen.
 """
 from __future__ import annotations
 
@@ -28,7 +29,7 @@ def make_scene(client: locus.Client, positions: list[list[float]]) -> locus.Ack:
 
 
 def visible(client: locus.Client, ack: locus.Ack, positions: list[list[float]]) -> list[list[int]]:
-    """Returns for each player the numbers of the players that it may know of."""
+    """Returns for each player the numbers of the players that it sees or that are close to it."""
     eyes = [[x, 1.7, z] for x, _, z in positions]
     bodies = [[x, height, z] for x, _, z in positions for height in SAMPLES]
     groups = list(range(1, PLAYERS + 1))

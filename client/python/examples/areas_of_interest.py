@@ -1,9 +1,10 @@
-"""Areas of interest: what is within a radius of each player, without sending a single position.
+"""Areas of interest: the things within a radius of each player, found without sending the positions of the players.
 
     PYTHONPATH=build/release/python /usr/bin/python3 areas_of_interest.py [ADDRESS]
 
-The queries are anchored: each counts from where its player is at the revision of the answer, and does not find the player
-itself. A second block only counts, for a list of crowded places.
+Each query is anchored to a player: its position is relative to the position of the player at the revision of the
+answer, and it does not find the player itself. A second block returns only numbers of objects, for a list of crowded
+places.
 """
 from __future__ import annotations
 
@@ -28,7 +29,7 @@ def make_scene(client: locus.Client) -> locus.Ack:
 
 
 def interests(client: locus.Client, ack: locus.Ack) -> tuple[list[list[int]], list[int]]:
-    """Returns for each player the ids of the things around it, and the number of everything within twice the radius."""
+    """Returns for each player the ids of the things around it, and the number of objects within twice the radius."""
     players = list(range(1, PLAYERS + 1))
     here = [[0, 0, 0]] * PLAYERS
     batch = locus.QueryBatch(at_least=ack)

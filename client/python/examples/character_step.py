@@ -1,9 +1,10 @@
-"""A character's step: push out of what it overlaps, then move and slide along walls and the floor.
+"""A character's step: it is pushed out of objects that it overlaps, then it moves and slides along walls and the floor.
 
     PYTHONPATH=build/release/python /usr/bin/python3 character_step.py [ADDRESS]
 
-The character is a capsule. Contacts (T, NORMAL of a capsule query) say how deep it overlaps and which way leads out; a
-sweep with AtStart.APPROACH says how far it may go, and passes the floor that it stands on.
+The character is a capsule. Columns T and NORMAL of a capsule query give the depth of each overlap and the direction out
+of it. A sweep with AtStart.APPROACH gives the distance that the character can move, without being stopped by the floor
+on which it stands.
 """
 from __future__ import annotations
 
@@ -29,7 +30,7 @@ def dot(a: Vector, b: Vector) -> float:
 
 
 def push_out(client: locus.Client, center: Vector) -> Vector:
-    """Returns the centre moved out of everything that the capsule overlaps, one contact after the other."""
+    """Returns the centre after moving it out of each object that the capsule overlaps, one contact after the other."""
     up = [0.0, HALF, 0.0]
     batch = locus.QueryBatch().capsules([add(center, up, -1)], [add(center, up)], RADIUS,
                                         block=locus.Block(columns=[Column.T, Column.NORMAL]))
@@ -42,7 +43,7 @@ def push_out(client: locus.Client, center: Vector) -> Vector:
 
 
 def step(client: locus.Client, center: Vector, way: Vector) -> Vector:
-    """Returns where the character is after it has tried to go `way`."""
+    """Returns the position of the character's centre after it has tried to move by the vector `way`."""
     center = push_out(client, center)
     for _ in range(SLIDES):
         batch = locus.QueryBatch().sweeps([center], [add(center, way)], RADIUS, half_axes=[0.0, HALF, 0.0],

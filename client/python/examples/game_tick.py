@@ -2,8 +2,9 @@
 
     PYTHONPATH=build/release/python /usr/bin/python3 client/python/examples/game_tick.py --address 127.0.0.1:7575
 
-Creates a scene of its own and deletes it at the end. Players walk on circles around a wall. Each tick queries which
-players are in reach of each player (with a ball), and whether each player sees the next player (with a ray to it).
+Creates a scene of its own and deletes the scene at the end. Players walk on circles around a wall. Each tick queries
+which players are within reach of each player (a ball query), and whether each player sees the next player (a ray
+query).
 """
 from __future__ import annotations
 
@@ -70,8 +71,8 @@ class Game:
         ack = self.updates.send(locus.UpdateBatch(tick=number).move(self.ids, here)).result()
         batch = locus.QueryBatch(at_least=ack)
         batch.balls(here, REACH, block=locus.Block(ignore_groups=self.ids, ignore_ids=[WALL]))
-        # Each ray goes from a player to the next one and ignores the player itself: its first hit is the next player,
-        # or an obstacle that hides it.
+        # Each ray goes from a player to the next player and ignores the group of the first. So its first hit is the
+        # next player, or an obstacle that hides the next player.
         batch.rays(here, difference(shifted(here), here), t_max=1.0, block=locus.Block(ignore_groups=self.ids))
         near, sight = self.queries.send(batch).result().blocks
         next_ids = self.ids[1:] + self.ids[:1]

@@ -2,8 +2,9 @@
 
     PYTHONPATH=build/release/python /usr/bin/python3 client/python/examples/lidar_sweep.py --address 127.0.0.1:7575
 
-Creates a scene of its own, a street of boxes with balls, and deletes it at the end. "Client time" is the time that this
-process spends on encoding the request and decoding the answer into columns; gRPC and the network count as waiting.
+Creates a scene of its own, a street of boxes with balls, and deletes the scene at the end. "Client time" is the time
+that this process spends on encoding the request and decoding the answer into columns. Time in gRPC and in the network
+counts as waiting.
 """
 from __future__ import annotations
 
@@ -73,7 +74,7 @@ def measured_sweep(client: locus.Client, scene: str, sweep: int, zeros: Any, dir
     answer = client.query_bytes(scene, request)
     answered = time.perf_counter_ns()
     hits = locus.QueryResult.from_bytes(answer).blocks[0]
-    hits.t, hits.ids, hits.triangles  # columns are made when first read
+    hits.t, hits.ids, hits.triangles  # a column is decoded when it is first read
     return hits, Cost(asked - begin, answered - asked, time.perf_counter_ns() - answered)
 
 

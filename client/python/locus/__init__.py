@@ -5,8 +5,8 @@ arrays, or array.array if numpy is not installed.
 """
 import pkgutil
 
-# Modules that protoc generates from the protocol are in another folder `locus`, as `locus/v1`. Extend the path of this
-# package, so that this package and those modules can be imported in the same process.
+# Extend the path of this package: the modules that protoc generates from the protocol are in `locus/v1` of another
+# folder that is also called `locus`. With the extended path, one process can import both.
 __path__ = pkgutil.extend_path(__path__, __name__)
 
 from .client import DEFAULT_ADDRESS, Client, connect

@@ -101,8 +101,9 @@ class Client:
         return Server.of(self._unary(rpc, rpc.request(), repeat=True))
 
     def quotas(self, identity: str = "", *, everybody: bool = False) -> Dict[str, Dict[str, Quota]]:
-        """Returns the quotas and their use, by identity and by name: of this caller and its connection, of `identity`,
-        or of `everybody`. Those of others are for callers that administer all scenes.
+        """Returns quotas and their use, by identity and by name of the quota. By default these are the quotas of this
+        caller and its connection; with `identity`, those of this identity; with `everybody`, those of all identities.
+        Only callers that administer all scenes may ask for the quotas of others.
         """
         fields = {"identity": identity, "all": everybody}
         return {entry.identity: {quota.name: Quota.of(quota) for quota in entry.quotas}
@@ -189,8 +190,8 @@ class Client:
         self._unary(rpc, rpc.request(mesh=name))
 
     def change_instances(self, scene: str, change: InstanceChange, *, no_wait: bool = False) -> PlacedInstances:
-        """Removes and places instances as one revision. Returns when queries see the change, or, with `no_wait`, as
-        soon as the server has accepted it.
+        """Removes and places instances as one revision. Returns when queries see the change or, with `no_wait`, as soon
+        as the server has accepted the change.
         """
         rpc = _rpc("Scene", "ChangeInstances")
         request = rpc.request()
@@ -240,7 +241,7 @@ class Client:
             request.page_token = page.next_page_token
 
     def _greet(self, wait_for_server: bool) -> None:
-        """Makes a first call to the server, so that connect() itself fails, with a clear message, if the address is
+        """Makes a first call to the server, so that connect() itself fails with a clear message if the address is
         wrong.
         """
         rpc = _rpc("Server", "GetServer")
@@ -250,7 +251,7 @@ class Client:
             call(b"", timeout=self._connection.timeout, wait_for_ready=wait_for_server, metadata=metadata)
         except grpc.RpcError as failure:
             error = from_call(failure)
-            if error.code == grpc.StatusCode.PERMISSION_DENIED:  # the server answers; other calls may be permitted
+            if error.code == grpc.StatusCode.PERMISSION_DENIED:  # the server answers, and other calls may be permitted
                 return
             silent = error.code in (grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.DEADLINE_EXCEEDED)
             if error.refused or handshake_advice(error.message) or not silent:

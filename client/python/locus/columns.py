@@ -42,7 +42,8 @@ class Values(Protocol):
 
 
 class Kind(NamedTuple):
-    """Number type of a column: its name, its type code in array.array, its size in bytes, its format codes in buffers.
+    """Number type of a column: its name, its type code in array.array, its size in bytes, and the format codes that a
+    buffer of this type may have.
     """
 
     name: str
@@ -98,10 +99,10 @@ def _from_numbers(path: str, value: Any, kind: Kind) -> bytes:
 
 
 def borrow(path: str, value: ColumnLike, kind: Kind, width: int = 1) -> Raw:
-    """Returns the encoded column, empty for None. A contiguous buffer is borrowed, not copied, so it must not change
+    """Returns the encoded column; empty for None. A contiguous buffer is borrowed, not copied, so it must not change
     until the request was sent.
 
-    `path` names the column in errors. Raises TypeError for numbers of another type, ValueError if the count of numbers
+    `path` names the column in errors. Raises TypeError for numbers of another type, ValueError if the number of values
     is not a multiple of `width`. Cost: linear for lists and for arrays that are not contiguous, else constant.
     """
     if value is None:
@@ -130,7 +131,9 @@ def entries(raw: Raw, kind: Kind, width: int = 1) -> int:
 
 
 def borrow_for(path: str, value: ColumnLike, kind: Kind, count: int, width: int = 1) -> Raw:
-    """Returns the encoded column like borrow(). Raises ValueError unless it has `count` entries, one entry or none."""
+    """Returns the encoded column like borrow(). Raises ValueError unless the column has `count` entries, one entry or
+    no entry.
+    """
     raw = borrow(path, value, kind, width)
     found = entries(raw, kind, width)
     if found not in (0, 1, count):
@@ -139,12 +142,12 @@ def borrow_for(path: str, value: ColumnLike, kind: Kind, count: int, width: int 
 
 
 def encode(path: str, value: ColumnLike, kind: Kind, width: int = 1) -> bytes:
-    """Returns a copy of the encoded column; arguments and errors as borrow()."""
+    """Returns a copy of the encoded column. Arguments and errors are those of borrow()."""
     return bytes(borrow(path, value, kind, width))
 
 
 def encode_for(path: str, value: ColumnLike, kind: Kind, count: int, width: int = 1) -> bytes:
-    """Returns a copy of the encoded column; arguments and errors as borrow_for()."""
+    """Returns a copy of the encoded column. Arguments and errors are those of borrow_for()."""
     return bytes(borrow_for(path, value, kind, count, width))
 
 

@@ -40,7 +40,7 @@ class Retry:
 
 
 def target_of(address: str) -> str:
-    """Returns `address` as a target for gRPC: with the default port if it has no port."""
+    """Returns `address` as a target for gRPC. Adds the default port if the address has no port."""
     if not address:
         raise ValueError("the address is empty: give host:port or unix:/path")
     has_port = not address.endswith("]") if address.startswith("[") else ":" in address
@@ -91,7 +91,9 @@ class Connection:
 
     def unary_bytes(self, path: str, request: bytes, *, scene: str = "", repeat: bool = False,
                     timeout: Optional[float] = None) -> bytes:
-        """Calls a unary rpc with an encoded request and returns the encoded response; otherwise like unary()."""
+        """Calls a unary rpc with an encoded request and returns the encoded response. The other arguments are those of
+        unary().
+        """
         call = self.channel.unary_unary(path)
         deadline = time.monotonic() + (self.timeout if timeout is None else timeout)
 
@@ -105,7 +107,7 @@ class Connection:
         try:
             return self._attempts(attempt, deadline if repeat else None)
         except LocusError as error:
-            # A server that does not accept the token has done nothing, so every call may be repeated.
+            # A server that refuses the token has done nothing, so every call may be repeated.
             if error.code != grpc.StatusCode.UNAUTHENTICATED or not self.token.has_newer(used):
                 raise
         return self._attempts(attempt, deadline if repeat else None)

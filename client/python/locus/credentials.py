@@ -31,7 +31,7 @@ def stays_on_this_machine(target: str) -> bool:
 
 @dataclasses.dataclass(frozen=True)
 class Credentials:
-    """The options of connect() about encryption and identity; see there."""
+    """Options of connect() about encryption and identity; connect() describes them."""
 
     tls: bool = False
     ca: str = ""
@@ -84,21 +84,22 @@ class Token:
             raise ValueError(f"without TLS everyone on the way to {target} could read the token: connect with TLS")
 
     def metadata(self) -> Tuple[int, Metadata]:
-        """Returns the number of the token, 1 for the first, and the metadata for a call."""
+        """Returns the number of the token (1 for the first token) and the metadata for a call."""
         with self._lock:
             if self._file and _stamp(self._file) != self._stamp:
                 self._read()
             return self._number, [("authorization", f"Bearer {self._token}")] if self._token else []
 
     def has_newer(self, used: int) -> bool:
-        """Reads the file again after the server refused token number `used`. Returns True if there is a newer one."""
+        """Reads the file again after the server refused token number `used`. Returns True if there is a newer token."""
         with self._lock:
             if self._file:
                 self._read()
             return self._number > used
 
     def _read(self) -> None:
-        self._stamp = _stamp(self._file)  # before the file is read, so that a change in between is noticed later
+        # Take the stamp before reading the file: if the file changes in between, the next call reads it again.
+        self._stamp = _stamp(self._file)
         try:
             token = _read_token(self._file)
         except (OSError, ValueError):
@@ -116,7 +117,7 @@ def _content(name: str) -> Optional[bytes]:
 
 
 def _check_token(origin: str, token: str) -> None:
-    """Raises ValueError, without the token, if it is malformed."""
+    """Raises ValueError if the token is malformed. The message does not contain the token."""
     if not _TOKEN.fullmatch(token) or len(token) > MAX_TOKEN_BYTES:
         raise ValueError(f"{origin} is no token: a token is one word of at most {MAX_TOKEN_BYTES} ASCII characters")
 
@@ -129,7 +130,7 @@ def _read_token(name: str) -> str:
 
 
 def _stamp(name: str) -> Optional[Tuple[int, int, int]]:
-    """Returns the state of a file; another state means that the file has changed."""
+    """Returns the state of a file. If a later state differs, the file has changed."""
     try:
         status = os.stat(name) if name else None
     except OSError:

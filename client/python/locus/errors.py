@@ -12,7 +12,7 @@ _Status, _Error = schema.message("Status"), schema.message("Error")
 _CODES = {code.value[0]: code for code in grpc.StatusCode}
 _ERROR_TYPE = "type.googleapis.com/locus.v1.Error"
 
-# Hints for errors that did not come from the server. Error messages of the server need no hint, since they already
+# Hints for errors that did not come from the server. The server's own error messages need no hint, because they already
 # suggest a remedy.
 _HINTS = {
     grpc.StatusCode.UNAVAILABLE: "try again when the server answers",
@@ -24,8 +24,8 @@ _HINTS = {
     grpc.StatusCode.PERMISSION_DENIED: "ask the operator of the server for the right to do this",
 }
 
-# Parts of gRPC's messages for connections that end during their establishment, each with advice; the first match is
-# used.
+# Pairs of texts for connections that end during their establishment: if gRPC's message contains the first text, the
+# advice is the second. The first pair that matches is used.
 _ON_HANDSHAKES = (
     (": Permission denied", "permission denied: the socket's file admits other users only; the server's operator can set "
                             "--unix-mode and --unix-owner"),
@@ -84,7 +84,7 @@ class LocusError(Exception):
 
     @property
     def worth_repeating(self) -> bool:
-        """True if an idempotent call may succeed when it is retried unchanged."""
+        """True if an idempotent call that failed with this error may succeed when it is retried unchanged."""
         return self.code == grpc.StatusCode.UNAVAILABLE or (
             self.code == grpc.StatusCode.RESOURCE_EXHAUSTED and self.retry_after > 0)
 
@@ -94,12 +94,16 @@ class LocusError(Exception):
 
 
 def reason_of(number: int) -> Reason:
-    """Returns the reason of this enum number, or UNSPECIFIED for a number that only a newer server knows."""
+    """Returns the reason of this enum number. Returns UNSPECIFIED for a number that this client does not know, which a
+    newer server may send.
+    """
     return Reason(number) if number in Reason._value2member_map_ else Reason.UNSPECIFIED
 
 
 def from_error(error: Any) -> LocusError:
-    """Returns the LocusError for the protocol's Error of a stream. OK and unknown status codes become UNKNOWN."""
+    """Returns the LocusError for an Error message of the protocol, with which a stream answers a request. OK and
+    unknown status codes become UNKNOWN.
+    """
     code = _CODES.get(error.code, grpc.StatusCode.UNKNOWN)
     return LocusError(code if code != grpc.StatusCode.OK else grpc.StatusCode.UNKNOWN, error.message,
                       reason=reason_of(error.reason), field=error.field,
@@ -108,8 +112,8 @@ def from_error(error: Any) -> LocusError:
 
 
 def from_call(call: Any) -> LocusError:
-    """Returns the LocusError for a failed gRPC call. Details that cannot be decoded are ignored; code and message are
-    kept.
+    """Returns the LocusError for a failed gRPC call. Details that cannot be decoded are ignored; the code and the
+    message are kept.
     """
     for key, value in call.trailing_metadata() or ():
         if key == "grpc-status-details-bin":

@@ -14,7 +14,7 @@ from .values import Mesh, MeshPart
 
 _Change = schema.message("ChangeInstancesRequest")
 _Upload = schema.message("UploadMeshRequest")
-_BYTES_A_MESSAGE = 12 * 87_040  # a little under 1 MiB, in whole vertices or triangles of 12 bytes
+_BYTES_A_MESSAGE = 12 * 87_040  # a little under 1 MiB; a multiple of 12, the size of a vertex and of a triangle
 
 # Callback that is called after each message of an upload, with the number of bytes sent so far and the total number.
 Progress = Callable[[int, int], None]
@@ -73,8 +73,8 @@ class InstanceChange:
 
 @dataclasses.dataclass(frozen=True)
 class PlacedInstances:
-    """Result of a change of instances. `revision` is the first revision that contains the change; with `no_wait` the
-    change is only accepted, and `revision` is None.
+    """Result of a change of instances. `revision` is the first revision that contains the change. With `no_wait` the
+    server has accepted the change but not applied it yet, so `revision` is None.
 
     `ids`: uint64, one for each placed instance in the order of the request. `change` is the sequence number of the
     change within the epoch, from 1.
@@ -94,8 +94,8 @@ class PlacedInstances:
 
 @dataclasses.dataclass(frozen=True)
 class MeshColumns:
-    """Mesh of V vertices and T triangles with its columns, as uploaded: `vertices` 3V float32 in mesh axes, `indices`
-    3T uint32.
+    """Mesh of V vertices and T triangles with its columns, as they were uploaded: `vertices` are 3V float32 in mesh
+    axes, `indices` are 3T uint32.
     """
 
     mesh: Mesh
@@ -104,8 +104,8 @@ class MeshColumns:
 
     @classmethod
     def of(cls, pieces: Sequence[Any]) -> "MeshColumns":
-        """Joins all messages of a download. Raises LocusError DATA_LOSS if their content does not have the mesh's
-        SHA-256.
+        """Joins all messages of a download. Raises LocusError DATA_LOSS if the SHA-256 of the received columns differs
+        from the SHA-256 of the mesh.
         """
         vertices = b"".join(piece.vertices for piece in pieces)
         indices = b"".join(piece.indices for piece in pieces)
@@ -127,7 +127,7 @@ def mesh_sha256(vertices: bytes, indices: bytes) -> bytes:
 
 def upload_messages(name: str, vertices: ColumnLike, indices: ColumnLike, parts: Sequence[MeshPart],
                     progress: Optional[Progress]) -> Iterator[Any]:
-    """Yields the messages of UploadMesh: a first message with counts and hash, then the columns in parts below 1 MiB.
+    """Yields the messages of UploadMesh: first a message with counts and hash, then the columns in pieces below 1 MiB.
     """
     columns_: Tuple[Tuple[str, bytes], ...] = (("vertices", columns.encode("vertices", vertices, FLOAT32, 3)),
                                                ("indices", columns.encode("indices", indices, UINT32, 3)))

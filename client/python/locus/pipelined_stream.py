@@ -18,7 +18,7 @@ from .connection import Connection, Retry
 from .errors import LocusError, from_call
 
 Result = TypeVar("Result")
-# Status codes, besides those worth repeating, of a broken call after which a new call may succeed.
+# Status codes after which a new call may succeed, in addition to the codes that worth_repeating covers.
 _AGAIN = (grpc.StatusCode.CANCELLED, grpc.StatusCode.INTERNAL)
 
 
@@ -73,11 +73,11 @@ class PipelinedStream(Generic[Result]):
         raise NotImplementedError
 
     def _answer_in(self, response: bytes) -> Tuple[int, Any]:
-        """Returns the sequence number of a response, and its result or LocusError."""
+        """Returns the sequence number of a response, and the result or LocusError that the response contains."""
         raise NotImplementedError
 
     def _answered(self, outcome: Any, position: int) -> None:
-        """Handles `outcome`, the result or LocusError of an item. Called after the item was removed from position
+        """Handles `outcome`, the result or LocusError of an item. Called after the item was removed from index
         `position` of `_items`.
         """
 
@@ -98,10 +98,10 @@ class PipelinedStream(Generic[Result]):
         return item.future
 
     def sync(self, timeout: Optional[float] = None) -> None:
-        """Blocks until every sent batch has been answered. Errors of single batches are raised only by the futures of
-        these batches.
+        """Blocks until every sent batch has been answered. Raises LocusError if the stream ended with an error, and
+        TimeoutError after `timeout` seconds.
 
-        Raises LocusError if the stream ended with an error, TimeoutError after `timeout` seconds.
+        An error of a single batch is not raised here, but by the future of this batch.
         """
         with self._changed:
             if not self._changed.wait_for(lambda: not self._items and not self._handing_over, timeout):
@@ -145,7 +145,7 @@ class PipelinedStream(Generic[Result]):
 
     def _another_call(self, end: Optional[LocusError]) -> bool:
         """Waits until a new call may be opened and there is a message to send, then returns True. Returns False if the
-        stream has ended instead. `end` is the error of the previous call, if any.
+        stream ends before that. `end` is the error of the previous call, if any.
         """
         with self._changed:
             wait = self._wait_before_next(end) if end is not None else 0.0
@@ -192,7 +192,9 @@ class PipelinedStream(Generic[Result]):
                 self._changed.notify_all()
 
     def _requests(self, over: threading.Event) -> Iterator[bytes]:
-        """Yields the messages to send on one call, until `over` is set. Iterated by gRPC's thread."""
+        """Yields the messages to send on one call, until `over` is set or the stream is closed. gRPC iterates over them
+        in its own thread.
+        """
         while True:
             with self._changed:
                 self._changed.wait_for(lambda: over.is_set() or self._unwritten() is not None
@@ -208,8 +210,8 @@ class PipelinedStream(Generic[Result]):
         return next((item for item in self._items if not item.written), None)
 
     def _receive(self, response: bytes) -> None:
-        """Resolves the item that a response answers. A response with an unknown sequence number is ignored: its item
-        was renumbered and is sent again.
+        """Resolves the item that a response answers. A response whose sequence number no item has is ignored: its item
+        was renumbered in the meantime and is sent again.
         """
         sequence, outcome = self._answer_in(response)
         with self._changed:
@@ -235,8 +237,8 @@ class PipelinedStream(Generic[Result]):
             return LocusError(grpc.StatusCode.UNAVAILABLE, "the server ended the stream before it had answered everything")
 
     def _wait_before_next(self, end: LocusError) -> Optional[float]:
-        """Returns the seconds to wait before the next call, or None if the stream has ended. Failures while no message
-        is unanswered are not counted.
+        """Returns the seconds to wait before the next call, or None if the stream ends instead. A call that fails while
+        no message is unanswered does not count as a failure.
         """
         if self._broken_off or self._fatal is not None:
             return None

@@ -17,25 +17,27 @@ _KINDS = {name: schema.numbers(name.capitalize())
 
 
 class Block(NamedTuple):
-    """Settings common to all kinds of block, for N queries. All settings are optional. Of a setting with N numbers or
-    one, the one number applies to all queries.
+    """Settings common to all kinds of block, for N queries. All settings are optional. For a setting with N numbers or
+    one, a single number applies to all queries.
 
-    - `frame`: three floats, added to every position of the block. Column POINT of the result is relative to the frame,
-      column POSE is absolute.
+    - `frame`: three floats, the origin that the server adds to every position of the block. Column POINT of the result
+      is relative to the frame, but column POSE is absolute.
     - `source`: search static instances, moving objects or both; `precision`: exact shapes or their bounds.
-    - `columns`: columns to return for each row, by default T, ID and TRIANGLE for rays, sweeps and nearest queries, ID for
-      balls, boxes, capsules, frustums and contains (TRIANGLE too if their detail is triangles), ID and POSE for lookups,
-      ID and OTHER for pairs (T too with `k`), T, ID, TRIANGLE and NORMAL for cells.
+    - `columns`: columns to return for each row, by default T, ID and TRIANGLE for rays, sweeps and nearest queries, ID
+      for balls, boxes, capsules, frustums and contains (TRIANGLE too if their detail is triangles), ID and POSE for
+      lookups, ID and OTHER for pairs (T too with `k`), T, ID, TRIANGLE and NORMAL for cells.
     - `masks`: N uint32 or one; only objects and instances with (layers & mask) != 0 are found.
     - `ignore_groups`: N uint64 or one; the query ignores objects and instances of this group.
     - `ignore_ids`: at most 64 uint64 ids to ignore, for the whole block.
-    - `max_results`: maximum number of rows a query, 0 = 1,024.
+    - `max_results`: maximum number of rows per query, 0 = 1,024.
     - `after_id`: return only rows with a higher id, to continue after a truncated result.
     - `as_of_ticks`: N uint64 or one; the query sees objects as they were at the end of this tick. `as_of_fractions`: N
-      float32 or one, 0 <= f < 1, only with `as_of_ticks`: fraction f of the time from that tick to the next one.
-      `outside_history`: handling of times that are not in the history; they are refused by default.
-    - `anchor_ids`: N uint64; positions of a query count from where this object or instance is, which is not found itself.
-    - `count_only`: return only the number of rows of each query, without a maximum.
+      float32 or one, 0 <= f < 1, only with `as_of_ticks`: moves the time of the query on by the fraction f of the time
+      from that tick to the next. `outside_history`: how times outside the history are handled; by default they are
+      refused.
+    - `anchor_ids`: N uint64, an object or instance for each query. The positions of the query are relative to the
+      position of this anchor, and the query does not find the anchor.
+    - `count_only`: return only the number of rows of each query; `max_results` does not limit this number.
     """
 
     frame: Optional[ColumnLike] = None
@@ -54,7 +56,9 @@ class Block(NamedTuple):
     count_only: bool = False
 
     def write(self, block: wire.Parts, path: str, count: int) -> None:
-        """Appends the settings to a QueryBlock of `count` queries, named `path` in errors. Defaults add no bytes."""
+        """Appends the settings to a QueryBlock of `count` queries, which errors call `path`. Settings with default
+        values add no bytes.
+        """
         if self.frame is not None:
             block.add(_BLOCK["frame"], wire.vector(columns.vector(path + "frame", self.frame)))
         if self.source:
@@ -88,8 +92,8 @@ class Block(NamedTuple):
 
 
 class After(NamedTuple):
-    """Position in the order of rows (t, id, triangle) behind which rays and nearest queries continue: N numbers each, or
-    one for all. Without `ids`, rows at t itself are left out; `triangles` need `ids`.
+    """Position in the order of rows (t, id, triangle). Rays and nearest queries return only rows behind this position:
+    N numbers each, or one for all. Without `ids`, rows whose t equals the given t are left out; `triangles` need `ids`.
     """
 
     ts: ColumnLike
@@ -100,19 +104,19 @@ class After(NamedTuple):
 class QueryBatch:
     """Blocks of queries for one scene, answered at one revision, in order.
 
-    N, the number of queries of a block, is the number of entries of its first column; every other column has N entries,
-    one entry for all queries, or none for its default. Positions are float32, relative to the block's frame; positions
-    and lengths are in the caller's unit.
+    N, the number of queries of a block, is the number of entries of the block's first column; every other column has N
+    entries, one entry for all queries, or none for its default. Positions are float32, relative to the block's frame.
+    Positions and lengths are in the caller's unit of length.
 
     `at_least`: the minimum revision, for example an Ack ("read your own writes"); `exactly`: exactly this revision, if
-    the server still retains it. The default is the latest revision. With `at_least` or `exactly`, the query raises
-    LocusError with Reason.SCENE_RESTARTED if the scene's epoch differs from the epoch of the given revision.
-    `max_work`: maximum total number of visited nodes and cells and of tests for the batch; `explain`: report the work
-    done; `max_reply_bytes`: the maximum size of the answer, 0 = 4,000,000.
+    the server still retains it. By default the batch is answered at the latest revision. If the epoch of the given
+    revision differs from the scene's epoch, the query raises LocusError with Reason.SCENE_RESTARTED. `max_work`:
+    maximum total number of visited nodes and cells and of tests for the batch; `explain`: report the work done;
+    `max_reply_bytes`: the maximum size of the answer, 0 = 4,000,000.
 
-    Columns are checked for type and length here (TypeError and ValueError name the column), values by the server. Buffers
-    are borrowed: leave them unchanged until the batch was sent. A batch may be sent several times. Methods return the
-    batch, so that calls can be chained. Not thread-safe.
+    The batch checks types and lengths of columns (TypeError and ValueError name the column); the server checks values.
+    Buffers are borrowed: leave them unchanged until the batch was sent. A batch may be sent several times. Methods
+    return the batch, so that calls can be chained. Not thread-safe.
     """
 
     def __init__(self, *, at_least: Optional[Revision] = None, exactly: Optional[Revision] = None, max_work: int = 0,
@@ -191,11 +195,11 @@ class QueryBatch:
                half_extents: ColumnLike = None, rotations: ColumnLike = None, mode: RayMode = RayMode.FIRST,
                at_start: AtStart = AtStart.HIT, block: Block = Block()) -> "QueryBatch":
         """Adds a block of N solids that move in a straight line: balls (`radii`), capsules (`radii` and `half_axes`) or
-        boxes (`half_extents`). Column T contains the first moment of contact, 0 .. 1. `starts`: 3N float32; `ends`: 3N
-        float32 or three, both of the centre; `radii`: N float32 or one, above 0; `half_axes`: 3N float32 or three, from
-        the centre to one end of the inner segment; `half_extents`: 3N float32 or three, along the box's own axes;
-        `rotations`: 4N float32 or four, unit quaternions x, y, z, w, for boxes; `at_start`: treatment of what the solid
-        touches at t = 0.
+        boxes (`half_extents`). Column T contains the first moment of contact, 0 .. 1. `starts`, `ends`: positions of
+        the centre, 3N float32 each, or three for `ends`; `radii`: N float32 or one, above 0; `half_axes`: 3N float32 or
+        three, from the centre to one end of the inner segment; `half_extents`: 3N float32 or three, along the box's own
+        axes; `rotations`: 4N float32 or four, unit quaternions x, y, z, w, for boxes; `at_start`: how objects and
+        triangles are treated that the solid touches at t = 0.
         """
         new = _NewBlock(self._blocks, "sweeps")
         new.first("starts", starts, FLOAT32, 3)
@@ -224,8 +228,9 @@ class QueryBatch:
 
     def frustums(self, planes: ColumnLike, *, planes_each: int = 6, detail: StaticDetail = StaticDetail.INSTANCES,
                  block: Block = Block()) -> "QueryBatch":
-        """Adds a block of N convex regions, to find the objects and instances that overlap them. `planes`: float32
-        nx, ny, nz, d of `planes_each` planes, 4 .. 32, for each region; a point p is inside of a plane if n.p + d >= 0.
+        """Adds a block of N convex regions, to find the objects and instances that overlap them. `planes`: for each
+        region, `planes_each` planes (4 .. 32) of four float32 nx, ny, nz, d; a point p is inside a plane if n.p + d >=
+        0.
         """
         new = _NewBlock(self._blocks, "frustums")
         new.first("planes", planes, FLOAT32, 4 * planes_each)
@@ -255,9 +260,9 @@ class QueryBatch:
               pairwise: bool = False, block: Block = Block()) -> "QueryBatch":
         """Adds a block of V viewers that look at M targets; BlockResult.sight has a byte for each viewer and target.
         `viewers`: float32, `eyes` points for each viewer; `targets`: float32, `samples` points for each target;
-        `viewer_groups`: V uint64 or one, `target_groups`: M uint64 or one, groups that do not block the sight of this
-        viewer, or of this target; `max_distances`: V float32 or one, inclusive; `pairwise`: viewer i looks at target i
-        only.
+        `viewer_groups`: V uint64 or one, `target_groups`: M uint64 or one: objects and instances of these groups do not
+        block the sight of this viewer, or of this target; `max_distances`: V float32 or one, inclusive; `pairwise`:
+        viewer i looks only at target i.
         """
         new = _NewBlock(self._blocks, "sight")
         new.first("viewers", viewers, FLOAT32, 3 * eyes)
@@ -273,8 +278,8 @@ class QueryBatch:
     def pairs(self, max_distance: float = 0.0, *, first_mask: int = 0, second_mask: int = 0, k: int = 0,
               after_other: int = 0, block: Block = Block()) -> "QueryBatch":
         """Adds one query for the pairs of objects within `max_distance` of each other; 0 finds objects that touch.
-        `first_mask`, `second_mask`: layers of the two objects, 0 = all; `k`: the k nearest objects of each object instead
-        of all pairs; `after_other` with Block.after_id: only rows behind this pair.
+        `first_mask`, `second_mask`: layers of the two objects, 0 = all; `k`: find only the k nearest objects of each
+        object; `after_other`, together with Block.after_id: only rows behind this pair.
         """
         new = _NewBlock(self._blocks, "pairs")
         new.count = 1
@@ -287,9 +292,10 @@ class QueryBatch:
 
     def cells(self, points: ColumnLike, max_distances: ColumnLike, *, max_planes: int = 32,
               block: Block = Block()) -> "QueryBatch":
-        """Adds a block of N points, to get the convex free space around them. `points`: 3N float32; `max_distances`: N
-        float32 or one, above 0. The first row of a point has id 0, and as T the radius of the ball that bounds the
-        space; each further row is a plane. A point in or on something has no rows.
+        """Adds a block of N points, to get the convex free space around each of them. `points`: 3N float32;
+        `max_distances`: N float32 or one, above 0. The first row of a point describes the ball that bounds the space:
+        it has id 0, and T is the radius of the ball. Each further row is a plane. A point in or on an object or
+        triangle has no rows.
         """
         new = _NewBlock(self._blocks, "cells")
         new.first("points", points, FLOAT32, 3)
@@ -314,18 +320,20 @@ class QueryBatch:
         return self._add(new, block)
 
     def request_bytes(self, scene: str) -> bytes:
-        """Returns the encoded request for Query. Copies the borrowed columns, which may be changed afterwards."""
+        """Returns the encoded request for Query. The columns are copied, so the borrowed buffers may be changed
+        afterwards.
+        """
         request = wire.Parts()
         request.add(_REQUEST["scene"], scene.encode())
         request.add_parts(_REQUEST["batch"], self._parts)
         return b"".join(request.pieces)
 
     def batch_bytes(self) -> bytes:
-        """Returns the encoded QueryBatch. Copies the borrowed columns, which may be changed afterwards."""
+        """Returns the encoded QueryBatch. The columns are copied, so the borrowed buffers may be changed afterwards."""
         return b"".join(self._parts.pieces)
 
     def _add(self, new: _NewBlock, settings: Block) -> QueryBatch:
-        """Adds a complete block to the batch. A block whose settings are refused is not added."""
+        """Adds a complete block to the batch. Adds nothing if the block's settings are refused."""
         block = wire.Parts()
         settings.write(block, new.path, new.count)
         block.add_parts(_BLOCK[new.name], new.kind)
@@ -362,19 +370,21 @@ class _NewBlock:
             self.column("after_triangles", after.triangles, UINT32)
 
     def numbers(self, **fields: float) -> None:
-        """Adds the kind's fields that are single floats. Fields that are 0 are omitted."""
+        """Adds those fields of the kind that are single floats. Fields that are 0 are omitted."""
         for name, value in fields.items():
             if value:
                 self.kind.add_fixed32(_KINDS[self.name][name], struct.unpack("<I", struct.pack("<f", value))[0])
 
     def masks(self, **fields: int) -> None:
-        """Adds the kind's fields that are single fixed32 numbers. Fields that are 0 are omitted."""
+        """Adds those fields of the kind that are single fixed32 numbers. Fields that are 0 are omitted."""
         for name, value in fields.items():
             if value:
                 self.kind.add_fixed32(_KINDS[self.name][name], value)
 
     def options(self, **fields: int) -> None:
-        """Adds the kind's fields that are not columns. Fields that are 0 are omitted."""
+        """Adds those fields of the kind that are single varints: bools, enums and uint32. Fields that are 0 are
+        omitted.
+        """
         for name, value in fields.items():
             if value:
                 self.kind.add_varint(_KINDS[self.name][name], value)

@@ -1,4 +1,4 @@
-"""Results of query batches: columns that are views of the received bytes, by query and row."""
+"""Results of query batches: columns that are views of the received bytes, accessed by query and row."""
 from __future__ import annotations
 
 import dataclasses
@@ -18,8 +18,8 @@ NO_TRIANGLE = 0xFFFFFFFF
 _RESULT = schema.numbers("QueryResult")
 _BLOCK = schema.numbers("BlockResult")
 _IN_RESPONSE = schema.numbers("QueryResponse")["result"]
-# Size of a row, in bytes, of each column from whose length the number of rows can be computed. The two most frequent
-# columns are first, since they are tried in this order.
+# Sizes in bytes of a row of the columns from whose length the number of rows can be computed. The two most frequent
+# columns are first, because the columns are tried in this order.
 _COUNTS = _BLOCK["counts"]
 _ROW_BYTES = tuple((_BLOCK[name], size) for name, size in (
     ("ids", 8), ("t", 4), ("triangles", 4), ("uvs", 8), ("normals", 12), ("points", 12), ("groups", 8), ("tags", 8),
@@ -27,7 +27,9 @@ _ROW_BYTES = tuple((_BLOCK[name], size) for name, size in (
 
 
 class _Column:
-    """Descriptor of a column of a BlockResult: decoded when first read, then stored as an attribute of the block."""
+    """Descriptor of a column of a BlockResult. The column is decoded when it is first read, and then stored as an
+    attribute of the block.
+    """
 
     def __init__(self, doc: str, kind: columns.Kind, width: int = 1, *, by_row: bool = True) -> None:
         self.__doc__ = doc
@@ -110,8 +112,8 @@ class BlockResult:
         return _work_in(self._fields, _BLOCK["work"])
 
     def rows_of(self, query: int) -> slice:
-        """Returns the rows of one query as a slice, to index columns with one number per row. The first call is linear
-        in N.
+        """Returns the rows of one query as a slice, with which columns that have one number per row can be indexed. The
+        first call takes time linear in N.
         """
         if not len(self.counts):
             return slice(query, query + 1)
@@ -141,7 +143,7 @@ class BlockResult:
 
 @dataclasses.dataclass(frozen=True, eq=False, init=False)
 class QueryResult(Revision):
-    """Result of a batch at one revision: `blocks` in the order of the request; `tick` is the scene's tick.
+    """Result of a batch at one revision. `blocks` are in the order of the request; `tick` is the scene's tick.
 
     `work` is the work of the whole batch; None without `explain`.
     """
@@ -152,11 +154,13 @@ class QueryResult(Revision):
 
     @classmethod
     def of(cls, message: memoryview) -> "QueryResult":
-        """Decodes the protocol's QueryResult. Columns are views, so `message` stays in memory as long as any column."""
+        """Decodes the protocol's QueryResult. Columns are views of `message`, so its memory is kept as long as any
+        column.
+        """
         found = wire.fields(message)
         result = cls.__new__(cls)
-        # Set all attributes by one update() of the dictionary: it is measurably faster than object.__setattr__() for
-        # each one.
+        # Set all attributes by one update() of the dictionary, which is measurably faster than one object.__setattr__()
+        # for each.
         result.__dict__.update(
             epoch=wire.fixed64(found, _RESULT["epoch"]), revision=wire.fixed64(found, _RESULT["revision"]),
             tick=wire.fixed64(found, _RESULT["tick"]), work=_work_in(found, _RESULT["work"]),

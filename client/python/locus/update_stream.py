@@ -1,5 +1,5 @@
-"""Pipelined stream of update batches to one scene, each applied exactly once even if connections break. For game
-servers that send a batch a tick.
+"""Pipelined stream of update batches to one scene. Each batch is applied exactly once, even if connections break. For
+game servers that send one batch per tick.
 """
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ class UpdateStream(PipelinedStream[Ack]):
         self._last_ack: Optional[Ack] = None
 
     def send(self, batch: UpdateBatch) -> "Future[Ack]":
-        """Sends a batch. Blocks while `max_in_flight` batches are unanswered, so a caller that is faster than the
-        server is slowed down.
+        """Sends a batch. Blocks while `max_in_flight` batches are unanswered, which slows a caller down to the rate of
+        the server.
 
         The future receives the Ack, or the LocusError of this batch. The batch is copied and may be used again; the
-        stream replaces its `writer` and `number`. Raises LocusError if the stream has ended.
+        stream replaces the `writer` and `number` of the copy. Raises LocusError if the stream has ended.
         """
         return self._send(batch.message.SerializeToString())
 
@@ -59,8 +59,8 @@ class UpdateStream(PipelinedStream[Ack]):
         self._next_batch += 1
 
     def _request_of(self, item: Item[Ack]) -> bytes:
-        # Write the field `batch` twice: first with the columns, then with writer and batch number. Parsers of protobuf
-        # merge the two occurrences of the field.
+        # Write the field `batch` twice: first with the columns, then with writer and batch number. Protobuf parsers
+        # merge two occurrences of a field that is a message.
         numbers = _METHOD.request(scene=self._scene, sequence=item.sequence)
         numbers.batch.writer, numbers.batch.batch = self.writer, item.number
         return b"".join((wire.head(_BATCH, len(item.batch)), item.batch, numbers.SerializeToString()))
@@ -76,8 +76,8 @@ class UpdateStream(PipelinedStream[Ack]):
         if not isinstance(outcome, LocusError):
             self._last_ack = outcome
         elif not outcome.refused or outcome.reason == Reason.BATCH_GAP:
-            # End the stream: either it is unknown whether the server consumed the batch number, or the server does not
-            # know the writer. In both cases continuing could lose a batch.
+            # End the stream, because continuing could lose a batch: either it is unknown whether the server used the
+            # batch number, or the server does not know the writer any more.
             self._fatal = outcome
         else:
             self._next_batch -= len(self._items) - position + 1

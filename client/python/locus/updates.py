@@ -35,7 +35,7 @@ class UpdateBatch:
     def __init__(self, *, frame: Optional[ColumnLike] = None, tick: Optional[int] = None, clear: bool = False,
                  upsert: bool = False, all_or_nothing: bool = False, restart_ticks: bool = False, writer: int = 0,
                  number: int = 0) -> None:
-        # Create the batch as a part of its request, since adding it to a request later would copy it.
+        # Create the batch as a part of its request; if it were added to a request later, it would be copied.
         self._request = _Request()
         self.message = self._request.batch
         self.message.clear, self.message.upsert, self.message.all_or_nothing = clear, upsert, all_or_nothing
@@ -59,7 +59,7 @@ class UpdateBatch:
     def insert_points(self, ids: ColumnLike, positions: ColumnLike = None, *, positions_f64: ColumnLike = None,
                       rotations: ColumnLike = None, layers: ColumnLike = None, groups: ColumnLike = None,
                       tags: ColumnLike = None) -> "UpdateBatch":
-        """Inserts N points, which overlap queries, nearest queries and lookups find, and which no ray hits."""
+        """Inserts N points. Overlap queries, nearest queries and lookups find points; rays never hit them."""
         with _new_entry(self.message.inserts, "inserts", ids) as insert:
             insert.message.point.SetInParent()
             insert.pose(positions, positions_f64, rotations)
@@ -80,7 +80,9 @@ class UpdateBatch:
     def insert_boxes(self, ids: ColumnLike, positions: ColumnLike = None, half_extents: ColumnLike = None, *,
                      positions_f64: ColumnLike = None, rotations: ColumnLike = None, layers: ColumnLike = None,
                      groups: ColumnLike = None, tags: ColumnLike = None) -> "UpdateBatch":
-        """Inserts N solid boxes. `half_extents`: 3N float32 or three, half the size along the box's own axes."""
+        """Inserts N solid boxes. `half_extents`: 3N float32 or three, half the lengths of the edges along the box's own
+        axes.
+        """
         with _new_entry(self.message.inserts, "inserts", ids) as insert:
             insert.message.box.SetInParent()
             insert.pose(positions, positions_f64, rotations)
@@ -105,7 +107,7 @@ class UpdateBatch:
     def move(self, ids: ColumnLike, positions: ColumnLike = None, *, positions_f64: ColumnLike = None,
              rotations: ColumnLike = None, teleport: bool = False) -> "UpdateBatch":
         """Moves N objects: sets their centres and, if `rotations` is given, their rotations. With `teleport`, queries
-        of a time between the previous tick and this one do not interpolate the movement.
+        at a time between the previous tick and this one do not interpolate between the old and the new position.
         """
         with _new_entry(self.message.moves, "moves", ids) as entry:
             entry.pose(positions, positions_f64, rotations)
@@ -152,7 +154,8 @@ class _Entry:
 
 @contextlib.contextmanager
 def _new_entry(entries: Any, name: str, ids: ColumnLike) -> Iterator[_Entry]:
-    """Adds an entry to `entries` and yields it to the caller, which fills it. Removes the entry if the caller raises.
+    """Adds an entry to `entries` and yields it to the caller, who fills it. If the caller raises an exception, the
+    entry is removed.
     """
     path = f"{name}[{len(entries)}]."
     message = entries.add()

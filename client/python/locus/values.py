@@ -1,5 +1,4 @@
-"""Plain result types: scenes, meshes, acks and so on. Immutable. Each type is converted from a message of the protocol.
-"""
+"""Plain result types: scenes, meshes, acks and so on. Immutable. Each type is made from a message of the protocol."""
 from __future__ import annotations
 
 import dataclasses
@@ -56,10 +55,11 @@ class Ack(Revision):
 class Scene(Revision):
     """Description of a scene at the time of the call.
 
-    `objects`, `instances` and `triangles` are counts, `memory_bytes` an estimate without meshes. `bounds` is the lower
-    and the upper corner of the bounds of all objects and instances, each x, y, z in the caller's unit; None in an empty
-    scene. The bounds may be somewhat too large. `history_ticks` is the maximum number of ticks in the history, which
-    now contains `recorded_ticks` ticks, beginning with `oldest_tick`, in `history_bytes` bytes.
+    `objects`, `instances` and `triangles` are counts; `memory_bytes` is an estimate without meshes. `bounds` are two
+    corners of the bounding box of all objects and instances, the lower and the upper one, each x, y, z in the caller's
+    unit; None in an empty scene. The box may be somewhat too large. `history_ticks` is the maximum number of ticks in
+    the history; now the history contains `recorded_ticks` ticks, beginning with `oldest_tick`, in `history_bytes`
+    bytes.
     """
 
     name: str
@@ -124,7 +124,8 @@ class Mesh:
 
 @dataclasses.dataclass(frozen=True)
 class Limit:
-    """Limit of the server. `value` is the maximum, `used` the amount in use now (0 for limits of one request or scene).
+    """Limit of the server. `value` is the maximum. `used` is the amount in use now; it is 0 for limits of a single
+    request or scene.
     """
 
     value: float
@@ -134,7 +135,8 @@ class Limit:
 @dataclasses.dataclass(frozen=True)
 class Quota:
     """Quota of an identity or connection, and its use. `used` is the amount in use now or, for names that end in
-    `_per_s`, the mean rate; `available` may be used at once now. `limit` and `available` are None if unlimited.
+    `_per_s`, the mean rate. `available` is the amount that may be used at once now. `limit` and `available` are None if
+    there is no limit.
     """
 
     limit: Optional[float]
@@ -150,7 +152,9 @@ class Quota:
 
 @dataclasses.dataclass(frozen=True)
 class Server:
-    """Description of the server; `limits` maps names to limits. `insecure`: it was started with --insecure."""
+    """Description of the server. `limits` maps names to limits. `insecure` is True if the server was started with
+    --insecure.
+    """
 
     version: str
     instruction_set: str

@@ -1,9 +1,9 @@
-"""Part of protobuf's wire format that columns need: decoding of answers without copies, and framing of encoded batches;
-internal to the package.
+"""The part of protobuf's wire format that columns need: decoding of answers without copies, and framing of encoded
+batches. Internal to the package.
 
-Parsing an answer with protobuf would copy each column twice (into the message and out of it), and these copies would be
-most of the client's cost of an answer. In this module a decoded column is a view of the received bytes. All other
-messages use the mirrored schema.
+Parsing an answer with protobuf would copy each column twice (into the message and out of the message), and these copies
+would be most of the client's cost of an answer. In this module a decoded column is a view of the received bytes. All
+other messages use the mirrored schema.
 """
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ def _varint(data: memoryview, position: int) -> Tuple[int, int]:
 
 
 def fields(data: memoryview) -> Fields:
-    """Returns the fields of a message by number. A field is the list of its occurrences: ints for varints, views for
-    other types.
+    """Returns the fields of a message by number. Each value is the list of a field's occurrences: ints for varints,
+    memory views for other types.
 
     Cost: linear in the number of fields, independent of their size. Raises LocusError DATA_LOSS if `data` is not a
     message.
@@ -70,8 +70,8 @@ def fields(data: memoryview) -> Fields:
 
 
 def column(found: Fields, number: int) -> memoryview:
-    """Returns the bytes of the column in field `number`, empty if the field is absent. Joins the parts of a column that
-    was sent as several occurrences of the field, as protobuf allows.
+    """Returns the bytes of the column in field `number`, empty if the field is absent. If the field occurs several
+    times, which protobuf allows for a column, its parts are joined.
     """
     pieces = views(found, number)
     if not pieces:
@@ -80,7 +80,7 @@ def column(found: Fields, number: int) -> memoryview:
 
 
 def views(found: Fields, number: int) -> List[memoryview]:
-    """Returns every occurrence of a field that is not a varint, for example of a repeated message."""
+    """Returns every occurrence of a field whose type is not varint, for example of a repeated message."""
     pieces = found.get(number, [])
     for piece in pieces:
         if isinstance(piece, int):
@@ -109,7 +109,7 @@ _SMALL = tuple(bytes((value,)) for value in range(128))
 
 
 def head(number: int, size: int) -> bytes:
-    """Returns the tag and length of field `number`, a message, string or column of `size` bytes."""
+    """Returns the tag and length of field `number`, whose content is a message, string or column of `size` bytes."""
     return _encoded(number << 3 | _DELIMITED) + _encoded(size)
 
 
@@ -127,8 +127,8 @@ class Parts:
         self.size = 0
 
     def add(self, number: int, content: Raw) -> None:
-        """Appends field `number` with this content. Appends nothing if `content` is empty, since an empty column equals
-        an absent column.
+        """Appends field `number` with this content. Appends nothing if `content` is empty, since an empty column means
+        the same as an absent column.
         """
         size = len(content)
         if size:
@@ -137,7 +137,7 @@ class Parts:
             self.size += len(before) + size
 
     def add_parts(self, number: int, parts: Parts) -> None:
-        """Appends field `number` with this message, which may be empty."""
+        """Appends the message `parts` as field `number`. The message may be empty."""
         before = head(number, parts.size)
         self.pieces.append(before)
         self.pieces += parts.pieces
