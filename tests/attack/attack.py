@@ -27,7 +27,7 @@ FRONTS = ("plain", "tls", "mtls", STRANGER, "edge")
 
 
 def size(text):
-    """Returns the bytes of a size such as 512MiB."""
+    """Returns the number of bytes of a size such as 512MiB."""
     found = re.fullmatch(r"(\d+)(MiB|GiB)", text)
     if not found:
         raise argparse.ArgumentTypeError(f"{text} is no size such as 512MiB or 2GiB")

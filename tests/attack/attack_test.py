@@ -1,4 +1,4 @@
-"""Tests of the attacks themselves: the bytes that they send are as intended, and each fault of a daemon is detected."""
+"""Tests of the attacks themselves: they send the intended bytes, and each fault of a daemon is detected."""
 import functools
 import os
 import sys
@@ -31,7 +31,7 @@ def call_fault(job, name):
 
 
 def run_fault(*names):
-    """Attacks the fake daemon with calls that switch faults on. Returns (verdict, failures)."""
+    """Attacks the fake daemon with calls that switch on the faults `names`. Returns (verdict, failures)."""
     steps = [(name, functools.partial(call_fault, name=name)) for name in names]
     options = runner.Options(FAKE, LIMIT, "plain", 0.3, len(names) == 1)
     row = runner.run(Attack("fault", "faults", lambda job: steps, "", ""), options)

@@ -18,12 +18,12 @@ from wire import Target
 START_SECONDS = 60
 STOP_SECONDS = 20
 GROUPS = "/sys/fs/cgroup"
-VICTIM_ADDRESS = "127.0.0.2"  # so that limits on connections of the attacker's address do not concern it
+VICTIM_ADDRESS = "127.0.0.2"  # differs from the attacker's, so that limits per address do not affect the victim
 PR_SET_PDEATHSIG = 1
 
 
 class Unsupported(Exception):
-    """The requested options are not possible with this daemon or on this machine; the message says why."""
+    """The requested options are not possible with this daemon or on this machine. The message gives the reason."""
 
 
 def read(path):
@@ -40,8 +40,8 @@ def write(path, text):
 
 
 class MemoryGroup:
-    """Memory limit: a cgroup below that of this process, or RLIMIT_AS if no cgroup can be created. `kind` names the one
-    that is used.
+    """Memory limit: a cgroup below that of this process, or RLIMIT_AS if no cgroup can be created. `kind` names which
+    of the two is used.
     """
 
     NAMES = {"cgroup v2": ("memory.max", "memory.peak", "memory.events"),
@@ -64,10 +64,10 @@ class MemoryGroup:
 
     @staticmethod
     def parents():
-        """Yields (kind, folder) of the cgroups below which a cgroup can be created: those of this process, nearest
-        first.
+        """Yields (kind, folder) of each cgroup below which a cgroup may be created: the cgroup of this process, then
+        its ancestors, nearest first.
 
-        In cgroup version 2 a cgroup with processes cannot limit its children, so the ancestors follow.
+        The ancestors are needed because in cgroup version 2 a cgroup that contains processes cannot limit its children.
         """
         for line in read("/proc/self/cgroup").split():
             number, controllers, path = line.split(":", 2)
@@ -79,9 +79,9 @@ class MemoryGroup:
                 yield "cgroup v1", f"{GROUPS}/memory{path}"
 
     def enter(self):
-        """Puts the calling process under the limit. Runs in the child, before it executes the daemon.
+        """Puts the calling process under the limit. Runs in the child process, before it executes the daemon.
 
-        The kernel kills the child when its parent ends, even if the parent is killed.
+        Also makes the kernel kill the child when its parent ends, even if the parent is killed.
         """
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
         if self.path:
@@ -93,7 +93,9 @@ class MemoryGroup:
         return read(os.path.join(self.path, self.NAMES[self.kind][index])) if self.path else ""
 
     def peak(self):
-        """Returns the peak memory in bytes, including memory that the kernel uses for the daemon; 0 if unknown."""
+        """Returns the peak memory in bytes, including memory that the kernel uses for the daemon; 0 if the peak is
+        unknown.
+        """
         return int(self.file(1) or 0)
 
     def kills(self):
@@ -113,9 +115,9 @@ class MemoryGroup:
 
 
 class Front:
-    """Transport between clients and the daemon: `plain`, `tls` or `mtls`, with new certificates in `folder`.
+    """Transport between clients and the daemon: `plain`, `tls` or `mtls`, with newly made certificates in `folder`.
 
-    With `mtls`, `context` has a client's certificate; `stranger` has none.
+    With `mtls`, the TLS context `context` has a client certificate; the TLS context `stranger` has none.
     """
 
     def __init__(self, name, folder):
@@ -124,7 +126,7 @@ class Front:
             self.encrypt()
 
     def targets(self, port):
-        """Returns the Target of the victim and that of an attacker, with an address and a certificate of its own."""
+        """Returns two Targets, one for the victim and one for an attacker. They have different source addresses."""
         return Target("127.0.0.1", port, self.context, VICTIM_ADDRESS), Target("127.0.0.1", port, self.context)
 
     def path(self, name):
@@ -144,7 +146,9 @@ class Front:
             self.context.load_cert_chain(self.path("client.pem"), self.path("client.key"))
 
     def certify(self, name, authority):
-        """Makes a key and a certificate, signed by the authority or, without one, by itself."""
+        """Makes a key and a certificate. The certificate is signed by the authority; without an authority it is
+        self-signed.
+        """
         command = ["openssl", "req", "-x509" if not authority else "-new", "-newkey", "ec", "-pkeyopt",
                    "ec_paramgen_curve:P-256", "-nodes", "-keyout", self.path(name + ".key"), "-subj", f"/CN={name}",
                    "-out", self.path(name + (".csr" if authority else ".pem"))]
@@ -189,7 +193,7 @@ class Process:
 
 
 def how_it_ended(process, group):
-    """Returns how a child in a MemoryGroup ended, in a few words; empty while it runs."""
+    """Returns in a few words how a child in a MemoryGroup ended; empty while the child runs."""
     code = process.poll()
     if code is None:
         return ""
@@ -199,7 +203,7 @@ def how_it_ended(process, group):
 
 
 def stop_process(process):
-    """Ends a child by its id and waits for its end."""
+    """Ends a child process by its id and waits until it has ended."""
     if process.poll() is not None:
         return
     process.terminate()
@@ -227,7 +231,7 @@ class Daemon(Process):
             raise
 
     def start(self, program, options):
-        """Starts the daemon, waits until it can be reached and sets the Targets of the victim and of the attacker."""
+        """Starts the daemon, waits until it answers, and sets the Targets of the victim and of the attacker."""
         port_file = self.front.path("port")
         self.launch([program, "--listen", "127.0.0.1:0", "--port-file", port_file, *self.front.options, *options], port_file)
         self.target, self.attacker = self.front.targets(int(read(port_file)))
@@ -252,7 +256,7 @@ class Daemon(Process):
         return self.group.peak()
 
     def death(self):
-        """Returns how the daemon ended, in a few words; empty while it runs."""
+        """Returns in a few words how the daemon ended; empty while the daemon runs."""
         return how_it_ended(self.process, self.group)
 
     def stop(self):
@@ -265,7 +269,9 @@ class Daemon(Process):
 
 
 class OtherDaemon(Process):
-    """A daemon that is already running, perhaps behind a proxy: an address, and the id of the process to watch."""
+    """A daemon that is already running, perhaps behind a proxy. It is given by its address and the id of the process to
+    watch.
+    """
 
     def __init__(self, address, pid, authority=None):
         super().__init__(pid)
@@ -284,4 +290,4 @@ class OtherDaemon(Process):
         return "" if self.alive() else "ended"
 
     def stop(self):
-        """Does nothing: the process belongs to somebody else."""
+        """Does nothing, because the process was not started by this program."""

@@ -1,4 +1,5 @@
-"""A locusd behind the front of deploy/edge, with the configuration that is shipped. Both are started, watched and stopped.
+"""A locusd behind the front of deploy/edge (HAProxy as a proxy for untrusted clients), with the configuration that is
+shipped. Both processes are started, watched and stopped together.
 
 Memory, descriptors and threads are summed over both processes. Each process has its own MemoryGroup.
 """
@@ -11,20 +12,21 @@ from daemon import START_SECONDS, Daemon, MemoryGroup, Process, Unsupported, how
 
 PROGRAM = "/usr/sbin/haproxy"
 CONFIG = os.path.join(os.path.dirname(os.path.abspath(__file__)), "../../deploy/edge/haproxy.cfg")
-MEMORY = 1 << 30  # MemoryMax= of deploy/edge/locus-edge.service
-# For locusd all clients are one user of its socket: the front limits each of them. As in deploy/edge/locusd-edge.conf.
+MEMORY = 1 << 30  # bytes, as MemoryMax= in deploy/edge/locus-edge.service
+# Raise locusd's limits per address, as deploy/edge/locusd-edge.conf does: for locusd all clients are one user of its
+# socket, and the front limits each client instead.
 DAEMON_OPTIONS = ("--max-connections-per-address", "4096", "--max-new-connections", "4000")
 
 
 def free_port():
-    """Returns a port of loopback that was free a moment ago."""
+    """Returns a loopback port that was free a moment ago."""
     with socket.socket() as sock:
         sock.bind(("127.0.0.1", 0))
         return sock.getsockname()[1]
 
 
 def listens(port):
-    """Returns whether something accepts connections at a port of loopback."""
+    """Returns whether a process accepts connections at a loopback port."""
     try:
         socket.create_connection(("127.0.0.1", port), 1).close()
         return True
@@ -55,7 +57,7 @@ class Edge(Process):
             time.sleep(0.02)
 
     def death(self):
-        """Returns how the front ended, in a few words; empty while it runs."""
+        """Returns in a few words how the front ended; empty while the front runs."""
         how = how_it_ended(self.process, self.group)
         return f"the front was {how}" if how else ""
 
@@ -65,7 +67,7 @@ class Edge(Process):
 
 
 class EdgedDaemon(Daemon):
-    """A locusd on a unix socket, and the front before it. `client_ca` says whether the front wants client certificates."""
+    """A locusd on a unix socket, and the front before it. With `client_ca` the front requires client certificates."""
 
     def __init__(self, program, limit, options=(), client_ca=False):
         self.edge, self.client_ca = None, client_ca

@@ -9,20 +9,20 @@ MEMORY = 1 << 30  # memory limit of the attacking process, so that the suite its
 MAX_WRONG = 20
 DYING_SECONDS = 0.3
 MIN_STEP_SECONDS = 0.25
-STRANGER = "mtls-stranger"  # the front with which the attacker has no certificate; with the front mtls it has one
-# Fronts that must hold off every attack: no row is left out, and the victim's p99 may grow less.
+STRANGER = "mtls-stranger"  # front name: TLS requires a client certificate, and the attacker has none
+# Fronts that must protect locusd from every attack: no row is left out, and the victim's p99 may grow less.
 SHIELDED = (STRANGER, "edge")
-MAX_SLOWER, MAX_SHIELDED_SLOWER = 10, 5  # how many times the victim's p99 may grow, if the attack does not say more
-# Outcomes of a call that give the caller no information, or that no client request may cause.
+MAX_SLOWER, MAX_SHIELDED_SLOWER = 10, 5  # default of the factor by which the victim's p99 may grow
+# Status codes that give the caller no information, or that no request of a client may cause.
 NEVER = ("INTERNAL", "UNKNOWN", "CLOSED", "TIMEOUT", "RESET", "DATA_LOSS", "ABORTED")
 
-# HAProxy 2.6 sometimes turns a refusal that comes before the whole message was sent into a reset without headers
-# (REFUSED_STREAM), which gRPC reports as UNAVAILABLE.
+# HAProxy 2.6 sometimes refuses a call before the whole message was sent by a reset without headers (REFUSED_STREAM).
+# gRPC reports such a reset as UNAVAILABLE.
 REFUSED_STREAM = ("RESET", "HTTP status none")
 
-# One row of the table. `steps(job)` returns (name, function of job) pairs that run one after another; `what` and
-# `bound` describe the attack and its amount in a few words. `slower` is the allowed factor by which the victim's p99
-# may grow. `flags` are options of the daemon; a daemon that the suite did not start does not have them.
+# One row of the table. `steps(job)` returns (name, function of job) pairs, which run one after another. `what`
+# describes the attack and `bound` its amount, each in a few words. `slower` is the factor by which the victim's p99 may
+# grow. `flags` are options with which the daemon is started; they have no effect on a daemon that was already running.
 Attack = collections.namedtuple("Attack", "name group steps what bound slower flags", defaults=(MAX_SLOWER, ()))
 
 
@@ -36,18 +36,20 @@ def one(function):
 
 
 class Job:
-    """One run of an attack. Each step lasts `seconds`. In the quick form all steps share `seconds`, and some may be
-    skipped.
+    """One run of an attack. In the long form each step lasts `seconds`. In the quick form all steps together last
+    `seconds`, and some of them may be skipped.
     """
 
     def __init__(self, target, seconds, quick, pipe, front="plain"):
         self.target, self.seconds, self.quick, self.pipe, self.front = target, seconds, quick, pipe, front
         self.until = time.monotonic() + seconds
-        self.end = self.until + seconds  # end of a quick attack
+        self.end = self.until + seconds  # time at which a quick attack ends
         self.wrongs = set()
 
     def never_ends(self, path):
-        """Returns options of call(): a call such as Watch may stay open, so its timeout is allowed and short."""
+        """Returns options of call(). A call such as Watch may stay open forever, so it gets a short timeout, and
+        TIMEOUT is allowed.
+        """
         return {"allowed": (*(code for code in wire.CODES if code not in NEVER), "TIMEOUT"), "timeout": 2} \
             if path.endswith("/Watch") else {"timeout": 30}
 
@@ -79,7 +81,7 @@ class Job:
     def check(self, reply, what, allowed=None, text=True):
         """Counts a Reply. Reports it as wrong if its code is not allowed, or if it is an error without a text.
 
-        A stranger, whom TLS refuses, must get no reply at all.
+        A client without the required certificate (the front STRANGER) must get no reply at all.
         """
         self.count(reply.code)
         if self.front == STRANGER:
@@ -96,8 +98,8 @@ class Job:
             self.wrong(f"{what}: {reply.code} without a text")
 
     def accepts(self):
-        """Returns whether the daemon accepts connections. Waits first, since a dying daemon still accepts for a
-        moment.
+        """Returns whether the daemon accepts connections. Waits before the check, since a dying daemon accepts
+        connections for another moment.
         """
         time.sleep(DYING_SECONDS)
         try:
@@ -118,7 +120,7 @@ class Job:
 
 
 def work(attack, job, first):
-    """Runs the steps of an attack from index `first` on; main function of the attacking process."""
+    """Runs the steps of an attack, beginning with index `first`. This is the main function of the attacking process."""
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     steps = attack.steps(job)
     job.pipe.send(("steps", len(steps)))
@@ -137,6 +139,6 @@ def work(attack, job, first):
             job.count("ENDED")
             if not job.accepts():
                 break
-        except Exception as error:  # a broken attack must not count as a passed one
+        except Exception as error:  # an attack that fails itself must not count as passed
             job.wrong(f"the attack itself failed: {type(error).__name__}: {error}")
     job.pipe.send(("end",))

@@ -1,4 +1,6 @@
-"""Hand-written protobuf encoding: bytes of messages, the requests of the attacks, and the fields of every request."""
+"""Hand-written protobuf encoding: encoders of fields and messages, the requests that the attacks send, and a list of
+the fields of every request.
+"""
 import collections
 import os
 import struct
@@ -13,8 +15,8 @@ VARINTS = (Kind.TYPE_UINT32, Kind.TYPE_INT32, Kind.TYPE_UINT64, Kind.TYPE_INT64,
 
 # An rpc of the schema: path, name of its request, whether the client streams requests.
 Method = collections.namedtuple("Method", "path request streams")
-# A field of a request that can hold many or large entries: numbers of the fields that lead to it, its name, and its
-# kind: `lists`, `varints`, `map`, `strings` or `string`.
+# A field of a request that can contain many or large entries. `fields` are the field numbers that lead to it, from the
+# outermost message inwards; `kind` is `lists`, `varints`, `map`, `strings` or `string`.
 Place = collections.namedtuple("Place", "fields name kind")
 
 
@@ -61,14 +63,14 @@ def create_scene(name, history_ticks=0):
 
 
 def insert_balls(first, count):
-    """Returns an UpdateBatch that inserts or replaces balls in a square of 100 x 100."""
+    """Returns an UpdateBatch that inserts or replaces balls, 100 x 100 in each layer, one world unit apart."""
     places = [float(v) for i in range(count) for v in (i % 100, i // 100 % 100, i // 10000)]
     return delimited(6, fixed64s(1, range(first, first + count)) + floats(2, places) +
                      delimited(6, floats(1, [0.5]))) + number(9, 1)
 
 
 def move_balls(first, count, tick, height):
-    """Returns an UpdateBatch that moves balls to a height at a tick."""
+    """Returns an UpdateBatch with a tick, which moves balls to a height."""
     places = [v for i in range(count) for v in (float(i % 100), float(i // 100 % 100), height)]
     return fixed64(2, tick) + delimited(7, fixed64s(1, range(first, first + count)) + floats(2, places))
 
@@ -83,7 +85,7 @@ def stream_message(scene, sequence, batch):
 
 
 def rays(count):
-    """Returns a QueryBatch of rays that point down at the balls."""
+    """Returns a QueryBatch of rays that point down at the balls of insert_balls()."""
     origins = [float(v) for i in range(count) for v in (i % 100, i // 100 % 100, 50)]
     return delimited(2, delimited(16, floats(1, origins) + floats(2, [0, 0, -1])))
 
@@ -94,7 +96,7 @@ def awaiting(revision):
 
 
 def everything(count, reply_bytes):
-    """Returns a QueryBatch of balls that contain the whole scene and return every column: the largest replies."""
+    """Returns a QueryBatch of balls that contain the whole scene, with every column. It causes the largest replies."""
     columns = delimited(4, bytes((2, 7, 8, 9, 10)))
     balls = delimited(17, floats(1, [0.0] * (3 * count)) + floats(2, [1e6]))
     return delimited(2, columns + number(8, 1 << 20) + balls) + fixed32(5, reply_bytes)
@@ -105,7 +107,8 @@ def query(scene, batch):
 
 
 def nested(fields, body):
-    """Returns `body` nested in messages at the given field numbers, the outermost first."""
+    """Returns `body` nested in one message for each of `fields`, the field numbers from the outermost message inwards.
+    """
     for field in reversed(fields):
         body = delimited(field, body)
     return body
@@ -151,8 +154,8 @@ class Schema:
         return found
 
     def name_field(self, name):
-        """Returns the field that names a scene or mesh in this request. Requests that read or change a scene name
-        `world`.
+        """Returns the encoded field of this request that names a scene or a mesh. Requests that read or change a scene
+        get the name `world`.
         """
         first = self.messages[name].field[:1]
         if not first or first[0].type != Kind.TYPE_STRING or first[0].number != 1:

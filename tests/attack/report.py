@@ -1,4 +1,4 @@
-"""The table of results, as text and as JSON, made from the values that values() takes from a Row."""
+"""The table of results, as text and as JSON. Both are made from the dictionary that values() makes from a Row."""
 
 HEAD = ("limit", "attack", "verdict", "deaths", "p99x", "idle_p99_ms", "p99_ms", "new_p99_ms", "victim_errors", "peak_MiB",
         "before_MiB", "after_MiB", "most_fds", "fds_kept", "threads", "load", "codes")
@@ -9,7 +9,9 @@ def mib(size):
 
 
 def verdict(row, quick):
-    """Returns one word: ok, killed, hangs (victim or attack), wrong (codes), holds (memory or descriptors) or slow."""
+    """Returns one word: `ok`, `killed`, `hangs` (victim or attack), `wrong` (status codes), `holds` (memory or
+    descriptors were not returned) or `slow`.
+    """
     if row.deaths:
         return "killed"
     if not row.served or row.stuck:
@@ -49,6 +51,6 @@ def table(rows):
 
 
 def remarks(row):
-    """Returns lines that name what failed and what was skipped."""
+    """Returns lines that name the failures and the skipped steps of a row."""
     name = f"{mib(row['limit'])}MiB {row['attack']}"
     return [f"{name}: FAILED: {text}" for text in row["failures"]] + [f"{name}: skipped: {text}" for text in row["skipped"]]

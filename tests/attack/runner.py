@@ -15,12 +15,12 @@ IDLE_SECONDS = {True: 0.3, False: 1.0}
 RETURN_SECONDS = 10.0
 RETURN_SHARE = 1.3
 SERVED_SECONDS = 20.0
-QUIET_SECONDS = 90.0  # time without a message from an attack, after which it counts as stuck
+QUIET_SECONDS = 90.0  # time without a message from an attack after which the attack counts as stuck
 SPARE_DESCRIPTORS = 8
 LOOK_SECONDS = 0.05
 MAX_DEATHS = 20
 WORLD_OBJECTS = 20000
-MIN_SLOW_MS = 50.0  # a p99 below this may be caused by the machine instead of the daemon
+MIN_SLOW_MS = 50.0  # a p99 below this may be caused by the machine rather than by the daemon
 MIN_ANSWERED = 0.5  # share of the victim's calls that must be answered during the attack
 
 Options = collections.namedtuple("Options", "program limit front seconds quick address pid authority",
@@ -28,7 +28,9 @@ Options = collections.namedtuple("Options", "program limit front seconds quick a
 
 
 class Row:
-    """Measurements of one attack. Sizes are in bytes; `served` is whether the victim was served after the attack."""
+    """Measurements of one attack. Sizes are in bytes. `served` is whether the victim still got answers after the
+    attack.
+    """
 
     def __init__(self, attack, limit, front="plain"):
         self.attack, self.limit = attack, limit
@@ -39,12 +41,15 @@ class Row:
         self.descriptors = self.most_descriptors = self.descriptors_after = 0
         self.steps = 0
         self.kind, self.served, self.stuck = "nobody here", True, False
-        self.began, self.worst = [], ""  # (name, time) of each step, and the step in which the victim waited longest
+        # `began` has (name, time) of each step; `worst` is the step in which the victim waited longest.
+        self.began, self.worst = [], ""
         self.idle, self.during = {}, {}
         self.load = os.getloadavg()[0]
 
     def kept_allowed(self):
-        """Returns the allowed growth of the daemon's memory after the attack, since the allocator retains some."""
+        """Returns the number of bytes by which the daemon's memory may be larger after the attack; the allocator
+        retains some.
+        """
         return max(64 << 20, self.limit // 3)
 
     def returned(self):
@@ -56,16 +61,18 @@ class Row:
         return self.during.get("p99_ms", 0) / max(self.idle.get("p99_ms", 0), 1.0)
 
     def slower_connections(self):
-        """Returns the factor by which the p99 of the victim's new connections, with their first call, grew."""
+        """Returns the factor by which the p99 of the victim's new connections grew; it includes the first call on the
+        connection.
+        """
         return self.during.get("connect_p99_ms", 0) / max(self.idle.get("connect_p99_ms", 0), 1.0)
 
     def answered(self):
-        """Returns how many of the victim's calls during the attack were answered, and how many there were."""
+        """Returns how many of the victim's calls during the attack were answered, and how many calls there were."""
         calls = self.during.get("calls", 0)
         return calls - sum(self.during.get("errors", {}).values()), calls
 
     def failures(self, quick):
-        """Returns the failures of the row, each in a few words. Times are checked only in the long form."""
+        """Returns the failures of the row, each in a few words. Durations are checked only in the long form."""
         found = [f"{how} in {step}" if step else how for step, how in self.deaths]
         if not self.served:
             found.append("the victim is not served afterwards")
@@ -88,7 +95,9 @@ class Row:
 
 
 def start(options, flags=()):
-    """Returns a daemon with the scenes that the victim and the attacks use. `flags` are options of a daemon started here."""
+    """Returns a daemon with the scenes that the victim and the attacks use. `flags` are options for a daemon that is
+    started here; a daemon that already runs is used as it is.
+    """
     if options.address:
         daemon = OtherDaemon(options.address, options.pid, options.authority)
     elif options.front == "edge":
@@ -114,7 +123,7 @@ def start(options, flags=()):
 
 
 class Assault:
-    """The process of an attack. Stores its reports in a Row and watches the daemon."""
+    """The process of an attack: stores the reports of the attack in a Row, and watches the daemon."""
 
     def __init__(self, row, daemon, options, first):
         context = multiprocessing.get_context("fork")
@@ -143,8 +152,8 @@ class Assault:
             self.ended = True
 
     def listen(self):
-        """Reads the pending reports of the attack. Returns whether there were any. The end of the pipe ends the
-        attack.
+        """Reads the pending reports of the attack. Returns whether there were any. If the pipe has ended, the attack
+        has ended.
         """
         heard = False
         try:
@@ -156,7 +165,7 @@ class Assault:
         return heard
 
     def watch(self):
-        """Watches until the attack or the daemon has ended. Returns whether the daemon still runs."""
+        """Watches the attack and the daemon until one of them has ended. Returns whether the daemon still runs."""
         heard = time.monotonic()
         while not self.ended and self.daemon.alive():
             if self.listen():
@@ -195,8 +204,8 @@ def worst_step(began, samples):
 
 
 def settle(row, daemon, quick):
-    """Waits at most RETURN_SECONDS until descriptors have returned, and memory: in the long form to RETURN_SHARE of what it
-    was before. Returns whether the daemon still runs.
+    """Waits until the daemon has returned descriptors and memory, but at most RETURN_SECONDS. In the long form memory
+    must shrink to RETURN_SHARE times the memory before the attack. Returns whether the daemon still runs.
     """
     until = time.monotonic() + RETURN_SECONDS
     while daemon.alive():
@@ -218,7 +227,9 @@ def is_served_soon(daemon):
 
 
 def run_life(row, options, first):
-    """Runs steps from `first` on a new daemon. If the daemon died, returns the index of the next step, else None."""
+    """Starts a new daemon and runs the steps from index `first` on it. Returns the index of the next step if the daemon
+    died, else None.
+    """
     daemon = start(options, row.attack.flags)
     watcher = victim.Victim(daemon.target)
     try:
@@ -251,7 +262,7 @@ def run_life(row, options, first):
 
 
 def run(attack, options):
-    """Runs one row and returns it. If the daemon dies, a new one is started for the remaining steps."""
+    """Runs one row and returns it. If the daemon dies, a new daemon is started for the remaining steps."""
     row, step = Row(attack, options.limit, options.front), 0
     while step is not None:
         step = run_life(row, options, step)

@@ -7,22 +7,24 @@ import wire
 from job import SHIELDED, Attack, Job, Lost, one
 from rows import calls, connections, frames, messages, replies
 
-# Rows that locusd fails, each with the observed effect. The quick form skips them, unless a front shields locusd. Remove
-# a name once its row passes.
+# Rows that locusd fails at present, each with the observed effect. The quick form skips these rows, unless a front
+# shields locusd. Remove a row's name once the row passes.
 NOT_YET = {
 }
 
-# Rows that the union runs together: those that cost the daemon most although it withstands each of them.
+# Rows that the union runs at the same time: those that cost the daemon most, although it withstands each of them alone.
 TOGETHER = ("reset-queries", "settings", "ping", "garbage", "slow-bodies", "wrong-bytes", "honest", "unread", "continuation")
 
 
-# Addresses of the parts of the union whose calls must all be answered: locusd may refuse connections of the address from
-# which the other parts come.
+# Source addresses of those parts of the union whose calls must all be answered. They differ from the address of the
+# other parts, because locusd may refuse connections from that address.
 OWN_ADDRESSES = {"honest": "127.0.0.3", "wrong-bytes": "127.0.0.4"}
 
 
 class Ended:
-    """Replaces the pipe of an attack within the union: forwards codes and errors, but no steps."""
+    """Replacement for the pipe of an attack that is part of the union: forwards codes and errors, but not the begin of
+    steps.
+    """
 
     def __init__(self, name, pipe, lock):
         self.name, self.pipe, self.lock = name, pipe, lock
@@ -48,12 +50,12 @@ def run_again(attack, job):
 
 
 def not_yet(front):
-    """Returns the names of the rows that fail through a front."""
+    """Returns the names of the rows that locusd fails when it is attacked through this front."""
     return () if front in SHIELDED else tuple(NOT_YET)
 
 
 def together(job):
-    """Runs several attacks at the same time, each in its own process, until all have ended."""
+    """Runs the attacks of the union at the same time, each in its own process, until all have ended."""
     context, processes = multiprocessing.get_context("fork"), []
     lock = context.Lock()
     for attack in ROWS:
@@ -81,7 +83,9 @@ def by_name():
 
 
 def chosen(word, front="plain"):
-    """Returns (attacks, whether in the quick form, names left out) of `all`, `quick`, `quick:GROUP`, or names with commas."""
+    """Returns (attacks, whether to run the quick form, names of the attacks left out). `word` is `all`, `quick`,
+    `quick:GROUP`, or names separated by commas.
+    """
     head, _, group = word.partition(":")
     if head == "quick":
         rows = [attack for attack in ROWS if not group or attack.group == group]

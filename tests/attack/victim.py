@@ -1,4 +1,4 @@
-"""The victim: a process that sends small honest batches on one connection during an attack.
+"""The victim: a process that sends small batches on one connection during an attack, as an honest client would.
 
 It also opens a new connection from time to time. It records the time and the duration of each answer.
 """
@@ -45,7 +45,8 @@ def is_served(target):
 
 
 def measure(target, connection, connect):
-    """Makes one call. Returns (Sample, connection for the next call, or None)."""
+    """Makes one call. Returns (Sample, connection), where the connection is None if the next call must open a new one.
+    """
     started, fresh = time.monotonic(), connect or connection is None
     try:
         used = wire.Connection(target, timeout=WAIT_SECONDS) if fresh else connection
@@ -78,7 +79,7 @@ def loop(target, stop, pipe):
 
 
 class Victim:
-    """A running victim. stop() returns its measurements."""
+    """A running victim; stop() ends it and returns its measurements."""
 
     def __init__(self, target):
         context = multiprocessing.get_context("fork")
@@ -89,7 +90,7 @@ class Victim:
         inner.close()
 
     def stop(self):
-        """Ends the victim. Returns its Samples; empty if it ended early."""
+        """Ends the victim. Returns its Samples; none if the victim has ended early."""
         self.stopping.set()
         try:
             samples = self.pipe.recv() if self.pipe.poll(4 * WAIT_SECONDS) else []

@@ -1,6 +1,8 @@
-"""Hand-written HTTP/2 and gRPC for misbehaving clients: frames may break any rule, and messages need not fit in memory.
+"""Hand-written HTTP/2 and gRPC for misbehaving clients: frames may break any rule, and a message need not fit in
+memory.
 
-h2 opens the connection and hpack decodes replies; this module encodes all other bytes. One thread per Connection.
+The library h2 opens the connection and hpack decodes replies; this module encodes all other bytes. Only one thread may
+use a Connection.
 """
 import collections
 import select
@@ -20,7 +22,7 @@ FRAME_HEAD = 9
 LARGEST_WINDOW = 2**31 - 1
 DEFAULT_WINDOW = 65535
 PIECE = 16384
-IP_BIND_ADDRESS_NO_PORT = 24  # of Linux
+IP_BIND_ADDRESS_NO_PORT = 24  # constant of Linux that the module socket lacks
 CODES = ("OK", "CANCELLED", "UNKNOWN", "INVALID_ARGUMENT", "DEADLINE_EXCEEDED", "NOT_FOUND", "ALREADY_EXISTS",
          "PERMISSION_DENIED", "RESOURCE_EXHAUSTED", "FAILED_PRECONDITION", "ABORTED", "OUT_OF_RANGE", "UNIMPLEMENTED",
          "INTERNAL", "UNAVAILABLE", "DATA_LOSS", "UNAUTHENTICATED")
@@ -33,7 +35,7 @@ Reply = collections.namedtuple("Reply", "code text body")
 
 
 def frame(kind, flags, stream, payload=b""):
-    """Returns an encoded frame. Checks nothing."""
+    """Returns an encoded frame. Does not check the arguments."""
     return struct.pack(">I", len(payload))[1:] + struct.pack(">BBI", kind, flags, stream) + payload
 
 
@@ -47,8 +49,8 @@ def setting(key, value):
 
 
 def hpack_int(value, prefix_bits, first=0):
-    """Returns the HPACK encoding of `value` with a prefix of `prefix_bits` bits; `first` has the bits before the
-    prefix.
+    """Returns the HPACK encoding of the integer `value` with a prefix of `prefix_bits` bits. `first` contains the bits
+    of the first byte before the prefix.
     """
     limit = (1 << prefix_bits) - 1
     if value < limit:
@@ -68,7 +70,9 @@ def hpack_string(text):
 
 
 def literal(name, value, first=0x00):
-    """Returns a header field with a literal name; `first` = 0x40 adds it to the dynamic table."""
+    """Returns an HPACK header field whose name is literal. With `first` = 0x40 the receiver adds the field to the
+    dynamic table.
+    """
     return bytes([first]) + hpack_string(name) + hpack_string(value)
 
 
@@ -83,8 +87,8 @@ def header_block(fields, first=0x00):
 
 
 def indexed_block(count):
-    """Returns a header block that repeats the last `count` fields added to a dynamic table that was empty, oldest
-    first.
+    """Returns a header block that repeats the `count` fields that were added last to the dynamic table, oldest first.
+    Precondition: the table was empty before these fields were added.
     """
     return b"".join(hpack_int(61 + count - i, 7, 0x80) for i in range(count))
 
@@ -95,7 +99,7 @@ def message(body, compressed=False):
 
 
 def on_streams(template, offsets, first, count):
-    """Returns `count` copies of `template`, with stream ids first, first + 2, ... written at each of `offsets`."""
+    """Returns `count` copies of `template`. In copy i, the stream id first + 2 i is written at each of `offsets`."""
     block, size = bytearray(template * count), len(template)
     ids = b"".join(struct.pack(">I", first + 2 * i) for i in range(count))
     for offset in offsets:
@@ -109,8 +113,8 @@ class Closed(Exception):
 
 
 class Connection:
-    """One HTTP/2 connection. `window` is the receive window of each stream; `grant` renews the windows as replies
-    arrive.
+    """One HTTP/2 connection. `window` is the receive window of each stream in bytes. With `grant` the windows are
+    renewed as replies arrive.
     """
 
     def __init__(self, target, window=DEFAULT_WINDOW, grant=True, timeout=10.0, handshake=True, receive_buffer=None):
@@ -122,7 +126,7 @@ class Connection:
         self.initial_window, self.max_frame = DEFAULT_WINDOW, PIECE
         self.headers, self.bodies, self.ended = {}, {}, set()
         self.block = None  # (stream, flags, bytes) of a header block that is not complete
-        self.answers = bytearray()  # replies to received frames, sent when no other frame is partly written
+        self.answers = bytearray()  # replies to received frames; not sent while another frame is partly written
         self.resets, self.goaway = collections.Counter(), None
         self.sock.setblocking(False)
         if handshake:
@@ -151,7 +155,7 @@ class Connection:
     # Bytes.
 
     def wait(self, writing, timeout):
-        """Waits until bytes can be read, or written if `writing`. Returns (readable, writable)."""
+        """Waits until bytes can be read or, with `writing`, written. Returns (readable, writable)."""
         if isinstance(self.sock, ssl.SSLSocket) and self.sock.pending():
             return True, writing
         poller = select.poll()  # select() refuses descriptors above 1023
@@ -176,7 +180,7 @@ class Connection:
         return len(got)
 
     def try_send(self, view):
-        """Sends some of the bytes. Returns the number of sent bytes."""
+        """Sends as many of the bytes as the socket accepts. Returns their number."""
         try:
             return self.sock.send(view)
         except (BlockingIOError, ssl.SSLWantReadError, ssl.SSLWantWriteError):
@@ -186,7 +190,7 @@ class Connection:
             raise Closed(str(error)) from error
 
     def send(self, data, reading=True):
-        """Sends all bytes, and reads replies meanwhile. Raises Closed, or TimeoutError if nothing can be sent."""
+        """Sends all bytes, and meanwhile reads replies. Raises Closed, or TimeoutError if nothing can be sent."""
         view, end = memoryview(self.answers + data), time.monotonic() + self.timeout
         self.answers = bytearray()
         while len(view):
@@ -202,7 +206,7 @@ class Connection:
         self.answer()
 
     def answer(self):
-        """Sends replies to received frames, as far as the daemon reads them."""
+        """Sends the pending replies to received frames, as long as the daemon reads them."""
         while self.answers and self.wait(True, 0)[1]:
             sent = self.try_send(self.answers)
             if not sent:
@@ -210,9 +214,9 @@ class Connection:
             del self.answers[:sent]
 
     def flood(self, make, until, limit, reading=True):
-        """Sends the blocks that make() returns until the time is over or `limit` bytes are sent; discards replies.
+        """Sends blocks, each returned by make(), until the time is over or `limit` bytes are sent. Discards replies.
 
-        Returns the number of bytes sent. Ends early if the daemon closes the connection or reads nothing for long.
+        Returns the number of bytes sent. Ends early if the daemon closes the connection, or reads nothing for long.
         """
         total, view, moved = 0, memoryview(b""), time.monotonic()
         while time.monotonic() < until and total < limit:
@@ -307,8 +311,8 @@ class Connection:
         return stream
 
     def write(self, stream, body, end=True, until=None):
-        """Sends bytes of a call within the flow control windows. Returns False if the stream ended first or the time is
-        over.
+        """Sends bytes of a call as far as the flow control windows allow. Returns False if the stream ended first or
+        the time is over.
         """
         view, until = memoryview(body), until or time.monotonic() + self.timeout
         if not len(view) and end:
@@ -368,14 +372,15 @@ class Connection:
 
 
 def open_socket(target, timeout, receive_buffer=None):
-    """Returns a connected socket, encrypted if the target says so."""
+    """Returns a connected socket, with TLS if the target has an SSL context."""
     sock = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     try:
         if receive_buffer:
             sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer)
         sock.settimeout(timeout)
         if target.source:
-            sock.setsockopt(socket.IPPROTO_IP, IP_BIND_ADDRESS_NO_PORT, 1)  # so that ports are not used up
+            # Let connect() choose the local port, so that the ports of this address are not used up.
+            sock.setsockopt(socket.IPPROTO_IP, IP_BIND_ADDRESS_NO_PORT, 1)
             sock.bind((target.source, 0))
         sock.connect((target.host, target.port))
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)

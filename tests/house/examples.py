@@ -1,4 +1,6 @@
-"""Small example trees: one that keeps all rules, and others that each break one rule. None as text removes a file."""
+"""Small example trees: one that keeps all rules, and others that each break one rule. A file whose text is None is
+removed from the tree.
+"""
 import language_rules
 
 HEADER = """// Three numbers: a position or a direction in world units, for all rooms. Plain data, so threads share it freely.

@@ -4,8 +4,8 @@
     house_test.py --root . [--build DIR] [RULE]   checks the tree (one rule or all), 0 if every rule holds, 77 if skipped
     house_test.py --sizes                         lengths of files and functions
 
-Before a rule checks the tree, it runs on examples that break it and examples that keep it (examples.py): a rule that
-cannot fail is a defect and fails.
+Before a rule checks the tree, it runs on examples that break the rule and on examples that keep it (examples.py). If
+the rule does not detect a broken example, or refuses a good one, its test fails.
 """
 import argparse
 import os
@@ -27,7 +27,7 @@ TREE_RULES = {**include_rules.RULES, **shape_rules.RULES, **language_rules.RULES
 
 
 def failures_of_the_rule_itself(name, rule):
-    """Returns defects of a rule: examples that break the rule but pass, or the good example if it is refused."""
+    """Returns defects of a rule: examples that break the rule but pass, and problems found in the good example."""
     problems = [f"the rule refuses a good example: {problem}" for problem in rule(Tree(GOOD_EXAMPLE))]
     examples = BAD_EXAMPLES.get(name, [])
     if not examples:
@@ -62,7 +62,9 @@ def check_format(options):
 
 
 def check_exceptions(options):
-    """Fails if a file listed as an exception of the mirror no longer exists."""
+    """Returns a problem for each file that is listed as an exception of the mirror but no longer exists, and the
+    defects of this rule itself.
+    """
     problems = [] if shape_rules.stale_exceptions(Tree(GOOD_EXAMPLE)) else ["the rule does not see its bad example"]
     return problems + shape_rules.stale_exceptions(read_tree(options.root))
 

@@ -6,14 +6,16 @@ from source_tree import includes, quoted_includes
 
 INDEX_STRUCTURES = ("list", "bvh", "hash_grid", "kd_tree", "octree", "bsp_tree", "sphere_tree", "grid")
 
-# Folders that the sources of a folder may include in addition to their own folder. A name that ends with "/*" allows
-# the folder and all folders below it, another name only the folder. "proto" is the code generated from the protocol.
+# Folders that the sources of a folder may include, in addition to their own folder. A name that ends with "/*" stands
+# for the folder and all folders below it, another name only for the folder itself. "proto" is the code generated from
+# the protocol.
 ALLOWED = {
     "core/base": [],
     "core/geometry": ["core/base"],
     "core/mesh": ["core/geometry", "core/base"],
     "core/index": ["core/geometry", "core/base"],
-    # From the bottom up: stored content, its updates, snapshots and readers, the log, and the scene.
+    # The folders of core/scene from the bottom up: stored content, its updates, snapshots and readers, the log, and the
+    # scene.
     "core/scene/objects": ["core/index/*", "core/geometry", "core/base"],
     "core/scene/statics": ["core/index/*", "core/mesh", "core/geometry", "core/base"],
     "core/scene/updates": ["core/scene/objects", "core/scene/statics", "core/index/*", "core/geometry", "core/base"],
@@ -41,7 +43,8 @@ ALLOWED = {
                     "core/*"],
     "server/services": ["server/rpc", "server/host", "server/connections", "server/convert", "server/scheduling",
                         "server/storage", "server/security", "server/observability", "server/config", "core/*", "proto"],
-    # Of core, only status_macros.h, and only in sources, because it is not installed.
+    # The client library may include only status_macros.h of core, and only in sources, because this header is not
+    # installed.
     "client/lib": ["proto", "core/base/status_macros.h"],
     "client/cli": ["client/cli/security", "client/lib", "core/base"],
     "client/cli/security": ["client/lib", "core/base"],
@@ -68,8 +71,8 @@ ALLOWED["core/index/hash_grid/kernels"] = ["core/base"]
 ALLOWED.update({"core/index/" + name: ["core/index", "core/geometry", "core/base"] for name in INDEX_STRUCTURES})
 ALLOWED["core/index/hash_grid"].append("core/index/hash_grid/kernels")
 
-# Prefixes of third-party headers, and the folders whose files, and those in folders below, may include such headers.
-# Tests may include all headers.
+# Prefixes of third-party headers. A prefix is followed by the folders whose files, and those in folders below, may
+# include such headers. Tests may include all headers.
 THIRD_PARTY = {
     "grpc": ["server/rpc", "server/services", "server/convert", "server/observability", "client/lib"],
     "google/protobuf/": ["server/rpc", "server/services", "server/convert", "client/lib"],
@@ -98,16 +101,17 @@ THIRD_PARTY = {
 FORBIDDEN_IN_CORE = {"iostream", "fstream", "filesystem"}
 INTRINSICS = "immintrin.h"
 KERNELS = ("core/index/bvh/kernels/", "core/index/hash_grid/kernels/")
-# This file may call madvise(), for large pages, because madvise() changes no value.
+# Files that may include a header of the system to advise the kernel about memory. madvise(), which asks for large
+# pages, is allowed because it changes no value.
 MEMORY_ADVICE = {"core/base/large_array.h": "sys/mman.h"}
 CLOCK_FILES = re.compile(r"core/base/mutex\.h|core/scene/(?:scene|readers/reader_tracker)\.(h|cc)")
 
-# Pairs of a folder and its parent that count as one room, divided only because of its size.
+# Pairs of a folder and its parent that count as one room; the room is divided only because of its size.
 ONE_ROOM = {"client/cli/levels/import/quake": "client/cli/levels/import"}
 
 
 def room_of_include(target):
-    """Returns the folder that an include names, or None for Abseil and other libraries."""
+    """Returns the folder to which an included file belongs, or None for Abseil and other libraries."""
     if target.startswith("locus/v1/"):
         return "proto"
     top = target.split("/")[0]
@@ -197,7 +201,9 @@ def includes_start_at_the_root(tree):
 
 
 def cycles(graph):
-    """Returns sets of nodes that reach each other. Source: Tarjan, strongly connected components, 1972; not recursive."""
+    """Returns the sets of nodes that reach each other. Not recursive. Source: Tarjan, Depth-first search and linear
+    graph algorithms, 1972.
+    """
     number, low, on_stack, stack, found = {}, {}, set(), [], []
     for root in sorted(graph):
         work = [] if root in number else [(root, iter(sorted(graph[root])))]

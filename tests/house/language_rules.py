@@ -1,14 +1,16 @@
-"""The language of comments and names: how a comment begins, which words are not used, and where a page is required."""
+"""Rules about the language of comments and names: how a comment begins, which words are banned, and where a page is
+required.
+"""
 import posixpath
 import re
 
-# Beginnings of comments without a verb, which leave the reader to guess what the comment is about.
+# Beginnings of comments without a verb. Such a comment leaves the reader to guess its subject.
 FRAGMENT = re.compile(r"(Of|What|Whether|The same|As|Nothing|Who|Whose|Whoever|Where|Nobody|None)\b")
 COMMENT = re.compile(r"[ \t]*// ?(.*)")
 
 
 def first_lines_of_comments(text):
-    """Returns (line number, text) of the first line of each run of lines that are comments and nothing else."""
+    """Returns (line number, text) of the first line of each run of lines that contain only comments."""
     found, inside = [], False
     for number, line in enumerate(text.split("\n"), 1):
         comment = COMMENT.fullmatch(line)
@@ -31,7 +33,7 @@ def limits_are_named_max_and_min(tree):
             for number, line in enumerate(tree.files[path].split("\n"), 1) for match in OLD_LIMIT.finditer(line)]
 
 
-# Written in pieces, so that this file does not contain the words that it forbids.
+# The words are written in pieces, so that this file does not contain the words that it bans.
 BANNED = re.compile(r"\b(who" + r"ever|tells " + r"who|the ho" + r"use)\b", re.IGNORECASE)
 
 
@@ -41,7 +43,7 @@ def words_are_plain(tree):
             for number, line in enumerate(text.split("\n"), 1) for match in BANNED.finditer(line)]
 
 
-# Pages that explain what is hard to see from the code, each at most one screen.
+# Pages that explain properties that are hard to see from the code. Each page has at most one screen.
 PAGES = ("core/README.md", "core/GLOSSARY.md", "core/index/README.md", "core/index/bvh/README.md",
          "core/index/hash_grid/README.md", "core/scene/README.md", "core/scene/log/FORMAT.md", "core/query/README.md",
          "server/README.md", "server/ARCHITECTURE.md", "server/DECISIONS.md", "server/storage/README.md",

@@ -13,7 +13,9 @@ def python_files(tree, below=""):
 
 
 def parsed(path, text):
-    """Returns the file's syntax tree, or a problem if it does not parse."""
+    """Returns the file's syntax tree and a list of problems. If the file does not parse, the tree is empty and the list
+    has one problem.
+    """
     try:
         return ast.parse(text), []
     except SyntaxError as error:
@@ -41,7 +43,7 @@ def python_files_are_tidy(tree):
 
 
 def public(body, prefix=""):
-    """Yields public classes, functions and methods of a module or class, with their full names."""
+    """Yields the public classes, functions and methods of a module or class, each with its full name."""
     for node in body:
         if isinstance(node, (ast.ClassDef, *FUNCTIONS)) and not node.name.startswith("_"):
             yield node, prefix + node.name
@@ -50,7 +52,7 @@ def public(body, prefix=""):
 
 
 def untyped(function):
-    """Returns the arguments without a type, and `return` if the result has none."""
+    """Returns the names of the arguments without a type; also `return` if the result has no type."""
     arguments = function.args
     named = arguments.posonlyargs + arguments.args + arguments.kwonlyargs
     extra = [argument for argument in (arguments.vararg, arguments.kwarg) if argument]

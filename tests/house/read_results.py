@@ -1,8 +1,8 @@
 """Prints one line for each test of a JUnit file written by ctest: its outcome (passed, failed, skipped) and its name.
 
-ctest reports a test as "not run" if its program is missing, if its fixture failed, or if it skipped itself; only the
-last is a skip here. A test that Python's unittest skipped within a passing test gets its own line, and so does each
-attack of which a passing group skipped all or some steps.
+ctest reports a test as "not run" if its program is missing, if its fixture failed, or if it skipped itself; this
+program counts only the last case as skipped. If Python's unittest skipped a test within a passing ctest test, the
+skipped test gets its own line. So does each attack of a passing group that skipped all or some of its steps.
 """
 import re
 import sys

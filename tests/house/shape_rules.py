@@ -35,7 +35,7 @@ def percentile(values, share):
 
 
 def sizes(tree):
-    """Returns one line for each kind of file: their number and lengths."""
+    """Returns one line for each kind of file: the number of files or functions, and their lengths."""
     lines = []
     for name, rooms in (("product", ("core", "server", "client")), ("tests", ("tests",))):
         paths = tree.code(*rooms)
@@ -88,7 +88,7 @@ def rooms_have_short_readmes(tree):
 
 
 PICTURE_ENDINGS = (".png", ".jpg", ".jpeg", ".gif", ".webp", ".bmp", ".ico")
-PICTURES = {"deploy/quickstart.png": 300 * 1024}  # maximum bytes, so that a clone stays small
+PICTURES = {"deploy/quickstart.png": 300 * 1024}  # maximum size in bytes, so that a clone stays small
 
 
 def pictures_are_few_and_small(tree):
@@ -98,7 +98,7 @@ def pictures_are_few_and_small(tree):
          if path in PICTURES and tree.size(path) > PICTURES[path]]
 
 
-# Split into parts, so that this file does not contain the forbidden words.
+# The words are split into parts, so that this file does not contain the forbidden words.
 UNFINISHED = re.compile(r"\b(" + "|".join(("TO" + "DO", "FIX" + "ME", "XX" + "X", "HA" + "CK")) + r")\b")
 MACHINE_PATH = re.compile(r"(?<![\w.}/-])/(?:" + "|".join(("wo" + "rk", "ro" + "ot", "ho" + "me", "Us" + "ers")) +
                           r")/|\.\./sha" + "red|/tmp/w" + "t\\b")
@@ -134,7 +134,7 @@ def no_path_of_a_machine(tree):
     return each_line(tree, MACHINE_PATH, "a path of one machine")
 
 
-# Tests that mirror no source file, each with the reason.
+# Tests that mirror no source file, each with the reason why it mirrors none.
 MIRROR_EXCEPTIONS = {
     "tests/client/cli/exit_code_test.cc": "the program as a child process: exit codes and streams",
     "tests/core/geometry/shape_ray_test.cc": "ray tests of every shape, whose chords are in ray_convex",
@@ -144,7 +144,9 @@ MIRRORED = ("tests/core", "tests/server", "tests/client", "tests/deploy")
 
 
 def subjects(path):
-    """Returns possible subjects of a test: hash_grid_threads_test.cc tests hash_grid_threads, hash_grid or hash."""
+    """Returns the names of sources that a test may belong to: hash_grid_threads_test.cc may belong to
+    hash_grid_threads, hash_grid or hash.
+    """
     words = path[len("tests/"):-len("_test.cc")].split("_")
     return {"_".join(words[:count]) for count in range(1, len(words) + 1)}
 
@@ -174,8 +176,8 @@ def rooms_use_their_namespace(tree):
         opened = OUTER_NAMESPACE.findall(code)
         if not opened and posixpath.basename(path) not in ("main.cc", "status_macros.h"):
             problems.append(f"{path}: has nothing in namespace {expected}")
-        # A file opens the namespace of its top-level folder, or one inside it. That of core is locus, so core must not
-        # open the namespaces of the other folders.
+        # A file may open the namespace of its top-level folder, and namespaces inside it. The namespace of core is
+        # locus, which contains those of the other folders, so core must not open the namespaces of the other folders.
         for name in opened:
             inside = name == expected or name.startswith(expected + "::")
             nested = name != "locus" and "locus" not in name.split("::")[0] and expected in opened

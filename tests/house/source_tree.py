@@ -1,6 +1,6 @@
-"""The project's files for the repository rules: a map from path to text, and helpers that parse C++ files.
+"""Files of the project for the repository rules: a map from path to text, and helpers that parse C++ files.
 
-Rules take a Tree, so that tests can run them on small examples that exist only in memory.
+Rules take a Tree, so that the rules can be tested on small examples that exist only in memory.
 """
 import os
 import re
@@ -18,7 +18,7 @@ class Tree:
         self.sizes = dict(sizes or {})
 
     def size(self, path):
-        """Returns the bytes of a file on the disk; for a file of an example, the bytes of its text."""
+        """Returns the size of a file on the disk in bytes; for a file of an example, the size of its text."""
         return self.sizes.get(path, len(self.files[path].encode()))
 
     def code(self, *rooms):
@@ -60,7 +60,7 @@ INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*(["<])([^">]+)[">]', re.MULTIL
 
 
 def includes(text):
-    """Returns (quoted, target) of each #include."""
+    """Returns (whether the name is in quotes, name of the included file) for each #include."""
     return [(mark == '"', target) for mark, target in INCLUDE.findall(without_comments(text))]
 
 
@@ -83,7 +83,7 @@ def without_comments(text):
 
 
 def without_comments_and_literals(text):
-    """Replaces comments and literals of strings and characters by blanks, so that every remaining brace is code."""
+    """Replaces comments, and literals of strings and characters, by blanks, so that every remaining brace is code."""
     return COMMENT_OR_LITERAL.sub(lambda m: blank(m.group()), text)
 
 
@@ -93,7 +93,9 @@ ACCESS = re.compile(r"^(\s*(public|private|protected)\s*:)+")
 
 
 def after_template(declaration):
-    """Returns the declaration without leading template<...>, whose word `class` would be mistaken."""
+    """Returns the declaration without a leading template<...>, because the word `class` in it would be mistaken for a
+    class.
+    """
     declaration = ACCESS.sub("", declaration).strip()
     while re.match(r"template\s*<", declaration):
         position, depth = declaration.index("<"), 0
@@ -106,7 +108,7 @@ def after_template(declaration):
 
 
 def kind_of_brace(declaration):
-    """Returns what a brace after this text opens outside of functions: 'scope', 'function' or 'value'."""
+    """Returns what a brace after `declaration` opens, outside of functions: 'scope', 'function' or 'value'."""
     text = after_template(declaration)
     if TYPE_OR_NAMESPACE.match(re.sub(r"alignas\s*\([^)]*\)|final\b", "", text)):
         return "scope"
@@ -118,10 +120,11 @@ def kind_of_brace(declaration):
 
 
 def functions(text):
-    """Returns (first line, number of lines) of each function with a body; a lambda counts in its function.
+    """Returns (first line, number of lines) of each function with a body. A lambda counts as part of the function
+    around it.
 
-    Finds functions by the braces of formatted code, without a parser: a brace directly after a word begins a value, such
-    as the initialiser of a member.
+    Finds functions by the braces of formatted code, without a parser. A brace directly after a word begins a value,
+    such as the initialiser of a member.
     """
     code = PREPROCESSOR.sub(lambda m: blank(m.group()), without_comments_and_literals(text))
     found, open_braces, start, line = [], [], 0, 1

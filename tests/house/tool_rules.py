@@ -11,11 +11,13 @@ KERNEL_NAMES = ("ray_kernels_", "region_kernels_", "nearest_kernels_", "crossing
 
 
 class Skip(Exception):
-    """Raised if the tool or the build is missing."""
+    """Raised if the tool or the build folder that a rule needs is missing."""
 
 
 def symbols_of_other_worlds(lines):
-    """Returns the undefined names of gRPC or protobuf, from the output of nm --demangle --undefined-only."""
+    """Returns the undefined symbols that belong to gRPC or protobuf. `lines` is the output of nm --demangle
+    --undefined-only.
+    """
     return sorted({line.split(" U ", 1)[1].strip() for line in lines
                    if " U " in line and ("grpc" in line.lower() or "google::protobuf" in line)})
 
@@ -35,8 +37,8 @@ def pure_libraries_refer_to_no_grpc(tree, build):
 
 
 def faults_of_a_kernel(lines):
-    """Returns the faults of an object compiled for one instruction set: more than one exported symbol, or one that the
-    linker may merge with another object's. Takes the output of nm --demangle."""
+    """Returns the faults of an object that is compiled for one instruction set: more than one exported symbol, or a
+    symbol that the linker may merge with a symbol of another object. Takes the output of nm --demangle."""
     exported = [line.split(" T ", 1)[1] for line in lines if " T " in line]
     merged = [line for line in lines if any(f" {kind} " in line for kind in "VvWwu")]
     problems = [] if len(exported) == 1 else [f"exports {len(exported)} symbols, not one: {', '.join(exported)}"]

@@ -1,4 +1,6 @@
-"""Attacks by calls: invalid messages, deep nesting, false lengths, many writers; and a heavy but honest load."""
+"""Attacks by calls: invalid messages, deep nesting, false lengths, many writers; and heavy loads that are no attacks
+("honest").
+"""
 import functools
 import random
 import struct
@@ -15,7 +17,8 @@ UPLOAD = "/locus.v1.SceneService/UploadMesh"
 REFLECTION = "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo"
 NO_MESSAGES = {"ff": b"\xff\xff\xff\xff", "a cut field": b"\x0a\x7f", "a cut number": b"\x08\x80", "field 0": b"\x02\x00",
                "an end without a group": b"\x7c", "a text that is not UTF-8": b"\x0a\x02\xc3\x28"}
-# Allowed codes of requests whose field 1 is not a string.
+# Codes that are also allowed, by kind of bytes. A text that is not UTF-8 is valid in requests whose field 1 is no
+# string.
 OTHER_ENDS = {"a text that is not UTF-8": ("OK", "NOT_FOUND", "UNIMPLEMENTED")}
 DEPTH = 100_000
 WRITERS = 6000
@@ -69,19 +72,21 @@ def job_call(job, path, body, what):
 
 
 def declared_lengths(job):
-    """Declares message lengths above the maximum, above the limit, or above the bytes that follow."""
+    """Declares message lengths that are above any maximum, above the server's limit, or above the number of bytes that
+    follow.
+    """
     with job.connect() as connection:
         for declared in (0xffffffff, 0x7fffffff, (32 << 20) + 1, 1000):
             for path in (QUERY, STREAM_QUERIES, "/locus.v1.SceneService/CreateScene"):
                 stream = connection.start(path)
                 connection.write(stream, struct.pack(">BI", 0, declared) + bytes(10))
-                # gRPC itself ends a call with a truncated message. This test checks only that the declared length is
+                # gRPC itself ends a call with a truncated message. This step checks only that the declared length is
                 # not allocated.
                 job.check(connection.finish(stream), f"{path} declares {declared} bytes", wire.CODES, text=False)
 
 
 def writers(job):
-    """Sends batches of more writers than a scene stores."""
+    """Sends batches of more writer ids than a scene stores."""
     with job.connect(timeout=20) as connection:
         stream = connection.start(STREAM_UPDATES)
         for writer in range(1, WRITERS + 1):
@@ -100,7 +105,9 @@ def reflections(job):
 
 
 def hold_calls(job, path, body=None, window=wire.DEFAULT_WINDOW, count=HELD):
-    """Keeps as many calls as the daemon allows, without their message or without an end, while another client calls."""
+    """Keeps as many calls open as the daemon allows, by sending no message or no end of the call, while another client
+    makes honest calls.
+    """
     with job.connect(window=window, grant=window > 0) as holder, job.connect() as other:
         for _ in range(count):
             stream = holder.start(path, (("grpc-timeout", "100S"),))

@@ -12,17 +12,17 @@ from job import Attack, Lost, one
 QUERY = "/locus.v1.QueryService/Query"
 GARBAGE_BYTES = 64
 SPARE_DESCRIPTORS = 200
-HALF_HELLO = b"\x16\x03\x01\x02\x00\x01"  # begins a TLS record of 512 bytes
+HALF_HELLO = b"\x16\x03\x01\x02\x00\x01"  # beginning of a TLS record of 512 bytes
 SEED = 7
 
 
 def room(wanted):
-    """Returns `wanted`, limited to the number of sockets that this process may open."""
+    """Returns `wanted`, but not more than the number of sockets that this process may open."""
     return min(wanted, resource.getrlimit(resource.RLIMIT_NOFILE)[0] - SPARE_DESCRIPTORS)
 
 
 def quick_close(sock):
-    """Closes a socket with a reset, so that its port is free at once."""
+    """Closes a socket with a reset, so that its local port is free again at once."""
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
     sock.close()
 
@@ -70,7 +70,8 @@ def garbage_steps(job):
 
 
 def hold(job, opened, speak):
-    """Keeps the connections open until the time is over and calls speak() for each in turn."""
+    """Keeps the connections open until the time is over, and meanwhile calls speak() for one connection after another.
+    """
     at = 0
     while not job.over() and opened:
         at = (at + 1) % len(opened)
@@ -83,7 +84,9 @@ def hold(job, opened, speak):
 
 
 def open_many(job, count, **options):
-    """Opens connections for at most twice the duration of the attack. Returns the accepted ones."""
+    """Opens `count` connections, for at most twice the duration of the attack. Returns the connections that were
+    accepted.
+    """
     opened, until = [], time.monotonic() + 2 * job.seconds
     while len(opened) < room(count) and time.monotonic() < until:
         try:
@@ -109,8 +112,8 @@ def idle(job, count, handshake):
 
 
 def half_handshakes(job):
-    """Opens connections that send the first bytes of a TLS handshake and then nothing; without TLS, an invalid
-    preface.
+    """Opens connections that send the first bytes of a TLS handshake and then nothing more. Without TLS, sends an
+    invalid HTTP/2 preface instead.
     """
     sockets, until = [], time.monotonic() + 2 * job.seconds
     while len(sockets) < room(5000) and time.monotonic() < until:

@@ -19,8 +19,8 @@ PIECE = wire.PIECE
 
 
 def until_over(job, attack_once):
-    """Runs the attack on one connection after another until the time is over. The daemon may close connections, which are
-    then opened at most MAX_CONNECTIONS times in that time.
+    """Runs the attack on one connection after another until the time is over. The daemon may close a connection; a new
+    one is then opened, at most MAX_CONNECTIONS in that time.
     """
     for _ in range(MAX_CONNECTIONS):
         if job.over():
@@ -35,8 +35,8 @@ def until_over(job, attack_once):
 
 
 def indexed_call(connection, path, body):
-    """Makes a call that adds its headers to the dynamic table. Returns the header block of later calls that repeat
-    it.
+    """Makes a call that adds its header fields to the dynamic table of HPACK. Returns the header block with which later
+    calls repeat these fields.
     """
     fields = wire.grpc_fields(path)
     stream, connection.next_id = connection.next_id, connection.next_id + 2
@@ -49,8 +49,8 @@ def indexed_call(connection, path, body):
 
 
 def reset_streams(job, path, body, end):
-    """Opens streams on several connections and ends each with the frame `end` (its stream id is 0) right after the
-    request.
+    """Opens streams on several connections and ends each stream with the frame `end` right after its request. The
+    stream id in `end` is a placeholder, 0.
     """
     data, total = wire.frame(wire.DATA, wire.END_STREAM, 0, wire.message(body)), [0]
     cost = RESETS_AT_ONCE * (len(body) + 5)
@@ -96,7 +96,7 @@ ASKS = {"4 rays": protobuf.query(b"world", protobuf.rays(4)), "empty batches": p
 
 
 def endless_headers(job, start, filling):
-    """Sends an endless block of headers: `start`, then `filling` repeatedly in CONTINUATION frames."""
+    """Sends a block of headers that never ends: `start`, then `filling` repeatedly in CONTINUATION frames."""
     per_frame = PIECE // len(filling)
     block = wire.frame(wire.CONTINUATION, 0, 1, filling * per_frame) * 16
     sent = [0]
@@ -131,7 +131,7 @@ def continuation_steps(job):
 
 
 def hpack_steps(job):
-    """Returns steps for endless integers, changes of the table size, and texts sent byte by byte."""
+    """Returns steps for integers without an end, changes of the table size, and texts that are sent byte by byte."""
     zeros = b"\x80"
     endless = (("length with endless zeros", b"\x00\x7f", zeros), ("index with endless zeros", b"\xff", zeros),
                ("table size with endless zeros", b"\x3f", zeros))
@@ -145,7 +145,7 @@ def hpack_steps(job):
 
 
 def flood_frames(job, frames, reading, opens):
-    """Sends the same frames repeatedly, with an open call on the connection if `opens`."""
+    """Sends the same frames repeatedly. With `opens`, a call is open on the connection meanwhile."""
     block = frames * max(1, 65536 // len(frames))
 
     def once(connection):

@@ -1,4 +1,6 @@
-"""Attacks by messages: small messages that become large when inflated or parsed, and many that are never completed."""
+"""Attacks by messages: small messages that become large when they are inflated or parsed, and many messages that are
+never completed.
+"""
 import functools
 import struct
 import zlib
@@ -17,7 +19,9 @@ GZIPPED = (HOT[0], HOT[3], "/locus.v1.SceneService/CreateScene")
 
 @functools.lru_cache(maxsize=None)
 def gzip_of_zeros(mebibytes):
-    """Returns a gzip stream about a thousand times smaller than its content: one compressed piece repeated."""
+    """Returns a gzip stream of zeros, which is about a thousand times smaller than its content: a compressed piece of 1
+    MiB is repeated.
+    """
     piece = zlib.compressobj(9, zlib.DEFLATED, -15)
     packed = piece.compress(bytes(MIB)) + piece.flush(zlib.Z_FULL_FLUSH)
     check = 0
@@ -52,7 +56,7 @@ def gzip_steps(job):
 
 
 def filled(place):
-    """Returns a request of about 32 MiB with this Place filled."""
+    """Returns a request of about 32 MiB in which the field of this Place is filled."""
     field = place.fields[-1]
     if place.kind == "map":
         body = protobuf.map_entries(field, LARGEST)
@@ -75,8 +79,8 @@ def send_filled(job, method, prefix, make, what):
 
 
 def amplify_steps(job):
-    """Returns a step for every Place of every request. The steps that need most memory per byte, on hot calls, come
-    first.
+    """Returns a step for every Place of every request. The first steps are those that need most memory for each byte
+    sent, on the most frequent calls.
     """
     schema, steps = protobuf.Schema(), []
     for method in schema.methods:
@@ -108,7 +112,7 @@ def unfinished_messages(job):
 
 ROWS = [
     Attack("gzip", "messages", gzip_steps, "compressed messages of 2 MB that inflate to 2 GB and less", "13 messages"),
-    # Up to 0.1 s of work on an IO loop for each message: the price of the option.
+    # Parsing takes up to 0.1 s on an IO loop for each message, which is the cost of this option.
     Attack("gzip-accepted", "messages", gzip_steps, "the same, with a daemon that accepts compressed messages",
            "13 messages", slower=40, flags=("--accept-compression",)),
     Attack("amplify", "messages", amplify_steps,

@@ -1,4 +1,4 @@
-"""Attacks by data that the daemon must store: unread replies, and history."""
+"""Attacks by data that the daemon must keep in memory: unread replies, and history."""
 import functools
 import time
 

@@ -2,7 +2,7 @@
 
     python3 dashboards_test.py DASHBOARDS_DIRECTORY BIN_DIRECTORY
 
-/metrics is read by Prometheus's own Python library; dashboard, alerts and README may only name existing metrics.
+Prometheus's own Python library reads /metrics. Dashboard, alerts and README may name only metrics that exist there.
 """
 
 import json
@@ -22,7 +22,7 @@ DASHBOARDS, BIN = sys.argv[1], os.path.abspath(sys.argv[2])
 START_SECONDS = 30
 METRIC = re.compile(r"\b(?:locus|process)_[a-z_]+")
 LABELLED = re.compile(r"\b((?:locus|process)_[a-z_]+)\{([^}]*)\}")
-# Metrics of Prometheus itself.
+# Metrics that Prometheus itself provides.
 KNOWN_ELSEWHERE = {"up"}
 
 

@@ -1,5 +1,5 @@
-"""Tests of deploy/edge with the configuration that is shipped: HAProxy accepts it, clients reach locusd through it, each
-client is limited, and what one client does wrong ends no call of another.
+"""Tests of deploy/edge with the configuration that is shipped: HAProxy accepts the configuration, clients reach locusd
+through HAProxy, each client is limited, and a mistake of one client ends no call of another client.
 
     python3 edge_test.py SOURCE_DIRECTORY BIN_DIRECTORY PYTHON_PACKAGE_DIRECTORY
 """
@@ -33,7 +33,8 @@ def content(name):
 
 
 def files(folder):
-    """Writes an access file and a token file. Returns the options that name them, and the tokens by their ids."""
+    """Writes an access file and a token file. Returns the options that name these files, and the tokens by their ids.
+    """
     paths = [os.path.join(folder, name) for name in ("access.conf", "tokens")]
     with open(os.open(paths[0], os.O_CREAT | os.O_WRONLY, 0o600), "w", encoding="utf-8") as file:
         file.write(ACCESS)
@@ -44,7 +45,7 @@ def files(folder):
 
 
 class EdgedDaemon(edge.EdgedDaemon):
-    """An edge.EdgedDaemon with rights: `tokens` has those of an administrator and a player."""
+    """An edge.EdgedDaemon with an access file. `tokens` are the tokens of an administrator and of a player."""
 
     tokens = None
 
@@ -132,7 +133,7 @@ class EdgeTest(unittest.TestCase):
                 self.assertEqual(queries.send(rays).result(WAIT_SECONDS).blocks[0].t[0], 99.5 - height)
 
     def test_a_message_of_8_mebibytes_passes(self):
-        count = (8 << 20) // 20  # 8 bytes of id and 12 of position
+        count = (8 << 20) // 20  # bytes of an object: 8 for its id and 12 for its position
         positions = [coordinate for i in range(count) for coordinate in (float(i), 0.0, 0.0)]
         batch = locus.UpdateBatch(upsert=True).insert_points(ids=range(1, count + 1), positions=positions)
         self.assertGreater(len(batch.request_bytes("arena")), (8 << 20) - 64)
@@ -171,7 +172,8 @@ class EdgeTest(unittest.TestCase):
     def test_refusals_name_the_limit(self):
         reply = self.wire_connection().call(LIST, b"", (("x-long", "v" * 9000),))
         self.assertEqual((reply.code, "8000 bytes of metadata" in reply.text), ("RESOURCE_EXHAUSTED", True), reply.text)
-        busy = self.daemon.target._replace(source="127.0.0.3")  # so that no other test is refused
+        # Use an address of its own, so that the limits refuse no call of another test.
+        busy = self.daemon.target._replace(source="127.0.0.3")
         connections = [self.wire_connection(busy) for _ in range(4)]
         texts, until = "", time.monotonic() + WAIT_SECONDS
         while "200 new calls in 100 ms" not in texts and time.monotonic() < until:  # 360 calls take longer on a busy machine

@@ -8,7 +8,7 @@ import sys
 import unittest
 
 FOLDER = sys.argv[1]
-# A page has no date, so that the same sources give the same bytes.
+# The page has no date, so that equal sources give equal bytes. Accept the warning about it.
 ACCEPTED = re.compile(r'missing date')
 
 

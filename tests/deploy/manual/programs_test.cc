@@ -18,7 +18,7 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-// Expects each option, positional and example of the command and of its subcommands on its page.
+// Expects the page of the command, and the pages of its subcommands, to contain each option, positional and example.
 void expect_pages(const cli::CommandWords& command, const std::string& section,
                   std::map<std::string, std::string>& pages) {
   const std::string file = absl::StrCat(absl::StrReplaceAll(command.path, {{" ", "-"}}), ".", section);

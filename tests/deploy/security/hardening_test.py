@@ -1,9 +1,9 @@
-"""Follows deploy/security as a reader would, on two machines: network and mount namespaces that a virtual cable connects.
-The commands are those of the pages, word by word.
+"""Runs the commands of the pages in deploy/security, unchanged, on two simulated machines. A machine is a network
+namespace and a mount namespace; a virtual cable connects the two machines.
 
     python3 hardening_test.py SOURCE_DIRECTORY BIN_DIRECTORY
 
-Exits 77, which counts as skipped, where namespaces cannot be made.
+Exits 77, which counts as skipped, if namespaces cannot be made.
 """
 import os
 import re
@@ -18,7 +18,7 @@ import unittest
 SOURCE, BIN = (os.path.abspath(path) for path in sys.argv[1:3])
 PAGES = os.path.join(SOURCE, "deploy/security")
 SERVER, CLIENT = "10.0.0.5", "10.0.0.6"
-USER_ID = 61234  # user id of `locus` within the namespaces
+USER_ID = 61234  # user id of the user `locus` within the namespaces
 WAIT_SECONDS = 30
 SKIPPED = 77
 SETUP = f"""
@@ -39,7 +39,7 @@ exec sleep 600
 
 
 def blocks(page, heading):
-    """Returns the commands of a section of a page, one text for each block."""
+    """Returns the commands of one section of a page, as one text for each code block."""
     with open(os.path.join(PAGES, page), encoding="utf-8") as file:
         section = re.split(r"^## ", file.read(), flags=re.MULTILINE)
     text = next(part for part in section if part.startswith(heading))
@@ -52,7 +52,9 @@ def can_make_machines():
 
 
 class Machine:
-    """A network namespace and a mount namespace, kept by a process. `folder` is its user's folder."""
+    """A machine made of a network namespace and a mount namespace, which a process keeps alive. `folder` is the folder
+    of its user.
+    """
 
     def __init__(self, root, name):
         self.folder = os.path.join(root, name, "work")
@@ -66,7 +68,9 @@ class Machine:
             raise RuntimeError(f"machine {name} did not start")
 
     def enter(self, command, user=True):
-        """Returns a command that runs `command`, a text for the shell, on this machine as the user locus or as root."""
+        """Returns the arguments that run `command`, a text for the shell, on this machine, as the user locus or as
+        root.
+        """
         as_user = ["setpriv", f"--reuid={USER_ID}", f"--regid={USER_ID}", "--clear-groups"] if user else []
         return ["nsenter", "-t", str(self.keeper.pid), "--net", "--mount", "--wd=" + self.folder, *as_user, "sh", "-c",
                 f"PATH={self.programs}:$PATH\n{command}"]
@@ -85,7 +89,7 @@ class MutualTlsTest(unittest.TestCase):
         root = tempfile.mkdtemp()
         self.addCleanup(shutil.rmtree, root)
         os.mkdir(os.path.join(root, "bin"))
-        for program in ("locus", "locusd"):  # the user may not be allowed to read BIN
+        for program in ("locus", "locusd"):  # copy the programs: the user may not be allowed to read BIN
             shutil.copy(os.path.join(BIN, program), os.path.join(root, "bin"))
         self.server = Machine(root, "server")
         self.addCleanup(self.server.stop)
@@ -96,13 +100,13 @@ class MutualTlsTest(unittest.TestCase):
             self.check(machine, f"ip address add {address}/24 dev cable && ip link set cable up", user=False)
 
     def check(self, machine, command, user=True):
-        """Runs a command that must succeed. Returns what it prints."""
+        """Runs a command that must succeed. Returns the command's output."""
         result = machine.run(command, user)
         self.assertEqual(result.returncode, 0, f"{command}\n{result.stdout}{result.stderr}")
         return result.stdout
 
     def refuse(self, machine, command):
-        """Runs a command that must fail. Returns its error."""
+        """Runs a command that must fail. Returns the command's error output."""
         result = machine.run(command)
         self.assertNotEqual(result.returncode, 0, f"{command}\n{result.stdout}")
         return result.stderr

@@ -16,7 +16,7 @@ import unittest
 DEPLOY = sys.argv[1]
 UNIT = os.path.join(DEPLOY, "locusd.service")
 SKIPPED = 77
-# In tenths: 0 is none, 100 is complete.
+# Maximum exposure in tenths of systemd's scale, on which 0.0 is no exposure and 10.0 is complete exposure.
 MAX_EXPOSURE = 11
 
 
