@@ -17,7 +17,7 @@ namespace {
 using cli::CommandWords;
 using cli::OptionWords;
 
-// Footer of a command's help, split into the indented lines below "Examples:" and all other lines.
+// Footer of a command's help, split into examples (the indented lines below "Examples:") and notes (all other lines).
 struct Footer {
   std::string notes;
   std::vector<std::string> examples;
@@ -49,10 +49,10 @@ std::string markup_of(const OptionWords& option) {
   return absl::StrCat(absl::StrJoin(names, ", "), value.empty() ? "" : " ", value);
 }
 
-// Returns `text` with a full stop at its end. A full stop that is there already is not doubled.
+// Returns `text` with exactly one full stop at its end.
 std::string sentence(const std::string& text) { return absl::StrCat(absl::StripSuffix(text, "."), "."); }
 
-// Returns the first sentence of `description` on one line, which whatis(1) indexes.
+// Returns the first sentence of `description` on one line. whatis(1) indexes this line.
 std::string summary(const std::string& description) {
   const std::string line = absl::StrReplaceAll(description, {{"\n", " "}});
   return std::string(absl::StripSuffix(line.substr(0, line.find(". ")), "."));
@@ -107,7 +107,7 @@ void add_explained(const std::string& heading, const Explained& words, RoffPage&
   for (const auto& [word, text] : words) page.item(bold(word), text);
 }
 
-// Adds `notes` to `page`: indented lines are printed literally, other lines as running text.
+// Adds `notes` to `page`. Indented lines are printed literally, other lines as running text.
 void add_notes(const std::string& notes, RoffPage& page) {
   std::string running;
   std::vector<std::string> kept;

@@ -1,5 +1,5 @@
-// Generates manual pages from a parser's texts: one for a program and one for each of its commands. Exit statuses and
-// environment variables, which are not in the parser, are passed as a Manual. Used by write_manual.cc.
+// Generator of manual pages from a parser's texts: one page for a program and one for each of its commands. The parser
+// does not contain exit statuses and environment variables, so they are passed as a Manual. Used by write_manual.cc.
 #ifndef LOCUS_DEPLOY_MANUAL_MANUAL_PAGE_H_
 #define LOCUS_DEPLOY_MANUAL_MANUAL_PAGE_H_
 
@@ -28,7 +28,7 @@ struct Page {
   std::string roff;
 };
 
-// Returns the pages of the program and of every command below it, the program's first.
+// Returns the page of the program, followed by the pages of every command below it.
 std::vector<Page> manual_pages(const cli::CommandWords& program, const Manual& manual);
 
 }  // namespace locus::manual

@@ -1,5 +1,5 @@
-// The manual pages of the two installed programs. The only file that includes the parsers of both: neither program
-// includes code of the other.
+// The manual pages of the two installed programs. Only programs.cc includes the parsers of both programs; neither
+// program includes code of the other.
 #ifndef LOCUS_DEPLOY_MANUAL_PROGRAMS_H_
 #define LOCUS_DEPLOY_MANUAL_PROGRAMS_H_
 

@@ -1,4 +1,4 @@
-// Builder of a manual page in roff with the `man` macros, as man(7) describes them. It escapes all plain text. Used by
+// Builder of a manual page in roff with the `man` macros (man(7)). The builder escapes all plain text. Used by
 // manual_page.h. Not thread-safe.
 #ifndef LOCUS_DEPLOY_MANUAL_ROFF_H_
 #define LOCUS_DEPLOY_MANUAL_ROFF_H_
@@ -8,8 +8,8 @@
 
 namespace locus::manual {
 
-// Returns `text` escaped, so that roff prints it unchanged: it has no commands and no escape sequences, and minus signs
-// and straight quotes stay as they are. Line ends are kept.
+// Returns `text` escaped, so that roff prints it unchanged: no part of it is interpreted as a command or an escape
+// sequence, and minus signs and straight quotes are kept. Line ends are kept.
 std::string escaped(const std::string& text);
 
 // Return the escaped text in bold or in italics.
@@ -24,10 +24,10 @@ class RoffPage {
   RoffPage& heading(const std::string& name);
   // Adds running text; an empty line begins a new paragraph.
   RoffPage& text(const std::string& plain);
-  // Adds a term and its explanation. `markup` is the term, made by escaped(), bold() or italic(); `plain` is plain
-  // text.
+  // Adds a term and its explanation. `markup` is the term as roff, made by escaped(), bold() or italic(); `plain` is
+  // the explanation as plain text.
   RoffPage& item(const std::string& markup, const std::string& plain);
-  // Adds a synopsis: `markup`, then `rest_markup`. The lines after the first are indented.
+  // Adds a synopsis: `markup`, followed by `rest_markup`. Lines after the first are indented.
   RoffPage& synopsis(const std::string& markup, const std::string& rest_markup);
   // Adds lines that are printed unchanged.
   RoffPage& literal(const std::vector<std::string>& lines);
