@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# From a fresh Debian 12 machine to a running locusd that answers on a real game level, checked by brute force.
+# Sets up locusd on a fresh Debian 12 machine, with a real game level, and checks its answers by brute force.
 #
 #   ./deploy/quickstart.sh [--seconds N] [--objects N] [--keep]
 #
@@ -51,7 +51,7 @@ if [ ! -f "$build/build.ninja" ]; then
 fi
 cmake --build "$build" --target locusd locus locus_python
 
-# The level's package is downloaded and unpacked, never installed.
+# Downloads and unpacks the package of the level, but does not install it.
 download_level() {
   local work status=0
   work=$(mktemp -d "$levels/fetch.XXXXXX")
@@ -62,7 +62,7 @@ download_level() {
   return $status
 }
 
-# Updates Debian's package lists once; without them a fresh machine does not know the package.
+# Updates Debian's package lists once: on a fresh machine they do not contain the package yet.
 update_lists() {
   local as_root=()
   [ "$(id -u)" = 0 ] || as_root=(sudo)
@@ -97,7 +97,7 @@ stop() {
 }
 trap stop EXIT
 
-# Starts a daemon with the given number of threads; sets `address`.
+# Starts a daemon with the given name and number of threads. Sets `address` to its address.
 start() {
   local name=$1 threads=$2
   "$build/bin/locusd" --listen 127.0.0.1:0 --port-file "$run/$name.port" --threads "$threads" > "$run/$name.log" 2>&1 &
