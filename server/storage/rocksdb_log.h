@@ -81,8 +81,8 @@ class RocksdbLog final : public UpdateLog {
   void list_stored();
 
   // Writes the chunks that `source` returns into `family`, under keys that begin with `prefix`, and returns the summary
-  // of the chunks. Before the chunks, writes the row with the key `pending` into the family meta: it marks the chunks
-  // as unfinished until a commit() deletes the row. Does not sync. After an error deletes the chunks again.
+  // of the chunks. Before the chunks, writes a row with the key `pending` into the family meta. This row marks the
+  // chunks as unfinished until a commit() deletes the row. Does not sync. After an error deletes the chunks again.
   absl::StatusOr<ChunkList> put_chunks(rocksdb::ColumnFamilyHandle* family, const std::string& pending,
                                        const std::string& prefix, ChunkSource source);
   void drop_chunks(rocksdb::ColumnFamilyHandle* family, const std::string& pending, const std::string& prefix);
@@ -95,12 +95,12 @@ class RocksdbLog final : public UpdateLog {
   // snapshot, whose content id is `replaced_id`. ABORTED if another snapshot was committed meanwhile.
   absl::Status put_snapshot(const SceneLogStatePtr& log_state, uint64_t replaced_id, uint64_t sequence,
                             const ContentRow& snapshot) LOCUS_EXCLUDES(catalogue_mutex_);
-  // Returns whether the chunks that the row with the key `pending` marks as unfinished belong to a committed snapshot
-  // or mesh.
+  // Returns whether the chunks whose row `pending` marks them as unfinished belong to a committed snapshot or mesh.
   bool in_use(absl::string_view pending) const LOCUS_REQUIRES(catalogue_mutex_);
   // Returns the row of the mesh `name`; no value if the catalogue has no intact row of this name.
   std::optional<MeshRow> mesh_row(absl::string_view name) const LOCUS_REQUIRES(catalogue_mutex_);
-  // Returns whether `number` is the content id of the parts of a mesh whose content has the hash `sha256` (32 bytes).
+  // Returns whether `number` is the content id of the parts of a mesh. `sha256` (32 bytes) is the hash of the mesh's
+  // content.
   bool parts_in_use(absl::string_view sha256, uint64_t number) const LOCUS_REQUIRES(catalogue_mutex_);
   absl::Status read_mesh_chunks(const Sha256& sha256, const ContentRow& row, ChunkSink sink) const;
   std::set<Sha256> content_hashes() const LOCUS_REQUIRES(catalogue_mutex_);

@@ -16,8 +16,8 @@
 namespace locus::server {
 namespace {
 
-// Minimum size in bytes of a full batch of chunks, which is then written. A larger batch would make concurrent appends
-// wait longer for the disk.
+// Size in bytes from which a batch of chunks is written. With larger batches, concurrent appends would wait longer for
+// the disk.
 constexpr size_t kChunkBatchBytes = size_t{2} << 20;
 // Minimum total size in bytes of RocksDB's memory tables for which write_snapshot() starts a flush. After the flush
 // RocksDB deletes old log files.

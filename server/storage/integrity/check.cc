@@ -11,9 +11,8 @@
 namespace locus::server {
 namespace {
 
-// Locks the directory, so that no process writes during the check. Returns OK without a lock, with `lock` null, for a
-// backup that was never opened, because it has no lock file, and for a directory on a read-only disk, because its lock
-// file cannot be locked.
+// Locks the directory, so that no process writes during the check. Returns OK with a null `lock` in two cases: a backup
+// that was never opened has no lock file, and a lock file on a read-only disk cannot be locked.
 absl::Status acquire_lock(const StorageOptions& options, std::unique_ptr<DirectoryLock>& lock) {
   if (!options.env->FileExists(absl::StrCat(options.path, "/", DirectoryLock::kName)).ok()) return absl::OkStatus();
   auto taken = DirectoryLock::acquire(*options.env, options.path);

@@ -116,7 +116,7 @@ absl::Status DurableMarkerFile::write(DurableMarker& durable_marker) {
   LOCUS_DCHECK_LE(slot.size(), slot_bytes_);
   rocksdb::Status status = file_->Write(durable_marker.write_number % 2 * slot_bytes_, slot);
   if (status.ok()) status = file_->Sync();
-  if (!status.ok()) file_ = nullptr;  // it is unknown what the slot contains: the next write() replaces the file
+  if (!status.ok()) file_ = nullptr;  // the slot's content is unknown, so the next write() replaces the file
   return status.ok() ? absl::OkStatus() : error(folder_, status);
 }
 

@@ -31,8 +31,10 @@ struct SceneMarker {
   uint64_t sequence = 0;          // sequence number of the last synced record
   uint64_t running_checksum = 0;  // running checksum of record `sequence`
   uint64_t row_checksum = 0;      // checksum of the scene's row in the catalogue
-  bool copied = false;            // true if back_up() made this directory and the scene still has the original's epoch
-  std::string damage;             // damage found by an opening; empty if intact; kept until deletion or repair
+  // True if back_up() made this directory as a copy, and the scene still has the epoch of the original scene.
+  bool copied = false;
+  // Damage found when the directory was opened; kept until the scene is deleted or repaired. Empty if intact.
+  std::string damage;
 };
 
 struct DurableMarker {

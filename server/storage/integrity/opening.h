@@ -52,9 +52,10 @@ DatabaseOptions database_options_of(const StorageOptions& options);
 // if it is too damaged to be opened, UNAVAILABLE or RESOURCE_EXHAUSTED for an error of the disk.
 absl::StatusOr<OpenedDirectory> open_directory(const StorageOptions& options);
 
-// Compares RocksDB's list of its files (the MANIFEST) with the durable marker. DATA_LOSS if the database is missing. If
-// the current MANIFEST has the name that the marker contains, also DATA_LOSS if the MANIFEST is missing or shorter than
-// the marker says. RocksDB starts a new MANIFEST at times; a MANIFEST of another name is not checked.
+// Compares RocksDB's list of its files, the MANIFEST, with the durable marker. DATA_LOSS if the database is missing.
+// RocksDB starts a new MANIFEST at times. If the current MANIFEST has another name than the one in the marker, returns
+// OK without a further check. Otherwise returns DATA_LOSS if the MANIFEST is missing, or shorter than the length in the
+// marker.
 absl::Status check_file_list(rocksdb::Env& env, const std::string& database_folder,
                              const DurableMarker& durable_marker);
 // Stores the current name and length of the MANIFEST in the durable marker.

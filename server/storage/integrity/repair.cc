@@ -158,8 +158,8 @@ absl::Status copy_mesh(const Database& source, const MeshHealth& found, Copier& 
     absl::Status parts = row.parts ? copy_mesh_chunks(source, row.sha256, *row.parts, copier) : absl::OkStatus();
     if (!parts.ok() && !absl::IsDataLoss(parts)) return parts;
     repaired.parts_dropped = !parts.ok();
-    // If the chunks of the parts are damaged, write the row without `parts`. A reader of such a row looks for the parts
-    // in the chunks of the content; those of this content have none, so the mesh has no parts.
+    // If the chunks of the parts are damaged, write the row without `parts`. Such a row means that the parts are among
+    // the chunks of the content. The chunks of this content contain no parts, so the mesh then has none.
     if (repaired.parts_dropped) row.parts = std::nullopt;
     put_row(content, with_checksum(content, encode(found.content)), result, copier);
     const std::string key = mesh_key(found.name);
@@ -202,9 +202,10 @@ absl::Status make_copy(const Database& source, const DamageReport& damage_report
   return DurableMarkerFile(*options.env, folder).replace(durable_marker);
 }
 
-// Moves the old database and marker into the folder before-repair-N, and the new database and marker from repaired/ to
-// their place. Precondition: repaired/READY, which contains the path of before-repair-N, exists. Writing READY is the
-// commit point of a repair: after a later crash, the next call of repair() only does the moves that are still missing.
+// Moves the old database and marker into the folder before-repair-N, and the new database and marker from repaired/
+// into the data directory. Precondition: repaired/READY, which contains the path of before-repair-N, exists. Writing
+// READY is the commit point of a repair: after a later crash, the next call of repair() only does the moves that are
+// still missing.
 absl::Status install_repaired(const StorageOptions& options, std::string& kept_at) {
   rocksdb::Env& env = *options.env;
   const fs::path here = options.path;

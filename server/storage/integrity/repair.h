@@ -19,7 +19,7 @@ struct SceneRepair {
   std::string name;
   std::string damage;
   bool dropped = false;    // no part of the scene was kept
-  bool deleted = false;    // the scene had been deleted, reappeared, and is deleted again: nothing is lost
+  bool deleted = false;    // a deleted scene had reappeared and was deleted again; nothing is lost
   uint64_t kept_to = 0;    // sequence number of the last record that was kept
   uint64_t lost_from = 0;  // sequence number of the first lost record; 0 if no lost record is known
   uint64_t lost_to = 0;

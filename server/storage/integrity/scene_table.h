@@ -23,7 +23,7 @@
 
 namespace locus::server {
 
-// Position in a scene's log: the sequence number of a record, and the checksum over all records up to it.
+// Position in a scene's log: the sequence number of a record, and the checksum over all records up to that record.
 struct Position {
   uint64_t sequence = 0;
   uint64_t running_checksum = 0;

@@ -79,8 +79,8 @@ std::string row_damage(const SceneHealth& scene, const SceneMarker* scene_marker
   return "";
 }
 
-// Returns the message of `status`, which is empty for OK. If `status` is an error of the disk rather than damage, also
-// stores it in `disk`.
+// Returns the message of `status`, an empty text for OK. If `status` is an error of the disk rather than damage, also
+// stores `status` in `disk`.
 std::string damage_of(const absl::Status& status, absl::Status& disk) {
   if (!status.ok() && !absl::IsDataLoss(status)) disk.Update(status);
   return std::string(status.message());

@@ -25,8 +25,9 @@ struct SceneHealth {
   uint64_t running_checksum = 0;  // checksum of record `last`
   uint64_t log_bytes = 0;
   uint64_t expected_sequence = 0;  // sequence number of the last record that must exist
-  bool copied = false;             // true if back_up() made this directory and the scene still has the original's epoch
-  std::string damage;              // description of the damage; empty if the scene is intact
+  // True if back_up() made this directory as a copy, and the scene still has the epoch of the original scene.
+  bool copied = false;
+  std::string damage;  // description of the damage; empty if the scene is intact
 };
 
 struct MeshHealth {

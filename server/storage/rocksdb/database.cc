@@ -20,13 +20,15 @@ constexpr size_t kBlockBytes = size_t{64} << 10;
 constexpr size_t kCacheBytes = size_t{8} << 20;
 constexpr int kBuffers = 4;
 // Numbers of tables in RocksDB's level 0. RocksDB merges the tables once there are kTablesToMerge of them. It would
-// stall writers once there are kUnlimitedTables, a number that is never reached; stalling does not help here.
+// stall writers once there are kUnlimitedTables. This number is never reached, because a stall would only delay
+// updates.
 constexpr int kTablesToMerge = 4;
 constexpr int kUnlimitedTables = 1 << 20;
 constexpr uint64_t kManifestBytes = uint64_t{4} << 20;
 constexpr size_t kInfoLogBytes = size_t{1} << 20;
 constexpr uint64_t kLogBuffersOnDisk = 4;
-constexpr uint64_t kRecoveryBytes = uint64_t{1} << 20;  // disk space for recover(), without that of the memory tables
+// Disk space in bytes that recover() needs in addition to the size of the memory tables.
+constexpr uint64_t kRecoveryBytes = uint64_t{1} << 20;
 constexpr auto kBufferPoll = std::chrono::milliseconds(1);
 
 // Logger that drops every message. The read-only modes use it, because they must not write a log file.
@@ -191,8 +193,9 @@ absl::Status Database::recover(uint64_t free_bytes) {
     return refusal;
   }
   if (!broken_) fail_writes(rocksdb::Status::IOError("a table could not be written")).IgnoreError();
-  // RocksDB aborts the process if it writes to a log file in which an earlier write failed. After Resume() it accepts
-  // writes again, but only flush_to_new_log() replaces that file. So wait until all calls of write_now() have returned.
+  // RocksDB aborts the process if it writes to a log file in which an earlier write failed. Resume() permits writes
+  // again before flush_to_new_log() has replaced this log file. Therefore wait until no call of write_now() is in
+  // progress.
   while (writers_ > 0) std::this_thread::sleep_for(kBufferPoll);
   errors_->seen = false;
   rocksdb::Status status = db_->Resume();

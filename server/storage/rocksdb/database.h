@@ -68,8 +68,8 @@ class Database {
   bool needs_recovery() const;
   // Resumes writing after an error. Starts a new log file, because RocksDB reads no record that follows a torn one.
   // Waits until the calls of write() in progress have returned; new calls of write() fail meanwhile. Flushes all memory
-  // tables: if the disk's free space, `free_bytes`, is too small for them, returns RESOURCE_EXHAUSTED with the bytes
-  // needed. If write() fails already, it fails with this error from then on.
+  // tables. If the disk's free space, `free_bytes`, is too small for them, returns RESOURCE_EXHAUSTED with the bytes
+  // needed; if writes fail at this time, write() returns this new error from then on.
   absl::Status recover(uint64_t free_bytes) LOCUS_EXCLUDES(mutex_);
   // Starts flushing all memory tables, so that RocksDB can delete old log files. Returns at once; if flushing fails,
   // the next write reports the error.
@@ -79,7 +79,7 @@ class Database {
   void wait_for_buffers(rocksdb::ColumnFamilyHandle* family) const;
   // Returns the total size in bytes of the memory tables of all column families that are not flushed yet.
   uint64_t buffered_bytes() const;
-  // Returns the size in bytes of the blocks of tables that are held in memory.
+  // Returns the size in bytes of RocksDB's block cache, which keeps blocks of tables in memory.
   uint64_t block_cache_bytes() const;
 
  private:

@@ -130,7 +130,7 @@ inline constexpr size_t kRecordOverhead = kRecordHeadBytes + 8;
 std::string record_head(const LogEntry& entry);
 uint64_t record_checksum(absl::string_view key, absl::string_view head, absl::string_view bytes,
                          uint64_t running_checksum);
-// Returns the entry of a record, which borrows from `value`; no value if `value` is malformed. Does not verify the
+// Decodes the value of a record. The result borrows from `value`; no value if `value` is malformed. Does not verify the
 // checksum.
 std::optional<LogEntry> decode_record(absl::string_view value);
 

@@ -1,7 +1,7 @@
 // The folder outlines/ of a data directory: a cache of the tree topologies of meshes. The folder has one file for each
 // mesh content (vertices and triangles), named by the content's SHA-256. Any file may be deleted at any time, because
-// the tree can be built without it; so files need no sync. No function returns an error: keep() ignores it if a file
-// cannot be written, and read() returns no value if a file has a wrong checksum. Files with other names are never
+// the tree can be built without it. For the same reason files are not synced, and no function returns an error: keep()
+// ignores a failed write, and read() returns no value if a file has a wrong checksum. Files with other names are never
 // changed.
 //
 // Threads: any thread; calls for the same SHA-256 must not overlap.
