@@ -29,11 +29,11 @@ absl::Status no_method(const std::string& path) {
 
 }  // namespace
 
-// One call: requested from gRPC, or accepted and not yet over. Its events arrive on the loop. The call reads its first
-// message there, and is admitted when the message has arrived: a caller that sends none takes no thread and no permit.
-// The body runs on a thread of its own, starts one operation at a time and waits for the operation's event. The call
-// deletes itself on the loop when the first read has ended, the status was sent (finished_) and gRPC has reported the
-// end of the call (over_).
+// One call that was requested from gRPC, or was accepted and is not over yet. Its events arrive on its IO loop. The
+// call reads its first message on the loop and is admitted only when the message has arrived, so a caller that sends no
+// message takes no thread and no permit. The method's body then runs on a thread of its own, starts one operation at a
+// time and waits for the operation's event. The call deletes itself on the loop when the first read has ended, the
+// status was sent (finished_) and gRPC has reported the end of the call (over_).
 class BlockingCalls::Call final : private IoLoop::ActiveCall, private MessageStream {
  public:
   static void listen(BlockingCalls& owner, IoLoop& io) {
@@ -70,7 +70,7 @@ class BlockingCalls::Call final : private IoLoop::ActiveCall, private MessageStr
     wire_.Read(&first_bytes_, &first_read_tag_);
   }
 
-  // Handles the arrival of the first message; `ok` is false if the caller sends none or gave up.
+  // Handles the arrival of the first message. `ok` is false if the caller sends no message or gave up.
   void first_read(bool ok) {
     if (ok) caller_->connection().message_read(first_bytes_.Valid() ? first_bytes_.Length() : 0);
     if (first_ == First::kGivenUp) {
@@ -84,7 +84,7 @@ class BlockingCalls::Call final : private IoLoop::ActiveCall, private MessageStr
     if (!owner_.threads_.run([this] { run(); })) refuse_first(refuse_busy("calls", owner_.threads_.max()));
   }
 
-  // Sends the refusal of a call whose first message has arrived, and frees the message, which no claim covers.
+  // Sends the refusal of a call whose first message has arrived. Frees the message, because its memory is not claimed.
   void refuse_first(const absl::Status& status) {
     first_bytes_.Clear();
     finish(status);
@@ -116,20 +116,20 @@ class BlockingCalls::Call final : private IoLoop::ActiveCall, private MessageStr
     return absl::OkStatus();
   }
 
-  // Runs the body on the call's thread. The call may be deleted before this returns.
+  // Runs the body on the call's thread. The call may be deleted before run() returns.
   void run() {
     const LogScope scope(caller_->trace());
     finish(method_->body(*caller_, *this));
   }
 
-  // Sends the status. The call may be deleted before this returns.
+  // Sends the status. The call may be deleted before finish() returns.
   void finish(const absl::Status& status) {
     context_.AddTrailingMetadata(kRequestIdMetadata, caller_->trace().request_id);
     if (method_ != nullptr && (method_->is_change || Caller::is_audited(status)))
       caller_->audit(caller_->subject(), status);
     if (method_ != nullptr && method_->rpc)
       record_answer(owner_.state_.metrics, *caller_, *method_->rpc, status, arrived_);
-    // Release the permit first: a caller that has its answer may call again at once, and must be admitted.
+    // Release the permit first: the caller may call again as soon as it has the answer, and must then be admitted.
     permit_ = AdmissionLimiter::Permit();
     request_claim_.release();
     finishing_since_.store(std::chrono::steady_clock::now());
@@ -163,8 +163,8 @@ class BlockingCalls::Call final : private IoLoop::ActiveCall, private MessageStr
     return wait();
   }
 
-  // Sets the answer and claims its memory. A claim that the body holds would not suffice: it ends with the body, but
-  // the answer may still wait to be sent.
+  // Sets the answer and claims its memory. The call keeps the claim itself, because the answer may still wait to be
+  // sent when the body and its claims have ended.
   void answer(const google::protobuf::Message& response) override {
     answer_ = to_bytes(response);
     caller_->connection().written(answer_.Length());
@@ -246,10 +246,10 @@ class BlockingCalls::Call final : private IoLoop::ActiveCall, private MessageStr
 
   // State of the first message.
   enum class First : uint8_t {
-    kReading,  // the read is pending; on the loop only
+    kReading,  // the read is pending, and the call is used on the IO loop only
     kGivenUp,  // the read is pending, but the call is being finished
     kArrived,  // first_bytes_ has the message
-    kTaken,    // the message was taken, or there is none
+    kTaken,    // the body has read the message, or there is no message
   };
 
   BlockingCalls& owner_;

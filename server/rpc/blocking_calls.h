@@ -1,10 +1,10 @@
-// Serves the methods that block: accepts their calls on an IO loop, admits each call before any of its bytes is read,
-// and runs its body on a thread of its own. Calls of unknown methods are refused with UNIMPLEMENTED.
+// Serves the methods that block: accepts their calls on an IO loop, admits each call before its first message is
+// parsed, and runs its body on a thread of its own. Calls of unknown methods are refused with UNIMPLEMENTED.
 //
 // gRPC's synchronous services are not used: they parse a message before any of our code runs, so that a message of a
 // few megabytes could use gigabytes. Also, they answer malformed bytes with INTERNAL and an empty text.
 //
-// Threads: add() and listen() before the server serves, by one thread. Calls arrive on IO loops.
+// Threads: one thread calls add() and listen(), before the server serves. Calls arrive on IO loops.
 #ifndef LOCUS_SERVER_RPC_BLOCKING_CALLS_H_
 #define LOCUS_SERVER_RPC_BLOCKING_CALLS_H_
 

@@ -1,5 +1,5 @@
-// Description of a method whose calls block a thread: all methods but those of queries and updates. Services build
-// these; server/rpc/blocking_calls.h serves them. Plain data; any thread.
+// Description of a method whose calls block a thread: every method except queries and updates. Services build these
+// descriptions; server/rpc/blocking_calls.h serves the methods. Plain data; any thread.
 #ifndef LOCUS_SERVER_RPC_BLOCKING_METHOD_H_
 #define LOCUS_SERVER_RPC_BLOCKING_METHOD_H_
 
@@ -40,8 +40,8 @@ absl::Status read_only_message(MessageStream& stream, Request& request) {
   return refuse_argument(Reason::kMalformed, "", {}, "a call of this method has one message; none was sent");
 }
 
-// Returns the body of a method with one request and one response.
-// `serve` is absl::Status(const Caller&, const Request&, Response&).
+// Returns the body of a method with one request and one response. `serve` has the signature absl::Status(const Caller&,
+// const Request&, Response&).
 template <class Request, class Response, class Serve>
 std::function<absl::Status(const Caller&, MessageStream&)> unary_body(Serve serve) {
   return [serve = std::move(serve)](const Caller& caller, MessageStream& stream) -> absl::Status {
@@ -54,8 +54,8 @@ std::function<absl::Status(const Caller&, MessageStream&)> unary_body(Serve serv
   };
 }
 
-// Returns the body of a method with one request and a stream of responses.
-// `serve` is absl::Status(const Caller&, const Request&, MessageStream&).
+// Returns the body of a method with one request and a stream of responses. `serve` has the signature absl::Status(const
+// Caller&, const Request&, MessageStream&).
 template <class Request, class Serve>
 std::function<absl::Status(const Caller&, MessageStream&)> streaming_body(Serve serve) {
   return [serve = std::move(serve)](const Caller& caller, MessageStream& stream) -> absl::Status {

@@ -40,8 +40,7 @@ class Caller {
   // Returns the call's deadline; for a call without a deadline, the time a year after the call began.
   SteadyTime deadline() const { return deadline_; }
   // Returns the time until which this call may wait for a revision: its deadline, or limits::kDefaultWaitMs from now if
-  // the call has no deadline. A message of a stream waits until the deadline too, but never longer than
-  // limits::kDefaultWaitMs.
+  // the call has no deadline. For a message of a stream, the time is never later than limits::kDefaultWaitMs from now.
   SteadyTime wait_until(bool stream) const;
 
   // Returns INVALID_ARGUMENT (MALFORMED) if the metadata `x-scene` is present and names another scene.
@@ -50,16 +49,17 @@ class Caller {
   // Counts the call and its metadata for its connection. Call it once, when the call was accepted.
   void count_call() const;
 
-  // Authenticates the caller, and checks that the caller may call the method `path` of this server. UNAUTHENTICATED if
-  // the caller's credentials are not accepted, or if a caller without credentials may do nothing here;
-  // PERMISSION_DENIED if the caller lacks a right to the server that the method needs. Call it before the other
-  // functions on rights.
+  // Authenticates the caller, and checks the caller's rights to the server (not to scenes) that the method `path`
+  // needs. UNAUTHENTICATED if the caller's credentials are not accepted, or if a caller without credentials may do
+  // nothing on this server. PERMISSION_DENIED if the caller lacks a needed right. Call it before the other functions on
+  // rights.
   absl::Status authorize(absl::string_view path);
-  // Returns whether the caller has the right; if it is a right to scenes, whether the caller has it to `scene`.
+  // Returns whether the caller has the right. A right to scenes is checked for `scene`; for other rights `scene` is
+  // ignored.
   bool may(Right right, absl::string_view scene) const;
   // Returns whether the caller may administer every scene.
   bool administers_all() const;
-  // Returns OK if the caller has the right to the scene that the method needs. NOT_FOUND, as for a scene that does not
+  // Returns OK if the caller has the right to `scene` that the method needs. NOT_FOUND, as for a scene that does not
   // exist, if the caller may not read the scene; PERMISSION_DENIED if the caller may read it, but lacks the right.
   absl::Status check_right(const std::string& scene) const;
   // Returns PERMISSION_DENIED with a text that names the caller, the missing right and the scene.
@@ -87,8 +87,9 @@ class Caller {
   absl::StatusOr<QuotaHold> hold_quota(QuotaKind kind, double amount) const;
 
   // Claims `bytes` on `line` of the server's memory budget, and takes them from the quota bytes_in_flight of the
-  // caller's identity and connection. For moves, requests and replies, the bytes also count against the connection's
-  // share (MemoryBudget::connection_share()). RESOURCE_EXHAUSTED names the limit or quota that does not suffice.
+  // caller's identity and connection. For the lines of moves, requests and replies, the bytes also count against the
+  // connection's share (MemoryBudget::connection_share()). RESOURCE_EXHAUSTED names the limit or quota that does not
+  // suffice.
   absl::StatusOr<CallMemory> claim(MemoryLine line, absl::string_view field, uint64_t bytes) const;
   // Claims `bytes` for work that is never refused, because it frees memory.
   CallMemory claim_anyway(MemoryLine line, uint64_t bytes) const;
@@ -100,8 +101,8 @@ class Caller {
   // mesh, or why the call was refused.
   void audit(absl::string_view subject, const absl::Status& status) const;
   // Appends a line to the audit log for a call that names a scene that the caller may not read. Does nothing if
-  // promise_audit() was called and `scene` is the call's subject, because then the line of the answer names the scene
-  // too. The scene need not exist.
+  // promise_audit() was called and `scene` is the call's subject, because the line that audit() will append names the
+  // scene too. The scene need not exist.
   void audit_hidden(absl::string_view scene) const;
   // Tells audit_hidden() that audit() will be called with the final status of this call.
   void promise_audit() { is_answer_audited_ = true; }
@@ -137,7 +138,7 @@ class Caller {
   const std::atomic<bool>& gone_;
   const std::shared_ptr<Connection> connection_;
   SteadyTime deadline_;
-  const RpcRight* rpc_right_ = nullptr;  // row of the method; null before authorize()
+  const RpcRight* rpc_right_ = nullptr;  // entry of the method in the table of rights; null before authorize()
   IdentityPtr identity_ = anonymous_identity();
   std::array<std::string, 2> quota_subjects_;  // result of quota_subjects(); set by authorize() with access control
   mutable std::string subject_;

@@ -1,6 +1,6 @@
 // Hands accepted connections over to gRPC. TCP connections go through gRPC's external acceptor, which supports TLS and
-// names each peer by its address. It would give all peers of unix sockets the same name, so unix connections are added
-// by their descriptors, which then are part of their names.
+// names each peer by its address. The external acceptor would give all peers of unix sockets the same name. Therefore
+// unix connections are added by their file descriptors, and each peer's name contains the descriptor.
 //
 // Threads: hand_over() on one thread, between started() and the shutdown of the server.
 #ifndef LOCUS_SERVER_RPC_CONNECTION_INTAKE_H_

@@ -262,7 +262,8 @@ class HotCall final : private IoLoop::ActiveCall {
   }
 
   // Returns whether a message that was refused before it was parsed can be answered by itself, so that its stream
-  // continues. This needs its sequence number, so only the numbers and short texts of `request` are parsed.
+  // continues. The answer needs the message's sequence number, so only the numbers and short texts of `request` are
+  // parsed.
   static bool can_answer(const absl::Status& refused, const Bytes& bytes, Request& request) {
     const std::optional<Refusal> refusal = refusal_of(refused);
     return Method::kStream && refusal && refusal->reason != Reason::kMalformed && parse_envelope(bytes, request);
@@ -377,7 +378,7 @@ class HotCall final : private IoLoop::ActiveCall {
   void finish() {
     finishing_ = true;
     writing_since_ = std::chrono::steady_clock::now();
-    // Release the permit and the quota first: a caller that has its answer may call again at once, and must be
+    // Release the permit and the quota first: the caller may call again as soon as it has the answer, and must then be
     // admitted.
     permit_ = AdmissionLimiter::Permit();
     open_quota_.shrink(0);
@@ -452,7 +453,7 @@ class HotCall final : private IoLoop::ActiveCall {
   std::atomic<bool> stopped_{false};  // true once the caller no longer waits for answers; polled by work on any thread
   SteadyTime arrived_;
   std::optional<OpenStream> open_;
-  QuotaHold open_quota_;  // quota of open streams, held by a stream
+  QuotaHold open_quota_;  // hold on the quota open_streams; empty for a unary call
   std::optional<Caller> caller_;
   AdmissionLimiter::Permit permit_;
   SceneBinding scene_;

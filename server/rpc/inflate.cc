@@ -17,7 +17,7 @@ constexpr uint8_t kGzipFirst = 0x1f;
 // Sizes in bytes of the pieces of the result: each is twice as large as the one before.
 constexpr uint64_t kFirstPiece = 4096;
 constexpr uint64_t kLargestPiece = 1u << 20;
-constexpr int kGzipOnly = 16;  // added to the bits of zlib's window
+constexpr int kGzipOnly = 16;  // added to zlib's windowBits, so that zlib accepts gzip streams only
 
 absl::Status no_gzip() {
   return refuse_argument(Reason::kMalformed, "", {}, "the bytes are no complete gzip stream of one message");
@@ -37,10 +37,10 @@ class Inflation {
   Inflation(const Inflation&) = delete;
   Inflation& operator=(const Inflation&) = delete;
 
-  // Returns the next `bytes` bytes of the result, or fewer if the result ends before.
+  // Returns the next `bytes` bytes of the result, or fewer bytes if the result ends earlier.
   absl::StatusOr<grpc::Slice> next(uint64_t bytes) {
     const grpc::Slice piece(bytes);
-    stream_.next_out = const_cast<Bytef*>(piece.begin());  // the new piece is not shared
+    stream_.next_out = const_cast<Bytef*>(piece.begin());  // writing is safe: no other slice shares the new piece
     stream_.avail_out = static_cast<uInt>(bytes);
     while (!ended_ && stream_.avail_out > 0) RETURN_IF_ERROR(step());
     return piece.sub(0, bytes - stream_.avail_out);

@@ -1,6 +1,6 @@
-// Inflates messages that callers compressed with gzip, for servers with --accept-compression. gRPC 1.51 checks the size
-// of a message before it inflates it, to any size, so it hands compressed messages over as they are. Functions without
-// state; any thread.
+// Inflates messages that callers compressed with gzip, for servers with --accept-compression. gRPC 1.51 limits only the
+// compressed size of a message and would inflate the message to any size, so gRPC is configured to pass compressed
+// messages on unchanged. Functions without state; any thread.
 #ifndef LOCUS_SERVER_RPC_INFLATE_H_
 #define LOCUS_SERVER_RPC_INFLATE_H_
 

@@ -5,9 +5,9 @@
 // Only one thread of a loop at a time waits in gRPC: if several threads waited, gRPC would make each waiting thread
 // wake the next thread for every event.
 //
-// Threads: any thread may call IoLoop::post(). It does not call gRPC; a separate thread, the waker, sets a gRPC alarm
-// if a sleeping loop must be woken. Lifetime: call IoThreads::stop() after the server has ended; stop() waits for the
-// last call.
+// Threads: any thread may call IoLoop::post(). post() does not call gRPC; if it must wake a sleeping loop, a separate
+// thread, the waker, sets a gRPC alarm. Lifetime: call IoThreads::stop() after the server has ended; stop() waits for
+// the last call.
 #ifndef LOCUS_SERVER_RPC_IO_THREADS_H_
 #define LOCUS_SERVER_RPC_IO_THREADS_H_
 
@@ -92,7 +92,8 @@ class IoLoop final : private EventSource, public EventLoop {
   std::atomic<bool> recheck_posted_{false};
   MemberTag<IoLoop> recheck_{*this, &IoLoop::recheck_active_calls};
   ActiveCalls active_calls_;
-  bool stall_timer_set_ = false;  // set whenever there are active calls
+  // True while the timer of check_stalled_calls() is set. It is set whenever there are active calls.
+  bool stall_timer_set_ = false;
 };
 
 // The IO loops of a server and their threads.

@@ -1,5 +1,5 @@
-// The messages of one blocking call: its body reads the caller's messages and writes its own. Threads: the call's
-// thread only.
+// Interface with which the body of a blocking call reads the caller's messages and writes its responses. Threads: the
+// call's thread only.
 #ifndef LOCUS_SERVER_RPC_MESSAGE_STREAM_H_
 #define LOCUS_SERVER_RPC_MESSAGE_STREAM_H_
 

@@ -23,13 +23,13 @@ void free_check(void*, void* check, CRYPTO_EX_DATA*, int, long, void*) { delete 
 
 struct TlsChecks {
   OnRefused on_refused;
-  int index;  // index of a connection's FrameCheck among the data that OpenSSL keeps for it
+  int index;  // index under which OpenSSL stores the FrameCheck of a connection
 };
 
 std::atomic<const TlsChecks*> tls_checks{nullptr};  // null until check_tls_reads()
 
-// Returns whether the peers have agreed on a protocol. gRPC offers h2 and grpc-exp, which are both HTTP/2; the HTTP
-// port offers none.
+// Returns whether the two peers have agreed on a protocol. gRPC offers h2 and grpc-exp, which are both HTTP/2; the HTTP
+// port of metrics offers no protocol.
 bool has_chosen_http2(const SSL* ssl) {
   const unsigned char* name = nullptr;
   unsigned int size = 0;
@@ -55,7 +55,7 @@ bool accept(SSL* ssl, absl::string_view bytes) {
 }  // namespace
 
 void check_tls_reads(OnRefused on_refused) {
-  // Otherwise gRPC would call the original functions, for example because it is linked statically.
+  // If these symbols are not ours, gRPC calls the original functions, for example because gRPC is linked statically.
   LOCUS_CHECK(dlsym(RTLD_DEFAULT, "recvmsg") == reinterpret_cast<void*>(&recvmsg));
   LOCUS_CHECK(dlsym(RTLD_DEFAULT, "SSL_read") == reinterpret_cast<void*>(&SSL_read));
   static const TlsChecks kChecks{on_refused, SSL_get_ex_new_index(0, nullptr, nullptr, nullptr, free_check)};

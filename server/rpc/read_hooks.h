@@ -1,8 +1,8 @@
-// Replaces the functions with which gRPC reads from connections, recvmsg() and SSL_read(), for the whole process,
+// Replaces recvmsg() and SSL_read(), the functions with which gRPC reads from connections, for the whole process,
 // because gRPC 1.51 offers no hook between reading and parsing. The replacements call the original functions, then
-// check the frames of HTTP/2 in the bytes that were read. They check the sockets that a CheckedReads watches, and all
-// TLS connections of clients that have agreed on a protocol with the server. A connection with refused bytes gets an
-// error of reading, so that gRPC closes it. See server/connections/README.md for the reason.
+// check the frames of HTTP/2 in the bytes that were read. They check the sockets that a CheckedReads object watches,
+// and every TLS connection whose client has agreed on a protocol with the server. If bytes are refused, the read fails,
+// so that gRPC closes the connection. See server/connections/README.md for the reason.
 #ifndef LOCUS_SERVER_RPC_READ_HOOKS_H_
 #define LOCUS_SERVER_RPC_READ_HOOKS_H_
 

@@ -28,7 +28,8 @@ using google::protobuf::io::StringOutputStream;
 // Maximum size in bytes of a slice of a response.
 constexpr int kSliceBytes = 1 << 20;
 
-// Maximum sizes in bytes of one text in an envelope (names of scenes are shorter), and of all fields of an envelope.
+// Maximum sizes in bytes of one text in an envelope (see parse_envelope(); names of scenes are shorter), and of all
+// fields of an envelope.
 constexpr uint32_t kMaxEnvelopeText = 256;
 constexpr int kMaxEnvelopeBytes = 2048;
 
@@ -73,7 +74,7 @@ absl::StatusOr<CallMemory> parse_request(const Caller& caller, const WirePlan& p
 }
 
 bool parse_envelope(const grpc::ByteBuffer& bytes, google::protobuf::Message& request) {
-  grpc::ByteBuffer borrowed(bytes);  // shares the slices: the reader takes a pointer to a buffer that is not const
+  grpc::ByteBuffer borrowed(bytes);  // shares the slices; the reader needs a pointer to a non-const buffer
   grpc::ProtoBufferReader reader(&borrowed);
   if (!reader.status().ok()) return false;
   CodedInputStream in(&reader);

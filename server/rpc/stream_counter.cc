@@ -18,8 +18,8 @@ using std::chrono::steady_clock;
 using Json = nlohmann::json;
 
 constexpr intptr_t kSocketsAtOnce = 256;
-// Interval at which the counter asks for the numbers of all connections, not only for new ones: gRPC may list a
-// connection later than another one with a higher number.
+// Interval at which the counter asks for the numbers of all connections, not only for numbers above the last one. This
+// finds connections that gRPC listed late, after a connection with a higher number.
 constexpr std::chrono::seconds kAskAllInterval{1};
 
 // Parses a text that gRPC has allocated, and frees it. Returns a discarded value if `text` is null or not JSON.
@@ -36,7 +36,7 @@ int64_t number_in(const Json& object, const char* field) {
   return absl::SimpleAtoi(found->get_ref<const std::string&>(), &number) ? number : 0;
 }
 
-// Returns the elements of an array in a field; none if it is missing.
+// Returns the elements of an array in a field; an empty array if the field is missing.
 Json list_in(const Json& object, const char* field) {
   return object.is_object() && object.contains(field) && object[field].is_array() ? object[field] : Json::array();
 }

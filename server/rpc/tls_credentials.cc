@@ -109,8 +109,8 @@ grpc_ssl_certificate_config_reload_status TlsCredentials::fetch(void* self,
   if (std::exchange(credentials.fetched_, true)) return GRPC_SSL_CERTIFICATE_CONFIG_RELOAD_UNCHANGED;
   const TlsContents& contents = credentials.contents_;
   const grpc_ssl_pem_key_cert_pair pair{contents.key.c_str(), contents.certificate.c_str()};
-  // gRPC requires CA certificates here. If it asks clients for no certificate, it ignores them, so pass any
-  // certificates.
+  // gRPC requires CA certificates here even if it asks clients for no certificate. It then ignores the CA certificates,
+  // so pass any certificates.
   const std::string& roots = contents.client_ca.empty() ? contents.certificate : contents.client_ca;
   *config = grpc_ssl_server_certificate_config_create(roots.c_str(), &pair, 1);
   return GRPC_SSL_CERTIFICATE_CONFIG_RELOAD_NEW;

@@ -25,7 +25,8 @@ using google::protobuf::io::CodedInputStream;
 
 // Repeated fields double their capacity as they grow.
 constexpr uint64_t kGrowth = 2;
-// Bytes of a column's header and of the first values' room, in addition to kGrowth times its values.
+// Bytes of a column's header and of the space that Protobuf allocates for the first values, in addition to kGrowth
+// times the bytes of the values.
 constexpr uint64_t kColumnBytes = 16;
 // Bytes of a string object with its allocation, and of an entry in a list of pointers with the allocation that it
 // points to.
@@ -125,7 +126,8 @@ struct WirePlan::Scan {
   uint64_t memory = 0;
   uint32_t fields = 0;
   uint32_t unknown = 0;
-  absl::InlinedVector<uint32_t, 16> counts;  // values of the fields of each limit; grows with the largest index
+  // Number of values so far of the fields of each limit, by limit_index; grows as needed.
+  absl::InlinedVector<uint32_t, 16> counts;
 
   absl::Status message(const Type& type);
   absl::Status field(const Type& type, uint32_t tag);
@@ -287,7 +289,7 @@ WirePlan::Field WirePlan::make_field(const FieldDescriptor& field, const std::ve
 }
 
 absl::StatusOr<uint64_t> WirePlan::scan(const grpc::ByteBuffer& bytes) const {
-  grpc::ByteBuffer borrowed(bytes);  // shares the slices: the reader takes a pointer to a buffer that is not const
+  grpc::ByteBuffer borrowed(bytes);  // shares the slices; the reader needs a pointer to a non-const buffer
   grpc::ProtoBufferReader reader(&borrowed);
   if (!reader.status().ok()) return no_message();
   CodedInputStream in(&reader);
