@@ -19,8 +19,8 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 
-// Interval at which running calls check whether their credentials have expired, and at which due counts are written to
-// the audit log.
+// Interval at which running calls check whether their credentials have expired. At the same interval, the counts of
+// updates are written to the audit log if they are old enough (AuditUpdates::tick()).
 constexpr milliseconds kRecheckInterval{500};
 // Interval at which the files are examined. A change takes effect when two successive examinations find the same state.
 constexpr milliseconds kWatchInterval{200};

@@ -29,9 +29,9 @@ class Access {
   Access(const Access&) = delete;
   Access& operator=(const Access&) = delete;
 
-  // Starts to watch the files, which reads them once more, and to write the counts of updates to the audit log.
-  // `recheck_calls` must make every running call check its rights. It is called after each change, and twice a second
-  // because credentials expire.
+  // Starts two threads: one watches the files, and first reads them once more; the other one writes the counts of
+  // updates to the audit log. `recheck_calls` must make every running call check its rights. It is called after each
+  // change of the files, and twice a second because credentials expire.
   void start(std::function<void()> recheck_calls);
   // Ends the threads. `recheck_calls` is not called afterwards.
   void stop();
@@ -53,8 +53,9 @@ class Access {
   RpcState& state_;
   const std::unique_ptr<AccessControl> control_;
   std::function<void()> recheck_;
-  absl::Status last_reading_;     // used by the watcher's thread only
-  bool read_by_watcher_ = false;  // used by the watcher's thread only
+  // Result of the watcher's last reading. Used by the watcher's thread only, like the next member.
+  absl::Status last_reading_;
+  bool read_by_watcher_ = false;  // true after the watcher's first reading
   std::optional<FileWatcher> watcher_;
   std::thread clock_;
   Mutex mutex_;

@@ -34,7 +34,7 @@ constexpr uint32_t kBackupRetryMs = 5000;
 // Name of the copy's directory inside kBackupDirectory. kBackupDirectory is used by the copy alone, so that removing
 // it also removes files that the log leaves beside the copy.
 constexpr const char* kCopy = "copy";
-// Number of copies of a piece that exist at once: its data, the message and the bytes that are sent.
+// Upper bound of the memory of a backup, in pieces: a piece's data, the message and its bytes exist at the same time.
 constexpr uint64_t kCopies = 4;
 
 // Function that writes a piece to the caller; returns false to end the backup.

@@ -17,8 +17,8 @@
 namespace locus::server {
 namespace {
 
-// Returns the configured maximum number of connections; without one, the number for which the process may open enough
-// files.
+// Returns the configured maximum number of connections. If none is configured, returns the number of connections for
+// which the process may open enough files.
 uint32_t max_connections(const ServerConfig& config) {
   if (config.max_connections > 0) return config.max_connections;
   rlimit files{};

@@ -62,10 +62,10 @@ class Connections {
   std::unique_ptr<TlsCredentials> tls_;  // null without TLS
   std::unique_ptr<ConnectionIntake> intake_;
   uint32_t max_streams_ = 0;
-  StreamCounter stream_counter_;  // used by the guard's thread
+  StreamCounter stream_counter_;  // used by the thread of the FloodGuard
   std::unique_ptr<FloodGuard> guard_;
   std::unique_ptr<CheckedReads> reads_;
-  std::unique_ptr<Acceptor> acceptor_;  // declared last, so destroyed first: it uses the others
+  std::unique_ptr<Acceptor> acceptor_;  // declared last and so destroyed first, because it uses the members above
 };
 
 }  // namespace locus::server

@@ -129,7 +129,7 @@ void log_failure(const Scene& scene, uint64_t number, const absl::StatusOr<Insta
       {{"scene", scene.name()}, {"change", absl::StrCat(number)}, {"text", std::string(change.status().message())}});
 }
 
-// Queues the change, and with it the claim of its memory. Returns its number.
+// Queues the change together with the claim of its memory. Returns the change's number.
 absl::StatusOr<uint64_t> submit(Host& host, const ScenePtr& scene, uint64_t epoch, std::shared_ptr<OwnedChange> owned,
                                 SharedClaim room, std::shared_ptr<Outcome> outcome) {
   return host.changes.submit(
@@ -156,7 +156,7 @@ absl::Status change_instances(Host& host, const Caller& caller, const v1::Change
   // Held until the response is written.
   ASSIGN_OR_RETURN(const CallMemory reply, claim_copy(caller, placed_count(request) * kReplyBytesAPlacement));
   ASSIGN_OR_RETURN(const std::shared_ptr<OwnedChange> owned, read_change(host.registry, request));
-  // The scene's instances are not used, because changes that were queued earlier may still alter them.
+  // Check the placements without the scene's instances, because changes that were queued earlier may still alter these.
   if (request.no_wait()) RETURN_IF_ERROR(StaticSet::check_placements(owned->change.place));
   const auto outcome = std::make_shared<Outcome>();
   const uint64_t epoch = scene->latest()->epoch;

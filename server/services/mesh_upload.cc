@@ -242,7 +242,7 @@ absl::Status receive_mesh(Host& host, const Caller& caller, MessageStream& strea
   const uint64_t columns = upload_cost(message.vertex_count(), message.triangle_count()) + parts_cost(upload.parts());
   const uint64_t tree = tree_cost(message.triangle_count());
   RETURN_IF_ERROR(hold_mesh_bytes(host, creator_name(caller), kMinTriangleBytes * message.triangle_count()).status());
-  // Claim the memory of the tree now too, so that building the mesh cannot fail for lack of memory after it has
+  // Claim the memory of the tree now too, so that the mesh cannot fail for lack of memory after all its pieces have
   // arrived.
   ASSIGN_OR_RETURN(const CallMemory room, caller.claim(MemoryLine::kUploads, "triangle_count", columns));
   ASSIGN_OR_RETURN(const CallMemory build_room, caller.claim(MemoryLine::kBuilds, "triangle_count", tree));

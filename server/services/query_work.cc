@@ -50,10 +50,11 @@ absl::Status QueryWork::take_quotas() const {
   double queries = 0;
   for (const QueryBlock& block : batch_.blocks) queries += static_cast<double>(query_count(block));
   RETURN_IF_ERROR(slot_.caller().take_quota(QuotaKind::kQueries, queries));
-  return slot_.caller().take_quota(QuotaKind::kWork, 0);  // refused while the rate is overdrawn
+  return slot_.caller().take_quota(QuotaKind::kWork, 0);  // with amount 0, fails only while the quota is overdrawn
 }
 
-// Ends the work with `status`. Also charges work on queries that failed or were given up, because it was done.
+// Ends the work with `status`. Charges the caller's quota for the work of the queries even if they failed or were given
+// up.
 void QueryWork::answer(absl::Status status) {
   ticket_.reset();
   if (run_ != nullptr) slot_.caller().charge_quota(QuotaKind::kWork, static_cast<double>(run_->work_done()));
@@ -150,7 +151,8 @@ void QueryWork::run_deferred() { progress_ = host_.scheduler.run_inline(*this); 
 
 void QueryWork::on_deferred_done() {
   if (progress_ == Progress::kDone) return finished(true);
-  submit(host_.scheduler.options().inline_nanoseconds);  // run_inline() has already used this much time
+  // Use the time that run_inline() has already taken as the estimate for the rest.
+  submit(host_.scheduler.options().inline_nanoseconds);
 }
 
 void QueryWork::submit(uint64_t nanoseconds) {

@@ -51,7 +51,7 @@ constexpr int kPingAnswerMs = 10'000;
 // Minimum interval in milliseconds between keepalive pings from a client. With these pings a client detects that this
 // server is unreachable.
 constexpr int kMinPingIntervalMs = 5'000;
-// Maximum time in which gRPC, after all calls have finished, sends the last statuses and ends the health watchers.
+// Maximum time after the end of all calls in which gRPC sends the last statuses and ends the health watchers.
 constexpr milliseconds kLastWords{500};
 
 // Starts serving the HTTP pages, over TLS if `tls` is not null. Returns null if the config turns them off, or if the
@@ -90,8 +90,8 @@ void set_limits(const ServerConfig& config, grpc::ServerBuilder& builder) {
   builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_GZIP, config.accept_compression);
   builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_DEFLATE, false);
   builder.AddChannelArgument(GRPC_ARG_ENABLE_PER_MESSAGE_DECOMPRESSION, 0);
-  // gRPC handles all frames of a read before it reports the first call. A read of 4 MiB, the default maximum, may
-  // contain calls that take a gigabyte. Reads of 32 KiB made large messages 10 to 20 % slower.
+  // gRPC handles all frames of a read before it reports the first call. A read of 4 MiB, gRPC's default maximum, may
+  // contain calls that take a gigabyte of memory. Reads of 32 KiB made large messages 10 to 20 % slower.
   builder.AddChannelArgument(GRPC_ARG_TCP_MAX_READ_CHUNK_SIZE, kMaxReadBytes);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kPingEveryMs);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kPingAnswerMs);
@@ -199,7 +199,8 @@ void Server::drain(milliseconds grace) {
   host.drain.end();
   parts_->health_service.end();
   const milliseconds last_words = idle ? milliseconds(kLastWords) : milliseconds(0);
-  // gRPC waits without a limit for a client that does not read what was sent to it.
+  // Shutdown() waits without a limit for a client that does not read its responses. Therefore another thread closes all
+  // connections if gRPC has not ended in time.
   std::promise<void> ended;
   std::thread closer([&host, last_words, future = ended.get_future()] {
     if (future.wait_for(last_words + kCloseAfter) == std::future_status::ready) return;

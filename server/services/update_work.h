@@ -42,7 +42,8 @@ class UpdateWork final : private PendingUpdate {
   SteadyTime arrived_;
   v1::UpdateAck* ack_ = nullptr;
   CallMemory claim_;
-  QuotaHold objects_;  // objects that the batch adds, until it is applied
+  // Quota of the objects that the batch adds; held until the batch is applied.
+  QuotaHold objects_;
   absl::StatusOr<UpdateAck> outcome_;
   MemberTag<UpdateWork> applied_{*this, &UpdateWork::applied};
 };
