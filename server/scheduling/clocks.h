@@ -1,4 +1,4 @@
-// The two clocks that measure work, in nanoseconds, and the clock of the calendar. Thread-safe.
+// Clocks: two clocks in nanoseconds for measuring work, and the calendar clock. Thread-safe.
 #ifndef LOCUS_SERVER_SCHEDULING_CLOCKS_H_
 #define LOCUS_SERVER_SCHEDULING_CLOCKS_H_
 

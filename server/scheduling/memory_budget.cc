@@ -9,14 +9,14 @@ namespace locus::server {
 namespace {
 
 constexpr uint32_t kMemoryRetryMs = 200;
-// Shares of the limit that are kept free for lines that are refused later: lines up to kInserts leave 1/8, moves leave
-// 3/32.
+// Shares of the limit that a line leaves free for lines that are refused later: the lines up to kInserts leave 1/8, the
+// line kMoves leaves 3/32.
 constexpr uint64_t kShareKeptFromGrowth = 8;
 constexpr uint64_t kShareKeptFromMoves = 32;
 constexpr uint64_t kPartsKeptFromMoves = 3;
 
-// Share of the limit that is the reserve of small claims, and its bounds in bytes. One owner may use 1 /
-// kReserveOwners.
+// Share of the limit that is the reserve for small claims, and the minimum and maximum size of the reserve in bytes.
+// One owner may use 1 / kReserveOwners of the reserve.
 constexpr uint64_t kReserveShare = 16;
 constexpr uint64_t kMinReserve = 4u << 20;
 constexpr uint64_t kMaxReserve = 64u << 20;
@@ -90,7 +90,7 @@ uint64_t MemoryBudget::connection_share() const {
 
 uint64_t MemoryBudget::reserve() const { return std::clamp(limit_ / kReserveShare, kMinReserve, kMaxReserve); }
 
-// Claims `bytes` from the reserve if there is room in it. Only claims that use the reserve fill it.
+// Claims `bytes` from the reserve if they fit into it. The reserve counts only the claims made by this function.
 bool MemoryBudget::try_reserve(MemoryLine line, uint64_t bytes, uint64_t owner) {
   if (line < MemoryLine::kMoves || bytes > kSmallClaim) return false;
   const auto found = reserved_.find(owner);
@@ -157,7 +157,7 @@ uint64_t MemoryBudget::used() const {
   return meter_();
 }
 
-// Counts the bytes as ended before they are no longer claimed, so that taken() never misses them.
+// Adds the bytes to ended_since_ before subtracting them from claimed_, so that taken() never misses them.
 void MemoryBudget::end(MemoryLine line, Owner reserve_owner, uint64_t bytes) {
   LOCUS_DCHECK_LE(bytes, lines_[static_cast<size_t>(line)].load());
   ended_since_.fetch_add(bytes);

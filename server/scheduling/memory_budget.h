@@ -3,15 +3,16 @@
 // transit, old revisions, history and the allocator's free memory) plus the bytes claimed by work in progress. A claim
 // is made before the memory exists.
 //
-// Each claim belongs to a line. Lines have different ceilings, so that work that makes scenes grow is refused first,
-// then updates, and queries last. Between the highest ceiling and the limit is a reserve for small claims of moves,
-// requests and replies that do not fit below their ceilings. Each client may use a quarter of it, so that a caller can
-// always ask what fills the memory, and delete it.
+// Each claim belongs to a line, which is the purpose of the memory. Lines have different ceilings, so that work that
+// makes scenes grow is refused first, then updates, and queries last. Between the highest ceiling and the limit is a
+// reserve for small claims of moves, requests and replies that do not fit below their ceilings. Each client may use a
+// quarter of the reserve. So every client can always query what fills the memory, and delete it.
 //
 // Threads: every member may be called from any thread; the Meter is called by one thread at a time. No member frees
-// memory, which takes long: claims are refused with a delay, during which the owner of the budget frees memory if
-// take_shortage() says so. Cost: claims that fit take no lock. The process is measured only when a claim does not seem
-// to fit, by refresh(), and when the claims that ended since the last measurement exceed 1 / kStepShare of the limit.
+// memory, because freeing takes long. Instead, a refusal contains a retry delay, and the owner of the budget frees
+// memory during the delay if take_shortage() returns true. Cost: a claim that fits takes no lock. The process is
+// measured in three cases: refresh() is called, a claim does not seem to fit, or claims of more than 1 / kStepShare of
+// the limit have ended since the last measurement.
 // Invariants: claimed_ is the sum of the live claims; when a claim succeeds, measured memory plus live claims is at
 // most the ceiling of its line, or the live claims that use the reserve are at most the reserve.
 #ifndef LOCUS_SERVER_SCHEDULING_MEMORY_BUDGET_H_

@@ -287,10 +287,10 @@ bool QueryScheduler::end_turn(Ticket& ticket, Progress progress, uint64_t spent)
   return ticket.end_work();
 }
 
-// Queues the job again, or removes it from its queue, after a turn that returned `progress`. kBegun means that no chunk
-// may be started now, so the job leaves the queue until one of the threads working on it returns kMore. The last of
-// these threads queues an unfinished job again even if it returns kBegun, because another thread's kMore may have been
-// processed before this kBegun. A small job that took too long continues as a large job.
+// Queues the job again, or removes it from its queue, after a turn that returned `progress`. Progress::kBegun means
+// that no chunk of the job may be started now, so the job leaves the queue until a thread that works on it returns
+// kMore. Exception: the last working thread queues an unfinished job again even after kBegun, because a kMore of
+// another thread may have been processed before this kBegun. A small job that took too long continues as a large job.
 void QueryScheduler::requeue(Ticket& ticket, Progress progress) {
   const bool waits = !ticket.finished() && (progress == Progress::kMore || ticket.alone());
   const bool grown = ticket.job_class == JobClass::kSmall && ticket.spent > 2 * options_.small_nanoseconds;

@@ -100,7 +100,7 @@ class QueryScheduler {
   absl::StatusOr<TicketPtr> submit(QueryJob& job, uint64_t client, uint64_t nanoseconds) LOCUS_EXCLUDES(mutex_);
 
   // Removes the job and returns true if the job is not done and no thread is working on it; done() is then not called.
-  // Otherwise returns false: done() was called or will be called. If the job ends its work early, this happens soon.
+  // Otherwise returns false: done() was called already or will be called, soon if the job ends its work early.
   bool withdraw(Ticket& ticket);
 
   SchedulerStats stats() const;

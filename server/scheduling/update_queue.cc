@@ -257,8 +257,8 @@ void UpdateQueue::count(const Scene& scene, size_t updates) {
   if (updates > 1 && coalesces(scene)) stats_.coalesced += updates - 1;
 }
 
-// Queues the group again and lets its scene wait, because readers whose snapshots are revoked still hold too much
-// memory. Other scenes do not wait.
+// Queues the group again and makes its scene wait: the scene's readers still hold too much memory in revoked snapshots.
+// Other scenes do not wait.
 void UpdateQueue::stall(SceneQueue& scene_queue, const Group& group) {
   const SteadyTime now = steady_clock::now();
   ScenePtr overdue;  // keeps the scene alive: another thread may free the SceneQueue before its readers are revoked
