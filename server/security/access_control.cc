@@ -22,7 +22,7 @@ namespace locus::server {
 namespace {
 
 constexpr size_t kMaxCachedUsers = 1024;
-constexpr size_t kPasswdBytes = 16384;  // enough for the line of a user
+constexpr size_t kPasswdBytes = 16384;  // buffer of getpwuid_r(); enough for a user's line of passwd
 constexpr absl::string_view kTokenPrincipal = "token:";
 constexpr absl::string_view kBearerPrefix = "Bearer ";
 
@@ -122,7 +122,7 @@ absl::StatusOr<std::shared_ptr<const AccessControl::State>> AccessControl::read(
 
 void AccessControl::publish(std::shared_ptr<const State> state) {
   MutexLock lock(mutex_);
-  state_.swap(state);  // the old state is freed by the caller or by its last reader, after the lock
+  state_.swap(state);  // the old state is freed after the lock is released, by the caller or its last reader
 }
 
 std::shared_ptr<const AccessControl::State> AccessControl::state() const {

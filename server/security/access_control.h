@@ -58,7 +58,8 @@ class AccessControl {
   // token or JWT that is not accepted, with a text that does not say whether the token's id exists.
   absl::StatusOr<IdentityPtr> authenticate(const Credentials& credentials) const;
 
-  // Returns the current rules. Takes less than 50 ns. Keep the pointer for one decision, not for a stream.
+  // Returns the current rules. Takes less than 50 ns. Use the result for one decision only, because it does not change
+  // when the rules change.
   std::shared_ptr<const AccessRules> rules() const;
   // Returns a number that grows with each change of rules, tokens or keys. A stream compares it with the number that it
   // remembers, and checks its rights again if they differ. Read the number before the rules.

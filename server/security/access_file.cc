@@ -47,8 +47,9 @@ std::vector<absl::string_view> words_of(absl::string_view line) {
   return words;
 }
 
-// Returns whether `pattern` can match a principal that begins with `start`, such as `token:`, or is equal to `start` if
-// that has no colon (`anonymous`). `head` is the part of the pattern before its first wildcard.
+// Returns whether `pattern` can match a principal that begins with `start`, such as `token:`. If `start` has no colon
+// (`anonymous`), returns whether `pattern` matches `start` itself. `head` is the part of the pattern before its first
+// wildcard.
 bool can_begin(absl::string_view pattern, absl::string_view head, absl::string_view start) {
   if (start.back() != ':') return glob_matches(pattern, start);
   if (absl::StartsWith(head, start)) return pattern.size() > start.size();

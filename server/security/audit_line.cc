@@ -21,7 +21,8 @@ size_t length_of(uint8_t first) {
   return 0;
 }
 
-// Takes the first character from a text that is not empty; kReplacement for a byte that is not UTF-8.
+// Removes and returns the first character of `text`, which must not be empty; returns kReplacement for a byte that is
+// not UTF-8.
 uint32_t take_character(absl::string_view& text) {
   // Smallest character of each length: a longer form of a smaller character is not UTF-8.
   constexpr uint32_t kSmallest[] = {0, 0, 0x80, 0x800, kFirstWide};

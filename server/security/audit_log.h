@@ -1,11 +1,12 @@
-// Audit log: each change is one line of JSON in FILE, each refusal one in FILE.refused. The files are separate, because
-// otherwise many refusals could rotate the lines of changes away. A caller's refusals beyond a few a second are counted
-// instead (refusal_tally.h). Callers never wait for the disk: one thread writes the lines of a bounded queue. If the
-// queue was full, a line reports how many lines were dropped. Refusals may fill only half of the queue.
+// Audit log: each change is one line of JSON in FILE, each refusal is one line in FILE.refused. Refusals have a file of
+// their own, so that many of them cannot displace the lines of changes when a full file is replaced. A caller's
+// refusals beyond a few a second are counted instead of written (refusal_tally.h). Callers never wait for the disk: one
+// thread writes the lines of a bounded queue. If the queue was full, a line reports how many lines were dropped.
+// Refusals may fill only half of the queue.
 //
-// The files have mode 0600. When one reaches the given size it is renamed to FILE.1, FILE.1 to FILE.2 and so on; four
-// older files are kept. Threads: every member may be called from any thread. A line is written whole or not at all,
-// unless the disk fails.
+// The files have mode 0600. When a file reaches the given size, it is renamed to FILE.1, FILE.1 to FILE.2 and so on;
+// four older files are kept. Threads: every member may be called from any thread. A line is written whole or not at
+// all, unless the disk fails.
 #ifndef LOCUS_SERVER_SECURITY_AUDIT_LOG_H_
 #define LOCUS_SERVER_SECURITY_AUDIT_LOG_H_
 

@@ -38,7 +38,7 @@ void AuditUpdates::tick(int64_t unix_ms) {
   Sums due;
   {
     const MutexLock lock(mutex_);
-    // The clock of the machine may have been set back.
+    // The counts are also due if the machine's clock was set back to a time before since_ms_.
     if (sums_.empty() || (unix_ms >= since_ms_ && unix_ms < since_ms_ + kAuditedMs)) return;
     due.swap(sums_);
   }

@@ -1,4 +1,4 @@
-// Name in a client's certificate, by which grants know the client. A pure function; any thread.
+// Name in a client's certificate, by which grants identify the client. A pure function; any thread.
 #ifndef LOCUS_SERVER_SECURITY_CERTIFICATE_NAME_H_
 #define LOCUS_SERVER_SECURITY_CERTIFICATE_NAME_H_
 
@@ -9,7 +9,8 @@
 namespace locus::server {
 
 // Returns the first URI among the alternative names, or else the first DNS name, or else the common name of the
-// subject, as the gRPC port does. Returns an empty text if there is none. The caller has verified the certificate.
+// subject. The gRPC port uses the same rule. Returns an empty text if there is none. The caller has verified the
+// certificate.
 std::string certificate_name(const X509& certificate);
 
 }  // namespace locus::server

@@ -1,8 +1,8 @@
-// Watches a few files by polling them, which also detects files that are replaced by renaming and works on every file
-// system. A change is reported when two successive looks find the same state, so that a file is not read while it is
-// being written. A change that could not be handled is reported again until it is handled.
+// Watches a few files by polling them with stat(). Polling also detects files that are replaced by renaming, and works
+// on every file system. A change is reported when two successive polls find the same state, so that a file is not read
+// while it is being written. A change that could not be handled is reported again until it is handled.
 //
-// Threads: one thread looks and calls the function; it ends in the destructor.
+// Threads: one thread polls and calls the function; it ends in the destructor.
 #ifndef LOCUS_SERVER_SECURITY_FILE_WATCHER_H_
 #define LOCUS_SERVER_SECURITY_FILE_WATCHER_H_
 
@@ -20,7 +20,7 @@
 
 namespace locus::server {
 
-// State of a file as far as stat() shows it; all 0 = there is none, or it cannot be seen.
+// State of a file as stat() reports it; all members are 0 if there is no such file or stat() fails.
 struct FileMark {
   uint64_t device = 0;
   uint64_t inode = 0;
@@ -39,8 +39,8 @@ class FileChanges {
   using Mark = std::function<FileMark(const std::string& file)>;
   FileChanges(std::vector<std::string> files, Mark mark = mark_of);
 
-  // Looks at all files. Returns true if their state differs from the last reported state and has not changed since the
-  // previous look.
+  // Polls all files. Returns true if their state differs from the last reported state and has not changed since the
+  // previous poll.
   bool look();
 
  private:
@@ -54,8 +54,9 @@ class FileChanges {
 
 class FileWatcher {
  public:
-  // Calls `read` at once, because files may have changed since their owner read them, then looks every `pause` and
-  // calls `read` after each change. While `read` returns false, calls it again every `retry`, even without a change.
+  // Calls `read` at once, because files may have changed since their owner read them. Then polls the files every
+  // `pause` and calls `read` after each change. While `read` returns false, calls it again every `retry`, even without
+  // a change.
   FileWatcher(std::vector<std::string> files, std::function<bool()> read,
               std::chrono::milliseconds pause = std::chrono::milliseconds(kFileWatchMilliseconds),
               std::chrono::milliseconds retry = std::chrono::milliseconds(kFileRetryMilliseconds));

@@ -9,7 +9,7 @@ namespace locus::server {
 // Returns whether the whole text matches the pattern. Time: at most the product of both lengths, without recursion.
 bool glob_matches(absl::string_view pattern, absl::string_view text);
 
-// Returns whether the pattern contains `*` or `?`; otherwise it matches only itself.
+// Returns whether the pattern contains `*` or `?`. A pattern without them matches only a text equal to it.
 bool is_glob(absl::string_view pattern);
 
 }  // namespace locus::server

@@ -8,8 +8,8 @@
 namespace locus::server {
 
 // Returns whether a user namespace shows some users of the machine as the user `nobody`. `uid_map` is the text of
-// /proc/self/uid_map: lines of a first user inside, a first user outside, and a number of users. Returns false for an
-// empty or malformed text.
+// /proc/self/uid_map. Each line maps a range of users: the first user id inside the namespace, the first user id
+// outside, and the number of users. Returns false for an empty or malformed text.
 bool hides_users(absl::string_view uid_map);
 
 }  // namespace locus::server

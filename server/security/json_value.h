@@ -1,4 +1,4 @@
-// Parses JSON texts that others wrote, with jansson, and reads their members. Functions without state; any thread.
+// Parses untrusted JSON texts with jansson, and reads their members. Functions without state; any thread.
 #ifndef LOCUS_SERVER_SECURITY_JSON_VALUE_H_
 #define LOCUS_SERVER_SECURITY_JSON_VALUE_H_
 

@@ -30,7 +30,7 @@ bool decode(absl::string_view part, std::string& bytes) {
   return !part.empty() && std::all_of(part.begin(), part.end(), good) && absl::WebSafeBase64Unescape(part, &bytes);
 }
 
-// Reads a time claim in seconds since 1970; `time` is unset if it is absent.
+// Reads a time claim in seconds since 1970; `time` gets no value if the claim is absent.
 absl::Status read_time(const json_t* claims, const char* name, std::optional<double>& time) {
   const json_t* const value = json_object_get(claims, name);
   if (value == nullptr) return absl::OkStatus();

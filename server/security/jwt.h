@@ -25,9 +25,9 @@ class JwtVerifier {
   static absl::StatusOr<JwtVerifier> parse(absl::string_view file, absl::string_view text, absl::string_view audience,
                                            absl::string_view issuer, std::vector<std::string>& warnings);
 
-  // Returns the identity `jwt:SUBJECT` that a JWT proves at `now` (seconds since 1970). Returns UNAUTHENTICATED if
-  // anything about it is wrong: form, algorithm, signature, audience, issuer or times, which may be off by
-  // kJwtSkewSeconds. The text of the error says which.
+  // Returns the identity `jwt:SUBJECT` that a JWT proves at `now` (seconds since 1970). Returns UNAUTHENTICATED, with
+  // the reason, if the JWT's form, algorithm, signature, audience or issuer is wrong, or if `now` is outside of the
+  // JWT's times by more than kJwtSkewSeconds.
   absl::StatusOr<IdentityPtr> verify(absl::string_view jwt, int64_t now) const;
 
   // Returns whether a key with this thumbprint, as in Identity::credential, is in the file.

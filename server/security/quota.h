@@ -19,10 +19,11 @@ enum class QuotaKind : uint8_t {
   kUpdateItems,    // items of update batches
   kBytesInFlight,  // memory claimed by calls in progress: parsed requests, their work, replies not yet taken
   kOpenStreams,
-  kObjects,       // objects in the scenes that the identity created
-  kScenes,        // scenes that the identity created
-  kMeshBytes,     // memory of the meshes that it uploaded; a content with several names counts for each name
-  kHistoryBytes,  // sum of history_bytes of the scenes that it created: the most that their histories may take
+  kObjects,    // objects in the scenes that the identity created
+  kScenes,     // scenes that the identity created
+  kMeshBytes,  // memory of the meshes that the identity uploaded; a content with several names counts for each name
+  // Sum of history_bytes, the maximum memory of a scene's history, of the scenes that the identity created.
+  kHistoryBytes,
 };
 inline constexpr size_t kQuotaKinds = 9;
 inline constexpr std::array<absl::string_view, kQuotaKinds> kQuotaNames = {

@@ -2,7 +2,7 @@
 // written, the others are only counted, and one line reports their number. So a stranger who is refused ten thousand
 // times a second causes only a few lines a second.
 //
-// One thread at a time. The window ends when its owner says so. Invariant: at most kMaxCallers callers are counted
+// One thread at a time. The owner ends each window by end_window(). Invariant: at most kMaxCallers callers are counted
 // separately; the others share one count.
 #ifndef LOCUS_SERVER_SECURITY_REFUSAL_TALLY_H_
 #define LOCUS_SERVER_SECURITY_REFUSAL_TALLY_H_

@@ -56,7 +56,7 @@ absl::Status check_use(const json_t* jwk, const KeyType& type) {
   return absl::UnimplementedError("its `key_ops` do not include verify");
 }
 
-// Returns the type of a key; INVALID_ARGUMENT for one that must not be in the file.
+// Returns the type of a key; INVALID_ARGUMENT for a key that must not be in the file.
 absl::StatusOr<const KeyType*> type_of(const json_t* jwk) {
   if (!json_is_object(jwk)) return absl::InvalidArgumentError("it is no JSON object");
   const absl::string_view name = member_text(jwk, "kty");
@@ -80,7 +80,7 @@ absl::StatusOr<JwkPointer> essential_jwk(const json_t* jwk) {
   return owned;
 }
 
-// Returns OpenSSL's form of a key; null if it is wrong.
+// Converts a key to OpenSSL's form; returns null if the key is invalid.
 EVP_PKEY* to_openssl(jwk_t* jwk) {
   unsigned char der[kMaxKeyDerBytes];
   size_t size = sizeof der;
@@ -89,8 +89,8 @@ EVP_PKEY* to_openssl(jwk_t* jwk) {
   return d2i_PUBKEY(nullptr, &position, static_cast<long>(size));
 }
 
-// Returns an error if the key does not have the type that its JSON names, is too weak or too slow, or is not on its
-// curve.
+// Returns an error if the key does not have the type that its JSON names, is too weak, is so large that verification is
+// slow, or is not on its curve.
 absl::Status check_key(EVP_PKEY* key, const KeyType& type) {
   if (key == nullptr || EVP_PKEY_get_base_id(key) != type.openssl_type)
     return absl::InvalidArgumentError("its public key is malformed");
