@@ -22,10 +22,9 @@ using std::chrono::steady_clock;
 // Maximum number of connections that are accepted from one socket before the other sockets are served.
 constexpr int kAcceptsAtOnce = 64;
 constexpr int kWakeUpsAtOnce = 256;
-// Reason with which idle connections are closed, and pause after accept() failed because descriptors or memory are used
-// up.
+// Reason with which idle connections are closed.
 constexpr const char* kIdle = "idle for too long";
-constexpr milliseconds kPause{100};
+constexpr milliseconds kPause{100};  // pause after accept() has failed because descriptors or memory are used up
 constexpr milliseconds kCheckInterval{1000};
 constexpr milliseconds kReportInterval{1000};
 

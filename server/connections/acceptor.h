@@ -1,6 +1,7 @@
-// Accepts the connections of all listening sockets. A new connection must pass the limits and begin like a client of
-// gRPC, in time; only then it is handed over to gRPC. The acceptor keeps a duplicate of the connection's descriptor, so
-// that the connection can be closed from this side, and releases it when the connection has ended.
+// Accepts the connections of all listening sockets. A new connection must pass the limits, and must in time send the
+// first bytes of a client of gRPC; only then is it handed over to gRPC. The acceptor keeps a duplicate of the
+// connection's descriptor, so that it can close the connection itself, and releases the duplicate when the connection
+// has ended.
 //
 // Threads: one thread does all work and calls the hooks; the members may be called from any thread. Invariant: each
 // admitted connection is counted by the limiter until it has ended, and is in exactly one of two states: opening, with
@@ -88,7 +89,7 @@ class Acceptor {
   using Entries = absl::flat_hash_map<uint64_t, Entry>;
 
   void run() LOCUS_EXCLUDES(mutex_);
-  // Returns the milliseconds until the next time that something is due, as an argument of epoll_wait().
+  // Returns the milliseconds until the next timed work, as an argument of epoll_wait(); -1 if there is none.
   int wait_time() const;
   void handle(uint64_t id, uint32_t events, Time now);
   void accept_some(ListeningSocket& listening, Time now);

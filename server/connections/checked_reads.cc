@@ -44,7 +44,8 @@ std::array<Shard, kShards>& shards() {
 
 Shard& shard_of(int descriptor) { return shards()[static_cast<size_t>(descriptor) % kShards]; }
 
-// Returns as FrameCheck::refusal() does.
+// Passes the `count` bytes that were read into `message` to `check`. Returns the reason of a refusal; null if all bytes
+// are accepted.
 const char* refusal(FrameCheck& check, const msghdr& message, size_t count) {
   const FrameCheck::Time now = std::chrono::steady_clock::now();
   for (size_t i = 0; i < message.msg_iovlen && count > 0; ++i) {

@@ -1,5 +1,5 @@
 // One accepted connection as the rest of the server sees it: its peer, counts of its calls, and a function that closes
-// it. The acceptor makes a Connection for each socket; calls find theirs in the ConnectionTable.
+// it. The acceptor makes a Connection for each socket; a call finds its Connection in the ConnectionTable.
 //
 // Threads: every member may be called from any thread. Counting takes no lock. Invariant: calls_open is the number of
 // begun calls that have not ended.
@@ -107,7 +107,7 @@ class Connection {
   // Returns the reason given to the first close(); null if the connection was not closed from this side.
   const char* close_reason() const { return close_reason_.load(); }
 
-  // Returns what the kernel has received; zeros if the connection is not TCP or its descriptor is released.
+  // Returns the counts of the kernel; zeros if the connection is not TCP or its descriptor is released.
   ReceivedCounts received() const LOCUS_EXCLUDES(mutex_);
 
   // Returns the number of bytes that the kernel has received since the previous use of this function, less the bytes of
@@ -139,11 +139,10 @@ class Connection {
   std::shared_ptr<const void> identity_ LOCUS_GUARDED_BY(mutex_);
 };
 
-// Returns the peer of the connected socket `descriptor`, with the name that gRPC gives the connection. The name of a
-// unix connection is made from its descriptor, because gRPC gets the connection by its descriptor; the peer then also
-// has the user id of the other process. The limit key is the IPv4 address, the first 64 bits of the IPv6 address (a
-// subscriber owns all addresses that begin with these bits), or the user id. Returns nullopt if the peer has already
-// gone.
+// Returns the peer of the connected socket `descriptor`, with the name that gRPC gives the connection. gRPC gets a unix
+// connection by its descriptor, so the name contains the descriptor; the peer then also has the user id of the other
+// process. The limit key is the IPv4 address, the first 64 bits of the IPv6 address (a subscriber owns all addresses
+// that begin with these bits), or the user id. Returns nullopt if the peer has already gone.
 std::optional<Peer> peer_of(int descriptor);
 
 }  // namespace locus::server

@@ -7,7 +7,7 @@ namespace {
 
 constexpr absl::string_view kPreface = "PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
 constexpr size_t kFrameHeaderBytes = 9;
-constexpr uint32_t kMaxFrameBytes = 16384;  // maximum before the peers agree on another
+constexpr uint32_t kMaxFrameBytes = 16384;  // maximum size of a frame until the peers agree on another maximum
 constexpr uint32_t kSettingBytes = 6;
 constexpr uint8_t kSettingsFrame = 4;
 static_assert(kPreface.size() + kFrameHeaderBytes == kFirstBytes);

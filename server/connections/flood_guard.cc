@@ -50,8 +50,8 @@ double received_bytes(const ReceivedCounts& now, const ReceivedCounts& before) {
   return static_cast<double>(std::max(now.bytes - before.bytes, segments * kSegmentBytes));
 }
 
-// Returns whether within one second the peer cancels more calls than it lets finish, and more than `limits` always
-// accepts.
+// Returns whether, within one second, the peer has cancelled more calls than it let finish, and more calls than
+// limits.cancelled_per_second.
 bool cancels_too_many(const FloodSample& sample, const FloodLimits& limits, FloodBudget& budget) {
   const CallCounts& begin = budget.second_begin.counts;
   const uint64_t cancelled = sample.counts.calls_cancelled - begin.calls_cancelled;

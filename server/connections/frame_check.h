@@ -27,14 +27,14 @@ class FrameCheck {
   static constexpr uint64_t kMaxBlockBytes = 64 << 10;
   // Maximum CONTINUATION frames of a block. A client needs one for each 16 KiB after the first.
   static constexpr uint32_t kMaxContinuations = 8;
-  // Cancelled calls in excess of half of all calls, frames that carry nothing, and PING frames in excess of the other
-  // frames of calls: the number of each that is accepted in a second, and the number that is accepted at once. A client
-  // may cancel all its open calls at once, because they reach their deadlines together; clients in Go send a PING after
-  // each piece of a reply.
+  // Rates for three counts: cancelled calls in excess of half of all calls; frames that carry nothing; and PING frames
+  // in excess of the other frames of calls. Each count may grow by kPerSecond in a second, and by kBurst at once. A
+  // client may cancel all its open calls at once, because they reach their deadlines together; clients in Go send a
+  // PING after each piece of a reply.
   static constexpr double kPerSecond = 1000;
   static constexpr double kBurst = 1000;
-  // Maximum calls that begin in the bytes of one read. gRPC creates all of them before it accepts the first one, and a
-  // client may have fewer open calls.
+  // Maximum calls that begin in the bytes of one read. The maximum is needed because gRPC creates all of these calls
+  // before it accepts the first one. It is above the default maximum of calls that a client may have open.
   static constexpr uint32_t kMaxCallsOfRead = 2048;
 
   // Checks the next bytes of the connection, which were read at `now`. Returns null if they are accepted, otherwise the
@@ -45,11 +45,11 @@ class FrameCheck {
   static constexpr size_t kPrefaceBytes = 24;
   static constexpr size_t kFrameHeaderBytes = 9;
 
-  // Checks a frame whose header is complete. Returns as refusal() does.
+  // Checks a frame whose header is complete. Returns null, or the reason of a refusal like refusal().
   const char* begin_frame();
   // Counts a frame of HEADERS. Only a frame with a new stream number of a client begins a call.
   void begin_headers();
-  // Subtracts from both counts what is accepted in the time since the last read.
+  // Subtracts from each count the number that is accepted in the time since the last read.
   void let_time_pass(Time now);
 
   uint64_t bytes_to_skip_ = kPrefaceBytes;  // rest of the preface, or of the current frame

@@ -93,8 +93,8 @@ void set_flag(int descriptor, int level, int option, int value) {
   setsockopt(descriptor, level, option, &value, sizeof value);
 }
 
-// Binds and listens on one address of a host. Accepted sockets inherit the options that are set here. Returns the
-// system's error number, 0 if it listens.
+// Binds and listens on one address of a host. Accepted sockets inherit the options that are set here. Returns 0, or the
+// system's error number.
 int listen_tcp(const addrinfo& address, ListeningSocket& listening) {
   listening = ListeningSocket(socket(address.ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   const int descriptor = listening.descriptor();
@@ -136,7 +136,7 @@ absl::StatusOr<std::vector<ListeningSocket>> listen_on_host(const ListenAddress&
       continue;
     }
     failure = listen_error(error);
-    // A machine without IPv6 may have a host name with an IPv6 address.
+    // Skip addresses that this machine does not have: a host name can have an IPv6 address on a machine without IPv6.
     if (error != EADDRNOTAVAIL && error != EAFNOSUPPORT) return failure;
   }
   if (sockets.empty()) return failure;
