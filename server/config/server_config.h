@@ -38,9 +38,9 @@ struct ServerConfig {
   // Address of the HTTP pages: /metrics for Prometheus, /healthz, /readyz. `host:port` or `[v6]:port`; port 0 means any
   // free port; empty = no pages. If the default address is in use, the daemon logs a warning and runs without the
   // pages; any other address that is in use is an error. With `tls_cert`, the pages use TLS as the other TCP
-  // connections do. With access control, /metrics needs the right `metrics`, because it shows the names and the use of
-  // scenes; /healthz and /readyz are for everybody. Change it so that a scraper on another machine can read the pages;
-  // that also needs `tls_cert` and `access_file`, or `insecure`.
+  // connections do. With access control, /metrics needs the right `metrics`, because the page shows the names and the
+  // use of scenes; /healthz and /readyz are for everybody. Change this option so that a scraper on another machine can
+  // read the pages; that also needs `tls_cert` and `access_file`, or `insecure`.
   std::string http_listen = kDefaultHttpListen;
 
   // File to write the port of the HTTP pages to, once they are served; empty = no file.
@@ -89,8 +89,9 @@ struct ServerConfig {
   uint32_t max_streams = limits::kMaxStreams;  // maximum number of open update and query streams of one client
   uint32_t max_calls = limits::kMaxCalls;      // maximum number of concurrent calls of one client, not counting streams
 
-  // Accepts messages that are compressed with gzip; they may inflate to `max_receive_bytes`. Off: they are refused. Set
-  // it if the network is slower than gzip, which takes 3 ms for each MiB; strangers can use up processor time with it.
+  // Accepts messages that are compressed with gzip; they may inflate to `max_receive_bytes`. If false, such messages
+  // are refused. Set this option if the network is slower than gzip, which takes 3 ms for each MiB. Strangers can then
+  // use up processor time by sending compressed messages.
   bool accept_compression = false;
 
   // Maximum numbers of connections: of all clients (0 = 4096, or fewer if the process may open only few files), of one
@@ -105,15 +106,15 @@ struct ServerConfig {
   // otherwise the connection is closed. Raise it for clients on very slow networks.
   uint32_t handshake_timeout_s = 10;
 
-  // Seconds after which a connection without an open call is closed; 0 = never. Clients open a new one with their next
-  // call. Set it if clients leave many connections behind.
+  // Seconds after which a connection without an open call is closed; 0 = never. A client opens a new connection with
+  // its next call. Set this option if clients leave many connections behind.
   uint32_t idle_timeout_s = 0;
 
   // Bytes of memory that the process may use; 0 = three quarters of the memory of the machine or its control group. As
   // memory runs short, histories lose their oldest ticks first. Then uploads, dumps, inserts and placements are refused
-  // when 7/8 of the limit are in use, moves when 15/16 are, and queries at the limit. A reserve beyond that admits
-  // small messages and answers, and removals are never refused. Lower it to leave memory to other processes. With a
-  // value above the default, the kernel may kill the process.
+  // when 7/8 of the limit are in use, moves when 29/32 are, and queries when 15/16 are or, for a limit above 1 GiB, at
+  // 64 MiB below the limit. The rest is a reserve for small messages and answers. Removals are never refused. Lower the
+  // option to leave memory to other processes. With a value above the default, the kernel may kill the process.
   uint64_t memory_limit = 0;
 
   // Bytes of replaced data per scene that batches and dumps may keep alive by reading older revisions; 0 = 256 MiB, or
@@ -135,7 +136,8 @@ struct ServerConfig {
   // no certificate. Set it to admit only machines that hold a certificate.
   std::string tls_client_ca;
 
-  // File that says who may call what. Empty = every client may call everything.
+  // File of the access rules: which caller may make which calls. Empty = every client may call everything or, with a
+  // token file or JWKS file, every client with a valid token, JWT or certificate.
   std::string access_file;
 
   // Files for the authentication of clients: hashes of the accepted tokens, and public keys (JWKS) that verify signed

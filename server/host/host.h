@@ -61,8 +61,9 @@ struct Host : RpcState {
   }
   static SnapshotterOptions snapshotter_options(const ServerConfig& config);
 
-  // Returns the memory budget in bytes of the readers of a scene; 0: the default of ReaderTracker, unless the memory
-  // limit is too small for it.
+  // Returns the memory budget in bytes of the readers of a scene: the option pinned_limit. If the option is not set,
+  // returns 0, which selects the default of ReaderTracker, or a quarter of the memory limit if that is less than the
+  // default.
   uint64_t pinned_limit() const {
     const uint64_t share = config.memory_limit / 4;
     if (config.pinned_limit != 0 || share >= limits::kPinnedBytes) return config.pinned_limit;

@@ -1,7 +1,7 @@
 // The lines of the memory budget as an operator sees them: each use of memory, with its ceiling. The memory of work in
 // progress is claimed (server/scheduling/memory_budget.h); lasting data, such as scenes, is measured. The sum of all
-// lines is about the sum that the budget keeps below the memory limit. The budget's sum can be larger, because it
-// counts memory twice that is claimed and already allocated.
+// lines is about the sum that the budget keeps below the memory limit. The budget's sum can be larger, because memory
+// that is claimed and already allocated is counted twice there.
 //
 // Plain functions; any thread. Cost: O(scenes + meshes + memory that pinned revisions do not share).
 #ifndef LOCUS_SERVER_HOST_MEMORY_LINES_H_

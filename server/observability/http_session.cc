@@ -64,7 +64,7 @@ http::response<http::string_body> response_of(const Request& request, HttpReply 
   response.keep_alive(false);
   response.body() = std::move(reply.body);
   response.prepare_payload();
-  if (request.method() == http::verb::head) response.body().clear();  // the header keeps the length
+  if (request.method() == http::verb::head) response.body().clear();  // the header keeps the length of the body
   return response;
 }
 
