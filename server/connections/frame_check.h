@@ -34,7 +34,7 @@ class FrameCheck {
   static constexpr double kPerSecond = 1000;
   static constexpr double kBurst = 1000;
   // Maximum calls that begin in the bytes of one read. The maximum is needed because gRPC creates all of these calls
-  // before it accepts the first one. It is above the default maximum of calls that a client may have open.
+  // before it accepts the first one. It is above the number of calls that a client may have open.
   static constexpr uint32_t kMaxCallsOfRead = 2048;
 
   // Checks the next bytes of the connection, which were read at `now`. Returns null if they are accepted, otherwise the
