@@ -14,6 +14,7 @@
 #include "server/scheduling/drain.h"
 #include "server/scheduling/memory_budget.h"
 #include "server/security/access_control.h"
+#include "server/security/file_loads.h"
 #include "server/security/quotas.h"
 
 namespace locus::server {
@@ -32,6 +33,8 @@ struct RpcState {
   uint64_t max_inflated_bytes = 0;  // maximum size of an inflated message; 0 = gRPC refuses compressed ones
   // Identities and rights of callers. Set before the first call; null in servers without access control.
   AccessControl* access = nullptr;
+  FileLoads access_loads;  // of the access file, the token file and the JWKS file
+  FileLoads tls_loads;     // of the certificate, its key and the client CA
   Quotas quotas{
       [this](absl::string_view subject) { return access == nullptr ? Quota() : access->rules()->quota_of(subject); }};
   Drain drain;

@@ -79,6 +79,7 @@ std::optional<TlsCredentials::Change> TlsCredentials::replace(absl::StatusOr<Tls
     return std::nullopt;
   }
   if (*contents == contents_) {
+    if (!last_failure_.ok() && logged_) note_success();  // the bad files were replaced by those in use
     last_failure_ = absl::OkStatus();
     return std::nullopt;
   }
@@ -91,7 +92,7 @@ std::optional<TlsCredentials::Change> TlsCredentials::replace(absl::StatusOr<Tls
   fetched_ = false;
   last_failure_ = absl::OkStatus();
   reloads_.fetch_add(1);
-  log(LogLevel::kInfo, "tls files reloaded", {{"certificate", files_.certificate}});
+  note_success();
   log_warnings(files_, contents_);
   return change;
 }
@@ -140,8 +141,14 @@ void TlsCredentials::note_failure(const absl::Status& why) {
   }
   if (std::exchange(logged_, true)) return;
   failures_.fetch_add(1);
+  hooks_.reloaded(why);
   log(LogLevel::kError, "changed TLS files cannot be used; the previous files stay in use",
       {{"reason", std::string(why.message())}});
+}
+
+void TlsCredentials::note_success() {
+  log(LogLevel::kInfo, "tls files reloaded", {{"certificate", files_.certificate}});
+  hooks_.reloaded(absl::OkStatus());
 }
 
 }  // namespace locus::server

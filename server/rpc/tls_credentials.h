@@ -28,13 +28,16 @@
 
 namespace locus::server {
 
-// Callbacks of TlsCredentials. Its thread calls them; reload() calls authority_removed too. They must not call
-// functions of the TlsCredentials.
+// Callbacks of TlsCredentials. Its thread calls them; reload() calls authority_removed and reloaded too. They must not
+// call functions of the TlsCredentials.
 struct TlsHooks {
   // Called when a certificate of the client CA has been removed and the new files are in use. Connections that begin
   // after the call use the new files.
   std::function<void()> authority_removed = [] {};
   std::function<void()> second_passed = [] {};  // called each second
+  // Called when changed files were put into use (OK), or could not be used (the reason); also called with OK when files
+  // that could not be used have been replaced by those in use.
+  std::function<void(const absl::Status&)> reloaded = [](const absl::Status&) {};
 };
 
 class TlsCredentials {
@@ -72,6 +75,7 @@ class TlsCredentials {
   std::optional<Change> replace(absl::StatusOr<TlsContents> contents) LOCUS_EXCLUDES(mutex_);
   void run() LOCUS_EXCLUDES(mutex_);
   void note_failure(const absl::Status& why) LOCUS_REQUIRES(mutex_);
+  void note_success() LOCUS_REQUIRES(mutex_);
 
   const TlsFiles files_;
   const TlsHooks hooks_;

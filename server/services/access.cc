@@ -12,6 +12,7 @@
 #include "server/observability/log.h"
 #include "server/scheduling/clocks.h"
 #include "server/security/hidden_users.h"
+#include "server/services/server_events.h"
 
 namespace locus::server {
 namespace {
@@ -61,6 +62,7 @@ absl::StatusOr<std::unique_ptr<Access>> Access::open(const ServerConfig& config,
   log_warnings(*control);
   warn_of_hidden_users(config);
   state.access = control.get();
+  if (control->enabled()) state.access_loads.start(unix_seconds());
   return std::unique_ptr<Access>(new Access(state, std::move(control)));
 }
 
@@ -105,6 +107,8 @@ bool Access::reload_watched() {
 }
 
 void Access::report(const absl::Status& status) const {
+  if (!control_->enabled()) return;
+  report_reload(state_, state_.access_loads, "access files", status);
   if (!status.ok()) {
     log(LogLevel::kError, "access files were not reloaded, the old rules stay in force",
         {{"text", std::string(status.message())}});

@@ -41,7 +41,7 @@ class Access {
 
  private:
   Access(RpcState& state, std::unique_ptr<AccessControl> control) : state_(state), control_(std::move(control)) {}
-  // Logs the result of reading the files.
+  // Logs, counts and audits the result of reading the files. Does nothing if there are no files.
   void report(const absl::Status& status) const;
   // Reads the files again for the watcher. Returns false if a file has a mistake. Logs the same mistake only once,
   // because the watcher repeats a failed reading each second.

@@ -13,6 +13,7 @@
 #include "server/observability/log.h"
 #include "server/rpc/read_hooks.h"
 #include "server/scheduling/clocks.h"
+#include "server/services/server_events.h"
 
 namespace locus::server {
 namespace {
@@ -66,9 +67,11 @@ void log_ended(size_t closed, const char* reason) {
 
 // Returns functions that end the connections of clients whose certificate is no longer trusted. TLS checks certificates
 // only when a connection begins.
-TlsHooks tls_hooks(const ServerConfig& config, ConnectionTable& table) {
+TlsHooks tls_hooks(const ServerConfig& config, RpcState& state) {
   TlsHooks hooks;
+  hooks.reloaded = [&state](const absl::Status& status) { report_reload(state, state.tls_loads, "TLS files", status); };
   if (config.tls_client_ca.empty()) return hooks;
+  ConnectionTable& table = state.connections;
   hooks.authority_removed = [&table] {
     constexpr const char* kReason = "a client CA was removed: clients must prove their certificates again";
     log_ended(table.close_if([](const Connection& connection) { return !connection.peer().uid; }, kReason), kReason);
@@ -87,16 +90,17 @@ TlsHooks tls_hooks(const ServerConfig& config, ConnectionTable& table) {
 
 }  // namespace
 
-Connections::Connections(const ServerConfig& config, ConnectionTable& table)
-    : config_(config), table_(table), stream_counter_(table) {}
+Connections::Connections(const ServerConfig& config, RpcState& state)
+    : config_(config), table_(state.connections), stream_counter_(table_) {}
 
 Connections::~Connections() = default;
 
-absl::StatusOr<std::unique_ptr<Connections>> Connections::listen(const ServerConfig& config, ConnectionTable& table) {
-  std::unique_ptr<Connections> made(new Connections(config, table));
+absl::StatusOr<std::unique_ptr<Connections>> Connections::listen(const ServerConfig& config, RpcState& state) {
+  std::unique_ptr<Connections> made(new Connections(config, state));
   if (!config.tls_cert.empty()) {
     ASSIGN_OR_RETURN(made->tls_, TlsCredentials::start({config.tls_cert, config.tls_key, config.tls_client_ca},
-                                                       tls_hooks(config, table)));
+                                                       tls_hooks(config, state)));
+    state.tls_loads.start(unix_seconds());
   }
   UnixAccess unix_access;
   unix_access.owner = config.unix_owner;

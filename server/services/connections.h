@@ -21,6 +21,7 @@
 #include "server/connections/connection_table.h"
 #include "server/connections/flood_guard.h"
 #include "server/rpc/connection_intake.h"
+#include "server/rpc/rpc_state.h"
 #include "server/rpc/stream_counter.h"
 #include "server/rpc/tls_credentials.h"
 
@@ -29,8 +30,8 @@ namespace locus::server {
 class Connections {
  public:
   // Reads the files of TLS and listens on all addresses. Returns an error that names the file or the address that
-  // cannot be used, and the reason. `table` must outlive the result.
-  static absl::StatusOr<std::unique_ptr<Connections>> listen(const ServerConfig& config, ConnectionTable& table);
+  // cannot be used, and the reason. `state` must outlive the result.
+  static absl::StatusOr<std::unique_ptr<Connections>> listen(const ServerConfig& config, RpcState& state);
   ~Connections();
   Connections(const Connections&) = delete;
   Connections& operator=(const Connections&) = delete;
@@ -52,7 +53,7 @@ class Connections {
   uint16_t port() const { return port_; }
 
  private:
-  Connections(const ServerConfig& config, ConnectionTable& table);
+  Connections(const ServerConfig& config, RpcState& state);
 
   const ServerConfig config_;
   ConnectionTable& table_;

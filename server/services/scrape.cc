@@ -113,6 +113,23 @@ void add_storage(const Host& host, MetricPage& page) {
                MetricKind::kGauge, static_cast<double>(host.registry.damaged_scenes().size()));
 }
 
+void add_file_loads(const Host& host, MetricPage& page) {
+  const std::pair<const char*, const FileLoads&> all[] = {{"access", host.access_loads}, {"tls", host.tls_loads}};
+  page.begin("locus_file_reloads_total",
+             "Times that changed files were put into use: the access file, tokens and JWKS file, or those of TLS.",
+             MetricKind::kCounter);
+  for (const auto& [files, loads] : all) page.add({{"files", files}}, static_cast<double>(loads.reloads()));
+  page.begin("locus_file_reload_failures_total", "Times that changed files could not be used; the log says why.",
+             MetricKind::kCounter);
+  for (const auto& [files, loads] : all) page.add({{"files", files}}, static_cast<double>(loads.failures()));
+  page.begin("locus_files_loaded_time_seconds",
+             "When the files in use were read, in seconds since 1970; 0 if there are none.", MetricKind::kGauge);
+  for (const auto& [files, loads] : all) page.add({{"files", files}}, static_cast<double>(loads.loaded_s()));
+  page.begin("locus_files_refused", "1 if older files are in use because the newest cannot be used, otherwise 0.",
+             MetricKind::kGauge);
+  for (const auto& [files, loads] : all) page.add({{"files", files}}, loads.refused() ? 1 : 0);
+}
+
 void audit_refusal(const Host& host, const HttpRequest& reader, const Identity& identity, const absl::Status& status) {
   if (host.access->audit() == nullptr) return;
   AuditEntry entry;
@@ -185,6 +202,7 @@ std::string Scrape::metrics() {
   add_memory(host_, page);
   add_quotas(host_, page);
   add_storage(host_, page);
+  add_file_loads(host_, page);
   add_call_figures(host_.metrics.read(), page);
   std::vector<SceneFigures> scenes;
   for (const ScenePtr& scene : host_.registry.list_scenes("", std::numeric_limits<size_t>::max()))

@@ -141,7 +141,7 @@ absl::StatusOr<std::unique_ptr<Server>> Server::start(const ServerConfig& config
                                                       const std::atomic<bool>& stop) {
   auto parts = std::make_unique<Parts>(config, log);
   ASSIGN_OR_RETURN(parts->access, Access::open(config, parts->host));
-  ASSIGN_OR_RETURN(parts->connections, Connections::listen(config, parts->host.connections));
+  ASSIGN_OR_RETURN(parts->connections, Connections::listen(config, parts->host));
   if (can_back_up(parts->host)) remove_leftover_backup(parts->host);
   parts->host.recovering = log != nullptr;
   ASSIGN_OR_RETURN(std::unique_ptr<HttpServer> http, start_http(config, parts->connections->tls(), parts->scrape));

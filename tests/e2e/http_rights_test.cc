@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <sstream>
 
 #include "server/security/token_file.h"
 #include "tests/support/http_get.h"
@@ -61,6 +62,19 @@ class HttpRightsTest : public ::testing::Test {
     return config;
   }
   void start(const server::ServerConfig& config) { running_.emplace(config); }
+  // Returns the value of a metric with its labels, as its line in /metrics begins.
+  double metric(const std::string& name, HttpReader reader) {
+    reader.authorization = "Bearer " + tokens_["scraper"];
+    const std::string page = "\n" + http_get(running_->server().http_port(), "/metrics", "GET", reader).body;
+    const size_t line = page.find("\n" + name + " ");
+    EXPECT_NE(line, std::string::npos) << name;
+    return line == std::string::npos ? -1 : std::stod(page.substr(line + name.size() + 2));
+  }
+  std::string read(const std::string& name) const {
+    std::ostringstream text;
+    text << std::ifstream(folder_.file(name)).rdbuf();
+    return text.str();
+  }
   // Returns the code of a page; 0 if the connection failed.
   long code(const std::string& page, const std::string& who, HttpReader reader = {}) {
     if (!who.empty()) reader.authorization = "Bearer " + tokens_[who];
@@ -113,11 +127,10 @@ TEST_F(HttpRightsTest, RefusalsSayNothingOfScenesAndAreAudited) {
   EXPECT_THAT(http_get(port, "/metrics", "GET", {.authorization = "Bearer " + tokens_["ops"]}).body,
               HasSubstr("token:ops lacks the right metrics"));
   running_.reset();  // writes what is queued
-  std::ostringstream audit;
-  audit << std::ifstream(folder_.file("audit.refused")).rdbuf();
-  EXPECT_THAT(audit.str(), HasSubstr(R"("principal":"anonymous","peer":"ipv4:127.0.0.1:)"));
-  EXPECT_THAT(audit.str(), HasSubstr(R"("rpc":"/metrics","subject":"","code":"PERMISSION_DENIED")"));
-  for (const auto& [name, token] : tokens_) EXPECT_THAT(audit.str(), Not(HasSubstr(token))) << name;
+  const std::string audit = read("audit.refused");
+  EXPECT_THAT(audit, HasSubstr(R"("principal":"anonymous","peer":"ipv4:127.0.0.1:)"));
+  EXPECT_THAT(audit, HasSubstr(R"("rpc":"/metrics","subject":"","code":"PERMISSION_DENIED")"));
+  for (const auto& [name, token] : tokens_) EXPECT_THAT(audit, Not(HasSubstr(token))) << name;
 }
 
 TEST_F(HttpRightsTest, GrantsAndTokensCountAnewAfterAReload) {
@@ -142,6 +155,38 @@ TEST_F(HttpRightsTest, WithACertificateTheDaemonServesItsPagesOverTlsAndReloadsI
   running_->server().reload();
   EXPECT_EQ(code("/metrics", "scraper", trusting(authority_)), 0);
   EXPECT_EQ(code("/metrics", "scraper", trusting(next)), 200);
+}
+
+TEST_F(HttpRightsTest, AnAccessFileThatCannotBeUsedIsCountedUntilItIsMendedAndTheOldRulesStay) {
+  start(config());
+  EXPECT_GT(metric(R"(locus_files_loaded_time_seconds{files="access"})", {}), 0);
+  EXPECT_EQ(metric(R"(locus_files_loaded_time_seconds{files="tls"})", {}), 0) << "there are no such files";
+  write("access", "grant token:scraper\n");
+  running_->server().reload();
+  EXPECT_EQ(metric(R"(locus_files_refused{files="access"})", {}), 1);
+  EXPECT_GE(metric(R"(locus_file_reload_failures_total{files="access"})", {}), 1);
+  write("access", kGrants);
+  running_->server().reload();
+  EXPECT_EQ(metric(R"(locus_files_refused{files="access"})", {}), 0);
+  EXPECT_GE(metric(R"(locus_file_reloads_total{files="access"})", {}), 1);
+  EXPECT_EQ(metric(R"(locus_files_refused{files="tls"})", {}), 0);
+  running_.reset();  // writes what is queued
+  EXPECT_THAT(read("audit"), HasSubstr(R"("rpc":"reload","subject":"access files","code":"OK")"));
+  EXPECT_THAT(read("audit.refused"), HasSubstr(R"("rpc":"reload","subject":"access files","code":"INVALID_ARGUMENT")"));
+}
+
+TEST_F(HttpRightsTest, ACertificateThatCannotBeUsedIsCountedUntilItIsMendedAndTheOldOneStays) {
+  start(tls_config());
+  const HttpReader reader = trusting(authority_);
+  EXPECT_GT(metric(R"(locus_files_loaded_time_seconds{files="tls"})", reader), 0);
+  const std::string good = read("crt");
+  write("crt", "nonsense");
+  EXPECT_TRUE(wait_until([&] { return metric(R"(locus_files_refused{files="tls"})", reader) == 1; }));
+  EXPECT_EQ(metric(R"(locus_file_reload_failures_total{files="tls"})", reader), 1);
+  write("crt", good);
+  EXPECT_TRUE(wait_until([&] { return metric(R"(locus_files_refused{files="tls"})", reader) == 0; }));
+  running_.reset();
+  EXPECT_THAT(read("audit.refused"), HasSubstr(R"("rpc":"reload","subject":"TLS files","code":"INVALID_ARGUMENT")"));
 }
 
 TEST_F(HttpRightsTest, WithAClientCaACertificateIsNeededAndNamesItsReader) {

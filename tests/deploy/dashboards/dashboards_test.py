@@ -138,6 +138,13 @@ class DashboardsTest(unittest.TestCase):
                 used = set(re.findall(r"(\w+)\s*[=!]", inside)) - {"instance", "job"}
                 self.assertLessEqual(used, labels[name], expression)
 
+    def test_files_that_cannot_be_reloaded_raise_an_alert(self):
+        rules = [rule for group in yaml.safe_load(read("alerts.yml"))["groups"] for rule in group["rules"]]
+        self.assertEqual([rule["expr"] for rule in rules if "locus_files_refused" in rule["expr"]],
+                         ["locus_files_refused > 0"])
+        for files in ("access", "tls"):
+            self.assertEqual(self.value("locus_files_refused", files=files), 0)
+
     def test_panels_lie_side_by_side_and_have_numbers_of_their_own(self):
         panels = json.loads(read("grafana.json"))["panels"]
         self.assertEqual(len({panel["id"] for panel in panels}), len(panels))
