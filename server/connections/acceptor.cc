@@ -88,18 +88,6 @@ void Acceptor::stop_accepting() {
   while (!stopped_) stopped_changed_.wait(mutex_);
 }
 
-AcceptorStats Acceptor::stats() const {
-  AcceptorStats stats;
-  stats.accepted = accepted_.load();
-  stats.refused_full = refused_full_.load();
-  stats.refused_address = refused_address_.load();
-  stats.refused_too_fast = refused_too_fast_.load();
-  stats.refused_bytes = refused_bytes_.load();
-  stats.timed_out = timed_out_.load();
-  stats.ended = ended_.load();
-  return stats;
-}
-
 void Acceptor::run() {
   std::array<epoll_event, kWakeUpsAtOnce> events;
   while (!end_.load()) {
@@ -146,7 +134,7 @@ void Acceptor::accept_some(ListeningSocket& listening, Time now) {
   for (int i = 0; i < kAcceptsAtOnce && !paused_; ++i) {
     const int descriptor = accept4(listening.descriptor(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
     if (descriptor >= 0) {
-      accepted_.fetch_add(1);
+      table_.counters().accepted.fetch_add(1);
       admit(descriptor, listening, now);
     } else if (lacks_resources(errno)) {
       pause(now);
@@ -166,13 +154,13 @@ void Acceptor::admit(int descriptor, const ListeningSocket& listening, Time now)
     case Admission::kAdmitted:
       break;
     case Admission::kFull:
-      refused_full_.fetch_add(1);
+      table_.counters().refused_full.fetch_add(1);
       return refuse(descriptor, peer->address, "max-connections");
     case Admission::kAddressFull:
-      refused_address_.fetch_add(1);
+      table_.counters().refused_address.fetch_add(1);
       return refuse(descriptor, peer->address, "max-connections-per-address");
     case Admission::kTooFast:
-      refused_too_fast_.fetch_add(1);
+      table_.counters().refused_too_fast.fetch_add(1);
       return refuse(descriptor, peer->address, "max-new-connections");
   }
   const uint64_t id = next_id_++;
@@ -197,7 +185,7 @@ void Acceptor::opening(uint64_t id) {
   if (seen == Opening::kIncomplete) return;
   --opening_;
   if (seen == Opening::kGood) return hand_over(id, entry);
-  refused_bytes_.fetch_add(1);
+  table_.counters().refused_bytes.fetch_add(1);
   const int descriptor = entry.descriptor;
   const std::string address = entry.peer.address;
   const Transport transport = entry.transport;
@@ -242,7 +230,7 @@ void Acceptor::ended(uint64_t id) {
   table_.remove(*entry.connection);
   epoll_ctl(epoll_, EPOLL_CTL_DEL, entry.connection->descriptor(), nullptr);
   entry.connection->release();
-  ended_.fetch_add(1);
+  table_.counters().ended.fetch_add(1);
 }
 
 // Closes connections whose clients have not sent their first bytes in time, and connections that have been idle for too
@@ -259,14 +247,14 @@ void Acceptor::close_overdue(Time now) {
     if (counts.calls_open > 0 || counts.calls_begun != std::exchange(entry.calls_begun, counts.calls_begun)) {
       entry.since = now;
     } else if (now - entry.since >= options_.idle_timeout && entry.connection->close(kIdle)) {
-      timed_out_.fetch_add(1);
+      table_.counters().idle.fetch_add(1);
     }
   }
   for (const uint64_t id : late) {
     const Entry entry = std::move(entries_.at(id));
     entries_.erase(id);
     --opening_;
-    timed_out_.fetch_add(1);
+    table_.counters().late.fetch_add(1);
     limiter_.leave(entry.peer.limit_key);
     refuse(entry.descriptor, entry.peer.address, "handshake-timeout-s");
   }

@@ -46,17 +46,6 @@ struct AcceptorHooks {
   std::function<void(uint64_t refused, const std::string& address, const char* reason)> refused;
 };
 
-// Numbers of connections since the start.
-struct AcceptorStats {
-  uint64_t accepted = 0;          // accepted by the kernel, including the refused connections
-  uint64_t refused_full = 0;      // over the limit on all connections
-  uint64_t refused_address = 0;   // over the limit of their address
-  uint64_t refused_too_fast = 0;  // over the limit on new connections of their address
-  uint64_t refused_bytes = 0;     // did not begin like a client of gRPC
-  uint64_t timed_out = 0;         // did not begin in time, or were idle for too long
-  uint64_t ended = 0;             // ended after they were handed over to gRPC
-};
-
 class Acceptor {
  public:
   // Starts the thread. `sockets` already listen, so clients wait until this is called. `table` and `guard` must outlive
@@ -71,8 +60,6 @@ class Acceptor {
   // Closes the listening sockets and the connections that are still opening; connections that were handed over stay.
   // When it returns, no further connection is handed over.
   void stop_accepting() LOCUS_EXCLUDES(mutex_);
-
-  AcceptorStats stats() const;
 
  private:
   using Time = std::chrono::steady_clock::time_point;
@@ -108,7 +95,7 @@ class Acceptor {
 
   std::vector<ListeningSocket> sockets_;
   const AcceptorOptions options_;
-  ConnectionTable& table_;
+  ConnectionTable& table_;  // its counters count what this object does
   FloodGuard& guard_;
   const AcceptorHooks hooks_;
   const int epoll_;
@@ -127,14 +114,6 @@ class Acceptor {
   Time last_report_;
   std::string last_address_;
   const char* last_reason_ = nullptr;
-
-  std::atomic<uint64_t> accepted_{0};
-  std::atomic<uint64_t> refused_full_{0};
-  std::atomic<uint64_t> refused_address_{0};
-  std::atomic<uint64_t> refused_too_fast_{0};
-  std::atomic<uint64_t> refused_bytes_{0};
-  std::atomic<uint64_t> timed_out_{0};
-  std::atomic<uint64_t> ended_{0};
 
   std::atomic<bool> stop_{false};
   std::atomic<bool> end_{false};

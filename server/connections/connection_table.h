@@ -18,6 +18,7 @@
 #include "absl/strings/string_view.h"
 #include "core/base/mutex.h"
 #include "server/connections/connection.h"
+#include "server/connections/connection_counters.h"
 
 namespace locus::server {
 
@@ -45,6 +46,10 @@ class ConnectionTable {
   // Returns the number of accepted connections.
   size_t size() const;
 
+  // Returns the counts of all connections since the start.
+  ConnectionCounters& counters() { return counters_; }
+  const ConnectionCounters& counters() const { return counters_; }
+
  private:
   static constexpr size_t kParts = 16;
   static constexpr size_t kMinCleanup = 64;
@@ -61,6 +66,7 @@ class ConnectionTable {
   static std::shared_ptr<Connection> stand_in(Part& part, absl::string_view name) LOCUS_REQUIRES(part.mutex);
 
   std::array<Part, kParts> parts_;
+  ConnectionCounters counters_;
 };
 
 }  // namespace locus::server

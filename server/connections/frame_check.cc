@@ -59,8 +59,7 @@ const char* FrameCheck::begin_frame() {
     default:  // SETTINGS, PRIORITY, GOAWAY and unknown types: a client sends a few in a second
       ++empty_;
   }
-  if (block_bytes_ > kMaxBlockBytes || continuations_ > kMaxContinuations)
-    return "a block of headers that is too long or in too many frames";
+  if (block_bytes_ > kMaxBlockBytes || continuations_ > kMaxContinuations) return kLongHeaders;
   if (cancelled_ > kBurst) return "more calls cancelled than finished";
   if (empty_ > kBurst || pings_ > kBurst) return "too many frames that carry nothing";
   if (calls_of_read_ > kMaxCallsOfRead) return "more calls at once than it may open";

@@ -37,6 +37,9 @@ class FrameCheck {
   // before it accepts the first one. It is above the number of calls that a client may have open.
   static constexpr uint32_t kMaxCallsOfRead = 2048;
 
+  // Reason with which blocks of headers are refused that exceed the first two of these limits.
+  static constexpr const char* kLongHeaders = "a block of headers that is too long or in too many frames";
+
   // Checks the next bytes of the connection, which were read at `now`. Returns null if they are accepted, otherwise the
   // reason for which the connection must be closed, a constant; later results have no meaning.
   const char* refusal(absl::string_view bytes, Time now);

@@ -28,6 +28,8 @@ struct TlsChecks {
 
 std::atomic<const TlsChecks*> tls_checks{nullptr};  // null until check_tls_reads()
 
+std::atomic<uint64_t> failed_handshakes{0}, long_headers{0}, floods{0};  // see TlsCounts
+
 // Returns whether the two peers have agreed on a protocol. gRPC offers h2 and grpc-exp, which are both HTTP/2; the HTTP
 // port of metrics offers no protocol.
 bool has_chosen_http2(const SSL* ssl) {
@@ -48,16 +50,29 @@ bool accept(SSL* ssl, absl::string_view bytes) {
     check = made.release();
   }
   const char* reason = check->refusal(bytes, std::chrono::steady_clock::now());
-  if (reason != nullptr) checks->on_refused(reason);
+  if (reason != nullptr) {
+    (reason == FrameCheck::kLongHeaders ? long_headers : floods).fetch_add(1);
+    checks->on_refused(reason);
+  }
   return reason == nullptr;
 }
 
+// Counts the result of a step of a handshake if the handshake has failed.
+void count_handshake(SSL* ssl, int result) {
+  if (result > 0 || SSL_is_server(ssl) == 0) return;
+  const int error = SSL_get_error(ssl, result);
+  if (error != SSL_ERROR_WANT_READ && error != SSL_ERROR_WANT_WRITE) failed_handshakes.fetch_add(1);
+}
+
 }  // namespace
+
+TlsCounts tls_counts() { return {failed_handshakes.load(), long_headers.load(), floods.load()}; }
 
 void check_tls_reads(OnRefused on_refused) {
   // If these symbols are not ours, gRPC calls the original functions, for example because gRPC is linked statically.
   LOCUS_CHECK(dlsym(RTLD_DEFAULT, "recvmsg") == reinterpret_cast<void*>(&recvmsg));
   LOCUS_CHECK(dlsym(RTLD_DEFAULT, "SSL_read") == reinterpret_cast<void*>(&SSL_read));
+  LOCUS_CHECK(dlsym(RTLD_DEFAULT, "SSL_do_handshake") == reinterpret_cast<void*>(&SSL_do_handshake));
   static const TlsChecks kChecks{on_refused, SSL_get_ex_new_index(0, nullptr, nullptr, nullptr, free_check)};
   tls_checks.store(&kChecks);
 }
@@ -71,6 +86,13 @@ extern "C" __attribute__((visibility("default"))) ssize_t recvmsg(int descriptor
   if (locus::server::CheckedReads::accept(descriptor, *message, static_cast<size_t>(count))) return count;
   errno = ECONNRESET;
   return -1;
+}
+
+extern "C" __attribute__((visibility("default"))) int SSL_do_handshake(SSL* ssl) {
+  static const auto original = reinterpret_cast<decltype(&SSL_do_handshake)>(dlsym(RTLD_NEXT, "SSL_do_handshake"));
+  const int result = original(ssl);
+  locus::server::count_handshake(ssl, result);
+  return result;
 }
 
 extern "C" __attribute__((visibility("default"))) int SSL_read(SSL* ssl, void* buffer, int size) {

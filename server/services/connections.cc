@@ -10,6 +10,7 @@
 #include "core/base/status_macros.h"
 #include "server/config/connection_limits.h"
 #include "server/config/listen_address.h"
+#include "server/connections/frame_check.h"
 #include "server/observability/log.h"
 #include "server/rpc/read_hooks.h"
 #include "server/scheduling/clocks.h"
@@ -56,7 +57,10 @@ void log_refused(uint64_t refused, const std::string& address, const char* reaso
       {{"count", absl::StrCat(refused)}, {"last_address", address}, {"reason", reason}});
 }
 
-void log_closed(const Connection& connection, const char* reason) {
+// Logs and counts a connection that was closed because it flooded the server.
+void note_closed(ConnectionTable& table, const Connection& connection, const char* reason) {
+  ConnectionCounters& counters = table.counters();
+  (reason == FrameCheck::kLongHeaders ? counters.long_headers : counters.floods).fetch_add(1);
   log(LogLevel::kWarning, "connection closed", {{"peer", connection.peer().label}, {"reason", reason}});
 }
 
@@ -90,6 +94,29 @@ TlsHooks tls_hooks(const ServerConfig& config, RpcState& state) {
 
 }  // namespace
 
+std::vector<ConnectionLimit> connection_limits(const ServerConfig& config, const ConnectionTable& table) {
+  const ConnectionCounters& counters = table.counters();
+  return {
+      {"connections", static_cast<double>(max_connections(config)), static_cast<double>(table.size()),
+       counters.refused_full.load()},
+      {"connections_per_address", static_cast<double>(config.max_connections_per_address), 0,
+       counters.refused_address.load()},
+      {"handshake_timeout_s", static_cast<double>(config.handshake_timeout_s), 0, counters.late.load()},
+      {"header_bytes", static_cast<double>(FrameCheck::kMaxBlockBytes), 0,
+       counters.long_headers.load() + tls_counts().long_headers},
+      {"idle_timeout_s", static_cast<double>(config.idle_timeout_s), 0, counters.idle.load()},
+      {"new_connections_per_s", static_cast<double>(config.max_new_connections), 0, counters.refused_too_fast.load()},
+  };
+}
+
+std::vector<ConnectionMisuse> connection_misuses(const ConnectionTable& table) {
+  const ConnectionCounters& counters = table.counters();
+  const TlsCounts tls = tls_counts();
+  return {{"first_bytes", counters.refused_bytes.load()},
+          {"floods", counters.floods.load() + tls.floods},
+          {"tls_handshake", tls.failed_handshakes}};
+}
+
 Connections::Connections(const ServerConfig& config, RpcState& state)
     : config_(config), table_(state.connections), stream_counter_(table_) {}
 
@@ -98,9 +125,9 @@ Connections::~Connections() = default;
 absl::StatusOr<std::unique_ptr<Connections>> Connections::listen(const ServerConfig& config, RpcState& state) {
   std::unique_ptr<Connections> made(new Connections(config, state));
   if (!config.tls_cert.empty()) {
+    state.tls_loads.start(unix_seconds());
     ASSIGN_OR_RETURN(made->tls_, TlsCredentials::start({config.tls_cert, config.tls_key, config.tls_client_ca},
                                                        tls_hooks(config, state)));
-    state.tls_loads.start(unix_seconds());
   }
   UnixAccess unix_access;
   unix_access.owner = config.unix_owner;
@@ -133,7 +160,7 @@ void Connections::start(grpc::Server& server) {
   intake_->started(server);
   guard_ = std::make_unique<FloodGuard>(
       flood_limits(config_, max_streams_), [this](Connection& connection) { return stream_counter_.count(connection); },
-      log_closed);
+      [this](const Connection& connection, const char* reason) { note_closed(table_, connection, reason); });
   reads_ = std::make_unique<CheckedReads>(
       [this](Connection& connection, const char* reason) { guard_->close_for(connection, reason); });
   check_tls_reads([](const char* reason) { log(LogLevel::kWarning, "TLS connection closed", {{"reason", reason}}); });

@@ -27,6 +27,24 @@
 
 namespace locus::server {
 
+// A limit on connections or on what one of them may send.
+struct ConnectionLimit {
+  const char* name;      // as in `locus limits`
+  double value = 0;      // 0 = no limit
+  double used = 0;       // connections that count against the limit, if it concerns all of them
+  uint64_t refused = 0;  // connections that were refused or closed for it since the start
+};
+// Returns the limits on connections.
+std::vector<ConnectionLimit> connection_limits(const ServerConfig& config, const ConnectionTable& table);
+
+// Number of connections that were refused or closed for a reason that is no configurable limit.
+struct ConnectionMisuse {
+  const char* name;  // as in the label of the metric
+  uint64_t refused = 0;
+};
+// Returns the counts of all kinds of misuse.
+std::vector<ConnectionMisuse> connection_misuses(const ConnectionTable& table);
+
 class Connections {
  public:
   // Reads the files of TLS and listens on all addresses. Returns an error that names the file or the address that

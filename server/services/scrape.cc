@@ -13,6 +13,7 @@
 #include "server/scheduling/clocks.h"
 #include "server/security/access_control.h"
 #include "server/security/rights.h"
+#include "server/services/connections.h"
 #include "server/services/quota_report.h"
 
 namespace locus::server {
@@ -54,6 +55,19 @@ void add_server(const Host& host, bool ready, MetricPage& page) {
   for (const auto& [name, numbers] : limits) page.add({{"limit", name}}, numbers.first);
   page.begin("locus_limit_used", "How much of a limit is in use.", MetricKind::kGauge);
   for (const auto& [name, numbers] : limits) page.add({{"limit", name}}, numbers.second);
+}
+
+void add_connections(const Host& host, MetricPage& page) {
+  const std::vector<ConnectionLimit> limits = connection_limits(host.config, host.connections);
+  page.begin("locus_connection_limit",
+             "Limits on connections and on what one may send, by the names of `locus limits`; 0 = none.",
+             MetricKind::kGauge);
+  for (const ConnectionLimit& limit : limits) page.add({{"limit", limit.name}}, limit.value);
+  page.begin("locus_connections_refused_total",
+             "Connections that were refused or closed, by the limit or kind of misuse.", MetricKind::kCounter);
+  for (const ConnectionLimit& limit : limits) page.add({{"limit", limit.name}}, static_cast<double>(limit.refused));
+  for (const ConnectionMisuse& misuse : connection_misuses(host.connections))
+    page.add({{"limit", misuse.name}}, static_cast<double>(misuse.refused));
 }
 
 void add_queues(const Host& host, MetricPage& page) {
@@ -198,6 +212,7 @@ std::string Scrape::metrics() {
   const MutexLock lock(mutex_);
   MetricPage page;
   add_server(host_, readiness().code == 200, page);
+  add_connections(host_, page);
   add_queues(host_, page);
   add_memory(host_, page);
   add_quotas(host_, page);

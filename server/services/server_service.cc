@@ -13,6 +13,7 @@
 #include "server/rpc/call.h"
 #include "server/rpc/wire_plan.h"
 #include "server/services/backup.h"
+#include "server/services/connections.h"
 #include "server/services/quota_report.h"
 
 namespace locus::server {
@@ -27,6 +28,7 @@ struct NamedLimit {
   std::string name;
   double value;
   double used = 0;
+  uint64_t refused = 0;
 };
 
 // Adds the two limits of a queue to `all`: the maximum number of jobs that wait or run, and the maximum sum of their
@@ -58,6 +60,18 @@ void add_queues(const Host& host, std::vector<NamedLimit>& all) {
 void add_memory_lines(const Host& host, std::vector<NamedLimit>& all) {
   for (const MemoryLineUse& line : memory_lines(host.memory, host.registry, host.log))
     all.push_back({"memory_" + line.name, static_cast<double>(line.ceiling), static_cast<double>(line.used)});
+}
+
+void add_connections(const Host& host, std::vector<NamedLimit>& all) {
+  for (const ConnectionLimit& limit : connection_limits(host.config, host.connections))
+    all.push_back({limit.name, limit.value, limit.used, limit.refused});
+}
+
+// Adds the numbers of refused calls and messages to the limits that refused them.
+void add_refusals(const Host& host, std::vector<NamedLimit>& all) {
+  for (const auto& [name, count] : host.metrics.read().refusals)
+    for (NamedLimit& limit : all)
+      if (limit.name == name.second) limit.refused += count;
 }
 
 // Returns every limit under the name that refusals use, in ascending order of names.
@@ -119,8 +133,10 @@ std::vector<NamedLimit> limits_of(const Host& host) {
       {"wire_fields", kMaxWireFields},
       {"writers", limits::kMaxWriters},
   };
+  add_connections(host, all);
   add_queues(host, all);
   add_memory_lines(host, all);
+  add_refusals(host, all);
   std::sort(all.begin(), all.end(), [](const NamedLimit& a, const NamedLimit& b) { return a.name < b.name; });
   return all;
 }
@@ -139,6 +155,7 @@ void get_server(Host& host, v1::GetServerResponse& response) {
     out->set_name(limit.name);
     out->set_value(limit.value);
     out->set_used(limit.used);
+    out->set_refused(limit.refused);
   }
   response.set_insecure(host.config.insecure);
 }

@@ -50,6 +50,17 @@ class ConnectionsTest : public RpcTest {
     return made;
   }
   bool victim_is_served() { return query(ray_along_x()).ok(); }
+  // Returns a limit as GetServer lists it; an empty one if it is not listed.
+  v1::Limit limit(const std::string& name) {
+    grpc::ClientContext context;
+    set_timeout(context);
+    v1::GetServerResponse response;
+    EXPECT_TRUE(stubs().server->GetServer(&context, {}, &response).ok());
+    for (const v1::Limit& listed : response.limits())
+      if (listed.name() == name) return listed;
+    ADD_FAILURE() << "no limit " << name;
+    return {};
+  }
 
   // Sends `bytes` again and again until the server closes the connection. Returns false if it does not.
   bool flood(const std::string& bytes, RawSocket attacker) {
@@ -102,6 +113,8 @@ TEST_F(ConnectionsTest, ABlockOfHeadersThatIsTooLongClosesItsConnectionAtOnce) {
   EXPECT_TRUE(attacker.send(begin));
   attacker.send(repeated(part, server::FrameCheck::kMaxContinuations + 1));
   EXPECT_TRUE(wait_until([&] { return !attacker.discard(); }));
+  EXPECT_EQ(limit("header_bytes").value(), server::FrameCheck::kMaxBlockBytes);
+  EXPECT_EQ(limit("header_bytes").refused(), 1u);
   EXPECT_TRUE(honest.discard()) << "the older connection, which is as silent, must still be open";
   EXPECT_TRUE(victim_is_served());
 }
@@ -177,6 +190,17 @@ TEST_F(ConnectionsTest, ASilentOrWrongClientIsNotHandedToGrpc) {
 
 class ConnectionLimitsTest : public ::testing::Test {
  protected:
+  // Returns how many connections a limit has refused, as GetServer lists it.
+  static uint64_t refused_by(Stubs& stubs, const std::string& name) {
+    grpc::ClientContext context;
+    set_timeout(context);
+    v1::GetServerResponse response;
+    EXPECT_TRUE(stubs.server->GetServer(&context, {}, &response).ok());
+    for (const v1::Limit& limit : response.limits())
+      if (limit.name() == name) return limit.refused();
+    ADD_FAILURE() << "no limit " << name;
+    return 0;
+  }
   static bool served(Stubs& stubs, std::chrono::milliseconds timeout) {
     grpc::ClientContext context;
     set_timeout(context, timeout);
@@ -194,6 +218,7 @@ TEST_F(ConnectionLimitsTest, AnAddressHasAMaximumOfConnectionsAndIsServedAgainWh
   RawSocket third(running.server().port());
   Stubs excess(running.address());
   EXPECT_FALSE(served(excess, std::chrono::milliseconds(500)));
+  EXPECT_GE(refused_by(running.stubs(), "connections_per_address"), 1u);
   second.reset();
   EXPECT_TRUE(wait_until([&] { return served(excess, std::chrono::seconds(2)); }));
   EXPECT_TRUE(served(running.stubs(), kCallTimeout));
@@ -211,6 +236,7 @@ TEST_F(ConnectionLimitsTest, NewConnectionsOfAnAddressAreLimitedWhileItsOldOnesA
     ++refused;
   }
   EXPECT_GT(refused, 10);
+  EXPECT_GE(refused_by(running.stubs(), "new_connections_per_s"), 10u);
   EXPECT_TRUE(served(running.stubs(), kCallTimeout));
 }
 

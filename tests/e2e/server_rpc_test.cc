@@ -57,6 +57,18 @@ TEST_F(ServerRpcTest, LimitsAreListedInOrderWithTheirUse) {
   EXPECT_EQ(limit_of(server, "receive_bytes").value(), limits::kReceiveBytes);
 }
 
+TEST_F(ServerRpcTest, LimitsCountWhatTheyHaveRefused) {
+  EXPECT_EQ(limit_of(get_server(stubs()), "history_ticks").refused(), 0u);
+  grpc::ClientContext context;
+  set_timeout(context);
+  v1::CreateSceneRequest request;
+  request.set_name("other");
+  request.mutable_spec()->set_history_ticks(limits::kMaxHistoryTicks + 1);
+  v1::CreateSceneResponse response;
+  EXPECT_FALSE(stubs().scenes->CreateScene(&context, request, &response).ok());
+  EXPECT_EQ(limit_of(get_server(stubs()), "history_ticks").refused(), 1u);
+}
+
 TEST_F(ServerRpcTest, OpenStreamsCountAsUsed) {
   grpc::ClientContext context;
   set_timeout(context);

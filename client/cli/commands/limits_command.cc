@@ -24,8 +24,10 @@ absl::Status limits(const NoOptions&, Context& context) {
   Report report;
   report.rows_name = "limits";
   for (const v1::Limit& limit : server.limits()) {
-    report.rows.push_back(
-        {{"name", limit.name()}, {"value", number_json(limit.value())}, {"used", number_json(limit.used())}});
+    report.rows.push_back({{"name", limit.name()},
+                           {"value", number_json(limit.value())},
+                           {"used", number_json(limit.used())},
+                           {"refused", limit.refused()}});
   }
   context.write(report);
   return absl::OkStatus();
@@ -34,12 +36,14 @@ absl::Status limits(const NoOptions&, Context& context) {
 }  // namespace
 
 void add_limits_command(CLI::App& parent, Context& context) {
-  CLI::App& command = *parent.add_subcommand("limits", "List every limit of the server, and how much is in use");
+  CLI::App& command = *parent.add_subcommand(
+      "limits", "List every limit of the server, how much is in use, and how often it refused something");
   command.footer(
       "The limits memory_... are what memory_bytes is used for. memory_history, memory_pinned, memory_scenes,\n"
       "memory_meshes, memory_caches and memory_network are measured, the others claimed by work in progress. Of\n"
       "pinned, caches and network, the value is the most that they may take; of the others, the use of the whole\n"
       "process at which they give way or are refused.\n"
+      "`refused` counts calls, messages and connections since the server started.\n"
       "Examples:\n  locus limits\n  locus -o json limits");
   run_when_chosen(command, std::make_shared<NoOptions>(), context, limits);
 }

@@ -125,11 +125,13 @@ class Mesh:
 @dataclasses.dataclass(frozen=True)
 class Limit:
     """Limit of the server. `value` is the maximum. `used` is the amount in use now; it is 0 for limits of a single
-    request or scene.
+    request or scene. `refused` is the number of calls, messages and connections that the limit has refused since the
+    server started.
     """
 
     value: float
     used: float
+    refused: int
 
 
 @dataclasses.dataclass(frozen=True)
@@ -165,7 +167,7 @@ class Server:
     @classmethod
     def of(cls, message: Any) -> "Server":
         """Converts the protocol's GetServerResponse."""
-        limits = {limit.name: Limit(limit.value, limit.used) for limit in message.limits}
+        limits = {limit.name: Limit(limit.value, limit.used, limit.refused) for limit in message.limits}
         return cls(message.version, message.instruction_set, tuple(message.features), limits,
                    message.insecure)
 

@@ -365,7 +365,7 @@ TEST_F(RunTest, GetShowsTheFoundIdsAndNamesTheMissingOnes) {
 }
 
 TEST_F(RunTest, LimitsHealthAndVersionDescribeTheServer) {
-  EXPECT_EQ(json_of({"limits"})["limits"].dump(), R"([{"name":"max_scenes","value":1024,"used":2}])");
+  EXPECT_EQ(json_of({"limits"})["limits"].dump(), R"([{"name":"max_scenes","value":1024,"used":2,"refused":3}])");
   EXPECT_EQ(json_of({"health"})["status"], "SERVING");
   EXPECT_EQ(json_of({"version", "--server"})["server_version"], "1.2.3");
 }
@@ -409,7 +409,7 @@ TEST_F(RunTest, EveryCommandAnswersInCsv) {
   EXPECT_THAT(csv({"scene", "describe", "arena"}), HasSubstr(",min.x,min.y,min.z,max.x,"));
   EXPECT_EQ(csv({"insert", "arena", "point", "--id", "1", "--at", "0,0,0"}),
             "applied,refused,revision,tick,epoch\n1,0,1,0,9\n");
-  EXPECT_EQ(csv({"limits"}), "name,value,used\nmax_scenes,1024,2\n");
+  EXPECT_EQ(csv({"limits"}), "name,value,used,refused\nmax_scenes,1024,2,3\n");
   EXPECT_THAT(csv({"health"}), HasSubstr("address,status\n"));
   EXPECT_THAT(csv({"version", "--server"}), HasSubstr("\"[\"\"rays\"\"]\""));
   EXPECT_THAT(csv({"generate", "city", "--triangles", "100", "--scene", "arena"}), HasSubstr("mesh,triangles,"));

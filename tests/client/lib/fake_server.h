@@ -388,6 +388,7 @@ class FakeServerService final : public v1::ServerService::Service {
     limit.set_name("max_scenes");
     limit.set_value(1024);
     limit.set_used(2);
+    limit.set_refused(3);
     return grpc::Status::OK;
   }
 

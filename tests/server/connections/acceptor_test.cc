@@ -116,7 +116,7 @@ TEST_F(AcceptorTest, GarbageIsResetWithoutBeingHandedOver) {
   RawSocket gone = client();
   EXPECT_TRUE(wait_until([&] { return refused() == 1; }));
   EXPECT_EQ(taken(), 0u);
-  EXPECT_EQ(acceptor_->stats().refused_bytes, 1u);
+  EXPECT_EQ(table_.counters().refused_bytes, 1u);
 }
 
 TEST_F(AcceptorTest, ATlsPortTakesOnlyClientHellos) {
@@ -141,7 +141,7 @@ TEST_F(AcceptorTest, ConnectionsBeyondTheLimitOfTheirAddressAreReset) {
   EXPECT_TRUE(excess.wait_closed());
   kept.push_back(good_client("127.0.0.2"));
   EXPECT_TRUE(wait_until([&] { return taken() == 4; }));
-  EXPECT_EQ(acceptor_->stats().refused_address, 1u);
+  EXPECT_EQ(table_.counters().refused_address, 1u);
   EXPECT_TRUE(wait_until([&] { return has_reason("max-connections-per-address"); }));
 }
 
@@ -155,10 +155,10 @@ TEST_F(AcceptorTest, ConnectionsBeyondTheLimitOnAllAreResetUntilOneEnds) {
   RawSocket excess = client("127.0.0.3");
   EXPECT_TRUE(excess.wait_closed());
   end_taken();
-  ASSERT_TRUE(wait_until([&] { return acceptor_->stats().ended == 2; }));
+  ASSERT_TRUE(wait_until([&] { return table_.counters().ended == 2; }));
   RawSocket next = good_client("127.0.0.3");
   EXPECT_TRUE(wait_until([&] { return taken() == 1; }));
-  EXPECT_EQ(acceptor_->stats().refused_full, 1u);
+  EXPECT_EQ(table_.counters().refused_full, 1u);
 }
 
 TEST_F(AcceptorTest, NewConnectionsBeyondTheRateAreReset) {
@@ -168,9 +168,9 @@ TEST_F(AcceptorTest, NewConnectionsBeyondTheRateAreReset) {
   start(options);
   std::vector<RawSocket> clients;
   for (int i = 0; i < 50; ++i) clients.push_back(client());
-  EXPECT_TRUE(wait_until([&] { return acceptor_->stats().accepted == 50; }));
-  EXPECT_GE(acceptor_->stats().refused_too_fast, 30u);
-  EXPECT_TRUE(wait_until([&] { return refused() == acceptor_->stats().refused_too_fast; }));
+  EXPECT_TRUE(wait_until([&] { return table_.counters().accepted == 50; }));
+  EXPECT_GE(table_.counters().refused_too_fast, 30u);
+  EXPECT_TRUE(wait_until([&] { return refused() == table_.counters().refused_too_fast; }));
   EXPECT_TRUE(has_reason("max-new-connections"));
 }
 
@@ -183,7 +183,7 @@ TEST_F(AcceptorTest, ASilentConnectionIsClosedAfterTheTimeout) {
   EXPECT_TRUE(partial.send(kHttp2Opening.substr(0, 20)));
   EXPECT_TRUE(silent.wait_closed());
   EXPECT_TRUE(partial.wait_closed());
-  EXPECT_EQ(acceptor_->stats().timed_out, 2u);
+  EXPECT_EQ(table_.counters().late, 2u);
 }
 
 TEST_F(AcceptorTest, OnlyConnectionsWithoutOpenCallsAreIdle) {
@@ -235,7 +235,7 @@ TEST_F(AcceptorTest, AFloodIsClosedWhileAnHonestConnectionStays) {
   std::thread reader([&] {
     char bytes[65536];
     std::set<int> open = taken_;
-    while (acceptor_->stats().ended == 0)
+    while (table_.counters().ended == 0)
       for (const int descriptor : open)
         while (recv(descriptor, bytes, sizeof bytes, MSG_DONTWAIT) > 0) {
         }
@@ -252,7 +252,7 @@ TEST_F(AcceptorTest, AfterStoppingNobodyConnectsButConnectionsStay) {
   RawSocket kept = good_client();
   ASSERT_TRUE(wait_until([&] { return taken() == 1; }));
   RawSocket opening = client();
-  ASSERT_TRUE(wait_until([&] { return acceptor_->stats().accepted == 2; }));
+  ASSERT_TRUE(wait_until([&] { return table_.counters().accepted == 2; }));
   acceptor_->stop_accepting();
   EXPECT_FALSE(RawSocket(port_).connected());
   EXPECT_TRUE(opening.wait_closed());
@@ -295,7 +295,7 @@ TEST_F(AcceptorTest, AUnixConnectionThatWasClosedForMisuseKeepsOutNoOther) {
 TEST_F(AcceptorTest, WithoutFreeDescriptorsConnectionsWaitAndTheThreadPauses) {
   start();
   RawSocket waiting(port_);  // needs a descriptor on both sides
-  ASSERT_TRUE(wait_until([&] { return acceptor_->stats().accepted == 1; }));
+  ASSERT_TRUE(wait_until([&] { return table_.counters().accepted == 1; }));
   rlimit limit{};
   ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &limit), 0);
   const int free_descriptor = socket(AF_INET, SOCK_STREAM, 0);
@@ -307,9 +307,9 @@ TEST_F(AcceptorTest, WithoutFreeDescriptorsConnectionsWaitAndTheThreadPauses) {
   ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &none), 0);
   EXPECT_EQ(connect(free_descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
   std::this_thread::sleep_for(milliseconds(300));
-  EXPECT_EQ(acceptor_->stats().accepted, 1u);
+  EXPECT_EQ(table_.counters().accepted, 1u);
   ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &limit), 0);
-  EXPECT_TRUE(wait_until([&] { return acceptor_->stats().accepted == 2; }));
+  EXPECT_TRUE(wait_until([&] { return table_.counters().accepted == 2; }));
   close(free_descriptor);
 }
 

@@ -1,0 +1,26 @@
+// Counts of the connections of a server since its start, for metrics and limits. The acceptor and the code that closes
+// connections count; any thread reads. Plain atomic counters.
+#ifndef LOCUS_SERVER_CONNECTIONS_CONNECTION_COUNTERS_H_
+#define LOCUS_SERVER_CONNECTIONS_CONNECTION_COUNTERS_H_
+
+#include <atomic>
+#include <cstdint>
+
+namespace locus::server {
+
+struct ConnectionCounters {
+  std::atomic<uint64_t> accepted{0};          // accepted by the kernel, including the refused connections
+  std::atomic<uint64_t> refused_full{0};      // over the limit on all connections
+  std::atomic<uint64_t> refused_address{0};   // over the limit of their address
+  std::atomic<uint64_t> refused_too_fast{0};  // over the limit on new connections of their address
+  std::atomic<uint64_t> refused_bytes{0};     // did not begin like a client of gRPC
+  std::atomic<uint64_t> late{0};              // did not begin in time
+  std::atomic<uint64_t> idle{0};              // closed because they were idle for too long
+  std::atomic<uint64_t> ended{0};             // ended after they were handed over to gRPC
+  std::atomic<uint64_t> long_headers{0};      // closed for a block of headers that was too long, without TLS
+  std::atomic<uint64_t> floods{0};            // closed for other floods, without TLS
+};
+
+}  // namespace locus::server
+
+#endif  // LOCUS_SERVER_CONNECTIONS_CONNECTION_COUNTERS_H_
