@@ -125,7 +125,7 @@ class BlockingCalls::Call final : private IoLoop::ActiveCall, private MessageStr
   // Sends the status. The call may be deleted before finish() returns.
   void finish(const absl::Status& status) {
     context_.AddTrailingMetadata(kRequestIdMetadata, caller_->trace().request_id);
-    if (method_ != nullptr && (method_->is_change || Caller::is_audited(status)))
+    if (method_ != nullptr && (method_->is_change || Caller::is_audited(status, false)))
       caller_->audit(caller_->subject(), status);
     if (method_ != nullptr && method_->rpc)
       record_answer(owner_.state_.metrics, *caller_, *method_->rpc, status, arrived_);

@@ -109,8 +109,9 @@ class Caller {
   // Counts an update of a scene for the line about updates that the audit log gets each minute. `items` is the number
   // of objects that the update changed.
   void audit_update(const std::string& scene, uint64_t items) const;
-  // Returns whether the refusal `status` is written to the audit log.
-  static bool is_audited(const absl::Status& status);
+  // Returns whether the refusal `status` is written to the audit log. `is_change` tells whether the refused call would
+  // have changed something.
+  static bool is_audited(const absl::Status& status, bool is_change);
 
   // Cancels the call at once, even while it is blocked in a read or write.
   void cancel() const { context_.TryCancel(); }
@@ -156,9 +157,11 @@ absl::Status check_serving(const RpcState& state);
 // call's deadline passed, or the server drains.
 bool ends_stream(const Caller& caller, const absl::Status& status);
 
-// Counts a call, or one message of a stream, that was answered with `status`. Logs a line at debug level if `status` is
-// not OK.
-void record_answer(CallMetrics& metrics, const Caller& caller, Rpc rpc, const absl::Status& status, SteadyTime arrived);
+// Counts a call, or one message of a stream, that was answered with `status`. If `status` is not OK, logs a line at
+// debug level and, for queries and updates, writes a line to the audit log as Caller::is_audited() says; `scene` is the
+// scene that the message names, empty if it is not known.
+void record_answer(CallMetrics& metrics, const Caller& caller, Rpc rpc, const absl::Status& status, SteadyTime arrived,
+                   absl::string_view scene = "");
 
 }  // namespace locus::server
 

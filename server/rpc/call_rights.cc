@@ -200,8 +200,22 @@ CallMemory Caller::claim_anyway(MemoryLine line, uint64_t bytes) const {
   return {state_.memory.claim_anyway(line, bytes), std::move(quota), nullptr};
 }
 
-bool Caller::is_audited(const absl::Status& status) {
-  return status.code() == absl::StatusCode::kUnauthenticated || status.code() == absl::StatusCode::kPermissionDenied;
+// Not audited: calls that end because of time, of their caller or of the server's end, and scenes that do not exist,
+// unless they are hidden from the caller (see audit_hidden()).
+bool Caller::is_audited(const absl::Status& status, bool is_change) {
+  switch (status.code()) {
+    case absl::StatusCode::kUnauthenticated:
+    case absl::StatusCode::kPermissionDenied:
+    case absl::StatusCode::kResourceExhausted:
+      return true;
+    case absl::StatusCode::kInvalidArgument:
+    case absl::StatusCode::kFailedPrecondition:
+    case absl::StatusCode::kOutOfRange:
+    case absl::StatusCode::kAborted:
+      return is_change;
+    default:
+      return false;
+  }
 }
 
 void Caller::audit_update(const std::string& scene, uint64_t items) const {

@@ -287,7 +287,7 @@ class HotCall final : private IoLoop::ActiveCall {
       LOCUS_CHECK(!slot.answered_);
       slot.answered_ = true;
       slot.holds_ = false;
-      record_answer(listener_.state_.metrics, *caller_, Method::kRpc, status, slot.arrived_);
+      record_answer(listener_.state_.metrics, *caller_, Method::kRpc, status, slot.arrived_, scene_of(slot));
       if (stopping_ || status.ok()) return shrink_claim(slot);
       if constexpr (Method::kStream) {
         if (ends_stream(*caller_, status)) return stop(std::move(status));
@@ -296,6 +296,11 @@ class HotCall final : private IoLoop::ActiveCall {
         end(std::move(status));
       }
     });
+  }
+
+  // Returns the scene that a message is about; empty if the message does not name it or was not read.
+  const std::string& scene_of(const Slot& slot) const {
+    return Method::kStream ? scene_.scene() : slot.request_.scene();
   }
 
   // Reduces the claim for a slot's answer to the memory that the finished answer needs.

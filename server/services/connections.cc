@@ -52,16 +52,20 @@ FloodLimits flood_limits(const ServerConfig& config, uint32_t streams) {
   return limits;
 }
 
-void log_refused(uint64_t refused, const std::string& address, const char* reason) {
+// Logs and audits connections that were refused; called at most once a second.
+void note_refused(const RpcState& state, uint64_t refused, const std::string& address, const char* reason) {
   log(LogLevel::kWarning, "connections refused",
       {{"count", absl::StrCat(refused)}, {"last_address", address}, {"reason", reason}});
+  report_connections(state, refused, address, "", absl::ResourceExhaustedError(absl::StrCat("refused: ", reason)));
 }
 
-// Logs and counts a connection that was closed because it flooded the server.
-void note_closed(ConnectionTable& table, const Connection& connection, const char* reason) {
-  ConnectionCounters& counters = table.counters();
+// Counts, logs and audits a connection that was closed because it flooded the server.
+void note_closed(RpcState& state, const Connection& connection, const char* reason) {
+  ConnectionCounters& counters = state.connections.counters();
   (reason == FrameCheck::kLongHeaders ? counters.long_headers : counters.floods).fetch_add(1);
   log(LogLevel::kWarning, "connection closed", {{"peer", connection.peer().label}, {"reason", reason}});
+  report_connections(state, 1, connection.peer().label, connection.peer().limit_key,
+                     absl::ResourceExhaustedError(absl::StrCat("closed: ", reason)));
 }
 
 void log_ended(size_t closed, const char* reason) {
@@ -69,18 +73,34 @@ void log_ended(size_t closed, const char* reason) {
   log(LogLevel::kWarning, "connections closed", {{"count", absl::StrCat(closed)}, {"reason", reason}});
 }
 
-// Returns functions that end the connections of clients whose certificate is no longer trusted. TLS checks certificates
-// only when a connection begins.
+// Audits the TLS connections that failed since the counts `before`, and updates `before`. Called once a second.
+void note_failed_tls(const RpcState& state, TlsCounts& before) {
+  const TlsCounts now = tls_counts();
+  const auto report = [&state](uint64_t count, const absl::Status& status) {
+    if (count > 0) report_connections(state, count, "", "", status);
+  };
+  report(now.failed_handshakes - before.failed_handshakes, absl::UnauthenticatedError("the TLS handshake failed"));
+  report(now.long_headers - before.long_headers + now.floods - before.floods,
+         absl::ResourceExhaustedError("closed: a TLS connection flooded the server with frames"));
+  before = now;
+}
+
+// Returns functions that end the connections of clients whose certificate is no longer trusted, since TLS checks
+// certificates only when a connection begins. They also audit failed handshakes.
 TlsHooks tls_hooks(const ServerConfig& config, RpcState& state) {
   TlsHooks hooks;
   hooks.reloaded = [&state](const absl::Status& status) { report_reload(state, state.tls_loads, "TLS files", status); };
+  hooks.second_passed = [&state, before = std::make_shared<TlsCounts>(tls_counts())] {
+    note_failed_tls(state, *before);
+  };
   if (config.tls_client_ca.empty()) return hooks;
   ConnectionTable& table = state.connections;
   hooks.authority_removed = [&table] {
     constexpr const char* kReason = "a client CA was removed: clients must prove their certificates again";
     log_ended(table.close_if([](const Connection& connection) { return !connection.peer().uid; }, kReason), kReason);
   };
-  hooks.second_passed = [&table] {
+  hooks.second_passed = [&table, note_failures = hooks.second_passed] {
+    note_failures();
     constexpr const char* kReason = "the client's certificate has expired";
     const int64_t now = unix_seconds();
     const auto has_expired = [now](const Connection& connection) {
@@ -118,7 +138,7 @@ std::vector<ConnectionMisuse> connection_misuses(const ConnectionTable& table) {
 }
 
 Connections::Connections(const ServerConfig& config, RpcState& state)
-    : config_(config), table_(state.connections), stream_counter_(table_) {}
+    : config_(config), state_(state), stream_counter_(state.connections) {}
 
 Connections::~Connections() = default;
 
@@ -160,7 +180,7 @@ void Connections::start(grpc::Server& server) {
   intake_->started(server);
   guard_ = std::make_unique<FloodGuard>(
       flood_limits(config_, max_streams_), [this](Connection& connection) { return stream_counter_.count(connection); },
-      [this](const Connection& connection, const char* reason) { note_closed(table_, connection, reason); });
+      [this](const Connection& connection, const char* reason) { note_closed(state_, connection, reason); });
   reads_ = std::make_unique<CheckedReads>(
       [this](Connection& connection, const char* reason) { guard_->close_for(connection, reason); });
   check_tls_reads([](const char* reason) { log(LogLevel::kWarning, "TLS connection closed", {{"reason", reason}}); });
@@ -174,9 +194,11 @@ void Connections::start(grpc::Server& server) {
     }
     intake_->hand_over(descriptor, *connection);
   };
-  hooks.refused = log_refused;
-  acceptor_ =
-      std::make_unique<Acceptor>(std::move(sockets_), acceptor_options(config_), table_, *guard_, std::move(hooks));
+  hooks.refused = [this](uint64_t refused, const std::string& address, const char* reason) {
+    note_refused(state_, refused, address, reason);
+  };
+  acceptor_ = std::make_unique<Acceptor>(std::move(sockets_), acceptor_options(config_), state_.connections, *guard_,
+                                         std::move(hooks));
 }
 
 void Connections::stop_accepting() {

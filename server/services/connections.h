@@ -74,7 +74,7 @@ class Connections {
   Connections(const ServerConfig& config, RpcState& state);
 
   const ServerConfig config_;
-  ConnectionTable& table_;
+  RpcState& state_;
   std::vector<ListeningSocket> sockets_;
   std::vector<std::string> addresses_;
   uint16_t port_ = 0;

@@ -1,7 +1,10 @@
 // Events of the server that no call causes, for /metrics and the audit log: changed files of TLS or access control that
-// were put into use, or could not be used. Whoever reads the files writes the line in the log.
+// were put into use, or could not be used; connections that were refused or closed. Other code writes the lines of the
+// log.
 #ifndef LOCUS_SERVER_SERVICES_SERVER_EVENTS_H_
 #define LOCUS_SERVER_SERVICES_SERVER_EVENTS_H_
+
+#include <cstdint>
 
 #include "absl/status/status.h"
 #include "absl/strings/string_view.h"
@@ -12,6 +15,12 @@ namespace locus::server {
 // Reports one reading of the changed files that `loads`, a member of `state`, counts. `files` names them in the audit
 // log. `status` is OK if they are in use now. Any thread.
 void report_reload(const RpcState& state, FileLoads& loads, absl::string_view files, const absl::Status& status);
+
+// Reports `count` connections that were refused or closed since the last report of this kind. `peer` and `address` name
+// the last of them, as Peer::label and Peer::limit_key do; empty if they are not known. `status` says why. The caller
+// limits how often it reports; the audit log then limits the lines of each address. Any thread.
+void report_connections(const RpcState& state, uint64_t count, absl::string_view peer, absl::string_view address,
+                        const absl::Status& status);
 
 }  // namespace locus::server
 

@@ -312,6 +312,39 @@ TEST_F(AccessRpcTest, ChangesAndRefusalsAreAudited) {
   for (const auto& [name, token] : tokens_) EXPECT_EQ((changes + refusals).find(token), std::string::npos) << name;
 }
 
+TEST_F(AccessRpcTest, RefusedChangesAreAuditedWithTheirScenesAndRefusedQueriesOnlyForQuotas) {
+  write("access", std::string(kAccess) + "quota token:updater update_items_per_s=5 burst_s=1\n" +
+                      "quota token:reader queries_per_s=1 burst_s=1\n");
+  running_->server().reload();
+  v1::ApplyUpdatesRequest update;
+  update.set_scene("arena-1");
+  *update.mutable_batch() = insert_balls(100, 199);
+  v1::QueryRequest query;
+  query.set_scene("arena-1");
+  v1::Rays* rays = query.mutable_batch()->add_blocks()->mutable_rays();
+  for (int axis = 0; axis < 6; ++axis) rays->add_origins(0.0f);
+  for (int axis = 0; axis < 6; ++axis) rays->add_directions(1.0f);
+  const auto send = [&](const std::string& path, const google::protobuf::Message& request, const std::string& who) {
+    return raw_call(running_->stubs().channel, path, request.SerializeAsString(), kCallTimeout, tokens_[who]).status;
+  };
+  EXPECT_EQ(send("/locus.v1.UpdateService/ApplyUpdates", update, "updater").error_code(),
+            grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_EQ(send("/locus.v1.QueryService/Query", query, "reader").error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  update.mutable_batch()->mutable_inserts(0)->clear_positions();
+  rays->clear_directions();
+  EXPECT_EQ(send("/locus.v1.UpdateService/ApplyUpdates", update, "admin").error_code(),
+            grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(send("/locus.v1.QueryService/Query", query, "admin").error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  running_.reset();  // writes the queued lines
+  const std::string audit = read("audit.refused");
+  const std::string updates = R"("rpc":"/locus.v1.UpdateService/ApplyUpdates","subject":"arena-1","code":)";
+  EXPECT_THAT(audit, HasSubstr(updates + R"("RESOURCE_EXHAUSTED")"));
+  EXPECT_THAT(audit, HasSubstr(updates + R"("INVALID_ARGUMENT")"));
+  const std::string queries = R"("rpc":"/locus.v1.QueryService/Query","subject":"arena-1","code":)";
+  EXPECT_THAT(audit, HasSubstr(queries + R"("RESOURCE_EXHAUSTED")"));
+  EXPECT_THAT(audit, Not(HasSubstr(queries + R"("INVALID_ARGUMENT")")));
+}
+
 TEST_F(AccessRpcTest, CallersWithoutCredentialsFillNoAuditFile) {
   call("/locus.v1.SceneService/DeleteScene", "admin");
   for (int i = 0; i < 200; ++i) call("/locus.v1.SceneService/DeleteScene", "");

@@ -1,6 +1,9 @@
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <atomic>
+#include <fstream>
+#include <sstream>
 #include <thread>
 #include <vector>
 
@@ -238,6 +241,41 @@ TEST_F(ConnectionLimitsTest, NewConnectionsOfAnAddressAreLimitedWhileItsOldOnesA
   EXPECT_GT(refused, 10);
   EXPECT_GE(refused_by(running.stubs(), "new_connections_per_s"), 10u);
   EXPECT_TRUE(served(running.stubs(), kCallTimeout));
+}
+
+// Returns the text of a file.
+std::string text_of(const std::string& file) {
+  std::ostringstream text;
+  text << std::ifstream(file).rdbuf();
+  return text.str();
+}
+
+TEST_F(ConnectionLimitsTest, RefusedAndClosedConnectionsAreAuditedInAFewLines) {
+  const TemporaryFolder folder;
+  server::ServerConfig config = test_config();
+  config.max_new_connections = 50;
+  config.audit_file = folder.file("audit");
+  {
+    RunningServer running(config);
+    ASSERT_TRUE(served(running.stubs(), kCallTimeout));
+    RawSocket flooding(running.server().port());
+    std::string pings = kHttp2Opening;
+    for (int i = 0; i < 3000; ++i) pings += http2_frame(kPing, 0, 0, "12345678");
+    flooding.send(pings);
+    EXPECT_TRUE(wait_until([&] { return !flooding.discard(); }));
+    for (int i = 0; i < 300; ++i) {
+      RawSocket wrong(running.server().port());
+      wrong.send("GET / HTTP/1.1\r\n\r\n");
+      wrong.wait_closed();
+    }
+    const auto audited = [&] { return text_of(folder.file("audit.refused")); };
+    EXPECT_TRUE(wait_until([&] { return audited().find("refused: max-new-connections") != std::string::npos; }));
+  }
+  const std::string audit = text_of(folder.file("audit.refused"));
+  EXPECT_THAT(audit, ::testing::HasSubstr(R"("peer":"ipv4:127.0.0.1:)"));
+  EXPECT_THAT(audit, ::testing::HasSubstr("closed: too many frames that carry nothing"));
+  EXPECT_THAT(audit, ::testing::HasSubstr(" connections; the last of them: refused: "));
+  EXPECT_LT(std::count(audit.begin(), audit.end(), '\n'), 40);
 }
 
 TEST_F(ConnectionLimitsTest, CallsOverUnixSocketsAreServedAndTheFileIsRemovedAtTheEnd) {

@@ -6,14 +6,17 @@
 #include <array>
 #include <atomic>
 #include <csignal>
+#include <fstream>
 #include <functional>
 #include <iostream>
 #include <memory>
 #include <optional>
+#include <sstream>
 #include <thread>
 #include <vector>
 
 #include "server/connections/frame_check.h"
+#include "server/rpc/read_hooks.h"
 #include "server/rpc/tls_credentials.h"
 #include "server/security/token_file.h"
 #include "tests/support/raw_socket.h"
@@ -88,6 +91,22 @@ TEST_F(TlsTest, OnlyClientsWithACertificateOfTheClientCaAreServed) {
   EXPECT_FALSE(get_server(channel_to(running.address(), root, foreign), std::chrono::seconds(2)).ok());
   const TestCertificate expired = clients_.issue({.common_name = "game", .valid_from_s = -7200, .valid_to_s = -3600});
   EXPECT_FALSE(get_server(channel_to(running.address(), root, expired), std::chrono::seconds(2)).ok());
+}
+
+TEST_F(TlsTest, FailedHandshakesAreCountedAndAudited) {
+  server::ServerConfig audited = config(true);
+  audited.audit_file = folder_.file("audit");
+  RunningServer running(audited);
+  const uint64_t before = server::tls_counts().failed_handshakes;
+  const TestCertificate foreign = authority_.issue({.common_name = "game"});
+  const auto stranger = channel_to(running.address(), authority_.certificate(), foreign);
+  EXPECT_FALSE(get_server(stranger, std::chrono::seconds(2)).ok());
+  EXPECT_GT(server::tls_counts().failed_handshakes, before);
+  EXPECT_TRUE(wait_until([&] {
+    std::ostringstream text;
+    text << std::ifstream(folder_.file("audit.refused")).rdbuf();
+    return text.str().find(R"("rpc":"connect","subject":"","code":"UNAUTHENTICATED")") != std::string::npos;
+  }));
 }
 
 // A TLS connection of a client that offers one protocol and sends bytes of its own making.
