@@ -7,6 +7,7 @@
 #include "core/index/list/list_index.h"
 #include "core/scene/objects/object.h"
 #include "tests/support/random.h"
+#include "tests/support/small_world.h"
 
 namespace locus::test {
 namespace {
@@ -15,16 +16,6 @@ using ::testing::ElementsAre;
 using ::testing::UnorderedElementsAre;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-// Returns a ball around (x, 0, 0): rays along the x axis from the origin hit it at x - radius.
-Object ball_at(Id id, double x, float radius = 1) {
-  Object object;
-  object.id = id;
-  object.shape.kind = ShapeKind::kBall;
-  object.shape.position = {x, 0, 0};
-  object.shape.radius = radius;
-  return object;
-}
 
 ObjectRay along_x() { return ObjectRay(Rayd{{0, 0, 0}, {1, 0, 0}}); }
 
@@ -59,36 +50,36 @@ std::vector<Id> ids_of(const std::vector<RayHit<Object>>& hits) {
 }
 
 TYPED_TEST(IndexQueriesTest, FirstRayWithoutAHitChangesNeitherValueNorDistance) {
-  const auto index = this->make({ball_at(1, -10)});
-  Object value = ball_at(77, 0);
+  const auto index = this->make({ball_object(1, {-10, 0, 0})});
+  Object value = ball_object(77, {0, 0, 0});
   double distance = 100;
   EXPECT_FALSE(first_ray(index, along_x(), value, distance));
-  EXPECT_EQ(value, ball_at(77, 0));
+  EXPECT_EQ(value, ball_object(77, {0, 0, 0}));
   EXPECT_EQ(distance, 100);
 }
 
 TYPED_TEST(IndexQueriesTest, FirstRayWithANearerHitSetsValueAndDistance) {
-  const auto index = this->make({ball_at(1, 30), ball_at(2, 10), ball_at(3, 20)});
-  Object value = ball_at(77, 0);
+  const auto index = this->make({ball_object(1, {30, 0, 0}), ball_object(2, {10, 0, 0}), ball_object(3, {20, 0, 0})});
+  Object value = ball_object(77, {0, 0, 0});
   double distance = 100;
   EXPECT_TRUE(first_ray(index, along_x(), value, distance));
-  EXPECT_EQ(value, ball_at(2, 10));
+  EXPECT_EQ(value, ball_object(2, {10, 0, 0}));
   EXPECT_EQ(distance, 9);
 }
 
 TYPED_TEST(IndexQueriesTest, FirstRayWithAHitAtOrBeyondTheDistanceChangesNeitherValueNorDistance) {
-  const auto index = this->make({ball_at(1, 10)});
+  const auto index = this->make({ball_object(1, {10, 0, 0})});
   for (const double limit : {9.0, 8.0, 0.0}) {
-    Object value = ball_at(77, 0);
+    Object value = ball_object(77, {0, 0, 0});
     double distance = limit;
     EXPECT_FALSE(first_ray(index, along_x(), value, distance)) << limit;
-    EXPECT_EQ(value, ball_at(77, 0));
+    EXPECT_EQ(value, ball_object(77, {0, 0, 0}));
     EXPECT_EQ(distance, limit);
   }
 }
 
 TYPED_TEST(IndexQueriesTest, FirstRayAcceptsAHitJustBeforeTheDistance) {
-  const auto index = this->make({ball_at(1, 10)});
+  const auto index = this->make({ball_object(1, {10, 0, 0})});
   Object value;
   double distance = std::nextafter(9.0, kInfinity);
   EXPECT_TRUE(first_ray(index, along_x(), value, distance));
@@ -97,7 +88,7 @@ TYPED_TEST(IndexQueriesTest, FirstRayAcceptsAHitJustBeforeTheDistance) {
 
 TYPED_TEST(IndexQueriesTest, TheLowerIdWinsATie) {
   std::vector<Object> objects;
-  for (const Id id : {40, 12, 7, 33, 21, 8, 9, 10, 11, 13, 14, 15}) objects.push_back(ball_at(id, 10));
+  for (const Id id : {40, 12, 7, 33, 21, 8, 9, 10, 11, 13, 14, 15}) objects.push_back(ball_object(id, {10, 0, 0}));
   const auto index = this->make(objects);
   Object value;
   double distance = kInfinity;
@@ -106,14 +97,15 @@ TYPED_TEST(IndexQueriesTest, TheLowerIdWinsATie) {
 }
 
 TYPED_TEST(IndexQueriesTest, AnyRayIsStrictAtTheDistance) {
-  const auto index = this->make({ball_at(1, 10), ball_at(2, 50)});
+  const auto index = this->make({ball_object(1, {10, 0, 0}), ball_object(2, {50, 0, 0})});
   EXPECT_FALSE(any_ray(index, along_x(), 9));
   EXPECT_TRUE(any_ray(index, along_x(), std::nextafter(9.0, kInfinity)));
   EXPECT_FALSE(any_ray(this->make({}), along_x(), kInfinity));
 }
 
 TYPED_TEST(IndexQueriesTest, AllRaysSortByDistanceThenId) {
-  const auto index = this->make({ball_at(9, 30), ball_at(2, 10), ball_at(5, 20), ball_at(1, 30), ball_at(8, 10)});
+  const auto index = this->make({ball_object(9, {30, 0, 0}), ball_object(2, {10, 0, 0}), ball_object(5, {20, 0, 0}),
+                                 ball_object(1, {30, 0, 0}), ball_object(8, {10, 0, 0})});
   std::vector<RayHit<Object>> hits;
   all_rays(index, along_x(), kInfinity, 100, hits);
   EXPECT_THAT(ids_of(hits), ElementsAre(2, 8, 5, 1, 9));
@@ -121,7 +113,8 @@ TYPED_TEST(IndexQueriesTest, AllRaysSortByDistanceThenId) {
 }
 
 TYPED_TEST(IndexQueriesTest, AllRaysReturnTheNearestHits) {
-  const auto index = this->make({ball_at(9, 30), ball_at(2, 10), ball_at(5, 20), ball_at(1, 30), ball_at(8, 10)});
+  const auto index = this->make({ball_object(9, {30, 0, 0}), ball_object(2, {10, 0, 0}), ball_object(5, {20, 0, 0}),
+                                 ball_object(1, {30, 0, 0}), ball_object(8, {10, 0, 0})});
   for (size_t max_hits = 0; max_hits <= 5; ++max_hits) {
     std::vector<RayHit<Object>> hits;
     all_rays(index, along_x(), kInfinity, max_hits, hits);
@@ -131,23 +124,23 @@ TYPED_TEST(IndexQueriesTest, AllRaysReturnTheNearestHits) {
 }
 
 TYPED_TEST(IndexQueriesTest, AllRaysAreStrictAtTheDistance) {
-  const auto index = this->make({ball_at(1, 10), ball_at(2, 20)});
+  const auto index = this->make({ball_object(1, {10, 0, 0}), ball_object(2, {20, 0, 0})});
   std::vector<RayHit<Object>> hits;
   all_rays(index, along_x(), 19, 100, hits);
   EXPECT_THAT(ids_of(hits), ElementsAre(1));
 }
 
 TYPED_TEST(IndexQueriesTest, ResultsAreAppendedAndNeverOverwritten) {
-  const auto index = this->make({ball_at(1, 10), ball_at(2, 20)});
+  const auto index = this->make({ball_object(1, {10, 0, 0}), ball_object(2, {20, 0, 0})});
   // The given vector contains a hit that is farther than every hit of the ray, so that a sort of the whole vector would
   // move it.
-  std::vector<RayHit<Object>> hits = {{1e9, ball_at(77, 0)}};
+  std::vector<RayHit<Object>> hits = {{1e9, ball_object(77, {0, 0, 0})}};
   all_rays(index, along_x(), kInfinity, 1, hits);
   EXPECT_THAT(ids_of(hits), ElementsAre(77, 1));
   all_rays(index, along_x(), kInfinity, 2, hits);
   EXPECT_THAT(ids_of(hits), ElementsAre(77, 1, 1, 2));
 
-  std::vector<Object> values = {ball_at(77, 0)};
+  std::vector<Object> values = {ball_object(77, {0, 0, 0})};
   ball_overlap(index, {{10, 0, 0}, 1}, values);
   box_overlap(index, {{20, 0, 0}, {1, 1, 1}, {}}, values);
   conservative_ball(index, {{10, 0, 0}, 1}, values);
@@ -157,7 +150,7 @@ TYPED_TEST(IndexQueriesTest, ResultsAreAppendedAndNeverOverwritten) {
 }
 
 TYPED_TEST(IndexQueriesTest, TouchingCountsAsOverlap) {
-  const auto index = this->make({ball_at(1, 10)});
+  const auto index = this->make({ball_object(1, {10, 0, 0})});
   std::vector<Object> values;
   ball_overlap(index, {{13, 0, 0}, 2}, values);
   box_overlap(index, {{7, 0, 0}, {2, 0, 0}, {}}, values);
@@ -170,7 +163,7 @@ TYPED_TEST(IndexQueriesTest, TouchingCountsAsOverlap) {
 
 TYPED_TEST(IndexQueriesTest, ConservativeQueriesDecideByBounds) {
   // The queries (a ball, a box and a ray) overlap the stored ball's bounds at a corner, but not the stored ball.
-  const auto index = this->make({ball_at(1, 0, 10)});
+  const auto index = this->make({ball_object(1, {0, 0, 0}, 10)});
   const Balld ball{{10, 10, 10}, 1};
   const Obbd box{{10, 10, 10}, {1, 1, 1}, {}};
   const ObjectRay ray(Rayd{{9.5, 9.5, -20}, {0, 0, 1}});
@@ -188,7 +181,7 @@ TYPED_TEST(IndexQueriesTest, ConservativeQueriesDecideByBounds) {
 }
 
 TYPED_TEST(IndexQueriesTest, WorkIsAddedToTheCallersCounter) {
-  const auto index = this->make({ball_at(1, 10), ball_at(2, 20)});
+  const auto index = this->make({ball_object(1, {10, 0, 0}), ball_object(2, {20, 0, 0})});
   Work work;
   work.tests = 100;
   Object value;
@@ -203,8 +196,8 @@ TYPED_TEST(IndexQueriesTest, WorkIsAddedToTheCallersCounter) {
 // The expression first_ray(statics) || first_ray(dynamics) does not search `dynamics` after a hit in `statics`,
 // although `dynamics` may have a nearer hit.
 TYPED_TEST(IndexQueriesTest, TheNearerHitOfASecondIndexIsNotSkippedAfterAHitInTheFirst) {
-  const auto statics = this->make({ball_at(1, 50)});
-  const auto dynamics = this->make({ball_at(2, 10)});
+  const auto statics = this->make({ball_object(1, {50, 0, 0})});
+  const auto dynamics = this->make({ball_object(2, {10, 0, 0})});
   Object joined;
   double joined_distance = kInfinity;
   const bool hit =
@@ -220,9 +213,9 @@ TYPED_TEST(IndexQueriesTest, TheNearerHitOfASecondIndexIsNotSkippedAfterAHitInTh
 }
 
 TYPED_TEST(IndexQueriesTest, FirstRayOfSeveralIndicesDoesNotDependOnTheirOrder) {
-  const auto far = this->make({ball_at(1, 50), ball_at(9, 20)});
-  const auto near = this->make({ball_at(2, 10)});
-  const auto tied = this->make({ball_at(3, 10), ball_at(4, 11)});
+  const auto far = this->make({ball_object(1, {50, 0, 0}), ball_object(9, {20, 0, 0})});
+  const auto near = this->make({ball_object(2, {10, 0, 0})});
+  const auto tied = this->make({ball_object(3, {10, 0, 0}), ball_object(4, {11, 0, 0})});
   const auto none = this->make({});
   const auto check = [](const auto&... indices) {
     Object value;
@@ -238,14 +231,14 @@ TYPED_TEST(IndexQueriesTest, FirstRayOfSeveralIndicesDoesNotDependOnTheirOrder) 
 
 TEST(IndexQueriesOfTwoStructuresTest, FirstRayOfAListAndATreeReturnsTheNearerHitOrTheLowerId) {
   ListIndex<Object> list;
-  list.insert(ball_at(5, 10));
-  const Bvh<Object> tree = *Bvh<Object>::build({ball_at(4, 10), ball_at(6, 9)});
+  list.insert(ball_object(5, {10, 0, 0}));
+  const Bvh<Object> tree = *Bvh<Object>::build({ball_object(4, {10, 0, 0}), ball_object(6, {9, 0, 0})});
   Object value;
   double distance = kInfinity;
   EXPECT_TRUE(first_ray_of(along_x(), value, distance, nullptr, list, tree));
   EXPECT_EQ(value.id, 6u);
   distance = kInfinity;
-  const Bvh<Object> tied = *Bvh<Object>::build({ball_at(4, 10), ball_at(6, 10)});
+  const Bvh<Object> tied = *Bvh<Object>::build({ball_object(4, {10, 0, 0}), ball_object(6, {10, 0, 0})});
   EXPECT_TRUE(first_ray_of(along_x(), value, distance, nullptr, list, tied));
   EXPECT_EQ(value.id, 4u);
 }

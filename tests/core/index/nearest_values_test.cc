@@ -6,6 +6,7 @@
 #include "core/index/bvh/bvh.h"
 #include "core/index/list/list_index.h"
 #include "tests/support/object_grid.h"
+#include "tests/support/small_world.h"
 
 namespace locus::test {
 namespace {
@@ -13,16 +14,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-Object ball_at(Id id, double x, float radius = 1) {
-  Object object;
-  object.id = id;
-  object.shape.kind = ShapeKind::kBall;
-  object.shape.position = {x, 0, 0};
-  object.shape.radius = radius;
-  return object;
-}
+constexpr double kNoLimit = std::numeric_limits<double>::infinity();
 
 // Fixture that runs each test for every index structure.
 template <class Index>
@@ -47,26 +39,28 @@ class NearestValuesTest : public ::testing::Test {
   }
 };
 
-using Structures = ::testing::Types<ListIndex<Object>, Bvh<Object>, ObjectGrid>;
-TYPED_TEST_SUITE(NearestValuesTest, Structures);
+using NearestStructures = ::testing::Types<ListIndex<Object>, Bvh<Object>, ObjectGrid>;
+TYPED_TEST_SUITE(NearestValuesTest, NearestStructures);
 
 TYPED_TEST(NearestValuesTest, ResultsAscendByDistanceThenId) {
-  const auto index = this->make({ball_at(9, 30), ball_at(2, -10), ball_at(5, 20), ball_at(1, -30), ball_at(8, 10)});
-  EXPECT_THAT(this->nearest(index, kInfinity, 100), ElementsAre(2, 8, 5, 1, 9));
-  EXPECT_THAT(this->nearest(index, kInfinity, 2), ElementsAre(2, 8));
-  EXPECT_THAT(this->nearest(index, kInfinity, 4), ElementsAre(2, 8, 5, 1));
-  EXPECT_THAT(this->nearest(index, kInfinity, 0), IsEmpty());
+  const auto index = this->make({ball_object(9, {30, 0, 0}), ball_object(2, {-10, 0, 0}), ball_object(5, {20, 0, 0}),
+                                 ball_object(1, {-30, 0, 0}), ball_object(8, {10, 0, 0})});
+  EXPECT_THAT(this->nearest(index, kNoLimit, 100), ElementsAre(2, 8, 5, 1, 9));
+  EXPECT_THAT(this->nearest(index, kNoLimit, 2), ElementsAre(2, 8));
+  EXPECT_THAT(this->nearest(index, kNoLimit, 4), ElementsAre(2, 8, 5, 1));
+  EXPECT_THAT(this->nearest(index, kNoLimit, 0), IsEmpty());
 }
 
 TYPED_TEST(NearestValuesTest, TheMaximumDistanceIsIncluded) {
-  const auto index = this->make({ball_at(2, 10), ball_at(5, 20)});
+  const auto index = this->make({ball_object(2, {10, 0, 0}), ball_object(5, {20, 0, 0})});
   EXPECT_THAT(this->nearest(index, 19, 9), ElementsAre(2, 5));
   EXPECT_THAT(this->nearest(index, std::nextafter(19.0, 0.0), 9), ElementsAre(2));
   EXPECT_THAT(this->nearest(index, 0, 9), IsEmpty());
 }
 
 TYPED_TEST(NearestValuesTest, SolidsThatContainThePointHaveDistanceZero) {
-  const auto index = this->make({ball_at(3, 10, 30), ball_at(2, 10, 10), ball_at(5, 20)});
+  const auto index =
+      this->make({ball_object(3, {10, 0, 0}, 30), ball_object(2, {10, 0, 0}, 10), ball_object(5, {20, 0, 0})});
   std::vector<ValueAt<Object>> found;
   nearest_values(index, Vec3d{}, 0, 9, found);
   ASSERT_EQ(found.size(), 2u);
@@ -77,15 +71,15 @@ TYPED_TEST(NearestValuesTest, SolidsThatContainThePointHaveDistanceZero) {
 }
 
 TYPED_TEST(NearestValuesTest, AnEmptyIndexGivesNoResults) {
-  EXPECT_THAT(this->nearest(this->make({}), kInfinity, 3), IsEmpty());
+  EXPECT_THAT(this->nearest(this->make({}), kNoLimit, 3), IsEmpty());
 }
 
 TYPED_TEST(NearestValuesTest, ResultsAreAppendedAndWorkIsAdded) {
-  const auto index = this->make({ball_at(2, 10)});
-  std::vector<ValueAt<Object>> found = {{0, ball_at(7, 0)}};
+  const auto index = this->make({ball_object(2, {10, 0, 0})});
+  std::vector<ValueAt<Object>> found = {{0, ball_object(7, {0, 0, 0})}};
   Work work;
   work.tests = 100;
-  nearest_values(index, Vec3d{}, kInfinity, 1, found, &work);
+  nearest_values(index, Vec3d{}, kNoLimit, 1, found, &work);
   ASSERT_EQ(found.size(), 2u);
   EXPECT_EQ(found[0].value.id, 7u);
   EXPECT_EQ(found[1].value.id, 2u);
@@ -95,11 +89,11 @@ TYPED_TEST(NearestValuesTest, ResultsAreAppendedAndWorkIsAdded) {
 
 TEST(NearestWorkTest, ATreeTestsFewValuesBesidesTheNearest) {
   std::vector<Object> objects;
-  for (Id id = 1; id <= 4096; ++id) objects.push_back(ball_at(id, 4.0 * static_cast<double>(id)));
+  for (Id id = 1; id <= 4096; ++id) objects.push_back(ball_object(id, {4.0 * static_cast<double>(id), 0, 0}));
   const Bvh<Object> tree = *Bvh<Object>::build(objects);
   std::vector<ValueAt<Object>> found;
   Work work;
-  nearest_values(tree, Vec3d{8000, 3, 0}, kInfinity, 4, found, &work);
+  nearest_values(tree, Vec3d{8000, 3, 0}, kNoLimit, 4, found, &work);
   EXPECT_EQ(found.size(), 4u);
   EXPECT_LE(work.tests, 32u);
 }
