@@ -12,7 +12,7 @@
 namespace locus {
 namespace {
 
-constexpr double kEpsilon = 0x1p-46;
+constexpr double kReachError = 0x1p-46;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 Vec3d unit(int axis) {
@@ -33,7 +33,7 @@ class AxisTests {
     const double weight = size.x + size.y + size.z;
     if (weight == 0) return true;
     const double speed = dot(axis, velocity_);
-    const double reach = dot(size, half_) + kEpsilon * weight * (magnitude + max_component(half_));
+    const double reach = dot(size, half_) + kReachError * weight * (magnitude + max_component(half_));
     if (low <= reach && high >= -reach) {
       add_way_out(axis, std::min(reach - low, high + reach), reach - low < high + reach);
     } else {
@@ -73,11 +73,11 @@ class AxisTests {
   bool outside_ = false;
 };
 
-using Polygon = absl::InlinedVector<Vec3d, 12>;
+using CutFace = absl::InlinedVector<Vec3d, 12>;
 
 // Returns the part of a convex polygon with sign * p[axis] <= limit.
-Polygon clipped(const Polygon& polygon, int axis, double sign, double limit) {
-  Polygon result;
+CutFace clipped(const CutFace& polygon, int axis, double sign, double limit) {
+  CutFace result;
   for (size_t i = 0; i < polygon.size(); ++i) {
     const Vec3d from = polygon[i], to = polygon[(i + 1) % polygon.size()];
     const double a = sign * from[axis] - limit, b = sign * to[axis] - limit;
@@ -88,7 +88,7 @@ Polygon clipped(const Polygon& polygon, int axis, double sign, double limit) {
 }
 
 // Returns the mean of the corners of the part of the polygon inside the box; nullopt if there is none.
-std::optional<Vec3d> mean_inside(Polygon polygon, Vec3d half) {
+std::optional<Vec3d> mean_inside(CutFace polygon, Vec3d half) {
   for (int axis = 0; axis < 3; ++axis) {
     polygon = clipped(polygon, axis, 1, half[axis]);
     polygon = clipped(polygon, axis, -1, half[axis]);
@@ -150,7 +150,7 @@ Vec3d shared_point(Vec3d half, Vec3d center, Vec3d other_half, const Rotation& r
   int faces = 0;
   for (int axis = 0; axis < 3; ++axis) {
     for (const double sign : {1.0, -1.0}) {
-      Polygon face;
+      CutFace face;
       const int u = (axis + 1) % 3, v = (axis + 2) % 3;
       for (const auto& [su, sv] : {std::pair{-1.0, -1.0}, {1.0, -1.0}, {1.0, 1.0}, {-1.0, 1.0}}) {
         Vec3d corner;

@@ -9,7 +9,6 @@
 #include <future>
 #include <map>
 #include <set>
-#include <sstream>
 #include <thread>
 
 #include "grpc/health/v1/health.grpc.pb.h"
@@ -18,6 +17,7 @@
 #include "tests/support/rpc_test.h"
 #include "tests/support/running_server.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/text_of.h"
 
 namespace locus::test {
 namespace {
@@ -92,11 +92,7 @@ class AccessRpcTest : public ::testing::Test {
     std::filesystem::permissions(fresh, std::filesystem::perms::owner_read | std::filesystem::perms::owner_write);
     std::filesystem::rename(fresh, folder_.file(name));
   }
-  std::string read(const std::string& name) const {
-    std::ostringstream text;
-    text << std::ifstream(folder_.file(name)).rdbuf();
-    return text.str();
-  }
+  std::string read(const std::string& name) const { return text_of(folder_.file(name)); }
   server::ServerConfig config() const {
     server::ServerConfig config = test_config();
     config.access_file = folder_.file("access");

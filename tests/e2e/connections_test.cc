@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <fstream>
-#include <sstream>
 #include <thread>
 #include <vector>
 
@@ -11,6 +9,7 @@
 #include "tests/support/raw_socket.h"
 #include "tests/support/rpc_test.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/text_of.h"
 
 namespace locus::test {
 namespace {
@@ -241,13 +240,6 @@ TEST_F(ConnectionLimitsTest, NewConnectionsOfAnAddressAreLimitedWhileItsOldOnesA
   EXPECT_GT(refused, 10);
   EXPECT_GE(refused_by(running.stubs(), "new_connections_per_s"), 10u);
   EXPECT_TRUE(served(running.stubs(), kCallTimeout));
-}
-
-// Returns the text of a file.
-std::string text_of(const std::string& file) {
-  std::ostringstream text;
-  text << std::ifstream(file).rdbuf();
-  return text.str();
 }
 
 TEST_F(ConnectionLimitsTest, RefusedAndClosedConnectionsAreAuditedInAFewLines) {

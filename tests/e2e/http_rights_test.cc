@@ -4,7 +4,6 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
-#include <sstream>
 
 #include "server/security/token_file.h"
 #include "tests/support/http_get.h"
@@ -12,6 +11,7 @@
 #include "tests/support/running_server.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test_certificates.h"
+#include "tests/support/text_of.h"
 
 namespace locus::test {
 namespace {
@@ -70,11 +70,7 @@ class HttpRightsTest : public ::testing::Test {
     EXPECT_NE(line, std::string::npos) << name;
     return line == std::string::npos ? -1 : std::stod(page.substr(line + name.size() + 2));
   }
-  std::string read(const std::string& name) const {
-    std::ostringstream text;
-    text << std::ifstream(folder_.file(name)).rdbuf();
-    return text.str();
-  }
+  std::string read(const std::string& name) const { return text_of(folder_.file(name)); }
   // Returns the code of a page; 0 if the connection failed.
   long code(const std::string& page, const std::string& who, HttpReader reader = {}) {
     if (!who.empty()) reader.authorization = "Bearer " + tokens_[who];

@@ -6,12 +6,10 @@
 #include <array>
 #include <atomic>
 #include <csignal>
-#include <fstream>
 #include <functional>
 #include <iostream>
 #include <memory>
 #include <optional>
-#include <sstream>
 #include <thread>
 #include <vector>
 
@@ -23,6 +21,7 @@
 #include "tests/support/running_server.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test_certificates.h"
+#include "tests/support/text_of.h"
 
 namespace locus::test {
 namespace {
@@ -103,9 +102,8 @@ TEST_F(TlsTest, FailedHandshakesAreCountedAndAudited) {
   EXPECT_FALSE(get_server(stranger, std::chrono::seconds(2)).ok());
   EXPECT_GT(server::tls_counts().failed_handshakes, before);
   EXPECT_TRUE(wait_until([&] {
-    std::ostringstream text;
-    text << std::ifstream(folder_.file("audit.refused")).rdbuf();
-    return text.str().find(R"("rpc":"connect","subject":"","code":"UNAUTHENTICATED")") != std::string::npos;
+    return text_of(folder_.file("audit.refused")).find(R"("rpc":"connect","subject":"","code":"UNAUTHENTICATED")") !=
+           std::string::npos;
   }));
 }
 

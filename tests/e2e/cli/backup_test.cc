@@ -1,7 +1,6 @@
 // Backups by the command line against a real server: a backup is made and restored to a data directory.
 #include <atomic>
 #include <filesystem>
-#include <fstream>
 #include <sstream>
 #include <thread>
 
@@ -11,6 +10,7 @@
 #include "tests/support/kept_daemon.h"
 #include "tests/support/rpc_test.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/text_of.h"
 
 namespace locus::test {
 namespace {
@@ -24,12 +24,6 @@ Outcome run(const std::string& address, std::vector<std::string> arguments) {
   cli::Context context(out, err, cli::Progress::kSilent);
   const cli::ExitCode code = cli::run_line(arguments, context);
   return {code, out.str(), err.str()};
-}
-
-std::string bytes_of(const std::string& path) {
-  std::ostringstream bytes;
-  bytes << std::ifstream(path, std::ios::binary).rdbuf();
-  return bytes.str();
 }
 
 TEST(BackupTest, ARestoredDirectoryHasTheFilesThatTheLogCopied) {
@@ -47,7 +41,7 @@ TEST(BackupTest, ARestoredDirectoryHasTheFilesThatTheLogCopied) {
   EXPECT_TRUE(std::filesystem::is_empty(config.data_dir));
   const Outcome restored = run(server.address(), {"restore", folder.file("backup"), folder.file("data")});
   ASSERT_EQ(restored.code, cli::ExitCode::kOk) << restored.err;
-  for (const auto& [path, bytes] : log.files) EXPECT_TRUE(bytes_of(folder.file("data/" + path)) == bytes) << path;
+  for (const auto& [path, bytes] : log.files) EXPECT_TRUE(text_of(folder.file("data/" + path)) == bytes) << path;
   EXPECT_FALSE(std::filesystem::exists(folder.file("data/SHA256SUMS")));
 }
 

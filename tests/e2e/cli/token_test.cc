@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
-#include <fstream>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -13,6 +12,7 @@
 #include "client/cli/run.h"
 #include "tests/support/sha256_hex.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/text_of.h"
 
 namespace locus::test {
 namespace {
@@ -27,11 +27,7 @@ std::string run_token(const std::vector<std::string>& arguments) {
   return out.str();
 }
 
-std::vector<std::string> lines_of(const std::string& file) {
-  std::ostringstream text;
-  text << std::ifstream(file).rdbuf();
-  return absl::StrSplit(text.str(), '\n');
-}
+std::vector<std::string> lines_of(const std::string& file) { return absl::StrSplit(text_of(file), '\n'); }
 
 TEST(TokenTest, TheFileHasTheFormatThatLocusdReads) {
   const TemporaryFolder folder;
