@@ -33,6 +33,8 @@ enum class PlantedBug {
   kClosedEdge,         // a ray that counts crossings of a mesh meets both ends of an edge
   kCrossingInDouble,   // signs of crossings that double leaves in doubt are those of double
   kCrossingMirror,     // a half line that descends counts crossings like one that ascends
+  kCellAtMax,          // a triangle does not mark the cells of the greatest coordinates of its bounds
+  kWayShort,           // a search with a known end ends in the cell of its start
   kHalfLineRounding,   // boxes are compared with the point rounded to the nearest float
   kHalfLineStart,      // a half line does not meet a box that ends exactly at its start
   // The ray kernels:

@@ -78,6 +78,13 @@ std::string compare_half_lines_with_list() {
   return "";
 }
 
+std::string compare_winding_cells_with_list() {
+  static const std::vector<CrossingTrial>* const kClosed = new std::vector<CrossingTrial>(closed_crossing_trials());
+  for (const CrossingTrial& trial : *kClosed)
+    if (std::string what = trial.difference_with_cells(nullptr); !what.empty()) return what;
+  return "";
+}
+
 #ifdef LOCUS_X86_KERNELS
 // Tests only one instruction set, because the kernels of all instruction sets are compiled from one source.
 std::string compare_kernels_with_list() {
@@ -136,6 +143,8 @@ constexpr Trial kTrials[] = {
     {"CrossingsWithBothEndsOfAnEdge", PlantedBug::kClosedEdge, contains_difference},
     {"CrossingsDecidedInDouble", PlantedBug::kCrossingInDouble, crossing_difference},
     {"CrossingsOfAHalfLineInTheMirror", PlantedBug::kCrossingMirror, contains_difference},
+    {"CellsWithoutTheGreatestCoordinates", PlantedBug::kCellAtMax, compare_winding_cells_with_list},
+    {"CellsWithWaysThatEndTooEarly", PlantedBug::kWayShort, compare_winding_cells_with_list},
     {"HalfLineWithoutItsStart", PlantedBug::kHalfLineStart, compare_half_lines_with_list},
     {"ViewWithAWrongRowOfItsMatrix", PlantedBug::kMatrixRow, view_difference},
     {"PairsFromBothSides", PlantedBug::kPairBothSides, pair_difference},

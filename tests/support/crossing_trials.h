@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "absl/types/span.h"
 #include "core/query/kinds/winding_search.h"
 #include "tests/support/half_lines.h"
 #include "tests/support/random_region.h"
@@ -47,7 +48,7 @@ class CrossingTrial {
   // empty if there is none.
   std::string difference(const CrossingKernels& kernels, CrossingCost* cost = nullptr) const {
     return first_fault([&](Vec3d point, HalfLine line, const Sum& expected) -> std::string {
-      WindingSearch search(kernels, tree_, point, line);
+      WindingSearch search(kernels, tree_, point, WindingWay::out(line));
       Work spent, work;
       while (!search.over()) {
         search.next();
@@ -62,6 +63,34 @@ class CrossingTrial {
         return absl::StrCat(spent.nodes, " nodes and ", spent.tests, " tests, not ", work.nodes, " and ", work.tests);
       if (cost != nullptr) cost->tests += spent.tests, ++cost->searches;
       return "";
+    });
+  }
+
+  // Returns the first point around which the winding number differs if the search ends at clear cells; empty if there
+  // is none. `known` counts the points that need no search. `kernels` may be null. The mesh must be closed.
+  std::string difference_with_cells(const CrossingKernels* kernels, size_t* known = nullptr) const {
+    const WindingCells cells = WindingCells::build(tree_);
+    return first_fault([&](Vec3d point, HalfLine line, const Sum& expected) -> std::string {
+      const WindingWay way = cells.way_from(tree_, point);
+      if (way.is_known) {
+        if (known != nullptr && line.axis == 0 && !line.descending) ++*known;
+        return fault(expected, false, way.winding);
+      }
+      Sum found(point, way.line);
+      Work work;
+      tree_.visit_half_line(HalfLineBoxes(point, way.line, way.end), found, work);
+      if (std::string what = fault(expected, found.on_surface, way.winding + found.winding); !what.empty()) return what;
+      if (kernels == nullptr) return "";
+      WindingSearch search(*kernels, tree_, point, way);
+      Work spent;
+      while (!search.over()) {
+        search.next();
+        spent.nodes += search.nodes();
+        spent.tests += search.tests();
+      }
+      if (spent.nodes != work.nodes || spent.tests != work.tests)
+        return absl::StrCat(spent.nodes, " nodes and ", spent.tests, " tests, not ", work.nodes, " and ", work.tests);
+      return fault(expected, search.on_surface(), search.winding());
     });
   }
 
@@ -204,6 +233,70 @@ inline std::vector<CrossingTrial> stepped_crossing_trials() {
     }
     trials.emplace_back(absl::StrCat("steps ", i), std::vector<Triangle>{triangle}, std::move(points));
   }
+  return trials;
+}
+
+// Returns the triangles of several closed meshes, which are one closed mesh.
+inline std::vector<Triangle> joined(const std::vector<std::vector<Triangle>>& meshes) {
+  std::vector<Triangle> all;
+  for (const std::vector<Triangle>& mesh : meshes) all.insert(all.end(), mesh.begin(), mesh.end());
+  number_in_order(all);
+  return all;
+}
+
+// Returns the mesh with the opposite orientation.
+inline std::vector<Triangle> turned_inside_out(std::vector<Triangle> mesh) {
+  for (Triangle& triangle : mesh) std::swap(triangle.b, triangle.c);
+  return mesh;
+}
+
+// Returns a city of box_city() whose triangles all face outward, so that its houses have an inside.
+inline std::vector<Triangle> outward_city(int side, uint64_t seed) {
+  constexpr size_t kTrianglesAHouse = 12;
+  std::vector<Triangle> city = box_city(side, seed);
+  for (size_t first = 0; first < city.size(); first += kTrianglesAHouse) {
+    const absl::Span<Triangle> house(&city[first], kTrianglesAHouse);
+    Aabbf bounds = bounds_of(house[0]);
+    for (const Triangle& triangle : house) bounds = merge(bounds, bounds_of(triangle));
+    const Vec3d center = (to_double(bounds.min) + to_double(bounds.max)) * 0.5;
+    for (Triangle& triangle : house) {
+      const Corners corners = corners_of(triangle);
+      const Vec3d normal = cross(corners[1] - corners[0], corners[2] - corners[0]);
+      if (dot(normal, corners[0] - center) < 0) std::swap(triangle.b, triangle.c);
+    }
+  }
+  return city;
+}
+
+// Makes trials of closed meshes: of several winding numbers, flat, with many separate hollows, and of sizes and at
+// distances where cells are smaller than the steps of floats.
+inline std::vector<CrossingTrial> closed_crossing_trials() {
+  const std::vector<Triangle> sphere = bumpy_sphere(12, 0.2, 7), inner = moved(bumpy_sphere(6, 0.1, 8), 0.4f, {});
+  std::vector<std::vector<Triangle>> crowd, stack;
+  for (int i = 0; i < 1'331; ++i) {
+    const Vec3f at{static_cast<float>(i % 11), static_cast<float>(i / 11 % 11), static_cast<float>(i / 121)};
+    crowd.push_back(moved(bumpy_sphere(3, 0.1, static_cast<uint64_t>(i)), 0.4f, at));
+  }
+  for (int i = 0; i < 70; ++i) stack.push_back(moved(inner, 1 + static_cast<float>(i) / 16, {}));
+  std::vector<CrossingTrial> trials;
+  const auto add = [&](const char* name, const std::vector<Triangle>& mesh, size_t points) {
+    trials.push_back(random_crossing_trial(name, mesh, scaled_count(points), trials.size() + 20));
+  };
+  add("sphere with cells", sphere, 2'000);
+  add("sphere in a sphere", joined({sphere, inner}), 2'000);
+  add("hollow sphere", joined({sphere, turned_inside_out(inner)}), 2'000);
+  add("sphere turned inside out", turned_inside_out(sphere), 500);
+  add("more spheres than a cell can count", joined(stack), 200);
+  add("more spheres than sets of cells", joined(crowd), 200);
+  add("city with cells", outward_city(4, 2), 1'000);
+  std::vector<Triangle> flat = sphere;
+  for (Triangle& triangle : flat)
+    for (Vec3f* corner : {&triangle.a, &triangle.b, &triangle.c}) corner->z = 0;
+  add("flat", flat, 500);
+  for (const int exponent : {-140, -100, -20, 60, 120})
+    add("sphere with cells, scaled", moved(sphere, std::ldexp(1.0f, exponent), {}), 200);
+  for (const float distance : {1e3f, 1e6f, 1e7f})
+    add("sphere with cells, far away", moved(sphere, 1, {distance, -2 * distance, distance / 2}), 200);
   return trials;
 }
 

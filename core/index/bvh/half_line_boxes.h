@@ -1,12 +1,14 @@
 // Tests of eight boxes of a tree, or of the boxes of eight triangles, against a half line that is parallel to an axis.
-// A box is met if it has a point in common with the half line; all sides belong to the box, and the start belongs to
-// the half line. The tests are exact, so they need no pads: see half_line_floats.h. Immutable; any thread.
+// A box is met if it has a point in common with the half line, and does not begin beyond the end of the search; all
+// sides belong to the box, and the start belongs to the half line. The tests are exact, so they need no pads: see
+// half_line_floats.h. Immutable; any thread.
 #ifndef LOCUS_CORE_INDEX_BVH_HALF_LINE_BOXES_H_
 #define LOCUS_CORE_INDEX_BVH_HALF_LINE_BOXES_H_
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
 #include "core/base/check.h"
 #include "core/base/planted_bug.h"
@@ -26,6 +28,7 @@ class HalfLineBoxes {
     floats_.way = line.descending ? -1.0f : 1.0f;
     floats_.along_low = rounded_down(along);
     floats_.along_high = rounded_up(along);
+    floats_.along_end = std::numeric_limits<float>::infinity();
     if (planted(PlantedBug::kHalfLineStart)) floats_.along_high = next_above(floats_.along_high);
     double pad = 0;
     for (int i = 0; i < 2; ++i) {
@@ -38,16 +41,24 @@ class HalfLineBoxes {
     floats_.pad = rounded_up(pad);
   }
 
+  // Makes a half line on which boxes are not met that begin beyond the coordinate `end` on line.axis, which may be
+  // infinite.
+  HalfLineBoxes(const Vec3d& point, HalfLine line, float end) : HalfLineBoxes(point, line) {
+    floats_.along_end = end * floats_.way;
+  }
+
   const HalfLineFloats& floats() const { return floats_; }
 
   // Returns a mask of the boxes that the half line meets, one bit for each box, laid out as in TriangleNode::bounds.
   // Boxes of unused slots are not met.
   uint32_t boxes_met(const float (&bounds)[6][kTreeWidth]) const {
     const int axis = floats_.axis, first = (axis + 1) % 3, second = (axis + 2) % 3;
+    const float(&begins)[kTreeWidth] = bounds[floats_.way > 0 ? axis : axis + 3];
     const float(&ends)[kTreeWidth] = bounds[floats_.way > 0 ? axis + 3 : axis];
     uint32_t met = 0;
     for (int i = 0; i < kTreeWidth; ++i) {
-      const int is_met = (ends[i] * floats_.way >= floats_.along_high) & (bounds[first][i] <= floats_.low[0]) &
+      const int is_met = (ends[i] * floats_.way >= floats_.along_high) &
+                         (begins[i] * floats_.way <= floats_.along_end) & (bounds[first][i] <= floats_.low[0]) &
                          (bounds[first + 3][i] >= floats_.high[0]) & (bounds[second][i] <= floats_.low[1]) &
                          (bounds[second + 3][i] >= floats_.high[1]);
       met |= static_cast<uint32_t>(is_met) << i;

@@ -11,8 +11,9 @@ namespace {
 // on the surface.
 class Crossings {
  public:
-  // `point` is in mesh axes.
-  Crossings(QueryTask& task, Vec3d point, HalfLine line) : task_(task), point_(point), line_(line) {}
+  // `point` is in mesh axes. `winding` is the winding number around the end of the half line.
+  Crossings(QueryTask& task, Vec3d point, HalfLine line, int winding)
+      : task_(task), point_(point), line_(line), winding_(winding) {}
 
   bool visit(const Triangle& triangle) {
     if (!task_.count_test()) return false;
@@ -27,7 +28,7 @@ class Crossings {
   QueryTask& task_;
   const Vec3d point_;
   const HalfLine line_;
-  int64_t winding_ = 0;
+  int64_t winding_;
   bool on_surface_ = false;
 };
 
@@ -52,16 +53,19 @@ class InstancesAround {
   bool winds_around(const Instance& instance) {
     const Vec3d point = without_tiny_coordinates(instance.transform.point_to_mesh(ball_.center));
     const TriangleBvh& tree = instance.mesh->tree();
-    const HalfLine line = tree.cheapest_half_line(point);
-    if (task_.uses_kernels() && WindingSearch::served(tree)) return search(tree, point, line);
-    Crossings crossings(task_, point, line);
-    task_.visit_half_line(tree, HalfLineBoxes(point, line), crossings);
+    // Brute force tests all triangles, so that its half line has no end.
+    const WindingWay way = task_.uses_kernels() ? instance.mesh->winding_cells().way_from(tree, point)
+                                                : WindingWay::out(tree.cheapest_half_line(point));
+    if (way.is_known) return way.winding != 0;
+    if (task_.uses_kernels() && WindingSearch::served(tree)) return search(tree, point, way);
+    Crossings crossings(task_, point, way.line, way.winding);
+    task_.visit_half_line(tree, HalfLineBoxes(point, way.line, way.end), crossings);
     return !task_.ended() && crossings.contained();
   }
 
   // Does the same by the vector kernels.
-  bool search(const TriangleBvh& tree, Vec3d point, HalfLine line) {
-    WindingSearch search(tree, point, line);
+  bool search(const TriangleBvh& tree, Vec3d point, const WindingWay& way) {
+    WindingSearch search(tree, point, way);
     while (!search.over()) {
       search.next();
       task_.work().nodes += search.nodes();

@@ -9,7 +9,8 @@ namespace locus {
 
 // Answers one query for a point in world axes. Objects are searched as of `moment`, which the answer borrows; the
 // memory of OverlapAnswer::objects belongs to `task` and is valid until its next query. Cost: visits of the nodes and
-// triangles that a half line from the point to a side of each mesh passes, and of the cells around the point.
+// triangles between the point and the next clear cell of each mesh (winding_cells.h), and of the cells around the
+// point.
 OverlapAnswer run_contains(QueryTask& task, const SceneAtTime& moment, Vec3d point, const OverlapOptions& options,
                            const Filter& filter);
 

@@ -1,12 +1,12 @@
-// Search by the vector kernels for the winding number of a closed mesh around a point in mesh axes. It runs in steps,
-// so that the caller can stop between two steps:
+// Search by the vector kernels for the winding number of a closed mesh around a point in mesh axes, along a way.
+// It runs in steps, so that the caller can stop between two steps:
 //
-//   WindingSearch search(tree, point, tree.cheapest_half_line(point));
+//   WindingSearch search(tree, point, cells.way_from(tree, point));
 //   while (!search.over()) search.next();
 //   use(search.winds_around());
 //
-// The result equals the sum of crossing() over all triangles. Threads: a search belongs to one thread; any number of
-// searches may share a tree.
+// The result equals the sum of crossing() along a half line over all triangles. Threads: a search belongs to one
+// thread; any number of searches may share a tree.
 #ifndef LOCUS_CORE_QUERY_KINDS_WINDING_SEARCH_H_
 #define LOCUS_CORE_QUERY_KINDS_WINDING_SEARCH_H_
 
@@ -14,6 +14,7 @@
 #include "core/geometry/point_in_mesh.h"
 #include "core/index/bvh/kernels/dispatch.h"
 #include "core/index/bvh/triangle_bvh.h"
+#include "core/index/bvh/winding_cells.h"
 
 namespace locus {
 
@@ -22,15 +23,17 @@ class WindingSearch {
   // Returns whether a search is possible: kernels exist for this processor, and the tree is not empty.
   static bool served(const TriangleBvh& tree) { return active_crossing_kernels() != nullptr && tree.size() != 0; }
 
-  // Begins a search along `line`. `point` must be a point that crossing() expects. Precondition: served(tree).
-  WindingSearch(const TriangleBvh& tree, Vec3d point, HalfLine line)
-      : WindingSearch(*active_crossing_kernels(), tree, point, line) {
+  // Begins a search along `way`. `point` must be a point that crossing() expects. Preconditions: served(tree); the
+  // winding number is not known without a search.
+  WindingSearch(const TriangleBvh& tree, Vec3d point, const WindingWay& way)
+      : WindingSearch(*active_crossing_kernels(), tree, point, way) {
     LOCUS_DCHECK(served(tree));
   }
   // Does the same with the kernels of a chosen instruction set.
-  WindingSearch(const CrossingKernels& kernels, const TriangleBvh& tree, Vec3d point, HalfLine line)
-      : kernels_(kernels), bvh_(tree), tree_(tree.tree()), point_(point), line_(line) {
-    visit_.line = HalfLineBoxes(point, line).floats();
+  WindingSearch(const CrossingKernels& kernels, const TriangleBvh& tree, Vec3d point, const WindingWay& way)
+      : kernels_(kernels), bvh_(tree), tree_(tree.tree()), point_(point), way_(way) {
+    LOCUS_DCHECK(!way.is_known);
+    visit_.line = HalfLineBoxes(point, way.line, way.end).floats();
     visit_.judge = {judge, this};
     visit_.start();
   }
@@ -53,13 +56,13 @@ class WindingSearch {
   uint32_t judged() const { return visit_.judged; }
   // Return the result of a complete search. The winding number is only known if the point is not on the surface.
   bool on_surface() const { return visit_.on_surface; }
-  int64_t winding() const { return visit_.winding; }
+  int64_t winding() const { return way_.winding + visit_.winding; }
   bool winds_around() const { return on_surface() || winding() != 0; }
 
  private:
   static int judge(const void* context, const TriangleBlock& block, uint32_t lane) {
     const auto& search = *static_cast<const WindingSearch*>(context);
-    const Crossing found = crossing(search.point_, search.bvh_.triangle(block, lane), search.line_);
+    const Crossing found = crossing(search.point_, search.bvh_.triangle(block, lane), search.way_.line);
     return found.on_surface ? kOnTriangle : found.winding;
   }
 
@@ -67,7 +70,7 @@ class WindingSearch {
   const TriangleBvh& bvh_;
   const TriangleTree tree_;
   const Vec3d point_;
-  const HalfLine line_;
+  const WindingWay way_;
   CrossingVisit visit_;
 };
 

@@ -32,8 +32,7 @@ absl::StatusOr<std::shared_ptr<const StaticMesh>> StaticMesh::build(std::string 
   content->keep_columns(mesh);
   std::vector<MeshPart> parts = mesh.parts();
   ASSIGN_OR_RETURN(TriangleBvh tree, TriangleBvh::build(triangles_of(std::move(mesh)), options));
-  content->tree = std::move(tree);
-  content->number_blocks();
+  content->set_tree(std::move(tree));
   return std::shared_ptr<const StaticMesh>(new StaticMesh(std::move(name), std::move(parts), std::move(content)));
 }
 
@@ -45,9 +44,8 @@ absl::StatusOr<std::shared_ptr<const StaticMesh>> StaticMesh::restore(std::strin
   content->sha256 = sha256;
   const auto triangle = [&mesh](uint32_t number) { return mesh.triangle(number); };
   ASSIGN_OR_RETURN(TriangleBvh tree, TriangleBvh::restore(topology, mesh.triangle_count(), triangle, options));
-  content->tree = std::move(tree);
   content->keep_columns(mesh);
-  content->number_blocks();
+  content->set_tree(std::move(tree));
   return std::shared_ptr<const StaticMesh>(new StaticMesh(std::move(name), mesh.parts(), std::move(content)));
 }
 
@@ -71,6 +69,13 @@ void StaticMesh::Content::keep_columns(const TriangleMesh& mesh) {
     const float* at = &mesh.vertices()[size_t{3} * number];
     if (!used[number]) unused_vertices.push_back({number, {at[0], at[1], at[2]}});
   }
+}
+
+// Sets the tree, and what is computed from it. The columns must be set.
+void StaticMesh::Content::set_tree(TriangleBvh new_tree) {
+  tree = std::move(new_tree);
+  if (open_edges == 0) winding_cells = WindingCells::build(tree);
+  number_blocks();
 }
 
 void StaticMesh::Content::number_blocks() {
@@ -118,8 +123,8 @@ uint64_t StaticMesh::bytes() const {
 }
 
 uint64_t StaticMesh::shared_bytes() const {
-  return sizeof(Content) + content_->tree.bytes() + content_->indices.bytes() + content_->blocks.bytes() +
-         content_->unused_vertices.capacity() * sizeof(UnusedVertex);
+  return sizeof(Content) + content_->tree.bytes() + content_->winding_cells.bytes() + content_->indices.bytes() +
+         content_->blocks.bytes() + content_->unused_vertices.capacity() * sizeof(UnusedVertex);
 }
 
 }  // namespace locus

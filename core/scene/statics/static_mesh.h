@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "core/index/bvh/triangle_bvh.h"
+#include "core/index/bvh/winding_cells.h"
 #include "core/mesh/packed_indices.h"
 #include "core/mesh/packed_numbers.h"
 #include "core/mesh/triangle_mesh.h"
@@ -62,6 +63,8 @@ class StaticMesh {
   // Returns the number of open edges: see count_open_edges(). A mesh without open edges is closed and has an inside.
   uint64_t open_edges() const { return content_->open_edges; }
   bool is_closed() const { return open_edges() == 0; }
+  // Returns the winding numbers around cells of space. They have no cells if the mesh is not closed.
+  const WindingCells& winding_cells() const { return content_->winding_cells; }
   // Returns the bounds of all triangles.
   const Aabbf& bounds() const { return tree().bounds(); }
   const std::vector<MeshPart>& parts() const { return parts_; }
@@ -90,6 +93,7 @@ class StaticMesh {
   struct Content {
     Sha256 sha256 = {};
     TriangleBvh tree;
+    WindingCells winding_cells;
     PackedIndices indices;
     PackedNumbers blocks;  // for each triangle number, the index of the tree's TriangleBlock with this triangle
     std::vector<UnusedVertex> unused_vertices;
@@ -98,6 +102,7 @@ class StaticMesh {
     uint64_t open_edges = 0;
 
     void keep_columns(const TriangleMesh& mesh);
+    void set_tree(TriangleBvh new_tree);
     void number_blocks();
   };
 

@@ -70,6 +70,7 @@ class CrossingWalk {
         second_((line_.axis + 2) % 3),
         way_(Floats8::splat(line_.way)),
         along_high_(Floats8::splat(line_.along_high)),
+        along_end_(Floats8::splat(line_.along_end)),
         low_{Floats8::splat(line_.low[0]), Floats8::splat(line_.low[1])},
         high_{Floats8::splat(line_.high[0]), Floats8::splat(line_.high[1])},
         top_(visit.top) {}
@@ -91,7 +92,7 @@ class CrossingWalk {
  private:
   // Opens nodes until none is waiting, or there is no room for the blocks of another node.
   __attribute__((always_inline)) inline void open_nodes() {
-    const int ends = line_.way > 0 ? line_.axis + 3 : line_.axis;
+    const int begins = line_.way > 0 ? line_.axis : line_.axis + 3, ends = (begins + 3) % 6;
     for (found_ = 0; top_ != 0 && found_ <= kMaxLineBlocks - kTreeWidth;) {
       const TriangleNode& node = tree_.nodes[visit_.waiting[--top_]];
       ++nodes_;
@@ -99,7 +100,8 @@ class CrossingWalk {
                                              greater_equal_mask(Floats8::load(node.bounds[first_ + 3]), high_[0])),
                                      bit_and(greater_equal_mask(low_[1], Floats8::load(node.bounds[second_])),
                                              greater_equal_mask(Floats8::load(node.bounds[second_ + 3]), high_[1])));
-      const Floats8 along = greater_equal_mask(Floats8::load(node.bounds[ends]) * way_, along_high_);
+      const Floats8 along = bit_and(greater_equal_mask(Floats8::load(node.bounds[ends]) * way_, along_high_),
+                                    greater_equal_mask(along_end_, Floats8::load(node.bounds[begins]) * way_));
       const uint32_t met = signs_of(bit_and(across, along)), met_blocks = met & block_slots(node);
       const uint32_t met_nodes = met & ~met_blocks;
       pack_falling(node, met_blocks, 0, 0, blocks_ + found_);
@@ -115,9 +117,12 @@ class CrossingWalk {
     const Coordinates8 along = Coordinates8::load(block, line_.axis) * way_;
     const uint32_t low_a = at_most(first.a, low_[0]), low_b = at_most(first.b, low_[0]),
                    low_c = at_most(first.c, low_[0]);
-    const Floats8 within = bit_and(
-        bit_and(greater_equal_mask(first.greatest(), high_[0]), greater_equal_mask(along.greatest(), along_high_)),
-        bit_and(greater_equal_mask(low_[1], second.least()), greater_equal_mask(second.greatest(), high_[1])));
+    const Floats8 begin = along.least();
+    const Floats8 reached =
+        bit_and(greater_equal_mask(along.greatest(), along_high_), greater_equal_mask(along_end_, begin));
+    const Floats8 within =
+        bit_and(bit_and(greater_equal_mask(first.greatest(), high_[0]), reached),
+                bit_and(greater_equal_mask(low_[1], second.least()), greater_equal_mask(second.greatest(), high_[1])));
     const uint32_t lanes = (1u << block.count) - 1u, met = signs_of(within) & (low_a | low_b | low_c) & lanes;
     if (met == 0) return true;
     const float pad = unless(PlantedBug::kCrossingPad, line_.pad), reach = 2 * (block.extent + pad);
@@ -127,7 +132,7 @@ class CrossingWalk {
     edges.add(low_a, low_b, multiply_subtract(y.a, z.b, z.a * y.b), error);
     edges.add(low_b, low_c, multiply_subtract(y.b, z.c, z.b * y.c), error);
     edges.add(low_c, low_a, multiply_subtract(y.c, z.a, z.c * y.a), error);
-    uint32_t near = at_most(along.least(), Floats8::splat(line_.along_low));
+    uint32_t near = at_most(begin, Floats8::splat(line_.along_low));
     if (planted(PlantedBug::kCrossingNear)) near = 0;
     const uint32_t crossing = edges.up ^ edges.down, without_edges = ~((low_a ^ low_b) | (low_b ^ low_c));
     const uint32_t maybe_on = planted(PlantedBug::kCrossingTop) ? crossing : crossing | without_edges;
@@ -159,7 +164,7 @@ class CrossingWalk {
   CrossingVisit& visit_;
   const HalfLineFloats line_;
   const int first_, second_;  // the axes across the half line
-  const Floats8 way_, along_high_, low_[2], high_[2];
+  const Floats8 way_, along_high_, along_end_, low_[2], high_[2];
   uint32_t top_, found_ = 0, nodes_ = 0, tests_ = 0, judged_ = 0;
   int64_t winding_ = 0;                          // as if the half line were ascending
   alignas(32) uint32_t blocks_[kMaxLineBlocks];  // met blocks that are not tested yet: `found_` elements

@@ -52,7 +52,7 @@ TEST_P(CrossingKernelsTest, ACallPausesAfterTheMaximumAmountOfWork) {
   }
   const absl::StatusOr<TriangleBvh> tree = TriangleBvh::build(pile);
   ASSERT_TRUE(tree.ok());
-  WindingSearch search(*tree, {0, -0.5, -0.5}, {});
+  WindingSearch search(*tree, {0, -0.5, -0.5}, WindingWay::out({}));
   search.next();
   EXPECT_FALSE(search.over());
   uint64_t tests = search.tests();

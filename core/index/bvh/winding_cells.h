@@ -1,0 +1,116 @@
+// Cells over the bounds of a closed mesh, with the winding number of the mesh around all points of each clear cell. A
+// cell is clear if it meets the bounds of no triangle. A point in a clear cell needs no search; from another point, a
+// half line needs to reach only as far as the next clear cell, because the triangles that it crosses beyond are those
+// that the half line from the clear cell crosses.
+//
+// Proof. Cells are intervals of coordinates on each axis, so a clear cell is a box without a point of the surface, and
+// the winding number is the same in all of it. It is also the same in a clear cell beside it. Let a half line from p
+// reach q in a clear cell. The winding number around p is the one around q plus the crossings between p and q: see
+// core/geometry/point_in_mesh.h. A triangle whose bounds contain the line in the projection along it shares the
+// interval of the clear cell on both other axes. So its bounds lie before or beyond the clear cell along the line, and
+// whether they begin before q decides which.
+//
+// Threads: immutable after build(); every member may run concurrently.
+// Invariants: a cell that meets the bounds of a triangle is not clear; the end of a way lies in a clear cell.
+#ifndef LOCUS_CORE_INDEX_BVH_WINDING_CELLS_H_
+#define LOCUS_CORE_INDEX_BVH_WINDING_CELLS_H_
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "core/geometry/point_in_mesh.h"
+#include "core/index/bvh/triangle_bvh.h"
+
+namespace locus {
+
+// Where the search for the winding number around a point may end.
+struct WindingWay {
+  bool is_known = false;  // no search is needed: `winding` is the winding number around the point itself
+  int winding = 0;        // winding number around the end of the way
+  HalfLine line;          // half line to search
+  float end = 0;          // coordinate on line.axis where the search ends; infinite: outside the mesh
+
+  // Returns the way along the whole of a half line.
+  static WindingWay out(HalfLine line) {
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
+    return {false, 0, line, line.descending ? -kInfinity : kInfinity};
+  }
+};
+
+class WindingCells {
+ public:
+  // Makes an object without cells: every way leads out of the mesh.
+  WindingCells() = default;
+  // Makes the cells of a closed mesh: about four for each triangle, at most 2^22, of a byte each. O(n); 5 bytes of
+  // temporary memory for each cell.
+  static WindingCells build(const TriangleBvh& tree);
+
+  // Returns where the search from `point` may end: in its own cell, in a clear cell near it, or outside the mesh.
+  // `tree` must be the one of build(). O(1).
+  WindingWay way_from(const TriangleBvh& tree, const Vec3d& point) const;
+
+  // Returns the size in bytes of the memory allocated by this object; sizeof(WindingCells) is not included.
+  size_t bytes() const;
+
+ private:
+  static constexpr uint32_t kMaxCells = 1u << 22, kMaxCellsPerAxis = 1024;
+  static constexpr uint32_t kCellsPerTriangle = 4;
+  // Number of sets of connected clear cells whose winding number is computed; the cells of further sets count as not
+  // clear. This bounds the time of a build.
+  static constexpr uint32_t kMaxSets = 1024;
+
+  // A cell is one byte. Up to kMaxWinding - kMinWinding: a clear cell, with its winding number minus kMinWinding. From
+  // kFirstWay on, below kNoWay: the number of steps to the nearest clear cell, minus 1, plus kMaxSteps times the number
+  // of the direction: see Direction.
+  static constexpr int kMinWinding = -63, kMaxWinding = 63, kMaxSteps = 16;
+  static constexpr uint8_t kFirstWay = 128, kNoWay = kFirstWay + 6 * kMaxSteps, kUnset = 255;
+
+  // Cells of one axis. cell() ascends with the coordinate, so that each cell is an interval.
+  struct Axis {
+    double low = 0, size = 0, cells_a_unit = 0;
+    uint32_t count = 1;
+    size_t stride = 0;
+    std::vector<float> inside = {0};  // for each cell, a coordinate in it
+
+    // Precondition: `coordinate` is within the bounds of the mesh.
+    uint32_t cell(double coordinate) const {
+      return std::min(static_cast<uint32_t>((coordinate - low) * cells_a_unit), count - 1);
+    }
+  };
+  using Cell = std::array<uint32_t, 3>;
+
+  static bool is_clear(uint8_t cell) { return cell < kFirstWay; }
+  size_t size() const { return size_t{axes_[0].count} * axes_[1].count * axes_[2].count; }
+  size_t index_of(const Cell& cell) const {
+    return cell[0] * axes_[0].stride + cell[1] * axes_[1].stride + cell[2] * axes_[2].stride;
+  }
+  uint32_t coordinate_of(size_t index, int axis) const {
+    return static_cast<uint32_t>(index / axes_[axis].stride % axes_[axis].count);
+  }
+  // Returns a point in a cell.
+  Vec3d inside(size_t index) const;
+
+  // Divides each axis into cells of about equal size.
+  void divide(const Aabbf& bounds, size_t triangles);
+  static Axis divided(double low, double high, uint32_t count);
+  // Sets each cell to kNoWay if it meets the bounds of a triangle, otherwise to kUnset.
+  void mark(const TriangleBvh& tree);
+  // Sets the winding numbers of clear cells.
+  void set_windings(const TriangleBvh& tree);
+  // Sets all cells that are connected to `first` by sides, and were kUnset, to `value`.
+  void fill(size_t first, uint8_t value);
+  // Sets the ways from cells that are not clear.
+  void set_ways();
+  // Verifies the ways, and the winding numbers of some cells, in debug builds.
+  void check_invariants(const TriangleBvh& tree) const;
+
+  std::array<Axis, 3> axes_;
+  std::vector<uint8_t> cells_;  // empty without cells
+};
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_INDEX_BVH_WINDING_CELLS_H_
