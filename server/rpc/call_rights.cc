@@ -10,12 +10,21 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/refusal.h"
 #include "core/base/status_macros.h"
+#include "locus/rpc_paths.h"
 #include "server/rpc/call.h"
 #include "server/rpc/peer_identity.h"
 #include "server/scheduling/clocks.h"
 
 namespace locus::server {
 namespace {
+
+// Without a row in kRpcRights nobody could call an rpc, so the build fails if one is missing.
+constexpr bool has_right(std::string_view path) {
+  for (const RpcRight& row : kRpcRights)
+    if (std::string_view(row.path.data(), row.path.size()) == path) return true;
+  return false;
+}
+static_assert(std::all_of(kRpcPaths.begin(), kRpcPaths.end(), has_right), "add the new rpc to kRpcRights");
 
 constexpr const char* kAuthorization = "authorization";
 // Number of wrong credentials after which a connection is closed, because checking them costs up to 0.2 ms each.

@@ -70,6 +70,7 @@ inline constexpr std::array kRpcRights = std::to_array<RpcRight>({
     {"/grpc.health.v1.Health/Check", Need::kNothing, Right::kRead},
     {"/grpc.health.v1.Health/Watch", Need::kNothing, Right::kRead},
     {"/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo", Need::kServerRight, Right::kReflection},
+    // Not served. Clients try this version first, and must learn that it is not implemented to try the other one.
     {"/grpc.reflection.v1.ServerReflection/ServerReflectionInfo", Need::kServerRight, Right::kReflection},
 });
 
