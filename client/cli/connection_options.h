@@ -8,20 +8,17 @@
 
 #include "CLI/CLI.hpp"
 #include "absl/status/status.h"
-#include "client/lib/client.h"
-#include "client/lib/options.h"
+#include "client/lib/environment.h"
 
 namespace locus::cli {
 
-struct ConnectionOptions {
-  std::string address = client::kDefaultAddress;
+struct ConnectionOptions : client::Endpoint {
   std::string context = {};  // name of the context; empty = the default one, if no address is given
-  client::CredentialOptions credentials = {};
 };
 
 // Names of the options that add_connection_options() adds.
-inline constexpr const char* kConnectionOptionNames[] = {"--address", "--context", "--tls",       "--ca",
-                                                         "--cert",    "--key",     "--token-file"};
+inline constexpr const char* kConnectionOptionNames[] = {"--address", "--context", "--tls",         "--ca",
+                                                         "--cert",    "--key",     "--server-name", "--token-file"};
 
 // Adds the options to the parser, with their environment variables.
 void add_connection_options(CLI::App& app, ConnectionOptions& options);

@@ -9,7 +9,7 @@
 
 #include "client/cli/context.h"
 #include "client/cli/run.h"
-#include "client/cli/security/saved_contexts.h"
+#include "client/lib/saved_contexts.h"
 
 namespace {
 
@@ -28,7 +28,7 @@ int main(int argc, char** argv) {
   using locus::cli::Progress;
   const Progress progress = isatty(STDERR_FILENO) != 0 ? Progress::kLive : Progress::kSilent;
   locus::cli::Context context(std::cout, std::cerr, progress);
-  context.set_contexts_path(locus::cli::default_contexts_path());
+  context.set_contexts_path(locus::client::default_contexts_path());
   // Take the token from the environment. No option passes a token directly, because other users of the machine can see
   // the arguments of a process.
   if (const char* const token = std::getenv("LOCUS_TOKEN")) context.options().connection.credentials.token = token;

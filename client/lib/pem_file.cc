@@ -32,7 +32,7 @@ int no_password(char*, int, int, void*) { return -1; }
 
 }  // namespace
 
-absl::StatusOr<std::string> read_small_file(absl::string_view option, const std::string& file) {
+absl::StatusOr<std::string> read_small_file(absl::string_view option, const std::string& file, EmptyFile empty) {
   std::ifstream opened(file, std::ios::binary);
   std::string text(kMaxCredentialBytes + 1, '\0');
   const bool is_open = opened.is_open();
@@ -42,7 +42,8 @@ absl::StatusOr<std::string> read_small_file(absl::string_view option, const std:
     return errno == ENOENT ? absl::NotFoundError(message) : absl::FailedPreconditionError(message);
   }
   text.resize(static_cast<size_t>(opened.gcount()));
-  if (text.empty()) return absl::InvalidArgumentError(absl::StrCat(option, " ", file, " is empty"));
+  if (text.empty() && empty == kMustHaveContent)
+    return absl::InvalidArgumentError(absl::StrCat(option, " ", file, " is empty"));
   if (text.size() > kMaxCredentialBytes)
     return absl::InvalidArgumentError(
         absl::StrCat(option, " ", file, " is larger than ", kMaxCredentialBytes, " bytes"));

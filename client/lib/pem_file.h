@@ -14,10 +14,14 @@ namespace locus::client {
 
 inline constexpr size_t kMaxCredentialBytes = size_t{1} << 20;
 
-// Returns the content of a file with credentials. `option` names the option in messages. Returns NOT_FOUND if there is
-// no such file, FAILED_PRECONDITION if it cannot be read, INVALID_ARGUMENT if it is empty or larger than
-// kMaxCredentialBytes.
-absl::StatusOr<std::string> read_small_file(absl::string_view option, const std::string& file);
+// Whether read_small_file() accepts an empty file.
+enum EmptyFile : bool { kMayBeEmpty = true, kMustHaveContent = false };
+
+// Returns the content of a file with credentials or contexts. `option` names the option in messages. Returns NOT_FOUND
+// if there is no such file, FAILED_PRECONDITION if it cannot be read, INVALID_ARGUMENT if it is empty and must have
+// content, or is larger than kMaxCredentialBytes.
+absl::StatusOr<std::string> read_small_file(absl::string_view option, const std::string& file,
+                                            EmptyFile empty = kMustHaveContent);
 
 // Checks that the text has at least one certificate and no malformed certificate. Otherwise returns INVALID_ARGUMENT
 // with the name `file` in the message.

@@ -9,11 +9,14 @@
 #include "absl/strings/str_cat.h"
 #include "client/cli/commands.h"
 #include "client/cli/output.h"
-#include "client/cli/security/saved_contexts.h"
+#include "client/cli/security/context_writer.h"
 #include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
+
+using client::SavedContext;
+using client::SavedContexts;
 
 struct ContextOptions {
   std::string name;
@@ -28,7 +31,7 @@ Json context_row(const std::string& name, const SavedContexts& contexts, const S
 }
 
 absl::Status list_contexts(const ContextOptions&, Context& context) {
-  ASSIGN_OR_RETURN(const SavedContexts contexts, read_contexts(context.contexts_path()));
+  ASSIGN_OR_RETURN(const SavedContexts contexts, client::read_contexts(context.contexts_path()));
   Report report;
   report.rows_name = "contexts";
   report.no_rows = "no contexts";
@@ -40,7 +43,7 @@ absl::Status list_contexts(const ContextOptions&, Context& context) {
 }
 
 absl::Status show_context(const ContextOptions& options, Context& context) {
-  ASSIGN_OR_RETURN(const SavedContexts contexts, read_contexts(context.contexts_path()));
+  ASSIGN_OR_RETURN(const SavedContexts contexts, client::read_contexts(context.contexts_path()));
   const std::string& name = options.name.empty() ? contexts.default_name : options.name;
   if (name.empty()) return absl::NotFoundError("no context is the default: `locus context use NAME` chooses one");
   ASSIGN_OR_RETURN(const SavedContext saved, find_context(contexts, name));
@@ -51,7 +54,7 @@ absl::Status show_context(const ContextOptions& options, Context& context) {
 }
 
 absl::Status use_context(const ContextOptions& options, Context& context) {
-  ASSIGN_OR_RETURN(SavedContexts contexts, read_contexts(context.contexts_path()));
+  ASSIGN_OR_RETURN(SavedContexts contexts, client::read_contexts(context.contexts_path()));
   RETURN_IF_ERROR(find_context(contexts, options.name).status());
   contexts.default_name = options.name;
   return write_contexts(context.contexts_path(), contexts);
@@ -64,8 +67,8 @@ void make_absolute(std::string& path) {
 }
 
 absl::Status set_context(const ContextOptions& options, Context& context) {
-  RETURN_IF_ERROR(check_context_name(options.name));
-  ASSIGN_OR_RETURN(SavedContexts contexts, read_contexts(context.contexts_path()));
+  RETURN_IF_ERROR(client::check_context_name(options.name));
+  ASSIGN_OR_RETURN(SavedContexts contexts, client::read_contexts(context.contexts_path()));
   SavedContext& saved = contexts.by_name[options.name];
   saved = options.saved;
   if (options.tls) saved.tls = "true";
@@ -78,7 +81,7 @@ absl::Status set_context(const ContextOptions& options, Context& context) {
 }
 
 absl::Status remove_context(const ContextOptions& options, Context& context) {
-  ASSIGN_OR_RETURN(SavedContexts contexts, read_contexts(context.contexts_path()));
+  ASSIGN_OR_RETURN(SavedContexts contexts, client::read_contexts(context.contexts_path()));
   RETURN_IF_ERROR(find_context(contexts, options.name).status());
   contexts.by_name.erase(options.name);
   if (contexts.default_name == options.name) contexts.default_name.clear();
@@ -97,10 +100,12 @@ void add_context_set(CLI::App& parent, Context& context) {
                               "set prod --address game.example.com:7575 --ca ca.pem --token-file game.token");
   command.add_option("NAME", options->name, "Letters, digits, `-`, `_` and `.`, at most 63")->required();
   command.add_option("--address", options->saved.address, "Where locusd listens")->type_name("ADDRESS");
-  command.add_flag("--tls", options->tls, "Encrypt the connection; --ca and --cert imply it");
+  command.add_flag("--tls", options->tls, "Encrypt the connection; --ca, --cert and --server-name imply it");
   command.add_option("--ca", options->saved.ca, "Certificates of the server's authority")->type_name("FILE");
   command.add_option("--cert", options->saved.cert, "Certificate of this client")->type_name("FILE");
   command.add_option("--key", options->saved.key, "Private key of --cert")->type_name("FILE");
+  command.add_option("--server-name", options->saved.server_name, "Name in the server's certificate")
+      ->type_name("NAME");
   command.add_option("--token-file", options->saved.token_file, "File with the token; only its name is kept")
       ->type_name("FILE");
   run_when_chosen(command, options, context, set_context);

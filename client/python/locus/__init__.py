@@ -14,6 +14,7 @@ from .columns import ColumnLike, Values
 from .connection import Retry
 from .enums import (AtStart, ClipDepth, Column, Cull, Inside, OutsideHistory, OverloadPolicy, Precision, RayMode, Reason,
                     SceneState, Source, StaticDetail, Winding)
+from .environment import connect_from_environment
 from .errors import LocusError
 from .meshes import InstanceChange, MeshColumns, PlacedInstances
 from .queries import After, Block, QueryBatch
@@ -30,4 +31,5 @@ __all__ = [
     "OutsideHistory", "OverloadPolicy", "PlacedInstances", "Precision", "QueryBatch", "QueryResult", "QueryStream",
     "Quota", "RayMode", "Reason", "Retry", "Revision", "Scene", "SceneState", "Server", "Source", "StaticDetail",
     "UpdateBatch", "UpdateStream", "Values", "Winding", "Work", "connect",
+    "connect_from_environment",
 ]

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "client/cli/security/saved_contexts.h"
+#include "client/cli/security/context_writer.h"
 #include "tests/support/temporary_folder.h"
 
 namespace locus::cli {
@@ -13,8 +13,8 @@ class ConnectionOptionsTest : public ::testing::Test {
  protected:
   void SetUp() override {
     contexts_.default_name = "usual";
-    contexts_.by_name["usual"] = {"usual:1", "", "/usual.pem", "", "", "/usual.token"};
-    contexts_.by_name["prod"] = {"prod:1", "true", "", "/prod.pem", "/prod.key", "/prod.token"};
+    contexts_.by_name["usual"] = {"usual:1", "", "/usual.pem", "", "", "", "/usual.token"};
+    contexts_.by_name["prod"] = {"prod:1", "true", "", "/prod.pem", "/prod.key", "inner", "/prod.token"};
     ASSERT_TRUE(write_contexts(path_, contexts_).ok());
     for (const char* name : kVariables) unsetenv(name);
   }
@@ -35,11 +35,12 @@ class ConnectionOptionsTest : public ::testing::Test {
     return options;
   }
 
-  static constexpr const char* kVariables[] = {"LOCUS_ADDRESS", "LOCUS_CONTEXT", "LOCUS_TLS",       "LOCUS_CA",
-                                               "LOCUS_CERT",    "LOCUS_KEY",     "LOCUS_TOKEN_FILE"};
+  static constexpr const char* kVariables[] = {"LOCUS_ADDRESS",     "LOCUS_CONTEXT",   "LOCUS_TLS",
+                                               "LOCUS_CA",          "LOCUS_CERT",      "LOCUS_KEY",
+                                               "LOCUS_SERVER_NAME", "LOCUS_TOKEN_FILE"};
   const test::TemporaryFolder folder_;
   const std::string path_ = folder_.file("contexts");
-  SavedContexts contexts_;
+  client::SavedContexts contexts_;
 };
 
 TEST_F(ConnectionOptionsTest, TheDefaultContextFillsWhatIsNotGiven) {
@@ -67,6 +68,8 @@ TEST_F(ConnectionOptionsTest, LineComesBeforeEnvironmentAndEnvironmentBeforeCont
   EXPECT_EQ(options.credentials.certificate_file, "/prod.pem");
   EXPECT_EQ(options.credentials.key_file, "/prod.key");
   EXPECT_TRUE(options.credentials.tls);
+  EXPECT_EQ(options.credentials.server_name, "inner");
+  EXPECT_EQ(parsed({"--context", "prod", "--server-name", "mine"}).credentials.server_name, "mine");
   EXPECT_EQ(parsed({"--context", "usual"}).credentials.ca_file, "/usual.pem");
 }
 

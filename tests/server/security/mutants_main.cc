@@ -42,6 +42,7 @@ int result_with(PlantedBug bug) {
   const pid_t child = fork();
   if (child == 0) {
     planted_bug = bug;
+    GTEST_FLAG_SET(fail_fast, bug != PlantedBug::kNone);  // one failure is enough to catch a bug
     if (bug != PlantedBug::kNone && std::freopen("/dev/null", "w", stdout) == nullptr) std::_Exit(2);
     std::_Exit(RUN_ALL_TESTS());
   }

@@ -6,7 +6,7 @@
 #include <sstream>
 
 #include "client/cli/run.h"
-#include "client/cli/security/saved_contexts.h"
+#include "client/lib/saved_contexts.h"
 #include "tests/client/lib/guarded_server.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test_certificates.h"
@@ -54,7 +54,7 @@ TEST_F(ContextCommandTest, AContextIsSetShownListedUsedAndRemoved) {
   EXPECT_THAT(out_.str(), HasSubstr("prod,true,host:1,true,"));
   ASSERT_EQ(run_with_contexts({"context", "remove", "prod"}), ExitCode::kOk);
   EXPECT_EQ(run_with_contexts({"context", "use", "prod"}), ExitCode::kNotFound);
-  EXPECT_EQ(read_contexts(path_)->default_name, "");
+  EXPECT_EQ(client::read_contexts(path_)->default_name, "");
 }
 
 TEST_F(ContextCommandTest, ShowingAContextPrintsTheNameOfTheTokenFileAndNoToken) {

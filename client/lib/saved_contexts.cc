@@ -1,19 +1,17 @@
-#include "client/cli/security/saved_contexts.h"
+#include "client/lib/saved_contexts.h"
 
 #include <algorithm>
 #include <cstdlib>
-#include <filesystem>
-#include <system_error>
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
-#include "client/cli/security/private_file.h"
+#include "client/lib/pem_file.h"
 #include "core/base/status_macros.h"
 
-namespace locus::cli {
+namespace locus::client {
 namespace {
 
 constexpr absl::string_view kDefaultKey = "default";
@@ -24,8 +22,13 @@ struct ContextField {
   std::string SavedContext::*value;
 };
 constexpr ContextField kContextFields[] = {
-    {"address", &SavedContext::address}, {"tls", &SavedContext::tls}, {"ca", &SavedContext::ca},
-    {"cert", &SavedContext::cert},       {"key", &SavedContext::key}, {"token_file", &SavedContext::token_file},
+    {"address", &SavedContext::address},
+    {"tls", &SavedContext::tls},
+    {"ca", &SavedContext::ca},
+    {"cert", &SavedContext::cert},
+    {"key", &SavedContext::key},
+    {"server_name", &SavedContext::server_name},
+    {"token_file", &SavedContext::token_file},
 };
 
 // Stores the option of one line `key = value` in `section`, or in `contexts` if the line is before the first section.
@@ -46,7 +49,7 @@ absl::Status store_line(absl::string_view line, SavedContext* section, SavedCont
     section->*field.value = value;
     return absl::OkStatus();
   }
-  return absl::InvalidArgumentError("write `KEY = VALUE`: address, tls, ca, cert, key, token_file");
+  return absl::InvalidArgumentError("write `KEY = VALUE`: address, tls, ca, cert, key, server_name, token_file");
 }
 
 }  // namespace
@@ -108,17 +111,10 @@ std::string contexts_text(const SavedContexts& contexts) {
 
 absl::StatusOr<SavedContexts> read_contexts(const std::string& path) {
   if (path.empty()) return SavedContexts();
-  const absl::StatusOr<SecurityFile> file = read_security_file(path);
-  if (absl::IsNotFound(file.status())) return SavedContexts();
-  RETURN_IF_ERROR(file.status());
-  return parse_contexts(path, file->text);
-}
-
-absl::Status write_contexts(const std::string& path, const SavedContexts& contexts) {
-  if (path.empty()) return absl::FailedPreconditionError("there is no folder for contexts: set HOME");
-  std::error_code ignored;  // replace_security_file() reports a missing folder
-  std::filesystem::create_directories(std::filesystem::path(path).parent_path(), ignored);
-  return replace_security_file(path, {contexts_text(contexts), kPrivateMode});
+  const absl::StatusOr<std::string> text = read_small_file("the contexts file", path, kMayBeEmpty);
+  if (absl::IsNotFound(text.status())) return SavedContexts();
+  RETURN_IF_ERROR(text.status());
+  return parse_contexts(path, *text);
 }
 
 absl::StatusOr<SavedContext> find_context(const SavedContexts& contexts, const std::string& name) {
@@ -130,4 +126,4 @@ absl::StatusOr<SavedContext> find_context(const SavedContexts& contexts, const s
                                           ": `locus context set NAME` makes one"));
 }
 
-}  // namespace locus::cli
+}  // namespace locus::client

@@ -1,28 +1,19 @@
-#include "client/cli/security/saved_contexts.h"
+#include "client/lib/saved_contexts.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/stat.h>
 
-#include "tests/support/temporary_folder.h"
-
-namespace locus::cli {
+namespace locus::client {
 namespace {
 
 using ::testing::HasSubstr;
 
-TEST(SavedContextsTest, WhatIsWrittenIsReadAgainWithMode0600) {
-  const test::TemporaryFolder folder;
-  const std::string path = folder.file("config/locus/contexts");
+TEST(SavedContextsTest, TheTextOfContextsIsParsedAgain) {
   SavedContexts contexts;
   contexts.default_name = "prod";
-  contexts.by_name["prod"] = {"host:1", "true", "/ca.pem", "/c.pem", "/c.key", "/token"};
+  contexts.by_name["prod"] = {"host:1", "true", "/ca.pem", "/c.pem", "/c.key", "inner", "/token"};
   contexts.by_name["bare"] = {};
-  ASSERT_TRUE(write_contexts(path, contexts).ok());
-  struct stat status {};
-  ASSERT_EQ(::stat(path.c_str(), &status), 0);
-  EXPECT_EQ(status.st_mode & 07777, 0600u);
-  const absl::StatusOr<SavedContexts> read = read_contexts(path);
+  const absl::StatusOr<SavedContexts> read = parse_contexts("f", contexts_text(contexts));
   ASSERT_TRUE(read.ok()) << read.status();
   EXPECT_EQ(read->default_name, "prod");
   ASSERT_EQ(read->by_name.size(), 2u);
@@ -33,7 +24,6 @@ TEST(SavedContextsTest, WhatIsWrittenIsReadAgainWithMode0600) {
 TEST(SavedContextsTest, AFileThatDoesNotExistHasNoContexts) {
   EXPECT_TRUE(read_contexts("/nonexistent/contexts")->by_name.empty());
   EXPECT_TRUE(read_contexts("")->by_name.empty());
-  EXPECT_FALSE(write_contexts("", {}).ok());
 }
 
 TEST(SavedContextsTest, CommentsAndBlankLinesAreIgnored) {
@@ -61,4 +51,4 @@ TEST(SavedContextsTest, AnUnknownNameIsReportedWithTheKnownOnes) {
 }
 
 }  // namespace
-}  // namespace locus::cli
+}  // namespace locus::client

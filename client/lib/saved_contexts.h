@@ -1,4 +1,5 @@
-// Named contexts: the connection options of servers, in a file of the user. For `locus context` and --context.
+// Named contexts: the connection options of servers, in a file of the user, which `locus context` writes. For
+// endpoint_from_environment() and the command line.
 //   default = prod
 //   [prod]
 //   address = game.example.com:7575
@@ -6,8 +7,8 @@
 //   token_file = /etc/game/token
 // Lines that begin with # are ignored, and are lost when the file is written. The file never contains a token. Plain
 // data and functions without state.
-#ifndef LOCUS_CLIENT_CLI_SECURITY_SAVED_CONTEXTS_H_
-#define LOCUS_CLIENT_CLI_SECURITY_SAVED_CONTEXTS_H_
+#ifndef LOCUS_CLIENT_LIB_SAVED_CONTEXTS_H_
+#define LOCUS_CLIENT_LIB_SAVED_CONTEXTS_H_
 
 #include <map>
 #include <string>
@@ -18,7 +19,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 
-namespace locus::cli {
+namespace locus::client {
 
 // Connection options of one server. Empty = not set.
 struct SavedContext {
@@ -27,6 +28,7 @@ struct SavedContext {
   std::string ca = {};
   std::string cert = {};
   std::string key = {};
+  std::string server_name = {};
   std::string token_file = {};
 };
 
@@ -47,10 +49,9 @@ absl::StatusOr<SavedContexts> parse_contexts(absl::string_view file, absl::strin
 // Returns the text of a contexts file.
 std::string contexts_text(const SavedContexts& contexts);
 
-// Reads the contexts. A missing file counts as a file without contexts.
+// Reads the contexts. A missing file counts as a file without contexts. Returns the errors of parse_contexts(), and
+// FAILED_PRECONDITION for a file that cannot be read or is too large.
 absl::StatusOr<SavedContexts> read_contexts(const std::string& path);
-// Writes the contexts with mode 0600, and creates the file's folder if it does not exist.
-absl::Status write_contexts(const std::string& path, const SavedContexts& contexts);
 
 // Returns the context of this name. Returns NOT_FOUND with the names that exist.
 absl::StatusOr<SavedContext> find_context(const SavedContexts& contexts, const std::string& name);
@@ -58,6 +59,6 @@ absl::StatusOr<SavedContext> find_context(const SavedContexts& contexts, const s
 // Returns OK if the name has 1 to 63 characters of a-z, A-Z, 0-9, `-`, `_` and `.`.
 absl::Status check_context_name(absl::string_view name);
 
-}  // namespace locus::cli
+}  // namespace locus::client
 
-#endif  // LOCUS_CLIENT_CLI_SECURITY_SAVED_CONTEXTS_H_
+#endif  // LOCUS_CLIENT_LIB_SAVED_CONTEXTS_H_

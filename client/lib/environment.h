@@ -1,0 +1,48 @@
+// Address and credentials of a server from the environment and from named contexts, as the command line takes them.
+//
+//   auto endpoint = locus::client::endpoint_from_environment();
+//   if (!endpoint.ok()) return endpoint.status();
+//   auto client = locus::client::Client::connect(endpoint->address, {.credentials = endpoint->credentials});
+//
+// For programs that are configured like `locus`. Functions read the environment, so no other thread may change it at
+// the same time.
+#ifndef LOCUS_CLIENT_LIB_ENVIRONMENT_H_
+#define LOCUS_CLIENT_LIB_ENVIRONMENT_H_
+
+#include <string>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "client/lib/client.h"
+#include "client/lib/options.h"
+
+namespace locus::client {
+
+struct Endpoint {
+  std::string address = kDefaultAddress;
+  CredentialOptions credentials = {};
+};
+
+// Returns the endpoint that the variables LOCUS_ADDRESS, LOCUS_TLS, LOCUS_CA, LOCUS_CERT, LOCUS_KEY, LOCUS_SERVER_NAME,
+// LOCUS_TOKEN_FILE and LOCUS_TOKEN describe. A named context gives what they leave open: the context `context`, else
+// the one of LOCUS_CONTEXT, else, if LOCUS_ADDRESS is not set, the default context of the user. The default context is
+// not used for another address, so that its credentials do not reach another server. Returns NOT_FOUND for an unknown
+// context, INVALID_ARGUMENT for a malformed contexts file or value of LOCUS_TLS. Files of credentials are read by
+// Client::connect().
+absl::StatusOr<Endpoint> endpoint_from_environment(const std::string& context = {});
+
+// What the caller of complete_endpoint() has set already.
+struct GivenOptions {
+  bool address = false;
+  bool tls = false;
+};
+
+// Fills in the members of `endpoint` that are not given. Their values come from the context `context` of the file
+// `contexts_path` or, if `context` is empty and no address is given, from its default context. A token file that is
+// given comes before a token. Returns NOT_FOUND for an unknown context, INVALID_ARGUMENT for a malformed file.
+absl::Status complete_endpoint(const std::string& contexts_path, const std::string& context, GivenOptions given,
+                               Endpoint& endpoint);
+
+}  // namespace locus::client
+
+#endif  // LOCUS_CLIENT_LIB_ENVIRONMENT_H_
