@@ -93,7 +93,7 @@ OverlapAnswer run_contains(QueryTask& task, const SceneAtTime& moment, Vec3d poi
     task.visit_region(task.snapshot().statics->tree(), visitor);
   }
   OverlapAnswer instances = rows.finish();
-  if (options.source == Source::kStatic || task.ended()) return instances;
+  if (options.source == Source::kStatic || moment.objects().size() == 0 || task.ended()) return instances;
   OverlapOptions of_objects = options;
   of_objects.source = Source::kDynamic;
   run_ball(task, moment, Balld{point, 0}, of_objects, filter);

@@ -452,7 +452,8 @@ OverlapAnswer run_overlap(QueryTask& task, const SceneAtTime& moment, const type
     InstanceSearch<Kind> search(task, shape, options, filter, rows);
     task.visit_region(task.snapshot().statics->tree(), search);
   }
-  if (options.source != Source::kStatic && !task.ended()) {
+  const bool may_find_objects = options.source != Source::kStatic && moment.objects().size() != 0;
+  if (may_find_objects && !task.ended()) {
     ObjectRows<Kind> search(task, moment, shape, options, filter);
     task.visit_objects_in_region(moment, search);
     return with_objects(rows.finish(), task.found_objects(), moment, options);
