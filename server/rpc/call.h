@@ -88,8 +88,8 @@ class Caller {
 
   // Claims `bytes` on `line` of the server's memory budget, and takes them from the quota bytes_in_flight of the
   // caller's identity and connection. For the lines of moves, requests and replies, the bytes also count against the
-  // connection's share (MemoryBudget::connection_share()). RESOURCE_EXHAUSTED names the limit or quota that does not
-  // suffice.
+  // shares (MemoryBudget::connection_share()) of the connection and of the caller's identity. RESOURCE_EXHAUSTED names
+  // the limit or quota that does not suffice.
   absl::StatusOr<CallMemory> claim(MemoryLine line, absl::string_view field, uint64_t bytes) const;
   // Claims `bytes` for work that is never refused, because it frees memory.
   CallMemory claim_anyway(MemoryLine line, uint64_t bytes) const;
@@ -131,6 +131,9 @@ class Caller {
   absl::Status check_certificate() const;
   // Returns whether the method needs a right that must be checked.
   bool needs_right() const;
+  // Adds `bytes` to what the connection and the identity have claimed. Returns RESOURCE_EXHAUSTED, and adds nothing, if
+  // either would exceed its share.
+  absl::Status take_shares(absl::string_view field, uint64_t bytes) const;
   // Checks the rights that do not depend on a scene.
   absl::Status check_grants() const;
 
@@ -141,6 +144,7 @@ class Caller {
   SteadyTime deadline_;
   const RpcRight* rpc_right_ = nullptr;  // entry of the method in the table of rights; null before authorize()
   IdentityPtr identity_ = anonymous_identity();
+  std::shared_ptr<ClientShares::Counter> identity_share_;  // claims of the identity; null without an identity
   std::array<std::string, 2> quota_subjects_;  // result of quota_subjects(); set by authorize() with access control
   mutable std::string subject_;
   bool is_answer_audited_ = false;

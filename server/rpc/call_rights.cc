@@ -53,23 +53,24 @@ absl::Status lacks(const Identity& identity, Right right, absl::string_view what
                                                   "; ask the operator for a line `grant` in the access file"));
 }
 
-// Adds `bytes` to the connection's claimed_bytes. Returns RESOURCE_EXHAUSTED, and adds nothing, if the sum would exceed
-// `share`.
-absl::Status take_share(Connection& connection, uint64_t share, absl::string_view field, uint64_t bytes) {
+// Adds `bytes` to `claimed`, the bytes that calls of the `owner`, a connection or an identity, have claimed. Returns
+// RESOURCE_EXHAUSTED, and adds nothing, if the sum would exceed `share`.
+absl::Status take_share(std::atomic<uint64_t>& claimed, absl::string_view owner, uint64_t share,
+                        absl::string_view field, uint64_t bytes) {
   constexpr uint32_t kShareRetryMs = 200;
-  const uint64_t held = connection.claimed_bytes.fetch_add(bytes);
+  const uint64_t held = claimed.fetch_add(bytes);
   if (bytes <= share && held <= share - bytes) return absl::OkStatus();
-  connection.claimed_bytes.fetch_sub(bytes);
+  claimed.fetch_sub(bytes);
   Refusal refusal;
   refusal.reason = Reason::kLimit;
   refusal.field = std::string(field);
-  refusal.limit = "connection_memory_bytes";
+  refusal.limit = absl::StrCat(owner, "_memory_bytes");
   refusal.limit_value = static_cast<double>(share);
   refusal.asked = static_cast<double>(held) + static_cast<double>(bytes);
   if (bytes <= share) refusal.retry_after_ms = kShareRetryMs;
   return refuse(absl::StatusCode::kResourceExhausted,
-                absl::StrCat("limit connection_memory_bytes is ", share, ", of which calls of this connection hold ",
-                             held, "; this may need ", bytes,
+                absl::StrCat("limit ", refusal.limit, " is ", share, ", of which calls of this ", owner, " hold ", held,
+                             "; this may need ", bytes,
                              " more. Read the answers, make fewer calls at once, or send smaller batches"),
                 refusal);
 }
@@ -119,6 +120,7 @@ absl::Status Caller::authorize(absl::string_view path) {
   if (!needs_right()) return absl::OkStatus();
   ASSIGN_OR_RETURN(identity_, authenticate(*state_.access, *connection_, context_));
   quota_subjects_.front() = identity_->principal;
+  if (identity_->kind != IdentityKind::kAnonymous) identity_share_ = state_.shares.of(identity_->principal);
   return check_grants();
 }
 
@@ -194,11 +196,22 @@ absl::StatusOr<QuotaHold> Caller::hold_quota(QuotaKind kind, double amount) cons
 absl::StatusOr<CallMemory> Caller::claim(MemoryLine line, absl::string_view field, uint64_t bytes) const {
   ASSIGN_OR_RETURN(QuotaHold quota, hold_quota(QuotaKind::kBytesInFlight, static_cast<double>(bytes)));
   const bool is_shared = line >= MemoryLine::kMoves;
-  if (is_shared) RETURN_IF_ERROR(take_share(*connection_, state_.memory.connection_share(), field, bytes));
+  if (is_shared) RETURN_IF_ERROR(take_shares(field, bytes));
   absl::StatusOr<MemoryBudget::Claim> claim = state_.memory.claim(line, field, bytes, client());
-  if (claim.ok()) return CallMemory(*std::move(claim), std::move(quota), is_shared ? connection_ : nullptr);
+  if (!is_shared && claim.ok()) return CallMemory(*std::move(claim), std::move(quota), nullptr, nullptr);
+  if (claim.ok()) return CallMemory(*std::move(claim), std::move(quota), connection_, identity_share_);
   if (is_shared) connection_->claimed_bytes.fetch_sub(bytes);
+  if (is_shared && identity_share_ != nullptr) identity_share_->fetch_sub(bytes);
   return claim.status();
+}
+
+absl::Status Caller::take_shares(absl::string_view field, uint64_t bytes) const {
+  const uint64_t share = state_.memory.connection_share();
+  RETURN_IF_ERROR(take_share(connection_->claimed_bytes, "connection", share, field, bytes));
+  if (identity_share_ == nullptr) return absl::OkStatus();
+  absl::Status taken = take_share(*identity_share_, "identity", share, field, bytes);
+  if (!taken.ok()) connection_->claimed_bytes.fetch_sub(bytes);
+  return taken;
 }
 
 CallMemory Caller::claim_anyway(MemoryLine line, uint64_t bytes) const {
@@ -206,7 +219,7 @@ CallMemory Caller::claim_anyway(MemoryLine line, uint64_t bytes) const {
   if (has_quotas())
     quota = state_.quotas.hold_anyway(quota_subjects_, QuotaKind::kBytesInFlight, static_cast<double>(bytes),
                                       steady_nanoseconds());
-  return {state_.memory.claim_anyway(line, bytes), std::move(quota), nullptr};
+  return {state_.memory.claim_anyway(line, bytes), std::move(quota), nullptr, nullptr};
 }
 
 // Not audited: calls that end because of time, of their caller or of the server's end, and scenes that do not exist,

@@ -11,6 +11,7 @@
 #include "server/connections/connection_table.h"
 #include "server/observability/metrics.h"
 #include "server/scheduling/admission_limiter.h"
+#include "server/scheduling/client_shares.h"
 #include "server/scheduling/drain.h"
 #include "server/scheduling/memory_budget.h"
 #include "server/security/access_control.h"
@@ -30,6 +31,7 @@ struct RpcState {
   AdmissionLimiter calls;           // running calls, except streams
   AdmissionLimiter streams;         // open streams
   MemoryBudget memory;              // limit of the process
+  ClientShares shares;              // what each identity has claimed of it
   uint64_t max_inflated_bytes = 0;  // maximum size of an inflated message; 0 = gRPC refuses compressed ones
   // Identities and rights of callers. Set before the first call; null in servers without access control.
   AccessControl* access = nullptr;

@@ -128,8 +128,8 @@ class MemoryBudget {
   // Returns the bytes that are claimed on `line`, and the number of claims of the line that were refused so far.
   uint64_t claimed(MemoryLine line) const { return lines_[static_cast<size_t>(line)].load(); }
   uint64_t refused(MemoryLine line) const { return refused_[static_cast<size_t>(line)].load(); }
-  // Returns the largest sum of claims of moves, requests and replies that one connection may hold: half of the memory
-  // that is left for claims, so that one client leaves room for all others.
+  // Returns the largest sum of claims of moves, requests and replies that one connection, or one identity on all of its
+  // connections, may hold: half of the memory that is left for claims, so that one client leaves room for all others.
   uint64_t connection_share() const;
 
  private:

@@ -82,6 +82,7 @@ std::vector<NamedLimit> limits_of(const Host& host) {
       {"blocks", limits::kMaxBlocks},
       {"calls", static_cast<double>(host.calls.max()), static_cast<double>(host.calls.used())},
       {"connection_memory_bytes", static_cast<double>(host.memory.connection_share())},
+      {"identity_memory_bytes", static_cast<double>(host.memory.connection_share())},
       {"coordinate", limits::kMaxCoordinate},
       {"health_checks", kMaxHealthChecks, static_cast<double>(host.health_checks.used())},
       {"health_watchers", kMaxHealthWatchers, static_cast<double>(host.health_watchers.used())},

@@ -8,10 +8,13 @@
 #include <fstream>
 #include <future>
 #include <map>
+#include <set>
 #include <thread>
 
 #include "grpc/health/v1/health.grpc.pb.h"
+#include "server/observability/process_figures.h"
 #include "server/security/token_file.h"
+#include "tests/support/memory_log.h"
 #include "tests/support/raw_call.h"
 #include "tests/support/rpc_test.h"
 #include "tests/support/running_server.h"
@@ -308,6 +311,50 @@ TEST_F(AccessRpcTest, AQuotaOfQueriesRefusesWithItsName) {
   const grpc::Status refused = ask();
   EXPECT_EQ(refused.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
   EXPECT_THAT(refused.error_message(), HasSubstr("queries_per_s"));
+}
+
+// Updates that wait for the log hold the memory that they have claimed.
+TEST_F(AccessRpcTest, MoreConnectionsGiveAnIdentityNoMoreMemory) {
+  constexpr uint64_t kRoom = uint64_t{128} << 20;
+  MemoryLog log;
+  running_.reset();
+  server::ServerConfig scarce = config();
+  scarce.memory_limit = server::resident_bytes() + kRoom;
+  running_.emplace(scarce, &log);
+  create("arena-1");
+  v1::ApplyUpdatesRequest update;
+  update.set_scene("arena-1");
+  v1::Move* const moves = update.mutable_batch()->add_moves();
+  moves->mutable_ids()->Resize(30'000, 1);
+  moves->mutable_positions()->Resize(3, 0.0f);
+  const auto apply = [&update](const Stubs& stubs, const std::string& token) {
+    return raw_call(stubs.channel, "/locus.v1.UpdateService/ApplyUpdates", update.SerializeAsString(), kCallTimeout,
+                    token)
+        .status;
+  };
+  log.hold();
+  // Each of the connections has a fourth of the calls, so that it stays far below the share of a connection.
+  std::vector<Stubs> connections;
+  for (int i = 0; i < 4; ++i) connections.emplace_back(running_->address());
+  std::vector<std::future<grpc::Status>> calls;
+  std::atomic<bool> refused{false};
+  for (size_t i = 0; i < 64 && !refused; ++i) {
+    calls.push_back(std::async(std::launch::async, [&, i] {
+      grpc::Status status = apply(connections[i % 4], tokens_["updater"]);
+      if (!status.ok()) refused = true;
+      return status;
+    }));
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  std::future<grpc::Status> other =
+      std::async(std::launch::async, [&] { return apply(running_->stubs(), tokens_["admin"]); });
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  log.release();
+  EXPECT_TRUE(other.get().ok()) << "another identity has a share of its own";
+  std::set<std::string> limits;
+  for (std::future<grpc::Status>& call : calls)
+    if (const grpc::Status status = call.get(); !status.ok()) limits.insert(error_of(status).limit());
+  EXPECT_THAT(limits, ::testing::ElementsAre("identity_memory_bytes"));
 }
 
 TEST_F(AccessRpcTest, DescriptionsAndDumpsUseTheQuotaOfWork) {
