@@ -13,12 +13,15 @@
 #include <thread>
 #include <vector>
 
+#include "absl/strings/str_cat.h"
 #include "server/connections/frame_check.h"
 #include "server/rpc/read_hooks.h"
 #include "server/rpc/tls_credentials.h"
+#include "server/scheduling/clocks.h"
 #include "server/security/token_file.h"
 #include "tests/support/raw_socket.h"
 #include "tests/support/running_server.h"
+#include "tests/support/signing_key.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test_certificates.h"
 #include "tests/support/text_of.h"
@@ -248,12 +251,18 @@ TEST_F(TlsTest, AServerWithABadNewFileServesNewConnections) {
 }
 
 // Runs clients with tokens on old and new connections while certificates, tokens and rights are replaced.
+// Clients that call without a pause while every file of TLS and access control changes.
 class TlsReloadTest : public TlsTest {
  protected:
-  TlsReloadTest() {
-    replace_file(folder_.file("access"), "grant token:caller admin *\ngrant token:guest read *\n");
+  // `mutual`: the server asks for certificates of clients, and the file of their authorities changes too.
+  explicit TlsReloadTest(bool mutual = false) : mutual_(mutual) {
+    change_access(0);
+    change_keys();
     token_ = *server::add_token(tokens(), "caller", kForever, {}, "");
-    server::ServerConfig with_tokens = config(false);
+    if (mutual) own_ = clients_.issue({.common_name = "game"});
+    server::ServerConfig with_tokens = config(mutual);
+    with_tokens.jwks_file = folder_.file("jwks");
+    with_tokens.jwt_audience = "locus";
     with_tokens.access_file = folder_.file("access");
     with_tokens.token_file = tokens();
     running_.emplace(with_tokens);
@@ -264,14 +273,14 @@ class TlsReloadTest : public TlsTest {
   }
 
   std::string tokens() const { return folder_.file("tokens"); }
-  std::shared_ptr<grpc::Channel> channel() { return channel_to(running_->address(), authority_.certificate()); }
+  std::shared_ptr<grpc::Channel> channel() { return channel_to(running_->address(), authority_.certificate(), own_); }
   static void set_token(grpc::ClientContext& context, const std::string& token) {
     set_timeout(context);
     context.AddMetadata("authorization", "Bearer " + token);
   }
-  void call(const std::shared_ptr<grpc::Channel>& channel) {
+  void call(const std::shared_ptr<grpc::Channel>& channel, const std::string& token) {
     grpc::ClientContext context;
-    set_token(context, token_);
+    set_token(context, token);
     v1::GetServerResponse response;
     const grpc::Status status = v1::ServerService::NewStub(channel)->GetServer(&context, {}, &response);
     calls_.fetch_add(1);
@@ -279,11 +288,36 @@ class TlsReloadTest : public TlsTest {
   }
   void start_clients() {
     clients_of_test_.emplace_back([this, kept = channel()] {
-      while (!end_.load()) call(kept);
+      while (!end_.load()) call(kept, token_);
     });
     clients_of_test_.emplace_back([this] {
-      while (!end_.load()) call(channel());
+      while (!end_.load()) call(channel(), token_);
     });
+    const std::string claims =
+        absl::StrCat(R"({"sub":"caller","aud":"locus","exp":)", server::unix_seconds() + kForever, "}");
+    clients_of_test_.emplace_back([this, kept = channel(), jwt = key_.jwt(R"({"alg":"EdDSA","kid":"kept"})", claims)] {
+      while (!end_.load()) call(kept, jwt);
+    });
+  }
+
+  // Replaces the access file by one with the same grants.
+  void change_access(int number) const {
+    replace_file(folder_.file("access"), absl::StrCat("# change ", number,
+                                                      "\ngrant token:caller admin *\ngrant token:guest read *\n"
+                                                      "grant jwt:caller read *\n"));
+  }
+  // Replaces the keys of JWTs, but for the one that is in use.
+  void change_keys() const {
+    replace_file(folder_.file("jwks"), absl::StrCat(R"({"keys":[)", key_.jwk(R"(,"kid":"kept")"), ",",
+                                                    SigningKey::ed25519().jwk(R"(,"kid":"other")"), "]}"));
+  }
+  // Changes the order of the authorities of clients, and now and then adds one. Removing one would end connections.
+  void change_authorities(int number) {
+    if (number % 50 == 0) authorities_.push_back(TestAuthority(absl::StrCat("authority ", number)).certificate());
+    std::rotate(authorities_.begin(), authorities_.begin() + 1, authorities_.end());
+    std::string all;
+    for (const std::string& authority : authorities_) all += authority;
+    replace_file(folder_.file("ca"), all);
   }
 
   // Gives a guest a token, lets it open a stream, revokes the token, and waits until the stream has ended. Returns the
@@ -307,7 +341,7 @@ class TlsReloadTest : public TlsTest {
     return end - begin;
   }
 
-  // Replaces the certificate, adds a token and revokes it, `times` times.
+  // Replaces the certificate and the other files, adds a token and revokes it, `times` times.
   void reload(int times) {
     create_world();
     start_clients();
@@ -315,10 +349,14 @@ class TlsReloadTest : public TlsTest {
     std::chrono::nanoseconds longest{0};
     for (int i = 0; i < times && !HasFailure(); ++i) {
       write(authority_.for_server("server " + std::to_string(i)));
+      change_access(i);
+      change_keys();
+      if (mutual_) change_authorities(i);
       longest = std::max(longest, revoke_one(guests));
     }
-    std::cout << "proof: " << times << " changes of certificates and tokens: " << calls_.load() << " calls, "
-              << failed_.load() << " failed; streams of revoked tokens ended within "
+    std::cout << "proof: " << times << " changes of certificates, " << (mutual_ ? "authorities, " : "")
+              << "access file, keys and tokens: " << calls_.load() << " calls, " << failed_.load()
+              << " failed; streams of revoked tokens ended within "
               << std::chrono::ceil<std::chrono::milliseconds>(longest).count() << " ms" << std::endl;
     EXPECT_EQ(failed_.load(), 0);
     EXPECT_GT(calls_.load(), times);
@@ -336,6 +374,10 @@ class TlsReloadTest : public TlsTest {
     ASSERT_TRUE(v1::SceneService::NewStub(channel())->CreateScene(&context, request, &response).ok());
   }
 
+  const bool mutual_;
+  const SigningKey key_ = SigningKey::ed25519();
+  TestCertificate own_;
+  std::vector<std::string> authorities_ = {clients_.certificate()};
   std::string token_;
   std::optional<RunningServer> running_;
   std::atomic<bool> end_{false};
@@ -346,8 +388,17 @@ class TlsReloadTest : public TlsTest {
 
 TEST_F(TlsReloadTest, FiftyChangesDropNoCallAndEndTheStreamsOfRevokedTokens) { reload(50); }
 
+// The same with certificates of clients.
+class MutualTlsReloadTest : public TlsReloadTest {
+ protected:
+  MutualTlsReloadTest() : TlsReloadTest(true) {}
+};
+TEST_F(MutualTlsReloadTest, FiftyChangesDropNoCallAndEndTheStreamsOfRevokedTokens) { reload(50); }
+
 using LongTlsReloadTest = TlsReloadTest;
 TEST_F(LongTlsReloadTest, AThousandChangesDropNoCallAndEndTheStreamsOfRevokedTokens) { reload(1000); }
+using LongMutualTlsReloadTest = MutualTlsReloadTest;
+TEST_F(LongMutualTlsReloadTest, AThousandChangesDropNoCallAndEndTheStreamsOfRevokedTokens) { reload(1000); }
 
 }  // namespace
 }  // namespace locus::test
