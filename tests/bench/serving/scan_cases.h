@@ -1,0 +1,14 @@
+// Case scan/1024: the scan of a message before it is parsed, beside the whole work of the query in it.
+#ifndef LOCUS_TESTS_BENCH_SERVING_SCAN_CASES_H_
+#define LOCUS_TESTS_BENCH_SERVING_SCAN_CASES_H_
+
+#include "tests/bench/serving/serving_run.h"
+
+namespace locus::bench::serving {
+
+// Runs the case if the options want it. Returns the error of a server that did not start or refused the level.
+absl::Status run_scan_cases(const ServingRun& run);
+
+}  // namespace locus::bench::serving
+
+#endif  // LOCUS_TESTS_BENCH_SERVING_SCAN_CASES_H_
