@@ -23,8 +23,6 @@ using std::chrono::steady_clock;
 // Interval at which running calls check whether their credentials have expired. At the same interval, the counts of
 // updates are written to the audit log if they are old enough (AuditUpdates::tick()).
 constexpr milliseconds kRecheckInterval{500};
-// Interval at which the files are examined. A change takes effect when two successive examinations find the same state.
-constexpr milliseconds kWatchInterval{200};
 
 SecurityOptions security_options(const ServerConfig& config) {
   SecurityOptions options;
@@ -78,8 +76,7 @@ void Access::start(std::function<void()> recheck_calls) {
     recheck();
   });
   if (control_->enabled()) {
-    watcher_.emplace(
-        control_->files(), [this] { return reload_watched(); }, kWatchInterval);
+    watcher_.emplace(control_->files(), [this] { return reload_watched(); });
   }
   if (control_->enabled() || control_->audit() != nullptr) clock_ = std::thread([this] { run_clock(); });
 }
