@@ -19,17 +19,20 @@ template <class A, class B>
   check_failed(file, line, condition, operands.str());
 }
 
+// Aborts unless compare(a, b). The operands are parameters, because a local reference would outlive a temporary, for
+// example in LOCUS_CHECK_LE(x, std::min(y, 5)).
+template <class Compare, class A, class B>
+constexpr void check_op(Compare compare, const A& a, const B& b, const char* file, int line, const char* condition) {
+  if (!compare(a, b)) check_failed_op(file, line, condition, a, b);
+}
+
 }  // namespace locus::internal
 
 #define LOCUS_CHECK(condition) \
   (static_cast<bool>(condition) ? void(0) : ::locus::internal::check_failed(__FILE__, __LINE__, #condition, ""))
-#define LOCUS_CHECK_OP_(a, op, b)                                                                              \
-  do {                                                                                                         \
-    const auto& locus_check_a = (a);                                                                           \
-    const auto& locus_check_b = (b);                                                                           \
-    if (!(locus_check_a op locus_check_b))                                                                     \
-      ::locus::internal::check_failed_op(__FILE__, __LINE__, #a " " #op " " #b, locus_check_a, locus_check_b); \
-  } while (false)
+#define LOCUS_CHECK_OP_(a, op, b)                                                                                    \
+  ::locus::internal::check_op([](const auto& locus_a, const auto& locus_b) { return locus_a op locus_b; }, (a), (b), \
+                              __FILE__, __LINE__, #a " " #op " " #b)
 #define LOCUS_CHECK_EQ(a, b) LOCUS_CHECK_OP_(a, ==, b)
 #define LOCUS_CHECK_NE(a, b) LOCUS_CHECK_OP_(a, !=, b)
 #define LOCUS_CHECK_LE(a, b) LOCUS_CHECK_OP_(a, <=, b)
