@@ -24,7 +24,7 @@ using RecoveryProgress = std::function<void(uint64_t applied, uint64_t of)>;
 
 // Returns the scene in the state after its last record, in the epoch stored.epoch. The scene appends to `log`, which
 // outlives the scene. `find_mesh` is called for each mesh that the snapshot or a later record uses, and may return null
-// for a mesh that no instance uses any more. O(snapshot + records).
+// for a mesh that no instance uses after the last record. O(snapshot + records).
 absl::StatusOr<ScenePtr> recover_scene(UpdateLog& log, const StoredScene& stored, const FindMesh& find_mesh,
                                        const RecoveryProgress& progress = nullptr);
 

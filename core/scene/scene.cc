@@ -143,9 +143,9 @@ absl::StatusOr<Scene::Acks> Scene::apply_each(absl::Span<const UpdateBatch* cons
     for (absl::StatusOr<UpdateAck>& ack : acks) {
       if (!ack.ok()) continue;
       absl::StatusOr<SceneWriter::Admission> admission = writer_.admit(*rest.front());
-      // Logs all batches from the first new batch on, because applying a batch may make a later batch of the same
-      // writer new. Earlier batches are answered without a change of the scene. Logged batches must be applied, so
-      // there is no error return after the append.
+      // Log all batches from the first new batch on, because applying a batch may make a later batch of the same writer
+      // new. The batches before the first new batch are duplicates or refused, so they change nothing and are not
+      // logged. Logged batches must be applied, so there is no error return after the append.
       if (!logged && admission.ok() && !*admission) {
         RETURN_IF_ERROR(journal_.append_each(writer_.epoch(), rest));
         logged = true;

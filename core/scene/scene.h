@@ -8,8 +8,8 @@
 // Threads: every member may be called from any thread. Calls of apply...() and change_instances() wait for each other
 // and for the log. latest() and view() hold a lock only to copy a pointer, and the writer holds this lock only to
 // publish a revision. So latest() and view() never wait for the writer or the log, unless view() is called for a future
-// revision. Invariants: the revisions of a scene are published in order and without gaps, each only when it is
-// complete, and with the writer's epoch; ticks never decrease unless a batch restarts them; a published snapshot never
+// revision. Invariants: the revisions of a scene are published in order and without gaps; a published revision is
+// complete and has the writer's epoch; ticks never decrease unless a batch restarts them; a published snapshot never
 // changes; no change is published or acknowledged before it is logged.
 #ifndef LOCUS_CORE_SCENE_SCENE_H_
 #define LOCUS_CORE_SCENE_SCENE_H_
@@ -101,9 +101,9 @@ class Scene {
 
   // Applies one batch as one revision; makes no revision if the batch changes nothing. Waits while readers exceed their
   // memory budget: see ReaderTracker. After an error, nothing has changed. The errors are: the error of check_form();
-  // FAILED_PRECONDITION BATCH_GAP if an earlier batch of the writer is missing; the first refused item if
-  // `all_or_nothing` is set; RESOURCE_EXHAUSTED for too many objects; DEADLINE_EXCEEDED if readers still exceed their
-  // budget at `until`; NOT_FOUND if the scene is closed; or the log's error.
+  // FAILED_PRECONDITION BATCH_GAP if an earlier batch of the writer is missing; an error that names the first refused
+  // item if `all_or_nothing` is set; RESOURCE_EXHAUSTED for too many objects; DEADLINE_EXCEEDED if readers still exceed
+  // their budget at `until`; NOT_FOUND if the scene is closed; or the log's error.
   absl::StatusOr<UpdateAck> apply(const UpdateBatch& batch, Deadline until = ReaderTracker::kNever)
       LOCUS_EXCLUDES(writer_mutex_, mutex_);
 
@@ -183,10 +183,10 @@ class Scene {
     bool notified_ = false;
   };
 
-  // Drops the oldest ticks of the history until the rest takes at most `bytes`. If it drops a tick, it also drops the
-  // revisions that are retained for kExactly views, except the latest revision, which keeps its number. Waits for a
-  // batch that is being applied. Returns the number of bytes by which the history became smaller. Called when memory is
-  // short.
+  // Drops the oldest ticks of the history until the rest takes at most `bytes`. If a tick is dropped, this call also
+  // drops the revisions that are retained for kExactly views, except the latest revision, whose number does not change.
+  // Waits for a batch that is being applied. Returns the number of bytes by which the history became smaller. Called
+  // when memory is short.
   uint64_t trim_history(uint64_t bytes) LOCUS_EXCLUDES(writer_mutex_, mutex_);
   // Revokes the pins of the oldest revisions until pinned revisions hold at most `bytes`, and cancels the readers of
   // the revoked pins. Called when memory is short. Returns the bytes that become free once these readers have ended.
@@ -232,8 +232,8 @@ class Scene {
   absl::Status admit_change(const StaticChange& change) LOCUS_EXCLUDES(mutex_);
   void leave_change(const StaticChange& change, const absl::Status& result) LOCUS_EXCLUDES(mutex_);
   absl::Status check_kept(const StaticChange& change) const;
-  // Returns the ack or error of a batch with the result `admission` of SceneWriter::admit(). Applies a new batch and
-  // publishes its revision.
+  // Returns the ack or the error of `batch`, for which SceneWriter::admit() has returned `admission`. If the batch is
+  // new, applies the batch and publishes the new revision.
   absl::StatusOr<UpdateAck> answer(const UpdateBatch& batch, absl::StatusOr<SceneWriter::Admission> admission)
       LOCUS_REQUIRES(writer_mutex_);
   void count_joined(const Acks& acks) LOCUS_EXCLUDES(mutex_);

@@ -189,8 +189,8 @@ absl::StatusOr<SceneWriter::Joined> SceneWriter::apply_joined(absl::Span<const U
   moves_.finish(objects_);
   if (any_new != nullptr) joined.snapshot = publish_moves(*any_new);
   for (size_t i = 0; i < batches.size(); ++i) {
-    // The ack of a duplicate has no epoch if it repeats an earlier element of `batches`, whose revision is known only
-    // now, or if the writer table has dropped it.
+    // The ack of a duplicate has epoch 0 in two cases: the duplicate repeats an earlier element of `batches`, whose
+    // revision is known only now, or the writer table has dropped the ack.
     if (is_new[i])
       record_ack(*batches[i], *joined.acks[i]);
     else if (joined.acks[i].ok() && joined.acks[i]->epoch == 0)

@@ -36,8 +36,8 @@ class SceneWriter {
   // The ack of a batch that was applied before, or nullopt if the batch is new.
   using Admission = std::optional<UpdateAck>;
   // Returns the ack of a batch that was applied before, marked as duplicate, or nullopt if the batch is new. If the
-  // writer table has dropped the ack, returns one with the current revision. Returns FAILED_PRECONDITION BATCH_GAP if
-  // an earlier batch of the writer is missing. Precondition: the batch has passed check_form().
+  // writer table has dropped the ack, the returned ack has the current revision instead. Returns FAILED_PRECONDITION
+  // BATCH_GAP if an earlier batch of the writer is missing. Precondition: the batch has passed check_form().
   absl::StatusOr<Admission> admit(const UpdateBatch& batch) const;
 
   struct Applied {
@@ -55,8 +55,8 @@ class SceneWriter {
     std::vector<absl::StatusOr<UpdateAck>> acks;  // one entry for each batch
     SnapshotPtr snapshot;                         // null when nothing changed
   };
-  // Applies the batches in order, as one revision. Calls log() before the first new batch is applied, and not if no
-  // batch is new; if log() returns an error, applies nothing and returns the error. Preconditions: each batch has
+  // Applies the batches in order, as one revision. Calls log() once, before the first new batch is applied, or never if
+  // no batch is new. If log() returns an error, applies nothing and returns this error. Preconditions: each batch has
   // passed check_form(), and may_join() is true for the first batch and each other batch.
   absl::StatusOr<Joined> apply_joined(absl::Span<const UpdateBatch* const> batches,
                                       absl::FunctionRef<absl::Status()> log);
@@ -68,8 +68,8 @@ class SceneWriter {
   // revision with the shorter history, or null if no record was dropped.
   SnapshotPtr trim_history(uint64_t bytes);
 
-  // Begins replay. If the scene has no history, no snapshots are built until end_replay(). Until then, apply(),
-  // apply_joined() and replace_statics() return null snapshots. published() must not be called during any replay.
+  // Begins replay, during which published() must not be called. If the scene has no history, no snapshots are built
+  // during the replay, so apply(), apply_joined() and replace_statics() return null snapshots.
   void begin_replay() {
     LOCUS_DCHECK(!replaying_);
     replaying_ = true;
@@ -124,7 +124,7 @@ class SceneWriter {
   absl::StatusOr<Applied> apply_changes(const UpdateBatch& batch);
   // Returns true if the batch drops history.
   bool drops_history(const UpdateBatch& batch) const { return batch.restart_ticks && has_past(); }
-  // Returns the scene's tick once the batch is applied.
+  // Returns the tick that the scene will have after the batch.
   uint64_t tick_of(const UpdateBatch& batch) const;
   // Ends the current tick if the batch begins another tick: adds the state at the end of the current tick to the
   // history, or drops the history if the batch restarts ticks. Does nothing for a scene without history. Call before

@@ -9,9 +9,9 @@
 namespace locus {
 namespace {
 
-// The largest batch fits into a record, and so does the largest static change: the values of an item have at most 128
-// bytes in all columns, the column lengths of a list at most 256 bytes, and an instance at most 256 bytes, including
-// the hash and name of its mesh.
+// The largest batch and the largest static change fit into a record. The values of one item take at most 128 bytes in
+// all columns together, the column lengths of one list take at most 256 bytes, and one instance takes at most 256
+// bytes, including the hash and the name of its mesh.
 static_assert(uint64_t{limits::kMaxUpdateItems} * 128 + uint64_t{limits::kMaxUpdateLists} * 256 <=
               UpdateLog::kMaxRecordBytes);
 static_assert(uint64_t{limits::kMaxInstances} * 256 <= UpdateLog::kMaxRecordBytes);

@@ -46,8 +46,9 @@ class SceneJournal {
   absl::Status append_each(uint64_t epoch, absl::Span<const UpdateBatch* const> batches) LOCUS_EXCLUDES(mutex_);
   // Appends a single record for all batches, which become one revision.
   absl::Status append_joined(uint64_t epoch, absl::Span<const UpdateBatch* const> batches) LOCUS_EXCLUDES(mutex_);
-  // Appends a static change. Syncs it even for a scene with AckLevel::kMemory: once the change removes the last
-  // instance of a mesh, the mesh may be deleted, and after a crash that loses the change the scene would need the mesh.
+  // Appends a static change, and syncs the change even for a scene with AckLevel::kMemory. The change may remove the
+  // last instance of a mesh, and the mesh may then be deleted. If a crash lost the change, the recovered scene would
+  // need the deleted mesh.
   absl::Status append_change(uint64_t epoch, const StaticChange& change, absl::Span<const Id> placed)
       LOCUS_EXCLUDES(mutex_);
   // Deletes the scene from the log.
@@ -78,7 +79,7 @@ class SceneJournal {
 
   mutable Mutex mutex_;
   LogPosition position_ LOCUS_GUARDED_BY(mutex_);
-  uint64_t bytes_in_snapshots_ LOCUS_GUARDED_BY(mutex_) = 0;  // total_bytes() at the snapshot's last record
+  uint64_t bytes_in_snapshots_ LOCUS_GUARDED_BY(mutex_) = 0;  // total_bytes() after the last record in the snapshot
 };
 
 }  // namespace locus

@@ -2,7 +2,7 @@
 // with sequence numbers without gaps. The log stores bytes, which the caller encodes (core/scene/log/record_codec.h),
 // and detects damage of the stored bytes. Implemented in server/storage; the daemon's main() passes it to the scenes.
 //
-// A replicated log can implement the interface later: for this purpose, the sequence numbers of a scene have no gaps,
+// A future replicated log can implement this interface. For this purpose, the sequence numbers of a scene have no gaps,
 // every record has the epoch of the scene and the writer id and number of its batch, and the durability of an ack is an
 // AckLevel.
 //
@@ -116,19 +116,19 @@ class UpdateLog {
   virtual absl::Status write_snapshot(SceneKey scene, uint64_t sequence, ChunkSource state) = 0;
   virtual absl::Status read_snapshot(SceneKey scene, ChunkSink sink) const = 0;
 
-  // Adds a mesh name. The content, vertices and indices, is stored once for all names of equal content: `content` is
-  // called only if the content is not stored yet, or if read_mesh() has found it damaged. `parts` are stored for each
-  // name.
+  // Adds a mesh name. The content (vertices and indices) is stored once for all names of equal content: `content` is
+  // called only if the content is not stored yet, or if read_mesh() has found the stored content damaged. The result of
+  // `parts` is stored for each name.
   virtual absl::Status add_mesh(absl::string_view name, const std::array<uint8_t, 32>& sha256, ChunkSource content,
                                 ChunkSource parts) = 0;
   virtual absl::Status delete_mesh(absl::string_view name) = 0;
   virtual absl::Status read_mesh(const std::array<uint8_t, 32>& sha256, ChunkSink sink) const = 0;
   virtual absl::Status read_parts(absl::string_view name, ChunkSink sink) const = 0;
 
-  // Write and read a cache of tree topologies (core/scene/log/tree_codec.h), one for each content, which makes recovery
-  // faster. Writing ignores errors; reading returns nullopt if nothing is stored. The topology is deleted with the last
-  // name of its content and is not part of a backup. For each content, only one thread at a time may call these two
-  // functions.
+  // Write and read a cache that makes recovery faster: it has one tree topology (core/scene/log/tree_codec.h) for each
+  // content. Writing ignores errors; reading returns nullopt if nothing is stored. The topology is deleted with the
+  // last name of its content and is not part of a backup. For each content, only one thread at a time may call these
+  // two functions.
   virtual void keep_outline(const std::array<uint8_t, 32>& sha256, absl::string_view bytes) = 0;
   virtual std::optional<std::string> read_outline(const std::array<uint8_t, 32>& sha256) const = 0;
 

@@ -33,7 +33,7 @@ class ObjectSet {
   // through the keys of one brick.
   GridRef find_ref(Id id) const;
   std::optional<Object> find(Id id) const;
-  // Returns true if an object with this id is stored at exactly this position.
+  // Returns true if an object with the id of `object` is stored at exactly the position of `object`.
   bool contains(const Object& object) const {
     const GridRef known = find_ref(object.id);
     return known && known.entry().position == object.shape.position;

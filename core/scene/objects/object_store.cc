@@ -10,10 +10,10 @@ namespace locus {
 namespace {
 
 constexpr size_t kPrefetchObjects = 16;  // prefetch distance, in objects
-constexpr uint32_t kNewLife = ~0u;       // marks an inserted object that updates no removed object
+constexpr uint32_t kNewLife = ~0u;       // marks an inserted object that begins a new lifetime
 
-// Returns for each object of `inserted` the index in `removed` of the object that it updates, or kNewLife if it updates
-// no removed object.
+// Returns, for each object of `inserted`, the index in `removed` of the old state of the same object. Returns kNewLife
+// if `removed` has no object with this id, or if the id is in `replaced`.
 std::vector<uint32_t> updated_objects(absl::Span<const Object> removed, absl::Span<const Object> inserted,
                                       const absl::flat_hash_set<Id>& replaced) {
   std::vector<uint32_t> before(inserted.size(), kNewLife);

@@ -65,15 +65,16 @@ class ObjectStore {
   // Replaces the objects `removed` by `inserted`. An id in both lists is an update of one object, unless the id is in
   // `replaced`: then the lifetime of the old object ends, and a new lifetime begins. Preconditions: every removed
   // object is present; after the removals, no object with an inserted id is present. O(removed + inserted), plus the
-  // size of the changed bricks. Returns the number of bytes that existing sets hold and later sets will not share.
+  // size of the changed bricks. Returns the number of replaced bytes: the bytes that existing object sets hold and
+  // later sets will not share.
   size_t apply(absl::Span<const Object> removed, absl::Span<const Object> inserted,
                const absl::flat_hash_set<Id>& replaced = {});
   // Moves objects. Precondition: the handles belong to objects and are distinct. Returns the number of replaced bytes,
   // like apply().
   size_t move(const GridMoves& moves);
   void insert(const Object& object) { apply({}, {&object, 1}); }
-  // Inserts the objects of `chunks` into an empty store with cells of about `cell_size`. Frees each chunk once it is
-  // inserted. Returns false if an id occurs twice; after that, the store must not be used any more.
+  // Inserts the objects of `chunks` into an empty store with cells of about `cell_size`. Frees each chunk once its
+  // objects are copied. Returns false if an id occurs twice; after that, the store must not be used any more.
   bool fill(std::vector<std::vector<Object>> chunks, double cell_size);
   // Removes the object with the id of `object`. Returns false and changes nothing if contains() is false.
   bool remove(const Object& object);

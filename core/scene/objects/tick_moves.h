@@ -3,7 +3,7 @@
 //
 // Most objects move little, and one bound covers all of them. Objects that moved farther than the width of a cell are
 // fast: they are listed individually, so that a single fast object does not widen every search. If more than kMaxFast
-// objects are listed, the length above which an object is fast is doubled until at most half of kMaxFast objects are
+// objects are listed, the length above which an object is fast is doubled until at most kMaxFast / 2 objects are
 // listed. Invariants: the list is ascending by handle, holds at most kMaxFast objects, and holds exactly the objects of
 // Kind::kListed.
 #ifndef LOCUS_CORE_SCENE_OBJECTS_TICK_MOVES_H_
@@ -16,8 +16,8 @@
 
 namespace locus {
 
-// Object that moved far in a tick: its extent under any rotation, and `centers`, the bounds of its position when the
-// tick began and of its positions since it became fast.
+// Object that moved far in a tick. `extent` holds under any rotation. `centers` are the bounds of the object's position
+// at the start of the tick and of its positions since it became fast.
 struct FastMover {
   uint32_t handle = 0;
   float extent = 0;
@@ -61,7 +61,7 @@ class TickMoves {
   Start& start_of(uint32_t handle);
   // Adds an object to fast_, or extends FastMover::centers of an object that is already in fast_.
   void add_fast(uint32_t handle, Start& start, Vec3d to, double length);
-  // Raises fast_length_ until at most half of kMaxFast objects are listed.
+  // Raises fast_length_ until at most kMaxFast / 2 objects are listed.
   void list_fewer();
 
   std::vector<Start> starts_;  // indexed by handle

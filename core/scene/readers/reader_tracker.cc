@@ -16,7 +16,7 @@ namespace {
 constexpr uint64_t kCountShare = 64;
 // Upper bound of the ratio A / B for two revisions of a scene. A is the number of bytes that the earlier revision holds
 // and the later revision does not hold. B is the difference of their SceneSnapshot::replaced_bytes, which does not
-// count lookup tables. The largest measured ratio is 2.2.
+// count the lookup tables of the grid. The largest measured ratio is 2.2.
 constexpr uint64_t kMaxOfReplaced = 4;
 constexpr uint32_t kRetryMs = 10;
 
@@ -123,8 +123,8 @@ std::vector<ReaderTracker::Holding> ReaderTracker::pinned_before(const SceneSnap
   return pinned;
 }
 
-// Bytes replaced between two consecutive pinned revisions are counted only for the older revision, so that bytes which
-// several pinned revisions share are counted once.
+// Compares each pinned revision with the next one. Bytes that several consecutive pinned revisions share are therefore
+// counted only once, for the last of these revisions.
 uint64_t ReaderTracker::count(std::vector<Holding>& pinned, const SceneSnapshot& latest) {
   uint64_t held = 0;
   for (size_t i = 0; i < pinned.size(); ++i) {

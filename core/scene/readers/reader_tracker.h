@@ -1,10 +1,11 @@
-// Tracks the revisions of a scene that are being read, and the memory that cannot be freed while these revisions are
-// read. So slow readers cannot make memory grow without limit while updates stream in. If pinned revisions hold more
-// than the budget, the pins of the oldest revisions are revoked, and the writer waits until these pins are released.
+// Tracks the revisions of a scene that readers have pinned, and the memory that cannot be freed because of the pins. If
+// pinned revisions hold more memory than the budget, the pins of the oldest revisions are revoked, and the writer waits
+// until the revoked pins are released. Therefore slow readers cannot make memory grow without limit while updates
+// arrive.
 //
 // Threads: every member may be called from any thread; enforce_budget() from one thread at a time. Readers and the
-// writer block each other only for the access to a small map: memory is counted outside the lock. Invariants: each
-// entry of pinned_ has at least one pin; revoked_ is the number of revoked entries; a revoked entry stays revoked.
+// writer block each other only while one of them accesses a small map: memory is counted outside the lock. Invariants:
+// each entry of pinned_ has at least one pin; revoked_ is the number of revoked entries; a revoked entry stays revoked.
 #ifndef LOCUS_CORE_SCENE_READERS_READER_TRACKER_H_
 #define LOCUS_CORE_SCENE_READERS_READER_TRACKER_H_
 
@@ -75,9 +76,9 @@ class ReaderTracker {
   // limits::kPinnedShare times the memory of the scene.
   explicit ReaderTracker(uint64_t budget) : fixed_(budget), budget_(budget_for(0)) {}
 
-  // Revokes the oldest pins until the memory held by pins fits the budget. The writer calls enforce_budget() after
-  // publishing `latest`. Usually O(1); O(memory that the pinned revisions do not share) if the bytes replaced since the
-  // oldest pin could exceed the budget. `latest` and all pinned snapshots belong to one scene.
+  // Revokes the oldest pins until the memory held by the other pins fits the budget. The writer calls enforce_budget()
+  // after publishing `latest`. O(1) if may_exceed() returns false, as it usually does; otherwise O(memory that the
+  // pinned revisions do not share). `latest` and all pinned snapshots belong to one scene.
   void enforce_budget(const SceneSnapshot& latest) LOCUS_EXCLUDES(mutex_);
 
   // Returns true while a revoked pin is not released, unless the tracker is closed.
@@ -88,8 +89,8 @@ class ReaderTracker {
   uint64_t budget() const LOCUS_EXCLUDES(mutex_);
   // Calls the on_revoke() callbacks of pins that are revoked but not released, each at most once.
   void revoke_overdue() LOCUS_EXCLUDES(mutex_);
-  // Revokes the oldest pins until pins hold at most `bytes`, regardless of the budget. Called when memory is short.
-  // Returns the bytes that the pins revoked by this call hold, which become free when their readers end.
+  // Revokes the oldest pins until the other pins hold at most `bytes`, regardless of the budget. Called when memory is
+  // short. Returns the number of bytes that become free when the readers of the pins revoked by this call end.
   uint64_t revoke_beyond(const SceneSnapshot& latest, uint64_t bytes) LOCUS_EXCLUDES(mutex_);
   // Closes the tracker: running and later calls of wait_until_returned() return true at once.
   void close() LOCUS_EXCLUDES(mutex_);
@@ -104,8 +105,8 @@ class ReaderTracker {
 
  private:
   friend class SnapshotPin;
-  // Pinned revision, and the bytes that it does not share with the next later pinned revision or, if there is none,
-  // with the latest revision.
+  // Pinned revision. `bytes` is the memory that this revision does not share with the next later pinned revision or, if
+  // there is none, with the latest revision.
   struct Holding {
     SnapshotPtr snapshot;
     uint64_t bytes = 0;
@@ -117,7 +118,8 @@ class ReaderTracker {
   SnapshotPin::Entry add(const SnapshotPtr& snapshot) LOCUS_EXCLUDES(mutex_);
   void remove(SnapshotPin::Entry entry, const SnapshotPin::Revocation* revocation) LOCUS_EXCLUDES(mutex_);
   void add_revocation(std::shared_ptr<SnapshotPin::Revocation> revocation) LOCUS_EXCLUDES(mutex_);
-  // Returns true if pins may hold more than the budget, estimated from the replaced bytes.
+  // Returns true if pinned revisions may hold more memory than the budget. This is an estimate from the number of bytes
+  // that updates have replaced since the oldest pinned revision and since the last count of held memory.
   bool may_exceed(const SceneSnapshot& latest) const LOCUS_REQUIRES(mutex_);
   // Returns the pinned revisions before `latest`, oldest first.
   std::vector<Holding> pinned_before(const SceneSnapshot& latest) const LOCUS_REQUIRES(mutex_);
@@ -140,9 +142,9 @@ class ReaderTracker {
   uint64_t counted_ LOCUS_GUARDED_BY(mutex_) = 0;
   uint64_t counted_at_ LOCUS_GUARDED_BY(mutex_) = 0;
   uint64_t budget_ LOCUS_GUARDED_BY(mutex_);
-  // enforced_at_ is SceneSnapshot::replaced_bytes of the last snapshot passed to enforce_budget(). late_bytes_ accounts
-  // for revisions that were already outdated when they were pinned after the last count: for each of them, it includes
-  // enforced_at_ at the time of the pin minus SceneSnapshot::replaced_bytes of the revision.
+  // enforced_at_ is SceneSnapshot::replaced_bytes of the last snapshot passed to enforce_budget(). late_bytes_ is a sum
+  // with one term for each revision that was pinned after the last count and was already outdated at the time of the
+  // pin: enforced_at_ at that time minus SceneSnapshot::replaced_bytes of the revision.
   uint64_t enforced_at_ LOCUS_GUARDED_BY(mutex_) = 0;
   uint64_t late_bytes_ LOCUS_GUARDED_BY(mutex_) = 0;
 };

@@ -7,8 +7,8 @@
 namespace locus {
 namespace {
 
-// Returns a copy of `record` whose `bytes` count the memory that the record does not share with `next`, the objects of
-// the next record or, for the last record, of the latest revision.
+// Returns a copy of `record` in which `bytes` is the memory that the record does not share with `next`. `next` has the
+// objects of the next record or, if `record` is the last record, the current objects.
 std::shared_ptr<const HistoryRecord> with_bytes(const HistoryRecord& record, const ObjectSet& next) {
   HistoryRecord counted = record;
   counted.bytes = sizeof(HistoryRecord) + record.objects.unshared_bytes(next);

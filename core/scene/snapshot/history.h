@@ -19,7 +19,8 @@ struct HistoryRecord {
   ObjectSet objects;  // objects at the end of `tick`
   // Displacement up to the next record. Not set in the last record: see SceneSnapshot::since_close.
   Displacement to_next;
-  // Memory in bytes that is not shared with the next record or, for the last record, with the latest revision.
+  // Memory in bytes that is not shared with the next record. The last record of a history has no next record: for this
+  // record, the memory that is not shared with the first revision after `tick`.
   size_t bytes = 0;
 };
 
@@ -61,13 +62,13 @@ class HistoryRecorder {
   // scene is at `next_tick`. `since_last` is the displacement since the last record. Precondition: last record's tick <
   // `tick` < `next_tick`. O(records + memory that the tick changed).
   void close(uint64_t tick, const ObjectSet& objects, const Displacement& since_last, uint64_t next_tick);
-  // Counts the memory of the last record that is not shared with the current objects `now`. Only the first call after
-  // each close() has an effect.
+  // Measures how much memory of the last record is not shared with `now`, the current objects, and drops the oldest
+  // records if all records exceed HistoryOptions::bytes. Only the first call after each close() has an effect.
   void measure(const ObjectSet& now);
   // Drops all records.
   void drop();
-  // Drops the oldest records until the rest takes at most `bytes`, because memory is short. Returns whether a record
-  // was dropped. Does not change the memory limit for records that are added later.
+  // Drops the oldest records until the rest takes at most `bytes`. Called when memory is short. Returns true if a
+  // record was dropped. Does not change the memory limit for records that are added later.
   bool trim(uint64_t bytes);
   // Returns true if close() was called since the last drop(), even if all records were dropped to save memory. The
   // result depends on the batches alone, so that a replay of the same batches gives the same revisions.
@@ -85,8 +86,8 @@ class HistoryRecorder {
   // Checks the invariants of the published history. O(records).
   void check_invariants() const;
   void drop_first(History& history, size_t count, PastLimit reason);
-  // Publishes `history` without its oldest records, so that the rest takes at most `max_bytes`. If a record is dropped,
-  // sets the result of limit() to `reason`.
+  // Drops the oldest records of `history` until the rest takes at most `max_bytes`, and publishes the rest. If a record
+  // is dropped, sets the result of limit() to `reason`.
   void publish(History history, uint64_t max_bytes, PastLimit reason);
 
   HistoryOptions options_;

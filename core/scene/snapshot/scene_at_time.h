@@ -2,10 +2,10 @@
 // for objects. Borrows from a snapshot and is cheap to copy. Any thread may use a view.
 //
 // An object exists at a time if it existed at the end of the last tick recorded up to that time. If the same lifetime
-// of the object exists at the next recorded tick, the object moves there in a straight line; otherwise it stays in
-// place. A search widens its region by the displacement bound, finds objects at their positions at the earlier recorded
-// tick, and interpolates each object found. At a recorded tick, and at the latest revision, nothing is interpolated or
-// widened.
+// of the object exists at the next recorded tick, the object moves in a straight line to its position at that tick;
+// otherwise the object stays in place. A search widens its region by the displacement bound, finds objects at their
+// positions at the earlier recorded tick, and interpolates each object found. At a recorded tick, and at the latest
+// revision, nothing is interpolated or widened.
 #ifndef LOCUS_CORE_SCENE_SNAPSHOT_SCENE_AT_TIME_H_
 #define LOCUS_CORE_SCENE_SNAPSHOT_SCENE_AT_TIME_H_
 

@@ -17,16 +17,19 @@ const HistoryRecord* first_record(const SceneSnapshot& snapshot, uint64_t tick) 
   return first == records.end() ? nullptr : first->get();
 }
 
-// Returns the bytes of the history records of `held` that `later` does not hold. HistoryRecord::bytes excludes memory
-// shared with the next record: this memory is counted with the next record, or is still held by `later` and so not
-// counted.
+// Returns the bytes of the history records of `held` that `later` does not hold. A record whose tick `later` has
+// dropped counts with its HistoryRecord::bytes, which excludes the memory that the record shares with the next record
+// of `held`. If `later` has dropped the next record too, the excluded memory counts with that record; if not, `later`
+// still holds the excluded memory. For the last record of `held`, the excluded memory is shared with the first revision
+// after the tick of the record; this memory counts with held.objects, as far as held.objects still shares it.
 uint64_t unshared_history_bytes(const SceneSnapshot& held, const SceneSnapshot& later) {
   if (held.history == nullptr || held.history == later.history) return 0;
   uint64_t bytes = 0;
   for (const std::shared_ptr<const HistoryRecord>& record : held.history->records) {
     const HistoryRecord* kept = first_record(later, record->tick);
     if (kept == record.get()) continue;
-    // Appending a record replaces the record before it by a copy with the same objects, so compare the objects.
+    // Appending a record replaces the previous record by a copy with the same objects. Therefore compare the objects of
+    // two records of the same tick, not the pointers to the records.
     const bool same_tick = kept != nullptr && kept->tick == record->tick;
     bytes += same_tick ? record->objects.unshared_bytes(kept->objects) : record->bytes;
   }

@@ -22,8 +22,9 @@ struct SceneSnapshot {
   ObjectSet objects;
   HistoryPtr history;        // null if the history has no record
   Displacement since_close;  // displacement from the last history record to this revision
-  // Total bytes of memory that the revisions up to this one have replaced, not counting lookup tables. Includes memory
-  // that was allocated and replaced between two revisions, and memory that the history still holds. Never decreases.
+  // Total bytes of memory that the revisions up to this one have replaced, not counting the lookup tables of the grid.
+  // Includes memory that was allocated and replaced between two revisions, and memory that the history still holds.
+  // Never decreases.
   uint64_t replaced_bytes = 0;
   PastLimit past_limit = PastLimit::kOff;  // reason why the history has no ticks before oldest_tick()
 
@@ -34,8 +35,10 @@ struct SceneSnapshot {
 using SnapshotPtr = std::shared_ptr<const SceneSnapshot>;
 
 // Returns the bytes that `held` holds and `later`, a later revision of the same scene, does not: objects, instances and
-// history, but not meshes, which scenes share. The result is exact, except that it may overestimate the bytes of the
-// history if ticks were restarted between the two revisions. O(size of the difference).
+// history, but not meshes, which scenes share. The result is exact except for the history. It may overestimate the
+// bytes of the history if ticks were restarted between the two revisions. It may underestimate them if `later` has
+// dropped the last history record of `held`, and `held` is not the first revision after the tick of this record. O(size
+// of the difference).
 uint64_t unshared_bytes(const SceneSnapshot& held, const SceneSnapshot& later);
 
 // Returns the bytes of the snapshot without its history and meshes. O(objects).

@@ -71,7 +71,7 @@ void StaticMesh::Content::keep_columns(const TriangleMesh& mesh) {
   }
 }
 
-// Sets the tree, and what is computed from it. The columns must be set.
+// Sets the tree, and computes the winding cells and the block numbers from the tree. Call after keep_columns().
 void StaticMesh::Content::set_tree(TriangleBvh new_tree) {
   tree = std::move(new_tree);
   if (open_edges == 0) winding_cells = WindingCells::build(tree);

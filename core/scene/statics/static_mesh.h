@@ -34,8 +34,8 @@ struct MeshKey {
 
 class StaticMesh {
  public:
-  // Builds a mesh and its tree. Returns the errors of TriangleBvh::build(). `sha256` is the hash of the uploaded bytes,
-  // which is not verified.
+  // Builds a mesh and its tree. Returns the errors of TriangleBvh::build(). `sha256` is the hash of the uploaded bytes;
+  // build() does not verify this hash.
   static absl::StatusOr<std::shared_ptr<const StaticMesh>> build(std::string name, const Sha256& sha256,
                                                                  TriangleMesh mesh, const BvhOptions& options = {});
 
@@ -54,8 +54,8 @@ class StaticMesh {
   const std::string& name() const { return name_; }
   const Sha256& sha256() const { return content_->sha256; }
   MeshKey key() const { return {sha256(), name_}; }
-  // Returns the tree. Overlap queries with STATIC_DETAIL_TRIANGLES return an instance's rows in the tree's storage
-  // order.
+  // Returns the tree. Overlap queries with STATIC_DETAIL_TRIANGLES return the rows of an instance in the order in which
+  // the tree stores the triangles.
   const TriangleBvh& tree() const { return content_->tree; }
   uint32_t vertex_count() const { return content_->vertex_count; }
   uint32_t triangle_count() const { return static_cast<uint32_t>(tree().size()); }
@@ -63,7 +63,7 @@ class StaticMesh {
   // Returns the number of open edges: see count_open_edges(). A mesh without open edges is closed and has an inside.
   uint64_t open_edges() const { return content_->open_edges; }
   bool is_closed() const { return open_edges() == 0; }
-  // Returns the winding numbers around cells of space. They have no cells if the mesh is not closed.
+  // Returns the winding numbers of cells of space. The result has no cells if the mesh is not closed.
   const WindingCells& winding_cells() const { return content_->winding_cells; }
   // Returns the bounds of all triangles.
   const Aabbf& bounds() const { return tree().bounds(); }

@@ -15,7 +15,8 @@
 namespace locus {
 namespace {
 
-// Limit of the coordinates of a placed mesh's bounds, which may extend beyond the limit of positions.
+// Maximum absolute coordinate of the bounds of a placed mesh. Higher than the limit of positions, because a mesh may
+// extend beyond the position of its instance.
 constexpr double kMaxPlacedBound = 2 * limits::kMaxCoordinate;
 
 absl::Status check_columns(const PlacementColumns& place, const std::string& field) {

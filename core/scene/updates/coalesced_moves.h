@@ -11,8 +11,8 @@ namespace locus {
 
 class CoalescedMoves {
  public:
-  // Adds the moves of one batch for objects of `store`. Returns true if, after the moves of earlier calls, any of these
-  // moves still changes the position or rotation of its object. O(moves).
+  // Adds the moves of one batch for objects of `store`. Returns true if at least one of these moves changes the
+  // position or rotation that its object has after the moves of earlier calls. O(moves).
   bool add(const GridMoves& batch, const ObjectStore& store);
 
   bool empty() const { return moves_.empty(); }
@@ -33,7 +33,8 @@ class CoalescedMoves {
 
   std::vector<GridMove> moves_;  // at most one move for each handle
   std::vector<Quaternion> rotations_;
-  // For each handle, the index of its move in moves_. An entry is stale unless the move at this index has the handle.
+  // For each handle, the index of its move in moves_. An entry is stale unless the move at this index has the same
+  // handle.
   std::vector<uint32_t> move_of_handle_;
 };
 

@@ -9,7 +9,8 @@
 namespace locus {
 namespace {
 
-// Number of items whose handles are looked up together, so that their memory is prefetched before they are read.
+// Number of items that are read together. Before the first of them is read, the handles of all these items are looked
+// up and the memory to which the handles refer is prefetched.
 constexpr size_t kItemsAtOnce = 64;
 
 }  // namespace

@@ -62,7 +62,8 @@ class MoveApplier {
 
   std::vector<GridMove> moves_;
   std::vector<Quaternion> rotations_;
-  // For each handle, the index of its move in moves_. An entry is stale unless the move at this index has the handle.
+  // For each handle, the index of its move in moves_. An entry is stale unless the move at this index has the same
+  // handle.
   std::vector<uint32_t> last_move_;
   std::vector<uint32_t> handles_;  // handles of the items being read
   bool changes_ = false;

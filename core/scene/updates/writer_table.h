@@ -1,9 +1,9 @@
-// Table of the last batch and ack of each known writer, so that a batch that is sent twice is applied once. Bounded:
-// the least recently active writer is evicted first. Its next batch is then refused, because the batch may be a
-// duplicate. If the stored acks would list more than kMaxKeptErrors errors, the acks of all writers are dropped, but
-// the writers and their batch numbers are kept. A value type; one thread at a time. Invariants: at most
-// limits::kMaxWriters writers are stored, no writer id is 0, and no activity count exceeds clock_; kept_errors_ is the
-// number of errors in all stored acks, at most kMaxKeptErrors.
+// Table of the last batch and ack of each known writer, so that a batch that is sent twice is applied once. If the
+// table is full, the least recently active writer is evicted. The next batch of an evicted writer is refused, because
+// the table cannot know whether this batch was applied before. If the stored acks would list more than kMaxKeptErrors
+// errors, the acks of all writers are dropped, but the writers and their batch numbers are kept. A value type; one
+// thread at a time. Invariants: at most limits::kMaxWriters writers are stored, no writer id is 0, and no activity
+// count exceeds clock_; kept_errors_ is the number of errors in all stored acks, at most kMaxKeptErrors.
 #ifndef LOCUS_CORE_SCENE_UPDATES_WRITER_TABLE_H_
 #define LOCUS_CORE_SCENE_UPDATES_WRITER_TABLE_H_
 
@@ -24,8 +24,8 @@ class WriterTable {
   static constexpr size_t kMaxKeptErrors = size_t{64} * limits::kMaxListedItemErrors;
 
   // Returns nullopt if the batch must be applied, because it is the next batch of its writer or has no writer. If the
-  // batch was applied before, returns its ack, marked as duplicate, or, if the ack is not stored, an empty ack that is
-  // marked as duplicate. Returns FAILED_PRECONDITION BATCH_GAP if an earlier batch is missing.
+  // batch was applied before, returns an ack that is marked as duplicate: the stored ack of the batch or, if this ack
+  // is not stored, an empty ack. Returns FAILED_PRECONDITION BATCH_GAP if an earlier batch is missing.
   absl::StatusOr<std::optional<UpdateAck>> admit(uint64_t writer, uint64_t batch) const;
   // Stores the number and the ack of the latest batch of a writer. Evicts another writer, or drops all acks, if a limit
   // would be exceeded. Does nothing for writer 0.
