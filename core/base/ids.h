@@ -10,7 +10,7 @@ namespace locus {
 using Id = uint64_t;      // id of an object or instance; 0 = no id
 using Group = uint64_t;   // number that several objects share, such as a player; 0 = no group
 using Tag = uint64_t;     // any value that the caller stores with an object; returned on request
-using Layers = uint32_t;  // one bit per layer: the layers of an object, or those that a query searches
+using Layers = uint32_t;  // one bit per layer: the layers of an object, or the layers that a query searches
 
 inline constexpr Id kNoId = 0;
 inline constexpr Id kChosenIdBit = Id{1} << 63;

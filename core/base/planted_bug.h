@@ -24,17 +24,17 @@ enum class PlantedBug {
   kPlacedBoundsAlone,  // CONSERVATIVE ball and box queries lose exact hits outside a triangle's world bounds
   kCapsuleCap,         // a capsule has no caps: its inner segment ends where the caps begin
   kEndlessCapsule,     // a capsule is an endless cylinder
-  kSweepStart,         // a sweep ignores what it touches at its start
-  kPairBothSides,      // a pair of objects is found from both of its sides
+  kSweepStart,         // a sweep does not find a primitive that the mover touches at the start
+  kPairBothSides,      // a pair of objects is reported twice, once for each object
   kPairCullExtent,     // the cull of pairs ignores the extent of the first object
-  kCellBeyond,         // a cell of free space has planes for what lies beyond other planes
+  kCellBeyond,         // a cell of free space also has planes for primitives beyond its other planes
   kMatrixRow,          // a plane of a view is computed from the wrong row of its matrix
   kOwnGroupBlocks,     // the group of a viewer blocks its sight
-  kClosedEdge,         // a ray that counts crossings of a mesh meets both ends of an edge
-  kCrossingInDouble,   // signs of crossings that double leaves in doubt are those of double
-  kCrossingMirror,     // a half line that descends counts crossings like one that ascends
+  kClosedEdge,         // an edge includes both of its ends when crossings of a mesh are counted
+  kCrossingInDouble,   // signs of crossings are taken from double even if double cannot decide them
+  kCrossingMirror,     // a descending half line counts crossings with the sign of an ascending one
   kCellAtMax,          // a triangle does not mark the cells of the greatest coordinates of its bounds
-  kWayShort,           // a search with a known end ends in the cell of its start
+  kWayShort,           // a search that should end in another cell ends in the cell of its start
   kHalfLineRounding,   // boxes are compared with the point rounded to the nearest float
   kHalfLineStart,      // a half line does not meet a box that ends exactly at its start
   // The ray kernels:
@@ -51,7 +51,7 @@ enum class PlantedBug {
   // In a query for all hits, a hit at the same t as the highest stored row, with a lower triangle number, does not
   // replace that row.
   kKernelRowTie,
-  kKernelHitAfterGivingUp,  // a ray whose verdict is kUndecided in a packet of rays returns a later hit
+  kKernelHitAfterGivingUp,  // an undecided ray of a packet still records later hits
   // The region kernels:
   kRegionReach,       // boxes of nodes are tested against the ball without a pad
   kRegionInside,      // vertices are tested against the ball in float without an error bound
@@ -70,7 +70,7 @@ enum class PlantedBug {
   kRightLeftOut,         // a grant of any right to a scene grants every right to it
   kSceneLeftOut,         // a grant for some scenes grants its rights to every scene
   kUpdateIsAdmin,        // the right to update includes the right to administer
-  kGlobTooWide,          // a pattern matches every text that begins like it
+  kGlobTooWide,          // a pattern matches every text with a matching prefix
   kTokenByPrefix,        // only the beginning of a token, its id, is compared
   kTokenNeverExpires,    // the time at which a token expires is ignored
   kRevokedTokenStays,    // the streams of a revoked token are still valid
@@ -79,21 +79,21 @@ enum class PlantedBug {
   kJwtForAnyone,         // the claim aud is ignored
   kJwtWithoutAlgorithm,  // a JWT whose algorithm is `none` needs no signature
   kJwtAnySignature,      // the signature is not compared
-  kJwtKeyOfAnotherKind,  // a key verifies algorithms that it is not for
-  kUserFromAfar,         // the user of a peer counts on every connection
+  kJwtKeyOfAnotherKind,  // a key verifies signatures of any algorithm
+  kUserFromAfar,         // the Unix user of a peer is accepted on connections that are not local, too
   // The nearest kernels:
   kNearestError,      // bounds of distances to triangles are computed in float without an error bound
-  kNearestPad,        // the distance between the point and its rounded place is ignored
+  kNearestPad,        // the distance between the point and the rounded point is ignored
   kNearestBoxLimit,   // squared distances to boxes are compared in float without a pad
   kNearestFloor,      // squares that may underflow are compared without the pad for underflow
   kNearestSlack,      // only triangles exactly as near as the nearest one are candidates
-  kNearestOtherLane,  // a triangle that is not nearer than another one of its block is no candidate
-  kNearestMeasure,    // the plane of a sliver is measured like that of other triangles
+  kNearestOtherLane,  // the first candidate triangle of each block is dropped
+  kNearestMeasure,    // distances to the planes of slivers are measured as for other triangles
   // The crossing kernels:
   kCrossingError,  // areas are compared with 0 in float without an error bound
   kCrossingPad,    // the difference between the point and the rounded point is ignored
-  kCrossingNear,   // a triangle whose bounds contain the start of the half line counts like one beyond it
-  kCrossingTop,    // the vertex of a triangle that is highest across the half line is not on the surface
+  kCrossingNear,   // a triangle whose bounds contain the start of the half line counts as beyond the start
+  kCrossingTop,    // a point at a triangle's highest vertex, across the half line, is not on the surface
 };
 
 #ifdef LOCUS_PLANT_BUGS
