@@ -17,8 +17,9 @@ struct Edge {
   uint32_t from, to;
 };
 
-// Edges of a mesh, sorted by their lower corner: ends[start[i]] to ends[start[i + 1] - 1] are the higher corners of the
-// edges of corner i. The lowest bit is set for an edge that goes from the higher to the lower corner.
+// Edges of a mesh, grouped by their lower corner: ends_[start_[i]] to ends_[start_[i + 1] - 1] are the edges whose
+// lower corner is i. Each value has the higher corner of its edge in the upper bits. Its lowest bit is set if the edge
+// goes from the higher to the lower corner.
 class EdgesByCorner {
  public:
   // `for_each` calls its argument with each edge, in the same order each time.
@@ -34,7 +35,8 @@ class EdgesByCorner {
     });
   }
 
-  // Calls visit(edge, excess) for each edge that is used `excess` times more in this direction than in the other one.
+  // Calls visit(edge, excess) for each edge that is used `excess` times more in the direction of `edge` than in the
+  // opposite direction.
   template <class Visit>
   void for_each_open(const Visit& visit) {
     for (size_t corner = 0; corner + 1 < start_.size(); ++corner) {
@@ -84,8 +86,8 @@ size_t join_equal_corners(absl::Span<const float> vertices, std::vector<Edge>& e
 
 uint64_t count_open_edges(absl::Span<const float> vertices, absl::Span<const uint32_t> indices) {
   LOCUS_DCHECK_EQ(indices.size() % 3, size_t{0});
-  // First by index, which pairs nearly all edges of most meshes; then the rest by coordinates. Edges that cancel by
-  // index would cancel by coordinates too.
+  // First cancel opposite edges by vertex index, which leaves no or few edges of most meshes. Then cancel the remaining
+  // edges by coordinates. Edges that cancel by index would also cancel by coordinates.
   EdgesByCorner by_index(vertices.size() / 3, [indices](const auto& visit) {
     for (size_t i = 0; i < indices.size(); i += 3)
       for (const Edge edge :
