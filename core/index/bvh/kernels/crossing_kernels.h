@@ -1,9 +1,10 @@
-// Crossing kernels: vector code that sums the crossings of the triangles of one mesh's tree by a half line that is
-// parallel to an axis; tests eight boxes or triangles at a time. The sum is the winding number of a closed mesh around
-// the start of the half line: see core/geometry/point_in_mesh.h. A kernel accepts a sign that is computed in float only
-// if a documented bound of the rounding error proves it. Otherwise, and for triangles that the point may lie on, the
-// kernel calls the caller's CrossingJudge, so that the answers equal those of crossing(). The kernels are used through
-// core/query/kinds/winding_search.h. Plain data; functions without state, safe from any thread.
+// Crossing kernels: vector code that sums the signed crossings of a half line, which is parallel to an axis, with the
+// triangles of one mesh's tree. The code tests eight boxes or triangles at a time. The sum is the winding number of a
+// closed mesh around the start of the half line: see core/geometry/point_in_mesh.h. A kernel accepts the sign of a
+// value computed in float only if a documented bound of the rounding error proves that the sign is right. Otherwise,
+// and for triangles on which the start of the half line may lie, the kernel calls the caller's CrossingJudge, so that
+// the answers equal those of crossing(). The kernels are used through core/query/kinds/winding_search.h. Plain data;
+// functions without state, safe from any thread.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_CROSSING_KERNELS_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_CROSSING_KERNELS_H_
 
@@ -17,7 +18,7 @@ namespace locus {
 // Number of opened nodes and tested triangles after which a call of a kernel pauses, so that its caller can check
 // deadlines and cancellation.
 inline constexpr uint32_t kMaxCrossingWork = 4096;
-// Result of CrossingJudge::crossing() if the point lies on the triangle.
+// Result of CrossingJudge::crossing() if the start of the half line lies on the triangle.
 inline constexpr int kOnTriangle = 2;
 
 // Exact predicate for the triangles that the float tests leave undecided. crossing() returns Crossing::winding for the
@@ -32,7 +33,7 @@ struct CrossingVisit {
   HalfLineFloats line;
   CrossingJudge judge;
   int64_t winding;  // sum of the crossings of all calls
-  bool on_surface;  // the point lies on a triangle: the visit has ended there
+  bool on_surface;  // the start of the half line lies on a triangle; this ends the visit
   uint32_t nodes;   // number of nodes opened by the last call
   uint32_t tests;   // number of triangles tested by the last call: those whose bounds the half line meets
   uint32_t judged;  // number of tested triangles for which `judge` was called

@@ -3,19 +3,21 @@
 // The two phases alternate, so that mispredicted branches of one phase do not delay the other. The comparisons of
 // coordinates are exact: see half_line_floats.h. Only areas are computed.
 //
-// Let u and v be the ends of an edge, projected along the half line, and relative to the point p. The edge is to the
-// left or to the right of p by the sign of the area u.y v.z - u.z v.y. Error of an area, with e = 2^-24: the bounds of
-// the triangle contain p, so |u.y|, |u.z|, |v.y| and |v.z| are at most E, the extent of the block. The rounded point
-// differs from p by at most `pad` on each axis, so the error of a difference is at most n = pad + e (E + pad). The
-// errors of the differences change the two products by 4 E n + 2 n^2 in total; the roundings of the two products and of
-// their difference add 4 e (E + n)^2. The sum is below 9 e (E + pad)^2 + 5 pad (E + pad). The bound is 16 e (E + pad)^2
-// + 16 pad (E + pad), which covers its own roundings too. It is infinite if a product may overflow, so that no sign is
-// certain. Products that underflow add at most 2^-147, which 2^-120 covers.
+// Let u and v be the ends of an edge, projected along the half line, and relative to p, the start of the half line. The
+// sign of the area u.y v.z - u.z v.y shows on which side of the edge p lies. Error of an area, with e = 2^-24: the
+// bounds of the triangle contain p, so |u.y|, |u.z|, |v.y| and |v.z| are at most E, the extent of the block. The
+// rounded point differs from p by at most `pad` on each axis, so the error of a difference is at most n = pad + e (E +
+// pad). The errors of the differences change the two products by 4 E n + 2 n^2 in total; the roundings of the two
+// products and of their difference add 4 e (E + n)^2. The sum is below 9 e (E + pad)^2 + 5 pad (E + pad). The bound is
+// 16 e (E + pad)^2 + 16 pad (E + pad), which covers the roundings of the bound itself too. The bound is infinite if a
+// product may overflow, so that no sign counts as certain. Products that underflow add at most 2^-147, which 2^-120
+// covers.
 //
-// A triangle has no edge, or one rising and one falling edge, at the height of the point: with one end at the point's
-// height or below, and one above. If both edges have a certain sign, the triangle's winding in the projection is known.
-// If it is 0, the point is off the triangle, because the two edges are the ends of the triangle's section at that
-// height. Otherwise the point may be on the triangle only if the bounds reach back to the point.
+// An edge crosses the height of p if one of its ends is at the height of p or below, and its other end is above. Either
+// no edge of a triangle crosses this height, or one rising and one falling edge do. If the signs of both edges are
+// certain, the triangle's winding in the projection is known. If the winding is 0, p is off the triangle, because the
+// two edges bound the triangle's section at this height. Otherwise p may be on the triangle only if the triangle's
+// bounds, along the half line, extend back to p.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_CROSSING_KERNELS_IMPL_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_CROSSING_KERNELS_IMPL_H_
 
@@ -45,12 +47,14 @@ struct Coordinates8 {
   friend inline Coordinates8 operator*(Coordinates8 v, Floats8 by) { return {v.a * by, v.b * by, v.c * by}; }
 };
 
-// Edges of eight triangles at the height of the point: masks of the triangles whose rising edge has the point on its
-// left, whose falling edge has the point on its right, and of those for which a sign is not certain.
+// Masks of those of eight triangles that have edges across the height of the point: `up` if the point is to the left of
+// the rising edge, `down` if it is to the right of the falling edge, `doubtful` if the sign of one of the two edges is
+// not certain.
 struct Edges {
   uint32_t up = 0, down = 0, doubtful = 0;
 
-  // Adds the edge from u to v. `low_u` and `low_v` are the triangles in which the end is not above the point.
+  // Adds the edge from u to v. `low_u` and `low_v` are the masks of the triangles in which u or v, respectively, is not
+  // above the point.
   __attribute__((always_inline)) inline void add(uint32_t low_u, uint32_t low_v, Floats8 area, float error) {
     const uint32_t left = below(Floats8::splat(error), area), right = below(area, Floats8::splat(-error));
     up |= low_u & ~low_v & left;
@@ -59,7 +63,7 @@ struct Edges {
   }
 };
 
-// State of a call.
+// State of one call of CrossingKernels::run().
 class CrossingWalk {
  public:
   inline CrossingWalk(const TriangleTree& tree, CrossingVisit& visit)
@@ -166,7 +170,7 @@ class CrossingWalk {
   const int first_, second_;  // the axes across the half line
   const Floats8 way_, along_high_, along_end_, low_[2], high_[2];
   uint32_t top_, found_ = 0, nodes_ = 0, tests_ = 0, judged_ = 0;
-  int64_t winding_ = 0;                          // as if the half line were ascending
+  int64_t winding_ = 0;                          // sum of decided crossings, with the signs for an ascending half line
   alignas(32) uint32_t blocks_[kMaxLineBlocks];  // met blocks that are not tested yet: `found_` elements
 };
 

@@ -1,7 +1,7 @@
 // Vector of eight floats for the kernels: a thin wrapper that lets one source serve several instruction sets. The
 // functions are documented in floats8_avx2.h; floats8_sse4.h offers the same functions. All functions have internal
-// linkage, because each object file is compiled for another instruction set and the linker must not merge functions of
-// different object files.
+// linkage, because each object file is compiled for a different instruction set and the linker must not merge functions
+// of different object files.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_FLOATS8_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_FLOATS8_H_
 
@@ -14,15 +14,17 @@
 namespace locus {
 namespace {
 
-// Key of a slot that is visited, greater than every other key.
+// Key of a child slot that was already visited; greater than every other key.
 constexpr uint32_t kVisitedKey = 0xFFFFFFFFu;
 
-// Returns the greatest key of a slot whose distance is at most `limit`, which is finite and not negative.
+// Returns the greatest key that a slot at a distance of at most `limit` can have. Precondition: `limit` is finite and
+// not negative.
 static inline uint32_t greatest_key(float limit) {
   return static_cast<uint32_t>(_mm_cvtsi128_si32(_mm_castps_si128(_mm_set_ss(limit)))) | 7u;
 }
 
-// Returns the distance of a slot, rounded down by less than 2^-20 of its value, from its key.
+// Returns the distance that the key of a slot contains: the slot's distance, rounded down by less than 2^-20 of its
+// value.
 static inline float distance_of(uint32_t key) {
   return _mm_cvtss_f32(_mm_castsi128_ps(_mm_cvtsi32_si128(static_cast<int>(key & ~7u))));
 }

@@ -64,7 +64,7 @@ static inline uint32_t below(Floats8 a, Floats8 b) {
   return static_cast<uint32_t>(_mm256_movemask_ps(_mm256_cmp_ps(a.v, b.v, _CMP_LT_OQ)));
 }
 
-// Returns the sign bits of the lanes as such a mask: those of a mask for select().
+// Returns a mask with one bit per lane: the sign bit of the lane. Also converts a mask for select() to a mask of bits.
 static inline uint32_t signs_of(Floats8 a) { return static_cast<uint32_t>(_mm256_movemask_ps(a.v)); }
 
 // Table with one row for each bit mask of eight lanes. A row begins with the indices of the lanes in the mask, in
@@ -146,8 +146,8 @@ struct Keys8 {
   inline void store(uint32_t* to) const { _mm256_store_si256(reinterpret_cast<__m256i*>(to), v); }
 };
 
-// Returns a key for each slot, which orders slots by `distances`, none of which is negative, then by number: the bits
-// of the distance, the lowest three of which are replaced by the slot.
+// Returns a sort key for each slot: the bit pattern of its distance, with the lowest three bits replaced by the index
+// of the slot. So keys order slots by distance, then by index. Precondition: no distance is negative.
 static inline Keys8 keys_of(Floats8 distances) {
   const __m256i bits = _mm256_andnot_si256(_mm256_set1_epi32(7), _mm256_castps_si256(distances.v));
   return {_mm256_or_si256(bits, _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7))};

@@ -1,26 +1,27 @@
 // Bounds of the distances from a point to the eight triangles of a block, for nearest_kernels_impl.h.
 //
-// For each triangle, the kernel first computes the weights of a point q of the triangle, by the minima of the squared
-// distance on the three edges and, if it lies within, on the plane. No bound depends on how near q is to the nearest
-// point: let r be the vector from q to the point p; then
+// For each triangle, the kernel first computes the barycentric weights of a point q of the triangle: the best of the
+// nearest points on the three edges and, if it lies within the triangle, the nearest point on the plane. Rounding may
+// lead to another q, but the bounds hold for every point q of the triangle. Let r be the vector from q to the query's
+// point p:
 // - q is a point of the triangle, so the distance is at most |r|;
-// - for every vertex v, (p - v).r / |r| is its height above the plane through p square to r; the triangle lies beyond
-// the
-//   lowest of the three, so the distance is at least the least of these heights.
-// Both bounds are equal if q is the nearest point. If q is wrong, as for very thin triangles, the bounds are merely
-// wide, and the triangle is measured in double.
+// - for every vertex v, (p - v).r / |r| is the distance of v behind the plane through p that is perpendicular to r; the
+//   whole triangle is at least as far behind this plane as its nearest vertex, so the distance is at least the least of
+//   these three values.
+// Both bounds are equal if q is the nearest point. If it is not, which is possible for very thin triangles, the bounds
+// are only farther apart, and the measurement in double decides.
 //
 // Error bounds, with u = 2^-24 and L = d + 2 E, where d is the distance of the block's box and E the block's extent.
 // The distance of a vertex from p is at most L, and an edge is at most sqrt(3) E < L long. Each product and each sum
 // counts as one rounding, as if compiled without fused multiply-add.
 // - The weights are between 0 and 1, and their sum is at most 1 + 2 u: q is off the triangle by at most 2 u L. The
-// errors
-//   of r = (p - a) - s (b - a) - t (c - a) are u L, 2 u L and 2 u L for the terms, and at most 2 u L and 3 u L for the
-//   two differences: 10 u L. The error of |r| is 3 u of at most 2 L. So the upper bound is too low by at most 18 u L.
+//   errors of r = (p - a) - s (b - a) - t (c - a) are u L, 2 u L and 2 u L for the terms, and at most 2 u L and 3 u L
+//   for the two differences: 10 u L. The error of |r| is 3 u |r|, and |r| is at most 2 L. So the upper bound is too low
+//   by at most 18 u L.
 // - The dot products of r with p - a and with an edge have errors of 4 u |r| L each, their difference 2 u |r| L more:
 //   10 u |r| L. The quotient by |r| adds 4 u L. So the lower bound is too high by at most 14 u L.
-// Both are within 2^-19 L = 32 u L. The term 2^-59 covers a |r| below 2^-60, whose square underflows: it is raised to
-// 2^-60, which lowers a positive quotient.
+// Both are within 2^-19 L = 32 u L. The term 2^-59 covers the case that |r| is below 2^-60, so that its square
+// underflows: |r| is then raised to 2^-60, which lowers a positive quotient.
 //
 // Source: Ericson, Real-Time Collision Detection, 2005, 5.1.5 (nearest point of a triangle by regions); the lower bound
 // is that of a separating plane.
@@ -34,8 +35,8 @@
 namespace locus {
 namespace {
 
-// Weights of the second and third vertex of a point of each triangle, and its squared distance from the query's point,
-// less the squared distance of the first vertex.
+// One point of each of eight triangles: `s` and `t` are the barycentric weights of the second and third vertex; `gain`
+// is the squared distance of this point from the query's point, minus the squared distance of the first vertex.
 struct Weights8 {
   Floats8 s, t, gain;
 };
@@ -45,23 +46,25 @@ static inline Weights8 better_of(const Weights8& a, const Weights8& b) {
   return {select(mask, b.s, a.s), select(mask, b.t, a.t), select(mask, b.gain, a.gain)};
 }
 
-// Returns the value within 0 .. 1; 0 for a NaN.
+// Returns `a` clamped to 0 .. 1; 0 for a NaN.
 static inline Floats8 clamped(Floats8 a) { return minimum(maximum(a, Floats8::splat(0)), Floats8::splat(1)); }
 
-// Returns the weights of the nearest point of each triangle, as far as float allows: always of a point of the triangle.
-// `ap` is the vector from the first vertex to the query's point.
+// Returns the weights of the nearest point of each triangle. Because of rounding, the point may not be the nearest one,
+// but it is always a point of the triangle. `ap`, `ab` and `ac` are the vectors from the first vertex to the query's
+// point and to the other two vertices.
 __attribute__((always_inline)) inline Weights8 nearest_weights(Vector8 ap, Vector8 ab, Vector8 ac) {
   const Floats8 zero = Floats8::splat(0), one = Floats8::splat(1);
   const Floats8 bb = dot(ab, ab), bc = dot(ab, ac), cc = dot(ac, ac), pb = dot(ab, ap), pc = dot(ac, ap);
   const Floats8 pb2 = pb + pb, pc2 = pc + pc;
-  // The edges from the first vertex: the squared distance is s (s bb - 2 pb) above that of the vertex.
+  // The two edges from the first vertex: the squared distance of the point at s exceeds that of the vertex by s (s bb -
+  // 2 pb).
   const Floats8 s = clamped(pb / bb), t = clamped(pc / cc);
   Weights8 best = better_of({s, zero, s * multiply_subtract(s, bb, pb2)}, {zero, t, t * multiply_subtract(t, cc, pc2)});
   // The edge from the second to the third vertex.
   const Floats8 square = (bb - bc) + (cc - bc), along = (pc - pb) + (bb - bc);
   const Floats8 w = clamped(along / square);
   best = better_of(best, {one - w, w, multiply_add(w, multiply_subtract(w, square, along + along), bb - pb2)});
-  // The plane.
+  // The plane of the triangle, if the point is within the triangle.
   const Floats8 inverse = one / multiply_subtract(bb, cc, bc * bc);
   const Floats8 u = multiply_subtract(cc, pb, bc * pc) * inverse, v = multiply_subtract(bb, pc, bc * pb) * inverse;
   const Floats8 u_gain = u * (multiply_subtract(u, bb, pb2) + bc * (v + v));
@@ -70,7 +73,7 @@ __attribute__((always_inline)) inline Weights8 nearest_weights(Vector8 ap, Vecto
   return better_of(best, {u, v, select(within, gain, Floats8::splat(0x1p126f))});
 }
 
-// Bounds of the distances of eight triangles from a point, without the error bound.
+// Bounds of the distances of eight triangles from a point, not yet widened by the error bound.
 struct Bounds8 {
   Floats8 low, high;
 };

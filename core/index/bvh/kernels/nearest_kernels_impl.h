@@ -1,15 +1,15 @@
-// Traversal of the nearest kernels, compiled once for each instruction set by the .cc file that includes it: depth
-// first, the child with the nearest box first. The children of a node are a group, of which one after the other is
-// taken, until the nearest one left is beyond the limit. nearest_block_impl.h contains the bounds of the distances to
-// triangles.
+// Traversal of the nearest kernels, compiled once for each instruction set by the .cc file that includes it. The
+// traversal is depth first and visits the child with the nearest box first. The children of an opened node form a
+// group. They are taken from the group in order of distance, until the nearest remaining child is beyond the limit.
+// nearest_block_impl.h contains the bounds of the distances to triangles.
 //
 // Errors of squared distances to boxes, with u = 2^-24: the differences add 2 u of the value, the square u and the two
 // sums 2 u, 5 u in all; squares that underflow add at most 2^-148. A key rounds the squared distance down, which only
 // makes a box nearer. The limit is raised by 2^-20 = 16 u twice before and once after it is squared, which covers the 5
-// u and the roundings of the limit itself; a squared limit below 2^-100 is raised to this value, of which 2^-148 is
-// less than u. The distance of a block that is computed from its key is too small by at most 2^-20 of its value and
-// 2^-73; the error bound of the block, 32 u L + 2^-59 where 18 u L + 2^-85 are needed, covers both, and its own
-// roundings.
+// u and the roundings of the limit itself; a squared limit below 2^-100 is raised to 2^-100, so that 2^-148 is less
+// than u of it. The distance of a block is computed from its key and is too small by at most 2^-20 of its value plus
+// 2^-73. The error bound of the block is 32 u L + 2^-59, but only 18 u L + 2^-85 are needed: the difference covers the
+// error of the distance and the roundings of the bound itself.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_NEAREST_KERNELS_IMPL_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_NEAREST_KERNELS_IMPL_H_
 
@@ -23,7 +23,7 @@ static_assert(kTreeWidth == 8, "a key holds a slot in three bits");
 // Returns the error bound `bound`, or 0 if `bug` is planted: a test then shows that the bound is needed.
 static inline float unless(PlantedBug bug, float bound) { return planted(bug) ? 0 : bound; }
 
-// State of a call.
+// State of one call of NearestKernels::run().
 class NearestWalk {
  public:
   inline NearestWalk(const TriangleTree& tree, NearestVisit& visit)
@@ -59,8 +59,8 @@ class NearestWalk {
   }
 
  private:
-  // Sets the limit of distances, and the key of the greatest squared distance from the rounded point to a box that is
-  // not beyond it.
+  // Sets the limit of distances, and `limit_key_`: the greatest key of a box within the limit. The keys of boxes
+  // contain squared distances from the rounded point.
   inline void set_limit(float limit) {
     constexpr float kMin = 0x1p-100f, kMax = 0x1p125f;  // kMax is less than the squared distance of an unused slot
     const float raise = 1 + unless(PlantedBug::kNearestBoxLimit, 0x1p-20f);
@@ -74,10 +74,11 @@ class NearestWalk {
 
   struct Child {
     uint32_t child;
-    float near;  // lower bound of the squared distance of its box
+    float near;  // lower bound of the squared distance of the child's box
   };
 
-  // Takes the nearest child of the group at the top, and drops the group if there is none within the limit.
+  // Takes the nearest child of the top group, whose keys are `keys`. If this child is beyond the limit, drops the group
+  // and returns kNoChild.
   __attribute__((always_inline)) inline Child take(Keys8 keys) {
     const uint32_t key = least_key(keys);
     if (key > limit_key_) {
@@ -92,7 +93,7 @@ class NearestWalk {
     return {tree_.nodes[visit_.groups[top_ - 1]].child[slot], distance_of(key)};
   }
 
-  // Returns the next child within the limit, kNoChild if there is none.
+  // Returns the next child within the limit, or kNoChild if there is none.
   inline Child next() {
     while (top_ != 0) {
       const Child child = take(Keys8::load(visit_.keys[top_ - 1]));
@@ -101,7 +102,7 @@ class NearestWalk {
     return {kNoChild, 0};
   }
 
-  // Opens a node: returns its nearest child, kNoChild if it is beyond the limit.
+  // Opens a node and returns its nearest child, or kNoChild if that child is beyond the limit.
   __attribute__((always_inline)) inline Child open(uint32_t index) {
     ++nodes_;
     const TriangleNode& node = tree_.nodes[index];

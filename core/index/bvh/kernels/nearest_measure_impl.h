@@ -1,7 +1,7 @@
 // Distances of candidates in double, four triangles at a time, compiled once for each instruction set by the .cc file
-// that includes it. Every operation is that of the scalar functions named below, on the same operands, in the same
-// order, without fused multiply-add, so that the results are equal bit for bit; only their branches are selections
-// here.
+// that includes it. The operations are those of the scalar functions named below, on the same operands, in the same
+// order, and without fused multiply-add, so that the results are equal bit for bit. Only the branches of the scalar
+// functions are replaced by selections.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_NEAREST_MEASURE_IMPL_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_NEAREST_MEASURE_IMPL_H_
 
@@ -12,7 +12,7 @@
 namespace locus {
 namespace {
 
-// Four triangles, one in each lane. Scalars are extended to all lanes by the compiler.
+// One value for each of four triangles. The compiler extends scalars to all lanes.
 typedef double Doubles4 __attribute__((vector_size(32)));
 typedef long long Mask4 __attribute__((vector_size(32)));
 
@@ -41,7 +41,8 @@ __attribute__((always_inline)) inline Doubles4 squared_to_edge(Vector4 edge, Vec
   return along <= 0 ? squared_length(from) : not_before;
 }
 
-// Does what on_face() in point_triangle.cc does; `farthest` where it returns no distance.
+// Does what on_face() in point_triangle.cc does, but returns `farthest` for a triangle for which on_face() returns no
+// distance.
 __attribute__((always_inline)) inline Doubles4 squared_to_face(Vector4 ab, Vector4 ac, Vector4 bc, Vector4 from_a,
                                                                Vector4 from_b, Doubles4 farthest) {
   const Vector4 normal = cross(ab, ac);
@@ -57,7 +58,8 @@ __attribute__((always_inline)) inline Doubles4 squared_to_face(Vector4 ab, Vecto
   return within ? squared : farthest;
 }
 
-// Returns one coordinate of a vertex of four triangles, in mesh axes.
+// Returns one coordinate, in mesh axes, of the same vertex of four triangles; `row` is its row in
+// TriangleBlock::vertices.
 static inline Doubles4 coordinate(const float* const* lanes, int row) {
   const int at = row * kTreeWidth;
   return Doubles4{lanes[0][at], lanes[1][at], lanes[2][at], lanes[3][at]};
@@ -80,7 +82,7 @@ static inline Doubles4 gap(Doubles4 a, Doubles4 b, Doubles4 c, double point, dou
   return greater_of(greater_of(min - point, point - max), Doubles4{});
 }
 
-// Measures the triangles whose first coordinates are at `lanes`.
+// Returns the squared distances of four triangles. lanes[i] points to the first coordinate of triangle i.
 __attribute__((always_inline)) inline Doubles4 measured(const float* const* lanes, const NearestPlacement& placement) {
   const Vector4 a = placed_vertex(lanes, 0, placement), b = placed_vertex(lanes, 3, placement),
                 c = placed_vertex(lanes, 6, placement);

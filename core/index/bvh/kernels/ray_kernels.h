@@ -29,8 +29,8 @@ struct KernelRay {
   // True if the transform to mesh axes had no rotation. A zero component of the direction is then exact, so a triangle
   // perpendicular to the axis of this component is exactly edge-on.
   bool unrotated = false;
-  // any() only: index of the block to test first, or kNoBlock: a block that probably has a triangle that the ray hits.
-  // The answer does not depend on it.
+  // any() only: index of a block that is tested first, because it probably has a triangle that the ray hits; or
+  // kNoBlock. Whether the ray hits a triangle does not depend on the hint.
   uint32_t hint = kNoBlock;
 };
 

@@ -1,5 +1,5 @@
-// Region kernels: vector code that finds all triangles of one mesh's tree that overlap a ball or a box; tests eight
-// boxes or triangles at a time. The kernels of each instruction set are in an object file of their own. A kernel
+// Region kernels: vector code that finds all triangles of one mesh's tree that overlap a ball or a box. The code tests
+// eight boxes or triangles at a time. The kernels of each instruction set are in an object file of their own. A kernel
 // accepts the result of a float test only if a documented bound of the rounding error proves that the result is right.
 // Otherwise the kernel calls the caller's RegionJudge, which uses the predicates of core/geometry/triangle_overlap.h,
 // so that the answers of kernels equal the answers of the predicates. The triangle numbers of a subtree that lies
@@ -80,8 +80,8 @@ struct RegionVisit {
 };
 
 // Kernel of one kind of region.
-// - one() continues a visit until it is complete, the room for numbers is used up, or at least kMaxRegionTests
-//   triangles were tested.
+// - one() continues a visit until it is complete, `numbers` may have no room for another block, or at least
+//   kMaxRegionTests triangles were tested.
 // - many() answers up to kMaxRegions regions and opens their nodes in turns, so that their memory accesses overlap.
 //   many() writes the triangle numbers found for each region to `numbers`, one region after the other, and the count of
 //   triangle numbers of each region to `counts`. `room` is the length of `numbers`. Returns the number of answered
