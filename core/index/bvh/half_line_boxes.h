@@ -1,5 +1,5 @@
 // Tests of eight boxes of a tree, or of the boxes of eight triangles, against a half line that is parallel to an axis.
-// A box is met if it has a point in common with the half line, and does not begin beyond the end of the search; all
+// The half line meets a box if they have a point in common and the box does not begin beyond the end of the search. All
 // sides belong to the box, and the start belongs to the half line. The tests are exact, so they need no pads: see
 // half_line_floats.h. Immutable; any thread.
 #ifndef LOCUS_CORE_INDEX_BVH_HALF_LINE_BOXES_H_
@@ -41,16 +41,16 @@ class HalfLineBoxes {
     floats_.pad = rounded_up(pad);
   }
 
-  // Makes a half line on which boxes are not met that begin beyond the coordinate `end` on line.axis, which may be
-  // infinite.
+  // Makes a half line whose search ends at the coordinate `end` on line.axis: boxes that begin beyond `end` are not
+  // met. `end` may be infinite.
   HalfLineBoxes(const Vec3d& point, HalfLine line, float end) : HalfLineBoxes(point, line) {
     floats_.along_end = end * floats_.way;
   }
 
   const HalfLineFloats& floats() const { return floats_; }
 
-  // Returns a mask of the boxes that the half line meets, one bit for each box, laid out as in TriangleNode::bounds.
-  // Boxes of unused slots are not met.
+  // Returns a mask with one bit for each of eight boxes, set if the half line meets the box. The boxes are laid out as
+  // in TriangleNode::bounds. Boxes of unused slots are not met.
   uint32_t boxes_met(const float (&bounds)[6][kTreeWidth]) const {
     const int axis = floats_.axis, first = (axis + 1) % 3, second = (axis + 2) % 3;
     const float(&begins)[kTreeWidth] = bounds[floats_.way > 0 ? axis : axis + 3];
@@ -66,7 +66,7 @@ class HalfLineBoxes {
     return met;
   }
 
-  // Returns the same for the boxes around eight triangles, laid out as in TriangleBlock::vertices.
+  // Returns the same mask for the boxes around eight triangles, which are laid out as in TriangleBlock::vertices.
   uint32_t triangles_met(const float (&v)[9][kTreeWidth]) const {
     float bounds[6][kTreeWidth];
     for (int axis = 0; axis < 3; ++axis) {
@@ -79,7 +79,7 @@ class HalfLineBoxes {
   }
 
  private:
-  // Return the nearest float that is at most, or at least, `value`.
+  // Return the greatest float that is at most `value`, and the least float that is at least `value`.
   static float rounded_down(double value) { return -rounded_up(-value); }
   static float rounded_up(double value) {
     const auto nearest = static_cast<float>(value);

@@ -1,8 +1,8 @@
-// Intervals of a moving box in eight boxes of a tree, or in the boxes of eight triangles, in float for culling. The
-// moving box is a ray with an extent on each axis: a box of the tree is grown by the extent and by a pad, as in the
-// slab test of core/geometry/ray.h. Every rounding step is monotone in the box, and the pad is the same for all boxes
-// of one tree, so no box is culled if entry() accepts a box inside it. The loops over eight adjacent floats are
-// compiled to vector instructions. Immutable; any thread.
+// Intervals of t in which a moving box touches each of eight boxes of a tree, or the boxes of eight triangles, computed
+// in float for culling. The moving box is a ray with an extent on each axis: a box of the tree is grown by the extent
+// and by a pad, as in the slab test of core/geometry/ray.h. Every rounding step is monotone in the box, and the pad is
+// the same for all boxes of one tree, so no box is culled if entry() accepts a box inside it. The loops over eight
+// adjacent floats are compiled to vector instructions. Immutable; any thread.
 #ifndef LOCUS_CORE_INDEX_BVH_PATH_BOXES_H_
 #define LOCUS_CORE_INDEX_BVH_PATH_BOXES_H_
 
@@ -18,7 +18,7 @@ namespace locus {
 
 class PathBoxes {
  public:
-  // Value of near for a box that the path misses.
+  // Near value of a box that the path misses.
   static constexpr float kMissed = std::numeric_limits<float>::infinity();
 
   // Makes the path of a box of half extents `extent` around `origin` + t * `direction`. The largest |component| of
@@ -40,8 +40,8 @@ class PathBoxes {
     }
   }
 
-  // Returns the t at which the path enters the grown box, negative if it starts inside; nullopt if the path misses the
-  // box or has left it at t = 0.
+  // Returns the t at which the path enters the grown box; t is negative if the path starts inside. Returns nullopt if
+  // the path misses the box or leaves it before t = 0.
   std::optional<float> entry(const Aabbf& box) const {
     const float sides[6] = {box.min.x, box.min.y, box.min.z, box.max.x, box.max.y, box.max.z};
     const float near =
@@ -73,7 +73,7 @@ class PathBoxes {
  private:
   static float minimum(float a, float b) { return a < b ? a : b; }
   static float maximum(float a, float b) { return a > b ? a : b; }
-  // A comparison with NaN, from coordinates that overflow, never culls.
+  // If coordinates overflow to NaN, the comparisons are false, so the box is not culled.
   float near_of(float lx, float ly, float lz, float hx, float hy, float hz) const {
     const float near = maximum(maximum(lx * reciprocal_[0] - enter_[0], ly * reciprocal_[1] - enter_[1]),
                                lz * reciprocal_[2] - enter_[2]);

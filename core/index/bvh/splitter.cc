@@ -13,7 +13,7 @@ using limits::kMaxBvhBins;
 
 // Maximum number of references in a range that is sorted instead of binned.
 constexpr size_t kMaxSorted = 32;
-// References processed between two checks of the cancel flag.
+// Number of references processed between two checks of the cancel flag.
 constexpr size_t kReferencesBetweenChecks = 1u << 16;
 // Cost of a reference relative to the cost of a block. This cost distinguishes cuts whose parts need equally many
 // blocks: the cut that leaves fewer references in large boxes costs less. A much larger value would result in blocks

@@ -1,6 +1,6 @@
 // Bounding volume hierarchy over the triangles of one mesh, in the layout that the vector kernels read. TriangleBvh has
 // the same visits as Bvh, which pass triangles to visitors (spatial_index.h). Callers that need no visitor pass tree()
-// to the faster kernels of ray_kernels.h and region_kernels.h.
+// to the faster vector kernels in kernels/.
 //
 // Threads: immutable after build() or restore(); every member may run concurrently.
 // Invariants: the box of a child slot contains all triangles below it; the depth is at most limits::kMaxBvhDepth;
@@ -79,14 +79,14 @@ class TriangleBvh {
   void visit_ray(const SlabRay<float>& slabs, Visitor& visitor, Work& work) const;
 
   // Passes to `visitor` the triangles whose own boxes `path` enters at visitor.limit() or before, roughly from near to
-  // far. The magnitude of `path` must be that of bounds(). Allocates no memory.
+  // far. Precondition: the magnitude given to `path` is the largest |coordinate| of bounds(). Allocates no memory.
   template <RayVisitor<Triangle> Visitor>
   void visit_path(const PathBoxes& path, Visitor& visitor, Work& work) const;
 
   // Returns the half line from `point` that is expected to meet the fewest boxes of nodes and blocks.
   HalfLine cheapest_half_line(const Vec3d& point) const;
-  // Passes to visitor.visit() the triangles whose own bounds the half line meets, until it returns false. The order is
-  // the order of the kernels in crossing_kernels.h. Allocates no memory.
+  // Passes to visitor.visit() the triangles whose own bounds the half line meets, until visit() returns false. The
+  // kernels of crossing_kernels.h visit the same triangles in the same order. Allocates no memory.
   template <class Visitor>
   void visit_half_line(const HalfLineBoxes& line, Visitor& visitor, Work& work) const;
 
@@ -111,7 +111,7 @@ class TriangleBvh {
     float near;
   };
 
-  // Sets the bounds of the tree, and the members that depend on them. The arrays must be complete.
+  // Sets bounds_, magnitude_ and boxes_a_unit_. Precondition: arrays_ is complete.
   void set_bounds(const Aabbf& bounds);
   // Verifies, in debug builds, the storage order of nodes, blocks and triangles, and the ranges, boxes and slot orders
   // of all nodes. O(size).
@@ -139,7 +139,7 @@ class TriangleBvh {
   Aabbf bounds_;
   float magnitude_ = 0;
   // For each axis, the expected number of boxes of nodes and blocks that a random line through bounds(), parallel to
-  // the axis, meets for each unit of its length within bounds().
+  // the axis, meets per unit of length within bounds().
   Vec3d boxes_a_unit_;
 };
 

@@ -48,7 +48,7 @@ class TriangleWriter {
     const BinaryNode<float>* root;
     bool is_subtree;
     uint32_t parent, slot;  // index of the parent's chunk, and slot in the parent
-    uint32_t depth;  // levels of nodes from the tree's root to the chunk's root; count() extends it to the deepest node
+    uint32_t depth;  // number of levels from the tree's root to the chunk's root; after count(), to the deepest node
     Offsets start;
   };
   // Child of a wide node that was not visited yet. In split_into_chunks(), `parent` is the index of the chunk that

@@ -44,8 +44,8 @@ class WideChoice {
   }
 
  private:
-  // Verifies, in debug builds, that the cost never increases with the number of slots that a node may fill, and that a
-  // node which may fill all eight slots is replaced by its two children.
+  // Verifies, in debug builds, that the cost never increases with the number of slots that the binary node may occupy,
+  // and that the node is opened if it may occupy all eight slots.
   void check_invariants() const {
     for (uint32_t slots = 2; slots < kBvhWidth; ++slots) LOCUS_DCHECK_LE(costs_[slots], costs_[slots - 1]);
     for (uint32_t slots = 2; slots <= kBvhWidth; ++slots) LOCUS_DCHECK_LT(uint32_t{left_slots_[slots]}, slots);

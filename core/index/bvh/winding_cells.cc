@@ -57,7 +57,8 @@ WindingWay WindingCells::way_from(const TriangleBvh& tree, const Vec3d& point) c
   WindingWay way = WindingWay::out({direction % 3, direction >= 3});
   const Axis& axis = axes_[way.line.axis];
   const uint32_t start = cell[way.line.axis];
-  // A way below the first cell wraps around, and is not less than the number of cells either.
+  // If the way leads below the first cell, the unsigned `to` wraps around, so that it is not less than axis.count
+  // either.
   const uint32_t to = start + static_cast<uint32_t>(way.line.descending ? -steps : steps);
   if (to >= axis.count) return way;
   cell[way.line.axis] = to;
@@ -84,7 +85,7 @@ void WindingCells::divide(const Aabbf& bounds, size_t triangles) {
   const Vec3d extent = to_double(bounds.max) - to_double(bounds.min);
   const double most = std::min(double{kMaxCells}, kCellsPerTriangle * static_cast<double>(triangles));
   Cell counts = {1, 1, 1};
-  // Decreases the size of a cell until there would be too many.
+  // Decreases the size of a cell until there would be more than `most` cells.
   constexpr double kShrink = 0.9, kLeast = 1.0 / kMaxCellsPerAxis;
   for (double part = 1; part > kLeast; part *= kShrink) {
     const double size = part * max_component(extent);
@@ -112,15 +113,15 @@ WindingCells::Axis WindingCells::divided(double low, double high, uint32_t count
   for (uint32_t cell = 0; cell < count; ++cell) {
     axis.inside[cell] =
         count > 1 ? static_cast<float>(low + (cell + 0.5) / axis.cells_a_unit) : static_cast<float>(low);
-    // A cell that is so small that no float is inside cannot be the end of a way.
+    // An axis is not divided if a cell would be too small to contain a float, because a way could not end in this cell.
     if (axis.cell(double{axis.inside[cell]}) != cell) return divided(low, high, 1);
   }
   return axis;
 }
 
 void WindingCells::mark(const TriangleBvh& tree) {
-  // Each triangle changes the sum at the corners of its range of cells, so that adding up along each axis results in
-  // the number of triangles of each cell.
+  // Each triangle adds 1 or -1 at the eight corners of its range of cells, so that the prefix sums along all three axes
+  // are the numbers of triangles in the cells.
   std::array<size_t, 3> strides;
   size_t size = 1;
   for (int axis = 0; axis < 3; ++axis) {
@@ -193,7 +194,7 @@ void WindingCells::set_ways() {
     const bool descending = direction >= 3;
     for (size_t start = 0; start < cells_.size(); ++start) {
       if (coordinate_of(start, direction % 3) != 0) continue;
-      // Walks against the direction from the side of the bounds.
+      // Walks against the direction, beginning at the side of the bounds to which the direction leads.
       int steps = 0;
       for (uint32_t k = 0; k < axis.count; ++k) {
         const size_t index = start + (descending ? k : axis.count - 1 - k) * axis.stride;

@@ -1,14 +1,15 @@
 // Cells over the bounds of a closed mesh, with the winding number of the mesh around all points of each clear cell. A
-// cell is clear if it meets the bounds of no triangle. A point in a clear cell needs no search; from another point, a
-// half line needs to reach only as far as the next clear cell, because the triangles that it crosses beyond are those
-// that the half line from the clear cell crosses.
+// cell is clear if it meets the bounds of no triangle. A point in a clear cell needs no search. From any other point,
+// the search along a half line may end in the next clear cell: the crossings beyond are already included in the winding
+// number of this cell.
 //
 // Proof. Cells are intervals of coordinates on each axis, so a clear cell is a box without a point of the surface, and
-// the winding number is the same in all of it. It is also the same in a clear cell beside it. Let a half line from p
-// reach q in a clear cell. The winding number around p is the one around q plus the crossings between p and q: see
-// core/geometry/point_in_mesh.h. A triangle whose bounds contain the line in the projection along it shares the
-// interval of the clear cell on both other axes. So its bounds lie before or beyond the clear cell along the line, and
-// whether they begin before q decides which.
+// the winding number is the same around all its points. Two clear cells with a common side have the same winding
+// number. Let a half line from p reach a point q in a clear cell. The winding number around p is the winding number
+// around q plus the sum of the crossings between p and q: see core/geometry/point_in_mesh.h. If a triangle may cross
+// the line, the projection of its bounds along the line contains the line, so on the two other axes the bounds overlap
+// the intervals of the clear cell. Since they do not meet the cell, they lie completely before it or completely beyond
+// it along the line: before it if they begin before q, otherwise beyond it.
 //
 // Threads: immutable after build(); every member may run concurrently.
 // Invariants: a cell that meets the bounds of a triangle is not clear; the end of a way lies in a clear cell.
@@ -49,7 +50,7 @@ class WindingCells {
   static WindingCells build(const TriangleBvh& tree);
 
   // Returns where the search from `point` may end: in its own cell, in a clear cell near it, or outside the mesh.
-  // `tree` must be the one of build(). O(1).
+  // `tree` must be the tree that was passed to build(). O(1).
   WindingWay way_from(const TriangleBvh& tree, const Vec3d& point) const;
 
   // Returns the size in bytes of the memory allocated by this object; sizeof(WindingCells) is not included.
@@ -58,24 +59,25 @@ class WindingCells {
  private:
   static constexpr uint32_t kMaxCells = 1u << 22, kMaxCellsPerAxis = 1024;
   static constexpr uint32_t kCellsPerTriangle = 4;
-  // Number of sets of connected clear cells whose winding number is computed; the cells of further sets count as not
-  // clear. This bounds the time of a build.
+  // Maximum number of connected sets of clear cells whose winding number is computed. The cells of further sets count
+  // as not clear. This bounds the time of a build.
   static constexpr uint32_t kMaxSets = 1024;
 
-  // A cell is one byte. Up to kMaxWinding - kMinWinding: a clear cell, with its winding number minus kMinWinding. From
-  // kFirstWay on, below kNoWay: the number of steps to the nearest clear cell, minus 1, plus kMaxSteps times the number
-  // of the direction: see Direction.
+  // A cell is one byte. Values up to kMaxWinding - kMinWinding: a clear cell; the value is its winding number minus
+  // kMinWinding. Values from kFirstWay to kNoWay - 1: a cell with a way to a clear cell; the value is kFirstWay +
+  // direction * kMaxSteps + (number of steps to the clear cell) - 1, where `direction` is the axis, plus 3 if the way
+  // descends. kNoWay: any other cell. kUnset occurs only during a build.
   static constexpr int kMinWinding = -63, kMaxWinding = 63, kMaxSteps = 16;
   static constexpr uint8_t kFirstWay = 128, kNoWay = kFirstWay + 6 * kMaxSteps, kUnset = 255;
 
-  // Cells of one axis. cell() ascends with the coordinate, so that each cell is an interval.
+  // Division of one axis into cells. cell() never decreases if the coordinate increases, so each cell is an interval.
   struct Axis {
     double low = 0, size = 0, cells_a_unit = 0;
     uint32_t count = 1;
     size_t stride = 0;
     std::vector<float> inside = {0};  // for each cell, a coordinate in it
 
-    // Precondition: `coordinate` is within the bounds of the mesh.
+    // Returns the cell that contains `coordinate`. Precondition: `coordinate` is within the bounds of the mesh.
     uint32_t cell(double coordinate) const {
       return std::min(static_cast<uint32_t>((coordinate - low) * cells_a_unit), count - 1);
     }
@@ -100,7 +102,7 @@ class WindingCells {
   void mark(const TriangleBvh& tree);
   // Sets the winding numbers of clear cells.
   void set_windings(const TriangleBvh& tree);
-  // Sets all cells that are connected to `first` by sides, and were kUnset, to `value`.
+  // Sets `first`, and all kUnset cells that are connected to it through common sides of kUnset cells, to `value`.
   void fill(size_t first, uint8_t value);
   // Sets the ways from cells that are not clear.
   void set_ways();
@@ -108,7 +110,7 @@ class WindingCells {
   void check_invariants(const TriangleBvh& tree) const;
 
   std::array<Axis, 3> axes_;
-  std::vector<uint8_t> cells_;  // empty without cells
+  std::vector<uint8_t> cells_;  // empty in an object without cells
 };
 
 }  // namespace locus
