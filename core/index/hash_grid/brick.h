@@ -74,7 +74,7 @@ struct Brick {
   std::shared_ptr<const GridBlock> sorted;  // values sorted by cell; never null
   std::shared_ptr<GridBlock> recent;        // log; null if recent_count is 0
   uint32_t dead_count = 0;
-  uint32_t recent_count = 0;  // slots of the log that belong to this version
+  uint32_t recent_count = 0;  // number of slots of the log that belong to this version
   uint32_t recent_dead_count = 0;
   BrickGeometry geometry;
   std::array<uint64_t, kMaxRecent / 64 + 1> recent_dead{};
@@ -93,9 +93,9 @@ struct Brick {
     const uint32_t slot = recent->find_last(handle, recent_count);
     return slot == recent_count || is_recent_dead(slot) ? recent_count : slot;
   }
-  // Prefetch memory of the brick: prefetch() this whole struct, prefetch_head() its most used cache lines,
-  // prefetch_blocks() the headers of both blocks. Always inlined, since GCC otherwise drops calls of functions that
-  // only prefetch.
+  // Prefetch memory of the brick: prefetch() loads this whole struct, prefetch_head() loads its most used cache lines,
+  // and prefetch_blocks() loads the headers of both blocks. Always inlined, since GCC otherwise drops calls of
+  // functions that only prefetch.
   [[gnu::always_inline]] void prefetch() const {
     for (size_t line = 0; line < sizeof(Brick); line += 64)
       __builtin_prefetch(reinterpret_cast<const char*>(this) + line);

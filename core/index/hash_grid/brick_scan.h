@@ -18,8 +18,9 @@
 
 namespace locus {
 
-// Reference to a value of the grid, or an empty reference. Valid as long as the snapshot that returned it exists.
-// Precondition of the accessors: the reference is not empty.
+// Reference to a value of the grid, or an empty reference. A reference from a snapshot is valid as long as the snapshot
+// exists; a reference from HashGrid is valid until the next change of the grid. Precondition of the accessors: the
+// reference is not empty.
 class GridRef {
  public:
   GridRef() = default;

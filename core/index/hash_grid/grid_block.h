@@ -102,8 +102,8 @@ class GridBlock {
   std::array<uint32_t, kBrickCells + 1>& offsets() { return offsets_; }
   const std::array<uint32_t, kBrickCells + 1>& offsets() const { return offsets_; }
 
-  // Prefetch the memory of a slot: prefetch_entry() its entry, which usually spans two cache lines; prefetch_value()
-  // also its handle and extent; prefetch_target() all columns, for Places::put().
+  // Prefetch the memory of a slot: prefetch_entry() loads its entry, which usually spans two cache lines;
+  // prefetch_value() also loads its handle and extent; prefetch_target() loads all columns that Places::put() writes.
   [[gnu::always_inline]] void prefetch_entry(uint32_t slot) const {
     const char* const entry = reinterpret_cast<const char*>(&entries_[slot]);
     __builtin_prefetch(entry);

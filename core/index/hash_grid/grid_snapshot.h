@@ -2,12 +2,13 @@
 // culls: it passes each value that may satisfy a query to the caller once, and the caller applies the exact predicate
 // of the value in double.
 //
-// A value is stored in the one cell that contains its position, on the level whose cells are at least as wide as the
-// value. A query therefore widens its range on each level by the largest extent of that level, so it misses no value.
-// This extent is at most half a cell, unless a value is wider than the cells of the coarsest possible level. A large
-// value does not widen the range on other levels. Levels are visited from coarse to fine, so that a hit on a large near
-// value shortens a ray before the many small values are tested. Source: Ericson, Real-Time Collision Detection, 2005,
-// 7.2 (one cell per value); Schornbaum, Hierarchical Hash Grids for Coupled Particle Simulations, 2009.
+// A value is stored in the one cell that contains its position, on the finest level whose cells are at least as wide as
+// the value. A query therefore widens its range on each level by the largest extent of that level, so that the query
+// misses no value. This extent is at most half a cell, unless a value is wider than the cells of the coarsest possible
+// level. A large value does not widen the range on other levels. Levels are visited from coarse to fine, so that a hit
+// on a large near value shortens a ray before the many small values are tested. Source: Ericson, Real-Time Collision
+// Detection, 2005, 7.2 (one cell per value); Schornbaum, Hierarchical Hash Grids for Coupled Particle Simulations,
+// 2009.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_GRID_SNAPSHOT_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_GRID_SNAPSHOT_H_
 

@@ -144,7 +144,7 @@ class HashGrid {
   std::vector<BrickInfo> brick_info_;           // records of all bricks, indexed by brick
   std::vector<uint32_t> free_bricks_;
   std::vector<uint32_t> stale_bricks_;     // bricks with values that may have to move to cells of the new size
-  std::vector<uint32_t> touched_indices_;  // for each brick an index in touched_, valid if touched_ has the brick there
+  std::vector<uint32_t> touched_indices_;  // index of each brick in touched_; stale unless touched_ has the brick there
   internal::BrickArray bricks_;
   std::vector<internal::GridSlot> slots_;  // locations of all values, indexed by handle
   internal::BrickIndices bricks_by_handle_;

@@ -99,7 +99,7 @@ inline void write_lanes(uint32_t kept, uint32_t slot, Floats key, uint32_t* slot
 // List of the vectors of eight values in all rows: first slot, and mask of the lanes that belong to the row. One loop
 // over this list is faster than a loop of unknown length for each row.
 struct RowVectors {
-  static constexpr uint32_t kUsual = 4;  // vectors of a row that are written without a loop of unknown length
+  static constexpr uint32_t kUsual = 4;  // number of vectors that every row writes, in a loop of fixed length
   static constexpr uint32_t kMax = GridRows::kMaxValues / kLanes + GridRows::kMax + kUsual;
 
   explicit RowVectors(const GridRows& rows) {
