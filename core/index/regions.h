@@ -68,8 +68,8 @@ class BoxRegion {
 };
 
 // Region of a capsule: overlaps() returns true for the boxes that may_reach() accepts, and for no box that the bounds
-// of the capsule do not overlap. Not monotone: near the surface of the capsule, rounding decides. So a visitor may use
-// it only to cull values whose own test is stricter by more than this rounding.
+// of the capsule do not overlap. overlaps() is not monotone: near the surface of the capsule, the result depends on
+// rounding. So a visitor may use this region only to cull values whose own test is stricter by more than this rounding.
 class CapsuleRegion {
  public:
   explicit CapsuleRegion(const Capsule& capsule)

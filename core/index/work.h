@@ -9,7 +9,7 @@ namespace locus {
 
 struct Work {
   uint64_t nodes = 0;  // tree nodes opened
-  uint64_t cells = 0;  // grid bricks looked up and rows of their values scanned
+  uint64_t cells = 0;  // grid bricks looked up, plus rows of values scanned in these bricks
   uint64_t tests = 0;  // values passed to a visitor
 
   Work& operator+=(const Work& other) {
