@@ -27,7 +27,7 @@
 
 namespace locus {
 
-// Where the search for the winding number around a point may end.
+// Way of a search for the winding number around a point: the half line to search, and the end of the search.
 struct WindingWay {
   bool is_known = false;  // no search is needed: `winding` is the winding number around the point itself
   int winding = 0;        // winding number around the end of the way

@@ -19,18 +19,19 @@
 //   two differences, the product and the last difference, and the error of its length is 2 u L. The sum is 17 u L,
 //   within near = 2^-19 L + 2^-59; the term 2^-59 covers edges so short that their squares underflow.
 // - The error of a normal's component is 4 u of its two products, at most 8 u E^2, so the error of a normal is 14 u
-//   E^2. The error of its dot product with the offset is 14 u E^2 L and 4 u of at most 3 E^2 L: 26 u E^2 L. The error
-//   of the radius times its length is 14 u E^2 L and 4 u of 3 E^2 L: 26 u E^2 L, and 3 u for the sum. The sum is within
-//   plane = 2^-17 E^2 L. This bound also prevents triangles with a sine below 2^-20 at a vertex, whose planes the
-//   predicate handles separately, from being found by their planes.
+//   E^2. The error of the dot product of the normal with the offset (the vector from vertex a to the centre) is 14 u
+//   E^2 L and 4 u of at most 3 E^2 L: 26 u E^2 L. The error of the radius times the normal's length is 14 u E^2 L and 4
+//   u of 3 E^2 L: 26 u E^2 L, and 3 u for the sum. The sum is within plane = 2^-17 E^2 L. This bound also prevents
+//   triangles with a sine below 2^-20 at a vertex, whose planes the predicate handles separately, from being found by
+//   their planes.
 // - The barycentric weights of the foot on the plane are differences of products of two dot products; the error is 11 u
 //   of each product. Such a product is at most 5.2 E^3 L, or 4.5 E^3 L for the square of the area: 125 u E^3 L for each
 //   of two weights, 100 u for the square, and 60 u for the differences that leave the third weight. The sum is
 //   410 u E^3 L, within weight = 2^-15 E^3 L.
-// - The bounds of a single triangle use its longer edge at vertex a for E, and the maximum of that edge and the offset
-//   for R. The error of weights is 24 u E^3 R twice, 24 u E^3 R for the square and 10 u E^3 R, within 2^-17 E^3 R. The
-//   error of normals is 6 u E^2, the error of heights 10 u E^2 R and the error of the radius times the normal's length
-//   10 u E^2 r, within 2^-19 E^2 (R + r).
+// - In the error bounds of a single triangle, E is the length of its longer edge at vertex a, and R is the maximum of E
+//   and the length of the offset. The error of weights is 24 u E^3 R twice, 24 u E^3 R for the square and 10 u E^3 R,
+//   within 2^-17 E^3 R. The error of normals is 6 u E^2, the error of heights 10 u E^2 R and the error of the radius
+//   times the normal's length 10 u E^2 r, within 2^-19 E^2 (R + r).
 //
 // The predicate's own rounding errors are smaller by a factor of 2^-28, or 2^-12 for squared distances, so that a
 // result that these tests call certain equals the result of the predicate. The predicate also tests whether the ball
