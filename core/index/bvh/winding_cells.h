@@ -45,8 +45,8 @@ class WindingCells {
  public:
   // Makes an object without cells: every way leads out of the mesh.
   WindingCells() = default;
-  // Makes the cells of a closed mesh: about four for each triangle, at most 2^22, of a byte each. O(n); 5 bytes of
-  // temporary memory for each cell.
+  // Makes the cells of a closed mesh: about four for each triangle, at most 2^22, of a byte each. O(n); up to 13 bytes
+  // of temporary memory for each cell.
   static WindingCells build(const TriangleBvh& tree);
 
   // Returns where the search from `point` may end: in its own cell, in a clear cell near it, or outside the mesh.
