@@ -1,4 +1,4 @@
-// Planes of one query of a block of convex regions, from its columns. Plain data; any thread.
+// Planes of one query of a block of convex regions, computed from the columns of the block. Plain data; any thread.
 #ifndef LOCUS_CORE_QUERY_FRUSTUM_PLANES_H_
 #define LOCUS_CORE_QUERY_FRUSTUM_PLANES_H_
 
@@ -12,11 +12,13 @@ namespace locus {
 
 class FrustumPlanes {
  public:
-  // kZeroNormal: a plane has no normal and a negative offset. kSingular: the determinant of the matrix is 0.
+  // kZeroNormal: a plane has a zero normal and a negative offset, so it excludes everything. kSingular: the determinant
+  // of the matrix is 0.
   enum class Fault : uint8_t { kNone, kZeroNormal, kSingular };
 
-  // Reads the planes of region `i`, relative to its origin, from finite columns. A plane without a normal that excludes
-  // nothing is left out. The planes of a matrix are sums of its rows, computed in double.
+  // Reads the planes of region `i` from `frustums`, whose values must be finite. The planes are relative to the origin
+  // of the region. A plane with a zero normal is left out if it excludes nothing. The planes of a matrix are sums and
+  // differences of its rows, computed in double.
   // Source: Gribb, Hartmann, Fast Extraction of Viewing Frustum Planes from the World-View-Projection Matrix, 2001.
   FrustumPlanes(const FrustumColumns& frustums, size_t i);
 

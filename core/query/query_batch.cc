@@ -76,7 +76,8 @@ class BlockCheck {
     return absl::OkStatus();
   }
 
-  // Checks the columns of a position in the order of rows. `kind` is the name of the kind's message.
+  // Checks the columns that give positions in the order of rows. `kind` is the name of the block's kind in field names,
+  // such as rays.
   absl::Status check_after(const AfterColumns& after, const char* kind) const {
     const auto field = [kind](absl::string_view column) { return absl::StrCat(kind, ".", column); };
     if (after.ts.empty() && after.ids.empty() && after.triangles.empty()) return absl::OkStatus();
@@ -105,9 +106,9 @@ class BlockCheck {
     return check_column(values, width, n_, need, {"blocks", index_, field});
   }
 
-  // Returns whether all points, given relative to the frame, lie within the world: |coordinate| <= kMaxCoordinate. Has
-  // no branches per value, since nearly all batches are valid; check_points() searches for the invalid point only if
-  // this function returns false.
+  // Returns whether all points, given relative to the frame, lie within the world: |coordinate| <= kMaxCoordinate. The
+  // loop has no branch per value, because nearly all batches are valid: check_points_from() searches for the invalid
+  // point only if this function returns false.
   bool all_within_world(absl::Span<const float> values) const {
     bool all = values.size() % 3 == 0;
     for (size_t i = 0; i + 2 < values.size(); i += 3)
@@ -115,8 +116,8 @@ class BlockCheck {
         all &= std::abs(origin()[axis] + double{values[i + static_cast<size_t>(axis)]}) <= limits::kMaxCoordinate;
     return all;
   }
-  // Returns the point from which positions count, as far as it is known: for anchored queries the world's origin, so
-  // that an offset is checked by itself.
+  // Returns the point to which positions are relative. If the block has anchors, whose positions are not known here,
+  // this is the world's origin, so that the offset from the anchor is checked alone.
   Vec3d origin() const { return block_.anchor_ids.empty() ? block_.frame : Vec3d{}; }
 
   // Checks that points, given relative to the frame or an anchor, are finite and lie within the world. A query has
@@ -299,7 +300,8 @@ class BlockCheck {
     return absl::OkStatus();
   }
 
-  // Checks that region `i` has an interior point. A region that counts from an anchor is checked at the world's origin.
+  // Checks that region `i` has an interior point. A region relative to an anchor is checked as if the anchor were at
+  // the world's origin.
   absl::Status check_region(const FrustumColumns& frustums, absl::string_view field, size_t i) const {
     const FrustumPlanes planes(frustums, i);
     switch (planes.fault()) {
@@ -402,8 +404,7 @@ struct CountQueries {
   }
 };
 
-// Returns the number of segments from an eye to a sample in all blocks; at most 2^64 - 1. Every factor is below 2^32,
-// and a column has fewer than 2^32 entries.
+// Returns the number of segments from an eye to a sample point in all blocks, or 2^64 - 1 if the number exceeds 2^62.
 uint64_t sight_segments(const QueryBatch& batch) {
   uint64_t segments = 0;
   for (const QueryBlock& block : batch.blocks) {

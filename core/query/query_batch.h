@@ -61,9 +61,10 @@ class ColumnSet {
   uint32_t bits_ = 0;
 };
 
-// Position in the order of rows (t, id, triangle): only rows behind it are returned. Each column has an entry for each
-// query, one for all queries, or none. If `ts` has no entry, all rows are returned. Without ids, rows at t itself are
-// not returned; without triangles, neither are rows of the id at t.
+// Position of each query in the order of rows (t, id, triangle): a query returns only rows after its position. Each
+// column has one entry per query, one entry for all queries, or no entry. If `ts` has no entry, all rows are returned.
+// If `ids` has no entry, a row whose t equals the given t is not returned. If `triangles` has no entry, neither is a
+// row whose t and id equal the given t and id.
 struct AfterColumns {
   absl::Span<const float> ts;            // not NaN
   absl::Span<const uint64_t> ids;        // only with ts
@@ -156,11 +157,11 @@ struct SightColumns {
 
 // Pairs of objects within a distance of each other. A block of this kind has one query.
 struct PairColumns {
-  float max_distance = 0;    // inclusive, >= 0; +inf is allowed with count
+  float max_distance = 0;    // inclusive, >= 0; +inf is allowed only if count is not 0
   Layers first_mask = 0;     // 0 means all layers
   Layers second_mask = 0;    // 0 means all layers
-  uint32_t count = 0;        // number of nearest objects of each object; 0: every pair has one row
-  uint64_t after_other = 0;  // with QueryBlock::after_id: only rows behind (after_id, after_other)
+  uint32_t count = 0;        // maximum number of nearest objects of each object; 0: each pair has one row
+  uint64_t after_other = 0;  // requires QueryBlock::after_id: only rows after (after_id, after_other)
 };
 
 // Convex free space around points.
@@ -186,12 +187,14 @@ struct QueryBlock {
   absl::Span<const uint64_t> ignore_groups;  // group that each query ignores; default: 0, no group
   absl::Span<const uint64_t> ignore_ids;     // at most limits::kMaxIgnoredIds ids that every query of the block ignores
   uint32_t max_results = 0;                  // maximum number of rows per query; 0: limits::kDefaultMaxResults
-  Id after_id = kNoId;                       // lower bound, exclusive, of the ids returned for overlaps and groups
+  Id after_id = kNoId;                       // overlaps, contains, pairs and groups return only higher ids
   absl::Span<const uint64_t> as_of_ticks;    // tick of each query; default: the snapshot's latest state
   absl::Span<const float> as_of_fractions;   // fraction of the way to the next tick, >= 0 and < 1; default: 0
   OutsideHistory outside = OutsideHistory::kReject;
-  absl::Span<const uint64_t> anchor_ids;  // N ids: positions count from this object or instance, which is not found
-  bool count_only = false;                // only the number of rows of each query is returned
+  // N ids, the anchors of the queries. The positions of a query are relative to the position of its anchor, an object
+  // or an instance, which the query does not find.
+  absl::Span<const uint64_t> anchor_ids;
+  bool count_only = false;  // only the number of rows of each query is returned
   using Kind = std::variant<RayColumns, BallColumns, BoxColumns, LookupColumns, NearestColumns, CapsuleColumns,
                             SweepColumns, FrustumColumns, SightColumns, ContainsColumns, PairColumns, CellColumns>;
   Kind kind;

@@ -11,7 +11,7 @@
 namespace locus {
 namespace {
 
-// Numbers of rows that are asked from the nearest query at once: few cells need more than the first.
+// Number of rows that the first nearest query of a cell requests. Few cells need a second nearest query.
 constexpr uint32_t kFirstRows = 32;
 
 // Returns an upper bound of the |coordinates| of a shape relative to its position.
@@ -51,7 +51,7 @@ bool is_beyond(const CellPlane& plane, Vec3d point, Precision precision, const H
       least = least_along(plane.normal, local);
     }
   }
-  // A triangle far from the world's origin is placed with an error of its own coordinates.
+  // The last summand covers the rounding of world coordinates, which matters far from the world's origin.
   const double epsilon = kEpsilonOfPlane * (size + at + max_component(abs(point)) * 0x1p-8);
   return least >= at - epsilon;
 }

@@ -17,30 +17,32 @@ struct CellRequest {
   Precision precision;
 };
 
-// Returns the request of query `i` of a block, whose positions count from `origin`.
+// Returns the request of query `i` of a block. The positions of the query are relative to `origin`.
 CellRequest cell_request(const QueryBlock& block, Vec3d origin, const CellColumns& cells, size_t i);
 
-// Plane of a cell: through the nearest point of an object or triangle, square to the way to it.
+// Plane of a cell. The plane contains the nearest point of an object or triangle, and is perpendicular to the line from
+// the query's point to this nearest point.
 struct CellPlane {
   Hit row;       // t is the distance from the query's point
   Vec3d offset;  // from the query's point to the nearest point
-  Vec3d normal;  // of length 1, outwards
+  Vec3d normal;  // unit vector, pointing away from the query's point
 };
 
-// Space around a point: within `radius`, and within all planes.
+// Convex space around a point: the points within `radius` of it and on its side of all planes.
 struct CellAnswer {
-  bool is_free = false;    // false: the point lies in or on something, and there is no space
-  bool truncated = false;  // more planes were needed
+  bool is_free = false;    // false: the point lies in or on an object or triangle, so there is no free space
+  bool truncated = false;  // max_planes were not enough; `radius` is the distance of the first row without a plane
   float radius = 0;
   std::vector<CellPlane> planes;
 };
 
-// Answers one query. Objects are searched as of `moment`, which the answer borrows. Cost: that of a nearest query for
-// all objects and triangles within the returned radius, and a test of each with each plane.
+// Answers one query. Objects are searched as of `moment`, which the answer borrows. Cost: a nearest query for all
+// objects and triangles within the returned radius, and one test of each of them against each plane.
 CellAnswer run_cell(QueryTask& task, const SceneAtTime& moment, const CellRequest& request, const Filter& filter);
 
-// Returns whether the object or triangle of `row`, or with CONSERVATIVE its bounds, lies wholly on or beyond a plane of
-// the cell around `point`, up to 2^-40 of the coordinates relative to the point.
+// Returns whether the object or triangle of `row` lies wholly on or beyond `plane`, which belongs to the cell around
+// `point`. With CONSERVATIVE, the bounds of the object or triangle are tested instead. The tolerance is 2^-40 of the
+// coordinates relative to `point`, plus 2^-48 of the coordinates of `point`.
 bool is_beyond(const CellPlane& plane, Vec3d point, Precision precision, const Hit& row);
 
 }  // namespace locus

@@ -53,7 +53,7 @@ class InstancesAround {
   bool winds_around(const Instance& instance) {
     const Vec3d point = without_tiny_coordinates(instance.transform.point_to_mesh(ball_.center));
     const TriangleBvh& tree = instance.mesh->tree();
-    // Brute force tests all triangles, so that its half line has no end.
+    // Brute force tests all triangles, so its half line has no end.
     const WindingWay way = task_.uses_kernels() ? instance.mesh->winding_cells().way_from(tree, point)
                                                 : WindingWay::out(tree.cheapest_half_line(point));
     if (way.is_known) return way.winding != 0;
@@ -63,7 +63,7 @@ class InstancesAround {
     return !task_.ended() && crossings.contained();
   }
 
-  // Does the same by the vector kernels.
+  // Computes winds_around() by the vector kernels, along `way`.
   bool search(const TriangleBvh& tree, Vec3d point, const WindingWay& way) {
     WindingSearch search(tree, point, way);
     while (!search.over()) {

@@ -1,5 +1,6 @@
-// Search for the objects that contain a point, and the instances of closed meshes that wind around it. Rows ascend by
-// id. Free functions; any thread may call them with a QueryTask of its own.
+// Search for the objects that contain a point, and for the instances whose mesh is closed and either has a nonzero
+// winding number around the point or contains the point in its surface. Rows ascend by id. Free functions; any thread
+// may call them with a QueryTask of its own.
 #ifndef LOCUS_CORE_QUERY_KINDS_CONTAINS_QUERY_H_
 #define LOCUS_CORE_QUERY_KINDS_CONTAINS_QUERY_H_
 
@@ -8,9 +9,9 @@
 namespace locus {
 
 // Answers one query for a point in world axes. Objects are searched as of `moment`, which the answer borrows; the
-// memory of OverlapAnswer::objects belongs to `task` and is valid until its next query. Cost: visits of the nodes and
-// triangles between the point and the next clear cell of each mesh (winding_cells.h), and of the cells around the
-// point.
+// memory of OverlapAnswer::objects belongs to `task` and is valid until the next query of the task. Cost: visits of the
+// nodes and triangles between the point and the next clear cell of each mesh (winding_cells.h), and of the grid cells
+// around the point.
 OverlapAnswer run_contains(QueryTask& task, const SceneAtTime& moment, Vec3d point, const OverlapOptions& options,
                            const Filter& filter);
 

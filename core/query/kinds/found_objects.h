@@ -13,7 +13,7 @@
 
 namespace locus {
 
-// Choice of a query between its rows and only their number.
+// Selects whether a query returns its rows or only the number of rows.
 enum class CountOnly : uint8_t { kNo, kYes };
 
 struct FoundObject {

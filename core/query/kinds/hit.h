@@ -17,11 +17,12 @@ namespace locus {
 
 // One row of a result; a default-constructed hit is a miss.
 struct Hit {
-  float t = std::numeric_limits<float>::infinity();  // ray: multiple of the direction; nearest: distance; otherwise 0
-  Id id = kNoId;                                     // id of the object or instance; 0: the hit is a miss
-  uint32_t triangle = kNoTriangle;                   // index of the triangle in the uploaded mesh
-  GridRef object;                                    // null for an instance and for a miss
-  const Instance* instance = nullptr;                // null for an object and for a miss
+  // Ray or sweep: multiple of the direction or way. Nearest, pair or cell: distance. Other hits: 0. Miss: infinity.
+  float t = std::numeric_limits<float>::infinity();
+  Id id = kNoId;                        // id of the object or instance; 0: the hit is a miss
+  uint32_t triangle = kNoTriangle;      // index of the triangle in the uploaded mesh
+  GridRef object;                       // null for an instance and for a miss
+  const Instance* instance = nullptr;   // null for an object and for a miss
   const SceneAtTime* moment = nullptr;  // time at which the object was found; null: the snapshot's latest state
 
   // Returns the object's shape at the time at which it was found. Precondition: the hit is on an object.
@@ -55,7 +56,7 @@ struct RowPosition {
   }
   // Returns whether this position excludes any row.
   bool is_given() const { return t != -std::numeric_limits<float>::infinity(); }
-  // Returns whether `hit` is behind this position.
+  // Returns whether `hit` comes after this position.
   bool is_before(const Hit& hit) const { return std::tie(t, id, triangle) < std::tie(hit.t, hit.id, hit.triangle); }
 };
 

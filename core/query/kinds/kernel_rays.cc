@@ -41,7 +41,7 @@ class Rounds {
       for (const SlabRay<double>& slabs : slabs_) walks_.emplace_back(instances, slabs);
     stops_.reserve(rays.size());
     if (mode() != RayMode::kAll) return;
-    // One row more than requested shows that the result is truncated. A count has no limit.
+    // One row more than requested shows that the result is truncated. With count_only, max_results has no effect.
     const RayRequest& request = rays.front().request;
     max_rows_ = request.count_only ? kMaxRows : std::min(kMaxRows, request.max_results + 1);
     rows_ = std::make_unique_for_overwrite<KernelRow[]>(rays.size() * max_rows_);

@@ -13,7 +13,7 @@ namespace locus {
 Hit look_up(const SceneSnapshot& snapshot, const SceneAtTime& moment, Id id);
 
 // Returns for each group its objects at `moment` and its instances, one row for each. The ids of the rows are above
-// options.after_id and ascending; there are at most options.max_results rows. A group that occurs several times in
+// options.after_id and ascending; each group has at most options.max_results rows. A group that occurs several times in
 // `groups` has one entry in the result. Cost: O(all objects and instances), independent of the number of groups.
 absl::flat_hash_map<Group, OverlapAnswer> look_up_groups(QueryTask& task, const SceneAtTime& moment,
                                                          absl::Span<const uint64_t> groups,

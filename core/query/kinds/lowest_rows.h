@@ -29,7 +29,7 @@ struct OverlapAnswer {
   // `objects` is empty, and `runs` contains the rows of objects, too. The memory belongs to the QueryTask and is valid
   // until the next query of the task.
   absl::Span<const FoundObject> objects;
-  uint64_t count = 0;      // number of rows of a query that only counts; it has no runs and no objects
+  uint64_t count = 0;      // number of rows; with count_only, `runs` and `objects` are empty
   bool truncated = false;  // more rows were found than are returned
 
   absl::Span<const uint32_t> triangles_of(const RowRun& run) const {

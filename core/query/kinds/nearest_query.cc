@@ -207,8 +207,9 @@ class TrianglesNear {
   // Visits the triangles near `point`, the query's point in mesh axes, by the vector kernels, with the same result as
   // QueryTask::visit_nearest(). Precondition: NearestSearch::served(tree, point).
   void search(const TriangleBvh& tree, Vec3d point, NearestSearch::Find find) {
-    // The rows of two triangles are equally near if the distances in world axes are equal after rounding to float: the
-    // distances in mesh axes then differ by twice epsilon_, in world units, and by the rounding.
+    // The rows of two triangles are equally near if the distances in world axes are equal after rounding to float:
+    // their distances in mesh axes, multiplied by the scale, then differ by at most twice epsilon_ plus the error of
+    // this rounding.
     const double slack = 2 * (epsilon_ + std::numeric_limits<float>::min()) / transform_.scale;
     NearestSearch search(tree, point, mesh_limit(), find, slack);
     NearestSearch::Squared squared;

@@ -20,35 +20,37 @@ struct NearestRequest {
   uint32_t count;       // maximum number of rows, at least 1
   bool every_triangle;  // true: one row per triangle; false: one row per instance, for its nearest triangle
   bool count_only;      // only the number of rows within max_distance is returned; `count` has no effect
-  RowPosition after;    // only rows behind this position are returned
+  RowPosition after;    // only rows after this position are returned
   Source source;
   Precision precision;
 };
 
-// Returns the request of query `i` of a block, whose positions count from `origin`.
+// Returns the request of query `i` of a block. The positions of the query are relative to `origin`.
 NearestRequest nearest_request(const QueryBlock& block, Vec3d origin, const NearestColumns& nearest, size_t i);
 
-// Rows in order or, with count_only, only their number.
+// Rows in the order of nearer() or, with count_only, only the number of rows.
 struct NearestAnswer {
   absl::InlinedVector<Hit, 1> rows;
   uint64_t count = 0;
 };
 
-// Returns the nearest rows in order. Hit::t is the distance, and Hit::triangle the nearest triangle of an instance
-// (with every_triangle, the row's triangle). Objects are searched as of `moment`, which the rows borrow. Cost: one
-// visit for each node and cell that is at most as far away as the last returned row, and O(log count) for each inserted
-// row.
+// Returns the nearest rows in the order of nearer(). Hit::t is the distance, and Hit::triangle the nearest triangle of
+// an instance (with every_triangle, the row's triangle). Objects are searched as of `moment`, which the rows borrow.
+// Cost: one visit for each node and cell that is at most as far away as the last returned row, and O(log count) for
+// each inserted row.
 NearestAnswer run_nearest(QueryTask& task, const SceneAtTime& moment, const NearestRequest& request,
                           const Filter& filter);
 
-// Nearest point of a row's object or triangle or, for a CONSERVATIVE query, of its bounds.
+// Nearest point of a row's object or triangle or, for a CONSERVATIVE query, of the bounds of the object or triangle.
 struct NearestSurface {
-  Vec3d offset;        // from request.point to the nearest point; zero if request.point lies inside
-  Vec3d normal;        // unit vector from the nearest point to request.point; if they are equal, the front of the
-                       // triangle, or zero for an object; zero if CONSERVATIVE
+  Vec3d offset;  // from request.point to the nearest point; zero if request.point lies inside
+  // Unit vector from the nearest point to request.point. If both points are equal, `normal` is the unit normal on the
+  // side from which the triangle's stored vertices appear counter-clockwise; it is zero for an object and for a
+  // triangle without area. `normal` is zero for a CONSERVATIVE query.
+  Vec3d normal;
   float u = 0, v = 0;  // weights of the triangle's second and third vertex; 0 for an object and if CONSERVATIVE
 };
-// Returns the nearest point, computed again from the stored object or triangle, since a Hit does not store it.
+// Returns the nearest point. It is computed again from the stored object or triangle, since a Hit does not store it.
 NearestSurface nearest_surface(const NearestRequest& request, const Hit& row);
 
 }  // namespace locus

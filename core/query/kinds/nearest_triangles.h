@@ -28,7 +28,7 @@ static_assert(kMaxNearestGroups == limits::kMaxBvhDepth);
 
 class NearestSearch {
  public:
-  // Triangles to find: every one within the limit, or the nearest ones within the limit.
+  // Triangles to find: all triangles within the limit, or only the nearest of them.
   enum class Find { kEvery, kNearest };
 
   // Returns whether a search is possible: kernels exist for this processor, and support the tree and the point.
@@ -37,9 +37,9 @@ class NearestSearch {
            max_component(abs(point)) + double{tree.tree().magnitude} <= double{kMaxNearestReach};
   }
 
-  // Begins a search for the triangles at a distance of at most `limit`, in mesh axes; infinity is legal. With kNearest
-  // the candidates are those of them that are farther away than the nearest triangle by at most `slack`, plus 2^-20 of
-  // its distance. Precondition: served(tree, point).
+  // Begins a search for the triangles at a distance of at most `limit`, in mesh axes; infinity is legal. With kNearest,
+  // the search may omit triangles that are farther away than the nearest triangle by more than `slack` plus 2^-20 of
+  // the distance of the nearest triangle. Precondition: served(tree, point).
   NearestSearch(const TriangleBvh& tree, Vec3d point, double limit, Find find, double slack = 0)
       : NearestSearch(*active_nearest_kernels(), tree, point, limit, find, slack) {
     LOCUS_DCHECK(served(tree, point));
@@ -68,9 +68,9 @@ class NearestSearch {
     kernels_.run(tree_, visit_);
     LOCUS_DCHECK_LE(visit_.found, kMaxCandidates + kTreeWidth);
   }
-  // Lowers the limit to `limit`, if it is lower.
+  // Lowers the limit to `limit` if `limit` is lower than the current limit.
   void lower_limit(double limit) { visit_.limit = std::min(visit_.limit, rounded_up(limit)); }
-  // Returns the limit, which a search with kNearest lowers itself.
+  // Returns the limit. A search with kNearest also lowers the limit itself.
   float limit() const { return visit_.limit; }
 
   // Return the number of candidates of the last call of next(), and its cost: the number of nodes opened and of
@@ -82,10 +82,10 @@ class NearestSearch {
   Triangle triangle(uint32_t i) const { return bvh_.triangle(block(i), lane(i)); }
   uint32_t number(uint32_t i) const { return tree_.numbers[block(i).first + lane(i)]; }
 
-  // Squared distances of candidates, or the room for them.
+  // Array for the squared distances of all candidates that one call of next() can find.
   using Squared = double[kMaxCandidates + kTreeWidth];
-  // Measures the candidates in world axes, where the mesh is placed by `transform`: writes for each the larger one of
-  // the values of squared_distance() for `point` and the triangle and for `point` and its bounds, which are grown by
+  // Writes to `squared` the squared distance of each candidate from `point` in world axes, in which the mesh is placed
+  // by `transform`. The squared distance is the larger of two: to the triangle, and to the triangle's bounds grown by
   // `epsilon`.
   void measure(Vec3d point, const Transform& transform, double epsilon, Squared& squared) const {
     const Rotation& rotation = transform.rotation;

@@ -1,6 +1,6 @@
 // Contacts of balls and capsules with the objects and triangles that they overlap: distance, nearest point and normal.
-// Computed again from the stored object or triangle when a row is written, since a Hit does not store them. Pure
-// functions; any thread.
+// A contact is computed again from the stored object or triangle when a row is written, since a Hit does not store it.
+// Pure functions; any thread.
 #ifndef LOCUS_CORE_QUERY_KINDS_OVERLAP_CONTACT_H_
 #define LOCUS_CORE_QUERY_KINDS_OVERLAP_CONTACT_H_
 
@@ -9,9 +9,9 @@
 
 namespace locus {
 
-// Returns the contact of a ball or capsule, as a mover that rests, with the object or the triangle of a row, in world
-// axes: see Contact. With CONSERVATIVE, the distance and the nearest point of its bounds, or of the bounds of the
-// instance if `triangle` is kNoTriangle; the normal is then zero.
+// Returns the contact, in world axes, of `solid` with the object or the triangle of a row. `solid` is a ball or capsule
+// as a resting mover. With CONSERVATIVE, the result has the distance and the nearest point of the bounds of the object
+// or triangle, or of the whole instance if `triangle` is kNoTriangle; the normal is zero.
 Contact overlap_contact(const Mover& solid, Precision precision, const Hit& hit, uint32_t triangle);
 
 }  // namespace locus

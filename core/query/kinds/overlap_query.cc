@@ -405,7 +405,7 @@ class InstanceSearch {
   LowestRows& rows_;
 };
 
-// Visitor of the triangles of one instance that keeps the nearest one that the solid overlaps.
+// Visitor of the triangles of one instance. Retains the nearest triangle that the solid overlaps.
 template <class Kind>
 class NearestOverlapping {
  public:

@@ -38,14 +38,14 @@ OverlapAnswer run_capsule(QueryTask& task, const SceneAtTime& moment, const Caps
 OverlapAnswer run_region(QueryTask& task, const SceneAtTime& moment, const ConvexRegion& region,
                          const OverlapOptions& options, const Filter& filter);
 
-// Returns the number of the triangle nearest to the ball's centre, or to the capsule's inner segment, among the
-// triangles of the instance that the solid overlaps; of equally near ones the lowest. kNoTriangle if it overlaps none.
-// `solid` is in world axes.
+// Return the number of the triangle that is nearest to the ball's centre or to the capsule's inner segment, among the
+// triangles of the instance that the solid overlaps. Return the lowest number if several triangles are equally near,
+// and kNoTriangle if the solid overlaps no triangle. `solid` is in world axes.
 uint32_t nearest_overlapping(QueryTask& task, const Balld& solid, const Instance& instance);
 uint32_t nearest_overlapping(QueryTask& task, const Capsule& solid, const Instance& instance);
 
-// Returns the rows of instances merged with the objects that the last search of `found` has found: at most
-// options.max_results rows, ascending by id. With count_only, adds the numbers of rows.
+// Merges the rows of `instances` with the objects in `found`. Returns at most options.max_results rows, ascending by
+// id. With count_only, returns only the sum of the numbers of rows.
 OverlapAnswer with_objects(OverlapAnswer instances, FoundObjects& found, const SceneAtTime& moment,
                            const OverlapOptions& options);
 
@@ -55,7 +55,8 @@ GridRegion ball_region(const SceneAtTime& moment, const Balld& ball, const Overl
 GridRegion box_region(const SceneAtTime& moment, const Obbd& box, const OverlapOptions& options);
 GridRegion capsule_region(const SceneAtTime& moment, const Capsule& capsule, const OverlapOptions& options);
 
-// Return the ball, box or capsule of query `i` of a block, in world axes. Its positions count from `origin`.
+// Return the ball, box or capsule of query `i` of a block, in world axes. The positions of the query are relative to
+// `origin`.
 Balld ball_of(Vec3d origin, const BallColumns& balls, size_t i);
 Obbd box_of(Vec3d origin, const BoxColumns& boxes, size_t i);
 Capsule capsule_of(Vec3d origin, const CapsuleColumns& capsules, size_t i);

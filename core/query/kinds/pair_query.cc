@@ -22,7 +22,8 @@ struct Partner {
   float t;
 };
 
-// Orders of the rows of one object: by other, or with k by (t, other).
+// Return whether `a` comes before `b` in the order of the rows of one object: lower_other() if PairColumns::count is 0,
+// otherwise nearer_partner().
 bool lower_other(const Partner& a, const Partner& b) { return a.other < b.other; }
 bool nearer_partner(const Partner& a, const Partner& b) { return std::tie(a.t, a.other) < std::tie(b.t, b.other); }
 
@@ -32,7 +33,7 @@ class FirstPairs {
  public:
   FirstPairs(size_t max_rows, bool count_only) : max_rows_(max_rows), count_only_(count_only) {}
 
-  // Offers rows of one object, in order. No object may be offered twice.
+  // Offers all rows of one object, in order. No object may be offered twice.
   void offer(const GridRef& object, absl::Span<const Partner> partners) {
     count_ += partners.size();
     if (count_only_ || partners.empty()) return;
@@ -63,7 +64,7 @@ class FirstPairs {
     size_t begin, count;
   };
 
-  // Puts the rows in order and drops those behind the first max_rows_.
+  // Sorts the rows and drops all rows after the first max_rows_ rows.
   void keep_first() {
     std::sort(runs_.begin(), runs_.end(), [](const Run& a, const Run& b) { return a.id < b.id; });
     std::vector<Partner> kept;
@@ -108,27 +109,28 @@ struct PairSearch {
   static bool are_apart(const GridEntry& a, const GridEntry& b) {
     return a.id != b.id && (a.group == 0 || a.group != b.group);
   }
-  // Returns whether (a, b) may be a row without k: `a` has the lower id, and the row is behind (after_id, after_other).
-  // Does not apply the filter.
+  // Returns whether (a, b) may be a row if PairColumns::count is 0: groups and masks allow the pair, `a` has the lower
+  // id, and the row comes after (after_id, after_other). Does not apply the filter.
   bool may_be_row(const GridEntry& a, const GridEntry& b) const {
     if (b.id <= a.id && !(planted(PlantedBug::kPairBothSides) && b.id != a.id)) return false;
     if (a.id == after_id && b.id <= after_other) return false;
     return are_apart(a, b) && ((may_be_first(a) && may_be_second(b)) || (may_be_first(b) && may_be_second(a)));
   }
-  // Returns bounds of the objects within the distance of an object.
+  // Returns a box that overlaps the bounds of every object within max_distance of an object with this shape.
   Aabbd reach_of(const Shape& shape) const {
     const Aabbd own = bounds_of(shape);
     const double reach = raised(max_distance);
     return grown(own, reach + 0x1p-40 * (magnitude(own) + reach));
   }
-  // Returns the rounded distance between two objects. The lower id comes first, so that both orders give one result.
+  // Returns the rounded distance between two objects. The object with the lower id is passed first, so that both orders
+  // of the arguments give the same result.
   float distance(Id a_id, const Shape& a, Id b_id, const Shape& b) const {
     if (conservative) return rounded_distance(distance_between(bounds_of(a), bounds_of(b)));
     return rounded_distance(a_id < b_id ? distance_between(a, b) : distance_between(b, a));
   }
 };
 
-// Visitor of all objects that finds those within the distance of one object, for brute force.
+// Visitor of all objects that finds the objects within max_distance of one object. Used for brute force.
 class Partners {
  public:
   Partners(const PairSearch& search, const GridRef& object, std::vector<Partner>& rows)
@@ -152,21 +154,22 @@ class Partners {
   std::vector<Partner>& rows_;
 };
 
-// Search for the pairs of a group of neighbouring objects: visits the objects near any of them once, collects these in
-// float columns and culls them by a kernel for each object of the group. add() objects, then search().
+// Search for the pairs of a group of neighbouring objects. Visits the objects near the group once, collects them as
+// candidates in float columns, and culls the candidates by a kernel for each object of the group. Call add() for each
+// object, then search().
 class PairGroup {
  public:
   explicit PairGroup(const PairSearch& search) : search_(search), kernels_(active_grid_kernels()) {}
 
   bool empty() const { return size_ == 0; }
-  // Adds an object, unless the group is full or the object too far from it. Returns whether it was added. Objects of
-  // different bricks are never in one group.
+  // Adds an object unless the group is full, the object is too far from the group, or the object belongs to another
+  // brick than the group. Returns whether the object was added.
   bool add(const GridRef& object) {
     if (size_ == kMembers || (!empty() && members_.front().object.brick() != object.brick())) return false;
     const Shape shape = search_.moment.shape(object);
     const Aabbd reach = search_.reach_of(shape);
     const Aabbd bounds = empty() ? reach : merge(bounds_, reach);
-    // The search visits all objects in `bounds`. A larger group of objects far apart would visit too many.
+    // The search visits all objects in `bounds`, so a group of objects far apart would visit too many objects.
     if (!empty() && volume(bounds) > kMaxWaste * (volumes_ + volume(reach))) return false;
     bounds_ = bounds;
     volumes_ = empty() ? volume(reach) : volumes_ + volume(reach);
@@ -205,27 +208,27 @@ class PairGroup {
   static constexpr size_t kMembers = 32;
   static constexpr uint32_t kCandidates = GridRows::kMaxValues;
   static constexpr double kMaxWaste = 4;
-  // Rounding of the columns, of the balls and in the kernel changes a distance by less than 2^-20 of the coordinates,
-  // relative to the centre, and of the extents.
+  // Rounding in the columns, in the balls and in the kernel changes a distance by less than 2^-20 of the sum of the
+  // extents and of the coordinates relative to center_.
   static constexpr double kCullGrowth = 0x1p-18;
 
   struct Member {
     GridRef object;
     Shape shape;
-    std::vector<Partner> rows;  // empty between two searches, which keep its memory
+    std::vector<Partner> rows;  // empty between two searches; its memory is kept
   };
 
   static double volume(const Aabbd& box) {
     const Vec3d size = box.max - box.min;
     return size.x * size.y * size.z;
   }
-  // Returns an upper bound of the distance from the position to any point of the solid or, with CONSERVATIVE, of its
-  // bounds, up to rounding.
+  // Returns an upper bound, up to rounding, of the distance from the object's position to any point of its solid or,
+  // with CONSERVATIVE, to any point of its bounds.
   double extent_of(const GridRef& object) const {
     return object.reach() * (search_.conservative ? double{kDiagonal} : 1.0);
   }
-  // Returns the ball around the position of a member that the ball of every candidate within the distance meets, as the
-  // kernel computes it.
+  // Returns a ball around the position of `member` for the kernel, which culls candidates whose own balls do not meet
+  // it. The ball is so large that no candidate within max_distance of the member is culled.
   GridBall ball_of(const Member& member) const {
     const Vec3d center = member.shape.position - center_;
     const double extent = planted(PlantedBug::kPairCullExtent) ? 0 : extent_of(member.object);
@@ -237,7 +240,7 @@ class PairGroup {
     return {{local.x, local.y, local.z},
             static_cast<float>(std::min(radius, double{std::numeric_limits<float>::max()}))};
   }
-  // Tests the collected candidates with each member. Returns false if the query must end.
+  // Tests the collected candidates against each member. Returns false if the query must end.
   bool test_candidates() {
     const GridRows all = {x_, y_, z_, extent_, nullptr, 1, {0}, {count_}};
     for (size_t i = 0; i < size_; ++i) {
@@ -264,8 +267,8 @@ class PairGroup {
   const GridKernels& kernels_;
   std::array<Member, kMembers> members_;
   size_t size_ = 0;     // number of members
-  Aabbd bounds_;        // of all objects within the distance of a member
-  double volumes_ = 0;  // sum of the volumes of these bounds for each member
+  Aabbd bounds_;        // union of reach_of() of all members
+  double volumes_ = 0;  // sum of the volumes of reach_of() of all members
   Vec3d center_;        // origin of the columns
   std::array<GridBall, kMembers> balls_;
   // Columns of the candidates, padded to whole vectors.
@@ -276,7 +279,7 @@ class PairGroup {
   uint32_t count_ = 0;
 };
 
-// Visitor of the objects near one object that keeps the nearest.
+// Visitor of the objects near one object. Retains the nearest of them.
 class NearestPartners {
  public:
   NearestPartners(const PairSearch& search, const GridRef& object, uint32_t count)
@@ -315,8 +318,8 @@ class NearestPartners {
   }
 
  private:
-  // Returns an upper bound of the distance from the position to any point of the solid or, with CONSERVATIVE, of its
-  // bounds, whose corners are farther away.
+  // Returns an upper bound of the distance from the object's position to any point of its solid or, with CONSERVATIVE,
+  // to any point of its bounds, whose corners may be farther away.
   static double extent_of(const Shape& shape, const Aabbd& bounds, const GridRef& object, bool conservative) {
     if (!conservative) return object.reach() * (1 + 0x1p-40);
     const Vec3d corner = max(abs(bounds.min - shape.position), abs(bounds.max - shape.position));
@@ -332,13 +335,14 @@ class NearestPartners {
   std::vector<Partner> rows_;  // a heap whose front is the last row
 };
 
-// Returns the rows behind the row with `after_other`, or all rows if there is no such row.
+// Returns the rows after the row with `after_other`, or all rows if there is no such row.
 absl::Span<const Partner> behind(absl::Span<const Partner> rows, Id after_other) {
   const auto at = std::find_if(rows.begin(), rows.end(), [&](const Partner& row) { return row.other == after_other; });
   return at == rows.end() ? rows : rows.subspan(static_cast<size_t>(at - rows.begin()) + 1);
 }
 
-// Searches the partners of one object: all within the distance, or with k the nearest.
+// Searches the partners of one object: all objects within max_distance if `count` is 0, otherwise the `count` nearest
+// of them.
 void search_object(const PairSearch& search, const GridRef& object, uint32_t count, FirstPairs& rows) {
   if (count == 0) {
     std::vector<Partner> found;
@@ -375,7 +379,7 @@ PairAnswer run_pairs(QueryTask& task, const SceneAtTime& moment, const QueryBloc
     const GridEntry& entry = object.entry();
     ++task.work().tests;
     if (!task.count_test()) return false;
-    // The rows of after_id itself go on behind after_other.
+    // The object with the id after_id may have further rows, after after_other.
     const bool is_behind = entry.id > block.after_id || (entry.id == block.after_id && pairs.after_other != 0);
     if (!is_behind || !rows.has_room_for(entry.id) || !search.filter.accepts(entry)) return true;
     if (!by_groups) {

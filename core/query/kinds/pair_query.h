@@ -22,9 +22,10 @@ struct PairAnswer {
   bool truncated = false;  // more rows were found than are returned
 };
 
-// Answers the query of a block of pairs. Objects are searched as of `moment`, which the answer borrows. Cost: a search
-// of the objects around each group of up to 32 objects, and a float test of those found with each object of the group;
-// with k a search around each object. Memory: at most twice the maximum number of rows and the rows of one group.
+// Answers the query of a block of pairs. Objects are searched as of `moment`, which the answer borrows. Cost if
+// pairs.count is 0: one search around each group of up to 32 objects, and one test in float of each object found
+// against each object of the group. Cost otherwise: one search around each object. Memory: at most twice the maximum
+// number of rows, plus the rows of one group.
 PairAnswer run_pairs(QueryTask& task, const SceneAtTime& moment, const QueryBlock& block, const PairColumns& pairs);
 
 }  // namespace locus

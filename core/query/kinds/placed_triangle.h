@@ -78,8 +78,8 @@ class LoosePlacedTriangles {
   }
 
   // Returns true if the test against bounds_of_triangle() can be omitted for a query of `size` around `center`, both in
-  // mesh axes: a query that overlaps a triangle in mesh axes then also overlaps the triangle's bounds in world axes.
-  // Rounding center and size to float moves the query by less than 2^-24 * sqrt(3) times their magnitude. If this
+  // mesh axes, because a query that overlaps a triangle in mesh axes is sure to overlap the triangle's bounds in world
+  // axes. Rounding center and size to float moves the query by less than 2^-24 * sqrt(3) times their magnitude. If this
   // magnitude, scaled to world axes, is at most 2 * extent_, the error is at most half of epsilon_. The other half
   // covers the transformation back to world axes.
   bool bounds_follow(Vec3d center, double size) const {

@@ -16,8 +16,8 @@ std::optional<Vec3d> position_of(const SceneSnapshot& snapshot, const SceneAtTim
   return std::nullopt;
 }
 
-// Returns whether the points of query `i`, as offsets from `origin`, lie within the world. Each query has `points_each`
-// points in the column, which may also have the points of one query for all.
+// Returns whether the points of query `i` lie within the world. `column` has the offsets of the points from `origin`:
+// `points_each` points for each query, or `points_each` points that all queries share.
 bool within_world(Vec3d origin, absl::Span<const float> column, size_t points_each, size_t i) {
   const ColumnReader<float> reader(column, 3 * points_each);
   if (!reader.given()) return true;

@@ -1,5 +1,5 @@
-// Points from which the positions of a block's queries count: the frame of the block, or, with anchor_ids, the position
-// of each query's anchor at the query's time. Immutable, so any thread may use it; borrows the block.
+// Points to which the positions of a block's queries are relative: the frame of the block or, with anchor_ids, the
+// position of each query's anchor at the query's time. Immutable, so any thread may use it; borrows the block.
 #ifndef LOCUS_CORE_QUERY_KINDS_QUERY_ORIGINS_H_
 #define LOCUS_CORE_QUERY_KINDS_QUERY_ORIGINS_H_
 
@@ -18,7 +18,8 @@ class QueryOrigins {
   // Looks up the anchors of `block`, which has passed check_batch(), at the times of its queries. O(1) for each query.
   QueryOrigins(const SceneSnapshot& snapshot, const QueryBlock& block, const QueryTimes& times);
 
-  // Returns the point from which the positions of query `i` count; any point if the query is unanchored.
+  // Returns the point to which the positions of query `i` are relative. The point has no meaning if the query is
+  // unanchored.
   Vec3d of(size_t i) const {
     LOCUS_DCHECK(positions_.empty() || i < positions_.size());
     return positions_.empty() ? block_.frame : positions_[i];

@@ -34,7 +34,7 @@ class Filter {
         anchor_(block.anchor_ids.empty() ? kNoId : block.anchor_ids[query]),
         ignored_ids_(block.ignore_ids) {}
 
-  // Makes the filter ignore two more groups; 0: none. A later call replaces these groups.
+  // Makes the filter ignore two more groups; 0 stands for no group. Another call replaces both groups.
   void ignore(Group first, Group second) {
     ignored_groups_[1] = first;
     ignored_groups_[2] = second;
@@ -54,11 +54,12 @@ class Filter {
  private:
   Layers mask_;
   std::array<Group, 3> ignored_groups_;  // 0: none
-  Id anchor_;                            // 0, which is no id, without an anchor
+  Id anchor_;                            // kNoId if the query has no anchor
   absl::Span<const uint64_t> ignored_ids_;
 };
 
-// Returns the rotation of query `i` in an optional column of quaternions x, y, z, w; the identity if there is none.
+// Returns the rotation of query `i` in an optional column of quaternions x, y, z, w. Returns the identity if the column
+// has no entries.
 inline Rotation rotation_entry(absl::Span<const float> rotations, size_t i) {
   const ColumnReader<float> reader(rotations, 4);
   if (!reader.given()) return {};
@@ -125,7 +126,7 @@ class QueryTask {
   // Returns the collector of found objects, which successive ball and box queries reuse.
   FoundObjects& found_objects() { return found_objects_; }
 
-  // Returns whether ball, box, contains and nearest queries may use the vector kernels.
+  // Returns whether ball, box, contains, nearest and pair queries may use the vector kernels.
   bool uses_kernels() const { return !brute_force_; }
 
   // Call the visitor for every value of `index` that may match the query: the values that the index structure finds,

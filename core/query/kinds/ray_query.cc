@@ -81,8 +81,8 @@ class InstanceVisitor {
   HitCollector& collector_;
 };
 
-// Returns whether the vector kernels trace `ray` through the instances. They return the first hits of a mesh, not the
-// first ones behind a position.
+// Returns whether the vector kernels trace `ray` through the instances. The kernels return the first hits in a mesh, so
+// they cannot trace a ray that needs the first hits after a given position.
 bool uses_kernels(const QueryTask& task, const RayRequest& ray) {
   return !ray.after.is_given() && ray.precision == Precision::kExact && task.ray_kernels() != nullptr;
 }
@@ -116,7 +116,8 @@ void find_hits(QueryTask& task, std::vector<PendingRay>& rays,
                absl::FunctionRef<const SceneAtTime&(size_t)> moment_of) {
   if (rays.empty()) return;
   const Source source = rays.front().request.source;
-  // The columns of a block have the position for all rays, or for none; the kernels need rays without one.
+  // Uses the kernels for all rays or for none, because usually either all rays of a block have a position `after`, or
+  // none.
   const bool by_kernels =
       std::all_of(rays.begin(), rays.end(), [&](const PendingRay& ray) { return uses_kernels(task, ray.request); });
   if (by_kernels && source != Source::kDynamic) trace_meshes(task, rays);

@@ -25,11 +25,11 @@ struct RayRequest {
   Precision precision;
   uint32_t max_results;  // kAll only
   bool count_only;       // kAll only
-  RowPosition after;     // only rows behind this position are returned
+  RowPosition after;     // only rows after this position are returned
 };
 
-// Returns the request of query `i` of a block of rays, whose positions count from `origin`. Converts the block's cull
-// from the scene's `winding` to the stored counter-clockwise winding.
+// Returns the request of query `i` of a block of rays. The positions of the query are relative to `origin`. Converts
+// the block's cull from the scene's `winding` to the stored counter-clockwise winding.
 RayRequest ray_request(const QueryBlock& block, Vec3d origin, const RayColumns& rays, Winding winding, size_t i);
 
 struct RayAnswer {

@@ -20,14 +20,14 @@ struct Segment {
   uint32_t target;  // index of the target's byte in the answer
   uint32_t sample;  // index of the sample point in the block
   Vec3d way;        // from the eye to the sample
-  uint32_t hint;    // block of the tree of the searched mesh that probably blocks this segment, or kNoBlock
+  uint32_t hint;    // block of triangles of the searched mesh that probably blocks the segment, or kNoBlock
   bool is_blocked = false;
 };
 
-// Search of the segments of one viewer, eye after eye: samples that an eye sees are not searched again for the next
-// eye. All segments of an eye start at one point, so the transform of the eye to the axes of a mesh is shared, and
-// neighbouring segments are often blocked by the same triangles: the block of triangles that blocked the last one is
-// tested first. That decides no answer, only the order of tests.
+// Search of the segments of one viewer, eye after eye. A sample that one eye sees is not searched again for the
+// following eyes. All segments of an eye start at the same point, so the eye is transformed to the axes of a mesh only
+// once. Neighbouring segments are often blocked by the same triangles, so the block of triangles that blocked a
+// previous segment is tested first. This hint affects only the order of the tests, not the answer.
 class Look {
  public:
   Look(QueryTask& task, const SceneAtTime& moment, const QueryBlock& block, const SightColumns& sight, size_t viewer)
@@ -42,7 +42,7 @@ class Look {
         max_distance_(
             ColumnReader<float>(sight.max_distances, 1).value(viewer, std::numeric_limits<float>::infinity())) {}
 
-  // Adds the samples that are seen from `eye` and from none of the eyes before.
+  // Counts the samples that are seen from `eye` and were not seen from a previous eye.
   void from(Vec3d eye, absl::Span<char> seen) {
     eye_ = eye;
     gather(seen);
@@ -61,11 +61,11 @@ class Look {
   }
 
  private:
-  // Maximum number of instances of which each is searched for all segments. More instances are found by the tree over
-  // instances, segment by segment.
+  // Maximum number of instances in the scene for which every instance is searched for all segments. In a scene with
+  // more instances, the tree over instances is searched for each segment.
   static constexpr size_t kFewInstances = 8;
-  // Number of segments of the first samples that are searched at once. The next ones begin with the blocks that blocked
-  // these.
+  // Number of segments that are tested at once in the first pass of trace(), which has one segment per target. A block
+  // that blocks one of these segments is the hint of the following segments.
   static constexpr size_t kSegmentsAtOnce = 16;
   // Maximum number of segments in one call of a kernel or of find_hits(), which cannot be interrupted.
   static constexpr size_t kMaxAtOnce = 128;
@@ -80,7 +80,8 @@ class Look {
     const ColumnReader<uint64_t> groups(sight_.target_groups, 1);
     return groups.value(sight_.pairwise ? viewer_ : target, 0);
   }
-  // Returns the filter of a segment: what it accepts blocks the segment.
+  // Returns the filter of the segments to a target. Objects and instances that the filter accepts block a segment if
+  // they meet it.
   Filter filter_of(uint32_t target) const {
     Filter filter = filter_;
     filter.ignore(viewer_group_, group_of(target));
@@ -93,7 +94,8 @@ class Look {
   }
 
   // Collects the segments from the eye to the samples that are not seen yet, sorted by target so that neighbouring
-  // targets have similar directions. Samples at the eye itself are seen, samples too far away are not.
+  // targets have similar directions. Samples at the eye itself count as seen. Samples farther away than max_distance_
+  // are not seen.
   void gather(absl::Span<char> seen) {
     segments_.clear();
     if (sight_.eyes_per_viewer() > 1 && is_seen_.empty()) is_seen_.resize(sight_.targets.size() / 3);
@@ -112,8 +114,8 @@ class Look {
     sort_by_direction();
   }
 
-  // Sorts the segments by the direction of their target's first segment: by octant of the direction's largest
-  // component, then along a curve of 8 x 8 squares.
+  // Sorts the segments by the direction of their target's first segment: by the face of a cube around the eye that this
+  // direction meets, then along a Morton curve through the 8 x 8 squares of the face.
   void sort_by_direction() {
     constexpr size_t kFew = 32;
     if (segments_.size() < kFew) return;
@@ -143,8 +145,8 @@ class Look {
     return (static_cast<uint32_t>(axis) * 2 + (way[axis] < 0 ? 1u : 0u)) << 6 | curve;
   }
 
-  // Searches the segments that are not blocked yet in one instance: first one segment of each target, then the others,
-  // which begin with the block that blocked the first one.
+  // Tests the segments that are not blocked yet against one instance: first one segment of each target, then the other
+  // segments. Their hint is the block that blocked the first segment of the same target.
   void trace(const Instance& instance) {
     if (task_.ended() || !task_.count_test() || !filter_of_viewer().accepts(instance)) return;
     open_.clear();
@@ -156,7 +158,7 @@ class Look {
     }
     const Vec3d origin = instance.transform.point_to_mesh(eye_);
     uint32_t hint = kNoBlock;
-    // The first open segment of each target.
+    // Search the first open segment of each target.
     now_.clear();
     const auto starts_target = [&](size_t k) {
       return k == 0 || segments_[open_[k]].target != segments_[open_[k - 1]].target;
@@ -170,7 +172,7 @@ class Look {
       now_.clear();
     }
     trace(instance, origin, hint);
-    // The other ones.
+    // Search the other open segments of each target.
     now_.clear();
     uint32_t first = 0;
     for (size_t k = 0; k < open_.size(); ++k) {
@@ -193,8 +195,8 @@ class Look {
     return filter;
   }
 
-  // Searches the segments of now_ in one instance by a kernel. Sets the hint of a blocked segment to the block that
-  // blocks it, and returns the hint of the last blocked one, or `hint`.
+  // Tests the segments of now_ against one instance by a kernel. Sets the hint of a blocked segment to the block that
+  // blocks it. Returns the hint of the last segment that the kernel found blocked, or `hint` if there is none.
   uint32_t trace(const Instance& instance, Vec3d origin, uint32_t hint) {
     if (now_.empty() || task_.ended()) return hint;
     const TriangleTree tree = instance.mesh->tree().tree();
@@ -256,7 +258,8 @@ class Look {
     return hint;
   }
 
-  // Searches one segment in one instance, triangle by triangle. `nearest` is the t at which it enters the instance.
+  // Tests one segment against one instance, triangle by triangle. `nearest` is the t at which the segment enters the
+  // instance's bounds.
   void trace_one(const Instance& instance, float nearest, Segment& segment) {
     const SlabRay<double> slabs(Rayd{eye_, segment.way}, kInstancePad);
     HitCollector collector(request_of(segment, Source::kStatic));

@@ -10,9 +10,9 @@
 namespace locus {
 
 // Writes the number of seen samples of each target that viewer `i` looks at: one byte per target, or one byte if the
-// block is pairwise. `seen` is zero at the beginning. Objects are searched as of `moment`; the eyes count from
-// `origin`. Each segment is decided as a ray of mode ANY with t_max 1. If the batch ends meanwhile, samples may be
-// missing. Cost: at most one search for each segment.
+// block is pairwise. The caller must fill `seen` with zeros. Objects are searched as of `moment`; the positions of the
+// eyes are relative to `origin`. A segment is blocked if a ray of mode ANY along it, with t_max 1, has a hit. If the
+// batch ends during the search, some seen samples may not be counted. Cost: at most one search for each segment.
 void look(QueryTask& task, const SceneAtTime& moment, const QueryBlock& block, const SightColumns& sight, Vec3d origin,
           size_t i, absl::Span<char> seen);
 

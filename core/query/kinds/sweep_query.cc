@@ -19,11 +19,11 @@ double search_limit(const SweptBounds& path, const HitCollector& collector) {
   return path.is_resting() ? 0 : raised(collector.limit());
 }
 
-// Returns a limit for first_contact(): every contact at t <= 1 that rounds to at most `limit` is within it.
+// Returns a limit for first_contact() that excludes no contact at t <= 1 whose t rounds to at most `limit`.
 double contact_limit(float limit) { return std::min(raised(limit), 1.0); }
 
 // Path of a mover's bounds through the tree of a mesh, in float. The way is scaled by a power of two, so that no
-// product over- or underflows; t in units of the scaled way is "scaled".
+// product over- or underflows. A "scaled" t is in units of the scaled way.
 class MeshPath {
  public:
   // `magnitude` is the largest |coordinate| of the mesh.
@@ -33,7 +33,7 @@ class MeshPath {
         boxes_(mover.start, is_resting_ ? Vec3d{1, 0, 0} : mover.way * (1 / scale_), extent_of(mover), magnitude) {}
 
   const PathBoxes& boxes() const { return boxes_; }
-  // Returns the largest scaled near value of a box that may hold a hit at t <= `limit`.
+  // Returns an upper bound, as a scaled t, of the near values of all boxes that may contain a hit at t <= `limit`.
   float to_scaled(float limit) const {
     if (is_resting_) return 0;
     const double scaled = raised(limit) * scale_;
@@ -48,8 +48,8 @@ class MeshPath {
   }
 
  private:
-  // Returns the power of two above the largest |component| of the way. Products with it and with its reciprocal change
-  // only exponents, which are far from the limits of double.
+  // Returns the power of two above the largest |component| of the way. A multiplication by this power or by its
+  // reciprocal changes only the exponent, which stays far from the limits of double.
   static double scale_of(Vec3d way) {
     int exponent = 0;
     (void)std::frexp(max_component(abs(way)), &exponent);
@@ -75,7 +75,8 @@ class ExactSweepTest {
 
   const MeshPath& mesh_path() const { return mesh_path_; }
   // Returns the t of the first contact, rounded to float; nullopt if there is none up to `limit`. A hit also requires
-  // that the mover's bounds meet the triangle's bounds, in mesh axes and in the world, and is not before.
+  // that the mover's bounds meet the triangle's bounds, in mesh axes and in world axes. The result is at least the t at
+  // which these bounds begin to meet.
   std::optional<float> hit(const Triangle& triangle, float limit) const {
     const std::optional<double> t = first_contact(mover_, corners_of(triangle), at_start_, contact_limit(limit));
     if (!t) return std::nullopt;
@@ -242,7 +243,8 @@ class SweptObjects {
   HitCollector& collector_;
 };
 
-// Returns the moment of the first contact, which a hit stores rounded; the hit's own t if rounding decides.
+// Returns the t of the first contact, `first`, of which `hit` stores the rounded value. Returns the rounded value if
+// `first` is null because rounding lost the contact.
 double moment_of(const std::optional<double>& first, const Hit& hit) { return first.value_or(double{hit.t}); }
 
 }  // namespace

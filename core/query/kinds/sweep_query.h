@@ -1,6 +1,6 @@
-// Sweeps through a snapshot: the objects and triangles that moving balls, capsules and boxes touch. First the static
-// instances, whose hits limit how far the sweep continues, then the moving objects. Free functions; any thread may call
-// them with a QueryTask of its own.
+// Sweeps through a snapshot: the objects and triangles that moving balls, capsules and boxes touch. The static
+// instances are searched first, because their hits limit the part of the path in which moving objects are searched.
+// Free functions; any thread may call them with a QueryTask of its own.
 #ifndef LOCUS_CORE_QUERY_KINDS_SWEEP_QUERY_H_
 #define LOCUS_CORE_QUERY_KINDS_SWEEP_QUERY_H_
 
@@ -19,7 +19,7 @@ struct SweepRequest {
   bool count_only;       // kAll only
 };
 
-// Returns the request of query `i` of a block of sweeps, whose positions count from `origin`.
+// Returns the request of query `i` of a block of sweeps. The positions of the query are relative to `origin`.
 SweepRequest sweep_request(const QueryBlock& block, Vec3d origin, const SweepColumns& sweeps, size_t i);
 
 // Answers one sweep. Objects are searched as of `moment`, which the answer borrows. Cost: visits of the nodes, cells

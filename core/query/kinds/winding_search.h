@@ -1,4 +1,5 @@
-// Search by the vector kernels for the winding number of a closed mesh around a point in mesh axes, along a way.
+// Search by the vector kernels for the winding number of a closed mesh around a point in mesh axes, along the half line
+// of a WindingWay.
 // It runs in steps, so that the caller can stop between two steps:
 //
 //   WindingSearch search(tree, point, cells.way_from(tree, point));
@@ -23,8 +24,8 @@ class WindingSearch {
   // Returns whether a search is possible: kernels exist for this processor, and the tree is not empty.
   static bool served(const TriangleBvh& tree) { return active_crossing_kernels() != nullptr && tree.size() != 0; }
 
-  // Begins a search along `way`. `point` must be a point that crossing() expects. Preconditions: served(tree); the
-  // winding number is not known without a search.
+  // Begins a search along `way`. `point` must be a result of without_tiny_coordinates(). Preconditions: served(tree),
+  // and way.is_known is false.
   WindingSearch(const TriangleBvh& tree, Vec3d point, const WindingWay& way)
       : WindingSearch(*active_crossing_kernels(), tree, point, way) {
     LOCUS_DCHECK(served(tree));

@@ -43,8 +43,8 @@ class AnswerSink {
   // Appends `queries` entries to the list of clamped queries of the block: queries that requested a time outside the
   // history and are answered at the nearest retained time. The caller writes their indices in the block, ascending.
   virtual uint32_t* add_clamped(size_t block, size_t queries) = 0;
-  // Appends `queries` entries to the list of queries of the block without an anchor. The caller writes their indices in
-  // the block, ascending.
+  // Appends `queries` entries to the block's list of unanchored queries (QueryOrigins::is_unanchored()). The caller
+  // writes their indices in the block, ascending.
   virtual uint32_t* add_unanchored(size_t block, size_t queries) = 0;
 };
 

@@ -9,8 +9,8 @@
 //
 // Invariants: chunks_ covers consecutive queries in batch order, from the first query that is not written out to
 // (next_block_, next_query_). Every chunk is unstarted, running or done; active_threads_ is the number of running
-// chunks plus the number of threads about to leave work(). One thread at a time runs write_out(). work() returns kDone
-// once.
+// chunks plus the number of threads in work() that have finished a chunk but have not yet begun another one or left
+// work(). One thread at a time runs write_out(). work() returns kDone once.
 #ifndef LOCUS_CORE_QUERY_RUN_BATCH_RUN_H_
 #define LOCUS_CORE_QUERY_RUN_BATCH_RUN_H_
 
@@ -60,8 +60,9 @@ struct QueryCost {
 
 class BatchRun {
  public:
-  // Maximum number of chunks that are running, or are done and wait until an earlier chunk is written out. The
-  // remainders of split chunks count as well, and may raise the number to twice this maximum.
+  // No new chunk is started while there are this many chunks that run, or that are done and wait until an earlier chunk
+  // is written out. Splitting a chunk adds its remainder as another chunk. A remainder may be started while there are
+  // fewer than 2 * kMaxChunks chunks, or if it is the first chunk in batch order.
   static constexpr size_t kMaxChunks = 16;
 
   // Prepares the execution of `batch`, which has passed check_batch(): resolves the as_of times of its queries and

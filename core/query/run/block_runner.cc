@@ -303,7 +303,7 @@ void BlockRunner::run_query(const NearestColumns& nearest, size_t i) {
 
 void BlockRunner::run_query(const FrustumColumns& frustums, size_t i) {
   const std::optional<ConvexRegion> region = ConvexRegion::make(origins_.of(i), FrustumPlanes(frustums, i).planes());
-  // A region that counts from an anchor may lie outside of the world.
+  // A region that is relative to an anchor may lie outside of the world.
   if (!region) return write_nothing(i);
   OverlapAnswer answer;
   if (!task_.ended())

@@ -2,8 +2,8 @@
 // of kDense and bytes of kBytes are written directly into the reply's columns. Rows of kCounted are collected in memory
 // of the runner, since their positions in the reply depend on how many rows the earlier chunks have.
 //
-// Threads: a runner belongs to one thread. Invariant: the runner has at most max_rows_ rows of kCounted and, for a
-// block with this layout, one row count for each query that was run; with count_only it has only row counts.
+// Threads: a runner belongs to one thread. Invariant: for a kCounted block, the runner has at most max_rows_ rows, and
+// one row count for each query that was run. If the block has count_only, the runner has only the row counts.
 #ifndef LOCUS_CORE_QUERY_RUN_BLOCK_RUNNER_H_
 #define LOCUS_CORE_QUERY_RUN_BLOCK_RUNNER_H_
 
@@ -61,7 +61,7 @@ class BlockRunner {
   void run_query(const ContainsColumns& contains, size_t i);
   void run_query(const PairColumns& pairs, size_t i);
   void run_query(const CellColumns& cells, size_t i);
-  // Columns of the following functions: RayColumns or SweepColumns.
+  // In the following functions, Columns is RayColumns or SweepColumns.
   template <class Columns>
   void write_answer(const Columns& columns, const RayAnswer& answer, size_t i);
   template <class Columns>
@@ -72,7 +72,7 @@ class BlockRunner {
   void write_surfaces(const SweepColumns& sweeps, absl::Span<const Hit> hits, size_t i, const RowSpans& to, size_t row);
   void append_rows(const OverlapAnswer& answer, size_t i);
   void append_runs(const OverlapAnswer& answer, size_t i);
-  // Appends the rows of a ball or capsule query, and the columns of their contacts.
+  // Appends the rows of a ball or capsule query, including the columns t, normal and point of their contacts.
   template <class Solid>
   void append_contacts(const OverlapAnswer& answer, const Solid& solid, size_t i);
   template <class Solid>
@@ -81,7 +81,7 @@ class BlockRunner {
   void count_rows(size_t rows, bool cut, size_t i);
   // Records the number of rows of query `i` of a block with count_only.
   void write_count(uint64_t rows);
-  // Writes the answer of a query without rows.
+  // Writes an empty answer for query `i`: a miss, bytes of 0, or a row count of 0.
   void write_nothing(size_t i);
   // Returns the work so far as the number of nodes, cells, tests and rows, which does not depend on the speed of the
   // machine.

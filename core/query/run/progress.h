@@ -9,7 +9,7 @@ namespace locus {
 enum class Progress : uint8_t {
   kMore,   // at least one chunk may be started
   kBegun,  // no chunk may be started now: other threads must finish their chunks first, or kDone was already returned
-  kDone,   // the result is complete; work() returns kDone once, to the last caller that worked
+  kDone,   // the batch has ended; work() returns kDone once, to the last caller that worked
 };
 
 }  // namespace locus

@@ -19,8 +19,8 @@ namespace locus {
 void write_row(const Hit& hit, const RowSpans& to, size_t row);
 // Writes all columns of a row without a hit.
 void write_miss(const RowSpans& to, size_t row);
-// Writes one row of a ball or box query for each of `triangles`, starting at row `row`. All columns except the triangle
-// have the values of `hit`.
+// Writes one row of an overlap query for each of `triangles`, starting at row `row`. The columns id, group, tag, layers
+// and pose have the values of `hit`. The columns t, normal and point are not written.
 void write_triangle_rows(const Hit& hit, absl::Span<const uint32_t> triangles, const RowSpans& to, size_t row);
 // Writes one row per object, starting at row 0. The pose of an object is its pose at `moment`.
 void write_object_rows(absl::Span<const FoundObject> objects, const SceneAtTime& moment, const RowSpans& to);
@@ -30,8 +30,9 @@ void write_surface(const RayRequest& request, Vec3d frame, const Hit& hit, Windi
                    size_t row);
 
 // Writes those of the columns t, normal and point that the block returns, for a row of a ball or capsule query.
-// `solid` is the ball or capsule as a mover that rests, in world axes; `triangle` is the triangle to measure,
-// kNoTriangle for an object or with CONSERVATIVE for the bounds of a whole instance. The point is relative to `frame`.
+// `solid` is the ball or capsule as a resting mover, in world axes. `triangle` is the triangle whose contact is
+// computed. It is kNoTriangle for an object, and for a CONSERVATIVE row of a whole instance, whose bounds are measured.
+// The point is relative to `frame`.
 void write_overlap_contact(const Mover& solid, Precision precision, Vec3d frame, const Hit& hit, uint32_t triangle,
                            const RowSpans& to, size_t row);
 
