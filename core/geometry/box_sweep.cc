@@ -21,13 +21,14 @@ Vec3d unit(int axis) {
   return vector;
 }
 
-// Intersection of the intervals of time of all axes so far.
+// Separating axis tests of one motion. Accumulates the intersection of the intervals of time of all axes added so far.
 class AxisTests {
  public:
   AxisTests(Vec3d half, Vec3d velocity) : half_(half), velocity_(velocity) {}
 
   // Adds an axis on which the moving polytope projects to low .. high at t = 0. `magnitude` is the largest |component|
-  // of the polytope's points. Returns false if the axis separates the polytopes at every time.
+  // of the polytope's points. Returns false if at every time at least one of the axes added so far separates the
+  // polytopes.
   bool add(Vec3d axis, double low, double high, double magnitude) {
     const Vec3d size = abs(axis);
     const double weight = size.x + size.y + size.z;
@@ -56,10 +57,12 @@ class AxisTests {
   }
 
  private:
-  // Offers the way out along `axis`, forwards for the resting box if the polytope lies below it.
+  // Offers a way out along `axis`. The resting box moves in the direction of `axis`, or against it if the polytope is
+  // above the box.
   void add_way_out(Vec3d axis, double exit, bool polytope_above) {
     const double length = std::sqrt(squared_length(axis));
-    // An axis from nearly parallel edges is too imprecise as a normal.
+    // Compares exit / length with depth_ without a division, because an axis from parallel edges may have a length near
+    // 0.
     if (!(exit < depth_ * length)) return;
     depth_ = exit / length;
     overlap_.depth = depth_;
@@ -87,7 +90,7 @@ CutFace clipped(const CutFace& polygon, int axis, double sign, double limit) {
   return result;
 }
 
-// Returns the mean of the corners of the part of the polygon inside the box; nullopt if there is none.
+// Returns the mean of the corners of the part of the polygon inside the box; nullopt if no part is inside.
 std::optional<Vec3d> mean_inside(CutFace polygon, Vec3d half) {
   for (int axis = 0; axis < 3; ++axis) {
     polygon = clipped(polygon, axis, 1, half[axis]);

@@ -1,6 +1,6 @@
-// Motion of a convex polytope, a triangle or a box, towards a resting box: the first moment at which they share a
-// point, by the separating axis test over time. On each axis both project to intervals, which overlap during one
-// interval of time; the polytopes overlap while all these intervals of time hold.
+// Motion of a convex polytope (a triangle or a box) towards a resting box: computes the time during which they share a
+// point, by the separating axis test over time. On each axis, both polytopes project to intervals, which overlap during
+// one interval of time. The polytopes share a point in the intersection of these intervals of time.
 // Source: Eberly, Dynamic Collision Detection Using Oriented Bounding Boxes, 1999.
 //
 // All vectors are relative to the resting box's centre, in its own axes. Pure functions; any thread.
@@ -16,11 +16,11 @@ namespace locus {
 
 // The time during which two polytopes share a point.
 struct BoxOverlap {
-  Interval<double> time;  // of an unlimited motion
-  // Unit vector from the moving polytope to the resting box: at the first moment the direction in which they are
-  // separate before it; if they overlap at t = 0, the shortest way out.
+  Interval<double> time;  // for a motion without begin and end
+  // Unit vector from the moving polytope to the resting box. If they overlap at t = 0, it is the direction of the
+  // shortest way out. Otherwise it is the axis that separates them until the first moment of overlap.
   Vec3d normal;
-  double depth = 0;  // length of the shortest way out at t = 0; only if they overlap then
+  double depth = 0;  // length of the shortest way out at t = 0; has no meaning if they do not overlap at t = 0
 };
 
 // Return the overlap of the box of half extents `half` with a triangle or with another box, which moves by `velocity`;
@@ -31,8 +31,9 @@ std::optional<BoxOverlap> overlap_with_triangle(Vec3d half, Vec3d a, Vec3d b, Ve
 std::optional<BoxOverlap> overlap_with_box(Vec3d half, Vec3d center, Vec3d other_half, const Rotation& rotation,
                                            Vec3d velocity);
 
-// Return a point that the box and the triangle or the other box share; the box is widened by 2^-36 of the magnitudes
-// first. If they share none, returns the point of the triangle, or of the other box, that is nearest to the centre.
+// Return a point that the box of half extents `half`, widened by 2^-36 of the magnitudes, shares with the triangle or
+// with the other box. If there is no such point, return the point of the triangle, or of the other box, that is nearest
+// to the centre of the box.
 Vec3d shared_point(Vec3d half, Vec3d a, Vec3d b, Vec3d c);
 Vec3d shared_point(Vec3d half, Vec3d center, Vec3d other_half, const Rotation& rotation);
 

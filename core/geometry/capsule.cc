@@ -27,7 +27,7 @@ double epsilon_of(const Capsule& capsule, const Aabbd& box) {
          (max_component(abs(capsule.center)) + max_component(abs(capsule.half_axis)) + capsule.radius + magnitude(box));
 }
 
-// Returns the half axis of the capsule, or the one that a planted bug takes for it.
+// Returns the half axis of the capsule, or a wrong half axis if a planted bug is switched on.
 Vec3d half_axis_of(const Capsule& capsule) {
   if (planted(PlantedBug::kEndlessCapsule)) return capsule.half_axis * 1e3;
   if (!planted(PlantedBug::kCapsuleCap)) return capsule.half_axis;

@@ -19,16 +19,18 @@ struct Capsule {
 // radius.
 Aabbd bounds_of(const Capsule& capsule);
 
-// Returns whether the capsule shares a point with the box, grown by 2^-40 of the sum of their magnitudes, which covers
-// the rounding of the box's coordinates. The bounds of the capsule must also overlap the box.
+// Returns whether the capsule's bounds overlap the box, and the capsule shares a point with the box after its radius is
+// increased by 2^-40 of the sum of the magnitudes of capsule and box. The increase covers the rounding of the box's
+// coordinates.
 bool reaches(const Capsule& capsule, const Aabbd& box);
 
-// Returns true for every box that holds a point of the capsule. May also return true for a box that the capsule misses
-// by less than the difference between a ball and the cube around it. Six comparisons without division.
+// Returns true for every box that contains a point of the capsule. May also return true for a box that the capsule
+// misses, because the test replaces the ball of the capsule's radius by the cube around the ball. Costs six comparisons
+// and no division.
 bool may_reach(const Capsule& capsule, const Aabbd& box);
 
-// Returns whether the capsule shares a point with the shape; touching counts. The capsule also reaches()
-// the shape's own bounds, so culling by any superset of these bounds never changes the result.
+// Returns whether the capsule shares a point with the shape; touching counts. The capsule must also reach (see
+// reaches()) the shape's own bounds, so culling by any superset of these bounds never changes the result.
 bool capsule_overlaps(const Capsule& capsule, const Shape& shape);
 
 // Returns whether the capsule shares a point with the triangle, which is a closed surface. The bounds of the capsule

@@ -17,7 +17,7 @@ constexpr double kParallelPlanes = 0x1p-40;
 
 double value_at(const Plane& plane, Vec3d point) { return dot(plane.normal, point) + plane.offset; }
 
-// Returns how far `point` may be outside of the plane and count as on it.
+// Returns how far `point` may be outside of the plane and still count as on it.
 double epsilon_at(const Plane& plane, Vec3d point) {
   return kPlaneEpsilon * (dot(abs(plane.normal), abs(point)) + std::abs(plane.offset));
 }
@@ -28,20 +28,21 @@ bool is_within(absl::Span<const Plane> planes, Vec3d point) {
   return true;
 }
 
-// Convex polygon that planes cut. A quadrilateral cut by n planes has at most 4 + n corners.
+// Convex polygon that is clipped by planes. A quadrilateral clipped by n planes has at most 4 + n corners.
 class Polygon {
  public:
   static constexpr size_t kMaxCorners = 4 + limits::kMaxPlanes + 6 + 6;
 
-  // Rounding may bend a polygon that has many nearly equal corners, so that a plane adds more than one. Such a corner
-  // beyond the maximum is left out.
+  // Rounding may make a polygon with many nearly equal corners slightly concave, so that one plane adds more than one
+  // corner. Corners beyond kMaxCorners are left out.
   void add(Vec3d corner) {
     if (count_ < kMaxCorners) corners_[count_++] = corner;
   }
   absl::Span<const Vec3d> corners() const { return {corners_.data(), count_}; }
   bool empty() const { return count_ == 0; }
 
-  // Removes the part outside of the plane. `epsilon(corner)` is how far a corner may be outside and count as on it.
+  // Removes the part outside of the plane. `epsilon(corner)` is how far a corner may be outside of the plane and still
+  // count as on it.
   template <class Epsilon>
   void cut(const Plane& plane, const Epsilon& epsilon) {
     std::array<double, kMaxCorners> values;
@@ -87,8 +88,8 @@ struct FaceCorners {
   size_t count = 0;
 };
 
-// Returns the corners of all faces. Each face begins as a square around `center` that is large enough, so the error of
-// its corners is a few roundings of `size`.
+// Returns the corners of all faces. Each face begins as a square of half side `size` around the projection of `center`;
+// the square must contain the face. The error of a corner is a few roundings of `size`.
 FaceCorners corners_of_faces(absl::Span<const Plane> planes, Vec3d center, double size) {
   FaceCorners corners;
   const auto epsilon = [error = size * 0x1p-45](Vec3d) { return error; };
@@ -105,8 +106,9 @@ FaceCorners corners_of_faces(absl::Span<const Plane> planes, Vec3d center, doubl
   return corners;
 }
 
-// Nearest points of a region to a point or a segment: candidates on its faces, edges and corners. The nearest point is
-// one of the candidates within all planes, and every candidate within all planes is a point of the region.
+// Search for the point of a region that is nearest to a point or a segment. The candidates lie on the region's faces,
+// edges and corners. The nearest point is one of the candidates within all planes, and every candidate within all
+// planes is a point of the region.
 class NearestSearch {
  public:
   explicit NearestSearch(absl::Span<const Plane> planes) : planes_(planes) {}
@@ -152,7 +154,7 @@ class NearestSearch {
                    planes_[b].normal * ((vb - g * va) / determinant));
   }
 
-  // Tests the corners of two planes with each later one.
+  // Tests the common points of the planes `a` and `b` with each plane after `b`.
   template <class IsNear>
   bool corners_within(size_t a, size_t b, Vec3d point, const IsNear& is_near) const {
     const Plane &first = planes_[a], &second = planes_[b];
@@ -273,8 +275,8 @@ std::optional<ConvexRegion> ConvexRegion::make(Vec3d origin, absl::Span<const Pl
       plane.offset = limits::kMaxCoordinate - side * origin[axis];
     }
   }
-  // First with squares as large as the world, whose corners have errors of micrometres, then with squares as large as
-  // the region.
+  // Computes the faces twice: first from squares as large as the world, whose corners have errors of micrometres, then
+  // from squares as large as the region.
   const FaceCorners rough = corners_of_faces(region.planes(), Vec3d{} - origin, 4 * limits::kMaxCoordinate);
   if (rough.count == 0) return std::nullopt;
   const Vec3d center = (rough.bounds.min + rough.bounds.max) * 0.5;
@@ -306,7 +308,7 @@ bool may_overlap(const ConvexRegion& region, const Aabbd& box) {
   if (!overlaps(region.bounds(), box)) return false;
   const Vec3d low = box.min - region.origin(), high = box.max - region.origin();
   const Vec3d largest = max(abs(low), abs(high));
-  // The coordinates of the box are rounded in world axes, far from the region's origin too.
+  // The coordinates of the box are rounded in world axes, so their errors do not shrink near the region's origin.
   const double rounding = 0x1p-48 * magnitude(box);
   for (const Plane& plane : region.planes()) {
     const Vec3d n = plane.normal;
@@ -370,8 +372,8 @@ bool RegionInMesh::may_overlap(const Aabbf& box) const {
 }
 
 bool RegionInMesh::overlaps(const Triangle& triangle) const {
-  // A box of the tree is culled if it lies outside of one plane, so a triangle must not lie wholly outside of one. This
-  // is the same test for the triangle's own bounds.
+  // The tree culls a box that lies wholly outside of one plane. The same test of the triangle's own bounds makes the
+  // result independent of this culling.
   if (!may_overlap(bounds_of(triangle))) return false;
   Polygon polygon;
   for (const Vec3d corner : corners_of(triangle)) polygon.add(corner);

@@ -1,11 +1,11 @@
 // Convex regions of space, bounded by planes, and their overlaps with shapes and triangles. A region is given relative
-// to an origin in world axes, so that it is as precise far out as at the world's origin; it is cut by the world's box.
-// Pure functions in double; any thread.
+// to an origin in world axes, so that a region far from the world's origin is as precise as a region near it. Every
+// region is clipped to the world's box. Pure functions in double; any thread.
 //
 // A point is within a plane if n.p + d >= -e, where e is 2^-40 of the magnitudes of n.p and d: a point that rounding
-// moves off a plane is on it. Two solids overlap if they share a point by this test. Every overlap also requires that
-// the bounds of the shape or triangle may_overlap() the region, so that culling by any superset of these bounds never
-// changes a result.
+// has moved off a plane still counts as on the plane. A region and a solid overlap if they share a point by this test.
+// Every overlap also requires that the bounds of the shape or triangle may_overlap() the region, so that culling by any
+// superset of these bounds never changes a result.
 // Source: Sutherland, Hodgman, Reentrant Polygon Clipping, 1974.
 #ifndef LOCUS_CORE_GEOMETRY_CONVEX_REGION_H_
 #define LOCUS_CORE_GEOMETRY_CONVEX_REGION_H_
@@ -24,7 +24,7 @@ namespace locus {
 
 // Half-space of the points p with normal.p + offset >= 0.
 struct Plane {
-  Vec3d normal;  // of length 1, inwards
+  Vec3d normal;  // unit vector, pointing into the half-space
   double offset = 0;
 };
 
@@ -57,20 +57,22 @@ class ConvexRegion {
   Aabbd bounds_;
 };
 
-// Returns false if the box lies outside of the region's bounds, or wholly outside of one of its planes. Monotone: true
-// for every box that contains a box for which it is true.
+// Returns false if the box lies outside of the region's bounds, or wholly outside of one of its planes. Monotone: if
+// the result is true for a box, it is true for every box that contains this box.
 bool may_overlap(const ConvexRegion& region, const Aabbd& box);
 
 // Returns whether the region shares a point with the shape, a closed solid.
 bool region_overlaps(const ConvexRegion& region, const Shape& shape);
 
-// Relation of a ball to a region. Tells most objects apart without their exact shape.
+// Relation of a ball to a region. For most objects it decides whether they overlap the region, without their exact
+// shape.
 enum class RegionSide { kInside, kOutside, kUndecided };
-// Returns kOutside if a ball lies wholly outside of a plane, and kInside if its centre lies within all planes, both by
-// more than rounding and than `slack`. `center` is in world axes.
+// Returns kOutside if a ball lies wholly outside of a plane, and kInside if its centre lies within all planes, in both
+// cases by more than the sum of the rounding error and `slack`. `center` is in world axes.
 RegionSide side_of_ball(const ConvexRegion& region, Vec3d center, double radius, double slack);
 
-// The planes of a region in the axes of a mesh, and how far a corner of the mesh may be off a plane and count as on it.
+// Planes of a region in the axes of a mesh, and for each plane the distance by which a corner of the mesh may be
+// outside of the plane and still count as on it.
 class RegionInMesh {
  public:
   // `magnitude` is the largest |coordinate| of the mesh.

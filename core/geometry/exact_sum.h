@@ -1,7 +1,7 @@
 // Exact sum of doubles and of products of doubles, for signs that must not depend on rounding. The sum is stored as an
 // expansion: components of increasing magnitude whose bits do not overlap, so that the last one determines the sign.
-// Plain value; any thread. Costs a few additions for each component, of which there are as many as the bits of the sum
-// need: mostly one to five.
+// Plain value; any thread. Each call of add(double) costs a few additions for each component. The sum has as many
+// components as its bits need, mostly one to five.
 //
 // Exact as long as no operation over- or underflows: every summand and product must be below 2^990, and a multiple of
 // 2^-1074 even after it was split into halves of 26 bits, which holds for products of up to three multiples of 2^-310.
@@ -35,7 +35,7 @@ class ExactSum {
     }
     count_ = kept;
   }
-  // Adds a number of two doubles.
+  // Adds both doubles of `value`.
   void add(DoubleDouble value) {
     add(value.error());
     add(value.rounded());

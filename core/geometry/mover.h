@@ -10,7 +10,7 @@ namespace locus {
 
 enum class MoverKind : uint8_t { kBall, kCapsule, kBox };
 
-// The solid covers the time 0 <= t <= 1; its centre is at start + t * way. A zero way is legal.
+// The solid moves during 0 <= t <= 1, with its centre at start + t * way. A zero way is legal.
 struct Mover {
   MoverKind kind = MoverKind::kBall;
   Vec3d start;
@@ -21,17 +21,19 @@ struct Mover {
   Rotation rotation;  // box: rotates its own axes to the axes of `start`
 };
 
-// Treatment of a primitive that the mover touches at t = 0. kHit: a hit at t = 0. kApproach: a hit at t = 0 if the way
-// goes against the contact's normal, otherwise ignored. kPass: ignored.
+// Treatment of a primitive that the mover touches at t = 0. kHit: the primitive is hit at t = 0. kApproach: the
+// primitive is hit at t = 0 if the mover moves against the contact's normal, and is ignored otherwise. kPass: the
+// primitive is ignored.
 enum class AtStart : uint8_t { kHit, kApproach, kPass };
 
 // Contact of a mover with a primitive.
 struct Contact {
-  // Distance from the primitive to the mover's centre or inner segment; for a box, to the box. Negative inside an
-  // object: minus the length of the shortest way out.
+  // Ball or capsule: distance from the primitive to the mover's centre or inner segment; if this centre or segment
+  // reaches into an object, minus the length of its shortest way out. Box: minus the length of the box's shortest way
+  // out at t = 0; the value has no meaning if the box and the primitive do not overlap at t = 0.
   double distance = 0;
-  // Point of the primitive, relative to the mover's start, so that it keeps its digits far from the origin. If the
-  // solids touch, it is within rounding a point of both.
+  // Point of the primitive, relative to the mover's start, so that no precision is lost far from the world's origin. If
+  // mover and primitive touch, the point belongs to both, up to rounding.
   Vec3d point;
   Vec3d normal;  // unit vector from the primitive to the mover
 };

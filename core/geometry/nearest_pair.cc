@@ -20,7 +20,7 @@ void keep_nearer(const NearestPair& candidate, NearestPair& best) {
   if (candidate.squared_distance < best.squared_distance) best = candidate;
 }
 
-// Returns the common point of the segment and a triangle that it crosses.
+// Returns the common point of the segment and a triangle that the segment crosses.
 Vec3d crossing_of(Vec3d half_axis, Vec3d a, Vec3d b, Vec3d c) {
   const Vec3d normal = cross(b - a, c - a);
   const double along = dot(normal, half_axis);
@@ -90,7 +90,8 @@ NearestPair nearest_to_box(Vec3d half_axis, Vec3d center, Vec3d half) {
   for (size_t i = 0; i < breakpoints.size(); ++i) {
     offer(breakpoints[i]);
     if (i + 1 == breakpoints.size() || breakpoints[i] == breakpoints[i + 1]) continue;
-    // Between two breakpoints the squared distance is a parabola in s: its coordinates outside of the box count.
+    // Between two breakpoints the squared distance is a parabola in s, to which only coordinates outside of the box
+    // contribute.
     const Vec3d middle = half_axis * (0.5 * (breakpoints[i] + breakpoints[i + 1]));
     const Vec3d nearest = nearest_in(middle, box);
     double slope = 0, curvature = 0;

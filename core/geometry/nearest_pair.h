@@ -10,7 +10,8 @@
 
 namespace locus {
 
-// A point of the segment and a point of the primitive at the least distance; equal, up to rounding, if both meet.
+// Point of the segment and point of the primitive that are nearest to each other. The two points are equal, up to
+// rounding, if segment and primitive meet.
 struct NearestPair {
   double squared_distance = std::numeric_limits<double>::infinity();
   Vec3d on_segment;
@@ -19,7 +20,8 @@ struct NearestPair {
   Vec3d offset() const { return on_segment - on_primitive; }
 };
 
-// Returns the nearest points of two segments. `center` and `other_half_axis` describe the primitive.
+// Returns the nearest points of two segments. `center` and `other_half_axis` are the midpoint and the half axis of the
+// second segment, which is the primitive.
 // Source: Ericson, Real-Time Collision Detection, 2005, 5.1.9.
 NearestPair nearest_to_segment(Vec3d half_axis, Vec3d center, Vec3d other_half_axis);
 

@@ -17,7 +17,7 @@ int sign_of(double value) { return (value > 0) - (value < 0); }
 // Returns corner - point, exactly.
 DoubleDouble difference(double corner, double point) { return DoubleDouble(corner) - DoubleDouble(point); }
 
-// Adds the product of two differences to `sum`, or its negative.
+// Adds factor * a * b to `sum`, exactly. `factor` is 1 or -1.
 template <int kMaxSummands>
 void add_product(DoubleDouble a, DoubleDouble b, double factor, ExactSum<kMaxSummands>& sum) {
   for (const double x : {a.error(), a.rounded()})
@@ -34,8 +34,9 @@ __attribute__((noinline)) int exact_orientation(Vec3d point, Vec3d u, Vec3d v, i
   return sum.sign();
 }
 
-// Returns the same, with the differences of u and v from the point in double. Each has one rounding error, each product
-// another, and the difference a last one: 2^-51 in total. A product is 0 only if a difference is.
+// Returns the same as exact_orientation(), computed in double if the sign is certain. `from_u` and `from_v` are u -
+// point and v - point, rounded to double. Each of these differences, each product and the final subtraction round once:
+// 2^-51 in total. A product is 0 only if one of its factors is 0.
 int orientation(Vec3d point, Vec3d u, Vec3d v, Vec3d from_u, Vec3d from_v, int axis) {
   const int x = (axis + 1) % 3, y = (axis + 2) % 3;
   const double left = from_u[x] * from_v[y], right = from_u[y] * from_v[x], area = left - right;
@@ -65,9 +66,10 @@ __attribute__((noinline)) int exact_side(Vec3d point, const Corners& corners) {
   return sum.sign();
 }
 
-// Returns the same, with the differences of the corners from the point in double: 1 if the triangle appears clockwise
-// from the point, that is, if the point is behind it. Three differences, a product of two of them and their difference,
-// a product and two sums round once each: 2^-50 in total.
+// Returns the same as exact_side(), computed in double if the sign is certain: 1 if the triangle appears clockwise from
+// the point, that is, if the point is behind the triangle. `from` has the differences of the corners from the point,
+// rounded to double. Each summand has eight roundings: three differences, the product of two of them, the subtraction
+// of two such products, the product with the third difference, and two sums. Their total is 2^-50.
 int side(Vec3d point, const Corners& corners, const Vec3d (&from)[3]) {
   const Vec3d a = from[0], b = from[1], c = from[2];
   const double yz[3] = {b.y * c.z, c.y * a.z, a.y * b.z}, zy[3] = {b.z * c.y, c.z * a.y, a.z * b.y};
@@ -79,9 +81,10 @@ int side(Vec3d point, const Corners& corners, const Vec3d (&from)[3]) {
   return magnitude == 0 ? 0 : exact_side(point, corners);
 }
 
-// Returns whether `point`, in the plane of the triangle and within its bounds, lies on the triangle: in each projection
-// it is inside. For a triangle without area, which is a segment or a point, this decides too: off the segment, but
-// within its bounds, the signs of the two directions differ in a projection.
+// Returns whether `point` lies on the triangle. Precondition: the point lies in the triangle's plane and within the
+// triangle's bounds. The point lies on the triangle if it is inside the triangle in all three projections. This also
+// holds for a triangle without area, which is a segment or a point: if the point is off the segment but within its
+// bounds, the signs for the two directions of the segment differ in some projection.
 bool is_inside(Vec3d point, const Corners& corners, const Vec3d (&from)[3]) {
   for (int axis = 0; axis < 3; ++axis) {
     int least = 1, most = -1;
@@ -96,8 +99,8 @@ bool is_inside(Vec3d point, const Corners& corners, const Vec3d (&from)[3]) {
   return true;
 }
 
-// Returns the winding of the triangle, projected along the x axis, around the point: exact signs for the edges at the
-// height of the point only.
+// Returns the winding of the triangle, projected along the x axis, around the point. Computes exact signs, but only for
+// edges whose range of y contains the point.
 __attribute__((noinline)) int exact_projected_winding(Vec3d point, const Corners& corners, const Vec3d (&from)[3]) {
   int winding = 0;
   for (size_t i = 0; i < 3; ++i) {
@@ -113,7 +116,7 @@ __attribute__((noinline)) int exact_projected_winding(Vec3d point, const Corners
   return winding;
 }
 
-// Returns the same. Decides in double and without branches if all signs are certain.
+// Returns the same as exact_projected_winding(), but computes in double and without branches if all signs are certain.
 int projected_winding(Vec3d point, const Corners& corners, const Vec3d (&from)[3]) {
   if (planted(PlantedBug::kClosedEdge)) return exact_projected_winding(point, corners, from);
   int winding = 0;
@@ -128,7 +131,8 @@ int projected_winding(Vec3d point, const Corners& corners, const Vec3d (&from)[3
   return certain ? winding : exact_projected_winding(point, corners, from);
 }
 
-// Returns a point or vertex in axes in which `line` runs along the x axis: rotated and, if it is descending, mirrored.
+// Returns the point or vertex `at` in axes in which `line` ascends along the x axis. The axes are rotated and, if
+// `line` is descending, also mirrored.
 template <class Vec>
 Vec along_x(Vec at, HalfLine line) {
   const auto along = at[line.axis];

@@ -2,13 +2,13 @@
 // number is the sum of the crossings of all triangles that the half line meets: 0 outside, 1 or -1 inside, depending on
 // the orientation of the mesh. Pure functions; any thread.
 //
-// Every sign is exact: computed in double where an error bound proves it, otherwise as an exact sum. So the sum is the
-// winding number of the stored mesh around the given point. Edges are half-open: in the projection along x, an edge
-// includes its lower end in y and not its upper one, and no point that is exactly on it. Triangles that share an edge
-// therefore count it with opposite signs, and the sum is right if the half line meets edges or corners, or runs along
-// faces. Source: Haines, Point in Polygon Strategies, Graphics Gems IV, 1994, for the rule of half-open edges;
-// Shewchuk, Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates, 1997, for filters and
-// exact signs.
+// Every sign is exact: it is computed in double if an error bound proves it, otherwise by an exact sum. So the sum of
+// the crossings is the winding number of the stored mesh around the given point. Edges are half-open: in the projection
+// along x, an edge includes its end with the lower y but not its end with the upper y, and a point that is exactly on
+// the edge is not counted. Triangles that share an edge therefore count it with opposite signs, and the sum is right
+// even if the half line meets edges or corners, or runs along faces. Source: Haines, Point in Polygon Strategies,
+// Graphics Gems IV, 1994, for the rule of half-open edges; Shewchuk, Adaptive Precision Floating-Point Arithmetic and
+// Fast Robust Geometric Predicates, 1997, for filters and exact signs.
 //
 // Every half line results in the same sum, unless the point is on the surface. Proof: the rule of half-open edges
 // treats the point as if it were moved by (0, d * d, -d) for an infinitely small d > 0. The half line from the moved
@@ -44,7 +44,8 @@ inline Vec3d without_tiny_coordinates(Vec3d point) {
   return {kept(point.x), kept(point.y), kept(point.z)};
 }
 
-// Returns the crossing of the half line from `point` with a triangle. The default is a half line along the x axis.
+// Returns the crossing of the half line from `point` with a triangle. Without `line`, the half line ascends along the x
+// axis.
 Crossing crossing(Vec3d point, const Triangle& triangle);
 Crossing crossing(Vec3d point, const Triangle& triangle, HalfLine line);
 

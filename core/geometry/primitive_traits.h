@@ -6,8 +6,8 @@
 //   RayQuery   type of a preprocessed ray: slabs() returns its SlabRay for culling; to_scaled(t) converts t from units
 //              of the ray's direction to the unit of slabs(), rounded up
 //   BallQuery, BoxQuery   types of the query argument of ball() and box()
-//   id         unique within one index; among hits at equal distance the lower id wins; an index finds the value that
-//              remove() removes by its id
+//   id         unique within one index; among hits at equal distance the lower id wins; remove() of an
+//              index finds the value to remove by this id
 //   bounds     axis-aligned bounds; every test below also requires that the query meets these bounds, so culling by any
 //              superset of them loses no result
 //   position   point that selects the cell of a grid: any point within the bounds, always the same for one value

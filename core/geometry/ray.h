@@ -60,9 +60,9 @@ inline constexpr double kObjectPad = 0x1p-40;    // predicates of moving objects
 template <class S>
 class SlabRay {
  public:
-  // `reach` widens every box by at least this length on each side, in addition to the pad, for the path of a solid of
-  // this size; only with a `pad` > 0. Always inlined, because a call of its own takes 27 instructions more for each
-  // ray.
+  // `reach` widens every box by at least this length on each side, in addition to the pad. It serves to search along
+  // the path of a solid of this size, and requires `pad` > 0. The constructor is always inlined, because a call takes
+  // 27 instructions more for each ray.
   [[gnu::always_inline]] SlabRay(const Ray<S>& ray, double pad, double reach = 0)
       : origin_(ray.origin),
         direction_(ray.direction),

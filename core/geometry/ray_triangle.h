@@ -50,8 +50,8 @@ class TriangleRay {
   // Returns the hit, a pure function of ray and triangle, or nullopt. A hit requires that the watertight test accepts
   // the triangle with t >= 0 (t is 0 if the origin lies on the triangle within the rounding error of the test) and that
   // the slab test accepts the triangle's own box. t is clamped to the interval of that slab test, so a tree, which
-  // culls by boxes, reports the same hits as a list. Triangles that are exactly edge-on or have no area are never hit.
-  // The error of a hit is at most 2^-21 of the magnitudes of hit and origin.
+  // culls by boxes, reports the same hits as a test of every triangle. Triangles that are exactly edge-on or have no
+  // area are never hit. The error of a hit is at most 2^-21 of the magnitudes of hit and origin.
   std::optional<TriangleHit> hit(const Triangle& triangle) const;
 
  private:

@@ -9,10 +9,11 @@
 namespace locus {
 namespace {
 
-// Epsilons of touches(), relative to the sizes and positions at the time, and to the way covered so far.
+// Epsilons of touches(): kPlaceEpsilon is relative to sizes and positions at the tested time, kWayEpsilon to the way
+// covered until this time.
 constexpr double kPlaceEpsilon = 0x1p-44, kWayEpsilon = 0x1p-48;
-// Limit of the steps of Newton's method. A grazing contact halves the remaining time in each step, which reaches the
-// epsilon after about half as many.
+// Limit of the steps of Newton's method. For a grazing contact, each step halves the remaining time, so the epsilon is
+// reached after about kMaxSteps / 2 steps.
 constexpr int kMaxSteps = 64;
 
 double size_of(Vec3d v) { return max_component(abs(v)); }
@@ -79,11 +80,12 @@ std::optional<double> RoundSweep::first_contact(double limit, double from) const
     const bool is_contact = touches(pair, t);
     if (is_contact && t == 0) return planted(PlantedBug::kSweepStart) ? std::nullopt : std::optional<double>(t);
     const double distance = std::sqrt(pair.squared_distance);
-    // Speed at which the distance decreases: the primitive moves along the offset.
+    // Speed at which the distance decreases: the component of the velocity along the offset from primitive to segment.
     const double approach = dot(pair.offset(), velocity_) / distance;
     if (is_contact && !(approach > 0 && distance > radius_)) return t;
     if (!(approach > 0)) return std::nullopt;
-    // At a contact within the epsilon, the last step reaches the radius itself.
+    // If only the epsilon makes this a contact, one last step advances to the moment at which the distance is the
+    // radius.
     t += (distance - radius_) / approach;
     if (is_contact) return std::min(t, 1.0) <= limit ? std::optional<double>(std::min(t, 1.0)) : std::nullopt;
     if (!(t <= limit)) return std::nullopt;
@@ -94,7 +96,7 @@ std::optional<double> RoundSweep::first_contact(double limit, double from) const
 RoundSweep::Separation RoundSweep::separation_at(double t) const {
   const NearestPair pair = pair_at(t);
   const double distance = std::sqrt(pair.squared_distance);
-  // A distance of rounding errors has no direction.
+  // A distance that consists of rounding errors has no meaningful direction.
   if (distance > kPlaceEpsilon * (size_of(pair.on_primitive) + size_))
     return {distance, pair.offset() * (1 / distance), pair};
   return way_out_at(t, pair);

@@ -1,5 +1,6 @@
 // Motion of a convex primitive towards a segment, with a radius around the segment: the relative motion of a mover and
-// a primitive if one of them is round. Computes the first moment at which their distance is at most the radius.
+// a primitive if one of them is round. Computes the first moment at which the distance between the primitive and the
+// segment is at most the radius.
 //
 // The distance between convex sets in relative translation is a convex function of time, so its tangent at any moment
 // is a lower bound. Newton's method from t = 0 therefore approaches the first contact from below and never passes it.
@@ -20,8 +21,8 @@ namespace locus {
 class RoundSweep {
  public:
   // Make the motion of a segment, a triangle or a box at `velocity` relative to the segment of `half_axis` around the
-  // origin. Positions are those at t = 0, relative to the midpoint of `half_axis`; `radius` >= 0. A box has its own
-  // axes parallel to the axes of all vectors.
+  // origin. Positions are those at t = 0, relative to the midpoint of `half_axis`; `radius` >= 0. All vectors of
+  // to_box() are in the box's own axes.
   static RoundSweep to_segment(Vec3d half_axis, double radius, Vec3d center, Vec3d other_half_axis, Vec3d velocity);
   static RoundSweep to_triangle(Vec3d half_axis, double radius, Vec3d a, Vec3d b, Vec3d c, Vec3d velocity);
   static RoundSweep to_box(Vec3d half_axis, double radius, Vec3d center, Vec3d half, Vec3d velocity);
@@ -35,14 +36,15 @@ class RoundSweep {
   // the exact moment by at most the epsilon of touches() divided by the speed of approach, and never greater except for
   // rounding. `from` >= 0 is a lower bound of the result, at which the search begins.
   std::optional<double> first_contact(double limit, double from = 0) const;
-  // Returns the contact's direction from the primitive to the segment at time t, of length 1, and the signed distance:
-  // negative if the segment meets a box. Where the two sets meet, the direction is the shortest way out; if there are
-  // several, or none is defined, the one against the segment's motion.
+  // Distance, direction and nearest points of primitive and segment. `distance` is negative if the segment meets a box.
+  // `direction` is the unit vector from the primitive to the segment. If they meet, it is the direction of the shortest
+  // way out of the primitive; if several directions are possible, it is one against the segment's motion.
   struct Separation {
     double distance;
     Vec3d direction;
     NearestPair pair;
   };
+  // Returns the separation at time t.
   Separation separation_at(double t) const;
 
  private:

@@ -8,9 +8,9 @@
 
 namespace locus {
 
-// Returns whether the segment crosses the triangle, by the signs of five volumes. Two triangles that share an edge
-// compute volumes of this edge of equal magnitude, so a segment cannot pass between them. A segment that only touches
-// the triangle, or lies in its plane, may be reported either way.
+// Returns whether the segment crosses the triangle, by the signs of five volumes. For two triangles that share an edge,
+// the computed volumes of this edge have equal magnitudes, so a segment cannot pass between the triangles. A segment
+// that only touches the triangle, or lies in its plane, may be reported either way.
 // Source: Moller, Trumbore, Fast, Minimum Storage Ray/Triangle Intersection, 1997, for the volumes.
 bool segment_crosses_triangle(Vec3d center, Vec3d half_axis, Vec3d a, Vec3d b, Vec3d c);
 

@@ -57,7 +57,7 @@ Aabbd bounds_of(const Shape& shape);
 // Returns the hit of the ray on the closed solid with the smallest t >= 0. If the ray starts inside the solid,
 // ray.inside() selects the result. Ignores the ray's t_max, so the caller must compare t with t_max. Points are never
 // hit. A hit also requires that the slab test accepts the shape's own bounds, and t is clamped to the interval of that
-// test. So an index, which culls by boxes, reports the same hits as a list.
+// test. So an index, which culls by boxes, reports the same hits as a test of every shape.
 std::optional<ShapeHit> ray_hit(const ObjectRay& ray, const Shape& shape);
 
 // Return whether the shape shares a point with the ball or the box; touching counts. ball_overlaps() also requires that

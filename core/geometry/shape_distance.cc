@@ -9,7 +9,8 @@
 namespace locus {
 namespace {
 
-// Solid of all points within `radius` of a core, which is a box or, with is_box false, the segment of `half_axis`.
+// Solid of all points within `radius` of a core around the origin. The core is a box if is_box is true, otherwise the
+// segment from -half_axis to half_axis.
 struct RoundedCore {
   bool is_box = false;
   Vec3d half_axis;  // in world axes
@@ -39,7 +40,7 @@ RoundedCore core_of(const Shape& shape) {
   return core;
 }
 
-// Corner `i`, 0 .. 7, of a box around the origin, in world axes.
+// Returns corner `i`, 0 .. 7, of a box around the origin, in world axes.
 Vec3d corner_of(const RoundedCore& box, int i) {
   return box.rotation.to_world({(i & 1) != 0 ? box.half.x : -box.half.x, (i & 2) != 0 ? box.half.y : -box.half.y,
                                 (i & 4) != 0 ? box.half.z : -box.half.z});
@@ -51,8 +52,9 @@ double squared_distance_to_box(Vec3d point, const RoundedCore& box) {
   return squared_length(gap);
 }
 
-// Returns the squared distance between two boxes that share no point: the nearest points are a corner and a box, or lie
-// on two edges. `offset` is the centre of `b` from the centre of `a`.
+// Returns the squared distance between two boxes that share no point. The nearest points are either a corner of one box
+// and a point of the other box, or a point on an edge of each box. `offset` is the centre of `b` from the centre of
+// `a`.
 double squared_distance_apart(const RoundedCore& a, const RoundedCore& b, Vec3d offset) {
   double least = std::numeric_limits<double>::infinity();
   for (int i = 0; i < 8; ++i) {
@@ -99,13 +101,14 @@ double squared_gap(const Aabbd& a, const Aabbd& b) {
 
 bool is_ball_or_point(const Shape& shape) { return shape.kind == ShapeKind::kPoint || shape.kind == ShapeKind::kBall; }
 
-// Returns the result of distance_between() for balls and points, faster: the squared distance of segments of length 0
-// is that of their centres, bit for bit, and the root of the squared distance of the bounds is seldom needed.
+// Returns the same result as distance_between() for balls and points, bit for bit, but faster: the squared distance of
+// segments of length 0 is computed from their centres, and the square root for the distance of the bounds is seldom
+// needed.
 double distance_of_balls(const Shape& a, const Shape& b) {
   const auto radius = [](const Shape& shape) { return shape.kind == ShapeKind::kBall ? double{shape.radius} : 0.0; };
   const double apart = std::sqrt(squared_length(b.position - a.position)) - radius(a) - radius(b);
   const double gap = squared_gap(bounds_of(a), bounds_of(b));
-  // The root of `gap`, rounded, is then at most `apart`.
+  // If this condition holds, the rounded square root of `gap` is at most `apart`.
   if (apart > 0 && apart * apart > gap * (1 + 0x1p-50)) return apart;
   return std::max(apart, std::sqrt(gap));
 }

@@ -13,11 +13,11 @@ namespace {
 
 bool is_round(const Shape& shape) { return shape.kind == ShapeKind::kBall || shape.kind == ShapeKind::kCapsule; }
 
-// Motion of a mover and a shape of which at least one is round. The segment of the RoundSweep is the mover's centre or
-// inner segment; if the mover is a box, it is the shape's.
+// Relative motion of a mover and a shape, at least one of which is round. The segment of the RoundSweep is the mover's
+// centre or inner segment; if the mover is a box, the segment is the shape's centre or inner segment.
 struct RoundMotion {
   RoundSweep sweep;
-  Rotation axes;        // rotates the axes of `sweep` to those of the mover
+  Rotation axes;        // rotates the axes of `sweep` to the axes in which the mover is given
   double shape_radius;  // part of the sweep's radius that belongs to the shape
   bool is_reversed;     // true if the segment is the shape's
 };
@@ -52,12 +52,14 @@ Contact contact_of(const RoundMotion& motion, const Mover& mover, const Shape& s
   return {separation.distance - motion.shape_radius, core + normal * depth_of_point, normal};
 }
 
-// Returns a lower bound of the first contact of a ball or capsule with a triangle, whose corners are relative to the
-// mover's start: the moment at which the mover reaches the triangle's plane. Returns infinity if it stays away from it.
+// Returns a lower bound of the time of the first contact of a ball or capsule with a triangle: the time at which the
+// mover reaches the triangle's plane, or infinity if the mover never reaches this plane. The corners `a`, `b` and `c`
+// are relative to the mover's start.
 inline double plane_bound(const Mover& mover, Vec3d a, Vec3d b, Vec3d c) {
   const Vec3d ab = b - a, ac = c - a;
   const Vec3d normal = cross(ab, ac);
-  // Height of the plane above the mover's centre, times the length of the normal, and its rate.
+  // Height of the plane above the mover's centre, and the rate at which the height changes, both times the length of
+  // the normal.
   const double height = dot(normal, a), rate = -dot(normal, mover.way);
   constexpr double kEpsilon = 0x1p-44;  // covers the rounding of the normal and of the heights
   const double size = max_component(max(abs(ab), abs(ac)));
@@ -96,7 +98,7 @@ std::optional<BoxOverlap> box_overlap(const Mover& box, const Shape& shape) {
                           compose(inverse(box.rotation), rotation_of(shape.rotation)), box.rotation.to_local(-box.way));
 }
 
-// Returns the first moment of an overlap in 0 .. limit.
+// Returns the first moment of `overlap` in 0 .. limit, or nullopt.
 std::optional<double> first_moment(const std::optional<BoxOverlap>& overlap, double limit) {
   if (!overlap || overlap->time.far < 0 || !(overlap->time.near <= limit)) return std::nullopt;
   return std::max(overlap->time.near, 0.0);

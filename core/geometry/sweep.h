@@ -1,9 +1,10 @@
-// Sweeps: the first moment at which a mover shares a point with a shape or a triangle, and the contact there. Both are
-// closed solids, so touching counts; a triangle is a closed surface with two sides. Points, and triangles without area,
-// are found too.
+// Sweeps: the first moment at which a mover shares a point with a shape or a triangle, and the contact there. Movers
+// and shapes are closed solids, so touching counts. A triangle is a closed surface with two sides. Points, and
+// triangles without area, are found too.
 //
-// Error: if the mover, shrunk by 2^-20 of its distance from the origin and its size, hits the primitive, the sweep hits
-// no later. A hit is reported at most about 2^-44 of the magnitudes involved before the solids touch.
+// Error: consider the mover shrunk by 2^-20 of the sum of its distance from the origin and its size. If the shrunk
+// mover hits the primitive, the sweep reports a hit that is not later. At a reported hit, the distance between mover
+// and primitive is at most about 2^-44 of the magnitudes involved.
 //
 // Pure functions in double, of products, sums, quotients and square roots in a fixed order. O(1); any thread.
 #ifndef LOCUS_CORE_GEOMETRY_SWEEP_H_
@@ -20,7 +21,8 @@
 
 namespace locus {
 
-// Return a ball or a capsule as a mover that rests. Its contact_at() time 0 measures from the centre or inner segment.
+// Return a ball or a capsule as a mover that rests. contact_at() of this mover at t = 0 returns the distance and the
+// nearest point of a primitive, as seen from the ball's centre or the capsule's inner segment.
 inline Mover resting(const Balld& ball) {
   Mover mover;
   mover.start = ball.center;
@@ -44,7 +46,8 @@ Mover mover_to_mesh(const Mover& mover, const Transform& transform);
 std::optional<double> first_contact(const Mover& mover, const Shape& shape, AtStart at_start, double limit = 1);
 std::optional<double> first_contact(const Mover& mover, const Corners& triangle, AtStart at_start, double limit = 1);
 
-// Return the contact at time t, at which the solids touch. Also defined if they do not.
+// Return the contact at time t. Mover and primitive usually touch at this time, but the contact is also defined if they
+// do not.
 Contact contact_at(const Mover& mover, const Shape& shape, double t);
 Contact contact_at(const Mover& mover, const Corners& triangle, double t);
 

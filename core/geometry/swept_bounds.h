@@ -10,8 +10,8 @@
 
 namespace locus {
 
-// A ray from the mover's start against boxes that are grown by the mover's extent on each axis. A mover that rests has
-// no direction: its ray points along x, and only boxes that contain its start count.
+// Tests a ray from the mover's start against boxes, each grown by the mover's extent on each axis. A mover that rests
+// has no direction: its ray points along x, and only grown boxes that contain its start count as met.
 class SweptBounds {
  public:
   SweptBounds(const Mover& mover, double pad)
@@ -19,8 +19,8 @@ class SweptBounds {
         extent_(extent_of(mover)),
         slabs_(Rayd{mover.start, is_resting_ ? Vec3d{1, 0, 0} : mover.way}, pad) {}
 
-  // Returns the t, at least 0, at which the mover's bounds begin to overlap `box`, or nullopt if they never do for t >=
-  // 0. A superset of a box never gives a larger t.
+  // Returns the t, at least 0, at which the mover's bounds begin to overlap `box`, or nullopt if the bounds do not
+  // overlap `box` at any t >= 0. A superset of a box never gives a larger t.
   std::optional<double> entry(const Aabbd& box) const {
     const Interval<double> interval = slabs_.interval(Aabbd{box.min - extent_, box.max + extent_});
     if (!(interval.near <= interval.far) || interval.far < 0) return std::nullopt;
@@ -28,8 +28,8 @@ class SweptBounds {
     return std::max(interval.near, 0.0);
   }
 
-  // Returns a ray for a search of an index with the same pad: no index culls a box by this ray that entry() accepts.
-  // For a mover that rests, the limit of the search must be 0.
+  // Returns a ray for searching an index: an index that culls by this ray never culls a box that entry() accepts. `pad`
+  // must be the pad that was passed to the constructor. For a mover that rests, the limit of the search must be 0.
   SlabRay<double> search_ray(double pad) const {
     return SlabRay<double>(Rayd{slabs_.origin(), slabs_.direction()}, pad, max_component(extent_));
   }

@@ -1,6 +1,6 @@
-// Mesh triangle: three float vertices in mesh axes, and the triangle's number, its position in the uploaded index list.
-// A triangle is stored as three vertices, never as a vertex and two edges: neighbours must have bitwise equal vertices,
-// or rays leak between them. Plain data; any thread.
+// Mesh triangle: three float vertices in mesh axes, and the triangle's number, which is its position in the uploaded
+// index list. A triangle is stored as three vertices, never as a vertex and two edges: neighbours must have bitwise
+// equal vertices, or rays leak between them. Plain data; any thread.
 #ifndef LOCUS_CORE_GEOMETRY_TRIANGLE_H_
 #define LOCUS_CORE_GEOMETRY_TRIANGLE_H_
 

@@ -293,7 +293,7 @@ class Look {
 
   struct KernelSegment {
     uint32_t index;  // in segments_
-    float nearest;   // t at which the segment enters the instance
+    float nearest;   // t at which the segment enters the bounds of the instance
   };
 
   QueryTask& task_;
