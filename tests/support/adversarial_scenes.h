@@ -70,9 +70,9 @@ inline SceneSketch random_scene(Random& random) {
   return sketch;
 }
 
-// Generates walls on the planes of a lattice, and rays in all 26 directions from the lattice's points and from points
-// half-way between them. The balls and boxes just touch the walls. `step` is the spacing of the lattice, `corner` its
-// origin.
+// Generates walls on the planes of a lattice. Rays start at lattice points or half-way between them, one in each of the
+// 26 directions and a few in other directions. Balls and boxes often just touch the walls. `step` is the spacing of the
+// lattice, `corner` its origin.
 inline SceneSketch lattice_scene(std::string family, double step, Vec3d corner, Random& random) {
   SceneSketch sketch{std::move(family), {}, {}, {}, {}};
   const auto point = [&](int parts) { return corner + random.whole_vector(2 * parts) * (step / parts); };

@@ -1,5 +1,5 @@
 // Overlap of boxes with segments, boxes and triangles by clipping in long double: a reference that does not use
-// separating axes. Everything is in the axes of one box around the origin.
+// separating axes. The clipping functions take coordinates relative to the centre and the axes of the box.
 #ifndef LOCUS_TESTS_SUPPORT_BOX_CLIP_H_
 #define LOCUS_TESTS_SUPPORT_BOX_CLIP_H_
 
@@ -49,7 +49,8 @@ inline bool clipped_polygon_remains(std::vector<Vec3r> polygon, Vec3r half, Real
   return true;
 }
 
-// Oriented box of the reference: its centre and its three rotated half edges.
+// Oriented box in long double: `axes` are its unit axes, `half` its half extents, and `half_edges` the products of
+// both.
 struct RealBox {
   Vec3r center;
   std::array<Vec3r, 3> half_edges;

@@ -24,9 +24,9 @@ struct FoundRow {
 };
 using Found = std::map<std::pair<Id, uint32_t>, FoundRow>;  // key: id and triangle
 
-// Returns whether the rows of the block have triangles, and each row of the exact answer is also in the conservative
-// answer. Lookups, contains, sight and pairs return no triangles. A wall that cuts a cell off hides the walls behind
-// it, so a cell with more walls may lack rows of the exact answer.
+// Returns whether the two answers to the block can be compared: their rows name triangles, and every row of the exact
+// answer must also be in the conservative answer. Lookups, contains, sight and pairs return no triangles. In a
+// conservative cell an additional wall may hide walls that the exact cell has.
 inline bool is_judged(const OwnedBlock& block) {
   const auto& kind = block.settings.kind;
   return !std::holds_alternative<LookupColumns>(kind) && !std::holds_alternative<ContainsColumns>(kind) &&
@@ -35,8 +35,8 @@ inline bool is_judged(const OwnedBlock& block) {
 }
 
 // Returns the rows of each query at `precision`, with detail kTriangles for nearest queries and mode kAll for rays and
-// sweeps. Asks for all rows of a query: without a count instead of rows, without a start behind other rows, and with
-// the highest maximum number of results.
+// sweeps. To get all rows of each query, it requests rows instead of counts, removes the page position (the `after`
+// columns), and sets the highest maximum number of results.
 inline std::vector<Found> found_by(const SceneSnapshot& snapshot, OwnedBlock block, Precision precision) {
   block.settings.precision = precision;
   block.settings.max_results = limits::kMaxMaxResults;

@@ -89,7 +89,8 @@ class SolidReference {
     return shape_.kind == ShapeKind::kBall || shape_.kind == ShapeKind::kCapsule ? shape_.radius : 0;
   }
 
-  // Returns the part of the line offset + s * unit, |s| <= reach, where gauge <= grown.
+  // Returns the interval of s in -reach .. reach in which the point offset + s * unit has a gauge of at most `grown`;
+  // nullopt if there is none.
   std::optional<RealInterval> chord(Vec3r offset, Vec3r unit, Real reach, Real grown) const {
     const auto along = [&](Real s) { return gauge(offset + unit * s); };
     const Real middle = argmin(along, -reach, reach);

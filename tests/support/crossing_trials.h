@@ -1,6 +1,6 @@
-// Families of meshes and points for testing half lines: each family is known to reveal one kind of error. The points
-// are generated from seeds. For the tests of the crossing kernels, of TriangleBvh::visit_half_line() and of planted
-// bugs in them.
+// Meshes and points for testing the crossings of half lines, from which winding numbers are computed. Each family is
+// known to reveal one kind of error. The points are generated from seeds. For the tests of the crossing kernels, of
+// TriangleBvh::visit_half_line() and of planted bugs in them.
 #ifndef LOCUS_TESTS_SUPPORT_CROSSING_TRIALS_H_
 #define LOCUS_TESTS_SUPPORT_CROSSING_TRIALS_H_
 
@@ -19,7 +19,8 @@
 
 namespace locus::test {
 
-// Cost of the searches of a trial.
+// Sums over the searches of a trial: number of searches, of tested triangles, and of tested triangles for which the
+// kernel called `judge`.
 struct CrossingCost {
   uint64_t searches = 0, tests = 0, judged = 0;
 };
@@ -34,7 +35,8 @@ class CrossingTrial {
     tree_.for_each([&](const Triangle& triangle) { triangles_.push_back(triangle); });
   }
 
-  // Returns the first half line whose sum differs in TriangleBvh::visit_half_line(); empty if there is none.
+  // Returns the first half line for which TriangleBvh::visit_half_line() results in another sum; empty if there is
+  // none.
   std::string difference() const {
     return first_fault([this](Vec3d point, HalfLine line, const Sum& expected) {
       Sum found(point, line);
@@ -44,7 +46,7 @@ class CrossingTrial {
     });
   }
 
-  // Returns the first half line whose sum differs in a kernel, or whose cost differs from that of visit_half_line();
+  // Returns the first half line for which the kernel results in another sum, or in another cost than visit_half_line();
   // empty if there is none.
   std::string difference(const CrossingKernels& kernels, CrossingCost* cost = nullptr) const {
     return first_fault([&](Vec3d point, HalfLine line, const Sum& expected) -> std::string {
@@ -66,8 +68,8 @@ class CrossingTrial {
     });
   }
 
-  // Returns the first point around which the winding number differs if the search ends at clear cells; empty if there
-  // is none. `known` counts the points that need no search. `kernels` may be null. The mesh must be closed.
+  // Returns the first point whose winding number is wrong when searches end early, at clear cells (WindingCells); empty
+  // if there is none. `known` counts the points that need no search. `kernels` may be null. The mesh must be closed.
   std::string difference_with_cells(const CrossingKernels* kernels, size_t* known = nullptr) const {
     const WindingCells cells = WindingCells::build(tree_);
     return first_fault([&](Vec3d point, HalfLine line, const Sum& expected) -> std::string {
@@ -95,7 +97,7 @@ class CrossingTrial {
   }
 
  private:
-  // Sum of crossings, and visitor of triangles.
+  // Visitor of triangles that sums their crossings.
   struct Sum {
     Sum(Vec3d from, HalfLine towards) : point(from), line(towards) {}
     bool visit(const Triangle& triangle) {
@@ -139,8 +141,8 @@ class CrossingTrial {
   std::vector<Vec3d> points_;
 };
 
-// Returns a point that lies at, or along an axis from, a corner, an edge or the inside of a triangle. Half of the
-// points have float coordinates.
+// Returns a point on a corner, on an edge or inside a triangle, or displaced from such a point along an axis. Half of
+// the points have float coordinates.
 inline Vec3d point_at(const Triangle& triangle, Random& random) {
   const Corners corners = corners_of(triangle);
   const Vec3d a = random.pick(corners), b = random.pick(corners), c = random.pick(corners);
@@ -236,7 +238,7 @@ inline std::vector<CrossingTrial> stepped_crossing_trials() {
   return trials;
 }
 
-// Returns the triangles of several closed meshes, which are one closed mesh.
+// Joins the triangles of several closed meshes into one mesh, which is closed, too.
 inline std::vector<Triangle> joined(const std::vector<std::vector<Triangle>>& meshes) {
   std::vector<Triangle> all;
   for (const std::vector<Triangle>& mesh : meshes) all.insert(all.end(), mesh.begin(), mesh.end());
@@ -268,8 +270,8 @@ inline std::vector<Triangle> outward_city(int side, uint64_t seed) {
   return city;
 }
 
-// Makes trials of closed meshes: of several winding numbers, flat, with many separate hollows, and of sizes and at
-// distances where cells are smaller than the steps of floats.
+// Makes trials of closed meshes: meshes with winding numbers other than 0 and 1, a flat mesh, a mesh of many separate
+// spheres, meshes of extreme sizes, and meshes so far away that cells are smaller than the spacing of floats.
 inline std::vector<CrossingTrial> closed_crossing_trials() {
   const std::vector<Triangle> sphere = bumpy_sphere(12, 0.2, 7), inner = moved(bumpy_sphere(6, 0.1, 8), 0.4f, {});
   std::vector<std::vector<Triangle>> crowd, stack;

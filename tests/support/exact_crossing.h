@@ -34,15 +34,15 @@ inline Integer scaled(double value) {
 
 inline IntegerVector exactly(Vec3d v) { return {{scaled(v.x), scaled(v.y), scaled(v.z)}}; }
 
-// Returns the sign of the area of (u, v, 0), projected along `axis`.
+// Returns the sign of the area of the triangle (u, v, 0) after projection along `axis`.
 inline int exact_turn(const IntegerVector& u, const IntegerVector& v, size_t axis) {
   const size_t y = (axis + 1) % 3, z = (axis + 2) % 3;
   return Integer(u.at[y] * v.at[z] - u.at[z] * v.at[y]).sign();
 }
 
-// Returns the crossing of the ray along the x axis by another rule than crossing(), which for closed meshes results in
-// the same sum and even in the same summands: the ray crosses a triangle if it passes through its inside after it was
-// moved by (e^2, -e) along y and z, for an infinitesimal e.
+// Returns the crossing of a triangle by the ray from `point` along the x axis. The rule differs from that of
+// crossing(), but both give the same result for each triangle: the ray is moved by (e^2, -e) along y and z, for an
+// infinitesimal e, and crosses the triangle if the moved ray passes through the triangle's inside.
 inline Crossing exact_crossing(Vec3d point, const Triangle& triangle) {
   const IntegerVector p = exactly(point);
   const std::array<IntegerVector, 3> corners = {exactly(to_double(triangle.a)) - p, exactly(to_double(triangle.b)) - p,
@@ -68,7 +68,8 @@ inline Crossing exact_crossing(Vec3d point, const Triangle& triangle) {
     }
     return result;
   }
-  // Signs of the three edges, as seen from the perturbed point: the area, else its change along -z, else along y.
+  // The sign of each edge as seen from the moved point: the sign of the area; if the area is 0, the sign of its change
+  // along -z; if that is 0 too, the sign of its change along y.
   int lefts = 0, rights = 0;
   for (size_t i = 0; i < 3; ++i) {
     const IntegerVector &u = corners[i], &v = corners[(i + 1) % 3];
@@ -83,7 +84,7 @@ inline Crossing exact_crossing(Vec3d point, const Triangle& triangle) {
   return result;
 }
 
-// A triangle, and a point on it or next to it, its plane or its edges.
+// A triangle, and a point on or next to the triangle, its plane or its edges.
 struct NearTrial {
   Triangle triangle;
   Vec3d point;

@@ -63,14 +63,15 @@ class FaultyFiles final : public rocksdb::FileSystemWrapper {
   }
   const char* Name() const override { return "FaultyFiles"; }
 
-  // Simulates a power loss before a later change: the next `change` changes take effect, all changes after them fail.
+  // Simulates a power loss: the next `change` changes take effect, all changes after them fail.
   void stop_before(uint64_t change) { changes_left_ = change; }
   // Ends the simulated power loss as if only the process had restarted: all written data remains, synced or not.
   void go_on() { changes_left_ = kForEver; }
   bool stopped() const { return changes_left_ == 0; }
   uint64_t changes() const { return changes_; }
-  // Make the next `count` syncs or writes of RocksDB's log files (*.log) fail. Other files are excluded, since their
-  // concurrent writes would consume faults at random. If `count` is negative, all syncs or writes of all files fail.
+  // These functions make the next `count` syncs or writes of RocksDB's log files (*.log) fail. Other files are
+  // excluded, since their concurrent writes would consume faults at random. If `count` is negative, all syncs or writes
+  // of all files fail.
   void fail_syncs(int64_t count) { failing_syncs_ = count; }
   void fail_writes(int64_t count) { failing_writes_ = count; }
   // If `full` is true, makes every write fail because the disk is full, and GetFreeSpace() return 0, until fill(false).

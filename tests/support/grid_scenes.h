@@ -57,7 +57,8 @@ inline SceneSketch sizes_between_levels(Random& random) {
   return sketch;
 }
 
-// Generates placements near zero on both sides, where cell indices would be equal if they were truncated towards zero.
+// Generates placements just below and just above zero, whose cell indices would be equal if they were truncated towards
+// zero.
 inline SceneSketch around_zero(Random& random) {
   SceneSketch sketch{"around zero", {}, {}, {}, {}};
   const double size = random.magnitude(-10, 3);

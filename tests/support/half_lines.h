@@ -1,4 +1,4 @@
-// All half lines of a point, for tests that compare them.
+// All half lines of a point: both directions along each axis. For tests that compare half lines.
 #ifndef LOCUS_TESTS_SUPPORT_HALF_LINES_H_
 #define LOCUS_TESTS_SUPPORT_HALF_LINES_H_
 

@@ -66,7 +66,7 @@ class KernelTrial {
  public:
   KernelTrial(std::string name, const std::vector<Triangle>& triangles, const std::vector<KernelQuestion>& questions)
       : KernelTrial(std::move(name), triangles, questions, *TriangleBvh::build(triangles)) {}
-  // Queries `tree`, which must be a tree of `triangles`, instead of a tree built from `triangles`.
+  // Makes a trial that queries `tree`, which must be a tree of `triangles`, instead of a tree built from `triangles`.
   KernelTrial(std::string name, const std::vector<Triangle>& triangles, const std::vector<KernelQuestion>& questions,
               TriangleBvh tree)
       : name_(std::move(name)), tree_(std::move(tree)) {

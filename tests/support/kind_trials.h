@@ -1,5 +1,5 @@
-// Comparisons of containment, views and sight with simple references, on random cases. For the tests of these kinds and
-// for the proof that they can fail.
+// Comparisons of containment, views, sight, pairs and cells with simple references. For the tests of these query kinds
+// and for the tests of planted bugs in them.
 #ifndef LOCUS_TESTS_SUPPORT_KIND_TRIALS_H_
 #define LOCUS_TESTS_SUPPORT_KIND_TRIALS_H_
 
@@ -18,8 +18,8 @@
 
 namespace locus::test {
 
-// Returns the first point whose winding in an octahedron is wrong on a half line. The points are eighths, so that half
-// lines meet edges and corners of the triangles.
+// Returns the first point whose winding number in an octahedron is wrong along one of the half lines; empty if there is
+// none. The points' coordinates are multiples of 1/8, so that half lines meet edges and corners of the triangles.
 inline std::string contains_difference() {
   std::vector<Triangle> octahedron;
   for (int octant = 0; octant < 8; ++octant) {
@@ -45,7 +45,8 @@ inline std::string contains_difference() {
   return "";
 }
 
-// Returns the first seed of a point near a triangle whose crossing differs from that in integers.
+// Returns the first seed whose random triangle and point have another crossing than the one computed in integers; empty
+// if there is none.
 inline std::string crossing_difference() {
   for (uint64_t seed = 0; seed < scaled_count(20'000); ++seed) {
     Random random(seed);
@@ -56,8 +57,8 @@ inline std::string crossing_difference() {
   return "";
 }
 
-// Returns the first point that is within the planes of a random view, but not within its clip coordinates, or the other
-// way round.
+// Returns the first seed whose random view has a point that is inside by the view's planes but outside by its clip
+// coordinates, or the other way round; empty if there is none.
 inline std::string view_difference() {
   for (uint64_t seed = 0; seed < scaled_count(300); ++seed) {
     Random random(seed);
@@ -97,7 +98,8 @@ inline std::string view_difference() {
   return "";
 }
 
-// Returns a description of the first viewer that does not see past the members of its own group, or of the target's.
+// Returns the first seed for which a viewer's sight is blocked by a member of its own group or of the target's group,
+// or is not blocked by an object of another group; empty if there is none.
 inline std::string sight_difference() {
   for (uint64_t seed = 0; seed < scaled_count(50); ++seed) {
     Random random(seed);
@@ -122,7 +124,8 @@ inline std::string sight_difference() {
   return "";
 }
 
-// Returns a description of the first row of balls on a line whose pairs are not its neighbours, each once.
+// Returns the first error in the pairs of balls on a line, where every two neighbours must be a pair exactly once;
+// empty if there is none.
 inline std::string pair_difference() {
   for (size_t balls = 2; balls < 20; ++balls) {
     QueryWorld world;
@@ -140,8 +143,8 @@ inline std::string pair_difference() {
   return "";
 }
 
-// Returns a description if the space before a wall of many triangles has more planes than the wall and what is in
-// front.
+// Returns a description of the error if the cell of a point between a ball and a wall of many triangles has not exactly
+// three rows: one for the cell itself, one plane for the wall and one for the ball.
 inline std::string cell_difference() {
   std::vector<Triangle> wall;
   for (int y = -8; y < 8; ++y)

@@ -19,7 +19,8 @@
 
 namespace locus::test {
 
-// Point in mesh axes, the distance at which triangles are still wanted, and the slack of a search for the nearest one.
+// Point in mesh axes, the largest distance of triangles that a search must return, and the slack of a search for the
+// nearest triangle.
 struct NearestTarget {
   Vec3d point;
   double limit = std::numeric_limits<double>::infinity();
@@ -34,8 +35,8 @@ class NearestTrial {
     tree_.for_each([&](const Triangle& triangle) { triangles_.push_back(triangle); });
   }
 
-  // Returns the first wrong answer; empty if there is none. Adds the numbers of candidates of searches for the nearest
-  // triangle, and of these searches.
+  // Returns the first wrong answer; empty if there is none. Adds to `searches` the number of searches for the nearest
+  // triangle, and to `candidates` the number of candidates that these searches returned.
   std::string difference(const NearestKernels& kernels, uint64_t* candidates = nullptr,
                          uint64_t* searches = nullptr) const {
     for (size_t i = 0; i < targets_.size(); ++i) {
@@ -60,8 +61,8 @@ class NearestTrial {
   }
 
  private:
-  // Returns what is wrong with the candidates of a search: a triangle within `limit` is missing, one is returned twice,
-  // or a distance is not measured as by the functions of core/geometry.
+  // Returns a description of the error in the candidates of a search: a triangle within `limit` is missing, a triangle
+  // is returned twice, or a distance differs from that of the functions of core/geometry.
   std::string fault(NearestSearch& search, const NearestTarget& target, const std::vector<double>& distances,
                     double limit, uint64_t* candidates) const {
     std::vector<int> times(triangles_.size());
@@ -176,9 +177,9 @@ inline std::vector<NearestTrial> scaled_nearest_trials() {
   return trials;
 }
 
-// Makes meshes of one point, whose box has no extent, and queries so near to the origin that the pad of their points is
-// small: the distance to the box is then that to the triangle, and only the pad of boxes keeps a box whose squared
-// distance is rounded up.
+// Makes meshes of one point, whose box has no extent, so that the distance to the box equals that to the triangle,
+// which is the limit of the search. The queries are so near to the origin that the pad of their points is small. So
+// only the pad of boxes prevents the search from dropping a box whose squared distance is rounded up.
 inline std::vector<NearestTrial> point_nearest_trials() {
   Random random(20);
   std::vector<NearestTrial> trials;
@@ -192,7 +193,8 @@ inline std::vector<NearestTrial> point_nearest_trials() {
   return trials;
 }
 
-// Makes fans of triangles around one vertex above which the points are: all triangles of a fan are equally near.
+// Makes fans of triangles around one vertex, and points at and above this vertex: all triangles of a fan are equally
+// near.
 inline std::vector<NearestTrial> tied_nearest_trials() {
   Random random(30);
   std::vector<NearestTrial> trials;

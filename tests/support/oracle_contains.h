@@ -10,7 +10,8 @@
 
 namespace locus::test {
 
-// Returns whether the mesh of the instance is closed and winds around the point, or has it on its surface.
+// Returns whether the mesh of the instance winds around the point or has the point on its surface. The mesh must be
+// closed.
 inline bool winds_around(const Instance& instance, Vec3d point) {
   const Vec3d local = without_tiny_coordinates(instance.transform.point_to_mesh(point));
   int64_t winding = 0;

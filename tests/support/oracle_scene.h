@@ -1,4 +1,4 @@
-// Scene of an oracle of queries as plain lists, and the functions with which the oracles of all kinds select, count and
+// The content of a scene as plain lists, and the functions with which the oracles of all query kinds select, count and
 // write rows.
 #ifndef LOCUS_TESTS_SUPPORT_ORACLE_SCENE_H_
 #define LOCUS_TESTS_SUPPORT_ORACLE_SCENE_H_
@@ -44,7 +44,7 @@ class OracleScene {
     const Object* object = nullptr;
     const Instance* instance = nullptr;
     float u = 0, v = 0;
-    Vec3d normal;  // nearest queries: vector to the nearest point
+    Vec3d normal;  // surface normal; nearest queries and cells: vector to the nearest point
     Vec3d place;   // sweeps only: point of contact, relative to the start
   };
   using Rows = std::vector<Row>;
@@ -60,7 +60,7 @@ class OracleScene {
     return std::nullopt;
   }
 
-  // Returns the position of the anchor of query `i`; nullopt if it has none in this scene.
+  // Returns the position of the anchor of query `i`; nullopt if the scene does not contain the anchor.
   std::optional<Vec3d> anchor(const QueryBlock& block, size_t i) const {
     for (const Object& object : objects_)
       if (object.id == block.anchor_ids[i]) return object.shape.position;
@@ -68,7 +68,7 @@ class OracleScene {
       if (instance->id == block.anchor_ids[i]) return instance->transform.translation;
     return std::nullopt;
   }
-  // Returns the columns with positions that count from the anchors, with the number of points of a query in each.
+  // Returns the columns whose positions are relative to anchors, each with the number of points that it has per query.
   static std::vector<std::pair<absl::Span<const float>, size_t>> anchored_columns(const QueryBlock& block) {
     if (const auto* rays = std::get_if<RayColumns>(&block.kind)) return {{rays->origins, 1}};
     if (const auto* balls = std::get_if<BallColumns>(&block.kind)) return {{balls->centers, 1}};
@@ -82,7 +82,8 @@ class OracleScene {
     if (const auto* sight = std::get_if<SightColumns>(&block.kind)) return {{sight->viewers, sight->eyes_per_viewer()}};
     return {};
   }
-  // Returns whether query `i` has no answer because its anchor is unknown, or one of its positions too far out.
+  // Returns whether query `i` has no answer because its anchor is unknown, or because one of its positions is outside
+  // the world.
   bool is_unanchored(const QueryBlock& block, size_t i) const {
     if (block.anchor_ids.empty()) return false;
     const std::optional<Vec3d> from = anchor(block, i);
@@ -94,11 +95,11 @@ class OracleScene {
     }
     return false;
   }
-  // Returns the point from which the positions of query `i` count.
+  // Returns the point to which the positions of query `i` are relative.
   Vec3d origin(const QueryBlock& block, size_t i) const {
     return block.anchor_ids.empty() ? block.frame : anchor(block, i).value_or(Vec3d{});
   }
-  // Returns the point of query `i` in a column with one point for each query, or for all queries.
+  // Returns the point of query `i` in a column that has one point for each query, or one point for all queries.
   Vec3d point(const QueryBlock& block, absl::Span<const float> column, size_t i) const {
     const float* const offset = &column[column.size() == 3 ? 0 : 3 * i];
     return origin(block, i) + Vec3d{offset[0], offset[1], offset[2]};
@@ -185,7 +186,7 @@ class OracleScene {
     result.rotations.insert(result.rotations.end(), {rotation.x, rotation.y, rotation.z, rotation.w});
   }
 
-  // Drops the rows that are not behind the position of query `i`.
+  // Drops the rows that are not behind the page position of query `i`.
   static void keep_behind(const AfterColumns& after, size_t i, Rows& rows) {
     if (after.ts.empty()) return;
     const float t = entry_for(after.ts, i, 0.0f);

@@ -45,7 +45,7 @@ class QueryOracle : public RayOracle {
     std::visit([&](const auto& kind) { answer_kind(block, kind, result); }, block.kind);
     return result;
   }
-  // Returns only the counts of the rows that there would be without any limit.
+  // Returns only the number of rows of each query, counted without any limit.
   BlockResult counts_of(QueryBlock block) const {
     block.count_only = false;
     block.max_results = std::numeric_limits<uint32_t>::max();
@@ -57,7 +57,7 @@ class QueryOracle : public RayOracle {
     return counts;
   }
 
-  // Adds the planes of a cell one after the other, over all objects and triangles from near to far.
+  // Builds each cell plane by plane, from the nearest object or triangle to the farthest.
   void answer_kind(const QueryBlock& block, const CellColumns& cells, BlockResult& result) const {
     const bool conservative = block.precision == Precision::kConservative;
     for (size_t i = 0; i < cells.points.size() / 3; ++i) {
@@ -114,7 +114,8 @@ class QueryOracle : public RayOracle {
       hit.triangle = row.triangle;
       return is_beyond(cell, from, block.precision, hit);
     }
-    // An object of another time has no reference into the grid: its extent along the normal is computed here.
+    // is_beyond() needs a reference into the grid, which an object of another time does not have. So compute the extent
+    // of the object along the normal here.
     Shape shape = row.object->shape;
     const Aabbd bounds = bounds_of(shape);
     shape.position = shape.position - from;
@@ -127,7 +128,7 @@ class QueryOracle : public RayOracle {
     return least >= at - 0x1p-40 * (size + at + max_component(abs(from)) * 0x1p-8);
   }
 
-  // Kinds with an oracle in a file of its own.
+  // Answers the kinds whose oracle is in a file of its own.
   template <class Columns>
   void answer_kind(const QueryBlock& block, const Columns& columns, BlockResult& result) const {
     answer_block(*this, block, columns, result);
@@ -221,8 +222,8 @@ class QueryOracle : public RayOracle {
     }
   }
 
-  // Writes the contact of a ball or capsule with the object or the triangle of a row; for a whole instance, with the
-  // nearest triangle that it overlaps.
+  // Writes the contact of a ball or capsule with the object or the triangle of a row; for a row of a whole instance,
+  // with the nearest triangle that the solid overlaps.
   template <class Solid>
   static void write_contact(const Row& row, const QueryBlock& block, const Solid& solid, BlockResult& result) {
     const ColumnSet columns = columns_of(block);
@@ -354,7 +355,8 @@ class QueryOracle : public RayOracle {
     rows.insert(rows.end(), own.begin(), own.end());
   }
 
-  // Returns the unit vector from the nearest point of a row; `row.normal` is the way to it.
+  // Returns the unit vector from the nearest point of a row to the query's point; `row.normal` is the opposite vector,
+  // not normalised. If both points are equal, returns the normal of the triangle's front.
   static Vec3d away(const Row& row, bool conservative) {
     if (conservative) return {};
     if (row.normal != Vec3d{}) return normalized(-row.normal) + Vec3d{};
@@ -364,7 +366,7 @@ class QueryOracle : public RayOracle {
     return squared_length(front) > 0 ? normalized(front) + Vec3d{} : Vec3d{};
   }
 
-  // Writes the weights of the nearest point in its triangle: parts of the triangle's area.
+  // Writes the barycentric coordinates (u, v) of the nearest point in its triangle.
   static void write_weights(Vec3d from, const Row& row, bool conservative, BlockResult& result) {
     float u = 0, v = 0;
     if (row.instance != nullptr && !conservative) {

@@ -137,8 +137,8 @@ inline SnapshotPtr snapshot_of(const QueryWorld& world) {
   return scene.latest();
 }
 
-// Makes a snapshot of the same content as snapshot_of(). Before this content is inserted, other content was inserted
-// and removed; the order of insertion differs, and there are several batches.
+// Makes a snapshot with the same content as snapshot_of(), but by a different history: first inserts and removes other
+// content, then inserts this content in a different order and in several batches.
 inline SnapshotPtr snapshot_after_history(QueryWorld world, Random& random) {
   Scene scene("world", spec_of(world), 1, StaticSet::empty());
   internal::live_through_history(scene, world, random);

@@ -75,8 +75,8 @@ inline void add_instances(const SceneSketch& sketch, Random& random, QueryWorld&
   });
 }
 
-// Adds instances of a closed mesh: a bumpy sphere, or a cube with corners on whole coordinates, often with a smaller
-// one inside that is turned over, so that it makes a cavity.
+// Adds instances of a closed mesh: a bumpy sphere, or a cube with corners on whole coordinates. Half of the meshes have
+// a second, inverted shell of half or full size, so that the space within this shell is not inside the mesh.
 inline void add_closed_meshes(const SceneSketch& sketch, Random& random, QueryWorld& world) {
   if (sketch.placements.empty() || random.chance(0.5)) return;
   std::vector<Triangle> shell;
@@ -142,8 +142,8 @@ inline void append_point(OwnedBlock& block, Vec3d world) {
   append(block.points, offset);
 }
 
-// Gives the queries of some blocks anchors: objects and instances of the scene, and ids that may be unknown. The
-// positions of the queries become offsets from there.
+// Sets anchors for the queries of some blocks: ids of objects and instances of the scene, and ids that may be unknown.
+// The positions of the queries are then relative to their anchors.
 inline void add_anchors(const QueryScene& scene, Random& random, OwnedBlock& block) {
   const BlockKind kind = block_kind(block.settings);
   const size_t n = query_count(block.view());
@@ -156,7 +156,9 @@ inline void add_anchors(const QueryScene& scene, Random& random, OwnedBlock& blo
   }
   QueryBatch batch;
   batch.blocks = {block.view()};
-  if (!check_batch(batch).ok()) block.anchor_ids.clear();  // offsets from a frame may exceed those from an anchor
+  if (!check_batch(batch).ok())
+    block.anchor_ids.clear();  // offsets from the frame may be too large as offsets from an
+                               // anchor
 }
 
 inline void add_common(const QueryScene& scene, Random& random, OwnedBlock& block) {
@@ -178,7 +180,7 @@ inline void add_common(const QueryScene& scene, Random& random, OwnedBlock& bloc
   if (has_counts && random.chance(0.15)) settings.count_only = true;
 }
 
-// Gives some rays and nearest queries a position behind which they continue: a hit of another block, or any.
+// Sets random page positions in some blocks of rays or nearest queries: the results continue behind these positions.
 inline void add_after(Random& random, OwnedBlock& block) {
   if (random.chance(0.7)) return;
   constexpr float kTs[] = {-1, 0, 0.5f, 1, 1, 2, 3, 5, std::numeric_limits<float>::infinity()};
@@ -288,7 +290,8 @@ inline OwnedBlock box_block(const QueryScene& scene, const SceneSketch& sketch, 
   return block;
 }
 
-// Capsules around and between the places of the sketch's balls: points, short, long, along an axis, and flat.
+// Returns a block of capsules that start at the centres of the sketch's balls: points, and short and long capsules, in
+// whole, random or notable directions; some capsules have a radius of zero.
 inline OwnedBlock capsule_block(const QueryScene& scene, const SceneSketch& sketch, Random& random) {
   OwnedBlock block = block_at(sketch, random);
   block.settings.kind = CapsuleColumns{{}, {}, {}, random_detail(random)};
@@ -308,7 +311,8 @@ inline OwnedBlock capsule_block(const QueryScene& scene, const SceneSketch& sket
   return block;
 }
 
-// Balls, capsules or boxes that move along the sketch's rays, towards the places of its balls, or rest.
+// Returns a block of balls, capsules or boxes that move from the centres of the sketch's balls to notable points or by
+// whole offsets, or rest.
 inline OwnedBlock sweep_block(const QueryScene& scene, const SceneSketch& sketch, Random& random) {
   OwnedBlock block = block_at(sketch, random);
   constexpr RayMode kModes[] = {RayMode::kFirst, RayMode::kFirst, RayMode::kAny, RayMode::kAll};
@@ -362,8 +366,9 @@ inline OwnedBlock nearest_block(const QueryScene& scene, const SceneSketch& sket
   return block;
 }
 
-// Convex regions around the sketch's balls: boxes, rotated and sheared boxes, and hulls of random planes, through
-// notable points often; at times without some planes. Regions without an interior point are left out.
+// Returns a block of convex regions around the sketch's balls: boxes, rotated and sheared boxes, and hulls of random
+// planes. Some planes pass through notable points, and a few are replaced by planes without effect. Regions that
+// check_batch() refuses, such as those without an interior point, are left out.
 inline OwnedBlock frustum_block(const QueryScene& scene, const SceneSketch& sketch, Random& random) {
   OwnedBlock block = block_at(sketch, random);
   FrustumColumns frustums;
@@ -398,7 +403,7 @@ inline OwnedBlock frustum_block(const QueryScene& scene, const SceneSketch& sket
   return block;
 }
 
-// Points at and near notable places, and in, on and near the instances of closed meshes.
+// Returns a block of points: notable points, and points in, on and near the instances of closed meshes.
 inline OwnedBlock contains_block(const QueryScene& scene, const SceneSketch& sketch, Random& random) {
   OwnedBlock block = block_at(sketch, random);
   block.settings.kind = ContainsColumns{};
@@ -417,7 +422,8 @@ inline OwnedBlock contains_block(const QueryScene& scene, const SceneSketch& ske
   return block;
 }
 
-// Viewers and targets at and near notable places, some at the same point, with groups that occur in the scene.
+// Returns a block of viewers and targets at and near notable points, sometimes with a viewer at a target's point, and
+// often with groups that occur in the scene.
 inline OwnedBlock sight_block(const QueryScene& scene, const SceneSketch& sketch, Random& random) {
   OwnedBlock block = block_at(sketch, random);
   SightColumns sight;
@@ -430,7 +436,7 @@ inline OwnedBlock sight_block(const QueryScene& scene, const SceneSketch& sketch
   const auto add = [&](size_t points) {
     for (; points > 0; --points) {
       Vec3d point = notable_point(sketch, random);
-      // Eighths, which a distant frame represents exactly.
+      // A distant frame represents multiples of 1/8 exactly.
       if (random.chance(0.6)) point = point + random.whole_vector(20) * 0.125;
       append_point(block, point);
     }
@@ -454,7 +460,8 @@ inline OwnedBlock sight_block(const QueryScene& scene, const SceneSketch& sketch
   return block;
 }
 
-// Pairs within a distance, at times behind a pair, of some layers, or the nearest objects of each.
+// Returns a block that asks for all pairs within a distance, or for the nearest objects of each object; sometimes only
+// of some layers, or behind a page position.
 inline OwnedBlock pair_block(const QueryScene& scene, Random& random) {
   OwnedBlock block;
   PairColumns pairs;
@@ -473,7 +480,7 @@ inline OwnedBlock pair_block(const QueryScene& scene, Random& random) {
   return block;
 }
 
-// Cells around the sketch's balls and points between them.
+// Returns a block of cells around points at and near the centres of the sketch's balls.
 inline OwnedBlock cell_block(const QueryScene& scene, const SceneSketch& sketch, Random& random) {
   OwnedBlock block = block_at(sketch, random);
   constexpr uint32_t kPlanes[] = {0, 0, 1, 3, 64};

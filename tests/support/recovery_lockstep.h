@@ -60,7 +60,7 @@ class RecoveryLockstep {
     Vec3d translation;
   };
   struct Deed {
-    std::vector<UpdateBatch> batches;  // one batch; several if joined; none for a change
+    std::vector<UpdateBatch> batches;  // one batch; several if joined; none for a change of instances
     bool joined = false;
     std::optional<Change> change;
   };

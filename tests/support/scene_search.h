@@ -25,7 +25,8 @@ std::string search_scenes(uint64_t count, const Draw& draw, const Difference& di
   return "";
 }
 
-// Returns the first difference found in ordinary scenes or, if there is none, in the adversarial families.
+// Returns the first difference found in ordinary scenes or, if these have none, in the adversarial families; empty if
+// there is none.
 template <Primitive V, class Difference>
 std::string search_all_scenes(uint64_t random_count, uint64_t adversarial_count, const Difference& difference) {
   const auto draw_random = [](uint64_t, Random& random) { return random_scene(random); };

@@ -64,7 +64,7 @@ class SigningKey {
     return algorithm_ == "ES256" ? pair_of(signature) : signature;
   }
 
-  // Returns the public key in the form in which attackers use it as a shared secret.
+  // Returns the public key in PEM, the form that attackers try to use as a shared secret.
   std::string pem() const {
     BIO* const memory = BIO_new(BIO_s_mem());
     PEM_write_bio_PUBKEY(memory, key_.get());

@@ -1,5 +1,5 @@
 // Comparison of sweeps with the predicates of overlap queries at single moments, on random movers, triangles and
-// shapes. For the tests of sweeps and for the proof that they can fail.
+// shapes. For the tests of sweeps and for the tests of planted bugs in them.
 #ifndef LOCUS_TESTS_SUPPORT_SWEEP_TRIALS_H_
 #define LOCUS_TESTS_SUPPORT_SWEEP_TRIALS_H_
 
@@ -16,7 +16,7 @@
 
 namespace locus::test {
 
-// Returns whether the mover at time t, larger by `by` on every side, shares a point with a triangle or shape.
+// Returns whether the mover at time t, grown by `by` on every side, shares a point with a triangle or shape.
 template <class Primitive>
 bool overlaps_at(const Mover& mover, double t, double by, const Primitive& primitive) {
   const Vec3d center = mover.start + mover.way * t;
@@ -80,8 +80,9 @@ inline SweepTrial<Shape> shape_trial(Random& random) {
 inline Corners swept_form(const Triangle& triangle) { return corners_of(triangle); }
 inline const Shape& swept_form(const Shape& shape) { return shape; }
 
-// Returns how a sweep differs from the overlaps at single moments: before the first contact the mover, made smaller,
-// overlaps nothing; at the contact the mover, made larger, does; and PASS passes only what is touched at the start.
+// Returns a description of the first difference between a sweep and overlaps at single moments; empty if there is none.
+// Before the first contact, the mover shrunk by epsilon must overlap nothing; at the contact, the mover grown by
+// epsilon must overlap; and PASS must skip only primitives that are touched at the start.
 template <class Primitive>
 std::string sweep_fault(const SweepTrial<Primitive>& trial, Random& random) {
   const auto form = swept_form(trial.primitive);
@@ -100,7 +101,7 @@ std::string sweep_fault(const SweepTrial<Primitive>& trial, Random& random) {
   return passed == (*t == 0) ? "" : "PASS differs";
 }
 
-// Returns the first fault of random sweeps past triangles and shapes.
+// Returns the first error of random sweeps past triangles and shapes; empty if there is none.
 inline std::string sweep_difference() {
   Random random(183);
   for (int i = 0; i < 4'000; ++i) {

@@ -19,7 +19,7 @@ inline Triangle random_triangle(Random& random) {
   const double size = random.magnitude(-6, 6);
   Triangle t{to_float(place + random.vector(size)), to_float(place + random.vector(size)), {}, 0};
   t.c = to_float(place + random.vector(size));
-  if (random.chance(0.3)) {  // a sliver: the third vertex almost on the line of the others
+  if (random.chance(0.3)) {  // a sliver: the third vertex is almost on the line through the other two
     const Vec3d along = to_double(t.a) + (to_double(t.b) - to_double(t.a)) * random.between(-0.5, 1.5);
     t.c = to_float(along + random.vector(size * random.magnitude(-24, -2)));
   }

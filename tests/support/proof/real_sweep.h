@@ -28,7 +28,8 @@ struct RealMover {
   Real size() const { return kind == MoverKind::kBox ? length(half) : radius + length(half_axis); }
 };
 
-// Returns the distance of two segments p + s d and q + t e, 0 <= s, t <= 1: at an end of one, or where both are within.
+// Returns the distance of the segments p + s d and q + t e, 0 <= s, t <= 1. The nearest points are an end of one
+// segment and any point of the other, or an inner point of each.
 inline Real segment_distance(Vec3r p, Vec3r d, Vec3r q, Vec3r e) {
   const auto to_point = [](Vec3r from, Vec3r along, Vec3r point) {
     const Real square = dot(along, along);
@@ -44,7 +45,7 @@ inline Real segment_distance(Vec3r p, Vec3r d, Vec3r q, Vec3r e) {
   return least;
 }
 
-// One triangle with world corners, as what a mover hits.
+// A triangle in world axes that movers may hit.
 class SweptTriangle {
  public:
   explicit SweptTriangle(const RealCorners& corners)
@@ -53,22 +54,23 @@ class SweptTriangle {
     for (const Vec3r& corner : corners_) radius_ = std::max(radius_, length(corner - center_));
   }
 
-  // Returns false if the mover, larger by `by`, stays away from the ball around the triangle.
+  // Returns false if the mover, grown by `by`, never meets the ball around the triangle on its way.
   bool is_near(const RealMover& mover, Real by) const {
     const Real square = dot(mover.way, mover.way);
     const Real t = square == 0 ? 0 : std::clamp<Real>(dot(center_ - mover.start, mover.way) / square, 0, 1);
     return length(mover.start + mover.way * t - center_) <= radius_ + mover.size() + 2 * by;
   }
 
-  // Returns how far the mover at time t, larger by `by` on every side, is from overlapping the triangle: negative or
-  // zero if they share a point. Convex in t.
+  // Returns a lower bound of the distance between the triangle and the mover at time t, grown by `by` on every side.
+  // The result is at most zero if they share a point, otherwise positive. It is convex in t.
   Real gap(const RealMover& mover, Real t, Real by) const {
     const Vec3r center = mover.start + mover.way * t;
     return mover.kind == MoverKind::kBox ? box_gap(mover, center, by) : capsule_gap(mover, center) - mover.radius - by;
   }
 
-  // Returns whether the mover, larger by `by`, overlaps the triangle at a time in 0 .. end. Golden section, which ends
-  // as soon as the gap is negative, or larger than what it can shrink by within the times that are left.
+  // Returns whether the mover, grown by `by`, overlaps the triangle at a time in 0 .. end. Searches for the smallest
+  // gap by golden section. Stops as soon as a gap is at most zero, or is larger than the distance that the mover covers
+  // in the remaining interval of time.
   bool is_overlapped(const RealMover& mover, Real by, Real end) const {
     constexpr Real kGolden = 0.61803398874989484820L;
     const bool is_box = mover.kind == MoverKind::kBox;
@@ -110,7 +112,7 @@ class SweptTriangle {
     return least;
   }
 
-  // Returns the largest gap of the projections on the axes that can separate a box and a triangle.
+  // Returns the largest gap between the projections of the box and of the triangle on the axes that can separate them.
   Real box_gap(const RealMover& mover, Vec3r center, Real by) const {
     Real largest = -std::numeric_limits<Real>::infinity();
     const auto project = [&](Vec3r axis) {
