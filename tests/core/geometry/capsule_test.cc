@@ -18,7 +18,8 @@ using test::Random;
 using test::Real;
 using test::to_real;
 
-// Returns the least distance from the points of a segment, by search: the distance to a convex set is convex.
+// Returns the least value of `distance_at` over the points of a segment, by search: along a segment, the distance to a
+// convex set is convex.
 template <class Distance>
 Real least_along(Vec3d half_axis, const Distance& distance_at) {
   const auto at = [&](Real s) { return distance_at(to_real(half_axis) * s); };
@@ -60,7 +61,7 @@ TEST(SegmentTriangleTest, DistanceAgreesWithASearch) {
     const double size = test::size_of(t) + max_component(abs(to_double(t.a)));
     const Vec3d half_axis = random.vector(size * random.magnitude(-3, 1));
     Vec3d center = to_double(t.a) + random.vector(size);
-    if (random.chance(0.5)) {  // through or near a point of the triangle
+    if (random.chance(0.5)) {  // the segment passes through or near a point of the triangle
       const double u = random.between(0, 1), v = random.between(0, 1 - u);
       center =
           to_double(t.a) + to_double(t.b - t.a) * u + to_double(t.c - t.a) * v + half_axis * random.between(-1.1, 1.1);
@@ -140,8 +141,7 @@ TEST(CapsuleTest, TouchingCounts) {
   EXPECT_TRUE(capsule_overlaps(Capsule{{0, 0, 0}, {}, 0}, Triangle{{-1, -1, 0}, {1, -1, 0}, {0, 1, 0}, 0}));
 }
 
-// Culling by may_reach() never drops a box that reaches() accepts, and drops a box farther away than a cube of the
-// radius.
+// may_reach() is used for culling: it never drops a box that reaches() accepts, but it drops many other boxes.
 TEST(CapsuleTest, EveryBoxThatIsReachedMayBeReached) {
   constexpr uint64_t kSeed = 145;
   Random random(kSeed);

@@ -1,5 +1,5 @@
-// Convex regions and their overlaps, judged by points: a shape and a region share a point if a search that descends to
-// the nearest common point, in long double, finds one.
+// Tests of convex regions and their overlaps. The reference searches in long double for the point of the shape that is
+// nearest to the region: both overlap if this point is in the region.
 #include "core/geometry/convex_region.h"
 
 #include <gtest/gtest.h>
@@ -73,7 +73,8 @@ TEST(ConvexRegionTest, ABoxOfPlanesIsABox) {
   EXPECT_FALSE(region_overlaps(region, ball({2.001, 3, 4}, 0)));
   EXPECT_TRUE(region_overlaps(region, ball({4, 2, 3}, 2)));
   EXPECT_FALSE(region_overlaps(region, ball({4, 2, 3}, 1.999f)));
-  // Off an edge by (3, 4), and off a corner by (2, 3, 6).
+  // The centre of the first two balls is 5 away from an edge, by the offset (3, 4); that of the last two is 7 away from
+  // a corner, by the offset (2, 3, 6).
   EXPECT_TRUE(region_overlaps(region, ball({5, 7, 3}, 5)));
   EXPECT_FALSE(region_overlaps(region, ball({5, 7, 3}, 4.999f)));
   EXPECT_TRUE(region_overlaps(region, ball({4, 6, 10}, 7)));
@@ -138,15 +139,15 @@ Vec3r projected(const ConvexRegion& region, Vec3r point) {
   return at;
 }
 
-// Returns the distance from the shape's core to the region: from the centre of a ball, or the least distance of many
-// points of the solid of a box or the inner segment of a capsule, refined around the best.
+// Returns the distance from the shape's core to the region, by alternating projections. The core is the point, the
+// centre of a ball, the solid of a box, or the inner segment of a capsule.
 Real core_distance(const ConvexRegion& region, const Shape& shape) {
   const auto distance_of = [&](Vec3r local) {
     const Vec3r point = to_real(shape.position) + turned(shape.rotation, local);
     return length(projected(region, point) - point);
   };
   if (shape.kind == ShapeKind::kPoint || shape.kind == ShapeKind::kBall) return distance_of({});
-  // The distance is convex, so alternating between the region and the solid converges to the least one.
+  // The distance is convex, so alternating projections on the region and the solid converge to the least distance.
   Vec3r local;
   Real best = distance_of(local);
   for (int round = 0; round < 3000; ++round) {
@@ -183,7 +184,7 @@ TEST(ConvexRegionTest, RandomShapesOverlapWhereTheyShareAPoint) {
     const Real distance = core_distance(region, shape) - radius;
     const bool found = region_overlaps(region, shape);
     (found ? overlapping : apart) += 1;
-    // The reference converges to about this distance.
+    // The reference is too imprecise to decide closer cases.
     if (std::abs(distance) < 1e-3L) {
       ++unsure;
       continue;
@@ -207,7 +208,7 @@ TEST(ConvexRegionTest, RandomTrianglesOverlapWhereTheyShareAPoint) {
                             to_float(center + random.vector(2)), 0};
     const Transform none = make_transform({}, {}, 1);
     const bool found = RegionInMesh(region, none, 10).overlaps(triangle);
-    // Alternates between the region and the triangle's plane, edges and corners by fine barycentric steps.
+    // Find the least distance from the region to the points of a fine barycentric grid in the triangle.
     Real best = 1e9L;
     constexpr int kSteps = 24;
     for (int u = 0; u <= kSteps; ++u)
@@ -217,7 +218,8 @@ TEST(ConvexRegionTest, RandomTrianglesOverlapWhereTheyShareAPoint) {
         best = std::min(best, length(projected(region, point) - point));
       }
     (found ? overlapping : apart) += 1;
-    // A sample within the region proves an overlap; samples are at most this far from any point of the triangle.
+    // A grid point within the region proves an overlap. Every point of the triangle is less than 8 / kSteps away from a
+    // grid point, and so is every common point.
     ASSERT_TRUE(found || best > 1e-9L) << "seed " << seed;
     ASSERT_TRUE(!found || best < 8.0L / kSteps) << "seed " << seed;
   }

@@ -54,7 +54,7 @@ TEST(ExactSumTest, SignsEqualThoseOfIntegers) {
     }
     for (const double summand : summands) sum.add(summand);
     ASSERT_EQ(sum.sign(), sign_of(expected)) << "seed " << seed;
-    // Most of it cancels.
+    // Subtract all summands but the first, so that most of the sum cancels.
     for (size_t i = 1; i < summands.size(); ++i) sum.add(-summands[i]);
     ASSERT_EQ(sum.sign(), sign_of(static_cast<Integer>(summands[0]))) << "seed " << seed;
     sum.add(-summands[0]);

@@ -1,5 +1,5 @@
-// Crossings of triangles by half lines, judged by the solid angles of triangles in long double, by
-// large integers, and on surfaces by construction.
+// Tests of crossings of triangles by half lines. The references are solid angles in long double, large integers, and
+// points on surfaces for which the answer is known by construction.
 #include "core/geometry/point_in_mesh.h"
 
 #include <gtest/gtest.h>
@@ -35,8 +35,8 @@ Containment inside(Vec3d point, const Mesh& mesh, HalfLine line = {}) {
   return result;
 }
 
-// Returns the winding number of a closed mesh, which is not rounded: the sum of the solid angles of its triangles.
-// Source: Van Oosterom, Strackee, The Solid Angle of a Plane Triangle, 1983.
+// Returns the winding number of a closed mesh around a point, not rounded to an integer: the sum of the solid angles of
+// its triangles. Source: Van Oosterom, Strackee, The Solid Angle of a Plane Triangle, 1983.
 Real winding_by_angles(Vec3d point, const Mesh& mesh) {
   Real sum = 0;
   for (const Triangle& triangle : mesh) {
@@ -48,8 +48,8 @@ Real winding_by_angles(Vec3d point, const Mesh& mesh) {
   return sum / (4 * std::numbers::pi_v<Real>);
 }
 
-// Returns the boundary of the cells of a lattice of `side`^3 cells that `filled` holds: two triangles for each face
-// between a filled and an empty cell, turned to the empty one. All corners are whole numbers.
+// Returns the boundary of the filled cells of a lattice of `side`^3 cells: for each face between a filled and an empty
+// cell two triangles, which face the empty cell. All corners have whole coordinates.
 Mesh lattice_mesh(int side, const std::vector<bool>& filled) {
   const auto is_filled = [&](int x, int y, int z) {
     const bool within = std::min({x, y, z}) >= 0 && std::max({x, y, z}) < side;
@@ -104,7 +104,8 @@ TEST(PointInMeshTest, WindingEqualsTheSumOfSolidAngles) {
   }
 }
 
-// Lattice points, edges and faces are met exactly by rays from other lattice points, halves and thirds.
+// Rays from lattice points, and from points half-way between them, pass exactly through corners, edges and faces of the
+// lattice.
 TEST(PointInMeshTest, LatticesAreDecidedWhereRaysMeetEdgesAndCorners) {
   for (uint64_t seed = 0; seed < scaled_count(200); ++seed) {
     Random random(seed);
@@ -115,7 +116,7 @@ TEST(PointInMeshTest, LatticesAreDecidedWhereRaysMeetEdgesAndCorners) {
     for (int i = 0; i < 100; ++i) {
       Vec3d point;
       for (int axis = 0; axis < 3; ++axis) point[axis] = static_cast<double>(random.whole(-2, 8)) * 0.5;
-      // The cells whose closure contains the point.
+      // Count the cells whose closure contains the point, and the filled ones among them.
       int cells = 0, full = 0;
       for (int part = 0; part < 8; ++part) {
         int cell[3];
@@ -177,8 +178,8 @@ TEST(PointInMeshTest, CrossingsNearPlanesAndEdgesEqualThoseOfIntegers) {
   EXPECT_GT(crossed, 100);
 }
 
-// A plane through three whole points, and points whose distance from it is below the resolution of 106 bits: the sign
-// of the volume is that of the last step.
+// The points are one float step away from a plane through three points with whole coordinates. Arithmetic with 106 bits
+// could not resolve their distance from the plane, but the sign of the volume must show on which side they are.
 TEST(PointInMeshTest, PointsOneStepAwayFromASlopingFaceAreOnTheirSide) {
   const Triangle triangle{{0x1p23f, 0, 0}, {0, 0x1p23f, 0}, {0, 0, 0x1p23f}, 0};
   const double third = 0x1p23 / 4 + 0x1p-30, rest = 0x1p23 - 2 * third;

@@ -23,7 +23,7 @@ TEST(RayBallTest, ATangentTouchesAndTheNextLineOutsideDoesNot) {
 }
 
 TEST(RayBallTest, AnObliqueTangentOfA345TriangleTouches) {
-  // The line through (5, 0) and (0, 20 / 3) * 3 is at distance 4 from the origin: 3-4-5 scaled.
+  // The line through (5, 0) and (0, 20 / 3) is at distance 4 from the origin: 3-4-5 scaled.
   const auto hit = ray_hit(test::ray_from({5, 0, 0}, {-3, 4, 0}), ball_at({0, 0, 0}, 4));
   ASSERT_TRUE(hit.has_value());
   EXPECT_DOUBLE_EQ(hit->t, 0.6);
@@ -167,7 +167,7 @@ bool exact_hit(const int64_t (&o)[3], const int64_t (&d)[3], const int64_t (&hal
 TEST(RayObbTest, CornersAndEdgesAreTouchedFromAll26Directions) {
   const Vec3f half = {1, 2, 3};
   const Shape box = box_of({5, -7, 11}, half);
-  for (const Vec3d place : signs_of_each_axis()) {  // a corner, or middle of an edge or face
+  for (const Vec3d place : signs_of_each_axis()) {  // a corner, or the middle of an edge or face
     const Vec3d target = box.position + Vec3d{place.x * half.x, place.y * half.y, place.z * half.z};
     for (const Vec3d direction : signs_of_each_axis()) {
       const auto hit = ray_hit(test::ray_from(target - direction * 8.0, direction), box);

@@ -1,4 +1,4 @@
-// Distances between shapes, judged by alternating projections in long double.
+// Tests of distances between shapes, compared with alternating projections in long double.
 #include "core/geometry/shape_distance.h"
 
 #include <gtest/gtest.h>

@@ -86,7 +86,8 @@ constexpr Corners kFloor = {Vec3d{-10, -10, 0}, Vec3d{30, -10, 0}, Vec3d{-10, 30
 TEST(SweepTest, ABallLandsOnAFaceAnEdgeAndACorner) {
   EXPECT_EQ(first_contact(ball({0, 0, 5}, {0, 0, 0}, 1), kFloor, AtStart::kHit), 0.8);
   EXPECT_EQ(first_contact(ball({0, 0, -5}, {0, 0, 0}, 1), kFloor, AtStart::kHit), 0.8);
-  // Beside the edge y = -10, three to the side: the radius of 5 reaches it at a height of 4.
+  // The ball passes beside an edge of the floor, 3 units away from it, so its radius of 5 reaches the edge at a height
+  // of 4.
   EXPECT_NEAR(*first_contact(ball({0, -13, 8}, {0, -13, 0}, 5), kFloor, AtStart::kHit), 0.5, 1e-12);
   EXPECT_NEAR(*first_contact(ball({-13, -10, 8}, {-13, -10, 0}, 5), kFloor, AtStart::kHit), 0.5, 1e-12);
   EXPECT_EQ(first_contact(ball({-14, -14, 8}, {-14, -14, 0}, 5), kFloor, AtStart::kHit), std::nullopt);
@@ -117,10 +118,12 @@ TEST(SweepTest, ACapsuleHasCapsAndAnEnd) {
   Mover capsule = ball({0, 0, 9}, {0, 0, 0}, 1);
   capsule.kind = MoverKind::kCapsule;
   capsule.half_axis = {0, 0, 2};
-  EXPECT_NEAR(*first_contact(capsule, kFloor, AtStart::kHit), 6.0 / 9, 1e-12);  // its lower cap touches at z = 3
+  EXPECT_NEAR(*first_contact(capsule, kFloor, AtStart::kHit), 6.0 / 9, 1e-12);  // the lower cap touches when the centre
+                                                                                // is at z = 3
   Shape point;
   point.position = {1, 0, 0};
-  EXPECT_NEAR(*first_contact(capsule, point, AtStart::kHit), 7.0 / 9, 1e-6);  // beside the cap: the cylinder's rim
+  EXPECT_NEAR(*first_contact(capsule, point, AtStart::kHit), 7.0 / 9, 1e-6);  // the point touches the rim between cap
+                                                                              // and cylinder
   point.position = {1.001, 0, 0};
   EXPECT_EQ(first_contact(capsule, point, AtStart::kHit), std::nullopt);
 }
@@ -155,7 +158,8 @@ TEST(SweepTest, ContactsInsideAnObjectPointToTheShortestWayOut) {
   EXPECT_EQ(in_ball.normal, (Vec3d{0, 1, 0}));
   Mover capsule = ball({0, 3, 0}, {0, 3, 0}, 1);
   capsule.kind = MoverKind::kCapsule;
-  capsule.half_axis = {0, 2, 0};  // sticks out by 1: out by 3 along y, or by 4 along x
+  capsule.half_axis = {0, 2, 0};  // the axis ends 1 outside; to leave the box, it must move by 3 along y or by 4 along
+                                  // x
   EXPECT_EQ(contact_at(capsule, box, 0).distance, -3);
   EXPECT_EQ(contact_at(capsule, box, 0).normal, (Vec3d{0, 1, 0}));
 }

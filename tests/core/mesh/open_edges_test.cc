@@ -21,7 +21,7 @@ struct Columns {
 
 Columns tetrahedron() { return {{0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1}, {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3}}; }
 
-// Returns the same triangles with vertices of their own.
+// Returns the same triangles, each with three vertices of its own.
 Columns unshared(const Columns& mesh) {
   Columns result;
   for (const uint32_t index : mesh.indices) {

@@ -15,8 +15,8 @@ TEST(BrickTableTest, AnEmptyTableFindsNoBrick) {
   EXPECT_TRUE(table.for_each([](uint32_t) { return false; }));
 }
 
-// Inserts and erases keys from a small range, so that probes cross places where the table closed the gap of an erased
-// key.
+// Inserts and erases keys from a small range, so that probes cross positions where the table closed the gap of an
+// erased key.
 TEST(BrickTableTest, EqualsAMapThroughRandomInsertsAndErases) {
   test::Random random(7);
   BrickTable table;

@@ -1,5 +1,5 @@
-// Cells of free space in small and random worlds. The three promises are checked in long double: the space holds the
-// point, nothing reaches into it, and every plane touches its object or triangle.
+// Cells of free space in small and random worlds. The three guarantees are checked in long double: the cell contains
+// the point, no object or triangle reaches into the cell, and every plane touches its object or triangle.
 #include "core/query/kinds/cell_query.h"
 
 #include <gmock/gmock.h>
@@ -66,8 +66,8 @@ TEST(CellQueryTest, AnEmptyWorldLeavesTheWholeBall) {
   EXPECT_THAT(run_block(*snapshot_of({}), cell_at({1, 2, 3}, 5)).t, ElementsAre(5));
 }
 
-// Returns how far the part of an object or triangle within the ball reaches into the space: the most over sample points
-// of the least depth behind a plane.
+// Returns how far `samples`, points of an object or triangle, reach into the cell: the depth of the deepest sample
+// within the cell's ball. The depth of a sample is its least distance behind a plane or the ball's surface.
 Real reach_into(const BlockResult& cell, Vec3r center, const std::vector<Vec3r>& samples) {
   Real most = -1e30L;
   for (const Vec3r sample : samples) {
@@ -104,7 +104,7 @@ TEST(CellQueryTest, NothingReachesIntoRandomCells) {
     for (size_t plane = 1; plane < cell.ids.size(); ++plane) {
       const Vec3r normal = to_real(read_vec3d(&cell.normals[3 * plane]));
       const Vec3r at = to_real(read_vec3d(&cell.points[3 * plane]));
-      ASSERT_GT(dot(normal, at - center), 0) << "seed " << seed;  // the space holds the point
+      ASSERT_GT(dot(normal, at - center), 0) << "seed " << seed;  // the cell contains the point
       ASSERT_NEAR(double(length(at - center)), cell.t[plane], 1e-5) << "seed " << seed;
     }
     for (const Triangle& triangle : triangles) {

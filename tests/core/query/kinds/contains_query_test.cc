@@ -1,4 +1,5 @@
-// Points in a small world: a cube from -1 to 1, a ball at x = 5, and a wall that is no closed mesh at x = 0.
+// Contains queries in a small world: a cube from -1 to 1, a ball at x = 5, and a wall at x = 0, which is no closed
+// mesh.
 #include "core/query/kinds/contains_query.h"
 
 #include <gmock/gmock.h>

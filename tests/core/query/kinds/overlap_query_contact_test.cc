@@ -1,4 +1,4 @@
-// Contacts of balls and capsules: distance, nearest point and normal of what they overlap.
+// Contacts of balls and capsules: distance, nearest point and normal of each object or triangle that they overlap.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -78,8 +78,8 @@ TEST(OverlapContactTest, ConservativeMeasuresToTheBounds) {
   EXPECT_THAT(result.normals, ElementsAre(0, 0, 0));
 }
 
-// radius - t says how deep the solids overlap: moved out by as much along the normal, they touch, and a little less
-// still overlap.
+// The depth of an overlap is radius - t: a ball that is moved out along the normal by this depth just touches the
+// object, and a ball that is moved out a little less still overlaps it.
 TEST(OverlapContactTest, TheBallMovedOutByItsDepthTouches) {
   size_t checked = 0;
   for (uint64_t seed = 0; seed < scaled_count(3'000); ++seed) {
@@ -105,7 +105,7 @@ TEST(OverlapContactTest, TheBallMovedOutByItsDepthTouches) {
     ASSERT_FALSE(ball_overlaps(Balld{out + normal * 1e-4, double{radius}}, shape)) << "seed " << seed;
     ASSERT_TRUE(ball_overlaps(Balld{out - normal * 1e-4, double{radius}}, shape)) << "seed " << seed;
     const Vec3d point = read_vec3d(result.points.data());
-    // Inside of an object the point is one that both solids share.
+    // The contact point belongs to the object, also if the ball's centre is inside the object.
     ASSERT_TRUE(ball_overlaps(Balld{point, 1e-5}, shape)) << "seed " << seed;
     if (t > 0) {
       ASSERT_NEAR(std::sqrt(squared_length(point - to_double(center))), t, 1e-4) << "seed " << seed;

@@ -99,7 +99,8 @@ TEST(PairQueryTest, InstancesAreNotSearched) {
   EXPECT_THAT(run_block(*snapshot_of(world), pairs_within(10)).ids, IsEmpty());
 }
 
-// Rows of balls along the axis x, each exactly as far from the next as the query asks, at places that floats round.
+// Rows of balls along the x axis. The distance of neighbours is exactly the maximum distance of the query, and floats
+// cannot represent the positions exactly.
 TEST(PairQueryTest, PairsExactlyAtTheDistanceAreFound) {
   Random random(31);
   QueryWorld world;

@@ -20,7 +20,7 @@ class QueryOriginsTest : public ::testing::Test {
     world.instances = {placed(3, wall_mesh(), {20, 0, 0})};
     snapshot_ = snapshot_of(world);
   }
-  // Returns balls around offsets from anchors.
+  // Returns a block of balls whose centres are given as offsets from anchors.
   static OwnedBlock balls(std::vector<uint64_t> anchors, std::vector<float> offsets, float radius) {
     OwnedBlock block;
     block.settings.kind = BallColumns{};

@@ -120,7 +120,8 @@ TEST(SightQueryTest, AnUnanchoredViewerSeesNothing) {
   EXPECT_EQ(ask(block), (Seen{1, 0}));
 }
 
-// Many targets, so that segments are sorted and begin with the block that blocked a neighbour.
+// There are so many targets that the segments are sorted, and the search of a segment begins with the triangle block
+// that blocked a neighbouring segment.
 TEST(SightQueryTest, ManyTargetsAreSeenAsByRaysOfModeAny) {
   for (uint64_t seed = 0; seed < scaled_count(40); ++seed) {
     Random random(seed);
@@ -148,7 +149,8 @@ TEST(SightQueryTest, ManyTargetsAreSeenAsByRaysOfModeAny) {
         int expected = 0;
         for (size_t k = 0; k < sight.samples; ++k) {
           const float *from = &block.points[3 * viewer], *to = &block.sizes[3 * (target * sight.samples + k)];
-          // Eighths, so that the difference is a float and a ray reaches the sample exactly.
+          // All coordinates are multiples of 1/8, so that floats represent the differences and a ray reaches the sample
+          // exactly.
           OwnedBlock ray =
               one_ray(RayMode::kAny, {from[0], from[1], from[2]}, {to[0] - from[0], to[1] - from[1], to[2] - from[2]});
           ray.extras = {1};

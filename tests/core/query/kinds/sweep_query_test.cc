@@ -91,7 +91,7 @@ TEST_F(SweepQueryTest, AtStartSelectsWhatIsTouchedAtTheStart) {
   EXPECT_THAT(ask().ids, ElementsAre(1u));
   columns().at_start = AtStart::kApproach;
   EXPECT_THAT(ask().ids, ElementsAre(100u));
-  block_.points = {4.1f, 0, 0};  // on the far side of the wall: it leaves the wall
+  block_.points = {4.1f, 0, 0};  // starts behind the wall and moves away from it
   EXPECT_THAT(ask().ids, ElementsAre(1u));
 }
 
@@ -102,14 +102,14 @@ TEST_F(SweepQueryTest, ACapsuleAndABoxTouchWithTheirOwnShape) {
   block_.extras.clear();
   block_.half_extents = {0.5f, 1, 1};
   EXPECT_THAT(ask().t, ElementsAre(0.35f));
-  block_.rotations = {0, 0, 0.70710678f, 0.70710678f};  // a quarter turn around z: one unit along x
+  block_.rotations = {0, 0, 0.70710678f, 0.70710678f};  // a quarter turn around z: the half extent along x becomes 1
   EXPECT_NEAR(ask().t[0], 0.3f, 1e-6f);
 }
 
 TEST_F(SweepQueryTest, AConservativeSweepMovesBoundsThroughBounds) {
   block_.settings.precision = Precision::kConservative;
   block_.settings.source = Source::kDynamic;
-  block_.points = {0, 0.7f, 0};  // passes the ball at a distance of 0.7 < 0.75: later than its bounds
+  block_.points = {0, 0.7f, 0};  // passes the ball at a distance of 0.7 < 0.75: touches the ball later than its bounds
   block_.sizes = {10, 0.7f, 0};
   block_.settings.columns = {Column::kT, Column::kId, Column::kNormal, Column::kPoint};
   const BlockResult result = ask();

@@ -236,7 +236,7 @@ TEST(RunBatchTest, WorkOfABatchIsTheSumOfItsBlocks) {
   EXPECT_EQ(result.work.cells, sum.cells);
 }
 
-// In a grid of at least 250,000 values, a RegionWalk visits many regions together. It calls a visitor after
+// In a grid of at least 250,000 values, a RegionWalk visits many regions together. The walk calls a visitor after
 // walk_regions() has returned: if the visitor referenced local variables of walk_regions(), AddressSanitizer would
 // detect it.
 TEST(RunBatchTest, ManyBallsAndBoxesInAGridLargerThanTheCachesAnswerLikeBruteForce) {
