@@ -1,7 +1,7 @@
-// No point inside a closed mesh is missed and none outside is found: points in and around placed meshes are answered by
-// the query engine with every instruction set, and compared with the solid angles of all triangles in long double; on
-// and at the surface of meshes that are not rotated, with crossings in integers. Tens of thousands of points in each
-// run, a million in the long run.
+// No point inside a closed mesh is missed and none outside is found. The query engine answers points in and around
+// placed meshes, with every instruction set. The answers are compared with the solid angles of all triangles in long
+// double and, for points at the surface of meshes that are not rotated, with crossings in integers. Each run tests tens
+// of thousands of points, the long run a million.
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -23,8 +23,8 @@ constexpr uint64_t kContainsSeed = 618;
 
 using Mesh = std::vector<Triangle>;
 
-// Returns the winding number of a closed mesh, which is not rounded: the sum of the solid angles of its triangles.
-// Source: Van Oosterom, Strackee, The Solid Angle of a Plane Triangle, 1983.
+// Returns the winding number of a closed mesh around a point, not rounded to an integer: the sum of the solid angles of
+// its triangles. Source: Van Oosterom, Strackee, The Solid Angle of a Plane Triangle, 1983.
 Real winding_by_angles(Vec3r point, const Mesh& mesh) {
   Real sum = 0;
   for (const Triangle& triangle : mesh) {
@@ -35,7 +35,8 @@ Real winding_by_angles(Vec3r point, const Mesh& mesh) {
   return sum / (4 * std::numbers::pi_v<Real>);
 }
 
-// Adds `other`, scaled and moved, turned over if `reversed`.
+// Adds the triangles of `other` to `mesh`, scaled by `scale` and then moved by `offset`; if `reversed` is true, with
+// the opposite orientation.
 void add_shell(const Mesh& other, float scale, Vec3f offset, bool reversed, Mesh& mesh) {
   for (const Triangle& t : other) {
     const Triangle moved{t.a * scale + offset, t.b * scale + offset, t.c * scale + offset};
@@ -78,8 +79,9 @@ Mesh houses(int side, uint64_t seed) {
   return mesh;
 }
 
-// Returns a random closed mesh: a sphere, a torus or houses, alone, with a cavity, doubled, beside one that is turned
-// over, or crossing another one.
+// Returns a random closed mesh: a sphere, a torus or houses, either alone or with a copy of itself. The copy is a
+// cavity, a duplicate, an inverted mesh beside the original, a mesh that crosses the original, or an inverted
+// duplicate.
 Mesh random_mesh(Random& random) {
   const uint64_t seed = random.next();
   Mesh shell;
@@ -102,7 +104,7 @@ Mesh random_mesh(Random& random) {
   if (form == 2) add_shell(shell, 1, {}, false, mesh);
   if (form == 3) add_shell(shell, 1, {3, 0, 0}, true, mesh);
   if (form == 4) add_shell(shell, 0.75f, {0.25f, 0.5f, -0.125f}, random.chance(0.5), mesh);
-  if (form == 5) add_shell(shell, 1, {}, true, mesh);  // nothing is inside
+  if (form == 5) add_shell(shell, 1, {}, true, mesh);  // the copies cancel, so that no point is inside
   return mesh;
 }
 
@@ -111,7 +113,7 @@ struct Tally {
   std::string first_fault;
 };
 
-// One placed mesh, the points that are asked about, and the answers.
+// One placed mesh, the points of its queries, and the verification of the answers.
 class Trial {
  public:
   explicit Trial(uint64_t seed) : seed_(seed), random_(seed), mesh_(random_mesh(random_)) {
@@ -153,7 +155,7 @@ class Trial {
   }
 
  private:
-  // Returns a point in mesh axes: on a corner, an edge, a face, next to one of these, or anywhere.
+  // Returns a random point in mesh axes: on a corner, an edge or a face, near one of these, or anywhere.
   Vec3d notable_point() {
     const Triangle& t = random_.pick(mesh_);
     const Triangle& other = random_.pick(mesh_);
@@ -162,7 +164,8 @@ class Trial {
     if (random_.chance(0.6)) point = (a + b) * 0.5;
     if (random_.chance(0.5)) point = a * 0.25 + b * 0.25 + c * 0.5;
     if (random_.chance(0.3)) point = (a + to_double(other.a)) * 0.5;
-    // Moves the point along an axis, often off the mesh on a line through a corner.
+    // Moves the point along an axis, often away from the mesh: a line through the point along this axis still meets a
+    // corner, an edge or a face exactly.
     if (random_.chance(0.5)) point[random_.whole(0, 2)] = random_.between(-1.5, 1.5);
     if (random_.chance(0.5)) point = point + random_.vector(random_.magnitude(-20, 1));
     return point;
@@ -175,7 +178,7 @@ class Trial {
     const Vec3d local = transform.point_to_mesh(world);
     double nearest = std::numeric_limits<double>::infinity();
     for (const Triangle& triangle : mesh_) nearest = std::min(nearest, squared_distance(local, triangle));
-    // The transform to mesh axes rounds by less than this.
+    // The error of the transform to mesh axes is less than 2^-40 of this size.
     const double size = max_component(abs(local)) + 2 * double{magnitude(snapshot_->statics->find(1)->mesh->bounds())} +
                         max_component(abs(transform.translation)) / transform.scale;
     if (std::sqrt(nearest) <= 0x1p-40 * size) {

@@ -67,7 +67,7 @@ class CorruptedAnswersTest : public ::testing::Test {
       if (corrupted.ids[i] != kNoId) corrupt(corrupted, i);
     return judge_first_hits(scene_, block_, corrupted);
   }
-  // Returns nine tenths of the number of hits.
+  // Returns nine tenths of the number of hits in the answers.
   uint64_t most_hits() { return judge_first_hits(scene_, block_, answer_).hits * 9 / 10; }
 
   ProofScene scene_;
@@ -92,7 +92,7 @@ TEST_F(CorruptedAnswersTest, ALostHitIsAMiss) {
 
 TEST_F(CorruptedAnswersTest, AHitInFrontOfItsTriangleIsFalseAndAHitBehindItIsAMiss) {
   const auto move = [](float factor) { return [factor](BlockResult& result, size_t i) { result.t[i] *= factor; }; };
-  // Fewer than all hits are false, since multiplication does not change a hit at t = 0.
+  // Not all hits become false, since multiplication does not change a hit at t = 0.
   EXPECT_GT(check_corrupted(move(0.99f)).false_hits, most_hits() * 8 / 10);
   EXPECT_GT(check_corrupted(move(1.01f)).misses, most_hits() / 2);
 }

@@ -46,7 +46,7 @@ std::vector<Triangle> random_mesh(Random& random) {
   return mesh;
 }
 
-// One placed mesh and the sweeps that are asked about.
+// One placed mesh, the random sweeps past it, and the verification of the answers.
 class SweepTrial {
  public:
   explicit SweepTrial(uint64_t seed) : seed_(seed), random_(seed), mesh_(random_mesh(random_)) {
@@ -75,8 +75,8 @@ class SweepTrial {
     return turned(transform_->quaternion, to_real(corner)) * Real{transform_->scale} + to_real(transform_->translation);
   }
 
-  // Adds a sweep that passes near a triangle. Its path is about as long as the start's distance from the triangle, so
-  // that the rounding of t to float stays within the promised error.
+  // Adds a sweep that passes near a triangle. The path of the sweep is about as long as the distance from its start to
+  // the triangle, so that the rounding of t to float stays within the documented error bound.
   void add_sweep(MoverKind kind, OwnedBlock& block) {
     const Triangle& target = random_.pick(mesh_);
     const double scale = transform_->scale, size = scale * random_.magnitude(-7, 1);
@@ -139,8 +139,9 @@ class SweepTrial {
     return mover;
   }
 
-  // Returns how an answer breaks the promise: the mover shrunk by e touches something e or more before it, or the mover
-  // grown by e touches nothing there; e is 2^-20 of the start's distance from the origin and the mover's size.
+  // Returns a description of the error in an answer; empty if there is none. The mover shrunk by e must touch nothing
+  // that is more than e before the contact found, and the mover grown by e must touch a triangle at the contact; e is
+  // 2^-20 of the sum of the start's distance from the origin and the mover's size.
   std::string fault_of(const RealMover& mover, std::optional<Real> found) const {
     const Real e = 0x1p-20L * (length(mover.start) + mover.size()), way = length(mover.way);
     const Real before = !found ? 1 : way == 0 ? -1 : *found - e / way;
