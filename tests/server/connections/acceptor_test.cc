@@ -271,7 +271,8 @@ TEST_F(AcceptorTest, AUnixConnectionHasAUserIdAndIsFoundByItsDescriptor) {
   EXPECT_TRUE(wait_until([&] { return table_.size() == 0; }));
 }
 
-// A front has all its clients behind one user, so that one of them would keep out the others.
+// A proxy in front of the server makes the connections of all its clients as one user, so that misuse by one client
+// could keep out the others.
 TEST_F(AcceptorTest, AUnixConnectionThatWasClosedForMisuseKeepsOutNoOther) {
   AcceptorOptions options;
   options.limits.new_per_second = 1;
@@ -294,7 +295,7 @@ TEST_F(AcceptorTest, AUnixConnectionThatWasClosedForMisuseKeepsOutNoOther) {
 
 TEST_F(AcceptorTest, WithoutFreeDescriptorsConnectionsWaitAndTheThreadPauses) {
   start();
-  RawSocket waiting(port_);  // needs a descriptor on both sides
+  RawSocket waiting(port_);  // the client's end and the server's end each need a descriptor
   ASSERT_TRUE(wait_until([&] { return table_.counters().accepted == 1; }));
   rlimit limit{};
   ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &limit), 0);

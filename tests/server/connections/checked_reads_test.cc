@@ -21,7 +21,7 @@ using test::kHttp2Opening;
 
 const std::string kTooLong = kHttp2Opening + http2_frame(1, 0, 1, std::string(FrameCheck::kMaxBlockBytes + 1, 'h'));
 
-// Asks about bytes that were read into two buffers, of which the first has `first` bytes.
+// Returns whether CheckedReads accepts `bytes`, which were read into two buffers; the first buffer has `first` bytes.
 bool accepted(int descriptor, std::string bytes, size_t first = 10) {
   std::array<iovec, 2> buffers{iovec{bytes.data(), first}, iovec{bytes.data() + first, bytes.size() - first}};
   msghdr message{};

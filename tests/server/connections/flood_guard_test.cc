@@ -50,7 +50,8 @@ FloodSample sample_at(const Traffic& traffic, milliseconds time) {
   return sample;
 }
 
-// Returns the verdict after `seconds` of steady traffic, or the first other than kHonest, judged each 100 ms.
+// Returns the verdict on `seconds` of steady traffic, which is assessed every 100 ms. Ends early with the first verdict
+// other than kHonest.
 FloodVerdict verdict_of(const Traffic& traffic, int seconds) {
   FloodBudget budget;
   budget.last.time = std::chrono::steady_clock::time_point();
@@ -138,7 +139,7 @@ TEST(FloodGuardTest, AMessageMayArriveInFullBeforeItIsRead) {
 TEST(FloodGuardTest, CallsDoNotJustifyLaterBytes) {
   FloodBudget budget;
   FloodSample sample;
-  sample.counts.calls_begun = 1'000'000;  // justify 1 GB of frames, which never came
+  sample.counts.calls_begun = 1'000'000;  // justify 1 GB of frames, which do not arrive
   sample.time += milliseconds(1000);
   EXPECT_EQ(assess(sample, {}, budget), FloodVerdict::kHonest);
   sample.received.bytes += static_cast<uint64_t>(40 * kMiB);
@@ -162,11 +163,11 @@ TEST(FloodGuardTest, AUnaryMessageMayArriveBeforeItsCallIsReported) {
 TEST(FloodGuardTest, UnaryMessagesOfAllStreamsMayArriveAtTheSameTime) {
   FloodBudget budget;
   FloodSample sample;
-  sample.streams = 2;  // of calls that are not reported yet
+  sample.streams = 2;  // two streams whose calls are not in `counts` yet
   sample.received.bytes = static_cast<uint64_t>(60 * kMiB);
   sample.time += milliseconds(100);
   EXPECT_EQ(assess(sample, {}, budget), FloodVerdict::kHonest);
-  sample.streams.reset();  // not counted now, since little has arrived
+  sample.streams.reset();  // streams are not counted in this sample, since few bytes have arrived
   sample.time += milliseconds(20);
   EXPECT_EQ(assess(sample, {}, budget), FloodVerdict::kHonest);
   sample.streams = 0;
@@ -185,7 +186,7 @@ TEST(FloodGuardTest, MoreStreamsThanMayBeOpenAreTooMany) {
   EXPECT_EQ(assess(sample, limits, budget), FloodVerdict::kTooManyStreams);
 }
 
-// Counts what a guard asks, and answers with a constant.
+// Fixture with a guard whose requests for the number of streams are counted and answered with a constant.
 class FloodGuardThreadTest : public ::testing::Test {
  protected:
   void watch(std::optional<uint64_t> streams) {

@@ -41,7 +41,7 @@ class FrameCheckTest : public ::testing::Test {
     const std::string begin = call();
     return begin + cancel();
   }
-  // Returns whether `count` calls are accepted that are all cancelled, each in a read of its own.
+  // Returns whether the check accepts `count` calls that are all cancelled, each in a read of its own.
   bool accepts_cancelled(int count) {
     for (int i = 0; i < count; ++i)
       if (!accepts(cancelled_call())) return false;
@@ -130,7 +130,7 @@ TEST_F(FrameCheckTest, FloodsOfFramesThatCarryNothingAreRefused) {
   for (const std::string& frame : {ping, empty, http2_frame(kSettings, 0, 0, ""), http2_frame(kPriority, 0, 1, "12345"),
                                    http2_frame(kGoaway, 0, 0, "12345678"), http2_frame(kUnknown, 0, 0, "")}) {
     FrameCheck check;
-    const auto most = static_cast<size_t>(FrameCheck::kBurst) - 1;  // the opening has a frame of SETTINGS
+    const auto most = static_cast<size_t>(FrameCheck::kBurst) - 1;  // the opening contains one frame, SETTINGS
     EXPECT_EQ(check.refusal(kHttp2Opening + repeated(frame, most), now_), nullptr);
     EXPECT_NE(check.refusal(frame + frame, now_), nullptr);
   }
@@ -147,7 +147,7 @@ TEST_F(FrameCheckTest, WindowUpdatesDataAndEndsOfStreamsAreNotCounted) {
   EXPECT_TRUE(accepts(repeated(http2_frame(kData, kEndStream, 1, ""), 100'000)));
 }
 
-// Returns random frames of which about half of the sequences are refused.
+// Returns a random sequence of frames after the client's opening. The check refuses about half of such sequences.
 std::string random_frames(std::mt19937_64& random) {
   constexpr std::array<uint8_t, 5> kTypes{kData, kHeaders, kContinuation, kContinuation, kReset};
   std::string bytes = kHttp2Opening;

@@ -116,7 +116,7 @@ TEST_F(MemoryKeeperTest, ReadersOfOldRevisionsAreCancelledWhenMemoryIsFull) {
   ASSERT_TRUE(scene->apply(removal).ok());
   const uint64_t held = scene->status().pinned_bytes;
   ASSERT_GT(held, 0u);
-  used_ = kLimit / 8 * 7 - held;  // short, but not so short that inserts are refused
+  used_ = kLimit / 8 * 7 - held;  // memory is short, but not so short that inserts are refused
   {
     MemoryKeeper keeper(budget_, registry_, shed_);
     keeper.keep();

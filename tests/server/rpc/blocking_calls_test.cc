@@ -1,4 +1,4 @@
-// Calls whose bodies block, of callers that send or take nothing.
+// Tests of calls whose handlers block, with callers that send no message or do not read the response.
 #include "server/rpc/blocking_calls.h"
 
 #include <gtest/gtest.h>
@@ -25,7 +25,8 @@ constexpr const char* kLargeReply = "/test.Service/Bulky";  // its response fits
 constexpr size_t kLargeReplyBytes = 3u << 20;
 constexpr uint32_t kMaxCalls = 2;
 
-// A server with the two methods, at most kMaxCalls calls of one connection, and a client with one connection.
+// A server with the two methods, which accepts at most kMaxCalls calls of one connection, and a client with one
+// connection.
 class BlockingCallsTest : public ::testing::Test {
  protected:
   BlockingCallsTest() {

@@ -27,7 +27,7 @@ using server::Listener;
 using server::MemberTag;
 using server::RpcState;
 
-// Behaviour of the work on a message. The value is sent as the message's max_work.
+// Behaviour of the server's work on a message. The client selects the behaviour by the message's max_work.
 enum What : uint64_t {
   kAtOnce = 1,     // answers within begin()
   kElsewhere = 2,  // answers in an event that another thread posts

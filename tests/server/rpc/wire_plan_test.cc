@@ -83,7 +83,7 @@ TEST(WirePlanTest, AMessageNeedsNoMoreMemoryThanTheScanSays) {
   EXPECT_GE(*scan<v1::CreateSceneRequest>(bytes), parsed.SpaceUsedLong() - sizeof(parsed));
 }
 
-// Protobuf gives a repeated field a header, and room for several values with the first one.
+// With the first value of a repeated field, Protobuf allocates a header and room for several values.
 TEST(WirePlanTest, ShortColumnsNeedNoMoreMemoryThanTheScanSays) {
   const uint64_t empty = v1::QueryBlock().SpaceUsedLong();
   for (int values = 1; values <= 40; ++values) {
@@ -183,7 +183,7 @@ TEST(WirePlanTest, RandomlyChangedMessagesAreAcceptedIfProtobufParsesThem) {
 }
 
 TEST(WirePlanTest, EveryRequestTypeHasAPlan) {
-  // A file is linked only if something of it is used.
+  // The linker keeps the code of a proto file only if the program uses something of it, so use a message of each file.
   for (const google::protobuf::Descriptor* message :
        {v1::QueryRequest::descriptor(), v1::CreateSceneRequest::descriptor(), v1::GetServerRequest::descriptor(),
         v1::ApplyUpdatesRequest::descriptor(), grpc::health::v1::HealthCheckRequest::descriptor(),

@@ -17,25 +17,27 @@ namespace {
 constexpr uint64_t kLimit = uint64_t{1} << 30;
 constexpr uint64_t kBase = kLimit / 32;  // memory of a process without scenes
 
-// One piece of work: it claims memory, allocates up to its claim step by step, and keeps a part of it at its end.
+// One piece of work: it claims memory, allocates up to its claim step by step, and leaves a part of the memory
+// allocated when it ends.
 struct ModelWork {
   MemoryLine line;
   MemoryBudget::Claim claim;
   uint64_t allocated = 0;
   uint64_t kept = 0;
-  int stalled = 0;  // steps in which it cannot end, because its caller does not take the answer
+  int stalled = 0;  // number of steps in which the work cannot end, because its caller does not read the answer
 };
 
 constexpr bool keeps_memory(MemoryLine line) {
   return line == MemoryLine::kBuilds || line == MemoryLine::kInserts || line == MemoryLine::kMoves;
 }
-// Returns whether the work on the line ends only when its caller has read what was sent.
+// Returns whether work on the memory line ends only when its caller has read the data that was sent.
 constexpr bool has_readers(MemoryLine line) {
   return line == MemoryLine::kDumps || line == MemoryLine::kBackups || line == MemoryLine::kReplies;
 }
 
-// Model of a process. Built meshes and inserts keep memory until it is deleted; moves add to the history, which the
-// keeper may trim, and to pinned revisions, whose readers it may revoke; everything else returns its memory.
+// Model of a process. The memory of built meshes and inserts stays until they are deleted. Moves add to the history,
+// which the keeper may trim, and to pinned revisions, whose readers the keeper may revoke. All other work frees its
+// memory when it ends.
 class ModelProcess {
  public:
   explicit ModelProcess(uint64_t seed) : random_(seed), budget_(kLimit, [this] { return used(); }) {}
@@ -67,8 +69,8 @@ class ModelProcess {
     }
   }
 
-  // Ends all work and keeps deleting nothing. Returns whether work of each line then gets the memory that is left for
-  // it.
+  // Ends all work, without deleting any scene or mesh. Returns whether new work on each memory line then gets the
+  // memory that is left for this line.
   bool everybody_gets_memory() {
     for (ModelWork& work : works_) work.stalled = 0;  // stalled calls are cancelled after a minute
     while (!works_.empty()) end_one();
@@ -158,7 +160,7 @@ class ModelProcess {
   uint64_t pinned_ = 0;
   uint64_t free_heap_ = 0;
   std::array<uint64_t, kMemoryLines> started_{};
-  std::vector<ModelWork> works_;  // measured by the budget from its construction on
+  std::vector<ModelWork> works_;  // declared before budget_, which measures them from its construction on
   MemoryBudget budget_;
 };
 

@@ -172,7 +172,7 @@ TEST_F(MemoryBudgetTest, OrdinaryClaimsLeaveTheReserveToOthers) {
     claims.push_back(*std::move(claim));
   }
   EXPECT_LT(budget.ceiling(MemoryLine::kReplies) - budget.taken(), 12u << 20);
-  for (int i = 0; i < 1000; ++i) {  // the first owner fills the rest, and its part of the reserve
+  for (int i = 0; i < 1000; ++i) {  // owner 1 claims the rest, and its part of the reserve
     absl::StatusOr<MemoryBudget::Claim> claim = budget.claim(MemoryLine::kReplies, "", 64u << 10, 1);
     if (!claim.ok()) break;
     claims.push_back(*std::move(claim));

@@ -134,13 +134,14 @@ TEST_F(AuditLogTest, RefusalsNeitherRotateChangesAwayNorWriteMoreThanAFewLines) 
   EXPECT_EQ(refusals, 10'000u);
 }
 
-// A queue of changes that are not written yet has room although refusals have filled their half.
+// Refusals fill at most half of the queue of unwritten entries, so that changes still find room.
 TEST_F(AuditLogTest, RefusalsLeaveHalfOfTheQueueToChanges) {
   auto log = *AuditLog::open(file_, 1u << 20, 0);
   log->write(entry("dropped, because the queue has no room at all"));
   log->flush();
   EXPECT_EQ(log->lost(), 1u);
-  auto half = *AuditLog::open(folder_.file("half"), 1u << 20, 1);  // half of one is no room for refusals
+  auto half = *AuditLog::open(folder_.file("half"), 1u << 20, 1);  // half of a queue of one entry has no room for a
+                                                                   // refusal
   AuditEntry refusal = entry("no token");
   refusal.code = absl::StatusCode::kUnauthenticated;
   half->write(refusal);

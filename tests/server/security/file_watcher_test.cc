@@ -103,7 +103,7 @@ class CallCount {
     ++count_;
     changed_.notify_all();
   }
-  // Waits for at least `count` calls, for at most 20 s. Returns whether they came.
+  // Waits until at least `count` calls were made, for at most 20 s. Returns whether they were made.
   bool reaches(int count) {
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(20);
     MutexLock lock(mutex_);
@@ -154,7 +154,8 @@ TEST(FileWatcherTest, AFailedReadingIsRepeatedUntilItSucceeds) {
 
 TEST(FileWatcherTest, AWatcherEndsWithoutWaitingForItsPause) {
   const FileWatcher watcher(
-      {"/nonexistent"}, [] { return false; }, std::chrono::hours(1));  // the test would time out
+      {"/nonexistent"}, [] { return false; }, std::chrono::hours(1));  // if the destructor waited for the pause, the
+                                                                       // test would time out
 }
 
 }  // namespace

@@ -242,7 +242,7 @@ TEST(JwtTest, FormsThatAreNoCompactJwtAreRefused) {
   expect_refused(by, absl::StrCat(deep, ".", deep, ".AAAA"), "header is no JSON object");
 }
 
-// A JWT that was changed or cut is refused, unless it still decodes to the original.
+// A JWT that was changed or truncated is refused, unless it still decodes to the original.
 TEST(JwtTest, ChangedJwtsAreNeverAccepted) {
   const JwtVerifier by = verifier();
   for (const SigningKey* const key : all_keys()) {
