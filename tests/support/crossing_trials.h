@@ -194,8 +194,8 @@ inline std::vector<CrossingTrial> ordinary_crossing_trials() {
   return trials;
 }
 
-// Makes trials at many scales, where products underflow or overflow, and far away from the origin, where the rounding
-// of a point to float exceeds the size of a triangle.
+// Makes trials at many scales, some of which make products underflow or overflow, and trials far away from the origin,
+// where the rounding of a point to float exceeds the size of a triangle.
 inline std::vector<CrossingTrial> scaled_crossing_trials() {
   std::vector<CrossingTrial> trials;
   const std::vector<Triangle> soup = triangle_soup(30, 4);
@@ -214,8 +214,8 @@ inline std::vector<CrossingTrial> scaled_crossing_trials() {
   return trials;
 }
 
-// Makes triangles whose coordinates on one axis are a few float steps apart, and points between these steps: a point
-// that is rounded to float would be on the other side of a vertex.
+// Makes triangles whose coordinates on one axis are a few float steps apart, and points between these steps: if a point
+// were rounded to float, it would be on the wrong side of a vertex.
 inline std::vector<CrossingTrial> stepped_crossing_trials() {
   Random random(6);
   std::vector<CrossingTrial> trials;

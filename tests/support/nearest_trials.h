@@ -113,8 +113,8 @@ class NearestTrial {
   std::vector<NearestTarget> targets_;
 };
 
-// Makes `count` points around the mesh. Most limits are the distance of a triangle, in double, so that its float bounds
-// are on both sides of the limit.
+// Makes `count` points around the mesh. Most limits are the distance of a triangle, computed in double, so that the
+// distance bounds that a kernel computes in float are close to the limit on either side.
 inline NearestTrial random_nearest_trial(std::string name, const std::vector<Triangle>& mesh, size_t count,
                                          uint64_t seed) {
   RandomRegions regions(mesh, seed);
@@ -161,8 +161,8 @@ inline std::vector<NearestTrial> uneven_nearest_trials() {
   return trials;
 }
 
-// Makes trials at many scales, where squares and products underflow, and far away from the origin, where the point's
-// rounding to float exceeds the size of the mesh.
+// Makes trials at many scales, some of which make squares and products underflow, and trials far away from the origin,
+// where the point's rounding to float exceeds the size of the mesh.
 inline std::vector<NearestTrial> scaled_nearest_trials() {
   std::vector<NearestTrial> trials;
   const std::vector<Triangle> sphere = bumpy_sphere(4, 0.1, 1);

@@ -95,7 +95,7 @@ class RewindLockstep {
     return ids;
   }
 
-  // Returns the next position of an object, which may be close to its position at the beginning of the tick.
+  // Returns the next position of an object; sometimes a position close to that at the beginning of the tick.
   Vec3d step_from(Id id, Vec3d place) {
     if (random_.chance(0.25))
       return model_.position_at_last_tick(id).value_or(place) + random_.vector(step_ * (random_.chance(0.5) ? 8 : 1));
