@@ -1,4 +1,5 @@
-// Half lines through boxes and trees: the boxes that they meet, the sums of crossings, and the choice of the half line.
+// Tests of half lines through boxes and trees: the boxes that a half line meets, the sums of crossings, and the choice
+// of the cheapest half line.
 #include "core/index/bvh/half_line_boxes.h"
 
 #include <gtest/gtest.h>
@@ -27,7 +28,7 @@ bool meets(Vec3d point, HalfLine line, const Aabbf& box) {
   return met != 0;
 }
 
-// The box test in double, without any rounding.
+// Returns whether the half line meets the box, by a test in double without any rounding.
 bool is_met(Vec3d point, HalfLine line, const Aabbf& box) {
   for (int axis = 0; axis < 3; ++axis) {
     const bool from_min = double{box.min[axis]} <= point[axis], to_max = point[axis] <= double{box.max[axis]};
