@@ -99,7 +99,7 @@ class ShedTest : public testing::Test {
       table_.add(connections_.back());
     }
   }
-  // Sends to a connection, and waits until it has received `sum` bytes in all.
+  // Sends to a connection, and waits until the connection has received `sum` bytes in all.
   void send(size_t i, size_t bytes, uint64_t sum) {
     ASSERT_TRUE(clients_[i]->send(std::string(bytes, 'x')));
     ASSERT_TRUE(test::wait_until([&] { return connections_[i]->received().bytes == sum; }));
@@ -112,8 +112,7 @@ class ShedTest : public testing::Test {
 
 TEST_F(ShedTest, TheConnectionThatSendsMostIsClosedAndOthersAreNot) {
   send(0, 5'000, 5'000);
-  EXPECT_EQ(table_.shed_heaviest(false, kMinBytes, "short"), 0u);  // stores the 5,000 bytes, so that only later bytes
-                                                                   // count
+  EXPECT_EQ(table_.shed_heaviest(false, kMinBytes, "short"), 0u);  // records the 5,000 bytes, so only later ones count
   send(0, 6'000, 11'000);
   send(1, 9'000, 9'000);
   send(2, 1, 1);

@@ -1,5 +1,5 @@
-// Calls on completion queues that are ended after any number of their events: by the caller, by a broken connection, or
-// by the server. AddressSanitizer detects leaks, and the test's time limit detects calls that hang.
+// Tests of calls on completion queues. A call is ended after any number of its events: by the caller, by a broken
+// connection, or by the server. AddressSanitizer detects leaks, and the test's time limit detects calls that hang.
 #include "server/rpc/hot_call.h"
 
 #include <fcntl.h>

@@ -19,7 +19,7 @@ namespace {
 using test::TestAuthority;
 using test::TestCertificate;
 
-// Ends every call at once, and keeps the name that the caller's certificate gave.
+// Service that ends every call at once and stores the name in the caller's certificate.
 class NamingService final : public grpc::CallbackGenericService {
  public:
   std::optional<std::string> last_name() {

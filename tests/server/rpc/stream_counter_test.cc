@@ -18,7 +18,7 @@ namespace {
 using std::chrono::seconds;
 using std::chrono::system_clock;
 
-// A server that accepts only the first call of its client; all other calls stay open without an answer.
+// A server that accepts only the first call of its client, and answers none.
 class StreamCounterTest : public ::testing::Test {
  protected:
   struct Stream {

@@ -1,6 +1,6 @@
-// Random schedules of uploads and builds, movers with history and pinned revisions, dumps, backups, and readers that
-// take their answers slowly or not at all, against a model of the process's memory: the memory never exceeds the limit,
-// and no work that fits waits for ever.
+// Tests random schedules of work against a model of the process's memory. The work is uploads and builds, moves with
+// history and pinned revisions, dumps, backups, and replies whose readers take them slowly or not at all. The memory
+// must never exceed the limit, and no work that fits may wait for ever.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -11,7 +11,7 @@
 namespace locus::server {
 namespace {
 
-// Reference: the table of which beginnings of the pattern match which beginnings of the text.
+// Reference: fills a table of which prefixes of the pattern match which prefixes of the text.
 bool matches_by_table(const std::string& pattern, const std::string& text) {
   std::vector<std::vector<bool>> table(pattern.size() + 1, std::vector<bool>(text.size() + 1, false));
   table[0][0] = true;
