@@ -118,12 +118,10 @@ TEST(SweepTest, ACapsuleHasCapsAndAnEnd) {
   Mover capsule = ball({0, 0, 9}, {0, 0, 0}, 1);
   capsule.kind = MoverKind::kCapsule;
   capsule.half_axis = {0, 0, 2};
-  EXPECT_NEAR(*first_contact(capsule, kFloor, AtStart::kHit), 6.0 / 9, 1e-12);  // the lower cap touches when the centre
-                                                                                // is at z = 3
+  EXPECT_NEAR(*first_contact(capsule, kFloor, AtStart::kHit), 6.0 / 9, 1e-12);  // touches when its centre is at z = 3
   Shape point;
   point.position = {1, 0, 0};
-  EXPECT_NEAR(*first_contact(capsule, point, AtStart::kHit), 7.0 / 9, 1e-6);  // the point touches the rim between cap
-                                                                              // and cylinder
+  EXPECT_NEAR(*first_contact(capsule, point, AtStart::kHit), 7.0 / 9, 1e-6);  // touches the rim of the cap
   point.position = {1.001, 0, 0};
   EXPECT_EQ(first_contact(capsule, point, AtStart::kHit), std::nullopt);
 }
@@ -158,8 +156,7 @@ TEST(SweepTest, ContactsInsideAnObjectPointToTheShortestWayOut) {
   EXPECT_EQ(in_ball.normal, (Vec3d{0, 1, 0}));
   Mover capsule = ball({0, 3, 0}, {0, 3, 0}, 1);
   capsule.kind = MoverKind::kCapsule;
-  capsule.half_axis = {0, 2, 0};  // the axis ends 1 outside; to leave the box, it must move by 3 along y or by 4 along
-                                  // x
+  capsule.half_axis = {0, 2, 0};  // ends 1 outside; the ways out are 3 along y and 4 along x
   EXPECT_EQ(contact_at(capsule, box, 0).distance, -3);
   EXPECT_EQ(contact_at(capsule, box, 0).normal, (Vec3d{0, 1, 0}));
 }

@@ -140,8 +140,7 @@ TEST_F(AuditLogTest, RefusalsLeaveHalfOfTheQueueToChanges) {
   log->write(entry("dropped, because the queue has no room at all"));
   log->flush();
   EXPECT_EQ(log->lost(), 1u);
-  auto half = *AuditLog::open(folder_.file("half"), 1u << 20, 1);  // half of a queue of one entry has no room for a
-                                                                   // refusal
+  auto half = *AuditLog::open(folder_.file("half"), 1u << 20, 1);  // half of a queue of 1 has no room
   AuditEntry refusal = entry("no token");
   refusal.code = absl::StatusCode::kUnauthenticated;
   half->write(refusal);

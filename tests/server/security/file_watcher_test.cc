@@ -154,8 +154,7 @@ TEST(FileWatcherTest, AFailedReadingIsRepeatedUntilItSucceeds) {
 
 TEST(FileWatcherTest, AWatcherEndsWithoutWaitingForItsPause) {
   const FileWatcher watcher(
-      {"/nonexistent"}, [] { return false; }, std::chrono::hours(1));  // if the destructor waited for the pause, the
-                                                                       // test would time out
+      {"/nonexistent"}, [] { return false; }, std::chrono::hours(1));  // if it waited, the test would time out
 }
 
 }  // namespace
