@@ -44,8 +44,8 @@ class Rounds {
     return false;
   }
 
-  // Runs `window` for the time of this program's options. Makes the world at the first call, since not every case needs
-  // it.
+  // Runs `window` for 2 s, or 0.05 s in a quick run. The first call makes the world, since not every case needs a
+  // world.
   Seen run(const Window& window) {
     if (arena_ == nullptr) arena_ = std::make_unique<Arena>(count_);
     Window timed = window;

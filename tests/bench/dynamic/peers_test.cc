@@ -15,8 +15,8 @@ using ::testing::IsEmpty;
 constexpr uint32_t kCount = 3000;
 constexpr float kCrowded = 300;  // side of a world in which most queries find something
 
-// Returns answers with an id that no object has. So every right answer differs, and compare() tests all objects to
-// decide.
+// Returns, for each query, an id that no object has. Every right answer differs from it, so compare() tests all objects
+// to decide which answer is right.
 Answers wrong_answers(size_t queries) {
   Answers answers;
   answers.ids.assign(queries, 1);

@@ -106,8 +106,8 @@ class QueryRace {
     return {entry.contender->name(), run_turn, static_cast<double>(count), {}};
   }
 
-  // Adds cells for all contestants except `out`, one of the first two: both are locus, one with single queries and one
-  // with batches.
+  // Adds cells for all contestants except contestant `out`. Contestants 0 and 1 are both locus, one with single queries
+  // and one with batches; `out` is one of these two.
   void add(const char* name, std::vector<Contestant> contestants, std::vector<std::vector<double>> times, size_t out) {
     if (!run_.options.filter.wants(run_.case_of(name))) return;
     contestants.erase(contestants.begin() + static_cast<ptrdiff_t>(out));

@@ -10,8 +10,8 @@
 namespace locus::bench::queries {
 namespace {
 
-// Two trees of Bullet: one of the boxes of the balls, for frustums, and one of boxes grown by half the distance of
-// pairs, which overlap if two balls may be within the distance.
+// Two trees of Bullet: one of the bounding boxes of the balls, for frustums, and one of these boxes grown by half of
+// kPairDistance, for pairs. The grown boxes of two balls overlap if the balls are within kPairDistance.
 class BulletObjects : public ObjectPeer {
  public:
   explicit BulletObjects(const dynamic::Objects& objects) {

@@ -1,5 +1,5 @@
-// Cases of the suite `queries` that ask for cells of free space, 32 planes at most, on objects or on a mesh. No library
-// answers such queries; the peer is a test of all values, with a part of the points.
+// Cases of the suite `queries` that query cells of free space with at most 32 planes, among objects or in a mesh. No
+// library answers such queries; the peer is a test of all triangles or objects, for the first few points only.
 #ifndef LOCUS_TESTS_BENCH_QUERIES_CELL_CASES_H_
 #define LOCUS_TESTS_BENCH_QUERIES_CELL_CASES_H_
 
@@ -13,7 +13,7 @@
 
 namespace locus::bench::queries {
 
-// Cells around points, x y z each, that end at a distance.
+// Queries of cells of free space: one cell around each point (x, y, z), which ends at `distance` from the point.
 struct CellWork {
   SnapshotPtr snapshot;
   Source source;

@@ -17,7 +17,7 @@ namespace locus::bench::queries {
 namespace {
 
 constexpr size_t kPoints = 50'000, kQuickPoints = 600, kPointsAChunk = 5'000;
-// Points whose answers are compared with the crossings of every triangle.
+// Number of points whose answers are compared with those of proved().
 constexpr size_t kProvedPoints = 20;
 
 void append(Vec3f point, std::vector<float>& points) { points.insert(points.end(), {point.x, point.y, point.z}); }
@@ -32,7 +32,7 @@ std::vector<float> points_in_bounds(const BenchMesh& mesh, size_t count) {
 // Returns points 0.1 % of the diagonal away from points of the surface, in random directions.
 std::vector<float> points_near_surface(const BenchMesh& mesh, size_t count) {
   std::vector<float> points;
-  const std::vector<Ballf> on_surface = balls(mesh, 2 * count, 602, 0);  // every other one
+  const std::vector<Ballf> on_surface = balls(mesh, 2 * count, 602, 0);  // the balls with even index are on the surface
   const std::vector<RayQuery> directions = random_rays(mesh, count, 603, 1);
   for (size_t i = 0; i < count; ++i)
     append(on_surface[2 * i].center + directions[i].direction * (0.001f * mesh.diagonal), points);
@@ -70,7 +70,7 @@ class OurPoints {
   const SnapshotPtr snapshot_;
 };
 
-// Returns the answer for one point by the crossings of every triangle.
+// Returns the answer for one point, computed from the crossing() of every triangle.
 uint8_t proved(const BenchMesh& mesh, const float* point) {
   const Vec3d from = without_tiny_coordinates(read_vec3d(point));
   int64_t winding = 0;

@@ -1,4 +1,4 @@
-// Cases of the suite `queries` in which points are looked up in one closed mesh, compared with CGAL's
+// Cases of the suite `queries` which decide whether points are inside one closed mesh, compared with CGAL's
 // Side_of_triangle_mesh.
 #ifndef LOCUS_TESTS_BENCH_QUERIES_CONTAINS_CASES_H_
 #define LOCUS_TESTS_BENCH_QUERIES_CONTAINS_CASES_H_
@@ -20,7 +20,8 @@ class ContainsPeer {
   virtual void contains(absl::Span<const float> points, uint8_t* answers) = 0;
 };
 
-// Returns CGAL as a peer; null if the mesh is not a closed manifold, which CGAL requires. The mesh need not outlive it.
+// Returns a peer that uses CGAL; null if the mesh is not a closed manifold, which CGAL requires. The mesh need not
+// outlive the peer.
 std::unique_ptr<ContainsPeer> cgal_side(const BenchMesh& mesh);
 
 // Runs the cases if the mesh is closed; otherwise adds a note.

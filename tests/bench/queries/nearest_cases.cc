@@ -20,11 +20,11 @@ namespace locus::bench::queries {
 namespace {
 
 constexpr size_t kPoints = 100'000, kQuickPoints = 600, kPointsAChunk = 1'000;
-// Points whose answers are compared with a test of every triangle.
+// Number of points whose answers are compared with a test of every triangle.
 constexpr size_t kProvedPoints = 20;
 constexpr double kBar = 2;
 
-// Places of the points of a case.
+// Regions from which the points of a case are drawn.
 enum class Place {
   kAnywhere,     // in the bounds of the mesh
   kNearSurface,  // up to 1 % of the diagonal from a point of the surface
@@ -43,7 +43,7 @@ std::vector<Vec3f> points_of(const NearestCase& one, const BenchMesh& mesh, size
   points.reserve(count);
   for (const RayQuery& ray : rays) points.push_back(ray.origin);
   if (one.place == Place::kAnywhere) return points;
-  // balls() centres every second ball on the surface.
+  // balls() centres only the balls with even index on the surface.
   const std::vector<Ballf> on_surface = balls(mesh, 2 * count, one.seed, 0);
   for (size_t i = 0; i < count; ++i) points[i] = on_surface[2 * i].center + rays[i].direction * (0.01f * mesh.diagonal);
   return points;
@@ -62,7 +62,7 @@ class OurScene {
     for (size_t i = 0; i < points.size(); ++i) answers[i] = {result.t[i], result.triangles[i]};
   }
 
-  // Returns the number of rows of balls of one radius, with these columns.
+  // Returns the number of rows that a query of balls of one radius finds. `wanted` are the columns of the rows.
   size_t overlaps(absl::Span<const Vec3f> centers, float radius, ColumnSet wanted, StaticDetail detail) const {
     BallColumns columns;
     columns.centers = {&centers[0].x, 3 * centers.size()};

@@ -25,8 +25,8 @@ class NearestPeer {
   virtual void nearest(absl::Span<const Vec3f> points, NearestTriangle* answers) = 0;
 };
 
-// Returns Embree as a peer: rtcPointQuery with a callback that computes distances to triangles in float, as Embree's
-// tutorial closest_point does. The mesh must outlive it.
+// Returns a peer that uses Embree: rtcPointQuery with a callback that computes distances to triangles in float, as
+// Embree's tutorial closest_point does. The mesh must outlive the peer.
 std::unique_ptr<NearestPeer> embree_nearest(const BenchMesh& mesh);
 
 void run_nearest_cases(const Options& options, const Progress& progress, const BenchMesh& mesh, Report& report);

@@ -24,7 +24,7 @@ using dynamic::World;
 
 constexpr uint32_t kObjects = 100'000, kQuickObjects = 3'000;
 constexpr double kBulletBar = 4, kBallsBar = 2.5;
-// Cells of free space around points near objects, and the distance that they end at.
+// Number of cells of free space around points near objects, and the distance at which the cells end.
 constexpr size_t kCells = 1'000, kQuickCells = 50;
 constexpr float kCellDistance = 50;
 
@@ -97,8 +97,8 @@ std::vector<ObjectPair> proved_pairs(const Arena& arena) {
   return pairs;
 }
 
-// Answers a ball query around each object, which finds each pair twice and each object itself, in as few batches as
-// possible. Returns the number of rows.
+// Runs a ball query around each object, in as few batches as possible. The queries find each pair twice, and each
+// object itself. Returns the number of rows.
 size_t run_balls(const Arena& arena) {
   size_t rows = 0;
   std::vector<float> radii;
@@ -186,7 +186,8 @@ struct Camera {
   }
 };
 
-// Returns the planes of frustums whose far planes lie so that they hold one.share of the objects.
+// Returns the planes of `count` frustums. The far plane of each is placed so that the frustum holds one.share of the
+// objects.
 std::vector<float> planes_of(const FrustumCase& one, const Arena& arena, size_t count) {
   cli::SplitMix64 numbers(one.seed);
   const auto unit = [&numbers] { return static_cast<float>(numbers.next() >> 40) * 0x1p-24f; };

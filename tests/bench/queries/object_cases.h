@@ -36,7 +36,7 @@ class ObjectPeer {
   virtual void frustum(const float* planes, std::vector<uint64_t>& ids) = 0;
 };
 
-// Returns Bullet as a peer. It copies the objects.
+// Returns a peer that uses Bullet. It keeps a copy of `objects`.
 std::unique_ptr<ObjectPeer> bullet_objects(const dynamic::Objects& objects);
 
 void run_object_cases(const Options& options, const Progress& progress, Report& report);

@@ -50,7 +50,7 @@ class OurOverlaps {
 
   // Appends the same rows, found by a query of the balls around the capsules and a test of each triangle in these.
   void find_in_two_passes(size_t begin, size_t end, std::vector<CapsuleRow>& rows) const {
-    // A little more than the sum of radius and half length, whose rounding must not lose a triangle.
+    // Slightly more than the sum of radius and half length, so that rounding of the sum cannot lose a triangle.
     const float radius = (kCapsuleRadius + kCapsuleHalf) * mesh_.diagonal * (1 + 0x1p-18f);
     BallColumns columns;
     columns.centers = part(centers_, begin, end);

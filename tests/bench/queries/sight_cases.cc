@@ -17,8 +17,8 @@
 namespace locus::bench::queries {
 namespace {
 
-// Positions of viewers and targets: before the front of the surface, where most is blocked indoors and between
-// buildings; around the mesh; or above it, where nothing is blocked.
+// Positions of viewers and targets: close to the front of the surface, where most lines of sight are blocked if the
+// mesh has rooms or buildings; around the mesh; or above the mesh, where nothing is blocked.
 enum class Place : uint8_t { kSurface, kAround, kAbove };
 
 struct SightCase {
@@ -40,8 +40,8 @@ constexpr SightCase kCases[] = {
     {"sight/pairwise", Place::kSurface, 10'000, 10'000, true, 1, 0, 607},
 };
 constexpr size_t kSamples = 3, kQuickPart = 10;
-// Bars where at least half of the segments are blocked, and elsewhere. Matrices of few targets and pairs gain nothing
-// from the common eye.
+// Required ratios: kBlockedBar if at least half of the segments are blocked and many segments begin at each eye,
+// otherwise kOpenBar. Matrices of few targets, and pairs, gain nothing from the common eye.
 constexpr double kBlockedBar = 2, kOpenBar = 1;
 
 // Generator of the points of a case. All coordinates are multiples of a power of two, so that the difference of two

@@ -1,5 +1,5 @@
 // Cases of the suite `queries` in which viewers look for targets through one mesh: a matrix of 100 x 100 with three
-// sample points a target, compared with the same segments as rays of mode ANY in one batch.
+// sample points per target, compared with the same segments as rays of mode ANY in one batch.
 #ifndef LOCUS_TESTS_BENCH_QUERIES_SIGHT_CASES_H_
 #define LOCUS_TESTS_BENCH_QUERIES_SIGHT_CASES_H_
 
@@ -8,7 +8,8 @@
 
 namespace locus::bench::queries {
 
-// Adds the cells of the cases that the filter wants. An answer that differs from that of the ray is a disagreement.
+// Adds the cells of the cases that the filter wants. An answer that differs from the answers of its rays is a
+// disagreement.
 void run_sight_cases(const Options& options, const Progress& progress, const BenchMesh& mesh, Report& report);
 
 }  // namespace locus::bench::queries

@@ -39,7 +39,7 @@ constexpr SweepCase kCases[] = {
     {"sweep/box/0.5/20", MoverKind::kBox, 0.005f, 0.2f, 510, 3},
 };
 constexpr size_t kSweeps = 20'000, kQuickSweeps = 300, kSweepsAChunk = 1'000, kSweepsAPeer = 8;
-// Sweeps whose answers are compared with a test of every triangle.
+// Number of sweeps whose answers are compared with a test of every triangle.
 constexpr size_t kProvedSweeps = 20;
 
 // Returns the sweeps of a case: from random points of the bounds in random directions.

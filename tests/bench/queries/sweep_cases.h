@@ -1,5 +1,6 @@
-// Cases of the suite `queries` in which solids move through one mesh: FIRST, PASS, compared with Bullet's
-// convexSweepTest, which passes what a solid starts in.
+// Cases of the suite `queries` in which solids move through one mesh. They find the first contact (FIRST), and a solid
+// passes triangles that it touches at its start (PASS). Compared with Bullet's convexSweepTest, whose solids pass such
+// triangles too.
 #ifndef LOCUS_TESTS_BENCH_QUERIES_SWEEP_CASES_H_
 #define LOCUS_TESTS_BENCH_QUERIES_SWEEP_CASES_H_
 
@@ -14,7 +15,7 @@
 
 namespace locus::bench::queries {
 
-// Sweeps of one case: all have the same solid, unrotated, whose numbers are floats.
+// Sweeps of one case: all move the same solid, which is not rotated and has dimensions that are exact floats.
 struct SweepWork {
   Mover solid;
   std::vector<float> starts;  // 3 per sweep
@@ -37,7 +38,7 @@ class SweepPeer {
   virtual void sweep(const SweepWork& work, size_t begin, size_t end, SweepHit* hits) = 0;
 };
 
-// Returns Bullet as a peer. The mesh must outlive it.
+// Returns a peer that uses Bullet. The mesh must outlive the peer.
 std::unique_ptr<SweepPeer> bullet_sweeps(const BenchMesh& mesh);
 
 void run_sweep_cases(const Options& options, const Progress& progress, const BenchMesh& mesh, Report& report);

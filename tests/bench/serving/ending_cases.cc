@@ -102,8 +102,8 @@ class EndingCases {
     }
   }
 
-  // Returns whether the call ended with `expected`. Counts a refused call: the server had no processor time to drop the
-  // call before. Stores any other status as wrong.
+  // Returns whether the call ended with `expected`. Counts a refused call: the server has not yet had the processor
+  // time to drop the previous call. Stores any other status as wrong.
   bool is_ended(const grpc::Status& status, grpc::StatusCode expected) {
     if (status.error_code() == grpc::StatusCode::RESOURCE_EXHAUSTED)
       ++refused_;
@@ -112,8 +112,8 @@ class EndingCases {
     return status.error_code() == expected;
   }
 
-  // Waits until the server is idle. Returns the milliseconds of processor time that it has used since it had used
-  // `before` seconds. Processor time does not depend on the machine's other load.
+  // Waits until the server is idle. Returns how much processor time the server has used in excess of `before` seconds,
+  // in milliseconds. Processor time does not depend on the machine's other load.
   double settle(double before) const {
     double last = computed();
     for (int i = 0; i < 200; ++i) {

@@ -1,4 +1,4 @@
-// Processor time that the server spends on a call whose caller waits no longer, since the deadline has passed or the
+// Processor time that the server spends on a call whose caller no longer waits, because the deadline has passed or the
 // call was cancelled. For the suite serving.
 #ifndef LOCUS_TESTS_BENCH_SERVING_ENDING_CASES_H_
 #define LOCUS_TESTS_BENCH_SERVING_ENDING_CASES_H_

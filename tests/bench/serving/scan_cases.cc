@@ -10,9 +10,9 @@ namespace {
 
 constexpr const char* kScan = "scan/1024";
 constexpr size_t kRaysAMessage = 1024;
-constexpr double kMaxShare = 0.03;  // of the time of a query
+constexpr double kMaxShare = 0.03;  // time of a scan, as a part of the time of a query
 
-// Messages as the server receives them.
+// Returns the messages in the form in which the server receives them.
 std::vector<grpc::ByteBuffer> buffers_of(const Batches& batches) {
   std::vector<grpc::ByteBuffer> buffers;
   for (const v1::StreamQueriesRequest& message : batches.messages) {

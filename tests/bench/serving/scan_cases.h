@@ -1,4 +1,5 @@
-// Case scan/1024: the scan of a message before it is parsed, beside the whole work of the query in it.
+// The case scan/1024: the time to scan a message before it is parsed, compared with the time to check and answer the
+// queries in the message.
 #ifndef LOCUS_TESTS_BENCH_SERVING_SCAN_CASES_H_
 #define LOCUS_TESTS_BENCH_SERVING_SCAN_CASES_H_
 
@@ -6,7 +7,7 @@
 
 namespace locus::bench::serving {
 
-// Runs the case if the options want it. Returns the error of a server that did not start or refused the level.
+// Runs the case if the filter selects it. Returns the error of a server that did not start or refused the level.
 absl::Status run_scan_cases(const ServingRun& run);
 
 }  // namespace locus::bench::serving

@@ -25,8 +25,8 @@ inline constexpr size_t kDifferingRays = 20;
 inline constexpr size_t kDifferingRaysOf = 500'000;
 inline constexpr double kDifferingIds = 1e-3;
 
-// Compares first hits. `ours` has the answers to all rays of a case, `theirs` the answers to the rays in `asked`, which
-// the peer was asked.
+// Compares first hits. `ours` has the answers to all rays of a case, `theirs` the answers to the rays in `asked`, the
+// subset that was given to the peer.
 void compare_first(const std::string& case_name, const BenchMesh& mesh, const Peer& peer, Task task,
                    const Asked<RayQuery>& asked, absl::Span<const RayAnswer> ours, absl::Span<const RayAnswer> theirs,
                    Report& report);
