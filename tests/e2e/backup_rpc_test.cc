@@ -49,7 +49,7 @@ class BackupRpcTest : public ::testing::Test {
     return reader->Finish();
   }
 
-  // Drains the server, so that all calls have ended. Returns whether the data directory is empty then.
+  // Drains the server until all calls have ended, then returns whether the data directory is empty.
   bool nothing_is_left() {
     running_->server().drain(kCallTimeout);
     return std::filesystem::is_empty(folder_.path());

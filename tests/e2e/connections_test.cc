@@ -39,7 +39,7 @@ server::ServerConfig many_connections() {
   return config;
 }
 
-// A server, and a client of it on another connection that must be served whatever happens.
+// A server that a test attacks, and a client on another connection that must be served all the time.
 class ConnectionsTest : public RpcTest {
  protected:
   ConnectionsTest() : RpcTest(many_connections()) {}
@@ -52,7 +52,7 @@ class ConnectionsTest : public RpcTest {
     return made;
   }
   bool victim_is_served() { return query(ray_along_x()).ok(); }
-  // Returns a limit as GetServer lists it; an empty one if it is not listed.
+  // Returns the limit `name` as GetServer lists it. If it is not listed, fails the test and returns an empty limit.
   v1::Limit limit(const std::string& name) {
     grpc::ClientContext context;
     set_timeout(context);
@@ -64,7 +64,8 @@ class ConnectionsTest : public RpcTest {
     return {};
   }
 
-  // Sends `bytes` again and again until the server closes the connection. Returns false if it does not.
+  // Sends `bytes` again and again until the server closes the connection. Returns false if the server does not close
+  // it.
   bool flood(const std::string& bytes, RawSocket attacker) {
     return wait_until([&] {
       for (int i = 0; i < 50; ++i)
@@ -148,7 +149,7 @@ TEST_F(ConnectionsTest, DescriptorsComeBackAfterTwoThousandConnections) {
 }
 
 TEST_F(ConnectionsTest, SmallCallsManyStreamsAndLargeMessagesAreNotClosed) {
-  Stubs stubs(running_.address());  // one connection for all of it
+  Stubs stubs(running_.address());  // all callers share this connection
   std::atomic<bool> end{false};
   std::vector<std::thread> callers;
   std::atomic<int> failed{0};
@@ -192,7 +193,7 @@ TEST_F(ConnectionsTest, ASilentOrWrongClientIsNotHandedToGrpc) {
 
 class ConnectionLimitsTest : public ::testing::Test {
  protected:
-  // Returns how many connections a limit has refused, as GetServer lists it.
+  // Returns how many connections the limit `name` has refused, according to GetServer.
   static uint64_t refused_by(Stubs& stubs, const std::string& name) {
     grpc::ClientContext context;
     set_timeout(context);

@@ -104,7 +104,7 @@ TEST_F(ScarceMemoryRpcTest, AChangeThatIsNotWaitedForClaimsItsMemoryBeforeItIsCh
   ASSERT_TRUE(upload({whole_mesh("cube")}).ok());
   v1::ChangeInstancesRequest many = place_one("cube", 0);
   many.set_no_wait(true);
-  many.mutable_place(0)->mutable_ids()->Resize(1 << 20, 7);  // the check would find that the ids are equal
+  many.mutable_place(0)->mutable_ids()->Resize(1 << 20, 7);  // equal ids, which the check would refuse
   expect_short(change(many), "place");
   many.mutable_place(0)->mutable_ids()->Truncate(2);
   expect_refused(change(many), {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_DUPLICATE_ID, "place[0].ids", 1});
@@ -132,7 +132,7 @@ TEST_F(RoomyMemoryRpcTest, NamesOfKnownBytesAreRefusedWhenTheirPartsNeedTooMuch)
   }
   ASSERT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED) << status.error_message();
   EXPECT_EQ(error_of(status).reason(), v1::REASON_LIMIT);
-  // The share of this connection may become too small for the request before the parts do not fit.
+  // The request may exceed the shrinking share of this connection before the parts exceed the memory limit.
   EXPECT_THAT(error_of(status).limit(), ::testing::AnyOf("memory_bytes", "connection_memory_bytes"));
 }
 

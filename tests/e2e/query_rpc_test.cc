@@ -136,7 +136,7 @@ TEST_F(QueryRpcTest, SweepsFindWhatAMovingSolidTouches) {
   EXPECT_THAT(all.ids(), ElementsAre(1u, 2u, 3u));
   EXPECT_EQ(all.t(0), first.t(0));
   EXPECT_EQ(all.normals(0), -1);
-  // The ball's front touches where its centre is half a unit behind.
+  // The contact is at the front of the moving ball, half a unit ahead of its centre.
   EXPECT_FLOAT_EQ(all.points(0), 10 * all.t(0) + 0.5f);
   block.clear_columns();
   block.mutable_sweeps()->set_mode(v1::RAY_MODE_ANY);
@@ -146,7 +146,7 @@ TEST_F(QueryRpcTest, SweepsFindWhatAMovingSolidTouches) {
 TEST_F(QueryRpcTest, FrustumsFindWhatIsInView) {
   v1::QueryBatch batch;
   v1::Frustums* frustums = batch.add_blocks()->mutable_frustums();
-  // The box from (2, -1, -1) to (7, 1, 1).
+  // Planes of the box from (2, -1, -1) to (7, 1, 1).
   fill(frustums->mutable_planes(), {1.f, 0.f,  0.f, -2.f, -1.f, 0.f, 0.f, 7.f, 0.f, 1.f, 0.f,  1.f,
                                     0.f, -1.f, 0.f, 1.f,  0.f,  0.f, 1.f, 1.f, 0.f, 0.f, -1.f, 1.f});
   EXPECT_THAT(ask(batch).blocks(0).ids(), ElementsAre(1u, 2u));

@@ -1,5 +1,5 @@
-// Quotas of a server: each is enforced, says what to do when it refuses, and is free again afterwards. What a caller
-// created counts after a restart too.
+// Quotas of a server: each quota is enforced, its refusal says what to do, and it is available again afterwards. Scenes
+// count for the caller that created them after a restart too.
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -45,7 +45,7 @@ class QuotaRpcTest : public ::testing::Test {
     start();
   }
 
-  // Writes the access file; the running server, if there is one, uses it when this returns.
+  // Writes the access file. The running server, if there is one, uses the new file when this function returns.
   void set_quotas(const std::string& lines) {
     const std::string fresh = folder_.file("access.new");
     std::ofstream(fresh) << kGrants << lines;
@@ -139,7 +139,7 @@ v1::SceneSpec with_history(uint64_t bytes) {
 TEST_F(QuotaRpcTest, ScenesCountForTheirCreatorAlsoAfterARestart) {
   ASSERT_TRUE(create("a").ok());
   ASSERT_TRUE(create("others", {}, "other").ok());
-  set_quotas("quota token:* scenes=2\n");  // what was created before counts
+  set_quotas("quota token:* scenes=2\n");  // scenes that were created before the quota was set count
   ASSERT_TRUE(create("b").ok());
   for (int times = 0; times < 2; ++times) {
     expect_quota(create("c"), "scenes", "token:maker is 2, asked for 1; 2 are in use; delete a scene");
@@ -320,7 +320,7 @@ TEST_F(QuotaRpcTest, OpenStreamsAreGivenBackWhenTheyEnd) {
     auto [second_open, second] = open(second_context);
     EXPECT_FALSE(second_open);
     expect_quota(second->Finish(), "open_streams", "1 are in use; end a stream");
-    // A stream keeps what it took while the quotas change.
+    // The first stream still counts after the quotas have changed.
     set_quotas("");
     set_quotas("quota token:maker open_streams=1\n");
     first->WritesDone();

@@ -25,7 +25,8 @@ namespace {
 
 enum class Outcome { kServed, kDenied, kHidden, kUnknown };
 
-// Sets of rights, and the columns of the table. WHO stands for the caller.
+// A set of rights, for which the table has a column. In `grants`, which is lines of an access file, WHO stands for the
+// caller.
 struct Column {
   const char* name;
   const char* grants;
@@ -38,7 +39,7 @@ constexpr std::array kColumns = std::to_array<Column>({
     {"elsewhere", "grant WHO admin lobby-*\n"},
     {"without rights", ""},
 });
-// A caller without credentials is in the last column of a row.
+// Outcomes of a row: one for each set of rights, and the last one for a caller without credentials.
 constexpr size_t kOutcomes = kColumns.size() + 1;
 using Outcomes = std::array<Outcome, kOutcomes>;
 
@@ -52,7 +53,7 @@ constexpr Outcomes kReads = {kYes, kYes, kYes, kHid, kHid, kNo, kWho};
 constexpr Outcomes kUpdates = {kNo, kYes, kYes, kHid, kHid, kNo, kWho};
 constexpr Outcomes kDeletes = {kNo, kNo, kYes, kHid, kHid, kNo, kWho};
 constexpr Outcomes kCreates = {kNo, kNo, kYes, kNo, kNo, kNo, kWho};
-constexpr Outcomes kAdmins = kCreates;  // those who administer all scenes
+constexpr Outcomes kAdmins = kCreates;  // callers who administer all scenes
 constexpr Outcomes kServers = {kNo, kNo, kNo, kYes, kNo, kNo, kWho};
 constexpr Outcomes kKnown = {kYes, kYes, kYes, kYes, kYes, kNo, kWho};
 constexpr Outcomes kAll = {kYes, kYes, kYes, kYes, kYes, kYes, kYes};
@@ -80,7 +81,7 @@ constexpr std::array kRows = std::to_array<RpcRow>({
     {"/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo", kServers},
 });
 
-// The build fails if an rpc has no row, or a row no rpc.
+// Returns whether an rpc has a row. The build fails if an rpc has no row, or if a row has no rpc.
 constexpr bool has_row(std::string_view path) {
   return std::any_of(kRows.begin(), kRows.end(), [path](const RpcRow& row) { return row.path == path; });
 }
@@ -106,7 +107,7 @@ Outcome outcome_of(const grpc::Status& status) {
   return hidden ? Outcome::kHidden : Outcome::kServed;
 }
 
-// A caller: a connection, what it sends as a bearer token, and the principal as which the server knows it.
+// A caller: its connection, the bearer token that it sends, and the principal under which the server knows it.
 struct RpcCaller {
   std::shared_ptr<grpc::Channel> channel;
   std::string bearer;

@@ -118,7 +118,7 @@ TEST_F(ServerRpcTest, LongReflectionQuestionsAreRefusedBeforeTheyAreLookedUp) {
   const RawReply asked = raw_call(stubs().channel, kReflect, symbol_question(std::string(500, '.')));
   EXPECT_TRUE(asked.status.ok()) << asked.status.error_message();
   EXPECT_THAT(asked.bytes, ::testing::HasSubstr("the schema has no ...."));
-  std::string unknown = "\xca\x3e";  // field 1001, which the schema does not have; of 512 bytes
+  std::string unknown = "\xca\x3e";  // field 1001, of 512 bytes, which the schema does not have
   unknown += "\x80\x04" + std::string(512, 'x');
   for (const std::string& question : {symbol_question(std::string(10'000, '.')), unknown}) {
     const RawReply refused = raw_call(stubs().channel, kReflect, question);

@@ -1,4 +1,4 @@
-// Cases of the suite `queries` which decide whether points are inside one closed mesh, compared with CGAL's
+// Cases of the suite `queries` that decide whether points are inside one closed mesh, compared with CGAL's
 // Side_of_triangle_mesh.
 #ifndef LOCUS_TESTS_BENCH_QUERIES_CONTAINS_CASES_H_
 #define LOCUS_TESTS_BENCH_QUERIES_CONTAINS_CASES_H_
