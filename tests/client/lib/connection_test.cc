@@ -19,8 +19,8 @@ using ::testing::HasSubstr;
 
 class TlsTest : public ::testing::Test {
  protected:
-  // Returns a server whose certificate comes from authority_. With `mutual`, it refuses clients without a certificate
-  // of that authority.
+  // Returns a server whose certificate comes from authority_. With `mutual`, the server refuses clients without a
+  // certificate of that authority.
   std::unique_ptr<GuardedServer> server(bool mutual) {
     const test::TestCertificate own = authority_.for_server();
     grpc::SslServerCredentialsOptions options(mutual ? GRPC_SSL_REQUEST_AND_REQUIRE_CLIENT_CERTIFICATE_AND_VERIFY
@@ -35,7 +35,7 @@ class TlsTest : public ::testing::Test {
   }
   std::string ca() { return written("ca.pem", authority_.certificate()); }
 
-  // Returns the error of connecting and of one call.
+  // Connects and makes one call. Returns the first error, or OK.
   static absl::Status ask(const std::string& address, const CredentialOptions& credentials) {
     ClientOptions options;
     options.credentials = credentials;

@@ -228,7 +228,7 @@ class FakeQueries final : public v1::QueryService::Service {
     return grpc::Status::OK;
   };
   std::function<v1::QueryResult(const v1::QueryBatch&)> stream_answer;
-  int silent_messages = 0;  // number of next messages on streams that are never answered
+  int silent_messages = 0;  // the next so many messages on streams are never answered
   int failing_calls = 0;
   grpc::Status failure{grpc::StatusCode::UNAVAILABLE, "planned"};
   int calls = 0;
@@ -271,7 +271,7 @@ class FakeScenes final : public v1::SceneService::Service {
     return grpc::Status::OK;
   }
 
-  // Returns pages of two scenes.
+  // Returns the scenes in pages of two scenes.
   grpc::Status ListScenes(grpc::ServerContext*, const v1::ListScenesRequest* request,
                           v1::ListScenesResponse* response) override {
     std::lock_guard lock(mutex_);
@@ -367,7 +367,7 @@ class FakeScenes final : public v1::SceneService::Service {
   std::vector<uint32_t> indices;
   size_t largest_message = 0;
   std::vector<v1::DownloadMeshResponse> mesh_pieces;
-  int failing_downloads = 0;  // number of next downloads that fail after their first message
+  int failing_downloads = 0;  // the next so many downloads fail after their first message
   bool no_mesh = false;
   v1::ChangeInstancesRequest last_change;
   int creates = 0;
@@ -392,7 +392,7 @@ class FakeServerService final : public v1::ServerService::Service {
     return grpc::Status::OK;
   }
 
-  // Returns one entry a page, of those that the request asks for.
+  // Returns the requested entries in pages of one entry.
   grpc::Status GetQuotas(grpc::ServerContext*, const v1::GetQuotasRequest* request,
                          v1::GetQuotasResponse* response) override {
     const bool second = request->page_token() == "token:a";

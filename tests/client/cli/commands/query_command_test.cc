@@ -10,7 +10,8 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// Ball 7 of group 3 at the origin, ball 8 of group 4 at x = 5, both of radius 1; box 9 at z = -10.
+// Fixture with three objects: ball 7 of group 3 at the origin and ball 8 of group 4 at x = 5, both of radius 1, and box
+// 9 at z = -10.
 class QueryCommandTest : public BulkTest {
  protected:
   void SetUp() override {

@@ -32,7 +32,7 @@ std::string error_of_child(absl::FunctionRef<std::string()> produce, const Child
   return answer.ok() ? "no error" : std::string(answer.status().message());
 }
 
-// Returns whether the filter of system calls works here.
+// Returns whether the filter of system calls works on this machine.
 bool has_filter() {
   const absl::StatusOr<ChildAnswer> answer = run_in_child("x", {}, [] { return std::string(); });
   return answer.ok() && answer->filtered;
