@@ -16,8 +16,8 @@ namespace {
 
 using fuzz::check_error;
 
-// Verifies that the refusal names its field, and that the protocol's error can be made of it. A batch as a whole has
-// no field.
+// Verifies that a refusal names a field or, if it concerns a whole batch, a limit; and that it can be converted to the
+// protocol's error.
 void check_refusal(const absl::Status& status) {
   check_error(status);
   const std::optional<Refusal> refusal = refusal_of(status);

@@ -1,5 +1,5 @@
-// Chunks of a stored mesh, of its parts, and its tree: accepted bytes are parsed and written again as equal bytes, and
-// a tree that is accepted for a mesh finds every triangle.
+// Chunks of a stored mesh, of its parts and of its tree: accepted bytes are parsed and written again as equal bytes,
+// and a tree that is accepted for a mesh finds every triangle.
 #include <optional>
 
 #include "core/scene/log/mesh_codec.h"

@@ -30,7 +30,7 @@ struct Request {
   WirePlan plan;
 };
 
-// Returns the types of all requests, each with its plan.
+// Returns the types of all requests, each with the plan by which its messages are scanned.
 const std::vector<Request>& requests() {
   static const auto* const made = [] {
     std::set<const Descriptor*> types;
@@ -54,7 +54,8 @@ grpc::ByteBuffer in_two_slices(absl::string_view bytes) {
   return {slices.data(), slices.size()};
 }
 
-// An accepted message takes no more memory than the scan says. What Protobuf itself writes is not malformed.
+// Verifies that an accepted message takes no more memory than the scan says, and that the scan accepts a message that
+// Protobuf has serialized, or refuses it because of a limit.
 void check_request(const Request& request, absl::string_view input) {
   const absl::StatusOr<uint64_t> scanned = request.plan.scan(in_two_slices(input));
   if (!scanned.ok()) fuzz::check_error(scanned.status());
@@ -71,8 +72,8 @@ LOCUS_FUZZ_TARGET(wire) {
   for (const Request& request : requests()) check_request(request, input);
 }
 
-// The result for the frames must not depend on the pieces in which they are read; the input's first byte is the size of
-// a piece.
+// Verifies that the result for the frames does not depend on the pieces in which they are read. The first byte of the
+// input is the size of a piece, less 1.
 LOCUS_FUZZ_TARGET(frames) {
   if (input.empty()) return;
   const size_t piece = size_t{static_cast<uint8_t>(input[0])} + 1;

@@ -1,5 +1,5 @@
 // Writes the seeds that need an encoder into tests/fuzz/seeds: fuzz_write_seeds FOLDER. The same folders also contain
-// seeds of text formats and inputs that once failed, which it does not change.
+// seeds of text formats and inputs that once failed; this program does not change those.
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -202,7 +202,7 @@ void write_updates(const SeedWriter& seeds) {
   seeds.write("wire", "unknown_field", "\x7A\x10" + std::string(16, 'x'));
 }
 
-// Frames after the size of the pieces in which they are read, which is 3.
+// Writes seeds of HTTP/2 frames. The first byte of each seed has the frames read in pieces of 3 bytes.
 void write_frames(const SeedWriter& seeds) {
   const std::string begin = '\2' + test::kHttp2Opening;
   std::string endless = test::http2_frame(1, 0, 1, "headers");
