@@ -1,7 +1,6 @@
-// Accepts the connections of all listening sockets. A new connection must pass the limits, and must in time send the
-// first bytes of a client of gRPC; only then is it handed over to gRPC. The acceptor keeps a duplicate of the
-// connection's descriptor, so that it can close the connection itself, and releases the duplicate when the connection
-// has ended.
+// Accepts the connections of all listening sockets. A new connection is handed over to gRPC only if it is within the
+// limits and sends, in time, the first bytes of a gRPC client. The acceptor keeps a duplicate of the connection's
+// descriptor, so that it can close the connection itself, and releases the duplicate when the connection has ended.
 //
 // Threads: one thread does all work and calls the hooks; the members may be called from any thread. Invariant: each
 // admitted connection is counted by the limiter until it has ended, and is in exactly one of two states: opening, with
@@ -52,13 +51,13 @@ class Acceptor {
   // the acceptor.
   Acceptor(std::vector<ListeningSocket> sockets, const AcceptorOptions& options, ConnectionTable& table,
            FloodGuard& guard, AcceptorHooks hooks);
-  // Ends the thread and releases all connections, open or not.
+  // Ends the thread and releases all connections, whether they are opening or handed over.
   ~Acceptor();
   Acceptor(const Acceptor&) = delete;
   Acceptor& operator=(const Acceptor&) = delete;
 
   // Closes the listening sockets and the connections that are still opening; connections that were handed over stay.
-  // When it returns, no further connection is handed over.
+  // When stop_accepting() returns, no further connection is handed over.
   void stop_accepting() LOCUS_EXCLUDES(mutex_);
 
  private:
@@ -95,7 +94,7 @@ class Acceptor {
 
   std::vector<ListeningSocket> sockets_;
   const AcceptorOptions options_;
-  ConnectionTable& table_;  // its counters count what this object does
+  ConnectionTable& table_;  // the acceptor also updates its counters
   FloodGuard& guard_;
   const AcceptorHooks hooks_;
   const int epoll_;

@@ -1,6 +1,6 @@
-// Checks the bytes that the transport reads from connections without TLS, before it parses them. The transport reads
-// with recvmsg(), which server/rpc/read_hooks.h replaces by a function that asks CheckedReads::accept() about each
-// read. Bytes of other descriptors are always accepted.
+// Checks the bytes that the transport reads from connections without TLS, before the transport parses them. The
+// transport reads with recvmsg(), which server/rpc/read_hooks.h replaces by a function that asks CheckedReads::accept()
+// about each read. Bytes of other descriptors are always accepted.
 //
 // Threads: every member may be called from any thread; reads of different descriptors rarely wait for each other.
 // Invariant: bytes are checked only if their descriptor still refers to the watched socket. The transport closes

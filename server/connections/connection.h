@@ -82,7 +82,7 @@ class Connection {
   void written(uint64_t bytes) { bytes_written_.fetch_add(bytes, std::memory_order_relaxed); }
   CallCounts counts() const;
 
-  // Counts credentials that were not accepted, and returns their number so far.
+  // Counts one refusal of credentials, and returns the number of such refusals so far.
   uint32_t wrong_credentials() { return wrong_credentials_.fetch_add(1, std::memory_order_relaxed) + 1; }
 
   // Time in seconds since 1970 from which the peer's certificate is no longer valid; 0 until the first call has set it.

@@ -32,12 +32,12 @@ class ConnectionLimiter {
 
   // Decides on a new connection of the address `key`, and counts it if it is admitted.
   Admission admit(const std::string& key, Time now);
-  // Subtracts one connection of the address `key`, which has ended.
+  // Subtracts one ended connection from the number of connections of the address `key`.
   void leave(const std::string& key);
 
-  // Takes `count` tokens from the address `key`, because it has misused a connection. A new connection needs a token;
-  // tokens are refilled at the rate `new_per_second`. At most one burst of tokens can be owed, so the address has its
-  // full burst again after at most twice the time in which a burst is refilled.
+  // Takes `count` tokens from the address `key`, because a client at this address has misused a connection. A new
+  // connection needs a token; tokens are refilled at the rate `new_per_second`. At most one burst of tokens can be
+  // owed, so the address has its full burst again after at most twice the time in which a burst is refilled.
   void charge(const std::string& key, uint32_t count);
 
   // Returns the number of admitted connections.

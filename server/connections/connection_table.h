@@ -24,13 +24,14 @@ namespace locus::server {
 
 class ConnectionTable {
  public:
-  // Adds an accepted connection. It replaces a connection with the same name, which has ended.
+  // Adds an accepted connection. It replaces an ended connection with the same name, if there is one.
   void add(std::shared_ptr<Connection> connection);
   // Removes the connection, unless another one has replaced it.
   void remove(const Connection& connection);
 
   // Returns the connection with this name. If none was accepted, as in servers whose connections gRPC accepts, returns
-  // a stand-in, which counts but cannot be closed. While one caller holds the stand-in of a name, others get the same.
+  // a stand-in Connection, which counts calls but cannot be closed. While one caller holds the stand-in of a name,
+  // other callers get the same stand-in.
   std::shared_ptr<Connection> find(absl::string_view name);
 
   // Closes the connections that seem to use most memory. The weight of a connection is the sum of the bytes that its

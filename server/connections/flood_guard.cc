@@ -16,8 +16,9 @@ using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 
 constexpr milliseconds kLookInterval{10};
-// Interval between two looks during kAlertTime after a connection was closed or had many unexplained bytes. It is short
-// because a client that floods sends a megabyte or begins 100 streams in a millisecond, and connects again at once.
+// Interval between two checks of the connections during kAlertTime after a connection was closed or had many
+// unexplained bytes. It is short because a client that floods sends a megabyte or begins 100 streams in a millisecond,
+// and connects again at once.
 constexpr milliseconds kAlertInterval{2};
 constexpr std::chrono::seconds kAlertTime{1};
 constexpr double kAlertBytes = 1 << 20;
@@ -110,7 +111,7 @@ void FloodGuard::watch(const std::shared_ptr<Connection>& connection) {
     const MutexLock lock(mutex_);
     watched_[connection.get()] = std::move(watched);
   }
-  // With EPOLLET, a look finds a connection only if bytes have arrived since the look before.
+  // With EPOLLET, a check finds a connection only if bytes have arrived since the previous check.
   epoll_event event{};
   event.events = EPOLLIN | EPOLLET;
   event.data.ptr = connection.get();

@@ -4,8 +4,8 @@
 // faster than the application can accept and end them, so the guard asks gRPC how many streams of a connection it keeps
 // in memory. The code that serves calls only updates the counts of its connection.
 //
-// Threads: watch() and forget() may be called from any thread. The guard's thread looks periodically at the connections
-// that have received bytes since its previous look; idle connections cost nothing.
+// Threads: watch() and forget() may be called from any thread. The guard's thread periodically checks the connections
+// that have received bytes since its previous check; idle connections cost nothing.
 #ifndef LOCUS_SERVER_CONNECTIONS_FLOOD_GUARD_H_
 #define LOCUS_SERVER_CONNECTIONS_FLOOD_GUARD_H_
 
@@ -75,9 +75,9 @@ class FloodGuard {
   FloodGuard(const FloodGuard&) = delete;
   FloodGuard& operator=(const FloodGuard&) = delete;
 
-  // Begins to look at a connection that was just accepted.
+  // Begins to check a connection that was just accepted.
   void watch(const std::shared_ptr<Connection>& connection) LOCUS_EXCLUDES(mutex_);
-  // Stops looking at the connection. Call it before Connection::release().
+  // Stops checking the connection. Call forget() before Connection::release().
   void forget(const Connection& connection) LOCUS_EXCLUDES(mutex_);
 
   // Closes a connection that another check has found to flood the server. Does nothing if it is already closed.
@@ -95,7 +95,7 @@ class FloodGuard {
   };
 
   void run() LOCUS_EXCLUDES(mutex_);
-  // Waits until the next look is due. Returns false if the guard ends.
+  // Waits until the next check is due. Returns false if the guard ends.
   bool wait() LOCUS_EXCLUDES(mutex_);
   void look() LOCUS_EXCLUDES(mutex_);
   void look_at(const std::shared_ptr<Watched>& watched);

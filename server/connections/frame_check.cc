@@ -49,7 +49,7 @@ const char* FrameCheck::begin_frame() {
     case Frame::kPing:
       ++pings_;
       break;
-    case Frame::kWindowUpdate:  // one may follow each piece of a reply
+    case Frame::kWindowUpdate:  // a client may send one after each piece of a reply
       pings_ = std::max(0.0, pings_ - 1);
       break;
     case Frame::kData:

@@ -37,20 +37,23 @@ class FrameCheck {
   // before it accepts the first one. It is above the number of calls that a client may have open.
   static constexpr uint32_t kMaxCallsOfRead = 2048;
 
-  // Reason with which blocks of headers are refused that exceed the first two of these limits.
+  // Reason for which a block of headers that exceeds kMaxBlockBytes or kMaxContinuations is refused.
   static constexpr const char* kLongHeaders = "a block of headers that is too long or in too many frames";
 
-  // Checks the next bytes of the connection, which were read at `now`. Returns null if they are accepted, otherwise the
-  // reason for which the connection must be closed, a constant; later results have no meaning.
+  // Checks the next bytes of the connection, which were read at `now`. Returns null if the bytes are accepted.
+  // Otherwise returns the reason why the connection must be closed, a constant string; after that, results of further
+  // calls are meaningless.
   const char* refusal(absl::string_view bytes, Time now);
 
  private:
   static constexpr size_t kPrefaceBytes = 24;
   static constexpr size_t kFrameHeaderBytes = 9;
 
-  // Checks a frame whose header is complete. Returns null, or the reason of a refusal like refusal().
+  // Checks a frame whose header is complete. Returns null if the frame is accepted, otherwise the reason of the
+  // refusal.
   const char* begin_frame();
-  // Counts a frame of HEADERS. Only a frame with a new stream number of a client begins a call.
+  // Counts a HEADERS frame. It begins a call only if its stream number is odd, as those of clients are, and higher than
+  // all before.
   void begin_headers();
   // Subtracts from each count the number that is accepted in the time since the last read.
   void let_time_pass(Time now);
@@ -62,8 +65,8 @@ class FrameCheck {
   uint32_t continuations_ = 0;
   uint32_t last_stream_ = 0;    // number of the last stream that began a call
   uint32_t calls_of_read_ = 0;  // calls that began in the current read
-  // Counts that are never below 0, each less kPerSecond for each second: cancelled calls, less half of all calls;
-  // frames that carry nothing; and PING frames, less the frames that begin calls, carry data, or update windows.
+  // Counts that decrease by kPerSecond each second, but never below 0: cancelled calls, less half of all calls; frames
+  // that carry nothing; and PING frames, less the frames that begin calls, carry data, or update windows.
   double cancelled_ = 0;
   double empty_ = 0;
   double pings_ = 0;
