@@ -2,8 +2,8 @@
 // gains nothing by opening more connections. A client is named by its identity.
 //
 // Threads: any thread may call of(). Invariant: a client whose counter anybody holds has exactly one counter. Memory:
-// entries of clients whose counters nobody holds are removed before their number exceeds that of the others, or
-// kMinCleanup in each part.
+// when a part has twice as many entries as after its last cleanup, and at least kMinCleanup, a cleanup removes the
+// entries of clients whose counters nobody holds.
 #ifndef LOCUS_SERVER_SCHEDULING_CLIENT_SHARES_H_
 #define LOCUS_SERVER_SCHEDULING_CLIENT_SHARES_H_
 
@@ -25,7 +25,8 @@ class ClientShares {
  public:
   using Counter = std::atomic<uint64_t>;
 
-  // Returns the counter of a client, which is 0 if nobody holds it yet. It may outlive this object.
+  // Returns the counter of a client: a new counter, which is 0, if nobody holds one. The counter may outlive this
+  // object.
   std::shared_ptr<Counter> of(const std::string& client) {
     Part& part = parts_[absl::HashOf(client) % kParts];
     const MutexLock lock(part.mutex);

@@ -10,11 +10,11 @@
 //
 // Threads: every member may be called from any thread; the Meter is called by one thread at a time. No member frees
 // memory, because freeing takes long. Instead, a refusal contains a retry delay, and the owner of the budget frees
-// memory during the delay if take_shortage() returns true. Cost: a claim that fits takes no lock. The process is
-// measured in three cases: refresh() is called, a claim does not seem to fit, or claims of more than 1 / kStepShare of
-// the limit have ended since the last measurement.
-// Invariants: claimed_ is the sum of the live claims; when a claim succeeds, measured memory plus live claims is at
-// most the ceiling of its line, or the live claims that use the reserve are at most the reserve.
+// memory during the delay if take_shortage() returns true. Cost: a claim that fits takes no lock. The memory of the
+// process is measured in three cases: refresh() is called, a claim does not seem to fit, or the claims that have ended
+// since the last measurement add up to more than 1 / kStepShare of the limit. Invariants: claimed_ is the sum of the
+// live claims; when a claim succeeds, measured memory plus live claims is at most the ceiling of its line, or the live
+// claims that use the reserve are at most the reserve.
 #ifndef LOCUS_SERVER_SCHEDULING_MEMORY_BUDGET_H_
 #define LOCUS_SERVER_SCHEDULING_MEMORY_BUDGET_H_
 
@@ -133,7 +133,8 @@ class MemoryBudget {
   uint64_t connection_share() const;
 
  private:
-  // The process is measured again when claims of more than limit / kStepShare bytes have ended.
+  // The memory of the process is measured again once the claims that have ended since the last measurement add up to
+  // more than limit / kStepShare bytes.
   static constexpr uint64_t kStepShare = 32;
 
   // Claims of at most this many bytes may use the reserve.

@@ -100,7 +100,8 @@ class QueryScheduler {
   absl::StatusOr<TicketPtr> submit(QueryJob& job, uint64_t client, uint64_t nanoseconds) LOCUS_EXCLUDES(mutex_);
 
   // Removes the job and returns true if the job is not done and no thread is working on it; done() is then not called.
-  // Otherwise returns false: done() was called already or will be called, soon if the job ends its work early.
+  // Otherwise returns false: done() was called already or will be called. To have it called soon, the job must end its
+  // work early.
   bool withdraw(Ticket& ticket);
 
   SchedulerStats stats() const;

@@ -114,7 +114,7 @@ class UpdateQueue {
   Group take_group(SceneQueue& scene_queue) LOCUS_REQUIRES(mutex_);
   void requeue(SceneQueue& scene_queue, const Group& group) LOCUS_REQUIRES(mutex_);
   // Applies the group and calls done() of each of its batches. Returns false if the scene's readers hold too much
-  // memory; then `group` has the batches that still wait.
+  // memory; then `group` contains the batches that were not applied.
   bool apply(SceneQueue& scene_queue, Group& group) LOCUS_EXCLUDES(mutex_);
   void count(const Scene& scene, size_t updates) LOCUS_EXCLUDES(mutex_);
   static void drop_stopped(const SceneQueue& scene_queue, Group& group);
