@@ -29,7 +29,7 @@ struct LoadFigures {
   uint64_t items = 0;  // number of queries sent, or of objects moved
   uint64_t found = 0;
   std::vector<double> milliseconds;  // latency of each batch, in ms
-  std::vector<Sample> samples;       // some batches, spread evenly over the run; a bounded number
+  std::vector<Sample> samples;       // a bounded number of batches, spread evenly over the run
 
   double percentile(double fraction) const;
 };

@@ -13,12 +13,12 @@ namespace locus::cli {
 namespace {
 
 constexpr int kSections = 16;
-constexpr int kCuts = kSections - 1;  // number of cuts that are tested for each side
+constexpr int kCuts = kSections - 1;  // number of cuts, and so of tested slabs, for each side
 constexpr int kSides = 6;             // lower and upper side of each axis: side = 2 axis + (1 if upper)
 constexpr int kMaxRounds = 16;        // enough, since 16^16 exceeds the resolution of doubles
 // A box is flat along an axis if its size along the axis is less than this share of its longest side.
 constexpr double kFlat = 1e-4;
-constexpr double kWidening = 1e-6;  // share of the longest side; more than the rounding error of slabs in float
+constexpr double kWidening = 1e-6;  // a box is widened by this share of its longest side, above float rounding of slabs
 
 absl::Status not_found(const std::string& scene, uint64_t id, absl::string_view why) {
   return absl::NotFoundError(absl::StrCat("scene ", scene, " has no object or instance ", id, why));
@@ -48,8 +48,9 @@ Aabbd slab_of(const Aabbd& box, int side, int cut) {
   return slab;
 }
 
-// Returns for each slab of `box`, ordered by side and then by cut, whether the object or instance `id` overlaps the
-// slab. Slabs are sent relative to the box's centre, so that float precision increases as the box shrinks.
+// Returns one value for each slab of `box`: whether the object or instance `id` overlaps the slab. The slabs are
+// ordered by side, and for each side by cut. Slabs are sent relative to the box's centre, so that float precision
+// increases as the box shrinks.
 absl::StatusOr<std::vector<bool>> ask_slabs(const client::Client& client, const std::string& scene,
                                             const client::Revision& revision, uint64_t id, const Aabbd& box) {
   const Vec3d frame = (box.min + box.max) * 0.5;
