@@ -62,9 +62,9 @@ class QueryRace {
   }
 
  private:
-  // Work of one contender in a turn: `parts` calls. These are several passes over all queries if the contender is fast,
-  // since a single pass would mostly measure reloading the caches, which the others have filled; less than a pass if it
-  // is slow.
+  // Work of one contender in a turn: `parts` calls. A fast contender makes several passes over all queries, since a
+  // single pass would mostly measure reloading the caches, which the others have filled. A slow contender makes less
+  // than one pass.
   struct Entry {
     Contender* contender = nullptr;
     size_t parts = 1;
