@@ -22,7 +22,7 @@ using std::chrono::steady_clock;
 // Maximum number of connections that are accepted from one socket before the other sockets are served.
 constexpr int kAcceptsAtOnce = 64;
 constexpr int kWakeUpsAtOnce = 256;
-// Reason with which idle connections are closed.
+// Reason given to Connection::close() for idle connections.
 constexpr const char* kIdle = "idle for too long";
 constexpr milliseconds kPause{100};  // pause after accept() has failed because descriptors or memory are used up
 constexpr milliseconds kCheckInterval{1000};

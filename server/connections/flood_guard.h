@@ -23,7 +23,7 @@
 
 namespace locus::server {
 
-// Budgets of one connection. See assess().
+// Limits on the traffic of one connection. See assess().
 struct FloodLimits {
   uint64_t bytes_per_second = uint64_t{1} << 20;  // unexplained bytes that are always accepted
   uint64_t burst_bytes = uint64_t{4} << 20;       // unexplained bytes that are accepted at once
