@@ -29,7 +29,7 @@ class ChangeQueue {
   ChangeQueue(const ChangeQueue&) = delete;
   ChangeQueue& operator=(const ChangeQueue&) = delete;
 
-  // Queues the job and returns its number within the key, counted from 1. RESOURCE_EXHAUSTED, naming the limit
+  // Queues the job and returns its number within the key, counted from 1. Returns RESOURCE_EXHAUSTED, naming the limit
   // pending_changes, if the key has `max_waiting` jobs.
   absl::StatusOr<uint64_t> submit(uint64_t key, Job job) LOCUS_EXCLUDES(mutex_);
 
