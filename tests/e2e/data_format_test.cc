@@ -121,8 +121,8 @@ class DataFormatTest : public ::testing::Test {
     return dump.substr(at + 5, dump.find('\n', at) - at - 5);
   }
 
-  // Returns everything that a client can see of the directory, as text. The scene "quick" and epochs may differ from
-  // daemon to daemon.
+  // Returns everything that a client can see of the directory, as text. In this text, the scene "quick" and all epochs
+  // may differ from daemon to daemon.
   std::string words() {
     std::string words;
     v1::ListScenesResponse scenes =

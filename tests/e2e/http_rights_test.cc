@@ -62,7 +62,7 @@ class HttpRightsTest : public ::testing::Test {
     return config;
   }
   void start(const server::ServerConfig& config) { running_.emplace(config); }
-  // Returns the value of a metric with its labels, as its line in /metrics begins.
+  // Returns the value of a metric. `name` is the metric's name with its labels, as written in /metrics.
   double metric(const std::string& name, HttpReader reader) {
     reader.authorization = "Bearer " + tokens_["scraper"];
     const std::string page = "\n" + http_get(running_->server().http_port(), "/metrics", "GET", reader).body;
@@ -71,7 +71,7 @@ class HttpRightsTest : public ::testing::Test {
     return line == std::string::npos ? -1 : std::stod(page.substr(line + name.size() + 2));
   }
   std::string read(const std::string& name) const { return text_of(folder_.file(name)); }
-  // Returns the code of a page; 0 if the connection failed.
+  // Returns the HTTP status code for a page; 0 if the connection failed.
   long code(const std::string& page, const std::string& who, HttpReader reader = {}) {
     if (!who.empty()) reader.authorization = "Bearer " + tokens_[who];
     return http_get(running_->server().http_port(), page, "GET", reader).code;
@@ -122,7 +122,7 @@ TEST_F(HttpRightsTest, RefusalsSayNothingOfScenesAndAreAudited) {
   EXPECT_THAT(none.headers, HasSubstr("WWW-Authenticate: Bearer"));
   EXPECT_THAT(http_get(port, "/metrics", "GET", {.authorization = "Bearer " + tokens_["ops"]}).body,
               HasSubstr("token:ops lacks the right metrics"));
-  running_.reset();  // writes what is queued
+  running_.reset();  // writes the queued lines
   const std::string audit = read("audit.refused");
   EXPECT_THAT(audit, HasSubstr(R"("principal":"anonymous","peer":"ipv4:127.0.0.1:)"));
   EXPECT_THAT(audit, HasSubstr(R"("rpc":"/metrics","subject":"","code":"PERMISSION_DENIED")"));
@@ -166,7 +166,7 @@ TEST_F(HttpRightsTest, AnAccessFileThatCannotBeUsedIsCountedUntilItIsMendedAndTh
   EXPECT_EQ(metric(R"(locus_files_refused{files="access"})", {}), 0);
   EXPECT_GE(metric(R"(locus_file_reloads_total{files="access"})", {}), 1);
   EXPECT_EQ(metric(R"(locus_files_refused{files="tls"})", {}), 0);
-  running_.reset();  // writes what is queued
+  running_.reset();  // writes the queued lines
   EXPECT_THAT(read("audit"), HasSubstr(R"("rpc":"reload","subject":"access files","code":"OK")"));
   EXPECT_THAT(read("audit.refused"), HasSubstr(R"("rpc":"reload","subject":"access files","code":"INVALID_ARGUMENT")"));
 }

@@ -182,7 +182,7 @@ class RightsTableTest : public ::testing::Test {
           << status.error_message();
     }
   }
-  // Does so for every column but the last.
+  // Gives the caller the rights of each column in turn, and calls expect_column() for the column.
   void expect_columns(const RpcCaller& caller) {
     for (size_t column = 0; column < kColumns.size(); ++column) {
       write("access", absl::StrCat("grant token:root admin *\n",

@@ -110,7 +110,7 @@ TEST_F(TlsTest, FailedHandshakesAreCountedAndAudited) {
   }));
 }
 
-// A TLS connection of a client that offers one protocol and sends bytes of its own making.
+// A TLS connection of a client that offers one ALPN protocol and sends arbitrary bytes.
 class RawTlsSocket {
  public:
   RawTlsSocket(int port, const std::string& protocol) : socket_(port) {
@@ -137,7 +137,7 @@ class RawTlsSocket {
   const std::unique_ptr<SSL, decltype(&SSL_free)> ssl_{SSL_new(context_.get()), &SSL_free};
 };
 
-// gRPC accepts two names of HTTP/2.
+// The test uses both ALPN names under which gRPC accepts HTTP/2.
 TEST_F(TlsTest, ABlockOfHeadersThatIsTooLongClosesItsConnection) {
   RunningServer running(config(false));
   constexpr uint8_t kHeaders = 1, kContinuation = 9;
@@ -203,7 +203,7 @@ TEST_F(TlsTest, ConnectionsEndWhenAClientCaIsRemoved) {
   ASSERT_TRUE(get_server(channel).ok());
   const grpc::Status ended = end_of_stream(channel, [&] {
     replace_file(folder_.file("ca"), next.certificate());
-    running.server().reload_tls();  // false if the server has just read it by itself
+    running.server().reload_tls();  // returns false if the server has just reloaded the file by itself
   });
   EXPECT_EQ(ended.error_code(), grpc::StatusCode::UNAVAILABLE);
   EXPECT_FALSE(get_server(channel, std::chrono::seconds(2)).ok());
@@ -250,11 +250,11 @@ TEST_F(TlsTest, AServerWithABadNewFileServesNewConnections) {
   }
 }
 
-// Runs clients with tokens on old and new connections while certificates, tokens and rights are replaced.
-// Clients that call without a pause while every file of TLS and access control changes.
+// Fixture whose clients call without a pause, with tokens and on old and new connections, while every file of TLS and
+// access control is replaced.
 class TlsReloadTest : public TlsTest {
  protected:
-  // `mutual`: the server asks for certificates of clients, and the file of their authorities changes too.
+  // With `mutual`, the server requires client certificates, and the file of the clients' authorities changes too.
   explicit TlsReloadTest(bool mutual = false) : mutual_(mutual) {
     change_access(0);
     change_keys();
@@ -306,7 +306,7 @@ class TlsReloadTest : public TlsTest {
                                                       "\ngrant token:caller admin *\ngrant token:guest read *\n"
                                                       "grant jwt:caller read *\n"));
   }
-  // Replaces the keys of JWTs, but for the one that is in use.
+  // Replaces the file of keys for JWTs. The key that is in use stays in the file; the other key changes.
   void change_keys() const {
     replace_file(folder_.file("jwks"), absl::StrCat(R"({"keys":[)", key_.jwk(R"(,"kid":"kept")"), ",",
                                                     SigningKey::ed25519().jwk(R"(,"kid":"other")"), "]}"));
@@ -341,7 +341,7 @@ class TlsReloadTest : public TlsTest {
     return end - begin;
   }
 
-  // Replaces the certificate and the other files, adds a token and revokes it, `times` times.
+  // Replaces the certificate and the other files, then adds a token and revokes it; does all this `times` times.
   void reload(int times) {
     create_world();
     start_clients();
@@ -388,7 +388,7 @@ class TlsReloadTest : public TlsTest {
 
 TEST_F(TlsReloadTest, FiftyChangesDropNoCallAndEndTheStreamsOfRevokedTokens) { reload(50); }
 
-// The same with certificates of clients.
+// TlsReloadTest with client certificates.
 class MutualTlsReloadTest : public TlsReloadTest {
  protected:
   MutualTlsReloadTest() : TlsReloadTest(true) {}
