@@ -357,12 +357,13 @@ class QueryOracle : public RayOracle {
 
   // Returns the unit vector from the nearest point of a row to the query's point; `row.normal` is the opposite vector,
   // not normalised. If both points are equal, returns the normal of the triangle's front.
-  static Vec3d away(const Row& row, bool conservative) {
+  Vec3d away(const Row& row, bool conservative) const {
     if (conservative) return {};
     if (row.normal != Vec3d{}) return normalized(-row.normal) + Vec3d{};
     if (row.instance == nullptr) return {};
     const Corners corners = corners_of(row.instance->transform, row.instance->mesh->triangle(row.triangle));
-    const Vec3d front = cross(corners[1] - corners[0], corners[2] - corners[0]);
+    Vec3d front = cross(corners[1] - corners[0], corners[2] - corners[0]);
+    if (clockwise_) front = -front;
     return squared_length(front) > 0 ? normalized(front) + Vec3d{} : Vec3d{};
   }
 

@@ -64,7 +64,7 @@ CellAnswer run_cell(QueryTask& task, const SceneAtTime& moment, const CellReques
   while (true) {
     const absl::InlinedVector<Hit, 1> rows = run_nearest(task, moment, nearest, filter).rows;
     for (const Hit& row : rows) {
-      const Vec3d offset = nearest_surface(nearest, row).offset;
+      const Vec3d offset = nearest_surface(nearest, row, task.snapshot().winding).offset;
       if (row.t == 0 || offset == Vec3d{}) return {};
       const auto beyond = [&](const CellPlane& plane) {
         return is_beyond(plane, request.point, request.precision, row);

@@ -336,7 +336,7 @@ NearestAnswer run_nearest(QueryTask& task, const SceneAtTime& moment, const Near
   return rows.finish();
 }
 
-NearestSurface nearest_surface(const NearestRequest& request, const Hit& row) {
+NearestSurface nearest_surface(const NearestRequest& request, const Hit& row, Winding winding) {
   const Vec3d point = request.point;
   const bool conservative = request.precision == Precision::kConservative;
   NearestSurface surface;
@@ -363,7 +363,7 @@ NearestSurface nearest_surface(const NearestRequest& request, const Hit& row) {
   if (surface.offset != Vec3d{})
     surface.normal = normalized(-surface.offset);
   else if (area > 0)
-    surface.normal = normalized(front);
+    surface.normal = normalized(winding == Winding::kClockwise ? -front : front);
   return surface;
 }
 

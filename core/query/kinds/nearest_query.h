@@ -44,14 +44,15 @@ NearestAnswer run_nearest(QueryTask& task, const SceneAtTime& moment, const Near
 // Nearest point of a row's object or triangle or, for a CONSERVATIVE query, of the bounds of the object or triangle.
 struct NearestSurface {
   Vec3d offset;  // from request.point to the nearest point; zero if request.point lies inside
-  // Unit vector from the nearest point to request.point. If both points are equal, `normal` is the unit normal on the
-  // side from which the triangle's stored vertices appear counter-clockwise; it is zero for an object and for a
-  // triangle without area. `normal` is zero for a CONSERVATIVE query.
+  // Unit vector from the nearest point to request.point. If both points are equal, `normal` is the unit normal of the
+  // triangle's front; it is zero for an object and for a triangle without area. `normal` is zero for a CONSERVATIVE
+  // query.
   Vec3d normal;
   float u = 0, v = 0;  // weights of the triangle's second and third vertex; 0 for an object and if CONSERVATIVE
 };
 // Returns the nearest point. It is computed again from the stored object or triangle, since a Hit does not store it.
-NearestSurface nearest_surface(const NearestRequest& request, const Hit& row);
+// `winding` is the scene's, which determines the fronts of triangles.
+NearestSurface nearest_surface(const NearestRequest& request, const Hit& row, Winding winding);
 
 }  // namespace locus
 

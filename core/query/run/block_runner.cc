@@ -296,7 +296,7 @@ void BlockRunner::run_query(const NearestColumns& nearest, size_t i) {
   const RowSpans to = add_rows(result_, columns_, kept);
   for (size_t row = 0; row < kept; ++row) {
     write_row(rows[row], to, row);
-    write_nearest_surface(request, block_.frame, rows[row], to, row);
+    write_nearest_surface(request, block_.frame, rows[row], task_.snapshot().winding, to, row);
   }
   count_rows(kept, kept < rows.size(), i);
 }

@@ -139,9 +139,10 @@ void write_cell(const CellAnswer& cell, Vec3d point, const RowSpans& to, size_t 
   }
 }
 
-void write_nearest_surface(const NearestRequest& request, Vec3d frame, const Hit& hit, const RowSpans& to, size_t row) {
+void write_nearest_surface(const NearestRequest& request, Vec3d frame, const Hit& hit, Winding winding,
+                           const RowSpans& to, size_t row) {
   if (to.points == nullptr && to.normals == nullptr && to.uvs == nullptr) return;
-  const NearestSurface surface = nearest_surface(request, hit);
+  const NearestSurface surface = nearest_surface(request, hit, winding);
   const Vec3f point = to_float(request.point - frame + surface.offset);
   const Vec3f normal = to_float(surface.normal + Vec3d{});
   if (to.points != nullptr) write_point(to.points, row, point.x, point.y, point.z);

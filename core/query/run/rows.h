@@ -41,7 +41,8 @@ void write_overlap_contact(const Mover& solid, Precision precision, Vec3d frame,
 void write_contact(const SweepRequest& request, Vec3d frame, const Hit& hit, const RowSpans& to, size_t row);
 // Writes those of the columns uv, normal and point that the block returns, for a row of a nearest query. The point is
 // relative to `frame`.
-void write_nearest_surface(const NearestRequest& request, Vec3d frame, const Hit& hit, const RowSpans& to, size_t row);
+void write_nearest_surface(const NearestRequest& request, Vec3d frame, const Hit& hit, Winding winding,
+                           const RowSpans& to, size_t row);
 
 // Writes the first `rows` rows of a cell, beginning at row 0: the ball, then the planes. `point` is the query's point,
 // relative to the block's frame.

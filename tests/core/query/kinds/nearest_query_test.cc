@@ -109,6 +109,24 @@ TEST(NearestQueryTest, APointInASolidOrOnASurfaceHasDistanceZeroAndIsItsOwnNeare
   EXPECT_THAT(result.points, ElementsAre(1.5, 2, 3, 1.5, 2, 3, 1.5, 2, 3));
 }
 
+TEST(NearestQueryTest, TheNormalOfAPointOnATriangleIsThatOfTheFrontByTheWindingOfTheScene) {
+  QueryWorld world;
+  world.instances = {placed(4, mesh_of({wall_triangle(5)}))};
+  OwnedBlock block = one_point({5, 0, 0});
+  block.settings.columns = {Column::kT, Column::kNormal};
+  world.winding = Winding::kCounterClockwise;
+  const BlockResult counter = run_block(*snapshot_of(world), block);
+  world.winding = Winding::kClockwise;
+  const BlockResult clockwise = run_block(*snapshot_of(world), block);
+  EXPECT_THAT(counter.t, ElementsAre(0));
+  EXPECT_THAT(clockwise.normals, ElementsAre(-counter.normals[0], 0, 0));
+  EXPECT_EQ(std::abs(counter.normals[0]), 1);
+  // A ray that ignores backs hits the triangle from the side of this normal.
+  OwnedBlock ray = one_ray(RayMode::kFirst, {5 + clockwise.normals[0], 0, 0}, {-clockwise.normals[0], 0, 0});
+  rays_of(ray).cull = Cull::kBack;
+  EXPECT_THAT(run_block(*snapshot_of(world), ray).t, ElementsAre(1));
+}
+
 TEST(NearestQueryTest, PointsAreOnTheSurfaceRelativeToTheFrame) {
   QueryWorld world;
   world.objects = {ball_object(1, {1e6 + 3, 4, 0}, 4), box_object(2, {1e6 - 5, 0, 0})};
