@@ -31,7 +31,7 @@ struct Endpoint {
 // Client::connect().
 absl::StatusOr<Endpoint> endpoint_from_environment(const std::string& context = {});
 
-// What the caller of complete_endpoint() has set already.
+// Options that the caller of complete_endpoint() has set already.
 struct GivenOptions {
   bool address = false;
   bool tls = false;

@@ -20,11 +20,11 @@ inline constexpr size_t kMaxPrincipalBytes = 256;  // text of a principal
 inline constexpr size_t kMaxJwtBytes = 8192;
 inline constexpr int64_t kJwtSkewSeconds = 60;  // maximum difference of the clocks of a JWT's issuer and the server
 
-inline constexpr size_t kMaxQuotaSubjects = 65536;        // identities and connections whose use is counted
-inline constexpr size_t kMaxAuditQueue = 4096;            // audit lines that wait for the writer
-inline constexpr size_t kMaxAuditedPairs = 1024;          // pairs of principal and scene whose updates are counted
-inline constexpr size_t kMaxAuditTextBytes = 1024;        // each text of an audit line
-inline constexpr uint32_t kAuditFiles = 5;                // audit files kept: the current one and four older ones
+inline constexpr size_t kMaxQuotaSubjects = 65536;  // identities and connections whose use is counted
+inline constexpr size_t kMaxAuditQueue = 4096;      // audit lines that wait for the writer
+inline constexpr size_t kMaxAuditedPairs = 1024;    // pairs of principal and scene whose updates are counted
+inline constexpr size_t kMaxAuditTextBytes = 1024;  // each text of an audit line
+inline constexpr uint32_t kAuditFiles = 5;          // audit files kept: the current one and four older ones
 // Pause between two looks at the watched files. A change takes effect when two looks in a row find the same state.
 inline constexpr uint32_t kFileWatchMilliseconds = 200;
 inline constexpr uint32_t kFileRetryMilliseconds = 1000;  // pause between two readings of files that fail

@@ -112,7 +112,7 @@ ONE_ROOM = {"client/cli/levels/import/quake": "client/cli/levels/import"}
 
 def room_of_include(target):
     """Returns the folder to which an included file belongs, or None for Abseil and other libraries."""
-    if target.startswith("locus/v1/"):
+    if target.startswith("locus/"):  # generated from the protocol
         return "proto"
     top = target.split("/")[0]
     return posixpath.dirname(target) if top in ("core", "server", "client", "tests", "proto", "deploy") else None

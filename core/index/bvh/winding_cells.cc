@@ -86,8 +86,8 @@ void WindingCells::divide(const Aabbf& bounds, size_t triangles) {
   const double most = std::min(double{kMaxCells}, kCellsPerTriangle * static_cast<double>(triangles));
   Cell counts = {1, 1, 1};
   // Decreases the size of a cell until there would be more than `most` cells.
-  constexpr double kShrink = 0.9, kLeast = 1.0 / kMaxCellsPerAxis;
-  for (double part = 1; part > kLeast; part *= kShrink) {
+  constexpr double kShrink = 0.9, kMinPart = 1.0 / kMaxCellsPerAxis;
+  for (double part = 1; part > kMinPart; part *= kShrink) {
     const double size = part * max_component(extent);
     Cell smaller;
     for (int axis = 0; axis < 3; ++axis)
