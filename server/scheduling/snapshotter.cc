@@ -68,8 +68,8 @@ bool Snapshotter::snapshot_due_scenes() {
       if (ended()) return true;
       if (!due(*scene)) continue;
       const absl::StatusOr<uint64_t> bytes = write(*scene);
-      // The scene was deleted while its snapshot was written, and so needs no snapshot.
-      if (ended() || absl::IsNotFound(bytes.status())) return true;
+      if (ended()) return true;
+      if (absl::IsNotFound(bytes.status())) continue;  // the scene was deleted meanwhile, so it needs no snapshot
       if (options_.on_snapshot) options_.on_snapshot(*scene, bytes);
       const MutexLock lock(mutex_);
       stats_.written += bytes.ok() ? 1 : 0;

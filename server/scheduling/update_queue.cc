@@ -244,7 +244,7 @@ bool UpdateQueue::apply(SceneQueue& scene_queue, Group& group) {
     return false;
   }
   LOCUS_DCHECK(!acks.ok() || acks->size() == group.size());
-  count(*scene_queue.scene, group.size());
+  if (acks.ok()) count(*scene_queue.scene, group.size());
   for (size_t i = 0; i < group.size(); ++i) group[i]->done(acks.ok() ? std::move((*acks)[i]) : acks.status());
   return true;
 }

@@ -174,7 +174,9 @@ class MemoryLog : public UpdateLog {
     if (!chunks.ok()) return chunks.status();
     const MutexLock lock(mutex_);
     if (!failure_.ok()) return failure_;
-    KeptScene& scene = kept_.scenes.at(key);
+    const auto found = kept_.scenes.find(key);
+    if (found == kept_.scenes.end()) return absl::NotFoundError("no such scene");
+    KeptScene& scene = found->second;
     LOCUS_CHECK_LE(scene.snapshot_sequence, sequence);
     LOCUS_CHECK_LE(sequence, scene.last());
     scene.records.erase(scene.records.begin(),

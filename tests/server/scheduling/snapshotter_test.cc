@@ -112,6 +112,16 @@ TEST_F(SnapshotterTest, AFailedSnapshotIsReportedAndRetried) {
   EXPECT_EQ(recovered()->latest()->objects.size(), 200u);
 }
 
+TEST_F(SnapshotterTest, ASceneThatWasDeletedDoesNotKeepTheOthersFromTheirSnapshots) {
+  apply(200);
+  EXPECT_TRUE(log_.delete_scene(scene_->log_key()).ok());  // as if the registry were about to drop the scene
+  scene_ = registry_.create_scene("beta", {}, 6, "", false)->scene;
+  apply(200);
+  const Snapshotter snapshotter(registry_, &log_, eager());
+  wait_for_snapshots(snapshotter, 1);
+  EXPECT_EQ(snapshotter.stats().failed, 0u);
+}
+
 TEST_F(SnapshotterTest, WithoutALogItDoesNothing) {
   Registry registry;
   const Snapshotter snapshotter(registry, nullptr, eager());

@@ -414,11 +414,13 @@ TEST_F(LoggedUpdateQueueTest, AFullDiskRefusesUpdatesUntilSpaceIsFree) {
   ASSERT_TRUE(queue.post(scene_, *refused, WhenFull::kRefuse).ok());
   EXPECT_EQ(refused->wait().status().code(), absl::StatusCode::kResourceExhausted);
   EXPECT_EQ(scene_->latest()->revision, 0u);
+  EXPECT_EQ(queue.stats().applied, 0u);
   log_.fail_with(absl::OkStatus());
   const auto applied = insert({1});
   ASSERT_TRUE(queue.post(scene_, *applied, WhenFull::kRefuse).ok());
   EXPECT_TRUE(applied->wait().ok());
   EXPECT_EQ(scene_->latest()->revision, 1u);
+  EXPECT_EQ(queue.stats().applied, 1u);
 }
 
 }  // namespace
