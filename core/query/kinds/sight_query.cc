@@ -15,6 +15,9 @@
 namespace locus {
 namespace {
 
+// Maximum number of segments in one call of a kernel or of find_hits(), which cannot be interrupted.
+constexpr size_t kMaxSegmentsAtOnce = 128;
+
 // Segment from an eye to a sample point.
 struct Segment {
   uint32_t target;  // index of the target's byte in the answer
@@ -24,6 +27,71 @@ struct Segment {
   bool is_blocked = false;
 };
 
+// One viewer of a block: its filter, and its segments.
+class Viewer {
+ public:
+  Viewer(const QueryBlock& block, const SightColumns& sight, size_t index)
+      : block_(block),
+        sight_(sight),
+        index_(index),
+        group_(planted(PlantedBug::kOwnGroupBlocks) ? 0
+                                                    : ColumnReader<uint64_t>(sight.viewer_groups, 1).value(index, 0)),
+        filter_(block, index),
+        max_distance_(
+            ColumnReader<float>(sight.max_distances, 1).value(index, std::numeric_limits<float>::infinity())) {}
+
+  Group group_of(uint32_t target) const {
+    const ColumnReader<uint64_t> groups(sight_.target_groups, 1);
+    return groups.value(sight_.pairwise ? index_ : target, 0);
+  }
+  // Returns the filter of the segments to a target. Objects and instances that the filter accepts block a segment if
+  // they meet it.
+  Filter filter_of(uint32_t target) const {
+    Filter filter = filter_;
+    filter.ignore(group_, group_of(target));
+    return filter;
+  }
+  // Returns the filter of what may block any of the viewer's segments.
+  Filter filter() const {
+    Filter filter = filter_;
+    filter.ignore(group_, 0);
+    return filter;
+  }
+
+  // Returns the index of sample `k` of a target in the block.
+  uint32_t sample_of(uint32_t target, size_t k) const {
+    const size_t samples = sight_.samples_per_target(), first = sight_.pairwise ? index_ * samples : 0;
+    return static_cast<uint32_t>(first + target * samples + k);
+  }
+  // Returns the way from an eye to a sample.
+  Vec3d way(Vec3d eye, uint32_t sample) const {
+    return block_.frame + read_vec3d(&sight_.targets[size_t{3} * sample]) - eye;
+  }
+  // Returns whether a sample at the end of `way` is near enough to be seen.
+  bool reaches(Vec3d way) const { return std::sqrt(squared_length(way)) <= double{max_distance_}; }
+
+  // Returns the ray of mode ANY that is blocked if the segment along `way` is.
+  RayRequest request(Vec3d eye, Vec3d way, Source source) const {
+    RayRequest request{};
+    request.origin = eye;
+    request.direction = way;
+    request.t_max = 1;
+    request.mode = RayMode::kAny;
+    request.source = source;
+    request.precision = block_.precision;
+    request.max_results = 1;
+    return request;
+  }
+
+ private:
+  const QueryBlock& block_;
+  const SightColumns& sight_;
+  const size_t index_;
+  const Group group_;
+  const Filter filter_;
+  const float max_distance_;
+};
+
 // Search of the segments of one viewer, eye after eye. A sample that one eye sees is not searched again for the
 // following eyes. All segments of an eye start at the same point, so the eye is transformed to the axes of a mesh only
 // once. Neighbouring segments are often blocked by the same triangles, so the block of triangles that blocked a
@@ -31,16 +99,7 @@ struct Segment {
 class Look {
  public:
   Look(QueryTask& task, const SceneAtTime& moment, const QueryBlock& block, const SightColumns& sight, size_t viewer)
-      : task_(task),
-        moment_(moment),
-        block_(block),
-        sight_(sight),
-        viewer_(viewer),
-        viewer_group_(
-            planted(PlantedBug::kOwnGroupBlocks) ? 0 : ColumnReader<uint64_t>(sight.viewer_groups, 1).value(viewer, 0)),
-        filter_(block, viewer),
-        max_distance_(
-            ColumnReader<float>(sight.max_distances, 1).value(viewer, std::numeric_limits<float>::infinity())) {}
+      : task_(task), moment_(moment), block_(block), sight_(sight), viewer_(block, sight, viewer) {}
 
   // Counts the samples that are seen from `eye` and were not seen from a previous eye.
   void from(Vec3d eye, absl::Span<char> seen) {
@@ -67,25 +126,10 @@ class Look {
   // Number of segments that are tested at once in the first pass of trace(), which has one segment per target. A block
   // that blocks one of these segments is the hint of the following segments.
   static constexpr size_t kSegmentsAtOnce = 16;
-  // Maximum number of segments in one call of a kernel or of find_hits(), which cannot be interrupted.
-  static constexpr size_t kMaxAtOnce = 128;
 
   bool uses_kernels() const {
     return block_.precision == Precision::kExact && block_.source != Source::kDynamic &&
            task_.ray_kernels() != nullptr && task_.snapshot().statics->size() <= kFewInstances;
-  }
-
-  size_t samples() const { return sight_.samples_per_target(); }
-  Group group_of(uint32_t target) const {
-    const ColumnReader<uint64_t> groups(sight_.target_groups, 1);
-    return groups.value(sight_.pairwise ? viewer_ : target, 0);
-  }
-  // Returns the filter of the segments to a target. Objects and instances that the filter accepts block a segment if
-  // they meet it.
-  Filter filter_of(uint32_t target) const {
-    Filter filter = filter_;
-    filter.ignore(viewer_group_, group_of(target));
-    return filter;
   }
 
   void see(uint32_t target, uint32_t sample, absl::Span<char> seen) {
@@ -99,15 +143,14 @@ class Look {
   void gather(absl::Span<char> seen) {
     segments_.clear();
     if (sight_.eyes_per_viewer() > 1 && is_seen_.empty()) is_seen_.resize(sight_.targets.size() / 3);
-    const size_t first = sight_.pairwise ? viewer_ * samples() : 0;
     for (uint32_t target = 0; target < seen.size(); ++target) {
-      for (size_t k = 0; k < samples(); ++k) {
-        const auto sample = static_cast<uint32_t>(first + target * samples() + k);
+      for (size_t k = 0; k < sight_.samples_per_target(); ++k) {
+        const uint32_t sample = viewer_.sample_of(target, k);
         if (!is_seen_.empty() && is_seen_[sample] != 0) continue;
-        const Vec3d way = block_.frame + read_vec3d(&sight_.targets[size_t{3} * sample]) - eye_;
+        const Vec3d way = viewer_.way(eye_, sample);
         if (way == Vec3d{})
           see(target, sample, seen);
-        else if (std::sqrt(squared_length(way)) <= double{max_distance_})
+        else if (viewer_.reaches(way))
           segments_.push_back({target, sample, way, kNoBlock});
       }
     }
@@ -148,12 +191,12 @@ class Look {
   // Tests the segments that are not blocked yet against one instance: first one segment of each target, then the other
   // segments. Their hint is the block that blocked the first segment of the same target.
   void trace(const Instance& instance) {
-    if (task_.ended() || !task_.count_test() || !filter_of_viewer().accepts(instance)) return;
+    if (task_.ended() || !task_.count_test() || !viewer_.filter().accepts(instance)) return;
     open_.clear();
     for (uint32_t i = 0; i < segments_.size(); ++i) {
       Segment& segment = segments_[i];
       segment.hint = kNoBlock;
-      if (!segment.is_blocked && (instance.group == 0 || instance.group != group_of(segment.target)))
+      if (!segment.is_blocked && (instance.group == 0 || instance.group != viewer_.group_of(segment.target)))
         open_.push_back(i);
     }
     const Vec3d origin = instance.transform.point_to_mesh(eye_);
@@ -182,17 +225,11 @@ class Look {
       }
       segments_[open_[k]].hint = segments_[first].hint;
       now_.push_back(open_[k]);
-      if (now_.size() < kMaxAtOnce) continue;
+      if (now_.size() < kMaxSegmentsAtOnce) continue;
       trace(instance, origin, hint);
       now_.clear();
     }
     trace(instance, origin, hint);
-  }
-
-  Filter filter_of_viewer() const {
-    Filter filter = filter_;
-    filter.ignore(viewer_group_, 0);
-    return filter;
   }
 
   // Tests the segments of now_ against one instance by a kernel. Sets the hint of a blocked segment to the block that
@@ -262,30 +299,19 @@ class Look {
   // instance's bounds.
   void trace_one(const Instance& instance, float nearest, Segment& segment) {
     const SlabRay<double> slabs(Rayd{eye_, segment.way}, kInstancePad);
-    HitCollector collector(request_of(segment, Source::kStatic));
-    trace_instance(task_, request_of(segment, Source::kStatic), slabs, instance, nearest, collector);
+    const RayRequest request = viewer_.request(eye_, segment.way, Source::kStatic);
+    HitCollector collector(request);
+    trace_instance(task_, request, slabs, instance, nearest, collector);
     segment.is_blocked = collector.done();
-  }
-
-  RayRequest request_of(const Segment& segment, Source source) const {
-    RayRequest request{};
-    request.origin = eye_;
-    request.direction = segment.way;
-    request.t_max = 1;
-    request.mode = RayMode::kAny;
-    request.source = source;
-    request.precision = block_.precision;
-    request.max_results = 1;
-    return request;
   }
 
   // Searches the segments as rays of mode ANY among the instances or the objects.
   void search_rays(Source source) {
-    for (size_t begin = 0; begin < segments_.size() && !task_.ended(); begin += kMaxAtOnce) {
-      const size_t end = std::min(segments_.size(), begin + kMaxAtOnce);
+    for (size_t begin = 0; begin < segments_.size() && !task_.ended(); begin += kMaxSegmentsAtOnce) {
+      const size_t end = std::min(segments_.size(), begin + kMaxSegmentsAtOnce);
       rays_.clear();
       for (size_t i = begin; i < end; ++i)
-        rays_.emplace_back(request_of(segments_[i], source), filter_of(segments_[i].target));
+        rays_.emplace_back(viewer_.request(eye_, segments_[i].way, source), viewer_.filter_of(segments_[i].target));
       find_hits(task_, rays_, [this](size_t) -> const SceneAtTime& { return moment_; });
       for (size_t i = begin; i < end; ++i) segments_[i].is_blocked = rays_[i - begin].collector.done();
     }
@@ -300,10 +326,7 @@ class Look {
   const SceneAtTime& moment_;
   const QueryBlock& block_;
   const SightColumns& sight_;
-  const size_t viewer_;
-  const Group viewer_group_;
-  const Filter filter_;
-  const float max_distance_;
+  const Viewer viewer_;
   Vec3d eye_;
   std::vector<uint8_t> is_seen_;  // for each sample point; only for viewers with several eyes
   std::vector<Segment> segments_, sorted_;
@@ -324,6 +347,38 @@ void look(QueryTask& task, const SceneAtTime& moment, const QueryBlock& block, c
   const size_t eyes = sight.eyes_per_viewer();
   for (size_t eye = 0; eye < eyes && !task.ended(); ++eye)
     look.from(origin + read_vec3d(&sight.viewers[3 * (i * eyes + eye)]), seen);
+}
+
+size_t viewers_together(const SightColumns& sight) {
+  constexpr size_t kFewSegments = 8;
+  const size_t segments = sight.bytes_per_viewer() * sight.samples_per_target();
+  return sight.eyes_per_viewer() == 1 && segments > 0 && segments <= kFewSegments ? kMaxSegmentsAtOnce / segments : 0;
+}
+
+void look_together(QueryTask& task, const QueryBlock& block, const SightColumns& sight,
+                   absl::Span<const SightQuery> queries) {
+  std::vector<PendingRay> rays;
+  std::vector<std::pair<size_t, char*>> owners;  // for each ray its query, and the byte of its target
+  for (size_t query = 0; query < queries.size(); ++query) {
+    const SightQuery& now = queries[query];
+    const Viewer viewer(block, sight, now.viewer);
+    const Vec3d eye = now.origin + read_vec3d(&sight.viewers[3 * now.viewer]);
+    for (uint32_t target = 0; target < now.seen.size(); ++target) {
+      for (size_t k = 0; k < sight.samples_per_target(); ++k) {
+        const Vec3d way = viewer.way(eye, viewer.sample_of(target, k));
+        if (way == Vec3d{}) {
+          ++now.seen[target];
+        } else if (viewer.reaches(way)) {
+          rays.emplace_back(viewer.request(eye, way, block.source), viewer.filter_of(target));
+          owners.emplace_back(query, &now.seen[target]);
+        }
+      }
+    }
+  }
+  find_hits(task, rays, [&](size_t ray) -> const SceneAtTime& { return *queries[owners[ray].first].moment; });
+  if (task.ended()) return;
+  for (size_t ray = 0; ray < rays.size(); ++ray)
+    if (!rays[ray].collector.done()) ++*owners[ray].second;
 }
 
 }  // namespace locus

@@ -16,6 +16,23 @@ namespace locus {
 void look(QueryTask& task, const SceneAtTime& moment, const QueryBlock& block, const SightColumns& sight, Vec3d origin,
           size_t i, absl::Span<char> seen);
 
+// One viewer of look_together(): arguments of look() with the same names.
+struct SightQuery {
+  size_t viewer;
+  const SceneAtTime* moment;
+  Vec3d origin;
+  absl::Span<char> seen;
+};
+
+// Returns the number of viewers of a block that look_together() should search at once; 0 if look() is faster, because a
+// viewer has many segments or several eyes.
+size_t viewers_together(const SightColumns& sight);
+
+// Does the same as look() for each of several viewers of one block, and searches the segments of all of them together.
+// Precondition: viewers have one eye.
+void look_together(QueryTask& task, const QueryBlock& block, const SightColumns& sight,
+                   absl::Span<const SightQuery> queries);
+
 }  // namespace locus
 
 #endif  // LOCUS_CORE_QUERY_KINDS_SIGHT_QUERY_H_

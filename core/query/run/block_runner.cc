@@ -102,9 +102,31 @@ size_t BlockRunner::run_queries(const Columns& columns, size_t begin, size_t end
       write_nothing(i);
     else
       run_query(columns, i);
-    if (!task_.ended()) continue;
-    const auto query = static_cast<uint32_t>(i);
-    if (result_.truncated.empty() || result_.truncated.back() != query) result_.truncated.push_back(query);
+    if (task_.ended()) mark_truncated(i);
+  }
+  return end;
+}
+
+void BlockRunner::mark_truncated(size_t i) {
+  const auto query = static_cast<uint32_t>(i);
+  if (result_.truncated.empty() || result_.truncated.back() != query) result_.truncated.push_back(query);
+}
+
+size_t BlockRunner::run_queries(const SightColumns& sight, size_t begin, size_t end) {
+  const size_t at_once = viewers_together(sight);
+  if (at_once == 0) return run_queries<SightColumns>(sight, begin, end);
+  const size_t bytes = sight.bytes_per_viewer();
+  std::vector<SightQuery> queries;
+  for (size_t first = begin; first < end; first += at_once) {
+    if (first != begin && should_split()) return first;
+    const size_t last = std::min(end, first + at_once);
+    std::fill_n(output_.bytes + first * bytes, (last - first) * bytes, '\0');
+    queries.clear();
+    for (size_t i = first; i < last; ++i)
+      if (!origins_.is_unanchored(i))
+        queries.push_back({i, &times_.of(i), origins_.of(i), {output_.bytes + i * bytes, bytes}});
+    if (!task_.ended()) look_together(task_, block_, sight, queries);
+    for (size_t i = first; task_.ended() && i < last; ++i) mark_truncated(i);
   }
   return end;
 }

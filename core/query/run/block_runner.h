@@ -48,6 +48,7 @@ class BlockRunner {
   template <class Columns>
   size_t run_queries(const Columns& columns, size_t begin, size_t end);
   size_t run_queries(const RayColumns& rays, size_t begin, size_t end);
+  size_t run_queries(const SightColumns& sight, size_t begin, size_t end);
   template <class Columns, class RegionOf>
   void walk_regions(const Columns& columns, size_t begin, size_t end, const RegionOf& region_of);
   void run_query(const BallColumns& balls, size_t i);
@@ -83,6 +84,8 @@ class BlockRunner {
   void write_count(uint64_t rows);
   // Writes an empty answer for query `i`: a miss, bytes of 0, or a row count of 0.
   void write_nothing(size_t i);
+  // Adds query `i` to the truncated ones.
+  void mark_truncated(size_t i);
   // Returns the work so far as the number of nodes, cells, tests and rows, which does not depend on the speed of the
   // machine.
   uint64_t work_done() const;
