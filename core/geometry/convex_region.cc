@@ -288,7 +288,7 @@ std::optional<ConvexRegion> ConvexRegion::make(Vec3d origin, absl::Span<const Pl
     if (!(value_at(plane, region.interior_) > epsilon_at(plane, region.interior_))) return std::nullopt;
   const double growth = 0x1p-30 * (size + max_component(abs(center))) + 0x1p-40 * max_component(abs(origin));
   region.bounds_ = grown(Aabbd{fine.bounds.min + origin, fine.bounds.max + origin}, growth);
-  // Sides of the world that the region does not reach need not be tested.
+  // A side of the world need not be tested if the region does not reach it.
   size_t kept = planes.size();
   for (size_t i = planes.size(); i < region.count_; ++i) {
     double least = std::numeric_limits<double>::infinity();

@@ -27,9 +27,8 @@ namespace locus::server {
 struct FloodLimits {
   uint64_t bytes_per_second = uint64_t{1} << 20;  // unexplained bytes that are always accepted
   uint64_t burst_bytes = uint64_t{4} << 20;       // unexplained bytes that are accepted at once
-  // Bytes of messages that may have arrived although no call has read them yet: at most `message_bytes`, the maximum
-  // size of a message, for each open call or stream, and at most `buffered_bytes`, the size of gRPC's buffers, for all
-  // of them.
+  // Limits on bytes of messages that have arrived and that no call has read yet: `message_bytes`, the maximum size of a
+  // message, for each open call or stream, and `buffered_bytes`, the size of gRPC's buffers, for all of them together.
   uint64_t message_bytes = uint64_t{32} << 20;
   uint64_t buffered_bytes = uint64_t{256} << 20;
   uint64_t cancelled_per_second = 1000;  // cancelled calls that are always accepted
@@ -99,7 +98,8 @@ class FloodGuard {
   bool wait() LOCUS_EXCLUDES(mutex_);
   void look() LOCUS_EXCLUDES(mutex_);
   void look_at(const std::shared_ptr<Watched>& watched);
-  // Returns whether so many bytes have arrived outside of messages that the streams of the connection must be counted.
+  // Returns whether the streams of the connection must be counted, because many of the bytes that have arrived belong
+  // to no message.
   static bool must_count(const FloodSample& sample, Watched& watched);
 
   const FloodLimits limits_;

@@ -152,8 +152,8 @@ inline QueryScene touching_scene(Random& random) {
   return scene;
 }
 
-// Generates rays that graze triangles at the corner where they enter the triangles' bounds: at such a corner the error
-// of the t of an exact hit is larger than the error of the bounds.
+// Generates rays that graze a triangle at the corner where the ray enters the triangle's bounds. At such a corner the
+// rounding error of the t of the triangle is larger than that of the t of the bounds.
 inline QueryScene grazing_scene(Random& random) {
   QueryScene scene;
   scene.world.name = "grazing";

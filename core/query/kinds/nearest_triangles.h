@@ -70,7 +70,7 @@ class NearestSearch {
   }
   // Lowers the limit to `limit` if `limit` is lower than the current limit.
   void lower_limit(double limit) { visit_.limit = std::min(visit_.limit, rounded_up(limit)); }
-  // Returns the limit. A search with kNearest also lowers the limit itself.
+  // Returns the limit, which a search with kNearest lowers when it finds a nearer triangle.
   float limit() const { return visit_.limit; }
 
   // Return the number of candidates of the last call of next(), and its cost: the number of nodes opened and of

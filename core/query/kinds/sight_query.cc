@@ -120,8 +120,8 @@ class Look {
   }
 
  private:
-  // Maximum number of instances in the scene for which every instance is searched for all segments. In a scene with
-  // more instances, the tree over instances is searched for each segment.
+  // If the scene has at most this number of instances, all segments are tested against each instance. Otherwise each
+  // segment searches the tree over instances.
   static constexpr size_t kFewInstances = 8;
   // Number of segments that are tested at once in the first pass of trace(), which has one segment per target. A block
   // that blocks one of these segments is the hint of the following segments.

@@ -12,7 +12,8 @@
 
 namespace locus::bench::dynamic {
 
-// Tolerated differing queries of a peer: kDifferingQueries in kDifferingQueriesOf, at least one query.
+// A peer may answer at most kDifferingQueries of kDifferingQueriesOf queries differently. One such query is always
+// tolerated.
 inline constexpr size_t kDifferingQueries = 20;
 inline constexpr size_t kDifferingQueriesOf = 10'000;
 // Tolerances: two distances along a ray, or two distances to a nearest object, are different if their difference

@@ -60,7 +60,7 @@ class SilentReaders {
 };
 
 // Clients that connect, send one query, and leave. At most `at_once` are connected; then each new guest replaces the
-// oldest. Guests alternately end their calls in order and cancel them. At the end of run() all have left.
+// oldest. Every second guest finishes its call, the others cancel it. At the end of run() all have left.
 class Churn {
  public:
   // Borrows the message.

@@ -1,5 +1,5 @@
-// Rays of a real level over streams, compared with the same batches in this process on the same cores; and rays over
-// one stream compared with two streams. For the suite serving.
+// Cases of the suite `serving` with rays in a real level. They compare rays that are sent over streams with the same
+// batches in this process on the same cores, and one stream with two streams.
 #ifndef LOCUS_TESTS_BENCH_SERVING_RAY_CASES_H_
 #define LOCUS_TESTS_BENCH_SERVING_RAY_CASES_H_
 

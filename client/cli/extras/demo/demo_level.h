@@ -1,5 +1,5 @@
-// Level of `locus demo`. It is uploaded to a server and placed in a scene, and also kept in memory for checking
-// answers.
+// The static geometry (level) that `locus demo` uses. It is uploaded to a server and placed in a scene, and also kept
+// in memory for checking answers.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_DEMO_DEMO_LEVEL_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_DEMO_DEMO_LEVEL_H_
 

@@ -96,8 +96,8 @@ inline void write_lanes(uint32_t kept, uint32_t slot, Floats key, uint32_t* slot
 #endif
 }
 
-// List of the vectors of eight values in all rows: first slot, and mask of the lanes that belong to the row. One loop
-// over this list is faster than a loop of unknown length for each row.
+// List of the vectors of eight values that cover all rows. An entry has the vector's first slot and a mask of the lanes
+// that belong to the row. One loop over this list is faster than a loop of unknown length for each row.
 struct RowVectors {
   static constexpr uint32_t kUsual = 4;  // number of vectors that every row writes, in a loop of fixed length
   static constexpr uint32_t kMax = GridRows::kMaxValues / kLanes + GridRows::kMax + kUsual;
