@@ -75,7 +75,7 @@ size_t WindingCells::bytes() const {
   return bytes;
 }
 
-Vec3d WindingCells::inside(size_t index) const {
+Vec3d WindingCells::inside(uint32_t index) const {
   Vec3d point;
   for (int axis = 0; axis < 3; ++axis) point[axis] = double{axes_[axis].inside[coordinate_of(index, axis)]};
   return point;
@@ -95,7 +95,7 @@ void WindingCells::divide(const Aabbf& bounds, size_t triangles) {
     if (static_cast<double>(smaller[0]) * smaller[1] * smaller[2] > most) break;
     counts = smaller;
   }
-  size_t stride = 1;
+  uint32_t stride = 1;
   for (int axis = 0; axis < 3; ++axis) {
     axes_[axis] = divided(double{bounds.min[axis]}, double{bounds.max[axis]}, counts[axis]);
     axes_[axis].stride = stride;
@@ -122,8 +122,8 @@ WindingCells::Axis WindingCells::divided(double low, double high, uint32_t count
 void WindingCells::mark(const TriangleBvh& tree) {
   // Each triangle adds 1 or -1 at the eight corners of its range of cells, so that the prefix sums along all three axes
   // are the numbers of triangles in the cells.
-  std::array<size_t, 3> strides;
-  size_t size = 1;
+  std::array<uint32_t, 3> strides;
+  uint32_t size = 1;
   for (int axis = 0; axis < 3; ++axis) {
     strides[axis] = size;
     size *= axes_[axis].count + 1;
@@ -131,7 +131,7 @@ void WindingCells::mark(const TriangleBvh& tree) {
   std::vector<int32_t> sums(size);
   tree.for_each([&](const Triangle& triangle) {
     const Aabbf bounds = bounds_of(triangle);
-    size_t from[3], behind[3];
+    uint32_t from[3], behind[3];
     for (int axis = 0; axis < 3; ++axis) {
       from[axis] = axes_[axis].cell(double{bounds.min[axis]}) * strides[axis];
       behind[axis] = (axes_[axis].cell(double{bounds.max[axis]}) + 1) * strides[axis];
@@ -139,27 +139,26 @@ void WindingCells::mark(const TriangleBvh& tree) {
         behind[axis] = std::max(behind[axis] - strides[axis], from[axis] + strides[axis]);
     }
     for (int corner = 0; corner < 8; ++corner) {
-      const size_t at = ((corner & 1) != 0 ? behind : from)[0] + ((corner & 2) != 0 ? behind : from)[1] +
-                        ((corner & 4) != 0 ? behind : from)[2];
+      const uint32_t at = ((corner & 1) != 0 ? behind : from)[0] + ((corner & 2) != 0 ? behind : from)[1] +
+                          ((corner & 4) != 0 ? behind : from)[2];
       sums[at] += __builtin_popcount(static_cast<unsigned>(corner)) % 2 == 0 ? 1 : -1;
     }
   });
   for (int axis = 0; axis < 3; ++axis) {
-    const size_t ends = strides[axis] * (axes_[axis].count + 1);
-    for (size_t at = strides[axis]; at < size; ++at)
-      if (at % ends >= strides[axis]) sums[at] += sums[at - strides[axis]];
+    const uint32_t stride = strides[axis], length = stride * (axes_[axis].count + 1);
+    for (uint32_t first = 0; first < size; first += length)
+      for (uint32_t at = first + stride; at < first + length; ++at) sums[at] += sums[at - stride];
   }
-  cells_.resize(this->size());
-  for (size_t index = 0; index < cells_.size(); ++index) {
-    size_t at = 0;
-    for (int axis = 0; axis < 3; ++axis) at += coordinate_of(index, axis) * strides[axis];
-    cells_[index] = sums[at] == 0 ? kUnset : kNoWay;
-  }
+  cells_.reserve(this->size());
+  for (uint32_t z = 0; z < axes_[2].count; ++z)
+    for (uint32_t y = 0; y < axes_[1].count; ++y)
+      for (uint32_t x = 0; x < axes_[0].count; ++x)
+        cells_.push_back(sums[x + y * strides[1] + z * strides[2]] == 0 ? kUnset : kNoWay);
 }
 
 void WindingCells::set_windings(const TriangleBvh& tree) {
   uint32_t sets = 0;
-  for (size_t index = 0; index < cells_.size(); ++index) {
+  for (uint32_t index = 0; index < cells_.size(); ++index) {
     if (cells_[index] != kUnset) continue;
     const int64_t winding = sets++ < kMaxSets ? winding_around(tree, inside(index)) : kMaxWinding + 1;
     const bool is_stored = kMinWinding <= winding && winding <= kMaxWinding;
@@ -167,16 +166,16 @@ void WindingCells::set_windings(const TriangleBvh& tree) {
   }
 }
 
-void WindingCells::fill(size_t first, uint8_t value) {
-  std::vector<size_t> waiting = {first};
+void WindingCells::fill(uint32_t first, uint8_t value) {
+  std::vector<uint32_t> waiting = {first};
   cells_[first] = value;
   while (!waiting.empty()) {
-    const size_t index = waiting.back();
+    const uint32_t index = waiting.back();
     waiting.pop_back();
     for (int axis = 0; axis < 3; ++axis) {
       const uint32_t at = coordinate_of(index, axis);
-      const size_t stride = axes_[axis].stride;
-      const auto reach = [&](size_t beside) {
+      const uint32_t stride = axes_[axis].stride;
+      const auto reach = [&](uint32_t beside) {
         if (cells_[beside] != kUnset) return;
         cells_[beside] = value;
         waiting.push_back(beside);
@@ -190,14 +189,14 @@ void WindingCells::fill(size_t first, uint8_t value) {
 void WindingCells::set_ways() {
   std::vector<float> lengths(cells_.size(), std::numeric_limits<float>::infinity());
   for (int direction = 0; direction < 6; ++direction) {
-    const Axis& axis = axes_[direction % 3];
+    const Axis &axis = axes_[direction % 3], &second = axes_[(direction + 1) % 3], &third = axes_[(direction + 2) % 3];
     const bool descending = direction >= 3;
-    for (size_t start = 0; start < cells_.size(); ++start) {
-      if (coordinate_of(start, direction % 3) != 0) continue;
+    for (uint32_t row = 0; row < second.count * third.count; ++row) {
+      const uint32_t start = row % second.count * second.stride + row / second.count * third.stride;
       // Walks against the direction, beginning at the side of the bounds to which the direction leads.
       int steps = 0;
       for (uint32_t k = 0; k < axis.count; ++k) {
-        const size_t index = start + (descending ? k : axis.count - 1 - k) * axis.stride;
+        const uint32_t index = start + (descending ? k : axis.count - 1 - k) * axis.stride;
         if (is_clear(cells_[index])) {
           steps = 0;
           continue;
@@ -213,7 +212,7 @@ void WindingCells::set_ways() {
 
 void WindingCells::check_invariants(const TriangleBvh& tree) const {
   const size_t every = cells_.size() / 64 + 1;
-  for (size_t index = 0; index < cells_.size(); ++index) {
+  for (uint32_t index = 0; index < cells_.size(); ++index) {
     if (index % every != 0 && is_clear(cells_[index])) continue;
     const WindingWay way = way_from(tree, inside(index));
     LOCUS_DCHECK_EQ(way.is_known, is_clear(cells_[index]));

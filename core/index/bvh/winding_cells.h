@@ -45,7 +45,7 @@ class WindingCells {
  public:
   // Makes an object without cells: every way leads out of the mesh.
   WindingCells() = default;
-  // Makes the cells of a closed mesh: about four for each triangle, at most 2^22, of a byte each. O(n); up to 13 bytes
+  // Makes the cells of a closed mesh: about four for each triangle, at most 2^22, of a byte each. O(n); up to 9 bytes
   // of temporary memory for each cell.
   static WindingCells build(const TriangleBvh& tree);
 
@@ -74,7 +74,7 @@ class WindingCells {
   struct Axis {
     double low = 0, size = 0, cells_a_unit = 0;
     uint32_t count = 1;
-    size_t stride = 0;
+    uint32_t stride = 0;
     std::vector<float> inside = {0};  // for each cell, a coordinate in it
 
     // Returns the cell that contains `coordinate`. Precondition: `coordinate` is within the bounds of the mesh.
@@ -85,15 +85,13 @@ class WindingCells {
   using Cell = std::array<uint32_t, 3>;
 
   static bool is_clear(uint8_t cell) { return cell < kFirstWay; }
-  size_t size() const { return size_t{axes_[0].count} * axes_[1].count * axes_[2].count; }
-  size_t index_of(const Cell& cell) const {
+  uint32_t size() const { return axes_[0].count * axes_[1].count * axes_[2].count; }
+  uint32_t index_of(const Cell& cell) const {
     return cell[0] * axes_[0].stride + cell[1] * axes_[1].stride + cell[2] * axes_[2].stride;
   }
-  uint32_t coordinate_of(size_t index, int axis) const {
-    return static_cast<uint32_t>(index / axes_[axis].stride % axes_[axis].count);
-  }
+  uint32_t coordinate_of(uint32_t index, int axis) const { return index / axes_[axis].stride % axes_[axis].count; }
   // Returns a point in a cell.
-  Vec3d inside(size_t index) const;
+  Vec3d inside(uint32_t index) const;
 
   // Divides each axis into cells of about equal size.
   void divide(const Aabbf& bounds, size_t triangles);
@@ -103,7 +101,7 @@ class WindingCells {
   // Sets the winding numbers of clear cells.
   void set_windings(const TriangleBvh& tree);
   // Sets `first`, and all kUnset cells that are connected to it through common sides of kUnset cells, to `value`.
-  void fill(size_t first, uint8_t value);
+  void fill(uint32_t first, uint8_t value);
   // Sets the ways from cells that are not clear.
   void set_ways();
   // Verifies the ways, and the winding numbers of some cells, in debug builds.
