@@ -124,7 +124,8 @@ class Look {
   // segment searches the tree over instances.
   static constexpr size_t kFewInstances = 8;
   // Number of segments that are tested at once in the first pass of trace(), which has one segment per target. A block
-  // that blocks one of these segments is the hint of the following segments.
+  // that blocks one of these segments is the hint of the following segments. While none is blocked, the number doubles
+  // with each call, because kernels are faster with many segments.
   static constexpr size_t kSegmentsAtOnce = 16;
 
   bool uses_kernels() const {
@@ -206,12 +207,15 @@ class Look {
     const auto starts_target = [&](size_t k) {
       return k == 0 || segments_[open_[k]].target != segments_[open_[k - 1]].target;
     };
+    size_t at_once = kSegmentsAtOnce;
     for (size_t k = 0; k < open_.size(); ++k) {
       if (!starts_target(k)) continue;
       segments_[open_[k]].hint = hint;
       now_.push_back(open_[k]);
-      if (now_.size() < kSegmentsAtOnce) continue;
-      hint = trace(instance, origin, hint);
+      if (now_.size() < at_once) continue;
+      const uint32_t found = trace(instance, origin, kNoBlock);
+      at_once = found == kNoBlock ? std::min(2 * at_once, kMaxSegmentsAtOnce) : kSegmentsAtOnce;
+      if (found != kNoBlock) hint = found;
       now_.clear();
     }
     trace(instance, origin, hint);
