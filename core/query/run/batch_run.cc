@@ -13,11 +13,19 @@ namespace {
 
 // Maximum number of queries of a chunk. Chunks that turn out to be expensive are split further.
 constexpr size_t kChunkQueries = 256;
+// Maximum number of segments of sight in a chunk, unless a single viewer has more. Without it a block of few viewers
+// would be one chunk, and threads would work on it one after another.
+constexpr size_t kChunkSegments = 1024;
 
 size_t max_chunk_queries(const QueryBlock& block) {
   const auto* const lookup = std::get_if<LookupColumns>(&block.kind);
   // All groups of a block are looked up in one scan of all objects, so the block is not divided into chunks.
-  return lookup != nullptr && !lookup->groups.empty() ? limits::kMaxQueries : kChunkQueries;
+  if (lookup != nullptr && !lookup->groups.empty()) return limits::kMaxQueries;
+  if (const auto* const sight = std::get_if<SightColumns>(&block.kind)) {
+    const size_t segments = sight->bytes_per_viewer() * sight->samples_per_target() * sight->eyes_per_viewer();
+    return std::clamp<size_t>(kChunkSegments / std::max<size_t>(segments, 1), 1, kChunkQueries);
+  }
+  return kChunkQueries;
 }
 
 void copy_rows(const CollectedRows& from, size_t first, size_t rows, const RowSpans& to) {

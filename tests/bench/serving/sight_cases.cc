@@ -85,11 +85,13 @@ absl::Status run_sight_cases(const ServingRun& run) {
   const SightRequests requests(*mesh, scene.name());
   SightCalls calls(**daemon);
   std::string matrix, hits;
+  const size_t chunks = run.options.quick ? 1 : 8;
   const auto segments = static_cast<double>(kViewers * kTargets * kSamples);
+  const double operations = segments * static_cast<double>(chunks);
   const std::vector<Contestant> contestants = {
-      {"sight", [&](size_t) { matrix = calls.ask(requests.sight).sight(); }, segments, {}},
-      {"any_rays", [&](size_t) { hits = calls.ask(requests.rays).hits(); }, segments, {}}};
-  const auto times = race(contestants, run.options.quick ? 1 : 8, run.options.rounds, wall_seconds);
+      {"sight", [&](size_t) { matrix = calls.ask(requests.sight).sight(); }, operations, {}},
+      {"any_rays", [&](size_t) { hits = calls.ask(requests.rays).hits(); }, operations, {}}};
+  const auto times = race(contestants, chunks, run.options.rounds, wall_seconds);
   if (!calls.failure().ok()) return calls.failure();
   size_t differing = 0, seen = 0;
   for (size_t i = 0; i < matrix.size(); ++i) {
