@@ -70,7 +70,8 @@ inline constexpr std::array kRpcRights = std::to_array<RpcRight>({
     {"/grpc.health.v1.Health/Check", Need::kNothing, Right::kRead},
     {"/grpc.health.v1.Health/Watch", Need::kNothing, Right::kRead},
     {"/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo", Need::kServerRight, Right::kReflection},
-    // Not served. Clients try this version first, and must learn that it is not implemented to try the other one.
+    // This server implements v1alpha only. Clients call v1 first and fall back to v1alpha if the answer is
+    // UNIMPLEMENTED, so a caller with the right must get that answer instead of PERMISSION_DENIED.
     {"/grpc.reflection.v1.ServerReflection/ServerReflectionInfo", Need::kServerRight, Right::kReflection},
 });
 

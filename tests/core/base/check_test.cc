@@ -14,6 +14,7 @@ TEST(CheckDeathTest, AFailedComparisonPrintsBothOperandsFileAndLine) {
   EXPECT_DEATH(LOCUS_CHECK_NE(stored, 3), "stored != 3 with 3 and 3");
   EXPECT_DEATH(LOCUS_CHECK_LE(counted, stored), "counted <= stored with 4 and 3");
   EXPECT_DEATH(LOCUS_CHECK_LT(stored, stored), "stored < stored with 3 and 3");
+  EXPECT_DEATH(LOCUS_CHECK_LE(counted, std::min(counted, 2)), "with 4 and 2") << "std::min returns a temporary here";
 }
 
 TEST(CheckDeathTest, AFailedCheckPrintsItsCondition) {
@@ -27,7 +28,6 @@ TEST(CheckTest, PassedChecksEvaluateOperandsOnceAndPrintNothing) {
   LOCUS_CHECK_EQ(next(), 1);
   LOCUS_CHECK_LT(next(), 3);
   LOCUS_CHECK(next() == 3);
-  LOCUS_CHECK_LE(calls, std::max(7, calls));  // a reference to the temporary 7
   EXPECT_EQ(calls, 3);
 }
 

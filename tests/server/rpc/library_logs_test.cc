@@ -27,7 +27,7 @@ TEST(LibraryLogsTest, AFloodOfErrorsIsAFewLines) {
   start_logging(LogLevel::kWarning, LogFormat::kText);
   EXPECT_THAT(text, HasSubstr("handshake failed"));
   EXPECT_THAT(text, Not(HasSubstr("a detail")));
-  // On a busy machine, the flood of messages may last several seconds, and the limit is per second.
+  // The flood of messages may last several seconds on a busy machine, and the limit is per second.
   EXPECT_LT(std::count(text.begin(), text.end(), '\n'), 20 * kMaxLibraryLines);
 }
 
