@@ -3,7 +3,9 @@
 #include <cmath>
 #include <utility>
 
+#include "core/base/status_macros.h"
 #include "tests/bench/serving/ray_batches.h"
+#include "tests/bench/serving/served_level.h"
 
 namespace locus::bench::serving {
 namespace {
@@ -110,14 +112,9 @@ bool wants_any(const ServingRun& run) {
 
 absl::Status run_ray_cases(const ServingRun& run) {
   if (!wants_any(run)) return absl::OkStatus();
-  const absl::StatusOr<BenchMesh> mesh = level_of(run);
-  if (!mesh.ok()) return mesh.status();
-  const auto daemon = Daemon::start();
-  if (!daemon.ok()) return daemon.status();
-  TwinScene scene(**daemon, "rays");
-  absl::Status status = scene.create();
-  status.Update(scene.place(*mesh));
-  RayCases cases(run, *mesh, scene);
+  ASSIGN_OR_RETURN(const ServedLevel level, ServedLevel::start(run, "rays"));
+  RayCases cases(run, level.mesh, *level.scene);
+  absl::Status status;
   for (const Work& work : {kCoherent, kScattered})
     for (const Size& size : kSizes)
       if (status.ok()) status = cases.compare_with_process(work, size);

@@ -2,8 +2,10 @@
 
 #include <vector>
 
+#include "core/base/status_macros.h"
 #include "server/rpc/wire_plan.h"
 #include "tests/bench/serving/ray_batches.h"
+#include "tests/bench/serving/served_level.h"
 
 namespace locus::bench::serving {
 namespace {
@@ -27,17 +29,11 @@ std::vector<grpc::ByteBuffer> buffers_of(const Batches& batches) {
 absl::Status run_scan_cases(const ServingRun& run) {
   if (!run.wants(kScan)) return absl::OkStatus();
   run.progress(kScan);
-  const absl::StatusOr<BenchMesh> mesh = level_of(run);
-  if (!mesh.ok()) return mesh.status();
-  const auto daemon = Daemon::start();
-  if (!daemon.ok()) return daemon.status();
-  TwinScene scene(**daemon, "scan");
-  absl::Status status = scene.create();
-  status.Update(scene.place(*mesh));
-  if (!status.ok()) return status;
-  Batches batches = batches_of(coherent_rays(*mesh, run.options.quick ? 16'384 : 131'072), kRaysAMessage, scene.name());
+  ASSIGN_OR_RETURN(const ServedLevel level, ServedLevel::start(run, "scan"));
+  Batches batches =
+      batches_of(coherent_rays(level.mesh, run.options.quick ? 16'384 : 131'072), kRaysAMessage, level.scene->name());
   const std::vector<grpc::ByteBuffer> buffers = buffers_of(batches);
-  const LocalLoad process(scene.here().latest(), batches, 1);
+  const LocalLoad process(level.scene->here().latest(), batches, 1);
   const std::vector<uint64_t> hashes = process.hashes();
   const server::WirePlan& plan = server::wire_plan<v1::StreamQueriesRequest>();
   size_t refused = 0;

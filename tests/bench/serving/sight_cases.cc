@@ -5,9 +5,10 @@
 #include <string>
 #include <vector>
 
+#include "core/base/status_macros.h"
 #include "locus/v1/query_service.grpc.pb.h"
 #include "tests/bench/serving/ray_batches.h"
-#include "tests/bench/serving/twin_scene.h"
+#include "tests/bench/serving/served_level.h"
 
 namespace locus::bench::serving {
 namespace {
@@ -74,16 +75,9 @@ class SightCalls {
 absl::Status run_sight_cases(const ServingRun& run) {
   if (!run.wants(kSight)) return absl::OkStatus();
   run.progress(kSight);
-  const absl::StatusOr<BenchMesh> mesh = level_of(run);
-  if (!mesh.ok()) return mesh.status();
-  const auto daemon = Daemon::start();
-  if (!daemon.ok()) return daemon.status();
-  TwinScene scene(**daemon, "sight");
-  absl::Status status = scene.create();
-  status.Update(scene.place(*mesh));
-  if (!status.ok()) return status;
-  const SightRequests requests(*mesh, scene.name());
-  SightCalls calls(**daemon);
+  ASSIGN_OR_RETURN(const ServedLevel level, ServedLevel::start(run, "sight"));
+  const SightRequests requests(level.mesh, level.scene->name());
+  SightCalls calls(*level.daemon);
   std::string matrix, hits;
   const size_t chunks = run.options.quick ? 1 : 8;
   const auto segments = static_cast<double>(kViewers * kTargets * kSamples);
