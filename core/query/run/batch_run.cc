@@ -129,13 +129,13 @@ Progress BatchRun::work(uint64_t nanoseconds) {
   }
 }
 
-// Limits the number of chunks, and so the memory of rows that wait to be written out: a new chunk may begin if there
-// are fewer than kMaxChunks chunks, and the remainder of a split chunk may begin if there are fewer than 2 * kMaxChunks
-// chunks. The first chunk in batch order may always begin, since all other chunks are written out after it.
+// Limits the number of chunks that run or wait to be written out, and so the memory of their rows. The first chunk in
+// batch order may always begin, since all other chunks are written out after it.
 bool BatchRun::can_begin() const {
   if (control_.stopped()) return false;
-  if (!unstarted_.empty()) return chunks_.size() < 2 * kMaxChunks || unstarted_.front() == chunks_.begin();
-  return next_block_ < blocks_.size() && chunks_.size() < kMaxChunks;
+  const size_t begun = chunks_.size() - unstarted_.size();
+  if (!unstarted_.empty()) return begun < 2 * kMaxChunks || unstarted_.front() == chunks_.begin();
+  return next_block_ < blocks_.size() && begun < kMaxChunks;
 }
 
 BatchRun::Chunks::iterator BatchRun::begin_chunk() {
@@ -194,13 +194,19 @@ void BatchRun::end_chunk(Chunks::iterator chunk, size_t reached) {
 }
 
 void BatchRun::split(Chunks::iterator chunk, size_t reached) {
-  const Chunks::iterator rest = chunks_.insert(std::next(chunk), {chunk->block, reached, chunk->end});
+  const size_t middle = reached + (chunk->end - reached) / 2;
+  insert_unstarted(chunk, middle, chunk->end);
+  if (reached < middle) insert_unstarted(chunk, reached, middle);
   chunk->end = reached;
-  const auto before = [](Chunks::iterator a, Chunks::iterator b) {
+  LOCUS_DCHECK_CALL(check_invariants());
+}
+
+void BatchRun::insert_unstarted(Chunks::iterator before, size_t begin, size_t end) {
+  const Chunks::iterator chunk = chunks_.insert(std::next(before), {before->block, begin, end});
+  const auto precedes = [](Chunks::iterator a, Chunks::iterator b) {
     return std::tie(a->block, a->begin) < std::tie(b->block, b->begin);
   };
-  unstarted_.insert(std::upper_bound(unstarted_.begin(), unstarted_.end(), rest, before), rest);
-  LOCUS_DCHECK_CALL(check_invariants());
+  unstarted_.insert(std::upper_bound(unstarted_.begin(), unstarted_.end(), chunk, precedes), chunk);
 }
 
 void BatchRun::write_out() {

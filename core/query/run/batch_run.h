@@ -61,8 +61,8 @@ struct QueryCost {
 class BatchRun {
  public:
   // No new chunk is started while there are this many chunks that run, or that are done and wait until an earlier chunk
-  // is written out. Splitting a chunk adds its remainder as another chunk. A remainder may be started while there are
-  // fewer than 2 * kMaxChunks chunks, or if it is the first chunk in batch order.
+  // is written out. A chunk of the remainder of a split chunk may be started while there are fewer than 2 * kMaxChunks
+  // of them, or if it is the first chunk in batch order.
   static constexpr size_t kMaxChunks = 16;
 
   // Prepares the execution of `batch`, which has passed check_batch(): resolves the as_of times of its queries and
@@ -119,7 +119,7 @@ class BatchRun {
   BatchRun(const SceneSnapshot& snapshot, const QueryBatch& batch, RunOptions options, AnswerSink& answer);
   void add_block(QueryTimes times);
 
-  // Checks the invariants of the class comment; O(kMaxChunks).
+  // Checks the invariants of the class comment; O(number of chunks).
   void check_invariants() const LOCUS_REQUIRES(mutex_);
   // Checks that query `begin` of block `block` directly follows query `end` - 1 of block `before` in batch order.
   void check_adjacent(size_t before, size_t end, size_t block, size_t begin) const;
@@ -130,13 +130,16 @@ class BatchRun {
   // Precondition: can_begin().
   Chunks::iterator begin_chunk() LOCUS_REQUIRES(mutex_);
   Chunks::iterator pop_unstarted() LOCUS_REQUIRES(mutex_);
-  // Moves the queries of `chunk` from `reached` on into a new, unstarted chunk directly after `chunk`.
+  // Moves the queries of `chunk` from `reached` on into two new, unstarted chunks of half the queries each, directly
+  // after `chunk`. With a single new chunk, one thread at a time would work on a block of few, expensive queries.
   void split(Chunks::iterator chunk, size_t reached) LOCUS_REQUIRES(mutex_);
+  // Adds an unstarted chunk of the queries [begin, end) of the block of `before`, directly after `before`.
+  void insert_unstarted(Chunks::iterator before, size_t begin, size_t end) LOCUS_REQUIRES(mutex_);
   void skip_empty_blocks() LOCUS_REQUIRES(mutex_);
   // Answers the queries of `chunk` in order, and stops early if the queries turn out to be expensive. Returns the index
   // of the first query that is not answered.
   size_t run(Chunk& chunk);
-  // Marks `chunk` as done and moves its queries from `reached` on, which are not answered, into a new chunk. Then calls
+  // Marks `chunk` as done and moves its queries from `reached` on, which are not answered, into new chunks. Then calls
   // write_out() if the first chunk of chunks_ is done and no other thread is in write_out().
   void end_chunk(Chunks::iterator chunk, size_t reached) LOCUS_EXCLUDES(mutex_);
   // Removes chunks from the front of chunks_ and writes them to the AnswerSink, up to the first chunk that is not done.

@@ -133,6 +133,40 @@ TEST(BatchRunTest, ExpensiveQueriesRunInSmallChunks) {
   EXPECT_GE(turns, 256 * 5'000 / 32'768) << "a turn is split after a bounded number of tests";
 }
 
+TEST(BatchRunTest, ThreadsShareABlockOfFewExpensiveQueries) {
+  QueryWorld world;
+  for (Id id = 1; id <= 5'000; ++id) world.objects.push_back(ball_object(id, {0, 0, 0}));
+  const SnapshotPtr snapshot = snapshot_of(world);
+  OwnedBlock block = one_ball({}, 1);
+  constexpr size_t kQueries = 64;
+  block.points.assign(3 * kQueries, 0);
+  block.settings.max_results = 1;
+  std::atomic<std::thread::id> slow;
+  std::atomic<bool> slow_waits{false}, released{false};
+  RunOptions options;
+  options.stop = [&] {
+    if (std::this_thread::get_id() != slow.load()) return absl::OkStatus();
+    slow_waits = true;
+    while (!released) std::this_thread::yield();
+    return absl::OkStatus();
+  };
+  Prepared prepared(*snapshot, {block}, options);
+  ASSERT_EQ(prepared.run->work(0), Progress::kMore) << "the block is a single chunk, which is split";
+  std::thread first([&] {
+    slow = std::this_thread::get_id();
+    while (prepared.run->work(0) == Progress::kMore) {
+    }
+  });
+  while (!slow_waits) std::this_thread::yield();
+  const uint64_t work_before = prepared.run->work_done();
+  while (prepared.run->work(0) == Progress::kMore) {
+  }
+  EXPECT_GE(prepared.run->work_done() - work_before, kQueries / 3 * 5'000) << "half of the remainder is free to be run";
+  released = true;
+  first.join();
+  EXPECT_EQ(prepared.result.blocks[0].counts.size(), kQueries);
+}
+
 TEST(BatchRunTest, WithAClockATurnTakesChunksUntilTheTimeIsUp) {
   const SnapshotPtr snapshot = snapshot_of(world_of(1));
   const std::vector<OwnedBlock> blocks = {many_balls(2'560, StaticDetail::kInstances)};
