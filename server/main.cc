@@ -151,6 +151,9 @@ absl::StatusOr<std::unique_ptr<UpdateLog>> open_log(const ServerConfig& config) 
   if (config.data_dir.empty()) return nullptr;
   StorageOptions options;
   options.path = config.data_dir;
+  options.warn = [](absl::string_view text) {
+    log(LogLevel::kWarning, "warning of the storage library", {{"text", std::string(text)}});
+  };
   return RocksdbLog::open(options);
 }
 

@@ -182,7 +182,7 @@ StorageOptions with_defaults(StorageOptions options) {
 }
 
 DatabaseOptions database_options_of(const StorageOptions& options) {
-  return {options.env, absl::StrCat(options.path, "/", kDatabaseFolder), options.log_buffer_bytes};
+  return {options.env, absl::StrCat(options.path, "/", kDatabaseFolder), options.log_buffer_bytes, options.warn};
 }
 
 absl::StatusOr<OpenedDirectory> open_directory(const StorageOptions& options) {

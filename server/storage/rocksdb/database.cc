@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdio>
 #include <thread>
+#include <utility>
 
+#include "absl/strings/ascii.h"
 #include "core/base/check.h"
 #include "rocksdb/listener.h"
 #include "rocksdb/table.h"
@@ -25,17 +28,28 @@ constexpr int kBuffers = 4;
 constexpr int kTablesToMerge = 4;
 constexpr int kUnlimitedTables = 1 << 20;
 constexpr uint64_t kManifestBytes = uint64_t{4} << 20;
-constexpr size_t kInfoLogBytes = size_t{1} << 20;
+constexpr size_t kMaxWarning = 1024;  // bytes of a message of RocksDB; longer messages are cut
 constexpr uint64_t kLogBuffersOnDisk = 4;
 // Disk space in bytes that recover() needs in addition to the size of the memory tables.
 constexpr uint64_t kRecoveryBytes = uint64_t{1} << 20;
 constexpr auto kBufferPoll = std::chrono::milliseconds(1);
 
-// Logger that drops every message. The read-only modes use it, because they must not write a log file.
-class NoLogger final : public rocksdb::Logger {
+// Passes RocksDB's warnings and errors to a function. Without it RocksDB would write a text file into the database's
+// folder, which the read-only modes must not do; and on a full disk RocksDB 7.8 aborts the process at the first message
+// after one that could not be written.
+class WarningLogger final : public rocksdb::Logger {
  public:
+  explicit WarningLogger(StorageWarning warn) : Logger(rocksdb::InfoLogLevel::WARN_LEVEL), warn_(std::move(warn)) {}
+
   using rocksdb::Logger::Logv;
-  void Logv(const char*, va_list) override {}
+  void Logv(const char* format, va_list arguments) override {
+    if (!warn_) return;
+    char text[kMaxWarning];
+    if (std::vsnprintf(text, sizeof text, format, arguments) > 0) warn_(absl::StripTrailingAsciiWhitespace(text));
+  }
+
+ private:
+  const StorageWarning warn_;
 };
 
 bool read_only(OpenMode mode) { return mode == OpenMode::kReadOnly || mode == OpenMode::kReadOnlyLenient; }
@@ -97,14 +111,11 @@ rocksdb::DBOptions database_options(const DatabaseOptions& options, OpenMode mod
   // ends the process by an assertion. The durable marker detects the same damage.
   found.max_total_wal_size = kLogBuffersOnDisk * options.log_buffer_bytes;
   found.max_manifest_file_size = kManifestBytes;
-  found.info_log_level = rocksdb::InfoLogLevel::WARN_LEVEL;
-  found.max_log_file_size = kInfoLogBytes;
-  found.keep_log_file_num = 2;
+  found.info_log = std::make_shared<WarningLogger>(options.warn);
   found.stats_dump_period_sec = 0;
   found.stats_persist_period_sec = 0;
   found.skip_stats_update_on_db_open = true;
   found.max_file_opening_threads = 1;  // the default starts many threads to open a few files
-  if (read_only(mode)) found.info_log = std::make_shared<NoLogger>();
   return found;
 }
 

@@ -19,6 +19,7 @@
 #include "core/base/mutex.h"
 #include "rocksdb/db.h"
 #include "rocksdb/options.h"
+#include "server/storage/rocksdb/storage_options.h"
 #include "server/storage/rocksdb/wal_watch.h"
 
 namespace locus::server {
@@ -38,6 +39,7 @@ struct DatabaseOptions {
   rocksdb::Env* env = nullptr;
   std::string folder;  // path of the folder rocksdb/ in the data directory
   uint64_t log_buffer_bytes = 0;
+  StorageWarning warn = nullptr;
 };
 
 // Return the options of the database and of its column families (in the order meta, log, snapshot, mesh). They are

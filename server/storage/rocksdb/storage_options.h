@@ -4,14 +4,21 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
+
+#include "absl/strings/string_view.h"
 
 namespace rocksdb {
 class Env;
 }
 
 namespace locus::server {
+
+// Receives the warnings and errors that RocksDB logs, one line of text each. RocksDB calls it on any thread, possibly
+// holding its locks: the function must not use the log.
+using StorageWarning = std::function<void(absl::string_view)>;
 
 struct StorageOptions {
   // Data directory; created if it is missing. One process at a time may have it open.
@@ -35,6 +42,9 @@ struct StorageOptions {
   // Delay between a sync of the log and the update of the durable marker. If records that were synced within this time
   // before a crash are later missing at the end of the log, the loss is not detected.
   std::chrono::milliseconds durable_marker_delay{10};
+
+  // Receives RocksDB's warnings; they are dropped if it is empty.
+  StorageWarning warn;
 
   // If false, records are acknowledged without a sync. Only for tests that must be able to detect lost records.
   bool sync = true;

@@ -1,5 +1,6 @@
 // A disk that fails for a while: failing syncs and writes, and a full disk. No record that is lost was acknowledged,
 // and the log accepts writes again without a restart.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -8,9 +9,11 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <string>
 #include <thread>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/mutex.h"
 #include "core/base/refusal.h"
 #include "server/storage/rocksdb_log.h"
 #include "tests/support/faulty_files.h"
@@ -94,6 +97,26 @@ TEST_F(RocksdbLogFaultTest, WritingResumesAfterAWriteThatFailsRightAfterOpening)
     open();
   }
   expect_records(scene, 3);
+}
+
+// RocksDB aborts the process if its own text log is on a full disk, so it must not write one.
+TEST_F(RocksdbLogFaultTest, RocksDbsWarningsAreReportedAndNotWrittenToAFile) {
+  Mutex mutex;
+  std::string warnings;
+  options_.path = folder_.file("disk/warned");
+  options_.warn = [&](absl::string_view text) {
+    MutexLock lock(mutex);
+    absl::StrAppend(&warnings, text, "\n");
+  };
+  open();
+  const SceneKey scene = create_scene(*log_, "a", 1).value();
+  files_->fail_writes(1);
+  EXPECT_EQ(append_records(*log_, scene, 7, 1).code(), absl::StatusCode::kUnavailable);
+  EXPECT_EQ(succeeds_soon([&] { return append_records(*log_, scene, 7, 1); }), absl::OkStatus());
+  log_ = nullptr;
+  EXPECT_THAT(warnings, testing::HasSubstr("background error"));
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(options_.path))
+    EXPECT_THAT(entry.path().filename().string(), testing::Not(testing::StartsWith("LOG"))) << entry.path();
 }
 
 TEST_F(RocksdbLogFaultTest, RefusedRecordsDoNotReappearAfterLaterOnes) {
