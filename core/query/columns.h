@@ -1,41 +1,46 @@
 // Table of the result columns of a block: their names, element types and widths. Also defines which columns each kind
 // of query can return, and computes their size in a reply.
 //
-// To add a column: add a value to Column (query_batch.h), an array to ColumnArrays, a name to kColumnNames and a row to
-// kColumnArrays; write the values in run/rows.cc; and map the column to its protocol field in
-// server/convert/result_columns.cc. All code that allocates, copies or measures columns loops over kColumnArrays.
+// To add a column: add a value to Column (query_batch.h) and a row to LOCUS_COLUMN_ARRAYS, and write its values in
+// run/rows.cc. All code that allocates, copies, measures or sends columns is generated from LOCUS_COLUMN_ARRAYS.
 #ifndef LOCUS_CORE_QUERY_COLUMNS_H_
 #define LOCUS_CORE_QUERY_COLUMNS_H_
 
-#include <array>
-#include <tuple>
-#include <utility>
+#include <cstdint>
 
 #include "absl/strings/string_view.h"
 #include "core/query/query_batch.h"
 
 namespace locus {
 
+// Table of the arrays of the result columns. Each row has the column, the column's name in the protocol without the
+// prefix "COLUMN_", the type and the name of the array, and the number of values per result row. The field of the
+// protocol's BlockResult has the same name as the array.
+#define LOCUS_COLUMN_ARRAYS(X)                     \
+  X(kT, "T", float, t, 1)                          \
+  X(kId, "ID", uint64_t, ids, 1)                   \
+  X(kTriangle, "TRIANGLE", uint32_t, triangles, 1) \
+  X(kUv, "UV", float, uvs, 2)                      \
+  X(kNormal, "NORMAL", float, normals, 3)          \
+  X(kPoint, "POINT", float, points, 3)             \
+  X(kGroup, "GROUP", uint64_t, groups, 1)          \
+  X(kTag, "TAG", uint64_t, tags, 1)                \
+  X(kLayers, "LAYERS", uint32_t, layers, 1)        \
+  X(kPose, "POSE", double, positions, 3)           \
+  X(kPose, "POSE", float, rotations, 4)            \
+  X(kOther, "OTHER", uint64_t, others, 1)
+
 // Arrays of the result columns. Array<T> is a std::vector<T> in CollectedRows, which owns rows, and a T* in RowSpans,
-// which points to rows in a reply or in CollectedRows.
+// which points to rows in a reply or in CollectedRows. Points are relative to the block's frame.
 template <template <class> class Array>
 struct ColumnArrays {
-  Array<float> t{};
-  Array<uint64_t> ids{};
-  Array<uint32_t> triangles{};
-  Array<float> uvs{};
-  Array<float> normals{};
-  Array<float> points{};  // relative to the block's frame
-  Array<uint64_t> groups{};
-  Array<uint64_t> tags{};
-  Array<uint32_t> layers{};
-  Array<double> positions{};
-  Array<float> rotations{};
-  Array<uint64_t> others{};
+#define LOCUS_ARRAY(column, name, type, array, width) Array<type> array{};
+  LOCUS_COLUMN_ARRAYS(LOCUS_ARRAY)
+#undef LOCUS_ARRAY
 };
 
-// Entry of kColumnArrays: the result column `column` stores `width` values for each result row in the array that get()
-// returns.
+// Description of an array: the result column `column` stores `width` values for each result row in the array that
+// get() returns.
 template <class Get>
 struct ColumnArray {
   Column column;
@@ -45,33 +50,22 @@ struct ColumnArray {
 template <class Get>
 ColumnArray(Column, uint32_t, Get) -> ColumnArray<Get>;
 
-// Table of the result columns, with one entry for each array of ColumnArrays. The table is exempt from formatting,
-// because clang-format 14 would split the lambdas.
-// clang-format off
-inline constexpr auto kColumnArrays = std::make_tuple(
-    ColumnArray{Column::kT, 1, [](auto& arrays) -> auto& { return arrays.t; }},
-    ColumnArray{Column::kId, 1, [](auto& arrays) -> auto& { return arrays.ids; }},
-    ColumnArray{Column::kTriangle, 1, [](auto& arrays) -> auto& { return arrays.triangles; }},
-    ColumnArray{Column::kUv, 2, [](auto& arrays) -> auto& { return arrays.uvs; }},
-    ColumnArray{Column::kNormal, 3, [](auto& arrays) -> auto& { return arrays.normals; }},
-    ColumnArray{Column::kPoint, 3, [](auto& arrays) -> auto& { return arrays.points; }},
-    ColumnArray{Column::kGroup, 1, [](auto& arrays) -> auto& { return arrays.groups; }},
-    ColumnArray{Column::kTag, 1, [](auto& arrays) -> auto& { return arrays.tags; }},
-    ColumnArray{Column::kLayers, 1, [](auto& arrays) -> auto& { return arrays.layers; }},
-    ColumnArray{Column::kPose, 3, [](auto& arrays) -> auto& { return arrays.positions; }},
-    ColumnArray{Column::kPose, 4, [](auto& arrays) -> auto& { return arrays.rotations; }},
-    ColumnArray{Column::kOther, 1, [](auto& arrays) -> auto& { return arrays.others; }});
-// clang-format on
-
-// Column names indexed by the value of Column: the protocol's names without the prefix "COLUMN_".
-inline constexpr std::array<absl::string_view, 12> kColumnNames = {
-    "UNSPECIFIED", "T", "ID", "TRIANGLE", "UV", "NORMAL", "POINT", "GROUP", "TAG", "LAYERS", "POSE", "OTHER"};
-static_assert(kColumnNames.size() == static_cast<size_t>(kLastColumn) + 1);
-
-// Calls visit() with each entry of kColumnArrays, in the order of the table.
+// Calls visit() with a ColumnArray for each array, in the order of the table.
 template <class Visit>
 constexpr void for_each_column_array(const Visit& visit) {
-  std::apply([&visit](const auto&... array) { (visit(array), ...); }, kColumnArrays);
+#define LOCUS_VISIT(column, name, type, array, width) \
+  visit(ColumnArray{Column::column, width, [](auto& arrays) -> decltype(auto) { return (arrays.array); }});
+  LOCUS_COLUMN_ARRAYS(LOCUS_VISIT)
+#undef LOCUS_VISIT
+}
+
+// Returns the column's name in the protocol without the prefix "COLUMN_".
+constexpr absl::string_view column_name(Column wanted) {
+#define LOCUS_NAME(column, name, type, array, width) \
+  if (wanted == Column::column) return name;
+  LOCUS_COLUMN_ARRAYS(LOCUS_NAME)
+#undef LOCUS_NAME
+  return "UNSPECIFIED";
 }
 
 // Destination of a range of result rows: for each array, a pointer to the entry of the first row; null for columns that
@@ -79,9 +73,6 @@ constexpr void for_each_column_array(const Visit& visit) {
 template <class T>
 using Pointer = T*;
 using RowSpans = ColumnArrays<Pointer>;
-
-// Returns the name of a column as in kColumnNames.
-constexpr absl::string_view column_name(Column column) { return kColumnNames[static_cast<size_t>(column)]; }
 
 // Returns the encoded size of one row with these columns, in bytes.
 constexpr uint32_t row_bytes(ColumnSet columns) {

@@ -12,31 +12,6 @@ T* grow(google::protobuf::RepeatedField<T>& column, size_t entries) {
   return column.mutable_data() + before;
 }
 
-// Accessors of the fields of v1::BlockResult that hold the arrays of kColumnArrays, in the same order.
-constexpr auto kFields = std::make_tuple([](v1::BlockResult& to) { return to.mutable_t(); },          //
-                                         [](v1::BlockResult& to) { return to.mutable_ids(); },        //
-                                         [](v1::BlockResult& to) { return to.mutable_triangles(); },  //
-                                         [](v1::BlockResult& to) { return to.mutable_uvs(); },        //
-                                         [](v1::BlockResult& to) { return to.mutable_normals(); },    //
-                                         [](v1::BlockResult& to) { return to.mutable_points(); },     //
-                                         [](v1::BlockResult& to) { return to.mutable_groups(); },     //
-                                         [](v1::BlockResult& to) { return to.mutable_tags(); },       //
-                                         [](v1::BlockResult& to) { return to.mutable_layers(); },     //
-                                         [](v1::BlockResult& to) { return to.mutable_positions(); },  //
-                                         [](v1::BlockResult& to) { return to.mutable_rotations(); },  //
-                                         [](v1::BlockResult& to) { return to.mutable_others(); });
-static_assert(std::tuple_size_v<decltype(kFields)> == std::tuple_size_v<decltype(kColumnArrays)>);
-
-// Calls visit(array, field) for each array of a result and the protocol's field for it.
-template <class Visit, size_t... kIndices>
-void for_each_field(const Visit& visit, std::index_sequence<kIndices...>) {
-  (visit(std::get<kIndices>(kColumnArrays), std::get<kIndices>(kFields)), ...);
-}
-template <class Visit>
-void for_each_field(const Visit& visit) {
-  for_each_field(visit, std::make_index_sequence<std::tuple_size_v<decltype(kFields)>>());
-}
-
 }  // namespace
 
 ResultColumns::ResultColumns(v1::QueryResult& result, size_t blocks) : result_(result) {
@@ -48,9 +23,10 @@ ResultColumns::ResultColumns(v1::QueryResult& result, size_t blocks) : result_(r
 RowSpans ResultColumns::add_rows(size_t number, ColumnSet columns, size_t rows) {
   v1::BlockResult& to = block(number);
   RowSpans spans;
-  for_each_field([&](const auto& array, const auto& field) {
-    if (columns.has(array.column)) array.get(spans) = grow(*field(to), array.width * rows);
-  });
+#define LOCUS_ADD_ROWS(column, name, type, array, width) \
+  if (columns.has(Column::column)) spans.array = grow(*to.mutable_##array(), width * rows);
+  LOCUS_COLUMN_ARRAYS(LOCUS_ADD_ROWS)
+#undef LOCUS_ADD_ROWS
   return spans;
 }
 

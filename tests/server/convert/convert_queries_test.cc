@@ -1,6 +1,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "absl/strings/str_cat.h"
+#include "core/query/columns.h"
 #include "server/convert/convert.h"
 
 namespace locus::server {
@@ -61,6 +63,11 @@ TEST(ConvertQueriesTest, EveryEnumNumberHasItsMeaning) {
   EXPECT_EQ(rays.inside, Inside::kHollow);
   EXPECT_EQ(std::get<BallColumns>(queries->blocks[1].kind).detail, StaticDetail::kTrianglesSorted);
   EXPECT_EQ(std::get<NearestColumns>(queries->blocks[2].kind).detail, StaticDetail::kTriangles);
+}
+
+TEST(ConvertQueriesTest, EveryColumnHasItsNameInTheProtocol) {
+  for (int number = 1; number < v1::Column_ARRAYSIZE; ++number)
+    EXPECT_EQ(v1::Column_Name(number), absl::StrCat("COLUMN_", column_name(static_cast<Column>(number))));
 }
 
 TEST(ConvertQueriesTest, EveryFieldOfNearestArrives) {
