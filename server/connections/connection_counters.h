@@ -1,5 +1,5 @@
-// Counts of the connections of a server since its start, for metrics and limits. The acceptor and the code that closes
-// connections count; any thread reads. Plain atomic counters.
+// Counts of the connections of a server since its start, reported in metrics and in the list of limits. The acceptor
+// and the code that closes connections increment them; any thread may read them. Plain atomic counters.
 #ifndef LOCUS_SERVER_CONNECTIONS_CONNECTION_COUNTERS_H_
 #define LOCUS_SERVER_CONNECTIONS_CONNECTION_COUNTERS_H_
 

@@ -27,7 +27,8 @@ struct MemoryLineUse {
   uint64_t ceiling = 0;
 };
 
-// Returns all lines, the claimed ones in the order in which they are refused. `log` may be null.
+// Returns all lines: first the measured ones, then the claimed ones in the order in which their claims are refused as
+// memory runs short. `log` may be null.
 std::vector<MemoryLineUse> memory_lines(const MemoryBudget& budget, const Registry& registry, const UpdateLog* log);
 
 // Returns the memory use of the whole process above which memory is short, so that histories are shortened.

@@ -298,7 +298,8 @@ class HotCall final : private IoLoop::ActiveCall {
     });
   }
 
-  // Returns the scene that a message is about; empty if the message does not name it or was not read.
+  // Returns the scene that a message is about: on a stream the scene that the first message named, empty if none was
+  // accepted; for a unary call the scene that the request names, empty if it names none or was not read.
   const std::string& scene_of(const Slot& slot) const {
     return Method::kStream ? scene_.scene() : slot.request_.scene();
   }

@@ -30,8 +30,9 @@ class SharedMemoryRpcTest : public RpcTest {
   SharedMemoryRpcTest() : RpcTest(with_memory(server::resident_bytes() + kRoom)) {}
 };
 
-// Server whose memory limit leaves 2 GiB: much more than one upload takes, also with the larger allocations of
-// AddressSanitizer, so that an upload is refused before memory is so full that connections are closed.
+// Server whose memory limit leaves 2 GiB. One upload takes much less, also with the larger allocations of
+// AddressSanitizer. So when many uploads fill the memory, one of them is refused before memory is so full that
+// connections are closed.
 class RoomyMemoryRpcTest : public RpcTest {
  protected:
   static constexpr uint64_t kRoom = uint64_t{2} << 30;

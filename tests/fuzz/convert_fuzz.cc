@@ -1,5 +1,6 @@
 // Messages of the protocol as a client can send them: queries, updates and specifications of scenes. Accepted messages
-// are within the limits, an error names a field, and accepted batches are executed on a small scene.
+// are within the limits, a refusal names a field or a limit, and accepted batches are executed on a small scene; of
+// query batches only those of at most 256 queries.
 #include "core/base/limits.h"
 #include "core/query/query_batch.h"
 #include "core/scene/log/record_codec.h"

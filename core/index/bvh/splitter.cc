@@ -74,8 +74,8 @@ struct Split {
   int axis = -1;     // -1 if no cut was found
   uint32_t bin = 0;  // first bin of the right part
   S cost = std::numeric_limits<S>::infinity();
-  // Difference of the lengths of the two parts. At equal cost the cut with the lower difference wins. Used for sorted
-  // ranges only.
+  // Difference of the numbers of references in the two parts. At equal cost the cut with the lower difference wins. Set
+  // only by cuts of sorted references; 0 for cuts between bins.
   uint32_t imbalance = 0;
 };
 
@@ -142,8 +142,8 @@ class Orders {
 };
 
 // Sweeps the references, sorted along one axis, from both sides. Replaces `best` by the cheapest cut if this cut costs
-// less than `best`, or costs the same with a lower imbalance. Here the member `bin` of a cut is the length of its left
-// part.
+// less than `best`, or costs the same with a lower imbalance. Here the member `bin` of a cut is the number of
+// references in its left part.
 template <class S>
 void find_cheapest_cut(BoxReferences<S> references, const Orders<S>& orders, size_t axis, Split<S>& best) {
   const size_t count = references.size();

@@ -92,7 +92,8 @@ struct BoxShape {
   static bool overlaps_triangle(const Obbf& box, const Triangle& triangle) { return box_overlaps(box, triangle); }
 };
 
-// Operations on a capsule, with the same members as BallShape. A capsule stays in double in mesh axes.
+// Operations on a capsule, with the members of BallShape except size(), which only kernels need. A capsule stays in
+// double in mesh axes.
 struct CapsuleShape {
   static constexpr bool kHasKernels = false;
   using World = Capsule;

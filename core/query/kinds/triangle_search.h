@@ -1,7 +1,7 @@
-// Search by the vector kernels for the triangles of a mesh that overlap a ball or a box in mesh axes. Returns indices
-// of triangles in the uploaded mesh, in storage order. The results equal those of ball_overlaps() and box_overlaps().
-// find_triangles() answers many regions in one call. TriangleSearch answers one region in steps, so that the caller can
-// stop between two steps:
+// Search by the vector kernels for the triangles of a mesh that overlap a ball or a box in mesh axes. Returns the
+// triangles' indices in the uploaded mesh, in the order in which the tree stores the triangles. The results equal those
+// of ball_overlaps() and box_overlaps(). find_triangles() answers many regions in one call. TriangleSearch answers one
+// region in steps, so that the caller can stop between two steps:
 //
 //   if (TriangleSearch<Ballf>::served(tree, ball)) {
 //     TriangleSearch<Ballf> search(tree, ball);

@@ -29,7 +29,7 @@ static inline float distance_of(uint32_t key) {
   return _mm_cvtss_f32(_mm_castsi128_ps(_mm_cvtsi32_si128(static_cast<int>(key & ~7u))));
 }
 
-// Prefetches the cache lines of the `bytes` bytes of memory that begin at `from`.
+// Prefetches the cache lines of the `bytes` bytes of memory that begin at `from`, which must be a multiple of 64.
 static inline void prefetch(const void* from, int bytes) {
   for (int line = 0; line < bytes; line += 64) _mm_prefetch(static_cast<const char*>(from) + line, _MM_HINT_T0);
 }
