@@ -139,11 +139,14 @@ rocksdb::Status Database::open(const DatabaseOptions& options, OpenMode mode, st
   wanted.env = database->env_.get();
   wanted.wal_filter = &database->wal_watch_;
   wanted.listeners = {database->errors_};
+  rocksdb::Status status;
+  // RocksDB would create the folder too, but would first report it as an error that the folder is missing.
+  if (mode == OpenMode::kCreate) status = wanted.env->CreateDirIfMissing(options.folder);
+  if (!status.ok()) return status;
   rocksdb::DB* db = nullptr;
-  rocksdb::Status status =
-      read_only(mode)
-          ? rocksdb::DB::OpenForReadOnly(wanted, options.folder, families(options, mode), &database->families_, &db)
-          : rocksdb::DB::Open(wanted, options.folder, families(options, mode), &database->families_, &db);
+  status = read_only(mode)
+               ? rocksdb::DB::OpenForReadOnly(wanted, options.folder, families(options, mode), &database->families_, &db)
+               : rocksdb::DB::Open(wanted, options.folder, families(options, mode), &database->families_, &db);
   if (!status.ok()) return status;
   database->db_.reset(db);
   result = std::move(database);
