@@ -144,9 +144,10 @@ rocksdb::Status Database::open(const DatabaseOptions& options, OpenMode mode, st
   if (mode == OpenMode::kCreate) status = wanted.env->CreateDirIfMissing(options.folder);
   if (!status.ok()) return status;
   rocksdb::DB* db = nullptr;
-  status = read_only(mode)
-               ? rocksdb::DB::OpenForReadOnly(wanted, options.folder, families(options, mode), &database->families_, &db)
-               : rocksdb::DB::Open(wanted, options.folder, families(options, mode), &database->families_, &db);
+  status =
+      read_only(mode)
+          ? rocksdb::DB::OpenForReadOnly(wanted, options.folder, families(options, mode), &database->families_, &db)
+          : rocksdb::DB::Open(wanted, options.folder, families(options, mode), &database->families_, &db);
   if (!status.ok()) return status;
   database->db_.reset(db);
   result = std::move(database);
