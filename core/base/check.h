@@ -38,9 +38,9 @@ constexpr void check_op(Compare compare, const A& a, const B& b, const char* fil
 #define LOCUS_CHECK_LE(a, b) LOCUS_CHECK_OP_(a, <=, b)
 #define LOCUS_CHECK_LT(a, b) LOCUS_CHECK_OP_(a, <, b)
 
-// True in debug and sanitizer builds, where LOCUS_DCHECK* are evaluated. A class whose comment names an invariant has a
-// member check_invariants(), which each mutating public member calls at its end through LOCUS_DCHECK_CALL.
-// check_invariants() costs at most as much as the mutation.
+// True in debug and sanitizer builds, where LOCUS_DCHECK* are evaluated. Most mutable classes whose comment names an
+// invariant have a member check_invariants(), which each mutating public member calls at its end through
+// LOCUS_DCHECK_CALL. check_invariants() costs at most as much as the mutation.
 namespace locus {
 #ifdef NDEBUG
 inline constexpr bool kDebugChecks = false;

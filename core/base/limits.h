@@ -1,6 +1,6 @@
 // All limits and their defaults. The command `locus limits` lists the limits, and a refusal names the limit that was
 // exceeded. The assertions at the end verify relations between limits. The server configuration can lower some limits
-// but raise none.
+// and replace some defaults.
 #ifndef LOCUS_CORE_BASE_LIMITS_H_
 #define LOCUS_CORE_BASE_LIMITS_H_
 
@@ -33,7 +33,7 @@ inline constexpr uint32_t kMaxBvhDepth = 64;  // max levels of nodes; sets the s
 inline constexpr uint32_t kMaxBvhBins = 64;
 
 inline constexpr uint32_t kMaxUpdateItems = 1u << 20;   // items per update batch
-inline constexpr uint32_t kMaxUpdateLists = 65536;      // insert, move and relabel lists per batch, empty ones included
+inline constexpr uint32_t kMaxUpdateLists = 65536;      // lists of one kind (e.g. inserts) per request, empty or not
 inline constexpr uint32_t kMaxListedItemErrors = 1000;  // max refused items listed in an ack
 inline constexpr uint32_t kMaxWriters = 4096;           // writer ids stored per scene, to detect batches sent twice
 
@@ -74,7 +74,7 @@ inline constexpr uint32_t kTestsBetweenChecks = 4096;         // primitive tests
 
 inline constexpr uint32_t kMaxHistoryTicks = 1u << 14;                 // ticks of history per scene
 inline constexpr uint64_t kDefaultHistoryBytes = uint64_t{256} << 20;  // bytes of history per scene
-inline constexpr uint64_t kMaxHistoryBytes = uint64_t{1} << 40;  // largest configurable value of kDefaultHistoryBytes
+inline constexpr uint64_t kMaxHistoryBytes = uint64_t{1} << 40;  // largest bytes of history that a scene can ask for
 
 inline constexpr uint32_t kReceiveBytes = 32u << 20;        // size in bytes of the largest received message
 inline constexpr uint32_t kMaxStreams = 1024;               // open update and query streams of one client

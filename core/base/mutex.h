@@ -1,5 +1,5 @@
-// std::mutex and std::condition_variable with Clang's thread-safety annotations. All locks of locus are of these types:
-// ThreadSanitizer reports false races for Debian's absl::Mutex, but none for std::mutex.
+// std::mutex and std::condition_variable with Clang's thread-safety annotations. All locks of the core and of the
+// daemon are of these types: ThreadSanitizer reports false races for Debian's absl::Mutex, but none for std::mutex.
 #ifndef LOCUS_CORE_BASE_MUTEX_H_
 #define LOCUS_CORE_BASE_MUTEX_H_
 

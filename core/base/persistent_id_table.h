@@ -1,5 +1,5 @@
 // Persistent hash table from 64-bit ids to 32-bit values, with open addressing: a snapshot costs O(1), since snapshots
-// share their leaves, and a write copies only the leaf that it changes. Used by the only writer of a scene, whose
+// share their leaves, and a write copies only the leaves that it changes. Used by the only writer of a scene, whose
 // readers keep snapshots of earlier revisions.
 //
 // Threads: each table is like a standard container: const members may run concurrently, other members need exclusive
@@ -69,7 +69,8 @@ class PersistentIdTable {
   // memory until fit() shrinks it.
   bool erase(Id id);
   // Resizes the table for `ids` ids: grows it if `ids` exceeds its capacity; shrinks it if `ids` is at most a quarter
-  // of its capacity. Precondition: ids >= size(). O(size) if it resizes, else O(1).
+  // of its capacity and a table for twice `ids` has fewer leaves. Precondition: ids >= size(). O(size) if it resizes,
+  // else O(1).
   void fit(size_t ids);
 
   // Returns the size in bytes of the leaves that this table has replaced since the last call, and resets the count.

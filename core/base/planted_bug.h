@@ -21,9 +21,9 @@ enum class PlantedBug {
   kNearestLimit,       // a nearest query also prunes boxes at exactly the distance of its farthest result
   kNearestTreePad,     // distances to boxes of triangles are compared in float without the pad
   kWidePlacedBounds,   // world bounds of an instance's triangles are grown by a rounding error of float, not double
-  kPlacedBoundsAlone,  // CONSERVATIVE ball and box queries lose exact hits outside a triangle's world bounds
-  kCapsuleCap,         // a capsule has no caps: its inner segment ends where the caps begin
-  kEndlessCapsule,     // a capsule is an endless cylinder
+  kPlacedBoundsAlone,  // CONSERVATIVE overlap queries lose exact hits outside a triangle's world bounds
+  kCapsuleCap,         // a capsule's inner segment is shortened by the radius at both ends
+  kEndlessCapsule,     // a capsule's inner segment is a thousand times as long
   kSweepStart,         // a sweep does not find a primitive that the mover touches at the start
   kPairBothSides,      // a pair of objects is reported twice, once for each object
   kPairCullExtent,     // the cull of pairs ignores the extent of the first object

@@ -26,9 +26,9 @@ class AxisTests {
  public:
   AxisTests(Vec3d half, Vec3d velocity) : half_(half), velocity_(velocity) {}
 
-  // Adds an axis on which the moving polytope projects to low .. high at t = 0. `magnitude` is the largest |component|
-  // of the polytope's points. Returns false if at every time at least one of the axes added so far separates the
-  // polytopes.
+  // Adds an axis on which the moving polytope projects to low .. high at t = 0. `magnitude` is about the largest
+  // |component| of the polytope's points. Returns false if at every time at least one of the axes added so far
+  // separates the polytopes.
   bool add(Vec3d axis, double low, double high, double magnitude) {
     const Vec3d size = abs(axis);
     const double weight = size.x + size.y + size.z;

@@ -1,5 +1,5 @@
 // Requirements on the values of a spatial index, as C++20 concepts. A value type needs no base class and no member
-// functions: specialise PrimitiveTraits for the type, and every structure under core/index can store its values. For a
+// functions: specialise PrimitiveTraits for the type, and Bvh and ListIndex (core/index) can store its values. For a
 // missing member the compiler prints one error that names the concept's line. Pure functions; any thread.
 //
 //   Scalar     float or double: the type of bounds and distances
@@ -10,7 +10,7 @@
 //              index finds the value to remove by this id
 //   bounds     axis-aligned bounds; every test below also requires that the query meets these bounds, so culling by any
 //              superset of them loses no result
-//   position   point that selects the cell of a grid: any point within the bounds, always the same for one value
+//   position   reference point, always the same for one value; may lie outside the bounds; no structure reads it
 //   ray        distance >= 0 of the first hit on the value, even if it exceeds the ray's t_max
 //   ball, box  whether the value shares a point with the closed ball or box
 //   distance   distance from a point to the value, in double; 0 inside the value; needed for nearest queries only

@@ -68,7 +68,7 @@ class SlabRay {
         direction_(ray.direction),
         pad_(static_cast<S>(pad)),
         magnitude_(max_component(abs(ray.origin))) {
-    // The factor covers the rounding of a float, and the pad of the reach itself.
+    // The factor covers the rounding to float and, in addition, pad * reach.
     if (reach != 0) magnitude_ += static_cast<S>(reach * (1 + 0x1p-18) / pad);
     LOCUS_DCHECK_GT(max_component(abs(ray.direction)), S{0});
     LOCUS_DCHECK_GE(pad_, S{0});

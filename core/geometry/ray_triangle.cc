@@ -59,7 +59,7 @@ struct TriangleRay::Projected {
   double determinant;
   double size;        // S: largest |x| or |y| of a corner
   double depth_span;  // largest minus smallest depth
-  double magnitude;   // upper bound of R: no vertex is farther from the origin than 2 S + max |depth|
+  double magnitude;   // upper bound of R: no vertex is farther from the ray's origin than 2 S + max |depth|
 
   // Returns whether the triangle is so nearly edge-on that double is not precise enough. For all other triangles the
   // error of the hit is below 2^-23 R.

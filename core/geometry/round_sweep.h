@@ -60,7 +60,7 @@ class RoundSweep {
   double radius_;
   Vec3d velocity_;
   Vec3d a_, b_, c_;  // corners of a triangle; otherwise a_ is the centre, and b_ the half axis or the half extents
-  double size_ = 0;  // largest |component| of a difference of two points of the segment or of the primitive
+  double size_ = 0;  // largest |component| of half_axis_, plus that of the primitive's b_ or of its edges at a_
 };
 
 }  // namespace locus

@@ -67,9 +67,9 @@ class BoxRegion {
   Aabb<S> bounds_;
 };
 
-// Region of a capsule: overlaps() returns true for the boxes that may_reach() accepts, and for no box that the bounds
-// of the capsule do not overlap. overlaps() is not monotone: near the surface of the capsule, the result depends on
-// rounding. So a visitor may use this region only to cull values whose own test is stricter by more than this rounding.
+// Region of a capsule: overlaps() returns true for the boxes that may_reach() accepts and that overlap the bounds of
+// the capsule. overlaps() is not monotone: near the surface of the capsule, the result depends on rounding. So a
+// visitor may use this region only to cull values whose own test is stricter by more than this rounding.
 class CapsuleRegion {
  public:
   explicit CapsuleRegion(const Capsule& capsule)

@@ -77,8 +77,8 @@ concept SpatialIndex = Bounded<typename Index::Value> &&
 };
 
 // Structure that can be changed. Precondition of insert(): no value in the index has the same id. remove() and
-// contains() compare only ids, but the caller must pass the value with the position at which it was inserted, since a
-// grid searches for it at that position.
+// contains() find a value by its id, but the caller must pass the value with the position at which it was inserted,
+// since contains() may compare positions, too.
 template <class Index>
 concept MutableSpatialIndex = SpatialIndex<Index> &&
     requires(Index& index, const Index& const_index, const typename Index::Value& value) {

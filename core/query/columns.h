@@ -1,8 +1,9 @@
 // Table of the result columns of a block: their names, element types and widths. Also defines which columns each kind
 // of query can return, and computes their size in a reply.
 //
-// To add a column: add a value to Column (query_batch.h) and a row to LOCUS_COLUMN_ARRAYS, and write its values in
-// run/rows.cc. All code that allocates, copies, measures or sends columns is generated from LOCUS_COLUMN_ARRAYS.
+// To add a column: add a value to Column (query_batch.h), a row to LOCUS_COLUMN_ARRAYS, and the column to the kinds
+// that return it (ServedColumns in columns.cc), and write its values in run/rows.cc. All code that allocates, copies,
+// measures or sends columns is generated from LOCUS_COLUMN_ARRAYS.
 #ifndef LOCUS_CORE_QUERY_COLUMNS_H_
 #define LOCUS_CORE_QUERY_COLUMNS_H_
 
@@ -94,7 +95,7 @@ static_assert(
 // Returns the columns that `block` may request, which depend on the kind of the block.
 ColumnSet served_columns(const QueryBlock& block);
 // Returns the columns that the block returns: the requested columns, or the default columns of its kind if the block
-// requests no columns.
+// requests no columns. Returns no columns if count_only is set.
 ColumnSet returned_columns(const QueryBlock& block);
 
 // Layout of a block's result. kDense has one row per query, also for a miss. kBytes has one byte per query and no rows.
@@ -107,8 +108,9 @@ size_t bytes_per_query(const QueryBlock& block);
 // Returns the maximum number of rows of each query of a kCounted block.
 uint64_t max_rows_per_query(const QueryBlock& block);
 
-// Returns an upper bound of the encoded size of a reply in bytes, without the rows of kCounted blocks: dense rows, row
-// counts, effective times, lists of truncated queries, and field headers.
+// Returns an upper bound of the encoded size of a reply in bytes, without the rows of kCounted blocks: dense rows,
+// bytes of kBytes and kMatrix blocks, row counts, effective times, lists of truncated and unanchored queries, and field
+// headers.
 uint64_t fixed_reply_bytes(const QueryBatch& batch);
 // Returns the batch's max_reply_bytes, or limits::kDefaultReplyBytes if max_reply_bytes is 0.
 uint64_t reply_limit(const QueryBatch& batch);

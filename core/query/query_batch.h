@@ -2,8 +2,8 @@
 // of a request without copying, and run/ answers the batch. Plain data; any number of threads may read it.
 //
 // The caller keeps the columns alive while the batch is in use. Let N be the number of queries of a block, which is the
-// number of entries of the first column of its kind. An entry of a column has 1, 3 or 4 values. Unless stated
-// otherwise, a column has N entries, one entry for all queries, or no entries. The default applies to a column without
+// number of entries of the first column of its kind. Unless stated otherwise, an entry of a column has 1, 3 or 4
+// values, and a column has N entries, one entry for all queries, or no entries. The default applies to a column without
 // entries.
 #ifndef LOCUS_CORE_QUERY_QUERY_BATCH_H_
 #define LOCUS_CORE_QUERY_QUERY_BATCH_H_

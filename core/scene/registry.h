@@ -46,7 +46,8 @@ class Registry {
   };
   // Creates a scene. The scene begins with the instances of the scene `static_from`, or without instances if
   // `static_from` is empty. If the name is taken, returns the existing scene if `if_absent` is true, else
-  // ALREADY_EXISTS. Returns NOT_FOUND if `static_from` does not exist, DATA_LOSS if `name` or `static_from` names a
+  // ALREADY_EXISTS. Returns INVALID_ARGUMENT if `name` is not a valid name, RESOURCE_EXHAUSTED if there are
+  // limits::kMaxScenes scenes, NOT_FOUND if `static_from` does not exist, DATA_LOSS if `name` or `static_from` names a
   // damaged scene, and the log's error if the log fails.
   absl::StatusOr<CreatedScene> create_scene(const std::string& name, const SceneSpec& spec, uint64_t epoch,
                                             const std::string& static_from, bool if_absent)
@@ -80,7 +81,9 @@ class Registry {
   // Adds `mesh` under `name` and returns the registered mesh, which has this name and the parts of `mesh`. If a
   // registered mesh has equal content, both meshes share the content, so that equal content is in memory once. If the
   // name is registered with equal content and equal parts, returns the registered mesh. Returns ALREADY_EXISTS if the
-  // name is registered with other content or other parts.
+  // name is registered with other content or other parts, INVALID_ARGUMENT if `name` is not a valid name,
+  // RESOURCE_EXHAUSTED if there are limits::kMaxMeshes meshes, DATA_LOSS if `name` names a damaged mesh, and the log's
+  // error if the log fails.
   absl::StatusOr<MeshPtr> add_mesh(const std::string& name, MeshPtr mesh) LOCUS_EXCLUDES(mesh_changes_mutex_, mutex_);
   // Deletes a mesh, damaged or not. Returns FAILED_PRECONDITION IN_USE, naming the number of its instances, if a scene
   // has instances that were placed under this name, or if a pending change places such instances.

@@ -19,8 +19,8 @@ namespace locus {
 inline constexpr uint32_t kBvhBuilderVersion = 1;
 
 struct BvhOptions {
-  // Number of bins on each axis, 2 to limits::kMaxBvhBins; each border between two bins is a candidate for a split.
-  // More bins result in slightly better trees and longer builds; answers to queries do not depend on the number.
+  // Maximum number of bins on each axis, 2 to limits::kMaxBvhBins; each border between two bins is a candidate for a
+  // split. More bins result in slightly better trees and longer builds; answers to queries do not depend on the number.
   int bins = 32;
   // Cancel flag, null if the build cannot be cancelled. When the flag becomes true, the build ends soon with CANCELLED.
   // The flag must not become false again and must outlive the build.
@@ -50,7 +50,7 @@ inline void for_each(const BvhOptions& options, size_t count, const std::functio
 absl::Status check_build(size_t values, const BvhOptions& options);
 // Returns the error CANCELLED for a build whose cancel flag was set.
 absl::Status cancelled_build();
-// Returns INVALID_ARGUMENT for the value at `index`, whose bounds are not finite.
+// Returns INVALID_ARGUMENT for the value at `index`, whose bounds are empty or not finite.
 absl::Status refuse_bounds(size_t index);
 
 // Builds a tree over `boxes`. Errors: INVALID_ARGUMENT for an empty box, a box that is not finite, bins out of range,

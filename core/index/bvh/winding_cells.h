@@ -64,9 +64,9 @@ class WindingCells {
   static constexpr uint32_t kMaxSets = 1024;
 
   // A cell is one byte. Values up to kMaxWinding - kMinWinding: a clear cell; the value is its winding number minus
-  // kMinWinding. Values from kFirstWay to kNoWay - 1: a cell with a way to a clear cell; the value is kFirstWay +
-  // direction * kMaxSteps + (number of steps to the clear cell) - 1, where `direction` is the axis, plus 3 if the way
-  // descends. kNoWay: any other cell. kUnset occurs only during a build.
+  // kMinWinding. Values from kFirstWay to kNoWay - 1: a cell with a way to a clear cell or out of the bounds; the value
+  // is kFirstWay + direction * kMaxSteps + (number of steps to the end of the way) - 1, where `direction` is the axis,
+  // plus 3 if the way descends. kNoWay: any other cell. kUnset occurs only during a build.
   static constexpr int kMinWinding = -63, kMaxWinding = 63, kMaxSteps = 16;
   static constexpr uint8_t kFirstWay = 128, kNoWay = kFirstWay + 6 * kMaxSteps, kUnset = 255;
 

@@ -48,7 +48,8 @@ struct BrickGeometry {
     if (((x | y | z) & ~((int64_t{1} << kBrickBits) - 1)) != 0) return -1;
     return static_cast<int>(x | y << kBrickBits | z << (2 * kBrickBits));
   }
-  // Returns true if the position lies in the brick; equals brick_of(cell_of(position)) == key. Branch-free.
+  // Returns true if the position lies in the brick; equals brick_of(internal::cell_of(position, cells_per_unit)) ==
+  // key. Branch-free.
   bool holds(Vec3d position) const {
     return ((position.x >= low.x) & (position.x < high.x) & (position.y >= low.y) & (position.y < high.y) &
             (position.z >= low.z) & (position.z < high.z)) != 0;

@@ -1,6 +1,6 @@
-// Snapshot of the hash grid: the structure that readers query. Immutable; copied in O(1); any thread. A snapshot only
-// culls: it passes each value that may satisfy a query to the caller once, and the caller applies the exact predicate
-// of the value in double.
+// Snapshot of the hash grid: the structure that readers query. Immutable; copied in O(levels); any thread. A snapshot
+// only culls: it passes each value that may satisfy a query to the caller once, and the caller applies the exact
+// predicate of the value in double.
 //
 // A value is stored in the one cell that contains its position, on the finest level whose cells are at least as wide as
 // the value. A query therefore widens its range on each level by the largest extent of that level, so that the query

@@ -88,7 +88,7 @@ class NearCandidates {
   void collect_recent(const Brick& brick, const GridNear& near, Work& work);
   // Adds `count` candidates with the given slots and keys; sources_.back() is their block.
   void add(const uint32_t* slots, const float* keys, uint32_t count);
-  // Sorts the candidates by key. May lower each key by a few units in the last place; the keys stay sorted.
+  // Sorts the candidates by key. May lower each key by up to 63 units in the last place; the keys stay sorted.
   void sort();
 
   absl::InlinedVector<Candidate, kMaxSorted> candidates_;

@@ -1,6 +1,6 @@
-// Collector of the objects that one ball or box query finds: retains the objects with the lowest ids, up to a given
-// number, and returns these objects ascending by id. A QueryTask reuses one collector for all queries of a chunk, so
-// that memory is allocated once. A collector belongs to one thread.
+// Collector of the objects that one overlap or contains query finds: retains the objects with the lowest ids, up to a
+// given number, and returns these objects ascending by id. A QueryTask reuses one collector for all queries of a chunk,
+// so that memory is allocated once. A collector belongs to one thread.
 #ifndef LOCUS_CORE_QUERY_KINDS_FOUND_OBJECTS_H_
 #define LOCUS_CORE_QUERY_KINDS_FOUND_OBJECTS_H_
 

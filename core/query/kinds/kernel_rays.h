@@ -1,7 +1,8 @@
 // Intersection of many rays with the scene's static instances by the vector kernels, which are efficient only with many
 // rays per call. Each ray visits the instances from near to far. All rays advance in rounds: each ray moves to its next
 // instance, then the kernels trace all rays that wait at instances of the same mesh in one call. Once a ray's collector
-// is full, its worst retained hit limits the t up to which the ray is traced. Supports EXACT rays of all modes.
+// is full, its worst retained hit limits the t up to which the ray is traced. Supports EXACT rays of all modes, but no
+// RayRequest::after.
 //
 // Threads: any thread may call trace_meshes() with a QueryTask and rays of its own.
 #ifndef LOCUS_CORE_QUERY_KINDS_KERNEL_RAYS_H_
@@ -25,8 +26,8 @@ struct PendingRay {
   bool is_cut = false;  // the batch ended before the search of this ray was complete
 };
 
-// Finds the hits of each ray on static instances and offers them to the ray's collector. Preconditions: all rays have
-// the same mode, and task.ray_kernels() is not null.
+// Finds the hits of each ray on static instances and offers them to the ray's collector. Preconditions: all rays are
+// EXACT, have the same mode and no position `after`, and task.ray_kernels() is not null.
 void trace_meshes(QueryTask& task, std::vector<PendingRay>& rays);
 
 }  // namespace locus

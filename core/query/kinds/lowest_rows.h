@@ -1,6 +1,6 @@
-// Collector of the rows of one ball query, box query or group lookup: retains the rows with the lowest ids, up to a
-// given number. The rows of an instance's triangles differ only in the triangle, so they are stored as one run with a
-// list of triangles. A collector belongs to one thread.
+// Collector of the rows of one overlap query, contains query or group lookup: retains the rows with the lowest ids, up
+// to a given number. The rows of an instance's triangles differ only in the triangle, so they are stored as one run
+// with a list of triangles. A collector belongs to one thread.
 #ifndef LOCUS_CORE_QUERY_KINDS_LOWEST_ROWS_H_
 #define LOCUS_CORE_QUERY_KINDS_LOWEST_ROWS_H_
 
@@ -21,13 +21,13 @@ struct RowRun {
   size_t rows() const { return triangle_count == 0 ? 1 : triangle_count; }
 };
 
-// Result of one ball query, box query or group lookup.
+// Result of one overlap query, contains query or group lookup.
 struct OverlapAnswer {
   std::vector<RowRun> runs;
   std::vector<uint32_t> triangles;
-  // Found objects, ascending by id, if a ball or box query found no instances; `runs` is then empty. In all other cases
-  // `objects` is empty, and `runs` contains the rows of objects, too. The memory belongs to the QueryTask and is valid
-  // until the next query of the task.
+  // Found objects, ascending by id, if an overlap or contains query found no instances; `runs` is then empty. In all
+  // other cases `objects` is empty, and `runs` contains the rows of objects, too. The memory belongs to the QueryTask
+  // and is valid until the next query of the task.
   absl::Span<const FoundObject> objects;
   uint64_t count = 0;      // number of rows; with count_only, `runs` and `objects` are empty
   bool truncated = false;  // more rows were found than are returned

@@ -31,7 +31,8 @@ class NearestSearch {
   // Triangles to find: all triangles within the limit, or only the nearest of them.
   enum class Find { kEvery, kNearest };
 
-  // Returns whether a search is possible: kernels exist for this processor, and support the tree and the point.
+  // Returns whether a search is possible: kernels exist for the active instruction set, and support the tree and the
+  // point.
   static bool served(const TriangleBvh& tree, Vec3d point) {
     return active_nearest_kernels() != nullptr && tree.size() != 0 &&
            max_component(abs(point)) + double{tree.tree().magnitude} <= double{kMaxNearestReach};

@@ -149,7 +149,7 @@ class ConvexMeshRegion {
   const RegionInMesh& region_;
 };
 
-// Operations on a convex region, with the same members as BallShape.
+// Operations on a convex region, with the members of BallShape except size().
 struct RegionShape {
   static constexpr bool kHasKernels = false;
   using World = ConvexRegion;
@@ -187,7 +187,7 @@ GridRegion search_region(const SceneAtTime& moment, const typename Kind::World& 
   return moment.region(region.bounds(), options.precision == Precision::kExact ? Kind::as_ball(shape) : std::nullopt);
 }
 
-// Visitor of the moving objects that one ball, box or capsule may overlap.
+// Visitor of the moving objects that one ball, box, capsule or convex region may overlap.
 template <class Kind>
 class ObjectRows {
  public:
@@ -340,7 +340,7 @@ class PlacedBounds {
   OverlapRows rows_;
 };
 
-// Visitor of the instances that one ball, box or capsule may overlap.
+// Visitor of the instances that one ball, box, capsule or convex region may overlap.
 template <class Kind>
 class InstanceSearch {
  public:

@@ -1,5 +1,5 @@
 // Axis-aligned bounds of an instance's triangles in world axes. CONSERVATIVE queries test the bounds of
-// PlacedTriangles. EXACT rays, balls and boxes find a triangle only if they also meet the wider bounds that
+// PlacedTriangles. EXACT rays, sweeps and overlap queries find a triangle only if they also meet the wider bounds that
 // LoosePlacedTriangles computes for the triangle: the exact tests run in mesh axes and in floats, and without this
 // condition they could report a triangle that is far away in the world.
 //

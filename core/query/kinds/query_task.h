@@ -119,11 +119,11 @@ class QueryTask {
   bool check();
   bool ended() const { return ended_; }
 
-  // Returns the vector kernels for EXACT rays in meshes, or null if the processor supports none or the task uses brute
-  // force.
+  // Returns the vector kernels for EXACT rays in meshes, or null if the active instruction set has none or the task
+  // uses brute force.
   const RayKernels* ray_kernels() const { return brute_force_ ? nullptr : active_ray_kernels(); }
 
-  // Returns the collector of found objects, which successive ball and box queries reuse.
+  // Returns the collector of found objects, which successive overlap and contains queries reuse.
   FoundObjects& found_objects() { return found_objects_; }
 
   // Returns whether ball, box, contains, nearest and pair queries may use the vector kernels.

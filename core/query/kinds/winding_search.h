@@ -21,7 +21,7 @@ namespace locus {
 
 class WindingSearch {
  public:
-  // Returns whether a search is possible: kernels exist for this processor, and the tree is not empty.
+  // Returns whether a search is possible: kernels exist for the active instruction set, and the tree is not empty.
   static bool served(const TriangleBvh& tree) { return active_crossing_kernels() != nullptr && tree.size() != 0; }
 
   // Begins a search along `way`. `point` must be a result of without_tiny_coordinates(). Preconditions: served(tree),

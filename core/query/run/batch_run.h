@@ -37,8 +37,9 @@
 namespace locus {
 
 struct RunOptions {
-  // Function that is called every limits::kTestsBetweenChecks primitive tests, on any thread. If it returns a status
-  // that is not OK, the batch ends with this status. If `stop` is empty, the batch is never stopped.
+  // Function that is called before and after each chunk and after every limits::kTestsBetweenChecks primitive tests, on
+  // any thread. If it returns a status that is not OK, the batch ends with this status. If `stop` is empty, the batch
+  // is never stopped.
   std::function<absl::Status()> stop;
   // Wall clock in nanoseconds with any origin, read before and after each chunk, on any thread. If `clock` is empty,
   // each call of work() runs one chunk.

@@ -1,6 +1,7 @@
 // Runs a chunk of a block: consecutive queries, on one thread. The output depends on the RowLayout of the block. Rows
-// of kDense and bytes of kBytes are written directly into the reply's columns. Rows of kCounted are collected in memory
-// of the runner, since their positions in the reply depend on how many rows the earlier chunks have.
+// of kDense and bytes of kBytes and kMatrix are written directly into the reply's columns. Rows of kCounted are
+// collected in memory of the runner, since their positions in the reply depend on how many rows the earlier chunks
+// have.
 //
 // Threads: a runner belongs to one thread. Invariant: for a kCounted block, the runner has at most max_rows_ rows, and
 // one row count for each query that was run. If the block has count_only, the runner has only the row counts.
@@ -80,7 +81,7 @@ class BlockRunner {
   void write_contacts(const OverlapAnswer& answer, const Solid& solid, size_t i, size_t rows);
   void look_up_groups_at(const LookupColumns& lookup, size_t i);
   void count_rows(size_t rows, bool cut, size_t i);
-  // Records the number of rows of query `i` of a block with count_only.
+  // Records the number of rows of the next query of a block with count_only.
   void write_count(uint64_t rows);
   // Writes an empty answer for query `i`: a miss, bytes of 0, or a row count of 0.
   void write_nothing(size_t i);
@@ -89,7 +90,8 @@ class BlockRunner {
   // Returns the work so far as the number of nodes, cells, tests and rows, which does not depend on the speed of the
   // machine.
   uint64_t work_done() const;
-  // Returns true if the chunk has done so much work that its remaining queries should become a new chunk.
+  // Returns true if the chunk has done so much work that its remaining queries should become new chunks. Always false
+  // once the groups of a block were looked up.
   bool should_split() const;
   // Sets rays_per_call from the work of the last call, in which `rays` rays needed `work`, in units of work_done().
   void adapt_rays_per_call(size_t rays, uint64_t work);

@@ -1,5 +1,5 @@
-// Rows of one chunk of a batch, stored until all earlier chunks are written out: one vector per column, and the indices
-// of truncated queries. Plain data.
+// Rows of one chunk of a batch, stored until all earlier chunks are written out: one vector per column array, the row
+// counts, and the indices of truncated queries. Plain data.
 #ifndef LOCUS_CORE_QUERY_RUN_COLLECTED_ROWS_H_
 #define LOCUS_CORE_QUERY_RUN_COLLECTED_ROWS_H_
 
@@ -18,8 +18,8 @@ struct CollectedRows : ColumnArrays<ColumnVector> {
   std::vector<uint32_t> truncated;  // indices of truncated queries in the block, ascending
 };
 
-// Appends `rows` uninitialized rows to each column of `columns`, and returns pointers to the first new row. The
-// pointers stay valid until the next call for the same `collected`.
+// Appends `rows` rows of zeros to each column of `columns`, and returns pointers to the first new row. The pointers
+// stay valid until the next call for the same `collected`.
 inline RowSpans add_rows(CollectedRows& collected, ColumnSet columns, size_t rows) {
   RowSpans spans;
   for_each_column_array([&](const auto& array) {

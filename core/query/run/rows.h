@@ -44,8 +44,8 @@ void write_contact(const SweepRequest& request, Vec3d frame, const Hit& hit, con
 void write_nearest_surface(const NearestRequest& request, Vec3d frame, const Hit& hit, Winding winding,
                            const RowSpans& to, size_t row);
 
-// Writes the first `rows` rows of a cell, beginning at row 0: the ball, then the planes. `point` is the query's point,
-// relative to the block's frame.
+// Writes the first `rows` rows of a cell, beginning at row 0: a row with the radius, then one row for each plane.
+// `point` is the query's point, relative to the block's frame.
 void write_cell(const CellAnswer& cell, Vec3d point, const RowSpans& to, size_t rows);
 
 }  // namespace locus

@@ -63,7 +63,8 @@ class SceneJournal {
   void snapshot_written(uint64_t sequence, uint64_t total_bytes) LOCUS_EXCLUDES(mutex_);
 
  private:
-  // Checks the invariants of the class comment. O(1).
+  // Checks that the sequence numbers are in order, and that position_.bytes is 0 if no record follows the snapshot.
+  // O(1).
   void check_invariants() const LOCUS_REQUIRES(mutex_);
   // Ends the record that was last encoded into bytes_: adds its LogEntry, with the writer and batch number of `batch`,
   // to entries_, and its end offset to ends_.

@@ -30,7 +30,7 @@ class ObjectSet {
   size_t size() const { return grid_.size(); }
   const GridSnapshot& grid() const { return grid_; }
   // Returns a reference to the object with this id, or a null reference if no object has the id. O(1), plus a search
-  // through the keys of one brick.
+  // through the handles of one brick.
   GridRef find_ref(Id id) const;
   std::optional<Object> find(Id id) const;
   // Returns true if an object with the id of `object` is stored at exactly the position of `object`.

@@ -59,7 +59,7 @@ class ObjectStore {
     LOCUS_DCHECK_LT(handle, next_handle_);
     return grid_.at(handle);
   }
-  // Prefetches the memory that at(handle) reads.
+  // Prefetches the memory that at(handle) reads first.
   [[gnu::always_inline]] void prefetch_slot(uint32_t handle) const { grid_.prefetch_slot(handle); }
 
   // Replaces the objects `removed` by `inserted`. An id in both lists is an update of one object, unless the id is in

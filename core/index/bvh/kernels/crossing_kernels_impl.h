@@ -13,11 +13,11 @@
 // product may overflow, so that no sign counts as certain. Products that underflow add at most 2^-147, which 2^-120
 // covers.
 //
-// An edge crosses the height of p if one of its ends is at the height of p or below, and its other end is above. Either
-// no edge of a triangle crosses this height, or one rising and one falling edge do. If the signs of both edges are
-// certain, the triangle's winding in the projection is known. If the winding is 0, p is off the triangle, because the
-// two edges bound the triangle's section at this height. Otherwise p may be on the triangle only if the triangle's
-// bounds, along the half line, extend back to p.
+// Call the coordinate y of a point its height. An edge crosses the height of p if one of its ends is at the height of p
+// or below, and its other end is above. Either no edge of a triangle crosses this height, or one rising and one falling
+// edge do. If the signs of both edges are certain, the triangle's winding in the projection is known. If the winding is
+// 0, p is off the triangle, because the two edges bound the triangle's section at this height. Otherwise p may be on
+// the triangle only if the triangle's bounds, along the half line, extend back to p.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_CROSSING_KERNELS_IMPL_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_CROSSING_KERNELS_IMPL_H_
 

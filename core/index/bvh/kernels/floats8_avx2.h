@@ -97,14 +97,14 @@ static inline uint32_t pack_children(const TriangleNode& node, Floats8 near, Flo
 }
 
 // Returns the slots of a node from far to near for an octant of ray directions, each in the lowest three bits of a
-// lane. The other bits of a lane are not zero.
+// lane. The other bits of a lane may be nonzero.
 static inline __m256i slots_in_order(const TriangleNode& node, uint32_t octant) {
   const __m256i shifts = _mm256_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21);
   return _mm256_srlv_epi32(_mm256_set1_epi32(static_cast<int>(node.order[octant])), shifts);
 }
 
 // Writes the slots of the children whose boxes are hit (near <= far), from far to near for an octant of ray directions,
-// and returns their number. Each slot is in the lowest three bits of an element, whose other bits are not zero. May
+// and returns their number. Each slot is in the lowest three bits of an element, whose other bits may be nonzero. May
 // overwrite all eight elements of `slots`.
 static inline uint32_t pack_slots(const TriangleNode& node, Floats8 near, Floats8 far, uint32_t octant,
                                   uint32_t* slots) {

@@ -5,7 +5,7 @@
 //
 // Errors of squared distances to boxes, with u = 2^-24: the differences add 2 u of the value, the square u and the two
 // sums 2 u, 5 u in all; squares that underflow add at most 2^-148. A key rounds the squared distance down, which only
-// makes a box nearer. The limit is raised by 2^-20 = 16 u twice before and once after it is squared, which covers the 5
+// makes a box nearer. The limit is raised by 2^-20 = 16 u once before and once after it is squared, which covers the 5
 // u and the roundings of the limit itself; a squared limit below 2^-100 is raised to 2^-100, so that 2^-148 is less
 // than u of it. The distance of a block is computed from its key and is too small by at most 2^-20 of its value plus
 // 2^-73. The error bound of the block is 32 u L + 2^-59, but only 18 u L + 2^-85 are needed: the difference covers the

@@ -34,7 +34,7 @@ struct alignas(64) InFlightRay {
   uint32_t now;    // current node or block, or kNoChild at the end
   uint32_t top;    // number of elements in `waiting`
   float limit;
-  uint32_t number;  // triangle number of the best hit so far; if kAll, number of rows stored
+  uint32_t number;  // triangle number (kAny: block) of the best hit so far; kAll: number of rows stored
   uint32_t nodes, tests;
   bool found, undecided;
   alignas(64) uint32_t waiting[kTreeStack];

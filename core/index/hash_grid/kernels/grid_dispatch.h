@@ -6,7 +6,7 @@
 
 namespace locus {
 
-// Returns the kernels of the active instruction set. Thread-safe.
+// Returns the AVX2 kernels if the active instruction set is kAvx2, otherwise the portable kernels. Thread-safe.
 const GridKernels& active_grid_kernels();
 
 }  // namespace locus
