@@ -25,7 +25,8 @@ class PendingBatch {
 
   // Adds the changes of one line of the script. Returns a usage error, and adds nothing, if the line names a scene
   // other than scene(), sets a tick, differs from earlier lines in `upsert`, has float positions relative to a frame,
-  // or has a change that the server would apply before a change of an earlier line.
+  // or has a change that the server would apply before an earlier line's change of the same object. A removal of all
+  // objects or of a group counts as a change of every object.
   absl::Status add(const std::string& scene, const v1::UpdateBatch& line);
 
   // Returns the scene that all lines name; empty before the first add().

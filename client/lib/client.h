@@ -10,9 +10,10 @@
 //
 // Errors are absl::Status with the server's code and message; error_of() (client/lib/status.h) returns the server's
 // structured error. UNAVAILABLE means that no server answered or that the server is draining. After DEADLINE_EXCEEDED
-// the outcome of a change is unknown. Calls that change nothing are retried until their deadline if they fail with
-// UNAVAILABLE, or with RESOURCE_EXHAUSTED and a retry hint of the server. An update is retried only if its batch has
-// `writer` and `batch`, by which the server recognizes a repeated batch. No other call is ever retried.
+// the outcome of a change is unknown. Methods whose comment says "Retried" repeat a call that fails with UNAVAILABLE,
+// or with RESOURCE_EXHAUSTED and a retry hint of the server, as often as RetryPolicy allows and until the deadline.
+// apply() does so only if its batch has `writer` and `batch`, by which the server recognizes a repeated batch. In
+// addition, any unary call is repeated if the server refused its token and the token file contains another one by then.
 #ifndef LOCUS_CLIENT_LIB_CLIENT_H_
 #define LOCUS_CLIENT_LIB_CLIENT_H_
 
@@ -88,10 +89,11 @@ class Client {
   absl::StatusOr<std::vector<v1::Scene>> list_scenes(const std::map<std::string, std::string>& labels = {}) const;
   absl::Status delete_scene(const v1::DeleteSceneRequest& request) const;
 
-  // Uploads a mesh in messages of at most 1 MiB. The first message carries the mesh's SHA-256, and the upload stops as
-  // soon as the server answers, so a mesh that the server already has is not sent again. Returns when the server has
-  // built the mesh's tree. Not retried; safe to call again. Returns INVALID_ARGUMENT, before anything is sent, if the
-  // length of a column is not a multiple of three or is too large.
+  // Uploads a mesh in messages of at most 1 MiB, except that the first message has all parts of the mesh, whatever
+  // their size. The first message also carries the mesh's SHA-256, and the upload stops as soon as the server answers,
+  // so a mesh that the server already has is not sent again. Returns when the server has built the mesh's tree. Not
+  // retried; safe to call again. Returns INVALID_ARGUMENT, before anything is sent, if the length of a column is not a
+  // multiple of three or is too large.
   absl::StatusOr<v1::UploadMeshResponse> upload_mesh(const MeshColumns& mesh,
                                                      const UploadProgress& progress = {}) const;
   // Downloads a mesh as the server stores it, completely into memory: 12 bytes per vertex and per triangle. Retried.

@@ -27,7 +27,8 @@ namespace locus::client {
 absl::StatusOr<std::string> target_of(absl::string_view address);
 
 // Returns the channel credentials for these options, after checking the files. Returns INVALID_ARGUMENT, NOT_FOUND or
-// FAILED_PRECONDITION naming the file if a file is missing, unreadable or malformed, or if a key has no certificate.
+// FAILED_PRECONDITION naming the file if a file is missing, unreadable or malformed, and INVALID_ARGUMENT if only one
+// of certificate and key is given.
 absl::StatusOr<std::shared_ptr<grpc::ChannelCredentials>> channel_credentials(const CredentialOptions& options);
 
 // Returns a channel to `target`. The channel does not connect yet. It shares its connection with no other channel of

@@ -27,8 +27,8 @@ struct Endpoint {
 // LOCUS_TOKEN_FILE and LOCUS_TOKEN describe. A named context gives what they leave open: the context `context`, else
 // the one of LOCUS_CONTEXT, else, if LOCUS_ADDRESS is not set, the default context of the user. The default context is
 // not used for another address, so that its credentials do not reach another server. Returns NOT_FOUND for an unknown
-// context, INVALID_ARGUMENT for a malformed contexts file or value of LOCUS_TLS. Files of credentials are read by
-// Client::connect().
+// context, INVALID_ARGUMENT for a malformed or too large contexts file or a malformed value of LOCUS_TLS, and
+// FAILED_PRECONDITION for a contexts file that cannot be read. Files of credentials are read by Client::connect().
 absl::StatusOr<Endpoint> endpoint_from_environment(const std::string& context = {});
 
 // Options that the caller of complete_endpoint() has set already.
@@ -38,8 +38,8 @@ struct GivenOptions {
 };
 
 // Fills in the members of `endpoint` that are not given. Their values come from the context `context` of the file
-// `contexts_path` or, if `context` is empty and no address is given, from its default context. A token file that is
-// given comes before a token. Returns NOT_FOUND for an unknown context, INVALID_ARGUMENT for a malformed file.
+// `contexts_path` or, if `context` is empty and no address is given, from its default context. If both a token and a
+// token file are given, drops the token. Returns NOT_FOUND for an unknown context, and the errors of read_contexts().
 absl::Status complete_endpoint(const std::string& contexts_path, const std::string& context, GivenOptions given,
                                Endpoint& endpoint);
 

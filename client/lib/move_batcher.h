@@ -23,7 +23,8 @@ namespace locus::client {
 class MoveBatcher {
  public:
   // Callback that is called once for each message, with the message's ack, which lists refused moves (unknown ids), or
-  // with the error that ended the stream. It runs on a thread of the library, and must not block or call the batcher.
+  // with the error of the message or of the stream. It runs on a thread of the library, and must not block or call the
+  // batcher.
   using AckCallback = std::function<void(const absl::StatusOr<v1::UpdateAck>&)>;
 
   explicit MoveBatcher(std::unique_ptr<UpdateStream> stream, const GatherLimits& limits = {}, AckCallback on_ack = {});

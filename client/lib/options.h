@@ -28,8 +28,8 @@ enum class Lane {
   kBulk,     // large messages: streams by default, uploads, downloads, dumps, backups
 };
 
-// Options for the encryption of a connection, and the credentials of the client. Files are in PEM format and are read
-// by connect().
+// Options for the encryption of a connection, and the credentials of the client. Certificates and keys are files in PEM
+// format, which connect() reads.
 struct CredentialOptions {
   // Encrypts the connection with TLS. Implied by ca_file, certificate_file and server_name.
   bool tls = false;
@@ -72,8 +72,8 @@ struct ClientOptions {
   int max_send_bytes = 32 << 20;
   // Maximum size of a received message in bytes. The largest max_reply_bytes that a query may request is 64 MiB.
   int max_receive_bytes = 64 << 20;
-  // Retries of calls that change nothing, and of updates that carry `writer` and `batch`. No other call is ever
-  // retried.
+  // Retries of unary calls that change nothing, of mesh downloads, and of updates that carry `writer` and `batch`.
+  // Other calls are repeated only because of a new token (see CredentialOptions::token).
   RetryPolicy retry;
 };
 

@@ -48,8 +48,9 @@ struct QueryBatcherOptions {
   Double3 frame = {};
 };
 
-// Thread-safe: every method may be called from any thread. Callbacks run one at a time on a thread of the library: they
-// must not block or call the batcher.
+// Thread-safe: every method may be called from any thread. Callbacks run on threads of the library and must not block
+// or call the batcher. They run one at a time until the stream ends; after that, callbacks with the stream's error may
+// overlap.
 class QueryBatcher {
  public:
   using HitCallback = std::function<void(absl::StatusOr<SingleHit>)>;

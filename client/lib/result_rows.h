@@ -2,8 +2,9 @@
 // block and copies no columns; it only stores the index of each query's first row. Views are immutable, so any number
 // of threads may read a view.
 //
-// of() checks the lengths of the columns once, and returns DATA_LOSS if they are inconsistent. So no access runs past
-// the end of a column, even if the server sent a malformed result. Indices of queries and rows are not checked, as in
+// of() checks the lengths of the columns once. It returns DATA_LOSS if they are inconsistent, and INVALID_ARGUMENT if
+// the block lacks a column that the view needs or answers another kind of query. So no access runs past the end of a
+// column, even if the server sent a malformed result. Indices of queries and rows are not checked, as in
 // std::vector::operator[].
 #ifndef LOCUS_CLIENT_LIB_RESULT_ROWS_H_
 #define LOCUS_CLIENT_LIB_RESULT_ROWS_H_
@@ -33,7 +34,8 @@ class ResultRows {
   // Returns a view, or DATA_LOSS if the lengths of the columns are inconsistent.
   static absl::StatusOr<ResultRows> of(const v1::BlockResult& block);
 
-  // Return the number of queries, and the number of rows of all queries.
+  // Return the number of queries, and the number of rows of all queries. With count_only(), rows() counts rows that the
+  // block does not contain.
   size_t queries() const { return begins_.size() - 1; }
   size_t rows() const { return begins_.back(); }
   RowRange rows_of(size_t query) const { return {begins_[query], begins_[query + 1]}; }
@@ -84,7 +86,8 @@ class RayHits {
   size_t size() const { return rows_.queries(); }
   // Returns whether the ray has a hit.
   bool hit(size_t ray) const;
-  // Return the columns of the ray's nearest hit; +infinity, 0 and kNoTriangle for a miss.
+  // Return the columns of the ray's nearest hit; +infinity, 0 and kNoTriangle for a miss. triangle() also returns
+  // kNoTriangle for an object, or if the column was not requested.
   float t(size_t ray) const;
   uint64_t id(size_t ray) const;
   uint32_t triangle(size_t ray) const;

@@ -41,7 +41,7 @@ struct SavedContexts {
 std::vector<std::pair<std::string, std::string>> fields_of(const SavedContext& context);
 
 // Returns the path of the user's file: locus/contexts in $XDG_CONFIG_HOME or in $HOME/.config. Empty if neither
-// variable is set.
+// variable is an absolute path.
 std::string default_contexts_path();
 
 // Parses the text of a contexts file. Returns INVALID_ARGUMENT with the file's name and the line.
@@ -49,8 +49,8 @@ absl::StatusOr<SavedContexts> parse_contexts(absl::string_view file, absl::strin
 // Returns the text of a contexts file.
 std::string contexts_text(const SavedContexts& contexts);
 
-// Reads the contexts. A missing file counts as a file without contexts. Returns the errors of parse_contexts(), and
-// FAILED_PRECONDITION for a file that cannot be read or is too large.
+// Reads the contexts. A missing file counts as a file without contexts. Returns the errors of parse_contexts(),
+// INVALID_ARGUMENT for a file that is too large, and FAILED_PRECONDITION for a file that cannot be read.
 absl::StatusOr<SavedContexts> read_contexts(const std::string& path);
 
 // Returns the context of this name. Returns NOT_FOUND with the names that exist.

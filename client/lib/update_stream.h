@@ -8,7 +8,7 @@
 //
 // The stream ends permanently if the server refuses the stream itself (for example because of the scene name or of
 // missing rights), if the server does not know the writer any more (the scene was restarted without its state), or if
-// as many attempts to reconnect as the policy allows fail without an ack between them. Every unanswered batch and every
+// as many calls in a row as the policy allows fail without an answer between them. Every unanswered batch and every
 // later send() gets the status of this failure. The outcome of the unanswered batches is unknown; acked batches stay
 // applied.
 #ifndef LOCUS_CLIENT_LIB_UPDATE_STREAM_H_
@@ -43,9 +43,9 @@ struct UpdateStreamOptions {
   // options only to continue the batch numbers of an earlier stream's writer.
   uint64_t writer = 0;
   uint64_t next_batch = 1;
-  // Reconnection after a broken connection. Every ack resets the count of attempts.
+  // Reconnection after a broken connection. Every answer, ack or error, resets the count of attempts.
   RetryPolicy reconnect = {.max_attempts = 10};
-  // Maximum time without any ack while batches are unanswered; after that the connection counts as broken.
+  // Maximum time without any answer while batches are unanswered; after that the connection counts as broken.
   absl::Duration patience = absl::Seconds(10);
   // Connection of the stream. Use kLatency for small batches whose acks are needed quickly.
   Lane lane = Lane::kBulk;

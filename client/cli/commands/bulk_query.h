@@ -5,8 +5,8 @@
 // Without `follow`, all rows are answered at one revision: the options select the revision of the first batch, and
 // every later batch requests exactly the revision of the first answer. The server retains a bounded number of
 // revisions. If it drops the requested revision, the run ends with OUT_OF_RANGE after the answers received so far. With
-// `follow`, each batch is answered at the scene's newest revision, so revisions never decrease from one answer to the
-// next.
+// `follow`, each batch is answered at the scene's newest revision. The server may answer batches that are in flight
+// together in any order, so an answer can have an older revision than the answer before it.
 //
 // The answer to a row does not depend on the other rows of its batch, because the frame used for a row depends only on
 // the position in this row (frame_of).
@@ -30,7 +30,7 @@ struct BlockRows {
   const RowBatch& batch;
   RowSpan rows;
   client::Double3 frame;
-  std::vector<float> offsets;  // 3 per row: the position (field 0 of the schema) relative to `frame`; empty without
+  std::vector<float> offsets;  // 3 per row: position (field 0 of the schema) relative to `frame`; empty if it has none
 };
 
 // Content of a row of the answer.
@@ -55,7 +55,7 @@ struct BulkQuery {
 // position by less than 0.0005.
 client::Double3 frame_of(double x, double y, double z);
 
-// Returns the positions of field `column` relative to the frame, 3 for each row.
+// Returns the values of the column `positions` in `rows` relative to the frame, three floats for each row.
 std::vector<float> offsets_of(const RowColumn& positions, RowSpan rows, const client::Double3& frame);
 
 // Returns the field of a point, in the columns "at" or "position".

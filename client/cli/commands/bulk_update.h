@@ -31,8 +31,8 @@ struct BulkUpdate {
 
 // Reads rows and sends updates until the input ends, and writes one report. When an ack arrives, the items that it
 // lists as refused are written at once as rows (line, id, reason). The report ends with applied, refused, batches,
-// revision, tick and epoch. Returns the first error. Without such an error, returns the error of refused_items() if the
-// server refused items, otherwise OK.
+// revision, tick and epoch. Returns the first error. Without such an error, returns OK if the server refused no item,
+// otherwise NOT_FOUND if all refused items have unknown ids, and FAILED_PRECONDITION if not.
 absl::Status run_bulk_update(const BulkUpdate& update, const std::string& scene, const BulkOptions& bulk,
                              Context& context);
 

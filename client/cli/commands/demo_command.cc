@@ -1,5 +1,5 @@
-// `locus demo`: uploads a level, moves ten thousand objects in it while clients query them, and checks answers to every
-// kind of query.
+// `locus demo`: uploads a level, moves objects in it, by default ten thousand, while clients query them, and checks
+// answers to every kind of query that the clients send (kDemoKinds).
 #include <chrono>
 #include <functional>
 #include <memory>

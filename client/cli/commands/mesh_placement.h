@@ -24,7 +24,7 @@ struct PlacementOptions {
   std::vector<Number64> groups;
 };
 
-// Adds the options shared by the import and generate commands. Does not add the argument SCENE.
+// Adds the options shared by the import and generate commands, except --scene, which each command adds itself.
 void add_placement_options(CLI::App& command, PlacementOptions& options);
 
 // Uploads all meshes, then places an instance of each mesh in one atomic change. The position of the instances is the

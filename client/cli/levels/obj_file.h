@@ -1,4 +1,4 @@
-// Writer of a mesh as a Wavefront OBJ file, for viewing generated levels in other programs. A function without state.
+// Writer of a mesh as a Wavefront OBJ file. For the commands `generate` and `mesh download`. A function without state.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_OBJ_FILE_H_
 #define LOCUS_CLIENT_CLI_LEVELS_OBJ_FILE_H_
 

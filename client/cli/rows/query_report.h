@@ -31,7 +31,8 @@ Json work_json(const v1::Work& work);
 
 // Returns the head of a report: epoch, revision and tick, and the indices of truncated queries. For queries about the
 // past, the head also contains their effective times, and the indices of the queries whose times were clamped to the
-// history. It also contains the indices of queries without an anchor, and the work, if the server reported it.
+// history. It also contains the indices of the queries for which ResultRows::unanchored() is true, and the work, if the
+// server reported it.
 Json result_head(const v1::QueryResult& result);
 
 }  // namespace locus::cli

@@ -33,7 +33,9 @@ class Cost(NamedTuple):
 
 
 def directions(rays: int) -> "array.array[float]":
-    """Returns the unit directions of one revolution, 3N float32 for `rays` rays, ring by ring; z is up."""
+    """Returns the unit directions of one revolution, 3N float32 for `rays` rays; z is up. The directions of all rings
+    at one yaw are consecutive.
+    """
     steps = -(-rays // RINGS)
     column = array.array("f")
     for ray in range(rays):
@@ -50,7 +52,7 @@ def position(sweep: int) -> Tuple[float, float, float]:
 
 
 def build_street(client: locus.Client, scene: str) -> locus.Revision:
-    """Inserts a ground, houses on both sides, and balls on the road; returns the resulting revision."""
+    """Creates the scene with a ground, houses on both sides, and balls on the road; returns the resulting revision."""
     client.create_scene(scene)
     batch = locus.UpdateBatch()
     batch.insert_boxes([1], [0.0, 0.0, -0.5], [500.0, 500.0, 0.5], tags=1)

@@ -6,9 +6,10 @@
         result = client.query("arena", locus.QueryBatch().rays([0, 0, 100], [0, 0, -1]))
         print(result.blocks[0].t, result.blocks[0].ids)
 
-Calls block. Errors are LocusError (locus/errors.py); wrong arguments are TypeError and ValueError. While the server
-cannot be reached, calls that change nothing are retried within their timeout. An update is retried only if it carries
-`writer` and `number`. Other calls are never retried.
+Calls block. Errors are LocusError (locus/errors.py); wrong arguments are TypeError and ValueError. Unary calls that
+change nothing are retried within their timeout, as often as `retry` of connect() allows, if the server is unavailable
+or asks for a wait. apply() is retried only if its batch carries `writer` and `number`. Any unary call is also repeated
+if the server refused its token and the token file contains another one by then. Other calls are never retried.
 """
 from __future__ import annotations
 

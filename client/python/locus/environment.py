@@ -22,9 +22,9 @@ def connect_from_environment(context: str = "", **options: Any) -> Client:
     Reads LOCUS_ADDRESS, LOCUS_TLS, LOCUS_CA, LOCUS_CERT, LOCUS_KEY, LOCUS_SERVER_NAME, LOCUS_TOKEN_FILE and
     LOCUS_TOKEN. A named context gives what they leave open: `context`, else the one of LOCUS_CONTEXT, else, if
     LOCUS_ADDRESS is not set, the default context of the user. The default context is not used for another address, so
-    that its credentials do not reach another server. `options`: further options of connect(); they come before the
-    environment. Raises ValueError for an unknown context, a malformed file of contexts or a wrong LOCUS_TLS, and the
-    errors of connect().
+    that its credentials do not reach another server. `options`: further options of connect(); they take precedence over
+    the environment. Raises ValueError for an unknown context, a malformed file of contexts or a wrong LOCUS_TLS,
+    OSError for a file of contexts that cannot be read, and the errors of connect().
     """
     return connect(**{**endpoint(context), **options})
 

@@ -61,7 +61,7 @@ class PipelinedStream(Generic[Result]):
         self._end: Optional[LocusError] = None
         self._thread: Optional[threading.Thread] = None
 
-    # Methods that a kind of stream overrides; called with the lock held.
+    # Methods that a kind of stream overrides; called with the lock held, except _answer_in().
 
     def _number(self, item: Item[Result]) -> None:
         """Assigns the item its sequence number and, in an update stream, its batch number."""

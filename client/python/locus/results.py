@@ -128,7 +128,7 @@ class BlockResult:
 
     @property
     def rows(self) -> int:
-        """Number of rows, R."""
+        """Number of rows, R; with `count_only`, the number of rows that are counted but not contained in the block."""
         if self._rows is None:
             if _COUNTS in self._fields:
                 self._rows = self._begins[-1]

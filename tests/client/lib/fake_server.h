@@ -239,7 +239,7 @@ class FakeQueries final : public v1::QueryService::Service {
   std::mutex mutex_;
 };
 
-// Fake SceneService: stores scenes by name and meshes by hash.
+// Fake SceneService: stores scenes by name, the hashes of all uploaded meshes and the arrays of the last one.
 class FakeScenes final : public v1::SceneService::Service {
  public:
   grpc::Status CreateScene(grpc::ServerContext*, const v1::CreateSceneRequest* request,

@@ -93,7 +93,7 @@ def listed(values):
 
 
 def number(text):
-    """Converts a JSON value to a number: infinity and ids are strings in JSON."""
+    """Converts a JSON string to a number: a float for inf, -inf and nan, an int (such as an id) for other texts."""
     return float(text) if text in ("inf", "-inf", "nan") else int(text)
 
 

@@ -2,7 +2,8 @@
 
     python3 dashboards_test.py DASHBOARDS_DIRECTORY BIN_DIRECTORY
 
-Prometheus's own Python library reads /metrics. Dashboard, alerts and README may name only metrics that exist there.
+Prometheus's own Python library reads /metrics. Dashboard and alerts may name only metrics that exist there, and README
+must name all of locusd's own metrics.
 """
 
 import json

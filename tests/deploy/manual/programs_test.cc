@@ -18,7 +18,8 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-// Expects the page of the command, and the pages of its subcommands, to contain each option, positional and example.
+// Expects the page of the command, and the pages of its subcommands, to contain each option and positional, and at
+// least one example.
 void expect_pages(const cli::CommandWords& command, const std::string& section,
                   std::map<std::string, std::string>& pages) {
   const std::string file = absl::StrCat(absl::StrReplaceAll(command.path, {{" ", "-"}}), ".", section);

@@ -61,8 +61,8 @@ class Sampler {
   size_t stride_ = 1;
 };
 
-// Sends query batches of all kinds in rotation until `done` is set. Each batch is sent after the answer to the previous
-// one.
+// Sends query batches of the kinds `kinds` in rotation until `done` is set. Each batch is sent after the answer to the
+// previous one.
 absl::Status ask(const client::Client& client, const DemoWorld& world, const LoadOptions& options,
                  const std::vector<DemoKind>& kinds, const std::atomic<bool>& done, LoadResult& result) {
   const std::unique_ptr<client::QueryStream> stream = client.query_stream(options.scene);

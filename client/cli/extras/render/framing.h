@@ -20,12 +20,13 @@ struct Lens {
 // is z, the view is towards +x, +y and -z.
 Vec3d three_quarter_view(Vec3d up);
 
-// Returns the camera with these axes and this lens that is nearest to `bounds` and shows all of it. `bounds` must not
-// be empty. A box that is a single point is treated as a box of side 1. Method: a corner at (x, y) and depth z in the
-// view's axes is visible from the eye (ex, ey, ez) if |x - ex| <= w (z - ez), with w the slope of the view's edge. Let
-// a be the maximum of x - w z and b the maximum of -x - w z over all corners; then all corners are visible if a + w ez
-// <= ex <= -b - w ez. The nearest eye has the largest ez, for which both bounds of ex are equal. The same holds for y.
-// The eye gets the smaller of the two maxima of ez.
+// Returns the camera with these axes and this lens that is nearest to `bounds` and shows all of it; with an
+// orthographic lens whose half_height is not 0, the picture may be too small for that. `bounds` must not be empty. A
+// box that is a single point is treated as a box of side 1. Method: a corner at (x, y) and depth z in the view's axes
+// is visible from the eye (ex, ey, ez) if |x - ex| <= w (z - ez), with w the slope of the view's edge. Let a be the
+// maximum of x - w z and b the maximum of -x - w z over all corners; then all corners are visible if a + w ez <= ex <=
+// -b - w ez. The nearest eye has the largest ez, for which both bounds of ex are equal. The same holds for y. The eye
+// gets the smaller of the two maxima of ez.
 Camera frame_box(const Aabbd& bounds, const ViewAxes& axes, const Lens& lens);
 
 }  // namespace locus::cli

@@ -18,7 +18,7 @@ inline constexpr uint64_t kMaxCityTriangles = uint64_t{1} << 27;
 // slab is the first box. All coordinates are multiples of 0.5, so they are exact in float, and many faces are coplanar.
 // Parts: "ground" and "buildings". The mesh has at most `triangles` triangles and more than triangles - 12, but never
 // fewer than the slab's 12 nor more than kMaxCityTriangles. Equal arguments give equal bytes on every machine. Cost:
-// linear; memory: about 160 bytes per box.
+// linear; memory: 240 bytes per box.
 ImportedMesh generate_city(uint64_t triangles, uint64_t seed);
 
 }  // namespace locus::cli

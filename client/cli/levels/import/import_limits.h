@@ -1,6 +1,6 @@
 // Limits of the importers. A file that exceeds a limit is refused with an error that names the limit (exceeds() in
-// import_error.h). Exceptions are the limits on parts, part names and listed entries: beyond them, the result is merged
-// or truncated as their comments say. Constants only.
+// import_error.h). Exceptions are the limits on parts, part names, notes, texts and listed entries: beyond them, the
+// result is merged or truncated as their comments say. Constants only.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_IMPORT_LIMITS_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_IMPORT_LIMITS_H_
 

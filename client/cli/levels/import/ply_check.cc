@@ -161,7 +161,7 @@ absl::Status check_binary_body(const PlyHeader& header, absl::string_view body) 
   return absl::OkStatus();
 }
 
-// Checks that the body has at least one non-empty line for each declared element.
+// Checks that the body has at least one non-empty line for each row that the header declares.
 absl::Status check_ascii_body(const PlyHeader& header, absl::string_view body) {
   uint64_t lines = 0;
   for (const absl::string_view line : absl::StrSplit(body, '\n')) {

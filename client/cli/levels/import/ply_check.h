@@ -13,7 +13,8 @@ namespace locus::cli {
 
 // Verifies that the body of the PLY file is complete. Returns the number of faces that the header declares; the caller
 // must compare this number with the number of faces that assimp reads. Returns INVALID_ARGUMENT for a damaged header,
-// triangle strips or a truncated body; the message names the element. The bytes are untrusted. Cost: linear.
+// triangle strips or a truncated body, and the error of check_counts() for too many vertices or faces. The bytes are
+// untrusted. Cost: linear.
 absl::StatusOr<uint64_t> check_ply(absl::string_view bytes);
 
 }  // namespace locus::cli

@@ -1,7 +1,8 @@
 // Decoder of the drawn surfaces in a Quake 3 level file (IBSP version 46). For the BSP importer. Plain data and a
 // function without state. A meshvert is an entry of the file's list of triangle corners: a vertex index relative to the
-// face's first vertex. Invariants of a BspFile returned by parse_bsp(): every texture, vertex and meshvert index of a
-// face is in range, and every float is finite.
+// face's first vertex. Invariants of a BspFile returned by parse_bsp(): in range are the texture index of every face,
+// the vertex indices of every face except billboards, and the meshvert indices of polygons and meshes; every float is
+// finite.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_QUAKE_BSP_FILE_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_QUAKE_BSP_FILE_H_
 
@@ -23,7 +24,7 @@ struct BspFace {
   uint32_t first_vertex = 0;
   uint32_t vertex_count = 0;
   uint32_t first_meshvert = 0;  // polygons and meshes only
-  uint32_t meshvert_count = 0;  // a multiple of 3
+  uint32_t meshvert_count = 0;  // polygons and meshes only: a multiple of 3
   uint32_t patch_width = 0;     // patches only: odd, at least 3, width * height = vertex_count
   uint32_t patch_height = 0;
 };
