@@ -439,19 +439,23 @@ SceneStatus Scene::status() const {
 
 std::optional<SceneSummary> Scene::known_summary() const {
   const MutexLock lock(mutex_);
-  return summary_ && summary_->revision == latest_->revision ? summary_ : std::nullopt;
+  return summarized_.lock() == latest_ ? summary_ : std::nullopt;
 }
 
 SceneSummary Scene::summary() const {
   const uint64_t asked = latest()->revision;
   const MutexLock summarizing(summarizing_mutex_);
+  SnapshotPtr snapshot;
   {
     const MutexLock lock(mutex_);
-    if (summary_ && summary_->revision >= asked) return *summary_;
+    snapshot = latest_;
+    // trim_history() replaces the snapshot of a revision by one with a shorter history.
+    if (summary_ && (summary_->revision > asked || summarized_.lock() == snapshot)) return *summary_;
   }
-  const SceneSummary made = summarize(*latest());
+  const SceneSummary made = summarize(*snapshot);
   const MutexLock lock(mutex_);
   summary_ = made;
+  summarized_ = snapshot;
   return made;
 }
 

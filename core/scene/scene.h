@@ -253,6 +253,7 @@ class Scene {
   mutable Mutex mutex_;
   mutable ConditionVariable published_;
   mutable std::optional<SceneSummary> summary_ LOCUS_GUARDED_BY(mutex_);  // result of the last computation in summary()
+  mutable std::weak_ptr<const SceneSnapshot> summarized_ LOCUS_GUARDED_BY(mutex_);  // snapshot that summary_ describes
   SnapshotPtr latest_ LOCUS_GUARDED_BY(mutex_);
   std::deque<SnapshotPtr> recent_ LOCUS_GUARDED_BY(mutex_);  // retained snapshots, oldest first; back() is latest_
   // Watches that are not notified yet. The key is the awaited revision.

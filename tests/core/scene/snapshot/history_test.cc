@@ -83,6 +83,18 @@ TEST_F(HistoryTest, TrimmingDropsTheOldestTicksAndNothingElse) {
   EXPECT_EQ(recorded(scene), 3u);
 }
 
+TEST_F(HistoryTest, TheSummaryOfARevisionFollowsTrimming) {
+  Scene scene("scene", spec(20, uint64_t{1} << 30), 1, StaticSet::empty());
+  live(scene, 20);
+  EXPECT_EQ(scene.known_summary(), std::nullopt);
+  EXPECT_EQ(scene.summary().oldest_tick, 1u);
+  EXPECT_EQ(scene.known_summary()->oldest_tick, 1u);
+  EXPECT_GT(scene.trim_history(0), 0u);
+  EXPECT_EQ(scene.known_summary(), std::nullopt);
+  EXPECT_EQ(scene.summary().oldest_tick, 20u);
+  EXPECT_EQ(scene.known_summary()->oldest_tick, 20u);
+}
+
 TEST_F(HistoryTest, KeepsAtMostTheConfiguredBytes) {
   constexpr uint64_t kBytes = 1'000'000;
   Scene scene("scene", spec(1000, kBytes), 1, StaticSet::empty());
