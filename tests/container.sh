@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Builds the image of deploy/Dockerfile and tests a container of it, without a registry or a Docker daemon: the base
-# comes from this machine's Debian sources, buildah builds, podman runs. Checks the compose file and the systemd
-# unit too. All files are in build/container; the next run uses them again. Needs root.
+# comes from this machine's Debian sources, buildah builds, podman runs. Checks the compose file and the systemd units
+# too. All files are in build/container; the next run uses them again. Needs root.
 #
 #   ./tests/container.sh            ends with: N passed, M failed, K skipped
 #   ./tests/container.sh --fresh    first removes the files of earlier runs

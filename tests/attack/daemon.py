@@ -40,8 +40,8 @@ def write(path, text):
 
 
 class MemoryGroup:
-    """Memory limit: a cgroup below that of this process, or RLIMIT_AS if no cgroup can be created. `kind` names which
-    of the two is used.
+    """Memory limit: a cgroup below that of this process or of one of its ancestors, or RLIMIT_AS if no cgroup can be
+    created. `kind` names which of the two is used.
     """
 
     NAMES = {"cgroup v2": ("memory.max", "memory.peak", "memory.events"),

@@ -43,7 +43,7 @@ class Job:
     def __init__(self, target, seconds, quick, pipe, front="plain"):
         self.target, self.seconds, self.quick, self.pipe, self.front = target, seconds, quick, pipe, front
         self.until = time.monotonic() + seconds
-        self.end = self.until + seconds  # time at which a quick attack ends
+        self.end = self.until + seconds  # time after which a quick attack begins no step
         self.wrongs = set()
 
     def never_ends(self, path):

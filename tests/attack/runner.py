@@ -197,7 +197,7 @@ def sample(row, daemon):
 
 
 def worst_step(began, samples):
-    """Returns the step during which the slowest call of the victim began."""
+    """Returns the step that ran in the middle of the slowest call of the victim."""
     slowest = max(samples, key=lambda sample: sample.seconds, default=None)
     names = [name for name, at in began if slowest and at <= slowest.at - slowest.seconds / 2]
     return names[-1] if names else ""
@@ -262,7 +262,9 @@ def run_life(row, options, first):
 
 
 def run(attack, options):
-    """Runs one row and returns it. If the daemon dies, a new daemon is started for the remaining steps."""
+    """Runs one row and returns it. If the daemon dies in the long form, a new daemon is started for the remaining
+    steps, unless the daemon runs at a given address or has died MAX_DEATHS times.
+    """
     row, step = Row(attack, options.limit, options.front), 0
     while step is not None:
         step = run_life(row, options, step)

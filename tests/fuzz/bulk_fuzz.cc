@@ -1,5 +1,5 @@
 // Rows for bulk queries and updates in csv and ndjson: accepted rows have valid values in every column, and an error
-// names the line.
+// names the file.
 #include <fcntl.h>
 #include <sys/mman.h>
 #include <unistd.h>

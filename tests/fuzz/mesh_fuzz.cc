@@ -1,5 +1,5 @@
-// Chunks of a stored mesh, of its parts and of its tree: accepted bytes are parsed and written again as equal bytes,
-// and a tree that is accepted for a mesh finds every triangle.
+// Chunks of a stored mesh, of its parts and of its tree: what is accepted is valid, a mesh or tree that is written,
+// read and written again gives equal bytes, and a tree that is accepted for a mesh has the mesh's size and bounds.
 #include <optional>
 
 #include "core/scene/log/mesh_codec.h"

@@ -1,4 +1,5 @@
-// Stored specification of a scene: an accepted specification is within the limits and is encoded again as equal bytes.
+// Stored specification of a scene: an accepted specification is within the limits, and its encoding is decoded and
+// encoded again to equal bytes.
 #include "core/base/limits.h"
 #include "core/scene/spec_codec.h"
 #include "tests/fuzz/fuzz_target.h"

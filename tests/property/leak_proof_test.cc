@@ -40,7 +40,7 @@ TEST(LeakProofTest, NoRayLeavesAClosedMesh) { expect_no_leak(0, scaled_count(8'0
 
 TEST(LongLeakProofTest, NoRayLeavesAClosedMesh) { expect_no_leak(1, 1'000'000); }
 
-// Verifies the preconditions of the proof: each edge belongs to two triangles, once in each direction, and the middle
+// Verifies the preconditions of the proof: the triangles use each edge equally often in both directions, and the middle
 // of each edge is outside the ball in which rays start.
 TEST(LeakProofTest, ItsMeshesAreClosedAroundTheirInside) {
   for (const ClosedMesh& mesh :

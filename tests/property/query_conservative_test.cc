@@ -1,5 +1,5 @@
 // A query of precision CONSERVATIVE finds everything that the same query of precision EXACT finds, at the same distance
-// or nearer. It may also find triangles of instances that the EXACT query does not, but only triangles whose bounds in
+// or nearer. It may also find objects and triangles that the EXACT query does not, but only triangles whose bounds in
 // world axes it meets. Both hold for scenes far from the world's origin too.
 #include <gtest/gtest.h>
 

@@ -67,7 +67,8 @@ MissCount count_misses(const SceneSnapshot& snapshot, const OwnedBlock& block, c
   return counted;
 }
 
-// Returns rays from around the mesh towards points on, near and beyond its triangles; a few start far away.
+// Returns rays from points on and around the mesh towards points of its triangles; a few start far away. In a tenth of
+// the rays, one component of the direction is then set to zero.
 OwnedBlock rays_at(const std::vector<Triangle>& triangles, const Transform& transform, double size, Random& random,
                    uint64_t count) {
   OwnedBlock block = rays_along_x(RayMode::kFirst, {});

@@ -1,5 +1,5 @@
 // Ten minutes of a writer at full speed beside readers that compare the scene with a model. `tests/run.sh --long` runs
-// this test and prints the line that the test writes at its end.
+// this test; its log contains the line that the test writes at its end.
 #include <gtest/gtest.h>
 
 #include <chrono>

@@ -108,7 +108,8 @@ inline SceneSketch far_lattice(Random& random) {
   return lattice_scene("far lattice", random.chance(0.5) ? 1 : 64, {offset, -offset / 2, offset / 8}, random);
 }
 
-// Generates rays that graze boxes exactly at corners and edges, or run along edges.
+// Generates boxes, and rays between two notable points of a box, which graze or cross the box exactly at corners and
+// edges, or run along edges; also ordinary rays.
 inline SceneSketch edges_and_corners(Random& random) {
   SceneSketch sketch{"edges and corners", {}, {}, {}, {}};
   for (int i = 0; i < 24; ++i) {
@@ -221,7 +222,8 @@ inline SceneSketch long_and_short_directions(Random& random) {
   return sketch;
 }
 
-// Generates placements whose distances double from one to the next, so that any split leaves nearly all on one side.
+// Generates placements whose distances double from one to the next, so that a split at the middle of the bounds leaves
+// nearly all of them on one side.
 inline SceneSketch doubling_distances(Random& random) {
   SceneSketch sketch{"doubling distances", {}, {}, {}, {}};
   const Vec3d direction = random.chance(0.5) ? lattice_direction(random) : random.unit_vector();

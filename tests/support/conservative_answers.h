@@ -233,10 +233,10 @@ inline std::string superset_fault(const QueryScene& scene) {
 
 // Returns a description of the first error in the conservative answers; empty if there is none. It is an error if the
 // query meets the bounds of a triangle that has no row, or if a triangle has a row, but the query does not meet its
-// bounds after they are grown by a tolerance: 2^-38 of the sum of the largest |coordinate| of the placed mesh and that
-// of the query. It is also an error if t is neither that of the exact row nor that of the bounds, or if the point of a
-// row of nearest is not at distance t. Preconditions: the scene has only instances, and the queries have no filters,
-// limits or culling.
+// bounds after they are grown by a tolerance: 2^-38 of the sum of a bound of the |coordinates| of the placed mesh and
+// the magnitude of the query. It is also an error if t is neither that of the exact row nor that of the bounds, or if
+// the point of a row of nearest is not at distance t. Preconditions: the scene has only instances, and the queries have
+// no filters, limits or culling.
 inline std::string placed_bounds_fault(const QueryScene& scene) {
   return internal::conservative_fault(
       scene, [&](const OwnedBlock& block, size_t i, const internal::Found& exact, const internal::Found& conservative) {

@@ -1,4 +1,4 @@
-// Bytes as a faulty disk may return them: truncated, or with flipped bits.
+// Bytes as a faulty disk may return them: truncated, or with flipped bits or overwritten words.
 #ifndef LOCUS_TESTS_SUPPORT_DAMAGED_BYTES_H_
 #define LOCUS_TESTS_SUPPORT_DAMAGED_BYTES_H_
 

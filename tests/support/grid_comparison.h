@@ -1,6 +1,6 @@
 // Comparison of hash grids with a list (ListIndex, which tests every value). For the random tests, which expect no
-// difference, and for the tests of planted bugs, which expect a difference. Every function takes all random numbers
-// from its parameter `random`.
+// difference, and for the tests of planted bugs, which expect a difference. Every function with a parameter `random`
+// takes all random numbers from it.
 #ifndef LOCUS_TESTS_SUPPORT_GRID_COMPARISON_H_
 #define LOCUS_TESTS_SUPPORT_GRID_COMPARISON_H_
 
@@ -78,8 +78,8 @@ inline std::string grid_ball_difference(const ObjectScene& scene, Random& random
   return "";
 }
 
-// Returns `object` moved to the position of another object or slightly beside that position, so that queries of the
-// scene find the moved object.
+// Returns `object` moved to the position of another object, half of the time with one coordinate reduced by up to half,
+// so that queries of the scene find the moved object; sometimes with pose and shape of another object.
 inline Object moved(const Object& object, const std::vector<Object>& objects, Random& random) {
   Object result = object;
   result.shape.position = random.pick(objects).shape.position;

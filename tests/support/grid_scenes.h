@@ -1,5 +1,5 @@
 // Families of scenes built to break grids, in addition to the families of adversarial_scenes.h: placements on cell
-// borders of every level, on both sides of zero, at the world's edge, or larger than all cells.
+// borders of several levels, on both sides of zero, at the world's edge, or larger than all cells.
 #ifndef LOCUS_TESTS_SUPPORT_GRID_SCENES_H_
 #define LOCUS_TESTS_SUPPORT_GRID_SCENES_H_
 

@@ -1,6 +1,6 @@
-// Queries for the ray kernels, and verification of the answers: every answer of an instruction set's kernels is
-// compared with a test of all triangles, bit for bit. For the tests of the kernels and for tests of planted bugs in the
-// kernels.
+// Queries for the ray kernels, and verification of the answers: every answer of an instruction set's kernels that is
+// not undecided is compared with a test of all triangles, bit for bit. For the tests of the kernels and for tests of
+// planted bugs in the kernels.
 #ifndef LOCUS_TESTS_SUPPORT_KERNEL_JUDGE_H_
 #define LOCUS_TESTS_SUPPORT_KERNEL_JUDGE_H_
 

@@ -137,8 +137,8 @@ inline std::vector<KernelTrial> beam_trials() {
   return trials;
 }
 
-// Makes rays along axes and diagonals from corners, edges and walls of houses. Many triangles are edge-on to such a ray
-// or equally near.
+// Makes rays along axes and diagonals from points of the lattice on which the corners of the houses lie. Many triangles
+// are edge-on to such a ray or equally near.
 inline KernelTrial lattice_trial() {
   Random random(4);
   std::vector<KernelQuestion> questions;
@@ -196,7 +196,8 @@ inline KernelTrial surface_trial() {
   return KernelTrial("from the surface", sphere, questions);
 }
 
-// Makes a mesh of which a tenth of the triangles has no area, and rays of which a fifth lies in a triangle's plane.
+// Makes a mesh of which a tenth of the triangles has no area, and rays of which a fifth is parallel to the long edge of
+// a triangle.
 inline KernelTrial sliver_trial() {
   Random random(7);
   std::vector<Triangle> slivers;

@@ -45,9 +45,9 @@ class LossyRelay {
   int port() const { return port_; }
   // Sets the port to which new connections are forwarded from now on.
   void set_server(int port) { server_port_ = port; }
-  // Drops every `frames`-th frame of the replies and closes its connection; 0 drops none.
+  // Drops every `frames`-th DATA or HEADERS frame of the replies and closes its connection; 0 drops none.
   void lose_every(uint64_t frames) { lose_every_ = frames; }
-  // Drops only the next frame of the replies and closes its connection.
+  // Drops only the next DATA or HEADERS frame of the replies and closes its connection.
   void lose_one() { lose_one_ = true; }
   uint64_t lost() const { return lost_; }
 

@@ -41,7 +41,7 @@ class MemoryLog : public UpdateLog {
     std::map<SceneKey, KeptScene> scenes;
     std::map<std::string, std::array<uint8_t, 32>> meshes;
     std::map<std::array<uint8_t, 32>, std::vector<Bytes>> contents;
-    std::map<std::string, std::vector<Bytes>> parts;  // parts of each mesh, by name; empty for a mesh of format 1
+    std::map<std::string, std::vector<Bytes>> parts;  // parts of each mesh, by name; none for a mesh of format 1
     std::map<std::array<uint8_t, 32>, std::string> topologies;
     SceneKey last_key = 0;
   };
@@ -50,8 +50,8 @@ class MemoryLog : public UpdateLog {
   explicit MemoryLog(const Kept& kept) : kept_(kept) { list_stored(kept); }
 
   // Returns the data that remains if the machine stops now. A scene keeps its synced records and the first `unsynced`
-  // of its unsynced records. If these are all of its records, the scene also keeps the first `left_over` records of its
-  // last append that failed.
+  // of its unsynced records. If these are all of its records, and its last append failed, the scene also keeps the
+  // first `left_over` records of that append.
   Kept crash(uint64_t unsynced = 0, uint64_t left_over = 0) const {
     const MutexLock lock(mutex_);
     Kept kept = kept_;
@@ -70,7 +70,7 @@ class MemoryLog : public UpdateLog {
     const MutexLock lock(mutex_);
     failure_ = status;
   }
-  // Makes calls that write wait until release().
+  // Makes create_scene(), delete_scene(), append() and delete_mesh() wait until release().
   void hold() {
     const MutexLock lock(mutex_);
     held_ = true;
@@ -80,7 +80,7 @@ class MemoryLog : public UpdateLog {
     held_ = false;
     released_.notify_all();
   }
-  // Waits until a call that writes is blocked by hold().
+  // Waits until one of these calls is blocked by hold().
   void wait_for_writer() {
     const MutexLock lock(mutex_);
     while (waiting_ == 0) released_.wait(mutex_);

@@ -162,7 +162,7 @@ inline std::vector<NearestTrial> uneven_nearest_trials() {
 }
 
 // Makes trials at many scales, some of which make squares and products underflow, and trials far away from the origin,
-// where the point's rounding to float exceeds the size of the mesh.
+// the farthest of them where the rounding of a point to float is about as large as a triangle.
 inline std::vector<NearestTrial> scaled_nearest_trials() {
   std::vector<NearestTrial> trials;
   const std::vector<Triangle> sphere = bumpy_sphere(4, 0.1, 1);

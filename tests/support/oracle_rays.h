@@ -152,8 +152,8 @@ class RayOracle : public OracleScene {
     return mover;
   }
 
-  // Adds a row for each triangle of the instance that the mover touches. `normal` and `place` of a row are set from the
-  // contact with the triangle.
+  // Adds a row for each triangle of the instance that the mover touches, and in conservative answers also for each
+  // triangle whose bounds it touches. `normal` and `place` of a row are set from the contact with the triangle.
   void swept(const QueryBlock& block, const SweepColumns& sweeps, const Mover& mover, const Instance& instance,
              Rows& rows) const {
     const bool by_bounds = block.precision == Precision::kConservative;

@@ -1,6 +1,6 @@
 // Random scenes in which the placement of meshes is the difficulty: far from the world's origin, with vertices far from
-// the mesh's own origin, or rotated into planes of the world. The queries are of those kinds whose conservative answers
-// depend on the bounds of placed triangles.
+// the mesh's own origin, or rotated into planes of the world. The queries are mostly of those kinds whose conservative
+// answers depend on the bounds of placed triangles.
 #ifndef LOCUS_TESTS_SUPPORT_PLACED_SCENES_H_
 #define LOCUS_TESTS_SUPPORT_PLACED_SCENES_H_
 

@@ -1,6 +1,7 @@
 // Oracle that answers blocks of queries in the slow and simple way: tests every object and every triangle by the
 // predicates of core/geometry, collects the results in one list, sorts the list and truncates it. Shares with
-// core/query only the definition of the bounds of placed triangles.
+// core/query only the bounds of placed triangles, the planes of frustums, and the test whether a triangle is beyond a
+// plane of a cell.
 #ifndef LOCUS_TESTS_SUPPORT_QUERY_ORACLE_H_
 #define LOCUS_TESTS_SUPPORT_QUERY_ORACLE_H_
 
@@ -356,7 +357,8 @@ class QueryOracle : public RayOracle {
   }
 
   // Returns the unit vector from the nearest point of a row to the query's point; `row.normal` is the opposite vector,
-  // not normalised. If both points are equal, returns the normal of the triangle's front.
+  // not normalised. If both points are equal, returns the normal of the triangle's front, or zero for an object. If
+  // `conservative` is true, returns zero.
   Vec3d away(const Row& row, bool conservative) const {
     if (conservative) return {};
     if (row.normal != Vec3d{}) return normalized(-row.normal) + Vec3d{};

@@ -434,7 +434,7 @@ inline OwnedBlock sight_block(const QueryScene& scene, const SceneSketch& sketch
   const auto add = [&](size_t points) {
     for (; points > 0; --points) {
       Vec3d point = notable_point(sketch, random);
-      // A distant frame represents multiples of 1/8 exactly.
+      // Multiples of 1/8 are added without rounding error to whole coordinates, even to large ones.
       if (random.chance(0.6)) point = point + random.whole_vector(20) * 0.125;
       append_point(block, point);
     }

@@ -116,7 +116,7 @@ inline bool wait_until(const std::function<bool()>& condition) {
   return true;
 }
 
-// Returns the number of open descriptors of this process.
+// Returns the number of open descriptors of this process plus a constant, for comparisons.
 inline size_t open_descriptors() {
   DIR* folder = opendir("/proc/self/fd");
   size_t count = 0;

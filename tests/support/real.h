@@ -1,5 +1,5 @@
-// Vectors in long double and rotations by the quaternion product, for references that share no arithmetic with the
-// product.
+// Vectors in long double and rotations by the quaternion product, for references that share only the vector template
+// with the product.
 #ifndef LOCUS_TESTS_SUPPORT_REAL_H_
 #define LOCUS_TESTS_SUPPORT_REAL_H_
 

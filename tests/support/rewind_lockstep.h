@@ -58,8 +58,8 @@ inline void append_answer(const BlockResult& from, uint32_t query, BlockResult& 
 
 class RewindLockstep {
  public:
-  // Makes a scene whose objects move by about `step` per batch and stay within `world` of the origin; sometimes an
-  // object moves much farther. A batch begins a tick with the probability `new_tick`.
+  // Makes a scene whose objects start within `world` of the origin on each axis and move by about `step` per batch;
+  // sometimes an object moves much farther. A batch begins a tick with the probability `new_tick`.
   RewindLockstep(uint64_t seed, double world, double step, double new_tick)
       : random_(seed),
         world_(world),

@@ -77,7 +77,7 @@ class BatchResultSink final : public AnswerSink {
 };
 
 // Answers `batch`, which has passed check_batch(), at `snapshot`. `parallel_for` distributes calls of BatchRun::work()
-// over threads; if it is empty, this thread makes one call. Returns OUT_OF_RANGE for a time outside the history unless
+// over threads; if it is empty, this thread makes all calls. Returns OUT_OF_RANGE for a time outside the history unless
 // the block's option `outside` is kClamp, or returns the status of RunOptions::stop.
 inline absl::StatusOr<BatchResult> run_batch(const SceneSnapshot& snapshot, const QueryBatch& batch,
                                              const RunOptions& options, const ParallelFor& parallel_for = {}) {

@@ -1,7 +1,7 @@
 // A scene whose state at every revision can be computed: whether and how revision r changes an object depends only on r
 // and the object's id. So readers can check the objects at the revision of their snapshot while the writer continues.
-// Objects move, teleport, are removed and are inserted again; every tick has several revisions. The turn of an object
-// is the revision of its last change.
+// Objects move, sometimes far, are removed and are inserted again; every tick has several revisions. The turn of an
+// object is the revision of its last change.
 #ifndef LOCUS_TESTS_SUPPORT_SCENE_SCHEDULE_H_
 #define LOCUS_TESTS_SUPPORT_SCENE_SCHEDULE_H_
 
@@ -58,8 +58,8 @@ class SceneSchedule {
     apply(scene, 0, {}, ids, {});
   }
 
-  // Applies the changes of revision `revision` of the schedule as one batch. Each revision changes at least one object.
-  // Precondition: the scene is at the previous revision.
+  // Applies the changes of revision `revision` of the schedule as one batch. Preconditions: the scene is at the
+  // previous revision, and this revision changes at least one object, as it does if there are many objects.
   void advance(Scene& scene, uint64_t revision) const {
     std::vector<uint64_t> gone, come, move;
     for (Id id = 1 + (revision + kTurns - 1) % kTurns; id <= objects_; id += kTurns) {

@@ -43,7 +43,7 @@ def wrong_bytes_steps(job):
 
 
 def random_bytes(job):
-    """Sends random bytes to every call."""
+    """Sends random bytes to every call except Watch."""
     chance, methods = random.Random(SEED), protobuf.Schema().methods
     with job.connect(timeout=20) as connection:
         while not job.over():

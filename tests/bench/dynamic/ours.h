@@ -1,6 +1,6 @@
-// The only code of the dynamic suite that calls locus: the scene's writer, the scene's index without the query engine,
-// and whole batches as the server runs them. One thread; latest() and status() may be called from any thread, like
-// those of Scene.
+// The code by which the dynamic suite calls locus, except for the batches of mixed_batches.h: the scene's writer, the
+// scene's index without the query engine, and whole batches as the server runs them. One thread; latest() and status()
+// may be called from any thread, like those of Scene.
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_OURS_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_OURS_H_
 

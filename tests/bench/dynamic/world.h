@@ -3,7 +3,7 @@
 //
 // Random numbers are SplitMix64; f = (next >> 40) * 2^-24, uniform over [0, 1). All arithmetic is float; a product plus
 // a term is computed with one rounding (fused multiply-add). Seed 1: twenty towns (x and y 100 + 1800 f, drawn for
-// every kind), then the objects; seed 2: velocities; seed 5: mixed radii; seed 7: ids, without their highest bit.
+// every kind), then the objects; seed 2: velocities; seed 5: mixed radii; seed 7: ids, each next >> 1.
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_WORLD_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_WORLD_H_
 

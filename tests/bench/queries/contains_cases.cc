@@ -39,7 +39,7 @@ std::vector<float> points_near_surface(const BenchMesh& mesh, size_t count) {
   return points;
 }
 
-// Returns corners of random triangles.
+// Returns corners of triangles in all parts of the mesh.
 std::vector<float> points_at_corners(const BenchMesh& mesh, size_t count) {
   std::vector<float> points;
   for (size_t i = 0; i < count; ++i) append(mesh.triangles[i * 7919 % mesh.triangles.size()].a, points);

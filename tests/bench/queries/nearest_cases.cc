@@ -27,7 +27,7 @@ constexpr double kBar = 2;
 // Regions from which the points of a case are drawn.
 enum class Place {
   kAnywhere,     // in the bounds of the mesh
-  kNearSurface,  // up to 1 % of the diagonal from a point of the surface
+  kNearSurface,  // 1 % of the diagonal away from a point of the surface
 };
 struct NearestCase {
   const char* name;

@@ -38,7 +38,7 @@ class SweepPeer {
   virtual void sweep(const SweepWork& work, size_t begin, size_t end, SweepHit* hits) = 0;
 };
 
-// Returns a peer that uses Bullet. The mesh must outlive the peer.
+// Returns a peer that uses Bullet. The mesh need not outlive the peer.
 std::unique_ptr<SweepPeer> bullet_sweeps(const BenchMesh& mesh);
 
 void run_sweep_cases(const Options& options, const Progress& progress, const BenchMesh& mesh, Report& report);

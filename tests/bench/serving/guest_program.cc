@@ -1,9 +1,9 @@
 // The program `locus-guests`: clients beside the measured one. locus-bench starts it as
 //   locus-guests bulk|silent|churn ADDRESS COUNT FILE
-// where FILE has the message that each client sends. Bulk is one client with COUNT messages in flight; silent clients
-// never read their answers; clients of churn connect, send one query and leave. Churn ends by itself, the others by a
-// signal. Silent and churn clients run at a lower priority, so that they take no processor time from the server, as
-// clients on other machines would not.
+// where FILE has the message that each client sends. Bulk is one client with COUNT messages in flight; COUNT silent
+// clients never read their answers; 2 COUNT clients of churn, at most COUNT at a time, connect, send one query and
+// leave. Churn ends by itself, the others by a signal. Silent and churn clients run at a lower priority, so that they
+// take no processor time from the server, as clients on other machines would not.
 #include <unistd.h>
 
 #include <cstdlib>

@@ -43,7 +43,7 @@ class SilentReaders {
  public:
   // Connects `count` clients. Borrows the message.
   SilentReaders(const std::string& address, size_t count, const v1::StreamQueriesRequest& message);
-  // Drops the connections without ending the calls.
+  // Cancels the calls and closes the connections.
   ~SilentReaders();
   SilentReaders(const SilentReaders&) = delete;
   SilentReaders& operator=(const SilentReaders&) = delete;

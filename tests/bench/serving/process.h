@@ -48,8 +48,8 @@ class Process {
   int exit_code_ = -1;
 };
 
-// Returns the path of the program `name` in the folder of this program, otherwise in the PATH; empty if it is in
-// neither.
+// Return the path of the program `name` in the folder of this program, or in a folder of the PATH; empty if it is not
+// there.
 std::string program_beside(const std::string& name);
 std::string program_in_path(const std::string& name);
 

@@ -32,7 +32,8 @@ class ServerLoad {
  public:
   ServerLoad(const LocalServer& server, Batches& batches, size_t streams, size_t window);
 
-  // Sends all batches `passes` times, divided among the streams. Errors are stored in status().
+  // Sends `passes` times as many messages as there are batches, divided among the streams, each of which repeats its
+  // part of the batches. Errors are stored in status().
   void run(size_t passes);
   // Sends every batch once; returns a hash of each answer, in the order of the batches, and sets rows() to the number
   // of rows in all answers.

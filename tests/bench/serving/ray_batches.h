@@ -17,7 +17,7 @@ namespace locus::bench::serving {
 // or if it was not fetched, a generated level.
 absl::StatusOr<BenchMesh> level_of(const ServingRun& run);
 
-// Returns rays between random points of the level, or neighbouring rays of a picture of it.
+// Returns rays from random points of the level in random directions, or neighbouring rays of a picture of it.
 std::vector<RayQuery> scattered_rays(const BenchMesh& mesh, size_t count);
 std::vector<RayQuery> coherent_rays(const BenchMesh& mesh, size_t count);
 

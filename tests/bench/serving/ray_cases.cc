@@ -24,7 +24,7 @@ struct Size {
 constexpr Size kSizes[] = {{1024, 4, 45, 0.95}, {8192, 2, 20, 0.92}};
 
 // A workload, named after the approximate cost of a ray in process: kCoherent has neighbouring rays of a picture,
-// kScattered rays between random points.
+// kScattered rays from random points in random directions.
 struct Work {
   const char* name;
   double nanoseconds;

@@ -177,7 +177,7 @@ class RedisCases {
     return searches;
   }
 
-  // Runs every ball once: on the server, in this process if the objects have not moved, and in Redis.
+  // Runs every ball once on the server and once in Redis, and compares the numbers of hits.
   Hits search_all(const FlatWorld& flat, TwinScene& scene, const std::string& name) {
     Searches searches = searches_of(flat, scene);
     ServerLoad server(daemon_, searches.ours, 1, kWindow);

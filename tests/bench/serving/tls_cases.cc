@@ -92,7 +92,8 @@ class TlsCases {
     return status;
   }
 
-  // Measures new connections to the daemon with TLS, or to `guarded`, which requires certificates, under `case_name`.
+  // Measures new connections to `guarded`, a daemon with TLS that may require certificates of its clients, and to the
+  // plain daemon, as the case `case_name`.
   absl::Status handshakes(const std::string& case_name, TlsHost& guarded) {
     if (!run_.wants(case_name)) return absl::OkStatus();
     run_.progress(case_name);

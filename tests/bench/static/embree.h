@@ -8,8 +8,8 @@
 namespace locus::bench {
 
 // Adds embree_intersect1, embree_intersect1m, embree_intersect8 and embree_intersect16 (first hits), embree_occluded1
-// (any hits), embree_robust (both, with RTC_SCENE_FLAG_ROBUST), embree_point_query (balls, and boxes by the balls
-// around them).
+// (any hits), embree_robust (first, any and all hits, with RTC_SCENE_FLAG_ROBUST), embree_point_query (balls, and boxes
+// by the balls around them).
 void add_embree_peers(const BenchMesh& mesh, Needs needs, Peers& peers);
 
 // Makes the builder embree_medium, which commits a scene from buffers of vertices and indices. Its bytes are those that

@@ -1,4 +1,4 @@
-// The only code of the static suite that calls locus, by the functions that the server's queries use for a mesh.
+// The only code of the static suite that measures locus, by the functions that the server's queries use for a mesh.
 // Immutable; any number of threads may use it.
 #ifndef LOCUS_TESTS_BENCH_STATIC_OURS_H_
 #define LOCUS_TESTS_BENCH_STATIC_OURS_H_

@@ -1,7 +1,8 @@
 // The queries of the static suite: determined by a mesh and a seed and drawn in a fixed order, so that the workload can
 // be repeated in any server at any time. Pure functions.
 //
-// Random numbers are SplitMix64 from the seed; f = (next >> 40) * 2^-24, uniform over [0, 1). All arithmetic is float.
+// Random numbers are SplitMix64 from the seed; f = (next >> 40) * 2^-24, uniform over [0, 1). All arithmetic is float,
+// except that camera_rays() computes in double.
 #ifndef LOCUS_TESTS_BENCH_STATIC_WORKLOAD_H_
 #define LOCUS_TESTS_BENCH_STATIC_WORKLOAD_H_
 

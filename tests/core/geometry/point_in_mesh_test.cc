@@ -178,8 +178,9 @@ TEST(PointInMeshTest, CrossingsNearPlanesAndEdgesEqualThoseOfIntegers) {
   EXPECT_GT(crossed, 100);
 }
 
-// The points are one float step away from a plane through three points with whole coordinates. Arithmetic with 106 bits
-// could not resolve their distance from the plane, but the sign of the volume must show on which side they are.
+// The points are one step of a double away from a plane through three points with whole coordinates. Arithmetic with
+// 106 bits could not resolve their distance from the plane, but the sign of the volume must show on which side they
+// are.
 TEST(PointInMeshTest, PointsOneStepAwayFromASlopingFaceAreOnTheirSide) {
   const Triangle triangle{{0x1p23f, 0, 0}, {0, 0x1p23f, 0}, {0, 0, 0x1p23f}, 0};
   const double third = 0x1p23 / 4 + 0x1p-30, rest = 0x1p23 - 2 * third;

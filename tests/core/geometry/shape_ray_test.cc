@@ -31,7 +31,7 @@ struct RayCase {
   Real tolerance;
   Vec3r offset, unit;
   Real speed, max_distance;
-  Real inside_gauge;  // signed distance of the ray's origin to the solid, negative inside
+  Real inside_gauge;  // SolidReference::gauge() of the ray's origin, negative inside
 
   RayCase(const Shape& s, const Rayd& r) : shape(s), ray(r) {
     offset = to_real(r.origin) - to_real(s.position);

@@ -12,7 +12,8 @@ namespace {
 
 using test::Random;
 
-// Checks that the contact's point belongs to both solids, and that a plane through it separates them.
+// Checks that the contact's point belongs to both solids, and that the mover is on one side of the plane through this
+// point perpendicular to the contact's normal.
 template <class Primitive, class Stored>
 void check_contact(const Mover& mover, const Primitive& primitive, const Stored& stored, double epsilon,
                    const std::string& what) {

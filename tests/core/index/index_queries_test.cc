@@ -19,7 +19,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 ObjectRay along_x() { return ObjectRay(Rayd{{0, 0, 0}, {1, 0, 0}}); }
 
-// Fixture that runs each test for every index structure.
+// Fixture that runs each test for a list and for a tree.
 template <class Index>
 class IndexQueriesTest : public ::testing::Test {
  protected:

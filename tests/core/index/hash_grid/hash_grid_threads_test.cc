@@ -1,4 +1,5 @@
-// One writer at full speed and two readers that never wait for the writer: each snapshot contains exactly one revision.
+// One writer at full speed and two readers, which wait for the writer only while it exchanges a pointer: each snapshot
+// contains exactly one revision.
 #include <gtest/gtest.h>
 
 #include <atomic>

@@ -1,5 +1,6 @@
-// Cells of free space in small and random worlds. The three guarantees are checked in long double: the cell contains
-// the point, no object or triangle reaches into the cell, and every plane touches its object or triangle.
+// Cells of free space in small and random worlds. In random worlds, these properties are checked in long double: the
+// cell contains the point, no sampled point of an object or triangle is in the cell, and the point of every plane is at
+// the reported distance.
 #include "core/query/kinds/cell_query.h"
 
 #include <gmock/gmock.h>

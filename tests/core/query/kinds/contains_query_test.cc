@@ -1,5 +1,5 @@
-// Contains queries in a small world: a cube from -1 to 1, a ball at x = 5, and a wall at x = 0, which is no closed
-// mesh.
+// Contains queries in a small world: a cube from -1 to 1, a ball at (5, 0, 0), a box at (5, 1, 0), and a wall at x = 0,
+// which is no closed mesh.
 #include "core/query/kinds/contains_query.h"
 
 #include <gmock/gmock.h>

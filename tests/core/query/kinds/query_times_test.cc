@@ -246,7 +246,7 @@ class FastMoverQueryTest : public SceneFixture {
     const BlockResult result = run_block(*scene_.latest(), block);
     return {result.ids.begin(), result.ids.end()};
   }
-  // Expects that every kind of query finds the ball at (0, 2.5, 0).
+  // Expects that lookups, balls, boxes, rays and nearest queries find the ball at (0, 2.5, 0).
   void expect_found() const {
     const std::vector<uint64_t> ball = {7};
     OwnedBlock lookup = half_way(LookupColumns{}, {});

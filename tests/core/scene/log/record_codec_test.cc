@@ -184,7 +184,8 @@ TEST_F(RecordCodecTest, ABatchOfWrongFormIsRefusedNamingTheField) {
   EXPECT_THAT(status.message(), HasSubstr("inserts[0].positions"));
 }
 
-// Damaged bytes are either refused with DATA_LOSS or decoded to a record that can be applied without a crash.
+// Damaged bytes are either refused with DATA_LOSS or decoded to a record that can be applied without a crash. Records
+// of joined batches are decoded, but not applied.
 TEST_F(RecordCodecTest, DamagedBytesNeverHarm) {
   Random random(2);
   RandomUpdates updates(random, 40);

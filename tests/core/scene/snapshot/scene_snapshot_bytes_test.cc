@@ -5,7 +5,7 @@
 namespace locus::test {
 namespace {
 
-// Scene whose objects are points so far from each other that each is stored in a brick of its own.
+// Scene whose objects are points at intervals of 1000 along the x axis, stored in several bricks.
 class SnapshotBytesTest : public SceneFixture {
  protected:
   static constexpr uint64_t kObjects = 2'000;

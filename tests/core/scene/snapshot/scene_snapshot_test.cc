@@ -33,7 +33,7 @@ void expect_object_of(const Object& object, uint64_t tick) {
   EXPECT_EQ(object.shape.position.x, place_of(object.id, tick)) << "object " << object.id;
 }
 
-// Reads the objects through the grid and through the id table, and expects that both give the objects of one revision.
+// Reads the objects by a visit of a region and by for_each(), and expects that both give the objects of one revision.
 void expect_whole(const SceneSnapshot& snapshot) {
   WorldVisitor visitor;
   Work work;
@@ -131,7 +131,8 @@ class SceneSnapshotTest : public SceneFixture {
     EXPECT_EQ(apply(batch).refused, 0u);
   }
 
-  // Places an instance far above the lines along which objects move.
+  // Places an instance far above the lines along which objects move. If `id` is a multiple of 8, also removes all other
+  // instances.
   void place(Id id) {
     const double translation[] = {0, 0, 1000};
     StaticChange change = placing({mesh_, {&id, 1}, translation, {}, {}, {}, {}, {}});

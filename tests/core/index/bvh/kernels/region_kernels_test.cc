@@ -193,8 +193,8 @@ TEST_P(RegionKernelsTest, ACallPausesAfterTheMaximumNumberOfTests) {
   EXPECT_LT(search.tests(), kMaxRegionTests + 8);
 }
 
-// Batch of as many balls as one call of many() answers, from a ball without triangles to a ball around the mesh; and,
-// in `alone`, the triangle numbers that a separate search finds for each ball.
+// Batch of as many balls as one call of many() answers, from a ball without triangles to a large one; and, in `alone`,
+// the triangle numbers that a separate search finds for each ball.
 struct Together {
   explicit Together(const TriangleBvh& tree) {
     for (size_t i = 0; i < kMaxRegions; ++i) {
