@@ -22,7 +22,7 @@ base=localhost/debian:12-slim
 case "${1-}" in
   "") ;;
   --fresh) rm -rf "$store" ;;
-  *) sed -n '2,9s/^# \{0,1\}//p' "$0"; [ "$1" = --help ]; exit ;;
+  *) sed -n '2,10s/^# \{0,1\}//p' "$0"; [ "$1" = --help ]; exit ;;
 esac
 mkdir -p "$store" && : > "$results" && : > "$log" || exit
 

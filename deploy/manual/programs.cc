@@ -31,9 +31,11 @@ std::vector<Page> pages_of_locus() {
                     {"LOCUS_CA", "Like --ca."},
                     {"LOCUS_CERT", "Like --cert."},
                     {"LOCUS_KEY", "Like --key."},
+                    {"LOCUS_SERVER_NAME", "Like --server-name."},
                     {"LOCUS_TOKEN", "The token itself, if there is no token file."},
                     {"LOCUS_TOKEN_FILE", "Like --token-file."},
-                    {"LOCUS_SCENE", "The scene of commands that do not name one."}},
+                    {"LOCUS_SCENE", "The scene of commands that do not name one."},
+                    {"LOCUS_METRICS_ADDRESS", "Where `locus top` reads metrics, if --metrics-address is not given."}},
       .see_also = {"locusd(8)"},
   };
   return manual_pages(cli::words_of(app), manual);

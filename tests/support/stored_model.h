@@ -51,7 +51,7 @@ class StoredModel {
         return absl::StrCat("scene ", stored.name, " is back");
     }
     for (const auto& [name, scene] : scenes_) {
-      std::string what = scene_difference(log, name, scene);
+      std::string what = scene_difference(log, name, scene, refusals);
       if (!what.empty()) return absl::StrCat("scene ", name, ": ", what);
     }
     return mesh_difference(log, refusals);
@@ -156,7 +156,8 @@ class StoredModel {
   static std::string parts_of(const std::string& name) { return "parts of " + name; }
   static std::string outline_bytes(uint8_t number) { return bytes_of(100u + number, 60); }
 
-  static std::string scene_difference(const UpdateLog& log, const std::string& name, const Scene& scene) {
+  static std::string scene_difference(const UpdateLog& log, const std::string& name, const Scene& scene,
+                                      Refusals refusals) {
     const StoredScene* stored = find_stored(log, name);
     if (stored == nullptr) return scene.state == kThere && log.catalogue_damage().ok() ? "is missing" : "";
     if (!stored->damage.ok()) return "";
@@ -164,7 +165,8 @@ class StoredModel {
     if (stored->snapshot_sequence < scene.snapshot) return "an older snapshot";
     if (stored->snapshot_sequence > std::max(scene.snapshot, scene.tried_snapshot)) return "a newer snapshot";
     const auto chunks = read_snapshot(log, stored->key);
-    if (absl::IsDataLoss(chunks.status())) return "";  // the damage was detected by this read, which returned an error
+    // The damage was detected by this read, which returned an error.
+    if (absl::IsDataLoss(chunks.status()) && refusals == Refusals::kAllowed) return "";
     if (!chunks.ok()) return std::string(chunks.status().message());
     if (*chunks != snapshot_chunks(scene.key, stored->snapshot_sequence)) return "another snapshot";
     uint64_t last = stored->snapshot_sequence;
@@ -175,7 +177,7 @@ class StoredModel {
       last = record.sequence;
       return absl::OkStatus();
     });
-    if (absl::IsDataLoss(read)) return "";
+    if (absl::IsDataLoss(read) && refusals == Refusals::kAllowed) return "";
     if (!read.ok()) return std::string(read.message());
     if (last < scene.last) return absl::StrCat("has ", last, " of ", scene.last, " acknowledged records");
     if (last > std::max(scene.tried, scene.last)) return absl::StrCat("has ", last, " records of ", scene.tried);
