@@ -27,7 +27,8 @@ absl::StatusOr<ListenAddress> parse_listen_address(absl::string_view text);
 // Returns the address in the form that parse_listen_address() reads, with `port` instead of the address's own port.
 std::string to_string(const ListenAddress& address, uint16_t port);
 
-// Parses the permissions of a unix socket, three or four octal digits. Returns INVALID_ARGUMENT for others.
+// Parses the permissions of a unix socket: three octal digits, which may follow a 0. Returns INVALID_ARGUMENT for any
+// other text.
 absl::StatusOr<uint32_t> parse_unix_mode(absl::string_view text);
 
 }  // namespace locus::server

@@ -102,8 +102,9 @@ struct ServerConfig {
   uint32_t max_connections_per_address = 1024;
   uint32_t max_new_connections = 200;
 
-  // Seconds within which the client of a new connection must begin HTTP/2, after the TLS handshake if there is TLS;
-  // otherwise the connection is closed. Raise it for clients on very slow networks.
+  // Seconds within which the client of a new connection must send its first bytes, and then seconds within which it
+  // must complete the TLS handshake, if there is TLS, and begin HTTP/2; otherwise the connection is closed. Raise it
+  // for clients on very slow networks.
   uint32_t handshake_timeout_s = 10;
 
   // Seconds after which a connection without an open call is closed; 0 = never. A client opens a new connection with
@@ -118,9 +119,9 @@ struct ServerConfig {
   uint64_t memory_limit = 0;
 
   // Bytes of replaced data per scene that batches and dumps may keep alive by reading older revisions; 0 = 256 MiB, or
-  // four times the size of the scene if that is more. If the readers keep more bytes alive, the oldest readers are
-  // cancelled, and updates wait until these readers have ended. Lower the value if memory is short; batches that run
-  // for several ticks are then cancelled sooner.
+  // four times the size of the scene if that is more; with a `memory_limit` below 1 GiB, 0 = a quarter of that limit.
+  // If the readers keep more bytes alive, the oldest readers are cancelled, and updates wait until these readers have
+  // ended. Lower the value if memory is short; batches that run for several ticks are then cancelled sooner.
   uint64_t pinned_limit = 0;
 
   // Seconds that running calls may take to finish after SIGTERM. Raise it if batches run long; keep it below the time
@@ -145,7 +146,8 @@ struct ServerConfig {
   std::string token_file;
   std::string jwks_file;
 
-  // Values that the claims `aud` and `iss` of a JWT must have; empty = not checked.
+  // Values that the claims `aud` and `iss` of a JWT must have. With a JWKS file, `jwt_audience` is required; if
+  // `jwt_issuer` is empty, `iss` is not checked.
   std::string jwt_audience;
   std::string jwt_issuer;
 
@@ -191,7 +193,7 @@ struct Invocation {
 Invocation read_invocation(const std::vector<std::string>& arguments, const Environment& environment);
 
 // Returns INVALID_ARGUMENT if an address cannot be parsed, or if other machines can reach it and `config` has neither
-// TLS with an access file nor `insecure`.
+// TLS with an access file nor `insecure`; also for a malformed `unix_mode`, or an option that needs another one.
 absl::Status check_config(const ServerConfig& config);
 
 }  // namespace locus::server

@@ -220,8 +220,9 @@ void Acceptor::ended(uint64_t id) {
   const Entry entry = std::move(found->second);
   entries_.erase(found);
   limiter_.leave(entry.peer.limit_key);
-  // Charge the address of a client whose connection this server has closed, except for idleness. Otherwise a client
-  // that floods would connect again at once, and each connection may cost some megabytes before the guard closes it.
+  // Charge the address of a client whose connection this server has closed for any reason except idleness. Otherwise a
+  // client that floods would connect again at once, and each connection may cost some megabytes before the guard closes
+  // it.
   // Users of unix sockets are not charged: the user may run a proxy, and the charge would refuse the proxy's other
   // clients too.
   if (const char* reason = entry.connection->close_reason(); reason != nullptr && reason != kIdle && !entry.peer.uid)

@@ -73,7 +73,7 @@ class Connection {
   // the peer has cancelled more than kMaxCancelled calls, and more calls than it let finish. The periodic checks of the
   // guard would detect this too late, because gRPC accepts calls very fast.
   void call_cancelled();
-  // Restarts the count of cancelled calls. The guard calls it once a second.
+  // Restarts the count of cancelled calls. While bytes arrive, the guard calls it about once a second.
   void begin_cancel_window();
   void message_read(uint64_t bytes) {
     messages_read_.fetch_add(1, std::memory_order_relaxed);

@@ -67,8 +67,9 @@ class FloodGuard {
   // that are not yet destroyed, whether or not their calls were accepted. Returns nullopt if the number is unknown.
   using CountStreams = std::function<std::optional<uint64_t>(Connection& connection)>;
 
-  // Starts the thread, which calls `count_streams` for connections that send many bytes outside of messages.
-  // `on_closed` is called after the guard has closed a connection, on the thread that has closed it.
+  // Starts the thread, which calls `count_streams` for unix connections that send bytes, and for other connections that
+  // send many bytes outside of messages. `on_closed` is called after the guard has closed a connection, on the thread
+  // that has closed it.
   FloodGuard(const FloodLimits& limits, CountStreams count_streams, OnClosed on_closed);
   ~FloodGuard();
   FloodGuard(const FloodGuard&) = delete;
@@ -98,8 +99,8 @@ class FloodGuard {
   bool wait() LOCUS_EXCLUDES(mutex_);
   void look() LOCUS_EXCLUDES(mutex_);
   void look_at(const std::shared_ptr<Watched>& watched);
-  // Returns whether the streams of the connection must be counted, because many of the bytes that have arrived belong
-  // to no message.
+  // Returns whether the streams of the connection must be counted: many of the bytes that have arrived belong to no
+  // message, or the connection is a unix socket.
   static bool must_count(const FloodSample& sample, Watched& watched);
 
   const FloodLimits limits_;

@@ -1,8 +1,9 @@
 // Thread that keeps the memory of the process below its limit. It measures the process periodically. When memory runs
 // short or a claim was refused, it drops old revisions and returns free memory to the kernel; then it drops the oldest
 // ticks of histories, so that histories give way before inserts and uploads are refused; then it cancels the readers of
-// the oldest revisions. Only this thread does this work, because the work visits all scenes and the whole heap. It logs
-// which lines of the budget were shortened or refused.
+// the oldest revisions. If memory is nearly full, it first closes the connections that hold or send most. Only this
+// thread does this work, because the work visits all scenes and the whole heap. It logs which lines of the budget were
+// shortened or refused.
 //
 // Threads: the constructor starts the thread, the destructor ends it.
 #ifndef LOCUS_SERVER_HOST_MEMORY_KEEPER_H_

@@ -8,8 +8,8 @@
 
 namespace locus::server {
 
-// Reader of a page, as a page function sees it. Every text comes from the reader and is not verified, except the name
-// in a certificate.
+// Reader of a page, as a page function sees it. `authorization` is what the reader sent, not verified; the other
+// members come from the connection.
 struct HttpRequest {
   std::string peer;              // address and port of the reader, as calls show it
   std::string address;           // limit key of the reader's address; see connection.h

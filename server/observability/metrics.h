@@ -1,7 +1,7 @@
 // Counters of the daemon's calls, for /metrics. Code that serves calls must record:
 //
-// - every unary call, and every message of a stream, when its answer is known: record_call(rpc, code, nanoseconds since
-//   the call or message arrived); serve() and HotCall record the calls that they run;
+// - every message of a stream of queries or updates, and every other call, when its answer is known: record_call(rpc,
+//   code, nanoseconds since the call or message arrived); BlockingCalls and HotCall record the calls that they serve;
 // - every answered block of queries: record_block();
 // - every published batch of updates: record_update();
 // - every refused call or message: record_refusal();

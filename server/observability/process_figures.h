@@ -25,7 +25,7 @@ struct ProcessFigures {
 uint64_t resident_bytes();
 
 // Reads all figures. `addresses` are the addresses whose connections are counted, as texts for parse_listen_address();
-// invalid texts are ignored. A figure that cannot be read is 0. Costs two system calls for each open file.
+// invalid texts are ignored. A figure that cannot be read is 0. Costs one to three system calls for each open file.
 ProcessFigures read_process(const std::vector<std::string>& addresses);
 
 // Adds the figures to the page.

@@ -1,6 +1,6 @@
 // One call as the services see it: its metadata, its deadline, and whether its caller still waits for an answer.
 //
-// Threads: a Caller may be used from any thread while the call lasts, except trace().
+// Threads: a Caller may be used from any thread while the call lasts, except authorize(), set_subject() and trace().
 #ifndef LOCUS_SERVER_RPC_CALL_H_
 #define LOCUS_SERVER_RPC_CALL_H_
 
@@ -51,8 +51,8 @@ class Caller {
 
   // Authenticates the caller, and checks the caller's rights to the server (not to scenes) that the method `path`
   // needs. UNAUTHENTICATED if the caller's credentials are not accepted, or if a caller without credentials may do
-  // nothing on this server. PERMISSION_DENIED if the caller lacks a needed right. Call it before the other functions on
-  // rights.
+  // nothing on this server; also if the caller's certificate has expired. PERMISSION_DENIED if the caller lacks a
+  // needed right. CANCELLED if the connection was closed. Call it before the other functions on rights.
   absl::Status authorize(absl::string_view path);
   // Returns whether the caller has the right. A right to scenes is checked for `scene`; for other rights `scene` is
   // ignored.
@@ -91,7 +91,7 @@ class Caller {
   // shares (MemoryBudget::connection_share()) of the connection and of the caller's identity. RESOURCE_EXHAUSTED names
   // the limit or quota that does not suffice.
   absl::StatusOr<CallMemory> claim(MemoryLine line, absl::string_view field, uint64_t bytes) const;
-  // Claims `bytes` for work that is never refused, because it frees memory.
+  // Claims `bytes` for work that is never refused, such as work that frees memory, or an answer that is built already.
   CallMemory claim_anyway(MemoryLine line, uint64_t bytes) const;
 
   // Remembers the scene or mesh that a blocking call is about, for the audit log. Call it on the call's own thread.
@@ -158,7 +158,7 @@ inline constexpr const char* kRequestIdMetadata = "x-request-id";
 absl::Status check_serving(const RpcState& state);
 
 // Returns whether `status`, the error of one message, must end the whole stream: true if the caller ended the call, the
-// call's deadline passed, or the server drains.
+// call's deadline passed, or the error is UNAVAILABLE, because the server drains or its disk fails.
 bool ends_stream(const Caller& caller, const absl::Status& status);
 
 // Counts a call, or one message of a stream, that was answered with `status`. If `status` is not OK, logs a line at

@@ -20,7 +20,7 @@ class CallMemory {
  public:
   CallMemory() = default;
   // Combines a claim with the quotas that were taken for it, and with the counters of claimed bytes that include it:
-  // Connection::claimed_bytes of `connection`, and `identity` of ClientShares. Either may be null.
+  // Connection::claimed_bytes of `connection`, and `identity`, a counter of ClientShares. Either may be null.
   CallMemory(MemoryBudget::Claim claim, QuotaHold quota, std::shared_ptr<Connection> connection,
              std::shared_ptr<ClientShares::Counter> identity)
       : claim_(std::move(claim)),

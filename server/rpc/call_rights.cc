@@ -222,8 +222,8 @@ CallMemory Caller::claim_anyway(MemoryLine line, uint64_t bytes) const {
   return {state_.memory.claim_anyway(line, bytes), std::move(quota), nullptr, nullptr};
 }
 
-// Not audited: calls that end because of time, of their caller or of the server's end, and scenes that do not exist,
-// unless they are hidden from the caller (see audit_hidden()).
+// Not audited: calls that were ended by their deadline, by their caller or by the server's shutdown, failures of the
+// server, and names that do not exist or are taken. Scenes that are hidden from the caller: see audit_hidden().
 bool Caller::is_audited(const absl::Status& status, bool is_change) {
   switch (status.code()) {
     case absl::StatusCode::kUnauthenticated:

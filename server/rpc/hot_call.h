@@ -8,11 +8,11 @@
 // When the caller gives up or the server drains, give_up() asks the work to answer soon. A Slot contains a message, its
 // answer and the work on the message. Slots outlive calls and are reused, so that steady traffic allocates no columns.
 //
-// A stream has at most kSlots messages that are being processed or whose answers wait to be written. The stream reads
-// the next message when an answer has been written, so a caller that does not read its answers can use only bounded
-// memory; a call whose answer is not taken within RpcState::stall_limit is cancelled. Reads, one write and the work on
-// several messages proceed concurrently. If Method::kInOrder is true, answers are written in the order of the messages,
-// otherwise as they complete.
+// A stream has at most kSlots messages that are being processed or whose answers wait to be written. If it has kSlots,
+// it reads the next message when an answer has been written, so a caller that does not read its answers can use only
+// bounded memory; a call whose answer is not taken within RpcState::stall_limit is cancelled. Reads, one write and the
+// work on several messages proceed concurrently. If Method::kInOrder is true, answers are written in the order of the
+// messages, otherwise as they complete.
 #ifndef LOCUS_SERVER_RPC_HOT_CALL_H_
 #define LOCUS_SERVER_RPC_HOT_CALL_H_
 
@@ -362,7 +362,8 @@ class HotCall final : private IoLoop::ActiveCall {
     end_status_ = std::move(status);
   }
 
-  // Stops reading and drops all answers, because the caller no longer waits for them.
+  // Stops reading and drops all answers, because the caller is gone or has lost its right, or because the error
+  // `status` of a message ends the stream.
   void stop(absl::Status status) {
     if (stopping_) return;
     end(std::move(status));
@@ -456,7 +457,7 @@ class HotCall final : private IoLoop::ActiveCall {
   Tag gone_tag_{*this, &HotCall::gone};
 
   std::optional<IoLoop::ActiveCalls::iterator> active_call_;
-  std::atomic<bool> stopped_{false};  // true once the caller no longer waits for answers; polled by work on any thread
+  std::atomic<bool> stopped_{false};  // true once answers are dropped, see stop(); polled by work on any thread
   SteadyTime arrived_;
   std::optional<OpenStream> open_;
   QuotaHold open_quota_;  // hold on the quota open_streams; empty for a unary call

@@ -1,6 +1,6 @@
-// IO loops: event loops over one gRPC completion queue each, for the frequent calls (queries and updates), and the
-// threads that run the loops. A call belongs to one loop and is only changed under that loop's lock, so the call needs
-// no lock of its own. Event handlers may do short work; they defer longer work, and never block.
+// IO loops: event loops over one gRPC completion queue each, for the events of all calls, and the threads that run the
+// loops. A frequent call (query or update) belongs to one loop and is only changed under that loop's lock, so the call
+// needs no lock of its own. Event handlers may do short work; they defer longer work, and never block.
 //
 // Only one thread of a loop at a time waits in gRPC: if several threads waited, gRPC would make each waiting thread
 // wake the next thread for every event.

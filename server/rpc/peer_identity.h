@@ -16,7 +16,7 @@ namespace locus::server {
 std::optional<std::string> certificate_name(const grpc::ServerContextBase& context);
 
 // Returns the time in seconds since 1970 from which the caller's certificate is no longer valid; the largest number if
-// the caller has no certificate.
+// the caller has no certificate, and 0 if the certificate cannot be read.
 int64_t peer_certificate_end(const grpc::ServerContextBase& context);
 
 }  // namespace locus::server

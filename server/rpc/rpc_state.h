@@ -28,10 +28,10 @@ struct RpcState {
 
   CallMetrics metrics;
   ConnectionTable connections;      // calls find the connection that they came on
-  AdmissionLimiter calls;           // running calls, except streams
-  AdmissionLimiter streams;         // open streams
+  AdmissionLimiter calls;           // running calls that have no other limiter
+  AdmissionLimiter streams;         // open streams of queries and updates
   MemoryBudget memory;              // limit of the process
-  ClientShares shares;              // what each identity has claimed of it
+  ClientShares shares;              // what each identity has claimed of `memory`
   uint64_t max_inflated_bytes = 0;  // maximum size of an inflated message; 0 = gRPC refuses compressed ones
   // Identities and rights of callers. Set before the first call; null in servers without access control.
   AccessControl* access = nullptr;
@@ -40,7 +40,8 @@ struct RpcState {
   Quotas quotas{
       [this](absl::string_view subject) { return access == nullptr ? Quota() : access->rules()->quota_of(subject); }};
   Drain drain;
-  // Maximum time that a call waits for its caller to send or read a message. After it, the call is ended.
+  // Maximum time that a call waits for its caller to read an answer, and that a blocking call waits for a message of
+  // its caller. After it, the call is ended.
   std::chrono::milliseconds stall_limit = std::chrono::seconds(60);
   std::atomic<bool> recovering{false};  // true while the scenes of the log are being recovered
 };

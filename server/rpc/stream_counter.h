@@ -5,8 +5,8 @@
 // three times as many as the server accepts and ends, so the server's own count of calls misses most of them.
 //
 // Threads: one thread at a time. A count takes about 15 us; the first count of a connection takes longer, because it
-// asks for the numbers of all connections that gRPC has added since. Remove this class once gRPC limits the number of
-// calls that wait to be accepted.
+// asks for the numbers of all connections that gRPC has added since the last such question. Remove this class once gRPC
+// limits the number of calls that wait to be accepted.
 #ifndef LOCUS_SERVER_RPC_STREAM_COUNTER_H_
 #define LOCUS_SERVER_RPC_STREAM_COUNTER_H_
 

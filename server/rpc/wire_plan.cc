@@ -117,7 +117,7 @@ struct WirePlan::Field {
 };
 
 struct WirePlan::Type {
-  std::vector<Field> fields;  // sorted by number
+  std::vector<Field> fields;  // the index is the field number; numbers without a field have kUnknown
 };
 
 // State of one scan.

@@ -1,5 +1,5 @@
-// Estimated cost of a query by scene and kind, in nanoseconds of one thread, learned from finished work. Estimates
-// decide where and when a batch runs and whether it is admitted; they never change an answer.
+// Estimated cost of a query by scene, kind and QueryBlock::source, in nanoseconds of one thread, learned from finished
+// work. Estimates decide where and when a batch runs and whether it is admitted; they never change an answer.
 //
 // Threads: every member may be called from any thread, and no member takes a lock. If two threads call learn() at once,
 // one of their measurements may be lost. Memory is fixed: the entry of one scene may be replaced by that of another

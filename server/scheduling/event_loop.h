@@ -93,7 +93,8 @@ class EventLoop {
   Timers::iterator at(Time time, std::function<void()> callback);
   void cancel(Timers::iterator timer) { timers_.erase(timer); }
 
-  // Runs `work`, without the lock, as soon as the handler that calls defer() has returned.
+  // Runs `work`, without the lock, after the handler that calls defer() and the other handlers of the same turn() have
+  // returned.
   void defer(DeferredTask& work, TaskLength length) { deferred_.push_back({&work, length}); }
 
   // Waits until this thread is the leader, then waits for an event, a posted tag or a timer, and handles it. Returns

@@ -13,7 +13,7 @@
 // memory during the delay if take_shortage() returns true. Cost: a claim that fits takes no lock. The memory of the
 // process is measured in three cases: refresh() is called, a claim does not seem to fit, or the claims that have ended
 // since the last measurement add up to more than 1 / kStepShare of the limit. Invariants: claimed_ is the sum of the
-// live claims; when a claim succeeds, measured memory plus live claims is at most the ceiling of its line, or the live
+// live claims; when claim() succeeds, measured memory plus live claims is at most the ceiling of its line, or the live
 // claims that use the reserve are at most the reserve.
 #ifndef LOCUS_SERVER_SCHEDULING_MEMORY_BUDGET_H_
 #define LOCUS_SERVER_SCHEDULING_MEMORY_BUDGET_H_
@@ -107,7 +107,7 @@ class MemoryBudget {
   // Caller::client().
   absl::StatusOr<Claim> claim(MemoryLine line, absl::string_view field, uint64_t bytes, uint64_t owner = 0)
       LOCUS_EXCLUDES(mutex_);
-  // Claims `bytes` for work that is never refused, because it frees memory.
+  // Claims `bytes` for work that is never refused, such as work that frees memory.
   Claim claim_anyway(MemoryLine line, uint64_t bytes) LOCUS_EXCLUDES(mutex_);
 
   // Measures the process. Call it periodically.

@@ -151,7 +151,7 @@ class QueryScheduler {
   // Locked by pool threads only.
   Mutex mutex_;
   FairQueue<Ticket*> queues_[kJobClasses] LOCUS_GUARDED_BY(mutex_);
-  // Nanoseconds of turns of small jobs since the last turn of a large job.
+  // Nanoseconds of turns of small jobs since the last turn of a large job; counted only while large jobs wait.
   uint64_t small_in_a_row_ LOCUS_GUARDED_BY(mutex_) = 0;
   std::vector<std::thread> threads_;
 };

@@ -1,7 +1,7 @@
 // Queue of update batches: one bounded SceneQueue for each scene, emptied in order of arrival by one thread at a time.
 // Therefore threads that serve clients never wait for a scene's writer or its readers. A small batch for an idle scene
-// is applied by its caller, unless its ack waits for the disk. Batches whose ack waits for the disk are always queued,
-// and the waiting batches of a scene share one sync.
+// is applied by its caller, unless it scans all objects or its ack waits for the disk. Batches whose ack waits for the
+// disk are always queued, and the waiting batches of a scene share one sync.
 //
 // Threads: every member may be called from any thread; post() takes a lock that is held only briefly. Invariants: at
 // most one group of batches of a scene is being applied, and batches of a scene never overtake each other; the counts

@@ -2,7 +2,7 @@
 //
 // Threads: every member may be called from any thread. Readers never wait for a reload, which prepares everything
 // before it swaps one pointer. Only files without a mistake are published: a reload that finds a mistake changes
-// nothing. The generation grows by one with each change.
+// nothing. The generation grows by one with each reload that publishes.
 #ifndef LOCUS_SERVER_SECURITY_ACCESS_CONTROL_H_
 #define LOCUS_SERVER_SECURITY_ACCESS_CONTROL_H_
 
@@ -61,8 +61,9 @@ class AccessControl {
   // Returns the current rules. Takes less than 50 ns. Use the result for one decision only, because it does not change
   // when the rules change.
   std::shared_ptr<const AccessRules> rules() const;
-  // Returns a number that grows with each change of rules, tokens or keys. A stream compares it with the number that it
-  // remembers, and checks its rights again if they differ. Read the number before the rules.
+  // Returns a number that grows with each successful reload(). The code that keeps an identity for later calls compares
+  // the number with the one that it remembers, and authenticates again if they differ. Read the number before
+  // authenticate().
   uint64_t generation() const { return generation_.load(std::memory_order_acquire); }
   // Returns whether the credentials behind an identity are still good. A token is good until it is revoked, replaced or
   // expired; a JWT until it expires or its key is removed from the file.
@@ -71,7 +72,8 @@ class AccessControl {
   // Reads all files again, and opens the audit file anew. If any file has a mistake, keeps the old state and returns
   // the error. Otherwise publishes the new state, then calls the functions of on_change(). One reload runs at a time.
   absl::Status reload();
-  // Adds a function that reload() calls after each change, on its thread. It must not call reload() or on_change().
+  // Adds a function that reload() calls, on its thread, after it has published a state. The function must not call
+  // reload() or on_change().
   void on_change(std::function<void()> listener);
 
   // Returns the files to watch (see file_watcher.h).

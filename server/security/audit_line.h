@@ -13,10 +13,12 @@ namespace locus::server {
 struct AuditEntry {
   int64_t unix_ms = 0;    // milliseconds since 1970
   std::string principal;  // identity of the caller, such as token:ci
-  std::string peer;       // address and port that the call came from
-  std::string address;    // key by which refused callers are counted; not written
-  std::string rpc;        // full method path, or the HTTP page
-  std::string subject;    // scene or mesh; empty = none
+  // Peer::label of the connection; an address if the entry stands for several connections or refusals.
+  std::string peer;
+  // Key by which refused callers are counted. Written only as the peer of a line that counts refusals.
+  std::string address;
+  std::string rpc;      // full method path, HTTP page, or event of the server: connect, reload
+  std::string subject;  // scene or mesh; empty = none
   absl::StatusCode code = absl::StatusCode::kOk;
   std::string request_id;  // request id of the call; empty = none
   std::string text;        // what was changed, or why it was refused

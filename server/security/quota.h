@@ -15,7 +15,7 @@ namespace locus::server {
 // Quantity that a quota limits. The first three are rates, in units a second; the others are amounts in use at a time.
 enum class QuotaKind : uint8_t {
   kQueries,        // queries of batches
-  kWork,           // nodes, cells and primitive tests that queries visited
+  kWork,           // nodes, cells and primitive tests of queries; objects that other calls visit, such as dumps
   kUpdateItems,    // items of update batches
   kBytesInFlight,  // memory claimed by calls in progress: parsed requests, their work, replies not yet taken
   kOpenStreams,

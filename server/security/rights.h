@@ -29,7 +29,7 @@ enum class Need : uint8_t {
   kAnyGrant,     // everybody who has at least one right (AccessRules::knows)
   kSceneRight,   // `right` to the scene that the request names
   kServerRight,  // `right`
-  kListed,       // everybody, but the answer contains only scenes to which the caller has `right`
+  kListed,       // like kAnyGrant, but the answer contains only scenes to which the caller has `right`
 };
 
 // Place of the scene's name in the request.

@@ -8,7 +8,8 @@
 
 namespace locus::server {
 
-// If all files are empty, access control is off: every caller is `anonymous` and may do everything.
+// If access_file, token_file and jwks_file are empty, access control is off: every caller is `anonymous` and may do
+// everything.
 struct SecurityOptions {
   // File of grants and quotas (see access_file.h). If it is empty but a token file or JWKS file is given, every caller
   // with a valid token, JWT or certificate may do everything, and all others nothing.

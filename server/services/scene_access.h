@@ -13,8 +13,8 @@
 
 namespace locus::server {
 
-// Checks the scene's name and the metadata x-scene, then returns the scene. Errors name `field`, the field of the
-// request that contains the name.
+// Checks the scene's name, the metadata x-scene and the caller's right to the scene, then returns the scene. `field` is
+// the field of the request that contains the name; the error for a malformed name says so.
 absl::StatusOr<ScenePtr> find_scene(const Host& host, const Caller& caller, const std::string& name,
                                     absl::string_view field);
 

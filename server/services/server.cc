@@ -54,8 +54,8 @@ constexpr int kMinPingIntervalMs = 5'000;
 // Maximum time after the end of all calls in which gRPC sends the last statuses and ends the health watchers.
 constexpr milliseconds kLastWords{500};
 
-// Starts serving the HTTP pages, over TLS if `tls` is not null. Returns null if the config turns them off, or if the
-// default address is in use.
+// Starts serving the HTTP pages, over TLS if `tls` is not null. Returns null if the config turns them off, or if they
+// cannot be served on the default address.
 absl::StatusOr<std::unique_ptr<HttpServer>> start_http(const ServerConfig& config, const TlsCredentials* tls,
                                                        Scrape& scrape) {
   if (config.http_listen.empty()) return nullptr;

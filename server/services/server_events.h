@@ -16,9 +16,9 @@ namespace locus::server {
 // log. `status` is OK if they are in use now. Any thread.
 void report_reload(const RpcState& state, FileLoads& loads, absl::string_view files, const absl::Status& status);
 
-// Reports `count` connections that were refused or closed since the last report of this kind. `peer` and `address` name
-// the last of them, as Peer::label and Peer::limit_key do; empty if they are not known. `status` says why. The caller
-// limits how often it reports; the audit log then limits the lines of each address. Any thread.
+// Reports `count` connections that were refused or closed since the last report of this kind. `peer` (Peer::label or
+// Peer::address) and `address` (Peer::limit_key) name the last of them; empty if they are not known. `status` says why.
+// The caller limits how often it reports; the audit log then limits the lines of each address. Any thread.
 void report_connections(const RpcState& state, uint64_t count, absl::string_view peer, absl::string_view address,
                         const absl::Status& status);
 

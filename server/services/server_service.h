@@ -1,5 +1,5 @@
-// ServerService: version, features and limits of the server (GetServer), and a copy of its data directory (Backup).
-// Functions without state; any thread.
+// ServerService: version, features and limits of the server (GetServer), quotas and their use (GetQuotas), and a copy
+// of the server's data directory (Backup). Functions without state; any thread.
 #ifndef LOCUS_SERVER_SERVICES_SERVER_SERVICE_H_
 #define LOCUS_SERVER_SERVICES_SERVER_SERVICE_H_
 

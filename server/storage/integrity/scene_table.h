@@ -94,8 +94,9 @@ class SceneTable {
       LOCUS_EXCLUDES(mutex_);
   void remove(SceneKey scene, const CatalogueRow& totals) LOCUS_EXCLUDES(mutex_);
 
-  // Fills the members of the marker that concern scenes and the catalogue, and leaves its other members unchanged.
-  // `database_sequence` is RocksDB's last sequence number, read before this call.
+  // Fills the members of the marker that concern scenes and the catalogue. Sets flushed_sequence if all written records
+  // are synced: to `database_sequence`, RocksDB's last sequence number, read before this call, or to a lower number
+  // while an append is in progress. Leaves the other members unchanged.
   void fill_marker(uint64_t database_sequence, DurableMarker& durable_marker) const LOCUS_EXCLUDES(mutex_);
 
  private:

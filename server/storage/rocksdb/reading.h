@@ -19,7 +19,7 @@ inline rocksdb::Slice slice_of(absl::string_view view) { return {view.data(), vi
 
 // Returns the options that every read must use. The options ignore range deletions, because RocksDB 7.8 crashes if an
 // iterator reads both a range deletion and an unreadable table. So keys in deleted ranges may still be found; that is
-// safe, because no deleted key is ever reused.
+// safe, because no key in a deleted range is ever reused.
 rocksdb::ReadOptions reading_options();
 
 // Result of scan_records(), which reads the stored checksums of a scene's records but does not verify them.

@@ -17,7 +17,7 @@
 // snapshot  scene id index: a chunk of a scene's snapshot
 // mesh      sha256 id index: a chunk of the content, or of the parts of one name
 //
-// Content ids are never reused, because reads ignore range deletions: no key may be written again after it was deleted.
+// Content ids are never reused, because reads ignore range deletions: no key in a deleted range may be written again.
 // Each family has an empty row with the key kFamilyMark, "\0", which sorts first. Database::flush_to_new_log() writes
 // this row, because RocksDB flushes a family only if its memory table has a row.
 #ifndef LOCUS_SERVER_STORAGE_ROCKSDB_ROWS_H_
