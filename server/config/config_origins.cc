@@ -5,12 +5,14 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <utility>
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/string_view.h"
 #include "absl/strings/strip.h"
+#include "core/base/check.h"
 #include "server/config/server_parser.h"
 
 namespace locus::server {
@@ -29,11 +31,18 @@ std::string lines_that_set(const std::string& path, const std::string& name) {
   return lines;
 }
 
+// Options that are flags without a value.
+constexpr std::pair<absl::string_view, bool ServerConfig::*> kFlags[] = {
+    {"accept-compression", &ServerConfig::accept_compression}, {"insecure", &ServerConfig::insecure}};
+
 // Returns the option's value as text. The parser was built over `config`, which holds the values in use, so CLI11 shows
 // these values as the defaults of the options.
 std::string value_of(const CLI::Option& option, const ServerConfig& config) {
-  // --insecure is the only flag without a value.
-  if (option.get_expected_max() == 0) return config.insecure ? "true" : "false";
+  if (option.get_expected_max() == 0) {  // a flag without a value
+    for (const auto& [name, member] : kFlags)
+      if (option.check_lname(std::string(name))) return config.*member ? "true" : "false";
+    LOCUS_CHECK(false);
+  }
   const std::string text = option.get_default_str();
   absl::string_view list = text;  // CLI11 prints several values as a list in brackets
   if (absl::ConsumePrefix(&list, "[") && absl::ConsumeSuffix(&list, "]")) return std::string(list);

@@ -78,6 +78,13 @@ TEST_F(ConfigOriginsTest, EachValueNamesItsFlagVariableOrLine) {
   EXPECT_EQ(of("max-meshes", flags), "65536, default, ");
 }
 
+TEST_F(ConfigOriginsTest, EachFlagWithoutAValueShowsItsOwnValue) {
+  EXPECT_EQ(of("accept-compression", {"--accept-compression"}), "true, flag, --accept-compression");
+  EXPECT_EQ(of("insecure", {"--accept-compression"}), "false, default, ");
+  EXPECT_EQ(of("accept-compression", {"--insecure"}), "false, default, ");
+  EXPECT_EQ(of("insecure", {"--insecure"}), "true, flag, --insecure");
+}
+
 TEST_F(ConfigOriginsTest, AConfigFileNamedByAFlagIsRead) {
   write_file("memory-limit = 1GiB\n");
   EXPECT_EQ(of("memory-limit", {"--config", file_}), "1073741824, file, " + file_ + ":1");
