@@ -286,10 +286,7 @@ absl::StatusOr<RepairReport> repair(const StorageOptions& given) {
   RepairReport report;
   if (!fs::exists(options.path)) return absl::NotFoundError(absl::StrCat(options.path, " is no data directory"));
   ASSIGN_OR_RETURN(const auto lock, DirectoryLock::acquire(*options.env, options.path));
-  if (fs::exists(absl::StrCat(folder, "/", kReadyName))) {
-    std::string kept_at;
-    RETURN_IF_ERROR(install_repaired(options, kept_at));
-  }
+  if (fs::exists(absl::StrCat(folder, "/", kReadyName))) RETURN_IF_ERROR(install_repaired(options, report.finished_at));
   std::error_code failed;
   fs::remove_all(folder, failed);
   const absl::StatusOr<DurableMarker> durable_marker = DurableMarkerFile::read(*options.env, options.path);
@@ -317,8 +314,11 @@ absl::StatusOr<RepairReport> repair(const StorageOptions& given) {
 }
 
 std::string to_text(const RepairReport& report) {
-  if (!report.changed) return "all is intact: no file was changed\n";
   std::string text;
+  if (!report.finished_at.empty())
+    absl::StrAppend(&text, "finished a repair that was interrupted; the database before it is in ", report.finished_at,
+                    ": run `locusd check` on a copy to see what was damaged\n");
+  if (!report.changed) return absl::StrCat(text, text.empty() ? "all is intact: no file was changed\n" : "");
   for (const SceneRepair& scene : report.scenes)
     absl::StrAppend(&text, "scene ", scene.name, ": ", scene.damage, "; ", outcome_of(scene), "\n");
   for (const MeshRepair& mesh : report.meshes)

@@ -39,6 +39,9 @@ struct RepairReport {
   std::vector<SceneRepair> scenes;  // damaged scenes only
   std::vector<MeshRepair> meshes;   // damaged meshes only
   std::string kept_at;              // folder to which the old database was moved
+  // Folder of the old database of an earlier repair that was interrupted and that this call finished first; empty if
+  // there was none. The losses of that repair are not in this report.
+  std::string finished_at;
 };
 
 // Repairs the directory. Needs disk space for a copy of the intact part. After an error or a crash the directory is

@@ -3,7 +3,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
+
 #include "rocksdb/db.h"
+#include "server/storage/integrity/durable_marker.h"
+#include "server/storage/integrity/opening.h"
 #include "server/storage/rocksdb_log.h"
 #include "tests/support/faulty_files.h"
 #include "tests/support/stored_log.h"
@@ -95,6 +99,25 @@ TEST_F(RepairTest, MeshesWhoseContentIsDamagedAreDroppedWithTheirParts) {
   EXPECT_TRUE(report->meshes[0].dropped && report->meshes[1].dropped);
   EXPECT_EQ(stored_chunks(), 0u) << "the first chunk was copied before the damaged one was read";
   EXPECT_TRUE(open()->stored_meshes().empty());
+}
+
+TEST_F(RepairTest, ARepairThatWasInterruptedIsFinishedAndReported) {
+  store_two_meshes();
+  // The files of a repair that ended just before it moved the repaired database.
+  const std::filesystem::path data = options_.path, repaired = data / std::string(kRepairedFolder);
+  const std::string old = (data / "before-repair-1").string(), marker(DurableMarkerFile::kName);
+  std::filesystem::create_directories(repaired);
+  std::filesystem::copy(data / "rocksdb", repaired / "rocksdb", std::filesystem::copy_options::recursive);
+  std::filesystem::copy(data / marker, repaired / marker);
+  test::write_file_bytes((repaired / "READY").string(), old);
+  test::flip_bit_of(kContent, options_.path + "/rocksdb");
+  const absl::StatusOr<RepairReport> report = repair(options_);
+  ASSERT_TRUE(report.ok()) << report.status();
+  EXPECT_EQ(report->finished_at, old);
+  EXPECT_FALSE(report->changed);
+  EXPECT_THAT(to_text(*report), HasSubstr("the database before it is in " + old));
+  EXPECT_TRUE(std::filesystem::exists(old + "/rocksdb"));
+  EXPECT_EQ(open()->stored_meshes().size(), 2u);
 }
 
 }  // namespace
