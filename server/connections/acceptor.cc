@@ -220,12 +220,11 @@ void Acceptor::ended(uint64_t id) {
   const Entry entry = std::move(found->second);
   entries_.erase(found);
   limiter_.leave(entry.peer.limit_key);
-  // Charge the address of a client whose connection this server has closed for any reason except idleness. Otherwise a
-  // client that floods would connect again at once, and each connection may cost some megabytes before the guard closes
-  // it.
+  // Charge the address of a client that misused its connection. Otherwise a client that floods would connect again at
+  // once, and each connection may cost some megabytes before the guard closes it.
   // Users of unix sockets are not charged: the user may run a proxy, and the charge would refuse the proxy's other
   // clients too.
-  if (const char* reason = entry.connection->close_reason(); reason != nullptr && reason != kIdle && !entry.peer.uid)
+  if (entry.connection->was_misused() && !entry.peer.uid)
     limiter_.charge(entry.peer.limit_key, options_.limits.new_per_second);
   guard_.forget(*entry.connection);
   table_.remove(*entry.connection);
@@ -247,7 +246,7 @@ void Acceptor::close_overdue(Time now) {
     const CallCounts counts = entry.connection->counts();
     if (counts.calls_open > 0 || counts.calls_begun != std::exchange(entry.calls_begun, counts.calls_begun)) {
       entry.since = now;
-    } else if (now - entry.since >= options_.idle_timeout && entry.connection->close(kIdle)) {
+    } else if (now - entry.since >= options_.idle_timeout && entry.connection->close(kIdle, Misuse::kNo)) {
       table_.counters().idle.fetch_add(1);
     }
   }

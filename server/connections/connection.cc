@@ -128,10 +128,11 @@ void Connection::set_identity(std::shared_ptr<const void> identity) {
   identity_.swap(identity);
 }
 
-bool Connection::close(const char* reason) {
+bool Connection::close(const char* reason, Misuse misuse) {
   const MutexLock lock(mutex_);
   const char* open = nullptr;
   if (descriptor_ < 0 || !close_reason_.compare_exchange_strong(open, reason)) return false;
+  was_misused_ = misuse == Misuse::kYes;
   shutdown(descriptor_, SHUT_RDWR);
   discard_arrived(descriptor_);
   return true;

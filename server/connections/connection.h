@@ -45,6 +45,10 @@ struct ReceivedCounts {
   uint64_t segments = 0;  // segments that carried data
 };
 
+// Says whether a connection is closed because its client misused it. After a misuse the client's address may open fewer
+// new connections for a while.
+enum class Misuse : uint8_t { kNo, kYes };
+
 class Connection {
  public:
   static constexpr uint64_t kMaxCancelled = 1000;
@@ -103,9 +107,11 @@ class Connection {
   // Shuts the connection down in both directions and discards what the transport has not read yet; its calls end as if
   // the peer had gone. `reason` must be a constant. Returns false if the connection is already closed or has no
   // descriptor.
-  bool close(const char* reason) LOCUS_EXCLUDES(mutex_);
+  bool close(const char* reason, Misuse misuse = Misuse::kYes) LOCUS_EXCLUDES(mutex_);
   // Returns the reason given to the first close(); null if the connection was not closed from this side.
   const char* close_reason() const { return close_reason_.load(); }
+  // Returns whether the connection was closed because its client misused it.
+  bool was_misused() const { return was_misused_.load(); }
 
   // Returns the counts of the kernel; zeros if the connection is not TCP or its descriptor is released.
   ReceivedCounts received() const LOCUS_EXCLUDES(mutex_);
@@ -134,6 +140,7 @@ class Connection {
   std::atomic<uint32_t> wrong_credentials_{0};
   std::atomic<uint64_t> looked_at_unexplained_{0};
   std::atomic<const char*> close_reason_{nullptr};
+  std::atomic<bool> was_misused_{false};
   mutable Mutex mutex_;
   int descriptor_ LOCUS_GUARDED_BY(mutex_);
   std::shared_ptr<const void> identity_ LOCUS_GUARDED_BY(mutex_);

@@ -35,7 +35,7 @@ class ConnectionLimiter {
   // Subtracts one ended connection from the number of connections of the address `key`.
   void leave(const std::string& key);
 
-  // Takes `count` tokens from the address `key`, because the server has closed a connection of this address. A new
+  // Takes `count` tokens from the address `key`, because a client at this address has misused a connection. A new
   // connection needs a token; tokens are refilled at the rate `new_per_second`. At most one burst of tokens can be
   // owed, so the address has its full burst again after at most twice the time in which a burst is refilled.
   void charge(const std::string& key, uint32_t count);

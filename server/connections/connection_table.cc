@@ -47,7 +47,7 @@ size_t ConnectionTable::shed_heaviest(bool close, uint64_t min_bytes, const char
 size_t ConnectionTable::close_if(const std::function<bool(const Connection&)>& is_chosen, const char* reason) {
   size_t closed = 0;
   for (const std::shared_ptr<Connection>& connection : accepted())
-    if (is_chosen(*connection)) closed += connection->close(reason);
+    if (is_chosen(*connection)) closed += connection->close(reason, Misuse::kNo);
   return closed;
 }
 

@@ -106,7 +106,7 @@ absl::Status Caller::check_certificate() const {
     connection_->certificate_end.store(end, std::memory_order_relaxed);
   }
   if (end == std::numeric_limits<int64_t>::max() || unix_seconds() < end) return absl::OkStatus();
-  connection_->close("its certificate has expired");
+  connection_->close("its certificate has expired", Misuse::kNo);
   return absl::UnauthenticatedError("the client certificate has expired; connect again with a new one");
 }
 

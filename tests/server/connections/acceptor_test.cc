@@ -293,6 +293,23 @@ TEST_F(AcceptorTest, AUnixConnectionThatWasClosedForMisuseKeepsOutNoOther) {
   EXPECT_EQ(refused(), 0u);
 }
 
+TEST_F(AcceptorTest, AConnectionThatIsClosedWithoutMisuseDoesNotChargeItsAddress) {
+  AcceptorOptions options;
+  options.limits.new_per_second = 1;
+  options.limits.burst = 3;
+  start(options);
+  for (int i = 0; i < 2; ++i) {
+    RawSocket closed = good_client();
+    ASSERT_TRUE(wait_until([&] { return taken() == 1; }));
+    table_.close_if([](const Connection&) { return true; }, "no longer trusted");
+    end_taken();
+    ASSERT_TRUE(wait_until([&] { return table_.size() == 0; }));
+  }
+  RawSocket other = good_client();
+  EXPECT_TRUE(wait_until([&] { return taken() == 1; }));
+  EXPECT_EQ(refused(), 0u);
+}
+
 TEST_F(AcceptorTest, WithoutFreeDescriptorsConnectionsWaitAndTheThreadPauses) {
   start();
   RawSocket waiting(port_);  // the client's end and the server's end each need a descriptor
