@@ -45,7 +45,7 @@ absl::StatusOr<HistoryOptions> to_history(const v1::SceneSpec& spec) {
 
 Vec3d to_vec(const v1::Vec3d& vec) { return {vec.x(), vec.y(), vec.z()}; }
 
-v1::Vec3d vec_to_proto(const Vec3d& vec) {
+v1::Vec3d to_proto(const Vec3d& vec) {
   v1::Vec3d out;
   out.set_x(vec.x);
   out.set_y(vec.y);
@@ -114,8 +114,8 @@ v1::Scene to_proto(const Scene& scene, const SceneSummary& summary) {
   out.set_joined_updates(status.joined_updates);
   out.set_last_build_error(status.last_build_error);
   if (!summary.bounds.empty()) {
-    *out.mutable_min() = vec_to_proto(summary.bounds.min);
-    *out.mutable_max() = vec_to_proto(summary.bounds.max);
+    *out.mutable_min() = to_proto(summary.bounds.min);
+    *out.mutable_max() = to_proto(summary.bounds.max);
   }
   return out;
 }

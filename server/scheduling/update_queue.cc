@@ -136,10 +136,10 @@ void UpdateQueue::apply_inline(SceneQueue& scene_queue, PendingUpdate& update, u
   Group group = {&update};
   const SteadyTime start = steady_clock::now();
   if (!apply(scene_queue, group)) return stall(scene_queue, group);
-  learn(items, start);
+  if (!group.empty()) learn(items, start);
   std::unique_ptr<SceneQueue> empty;
   const MutexLock lock(mutex_);
-  ++stats_.applied_inline;
+  stats_.applied_inline += group.size();  // none if the update was withdrawn
   empty = finish(scene_queue);
 }
 
