@@ -79,7 +79,7 @@ class PathBoxes {
                                lz * reciprocal_[2] - enter_[2]);
     const float far = minimum(minimum(hx * reciprocal_[0] - leave_[0], hy * reciprocal_[1] - leave_[1]),
                               hz * reciprocal_[2] - leave_[2]);
-    return (near > far) | (far < 0) ? kMissed : near;
+    return ((near > far) | (far < 0)) ? kMissed : near;
   }
 
   float reciprocal_[3];

@@ -87,8 +87,8 @@ TEST_F(HistoryTest, TheSummaryOfARevisionFollowsTrimming) {
   Scene scene("scene", spec(20, uint64_t{1} << 30), 1, StaticSet::empty());
   live(scene, 20);
   EXPECT_EQ(scene.known_summary(), std::nullopt);
-  EXPECT_EQ(scene.summary().oldest_tick, 1u);
-  EXPECT_EQ(scene.known_summary()->oldest_tick, 1u);
+  EXPECT_EQ(scene.summary().oldest_tick, 0u);
+  EXPECT_EQ(scene.known_summary()->oldest_tick, 0u);
   EXPECT_GT(scene.trim_history(0), 0u);
   EXPECT_EQ(scene.known_summary(), std::nullopt);
   EXPECT_EQ(scene.summary().oldest_tick, 20u);
