@@ -7,6 +7,7 @@
 #include <array>
 
 #include "server/connections/listening_socket.h"
+#include "tests/support/machine_features.h"
 #include "tests/support/raw_socket.h"
 #include "tests/support/temporary_folder.h"
 
@@ -44,8 +45,9 @@ TEST_F(ConnectionTest, AnIpv4PeerIsNamedAsGrpcNamesIt) {
 }
 
 TEST_F(ConnectionTest, AnIpv4PeerOfADualSocketIsAnIpv4Peer) {
+  if (!test::has_ipv6()) GTEST_SKIP() << "this machine has no IPv6";
   const auto sockets = listen_on(*parse_listen_address("[::]:0"), {});
-  if (!sockets.ok()) GTEST_SKIP() << "this machine has no IPv6";
+  ASSERT_TRUE(sockets.ok()) << sockets.status();
   const test::RawSocket client(sockets->front().port());
   const int descriptor = accept_one(sockets->front());
   EXPECT_EQ(peer_of(descriptor)->address, "127.0.0.1");

@@ -9,6 +9,7 @@
 #include "core/base/mutex.h"
 #include "server/config/observability_limits.h"
 #include "tests/support/http_get.h"
+#include "tests/support/machine_features.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test_certificates.h"
 
@@ -120,8 +121,9 @@ TEST_F(HttpServerTest, APortInUseIsAnError) {
 }
 
 TEST_F(HttpServerTest, AnIpv6AddressIsListenedOn) {
+  if (!test::has_ipv6()) GTEST_SKIP() << "this machine has no [::1]";
   const auto server = HttpServer::start(*parse_listen_address("[::1]:0"), {});
-  if (!server.ok()) GTEST_SKIP() << "this machine has no [::1]";
+  ASSERT_TRUE(server.ok()) << server.status();
   EXPECT_GT((*server)->port(), 0);
 }
 
