@@ -19,8 +19,8 @@ struct Advice {
 constexpr absl::string_view kClosedAtOnce =
     "the server ended the connection at once: it may require TLS, or a client certificate that it knows";
 
-// Advice for failed handshakes. The order matters: the first entry whose symptom matches is used.
-constexpr Advice kOnHandshakes[] = {
+// Advice for connections that failed. The order matters: the first entry whose symptom matches is used.
+constexpr Advice kOnConnections[] = {
     {": Permission denied",
      "permission denied: the socket's file admits other users only; the server's operator can set --unix-mode and "
      "--unix-owner"},
@@ -31,13 +31,15 @@ constexpr Advice kOnHandshakes[] = {
     {"is not in peer certificate",
      "the server's certificate is for other names: use the name in the certificate as address or as server name"},
     {"Ssl handshake failed", "the server and this client do not agree on TLS: compare their certificates and CA files"},
+    {"DNS resolution failed",
+     "the name of the server is unknown here: correct it, or add it to DNS or to /etc/hosts of this machine"},
     {"failed to connect to all addresses; last error: UNAVAILABLE", kClosedAtOnce},
 };
 
 }  // namespace
 
-std::string advice_on_handshake(absl::string_view message) {
-  for (const Advice& advice : kOnHandshakes) {
+std::string advice_on_connection(absl::string_view message) {
+  for (const Advice& advice : kOnConnections) {
     if (absl::StrContains(message, advice.symptom)) return std::string(advice.remedy);
   }
   return "";
@@ -50,7 +52,7 @@ std::string advice_on(absl::StatusCode code, absl::string_view message) {
     case absl::StatusCode::kPermissionDenied:
       return "ask the operator of the server for the right to do this";
     case absl::StatusCode::kUnavailable:
-      return advice_on_handshake(message);
+      return advice_on_connection(message);
     default:
       return "";
   }

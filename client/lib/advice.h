@@ -10,10 +10,11 @@
 
 namespace locus::client {
 
-// Returns advice for a connection that failed because the permissions of a unix socket forbid it, or because client and
-// server do not agree on TLS: only one of them uses TLS, or a certificate was not accepted. `message` is gRPC's text.
-// Returns an empty string if no server answered or for any other cause.
-std::string advice_on_handshake(absl::string_view message);
+// Returns advice for a connection that failed because the permissions of a unix socket forbid it, because the server's
+// name cannot be resolved, or because client and server do not agree on TLS: only one of them uses TLS, or a
+// certificate was not accepted. `message` is gRPC's text. Returns an empty string if no server answered or for any
+// other cause.
+std::string advice_on_connection(absl::string_view message);
 
 // Returns advice for an error to which the server attached no details; empty if there is no advice.
 std::string advice_on(absl::StatusCode code, absl::string_view message);

@@ -39,7 +39,7 @@ absl::Status failure_of(const std::shared_ptr<grpc::ChannelInterface>& channel, 
   context.set_deadline(absl::ToChronoTime(absl::Now() + kMaxWait));
   grpc::health::v1::HealthCheckResponse unused;
   const grpc::Status status = grpc::health::v1::Health::NewStub(channel)->Check(&context, {}, &unused);
-  if (const std::string advice = advice_on_handshake(status.error_message()); !advice.empty())
+  if (const std::string advice = advice_on_connection(status.error_message()); !advice.empty())
     return absl::UnavailableError(absl::StrCat("no connection to ", target, ": ", advice));
   return absl::UnavailableError(
       absl::StrCat("nothing answers at ", target, detail, ": start locusd there, or give its address"));

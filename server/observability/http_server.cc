@@ -37,16 +37,17 @@ tcp protocol_of(int descriptor) {
   return known && address.ss_family == AF_INET6 ? tcp::v6() : tcp::v4();
 }
 
-// Accepts and serves connections of a listening socket, at most kMaxHttpConnections at once: when one ends, the next is
+// Accepts and serves connections of a listening socket, at most `max_connections` at once: when one ends, the next is
 // accepted. The operations on the socket run one at a time, on its strand. `socket` must outlive the listener.
 class HttpListener {
  public:
-  HttpListener(asio::io_context& io, const ListeningSocket& socket, const HttpPages& pages, HttpTls* tls)
+  HttpListener(asio::io_context& io, const ListeningSocket& socket, const HttpPages& pages, HttpTls* tls,
+               size_t max_connections)
       : io_(io), strand_(asio::make_strand(io)), acceptor_(io), pages_(pages), tls_(tls) {
     error_code error;
     acceptor_.assign(protocol_of(socket.descriptor()), socket.descriptor(), error);
     LOCUS_CHECK(!error);  // the descriptor is open and listens
-    for (uint32_t i = 0; i < kMaxHttpConnections; ++i) accept_next();
+    for (size_t i = 0; i < max_connections; ++i) accept_next();
   }
   ~HttpListener() {
     error_code ignored;
@@ -86,8 +87,10 @@ class HttpServer::Parts {
   Parts(std::vector<ListeningSocket> sockets, HttpPages pages, Certificates certificates)
       : sockets_(std::move(sockets)), pages_(std::move(pages)) {
     if (certificates) tls_ = std::make_unique<HttpTls>(std::move(certificates));
+    // A name such as localhost has two addresses, and so two sockets, which share the limit.
+    const size_t share = std::max<size_t>(1, kMaxHttpConnections / sockets_.size());
     for (const ListeningSocket& socket : sockets_)
-      listeners_.push_back(std::make_unique<HttpListener>(io_, socket, pages_, tls_.get()));
+      listeners_.push_back(std::make_unique<HttpListener>(io_, socket, pages_, tls_.get(), share));
     for (uint32_t i = 0; i < kHttpThreads; ++i) threads_.emplace_back([this] { io_.run(); });
   }
   ~Parts() {

@@ -129,7 +129,7 @@ bool Caller::needs_right() const { return rpc_right_ != nullptr && rpc_right_->n
 absl::Status Caller::check_grants() const {
   const std::shared_ptr<const AccessRules> rules = state_.access->rules();
   if (!rules->knows(*identity_))
-    return identity_->kind == IdentityKind::kAnonymous ? no_credentials() : lacks(*identity_, Right::kRead, "");
+    return identity_->kind == IdentityKind::kAnonymous ? no_credentials() : lacks(*identity_, rpc_right_->right, "");
   if (rpc_right_->need == Need::kServerRight && !rules->allows(*identity_, rpc_right_->right))
     return lacks(*identity_, rpc_right_->right, "");
   return absl::OkStatus();

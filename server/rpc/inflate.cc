@@ -83,21 +83,20 @@ bool is_gzip(const grpc::ByteBuffer& bytes) {
   return false;
 }
 
-absl::StatusOr<std::vector<MemoryBudget::Claim>> inflate_gzip(MemoryBudget& memory, uint64_t max_bytes,
-                                                              grpc::ByteBuffer& bytes) {
+absl::StatusOr<std::vector<CallMemory>> inflate_gzip(ClaimBytes claim, uint64_t max_bytes, grpc::ByteBuffer& bytes) {
   std::vector<grpc::Slice> slices;
   if (!bytes.Dump(&slices).ok()) return no_gzip();
   Inflation inflation(std::move(slices));
   std::vector<grpc::Slice> result;
-  std::vector<MemoryBudget::Claim> claims;
+  std::vector<CallMemory> claims;
   uint64_t total = 0;
   for (uint64_t piece = kFirstPiece;; piece = std::min(2 * piece, kLargestPiece)) {
     ASSIGN_OR_RETURN(const bool ended, inflation.ended());
     if (ended) break;
     // One byte beyond the limit shows that the message is too large.
     const uint64_t wanted = std::min(piece, max_bytes + 1 - total);
-    ASSIGN_OR_RETURN(MemoryBudget::Claim claim, memory.claim(MemoryLine::kRequests, "", wanted));
-    claims.push_back(std::move(claim));
+    ASSIGN_OR_RETURN(CallMemory claimed, claim(wanted));
+    claims.push_back(std::move(claimed));
     ASSIGN_OR_RETURN(grpc::Slice slice, inflation.next(wanted));
     total += slice.size();
     if (total > max_bytes) return too_large(max_bytes);

@@ -9,8 +9,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "absl/functional/function_ref.h"
 #include "absl/status/statusor.h"
-#include "server/scheduling/memory_budget.h"
+#include "server/rpc/call_memory.h"
 
 namespace locus::server {
 
@@ -18,12 +19,14 @@ namespace locus::server {
 // would be a tag with the wire type 7, which does not exist.
 bool is_gzip(const grpc::ByteBuffer& bytes);
 
-// Replaces `bytes` by their inflated content. Returns the claims of the memory of the content; each claim is made
+// Function that claims an amount of memory in bytes for the caller, such as Caller::claim().
+using ClaimBytes = absl::FunctionRef<absl::StatusOr<CallMemory>(uint64_t bytes)>;
+
+// Replaces `bytes` by their inflated content. Returns the claims of the memory of the content; each is made by `claim`
 // before its memory is allocated. RESOURCE_EXHAUSTED naming the limit receive_bytes if there are more than `max_bytes`,
-// INVALID_ARGUMENT (MALFORMED) for bytes that are not exactly one gzip stream, and errors of MemoryBudget::claim();
-// `bytes` are unchanged after an error. Cost: 3 ms for each MiB of the result.
-absl::StatusOr<std::vector<MemoryBudget::Claim>> inflate_gzip(MemoryBudget& memory, uint64_t max_bytes,
-                                                              grpc::ByteBuffer& bytes);
+// INVALID_ARGUMENT (MALFORMED) for bytes that are not exactly one gzip stream, and errors of `claim`; `bytes` are
+// unchanged after an error. Cost: 3 ms for each MiB of the result.
+absl::StatusOr<std::vector<CallMemory>> inflate_gzip(ClaimBytes claim, uint64_t max_bytes, grpc::ByteBuffer& bytes);
 
 }  // namespace locus::server
 

@@ -57,12 +57,13 @@ bool copy_scalar(uint32_t tag, const Descriptor& type, CodedInputStream& from, C
 
 absl::StatusOr<CallMemory> parse_request(const Caller& caller, const WirePlan& plan, grpc::ByteBuffer& bytes,
                                          google::protobuf::Message& request) {
-  std::vector<MemoryBudget::Claim> inflated;  // held until the message is parsed
+  const auto claim_bytes = [&caller](uint64_t amount) { return caller.claim(MemoryLine::kRequests, "", amount); };
+  std::vector<CallMemory> inflated;  // held until the message is parsed
   if (caller.state().max_inflated_bytes > 0 && is_gzip(bytes)) {
-    ASSIGN_OR_RETURN(inflated, inflate_gzip(caller.memory(), caller.state().max_inflated_bytes, bytes));
+    ASSIGN_OR_RETURN(inflated, inflate_gzip(claim_bytes, caller.state().max_inflated_bytes, bytes));
   }
   ASSIGN_OR_RETURN(const uint64_t parsed, plan.scan(bytes));
-  ASSIGN_OR_RETURN(CallMemory claim, caller.claim(MemoryLine::kRequests, "", parsed));
+  ASSIGN_OR_RETURN(CallMemory claim, claim_bytes(parsed));
   bool good = false;
   {
     grpc::ProtoBufferReader reader(&bytes);

@@ -35,6 +35,10 @@ uint64_t items_of(const UpdateBatch& batch) {
   return items;
 }
 
+uint64_t lists_of(const UpdateBatch& batch) {
+  return batch.inserts.size() + batch.moves.size() + batch.relabels.size();
+}
+
 bool coalesces(const Scene& scene) { return scene.spec().overload == OverloadPolicy::kLatestWins; }
 
 // Returns whether the scene's acks wait for the disk. The queue logs the waiting batches of such a scene together,
@@ -191,7 +195,8 @@ void UpdateQueue::work_on(SceneQueue& scene_queue) {
   empty = finish(scene_queue);
 }
 
-// Removes from the queue the batches that become one revision or share one sync, and returns them.
+// Removes from the queue the batches that become one revision or share one sync, and returns them. Lists count like
+// items, because empty lists are logged too and the log refuses a group that is too large.
 UpdateQueue::Group UpdateQueue::take_group(SceneQueue& scene_queue) {
   const bool coalescing = coalesces(*scene_queue.scene);
   const uint64_t max_items = coalescing                           ? limits::kMaxUpdateItems
@@ -199,14 +204,17 @@ UpdateQueue::Group UpdateQueue::take_group(SceneQueue& scene_queue) {
                                                                   : 0;
   Group group;
   uint64_t items = 0;
+  uint64_t lists = 0;
   while (!scene_queue.waiting.empty()) {
     PendingUpdate* const update = scene_queue.waiting.front();
     const uint64_t more = items_of(update->batch());
-    const bool fits = group.empty() ||
-                      (items + more <= max_items && (!coalescing || may_join(group.front()->batch(), update->batch())));
+    const uint64_t more_lists = lists_of(update->batch());
+    const bool fits = group.empty() || (items + lists + more + more_lists <= max_items &&
+                                        (!coalescing || may_join(group.front()->batch(), update->batch())));
     if (!fits) break;
     group.push_back(update);
     items += more;
+    lists += more_lists;
     scene_queue.waiting.pop_front();
   }
   LOCUS_DCHECK(scene_queue.busy && !group.empty());

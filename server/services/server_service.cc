@@ -142,7 +142,9 @@ std::vector<NamedLimit> limits_of(const Host& host) {
   return all;
 }
 
-void get_server(Host& host, v1::GetServerResponse& response) {
+void get_server(Host& host, const Caller& caller, v1::GetServerResponse& response) {
+  // The use of some limits would tell how many scenes exist that the caller may not read, and how large they are.
+  const bool shows_use = caller.may(Right::kMetrics, "") || caller.administers_all();
   response.set_version(kVersion);
   response.set_instruction_set(std::string(instruction_set()));
   for (const absl::string_view feature :
@@ -155,10 +157,12 @@ void get_server(Host& host, v1::GetServerResponse& response) {
     v1::Limit* out = response.add_limits();
     out->set_name(limit.name);
     out->set_value(limit.value);
+    if (!shows_use) continue;
     out->set_used(limit.used);
     out->set_refused(limit.refused);
   }
   response.set_insecure(host.config.insecure);
+  response.set_use_hidden(!shows_use);
 }
 
 }  // namespace
@@ -169,8 +173,8 @@ std::vector<BlockingMethod> server_methods(Host& host) {
   get.rpc = Rpc::kGetServer;
   get.while_closed = WhileClosed::kServe;
   get.body = unary_body<v1::GetServerRequest, v1::GetServerResponse>(
-      [&host](const Caller&, const v1::GetServerRequest&, v1::GetServerResponse& response) {
-        get_server(host, response);
+      [&host](const Caller& caller, const v1::GetServerRequest&, v1::GetServerResponse& response) {
+        get_server(host, caller, response);
         return absl::OkStatus();
       });
   BlockingMethod quotas;

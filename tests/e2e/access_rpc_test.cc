@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <cmath>
 #include <fstream>
 #include <future>
 #include <map>
@@ -132,6 +133,35 @@ TEST_F(AccessRpcTest, ListedScenesAreThoseThatTheCallerMayRead) {
   EXPECT_EQ(names("elsewhere"), "lobby-1 ");
   EXPECT_EQ(names("admin"), "arena-1 lobby-1 ");
   EXPECT_EQ(names("ops"), "");
+}
+
+TEST_F(AccessRpcTest, TheUseOfLimitsIsShownOnlyToThoseWhoMaySeeAllScenesOrMetrics) {
+  create("lobby-1");
+  const auto used_scenes = [&](const std::string& who) {
+    v1::GetServerResponse server;
+    EXPECT_TRUE(server.ParseFromString(call("/locus.v1.ServerService/GetServer", who, "").bytes));
+    double scenes = 0;
+    double all = 0;
+    for (const v1::Limit& limit : server.limits()) {
+      if (limit.name() == "scenes") scenes = limit.used();
+      all += limit.used() + static_cast<double>(limit.refused());
+    }
+    EXPECT_EQ(server.use_hidden(), all == 0) << who;
+    return scenes;
+  };
+  EXPECT_EQ(used_scenes("admin"), 2);
+  EXPECT_EQ(used_scenes("ops"), 2);
+  for (const char* who : {"reader", "updater", "elsewhere"}) EXPECT_EQ(used_scenes(who), 0) << who;
+}
+
+TEST_F(AccessRpcTest, ADenialNamesTheRightThatTheCallNeeds) {
+  const std::string path = "/locus.v1.SceneService/CreateScene";
+  EXPECT_THAT(call(path, "reader").status.error_message(), HasSubstr("lacks the right admin"));
+  write("access", "grant token:admin admin *\n");  // the reader has no grant any more
+  running_->server().reload();
+  EXPECT_THAT(call(path, "reader").status.error_message(), HasSubstr("lacks the right admin"));
+  EXPECT_THAT(call("/locus.v1.SceneService/ListScenes", "reader").status.error_message(),
+              HasSubstr("lacks the right read"));
 }
 
 TEST_F(AccessRpcTest, ARevokedTokenEndsItsStreams) {
@@ -311,6 +341,37 @@ TEST_F(AccessRpcTest, AQuotaOfQueriesRefusesWithItsName) {
   const grpc::Status refused = ask();
   EXPECT_EQ(refused.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
   EXPECT_THAT(refused.error_message(), HasSubstr("queries_per_s"));
+}
+
+TEST_F(AccessRpcTest, AnInflatedMessageCountsForTheQuotaOfItsCaller) {
+  running_.reset();
+  server::ServerConfig accepting = config();
+  accepting.accept_compression = true;
+  running_.emplace(accepting);
+  create("arena-1");
+  v1::ApplyUpdatesRequest update;
+  update.set_scene("arena-1");
+  update.mutable_batch()->add_removes()->mutable_ids()->Resize(100'000, 1);
+  const auto apply = [&](grpc_compression_algorithm algorithm) {
+    grpc::ClientContext context;
+    set_timeout(context);
+    context.AddMetadata("authorization", "Bearer " + tokens_["updater"]);
+    context.set_compression_algorithm(algorithm);
+    v1::ApplyUpdatesResponse response;
+    return running_->stubs().updates->ApplyUpdates(&context, update, &response);
+  };
+  // Finds a quota that is just large enough for the message if it is not compressed.
+  double quota = 100'000;
+  grpc::Status plain = grpc::Status::CANCELLED;
+  for (; !plain.ok() && quota < 1e9; quota *= 1.1) {
+    write("access", std::string(kAccess) + "quota token:updater bytes_in_flight=" + std::to_string(std::lround(quota)));
+    running_->server().reload();
+    plain = apply(GRPC_COMPRESS_NONE);
+  }
+  ASSERT_TRUE(plain.ok()) << plain.error_message();
+  const grpc::Status refused = apply(GRPC_COMPRESS_GZIP);
+  EXPECT_EQ(refused.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_THAT(refused.error_message(), HasSubstr("bytes_in_flight"));
 }
 
 // Updates that wait for the log hold the memory that they have claimed.

@@ -1,5 +1,6 @@
 // `locus context`: named connection options of servers; one name is the default.
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -8,6 +9,7 @@
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include "client/cli/commands.h"
+#include "client/cli/connection_options.h"
 #include "client/cli/output.h"
 #include "client/cli/security/context_writer.h"
 #include "core/base/status_macros.h"
@@ -19,6 +21,7 @@ using client::SavedContext;
 using client::SavedContexts;
 
 struct ContextOptions {
+  const CLI::App* program = nullptr;  // the parser with the options that stand before the command
   std::string name;
   SavedContext saved;
   bool tls = false;
@@ -66,7 +69,22 @@ void make_absolute(std::string& path) {
   if (!path.empty()) path = std::filesystem::absolute(path, ignored).string();
 }
 
+// Returns an error if an option of the connection stands before the command, where `context set` does not keep it.
+// Values of environment variables are ignored: they count for every command and are not meant to be kept.
+absl::Status check_options_before(const CLI::App& program) {
+  for (const char* name : kConnectionOptionNames) {
+    const CLI::Option& option = *program.get_option(name);
+    if (option.count() == 0) continue;
+    const char* const variable = std::getenv(option.get_envname().c_str());
+    if (variable != nullptr && option.results().front() == variable) continue;
+    return usage_error(
+        absl::StrCat(name, " before `context set` would have no effect: give the options to keep after the name"));
+  }
+  return absl::OkStatus();
+}
+
 absl::Status set_context(const ContextOptions& options, Context& context) {
+  RETURN_IF_ERROR(check_options_before(*options.program));
   RETURN_IF_ERROR(client::check_context_name(options.name));
   ASSIGN_OR_RETURN(SavedContexts contexts, client::read_contexts(context.contexts_path()));
   SavedContext& saved = contexts.by_name[options.name];
@@ -96,10 +114,11 @@ CLI::App& add_one(CLI::App& parent, const char* name, const char* description, c
 
 void add_context_set(CLI::App& parent, Context& context) {
   const auto options = std::make_shared<ContextOptions>();
+  options->program = parent.get_parent();
   CLI::App& command = add_one(parent, "set", "Make a context, or replace one",
                               "set prod --address game.example.com:7575 --ca ca.pem --token-file game.token");
   command.add_option("NAME", options->name, "Letters, digits, `-`, `_` and `.`, at most 63")->required();
-  command.add_option("--address", options->saved.address, "Where locusd listens")->type_name("ADDRESS");
+  command.add_option("-a,--address", options->saved.address, "Where locusd listens")->type_name("ADDRESS");
   command.add_flag("--tls", options->tls, "Encrypt the connection; --ca, --cert and --server-name imply it");
   command.add_option("--ca", options->saved.ca, "Certificates of the server's authority")->type_name("FILE");
   command.add_option("--cert", options->saved.cert, "Certificate of this client")->type_name("FILE");

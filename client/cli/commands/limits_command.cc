@@ -26,8 +26,8 @@ absl::Status limits(const NoOptions&, Context& context) {
   for (const v1::Limit& limit : server.limits()) {
     report.rows.push_back({{"name", limit.name()},
                            {"value", number_json(limit.value())},
-                           {"used", number_json(limit.used())},
-                           {"refused", limit.refused()}});
+                           {"used", server.use_hidden() ? Json() : number_json(limit.used())},
+                           {"refused", server.use_hidden() ? Json() : Json(limit.refused())}});
   }
   context.write(report);
   return absl::OkStatus();
@@ -43,7 +43,8 @@ void add_limits_command(CLI::App& parent, Context& context) {
       "memory_meshes, memory_caches and memory_network are measured, the others claimed by work in progress. Of\n"
       "pinned, caches and network, the value is the most that they may take; of the others, the use of the whole\n"
       "process at which they give way or are refused.\n"
-      "`refused` counts calls, messages and connections since the server started.\n"
+      "`refused` counts calls, messages and connections since the server started. On a server with access control,\n"
+      "only callers with the right `metrics` or `admin *` see `used` and `refused`.\n"
       "Examples:\n  locus limits\n  locus -o json limits");
   run_when_chosen(command, std::make_shared<NoOptions>(), context, limits);
 }

@@ -21,7 +21,7 @@ from . import columns, meshes, schema
 from .connection import Connection, Retry
 from .credentials import Credentials
 from .enums import OverloadPolicy, Winding
-from .errors import LocusError, from_call, handshake_advice, parsed
+from .errors import LocusError, from_call, connection_advice, parsed
 from .meshes import InstanceChange, MeshColumns, PlacedInstances
 from .queries import QueryBatch
 from .query_stream import QueryStream
@@ -255,7 +255,7 @@ class Client:
             if error.code == grpc.StatusCode.PERMISSION_DENIED:  # the server answers, and other calls may be permitted
                 return
             silent = error.code in (grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.DEADLINE_EXCEEDED)
-            if error.refused or handshake_advice(error.message) or not silent:
+            if error.refused or connection_advice(error.message) or not silent:
                 raise error from None
             message = f"nothing answers at {self.address}: start locusd there, or give its address"
             raise LocusError(grpc.StatusCode.UNAVAILABLE, message) from None

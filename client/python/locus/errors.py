@@ -26,7 +26,7 @@ _HINTS = {
 
 # Pairs of texts for connections that end during their establishment: if gRPC's message contains the first text, the
 # advice is the second. The first pair that matches is used.
-_ON_HANDSHAKES = (
+_ON_CONNECTIONS = (
     (": Permission denied", "permission denied: the socket's file admits other users only; the server's operator can set "
                             "--unix-mode and --unix-owner"),
     ("wrong version number", "the server does not use TLS: connect without it"),
@@ -35,14 +35,18 @@ _ON_HANDSHAKES = (
     ("is not in peer certificate", "the server's certificate is for other names: use the name in the certificate as "
                                    "address or as server_name"),
     ("Ssl handshake failed", "the server and this client do not agree on TLS: compare their certificates and CA files"),
+    ("DNS resolution failed", "the name of the server is unknown here: correct it, or add it to DNS or to /etc/hosts of "
+                              "this machine"),
     ("failed to connect to all addresses; last error: UNAVAILABLE", "the server ended the connection at once: it may "
      "require TLS, or a client certificate that it knows"),
 )
 
 
-def handshake_advice(message: str) -> str:
-    """Returns advice for a connection that was not permitted or whose TLS failed; empty for other messages."""
-    return next((remedy for symptom, remedy in _ON_HANDSHAKES if symptom in message), "")
+def connection_advice(message: str) -> str:
+    """Returns advice for a connection that was not permitted, whose server's name is unknown or whose TLS failed; empty
+    for other messages.
+    """
+    return next((remedy for symptom, remedy in _ON_CONNECTIONS if symptom in message), "")
 
 
 class LocusError(Exception):
@@ -74,7 +78,7 @@ class LocusError(Exception):
         """Suggested remedy; empty if the message already contains a remedy, or if no remedy is known."""
         if self.refused or "nothing answers" in self.message:
             return ""
-        advice = handshake_advice(self.message) if self.code == grpc.StatusCode.UNAVAILABLE else ""
+        advice = connection_advice(self.message) if self.code == grpc.StatusCode.UNAVAILABLE else ""
         return advice or _HINTS.get(self.code, "")
 
     @property

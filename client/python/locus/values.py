@@ -126,7 +126,7 @@ class Mesh:
 class Limit:
     """Limit of the server. `value` is the maximum. `used` is the amount in use now; it is 0 for limits of a single
     request or scene. `refused` is the number of calls, messages and connections that the limit has refused since the
-    server started.
+    server started. Both are 0 if Server.use_hidden is True.
     """
 
     value: float
@@ -155,7 +155,7 @@ class Quota:
 @dataclasses.dataclass(frozen=True)
 class Server:
     """Description of the server. `limits` maps names to limits. `insecure` is True if the server was started with
-    --insecure.
+    --insecure. `use_hidden` is True if the caller may not see how much of the limits is used.
     """
 
     version: str
@@ -163,13 +163,14 @@ class Server:
     features: Tuple[str, ...]
     limits: Dict[str, Limit]
     insecure: bool = False
+    use_hidden: bool = False
 
     @classmethod
     def of(cls, message: Any) -> "Server":
         """Converts the protocol's GetServerResponse."""
         limits = {limit.name: Limit(limit.value, limit.used, limit.refused) for limit in message.limits}
         return cls(message.version, message.instruction_set, tuple(message.features), limits,
-                   message.insecure)
+                   message.insecure, message.use_hidden)
 
 
 @dataclasses.dataclass(frozen=True)

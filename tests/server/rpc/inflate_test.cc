@@ -52,7 +52,12 @@ std::string noise(size_t bytes) {
 class InflateTest : public testing::Test {
  protected:
   absl::Status inflate_text(grpc::ByteBuffer& bytes, uint64_t max_bytes = 1u << 20) {
-    const auto claims = inflate_gzip(memory_, max_bytes, bytes);
+    const auto claim = [this](uint64_t amount) -> absl::StatusOr<CallMemory> {
+      absl::StatusOr<MemoryBudget::Claim> claimed = memory_.claim(MemoryLine::kRequests, "", amount);
+      if (!claimed.ok()) return claimed.status();
+      return CallMemory(*std::move(claimed), QuotaHold(), nullptr, nullptr);
+    };
+    const auto claims = inflate_gzip(claim, max_bytes, bytes);
     if (claims.ok()) {
       most_claimed_ = memory_.claimed(MemoryLine::kRequests);
       EXPECT_GE(most_claimed_, bytes.Length());

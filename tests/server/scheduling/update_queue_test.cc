@@ -407,6 +407,23 @@ TEST_F(LoggedUpdateQueueTest, OneSyncServesAllWaitingBatchesAndEachIsARevision) 
   EXPECT_EQ(stats.coalesced, 0u);
 }
 
+TEST_F(LoggedUpdateQueueTest, EmptyListsCountForTheSizeOfOneSync) {
+  constexpr uint64_t kBatches = 7;
+  constexpr size_t kLists = 10'000;  // three times as many fit into one sync
+  std::vector<std::unique_ptr<Points>> batches;
+  for (uint64_t i = 1; i <= kBatches; ++i) {
+    batches.push_back(insert({i}));
+    batches.back()->change().moves.resize(kLists);
+  }
+  UpdateQueue queue(UpdateQueueOptions{});
+  const uint64_t before = log_.appends();
+  log_.hold();
+  for (const auto& batch : batches) ASSERT_TRUE(queue.post(scene_, *batch, WhenFull::kRefuse).ok());
+  log_.release();
+  for (const auto& batch : batches) EXPECT_TRUE(batch->wait().ok()) << batch->wait().status();
+  EXPECT_GE(log_.appends() - before, 3u);
+}
+
 TEST_F(LoggedUpdateQueueTest, AFullDiskRefusesUpdatesUntilSpaceIsFree) {
   UpdateQueue queue(UpdateQueueOptions{});
   log_.fail_with(absl::ResourceExhaustedError("full"));

@@ -87,6 +87,22 @@ TEST_F(ContextCommandTest, ALineConnectsWithTheCredentialsOfItsContext) {
   EXPECT_THAT(err_.str(), HasSubstr("it may require TLS"));
 }
 
+TEST_F(ContextCommandTest, AnOptionThatWouldNotBeKeptIsRefused) {
+  for (const std::vector<std::string>& options : std::vector<std::vector<std::string>>{
+           {"-a", "host:1"}, {"--tls"}, {"--token-file", "token"}, {"--context", "other"}}) {
+    std::vector<std::string> line = options;
+    line.insert(line.end(), {"context", "set", "net", "--ca", "ca.pem"});
+    EXPECT_EQ(run_with_contexts(line), ExitCode::kUsage) << options.front();
+    EXPECT_THAT(err_.str(), HasSubstr("after the name"));
+  }
+  EXPECT_TRUE(client::read_contexts(path_)->by_name.empty());
+  setenv("LOCUS_ADDRESS", "host:2", 1);
+  EXPECT_EQ(run_with_contexts({"context", "set", "net", "-a", "host:1"}), ExitCode::kOk) << err_.str();
+  EXPECT_EQ(run_with_contexts({"-a", "host:3", "context", "set", "net"}), ExitCode::kUsage);
+  unsetenv("LOCUS_ADDRESS");
+  EXPECT_EQ(client::read_contexts(path_)->by_name.at("net").address, "host:1");
+}
+
 TEST_F(ContextCommandTest, AnUnknownContextIsAnErrorOnlyForLinesThatConnect) {
   EXPECT_EQ(run_with_contexts({"--context", "nowhere", "limits"}), ExitCode::kNotFound);
   EXPECT_EQ(run_with_contexts({"--context", "nowhere", "version"}), ExitCode::kOk);
