@@ -11,6 +11,7 @@
 #include "absl/strings/strip.h"
 #include "client/cli/failure.h"
 #include "client/cli/report_stream.h"
+#include "client/lib/status.h"
 #include "core/base/check.h"
 #include "core/base/status_macros.h"
 
@@ -96,8 +97,11 @@ class BulkUpdateRun {
   }
 
   std::string what_was_done() const {
-    if (batches_ == 0) return "nothing was applied";
-    return absl::StrCat("of the rows sent ", applied_, " were applied and ", refused_, " refused");
+    std::string known = batches_ == 0 && unknown_ == 0 ? "nothing was applied" : "";
+    if (batches_ > 0) known = absl::StrCat("of the rows sent ", applied_, " were applied and ", refused_, " refused");
+    if (unknown_ == 0) return known;
+    return absl::StrCat(known, known.empty() ? "" : "; ", "whether ", unknown_, batches_ > 0 ? " other" : "",
+                        " rows were applied is not known");
   }
 
   static bool is_there(const InFlight& message) {
@@ -110,11 +114,17 @@ class BulkUpdateRun {
     const double seconds = context_.options().timeout_seconds.value_or(kBulkAnswerSeconds);
     if (front.ack.wait_for(std::chrono::duration<double>(seconds)) != std::future_status::ready) {
       timed_out_ = true;
+      unknown_ += front.sent.rows();
+      for (const InFlight& message : in_flight_) unknown_ += message.sent.rows();
       return absl::DeadlineExceededError(
           absl::StrCat(reader_->name(), ":", front.sent.line_range(), ": no answer within ", seconds, " s"));
     }
     const absl::StatusOr<v1::UpdateAck> ack = front.ack.get();
-    if (!ack.ok()) return refused_rows(ack.status(), reader_->name(), front.sent);
+    if (!ack.ok()) {
+      const bool was_refused = client::error_of(ack.status()).has_value();
+      if (!was_refused) unknown_ += front.sent.rows();
+      return refused_rows(ack.status(), reader_->name(), front.sent);
+    }
     count(*ack);
     hide_rows(context_);
     for (const v1::ItemError& item : ack->errors()) write_refused(item, front.sent);
@@ -177,6 +187,7 @@ class BulkUpdateRun {
   std::string first_refused_;
   bool all_unknown_ = true;
   uint64_t batches_ = 0, applied_ = 0, refused_ = 0;
+  uint64_t unknown_ = 0;  // number of rows that were sent and neither acknowledged nor refused
   v1::UpdateAck last_;
 };
 

@@ -9,6 +9,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "tests/client/cli/bulk_fixture.h"
+#include "tests/client/lib/fake_server.h"
 
 namespace locus::cli {
 namespace {
@@ -142,6 +143,22 @@ TEST_F(BulkUpdateTest, ARefusedBatchIsReportedWithItsLines) {
   const BulkOutcome outcome = run({"insert", "nowhere", "point", "--from-csv", file.path()});
   EXPECT_EQ(outcome.code, ExitCode::kNotFound);
   EXPECT_THAT(outcome.err, AllOf(HasSubstr(file.path() + ":2-3: "), HasSubstr("; nothing was applied")));
+}
+
+TEST_F(BulkUpdateTest, RowsWithoutAnAnswerAreNotReportedAsNotApplied) {
+  client::testing::FakeServer server;
+  server.updates.breaks = {.after_messages = 2,
+                           .times = 1,
+                           .apply_last = true,
+                           .status = grpc::Status(grpc::StatusCode::INTERNAL, "planned")};
+  const TestFile file("id,at.x,at.y,at.z\n1,0,0,0\n2,0,0,0\n3,0,0,0\n");
+  std::ostringstream out, err;
+  Context context(out, err, Progress::kSilent);
+  EXPECT_EQ(
+      run_line({"--address", server.address(), "insert", "world", "point", "--batch", "2", "--from-csv", file.path()},
+               context),
+      ExitCode::kFailed);
+  EXPECT_THAT(err.str(), HasSubstr("; whether 1 other rows were applied is not known"));
 }
 
 TEST_F(BulkUpdateTest, AnInputWithoutRowsReportsTheRevision) {
