@@ -203,11 +203,11 @@ class BlockingCalls::Call final : private IoLoop::ActiveCall, private MessageStr
   void recheck() override {
     if (is_revoked_ || finishing_since_.load() != SteadyTime()) return;
     const std::string scene = this->scene();
-    absl::Status status = caller_->recheck(scene);
+    const absl::Status status = caller_->recheck(scene);
     if (status.ok()) return;
     is_revoked_ = true;
+    if (first_ == First::kReading) return give_up(status);  // which writes the audit line
     caller_->audit(scene, status);
-    if (first_ == First::kReading) return give_up(std::move(status));
     context_.TryCancel();
   }
   // Does nothing: the body polls Caller::stop(), which fails once the drain's grace period has passed.

@@ -177,9 +177,7 @@ std::array<std::string, 2> Caller::quota_subjects() const {
 
 absl::Status Caller::take_quota(QuotaKind kind, double amount) const {
   if (!has_quotas()) return absl::OkStatus();
-  const uint64_t now = steady_nanoseconds();
-  for (const std::string& subject : quota_subjects_) RETURN_IF_ERROR(state_.quotas.take(subject, kind, amount, now));
-  return absl::OkStatus();
+  return state_.quotas.take_each(quota_subjects_, kind, amount, steady_nanoseconds());
 }
 
 void Caller::charge_quota(QuotaKind kind, double amount) const {

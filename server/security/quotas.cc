@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/check.h"
 #include "core/base/refusal.h"
+#include "core/base/status_macros.h"
 
 namespace locus::server {
 namespace {
@@ -101,6 +102,22 @@ absl::Status Quotas::take(absl::string_view subject, QuotaKind kind, double amou
   return take_locked(subject, kind, amount, now, [] { return 0.0; });
 }
 
+absl::Status Quotas::take_each(absl::Span<const std::string> subjects, QuotaKind kind, double amount, uint64_t now) {
+  MutexLock lock(mutex_);
+  return take_each_locked(subjects, kind, amount, now, [] { return 0.0; });
+}
+
+absl::Status Quotas::take_each_locked(absl::Span<const std::string> subjects, QuotaKind kind, double amount,
+                                      uint64_t now, Besides besides) {
+  for (size_t i = 0; i < subjects.size(); ++i) {
+    absl::Status status = take_locked(subjects[i], kind, amount, now, besides);
+    if (status.ok()) continue;
+    while (i-- > 0) put_back_locked(subjects[i], kind, amount);
+    return status;
+  }
+  return absl::OkStatus();
+}
+
 absl::Status Quotas::take_locked(absl::string_view subject, QuotaKind kind, double amount, uint64_t now,
                                  Besides besides) {
   LOCUS_DCHECK_GE(amount, 0.0);
@@ -140,13 +157,9 @@ void Quotas::charge(absl::string_view subject, QuotaKind kind, double amount, ui
 
 absl::StatusOr<QuotaHold> Quotas::hold(absl::Span<const std::string> subjects, QuotaKind kind, double amount,
                                        uint64_t now, Besides besides) {
+  LOCUS_DCHECK(!is_rate(kind));
   MutexLock lock(mutex_);
-  for (size_t i = 0; i < subjects.size(); ++i) {
-    absl::Status status = take_locked(subjects[i], kind, amount, now, besides);
-    if (status.ok()) continue;
-    while (i-- > 0) release_locked(subjects[i], kind, amount);
-    return status;
-  }
+  RETURN_IF_ERROR(take_each_locked(subjects, kind, amount, now, besides));
   return QuotaHold(*this, subjects, kind, amount);
 }
 
@@ -156,17 +169,23 @@ QuotaHold Quotas::hold_anyway(absl::Span<const std::string> subjects, QuotaKind 
 }
 
 void Quotas::release(absl::string_view subject, QuotaKind kind, double amount) {
+  LOCUS_DCHECK(!is_rate(kind));
   MutexLock lock(mutex_);
-  release_locked(subject, kind, amount);
+  put_back_locked(subject, kind, amount);
 }
 
-void Quotas::release_locked(absl::string_view subject, QuotaKind kind, double amount) {
-  LOCUS_DCHECK(!is_rate(kind));
+void Quotas::put_back_locked(absl::string_view subject, QuotaKind kind, double amount) {
   LOCUS_DCHECK_GE(amount, 0.0);
   const auto found = slots_.find(subject);
   if (found == slots_.end()) return;
-  double& used = accounts_[found->second].in_use[static_cast<size_t>(kind)];
-  used = std::max(used - amount, 0.0);
+  if (is_rate(kind)) {
+    Bucket& bucket = accounts_[found->second].buckets[static_cast<size_t>(kind)];
+    bucket.level += amount;
+    bucket.window_used = std::max(bucket.window_used - amount, 0.0);
+  } else {
+    double& used = accounts_[found->second].in_use[static_cast<size_t>(kind)];
+    used = std::max(used - amount, 0.0);
+  }
   LOCUS_DCHECK_CALL(check_invariants(accounts_[found->second]));
 }
 

@@ -56,6 +56,9 @@ class Quotas {
   absl::Status take(const Identity& identity, QuotaKind kind, double amount, uint64_t now) {
     return take(identity.principal, kind, amount, now);
   }
+  // Takes `amount` from the quota of each subject or, if one quota does not suffice, from none.
+  absl::Status take_each(absl::Span<const std::string> subjects, QuotaKind kind, double amount, uint64_t now)
+      LOCUS_EXCLUDES(mutex_);
   // Function that returns how much of a quota is in use in addition to the amounts that were taken from this object.
   // Called with the mutex held.
   using Besides = absl::FunctionRef<double()>;
@@ -104,7 +107,9 @@ class Quotas {
 
   absl::Status take_locked(absl::string_view subject, QuotaKind kind, double amount, uint64_t now, Besides besides)
       LOCUS_REQUIRES(mutex_);
-  void release_locked(absl::string_view subject, QuotaKind kind, double amount) LOCUS_REQUIRES(mutex_);
+  absl::Status take_each_locked(absl::Span<const std::string> subjects, QuotaKind kind, double amount, uint64_t now,
+                                Besides besides) LOCUS_REQUIRES(mutex_);
+  void put_back_locked(absl::string_view subject, QuotaKind kind, double amount) LOCUS_REQUIRES(mutex_);
   Account* account(absl::string_view subject, uint64_t now) LOCUS_REQUIRES(mutex_);
   Account* add(absl::string_view subject, uint64_t now) LOCUS_REQUIRES(mutex_);
   bool evict_one(uint64_t now) LOCUS_REQUIRES(mutex_);

@@ -144,6 +144,16 @@ TEST_F(QuotasTest, AHoldGivesBackWhatItTookFromEachSubject) {
   EXPECT_TRUE(quotas.take("connection:x", QuotaKind::kBytesInFlight, 100, kStart).ok());
 }
 
+TEST_F(QuotasTest, ARateIsTakenFromEachSubjectOrFromNone) {
+  const std::vector<std::string> subjects = {"token:ci", "connection:1"};
+  Quotas quotas(
+      [](absl::string_view subject) { return quota(QuotaKind::kQueries, subject == "token:ci" ? 1000 : 10); });
+  EXPECT_TRUE(quotas.take_each(subjects, QuotaKind::kQueries, 20, kStart).ok());
+  EXPECT_FALSE(quotas.take_each(subjects, QuotaKind::kQueries, 1, kStart).ok()) << "the connection's quota is used up";
+  EXPECT_FALSE(quotas.take("token:ci", QuotaKind::kQueries, 1981, kStart).ok());
+  EXPECT_TRUE(quotas.take("token:ci", QuotaKind::kQueries, 1980, kStart).ok()) << "the refusal took nothing";
+}
+
 TEST_F(QuotasTest, WhatIsCountedElsewhereIsInUseToo) {
   quota_ = quota(QuotaKind::kScenes, 3);
   Quotas quotas(source());
