@@ -1,6 +1,6 @@
 #!/bin/sh
-# Installs the Debian packages that locus needs and that are missing. Safe to run again: if nothing is missing, it needs
-# neither network nor root rights.
+# Installs the Debian packages that locus needs and that are missing. Safe to run again: if nothing is missing, the
+# script needs neither network nor root rights.
 # shellcheck disable=SC2086  # lists of package names are meant to be split
 set -eu
 
@@ -32,8 +32,8 @@ build_packages="g++ cmake ninja-build pkg-config libgrpc++-dev libprotobuf-dev p
 python_packages="python3 python3-grpcio python3-protobuf"
 # Purposes: ccache speeds up later builds; binutils provides nm for tests/house; prometheus-client and yaml read the
 # metrics, alerts and dashboards; zsh and fish run the completions; groff and mandoc format the manual; tests run
-# haproxy as a proxy and as the front of deploy/edge; tests/attack uses python3-h2 for HTTP/2 and openssl for
-# certificates; the test of deploy/security connects two namespaces with iproute2.
+# haproxy as a plain proxy and as the reverse proxy of deploy/edge; tests/attack uses python3-h2 for HTTP/2 and openssl
+# for certificates; the test of deploy/security connects two namespaces with iproute2.
 test_packages="libgtest-dev libgmock-dev ccache clang-format git python3 binutils python3-numpy
   python3-prometheus-client python3-yaml python3-h2 openssl zsh fish mandoc groff-base haproxy iproute2"
 # redis-tools also contains the server, but unlike redis-server it starts no service.
@@ -41,12 +41,12 @@ bench_packages="libembree-dev libbullet-dev libcgal-dev libnanoflann-dev redis-t
 # The compiler of the asan preset, and the libraries of its sanitizers.
 clang_packages="clang-16 libclang-rt-16-dev"
 lint_packages="clang-tidy mypy"
-# systemd brings systemd-analyze, which checks the unit; iptables and containernetworking-plugins publish ports.
+# systemd contains systemd-analyze, which checks the unit; iptables and containernetworking-plugins publish ports.
 container_packages="mmdebstrap buildah podman podman-compose runc iptables containernetworking-plugins systemd"
 # The libraries that the programs link directly; apt installs the dependencies of these libraries.
 runtime_packages="libgrpc++1.51 libprotobuf32 libabsl20220623 libspdlog1.10 libassimp5 libzip4 libpng16-16 libssl3 libstdc++6
   libprometheus-cpp-core1.0 zlib1g libcurl4 librocksdb7.8 libxxhash0 librhonabwy1.1 libjansson4 libseccomp2"
-# The front of deploy/edge.
+# The reverse proxy of deploy/edge.
 edge_packages="haproxy"
 
 action=install

@@ -47,7 +47,8 @@ finish() {
 
 report() { echo "$1 $2" | tee -a "$results"; }
 
-# check NAME COMMAND...: passes when the command does. Its output goes to the log, and is shown if it fails.
+# check NAME COMMAND...: runs the command; the check passes if the command succeeds. The command's output goes to the
+# log, and is also printed if the check fails.
 check() {
   local name=$1 outcome=failed
   shift
@@ -67,8 +68,8 @@ need() {
   [ "$(grep -c ^failed "$results")" = "$before" ] || finish
 }
 
-# Separate storage and settings. runc instead of crun, and limits that a process without CAP_SYS_RESOURCE may set, so
-# that this works inside a container.
+# Gives podman storage and settings of its own. Uses runc instead of crun, and limits that a process without
+# CAP_SYS_RESOURCE may set, so that podman works inside a container.
 set_up_podman() {
   local driver=overlay
   [ "$(stat -f -c %T "$store")" = overlayfs ] && driver=vfs
@@ -88,7 +89,8 @@ driver = "$driver"
 graphroot = "$store/storage"
 runroot = "$work/run"
 TEXT
-  # Keeps the images of earlier runs, and removes podman's other state, which names folders that do not exist any more.
+  # Keeps the images of earlier runs, and removes podman's other state, which refers to folders that do not exist any
+  # more.
   rm -rf "$store/storage/libpod"
   export CONTAINERS_CONF=$work/containers.conf CONTAINERS_STORAGE_CONF=$work/storage.conf
   podman info
@@ -110,7 +112,8 @@ build_image() {
     --ignorefile deploy/Dockerfile.dockerignore --tag "$image" .
 }
 
-# Starts a container with the given options and waits until it answers; sets `id`. Hardened as in compose.yaml.
+# Starts a container that is hardened as in compose.yaml, with the given options. Sets `id` to the container's id and
+# waits until the server in the container answers.
 start() {
   # conmon writes a file to its working directory if the kernel kills a container that is out of memory.
   id=$(cd "$work" && podman run --detach --read-only --cap-drop all --security-opt no-new-privileges --env LOCUS_INSECURE=1 \
@@ -162,7 +165,7 @@ has_no_capability() { [ "$(inside sed -n 's/^Cap[A-Z][a-z]*:\t//p;s/^NoNewPrivs:
 is_healthy() { podman healthcheck run "$id"; }
 started_with() { podman logs "$id" 2>&1 | grep " serving " | grep -w -- "$1"; }
 lists_its_memory() { client -o ndjson limits | grep '"memory_bytes"' | grep -w 201326592; }
-# Uploads a mesh whose tree exceeds the memory: it is refused, and no data is lost.
+# Uploads a mesh whose tree exceeds the memory limit: the upload must be refused, and no data may be lost.
 refuses_what_does_not_fit() {
   local output code
   client scene create full || return
@@ -190,7 +193,8 @@ compose_starts() {
   done
   return 1
 }
-# Checks a unit, with a program that is installed in place of its own.
+# Verifies a systemd unit after replacing its program by /bin/true, because systemd-analyze requires that the program is
+# installed.
 unit_is_correct() {
   local output unit
   unit=$work/$(basename "$1")
@@ -200,7 +204,8 @@ unit_is_correct() {
   printf '%s' "$output"
   [ -z "$output" ]
 }
-# Maximum exposure in tenths: 0 is none, 100 is complete.
+# Passes if systemd rates the exposure of the unit at 1.1 or less; 0 is no exposure, 10 is complete exposure. The
+# threshold is in tenths.
 unit_is_hardened() { systemd-analyze security --offline=true --threshold=11 "$1"; }
 
 check_image() {

@@ -93,7 +93,7 @@ run_fuzz() {
   count_lines fuzz < build/fuzz/results.txt
 }
 
-# ThreadSanitizer of GCC 12 fails if the kernel randomises more address bits than it supports.
+# ThreadSanitizer of GCC 12 fails if the kernel randomises more address bits than ThreadSanitizer supports.
 steady_addresses=()
 if setarch "$(uname -m)" -R true 2> /dev/null; then steady_addresses=(setarch "$(uname -m)" -R); fi
 
@@ -105,8 +105,8 @@ run_suite() {
   if [ "$long" = yes ]; then options+=(-DLOCUS_UNITY=OFF); fi
   if [ "$suite" = release ]; then options+=(-DLOCUS_BENCH=$([ "$bench" = yes ] && echo ON || echo OFF)); fi
   if [ "$suite" = release ] && [ "$long" = yes ]; then labels=(); fi
-  # Compiling the whole command line with AddressSanitizer takes half an hour, so only the long run does; its file
-  # importers are always tested.
+  # Compiling the whole command line with AddressSanitizer takes half an hour, so only the long run does this. The file
+  # importers of the command line are tested with it in every run.
   if [ "$suite" = asan ] && [ "$long" = yes ]; then options+=(-DLOCUS_CLI=ON); fi
   say "$suite: configure"
   cmake --preset "$suite" "${options[@]}" || { fail "$suite: configure"; return; }

@@ -10,10 +10,9 @@
 
 namespace locus::client {
 
-// Returns advice for a connection that failed because the permissions of a unix socket forbid it, because the server's
-// name cannot be resolved, or because client and server do not agree on TLS: only one of them uses TLS, or a
-// certificate was not accepted. `message` is gRPC's text. Returns an empty string if no server answered or for any
-// other cause.
+// Returns advice for a failed connection. `message` is gRPC's error message. The function recognizes these causes: the
+// permissions of a unix socket forbid the connection, the server's name cannot be resolved, only one side uses TLS, or
+// a certificate was not accepted. Returns an empty string for any other cause, also if no server answered.
 std::string advice_on_connection(absl::string_view message);
 
 // Returns advice for an error to which the server attached no details; empty if there is no advice.

@@ -22,7 +22,7 @@ namespace locus::client {
 
 inline constexpr size_t kMaxTokenBytes = 8192;
 
-// Returns whether `options` ask for TLS.
+// Returns whether `options` enable TLS.
 bool uses_tls(const CredentialOptions& options);
 
 // Returns whether data that is sent to the gRPC target `target` stays on this machine. True for a unix socket,

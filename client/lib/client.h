@@ -13,7 +13,8 @@
 // the outcome of a change is unknown. Methods whose comment says "Retried" repeat a call that fails with UNAVAILABLE,
 // or with RESOURCE_EXHAUSTED and a retry hint of the server, as often as RetryPolicy allows and until the deadline.
 // apply() does so only if its batch has `writer` and `batch`, by which the server recognizes a repeated batch. In
-// addition, any unary call is repeated if the server refused its token and the token file contains another one by then.
+// addition, if the server refuses the token of a unary call, and the token file then contains a new token, the call is
+// repeated with the new token.
 #ifndef LOCUS_CLIENT_LIB_CLIENT_H_
 #define LOCUS_CLIENT_LIB_CLIENT_H_
 
@@ -59,7 +60,8 @@ class Client {
   // Connects to `address`: host:port, host alone (port 7575) or unix:/path. Blocks until the connection is established.
   // Returns UNAVAILABLE naming the address if no server answers or the TLS handshake fails, or INVALID_ARGUMENT for an
   // empty address. Returns INVALID_ARGUMENT, NOT_FOUND or FAILED_PRECONDITION, with the cause in the message, if
-  // members of options.credentials contradict each other, name a file that cannot be used, or would reveal a token.
+  // members of options.credentials contradict each other or name a file that cannot be used, or if a token would be
+  // sent unencrypted to another machine (see CredentialOptions::allow_token_without_tls).
   static absl::StatusOr<std::unique_ptr<Client>> connect(absl::string_view address = kDefaultAddress,
                                                          const ClientOptions& options = {});
   ~Client();

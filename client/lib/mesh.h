@@ -32,10 +32,10 @@ struct DownloadedMesh {
   MeshColumns columns() const { return {description.name(), vertices, indices, parts}; }
 };
 
-// Returns the SHA-256 of, in this order and little-endian: the number of vertices as uint32, the number of triangles as
-// uint32, the vertices as floats, the indices as uint32. This hash is the protocol's UploadMeshRequest.sha256: meshes
-// with equal hashes share one tree on the server. Takes linear time, at about 1 GB/s on processors with SHA
-// instructions.
+// Returns the SHA-256 of these values in this order, all little-endian: the number of vertices as uint32, the number of
+// triangles as uint32, the vertices as floats, the indices as uint32. This hash is the protocol's
+// UploadMeshRequest.sha256: meshes with equal hashes share one tree on the server. Takes linear time, at about 1 GB/s
+// on processors with SHA instructions.
 Sha256 mesh_sha256(absl::Span<const float> vertices, absl::Span<const uint32_t> indices);
 
 }  // namespace locus::client

@@ -14,7 +14,7 @@ namespace locus::client {
 
 inline constexpr size_t kMaxCredentialBytes = size_t{1} << 20;
 
-// Choice of read_small_file() to accept an empty file or not.
+// Choice whether read_small_file() accepts an empty file.
 enum EmptyFile : bool { kMayBeEmpty = true, kMustHaveContent = false };
 
 // Returns the content of a file with credentials or contexts. `option` names the option in messages. Returns NOT_FOUND

@@ -7,8 +7,8 @@
 // each call. Messages are read and written on gRPC's callback threads. send(), flush() and close() may be called from
 // any thread. Callbacks run one at a time, without the lock held.
 //
-// Invariants: `items_` holds the requests that were accepted and not answered, in the order of sending; within a call
-// an item is written only after all items before it. After `ended_` is set, `items_` is and stays empty.
+// Invariants: `items_` contains the requests that were accepted and not answered, in the order of sending. Within a
+// call, an item is written only after all items before it. After `ended_` is set, `items_` is and stays empty.
 #ifndef LOCUS_CLIENT_LIB_PIPELINED_STREAM_H_
 #define LOCUS_CLIENT_LIB_PIPELINED_STREAM_H_
 
@@ -53,7 +53,7 @@ class PipelinedStream {
   using Reactor = grpc::ClientBidiReactor<Request, Response>;
 
   struct Item {
-    // Replaced, never modified, when the request is renumbered: a write in progress may still read the old request.
+    // Renumbering replaces this request and does not modify it, because a write in progress may still read it.
     std::shared_ptr<Request> request;
     Callback done;
     bool written = false;  // whether the request's write on the current call has begun
@@ -208,7 +208,7 @@ class PipelinedStream {
     std::optional<absl::Status> end_;
   };
 
-  // Starts writing the next unwritten request. If the stream is closing and no request is unanswered, ends the writes
+  // Starts writing the next unwritten request. If the stream is closing and all requests are answered, ends the writes
   // of the call instead. Does nothing while a write is in progress. Precondition: the caller holds the lock.
   void pump() {
     if (!attempt_ || !attempt_->writable()) return;
@@ -316,7 +316,7 @@ class PipelinedStream {
   }
 
   // Returns the wait before the next call; nothing if the stream must not open another call and ends with `end`. If the
-  // connection is lost while no request is unanswered, the loss does not count as a failure.
+  // connection is lost while all requests are answered, the loss does not count as a failure.
   std::optional<absl::Duration> wait_before_next(const absl::Status& end) {
     if (broken_off_ || !fatal_.ok() || end.ok() || !worth_reconnecting(end)) return std::nullopt;
     if (items_.empty()) return absl::ZeroDuration();

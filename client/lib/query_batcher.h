@@ -63,9 +63,9 @@ class QueryBatcher {
   QueryBatcher(const QueryBatcher&) = delete;
   QueryBatcher& operator=(const QueryBatcher&) = delete;
 
-  // Add a query. The callback is called exactly once, with the answer or with the error of the message that carried the
-  // query. If one query has an invalid value, for example one that is not finite, the server refuses all queries of the
-  // same message. Both functions block while `max_items` queries are waiting to be sent.
+  // Add a query. The callback is called exactly once, with the answer or with the error of the message that contained
+  // the query. If one query has an invalid value, for example NaN, the server refuses all queries of the same message.
+  // Both functions block while `max_items` queries are waiting to be sent.
   void ray(const SingleRay& ray, HitCallback on_hit);
   void ball(const SingleBall& ball, IdsCallback on_ids);
 

@@ -273,8 +273,8 @@ class ContainsBlock : public BlockBuilder<ContainsBlock> {
   v1::Contains* contains_;
 };
 
-// Block that asks which targets each viewer sees. Settings with one entry per query, such as masks, have one entry per
-// viewer here.
+// Block that finds the targets that each viewer sees. Settings with one entry per query, such as masks, have one entry
+// per viewer here.
 class SightBlock : public BlockBuilder<SightBlock> {
  public:
   explicit SightBlock(v1::QueryBlock& block) : BlockBuilder(block), sight_(block.mutable_sight()) {}
@@ -317,7 +317,7 @@ class PairBlock : public BlockBuilder<PairBlock> {
   v1::Pairs* pairs_;
 };
 
-// Block that asks for the convex free space around points.
+// Block that finds the convex free space around points.
 class CellBlock : public BlockBuilder<CellBlock> {
  public:
   explicit CellBlock(v1::QueryBlock& block) : BlockBuilder(block), cells_(block.mutable_cells()) {}

@@ -44,7 +44,8 @@ std::vector<std::pair<std::string, std::string>> fields_of(const SavedContext& c
 // variable is an absolute path.
 std::string default_contexts_path();
 
-// Parses the text of a contexts file. Returns INVALID_ARGUMENT with the file's name and the line.
+// Parses the text of a contexts file. Returns INVALID_ARGUMENT, with `file` and the line number in the message, if a
+// line is malformed.
 absl::StatusOr<SavedContexts> parse_contexts(absl::string_view file, absl::string_view text);
 // Returns the text of a contexts file.
 std::string contexts_text(const SavedContexts& contexts);
@@ -53,10 +54,10 @@ std::string contexts_text(const SavedContexts& contexts);
 // INVALID_ARGUMENT for a file that is too large, and FAILED_PRECONDITION for a file that cannot be read.
 absl::StatusOr<SavedContexts> read_contexts(const std::string& path);
 
-// Returns the context of this name. Returns NOT_FOUND with the names that exist.
+// Returns the context of this name. If there is none, returns NOT_FOUND with the names of the existing contexts.
 absl::StatusOr<SavedContext> find_context(const SavedContexts& contexts, const std::string& name);
 
-// Returns OK if the name has 1 to 63 characters of a-z, A-Z, 0-9, `-`, `_` and `.`.
+// Returns OK if the name has 1 to 63 characters of a-z, A-Z, 0-9, `-`, `_` and `.`; otherwise INVALID_ARGUMENT.
 absl::Status check_context_name(absl::string_view name);
 
 }  // namespace locus::client

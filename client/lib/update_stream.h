@@ -7,10 +7,10 @@
 // renumbers the later batches and sends them again: the caller gets one outcome for each batch, in the order sent.
 //
 // The stream ends permanently if the server refuses the stream itself (for example because of the scene name or of
-// missing rights), if the server does not know the writer any more (the scene was restarted without its state), or if
-// as many calls in a row as the policy allows fail without an answer between them. Every unanswered batch and every
-// later send() gets the status of this failure. The outcome of the unanswered batches is unknown; acked batches stay
-// applied.
+// missing rights), if the server has lost the state of the writer (because the scene was restarted without its state),
+// or if as many consecutive calls as the policy allows fail without an answer between them. Every unanswered batch and
+// every later send() gets the status of this failure. The outcome of the unanswered batches is unknown; acked batches
+// stay applied.
 #ifndef LOCUS_CLIENT_LIB_UPDATE_STREAM_H_
 #define LOCUS_CLIENT_LIB_UPDATE_STREAM_H_
 

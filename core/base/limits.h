@@ -42,8 +42,8 @@ inline constexpr uint32_t kMaxQueries = 65536;        // queries per query batch
 inline constexpr uint32_t kMaxIgnoredIds = 64;        // ids that the queries of a block ignore
 inline constexpr uint32_t kDefaultMaxResults = 1024;  // results per query if the block sets no max_results
 inline constexpr uint32_t kMaxMaxResults = 1u << 20;  // largest max_results of a block
-inline constexpr uint32_t kMaxNearest = 65536;        // number of values that a nearest query can request
-inline constexpr uint32_t kMinPlanes = 4;             // planes of a convex region
+inline constexpr uint32_t kMaxNearest = 65536;        // max k of a nearest query: its number of results
+inline constexpr uint32_t kMinPlanes = 4;             // min planes of a convex region
 inline constexpr uint32_t kDefaultPlanes = 6;
 inline constexpr uint32_t kMaxPlanes = 32;
 inline constexpr uint32_t kMaxRegionPlanes = 131'072;     // planes of all convex regions of a query batch
@@ -57,9 +57,9 @@ inline constexpr uint32_t kDefaultCellPlanes = 32;
 inline constexpr uint32_t kDefaultReplyBytes = 4'000'000;
 inline constexpr uint32_t kMaxReplyBytes = 64u << 20;
 
-// Limits of the recent revisions that each scene retains for queries that ask for one exact revision. kRecentRevisions
-// is the maximum number of revisions. kRecentBytes is the maximum size in bytes of the data that updates have replaced
-// since the oldest of these revisions.
+// Limits of the recent revisions that each scene retains for queries of one exact revision. kRecentRevisions is the
+// maximum number of retained revisions. kRecentBytes is the maximum size in bytes of the data that updates have
+// replaced since the oldest retained revision.
 inline constexpr uint32_t kRecentRevisions = 64;
 inline constexpr uint64_t kRecentBytes = 2u << 20;
 // Readers that pin old revisions keep replaced data from being freed. The maximum size of this data per scene is
@@ -74,11 +74,11 @@ inline constexpr uint32_t kTestsBetweenChecks = 4096;         // primitive tests
 
 inline constexpr uint32_t kMaxHistoryTicks = 1u << 14;                 // ticks of history per scene
 inline constexpr uint64_t kDefaultHistoryBytes = uint64_t{256} << 20;  // bytes of history per scene
-inline constexpr uint64_t kMaxHistoryBytes = uint64_t{1} << 40;  // largest bytes of history that a scene can ask for
+inline constexpr uint64_t kMaxHistoryBytes = uint64_t{1} << 40;  // max bytes of history that a scene can request
 
 inline constexpr uint32_t kReceiveBytes = 32u << 20;        // size in bytes of the largest received message
 inline constexpr uint32_t kMaxStreams = 1024;               // open update and query streams of one client
-inline constexpr uint32_t kMaxCalls = 256;                  // concurrent calls of one client that are not streams
+inline constexpr uint32_t kMaxCalls = 256;                  // concurrent calls of one client, not counting streams
 inline constexpr uint32_t kMaxThreads = 256;                // worker threads
 inline constexpr uint32_t kMaxWaitingBatches = 1024;        // max entries in the queue of batches for helper threads
 inline constexpr uint64_t kMinMemory = uint64_t{64} << 20;  // smallest configurable memory limit, in bytes

@@ -43,8 +43,8 @@ class PersistentArray {
   PersistentArray() : list_(std::make_shared<List>()) {}
   PersistentArray(PersistentArray&&) noexcept = default;
   PersistentArray& operator=(PersistentArray&&) noexcept = default;
-  // Copies `other`. Precondition: `other` has not been written to since its creation or its last snapshot(); copy any
-  // other array with snapshot().
+  // Copies `other`. Precondition: `other` has not been written to since its creation or its last snapshot(). If it has,
+  // call other.snapshot() instead.
   PersistentArray(const PersistentArray& other) : list_(other.list_) {
     LOCUS_CHECK_EQ(other.owner_, internal::kNoOwner);
   }

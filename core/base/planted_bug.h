@@ -33,10 +33,10 @@ enum class PlantedBug {
   kClosedEdge,         // an edge includes both of its ends when crossings of a mesh are counted
   kCrossingInDouble,   // signs of crossings are taken from double even if double cannot decide them
   kCrossingMirror,     // a descending half line counts crossings with the sign of an ascending one
-  kCellAtMax,          // a triangle does not mark the cells of the greatest coordinates of its bounds
-  kWayShort,           // a search that should end in another cell ends in the cell of its start
+  kCellAtMax,          // on each axis, a triangle does not mark the last of several cells that it overlaps
+  kWayShort,           // a search along a half line that should end in another cell ends in its first cell
   kHalfLineRounding,   // boxes are compared with the point rounded to the nearest float
-  kHalfLineStart,      // a half line does not meet a box that ends exactly at its start
+  kHalfLineStart,      // a half line misses a box that ends exactly at the start of the half line
   // The ray kernels:
   kKernelEdgeBound,   // the signs of edge functions are computed in float without an error bound
   kKernelTBound,      // t is compared with the limit in float without an error bound
@@ -80,7 +80,7 @@ enum class PlantedBug {
   kJwtWithoutAlgorithm,  // a JWT whose algorithm is `none` needs no signature
   kJwtAnySignature,      // the signature is not compared
   kJwtKeyOfAnotherKind,  // a key verifies signatures of any algorithm
-  kUserFromAfar,         // the Unix user of a peer is accepted on connections that are not local, too
+  kUserFromAfar,         // the Unix user of a peer is also accepted on connections that are not local
   // The nearest kernels:
   kNearestError,      // bounds of distances to triangles are computed in float without an error bound
   kNearestPad,        // the distance between the point and the rounded point is ignored
@@ -93,7 +93,7 @@ enum class PlantedBug {
   kCrossingError,  // areas are compared with 0 in float without an error bound
   kCrossingPad,    // the difference between the point and the rounded point is ignored
   kCrossingNear,   // a triangle whose bounds contain the start of the half line counts as beyond the start
-  kCrossingTop,    // a point at a triangle's highest vertex, across the half line, is not on the surface
+  kCrossingTop,    // a point at the height of a triangle's highest vertex is never on the surface
 };
 
 #ifdef LOCUS_PLANT_BUGS

@@ -36,8 +36,8 @@ class SeededHash {
   // Returns the random seed of this process.
   static const Seed& process_seed();
 
-  // Odd constant without a regular bit pattern (fractional part of the golden ratio). The second product, by this
-  // constant, separates the hashes of keys for which the first product, by the random multiplier, gives similar values.
+  // Odd constant without a regular bit pattern (fractional part of the golden ratio). The hash multiplies twice: if the
+  // first product, by the random multiplier, is similar for two keys, the second, by this constant, separates them.
   static constexpr uint64_t kMixer = 0x9E3779B97F4A7C15;
 
   uint64_t mask_;

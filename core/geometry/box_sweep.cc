@@ -57,8 +57,8 @@ class AxisTests {
   }
 
  private:
-  // Offers a way out along `axis`. The resting box moves in the direction of `axis`, or against it if the polytope is
-  // above the box.
+  // Records the way out of the overlap along `axis` if it is the shortest so far. On this way the resting box moves by
+  // exit / |axis| in the direction of `axis`, or against it if the polytope is above the box.
   void add_way_out(Vec3d axis, double exit, bool polytope_above) {
     const double length = std::sqrt(squared_length(axis));
     // Compares exit / length with depth_ without a division, because an axis from parallel edges may have a length near

@@ -16,9 +16,10 @@ namespace locus {
 
 // The time during which two polytopes share a point.
 struct BoxOverlap {
-  Interval<double> time;  // for a motion without begin and end
+  Interval<double> time;  // for an endless motion: may begin before t = 0
   // Unit vector from the moving polytope to the resting box. If they overlap at t = 0, it is the direction of the
-  // shortest way out. Otherwise it is the axis that separates them until the first moment of overlap.
+  // shortest way out: the shortest translation of the resting box that separates them. Otherwise it is the axis that
+  // separates them until the first moment of overlap.
   Vec3d normal;
   double depth = 0;  // length of the shortest way out at t = 0; has no meaning if they do not overlap at t = 0
 };

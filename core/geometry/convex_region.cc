@@ -11,8 +11,8 @@ namespace locus {
 namespace {
 
 constexpr double kPlaneEpsilon = 0x1p-40;
-// Determinants below this value belong to planes that are parallel up to rounding; such planes have no common line or
-// corner of their own.
+// Determinants below this value belong to planes that are parallel up to rounding; such planes are treated as having no
+// common line and no common corner.
 constexpr double kParallelPlanes = 0x1p-40;
 
 double value_at(const Plane& plane, Vec3d point) { return dot(plane.normal, point) + plane.offset; }
@@ -33,8 +33,8 @@ class Polygon {
  public:
   static constexpr size_t kMaxCorners = 4 + limits::kMaxPlanes + 6 + 6;
 
-  // Rounding may make a polygon with many nearly equal corners slightly concave, so that one plane adds more than one
-  // corner. Corners beyond kMaxCorners are left out.
+  // Adds a corner. Drops corners beyond kMaxCorners: rounding may make a polygon with many nearly equal corners
+  // slightly concave, so that one plane adds more than one corner.
   void add(Vec3d corner) {
     if (count_ < kMaxCorners) corners_[count_++] = corner;
   }
@@ -81,7 +81,7 @@ Polygon square_on(const Plane& plane, Vec3d center, double size) {
   return polygon;
 }
 
-// Corners of the faces of a region.
+// Bounds, sum and number of the corners of all faces of a region. A corner counts once for each of its faces.
 struct FaceCorners {
   Aabbd bounds;
   Vec3d sum;
@@ -113,7 +113,7 @@ class NearestSearch {
  public:
   explicit NearestSearch(absl::Span<const Plane> planes) : planes_(planes) {}
 
-  // Returns whether a point of the region is within `distance` of `point`, which lies outside.
+  // Returns whether a point of the region is within `distance` of `point`, which lies outside of the region.
   bool within(Vec3d point, double distance) const {
     const auto is_near = [&](Vec3d candidate) {
       const double reach = distance + kPlaneEpsilon * (max_component(abs(candidate)) + distance);
@@ -130,7 +130,7 @@ class NearestSearch {
   }
 
   // Returns whether a point of the region is within `distance` of an inner point of the segment from center - half_axis
-  // to center + half_axis, which lies outside. The ends are not tested.
+  // to center + half_axis. The segment must lie outside of the region. The ends of the segment are not tested.
   bool within_of_segment(Vec3d center, Vec3d half_axis, double distance) const {
     const auto is_near = [&](Vec3d candidate) {
       const double reach = distance + kPlaneEpsilon * (max_component(abs(candidate)) + distance);
@@ -354,7 +354,7 @@ RegionInMesh::RegionInMesh(const ConvexRegion& region, const Transform& transfor
     Plane& local = planes_[count_];
     local.normal = transform.rotation.to_local(plane.normal);
     local.offset = value_at(plane, from) / double{transform.scale};
-    // The rounding of the offset is relative to its terms.
+    // The rounding error of the offset is proportional to the magnitudes of the terms of which it is the sum.
     const double terms = (dot(abs(plane.normal), abs(from)) + std::abs(plane.offset)) / double{transform.scale};
     epsilons_[count_++] = kPlaneEpsilon * (3 * double{magnitude} + terms);
   }

@@ -2,8 +2,9 @@
 // to an origin in world axes, so that a region far from the world's origin is as precise as a region near it. Every
 // region is clipped to the world's box. Pure functions in double; any thread.
 //
-// A point is within a plane if n.p + d >= -e, where e is 2^-40 of the magnitudes of n.p and d: a point that rounding
-// has moved off a plane still counts as on the plane. A region and a solid overlap if they share a point by this test.
+// A point p is within a plane with the normal n and the offset d if n.p + d >= -e, where e is 2^-40 of the magnitudes
+// of n.p and d: a point that rounding has moved off a plane still counts as on the plane. A region and a solid overlap
+// if they share a point by this test.
 // Every overlap also requires that the bounds of the shape or triangle may_overlap() the region, so that culling by any
 // superset of these bounds never changes a result.
 // Source: Sutherland, Hodgman, Reentrant Polygon Clipping, 1974.
@@ -64,11 +65,12 @@ bool may_overlap(const ConvexRegion& region, const Aabbd& box);
 // Returns whether the region shares a point with the shape, a closed solid.
 bool region_overlaps(const ConvexRegion& region, const Shape& shape);
 
-// Relation of a ball to a region. For most objects it decides whether they overlap the region, without their exact
-// shape.
+// Relation of a ball to a region. For most objects, the relation of a ball around the object already determines whether
+// the object overlaps the region, so that its exact shape need not be tested.
 enum class RegionSide { kInside, kOutside, kUndecided };
-// Returns kOutside if a ball lies wholly outside of a plane, and kInside if its centre lies within all planes, in both
-// cases by more than the sum of the rounding error and `slack`. `center` is in world axes.
+// Returns kOutside if a ball lies wholly outside of a plane, kInside if its centre lies within all planes, in both
+// cases by more than the sum of the rounding error and `slack`; otherwise kUndecided. `center` is in world axes;
+// `slack` is an upper bound of the error of `center`.
 RegionSide side_of_ball(const ConvexRegion& region, Vec3d center, double radius, double slack);
 
 // Planes of a region in the axes of a mesh, and for each plane the distance by which a corner of the mesh may be

@@ -35,8 +35,8 @@ struct EdgeOnVerdict {
   double corner_error;  // bound of a corner's rounding error perpendicular to the ray, a length in mesh axes
 };
 
-// Returns the hit in extended precision if the ray meets the triangle at t >= -corner_error; a negative t is returned
-// as 0.
+// Returns the hit in extended precision if the ray intersects the triangle at t >= -corner_error; a negative t is
+// returned as 0.
 //
 // If the ray misses in extended precision but hits in double, returns the point of the triangle's border nearest to the
 // ray among the points with t >= 0, provided that its distance from the ray is at most corner_error. So a hit in double

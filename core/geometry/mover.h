@@ -10,12 +10,12 @@ namespace locus {
 
 enum class MoverKind : uint8_t { kBall, kCapsule, kBox };
 
-// The solid moves during 0 <= t <= 1, with its centre at start + t * way. A zero way is legal.
+// Solid in motion: its centre is at start + t * way at the time t, 0 <= t <= 1. A zero way is legal.
 struct Mover {
   MoverKind kind = MoverKind::kBall;
   Vec3d start;
   Vec3d way;
-  double radius = 0;  // ball and capsule: > 0
+  double radius = 0;  // ball and capsule: >= 0
   Vec3d half_axis;    // capsule: from the centre to one end of the inner segment; zero for a ball
   Vec3d half;         // box: half extents along its own axes, >= 0
   Rotation rotation;  // box: rotates its own axes to the axes of `start`
@@ -28,9 +28,9 @@ enum class AtStart : uint8_t { kHit, kApproach, kPass };
 
 // Contact of a mover with a primitive.
 struct Contact {
-  // Ball or capsule: distance from the primitive to the mover's centre or inner segment; if this centre or segment
-  // reaches into an object, minus the length of its shortest way out. Box: minus the length of the box's shortest way
-  // out at t = 0; the value has no meaning if the box and the primitive do not overlap at t = 0.
+  // Ball or capsule: distance from the primitive to the mover's centre or inner segment. If the centre or segment
+  // reaches into an object, the distance is negative: minus the length of the shortest way out of the object. Box:
+  // minus the length of the box's shortest way out at t = 0; no meaning if the box does not overlap the primitive then.
   double distance = 0;
   // Point of the primitive, relative to the mover's start, so that no precision is lost far from the world's origin. If
   // mover and primitive touch, the point belongs to both, up to rounding.

@@ -11,7 +11,7 @@
 namespace locus {
 
 // Point of the segment and point of the primitive that are nearest to each other. The two points are equal, up to
-// rounding, if segment and primitive meet.
+// rounding, if segment and primitive intersect.
 struct NearestPair {
   double squared_distance = std::numeric_limits<double>::infinity();
   Vec3d on_segment;

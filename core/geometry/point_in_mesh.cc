@@ -35,8 +35,9 @@ __attribute__((noinline)) int exact_orientation(Vec3d point, Vec3d u, Vec3d v, i
 }
 
 // Returns the same as exact_orientation(), computed in double if the sign is certain. `from_u` and `from_v` are u -
-// point and v - point, rounded to double. Each of these differences, each product and the final subtraction round once:
-// 2^-51 in total. A product is 0 only if one of its factors is 0.
+// point and v - point, rounded to double. Each of these differences, each product and the final subtraction round once;
+// together they change the area by at most 2^-51 of the magnitudes of the two products. If both products are 0, the
+// area is exactly 0, because a product is 0 only if one of its factors is 0.
 int orientation(Vec3d point, Vec3d u, Vec3d v, Vec3d from_u, Vec3d from_v, int axis) {
   const int x = (axis + 1) % 3, y = (axis + 2) % 3;
   const double left = from_u[x] * from_v[y], right = from_u[y] * from_v[x], area = left - right;
@@ -83,9 +84,9 @@ int side(Vec3d point, const Corners& corners, const Vec3d (&from)[3]) {
 }
 
 // Returns whether `point` lies on the triangle. Precondition: the point lies in the triangle's plane and within the
-// triangle's bounds. The point lies on the triangle if it is inside the triangle in all three projections. This also
-// holds for a triangle without area, which is a segment or a point: if the point is off the segment but within its
-// bounds, the signs for the two directions of the segment differ in some projection.
+// triangle's bounds. The point lies on the triangle if it is inside the triangle in all three projections. This is also
+// true for a triangle without area, which is a segment or a point. Its edges run along the segment in both directions,
+// so if the point is off the segment but within its bounds, the signs of these edges differ in some projection.
 bool is_inside(Vec3d point, const Corners& corners, const Vec3d (&from)[3]) {
   for (int axis = 0; axis < 3; ++axis) {
     int least = 1, most = -1;
@@ -106,7 +107,7 @@ __attribute__((noinline)) int exact_projected_winding(Vec3d point, const Corners
   int winding = 0;
   for (size_t i = 0; i < 3; ++i) {
     const size_t next = i == 2 ? 0 : i + 1;
-    // An edge includes its lower end and not its upper one. The sign of a difference is exact.
+    // An edge includes its lower end but not its upper end. `u` and `v` are rounded, but their signs are exact.
     const double u = from[i].y, v = from[next].y;
     const bool closed = planted(PlantedBug::kClosedEdge);
     const bool rises = u <= 0 && (closed ? v >= 0 : v > 0), falls = v <= 0 && (closed ? u >= 0 : u > 0);
@@ -152,7 +153,8 @@ Crossing crossing(Vec3d point, const Triangle& triangle) {
   const int winding = projected_winding(point, corners, from);
   if (point.x < bounds.min.x) return {winding, false};
   const int behind = side(point, corners, from);
-  // The point may also be on an edge or a corner that is not counted, or on a triangle parallel to the ray.
+  // The point is in the triangle's plane. Even if `winding` is 0, it may be on the triangle: on an edge or a corner
+  // that is not counted, or on a triangle parallel to the half line.
   if (behind == 0) return {0, is_inside(point, corners, from)};
   return {winding * behind > 0 ? winding : 0, false};
 }

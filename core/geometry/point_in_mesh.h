@@ -1,6 +1,6 @@
 // Winding of a closed mesh around a point, by the crossings of a half line that is parallel to an axis. The winding
-// number is the sum of the crossings of all triangles that the half line meets: 0 outside, 1 or -1 inside, depending on
-// the orientation of the mesh. Pure functions; any thread.
+// number is the sum of the signed crossings of all triangles that the half line crosses: 0 outside, 1 or -1 inside,
+// depending on the orientation of the mesh. Pure functions; any thread.
 //
 // Every sign is exact: it is computed in double if an error bound proves it, otherwise by an exact sum. So the sum of
 // the crossings is the winding number of the stored mesh around the given point. Edges are half-open: in the projection

@@ -8,8 +8,8 @@
 //   BallQuery, BoxQuery   types of the query argument of ball() and box()
 //   id         unique within one index; among hits at equal distance the lower id wins; remove() of an
 //              index finds the value to remove by this id
-//   bounds     axis-aligned bounds; every test below also requires that the query meets these bounds, so culling by any
-//              superset of them loses no result
+//   bounds     axis-aligned bounds; every test below also requires that the query overlaps these bounds, so culling by
+//              any superset of them loses no result
 //   position   reference point, always the same for one value; may lie outside the bounds; no structure reads it
 //   ray        distance >= 0 of the first hit on the value, even if it exceeds the ray's t_max
 //   ball, box  whether the value shares a point with the closed ball or box

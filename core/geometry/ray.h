@@ -25,8 +25,8 @@
 
 namespace locus {
 
-// Side of a triangle that rays ignore. A ray meets the front of a triangle if the vertices appear counter-clockwise, in
-// uploaded order; queries of a scene with clockwise winding exchange kBack and kFront.
+// Side of a triangle that rays ignore. A ray hits the front of a triangle if the vertices, in uploaded order, appear
+// counter-clockwise from the ray's origin; queries of a scene with clockwise winding exchange kBack and kFront.
 enum class Cull : uint8_t { kNone, kBack, kFront };
 // Treatment of a ray that starts inside a closed solid: the ray hits at t = 0 (kSolid), where it leaves the solid
 // (kHollow) or not at all (kSkip).
@@ -60,15 +60,16 @@ inline constexpr double kObjectPad = 0x1p-40;    // predicates of moving objects
 template <class S>
 class SlabRay {
  public:
-  // `reach` widens every box by at least this length on each side, in addition to the pad. It serves to search along
-  // the path of a solid of this size, and requires `pad` > 0. The constructor is always inlined, because a call takes
-  // 27 instructions more for each ray.
+  // Makes a ray whose slab test widens every box by at least `reach` on each side, in addition to the pad: for a search
+  // along the path of a solid of this extent. A nonzero `reach` requires `pad` > 0. The constructor is always inlined,
+  // because a call would take 27 more instructions for each ray.
   [[gnu::always_inline]] SlabRay(const Ray<S>& ray, double pad, double reach = 0)
       : origin_(ray.origin),
         direction_(ray.direction),
         pad_(static_cast<S>(pad)),
         magnitude_(max_component(abs(ray.origin))) {
-    // The factor covers the rounding to float and, in addition, pad * reach.
+    // margin() multiplies this term by `pad`. The factor 1 + 2^-18 adds the pad of `reach`, at most 2^-20 * reach, and
+    // covers the rounding to float.
     if (reach != 0) magnitude_ += static_cast<S>(reach * (1 + 0x1p-18) / pad);
     LOCUS_DCHECK_GT(max_component(abs(ray.direction)), S{0});
     LOCUS_DCHECK_GE(pad_, S{0});

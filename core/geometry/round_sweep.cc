@@ -9,8 +9,8 @@
 namespace locus {
 namespace {
 
-// Epsilons of touches(): kPlaceEpsilon is relative to sizes and positions at the tested time, kWayEpsilon to the way
-// covered until this time.
+// Epsilons of touches(): kPlaceEpsilon is relative to sizes and positions at the tested time, kWayEpsilon to the length
+// of the path covered until this time.
 constexpr double kPlaceEpsilon = 0x1p-44, kWayEpsilon = 0x1p-48;
 // Limit of the steps of Newton's method. For a grazing contact, each step halves the remaining time, so the epsilon is
 // reached after about kMaxSteps / 2 steps.
@@ -18,8 +18,8 @@ constexpr int kMaxSteps = 64;
 
 double size_of(Vec3d v) { return max_component(abs(v)); }
 
-// Returns `direction` with length 1, on the side against `motion`. A zero direction is replaced by minus `motion` and,
-// if that is zero too, by the z axis.
+// Returns the unit vector of `direction` or of -`direction`, whichever points against `motion`. A zero `direction` is
+// replaced by -`motion` or, if that is zero too, by the z axis.
 Vec3d against(Vec3d direction, Vec3d motion) {
   if (direction == Vec3d{}) return motion == Vec3d{} ? Vec3d{0, 0, 1} : normalized(-motion);
   return normalized(dot(direction, motion) > 0 ? -direction : direction);
@@ -90,7 +90,7 @@ std::optional<double> RoundSweep::first_contact(double limit, double from) const
     if (is_contact) return std::min(t, 1.0) <= limit ? std::optional<double>(std::min(t, 1.0)) : std::nullopt;
     if (!(t <= limit)) return std::nullopt;
   }
-  return t;  // within the precision of t: reported rather than missed
+  return t;  // not decidable within the precision of t: reported rather than missed
 }
 
 RoundSweep::Separation RoundSweep::separation_at(double t) const {
@@ -106,8 +106,8 @@ RoundSweep::Separation RoundSweep::way_out_at(double t, const NearestPair& pair)
   const Vec3d motion = -velocity_;
   if (primitive_ == Primitive::kSegment) return {0, against(cross(half_axis_, b_), motion), pair};
   if (primitive_ == Primitive::kTriangle) return {0, against(cross(b_ - a_, c_ - a_), motion), pair};
-  // The shortest way out of a box is along one of its axes or square to one of them and to the segment: these are the
-  // normals of the faces of the box swept along the segment.
+  // The shortest way out of a box is parallel to one of the box's axes, or perpendicular to one of them and to the
+  // segment: these are the normals of the faces of the box swept along the segment.
   const Vec3d offset = -(a_ + velocity_ * t);  // of the segment's midpoint from the box's centre
   double depth = std::numeric_limits<double>::infinity();
   Vec3d best;

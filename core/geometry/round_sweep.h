@@ -36,9 +36,9 @@ class RoundSweep {
   // the exact moment by at most the epsilon of touches() divided by the speed of approach, and never greater except for
   // rounding. `from` >= 0 is a lower bound of the result, at which the search begins.
   std::optional<double> first_contact(double limit, double from = 0) const;
-  // Distance, direction and nearest points of primitive and segment. `distance` is negative if the segment meets a box.
-  // `direction` is the unit vector from the primitive to the segment. If they meet, it is the direction of the shortest
-  // way out of the primitive; if several directions are possible, it is one against the segment's motion.
+  // Distance, direction and nearest points of primitive and segment. `distance` is negative if the segment reaches into
+  // a box. `direction` is the unit vector from the primitive to the segment. If they intersect, it is the direction of
+  // the shortest way out of the primitive; among several shortest ways, one against the segment's motion.
   struct Separation {
     double distance;
     Vec3d direction;

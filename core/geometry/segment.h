@@ -24,13 +24,13 @@ double squared_distance_to_segment(Vec3d point, Vec3d half_axis);
 // Source: Ericson, Real-Time Collision Detection, 2005, 5.1.9.
 double squared_distance_segments(Vec3d offset, Vec3d half_axis, Vec3d other_half_axis);
 
-// Returns whether the segment with midpoint `center` meets the closed box of half extents `half` around the origin:
-// separating axis test over six axes, without division.
+// Returns whether the segment with midpoint `center` intersects the closed box of half extents `half` around the
+// origin: separating axis test over six axes, without division.
 bool segment_meets_box(Vec3d center, Vec3d half_axis, Vec3d half);
 
 // Returns the squared distance between the segment and the box, which are given as in segment_meets_box(); 0 if they
-// meet. As a function of s, the squared distance is convex and consists of at most seven parabolas; the minimum of each
-// is computed in closed form.
+// intersect. As a function of s, the squared distance of a point of the segment is convex and consists of at most seven
+// parabolas; the minimum of each parabola is computed in closed form.
 double squared_distance_segment_box(Vec3d center, Vec3d half_axis, Vec3d half);
 
 }  // namespace locus

@@ -109,7 +109,7 @@ Contact contact_of(const std::optional<BoxOverlap>& overlap, const Mover& box, V
   return {overlap ? -overlap->depth : 0, box.way * t + box.rotation.to_world(shared), normal};
 }
 
-// Applies `at_start` to the first moment of contact with a primitive.
+// Returns `t`, the first moment of contact with `primitive`, or nullopt if `at_start` excludes a contact at t = 0.
 template <class Primitive>
 std::optional<double> with_rule(std::optional<double> t, const Mover& mover, const Primitive& primitive,
                                 AtStart at_start) {

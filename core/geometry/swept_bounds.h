@@ -10,8 +10,8 @@
 
 namespace locus {
 
-// Tests a ray from the mover's start against boxes, each grown by the mover's extent on each axis. A mover that rests
-// has no direction: its ray points along x, and only grown boxes that contain its start count as met.
+// Ray from the mover's start, tested against boxes that are grown by the mover's extent on each axis. A mover that
+// rests has no direction: its ray points along x, and only grown boxes that contain its start count as hit.
 class SweptBounds {
  public:
   SweptBounds(const Mover& mover, double pad)

@@ -15,7 +15,7 @@ ProjectedRange range_of(double a, double b, double c) {
 
 // Returns whether the projections of triangle and box on `axis` are disjoint. The box has half extents `half` around
 // the origin. All three vertices are projected on the same rounded axis, so an axis with cancellation errors may miss a
-// separation but never separates a triangle and a box that meet.
+// separation but never separates a triangle and a box that overlap.
 bool separated_along(Vec3d axis, const Vec3d (&vertices)[3], Vec3d half) {
   const ProjectedRange range = range_of(dot(vertices[0], axis), dot(vertices[1], axis), dot(vertices[2], axis));
   const double extent = dot(abs(axis), half);

@@ -1,6 +1,7 @@
 // Collectors: visitors that test the candidates of a structure and store the results: the nearest hit of a ray, any
-// hit, the nearest few hits, or the values whose bounds meet a ray or a region. Collectors are separate from traversal,
-// so that every structure serves every kind of query. One object per query and thread; each object borrows its query.
+// hit, the nearest few hits, or all values whose bounds overlap a ray or a region. Collectors are separate from
+// traversal, so that every structure supports every kind of query. One object per query and thread; each object borrows
+// its query.
 #ifndef LOCUS_CORE_INDEX_COLLECTORS_H_
 #define LOCUS_CORE_INDEX_COLLECTORS_H_
 
@@ -147,7 +148,7 @@ class NearestFewVisitor {
   std::vector<RayHit<V>>& result_;
 };
 
-// Collector of the values whose bounds the ray meets at a distance of at most `distance`, by the slab test alone.
+// Collector of the values whose bounds the ray enters at a distance of at most `distance`, by the slab test alone.
 // Appends these values to `result`.
 template <Primitive V>
 class BoundsOnRayVisitor {

@@ -1,12 +1,12 @@
 // Queries of an index, written once for every structure: rays (first, any, all) and overlaps with balls and boxes. An
 // exact query applies the predicates of the values; a conservative query tests only their bounds. Results are appended
 // to the given vector and never overwrite its contents; overlap results are in the order of the structure. All
-// structures give the same results.
+// structures return the same results.
 //
 // A ray ends at the `distance` given here; the ray's own t_max is ignored. Distances are in units of the ray's
-// direction. If `work` is not null, the query adds its cost to `*work`. Cost of a query: the cost of the structure's
-// visit. Threads: as for the index. Source: Hughes et al., Computer Graphics: Principles and Practice, 3rd ed., 2013,
-// ch. 37 (the query interface).
+// direction. If `work` is not null, the query adds its cost to `*work`. The cost of a query is the cost of the
+// structure's visit. Threads: queries only read the index, so any number of them may run concurrently. Source: Hughes
+// et al., Computer Graphics: Principles and Practice, 3rd ed., 2013, ch. 37 (the query interface).
 #ifndef LOCUS_CORE_INDEX_INDEX_QUERIES_H_
 #define LOCUS_CORE_INDEX_INDEX_QUERIES_H_
 
@@ -90,7 +90,7 @@ void all_rays(const Index& index, const RayQueryOf<Index>& ray, ScalarOf<typenam
   few.finish();
 }
 
-// Appends the values whose bounds the ray meets at a distance of at most `distance`: a superset of the values that
+// Appends the values whose bounds the ray enters at a distance of at most `distance`: a superset of the values that
 // all_rays() finds.
 template <SpatialIndex Index>
 void conservative_ray(const Index& index, const RayQueryOf<Index>& ray, ScalarOf<typename Index::Value> distance,

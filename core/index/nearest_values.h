@@ -1,5 +1,5 @@
 // Query for the values nearest to a point, written once for every structure. The query is exact: it compares the
-// distances that PrimitiveTraits computes in double. All structures give the same results.
+// distances that PrimitiveTraits computes in double. All structures return the same results.
 #ifndef LOCUS_CORE_INDEX_NEAREST_VALUES_H_
 #define LOCUS_CORE_INDEX_NEAREST_VALUES_H_
 

@@ -116,8 +116,8 @@ class BlockCheck {
         all &= std::abs(origin()[axis] + double{values[i + static_cast<size_t>(axis)]}) <= limits::kMaxCoordinate;
     return all;
   }
-  // Returns the point to which positions are relative. If the block has anchors, whose positions are not known here,
-  // this is the world's origin, so that the offset from the anchor is checked alone.
+  // Returns the point to which positions are relative. Returns the world's origin if the block has anchors: their
+  // positions are not known here, so only the offsets from the anchors are checked.
   Vec3d origin() const { return block_.anchor_ids.empty() ? block_.frame : Vec3d{}; }
 
   // Checks that points, given relative to the frame or an anchor, are finite and lie within the world. A query has

@@ -63,8 +63,8 @@ class ColumnSet {
 
 // Position of each query in the order of rows (t, id, triangle): a query returns only rows after its position. Each
 // column has one entry per query, one entry for all queries, or no entry. If `ts` has no entry, all rows are returned.
-// If `ids` has no entry, a row whose t equals the given t is not returned. If `triangles` has no entry, neither is a
-// row whose t and id equal the given t and id.
+// If `ids` has no entry, a row whose t equals the given t is not returned. If `triangles` has no entry, a row whose t
+// and id equal the given t and id is not returned either.
 struct AfterColumns {
   absl::Span<const float> ts;            // not NaN
   absl::Span<const uint64_t> ids;        // only with ts
@@ -157,7 +157,7 @@ struct SightColumns {
 
 // Pairs of objects within a distance of each other. A block of this kind has one query.
 struct PairColumns {
-  float max_distance = 0;    // inclusive, >= 0; +inf is allowed only if count is not 0
+  float max_distance = 0;    // inclusive, 0 .. limits::kMaxCoordinate, or +inf if count is not 0
   Layers first_mask = 0;     // 0 means all layers
   Layers second_mask = 0;    // 0 means all layers
   uint32_t count = 0;        // maximum number of nearest objects of each object; 0: each pair has one row

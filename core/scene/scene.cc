@@ -449,7 +449,8 @@ SceneSummary Scene::summary() const {
   {
     const MutexLock lock(mutex_);
     snapshot = latest_;
-    // trim_history() replaces the snapshot of a revision by one with a shorter history.
+    // Comparing revisions is not enough: trim_history() replaces the snapshot of a revision by one with a shorter
+    // history.
     if (summary_ && (summary_->revision > asked || summarized_.lock() == snapshot)) return *summary_;
   }
   const SceneSummary made = summarize(*snapshot);

@@ -1,9 +1,9 @@
 // Scene: a named world with its latest snapshot, its single writer, and the callers that wait for a revision.
 //
 // A scene with a log appends a record of each change before it applies the change, and applies nothing if the append
-// fails. The result of a record depends only on the record and on the state before it, so that a replay gives the same
-// revisions, acks and refusals: see core/scene/recovery.h. A record may have no effect, for example if its batch is
-// refused.
+// fails. The result of a record depends only on the record and on the state before it, so that a replay produces the
+// same revisions, acks and refusals: see core/scene/recovery.h. A record may have no effect, for example if its batch
+// is refused.
 //
 // Threads: every member may be called from any thread. Calls of apply...() and change_instances() wait for each other
 // and for the log. latest() and view() hold a lock only to copy a pointer, and the writer holds this lock only to

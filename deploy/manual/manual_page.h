@@ -1,5 +1,6 @@
-// Generator of manual pages from a parser's texts: one page for a program and one for each of its commands. The parser
-// does not contain exit statuses and environment variables, so they are passed as a Manual. Used by write_manual.cc.
+// Generator of manual pages from the help texts of a command-line parser: one page for a program and one for each of
+// its commands. The parser does not contain exit statuses and environment variables, so they are passed as a Manual.
+// Used by write_manual.cc.
 #ifndef LOCUS_DEPLOY_MANUAL_MANUAL_PAGE_H_
 #define LOCUS_DEPLOY_MANUAL_MANUAL_PAGE_H_
 

@@ -64,8 +64,8 @@ std::string name_of(const std::map<std::string, T>& names, T value) {
 
 enum class ZeroBytes : uint8_t { kAllowed, kRefused };
 
-// Returns a validator of sizes from `min` bytes to limits::kMaxMemory, and 0 if it is allowed. `min_text` is `min` in
-// the error. CLI11 has already converted a size such as 16MiB to a plain number.
+// Returns a validator that accepts sizes from `min` bytes to limits::kMaxMemory, and also 0 if `zero` allows it.
+// `min_text` is the text of `min` in the error. CLI11 has already converted a size such as 16MiB to a plain number.
 CLI::Validator size_from(uint64_t min, const char* min_text, ZeroBytes zero) {
   const auto check = [min, min_text, zero](const std::string& text) -> std::string {
     uint64_t bytes = 0;
@@ -251,7 +251,7 @@ void follow_machine(ServerConfig& config) {
   LOCUS_DCHECK_LE(config.threads, limits::kMaxThreads);
 }
 
-// Returns an error unless `config` has TLS and an access file, which an address needs if other machines can reach it.
+// Returns an error unless `config` has TLS and an access file. Call it for an address that other machines can reach.
 // `option` is the option that sets the address. `exposed` is text for the error: what anyone could do without TLS and
 // access control.
 absl::Status check_protected(const ServerConfig& config, absl::string_view option, absl::string_view address,

@@ -102,8 +102,8 @@ struct ServerConfig {
   uint32_t max_connections_per_address = 1024;
   uint32_t max_new_connections = 200;
 
-  // Seconds within which the client of a new connection must send its first bytes, and then seconds within which it
-  // must complete the TLS handshake, if there is TLS, and begin HTTP/2; otherwise the connection is closed. Raise it
+  // Timeout in seconds for each of two steps of a new connection: the client sends its first bytes; then it completes
+  // the TLS handshake, if there is TLS, and begins HTTP/2. After a timeout the connection is closed. Raise the value
   // for clients on very slow networks.
   uint32_t handshake_timeout_s = 10;
 

@@ -273,7 +273,7 @@ void Acceptor::report(Time now) {
   hooks_.refused(std::exchange(unreported_, 0), last_address_, last_reason_);
 }
 
-// Stops listening to the sockets for kPause; connections wait in the kernel meanwhile.
+// Stops accepting connections for kPause. The sockets continue to listen, so new connections wait in the kernel.
 void Acceptor::pause(Time now) {
   paused_ = true;
   resume_at_ = now + kPause;

@@ -14,7 +14,8 @@
 namespace locus::server {
 namespace {
 
-// Returns the cookie of a socket, a number that the kernel gives to no other socket; 0 if `descriptor` is not a socket.
+// Returns the cookie of a socket, a number that the kernel assigns to no other socket; 0 if `descriptor` is not a
+// socket.
 uint64_t cookie_of(int descriptor) {
   uint64_t cookie = 0;
   socklen_t size = sizeof cookie;

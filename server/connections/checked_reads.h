@@ -1,11 +1,11 @@
 // Checks the bytes that the transport reads from connections without TLS, before the transport parses them. The
-// transport reads with recvmsg(), which server/rpc/read_hooks.h replaces by a function that asks CheckedReads::accept()
-// about each read. Bytes of other descriptors are always accepted.
+// transport reads with recvmsg(), which server/rpc/read_hooks.h replaces by a function that passes each read to
+// CheckedReads::accept(). Bytes of other descriptors are always accepted.
 //
 // Threads: every member may be called from any thread; reads of different descriptors rarely wait for each other.
 // Invariant: bytes are checked only if their descriptor still refers to the watched socket. The transport closes
-// descriptors without a notification and the kernel reuses their numbers, so the kernel's cookie of the socket is
-// compared.
+// descriptors without a notification and the kernel reuses their numbers, so the socket's cookie, which the kernel
+// assigns to no other socket, is compared.
 #ifndef LOCUS_SERVER_CONNECTIONS_CHECKED_READS_H_
 #define LOCUS_SERVER_CONNECTIONS_CHECKED_READS_H_
 

@@ -45,8 +45,8 @@ struct ReceivedCounts {
   uint64_t segments = 0;  // segments that carried data
 };
 
-// Says whether a connection is closed because its client misused it. After a misuse the client's address may open fewer
-// new connections for a while.
+// Argument of Connection::close(): whether the client misused the connection. After a misuse the client's address may
+// open fewer new connections for a while.
 enum class Misuse : uint8_t { kNo, kYes };
 
 class Connection {
@@ -96,7 +96,7 @@ class Connection {
   // MemoryBudget::connection_share(). Calls add and subtract their claims.
   std::atomic<uint64_t> claimed_bytes{0};
 
-  // Number by which the transport knows the connection; 0 while unknown. Used by the transport's counter of streams.
+  // The transport's number of this connection; 0 until StreamCounter, which uses the number, has found it.
   std::atomic<int64_t> transport_id{0};
 
   // Returns the identity that set_identity() stored last; null if there is none. The identity is kept so that later
@@ -146,8 +146,8 @@ class Connection {
   std::shared_ptr<const void> identity_ LOCUS_GUARDED_BY(mutex_);
 };
 
-// Returns the peer of the connected socket `descriptor`, with the name that gRPC gives the connection. gRPC gets a unix
-// connection by its descriptor, so the name contains the descriptor; the peer then also has the user id of the other
+// Returns the peer of the connected socket `descriptor`, with the name that gRPC gives the connection. gRPC names a
+// unix connection after its descriptor, such as fd:7; the peer of such a connection also has the user id of the other
 // process. The limit key is the IPv4 address, the first 64 bits of the IPv6 address (a subscriber owns all addresses
 // that begin with these bits), or the user id. Returns nullopt if the peer has already gone.
 std::optional<Peer> peer_of(int descriptor);

@@ -1,7 +1,7 @@
 // Checks the frames of HTTP/2 that a client sends, in the pieces in which they are read. Refuses what no honest client
 // sends: a block of headers that is too long or consists of too many frames, many calls of which most are cancelled,
 // and many frames that carry nothing. gRPC 1.51 limits none of them: it uses up to 27 bytes of memory for a byte of
-// headers, parses a text that arrives byte by byte in quadratic time (CVE-2023-33953), and creates a call for each
+// headers, needs quadratic time to parse a text that arrives byte by byte (CVE-2023-33953), and creates a call for each
 // block of headers (CVE-2023-44487). The check reads only the 9 bytes before each frame, so its cost depends on the
 // number of frames.
 //
@@ -54,7 +54,7 @@ class FrameCheck {
   // refusal.
   const char* begin_frame();
   // Counts a HEADERS frame. It begins a call only if its stream number is odd, as those of clients are, and higher than
-  // all before.
+  // the numbers of all earlier calls.
   void begin_headers();
   // Subtracts from each count the number that is accepted in the time since the last read.
   void let_time_pass(Time now);

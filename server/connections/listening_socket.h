@@ -50,8 +50,8 @@ class ListeningSocket {
   ino_t inode_ = 0;
 };
 
-// Listens on `address`: one socket, or one for each address of a host name. With port 0, all get the same free port.
-// Returns ALREADY_EXISTS if another process answers on the unix socket, and UNAVAILABLE for other reasons.
+// Listens on `address`: one socket, or one for each address of a host name. With port 0, all sockets get the same free
+// port. Returns ALREADY_EXISTS if another process answers on the unix socket, and UNAVAILABLE for other reasons.
 absl::StatusOr<std::vector<ListeningSocket>> listen_on(const ListenAddress& address, const UnixAccess& unix_access);
 
 }  // namespace locus::server

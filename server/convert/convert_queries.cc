@@ -35,8 +35,8 @@ absl::Status read_enum(int number, const std::array<T, kCount>& values, absl::st
   return absl::OkStatus();
 }
 
-// Returns the columns after_ts, after_ids and after_triangles of rays or nearest queries. They name a row of each
-// query; rows up to this one are left out.
+// Returns the columns after_ts, after_ids and after_triangles of rays or nearest queries. For each query they name a
+// row; the answer omits this row and all rows before it.
 template <class Kind>
 AfterColumns after_of(const Kind& kind) {
   return {span_of(kind.after_ts()), span_of(kind.after_ids()), span_of(kind.after_triangles())};

@@ -1,9 +1,9 @@
-// Thread that keeps the memory of the process below its limit. It measures the process periodically. When memory runs
-// short or a claim was refused, it drops old revisions and returns free memory to the kernel; then it drops the oldest
-// ticks of histories, so that histories give way before inserts and uploads are refused; then it cancels the readers of
-// the oldest revisions. If memory is nearly full, it first closes the connections that hold or send most. Only this
-// thread does this work, because the work visits all scenes and the whole heap. It logs which lines of the budget were
-// shortened or refused.
+// Thread that keeps the memory of the process below its limit. It measures the process periodically. When memory is
+// short or a claim was refused, it drops old revisions and returns free memory to the kernel. When memory is short, it
+// then drops the oldest ticks of histories, so that histories give way before inserts and uploads are refused, and
+// after that cancels the readers of the oldest revisions. If memory is nearly full, its first step is to close the
+// connections that hold or send most. Only this thread does this work, because the work visits all scenes and the whole
+// heap. It logs what it dropped, cancelled or closed, and the lines of the budget on which claims were refused.
 //
 // Threads: the constructor starts the thread, the destructor ends it.
 #ifndef LOCUS_SERVER_HOST_MEMORY_KEEPER_H_
@@ -45,7 +45,7 @@ class MemoryKeeper {
 
   // Returns the number of bytes by which histories were shortened so far.
   uint64_t trimmed_bytes() const { return trimmed_bytes_.load(); }
-  // Returns the bytes that cancelled readers held so far.
+  // Returns the number of bytes that the readers cancelled so far had held.
   uint64_t revoked_bytes() const { return revoked_bytes_.load(); }
 
  private:

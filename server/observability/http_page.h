@@ -11,13 +11,13 @@ namespace locus::server {
 // Reader of a page, as a page function sees it. `authorization` is what the reader sent, not verified; the other
 // members come from the connection.
 struct HttpRequest {
-  std::string peer;              // address and port of the reader, as calls show it
+  std::string peer;              // Peer::label of the connection: address and port of the reader
   std::string address;           // limit key of the reader's address; see connection.h
   std::string authorization;     // value of the header `authorization`; empty = none
   std::string certificate_name;  // see certificate_name.h; empty = no certificate
 };
 
-// A reply of code 401 gets the header `WWW-Authenticate: Bearer`.
+// Reply to a request. If the code is 401, the server adds the header `WWW-Authenticate: Bearer`.
 struct HttpReply {
   int code = 200;
   std::string content_type = "text/plain; charset=utf-8";

@@ -12,9 +12,9 @@
 
 namespace locus::server {
 
-// Serves a connection, on threads of the io_context of `socket`, which must have a strand of its own. Calls `ended`
-// there once, unless the io_context stops before. `pages` and `tls`, which is null without TLS, must outlive the
-// io_context's threads.
+// Serves a connection on threads of the socket's io_context. `socket` must have a strand of its own. Calls `ended`
+// once, on one of these threads, unless the io_context stops before. `tls` is null without TLS. `pages` and `tls` must
+// outlive the threads.
 void serve_http(boost::asio::ip::tcp::socket socket, HttpTls* tls, const HttpPages& pages, std::function<void()> ended);
 
 }  // namespace locus::server

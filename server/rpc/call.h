@@ -50,23 +50,23 @@ class Caller {
   void count_call() const;
 
   // Authenticates the caller, and checks the caller's rights to the server (not to scenes) that the method `path`
-  // needs. UNAUTHENTICATED if the caller's credentials are not accepted, or if a caller without credentials may do
-  // nothing on this server; also if the caller's certificate has expired. PERMISSION_DENIED if the caller lacks a
-  // needed right. CANCELLED if the connection was closed. Call it before the other functions on rights.
+  // needs. Returns UNAUTHENTICATED if the caller's credentials are not accepted or the caller's certificate has
+  // expired, or if a caller without credentials may do nothing on this server; PERMISSION_DENIED if the caller lacks a
+  // needed right; CANCELLED if the connection was closed. Call it before the other functions about rights.
   absl::Status authorize(absl::string_view path);
   // Returns whether the caller has the right. A right to scenes is checked for `scene`; for other rights `scene` is
   // ignored.
   bool may(Right right, absl::string_view scene) const;
   // Returns whether the caller may administer every scene.
   bool administers_all() const;
-  // Returns OK if the caller has the right to `scene` that the method needs. NOT_FOUND, as for a scene that does not
-  // exist, if the caller may not read the scene; PERMISSION_DENIED if the caller may read it, but lacks the right.
+  // Returns OK if the caller has the right to `scene` that the method needs. Otherwise returns NOT_FOUND, as for a
+  // scene that does not exist, if the caller may not read the scene, and PERMISSION_DENIED if the caller may read it.
   absl::Status check_right(const std::string& scene) const;
   // Returns PERMISSION_DENIED with a text that names the caller, the missing right and the scene.
   absl::Status lacks_right(Right right, absl::string_view scene) const;
   // Returns OK while the caller may continue the call. `scene` is the scene that the call serves; empty if it serves
-  // none. UNAUTHENTICATED if the credentials were revoked or have expired since the call began; otherwise the errors of
-  // authorize() and check_right() for the rights that the caller has now.
+  // none. Returns UNAUTHENTICATED if the credentials were revoked or have expired since the call began; otherwise the
+  // errors of authorize() and check_right() for the rights that the caller has now.
   absl::Status recheck(const std::string& scene) const;
   // Returns the caller's identity. Before authorize(), and in servers without access control, this is the identity of
   // callers without credentials.
@@ -88,8 +88,8 @@ class Caller {
 
   // Claims `bytes` on `line` of the server's memory budget, and takes them from the quota bytes_in_flight of the
   // caller's identity and connection. For the lines of moves, requests and replies, the bytes also count against the
-  // shares (MemoryBudget::connection_share()) of the connection and of the caller's identity. RESOURCE_EXHAUSTED names
-  // the limit or quota that does not suffice.
+  // shares (MemoryBudget::connection_share()) of the connection and of the caller's identity. Returns
+  // RESOURCE_EXHAUSTED, naming the limit or quota, if one of them does not suffice.
   absl::StatusOr<CallMemory> claim(MemoryLine line, absl::string_view field, uint64_t bytes) const;
   // Claims `bytes` for work that is never refused, such as work that frees memory, or an answer that is built already.
   CallMemory claim_anyway(MemoryLine line, uint64_t bytes) const;
@@ -106,8 +106,8 @@ class Caller {
   void audit_hidden(absl::string_view scene) const;
   // Tells audit_hidden() that audit() will be called with the final status of this call.
   void promise_audit() { is_answer_audited_ = true; }
-  // Counts an update of a scene for the line about updates that the audit log gets each minute. `items` is the number
-  // of objects that the update changed.
+  // Counts an update of a scene for the audit log, to which one line per caller and scene is appended each minute.
+  // `items` is the number of objects that the update changed.
   void audit_update(const std::string& scene, uint64_t items) const;
   // Returns whether the refusal `status` is written to the audit log. `is_change` tells whether the refused call would
   // have changed something.

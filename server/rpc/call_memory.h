@@ -1,5 +1,5 @@
-// Memory that a call has claimed: from the budget of the process, from the shares of it that one connection and one
-// identity may hold, and from the quotas bytes_in_flight of the caller's identity and connection. Released when
+// Memory that a call has claimed: from the budget of the process, from the shares of this budget that one connection
+// and one identity may hold, and from the quotas bytes_in_flight of the caller's identity and connection. Released when
 // destroyed. An empty CallMemory claims nothing. May outlive the call, but not the server. One thread at a time.
 #ifndef LOCUS_SERVER_RPC_CALL_MEMORY_H_
 #define LOCUS_SERVER_RPC_CALL_MEMORY_H_

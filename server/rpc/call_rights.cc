@@ -18,7 +18,8 @@
 namespace locus::server {
 namespace {
 
-// Without a row in kRpcRights nobody could call an rpc, so the build fails if one is missing.
+// Returns whether kRpcRights has a row for the rpc. The build fails if a row is missing, because nobody could call the
+// rpc.
 constexpr bool has_right(std::string_view path) {
   for (const RpcRight& row : kRpcRights)
     if (std::string_view(row.path.data(), row.path.size()) == path) return true;
@@ -220,8 +221,8 @@ CallMemory Caller::claim_anyway(MemoryLine line, uint64_t bytes) const {
   return {state_.memory.claim_anyway(line, bytes), std::move(quota), nullptr, nullptr};
 }
 
-// Not audited: calls that were ended by their deadline, by their caller or by the server's shutdown, failures of the
-// server, and names that do not exist or are taken. Scenes that are hidden from the caller: see audit_hidden().
+// Returns false for calls that were ended by their deadline, by their caller or by the server's shutdown, for failures
+// of the server, and for names that do not exist or are taken. audit_hidden() audits calls that name hidden scenes.
 bool Caller::is_audited(const absl::Status& status, bool is_change) {
   switch (status.code()) {
     case absl::StatusCode::kUnauthenticated:

@@ -22,7 +22,7 @@ class CallSlot {
   // Returns the caller. Valid while a message is being processed.
   virtual const Caller& caller() const = 0;
   virtual IoLoop& io() const = 0;
-  // Returns Caller::client(), the id of the client to which the scheduler gives a fair share.
+  // Returns Caller::client(), the id by which the scheduler gives each client a fair share.
   virtual uint64_t client() const = 0;
   // Returns whether the call is a stream.
   virtual bool stream() const = 0;

@@ -8,11 +8,11 @@
 // When the caller gives up or the server drains, give_up() asks the work to answer soon. A Slot contains a message, its
 // answer and the work on the message. Slots outlive calls and are reused, so that steady traffic allocates no columns.
 //
-// A stream has at most kSlots messages that are being processed or whose answers wait to be written. If it has kSlots,
-// it reads the next message when an answer has been written, so a caller that does not read its answers can use only
-// bounded memory; a call whose answer is not taken within RpcState::stall_limit is cancelled. Reads, one write and the
-// work on several messages proceed concurrently. If Method::kInOrder is true, answers are written in the order of the
-// messages, otherwise as they complete.
+// A stream has at most kSlots messages that are being processed or whose answers wait to be written. If it has kSlots
+// such messages, it reads the next message only after an answer has been written, so a caller that does not read its
+// answers can use only bounded memory; a call whose answer is not taken within RpcState::stall_limit is cancelled.
+// Reads, one write and the work on several messages proceed concurrently. If Method::kInOrder is true, answers are
+// written in the order of the messages, otherwise as they complete.
 #ifndef LOCUS_SERVER_RPC_HOT_CALL_H_
 #define LOCUS_SERVER_RPC_HOT_CALL_H_
 
@@ -119,7 +119,8 @@ class HotCall final : private IoLoop::ActiveCall {
     friend class HotCall;
     static constexpr size_t kLookEvery = 1u << 20;
     static constexpr size_t kMaxKept = 1u << 20;
-    // Number of copies of an answer: a message, whose columns double their capacity as they grow, and its bytes.
+    // Memory of an answer as a multiple of its encoded size: 2 for the message, whose columns double their capacity as
+    // they grow, and 1 for the encoded bytes.
     static constexpr uint64_t kAnswerCopies = 3;
 
     HotCall* call_ = nullptr;
@@ -129,7 +130,7 @@ class HotCall final : private IoLoop::ActiveCall {
     CallMemory request_claim_;  // memory of the request, claimed until the slot is released
     CallMemory answer_claim_;   // memory of the answer, claimed until it is written
     bool answered_ = false;
-    bool holds_ = false;  // the work called hold(): read no message before this one is answered
+    bool holds_ = false;  // the work called hold(): the stream reads no message before this one is answered
     SteadyTime arrived_;
     size_t bytes_since_look_ = 0;
   };
@@ -261,9 +262,9 @@ class HotCall final : private IoLoop::ActiveCall {
     begin(*slots_.back(), std::move(refused));
   }
 
-  // Returns whether a message that was refused before it was parsed can be answered by itself, so that its stream
-  // continues. The answer needs the message's sequence number, so only the numbers and short texts of `request` are
-  // parsed.
+  // Returns whether a message that was refused before it was parsed can be answered on its own, so that its stream
+  // continues. The answer needs the message's sequence number, so the numbers and short texts of the message are parsed
+  // into `request`.
   static bool can_answer(const absl::Status& refused, const Bytes& bytes, Request& request) {
     const std::optional<Refusal> refusal = refusal_of(refused);
     return Method::kStream && refusal && refusal->reason != Reason::kMalformed && parse_envelope(bytes, request);

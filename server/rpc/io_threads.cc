@@ -117,8 +117,8 @@ void IoLoop::recheck_active_calls(bool) {
   for (auto active_call = active_calls_.begin(); active_call != active_calls_.end();) (*active_call++)->recheck();
 }
 
-// Sets the timer again while there are active calls. If the last call ends while the timer is set, the timer fires once
-// more.
+// Calls end_if_stalled() of every active call. Sets the timer again if active calls remain. If the last call ends while
+// the timer is set, the timer fires once more.
 void IoLoop::check_stalled_calls() {
   const Time now = steady_clock::now();
   for (auto active_call = active_calls_.begin(); active_call != active_calls_.end();)

@@ -32,14 +32,14 @@ class IoWaker;
 // One event loop over one completion queue, with the list of its calls.
 class IoLoop final : private EventSource, public EventLoop {
  public:
-  // Interface of a call that lives on this loop.
+  // Interface of an accepted call that belongs to this loop.
   class ActiveCall {
    public:
-    // Called on the loop when the server begins to drain.
+    // Handles the beginning of the server's drain. Called on the loop.
     virtual void drain() = 0;
-    // Called on the loop when rights may have changed: ends the call if its caller may no longer make it.
+    // Ends the call if its caller may no longer make it. Called on the loop when rights may have changed.
     virtual void recheck() = 0;
-    // Called on the loop about once a second: ends the call if it has waited for its caller for too long.
+    // Ends the call if it has waited for its caller for too long. Called on the loop about once a second.
     virtual void end_if_stalled(EventLoop::Time now) = 0;
 
    protected:

@@ -69,7 +69,8 @@ void count_handshake(SSL* ssl, int result) {
 TlsCounts tls_counts() { return {failed_handshakes.load(), long_headers.load(), floods.load()}; }
 
 void check_tls_reads(OnRefused on_refused) {
-  // If these symbols are not ours, gRPC calls the original functions, for example because gRPC is linked statically.
+  // Check that gRPC will call our functions. It would call the original ones if, for example, it were linked
+  // statically.
   LOCUS_CHECK(dlsym(RTLD_DEFAULT, "recvmsg") == reinterpret_cast<void*>(&recvmsg));
   LOCUS_CHECK(dlsym(RTLD_DEFAULT, "SSL_read") == reinterpret_cast<void*>(&SSL_read));
   LOCUS_CHECK(dlsym(RTLD_DEFAULT, "SSL_do_handshake") == reinterpret_cast<void*>(&SSL_do_handshake));

@@ -3,7 +3,7 @@
 // check the frames of HTTP/2 in the bytes that were read. They check the sockets that a CheckedReads object watches,
 // and every TLS connection whose client has agreed on a protocol with the server. If bytes are refused, the read fails,
 // so that gRPC closes the connection. SSL_do_handshake() is replaced too, only to count failed handshakes, which gRPC
-// reports by a line in its log alone. See server/connections/README.md for the reason.
+// reports only in its log. See server/connections/README.md for the reason.
 #ifndef LOCUS_SERVER_RPC_READ_HOOKS_H_
 #define LOCUS_SERVER_RPC_READ_HOOKS_H_
 

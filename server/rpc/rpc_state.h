@@ -41,7 +41,7 @@ struct RpcState {
       [this](absl::string_view subject) { return access == nullptr ? Quota() : access->rules()->quota_of(subject); }};
   Drain drain;
   // Maximum time that a call waits for its caller to read an answer, and that a blocking call waits for a message of
-  // its caller. After it, the call is ended.
+  // its caller. A call that waits longer is ended.
   std::chrono::milliseconds stall_limit = std::chrono::seconds(60);
   std::atomic<bool> recovering{false};  // true while the scenes of the log are being recovered
 };

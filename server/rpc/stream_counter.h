@@ -24,7 +24,8 @@ class StreamCounter {
   // `table` finds connections by the names that gRPC gives them. It must outlive the counter.
   explicit StreamCounter(ConnectionTable& table) : table_(table) {}
 
-  // Returns the number of streams; nullopt if gRPC does not know the connection, such as before its handshake.
+  // Returns the number of streams; nullopt if gRPC has not registered the connection yet, for example before its
+  // handshake.
   std::optional<uint64_t> count(Connection& connection);
 
  private:

@@ -4,7 +4,7 @@
 // and client CA are always replaced together, in memory, so a key is never used with another certificate. The owner
 // ends the connections of clients that are no longer trusted, through TlsHooks.
 //
-// gRPC asks for new files when a connection begins. It takes no lock to do so. That is safe, because only the
+// When a connection begins, gRPC calls fetch() for new files, without a lock of its own. That is safe, because only the
 // acceptor's thread hands connections over to gRPC.
 //
 // Threads: the members may be called from any thread.
@@ -28,8 +28,8 @@
 
 namespace locus::server {
 
-// Callbacks of TlsCredentials. Its thread calls them; reload() calls authority_removed and reloaded too. They must not
-// call functions of the TlsCredentials.
+// Callbacks of TlsCredentials, called on its thread. reload() also calls authority_removed and reloaded, on its
+// caller's thread. The callbacks must not call functions of the TlsCredentials.
 struct TlsHooks {
   // Called when a certificate of the client CA has been removed and the new files are in use. Connections that begin
   // after the call use the new files.

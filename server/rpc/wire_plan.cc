@@ -28,14 +28,14 @@ constexpr uint64_t kGrowth = 2;
 // Bytes of a column's header and of the space that Protobuf allocates for the first values, in addition to kGrowth
 // times the bytes of the values.
 constexpr uint64_t kColumnBytes = 16;
-// Bytes of a string object with its allocation, and of an entry in a list of pointers with the allocation that it
-// points to.
+// Bytes of a string object with its allocation; bytes of an entry in a list of pointers, with the overhead of
+// allocating the object that it points to.
 constexpr uint64_t kStringBytes = 64;
 constexpr uint64_t kPointerBytes = 32;
 // Bytes of a map's node in addition to the key and the value.
 constexpr uint64_t kMapNodeBytes = 64;
 // Bytes that Protobuf keeps for an unknown field in addition to its content: the set of unknown fields of its message
-// (40), two entries in that set (32), and a string object with the room of its allocation that is not used (48).
+// (40), two entries in that set (32), and a string object with the unused rest of its allocation (48).
 constexpr uint64_t kUnknownBytes = 128;
 
 // Types of values on the wire, with Protobuf's numbers.
@@ -177,8 +177,9 @@ absl::Status WirePlan::Scan::count(const Field& field) {
   return refuse_limit(field.limit->path, field.limit->limit, field.limit->max, values);
 }
 
-// Counts the memory of a field of a column. The field contains all values of the column (packed) or a single value;
-// both forms are legal. Each field is charged kColumnBytes, although the fields of a column share one header.
+// Counts the memory of one encoded field of a column. It contains any number of values (packed) or a single value; both
+// forms are legal. Each encoded field is charged kColumnBytes, although all encoded fields of a column share one
+// header.
 absl::Status WirePlan::Scan::column(const Field& field, Wire wire) {
   uint32_t bytes = 0;
   if (!skip(wire, &bytes)) return no_message();

@@ -21,7 +21,7 @@ void EventLoop::post(EventTag& tag) {
   do tag.next_ = head;
   while (!posted_.compare_exchange_weak(head, &tag));
   // The tag may be destroyed from here on. Either this thread sees that the leader is asleep, or the leader sees the
-  // tag before it falls asleep.
+  // tag before it falls asleep, so no wake-up is lost.
   if (asleep_.exchange(false)) source_.interrupt();
 }
 

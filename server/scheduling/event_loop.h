@@ -70,7 +70,7 @@ class DeferredTask {
  public:
   virtual ~DeferredTask() = default;
   virtual void run_deferred() = 0;
-  // Called under the lock after run_deferred() has returned. The loop does not use the task afterwards.
+  // Handles the end of run_deferred(); called under the lock. The loop does not use the task afterwards.
   virtual void on_deferred_done() = 0;
 };
 // Length of a deferred task. Before a long task, the loop hands the lead to another thread, which may have to be woken.

@@ -33,8 +33,8 @@ class QueryJob {
   // Works for about `nanoseconds`, then returns. Several threads may call it at once.
   virtual Progress work(uint64_t nanoseconds) = 0;
 
-  // Called once, after a call of work() has returned kDone and all other calls of work() have returned. The scheduler
-  // does not use the job afterwards. Must not block.
+  // Reports that the job is complete. Called once, after a call of work() has returned kDone and all other calls of
+  // work() have returned. The scheduler does not use the job afterwards. Must not block.
   virtual void done() = 0;
 };
 

@@ -1,7 +1,7 @@
 // Priorities of threads: threads that answer large query batches have a lower priority than threads that serve clients
 // or apply updates, so that many queries do not delay small queries and updates. Each function changes the calling
-// thread permanently. If the system refuses a setting or does not know it, the setting is left unchanged; answers stay
-// correct, but latencies are higher.
+// thread permanently. If the system refuses a setting or does not support it, the setting is left unchanged; answers
+// stay correct, but latencies are higher.
 #ifndef LOCUS_SERVER_SCHEDULING_THREAD_PRIORITY_H_
 #define LOCUS_SERVER_SCHEDULING_THREAD_PRIORITY_H_
 

@@ -22,8 +22,8 @@ constexpr uint32_t kFullQueueRetryMs = 5;
 // Maximum number of items logged with one sync. Applying so many items takes many times as long as the sync, so a
 // larger group would gain little.
 constexpr uint64_t kMaxItemsPerSync = uint64_t{1} << 15;
-// Interval at which the queue checks whether a scene's readers have released their snapshots, and the time after which
-// overdue readers are revoked.
+// Interval at which the queue checks whether a scene's readers have released their revoked pins (reader_tracker.h), and
+// the length of a stall after which Scene::revoke_overdue_readers() is called.
 constexpr milliseconds kReaderPollInterval{2};
 constexpr milliseconds kReaderGrace{1000};
 
@@ -265,8 +265,8 @@ void UpdateQueue::count(const Scene& scene, size_t updates) {
   if (updates > 1 && coalesces(scene)) stats_.coalesced += updates - 1;
 }
 
-// Queues the group again and makes its scene wait: the scene's readers still hold too much memory in revoked snapshots.
-// Other scenes do not wait.
+// Queues the group again and stalls its scene, because the scene's readers hold too much memory and have not yet
+// released their revoked pins. Other scenes do not wait.
 void UpdateQueue::stall(SceneQueue& scene_queue, const Group& group) {
   const SteadyTime now = steady_clock::now();
   ScenePtr overdue;  // keeps the scene alive: another thread may free the SceneQueue before its readers are revoked

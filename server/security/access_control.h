@@ -61,12 +61,11 @@ class AccessControl {
   // Returns the current rules. Takes less than 50 ns. Use the result for one decision only, because it does not change
   // when the rules change.
   std::shared_ptr<const AccessRules> rules() const;
-  // Returns a number that grows with each successful reload(). The code that keeps an identity for later calls compares
-  // the number with the one that it remembers, and authenticates again if they differ. Read the number before
-  // authenticate().
+  // Returns a number that grows with each successful reload(). Code that caches an identity for later calls also stores
+  // this number, read before authenticate(), and authenticates again once generation() returns another number.
   uint64_t generation() const { return generation_.load(std::memory_order_acquire); }
-  // Returns whether the credentials behind an identity are still good. A token is good until it is revoked, replaced or
-  // expired; a JWT until it expires or its key is removed from the file.
+  // Returns whether the credentials behind an identity are still valid. A token is valid until it is revoked, replaced
+  // or expired; a JWT until it expires or its key is removed from the file; other credentials always.
   bool still_valid(const Identity& identity) const;
 
   // Reads all files again, and opens the audit file anew. If any file has a mistake, keeps the old state and returns

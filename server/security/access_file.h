@@ -1,13 +1,13 @@
-// Rules of who may do what, read from the access file. Immutable after parsing; any thread.
+// Rules that define who may do what, read from the access file. Immutable after parsing; any thread.
 //
 // The access file is text. `#` at the beginning of a line or of a word begins a comment. Each line is one of
 //   grant PRINCIPAL RIGHT[,RIGHT...] [SCENE-PATTERN...]    grant token:ci read,update arena-* lobby
 //   quota PRINCIPAL NAME=VALUE...                          quota token:* queries_per_s=50000 open_streams=16
-// PRINCIPAL is the text of a principal, in which `*` and `?` are wildcards. A quota may also have `connection:*`, which
-// means each connection. Rights to scenes (read, update, admin) need scene patterns, rights to the server have none;
-// the names are in rights.h and quota.h. Calls that no line grants are refused. If several lines set the same quota for
-// a caller, the last line counts. Connections can have only quotas of rates, bytes_in_flight and open_streams.
-// `burst_s=SECONDS` says how many seconds of an unused rate may be used at once.
+// PRINCIPAL is the text of a principal, in which `*` and `?` are wildcards. In a quota, PRINCIPAL may also be
+// `connection:*`, which means each connection. Rights to scenes (read, update, admin) need scene patterns, rights to
+// the server have none; the names are in rights.h and quota.h. Calls that no line grants are refused. If several lines
+// set the same quota for a caller, the last line counts. Connections can have only quotas of rates, bytes_in_flight and
+// open_streams. `burst_s=SECONDS` says how many seconds of an unused rate may be used at once.
 #ifndef LOCUS_SERVER_SECURITY_ACCESS_FILE_H_
 #define LOCUS_SERVER_SECURITY_ACCESS_FILE_H_
 
@@ -43,8 +43,8 @@ class AccessRules {
   bool allows(const Identity& identity, Right right) const { return allows(identity, right, {}); }
   // Returns whether the identity has a right to every scene, by a grant with the pattern `*`.
   bool allows_all(const Identity& identity, Right right) const;
-  // Returns whether any grant gives the identity this right. For a right to scenes, no scene that matches the grant's
-  // patterns need exist.
+  // Returns whether any grant gives the identity this right. For a right to scenes, the patterns of the grant need not
+  // match an existing scene.
   bool allows_any(const Identity& identity, Right right) const;
   // Returns whether the identity has any right at all.
   bool knows(const Identity& identity) const;

@@ -21,7 +21,7 @@ inline JsonPointer parse_json_object(absl::string_view text) {
   return json_is_object(value.get()) ? std::move(value) : nullptr;
 }
 
-// Returns the text of a string; an empty one for any other value.
+// Returns the text of a JSON string; an empty text for any other value.
 inline absl::string_view json_text(const json_t* value) {
   if (!json_is_string(value)) return {};
   return {json_string_value(value), json_string_length(value)};

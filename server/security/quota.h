@@ -15,7 +15,7 @@ namespace locus::server {
 // Quantity that a quota limits. The first three are rates, in units a second; the others are amounts in use at a time.
 enum class QuotaKind : uint8_t {
   kQueries,        // queries of batches
-  kWork,           // nodes, cells and primitive tests of queries; objects that other calls visit, such as dumps
+  kWork,           // nodes and cells visited and primitives tested by queries; objects visited by dumps and other calls
   kUpdateItems,    // items of update batches
   kBytesInFlight,  // memory claimed by calls in progress: parsed requests, their work, replies not yet taken
   kOpenStreams,
@@ -32,7 +32,8 @@ inline constexpr std::array<absl::string_view, kQuotaKinds> kQuotaNames = {
 
 constexpr absl::string_view quota_name(QuotaKind kind) { return kQuotaNames[static_cast<size_t>(kind)]; }
 constexpr bool is_rate(QuotaKind kind) { return kind <= QuotaKind::kUpdateItems; }
-// Returns whether a connection can have a quota of the kind. The other kinds count things that outlive connections.
+// Returns whether a connection can have a quota of the kind. The other kinds count objects, scenes, meshes and
+// histories, which outlive connections.
 constexpr bool is_of_connections(QuotaKind kind) { return kind <= QuotaKind::kOpenStreams; }
 // Returns the kind of a name such as "open_streams"; nullopt if there is none.
 std::optional<QuotaKind> quota_named(absl::string_view name);

@@ -15,7 +15,7 @@ namespace {
 constexpr double kNanosecondsPerSecond = 1e9;
 constexpr uint64_t kWindow = 1'000'000'000;   // minimum time in nanoseconds over which a mean is computed
 constexpr size_t kEvictionLooks = 64;         // maximum number of accounts that evict_one() examines
-constexpr uint32_t kFullTableRetryMs = 1000;  // buckets of idle subjects are full again after some seconds
+constexpr uint32_t kFullTableRetryMs = 1000;  // within seconds, buckets refill and idle subjects can be removed
 constexpr uint32_t kBytesRetryMs = 10;        // bytes in flight are released within milliseconds
 constexpr double kMaxRetryMs = 3'600'000;
 

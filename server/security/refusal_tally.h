@@ -3,7 +3,7 @@
 // times a second causes only a few lines a second.
 //
 // One thread at a time. The owner ends each window by end_window(). Invariant: at most kMaxCallers callers are counted
-// separately; the others share one count.
+// separately; all further callers share one count.
 #ifndef LOCUS_SERVER_SECURITY_REFUSAL_TALLY_H_
 #define LOCUS_SERVER_SECURITY_REFUSAL_TALLY_H_
 

@@ -43,7 +43,7 @@ enum class SceneField : uint8_t {
 struct RpcRight {
   absl::string_view path;  // full method path
   Need need;
-  Right right;  // for kNothing meaningless; for kAnyGrant only named in refusals
+  Right right;  // meaningless for kNothing; for kAnyGrant used only in the texts of refusals
   SceneField scene = SceneField::kNone;
   // True if the request can also name a scene to read, in `spec.static_from`; kRead to that scene is needed too.
   bool reads_static_from = false;

@@ -12,7 +12,7 @@ namespace locus::server {
 // everything.
 struct SecurityOptions {
   // File of grants and quotas (see access_file.h). If it is empty but a token file or JWKS file is given, every caller
-  // with a valid token, JWT or certificate may do everything, and all others nothing.
+  // with a valid token, JWT or certificate may do everything, and all other callers may do nothing.
   std::string access_file;
 
   // File of the tokens that are accepted (see token_file.h); empty = none.
@@ -31,7 +31,7 @@ struct SecurityOptions {
   // audit_log.h). Empty = none.
   std::string audit_file;
 
-  // Size in bytes after which an audit file is renamed to `audit_file`.1 and a new one begun; at least 65,536.
+  // Size in bytes at which either of the two audit files gets the suffix .1 and a new file is begun; at least 65,536.
   uint64_t audit_bytes = uint64_t{64} << 20;
 };
 

@@ -42,7 +42,8 @@ absl::string_view member_text(const json_t* object, const char* name) {
   return json_text(json_object_get(object, name));
 }
 
-// Returns UNIMPLEMENTED if a key says that it is not for verifying signatures with its type's algorithm.
+// Returns UNIMPLEMENTED if the key's `use`, `alg` or `key_ops` excludes verifying signatures with the algorithm of
+// `type`.
 absl::Status check_use(const json_t* jwk, const KeyType& type) {
   const json_t* const use = json_object_get(jwk, "use");
   if (use != nullptr && json_text(use) != "sig") return absl::UnimplementedError("its `use` is not sig");
@@ -104,7 +105,7 @@ absl::Status check_key(EVP_PKEY* key, const KeyType& type) {
   return good ? absl::OkStatus() : absl::InvalidArgumentError("its public key is no valid point or number");
 }
 
-// Returns an ES256 signature in the form that OpenSSL reads; empty if it has not the right size.
+// Converts an ES256 signature to DER, the form that OpenSSL reads. Returns an empty text if its size is wrong.
 std::string es256_to_der(absl::string_view signature) {
   if (signature.size() != 2 * kEs256HalfBytes) return {};
   const auto* const bytes = reinterpret_cast<const unsigned char*>(signature.data());

@@ -19,7 +19,7 @@ namespace locus::server {
 // Algorithm of a signature. JWTs that name the algorithm `none` or one with a shared secret are never accepted.
 enum class SignatureAlgorithm : uint8_t { kRs256, kEs256, kEdDsa };
 
-// Returns the algorithm of a name as in RFC 7518 and RFC 8037, such as "RS256"; nullopt if it is not accepted.
+// Returns the algorithm with a name of RFC 7518 or RFC 8037, such as "RS256"; nullopt if the algorithm is not accepted.
 std::optional<SignatureAlgorithm> signature_algorithm_named(absl::string_view name);
 
 class SignatureKey {
@@ -31,7 +31,7 @@ class SignatureKey {
   SignatureAlgorithm algorithm() const { return algorithm_; }
   const std::string& id() const { return id_; }                  // member `kid`; empty = none
   const std::string& thumbprint() const { return thumbprint_; }  // SHA-256 of the public key, RFC 7638
-  // Returns whether the signature of `text` is right. Takes 20 to 150 us.
+  // Returns whether `signature` is this key's valid signature of `text`. Takes 20 to 150 us.
   bool verifies(absl::string_view text, absl::string_view signature) const;
 
  private:

@@ -22,8 +22,8 @@ struct TextFile {
 // if it is larger or no regular file, and FAILED_PRECONDITION if its group or others can write it.
 absl::StatusOr<TextFile> read_text_file(const std::string& file);
 
-// Replaces a file: writes and syncs a temporary file beside it, then renames it. A reader sees the old text or the new
-// one, also after a loss of power.
+// Replaces a file: writes and syncs a temporary file beside it, then renames it. A reader sees either the complete old
+// text or the complete new text, even after a power loss.
 absl::Status replace_text_file(const std::string& file, absl::string_view text, mode_t mode);
 
 // Returns INVALID_ARGUMENT for a line of a file: `FILE:LINE: message`.

@@ -139,7 +139,7 @@ class WriterLock {
   int descriptor_;
 };
 
-// Reads a token file to change it; a missing one is empty. Refuses a file with mistakes.
+// Reads a token file that is about to be changed. A missing file counts as empty. Refuses a file with mistakes.
 absl::StatusOr<TextFile> read_to_change(const std::string& file, TokenTable& table) {
   absl::StatusOr<TextFile> read = read_text_file(file);
   if (absl::IsNotFound(read.status())) return TextFile{"", kTokenFileMode};
@@ -183,7 +183,7 @@ absl::StatusOr<TokenTable> TokenTable::read(const std::string& file, std::vector
 }
 
 const TokenEntry* TokenTable::find(absl::string_view token, int64_t now) const {
-  static constexpr TokenHash kNobody{};  // makes an unknown id take as long as a known id
+  static constexpr TokenHash kNobody{};  // compared for an unknown id, which then takes as long as a known id
   const absl::string_view id = id_of(token);
   if (id.empty()) return nullptr;
   const TokenHash hash = hash_of(token);

@@ -1,8 +1,9 @@
-// Tokens that locusd accepts. A file lists their hashes. A token is `locus_`, its id, `_` and 43 characters base64url
-// of 32 random bytes. The file has one line for each token, and `#` begins a comment line:
+// Tokens that locusd accepts. A file lists their hashes. A token consists of `locus_`, its id, `_`, and 32 random bytes
+// in 43 characters of base64url. The file has one line for each token, and `#` begins a comment line:
 //   ID SHA256-HEX CREATED EXPIRES [COMMENT]
-// SHA256-HEX is the hash of the whole token; CREATED and EXPIRES are UTC times like 2024-05-31T12:00:00Z or dates, and
-// EXPIRES may be `never`. An id has 1 to 63 of a-z, 0-9 and -, and begins and ends with a letter or digit.
+// SHA256-HEX is the hash of the whole token; CREATED and EXPIRES are UTC times, such as 2024-05-31T12:00:00Z, or dates;
+// EXPIRES may also be `never`. An id has 1 to 63 characters of a-z, 0-9 and -, and begins and ends with a letter or
+// digit.
 //
 // A table is immutable; any thread. The functions that change the file may be called by several processes at once.
 #ifndef LOCUS_SERVER_SECURITY_TOKEN_FILE_H_
@@ -44,7 +45,7 @@ class TokenTable {
   static absl::StatusOr<TokenTable> read(const std::string& file, std::vector<std::string>& warnings);
 
   // Returns the entry of a token; nullptr if there is none or it has expired at `now`. Takes the same time for a known
-  // id with another secret as for an unknown id. Valid while the table lives.
+  // id with another secret as for an unknown id. The pointer is valid until the table is destroyed.
   const TokenEntry* find(absl::string_view token, int64_t now) const;
   // Returns whether a token with this id and hash is listed and has not expired.
   bool contains(absl::string_view id, absl::string_view hash, int64_t now) const;

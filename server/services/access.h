@@ -29,9 +29,9 @@ class Access {
   Access(const Access&) = delete;
   Access& operator=(const Access&) = delete;
 
-  // Starts two threads: one watches the files, and first reads them once more; the other one writes the counts of
-  // updates to the audit log. `recheck_calls` must make every running call check its rights. It is called after each
-  // change of the files, and twice a second because credentials expire.
+  // Starts two threads. The first reads the files once more and then watches them. The second calls `recheck_calls`
+  // twice a second, because credentials expire, and writes the counts of updates to the audit log. `recheck_calls` must
+  // make every running call check its rights. It is also called after each change of the files.
   void start(std::function<void()> recheck_calls);
   // Ends the threads. `recheck_calls` is not called afterwards.
   void stop();

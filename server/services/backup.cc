@@ -34,7 +34,8 @@ constexpr uint32_t kBackupRetryMs = 5000;
 // Name of the copy's directory inside kBackupDirectory. kBackupDirectory is used by the copy alone, so that removing
 // it also removes files that the log leaves beside the copy.
 constexpr const char* kCopy = "copy";
-// Upper bound of the memory of a backup, in pieces: a piece's data, the message and its bytes exist at the same time.
+// Upper bound of the memory of a backup, as a multiple of limits::kBackupPieceBytes. A piece's message and its
+// serialized bytes exist at the same time; the rest is a margin.
 constexpr uint64_t kCopies = 4;
 
 // Function that writes a piece to the caller; returns false to end the backup.

@@ -85,8 +85,9 @@ void note_failed_tls(const RpcState& state, TlsCounts& before) {
   before = now;
 }
 
-// Returns functions that end the connections of clients whose certificate is no longer trusted, since TLS checks
-// certificates only when a connection begins. They also audit failed handshakes.
+// Returns functions that report reloaded TLS files and failed handshakes. If clients need certificates, the functions
+// also close connections whose certificate may no longer be valid, since TLS checks a certificate only when a
+// connection begins.
 TlsHooks tls_hooks(const ServerConfig& config, RpcState& state) {
   TlsHooks hooks;
   hooks.reloaded = [&state](const absl::Status& status) { report_reload(state, state.tls_loads, "TLS files", status); };

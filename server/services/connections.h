@@ -27,12 +27,12 @@
 
 namespace locus::server {
 
-// A limit on connections or on what one of them may send.
+// A limit on the number of connections, or on the behaviour of each connection.
 struct ConnectionLimit {
   const char* name;      // as in `locus limits`
   double value = 0;      // 0 = no limit
-  double used = 0;       // connections that count against the limit, if it concerns all of them
-  uint64_t refused = 0;  // connections that were refused or closed for it since the start
+  double used = 0;       // number of open connections, for the limit on all of them; 0 for other limits
+  uint64_t refused = 0;  // connections that were refused or closed because of this limit since the start
 };
 // Returns the limits on connections.
 std::vector<ConnectionLimit> connection_limits(const ServerConfig& config, const ConnectionTable& table);

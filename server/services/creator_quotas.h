@@ -24,7 +24,7 @@ namespace locus::server {
 // access control.
 std::string creator_name(const Caller& caller);
 
-// Takes one scene, and the bytes of the history that `spec` asks for.
+// Takes one scene, and the bytes of the history that `spec` requests.
 absl::StatusOr<std::vector<QuotaHold>> hold_scene(Host& host, const SceneSpec& spec);
 // Takes the bytes of a mesh.
 absl::StatusOr<QuotaHold> hold_mesh_bytes(Host& host, const std::string& creator, uint64_t bytes);

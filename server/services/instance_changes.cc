@@ -17,8 +17,8 @@ namespace {
 // Size in bytes up to which a change that only removes instances is never refused for lack of memory.
 constexpr uint64_t kSmallChangeBytes = 64u << 10;
 
-// Maximum memory in bytes for one id of the response: in the results of the change, in the message, and in the
-// message's bytes.
+// Upper bound in bytes of the memory for one id of the response. The id exists three times: in the result of the
+// change, in the response message, and in the message's serialized bytes.
 constexpr uint64_t kReplyBytesAPlacement = 40;
 
 // Interval at which a waiting call checks whether its caller has given up.
@@ -156,7 +156,8 @@ absl::Status change_instances(Host& host, const Caller& caller, const v1::Change
   // Held until the response is written.
   ASSIGN_OR_RETURN(const CallMemory reply, claim_copy(caller, placed_count(request) * kReplyBytesAPlacement));
   ASSIGN_OR_RETURN(const std::shared_ptr<OwnedChange> owned, read_change(host.registry, request));
-  // Check the placements without the scene's instances, because changes that were queued earlier may still alter these.
+  // Check the placements without the scene's instances, because changes that were queued earlier may still alter those
+  // instances.
   if (request.no_wait()) RETURN_IF_ERROR(StaticSet::check_placements(owned->change.place));
   const auto outcome = std::make_shared<Outcome>();
   const uint64_t epoch = scene->latest()->epoch;

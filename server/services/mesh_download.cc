@@ -14,7 +14,8 @@
 namespace locus::server {
 namespace {
 
-// Upper bound of the size in bytes of a piece's protobuf tags and lengths, and of its description of the mesh.
+// Upper bound of the bytes of a piece beside its parts, vertices and indices: the description of the mesh, and the
+// protobuf tags and lengths of the columns.
 constexpr size_t kFrameBytes = 1024;
 static_assert(limits::kMaxNameLength + sizeof(Sha256) + 64 < kFrameBytes);
 constexpr size_t kRoom = limits::kDefaultReplyBytes - kFrameBytes;

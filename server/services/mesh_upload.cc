@@ -19,7 +19,7 @@
 namespace locus::server {
 namespace {
 
-// Bytes that each triangle of a mesh takes at least: its tree stores three corners of three coordinates.
+// Minimum memory in bytes of each triangle of a mesh: the mesh's tree stores three corners with three coordinates each.
 constexpr uint64_t kMinTriangleBytes = 9 * sizeof(float);
 
 absl::Status malformed_upload(absl::string_view field, absl::string_view message) {

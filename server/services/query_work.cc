@@ -20,8 +20,9 @@ using std::chrono::steady_clock;
 
 namespace {
 
-// Estimated work below which a query batch runs while its IO loop handles no other event. For more work, another thread
-// is woken to handle the loop's events; waking it would cost more than such short work.
+// Estimated work, in nanoseconds, below which a query batch runs while its IO loop handles no other event. For a longer
+// batch, another thread is woken to handle the loop's events. For a shorter batch, waking that thread would take more
+// time than the batch itself.
 constexpr uint64_t kShortNanoseconds = 30'000;
 
 }  // namespace
@@ -78,8 +79,9 @@ void QueryWork::look() {
 }
 
 // Returns the error for a query batch that stops waiting for its revision, because the call has ended or because the
-// server drains and accepts no more updates. When the server drains, a message of a stream gets another error than a
-// unary call, because the stream ends only after all its messages are answered.
+// server drains and accepts no more updates. When the server drains, a unary call gets the draining error. A message of
+// a stream gets DEADLINE_EXCEEDED, because the draining error is the status of the whole stream, which ends only after
+// all its messages are answered.
 absl::Status QueryWork::no_longer() const {
   RETURN_IF_ERROR(slot_.caller().stop());
   if (!slot_.stream()) return draining();
@@ -133,8 +135,8 @@ void QueryWork::run() {
     absl::Status revoked = pin_->status();
     return revoked.ok() ? slot_.caller().stop() : revoked;
   };
-  // Measure processor time, not elapsed time. Otherwise a thread that waits for a core would learn estimates that are
-  // too high, and later batches would be queued needlessly.
+  // Measure processor time, not elapsed time. Otherwise the time that a thread waits for a core would raise the
+  // estimates of work, and later batches would be queued needlessly.
   options.work_clock = &thread_nanoseconds;
   options.clock = &steady_nanoseconds;
   columns_.emplace(*result_, batch_.blocks.size());

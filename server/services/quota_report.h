@@ -19,8 +19,8 @@ namespace locus::server {
 absl::Status get_quotas(const Host& host, const Caller& caller, const v1::GetQuotasRequest& request,
                         v1::GetQuotasResponse& response);
 
-// Considers the identities and connections that use or created something. Returns the name of each quota that one of
-// them has, and the largest share of the quota that one of them uses.
+// Returns the name of each quota that an identity or connection has, with the largest share of that quota that one of
+// them uses (1 = all). Considers only identities and connections that use or created something.
 std::vector<std::pair<std::string, double>> largest_quota_shares(const Host& host);
 
 }  // namespace locus::server

@@ -18,8 +18,8 @@ namespace locus::server {
 absl::StatusOr<ScenePtr> find_scene(const Host& host, const Caller& caller, const std::string& name,
                                     absl::string_view field);
 
-// Claims `bytes` for responses that copy parts of scenes or meshes. Up to 64 KiB are claimed as replies, which are
-// refused last; more bytes are claimed on `line`.
+// Claims `bytes` for responses that copy parts of scenes or meshes. A claim of up to 64 KiB uses MemoryLine::kReplies,
+// whose claims are refused last; a larger claim uses `line`.
 absl::StatusOr<CallMemory> claim_copy(const Caller& caller, uint64_t bytes, MemoryLine line = MemoryLine::kDumps);
 
 // Waits for the revision that `view` names, but at most until the time `until`, and pins the revision's snapshot.

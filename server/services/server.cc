@@ -71,7 +71,7 @@ absl::StatusOr<std::unique_ptr<HttpServer>> start_http(const ServerConfig& confi
   return nullptr;
 }
 
-// Returns the maximum number of calls that may block a thread each.
+// Returns the maximum number of concurrent calls that each block a thread.
 uint32_t max_blocking_calls(const Host& host) {
   return host.calls.max_in_all() + host.health_watchers.max_in_all() + host.health_checks.max_in_all() +
          host.reflections.max_in_all();
@@ -86,7 +86,7 @@ void set_limits(const ServerConfig& config, grpc::ServerBuilder& builder) {
   builder.SetMaxReceiveMessageSize(static_cast<int>(config.max_receive_bytes));
   builder.SetMaxSendMessageSize(-1);
   // gRPC must not inflate messages, because a few megabytes could become gigabytes. It refuses compressed messages or,
-  // with accept_compression, passes them on compressed.
+  // with accept_compression, passes them on still compressed.
   builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_GZIP, config.accept_compression);
   builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_DEFLATE, false);
   builder.AddChannelArgument(GRPC_ARG_ENABLE_PER_MESSAGE_DECOMPRESSION, 0);

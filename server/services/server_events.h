@@ -12,8 +12,8 @@
 
 namespace locus::server {
 
-// Reports one reading of the changed files that `loads`, a member of `state`, counts. `files` names them in the audit
-// log. `status` is OK if they are in use now. Any thread.
+// Reports that changed files were read. `loads`, a member of `state`, counts these readings, and `files` names the
+// files in the audit log. `status` is OK if the new content is in use now. Any thread.
 void report_reload(const RpcState& state, FileLoads& loads, absl::string_view files, const absl::Status& status);
 
 // Reports `count` connections that were refused or closed since the last report of this kind. `peer` (Peer::label or

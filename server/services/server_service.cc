@@ -143,7 +143,7 @@ std::vector<NamedLimit> limits_of(const Host& host) {
 }
 
 void get_server(Host& host, const Caller& caller, v1::GetServerResponse& response) {
-  // The use of some limits would tell how many scenes exist that the caller may not read, and how large they are.
+  // The used values of some limits would reveal the number and size of scenes that the caller may not read.
   const bool shows_use = caller.may(Right::kMetrics, "") || caller.administers_all();
   response.set_version(kVersion);
   response.set_instruction_set(std::string(instruction_set()));

@@ -95,7 +95,7 @@ class RocksdbLog final : public UpdateLog {
   // snapshot, whose content id is `replaced_id`. ABORTED if another snapshot was committed meanwhile.
   absl::Status put_snapshot(const SceneLogStatePtr& log_state, uint64_t replaced_id, uint64_t sequence,
                             const ContentRow& snapshot) LOCUS_EXCLUDES(catalogue_mutex_);
-  // Returns whether the chunks whose row `pending` marks them as unfinished belong to a committed snapshot or mesh.
+  // Returns whether the chunks that the row `pending` marks as unfinished belong to a committed snapshot or mesh.
   bool in_use(absl::string_view pending) const LOCUS_REQUIRES(catalogue_mutex_);
   // Returns the row of the mesh `name`; no value if the catalogue has no intact row of this name.
   std::optional<MeshRow> mesh_row(absl::string_view name) const LOCUS_REQUIRES(catalogue_mutex_);

@@ -13,8 +13,8 @@ from daemon import START_SECONDS, Daemon, MemoryGroup, Process, Unsupported, how
 PROGRAM = "/usr/sbin/haproxy"
 CONFIG = os.path.join(os.path.dirname(os.path.abspath(__file__)), "../../deploy/edge/haproxy.cfg")
 MEMORY = 1 << 30  # bytes, as MemoryMax= in deploy/edge/locus-edge.service
-# Raise locusd's limits per address, as deploy/edge/locusd-edge.conf does: for locusd all clients are one user of its
-# socket, and the front limits each client instead.
+# Raise locusd's limits per address, as deploy/edge/locusd-edge.conf does: all clients reach locusd as one user of its
+# socket, so the front limits each client instead.
 DAEMON_OPTIONS = ("--max-connections-per-address", "4096", "--max-new-connections", "4000")
 
 

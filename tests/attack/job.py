@@ -12,12 +12,12 @@ MIN_STEP_SECONDS = 0.25
 STRANGER = "mtls-stranger"  # front name: TLS requires a client certificate, and the attacker has none
 # Fronts that must protect locusd from every attack: no row is left out, and the victim's p99 may grow less.
 SHIELDED = (STRANGER, "edge")
-MAX_SLOWER, MAX_SHIELDED_SLOWER = 10, 5  # default of the factor by which the victim's p99 may grow
+MAX_SLOWER, MAX_SHIELDED_SLOWER = 10, 5  # factors by which the victim's p99 may grow: default, SHIELDED fronts
 # Status codes that give the caller no information, or that no request of a client may cause.
 NEVER = ("INTERNAL", "UNKNOWN", "CLOSED", "TIMEOUT", "RESET", "DATA_LOSS", "ABORTED")
 
-# HAProxy 2.6 sometimes refuses a call before the whole message was sent by a reset without headers (REFUSED_STREAM).
-# gRPC reports such a reset as UNAVAILABLE.
+# HAProxy 2.6 sometimes refuses a call with a reset without headers (REFUSED_STREAM) before the client has sent the
+# whole message. gRPC reports such a reset as UNAVAILABLE.
 REFUSED_STREAM = ("RESET", "HTTP status none")
 
 # One row of the table. `steps(job)` returns (name, function of job) pairs, which run one after another. `what`

@@ -47,8 +47,8 @@ class Row:
         self.load = os.getloadavg()[0]
 
     def kept_allowed(self):
-        """Returns the number of bytes by which the daemon's memory may be larger after the attack; the allocator
-        retains some.
+        """Returns the number of bytes by which the daemon's memory may be larger after the attack, because the
+        allocator retains some memory.
         """
         return max(64 << 20, self.limit // 3)
 

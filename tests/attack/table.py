@@ -12,7 +12,8 @@ from rows import calls, connections, frames, messages, replies
 NOT_YET = {
 }
 
-# Rows that the union runs at the same time: those that cost the daemon most, although it withstands each of them alone.
+# Rows that the attack `union` runs at the same time: the rows that cost the daemon most. It withstands each of them
+# alone.
 TOGETHER = ("reset-queries", "settings", "ping", "garbage", "slow-bodies", "wrong-bytes", "honest", "unread", "continuation")
 
 

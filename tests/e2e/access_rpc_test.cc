@@ -71,7 +71,7 @@ class AccessRpcTest : public ::testing::Test {
   void wait_for_calls(double count) {
     v1::GetServerResponse server;
     double used = 0;
-    while (used < count + 1) {  // the call that asks counts too
+    while (used < count + 1) {  // GetServer counts its own call, too
       ASSERT_TRUE(server.ParseFromString(call("/locus.v1.ServerService/GetServer", "admin", "").bytes));
       for (const v1::Limit& limit : server.limits())
         if (limit.name() == "calls") used = limit.used();
@@ -374,7 +374,8 @@ TEST_F(AccessRpcTest, AnInflatedMessageCountsForTheQuotaOfItsCaller) {
   EXPECT_THAT(refused.error_message(), HasSubstr("bytes_in_flight"));
 }
 
-// Updates that wait for the log hold the memory that they have claimed.
+// Updates of one identity, on four connections, wait for the log and keep their claims of memory meanwhile. When they
+// have claimed the share of one identity, further updates of this identity must be refused.
 TEST_F(AccessRpcTest, MoreConnectionsGiveAnIdentityNoMoreMemory) {
   constexpr uint64_t kRoom = uint64_t{128} << 20;
   MemoryLog log;
@@ -394,7 +395,8 @@ TEST_F(AccessRpcTest, MoreConnectionsGiveAnIdentityNoMoreMemory) {
         .status;
   };
   log.hold();
-  // Each of the connections has a fourth of the calls, so that it stays far below the share of a connection.
+  // Each of the connections has a fourth of the calls, so that no connection reaches the share of memory of one
+  // connection.
   std::vector<Stubs> connections;
   for (int i = 0; i < 4; ++i) connections.emplace_back(running_->address());
   std::vector<std::future<grpc::Status>> calls;
@@ -478,7 +480,7 @@ TEST_F(AccessRpcTest, AQuotaThatComesAndGoesCountsTheStreamsThatWereOpenedUnderI
   OpenQueries uncounted(running_->stubs(), tokens_["reader"]);
   ASSERT_TRUE(uncounted.is_open);
   reload(with);
-  std::optional<OpenQueries> second;  // is admitted once the server has forgotten the first stream
+  std::optional<OpenQueries> second;  // admitted when the server no longer counts `counted`
   for (int tries = 0; tries < 1000 && !(second && second->is_open); ++tries) {
     if (second) second->end();
     second.emplace(running_->stubs(), tokens_["reader"]);

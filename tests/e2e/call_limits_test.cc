@@ -1,4 +1,4 @@
-// Limits of concurrent calls: a client that uses them up refuses nobody but itself.
+// Limits of concurrent calls: if a client reaches such a limit, the server refuses further calls of this client only.
 #include <list>
 
 #include "grpc/health/v1/health.grpc.pb.h"

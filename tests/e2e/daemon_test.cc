@@ -68,13 +68,14 @@ TEST_F(DaemonTest, DrainingEndsStreamsRetryablyAndRunningCallsAreAnswered) {
   v1::StreamUpdatesResponse response;
   ASSERT_TRUE(stream->Write(request));
   ASSERT_TRUE(stream->Read(&response));
-  // The upload runs until its caller has sent the whole mesh.
+  // This upload stays in progress until its caller has sent the whole mesh.
   grpc::ClientContext upload_context;
   set_timeout(upload_context);
   v1::UploadMeshResponse uploaded;
   const auto upload = stubs.scenes->UploadMesh(&upload_context, &uploaded);
   ASSERT_TRUE(upload->Write(whole_mesh("cube")));
-  // The answer proves that the server has begun the upload before the signal is sent.
+  // Wait until two calls are in progress, the upload and GetServer itself, so that the server has begun the upload
+  // before the signal is sent.
   grpc::ClientContext info_context;
   set_timeout(info_context);
   v1::GetServerResponse info;

@@ -151,7 +151,8 @@ TEST_F(QueryRpcTest, FrustumsFindWhatIsInView) {
                                     0.f, -1.f, 0.f, 1.f,  0.f,  0.f, 1.f, 1.f, 0.f, 0.f, -1.f, 1.f});
   EXPECT_THAT(ask(batch).blocks(0).ids(), ElementsAre(1u, 2u));
   frustums->clear_planes();
-  // A matrix that maps the box from (2, -1, 0) to (7, 1, 1) to -w .. w, -w .. w, 0 .. w.
+  // A matrix that maps the box with the corners (2, -1, 0) and (7, 1, 1) to the clip coordinates x and y in -w .. w, z
+  // in 0 .. w.
   fill(frustums->mutable_view_projections(),
        {0.4f, 0.f, 0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 0.f, 0.f, 1.f, 0.f, -1.8f, 0.f, 0.f, 1.f});
   EXPECT_THAT(ask(batch).blocks(0).ids(), ElementsAre(1u, 2u));

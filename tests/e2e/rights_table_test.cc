@@ -25,8 +25,8 @@ namespace {
 
 enum class Outcome { kServed, kDenied, kHidden, kUnknown };
 
-// A set of rights, for which the table has a column. In `grants`, which is lines of an access file, WHO stands for the
-// caller.
+// A column of the table: a set of rights. `grants` contains the lines of an access file that grant these rights to the
+// caller WHO.
 struct Column {
   const char* name;
   const char* grants;

@@ -1,6 +1,7 @@
 // Messages of the protocol as a client can send them: queries, updates and specifications of scenes. Accepted messages
-// are within the limits, a refusal names a field or a limit, and accepted batches are executed on a small scene; of
-// query batches only those of at most 256 queries.
+// are within the limits, and a refusal names a field or a limit. Accepted update batches are applied to a small scene.
+// Accepted query batches of at most 256 queries are run on such a scene, and the results are compared with those of
+// brute force.
 #include "core/base/limits.h"
 #include "core/query/query_batch.h"
 #include "core/scene/log/record_codec.h"
@@ -80,7 +81,8 @@ LOCUS_FUZZ_TARGET(queries) {
   if (queries_of(*batch) > kMaxRunQueries) return;
   const absl::StatusOr<test::BatchResult> found = test::run_batch(*snapshot, *batch, {});
   if (!found.ok()) return check_refusal(found.status());
-  if (batch->max_work != 0) return;  // the work of brute force differs, so max_work would truncate elsewhere
+  // Brute force does another amount of work, so max_work would truncate its results at another place.
+  if (batch->max_work != 0) return;
   RunOptions all;
   all.brute_force = true;
   const absl::StatusOr<test::BatchResult> expected = test::run_batch(*snapshot, *batch, all);

@@ -1,5 +1,6 @@
-// Chunks of a stored mesh, of its parts and of its tree: what is accepted is valid, a mesh or tree that is written,
-// read and written again gives equal bytes, and a tree that is accepted for a mesh has the mesh's size and bounds.
+// Chunks of a stored mesh, of its parts and of its tree: accepted parts are valid; an accepted mesh or tree that is
+// written, read and written again has equal bytes both times; and a tree that is restored for a mesh has the mesh's
+// size and bounds.
 #include <optional>
 
 #include "core/scene/log/mesh_codec.h"

@@ -41,7 +41,7 @@ std::string encode_again(const Record::Change& read) {
   for (size_t i = 0; i < change.place.size(); ++i) {
     change.place[i].mesh = mesh_of(read.meshes[i]);
     const size_t count = change.place[i].count();
-    // StaticSet::apply() would refuse a change whose columns have different lengths; here it is left out.
+    // Skip a change whose columns have different lengths: it is never encoded, because StaticSet::apply() refuses it.
     if (change.place[i].ids.size() != count) return "";
     ids.insert(ids.end(), change.place[i].ids.begin(), change.place[i].ids.end());
   }

@@ -202,7 +202,7 @@ void write_updates(const SeedWriter& seeds) {
   seeds.write("wire", "unknown_field", "\x7A\x10" + std::string(16, 'x'));
 }
 
-// Writes seeds of HTTP/2 frames. The first byte of each seed has the frames read in pieces of 3 bytes.
+// Writes seeds of HTTP/2 frames. The first byte of each seed is 2, so the target reads the frames in pieces of 3 bytes.
 void write_frames(const SeedWriter& seeds) {
   const std::string begin = '\2' + test::kHttp2Opening;
   std::string endless = test::http2_frame(1, 0, 1, "headers");

@@ -62,8 +62,8 @@ def check_format(options):
 
 
 def check_exceptions(options):
-    """Returns a problem for each file that is listed as an exception of the mirror but no longer exists, and the
-    defects of this rule itself.
+    """Returns a problem for each test in MIRROR_EXCEPTIONS (shape_rules.py) that no longer exists, and the defects of
+    this rule itself.
     """
     problems = [] if shape_rules.stale_exceptions(Tree(GOOD_EXAMPLE)) else ["the rule does not see its bad example"]
     return problems + shape_rules.stale_exceptions(read_tree(options.root))

@@ -106,7 +106,8 @@ KERNELS = ("core/index/bvh/kernels/", "core/index/hash_grid/kernels/")
 MEMORY_ADVICE = {"core/base/large_array.h": "sys/mman.h"}
 CLOCK_FILES = re.compile(r"core/base/mutex\.h|core/scene/(?:scene|readers/reader_tracker)\.(h|cc)")
 
-# Pairs of a folder and its parent that count as one room; the room is divided only because of its size.
+# Pairs of a folder and its parent that the rule about cycles treats as one folder, because the folder was split only to
+# limit its size.
 ONE_ROOM = {"client/cli/levels/import/quake": "client/cli/levels/import"}
 
 

@@ -1,8 +1,9 @@
 """Prints one line for each test of a JUnit file written by ctest: its outcome (passed, failed, skipped) and its name.
 
 ctest reports a test as "not run" if its program is missing, if its fixture failed, or if it skipped itself; this
-program counts only the last case as skipped. If Python's unittest skipped a test within a passing ctest test, the
-skipped test gets its own line. So does each attack of a passing group that skipped all or some of its steps.
+program counts only the last case as skipped. A test that Python's unittest skipped gets its own line,
+because the ctest test that contains it can pass nevertheless. For the same reason, each attack (see tests/attack) of
+which all or some steps were skipped gets its own line.
 """
 import re
 import sys

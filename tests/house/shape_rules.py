@@ -110,12 +110,15 @@ def each_line(tree, pattern, message):
             for number, line in enumerate(text.split("\n"), 1) for match in pattern.finditer(line)]
 
 
-# A status that is returned as it is. Groups: the variable's name, and its name in the returned expression.
+# Matches code that returns a failed status unchanged. Groups: the variable's name, and its name in the returned
+# expression.
 WRITTEN_OUT_RETURN = re.compile(r"if \((?:[^;{}]*; )?!(\w+)\.ok\(\)\)\s*\{?\s*return (?:std::move\()?\1\)?(?:\.status\(\))?;")
 
 
 def statuses_return_by_macro(tree):
-    """Finds returns that RETURN_IF_ERROR or ASSIGN_OR_RETURN would write, except statuses of other libraries."""
+    """Finds written-out returns that a macro, RETURN_IF_ERROR or ASSIGN_OR_RETURN, could replace. Statuses of other
+    libraries are exempt.
+    """
     problems = []
     for path in tree.code("core", "server", "client"):
         text = re.sub(r"(?m)^\s*//.*", "", tree.files[path])
@@ -134,7 +137,7 @@ def no_path_of_a_machine(tree):
     return each_line(tree, MACHINE_PATH, "a path of one machine")
 
 
-# Tests that mirror no source file, each with the reason why it mirrors none.
+# Tests whose path and name do not correspond to a source file, each with the reason.
 MIRROR_EXCEPTIONS = {
     "tests/client/cli/exit_code_test.cc": "the program as a child process: exit codes and streams",
     "tests/core/geometry/shape_ray_test.cc": "ray tests of every shape, whose chords are in ray_convex",

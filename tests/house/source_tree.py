@@ -93,8 +93,8 @@ ACCESS = re.compile(r"^(\s*(public|private|protected)\s*:)+")
 
 
 def after_template(declaration):
-    """Returns the declaration without a leading template<...>, because the word `class` in it would be mistaken for a
-    class.
+    """Returns the declaration without a leading template<...>, because the word `class` in it would be mistaken for
+    the definition of a class.
     """
     declaration = ACCESS.sub("", declaration).strip()
     while re.match(r"template\s*<", declaration):

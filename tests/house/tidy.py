@@ -1,8 +1,8 @@
 """Runs clang-tidy over the product's sources as a build folder compiles them: tidy.py BUILD [--jobs N] [--part PATH_PART].
 
-Prints a line for each file, followed by its findings; exits 1 if there is a finding. Leaves out the targets with
-planted bugs (mutation testing), because they compile the same files. First checks a bad example, to detect a
-configuration that finds nothing.
+With --part, checks only files whose path contains PATH_PART. Prints a line for each file, followed by its findings;
+exits 1 if there is a finding. Leaves out the targets with planted bugs (mutation testing), because they compile the
+same files. First checks a bad example, to detect a configuration that finds nothing.
 """
 import argparse
 import concurrent.futures

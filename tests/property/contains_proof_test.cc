@@ -1,7 +1,7 @@
-// No point inside a closed mesh is missed and none outside is found. The query engine answers points in and around
-// placed meshes, with every instruction set. The answers are compared with the solid angles of all triangles in long
-// double and, for points at the surface of meshes that are not rotated, with crossings in integers. Each run tests tens
-// of thousands of points, the long run a million.
+// Proves that contains queries find the points inside a closed mesh and no point outside. The query engine is asked
+// about points in and around placed meshes, with every instruction set. The answers are compared with the solid angles
+// of all triangles in long double and, for points at the surface of meshes that are not rotated, with crossings in
+// integers. Each run tests tens of thousands of points, the long run a million.
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -164,8 +164,8 @@ class Trial {
     if (random_.chance(0.6)) point = (a + b) * 0.5;
     if (random_.chance(0.5)) point = a * 0.25 + b * 0.25 + c * 0.5;
     if (random_.chance(0.3)) point = (a + to_double(other.a)) * 0.5;
-    // Moves the point along an axis, often away from the mesh: a line through the point along this axis still meets a
-    // corner, an edge or a face exactly.
+    // Moves the point along an axis, often away from the mesh: a line through the point along this axis still passes
+    // exactly through a corner, an edge or a face.
     if (random_.chance(0.5)) point[random_.whole(0, 2)] = random_.between(-1.5, 1.5);
     if (random_.chance(0.5)) point = point + random_.vector(random_.magnitude(-20, 1));
     return point;

@@ -1,6 +1,6 @@
 // A query of precision CONSERVATIVE finds everything that the same query of precision EXACT finds, at the same distance
-// or nearer. It may also find objects and triangles that the EXACT query does not, but only triangles whose bounds in
-// world axes it meets. Both hold for scenes far from the world's origin too.
+// or nearer. It may also find objects and triangles that the EXACT query does not find; but a triangle is found only if
+// the query intersects the triangle's bounds in world axes. Both properties also hold far from the world's origin.
 #include <gtest/gtest.h>
 
 #include "tests/support/conservative_answers.h"

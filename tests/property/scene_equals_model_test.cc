@@ -1,5 +1,5 @@
-// Thousands of random batches, applied to scenes and to a model, a std::map to which one item after another is applied:
-// both must have equal contents.
+// Applies thousands of random batches to scenes and to a model, which applies one item after another to a std::map. A
+// scene and its model must have equal contents.
 #include <gtest/gtest.h>
 
 #include "tests/support/scene_lockstep.h"

@@ -1,6 +1,6 @@
-// No sweep misses and none hits too early: balls, capsules and boxes move past the triangles of placed meshes, and the
-// answers of the query engine are compared with a search in long double. A hundred thousand sweeps in each run, ten
-// million in the long run, or as many as LOCUS_PROOF_SWEEPS says.
+// Proves that no sweep misses and none hits too early: balls, capsules and boxes move past the triangles of placed
+// meshes, and the answers of the query engine are compared with a search in long double. Each run tests a hundred
+// thousand sweeps; the long run tests ten million, or the number in LOCUS_PROOF_SWEEPS.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -139,9 +139,9 @@ class SweepTrial {
     return mover;
   }
 
-  // Returns a description of the error in an answer; empty if there is none. The mover shrunk by e must touch nothing
-  // that is more than e before the contact found, and the mover grown by e must touch a triangle at the contact; e is
-  // 2^-20 of the sum of the start's distance from the origin and the mover's size.
+  // Returns a description of the error in an answer; empty if there is none. Until it is e away from the found contact,
+  // the mover shrunk by e must touch nothing; at the contact, the mover grown by e must touch a triangle. e is 2^-20 of
+  // the sum of the start's distance from the origin and the mover's size.
   std::string fault_of(const RealMover& mover, std::optional<Real> found) const {
     const Real e = 0x1p-20L * (length(mover.start) + mover.size()), way = length(mover.way);
     const Real before = !found ? 1 : way == 0 ? -1 : *found - e / way;

@@ -49,8 +49,8 @@ inline bool clipped_polygon_remains(std::vector<Vec3r> polygon, Vec3r half, Real
   return true;
 }
 
-// Oriented box in long double: `axes` are its unit axes, `half` its half extents, and `half_edges` the products of
-// both.
+// Oriented box in long double. `axes` are its unit axes, `half` contains its half extents, and half_edges[i] is the
+// product of axes[i] and half[i].
 struct RealBox {
   Vec3r center;
   std::array<Vec3r, 3> half_edges;
@@ -90,8 +90,8 @@ inline bool any_edge_meets(const RealBox& edges, const RealBox& solid, Real grow
   return false;
 }
 
-// Returns whether two boxes share a point: they do if and only if an edge of one box meets the other box. `grown` is
-// added to the half extents of the box that the edge meets.
+// Returns whether two boxes share a point: they do if and only if an edge of one box intersects the other box. `grown`
+// is added to the half extents of this other box.
 inline bool boxes_share_a_point(const RealBox& a, const RealBox& b, Real grown) {
   return any_edge_meets(a, b, grown) || any_edge_meets(b, a, grown);
 }

@@ -24,9 +24,9 @@ struct FoundRow {
 };
 using Found = std::map<std::pair<Id, uint32_t>, FoundRow>;  // key: id and triangle
 
-// Returns whether the two answers to the block can be compared: their rows name triangles, and every row of the exact
-// answer must also be in the conservative answer. Lookups, contains, sight and pairs return no triangles. In a
-// conservative cell an additional wall may hide walls that the exact cell has.
+// Returns whether the exact and the conservative answer to the block can be compared. Lookups, contains, sight and
+// pairs are excluded, because their rows name no triangles. Cells are excluded, because a conservative cell can have an
+// additional wall that hides walls of the exact cell, so it need not contain all rows of the exact cell.
 inline bool is_judged(const OwnedBlock& block) {
   const auto& kind = block.settings.kind;
   return !std::holds_alternative<LookupColumns>(kind) && !std::holds_alternative<ContainsColumns>(kind) &&
@@ -107,7 +107,7 @@ class RealQuery {
     if (std::holds_alternative<BoxColumns>(block.settings.kind)) half_ = half_bounds(block, i);
   }
 
-  // Returns nullopt if the query does not meet the box. Otherwise returns the t at which a ray enters the box, the
+  // Returns nullopt if the query does not intersect the box. Otherwise returns the t at which a ray enters the box, the
   // distance of a point from the box, or 0 for a ball or box.
   std::optional<Real> meets(const BoxReal& box) const {
     if (direction_) return entered(box);
@@ -231,12 +231,12 @@ inline std::string superset_fault(const QueryScene& scene) {
                 const internal::Found& conservative) { return internal::lacking(exact, conservative); });
 }
 
-// Returns a description of the first error in the conservative answers; empty if there is none. It is an error if the
-// query meets the bounds of a triangle that has no row, or if a triangle has a row, but the query does not meet its
-// bounds after they are grown by a tolerance: 2^-38 of the sum of a bound of the |coordinates| of the placed mesh and
-// the magnitude of the query. It is also an error if t is neither that of the exact row nor that of the bounds, or if
-// the point of a row of nearest is not at distance t. Preconditions: the scene has only instances, and the queries have
-// no filters, limits or culling.
+// Returns a description of the first error in the conservative answers; empty if there is none. The errors are: the
+// query intersects the bounds of a triangle that has no row; a triangle has a row, but the query does not intersect its
+// bounds, grown by a tolerance; a row's t is neither the t of the exact row nor that of the bounds; the point of a
+// nearest query's row is not at distance t. The tolerance is 2^-38 of the sum of an upper bound of the |coordinates| of
+// the placed mesh and the magnitude of the query. Preconditions: the scene has only instances, and the queries have no
+// filters, limits or culling.
 inline std::string placed_bounds_fault(const QueryScene& scene) {
   return internal::conservative_fault(
       scene, [&](const OwnedBlock& block, size_t i, const internal::Found& exact, const internal::Found& conservative) {

@@ -1,4 +1,4 @@
-// Comparison of two trees over a mesh's triangles in memory, byte for byte.
+// Byte-for-byte comparison of two trees over the triangles of a mesh, as they are in memory.
 #ifndef LOCUS_TESTS_SUPPORT_EQUAL_TREES_H_
 #define LOCUS_TESTS_SUPPORT_EQUAL_TREES_H_
 

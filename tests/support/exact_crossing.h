@@ -40,9 +40,9 @@ inline int exact_turn(const IntegerVector& u, const IntegerVector& v, size_t axi
   return Integer(u.at[y] * v.at[z] - u.at[z] * v.at[y]).sign();
 }
 
-// Returns the crossing of a triangle by the ray from `point` along the x axis. The rule differs from that of
-// crossing(), but both give the same result for each triangle: the ray is moved by (e^2, -e) along y and z, for an
-// infinitesimal e, and crosses the triangle if the moved ray passes through the triangle's inside.
+// Returns the crossing of a triangle by the ray from `point` along the x axis. The ray is moved by (e^2, -e) along y
+// and z, for an infinitesimal e, and crosses the triangle if the moved ray passes through the triangle's inside.
+// crossing() has another rule, but both rules give the same result for each triangle.
 inline Crossing exact_crossing(Vec3d point, const Triangle& triangle) {
   const IntegerVector p = exactly(point);
   const std::array<IntegerVector, 3> corners = {exactly(to_double(triangle.a)) - p, exactly(to_double(triangle.b)) - p,

@@ -44,7 +44,7 @@ class FakeLog final : public UpdateLog {
   void keep_outline(const std::array<uint8_t, 32>&, absl::string_view) override {}
   std::optional<std::string> read_outline(const std::array<uint8_t, 32>&) const override { return std::nullopt; }
 
-  // Writes `files` below the new directory `path`, then calls the function that the test has set.
+  // Writes `files` below the new directory `path`, then calls `afterwards` if the test has set it.
   absl::Status back_up(const std::string& path) override {
     std::error_code why;
     if (!std::filesystem::create_directory(path, why)) return absl::UnavailableError("the directory is not new");

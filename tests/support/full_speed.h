@@ -26,7 +26,8 @@ struct FullSpeedResult {
   std::string difference;  // first difference that a reader found
 };
 
-// Runs until go_on(result so far) returns false or a reader finds a difference. `go_on` is called before each update.
+// Runs until go_on() returns false or a reader finds a difference. go_on() is called before each update, with the
+// result so far.
 template <class GoOn>
 FullSpeedResult run_at_full_speed(const FullSpeedOptions& options, const GoOn& go_on) {
   const SceneSchedule schedule(options.objects);

@@ -78,8 +78,9 @@ inline std::string grid_ball_difference(const ObjectScene& scene, Random& random
   return "";
 }
 
-// Returns `object` moved to the position of another object, half of the time with one coordinate reduced by up to half,
-// so that queries of the scene find the moved object; sometimes with pose and shape of another object.
+// Returns `object` moved to the position of another object, half of the time with one coordinate reduced by up to half.
+// So queries of the scene find the moved object. Sometimes the object gets the complete shape of another object,
+// including its position and rotation.
 inline Object moved(const Object& object, const std::vector<Object>& objects, Random& random) {
   Object result = object;
   result.shape.position = random.pick(objects).shape.position;

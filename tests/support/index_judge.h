@@ -55,8 +55,9 @@ class IndexJudge {
   }
 
   // Compares the first hit, any hit, all hits and the conservative results of a ray. The limits are infinity and, for
-  // each of the two nearest hits, its t, the next greater value of type S, and half of its t. `turn` selects the values
-  // whose near values are the limits at which the contract of visit_ray() is checked.
+  // each of the two nearest hits, its t, the next greater value of type S, and half of its t. The contract of
+  // visit_ray() is checked without a limit and with limits at which the ray enters the bounds of a value; `turn`
+  // selects these values.
   std::string ray_difference(const typename Traits::RayQuery& ray, size_t turn) const {
     constexpr S kInfinity = std::numeric_limits<S>::infinity();
     Hits hits;

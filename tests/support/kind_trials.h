@@ -57,8 +57,8 @@ inline std::string crossing_difference() {
   return "";
 }
 
-// Returns the first seed whose random view has a point that is inside by the view's planes but outside by its clip
-// coordinates, or the other way round; empty if there is none.
+// Returns the first seed whose random view has a point for which the view's planes and the point's clip coordinates
+// disagree whether the point is inside; empty if there is none.
 inline std::string view_difference() {
   for (uint64_t seed = 0; seed < scaled_count(300); ++seed) {
     Random random(seed);
@@ -71,7 +71,7 @@ inline std::string view_difference() {
     const double z = opengl ? -(far + near) / (far - near) : -far / (far - near);
     const double w = opengl ? -2 * far * near / (far - near) : -far * near / (far - near);
     const std::array<Vec3d, 3> axes = {rotation.to_local({1, 0, 0}), rotation.to_local({0, 1, 0}),
-                                       rotation.to_local({0, 0, 1})};  // columns of the rotation to view axes
+                                       rotation.to_local({0, 0, 1})};  // columns of the matrix to view axes
     std::vector<float> matrix;
     const auto add_column = [&](Vec3d view, double one) {
       for (const double value : {across * view.x, up * view.y, z * view.z + w * one, -view.z})

@@ -19,8 +19,8 @@
 
 namespace locus::test {
 
-// Point in mesh axes, the largest distance of triangles that a search must return, and the slack of a search for the
-// nearest triangle.
+// Arguments of searches from one point in mesh axes. A search must return all triangles within `limit`. A search for
+// only the nearest triangle must return those that are farther than the nearest one by at most `slack`.
 struct NearestTarget {
   Vec3d point;
   double limit = std::numeric_limits<double>::infinity();

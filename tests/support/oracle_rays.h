@@ -233,7 +233,7 @@ class RayOracle : public OracleScene {
     }
   }
 
-  // Returns whether an instance or object that blocks the viewer's sight of the target meets the segment.
+  // Returns whether the segment hits an instance or object that can block the viewer's sight of the target.
   bool is_blocked(const QueryBlock& block, const SightColumns& sight, size_t viewer, size_t target,
                   const Question& segment) const {
     const Group own = entry_for(sight.viewer_groups, viewer, Group{0});

@@ -166,7 +166,7 @@ class QueryOracle : public RayOracle {
   static double reach(const Balld& ball) { return max_component(abs(ball.center)) + ball.radius; }
   static double reach(const Obbd& box) { return max_component(abs(box.center)) + 2 * max_component(box.half); }
 
-  // Returns whether a solid meets the bounds of an instance; for a capsule, its bounds decide.
+  // Returns whether a solid overlaps the bounds of an instance. A capsule is replaced by its bounds for this test.
   static bool may_meet(const Capsule& capsule, const Aabbd& bounds) { return overlaps(bounds_of(capsule), bounds); }
   template <class Solid>
   static bool may_meet(const Solid& solid, const Aabbd& bounds) {

@@ -156,7 +156,8 @@ inline void add_anchors(const QueryScene& scene, Random& random, OwnedBlock& blo
   }
   QueryBatch batch;
   batch.blocks = {block.view()};
-  if (!check_batch(batch).ok()) block.anchor_ids.clear();  // as offsets from an anchor they may be too large
+  // Positions that are valid relative to the frame may be too large as offsets from an anchor.
+  if (!check_batch(batch).ok()) block.anchor_ids.clear();
 }
 
 inline void add_common(const QueryScene& scene, Random& random, OwnedBlock& block) {

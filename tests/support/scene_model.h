@@ -265,7 +265,8 @@ class SceneModel {
     count(Reason::kUnspecified, field, i, columns.ids[i]);
   }
 
-  using Lives = std::map<Id, uint64_t>;  // unique number of the current life of each object
+  // For each object, the unique number of its life: a life begins when an unknown id is inserted, and at a teleport.
+  using Lives = std::map<Id, uint64_t>;
   struct Then {
     Objects objects;
     Lives lives;

@@ -1,5 +1,5 @@
-// SHA-256 of a text by OpenSSL's own function, so that tests compare the hashes of the product with another
-// implementation than the product's. Function without state.
+// SHA-256 of a text by a direct call of OpenSSL, so that tests check the hashes of the product without the product's
+// own functions. Function without state.
 #ifndef LOCUS_TESTS_SUPPORT_SHA256_HEX_H_
 #define LOCUS_TESTS_SUPPORT_SHA256_HEX_H_
 

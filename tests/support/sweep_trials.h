@@ -48,7 +48,7 @@ inline Mover random_mover(Random& random, Vec3d target, double size) {
   return mover;
 }
 
-// A mover and a triangle or shape that it may meet. `epsilon` covers the rounding of the overlap predicates.
+// A mover, and a triangle or shape that the mover may touch. `epsilon` covers the rounding of the overlap predicates.
 template <class Primitive>
 struct SweepTrial {
   Primitive primitive;

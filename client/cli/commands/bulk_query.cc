@@ -104,8 +104,8 @@ class BulkQueryRun {
     }
   }
 
-  // Adds the rows from index `begin` on to `message`, one block for each run of rows with the same frame, until the
-  // message has kMaxBlocks blocks. Returns the index of the first row that was not added.
+  // Adds rows of `batch` to `message`, beginning with row `begin`, until the message has kMaxBlocks blocks. Consecutive
+  // rows with the same frame form one block. Returns the index of the first row that was not added.
   size_t add_blocks(const RowBatch& batch, size_t begin, InFlight& message, client::QueryBuilder& builder) const {
     message.sent.first_row = batch.first_row + begin;
     const size_t first = begin;

@@ -30,7 +30,8 @@ struct BlockRows {
   const RowBatch& batch;
   RowSpan rows;
   client::Double3 frame;
-  std::vector<float> offsets;  // 3 per row: position (field 0 of the schema) relative to `frame`; empty if it has none
+  // Three per row: the position (field 0 of the schema) relative to `frame`. Empty if BulkQuery::has_position is false.
+  std::vector<float> offsets;
 };
 
 // Content of a row of the answer.

@@ -31,8 +31,8 @@ std::string in_folder(const CertOptions& options, absl::string_view name) {
   return absl::StrCat(options.folder, "/", name);
 }
 
-// Writes the report: the paths of the certificate BASE.pem and of the key BASE.key, and `next`, a command that uses
-// these two files, under the key `use`.
+// Writes the report. It contains the paths of the certificate BASE.pem and of the key BASE.key. Its entry with the key
+// `use` has the value `next`, an example of a command that uses these two files.
 void write_made(Context& context, const std::string& base, const std::string& use, const std::string& next) {
   Report report;
   report.head = {{"certificate", absl::StrCat(base, ".pem")}, {"key", absl::StrCat(base, ".key")}, {use, next}};

@@ -13,8 +13,8 @@ struct CompletionOptions {
   Shell shell = Shell::kBash;
 };
 
-// Writes a completion script. The commands are read from a second parser, which this function builds, because the
-// parser that runs this command belongs to the caller.
+// Writes a completion script. Builds a second parser and reads the commands from it, because the parser that is running
+// this command is not passed to this function.
 absl::Status completion(const CompletionOptions& options, Context& context) {
   std::ostringstream nowhere;
   Context unused(nowhere, nowhere, Progress::kSilent);

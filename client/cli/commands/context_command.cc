@@ -69,8 +69,8 @@ void make_absolute(std::string& path) {
   if (!path.empty()) path = std::filesystem::absolute(path, ignored).string();
 }
 
-// Returns an error if an option of the connection stands before the command, where `context set` does not keep it.
-// Values of environment variables are ignored: they count for every command and are not meant to be kept.
+// Returns an error if a connection option stands before the command, because `context set` would not store its value.
+// Values from environment variables are ignored: they apply to every command and are not meant to be stored.
 absl::Status check_options_before(const CLI::App& program) {
   for (const char* name : kConnectionOptionNames) {
     const CLI::Option& option = *program.get_option(name);

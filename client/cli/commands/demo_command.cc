@@ -1,4 +1,4 @@
-// `locus demo`: uploads a level, moves objects in it, by default ten thousand, while clients query them, and checks
+// `locus demo`: uploads a level and moves objects in it (ten thousand by default) while clients query them. Checks
 // answers to every kind of query that the clients send (kDemoKinds).
 #include <chrono>
 #include <functional>

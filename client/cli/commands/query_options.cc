@@ -21,8 +21,8 @@ const NamedValues<v1::Column>& column_names() {
 }
 
 // Returns whether `value` is exactly representable as a float. If a coordinate is not, framed() chooses a frame other
-// than the origin. Returns true for NaN and infinity too: they then do not change the frame, and the server's error
-// names the position that contains them.
+// than the origin. Returns true for NaN and infinity too, so that they do not change the frame: the server refuses
+// them, and its error names the position that contains them.
 bool is_float(double value) { return !std::isfinite(value) || static_cast<double>(static_cast<float>(value)) == value; }
 
 void add_filter_options(CLI::App& command, QueryOptions& options) {

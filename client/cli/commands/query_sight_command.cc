@@ -11,7 +11,8 @@
 #include "client/lib/result_rows.h"
 #include "core/base/status_macros.h"
 
-// The commands `locus query sight` and `locus query pairs`, which query relations between several things.
+// The commands `locus query sight`, which queries lines of sight between viewers and targets, and `locus query pairs`,
+// which queries pairs of objects near each other.
 namespace locus::cli {
 namespace {
 

@@ -23,7 +23,7 @@ namespace {
 
 constexpr uint64_t kMaxRenderRays = uint64_t{1} << 24;  // limits memory: 28 bytes per ray, 52 if work is reported
 constexpr ImageSize kDefaultSize = {960, 540};
-constexpr ImageSize kDefaultHeatSize = {480, 270};  // smaller, since reporting the work of a ray makes it slower
+constexpr ImageSize kDefaultHeatSize = {480, 270};  // smaller, since rays take longer if their work is reported
 
 enum class Show { kShaded, kDepth, kNormals, kIds };
 enum class Heat { kNone, kWork, kNodes, kCells, kTests };

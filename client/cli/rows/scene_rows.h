@@ -1,5 +1,5 @@
-// Objects and instances ("things") of a dumped scene, one by one, and as rows of a report. For the dump and export
-// commands. Plain data and functions without state.
+// Functions that iterate over the objects and instances ("things") of a dumped scene and convert them to rows of a
+// report. For the dump and export commands. Plain data and functions without state.
 #ifndef LOCUS_CLIENT_CLI_ROWS_SCENE_ROWS_H_
 #define LOCUS_CLIENT_CLI_ROWS_SCENE_ROWS_H_
 

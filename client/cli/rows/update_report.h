@@ -1,4 +1,4 @@
-// Sends one update batch and prints its ack. For the insert, move and remove commands.
+// Function that sends one update batch and prints its ack. For the insert, move and remove commands.
 #ifndef LOCUS_CLIENT_CLI_ROWS_UPDATE_REPORT_H_
 #define LOCUS_CLIENT_CLI_ROWS_UPDATE_REPORT_H_
 

@@ -7,9 +7,10 @@
 
 namespace locus::cli {
 
-// Applies an operator: any to two numbers, + and - to two vectors, * and / to a vector and a number. The result is
-// unknown if an operand is unknown. Returns INVALID_ARGUMENT, with the values in the message, for any other
-// combination, and OUT_OF_RANGE for division by zero and for results that are not finite or do not fit 64 bits.
+// Applies the operator `sign`. Two numbers allow every operator, two vectors allow + and -, and a vector and a number
+// allow * and /. The result is unknown if an operand is unknown. Returns INVALID_ARGUMENT, with the values in the
+// message, for any other combination, and OUT_OF_RANGE for division by zero and for results that are not finite or do
+// not fit 64 bits.
 absl::StatusOr<Value> calculate(char sign, const Value& left, const Value& right);
 
 }  // namespace locus::cli

@@ -172,7 +172,7 @@ Answer read_sum(Cursor& cursor, const Variables& variables) {
 }
 
 // Reads the index and the closing bracket of `[index]`, and applies the index to `value`. Precondition: the cursor is
-// behind the opening bracket.
+// just after the opening bracket.
 Answer read_entry(Cursor& cursor, const Variables& variables, const Value& value) {
   RETURN_IF_ERROR(cursor.open());
   const Answer index = read_sum(cursor, variables);
@@ -214,7 +214,7 @@ bool is_missing(const Value& value) {
   return json.ok() && json->is_null();
 }
 
-// Reads `name.path:-default}`. Precondition: the cursor is behind the opening brace.
+// Reads `name.path:-default}`. Precondition: the cursor is just after the opening brace.
 Answer read_braced_variable(Cursor& cursor, const Variables& variables) {
   const std::string name = cursor.read_name();
   if (name.empty()) return expected("a name behind `${`", cursor);

@@ -28,7 +28,7 @@ absl::StatusOr<Value> read_expression(Cursor& cursor, const Variables& variables
 absl::StatusOr<Value> read_braces(Cursor& cursor, const Variables& variables);
 
 // Reads `name.field[0]` or `{name.field:-default}`. The default is used if the variable does not exist, or its value is
-// null or a column without rows. Precondition: the cursor is behind the "$".
+// null or a column without rows. Precondition: the cursor is just after the "$".
 absl::StatusOr<Value> read_variable(Cursor& cursor, const Variables& variables);
 
 }  // namespace locus::cli

@@ -23,7 +23,7 @@ absl::StatusOr<Value> read_single_quoted(Cursor& cursor) {
   return Value::of(Json(std::move(text)));
 }
 
-// Reads an escape sequence after its backslash. Precondition: the cursor is behind the backslash.
+// Reads the rest of an escape sequence. Precondition: the cursor is just after the backslash.
 absl::Status read_escape(Cursor& cursor, std::string& text) {
   if (cursor.ended()) return not_closed('"');
   const char c = cursor.next();

@@ -26,7 +26,7 @@ const std::map<std::string, Verb>& verbs() {
   return table;
 }
 
-// Removes the first word, and the blanks behind this word, from `text`. Returns the word.
+// Removes the first word, and the blanks after this word, from `text`. Returns the word.
 std::string take_first_word(absl::string_view& text) {
   const size_t end = std::min(text.find_first_of(" \t"), text.size());
   std::string word(text.substr(0, end));

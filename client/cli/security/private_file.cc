@@ -17,8 +17,8 @@
 namespace locus::cli {
 namespace {
 
-// Returns the error of a failed system call, from errno. A missing file permission gives FAILED_PRECONDITION, because
-// PERMISSION_DENIED is reserved for denials by the server.
+// Returns the error of a failed system call, from errno. The code for missing file permissions is FAILED_PRECONDITION,
+// because PERMISSION_DENIED is reserved for denials by the server.
 absl::Status system_error(absl::string_view doing, const std::string& path) {
   const std::string message = absl::StrCat("cannot ", doing, " ", path, ": ", std::strerror(errno));
   if (errno == ENOENT) return absl::NotFoundError(message);
@@ -40,8 +40,8 @@ class Descriptor {
   const int number_;
 };
 
-// Gives an open file the owner and the group of the file at `path`, if there is one. When root replaces a file of
-// another user, this user must still be able to read the file.
+// Sets the owner and the group of an open file to those of the file at `path`, if that file exists. This is needed when
+// root replaces a file of another user: the user must still be able to read the file.
 absl::Status keep_owner(int descriptor, const std::string& path) {
   struct stat old {
   }, made{};

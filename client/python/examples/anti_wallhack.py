@@ -1,4 +1,4 @@
-"""One tick of an anti-wallhack filter: each player is sent only the players that it sees, and those close to it.
+"""One tick of an anti-wallhack filter, which sends to each player only the players that it sees or that are near it.
 
     PYTHONPATH=build/release/python /usr/bin/python3 anti_wallhack.py [ADDRESS]
 
@@ -29,7 +29,7 @@ def make_scene(client: locus.Client, positions: list[list[float]]) -> locus.Ack:
 
 
 def visible(client: locus.Client, ack: locus.Ack, positions: list[list[float]]) -> list[list[int]]:
-    """Returns for each player the numbers of the players that it sees or that are close to it."""
+    """Returns for each player the indices of the other players that it sees or that are close to it."""
     eyes = [[x, 1.7, z] for x, _, z in positions]
     bodies = [[x, height, z] for x, _, z in positions for height in SAMPLES]
     groups = list(range(1, PLAYERS + 1))

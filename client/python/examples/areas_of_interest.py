@@ -2,9 +2,9 @@
 
     PYTHONPATH=build/release/python /usr/bin/python3 areas_of_interest.py [ADDRESS]
 
-Each query is anchored to a player: its position is relative to the position of the player at the revision of the
-answer, and it does not find the player itself. A second block returns only numbers of objects, for a list of crowded
-places.
+Each query is anchored to a player: the position of the query is relative to the position of the player at the revision
+of the answer, and the query does not find the player. A second block returns for each player only the number of objects
+within twice the radius.
 """
 from __future__ import annotations
 

@@ -2,9 +2,9 @@
 
     PYTHONPATH=build/release/python /usr/bin/python3 character_step.py [ADDRESS]
 
-The character is a capsule. Columns T and NORMAL of a capsule query give the depth of each overlap and the direction out
-of it. A sweep with AtStart.APPROACH gives the distance that the character can move, without being stopped by the floor
-on which it stands.
+The character is a capsule. Columns T and NORMAL of a capsule query contain the depth of each overlap and the direction
+out of it. A sweep with AtStart.APPROACH returns how far the character can move. This mode is needed so that the floor
+on which the character stands does not stop the sweep.
 """
 from __future__ import annotations
 

@@ -8,8 +8,9 @@
 
 Calls block. Errors are LocusError (locus/errors.py); wrong arguments are TypeError and ValueError. Unary calls that
 change nothing are retried within their timeout, as often as `retry` of connect() allows, if the server is unavailable
-or asks for a wait. apply() is retried only if its batch carries `writer` and `number`. Any unary call is also repeated
-if the server refused its token and the token file contains another one by then. Other calls are never retried.
+or asks for a wait. apply() is retried only if its batch carries `writer` and `number`. Other calls are never retried,
+with one exception: if the server refuses the token of a unary call, and the token file then contains a new token, the
+call is repeated with the new token.
 """
 from __future__ import annotations
 
@@ -59,8 +60,8 @@ def connect(address: str = DEFAULT_ADDRESS, *, timeout: float = 10.0, long_timeo
 
     `token`: bearer token that every call carries; `token_file`: file that contains only the token, read again when it
     has changed and when the server refuses the token. A token is sent only over TLS, to loopback addresses and to unix
-    sockets, unless `allow_token_without_tls`. Raises ValueError for options that contradict each other or would reveal
-    a token, OSError for a file that cannot be read.
+    sockets, unless `allow_token_without_tls`. Raises ValueError for options that contradict each other or that would
+    send a token unencrypted to another machine, OSError for a file that cannot be read.
     """
     credentials = Credentials(tls=tls, ca=ca, cert=cert, key=key, server_name=server_name, token=token,
                               token_file=token_file, allow_token_without_tls=allow_token_without_tls)

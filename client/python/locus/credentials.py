@@ -50,7 +50,7 @@ class Credentials:
 
     @property
     def uses_tls(self) -> bool:
-        """True if the options ask for TLS."""
+        """True if the options enable TLS."""
         return self.tls or bool(self.ca or self.cert or self.server_name)
 
     def channel(self, target: str, options: List[Tuple[str, object]]) -> grpc.Channel:

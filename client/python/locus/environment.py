@@ -20,17 +20,18 @@ def connect_from_environment(context: str = "", **options: Any) -> Client:
     """Connects to the server that the environment and the user's contexts describe.
 
     Reads LOCUS_ADDRESS, LOCUS_TLS, LOCUS_CA, LOCUS_CERT, LOCUS_KEY, LOCUS_SERVER_NAME, LOCUS_TOKEN_FILE and
-    LOCUS_TOKEN. A named context gives what they leave open: `context`, else the one of LOCUS_CONTEXT, else, if
-    LOCUS_ADDRESS is not set, the default context of the user. The default context is not used for another address, so
-    that its credentials do not reach another server. `options`: further options of connect(); they take precedence over
-    the environment. Raises ValueError for an unknown context, a malformed file of contexts or a wrong LOCUS_TLS,
-    OSError for a file of contexts that cannot be read, and the errors of connect().
+    LOCUS_TOKEN. Options that are not set by these variables come from a named context. Its name is `context`, or the
+    value of LOCUS_CONTEXT if `context` is empty. If both are empty and LOCUS_ADDRESS is not set, the user's default
+    context is used; it is not used for another address, so that its credentials do not reach another server. `options`:
+    further options of connect(); they take precedence over the environment. Raises ValueError for an unknown context, a
+    malformed file of contexts or a wrong LOCUS_TLS, OSError for a file of contexts that cannot be read, and the errors
+    of connect().
     """
     return connect(**{**endpoint(context), **options})
 
 
 def endpoint(context: str = "") -> Dict[str, Any]:
-    """Returns the options of connect() that the environment and the contexts give."""
+    """Returns the options of connect() that the environment and the contexts specify."""
     found: Dict[str, Any] = {name: os.environ[_variable(name)] for name in ("address", "token") + _OPTIONS
                              if os.environ.get(_variable(name))}
     tls = os.environ.get("LOCUS_TLS", "")

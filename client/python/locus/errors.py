@@ -24,8 +24,8 @@ _HINTS = {
     grpc.StatusCode.PERMISSION_DENIED: "ask the operator of the server for the right to do this",
 }
 
-# Pairs of texts for connections that end during their establishment: if gRPC's message contains the first text, the
-# advice is the second. The first pair that matches is used.
+# Pairs (symptom, advice) for connections that cannot be established. The advice applies if gRPC's message contains the
+# symptom. The first pair that matches is used.
 _ON_CONNECTIONS = (
     (": Permission denied", "permission denied: the socket's file admits other users only; the server's operator can set "
                             "--unix-mode and --unix-owner"),
@@ -43,8 +43,8 @@ _ON_CONNECTIONS = (
 
 
 def connection_advice(message: str) -> str:
-    """Returns advice for a connection that was not permitted, whose server's name is unknown or whose TLS failed; empty
-    for other messages.
+    """Returns advice if the connection was not permitted, the server's name is unknown, or TLS failed. Returns an empty
+    string for other messages.
     """
     return next((remedy for symptom, remedy in _ON_CONNECTIONS if symptom in message), "")
 

@@ -238,7 +238,7 @@ class PipelinedStream(Generic[Result]):
 
     def _wait_before_next(self, end: LocusError) -> Optional[float]:
         """Returns the seconds to wait before the next call, or None if the stream ends instead. A call that fails while
-        no message is unanswered does not count as a failure.
+        all messages are answered does not count as a failure.
         """
         if self._broken_off or self._fatal is not None:
             return None

@@ -32,9 +32,9 @@ class Block(NamedTuple):
     - `max_results`: maximum number of rows per query, 0 = 1,024.
     - `after_id`: return only rows with a higher id, to continue after a truncated result.
     - `as_of_ticks`: N uint64 or one; the query sees objects as they were at the end of this tick. `as_of_fractions`: N
-      float32 or one, 0 <= f < 1, only with `as_of_ticks`: moves the time of the query on by the fraction f of the time
-      from that tick to the next. `outside_history`: how times outside the history are handled; by default they are
-      refused.
+      float32 or one, 0 <= f < 1, only with `as_of_ticks`: the query is answered for the time tick + f, f being a
+      fraction of the time between that tick and the next. `outside_history`: how times outside the history are handled;
+      by default they are refused.
     - `anchor_ids`: N uint64, an object or instance for each query. The positions of the query are relative to the
       position of this anchor, and the query does not find the anchor.
     - `count_only`: return only the number of rows of each query; `max_results` does not limit this number.
@@ -92,8 +92,9 @@ class Block(NamedTuple):
 
 
 class After(NamedTuple):
-    """Position in the order of rows (t, id, triangle). Rays and nearest queries return only rows behind this position:
-    N numbers each, or one for all. Without `ids`, rows whose t equals the given t are left out; `triangles` need `ids`.
+    """Position in the order of rows (t, id, triangle). Rays and nearest queries return only rows after this position.
+    Each column has N numbers, or one number for all queries. Without `ids`, rows whose t equals the given t are left
+    out; `triangles` need `ids`.
     """
 
     ts: ColumnLike
@@ -143,7 +144,7 @@ class QueryBatch:
              after: Optional[After] = None, block: Block = Block()) -> "QueryBatch":
         """Adds a block of N rays. `origins`: 3N float32; `directions`: 3N float32 or three, vectors of any length but
         zero. Directions are not normalized: the unit of t is the length of the direction. `t_max`: N float32 or one,
-        the maximum t, inclusive, +infinity by default; `after`: only hits behind this position.
+        the maximum t, inclusive, +infinity by default; `after`: only hits after this position.
         """
         new = _NewBlock(self._blocks, "rays")
         new.first("origins", origins, FLOAT32, 3)
@@ -217,7 +218,8 @@ class QueryBatch:
         """Adds a block of N points, to find the nearest objects and instances. `points`: 3N float32; `k`: maximum
         number of rows per point, by ascending distance. Column T contains the distance: 0 inside an object; for a mesh
         always the distance to its surface. `max_distances`: N float32 or one, inclusive, +infinity by default;
-        `detail`: INSTANCES returns one row per instance, for its nearest triangle; `after`: only rows behind this position.
+        `detail`: INSTANCES returns one row per instance, for its nearest triangle; `after`: only rows after this
+        position.
         """
         new = _NewBlock(self._blocks, "nearest")
         new.first("points", points, FLOAT32, 3)
@@ -279,7 +281,7 @@ class QueryBatch:
               after_other: int = 0, block: Block = Block()) -> "QueryBatch":
         """Adds one query for the pairs of objects within `max_distance` of each other; 0 finds objects that touch.
         `first_mask`, `second_mask`: layers of the two objects, 0 = all; `k`: find only the k nearest objects of each
-        object; `after_other`, together with Block.after_id: only rows behind this pair.
+        object; `after_other`, together with Block.after_id: only rows after this pair.
         """
         new = _NewBlock(self._blocks, "pairs")
         new.count = 1
@@ -363,28 +365,26 @@ class _NewBlock:
             self.kind.add(_KINDS[self.name][name], columns.borrow_for(path, value, number_type, self.count, width))
 
     def after(self, after: Optional[After]) -> None:
-        """Adds the position behind which the queries continue."""
+        """Adds the position after which the queries continue."""
         if after is not None:
             self.column("after_ts", after.ts, FLOAT32)
             self.column("after_ids", after.ids, UINT64)
             self.column("after_triangles", after.triangles, UINT32)
 
     def numbers(self, **fields: float) -> None:
-        """Adds those fields of the kind that are single floats. Fields that are 0 are omitted."""
+        """Adds fields of type float to the message of the query kind. Fields that are 0 are omitted."""
         for name, value in fields.items():
             if value:
                 self.kind.add_fixed32(_KINDS[self.name][name], struct.unpack("<I", struct.pack("<f", value))[0])
 
     def masks(self, **fields: int) -> None:
-        """Adds those fields of the kind that are single fixed32 numbers. Fields that are 0 are omitted."""
+        """Adds fields of type fixed32 to the message of the query kind. Fields that are 0 are omitted."""
         for name, value in fields.items():
             if value:
                 self.kind.add_fixed32(_KINDS[self.name][name], value)
 
     def options(self, **fields: int) -> None:
-        """Adds those fields of the kind that are single varints: bools, enums and uint32. Fields that are 0 are
-        omitted.
-        """
+        """Adds varint fields (bool, enum or uint32) to the message of the query kind. Fields that are 0 are omitted."""
         for name, value in fields.items():
             if value:
                 self.kind.add_varint(_KINDS[self.name][name], value)

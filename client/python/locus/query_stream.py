@@ -1,5 +1,5 @@
-"""Pipelined stream of query batches to one scene. Answers may arrive in any order and are matched by sequence number.
-For callers that query every tick.
+"""Pipelined stream of query batches to one scene, for callers that query every tick. Answers may arrive in any order;
+the stream assigns each answer to its batch by the sequence number.
 """
 from __future__ import annotations
 

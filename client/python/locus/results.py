@@ -18,8 +18,8 @@ NO_TRIANGLE = 0xFFFFFFFF
 _RESULT = schema.numbers("QueryResult")
 _BLOCK = schema.numbers("BlockResult")
 _IN_RESPONSE = schema.numbers("QueryResponse")["result"]
-# Sizes in bytes of a row of the columns from whose length the number of rows can be computed. The two most frequent
-# columns are first, because the columns are tried in this order.
+# _ROW_BYTES: columns with one entry per row, and the size of an entry in bytes. The number of rows of a block is
+# computed from the first of these columns that the block contains, so the two most frequent columns come first.
 _COUNTS = _BLOCK["counts"]
 _ROW_BYTES = tuple((_BLOCK[name], size) for name, size in (
     ("ids", 8), ("t", 4), ("triangles", 4), ("uvs", 8), ("normals", 12), ("points", 12), ("groups", 8), ("tags", 8),
@@ -62,7 +62,8 @@ class _Column:
 
 
 class BlockResult:
-    """Result of one block: R rows in columns, the rows of the first query first, then those of the second, and so on.
+    """Result of one block of N queries: R rows in columns, first the rows of the first query, then those of the second,
+    and so on.
 
     A column is a read-only numpy array of shape (R,) or (R, width), or, without numpy, a flat array.array. A column
     that was not requested is empty. Columns are decoded when first read. Immutable.
@@ -112,8 +113,8 @@ class BlockResult:
         return _work_in(self._fields, _BLOCK["work"])
 
     def rows_of(self, query: int) -> slice:
-        """Returns the rows of one query as a slice, with which columns that have one number per row can be indexed. The
-        first call takes time linear in N.
+        """Returns a slice that selects the rows of one query from any column that has one number per row. The first
+        call takes time linear in N, the number of queries.
         """
         if not len(self.counts):
             return slice(query, query + 1)
@@ -154,8 +155,8 @@ class QueryResult(Revision):
 
     @classmethod
     def of(cls, message: memoryview) -> "QueryResult":
-        """Decodes the protocol's QueryResult. Columns are views of `message`, so its memory is kept as long as any
-        column.
+        """Decodes the protocol's QueryResult. Columns are views of `message`, so the memory of `message` is freed only
+        after the last column.
         """
         found = wire.fields(message)
         result = cls.__new__(cls)

@@ -1,5 +1,5 @@
-"""Pipelined stream of update batches to one scene. Each batch is applied exactly once, even if connections break. For
-game servers that send one batch per tick.
+"""Pipelined stream of update batches to one scene, for game servers that send one batch per tick. Each batch is applied
+exactly once, even if connections break.
 """
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ class UpdateStream(PipelinedStream[Ack]):
             self._last_ack = outcome
         elif not outcome.refused or outcome.reason == Reason.BATCH_GAP:
             # End the stream, because continuing could lose a batch: either it is unknown whether the server used the
-            # batch number, or the server does not know the writer any more.
+            # batch number, or the server no longer has a record of the writer.
             self._fatal = outcome
         else:
             self._next_batch -= len(self._items) - position + 1

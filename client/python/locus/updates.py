@@ -24,10 +24,10 @@ class UpdateBatch:
     server, which refuses wrong items individually and lists them in Ack.errors, or, with `all_or_nothing`, refuses the
     whole batch.
 
-    Settings: `tick` is the caller's time step; `clear` removes every object first; with `upsert` an insert of a known
-    id replaces the object; `restart_ticks` drops the scene's history and accepts a `tick` lower than the scene's;
-    `writer` (random, not 0) and `number` (1, 2, 3 ...) let the server recognize a repeated batch and apply it once.
-    Streams set `writer` and `number` automatically.
+    Settings: `tick` is the caller's time step; `clear` removes every object first; with `upsert`, an insert replaces
+    the object that already has its id; `restart_ticks` drops the scene's history and accepts a `tick` lower than the
+    scene's; `writer` (random, not 0) and `number` (1, 2, 3 ...) let the server recognize a repeated batch and apply it
+    only once. Streams set `writer` and `number` automatically.
 
     Methods return the batch, so that calls can be chained. Not thread-safe.
     """

@@ -33,8 +33,8 @@ class ItemError:
 class Ack(Revision):
     """Result of an update batch. A query with `at_least=ack` sees the batch.
 
-    `applied` and `refused` count items; `errors` has the first 1,000 refused ones. `tick` is the scene's tick when the
-    batch was applied. `duplicate`: this writer's batch had been applied before and was not applied again.
+    `applied` and `refused` count items; `errors` lists the first 1,000 refused items. `tick` is the scene's tick when
+    the batch was applied. `duplicate` is True if the server had already applied this batch and did not apply it again.
     """
 
     tick: int
@@ -55,11 +55,11 @@ class Ack(Revision):
 class Scene(Revision):
     """Description of a scene at the time of the call.
 
-    `objects`, `instances` and `triangles` are counts; `memory_bytes` is an estimate without meshes. `bounds` are two
-    corners of the bounding box of all objects and instances, the lower and the upper one, each x, y, z in the caller's
-    unit; None in an empty scene. The box may be somewhat too large. `history_ticks` is the maximum number of ticks in
-    the history; now the history contains `recorded_ticks` ticks, beginning with `oldest_tick`, in `history_bytes`
-    bytes.
+    `objects`, `instances` and `triangles` are counts; `memory_bytes` is an estimate that excludes meshes. `bounds` is
+    the bounding box of all objects and instances: its lower and its upper corner, each x, y, z in the caller's unit;
+    None in an empty scene. The box may be somewhat too large. `history_ticks` is the maximum number of ticks in the
+    history. At present the history contains `recorded_ticks` ticks, the first of which is `oldest_tick`, and takes
+    `history_bytes` bytes.
     """
 
     name: str
@@ -126,7 +126,7 @@ class Mesh:
 class Limit:
     """Limit of the server. `value` is the maximum. `used` is the amount in use now; it is 0 for limits of a single
     request or scene. `refused` is the number of calls, messages and connections that the limit has refused since the
-    server started. Both are 0 if Server.use_hidden is True.
+    server started. `used` and `refused` are 0 if Server.use_hidden is True.
     """
 
     value: float
@@ -137,7 +137,7 @@ class Limit:
 @dataclasses.dataclass(frozen=True)
 class Quota:
     """Quota of an identity or connection, and its use. `used` is the amount in use now or, for names that end in
-    `_per_s`, the mean rate. `available` is the amount that may be used at once now. `limit` and `available` are None if
+    `_per_s`, the mean rate. `available` is the amount that may be used immediately. `limit` and `available` are None if
     there is no limit.
     """
 

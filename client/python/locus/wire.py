@@ -1,9 +1,9 @@
-"""The part of protobuf's wire format that columns need: decoding of answers without copies, and framing of encoded
-batches. Internal to the package.
+"""Part of protobuf's wire format: decodes query results without copies, and frames encoded batches. Internal to the
+package.
 
 Parsing an answer with protobuf would copy each column twice (into the message and out of the message), and these copies
 would be most of the client's cost of an answer. In this module a decoded column is a view of the received bytes. All
-other messages use the mirrored schema.
+other messages are encoded and decoded by protobuf with the mirrored schema (schema.py).
 """
 from __future__ import annotations
 
@@ -120,7 +120,9 @@ def vector(xyz: Sequence[float]) -> bytes:
 
 
 class Parts:
-    """Encoded message as a list of byte strings. Columns are borrowed and copied once, when the list is joined."""
+    """Encoded message as a list of byte strings. The columns in the list are borrowed: they are copied only once, when
+    the caller joins the list.
+    """
 
     def __init__(self) -> None:
         self.pieces: List[Raw] = []

@@ -41,8 +41,8 @@ class HalfLineBoxes {
     floats_.pad = rounded_up(pad);
   }
 
-  // Makes a half line whose search ends at the coordinate `end` on line.axis: boxes that begin beyond `end` are not
-  // met. `end` may be infinite.
+  // Makes a half line whose search ends at the coordinate `end` on line.axis: the half line does not meet boxes that
+  // begin beyond `end`. `end` may be infinite.
   HalfLineBoxes(const Vec3d& point, HalfLine line, float end) : HalfLineBoxes(point, line) {
     floats_.along_end = end * floats_.way;
   }
@@ -50,7 +50,7 @@ class HalfLineBoxes {
   const HalfLineFloats& floats() const { return floats_; }
 
   // Returns a mask with one bit for each of eight boxes, set if the half line meets the box. The boxes are laid out as
-  // in TriangleNode::bounds. Boxes of unused slots are not met.
+  // in TriangleNode::bounds. The bits of unused slots are 0.
   uint32_t boxes_met(const float (&bounds)[6][kTreeWidth]) const {
     const int axis = floats_.axis, first = (axis + 1) % 3, second = (axis + 2) % 3;
     const float(&begins)[kTreeWidth] = bounds[floats_.way > 0 ? axis : axis + 3];

@@ -18,7 +18,7 @@ namespace locus {
 
 class PathBoxes {
  public:
-  // Near value of a box that the path misses.
+  // Value that to_boxes() and to_triangles() write for a box that the path misses.
   static constexpr float kMissed = std::numeric_limits<float>::infinity();
 
   // Makes the path of a box of half extents `extent` around `origin` + t * `direction`. The largest |component| of
@@ -50,7 +50,7 @@ class PathBoxes {
     return near;
   }
 
-  // Writes the near value of each of eight boxes, laid out as in TriangleNode::bounds, or kMissed.
+  // Writes the result of entry() for each of eight boxes, laid out as in TriangleNode::bounds; kMissed for nullopt.
   void to_boxes(const float (&bounds)[6][kTreeWidth], float (&nears)[kTreeWidth]) const {
     const float(&lx)[kTreeWidth] = bounds[low_[0]], (&ly)[kTreeWidth] = bounds[low_[1]];
     const float(&lz)[kTreeWidth] = bounds[low_[2]], (&hx)[kTreeWidth] = bounds[high_[0]];
@@ -58,7 +58,7 @@ class PathBoxes {
     for (int i = 0; i < kTreeWidth; ++i) nears[i] = near_of(lx[i], ly[i], lz[i], hx[i], hy[i], hz[i]);
   }
 
-  // Writes the near value of the box around each of eight triangles, laid out as in TriangleBlock::vertices.
+  // Writes the same for the boxes around eight triangles, whose vertices are laid out as in TriangleBlock::vertices.
   void to_triangles(const float (&v)[9][kTreeWidth], float (&nears)[kTreeWidth]) const {
     float bounds[6][kTreeWidth];
     for (int axis = 0; axis < 3; ++axis) {
@@ -73,7 +73,9 @@ class PathBoxes {
  private:
   static float minimum(float a, float b) { return a < b ? a : b; }
   static float maximum(float a, float b) { return a > b ? a : b; }
-  // If coordinates overflow to NaN, the comparisons are false, so the box is not culled.
+  // Returns the t at which the path enters a box, or kMissed. The arguments are the sides at which the path enters the
+  // box (`lx` ...) and leaves it (`hx` ...). If coordinates overflow to NaN, the comparisons are false, so the box is
+  // not culled.
   float near_of(float lx, float ly, float lz, float hx, float hy, float hz) const {
     const float near = maximum(maximum(lx * reciprocal_[0] - enter_[0], ly * reciprocal_[1] - enter_[1]),
                                lz * reciprocal_[2] - enter_[2]);

@@ -84,7 +84,8 @@ void TriangleBvh::set_bounds(const Aabbf& bounds) {
   bounds_ = bounds;
   magnitude_ = magnitude(bounds);
   const Vec3d extent = to_double(bounds.max) - to_double(bounds.min);
-  // The probability that a random line through the bounds meets a box is the ratio of their cross sections.
+  // The probability that a random line through the bounds, parallel to an axis, intersects a box is the ratio of the
+  // cross section of the box to that of the bounds.
   Vec3d boxes_met;
   for (const TriangleNode& node : nodes()) {
     for (int slot = 0; slot < kTreeWidth && node.child[slot] != kNoChild; ++slot) {

@@ -57,8 +57,8 @@ WindingWay WindingCells::way_from(const TriangleBvh& tree, const Vec3d& point) c
   WindingWay way = WindingWay::out({direction % 3, direction >= 3});
   const Axis& axis = axes_[way.line.axis];
   const uint32_t start = cell[way.line.axis];
-  // If the way leads below the first cell, the unsigned `to` wraps around, so that it is not less than axis.count
-  // either.
+  // If the way leads out of the bounds, `to` is at least axis.count: below the first cell, the unsigned `to` wraps
+  // around.
   const uint32_t to = start + static_cast<uint32_t>(way.line.descending ? -steps : steps);
   if (to >= axis.count) return way;
   cell[way.line.axis] = to;

@@ -1,18 +1,19 @@
 // Cells over the bounds of a closed mesh, with the winding number of the mesh around all points of each clear cell. A
-// cell is clear if it meets the bounds of no triangle. A point in a clear cell needs no search. From any other point,
-// the search along a half line may end in the next clear cell: the crossings beyond are already included in the winding
-// number of this cell.
+// cell is clear if it overlaps the bounds of no triangle and its winding number is stored (see kMaxSets). A point in a
+// clear cell needs no search. From any other point, the search along a half line may end in the next clear cell: the
+// crossings beyond are already included in the winding number of this cell.
 //
 // Proof. Cells are intervals of coordinates on each axis, so a clear cell is a box without a point of the surface, and
 // the winding number is the same around all its points. Two clear cells with a common side have the same winding
 // number. Let a half line from p reach a point q in a clear cell. The winding number around p is the winding number
 // around q plus the sum of the crossings between p and q: see core/geometry/point_in_mesh.h. If a triangle may cross
 // the line, the projection of its bounds along the line contains the line, so on the two other axes the bounds overlap
-// the intervals of the clear cell. Since they do not meet the cell, they lie completely before it or completely beyond
-// it along the line: before it if they begin before q, otherwise beyond it.
+// the intervals of the clear cell. Since the bounds do not overlap the cell, they lie completely before it or
+// completely beyond it along the line: before it if they begin before q, otherwise beyond it.
 //
 // Threads: immutable after build(); every member may run concurrently.
-// Invariants: a cell that meets the bounds of a triangle is not clear; the end of a way lies in a clear cell.
+// Invariants: a cell that overlaps the bounds of a triangle is not clear; the end of a way (WindingWay) lies in a clear
+// cell or outside the mesh.
 #ifndef LOCUS_CORE_INDEX_BVH_WINDING_CELLS_H_
 #define LOCUS_CORE_INDEX_BVH_WINDING_CELLS_H_
 
@@ -27,14 +28,14 @@
 
 namespace locus {
 
-// Way of a search for the winding number around a point: the half line to search, and the end of the search.
+// Way of a search for the winding number around a point: the part of a half line that must be searched for crossings.
 struct WindingWay {
   bool is_known = false;  // no search is needed: `winding` is the winding number around the point itself
   int winding = 0;        // winding number around the end of the way
   HalfLine line;          // half line to search
-  float end = 0;          // coordinate on line.axis where the search ends; infinite: outside the mesh
+  float end = 0;          // coordinate on line.axis where the search ends; infinite if outside the mesh
 
-  // Returns the way along the whole of a half line.
+  // Returns the way along a whole half line: the search ends outside the mesh, where the winding number is 0.
   static WindingWay out(HalfLine line) {
     constexpr float kInfinity = std::numeric_limits<float>::infinity();
     return {false, 0, line, line.descending ? -kInfinity : kInfinity};
@@ -45,8 +46,8 @@ class WindingCells {
  public:
   // Makes an object without cells: every way leads out of the mesh.
   WindingCells() = default;
-  // Makes the cells of a closed mesh: about four for each triangle, at most 2^22, of a byte each. O(n); up to 9 bytes
-  // of temporary memory for each cell.
+  // Makes the cells of a closed mesh: about four cells for each triangle, at most 2^22 cells, one byte for each cell.
+  // O(n); up to 9 bytes of temporary memory for each cell.
   static WindingCells build(const TriangleBvh& tree);
 
   // Returns where the search from `point` may end: in its own cell, in a clear cell near it, or outside the mesh.
@@ -96,7 +97,7 @@ class WindingCells {
   // Divides each axis into cells of about equal size.
   void divide(const Aabbf& bounds, size_t triangles);
   static Axis divided(double low, double high, uint32_t count);
-  // Sets each cell to kNoWay if it meets the bounds of a triangle, otherwise to kUnset.
+  // Sets each cell to kNoWay if it overlaps the bounds of a triangle, otherwise to kUnset.
   void mark(const TriangleBvh& tree);
   // Sets the winding numbers of clear cells.
   void set_windings(const TriangleBvh& tree);

@@ -38,8 +38,8 @@ struct BrickGeometry {
            cell_along(position.z - low.z) << (2 * kBrickBits);
   }
   // Returns the index of the cell that contains the position, or a negative value if the position is not in the brick.
-  // Does the work of holds() and cell_of() in one step, but if the position is within rounding of a border of the
-  // brick, the result may disagree with holds().
+  // Faster than holds() followed by cell_of(). If the position is so close to a border of the brick that rounding
+  // decides, the result may disagree with holds().
   int cell_if_here(Vec3d position) const {
     // Adds 1 before the cast, which rounds toward zero: positions just below the brick must not become cell 0.
     const int64_t x = static_cast<int64_t>((position.x - low.x) * cells_per_unit + 1) - 1;

@@ -11,8 +11,8 @@ namespace {
 // Minimum number of sorted values of a brick for which changes are appended to its log. A smaller brick is sorted again
 // instead, which costs no more than appending.
 constexpr uint32_t kMinSorted = 48;
-constexpr uint32_t kSortedPerChange = 8;  // min sorted values per change for appending to the log
-constexpr uint32_t kSortedPerDead = 4;    // min sorted values per dead value for appending to the log
+constexpr uint32_t kSortedPerChange = 8;  // min ratio of sorted values to changes for appending to the log
+constexpr uint32_t kSortedPerDead = 4;    // min ratio of sorted values to dead values for appending to the log
 constexpr size_t kPrefetchValues = 16;    // number of values between a prefetch and its use
 
 // Mark of an unchanged value in sorted_changes_ and recent_changes_, larger than every index of a move.

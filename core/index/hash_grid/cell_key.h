@@ -18,7 +18,7 @@ namespace locus::internal {
 
 inline constexpr int kMinCellExponent = -20;  // min for the base level; about a micrometre if the unit is a metre
 inline constexpr int kMaxBaseExponent = 31;   // max for the base level; such a cell is wider than the world
-inline constexpr int kMaxCellExponent = 40;   // max for any level; this level also stores values wider than its cells
+inline constexpr int kMaxCellExponent = 40;   // max for any level; a level of this exponent also stores wider values
 inline constexpr int kBrickBits = 2;          // a brick is 2^kBrickBits cells wide
 inline constexpr double kMaxCellIndex =
     0x1p+62;  // limit of indices, far outside the world, so that every cast is defined

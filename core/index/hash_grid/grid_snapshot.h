@@ -151,7 +151,7 @@ class GridSnapshot {
   template <class Limit, class Visit>
   bool visit_nearest_bricks(const internal::GridLevel& level, const internal::NearestShells& shells, const Vec3d& point,
                             const Limit& limit, Work& work, const Visit& visit) const;
-  // Visits all bricks of a level that the ray meets, from near to far. Used if march() would look up more keys than the
+  // Visits all bricks of a level that the ray hits, from near to far. Used if march() would look up more keys than the
   // level has bricks. Returns false if visit() returned false.
   template <class Limit, class Visit>
   bool visit_by_distance(const internal::GridLevel& level, double max_extent, double ray_radius,

@@ -311,7 +311,7 @@ bool HashGrid::moves_nearly_all(const GridBatch& batch) const {
          moves >= size_ / 2;
 }
 
-// Does the work of move_all(), but iterates over the bricks and looks up the move of each value. Used if at least
+// Has the same effect as move_all(), but iterates over the bricks and looks up the move of each value. Used if at least
 // half of all values move. The values of a brick are adjacent in memory, so the moves need not be grouped by brick.
 void HashGrid::gather_all(const GridMoves& moves) {
   const internal::MoveFinder finder(moves);

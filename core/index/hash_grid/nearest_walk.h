@@ -35,7 +35,8 @@ class NearestShells {
   NearestShells(const Vec3d& point, const LevelGeometry& level, double per_cell);
   NearestShells(const Vec3d& point, const LevelGeometry&& level, double per_cell) = delete;
 
-  // Advances to the next shell. Returns false if no further key belongs to a squared distance of at most `limit`.
+  // Advances to the next shell. Returns false, without advancing, if the shells so far contain all values whose squared
+  // distance is at most `limit`.
   bool next(double limit);
   float above() const { return above_; }
   float up_to() const { return up_to_; }

@@ -1,6 +1,6 @@
 // March of a ray through one level of the hash grid: lists slabs of bricks perpendicular to the ray's dominant axis
 // (the axis of the direction's largest component), from near to far, each with the rectangle of bricks whose values the
-// ray can meet in that slab. Immutable; any thread.
+// ray can intersect in that slab. Immutable; any thread.
 //
 // The bounds of every slab are computed from its integer index, never accumulated along the ray, and widened by the
 // largest extent of the level, the padding of the slab test and the rounding of the bounds themselves. Therefore a
@@ -45,13 +45,13 @@ class SlabMarch {
   // Layer of cells within a slab, one cell thick; the four layers of a slab are counted from the near end.
   struct Layer {
     double near;
-    KeyRange cells;  // keys of the cells that the ray may meet in the layer; may be empty
+    KeyRange cells;  // keys of the cells whose values the ray may intersect in the layer; may be empty
   };
   Layer layer(int64_t n, int layer_index, double limit) const;
 
  private:
   // Part of the ray with t <= `limit` between the planes at `index` * `edge` and (`index` + 1) * `edge` on the dominant
-  // axis: its near value, as in Slab, and the bounds of the positions of values that this part can meet.
+  // axis: its near value, as in Slab, and the bounds of the positions of the values that this part can intersect.
   struct Crossing {
     double near;
     Aabbd positions;  // bounds of the positions of these values; may be empty
@@ -63,7 +63,7 @@ class SlabMarch {
   Aabbd bounds_;
   double per_unit_;
   double slab_edge_;
-  double tube_radius_ = 0;  // upper bound of the distance from the ray to the position of a value that the ray meets
+  double tube_radius_ = 0;  // upper bound of the distance from the ray to the position of a value that it intersects
   Interval<double> part_{0, 0};
   int axis_ = 0;
   int64_t first_ = 0;

@@ -14,7 +14,7 @@ namespace {
 // Number of rows that the first nearest query of a cell requests. Few cells need a second nearest query.
 constexpr uint32_t kFirstRows = 32;
 
-// Returns an upper bound of the |coordinates| of a shape relative to its position.
+// Returns an upper bound of the absolute coordinates, relative to the shape's position, of all points of a shape.
 double size_of(const Shape& shape) { return max_component(abs(to_double(shape.size))) * 2 + double{shape.radius}; }
 
 }  // namespace

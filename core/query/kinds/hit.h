@@ -17,7 +17,8 @@ namespace locus {
 
 // One row of a result; a default-constructed hit is a miss.
 struct Hit {
-  // Ray or sweep: multiple of the direction or way. Nearest, pair or cell: distance. Other hits: 0. Miss: infinity.
+  // Ray: multiple of the direction. Sweep: multiple of Mover::way. Nearest, pair or cell: distance. Other hits: 0.
+  // Miss: infinity.
   float t = std::numeric_limits<float>::infinity();
   Id id = kNoId;                        // id of the object or instance; 0: the hit is a miss
   uint32_t triangle = kNoTriangle;      // index of the triangle in the uploaded mesh

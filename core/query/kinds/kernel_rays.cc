@@ -15,7 +15,7 @@ namespace {
 // that may have more hits is traced triangle by triangle instead.
 constexpr uint32_t kMaxRows = 128;
 
-// Pair of a ray and an instance that the ray has reached, but against whose triangles the ray is not tested yet.
+// Pair of a ray and the instance that the ray has reached. The ray is not tested against the instance's triangles yet.
 struct Stop {
   uint32_t ray;   // index in Rounds::rays_
   float nearest;  // t at which the ray enters the bounds of the instance

@@ -45,7 +45,7 @@ class NearestSearch {
       : NearestSearch(*active_nearest_kernels(), tree, point, limit, find, slack) {
     LOCUS_DCHECK(served(tree, point));
   }
-  // Does the same with the kernels of a chosen instruction set.
+  // Begins the same search with `kernels` instead of the kernels of the active instruction set.
   NearestSearch(const NearestKernels& kernels, const TriangleBvh& tree, Vec3d point, double limit, Find find,
                 double slack)
       : kernels_(kernels), bvh_(tree), tree_(tree.tree()) {
@@ -79,15 +79,15 @@ class NearestSearch {
   uint32_t found() const { return visit_.found; }
   uint32_t nodes() const { return visit_.nodes; }
   uint32_t tests() const { return visit_.tests; }
-  // Return candidate `i` < found(), and its number in the uploaded mesh.
+  // Return candidate `i`, and its number in the uploaded mesh. Precondition: i < found().
   Triangle triangle(uint32_t i) const { return bvh_.triangle(block(i), lane(i)); }
   uint32_t number(uint32_t i) const { return tree_.numbers[block(i).first + lane(i)]; }
 
   // Array for the squared distances of all candidates that one call of next() can find.
   using Squared = double[kMaxCandidates + kTreeWidth];
-  // Writes to `squared` the squared distance of each candidate from `point` in world axes, in which the mesh is placed
-  // by `transform`. The squared distance is the larger of two: to the triangle, and to the triangle's bounds grown by
-  // `epsilon`.
+  // Writes to `squared` the squared distance of each candidate from `point`, which is in world axes; `transform` places
+  // the mesh in the world. A squared distance is the larger of the squared distance to the triangle and the squared
+  // distance to the triangle's bounds grown by `epsilon`.
   void measure(Vec3d point, const Transform& transform, double epsilon, Squared& squared) const {
     const Rotation& rotation = transform.rotation;
     const Vec3d shift = transform.translation, x = rotation.row_x, y = rotation.row_y, z = rotation.row_z;

@@ -9,9 +9,9 @@
 
 namespace locus {
 
-// Returns the contact, in world axes, of `solid` with the object or the triangle of a row. `solid` is a ball or capsule
-// as a resting mover. With CONSERVATIVE, the result has the distance and the nearest point of the bounds of the object
-// or triangle, or of the whole instance if `triangle` is kNoTriangle; the normal is zero.
+// Returns the contact, in world axes, of `solid` with the object or the triangle of a row. `solid` is the query's ball
+// or capsule, represented by a mover that rests. With CONSERVATIVE, the result has the distance and the nearest point
+// of the bounds of the object or triangle, or of the whole instance if `triangle` is kNoTriangle; the normal is zero.
 Contact overlap_contact(const Mover& solid, Precision precision, const Hit& hit, uint32_t triangle);
 
 }  // namespace locus

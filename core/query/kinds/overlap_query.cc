@@ -182,8 +182,8 @@ struct RegionShape {
 template <class Kind>
 GridRegion search_region(const SceneAtTime& moment, const typename Kind::World& shape, const OverlapOptions& options) {
   const typename Kind::WorldRegion region(shape);
-  // The search can be restricted to the ball only for an EXACT ball query. A CONSERVATIVE query also finds objects if
-  // it overlaps only their bounds, and for a box query the region is the axis-aligned bounds of the box.
+  // Only an EXACT ball query can restrict the search to the ball. A CONSERVATIVE ball query also finds objects of which
+  // it overlaps only the bounds. Queries of other shapes search the axis-aligned bounds of the shape.
   return moment.region(region.bounds(), options.precision == Precision::kExact ? Kind::as_ball(shape) : std::nullopt);
 }
 

@@ -28,7 +28,7 @@ bool lower_other(const Partner& a, const Partner& b) { return a.other < b.other;
 bool nearer_partner(const Partner& a, const Partner& b) { return std::tie(a.t, a.other) < std::tie(b.t, b.other); }
 
 // Collector of the first rows in order. The rows of one object are offered at once, as a run, so that only runs are
-// sorted. Invariant: between calls it has at most 2 * max_rows_ rows.
+// sorted. Invariant: between calls the collector has at most 2 * max_rows_ rows.
 class FirstPairs {
  public:
   FirstPairs(size_t max_rows, bool count_only) : max_rows_(max_rows), count_only_(count_only) {}
@@ -123,7 +123,7 @@ struct PairSearch {
     return grown(own, reach + 0x1p-40 * (magnitude(own) + reach));
   }
   // Returns the rounded distance between two objects. The object with the lower id is passed first, so that both orders
-  // of the arguments give the same result.
+  // of the arguments return the same distance.
   float distance(Id a_id, const Shape& a, Id b_id, const Shape& b) const {
     if (conservative) return rounded_distance(distance_between(bounds_of(a), bounds_of(b)));
     return rounded_distance(a_id < b_id ? distance_between(a, b) : distance_between(b, a));
@@ -227,8 +227,9 @@ class PairGroup {
   double extent_of(const GridRef& object) const {
     return object.reach() * (search_.conservative ? double{kDiagonal} : 1.0);
   }
-  // Returns a ball around the position of `member` for the kernel, which culls candidates whose own balls do not meet
-  // it. The ball is so large that no candidate within max_distance of the member is culled.
+  // Returns the ball around the position of `member` that the kernel intersects with the balls of the candidates. The
+  // kernel culls candidates whose balls do not intersect it. The ball is so large that no candidate within max_distance
+  // of the member is culled.
   GridBall ball_of(const Member& member) const {
     const Vec3d center = member.shape.position - center_;
     const double extent = planted(PlantedBug::kPairCullExtent) ? 0 : extent_of(member.object);
@@ -291,7 +292,7 @@ class NearestPartners {
         farthest_(search.max_distance) {}
 
   Vec3d position() const { return shape_.position; }
-  // Returns the limit of squared distances from the object's position to the bounds of others.
+  // Returns the limit of squared distances from the object's position to the bounds of other objects.
   double limit() const {
     const double reach = raised(farthest_) + extent_;
     return squared_limit(reach * (1 + 0x1p-40));

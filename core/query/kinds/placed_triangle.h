@@ -1,6 +1,6 @@
 // Axis-aligned bounds of an instance's triangles in world axes. CONSERVATIVE queries test the bounds of
-// PlacedTriangles. EXACT rays, sweeps and overlap queries find a triangle only if they also meet the wider bounds that
-// LoosePlacedTriangles computes for the triangle: the exact tests run in mesh axes and in floats, and without this
+// PlacedTriangles. EXACT rays, sweeps and overlap queries find a triangle only if they also intersect the wider bounds
+// that LoosePlacedTriangles computes for the triangle: the exact tests run in mesh axes and in floats, and without this
 // condition they could report a triangle that is far away in the world.
 //
 // Both classes are immutable and borrow the instance; any number of threads may share one object.
@@ -31,8 +31,8 @@ inline Aabbd grown_around(const Corners& corners, double epsilon) {
 // grown by an epsilon that covers the rounding of the corners, which are transformed in double. The epsilon is about
 // 2^-40 times the sum of the magnitudes of the translation and of the scaled mesh. Both magnitudes count, since a mesh
 // may be far from its own origin while the translation cancels this offset. The bounds of each triangle lie within
-// Instance::bounds, which are grown by twice as much. So the t, distance and point of a CONSERVATIVE row depend only on
-// the triangle's bounds, not on the instance's bounds.
+// Instance::bounds, which are grown by twice as much, so culling by Instance::bounds never changes a row: the t,
+// distance and point of a CONSERVATIVE row depend only on the triangle's bounds.
 class PlacedTriangles {
  public:
   explicit PlacedTriangles(const Instance& instance)

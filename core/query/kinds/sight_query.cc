@@ -44,14 +44,14 @@ class Viewer {
     const ColumnReader<uint64_t> groups(sight_.target_groups, 1);
     return groups.value(sight_.pairwise ? index_ : target, 0);
   }
-  // Returns the filter of the segments to a target. Objects and instances that the filter accepts block a segment if
-  // they meet it.
+  // Returns the filter of the segments to a target. Objects and instances that the filter accepts block each segment
+  // that they intersect.
   Filter filter_of(uint32_t target) const {
     Filter filter = filter_;
     filter.ignore(group_, group_of(target));
     return filter;
   }
-  // Returns the filter of what may block any of the viewer's segments.
+  // Returns a filter that accepts every object and instance that may block a segment of the viewer, to any target.
   Filter filter() const {
     Filter filter = filter_;
     filter.ignore(group_, 0);
@@ -63,14 +63,15 @@ class Viewer {
     const size_t samples = sight_.samples_per_target(), first = sight_.pairwise ? index_ * samples : 0;
     return static_cast<uint32_t>(first + target * samples + k);
   }
-  // Returns the way from an eye to a sample.
+  // Returns the vector from an eye to a sample.
   Vec3d way(Vec3d eye, uint32_t sample) const {
     return block_.frame + read_vec3d(&sight_.targets[size_t{3} * sample]) - eye;
   }
   // Returns whether a sample at the end of `way` is near enough to be seen.
   bool reaches(Vec3d way) const { return std::sqrt(squared_length(way)) <= double{max_distance_}; }
 
-  // Returns the ray of mode ANY that is blocked if the segment along `way` is.
+  // Returns the ray of mode ANY for the segment from `eye` to `eye` + `way`: the segment is blocked if the ray has a
+  // hit.
   RayRequest request(Vec3d eye, Vec3d way, Source source) const {
     RayRequest request{};
     request.origin = eye;
@@ -124,8 +125,8 @@ class Look {
   // segment searches the tree over instances.
   static constexpr size_t kFewInstances = 8;
   // Number of segments that are tested at once in the first pass of trace(), which has one segment per target. A block
-  // that blocks one of these segments is the hint of the following segments. While none is blocked, the number doubles
-  // with each call, because kernels are faster with many segments.
+  // of triangles that blocks one of these segments becomes the hint of the segments after it. The number doubles after
+  // each call that finds no blocked segment, because kernels are faster with many segments.
   static constexpr size_t kSegmentsAtOnce = 16;
 
   bool uses_kernels() const {
@@ -158,8 +159,8 @@ class Look {
     sort_by_direction();
   }
 
-  // Sorts the segments by the direction of their target's first segment: by the face of a cube around the eye that this
-  // direction meets, then along a Morton curve through the 8 x 8 squares of the face.
+  // Sorts the segments by the direction of their target's first segment. The direction crosses one face of a cube
+  // around the eye: sorts by this face, then along a Morton curve through the 8 x 8 squares of the face.
   void sort_by_direction() {
     constexpr size_t kFew = 32;
     if (segments_.size() < kFew) return;
@@ -190,7 +191,8 @@ class Look {
   }
 
   // Tests the segments that are not blocked yet against one instance: first one segment of each target, then the other
-  // segments. Their hint is the block that blocked the first segment of the same target.
+  // segments. The hint of these other segments is the block of triangles that blocked the first segment of the same
+  // target.
   void trace(const Instance& instance) {
     if (task_.ended() || !task_.count_test() || !viewer_.filter().accepts(instance)) return;
     open_.clear();
@@ -236,8 +238,9 @@ class Look {
     trace(instance, origin, hint);
   }
 
-  // Tests the segments of now_ against one instance by a kernel. Sets the hint of a blocked segment to the block that
-  // blocks it. Returns the hint of the last segment that the kernel found blocked, or `hint` if there is none.
+  // Tests the segments of now_ against one instance by a kernel. Sets the hint of a blocked segment to the block of
+  // triangles that blocks it. Returns the hint of the last segment that the kernel found blocked, or `hint` if there is
+  // none.
   uint32_t trace(const Instance& instance, Vec3d origin, uint32_t hint) {
     if (now_.empty() || task_.ended()) return hint;
     const TriangleTree tree = instance.mesh->tree().tree();

@@ -1,6 +1,6 @@
 // Sight of one viewer: how many sample points of each target it sees. A sample is seen if a segment from one of the
-// viewer's eyes to the sample meets nothing outside the groups of the viewer and the target. Free functions; any thread
-// may call them with a QueryTask of its own.
+// viewer's eyes to the sample intersects no object and no triangle, except those in the group of the viewer or of the
+// target. Free functions; any thread may call them with a QueryTask of its own.
 #ifndef LOCUS_CORE_QUERY_KINDS_SIGHT_QUERY_H_
 #define LOCUS_CORE_QUERY_KINDS_SIGHT_QUERY_H_
 
@@ -16,7 +16,7 @@ namespace locus {
 void look(QueryTask& task, const SceneAtTime& moment, const QueryBlock& block, const SightColumns& sight, Vec3d origin,
           size_t i, absl::Span<char> seen);
 
-// One viewer of look_together(): arguments of look() with the same names.
+// Arguments of look() for one viewer of look_together(). `viewer` is look()'s argument `i`.
 struct SightQuery {
   size_t viewer;
   const SceneAtTime* moment;
@@ -29,7 +29,7 @@ struct SightQuery {
 size_t viewers_together(const SightColumns& sight);
 
 // Does the same as look() for each of several viewers of one block, and searches the segments of all of them together.
-// Precondition: viewers have one eye.
+// Precondition: each viewer has one eye.
 void look_together(QueryTask& task, const QueryBlock& block, const SightColumns& sight,
                    absl::Span<const SightQuery> queries);
 

@@ -14,16 +14,17 @@
 namespace locus {
 namespace {
 
-// Returns the limit of a search in units of the way, or 0 for a mover that rests.
+// Returns the limit of a search as a multiple of Mover::way, or 0 for a mover that rests.
 double search_limit(const SweptBounds& path, const HitCollector& collector) {
   return path.is_resting() ? 0 : raised(collector.limit());
 }
 
-// Returns a limit for first_contact() that excludes no contact at t <= 1 whose t rounds to at most `limit`.
+// Returns a limit for first_contact() that includes every contact at t <= 1 whose t, rounded to float, is at most
+// `limit`.
 double contact_limit(float limit) { return std::min(raised(limit), 1.0); }
 
-// Path of a mover's bounds through the tree of a mesh, in float. The way is scaled by a power of two, so that no
-// product over- or underflows. A "scaled" t is in units of the scaled way.
+// Path of a mover's bounds through the tree of a mesh, in float. Mover::way is scaled by a power of two, so that no
+// product over- or underflows. A "scaled" t is a multiple of the scaled vector.
 class MeshPath {
  public:
   // `magnitude` is the largest |coordinate| of the mesh.
@@ -48,7 +49,7 @@ class MeshPath {
   }
 
  private:
-  // Returns the power of two above the largest |component| of the way. A multiplication by this power or by its
+  // Returns the power of two above the largest |component| of `way`. A multiplication by this power or by its
   // reciprocal changes only the exponent, which stays far from the limits of double.
   static double scale_of(Vec3d way) {
     int exponent = 0;
@@ -75,8 +76,8 @@ class ExactSweepTest {
 
   const MeshPath& mesh_path() const { return mesh_path_; }
   // Returns the t of the first contact, rounded to float; nullopt if there is none up to `limit`. A hit also requires
-  // that the mover's bounds meet the triangle's bounds, in mesh axes and in world axes. The result is at least the t at
-  // which these bounds begin to meet.
+  // that the mover's bounds overlap the triangle's bounds, in mesh axes and in world axes. The result is at least the t
+  // at which these bounds begin to overlap.
   std::optional<float> hit(const Triangle& triangle, float limit) const {
     const std::optional<double> t = first_contact(mover_, corners_of(triangle), at_start_, contact_limit(limit));
     if (!t) return std::nullopt;
@@ -243,8 +244,8 @@ class SweptObjects {
   HitCollector& collector_;
 };
 
-// Returns the t of the first contact, `first`, of which `hit` stores the rounded value. Returns the rounded value if
-// `first` is null because rounding lost the contact.
+// Returns `first`, the t of the first contact before rounding to float. If `first` is null, because rounding errors hid
+// the contact, returns the rounded t, which `hit` stores.
 double moment_of(const std::optional<double>& first, const Hit& hit) { return first.value_or(double{hit.t}); }
 
 }  // namespace

@@ -1,6 +1,5 @@
 // Search by the vector kernels for the winding number of a closed mesh around a point in mesh axes, along the half line
-// of a WindingWay.
-// It runs in steps, so that the caller can stop between two steps:
+// of a WindingWay. The search runs in steps, so that the caller can stop between two steps:
 //
 //   WindingSearch search(tree, point, cells.way_from(tree, point));
 //   while (!search.over()) search.next();
@@ -30,7 +29,7 @@ class WindingSearch {
       : WindingSearch(*active_crossing_kernels(), tree, point, way) {
     LOCUS_DCHECK(served(tree));
   }
-  // Does the same with the kernels of a chosen instruction set.
+  // Begins the same search with `kernels` instead of the kernels of the active instruction set.
   WindingSearch(const CrossingKernels& kernels, const TriangleBvh& tree, Vec3d point, const WindingWay& way)
       : kernels_(kernels), bvh_(tree), tree_(tree.tree()), point_(point), way_(way) {
     LOCUS_DCHECK(!way.is_known);

@@ -13,8 +13,8 @@ namespace {
 
 // Maximum number of queries of a chunk. Chunks that turn out to be expensive are split further.
 constexpr size_t kChunkQueries = 256;
-// Maximum number of segments of sight in a chunk, unless a single viewer has more. Without it a block of few viewers
-// would be one chunk, and threads would work on it one after another.
+// Maximum number of sight segments in a chunk, unless a single viewer has more. Without this limit, a block of few
+// viewers would be a single chunk, on which only one thread at a time could work.
 constexpr size_t kChunkSegments = 1024;
 
 size_t max_chunk_queries(const QueryBlock& block) {

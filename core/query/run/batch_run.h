@@ -61,9 +61,9 @@ struct QueryCost {
 
 class BatchRun {
  public:
-  // No new chunk is started while there are this many chunks that run, or that are done and wait until an earlier chunk
-  // is written out. A chunk of the remainder of a split chunk may be started while there are fewer than 2 * kMaxChunks
-  // of them, or if it is the first chunk in batch order.
+  // Maximum number of chunks that run, or that are done and wait until an earlier chunk is written out. While there are
+  // this many, no chunk of further queries is started. A chunk that split() made may be started while there are fewer
+  // than 2 * kMaxChunks such chunks, or if it is the first chunk in batch order.
   static constexpr size_t kMaxChunks = 16;
 
   // Prepares the execution of `batch`, which has passed check_batch(): resolves the as_of times of its queries and

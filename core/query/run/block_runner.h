@@ -85,7 +85,7 @@ class BlockRunner {
   void write_count(uint64_t rows);
   // Writes an empty answer for query `i`: a miss, bytes of 0, or a row count of 0.
   void write_nothing(size_t i);
-  // Adds query `i` to the truncated ones.
+  // Adds query `i` to the list of truncated queries.
   void mark_truncated(size_t i);
   // Returns the work so far as the number of nodes, cells, tests and rows, which does not depend on the speed of the
   // machine.

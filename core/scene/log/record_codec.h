@@ -1,6 +1,6 @@
 // Encodes and decodes the records of a scene's log. A record is an update batch, several joined batches, or a static
-// change. The result of applying a record depends only on the record and on the state before it, so that a replay gives
-// the same revision, acks and refused items. FORMAT.md describes the bytes.
+// change. The result of applying a record depends only on the record and on the state before it, so that a replay
+// produces the same revision, acks and refused items. FORMAT.md describes the bytes.
 //
 // Decoding validates everything and returns DATA_LOSS, with a description, if the bytes are damaged. Columns that a
 // shape's kind does not use are not stored. Plain functions; any thread.

@@ -16,8 +16,9 @@
 
 namespace locus {
 
-// Object that moved far in a tick. `extent` holds under any rotation. `centers` are the bounds of the object's position
-// at the start of the tick and of its positions since it became fast.
+// Object that moved far in a tick. `extent` is an upper bound, under any rotation, of the distance from the object's
+// position to any of its points. `centers` are the bounds of the object's position at the start of the tick and of its
+// positions since it became fast.
 struct FastMover {
   uint32_t handle = 0;
   float extent = 0;

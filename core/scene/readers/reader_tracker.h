@@ -27,7 +27,8 @@ namespace locus {
 
 class ReaderTracker;
 
-// Reader's hold on a snapshot: the pin is registered with the tracker until it is destroyed. One thread at a time.
+// Reference of a reader to a snapshot. The pin keeps the snapshot in memory and is registered with the tracker until
+// the pin is destroyed. One thread at a time.
 class SnapshotPin {
  public:
   SnapshotPin(std::shared_ptr<ReaderTracker> tracker, SnapshotPtr snapshot);

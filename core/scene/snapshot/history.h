@@ -19,8 +19,8 @@ struct HistoryRecord {
   ObjectSet objects;  // objects at the end of `tick`
   // Displacement up to the next record. Not set in the last record: see SceneSnapshot::since_close.
   Displacement to_next;
-  // Memory in bytes that is not shared with the next record. The last record of a history has no next record: for this
-  // record, the memory that is not shared with the first revision after `tick`.
+  // Memory in bytes that is not shared with the next record. The last record of a history has no next record: its bytes
+  // are the memory that is not shared with the first revision after `tick`.
   size_t bytes = 0;
 };
 
@@ -71,7 +71,7 @@ class HistoryRecorder {
   // record was dropped. Does not change the memory limit for records that are added later.
   bool trim(uint64_t bytes);
   // Returns true if close() was called since the last drop(), even if all records were dropped to save memory. The
-  // result depends on the batches alone, so that a replay of the same batches gives the same revisions.
+  // result depends on the batches alone, so that a replay of the same batches produces the same revisions.
   bool has_past() const { return has_past_; }
   // Initialises the recorder of a scene that was read from disk. If `has_past` is true, the scene had a history, which
   // is lost.

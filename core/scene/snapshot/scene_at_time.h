@@ -1,11 +1,11 @@
 // View of the moving objects of a scene at one time, which may lie between two recorded ticks. Queries search this view
 // for objects. Borrows from a snapshot and is cheap to copy. Any thread may use a view.
 //
-// An object exists at a time if it existed at the end of the last tick recorded up to that time. If the same lifetime
-// of the object exists at the next recorded tick, the object moves in a straight line to its position at that tick;
-// otherwise the object stays in place. A search widens its region by the displacement bound, finds objects at their
-// positions at the earlier recorded tick, and interpolates each object found. At a recorded tick, and at the latest
-// revision, nothing is interpolated or widened.
+// An object exists at a time if it existed at the end of the last recorded tick that is not after that time. If the
+// same lifetime of the object exists at the next recorded tick, the object moves in a straight line to its position at
+// that tick; otherwise the object stays in place. A search widens its region by the displacement bound, finds objects
+// at their positions at the earlier recorded tick, and interpolates each object found. At a recorded tick, and at the
+// latest revision, nothing is interpolated or widened.
 #ifndef LOCUS_CORE_SCENE_SNAPSHOT_SCENE_AT_TIME_H_
 #define LOCUS_CORE_SCENE_SNAPSHOT_SCENE_AT_TIME_H_
 
@@ -55,7 +55,7 @@ class SceneAtTime {
   // whose bounds are `bounds`. The region is the box or ball, widened by the displacement bound.
   GridRegion region(const Aabbd& bounds, const std::optional<Balld>& ball) const;
   // Calls visit(GridRef) once for each object that may be in a box or ball with the bounds `bounds`: for each fast
-  // mover whose path may meet `bounds`, and for each other object that ask(visit) finds. `ask` must search the
+  // mover whose path may intersect `bounds`, and for each other object that ask(visit) finds. `ask` must search the
   // GridRegion that region() returns and call `visit` for each object found.
   template <class Ask, class Visit>
   void visit_asked(const Aabbd& bounds, Work& work, const Ask& ask, const Visit& visit) const;

@@ -1,6 +1,6 @@
-// Application of one update batch. Collects the changed objects in a table beside the store and computes their
-// difference to the store at the end: a refused batch changes nothing, and the grid is updated once for each object.
-// One thread at a time.
+// Application of one update batch. Does not change the store: collects the changed objects in a table of its own and
+// computes their difference from the store at the end. So a refused batch changes nothing, and the grid is updated only
+// once for each object. One thread at a time.
 #ifndef LOCUS_CORE_SCENE_UPDATES_BATCH_APPLIER_H_
 #define LOCUS_CORE_SCENE_UPDATES_BATCH_APPLIER_H_
 
@@ -17,7 +17,7 @@
 
 namespace locus {
 
-// Controls whether difference() reports objects that were replaced under the same id or teleported. Only scenes with
+// Controls whether difference() reports the objects that begin a new lifetime (Difference::replaced). Only scenes with
 // history need these reports.
 enum class TrackLifetimes : uint8_t { kNo, kYes };
 
@@ -43,8 +43,8 @@ class BatchApplier {
   struct Difference {
     std::vector<Object> removed;
     std::vector<Object> added;
-    // Ids of objects for which the batch begins a new lifetime: inserted and teleported objects. Empty unless
-    // TrackLifetimes::kYes.
+    // Ids of objects for which the batch begins a new lifetime: teleported objects, and inserted objects that did not
+    // replace a present object by UpdateBatch::upsert. Empty unless TrackLifetimes::kYes.
     absl::flat_hash_set<Id> replaced;
     bool empty() const { return removed.empty() && added.empty(); }
   };

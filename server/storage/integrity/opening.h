@@ -42,8 +42,8 @@ struct OpenedDirectory {
   DamageReport damage_report;
 };
 
-// Returns `options` with defaults filled in: the file system if it is null, the disk reserve if it has no value, and
-// the log buffer bounded by a share of the disk's size.
+// Returns `options` with a default file system if `env` is null, and a default disk reserve if `reserve_bytes` has no
+// value. Limits the log buffer to a share of the disk's size, but not below a minimum.
 StorageOptions with_defaults(StorageOptions options);
 DatabaseOptions database_options_of(const StorageOptions& options);
 

@@ -22,8 +22,8 @@ constexpr uint64_t kMetaBytes = uint64_t{4} << 20;    // size of the memory tabl
 constexpr size_t kBlockBytes = size_t{64} << 10;
 constexpr size_t kCacheBytes = size_t{8} << 20;
 constexpr int kBuffers = 4;
-// Numbers of tables in RocksDB's level 0. RocksDB merges the tables once there are kTablesToMerge of them. It would
-// stall writers once there are kUnlimitedTables. This number is never reached, because a stall would only delay
+// Numbers of tables in RocksDB's level 0. RocksDB merges the tables once there are kTablesToMerge of them, and would
+// stall writers once there are kUnlimitedTables. kUnlimitedTables is too large to be reached: a stall would only delay
 // updates.
 constexpr int kTablesToMerge = 4;
 constexpr int kUnlimitedTables = 1 << 20;

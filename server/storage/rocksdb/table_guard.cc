@@ -12,8 +12,8 @@
 namespace locus::server {
 namespace {
 
-// A table ends with the metaindex block, which lists the positions of other blocks such as the properties block, with
-// the index block, and with a footer. The footer contains the checksum type, the positions of the metaindex and index
+// A table ends with three parts: the metaindex block, which lists the positions of other blocks such as the properties
+// block; the index block; and a footer. The footer contains the checksum type, the positions of the metaindex and index
 // blocks, zeros, the format version and a magic number. Source: RocksDB 7, table formats 2 to 5.
 constexpr size_t kFooterBytes = 53;
 constexpr size_t kTrailerBytes = 5;  // size of the trailer of each block: compression type (u8) and checksum (u32)

@@ -105,8 +105,8 @@ def reflections(job):
 
 
 def hold_calls(job, path, body=None, window=wire.DEFAULT_WINDOW, count=HELD):
-    """Keeps as many calls open as the daemon allows, by sending no message or no end of the call, while another client
-    makes honest calls.
+    """Keeps as many calls open as the daemon allows, while another client makes honest calls. Without `body` the open
+    calls send no message; otherwise their answers are not ready or, with a `window` of 0, are not read.
     """
     with job.connect(window=window, grant=window > 0) as holder, job.connect() as other:
         for _ in range(count):

@@ -79,8 +79,8 @@ def send_filled(job, method, prefix, make, what):
 
 
 def amplify_steps(job):
-    """Returns a step for every Place of every request. The first steps are those that need most memory for each byte
-    sent, on the most frequent calls.
+    """Returns a step for every Place of every request, and steps for unknown fields. The first steps fill the lists in
+    requests of the most frequent calls, which need most memory for each byte sent.
     """
     schema, steps = protobuf.Schema(), []
     for method in schema.methods:
@@ -112,7 +112,7 @@ def unfinished_messages(job):
 
 ROWS = [
     Attack("gzip", "messages", gzip_steps, "compressed messages of 2 MB that inflate to 2 GB and less", "13 messages"),
-    # Parsing takes up to 0.1 s on an IO loop for each message, which is the cost of this option.
+    # With --accept-compression, parsing a message takes up to 0.1 s on an IO loop, so a larger `slower` is allowed.
     Attack("gzip-accepted", "messages", gzip_steps, "the same, with a daemon that accepts compressed messages",
            "13 messages", slower=40, flags=("--accept-compression",)),
     Attack("amplify", "messages", amplify_steps,

@@ -1,7 +1,7 @@
 // Comparison of a peer's answers with those of locus. If they differ, a test of every object by the predicates of
-// core/geometry decides which answers are right. The answers of locus must always be right. Peers compute in float:
-// differences in a few queries are noted, differences in more queries are a disagreement. Writes into a report; pure
-// otherwise.
+// core/geometry decides which answers are right. The answers of locus must always be right. Peers compute in float, so
+// differences in a few queries are only noted; differences in more queries are a disagreement. Writes into a report;
+// pure otherwise.
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_AGREEMENT_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_AGREEMENT_H_
 

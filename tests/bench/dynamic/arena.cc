@@ -11,7 +11,7 @@
 namespace locus::bench::dynamic {
 namespace {
 
-constexpr size_t kBatchesApart = 997;     // distance between the numbers of the first batches of two readers
+constexpr size_t kBatchesApart = 997;     // reader i begins with batch number i * kBatchesApart
 constexpr size_t kBatchesToACount = 500;  // a reader counts all objects, untimed, once in this many batches
 
 void sleep_for(double seconds) { std::this_thread::sleep_for(std::chrono::duration<double>(seconds)); }

@@ -13,8 +13,8 @@ namespace locus::bench::dynamic {
 // Returns the number of ticks by which a world of `count` objects is advanced before it is queried.
 uint32_t ticks_before_queries(uint32_t count);
 
-// Reports sums that differ from the expected ones for this world after ticks_before_queries(). Reports nothing for a
-// world, or a number of queries, without expected sums.
+// Reports each sum that differs from the expected sum. `world` must have been advanced by ticks_before_queries() ticks.
+// Reports nothing if no sums are known for this world or number of queries.
 void check_values(const std::string& case_name, Task task, const World& world, const Queries& queries,
                   const std::string& contender, const Answers& answers, Report& report);
 

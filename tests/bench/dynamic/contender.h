@@ -18,7 +18,7 @@
 
 namespace locus::bench::dynamic {
 
-inline constexpr float kReach = 10;  // radius of every ball, half the edge of every box
+inline constexpr float kReach = 10;  // radius of every query ball, half the edge of every query box
 inline constexpr float kRayLength = 100;
 inline constexpr uint32_t kNearestCount = 8;
 
@@ -73,10 +73,10 @@ class Contender {
   // Releases past positions, which only queries about the past need.
   virtual void forget_past() {}
 
-  // Appends the results of each query. Balls and boxes: every object that shares a point with the ball or box of kReach
-  // around the centre, in any order. Rays: the first object that the ray hits, and its distance; no entry if the ray
-  // hits none. Nearest: the kNearestCount objects nearest to the centre, the nearest first, and their distances, 0 for
-  // an object that contains the centre.
+  // Appends the results of each query. Balls and boxes: every object that intersects the ball or box of kReach around
+  // the centre, in any order. Rays: the first object that the ray hits, and its distance; no entry if the ray hits
+  // none. Nearest: the kNearestCount objects nearest to the centre, the nearest first, with their distances; the
+  // distance of an object that contains the centre is 0.
   virtual void balls(absl::Span<const Vec3f>, Answers&) {}
   virtual void boxes(absl::Span<const Vec3f>, Answers&) {}
   virtual void rays(absl::Span<const Rayf>, Answers&) {}

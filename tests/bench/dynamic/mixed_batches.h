@@ -14,8 +14,8 @@ class MixedBatches {
  public:
   explicit MixedBatches(const Queries& queries);
 
-  // Runs 100 of the queries as one batch: 40 balls, 30 boxes, 20 rays and 10 more balls. `number` selects the hundred.
-  // Returns the number of ids found.
+  // Runs 100 of the queries as one batch: 40 balls, 30 boxes, 20 rays and 10 more balls. `number` selects which 100
+  // queries. Returns the number of ids found.
   size_t ask(const SceneSnapshot& snapshot, size_t number) const;
 
  private:

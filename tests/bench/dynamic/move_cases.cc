@@ -27,7 +27,7 @@ class MoveRace {
 
   void run() {
     // A contender moves a small world by several ticks in one turn: a single tick would mostly measure reloading the
-    // caches, which the other contenders have filled.
+    // caches, which the other contenders have filled with their data.
     const uint32_t count = run_.world.count();
     const size_t ticks = run_.options.quick ? 1 : std::clamp<size_t>(100'000 / count, 1, 8);
     const size_t chunks = run_.options.quick || count >= 1'000'000 ? 1 : 4;

@@ -1,5 +1,5 @@
-// The case move of one world: moves of all objects, tick by tick, by ids that the caller chooses. In locus they go
-// through the scene's writer. One thread.
+// The case move of one world: moves of all objects, tick by tick, by ids that the caller chooses. In locus the scene's
+// writer applies them. One thread.
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_MOVE_CASES_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_MOVE_CASES_H_
 

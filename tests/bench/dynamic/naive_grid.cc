@@ -92,7 +92,7 @@ class NaiveGrid : public Contender {
       if (meets(body.position, body.radius, center)) ids.push_back(body.id);
     });
   }
-  // Returns the first hit. Divides the ray into segments of a cell's length and tests the objects around each.
+  // Returns the first hit. Divides the ray into segments of a cell's length and tests the objects around each segment.
   FirstHit first_of(const Rayf& ray) const {
     FirstHit first;
     const Vec3f grown = {kRadius, kRadius, kRadius};

@@ -11,7 +11,7 @@
 namespace locus::bench::dynamic {
 namespace {
 
-// Visitor for GridSnapshot that appends the ids of objects for which meets() is true to `ids`.
+// Returns a visitor for GridSnapshot. It appends to `ids` the ids of the objects for which meets() is true.
 template <class Meets>
 auto collector(const Meets& meets, std::vector<uint64_t>& ids) {
   return [meets, &ids](const GridRef& object) {
@@ -198,8 +198,8 @@ void Ours::insert(const Objects& objects) {
 }
 
 // Answers balls or boxes as the query engine does: one after the other, or all in one walk of the grid if that is
-// faster. `region_of(center)` returns a query's region, `meets_of(center)` the predicate that decides whether the query
-// meets an object.
+// faster. `region_of(center)` returns the region of a query. `meets_of(center)` returns a predicate that tests whether
+// the query's ball or box intersects an object.
 template <class RegionOf, class MeetsOf>
 void Ours::ask_regions(absl::Span<const Vec3f> centers, Answers& answers, const RegionOf& region_of,
                        const MeetsOf& meets_of) {

@@ -63,8 +63,8 @@ class QueryRace {
 
  private:
   // Work of one contender in a turn: `parts` calls. A fast contender makes several passes over all queries, since a
-  // single pass would mostly measure reloading the caches, which the others have filled. A slow contender makes less
-  // than one pass.
+  // single pass would mostly measure reloading the caches, which the other contenders have filled with their data. A
+  // slow contender makes less than one pass.
   struct Entry {
     Contender* contender = nullptr;
     size_t parts = 1;

@@ -43,7 +43,8 @@ class PastWorld {
   uint32_t count() const { return world_.count(); }
   static AsOf time(uint32_t age) { return {kTicks - age, kFraction}; }
 
-  // Returns the ids of the objects that a ball met at the time of `age`, ascending, by testing all objects.
+  // Returns, in ascending order, the ids of the objects that intersected the ball of kReach around `center` at
+  // time(age). Tests all objects.
   std::vector<uint64_t> truth(Vec3f center, uint32_t age) const {
     const std::vector<float>&at = positions_.at(age), &next = positions_.at(age - 1);
     const Objects objects = world_.objects();
@@ -101,7 +102,7 @@ class Rewinding {
 
  private:
   // Returns the number of passes over all queries in a turn. A single pass would mostly measure reloading the caches,
-  // which the other contestants have filled.
+  // which the other contestants have filled with their data.
   size_t passes() const { return options_.quick ? 1 : 5; }
 
   Contestant contestant(const std::string& name, Contender& contender) {

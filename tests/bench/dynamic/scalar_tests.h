@@ -10,13 +10,13 @@
 
 namespace locus::bench::dynamic {
 
-// Returns whether an object meets the ball of kReach around `center`.
+// Returns whether an object intersects the ball of radius kReach around `center`.
 inline bool scalar_ball_meets(Vec3f position, float radius, Vec3f center) {
   const float reach = kReach + radius;
   return squared_length(position - center) <= reach * reach;
 }
 
-// Returns whether an object meets the box of kReach around `center`.
+// Returns whether an object intersects the box with edges of 2 kReach around `center`.
 inline bool scalar_box_meets(Vec3f position, float radius, Vec3f center) {
   const float x = std::max(0.0f, std::fabs(position.x - center.x) - kReach);
   const float y = std::max(0.0f, std::fabs(position.y - center.y) - kReach);

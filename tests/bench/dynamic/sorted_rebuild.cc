@@ -9,8 +9,9 @@
 #include "tests/bench/dynamic/peers.h"
 #include "tests/bench/dynamic/scalar_tests.h"
 
-// A list of all objects in the order of a dense grid's cells, sorted anew at each tick by a counting sort. It has no
-// versions, no moves of single objects and one cell size: a lower bound of the cost of a moving world.
+// A list of all objects in the order of a dense grid's cells, sorted anew at each tick by a counting sort. It keeps no
+// versions, cannot move single objects and has one cell size, so its cost is a lower bound of the cost of a moving
+// world.
 namespace locus::bench::dynamic {
 namespace {
 
@@ -151,7 +152,7 @@ class SortedRebuild : public Contender {
       if (scalar_ball_meets({x_[i], y_[i], z_[i]}, r_[i], center)) ids.push_back(sorted_ids_[i]);
   }
 #endif
-  // Returns the first hit. Divides the ray into segments of a cell's length and tests the objects around each.
+  // Returns the first hit. Divides the ray into segments of a cell's length and tests the objects around each segment.
   FirstHit first_of(const Rayf& ray) const {
     FirstHit first;
     for (float t = 0; t < kRayLength && t <= first.distance + largest_; t += cell_) {
@@ -189,7 +190,7 @@ class SortedRebuild : public Contender {
     }
     return found;
   }
-  // Visits the cells whose distance from `home`, the maximum over the axes in cells, is `ring`.
+  // Visits the cells at distance `ring` from `home`. The distance is measured in cells, as the maximum over the axes.
   template <class Visit>
   void each_run_of_ring(const std::array<int, 3>& home, int ring, const Visit& visit) const {
     const auto row = [&](int x, int y, int first_z, int last_z) {

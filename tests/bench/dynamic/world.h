@@ -37,8 +37,8 @@ class World {
   // Makes a world of `count` objects. `side` is the size of a uniform world in x and y.
   World(Kind kind, uint32_t count, float side = kSide);
 
-  // Advances by one tick: every object moves by its velocity. If it would leave the world along an axis, that component
-  // of its velocity is reversed first.
+  // Advances by one tick: every object moves by its velocity. If it would leave the world along an axis, its velocity
+  // along that axis is reversed first.
   void step();
   // Advances one object, given by its index, by one tick.
   void step(uint32_t object);

@@ -16,7 +16,7 @@ namespace locus::bench::dynamic {
 
 struct Entrant {
   std::unique_ptr<Contender> contender;
-  int64_t bytes = 0;  // heap bytes that the contender holds after loading and moves
+  int64_t bytes = 0;  // heap bytes that the contender uses after loading and moves
 };
 
 struct WorldRun {
@@ -30,7 +30,7 @@ struct WorldRun {
   std::string case_of(const std::string& what) const { return absl::StrCat(what, "/", world.name()); }
 };
 
-// Returns the factories of locus and of all peers that can hold this world.
+// Returns the factories of locus and of all peers that support the radii of this world.
 std::vector<Maker> makers_for(const World& world);
 
 // Returns a cell of the suite `dynamic` without results.

@@ -1,4 +1,4 @@
-// Required values of ratios, and notes whether a ratio reaches its required value. For suites that have requirements.
+// Function that notes in a report whether a ratio reaches its required value. For suites that have requirements.
 #ifndef LOCUS_TESTS_BENCH_FRAME_BAR_H_
 #define LOCUS_TESTS_BENCH_FRAME_BAR_H_
 
@@ -9,8 +9,8 @@
 
 namespace locus::bench {
 
-// Notes whether the ratio of the last added cell is at least `bar`; `how` explains how `bar` was computed, empty if it
-// is fixed.
+// Notes whether the ratio of the last added cell is at least `bar`; `how` explains how `bar` was computed; empty if
+// `bar` is a constant.
 inline void note_bar(Report& report, double bar, const std::string& how = "") {
   const Cell& cell = report.cells.back();
   report.notes.push_back(absl::StrFormat("%s beside %s: %.3f, required %.3f%s: %s", cell.case_name, cell.peer_name,

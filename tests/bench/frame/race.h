@@ -21,7 +21,7 @@ double wall_seconds();
 struct Contestant {
   std::string name;
   std::function<void(size_t chunk)> run;
-  double operations = 1;                      // operations in all chunks together; a time is divided by this
+  double operations = 1;                      // operations in all chunks; race() divides a round's time by it
   std::function<void(size_t chunk)> prepare;  // runs before each chunk, while the clock is stopped; may be empty
 };
 

@@ -1,5 +1,5 @@
-// Statistics that compute the figures of a cell from the rounds of a race. Pure functions for every suite. Inputs must
-// not be empty.
+// Functions that compute the figures of a cell from the rounds of a race, for every suite. Pure; inputs must not be
+// empty.
 #ifndef LOCUS_TESTS_BENCH_FRAME_STATISTICS_H_
 #define LOCUS_TESTS_BENCH_FRAME_STATISTICS_H_
 
@@ -10,7 +10,7 @@ namespace locus::bench {
 // Returns the middle value; of an even number of values, the mean of the two middle ones.
 double median(std::vector<double> values);
 
-// Returns the smallest of the values for which at least the part `share` (0 ... 1) of all values is less or equal.
+// Returns the smallest value v such that at least the fraction `share` (0 ... 1) of all values is <= v.
 double percentile(std::vector<double> values, double share);
 
 // Returns (maximum - minimum) / median.

@@ -16,7 +16,7 @@ Kernel::Point_3 point_of(const float* p) { return {p[0], p[1], p[2]}; }
 // CGAL's own point location: a ray along z through a tree of bounding boxes, with exact predicates.
 class CgalSide : public ContainsPeer {
  public:
-  // `surface` is closed.
+  // `surface` must be closed.
   explicit CgalSide(Surface surface) : surface_(std::move(surface)), side_(surface_) {}
 
   void contains(absl::Span<const float> points, uint8_t* answers) override {

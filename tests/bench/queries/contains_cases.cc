@@ -49,7 +49,7 @@ std::vector<float> points_at_corners(const BenchMesh& mesh, size_t count) {
 struct ContainsCase {
   const char* name;
   std::vector<float> (*points)(const BenchMesh& mesh, size_t count);
-  double bar;  // 0: reported only
+  double bar;  // required ratio; 0 = none
 };
 constexpr ContainsCase kCases[] = {{"contains/bounds", points_in_bounds, 5},
                                    {"contains/surface", points_near_surface, 5},

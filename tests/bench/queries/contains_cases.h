@@ -16,7 +16,7 @@ namespace locus::bench::queries {
 class ContainsPeer {
  public:
   virtual ~ContainsPeer() = default;
-  // Writes for each of `points`, 3 numbers each, 1 if the mesh contains it or has it on its surface, else 0.
+  // Writes one answer for each point (3 numbers): 1 if the point is inside the mesh or on its surface, else 0.
   virtual void contains(absl::Span<const float> points, uint8_t* answers) = 0;
 };
 

@@ -82,7 +82,8 @@ class EmbreeNearest : public NearestPeer {
     uint32_t triangle;
   };
 
-  // Shrinks the query's radius to the distance of a triangle, and returns whether it did.
+  // Stores a triangle that is nearer than the query's radius, and shrinks the radius to its distance. Returns whether
+  // the triangle was nearer.
   static bool offer(RTCPointQueryFunctionArguments* arguments) {
     Found& found = *static_cast<Found*>(arguments->userPtr);
     const Vec3f nearest = nearest_on(found.point, found.triangles[arguments->primID]);

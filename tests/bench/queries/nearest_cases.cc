@@ -140,8 +140,8 @@ void run_case(const Options& options, const NearestCase& one, const BenchMesh& m
   compare(name, mesh, our_answers, their_answers, report);
 }
 
-// Balls of 1.5 % of the diagonal around points near the surface: rows with the columns of contacts, compared with the
-// same rows without them.
+// Measures balls with radii of 1.5 % of the diagonal around points near the surface: rows with the columns of contacts,
+// compared with the same rows without these columns.
 void run_contact_case(const Options& options, StaticDetail detail, const std::string& name, const BenchMesh& mesh,
                       const OurScene& ours, Report& report) {
   const std::vector<Vec3f> points =

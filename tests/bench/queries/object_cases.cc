@@ -28,7 +28,7 @@ constexpr double kBulletBar = 4, kBallsBar = 2.5;
 constexpr size_t kCells = 1'000, kQuickCells = 50;
 constexpr float kCellDistance = 50;
 
-// Frustums of one case: each holds about `share` of the objects.
+// Frustums of one case: each contains about the fraction `share` of the objects.
 struct FrustumCase {
   const char* name;
   double share;
@@ -67,7 +67,8 @@ test::BlockResult answer(const SceneSnapshot& snapshot, QueryBlock block, bool b
   return answer_of(snapshot, std::move(block), brute_force);
 }
 
-// Returns the pairs in order, found by measuring the objects of all adjacent cubes.
+// Returns the sorted pairs, found by brute force: assigns the objects to cubes of space and measures the distances of
+// all objects in equal or adjacent cubes.
 std::vector<ObjectPair> proved_pairs(const Arena& arena) {
   using Key = std::tuple<int, int, int>;
   std::map<Key, std::vector<size_t>> cubes;
@@ -155,7 +156,7 @@ void run_pairs(const Options& options, const std::string& name, const Arena& are
       absl::StrFormat("%s: %d pairs; bullet %d; %d rows of balls", name, proved.size(), theirs.size(), ball_rows));
 }
 
-// Camera at a drawn place of the world that looks along a drawn horizontal direction, 90 degrees wide and 60 high. Its
+// Camera that looks in a horizontal direction, with a field of view of 90 degrees horizontally and 60 vertically. Its
 // planes are the near plane, four sides and the far plane.
 struct Camera {
   Vec3f at, along;
@@ -179,15 +180,15 @@ struct Camera {
   }
 
  private:
-  // Sets the plane whose distance from the camera along `normal` is -`offset`.
+  // Sets plane number `plane`: a point p is inside it if dot(normal, p - at) >= -offset.
   void set(size_t plane, Vec3f normal, float offset) {
     const float numbers[4] = {normal.x, normal.y, normal.z, offset - dot(normal, at)};
     std::copy_n(numbers, 4, planes + 4 * plane);
   }
 };
 
-// Returns the planes of `count` frustums. The far plane of each is placed so that the frustum holds one.share of the
-// objects.
+// Returns the planes of `count` frustums, at random points and in random directions. The far plane of each is placed so
+// that the frustum contains the centres of about the fraction one.share of the objects.
 std::vector<float> planes_of(const FrustumCase& one, const Arena& arena, size_t count) {
   cli::SplitMix64 numbers(one.seed);
   const auto unit = [&numbers] { return static_cast<float>(numbers.next() >> 40) * 0x1p-24f; };

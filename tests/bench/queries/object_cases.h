@@ -32,7 +32,8 @@ class ObjectPeer {
   virtual ~ObjectPeer() = default;
   // Appends all pairs of balls at most kPairDistance apart, in any order.
   virtual void pairs(std::vector<ObjectPair>& pairs) = 0;
-  // Appends the balls that reach into a frustum, given by kFrustumPlanes planes nx ny nz d, in any order.
+  // Appends the ids of the balls that intersect a frustum, in any order. `planes` has (nx, ny, nz, d) for each of
+  // kFrustumPlanes planes.
   virtual void frustum(const float* planes, std::vector<uint64_t>& ids) = 0;
 };
 

@@ -48,7 +48,7 @@ class OurOverlaps {
     for_each_row(run(columns), begin, [&](size_t i, uint32_t triangle) { rows.emplace_back(i, triangle); });
   }
 
-  // Appends the same rows, found by a query of the balls around the capsules and a test of each triangle in these.
+  // Appends the same rows, found by a query of the balls around the capsules and a capsule test of each triangle found.
   void find_in_two_passes(size_t begin, size_t end, std::vector<CapsuleRow>& rows) const {
     // Slightly more than the sum of radius and half length, so that rounding of the sum cannot lose a triangle.
     const float radius = (kCapsuleRadius + kCapsuleHalf) * mesh_.diagonal * (1 + 0x1p-18f);

@@ -26,8 +26,8 @@ struct SightCase {
   Place place;
   size_t viewers, targets;
   bool pairwise;
-  size_t copies;   // of the mesh, side by side
-  size_t objects;  // balls near the surface
+  size_t copies;   // number of copies of the mesh, side by side
+  size_t objects;  // number of balls near the surface
   uint64_t seed;
 };
 constexpr SightCase kCases[] = {
@@ -41,7 +41,8 @@ constexpr SightCase kCases[] = {
 };
 constexpr size_t kSamples = 3, kQuickPart = 10;
 // Required ratios: kBlockedBar if at least half of the segments are blocked and many segments begin at each eye,
-// otherwise kOpenBar. Matrices of few targets, and pairs, gain nothing from the common eye.
+// otherwise kOpenBar. In matrices of few targets, and in pairs, few segments begin at the same eye, so a query of sight
+// saves nothing.
 constexpr double kBlockedBar = 2, kOpenBar = 1;
 
 // Generator of the points of a case. All coordinates are multiples of a power of two, so that the difference of two

@@ -22,7 +22,7 @@ struct SweepCase {
   const char* name;
   MoverKind kind;
   float size;  // radius or half extent, as a part of the mesh's diagonal
-  float way;   // length of the way, as a part of the mesh's diagonal
+  float way;   // length of the sweep, as a part of the mesh's diagonal
   uint64_t seed;
   double bar;
 };

@@ -93,8 +93,8 @@ class CrowdCases {
  private:
   static constexpr double kShares[] = {0.5, 0.99};
 
-  // Sums over the rounds of an overload case: of the floods, with too many callers, and of the calm phase before each
-  // flood, with as many callers as the server admits.
+  // Measurements of an overload case, summed or collected over its rounds. Each round has a calm phase, with as many
+  // callers as the server admits, and then a flood, with too many callers.
   struct Crowd {
     std::vector<double> refusals;  // seconds until each refusal
     std::vector<int64_t> memory;   // resident bytes of the server after each flood
@@ -110,8 +110,8 @@ class CrowdCases {
       client += flood.client_seconds;
       server += flood.server_seconds;
     }
-    // Returns microseconds of processor time per refusal. From the floods' `seconds` it subtracts the time of the
-    // answers, assuming that an answer takes as long as in the calm.
+    // Returns microseconds of processor time per refusal. Subtracts from the floods' `seconds` the time of the answers,
+    // assuming that an answer takes as long as in the calm phases.
     double each(double seconds, double calm_seconds) const {
       const double answering = calm_seconds * static_cast<double>(answers) / static_cast<double>(calm_answers);
       return 1e6 * (seconds - answering) / static_cast<double>(refusals.size());

@@ -1,4 +1,5 @@
-// A locusd that the benchmark starts, with a client of the library to fill it. For every case. One thread.
+// A locusd that the benchmark starts, and a client (of the client library) with which the cases fill it. For every
+// case. One thread.
 #ifndef LOCUS_TESTS_BENCH_SERVING_DAEMON_H_
 #define LOCUS_TESTS_BENCH_SERVING_DAEMON_H_
 

@@ -102,8 +102,8 @@ class EndingCases {
     }
   }
 
-  // Returns whether the call ended with `expected`. Counts a refused call: the server has not yet had the processor
-  // time to drop the previous call. Stores any other status as wrong.
+  // Returns whether the call ended with `expected`. Only counts a refused call, which means that the server has not
+  // dropped the previous call yet. Stores any other status as wrong.
   bool is_ended(const grpc::Status& status, grpc::StatusCode expected) {
     if (status.error_code() == grpc::StatusCode::RESOURCE_EXHAUSTED)
       ++refused_;

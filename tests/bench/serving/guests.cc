@@ -73,7 +73,8 @@ void SilentReaders::write_until_stuck() {
   }
 }
 
-// A client that connects, asks once and leaves. It has at most one pending operation, and none in the step kStays.
+// A client that connects, sends one query and leaves. It has at most one pending operation, and none in the step
+// kStays.
 struct Churn::Guest {
   enum class Step : uint8_t { kCalls, kAsks, kIsAnswered, kStays, kSaysGoodbye, kGoes };
 

@@ -1,4 +1,4 @@
-"""Compares how long locusd takes to refuse a scene that the caller may not read with one that does not exist:
+"""Compares the time that locusd takes to refuse a scene that the caller may not read with that for a missing scene:
 
     /usr/bin/python3 hidden_scenes.py BIN_DIRECTORY [CALLS]
 

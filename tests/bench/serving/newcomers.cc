@@ -36,7 +36,8 @@ std::vector<uint64_t> Newcomers::hashes() {
   return hashes;
 }
 
-// Connects, asks and disconnects. Sets `hash`, if it is not null, to a hash of the answer.
+// Connects, sends the batch with index `batch` and disconnects after the answer. Sets `hash`, if it is not null, to a
+// hash of the answer.
 absl::Status Newcomers::come(size_t batch, uint64_t* hash) const {
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + kSilence);

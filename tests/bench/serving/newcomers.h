@@ -14,7 +14,7 @@ namespace locus::bench::serving {
 
 class Newcomers {
  public:
-  // Newcomer i sends batch i of `batches`, modulo their number. Borrows the daemon.
+  // Client number i sends the batch with index i modulo the number of batches. Borrows the daemon.
   Newcomers(const Daemon& daemon, const Batches& batches);
 
   // Lets `count` clients come and go. Errors are stored in status().

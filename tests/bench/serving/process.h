@@ -25,7 +25,7 @@ class Process {
   static absl::StatusOr<std::unique_ptr<Process>> start(const std::string& path,
                                                         const std::vector<std::string>& arguments,
                                                         const std::string& log);
-  // Asks the process to end; kills it if it has not ended after five seconds.
+  // Sends SIGTERM to the process; kills it if it has not ended after five seconds.
   ~Process();
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;

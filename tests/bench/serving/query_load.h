@@ -17,8 +17,8 @@ namespace locus::bench::serving {
 using QueryStreamLoad = StreamLoad<v1::StreamQueriesRequest, v1::StreamQueriesResponse>;
 std::unique_ptr<QueryStreamLoad> open_query_streams(const LocalServer& server, size_t streams);
 
-// Messages for a server, and the same batches as columns for this process. The messages are
-// divided among streams, the columns among threads.
+// Messages for a server, and the same batches as columns for this process. The messages are divided among streams, and
+// the columns among threads.
 struct Batches {
   std::vector<v1::StreamQueriesRequest> messages;
   std::vector<QueryBatch> columns;  // borrow the values of `messages`

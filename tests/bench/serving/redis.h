@@ -23,8 +23,8 @@ class Redis {
 
   // Sends all messages `passes` times, with up to `window` in flight. An error of Redis is stored in status().
   void run(const std::vector<std::string>& messages, size_t passes, size_t window);
-  // Returns the sum over all replies of the last run(): the number of members of a list reply, the value of an integer
-  // reply.
+  // Returns a sum over all replies of the last run(). A list reply adds its number of members, an integer reply its
+  // value.
   size_t counted() const { return counted_; }
   const absl::Status& status() const { return status_; }
 

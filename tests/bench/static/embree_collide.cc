@@ -23,7 +23,7 @@ void set(RTCBounds* to, const Aabbf& bounds) {
   to->upper_z = bounds.max.z;
 }
 
-// Returns a committed scene of user geometry: Embree knows only the bounds of each thing.
+// Returns a committed scene of user geometry, for which Embree gets only the bounds of each of `things`.
 template <class Thing>
 RTCScene scene_of(const Thing* things, size_t count, RTCBoundsFunction bounds, RTCBuildQuality quality) {
   const RTCScene scene = rtcNewScene(device());

@@ -26,7 +26,7 @@ inline std::string case_of(const std::string& start, const BenchMesh& mesh) {
   return absl::StrCat(start, "/", mesh.name);
 }
 
-// Queries that a contestant is asked, and the index of each among all queries of the case.
+// Queries that a contestant gets, and the index of each of them among all queries of the case.
 template <class Query>
 struct Asked {
   std::vector<Query> queries;

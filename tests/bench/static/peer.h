@@ -40,14 +40,14 @@ class Peer {
   // Returns the reason why some answers of this peer are known to be wrong; empty = all answers should be right.
   virtual std::string known_fault(Task) const { return ""; }
 
-  // Answers rays: the first hit, or whether there is any; the second argument has one entry for each ray. A function
-  // below is called only if does() returns true for its task.
+  // Answer rays: first() writes the first hit, any() writes whether there is a hit. The second argument has one entry
+  // for each ray. Each function below is called only if does() returns true for its task.
   virtual void first(absl::Span<const RayQuery>, RayAnswer*) {}
   virtual void any(absl::Span<const RayQuery>, uint8_t*) {}
   // Writes to `ids` the numbers of all triangles that each ray, ball or box reaches, in any order, and to `counts` how
   // many each query reaches. `ids` has room for all triangles of the mesh and kSpareIds more. A peer may continue at
-  // the start of `ids` when `ids` is full, or at each query, so all numbers of a query are in `ids`, from its start,
-  // only after a call with one query.
+  // the start of `ids` when `ids` is full, or at each query. Therefore only a call with one query is sure to leave all
+  // its numbers in `ids`, from the start.
   virtual void ray_ids(absl::Span<const RayQuery>, absl::Span<uint32_t> /*ids*/, uint32_t* /*counts*/) {}
   virtual void ball_ids(absl::Span<const Ballf>, absl::Span<uint32_t> /*ids*/, uint32_t* /*counts*/) {}
   virtual void box_ids(absl::Span<const Obbf>, absl::Span<uint32_t> /*ids*/, uint32_t* /*counts*/) {}

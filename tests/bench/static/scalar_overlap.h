@@ -48,8 +48,8 @@ inline bool separates(float p0, float p1, float p2, float reach) {
   return std::max(std::min(p0, std::min(p1, p2)), -std::max(p0, std::max(p1, p2))) > reach;
 }
 
-// Returns whether one of the three axes `edge` x unit vector separates. The vertices `a`, `b`, `c` are relative to the
-// box's centre.
+// Returns whether one of three axes, the cross products of `edge` and the unit vectors, separates the triangle from the
+// box. The vertices `a`, `b`, `c` are relative to the box's centre.
 inline bool edge_separates(Vec3f a, Vec3f b, Vec3f c, Vec3f edge, Vec3f half) {
   const float x = std::fabs(edge.x), y = std::fabs(edge.y), z = std::fabs(edge.z);
   return separates(edge.y * a.z - edge.z * a.y, edge.y * b.z - edge.z * b.y, edge.y * c.z - edge.z * c.y,

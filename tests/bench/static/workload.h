@@ -33,9 +33,9 @@ std::vector<RayQuery> random_rays(const BenchMesh& mesh, size_t count, uint64_t 
 // and height must be multiples of 4.
 std::vector<RayQuery> camera_rays(const BenchMesh& mesh, int width, int height);
 
-// Returns balls of radius `fraction` * diagonal. Balls with even index are centred on the surface (triangle next % n,
-// then u = sqrt(f), w = f; the corners' weights are 1 - u, u (1 - w), u w), those with odd index anywhere in the
-// bounds.
+// Returns balls of radius `fraction` * diagonal. Balls with even index are centred on the surface (triangle number next
+// % n of the n triangles, then u = sqrt(f), w = f; the corners' weights are 1 - u, u (1 - w), u w), those with odd
+// index anywhere in the bounds.
 std::vector<Ballf> balls(const BenchMesh& mesh, size_t count, uint64_t seed, float fraction);
 
 // Returns axis-aligned boxes with the centres of balls(). Half extents along x, y, z are fraction * diagonal * (0.5 +

@@ -1,5 +1,5 @@
-// Server of the real protocol inside the test's process that asks for a bearer token, with TLS if the test gives
-// credentials. For tests of what the client sends and how it handles refusals. Thread-safe.
+// In-process server of the real protocol, for tests of what the client sends and how it handles refusals. The server
+// requires a bearer token once require() is called, and uses TLS if the test passes credentials. Thread-safe.
 #ifndef LOCUS_TESTS_CLIENT_LIB_GUARDED_SERVER_H_
 #define LOCUS_TESTS_CLIENT_LIB_GUARDED_SERVER_H_
 
@@ -24,7 +24,7 @@ class GuardedServer final : v1::QueryService::Service,
                             v1::ServerService::Service,
                             v1::UpdateService::Service {
  public:
-  // Listens on a free loopback port; accepts calls with any token or none until require() is called.
+  // Listens on a free loopback port. Until require() is called, accepts calls with any token and calls without a token.
   explicit GuardedServer(
       const std::shared_ptr<grpc::ServerCredentials>& credentials = grpc::InsecureServerCredentials()) {
     grpc::ServerBuilder builder;
@@ -62,7 +62,7 @@ class GuardedServer final : v1::QueryService::Service,
   }
 
  private:
-  // Records a call and returns UNAUTHENTICATED if it has another token than the required one.
+  // Records a call. Returns UNAUTHENTICATED if a token is required and the call has no token or another token.
   grpc::Status admit(const grpc::ServerContext& context, const std::string& method) {
     std::lock_guard lock(mutex_);
     ++calls_;

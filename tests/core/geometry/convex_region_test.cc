@@ -1,5 +1,5 @@
 // Tests of convex regions and their overlaps. The reference searches in long double for the point of the shape that is
-// nearest to the region: both overlap if this point is in the region.
+// nearest to the region: the shape and the region overlap if this point is in the region.
 #include "core/geometry/convex_region.h"
 
 #include <gtest/gtest.h>

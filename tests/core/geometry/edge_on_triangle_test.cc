@@ -59,8 +59,8 @@ Grazing any_grazing(Random& random) {
   return grazing;
 }
 
-// With the tolerance e of the definition of a miss (tests/support/proof/ray_judge.h): no triangle is missed, and no hit
-// is farther than e / 2 from its triangle.
+// Let e be the tolerance that tests/support/proof/ray_judge.h defines. No triangle is missed, and no hit is farther
+// than e / 2 from its triangle.
 TEST(EdgeOnTriangleTest, HitsAreWithinTheToleranceAtEveryAngle) {
   constexpr uint64_t kSeed = 92;
   Random random(kSeed);

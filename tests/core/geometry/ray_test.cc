@@ -1,5 +1,5 @@
-// Tests of the slab test: a superset of a box has at least the box's interval, and the interval contains the t of every
-// point of the ray in the box.
+// Tests of the slab test: the ray's interval in a superset of a box contains the ray's interval in the box, which
+// contains the t of every point of the ray in the box.
 #include "core/geometry/ray.h"
 
 #include "gtest/gtest.h"

@@ -63,7 +63,7 @@ TEST(ShapeDistanceTest, RandomShapesAreAsFarApartAsTheirNearestPoints) {
     const double found = distance_between(a, b);
     const Real expected = reference(a, b);
     apart += expected > 0.01L ? 1 : 0;
-    // Alternating projections approach the distance from above, slowly where the solids barely meet.
+    // Alternating projections approach the distance from above, and converge slowly if the solids barely touch.
     ASSERT_LE(found, double(expected) + 1e-6) << "seed " << seed;
     ASSERT_GE(found, double(expected) - 2e-3 - 1e-3 * double(expected)) << "seed " << seed;
     ASSERT_NEAR(distance_between(b, a), found, 1e-9) << "seed " << seed;

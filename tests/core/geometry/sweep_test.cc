@@ -157,7 +157,8 @@ TEST(SweepTest, ContactsInsideAnObjectPointToTheShortestWayOut) {
   EXPECT_EQ(in_ball.normal, (Vec3d{0, 1, 0}));
   Mover capsule = ball({0, 3, 0}, {0, 3, 0}, 1);
   capsule.kind = MoverKind::kCapsule;
-  capsule.half_axis = {0, 2, 0};  // ends 1 outside; the ways out are 3 along y and 4 along x
+  // The capsule's core segment ends 1 outside the box. To leave the box, the segment must move 3 along y or 4 along x.
+  capsule.half_axis = {0, 2, 0};
   EXPECT_EQ(contact_at(capsule, box, 0).distance, -3);
   EXPECT_EQ(contact_at(capsule, box, 0).normal, (Vec3d{0, 1, 0}));
 }

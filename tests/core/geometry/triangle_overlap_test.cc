@@ -115,8 +115,8 @@ TEST(TriangleOverlapTest, TrianglesWithoutAreaCountAsSegmentsAndPoints) {
   EXPECT_TRUE(ball_overlaps({{1, 1, -1}, 2}, point));
 }
 
-// A needle is a triangle whose height is tiny. Tests of the triangle's interior by dot products can miss it by
-// cancellation; the distances to its three edges do not.
+// A needle is a triangle whose height is tiny. A test of its interior by dot products can miss an overlap because of
+// cancellation; the distances to its three edges are still correct.
 TEST(TriangleOverlapTest, NeedlesAreNotDropped) {
   const Triangle needle{{1000, 0, 0}, {1100, 0, 0}, {1050, 1e-5f, 0}, 0};
   EXPECT_TRUE(ball_overlaps({{1025, 0, 0.5f}, 0.5f}, needle));

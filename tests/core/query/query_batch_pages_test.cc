@@ -50,7 +50,7 @@ TEST(QueryPagesTest, FirstAndAnyContinueToo) {
   EXPECT_EQ(hits_behind(9, {}, {}, RayMode::kAny).hits, std::string("\0", 1));
 }
 
-// Asks for the rows of query `i` of a block, `rows` rows at a time, and returns the joined pages.
+// Runs query `i` of a block repeatedly, for one page of `rows` rows at a time, and returns the rows of all pages.
 BlockResult join_pages(const SceneSnapshot& snapshot, const OwnedBlock& block, size_t i, uint32_t rows) {
   BlockResult joined;
   OwnedBlock page = block.part(i, i + 1);

@@ -14,7 +14,7 @@ START_SECONDS = 30
 
 
 def last_part(offer):
-    """Returns the part after the last = or comma, because shells repeat different parts of the word before it."""
+    """Returns the part after the last = or comma. Before it, each shell repeats another part of the typed word."""
     return offer.split("=")[-1].split(",")[-1] if not offer.startswith("--") or "=" in offer else offer
 
 

@@ -139,7 +139,7 @@ TEST(FloodGuardTest, AMessageMayArriveInFullBeforeItIsRead) {
 TEST(FloodGuardTest, CallsDoNotJustifyLaterBytes) {
   FloodBudget budget;
   FloodSample sample;
-  sample.counts.calls_begun = 1'000'000;  // justify 1 GB of frames, which do not arrive
+  sample.counts.calls_begun = 1'000'000;  // enough calls to justify 1 GB of frames; no frame arrives
   sample.time += milliseconds(1000);
   EXPECT_EQ(assess(sample, {}, budget), FloodVerdict::kHonest);
   sample.received.bytes += static_cast<uint64_t>(40 * kMiB);

@@ -135,7 +135,7 @@ struct Streamed {
   Service* service;
 };
 
-// A server with one connection and one IO loop. The test runs the loop on its own thread, by calls of turn().
+// A server with one connection and one IO loop. No server thread runs the loop: the test's thread calls turn().
 template <class Stream>
 class Bench {
  public:

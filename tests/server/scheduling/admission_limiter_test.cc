@@ -45,7 +45,7 @@ TEST(AdmissionLimiterTest, AnOwnerThatKeepsAllItGetsLeavesPermitsToOthers) {
   greedy.push_back(take_all(limiter, 0));
   for (uint64_t owner = 1; owner <= 7; ++owner) {
     greedy.push_back(take_all(limiter, owner));
-    EXPECT_EQ(greedy.back().size(), 11u);  // an eighth of the 86 permits beyond the maximum
+    EXPECT_EQ(greedy.back().size(), 11u);  // an eighth of the reserve of 86 permits, rounded up
     EXPECT_FALSE(limiter.enter(owner));
     EXPECT_TRUE(limiter.enter(100 + owner));
   }

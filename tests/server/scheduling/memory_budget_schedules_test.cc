@@ -110,7 +110,8 @@ class ModelProcess {
  private:
   uint64_t some_bytes() { return 1 + random_.below(uint64_t{1} << (4 + random_.below(26))); }
 
-  // Starts work on a random line. An upload claims its build together with its columns, as the server does.
+  // Starts work on a random memory line. An upload claims memory for its columns and for its build at the same time, as
+  // in the server, and is not started if one of the claims is refused.
   void start_any() {
     const auto line = static_cast<MemoryLine>(random_.below(kMemoryLines));
     const uint64_t bytes = some_bytes();

@@ -244,8 +244,8 @@ TEST_F(UpdateQueueTest, ARefusedBatchDoesNotDelayTheNext) {
   EXPECT_TRUE(right->wait().ok());
 }
 
-// A reader's pin was revoked, but the reader keeps its snapshot. Updates of its scene wait, updates of other scenes do
-// not, and the queue's thread is not blocked.
+// A reader keeps its snapshot although its pin was revoked. Updates of the pinned scene wait, but updates of other
+// scenes do not, because the queue's thread is not blocked.
 TEST_F(UpdateQueueTest, AReaderThatHoldsTooMuchStallsItsOwnSceneOnly) {
   const ScenePtr pinned = make_scene(OverloadPolicy::kEveryBatch, limits::kMinPinnedBytes);
   std::vector<uint64_t> ids(50'000);

@@ -206,7 +206,7 @@ TEST_F(AccessControlTest, IdentitiesEndWhenTheirCredentialsExpire) {
   now_ = kNow + 159;
   EXPECT_TRUE(control->still_valid(*by_token));
   EXPECT_TRUE(control->still_valid(*by_jwt));
-  now_ = kNow + 160;  // the expiry of the JWT and the skew
+  now_ = kNow + 160;  // the JWT's expiry, kNow + 100, plus kJwtSkewSeconds
   EXPECT_FALSE(control->still_valid(*by_jwt));
   EXPECT_FALSE(control->authenticate(bearer(ann)).ok());
   now_ = kNow + 200;

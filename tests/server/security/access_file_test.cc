@@ -221,8 +221,8 @@ TEST(AccessFileTest, WithoutAnAccessFileEverybodyOrEveryVerifiedCallerMayDoEvery
   }
 }
 
-// Random bytes are accepted only if they are blank. Random words of the language cause no crash, and an accepted text
-// grants nothing to callers that no line names.
+// Random bytes are accepted only if they are blank. Random sequences of the words that access files use cause no crash,
+// and an accepted text grants nothing to callers that no line names.
 TEST(AccessFileTest, RandomTextsNeverCrashAndGrantNothingToOthers) {
   const std::vector<std::string> words = {"grant",
                                           "quota",

@@ -154,7 +154,7 @@ TEST(FileWatcherTest, AFailedReadingIsRepeatedUntilItSucceeds) {
 
 TEST(FileWatcherTest, AWatcherEndsWithoutWaitingForItsPause) {
   const FileWatcher watcher(
-      {"/nonexistent"}, [] { return false; }, std::chrono::hours(1));  // if it waited, the test would time out
+      {"/nonexistent"}, [] { return false; }, std::chrono::hours(1));  // a destructor that waits would time out
 }
 
 }  // namespace

@@ -11,7 +11,8 @@
 namespace locus::server {
 namespace {
 
-// Reference: fills a table of which prefixes of the pattern match which prefixes of the text.
+// Returns whether the pattern matches the text. Reference for glob_matches(): fills a table that contains for each pair
+// of a prefix of the pattern and a prefix of the text whether they match.
 bool matches_by_table(const std::string& pattern, const std::string& text) {
   std::vector<std::vector<bool>> table(pattern.size() + 1, std::vector<bool>(text.size() + 1, false));
   table[0][0] = true;

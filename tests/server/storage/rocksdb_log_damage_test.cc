@@ -102,8 +102,8 @@ Sample make_sample(Ending ending, int max_steps) {
         std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
     if (life < 2 || ending == Ending::kInOrder) continue;
-    // After this pause the durable marker is up to date. Copies the files while the log is open, which are the files
-    // that a killed process leaves.
+    // After this pause the durable marker is up to date. The files are copied while the log is open, because a killed
+    // process leaves the files of an open log.
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
     sample.files = files_below(options.path);
   }

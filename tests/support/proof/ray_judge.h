@@ -128,8 +128,8 @@ class RayJudge {
     return meeting && meeting->inset >= 0 ? Verdict::kRight : Verdict::kUndecidable;
   }
 
-  // Returns the verdict on a triangle that the reference meets but that is missing in an answer. The answer should
-  // contain all hits up to t = `end`.
+  // Returns the verdict on a triangle that is missing in an answer although the ray meets the triangle's plane at
+  // `meeting`, according to the reference. The answer should contain all hits up to t = `end`.
   Verdict judge_missing(const Placed& in, const Meeting& meeting, Real end) const {
     if (meeting.inset < 0 || culled(meeting.slope)) return Verdict::kRight;
     const bool within = meeting.inset >= in.e && meeting.t + in.e / in.speed < end;

@@ -54,15 +54,16 @@ class SweptTriangle {
     for (const Vec3r& corner : corners_) radius_ = std::max(radius_, length(corner - center_));
   }
 
-  // Returns false only if the mover, grown by `by`, never meets the ball around the triangle on its way.
+  // Returns false only if the mover, grown by `by`, touches the ball around the triangle at no time of its motion.
   bool is_near(const RealMover& mover, Real by) const {
     const Real square = dot(mover.way, mover.way);
     const Real t = square == 0 ? 0 : std::clamp<Real>(dot(center_ - mover.start, mover.way) / square, 0, 1);
     return length(mover.start + mover.way * t - center_) <= radius_ + mover.size() + 2 * by;
   }
 
-  // Returns a lower bound of the distance between the triangle and the mover at time t, grown by `by` on every side.
-  // The result is at most zero if they share a point, otherwise positive. It is convex in t.
+  // Returns a lower bound of the distance between the triangle and the mover at time t, where the mover is grown by
+  // `by` on every side. The bound is at most zero if the triangle and the mover share a point, otherwise positive. It
+  // is convex in t.
   Real gap(const RealMover& mover, Real t, Real by) const {
     const Vec3r center = mover.start + mover.way * t;
     return mover.kind == MoverKind::kBox ? box_gap(mover, center, by) : capsule_gap(mover, center) - mover.radius - by;

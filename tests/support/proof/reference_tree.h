@@ -1,8 +1,8 @@
-// Tree over triangles in long double. It shares vectors, triangles and boxes with the product, but no ray test and
-// no tree. The tree makes it possible to verify more rays than a plain list of triangles does. It is split at medians,
-// and its boxes in double are widened by far more than any rounding error of the box test. For the proof that no ray
-// misses a triangle that it meets; a test compares the tree with the list. Immutable after construction; safe from any
-// thread.
+// Tree over triangles in long double. It shares vectors, triangles and boxes with the product, but no ray test and no
+// tree. The tree makes it possible to verify more rays than a plain list of triangles does. It is split at medians, and
+// its boxes in double are widened by far more than any rounding error of the box test. For the proof that no ray
+// misses; a test compares the results of the tree with those of a plain list. Immutable after construction; safe from
+// any thread.
 #ifndef LOCUS_TESTS_SUPPORT_PROOF_REFERENCE_TREE_H_
 #define LOCUS_TESTS_SUPPORT_PROOF_REFERENCE_TREE_H_
 

@@ -15,7 +15,7 @@ namespace locus::cli {
 namespace {
 
 constexpr double kSceneMargin = 1.04;
-constexpr double kThingMargin = 2;  // wider than kSceneMargin, to show the object's surroundings
+constexpr double kThingMargin = 2;  // larger than kSceneMargin, to show the object's surroundings
 
 Vec3d vector_of(const Triple& triple) { return {triple.x, triple.y, triple.z}; }
 

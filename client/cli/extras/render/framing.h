@@ -25,8 +25,8 @@ Vec3d three_quarter_view(Vec3d up);
 // box that is a single point is treated as a box of side 1. Method: a corner at (x, y) and depth z in the view's axes
 // is visible from the eye (ex, ey, ez) if |x - ex| <= w (z - ez), with w the slope of the view's edge. Let a be the
 // maximum of x - w z and b the maximum of -x - w z over all corners; then all corners are visible if a + w ez <= ex <=
-// -b - w ez. The nearest eye has the largest ez, for which both bounds of ex are equal. The same holds for y. The eye
-// gets the smaller of the two maxima of ez.
+// -b - w ez. The eye nearest to the box has the largest ez, for which both bounds of ex are equal. The condition in y
+// gives a second maximum of ez; the smaller of the two maxima is used.
 Camera frame_box(const Aabbd& bounds, const ViewAxes& axes, const Lens& lens);
 
 }  // namespace locus::cli

@@ -73,7 +73,7 @@ class Shader {
   }
 
   // Returns the factor by which a pixel is darkened because it is at an edge. The factor is below 1 if a neighbouring
-  // pixel shows a surface further behind, or if the surface bends sharply between the two pixels.
+  // pixel shows a surface further away, or if the surface bends sharply between the two pixels.
   double edge(size_t pixel, uint32_t column, uint32_t row) const {
     double factor = 1;
     const uint32_t width = image_.size.width;

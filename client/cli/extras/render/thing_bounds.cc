@@ -18,7 +18,8 @@ constexpr int kSides = 6;             // lower and upper side of each axis: side
 constexpr int kMaxRounds = 16;        // enough, since 16^16 exceeds the resolution of doubles
 // A box is flat along an axis if its size along the axis is less than this share of its longest side.
 constexpr double kFlat = 1e-4;
-constexpr double kWidening = 1e-6;  // a box is widened by this share of its longest side, above float rounding of slabs
+// Share of a box's longest side by which the box is widened. It exceeds the error of rounding slabs to float.
+constexpr double kWidening = 1e-6;
 
 absl::Status not_found(const std::string& scene, uint64_t id, absl::string_view why) {
   return absl::NotFoundError(absl::StrCat("scene ", scene, " has no object or instance ", id, why));

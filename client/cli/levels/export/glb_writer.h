@@ -2,9 +2,9 @@
 // the whole file. For the exporter. One writer writes one file in one thread. Source: Khronos Group, glTF 2.0
 // Specification, 2021 (ISO/IEC 12113:2022).
 //
-// The file is not written with assimp 5.2.5, with which the importer reads such files, because assimp alters the scene
-// when it writes: it drops transforms within 0.01 of the identity and merges vertices nearer than 1e-5. It also needs
-// 400 bytes of memory per triangle.
+// The importer reads such files with assimp 5.2.5. This writer does not use assimp, because assimp alters a scene when
+// it writes it: it drops transforms within 0.01 of the identity and merges vertices nearer than 1e-5. It also needs 400
+// bytes of memory per triangle.
 //
 // Invariants: every accessor lies within the file's single buffer; node 0 is the root, and every other top-level node
 // is its child.

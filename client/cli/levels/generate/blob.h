@@ -1,5 +1,5 @@
-// Generator of a closed body. It is used to try the server with a mesh that has an inside, and by tests that check that
-// no ray passes between adjacent triangles. A function without state.
+// Generator of a closed body. It is used to try the server with a mesh that has an interior, and by tests that check
+// that no ray passes between adjacent triangles. A function without state.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_GENERATE_BLOB_H_
 #define LOCUS_CLIENT_CLI_LEVELS_GENERATE_BLOB_H_
 

@@ -20,8 +20,8 @@ struct SentRows {
 
   size_t rows() const { return lines.size(); }
 
-  // Returns the line of entry `index` of one of the batch's lists. `field` is the path of the list as the server's
-  // error gives it ("moves[3].ids", "blocks[0].rays.directions", "remove_ids"). Returns nullopt if no row belongs to
+  // Returns the line of entry `index` of one of the batch's lists. `field` is the path of the list, in the form of the
+  // server's errors ("moves[3].ids", "blocks[0].rays.directions", "remove_ids"). Returns nullopt if no row belongs to
   // that entry.
   std::optional<uint64_t> line_of(absl::string_view field, size_t index) const;
 

@@ -1,7 +1,7 @@
 // Traversal of the crossing kernels, compiled once for each instruction set by the .cc file that includes it. A
 // traversal first opens nodes and collects the blocks that the half line meets. Then it tests the blocks one by one.
 // The two phases alternate, so that mispredicted branches of one phase do not delay the other. The comparisons of
-// coordinates are exact: see half_line_floats.h. Only areas are computed.
+// coordinates are exact: see half_line_floats.h. Only areas have rounding errors; the bound is derived here.
 //
 // Let u and v be the ends of an edge, projected along the half line, and relative to p, the start of the half line. The
 // sign of the area u.y v.z - u.z v.y shows on which side of the edge p lies. Error of an area, with e = 2^-24: the
@@ -14,10 +14,12 @@
 // covers.
 //
 // Call the coordinate y of a point its height. An edge crosses the height of p if one of its ends is at the height of p
-// or below, and its other end is above. Either no edge of a triangle crosses this height, or one rising and one falling
-// edge do. If the signs of both edges are certain, the triangle's winding in the projection is known. If the winding is
-// 0, p is off the triangle, because the two edges bound the triangle's section at this height. Otherwise p may be on
-// the triangle only if the triangle's bounds, along the half line, extend back to p.
+// or below, and its other end is above. Either one rising and one falling edge of a triangle cross this height, or no
+// edge does. If two edges do and the signs of both are certain, the triangle's winding in the projection is known. If
+// this winding is 0, p is off the triangle, because the two edges bound the triangle's section at this height. If it is
+// not 0, p may be on the triangle. If no edge crosses the height, the winding is 0, but p may be at the height of the
+// triangle's highest vertex and on the triangle. In both cases p is on the triangle only if the triangle's bounds,
+// along the half line, extend back to p.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_CROSSING_KERNELS_IMPL_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_CROSSING_KERNELS_IMPL_H_
 
@@ -47,9 +49,9 @@ struct Coordinates8 {
   friend inline Coordinates8 operator*(Coordinates8 v, Floats8 by) { return {v.a * by, v.b * by, v.c * by}; }
 };
 
-// Masks of those of eight triangles that have edges across the height of the point: `up` if the point is to the left of
-// the rising edge, `down` if it is to the right of the falling edge, `doubtful` if the sign of one of the two edges is
-// not certain.
+// Masks of eight triangles, about their edges that cross the height of the point. The bit of a triangle is set in `up`
+// if the point is to the left of the rising edge, in `down` if the point is to the right of the falling edge, and in
+// `doubtful` if the sign of at least one of the two edges is not certain.
 struct Edges {
   uint32_t up = 0, down = 0, doubtful = 0;
 
@@ -167,11 +169,11 @@ class CrossingWalk {
   const TriangleTree& tree_;
   CrossingVisit& visit_;
   const HalfLineFloats line_;
-  const int first_, second_;  // the axes across the half line
+  const int first_, second_;  // the two axes perpendicular to the half line
   const Floats8 way_, along_high_, along_end_, low_[2], high_[2];
   uint32_t top_, found_ = 0, nodes_ = 0, tests_ = 0, judged_ = 0;
   int64_t winding_ = 0;                          // sum of decided crossings, with the signs for an ascending half line
-  alignas(32) uint32_t blocks_[kMaxLineBlocks];  // met blocks that are not tested yet: `found_` elements
+  alignas(32) uint32_t blocks_[kMaxLineBlocks];  // blocks still to be tested: `found_` elements
 };
 
 static void sum_crossings(const TriangleTree& tree, CrossingVisit& visit) { CrossingWalk(tree, visit).run(); }

@@ -20,8 +20,8 @@
 //   by at most 18 u L.
 // - The dot products of r with p - a and with an edge have errors of 4 u |r| L each, their difference 2 u |r| L more:
 //   10 u |r| L. The quotient by |r| adds 4 u L. So the lower bound is too high by at most 14 u L.
-// Both are within 2^-19 L = 32 u L. The term 2^-59 covers the case that |r| is below 2^-60, so that its square
-// underflows: |r| is then raised to 2^-60, which lowers a positive quotient.
+// Both errors are within 2^-19 L = 32 u L. The additional term 2^-59 of the error bound covers the case that |r| is
+// below 2^-60, so that its square underflows: |r| is then raised to 2^-60, which lowers a positive quotient.
 //
 // Source: Ericson, Real-Time Collision Detection, 2005, 5.1.5 (nearest point of a triangle by regions); the lower bound
 // is that of a separating plane.

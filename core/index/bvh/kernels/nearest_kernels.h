@@ -33,7 +33,7 @@ struct NearestCandidate {
 // Point in mesh axes, the state of a visit of one tree between two calls, and the candidates of the last call.
 struct NearestVisit {
   float point[3];  // finite; see kMaxNearestReach
-  float pad;       // >= 0: upper bound of the distance between `point` and the point that the caller means
+  float pad;       // >= 0: upper bound of the distance between `point` and the caller's unrounded point
   // Maximum distance from the caller's point, in mesh axes, >= 0: triangles beyond the limit are not needed. The caller
   // may lower the limit between two calls; see also `closest`.
   float limit;

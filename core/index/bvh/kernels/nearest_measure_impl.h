@@ -32,8 +32,8 @@ static inline Vector4 cross(Vector4 a, Vector4 b) {
 static inline Doubles4 less_of(Doubles4 a, Doubles4 b) { return b < a ? b : a; }
 static inline Doubles4 greater_of(Doubles4 a, Doubles4 b) { return a < b ? b : a; }
 
-// Does what on_edge() in point_triangle.cc does. `from` and `to` are the vectors from both ends of the edge to the
-// point.
+// Returns the squared distances that on_edge() in point_triangle.cc computes. `from` and `to` are the vectors from the
+// first and the second end of the edge to the point.
 __attribute__((always_inline)) inline Doubles4 squared_to_edge(Vector4 edge, Vector4 from, Vector4 to) {
   const Doubles4 along = dot(from, edge), length = squared_length(edge);
   const Doubles4 inside = squared_length(cross(from, edge)) / length;
@@ -41,8 +41,8 @@ __attribute__((always_inline)) inline Doubles4 squared_to_edge(Vector4 edge, Vec
   return along <= 0 ? squared_length(from) : not_before;
 }
 
-// Does what on_face() in point_triangle.cc does, but returns `farthest` for a triangle for which on_face() returns no
-// distance.
+// Returns the squared distances that on_face() in point_triangle.cc computes; `farthest` for a triangle for which
+// on_face() returns an infinite distance.
 __attribute__((always_inline)) inline Doubles4 squared_to_face(Vector4 ab, Vector4 ac, Vector4 bc, Vector4 from_a,
                                                                Vector4 from_b, Doubles4 farthest) {
   const Vector4 normal = cross(ab, ac);
@@ -65,7 +65,8 @@ static inline Doubles4 coordinate(const float* const* lanes, int row) {
   return Doubles4{lanes[0][at], lanes[1][at], lanes[2][at], lanes[3][at]};
 }
 
-// Does what Transform::point_to_world() does.
+// Returns the same vertex of four triangles in world axes, as computed by Transform::point_to_world(). `row` is the
+// first of the vertex's rows in TriangleBlock::vertices.
 __attribute__((always_inline)) inline Vector4 placed_vertex(const float* const* lanes, int row,
                                                             const NearestPlacement& placement) {
   const Doubles4 x = coordinate(lanes, row), y = coordinate(lanes, row + 1), z = coordinate(lanes, row + 2);

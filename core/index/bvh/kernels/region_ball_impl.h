@@ -5,7 +5,7 @@
 // rounding, as if compiled without fused multiply-add: the error of a product of two differences is 4 u of its value
 // within a difference of two such products, and 5 u within a dot product.
 //
-// For most triangles a test of the vertices alone, as vectors from the centre, gives the result:
+// For most triangles a test of the vertices alone, as vectors from the centre, determines the result:
 // - The error of the squared length of such a vector is 5 u of its value: a vertex is certainly inside if its squared
 //   length is at most r^2 (1 - 2^-19). The predicate then finds the triangle too, by its distance from the edge that
 //   starts at this vertex; this is true for edges of any length.

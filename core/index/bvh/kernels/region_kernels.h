@@ -27,8 +27,8 @@ struct KernelBox {
   float center[3];
   float half[3];
   float rotation[9];  // rows of the matrix from box axes to mesh axes
-  // Axis-aligned box strictly around this box (`outer`) and, if this box is not rotated, axis-aligned box strictly
-  // within it (`inner`).
+  // Axis-aligned box strictly around this box (`outer`), and axis-aligned box strictly within this box (`inner`, valid
+  // only if this box is not rotated).
   float outer_min[3], outer_max[3];
   float inner_min[3], inner_max[3];
 };

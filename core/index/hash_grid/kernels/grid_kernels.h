@@ -1,6 +1,6 @@
 // Kernels that cull the values of the hash grid in float, eight at a time: plain data and a table of functions,
 // compiled once per instruction set. The kernels only cull; their callers apply the exact predicates, in double. Any
-// thread.
+// thread may call the kernels.
 //
 // A kernel never drops a value that satisfies the caller's original query, in spite of rounding, because callers widen
 // the query by kCullEpsilon times the magnitudes of the query's coordinates and the brick's coordinates. The widening
@@ -57,8 +57,8 @@ struct GridNear {
 
 struct GridKernels {
   const char* name;
-  // Write the slots of the values that meet the box, line or ball to `slots`, in increasing order within each row, and
-  // return their number. `slots` has room for kMaxValues elements and one vector of eight more.
+  // Write the slots of the values whose bounds may intersect the box, line or ball to `slots`, in increasing order
+  // within each row, and return their number. `slots` has room for kMaxValues elements and one vector of eight more.
   uint32_t (*cull_box)(const GridRows& rows, const GridBox& box, uint32_t* slots);
   uint32_t (*cull_line)(const GridRows& rows, const GridLine& line, uint32_t* slots);
   uint32_t (*cull_ball)(const GridRows& rows, const GridBall& ball, uint32_t* slots);

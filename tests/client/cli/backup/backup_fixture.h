@@ -1,4 +1,5 @@
-// Fixture for tests of backup and restore: a server with a planned backup, a temporary folder, and command lines.
+// Fixture for tests of backup and restore: a fake server that sends a planned backup, a temporary folder, and a
+// function that runs command lines.
 #ifndef LOCUS_TESTS_CLIENT_CLI_BACKUP_BACKUP_FIXTURE_H_
 #define LOCUS_TESTS_CLIENT_CLI_BACKUP_BACKUP_FIXTURE_H_
 

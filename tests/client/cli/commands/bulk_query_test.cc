@@ -37,8 +37,8 @@ class BulkQueryTest : public BulkTest {
   }
 };
 
-// Returns random rays whose coordinates are multiples of 1/8, hence exact floats, so that the frame is the origin for
-// rays given by options as well as for rays read from rows.
+// Returns random rays. The coordinates of their origins are multiples of 1/8 and hence exact floats, so that the
+// command uses no frame, neither for rays given by options nor for rays read from rows.
 std::vector<std::array<double, 6>> random_rays(int count) {
   test::Random random(17);
   std::vector<std::array<double, 6>> rays;

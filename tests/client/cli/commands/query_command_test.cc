@@ -62,7 +62,7 @@ TEST_F(QueryCommandTest, CapsulesHaveContacts) {
 TEST_F(QueryCommandTest, AFrustumIsGivenByPlanesOrByAMatrix) {
   EXPECT_EQ(csv_of({"frustum", "world", "--plane=1,0,0,-4", "--plane=-1,0,0,9", "--plane=0,1,0,9", "--plane=0,-1,0,9"}),
             "frustum,id\n0,8\n");
-  // Clip coordinates are a quarter of the positions, and the depth (z + 4) / 8.
+  // The matrix maps x and y to a quarter of their values, and z to the depth (z + 4) / 8.
   const std::string view = "0.25,0,0,0,0,0.25,0,0,0,0,0.125,0,0,0,0.5,1";
   EXPECT_EQ(csv_of({"frustum", "world", "--view", view}), "frustum,id\n0,7\n0,8\n");
   EXPECT_THAT(refusal_of({"frustum", "world"}), HasSubstr("give --plane, --view with 16 numbers"));

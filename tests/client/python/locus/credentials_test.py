@@ -13,7 +13,7 @@ from support import BIN, WAIT_SECONDS
 
 
 class Server(grpc.GenericRpcHandler):
-    """Server that answers every call with an empty message, and refuses other tokens than `required`."""
+    """Server that answers calls with an empty message. If `required` is set, it refuses calls without this token."""
 
     def __init__(self, ssl=None):
         self.required = None

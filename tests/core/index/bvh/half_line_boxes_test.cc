@@ -1,5 +1,5 @@
-// Tests of half lines through boxes and trees: the boxes that a half line meets, the sums of crossings, and the choice
-// of the cheapest half line.
+// Tests of half lines through boxes and trees: the boxes that a half line intersects, the sums of crossings, and the
+// choice of the cheapest half line.
 #include "core/index/bvh/half_line_boxes.h"
 
 #include <gtest/gtest.h>
@@ -28,7 +28,7 @@ bool meets(Vec3d point, HalfLine line, const Aabbf& box) {
   return met != 0;
 }
 
-// Returns whether the half line meets the box, by a test in double without any rounding.
+// Returns whether the half line intersects the box. Compares doubles without any rounding.
 bool is_met(Vec3d point, HalfLine line, const Aabbf& box) {
   for (int axis = 0; axis < 3; ++axis) {
     const bool from_min = double{box.min[axis]} <= point[axis], to_max = point[axis] <= double{box.max[axis]};
@@ -72,7 +72,7 @@ TEST(HalfLineBoxesTest, AVisitSumsTheCrossingsOfAllTriangles) {
   for (const CrossingTrial& trial : all_crossing_trials()) ASSERT_EQ(trial.difference(), "");
 }
 
-// Returns the number of nodes and triangles that a visit opens and tests.
+// Returns the cost of a visit: the number of nodes that it opens plus the number of triangles that it tests.
 uint64_t cost_of(const TriangleBvh& tree, Vec3d point, HalfLine line) {
   struct {
     bool visit(const Triangle& /*triangle*/) { return true; }
@@ -94,7 +94,7 @@ TEST(HalfLineBoxesTest, TheCheapestHalfLineMeetsFewBoxes) {
     cheapest += cost_of(*city, point, city->cheapest_half_line(point));
     for (size_t k = 0; k < std::size(kHalfLines); ++k) fixed[k] += cost_of(*city, point, kHalfLines[k]);
   }
-  // Skip the half lines along z: they meet at most about one house, so they are cheap, too.
+  // Skip the half lines along z: each of them intersects about one house at most, so their cost is low, too.
   for (size_t k = 0; k < std::size(kHalfLines); ++k) {
     if (kHalfLines[k].axis == 2) continue;
     EXPECT_LT(2 * cheapest, fixed[k]);

@@ -160,8 +160,9 @@ TEST_F(WrongTopologyTest, NodesThatDoNotFormATreeAreRefused) {
   EXPECT_EQ(refused(), "the topology does not fit the mesh: too many blocks");
 }
 
-// Chain of nodes: each node has seven blocks and the next node. The triangles of every block are spread over the mesh,
-// so that queries meet every box and the stack of a visit reaches its maximum length.
+// Tree that is a chain of nodes: the children of each node but the last are seven blocks and the next node. The
+// triangles of every block are spread over the mesh, so that queries intersect every box and the stack of a visit
+// reaches its maximum length.
 class Chain {
  public:
   explicit Chain(uint32_t levels) : triangles_(bumpy_sphere(31, 0.1, 1)) {

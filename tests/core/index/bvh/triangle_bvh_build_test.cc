@@ -49,7 +49,8 @@ TEST(TriangleBvhBuildTest, CoincidentTrianglesGiveTheSameBytesOnAnyThreadsToo) {
   expect_equal_bytes(build_mesh(triangles, options), build_mesh(triangles));
 }
 
-// Cancels a build at one task, for every seventh task of the build: the result must be CANCELLED each time.
+// The first build is not cancelled and counts its tasks. Each further build is cancelled at one task, in steps of seven
+// tasks, and must return CANCELLED.
 TEST(TriangleBvhBuildTest, ABuildCancelledAnywhereEndsWithCancelled) {
   const std::vector<Triangle> triangles = large_mesh();
   size_t tasks = 0;
@@ -85,7 +86,7 @@ TEST(TriangleBvhBuildTest, TheFirstTriangleThatIsNotFiniteIsNamedByAnyThreads) {
 }
 
 // A large triangle is, for example, the ground below houses. If its block also contained small triangles, every ray
-// that meets the ground would test these.
+// that hits the ground would also test the small triangles.
 TEST(TriangleBvhBuildTest, ALargeTriangleGetsABlockOfItsOwn) {
   std::vector<Triangle> triangles;
   for (int i = 0; i < 15; ++i) {

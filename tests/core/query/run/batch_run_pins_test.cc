@@ -152,7 +152,7 @@ TEST_F(RunBatchPinsTest, QuickReadersAreNeverRevokedBesideOneThatKeepsAllRevisio
     std::deque<SnapshotPin> kept;
     uint64_t seen = 0;
     while (!done) {
-      // Pins at most one revision per answer that the quick reader gets, so that the quick reader's pin is never the
+      // Pins at most one revision for each answer of the quick reader, so that the quick reader's pin is never the
       // oldest when the pins exceed the limit.
       if (quick > seen) {
         seen = quick;
@@ -172,8 +172,8 @@ TEST_F(RunBatchPinsTest, QuickReadersAreNeverRevokedBesideOneThatKeepsAllRevisio
       ++quick;
     }
   });
-  // Stops on failure: if the quick reader fails, the hoarder pins no further revisions, so that no pin would be
-  // revoked.
+  // Stops on failure: if the quick reader fails, the hoarder pins no further revisions. Then no pin is revoked, and the
+  // loop would not end.
   for (uint64_t i = 0; (i < turns || revoked == 0) && !HasFailure(); ++i) {
     advance();
     expect_bounded();

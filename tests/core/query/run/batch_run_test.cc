@@ -252,8 +252,9 @@ TEST(BatchRunTest, AStoppedBatchIsDoneWithItsStatusWhenTheActiveThreadsReturn) {
   }
 }
 
-// A ray that hits thousands of triangles takes tens of microseconds, and one call of the kernels, which cannot be
-// interrupted, traces many rays.
+// Tests that a run polls RunOptions::stop at least once per 100,000 triangle tests. Rays that hit thousands of
+// triangles are the hard case: a call of the kernels cannot be interrupted and traces many rays, each of which takes
+// tens of microseconds.
 TEST(BatchRunTest, RaysThroughThousandsOfTrianglesPollTheStopInBoundedWork) {
   constexpr size_t kWalls = 4'000, kRays = 500;
   std::vector<Triangle> walls;

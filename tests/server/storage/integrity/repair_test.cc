@@ -103,7 +103,7 @@ TEST_F(RepairTest, MeshesWhoseContentIsDamagedAreDroppedWithTheirParts) {
 
 TEST_F(RepairTest, ARepairThatWasInterruptedIsFinishedAndReported) {
   store_two_meshes();
-  // The files of a repair that ended just before it moved the repaired database.
+  // Make the files of a repair that was interrupted just before it would have moved the repaired database.
   const std::filesystem::path data = options_.path, repaired = data / std::string(kRepairedFolder);
   const std::string old = (data / "before-repair-1").string(), marker(DurableMarkerFile::kName);
   std::filesystem::create_directories(repaired);

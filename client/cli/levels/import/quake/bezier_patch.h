@@ -21,8 +21,8 @@ struct PatchGrid {
 
 // Returns the point at parameter step / steps, 0 <= step <= steps, of the quadratic Bezier curve with control points a,
 // b, c. If the control points are floats, the result is bit for bit equal to the point at steps - step of the reversed
-// curve c, b, a. The reason is that the products are exact in double, and that a sum whose terms may be swapped is the
-// only value that is rounded.
+// curve c, b, a. The reason: the weighted control points are exact in double, and the weighted a and c are added first,
+// so swapping a and c changes no rounding.
 PatchPoint bezier_curve_point(const PatchPoint& a, const PatchPoint& b, const PatchPoint& c, int step, int steps);
 
 // Tessellates a grid of width x height control points (both odd and at least 3, stored row by row), which consists of 3

@@ -1,8 +1,8 @@
 // Decoder of the drawn surfaces in a Quake 3 level file (IBSP version 46). For the BSP importer. Plain data and a
 // function without state. A meshvert is an entry of the file's list of triangle corners: a vertex index relative to the
-// face's first vertex. Invariants of a BspFile returned by parse_bsp(): in range are the texture index of every face,
-// the vertex indices of every face except billboards, and the meshvert indices of polygons and meshes; every float is
-// finite.
+// face's first vertex. Invariants of a BspFile returned by parse_bsp(): every float is finite; the texture index of
+// every face, the vertex indices of every face except billboards, and the meshvert indices of polygons and meshes are
+// in range.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_QUAKE_BSP_FILE_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_QUAKE_BSP_FILE_H_
 

@@ -40,7 +40,7 @@ absl::Status unreadable(const std::string& path, absl::string_view why) {
   return absl::InvalidArgumentError(absl::StrCat("cannot read ", path, " as a zip archive: ", why, "; copy it again"));
 }
 
-// Opens an archive in memory, which must outlive the result.
+// Opens the archive whose content is `bytes`. `bytes` must outlive the result.
 absl::StatusOr<Archive> open_archive(absl::string_view bytes, const std::string& path) {
   zip_error_t error;
   zip_error_init(&error);

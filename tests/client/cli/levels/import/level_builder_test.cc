@@ -157,7 +157,7 @@ TEST(PartNameTest, BrokenUtf8LosesItsHighBytes) {
   EXPECT_EQ(clean_part_name("a\xF4\x90\x80\x80"), "a____");  // beyond U+10FFFF
   EXPECT_EQ(clean_part_name("a\xE5\xA3"), "a__");            // cut short
   EXPECT_EQ(clean_part_name("a\xF0\x9F\x8F"), "a___");       // cut short
-  EXPECT_EQ(clean_part_name("\x80z"), "_z");                 // starts in the middle
+  EXPECT_EQ(clean_part_name("\x80z"), "_z");                 // begins with a continuation byte
 }
 
 TEST(PartNameTest, ControlCharactersAreReplaced) { EXPECT_EQ(clean_part_name("a\nb\x1B[31m\x7F"), "a_b_[31m_"); }

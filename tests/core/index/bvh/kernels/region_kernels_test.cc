@@ -152,7 +152,7 @@ TEST_P(RegionKernelsTest, FindTheSameAsThePredicatesAmongNearlyFlatTriangles) {
 }
 
 // Blocks contain small and large triangles. For a small triangle, the kernel's error bound, which depends on the
-// block's extent, is much larger than a bound by the triangle's own size.
+// block's extent, is much larger than a bound that depends on the triangle's own size.
 TEST_P(RegionKernelsTest, FindTheSameAsThePredicatesAmongTrianglesOfManySizes) {
   Random random(10);
   std::vector<Triangle> mixed;
@@ -193,8 +193,8 @@ TEST_P(RegionKernelsTest, ACallPausesAfterTheMaximumNumberOfTests) {
   EXPECT_LT(search.tests(), kMaxRegionTests + 8);
 }
 
-// Batch of as many balls as one call of many() answers, from a ball without triangles to a large one; and, in `alone`,
-// the triangle numbers that a separate search finds for each ball.
+// Batch of kMaxRegions balls, the most that one call of many() answers. The first ball overlaps no triangle, and each
+// further ball is larger. `alone` contains the triangle numbers that a separate search finds for each ball.
 struct Together {
   explicit Together(const TriangleBvh& tree) {
     for (size_t i = 0; i < kMaxRegions; ++i) {

@@ -1,5 +1,5 @@
-// Kernels of every instruction set keep each value that the exact test in double keeps, and no value that is more than
-// an epsilon outside.
+// Compares the culling kernels of every instruction set with a test in double: a kernel must keep each value that
+// passes this test, and must drop each value that fails it by more than an epsilon.
 #include "core/index/hash_grid/kernels/grid_kernels.h"
 
 #include <gtest/gtest.h>
