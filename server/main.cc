@@ -59,8 +59,8 @@ int wait_for_signal(const sigset_t& signals) {
   return signal;
 }
 
-// Thread that waits for SIGTERM and SIGINT. It starts before the server, so that a signal can also end a long start,
-// and is never destroyed. A second signal ends the process at once.
+// Thread that waits for SIGTERM and SIGINT. It starts before the server, so that a signal can end the process even
+// during a long start. The object is never destroyed. A second signal ends the process immediately.
 class EndingSignals {
  public:
   static EndingSignals& listen() {

@@ -68,8 +68,8 @@ need() {
   [ "$(grep -c ^failed "$results")" = "$before" ] || finish
 }
 
-# Gives podman storage and settings of its own. Uses runc instead of crun, and limits that a process without
-# CAP_SYS_RESOURCE may set, so that podman works inside a container.
+# Gives podman storage and settings of its own. So that podman works inside a container, the settings select runc
+# instead of crun, and contain only resource limits that a process without CAP_SYS_RESOURCE may set.
 set_up_podman() {
   local driver=overlay
   [ "$(stat -f -c %T "$store")" = overlayfs ] && driver=vfs

@@ -30,8 +30,8 @@ class ReportStream {
   // Borrows `out`, which must outlive the stream.
   ReportStream(std::ostream& out, Format format, ReportShape shape);
 
-  // Begins the report. `head` contains facts known before the rows: json writes them at once, a table writes them below
-  // its rows, csv and ndjson omit them.
+  // Begins the report. `head` contains facts known before the rows: json writes them before the rows, a table writes
+  // them below its rows, csv and ndjson omit them.
   void begin(const Json& head);
   void add(const Json& row);
   // Ends the report. `tail` contains facts known only after the last row; they are written like the facts in `head`.

@@ -29,8 +29,8 @@ bool uses_tls(const CredentialOptions& options);
 // `localhost`, an IPv4 address that begins with 127, and [::1].
 bool stays_on_this_machine(absl::string_view target);
 
-// The token of one client, which has none if no token was configured. Thread-safe; streams share ownership.
-// Invariant: a token has only visible ASCII characters, since gRPC aborts the process for any other character.
+// Token of one client; empty if no token was configured. Thread-safe; streams share ownership. Invariant: a token has
+// only visible ASCII characters, since gRPC aborts the process for any other character.
 class Authorization {
  public:
   // Reads the token. Returns FAILED_PRECONDITION if the token may not be sent to `target` or its file cannot be read,

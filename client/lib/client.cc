@@ -25,8 +25,8 @@ namespace {
 
 enum class Repeat { kNever, kWhenUnavailable };
 
-// Parameters of a call besides its request: token, timeout, retries, and the name of its scene (empty if the call
-// concerns no scene).
+// Parameters of a call in addition to its request: token, timeout, retries, and the name of its scene (empty if the
+// call concerns no scene).
 struct CallPlan {
   Authorization& authorization;
   absl::Duration deadline;

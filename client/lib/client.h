@@ -51,7 +51,7 @@ using UploadProgress = std::function<void(uint64_t sent, uint64_t total)>;
 // Callback that is called after each message of a download with the number of bytes received so far and in total.
 using DownloadProgress = std::function<void(uint64_t received, uint64_t total)>;
 
-// Connection to one server. Thread-safe: every method may be called from any number of threads at once. Streams share
+// Connection to one server. Thread-safe: any number of threads may call any methods at the same time. Streams share
 // ownership of the connections and may outlive the client. Each client has two connections of its own, so that small
 // calls do not wait behind large messages (see Lane); the second connection is opened when it is first needed. Both
 // connections reconnect automatically.
@@ -91,11 +91,10 @@ class Client {
   absl::StatusOr<std::vector<v1::Scene>> list_scenes(const std::map<std::string, std::string>& labels = {}) const;
   absl::Status delete_scene(const v1::DeleteSceneRequest& request) const;
 
-  // Uploads a mesh in messages of at most 1 MiB, except that the first message has all parts of the mesh, whatever
-  // their size. The first message also carries the mesh's SHA-256, and the upload stops as soon as the server answers,
-  // so a mesh that the server already has is not sent again. Returns when the server has built the mesh's tree. Not
-  // retried; safe to call again. Returns INVALID_ARGUMENT, before anything is sent, if the length of a column is not a
-  // multiple of three or is too large.
+  // Uploads a mesh in messages of at most 1 MiB. The first message has the mesh's SHA-256 and all parts of the mesh, so
+  // it can be larger. The upload stops as soon as the server answers; thus a mesh that the server already has is not
+  // sent again. Returns when the server has built the mesh's tree. Not retried; safe to call again. Returns
+  // INVALID_ARGUMENT, before anything is sent, if the length of a column is not a multiple of three or is too large.
   absl::StatusOr<v1::UploadMeshResponse> upload_mesh(const MeshColumns& mesh,
                                                      const UploadProgress& progress = {}) const;
   // Downloads a mesh as the server stores it, completely into memory: 12 bytes per vertex and per triangle. Retried.

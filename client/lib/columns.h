@@ -1,6 +1,6 @@
 // Functions that fill columns row by row. Internal to the builders. The protocol allows a column to be absent if every
-// row has the default value, so a column stays empty until a row differs from the default, and is then filled with the
-// default up to that row.
+// row has the default value. Therefore a column stays empty until a row differs from the default; then the default is
+// filled in for all earlier rows.
 #ifndef LOCUS_CLIENT_LIB_COLUMNS_H_
 #define LOCUS_CLIENT_LIB_COLUMNS_H_
 

@@ -30,8 +30,8 @@ void add_scene(grpc::ClientContext& context, absl::string_view scene) {
 }
 
 // Returns the error of a channel that does not connect. gRPC reports the cause only in the status of a call, so this
-// function makes a call; the call fails at once if the channel's last attempt to connect has failed. `detail` follows
-// the target in the error message.
+// function makes a call. The call fails immediately if the channel's last attempt to connect has failed. `detail`
+// follows the target in the error message.
 absl::Status failure_of(const std::shared_ptr<grpc::ChannelInterface>& channel, const std::string& target,
                         absl::string_view detail) {
   constexpr absl::Duration kMaxWait = absl::Milliseconds(200);

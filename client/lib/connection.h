@@ -1,5 +1,5 @@
-// Functions that open a gRPC channel, prepare the calls on it, and report a wrong address or a failed TLS handshake at
-// once with a clear message. Internal to the library.
+// Functions that open a gRPC channel and prepare the calls on it. They report a wrong address or a failed TLS handshake
+// immediately, with a clear message. Internal to the library.
 #ifndef LOCUS_CLIENT_LIB_CONNECTION_H_
 #define LOCUS_CLIENT_LIB_CONNECTION_H_
 
@@ -42,7 +42,7 @@ std::shared_ptr<grpc::Channel> open_channel(const std::string& target, const Cli
 absl::Status await_connection(const std::shared_ptr<grpc::Channel>& channel, const std::string& target,
                               const ClientOptions& options);
 
-// Parameters of a call that are sent as metadata or as deadline, beside the request.
+// Parameters of a call that are not part of its request: gRPC sends them as metadata or as the call's deadline.
 struct CallHeader {
   Authorization& authorization;
   absl::Time deadline = absl::InfiniteFuture();

@@ -1,4 +1,5 @@
-// Address and credentials of a server, read from the environment and from named contexts as by the command line.
+// Address and credentials of a server, read from the environment and from named contexts in the same way as by the
+// command line.
 //
 //   auto endpoint = locus::client::endpoint_from_environment();
 //   if (!endpoint.ok()) return endpoint.status();
@@ -26,10 +27,10 @@ struct Endpoint {
 // Returns the endpoint that the variables LOCUS_ADDRESS, LOCUS_TLS, LOCUS_CA, LOCUS_CERT, LOCUS_KEY, LOCUS_SERVER_NAME,
 // LOCUS_TOKEN_FILE and LOCUS_TOKEN describe. Options that are not set by these variables come from a named context. Its
 // name is `context`, or the value of LOCUS_CONTEXT if `context` is empty. If both are empty and LOCUS_ADDRESS is not
-// set, the user's default context is used; it is not used for another address, so that its credentials do not reach
-// another server. Returns NOT_FOUND for an unknown context, INVALID_ARGUMENT for a malformed or too large contexts file
-// or a malformed value of LOCUS_TLS, and FAILED_PRECONDITION for a contexts file that cannot be read. Client::connect()
-// reads the files that contain credentials.
+// set, the user's default context is used. If LOCUS_ADDRESS is set, the default context is not used, so that its
+// credentials do not reach another server. Returns NOT_FOUND for an unknown context, INVALID_ARGUMENT for a malformed
+// or too large contexts file or a malformed value of LOCUS_TLS, and FAILED_PRECONDITION for a contexts file that cannot
+// be read. Client::connect() reads the files that contain credentials.
 absl::StatusOr<Endpoint> endpoint_from_environment(const std::string& context = {});
 
 // Options that the caller of complete_endpoint() has set already.

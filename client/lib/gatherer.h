@@ -55,8 +55,8 @@ class Gatherer {
     if (items_ == 1 || items_ == max_items_) changed_.notify_all();
   }
 
-  // Sends the gathered items at once, and blocks until `send` has returned for all items that were added before this
-  // call.
+  // Sends the gathered items without further delay, and blocks until `send` has returned for all items that were added
+  // before this call.
   void flush() {
     std::unique_lock lock(mutex_);
     const uint64_t target = sent_ + (sending_ ? 1 : 0) + (items_ > 0 ? 1 : 0);

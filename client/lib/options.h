@@ -10,9 +10,9 @@
 
 namespace locus::client {
 
-// Number of attempts and waits between them. The wait doubles with each attempt and varies randomly by up to 20 %, so
-// that many clients of one server do not retry in step. If the server requests a longer wait (Error.retry_after_ms),
-// that wait is used instead.
+// Maximum number of attempts of a call, and the waits between the attempts. The wait doubles with each attempt and
+// varies randomly by up to 20 %, so that many clients of one server do not retry in step. If the server requests a
+// longer wait (Error.retry_after_ms), that wait is used instead.
 struct RetryPolicy {
   // Maximum number of attempts, including the first. 1 = no retries.
   int max_attempts = 5;
@@ -58,8 +58,8 @@ struct ClientOptions {
   CredentialOptions credentials;
   // Maximum duration of connect().
   absl::Duration connect_timeout = absl::Seconds(10);
-  // False: connect() fails as soon as one attempt to connect is refused, so that a wrong address is reported at once.
-  // True: connect() retries until connect_timeout has passed, for servers that are just starting.
+  // False: connect() fails as soon as one attempt to connect is refused, so that a wrong address is reported
+  // immediately. True: connect() retries until connect_timeout has passed, for servers that are just starting.
   bool wait_for_server = false;
   // Maximum duration of a call including its retries. Raise it for large query batches on slow machines.
   absl::Duration deadline = absl::Seconds(10);
@@ -80,7 +80,7 @@ struct ClientOptions {
 // Limits of the number of items that a QueryBatcher or MoveBatcher gathers into one message, and of the time for which
 // it gathers them.
 struct GatherLimits {
-  // Maximum number of items in a message, at least 1. A full message is sent at once.
+  // Maximum number of items in a message, at least 1. A full message is sent immediately.
   size_t max_items = 1024;
   // Maximum time for which the first item of a message waits for more items. 0 = a message is sent as soon as the
   // previous message has been sent.

@@ -1,5 +1,5 @@
 // Files with certificates and keys, checked before gRPC uses them, since gRPC reports mistakes in them only to its own
-// log. Internal to the library. Functions without state; any thread.
+// log. Internal to the library. Functions without state, which any thread may call.
 #ifndef LOCUS_CLIENT_LIB_PEM_FILE_H_
 #define LOCUS_CLIENT_LIB_PEM_FILE_H_
 

@@ -1,6 +1,6 @@
 // Batcher of single queries from many callers. Queries that arrive within a short time are sent in one message, and
 // each query has a callback for its answer. For game code with scattered queries; code that has a thousand queries at
-// once builds one batch of them with QueryBuilder instead.
+// the same time builds one batch of them with QueryBuilder instead.
 //
 //   locus::client::QueryBatcher batcher(client->query_stream("arena", {.lane = locus::client::Lane::kLatency}));
 //   batcher.ray({{0, 1, 0}, {0, 0, -1}}, [](auto hit) { if (hit.ok() && hit->id != 0) shoot(hit->id, hit->t); });
@@ -69,7 +69,7 @@ class QueryBatcher {
   void ray(const SingleRay& ray, HitCallback on_hit);
   void ball(const SingleBall& ball, IdsCallback on_ids);
 
-  // Sends the gathered queries at once, and blocks until all queries added before are answered.
+  // Sends the gathered queries without further delay, and blocks until all queries added before are answered.
   void flush();
 
  private:

@@ -124,7 +124,7 @@ class RayBlock : public BlockBuilder<RayBlock> {
   // Appends one ray. The direction may have any length except zero; this length is the unit of t.
   RayBlock& ray(const Float3& origin, const Float3& direction, float t_max = std::numeric_limits<float>::infinity(),
                 const Filter& filter = {});
-  // Appends N rays: 3N floats each.
+  // Appends N rays: 3N floats of origins and 3N floats of directions.
   RayBlock& rays(absl::Span<const float> origins, absl::Span<const float> directions);
   // Sets the whole column of the maximum t, inclusive: N entries, or one for all rays.
   RayBlock& t_max(absl::Span<const float> t_max);

@@ -58,7 +58,7 @@ class UpdateBuilder {
   UpdateBuilder& upsert();
   // Makes the server refuse the whole batch if it would refuse any item of the batch.
   UpdateBuilder& all_or_nothing();
-  // Drops the scene's history and accepts the batch's tick even if it is lower than the scene's tick.
+  // Makes the server drop the scene's history, and accept the batch's tick even if it is lower than the scene's tick.
   UpdateBuilder& restart_ticks();
   // Removes all objects before the other changes of the batch.
   UpdateBuilder& clear();

@@ -21,8 +21,8 @@ uint64_t random_writer() {
 }
 
 // Returns whether the batch number of a failed batch can be used again: true if the server refused the batch with any
-// reason except REASON_BATCH_GAP, which means that the server has lost the state of the writer. After an error without
-// a reason it is unknown whether the server used the number, and continuing could lose a batch silently.
+// reason except REASON_BATCH_GAP. That reason means that the server has lost the state of the writer. After an error
+// without a reason it is unknown whether the server used the number, and continuing could lose a batch silently.
 bool batch_number_is_unused(const absl::Status& failure) {
   const std::optional<v1::Error> error = error_of(failure);
   return error && error->reason() != v1::REASON_UNSPECIFIED && error->reason() != v1::REASON_BATCH_GAP;

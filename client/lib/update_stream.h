@@ -6,11 +6,11 @@
 // it had already applied with `duplicate`. A batch that the server refuses does not use up its number, so the stream
 // renumbers the later batches and sends them again: the caller gets one outcome for each batch, in the order sent.
 //
-// The stream ends permanently if the server refuses the stream itself (for example because of the scene name or of
-// missing rights), if the server has lost the state of the writer (because the scene was restarted without its state),
-// or if as many consecutive calls as the policy allows fail without an answer between them. Every unanswered batch and
-// every later send() gets the status of this failure. The outcome of the unanswered batches is unknown; acked batches
-// stay applied.
+// The stream ends permanently in these cases: the server refuses the stream itself (for example because of the scene
+// name or of missing rights); the server has lost the state of the writer (because the scene was restarted without its
+// state); as many consecutive calls as the policy allows fail without an answer between them. Every unanswered batch
+// and every later send() gets the status of this failure. The outcome of the unanswered batches is unknown; acked
+// batches stay applied.
 #ifndef LOCUS_CLIENT_LIB_UPDATE_STREAM_H_
 #define LOCUS_CLIENT_LIB_UPDATE_STREAM_H_
 

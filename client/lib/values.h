@@ -12,7 +12,7 @@ struct Float3 {
   float x = 0, y = 0, z = 0;
 };
 
-// Absolute position, also the frame of a batch or block.
+// Absolute position of an object, or of the frame of a batch or block.
 struct Double3 {
   double x = 0, y = 0, z = 0;
 };

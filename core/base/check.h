@@ -19,8 +19,9 @@ template <class A, class B>
   check_failed(file, line, condition, operands.str());
 }
 
-// Aborts unless compare(a, b). The operands are parameters, because a local reference would outlive a temporary, for
-// example in LOCUS_CHECK_LE(x, std::min(y, 5)).
+// Aborts unless compare(a, b) returns true. A macro with local references to its operands would not be safe: in
+// LOCUS_CHECK_LE(x, std::min(y, 5)) such a reference would outlive a temporary. So the operands are parameters of a
+// function.
 template <class Compare, class A, class B>
 constexpr void check_op(Compare compare, const A& a, const B& b, const char* file, int line, const char* condition) {
   if (!compare(a, b)) check_failed_op(file, line, condition, a, b);

@@ -50,7 +50,7 @@ inline constexpr uint32_t kMaxRegionPlanes = 131'072;     // planes of all conve
 inline constexpr uint32_t kMaxSightSamples = 255;         // sample points of a target
 inline constexpr uint32_t kMaxSightEyes = 16;             // eyes of a viewer
 inline constexpr uint32_t kMaxSightSegments = 4'194'304;  // segments from an eye to a sample, per query batch
-inline constexpr uint32_t kMaxPairNeighbours = 1024;      // max nearest objects in a query of pairs, per object
+inline constexpr uint32_t kMaxPairNeighbours = 1024;      // max nearest objects per first object of a query of pairs
 inline constexpr uint32_t kMaxCellPlanes = 64;            // planes of a cell of free space
 inline constexpr uint32_t kDefaultCellPlanes = 32;
 // Default maximum size of a reply in bytes. gRPC clients refuse messages over 4 MiB by default.

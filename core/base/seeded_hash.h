@@ -1,6 +1,6 @@
 // Fast hash of ids that clients choose. The hash is seeded at random in every process, so that clients cannot choose
 // ids that collide in a table. The hash of an id differs between processes, so no query result may depend on
-// it. A SeededHash is a value that any number of threads may use at once.
+// it. A SeededHash is a value that any number of threads may use at the same time.
 //
 // The upper bits of the hash are distributed as evenly as the lower bits. Sources: Yi, wyhash (products folded into 64
 // bits); Dietzfelbinger et al., A Reliable Randomized Algorithm for the Closest-Pair Problem, 1997 (random multiplier).

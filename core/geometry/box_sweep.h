@@ -16,7 +16,7 @@ namespace locus {
 
 // The time during which two polytopes share a point.
 struct BoxOverlap {
-  Interval<double> time;  // for an endless motion: may begin before t = 0
+  Interval<double> time;  // computed for an endless motion, so it may begin before t = 0
   // Unit vector from the moving polytope to the resting box. If they overlap at t = 0, it is the direction of the
   // shortest way out: the shortest translation of the resting box that separates them. Otherwise it is the axis that
   // separates them until the first moment of overlap.

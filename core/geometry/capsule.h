@@ -19,9 +19,9 @@ struct Capsule {
 // radius.
 Aabbd bounds_of(const Capsule& capsule);
 
-// Returns whether the capsule's bounds overlap the box, and the capsule shares a point with the box after its radius is
-// increased by 2^-40 of the sum of the magnitudes of capsule and box. The increase covers the rounding of the box's
-// coordinates.
+// Returns true if the capsule's bounds overlap the box and the enlarged capsule shares a point with the box. The radius
+// of the enlarged capsule is larger by 2^-40 of the sum of the magnitudes of capsule and box. This covers the rounding
+// of the box's coordinates.
 bool reaches(const Capsule& capsule, const Aabbd& box);
 
 // Returns true for every box that contains a point of the capsule. May also return true for a box that the capsule
@@ -29,12 +29,12 @@ bool reaches(const Capsule& capsule, const Aabbd& box);
 // and no division.
 bool may_reach(const Capsule& capsule, const Aabbd& box);
 
-// Returns whether the capsule shares a point with the shape; touching counts. The capsule must also reach (see
-// reaches()) the shape's own bounds, so culling by any superset of these bounds never changes the result.
+// Returns whether the capsule shares a point with the shape; touching counts. The result is true only if reaches() is
+// also true for the shape's own bounds, so culling by any superset of these bounds never changes the result.
 bool capsule_overlaps(const Capsule& capsule, const Shape& shape);
 
-// Returns whether the capsule shares a point with the triangle, which is a closed surface. The bounds of the capsule
-// must also overlap the triangle's own bounds.
+// Returns whether the capsule shares a point with the triangle, which is a closed surface. The result is true only if
+// the bounds of the capsule also overlap the triangle's own bounds.
 bool capsule_overlaps(const Capsule& capsule, const Triangle& triangle);
 
 }  // namespace locus

@@ -70,7 +70,8 @@ class Polygon {
   size_t count_ = 0;
 };
 
-// Returns the square of half side `size` around the projection of `center` to the plane.
+// Returns a square polygon in the plane: its centre is the projection of `center` to the plane, and its sides have the
+// length 2 * size.
 Polygon square_on(const Plane& plane, Vec3d center, double size) {
   const Vec3d n = plane.normal, a = abs(n);
   const Vec3d other = a.x <= a.y && a.x <= a.z ? Vec3d{1, 0, 0} : a.y <= a.z ? Vec3d{0, 1, 0} : Vec3d{0, 0, 1};

@@ -3,10 +3,9 @@
 // region is clipped to the world's box. Pure functions in double; any thread.
 //
 // A point p is within a plane with the normal n and the offset d if n.p + d >= -e, where e is 2^-40 of the magnitudes
-// of n.p and d: a point that rounding has moved off a plane still counts as on the plane. A region and a solid overlap
-// if they share a point by this test.
-// Every overlap also requires that the bounds of the shape or triangle may_overlap() the region, so that culling by any
-// superset of these bounds never changes a result.
+// of n.p and d. So a point that rounding has moved off a plane still counts as on the plane. A region and a solid
+// overlap if they share a point by this test. Every overlap also requires that may_overlap() is true for the bounds of
+// the shape or triangle, so that culling by any superset of these bounds never changes a result.
 // Source: Sutherland, Hodgman, Reentrant Polygon Clipping, 1974.
 #ifndef LOCUS_CORE_GEOMETRY_CONVEX_REGION_H_
 #define LOCUS_CORE_GEOMETRY_CONVEX_REGION_H_
@@ -58,8 +57,8 @@ class ConvexRegion {
   Aabbd bounds_;
 };
 
-// Returns false if the box lies outside of the region's bounds, or wholly outside of one of its planes. Monotone: if
-// the result is true for a box, it is true for every box that contains this box.
+// Returns false if the box lies outside of the region's bounds, or wholly outside of one of the region's planes;
+// otherwise true. Monotone: if the result is true for a box, it is true for every box that contains this box.
 bool may_overlap(const ConvexRegion& region, const Aabbd& box);
 
 // Returns whether the region shares a point with the shape, a closed solid.
@@ -80,7 +79,7 @@ class RegionInMesh {
   // `magnitude` is the largest |coordinate| of the mesh.
   RegionInMesh(const ConvexRegion& region, const Transform& transform, float magnitude);
 
-  // Returns false only if the box lies wholly outside of one plane.
+  // Returns whether the box may overlap the region: false if the box lies wholly outside of one plane, otherwise true.
   bool may_overlap(const Aabbf& box) const;
   // Returns whether the region shares a point with the triangle, a closed surface.
   bool overlaps(const Triangle& triangle) const;

@@ -3,19 +3,22 @@
 // depending on the orientation of the mesh. Pure functions; any thread.
 //
 // Every sign is exact: it is computed in double if an error bound proves it, otherwise by an exact sum. So the sum of
-// the crossings is the winding number of the stored mesh around the given point. Edges are half-open: in the projection
-// along x, an edge includes its end with the lower y but not its end with the upper y, and a point that is exactly on
-// the edge is not counted. Triangles that share an edge therefore count it with opposite signs, and the sum is right
-// even if the half line meets edges or corners, or runs along faces. Source: Haines, Point in Polygon Strategies,
-// Graphics Gems IV, 1994, for the rule of half-open edges; Shewchuk, Adaptive Precision Floating-Point Arithmetic and
-// Fast Robust Geometric Predicates, 1997, for filters and exact signs.
+// the crossings is the winding number of the stored mesh around the given point. Edges are half-open. For a half line
+// along x, each edge is projected along x. The projected edge includes its end with the lower y, but not its end with
+// the upper y, and it counts as 0 for a point exactly on it. So two triangles that share an edge count it with opposite
+// signs, and the sum is right even if the half line meets edges or corners, or runs along faces. Sources: Haines, Point
+// in Polygon Strategies, Graphics Gems IV, 1994 (half-open edges); Shewchuk, Adaptive Precision Floating-Point
+// Arithmetic and Fast Robust Geometric Predicates, 1997 (filters and exact signs).
 //
 // Every half line results in the same sum, unless the point is on the surface. Proof: the rule of half-open edges
 // treats the point as if it were moved by (0, d * d, -d) for an infinitely small d > 0. The half line from the moved
 // point meets no edge or corner, so the sum is the winding number around the moved point. This is the winding number
-// around the point itself, because the surface is closed and does not contain the point. A half line along another axis
-// moves the point in another direction, to which the same applies. Whether the point is on the surface is determined
-// separately: the bounds of a triangle that contains the point also contain the start of every half line.
+// around the point itself, because the surface is closed and does not contain the point. For a half line along another
+// axis the point is moved in another direction, and the same proof applies.
+//
+// Crossing::on_surface tells whether the point is on the surface. Every half line determines this: if a triangle
+// contains the point, the bounds of the triangle contain the point too. The point is the start of the half line, so the
+// triangle is tested.
 #ifndef LOCUS_CORE_GEOMETRY_POINT_IN_MESH_H_
 #define LOCUS_CORE_GEOMETRY_POINT_IN_MESH_H_
 

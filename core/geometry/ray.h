@@ -60,9 +60,9 @@ inline constexpr double kObjectPad = 0x1p-40;    // predicates of moving objects
 template <class S>
 class SlabRay {
  public:
-  // Makes a ray whose slab test widens every box by at least `reach` on each side, in addition to the pad: for a search
-  // along the path of a solid of this extent. A nonzero `reach` requires `pad` > 0. The constructor is always inlined,
-  // because a call would take 27 more instructions for each ray.
+  // Makes a ray whose slab test widens every box by at least `reach` on each side, in addition to the pad. Used for a
+  // search along the path of a solid of this extent. A nonzero `reach` requires `pad` > 0. The constructor is always
+  // inlined, because a call would take 27 more instructions for each ray.
   [[gnu::always_inline]] SlabRay(const Ray<S>& ray, double pad, double reach = 0)
       : origin_(ray.origin),
         direction_(ray.direction),

@@ -1,10 +1,10 @@
 // Watertight intersection of a ray and a triangle: a ray from inside a closed mesh always hits the mesh. The triangle
 // is projected along the ray. Each of the three edge functions is the difference of two products. If the two vertices
 // of an edge are exchanged, only the sign of its edge function changes, so an edge that two triangles share has no gap
-// in spite of rounding. Boxes are culled in float, but hits are computed in double: in float the error of t would be
-// the rounding error divided by the sine of the angle between ray and plane (measured in float: for 0.7 % of random
-// rays the result is wrong by more than hit() allows, or a hit is lost). If a triangle is so nearly edge-on that double
-// is not precise enough either, edge_on_hit() of edge_on_triangle.h computes the hit. Source: Woop, Benthin, Wald,
+// in spite of rounding. Boxes are culled in float, but hits are computed in double. In float the error of t would be
+// the rounding error divided by the sine of the angle between ray and plane. Measured in float, for 0.7 % of random
+// rays the hit was lost or its error was larger than hit() allows. If a triangle is so nearly edge-on that double is
+// not precise enough either, edge_on_hit() of edge_on_triangle.h computes the hit. Source: Woop, Benthin, Wald,
 // Watertight Ray/Triangle Intersection, 2013; the code here omits the divisions of the paper, so that results on small
 // integers are exact.
 #ifndef LOCUS_CORE_GEOMETRY_RAY_TRIANGLE_H_
@@ -48,10 +48,10 @@ class TriangleRay {
   float to_scaled(float t) const;
 
   // Returns the hit, a pure function of ray and triangle, or nullopt. A hit requires that the watertight test accepts
-  // the triangle with t >= 0 (t is 0 if the origin lies on the triangle within the rounding error of the test) and that
-  // the slab test accepts the triangle's own box. t is clamped to the interval of that slab test, so a tree, which
-  // culls by boxes, reports the same hits as a test of every triangle. Triangles that are exactly edge-on or have no
-  // area are never hit. The error of a hit is at most 2^-21 of the magnitudes of hit and origin.
+  // the triangle with t >= 0, and that the slab test accepts the triangle's own box. If the origin lies on the
+  // triangle, up to the rounding error of the watertight test, t is 0. t is clamped to the interval of the slab test,
+  // so a tree, which culls by boxes, reports the same hits as a test of every triangle. Triangles that are exactly
+  // edge-on or have no area are never hit. The error of a hit is at most 2^-21 of the magnitudes of hit and origin.
   std::optional<TriangleHit> hit(const Triangle& triangle) const;
 
  private:

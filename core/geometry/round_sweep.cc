@@ -90,7 +90,7 @@ std::optional<double> RoundSweep::first_contact(double limit, double from) const
     if (is_contact) return std::min(t, 1.0) <= limit ? std::optional<double>(std::min(t, 1.0)) : std::nullopt;
     if (!(t <= limit)) return std::nullopt;
   }
-  return t;  // not decidable within the precision of t: reported rather than missed
+  return t;  // contact not decidable within the precision of t: report it, so that no contact is missed
 }
 
 RoundSweep::Separation RoundSweep::separation_at(double t) const {

@@ -20,9 +20,9 @@ namespace locus {
 
 class RoundSweep {
  public:
-  // Make the motion of a segment, a triangle or a box at `velocity` relative to the segment of `half_axis` around the
-  // origin. Positions are those at t = 0, relative to the midpoint of `half_axis`; `radius` >= 0. All vectors of
-  // to_box() are in the box's own axes.
+  // Make the motion of a primitive (a segment, a triangle or a box) relative to the segment from -half_axis to
+  // half_axis. `velocity` is the velocity of the primitive relative to the segment. Positions are those at t = 0,
+  // relative to the midpoint of `half_axis`; `radius` >= 0. All vectors of to_box() are in the box's own axes.
   static RoundSweep to_segment(Vec3d half_axis, double radius, Vec3d center, Vec3d other_half_axis, Vec3d velocity);
   static RoundSweep to_triangle(Vec3d half_axis, double radius, Vec3d a, Vec3d b, Vec3d c, Vec3d velocity);
   static RoundSweep to_box(Vec3d half_axis, double radius, Vec3d center, Vec3d half, Vec3d velocity);
@@ -32,9 +32,10 @@ class RoundSweep {
   // Returns whether the distance of `pair`, at time t, is at most the radius plus an epsilon for rounding: 2^-44 of the
   // magnitudes involved.
   bool touches(const NearestPair& pair, double t) const;
-  // Returns the first t in 0 .. limit at which the distance is at most the radius, or nullopt. The result is less than
-  // the exact moment by at most the epsilon of touches() divided by the speed of approach, and never greater except for
-  // rounding. `from` >= 0 is a lower bound of the result, at which the search begins.
+  // Returns the first t in 0 .. limit at which the distance is at most the radius, or nullopt. The result may be
+  // earlier than the exact moment, by at most the epsilon of touches() divided by the speed of approach. It is later
+  // than the exact moment only by rounding errors. `from` >= 0 is a lower bound of the result, at which the search
+  // begins.
   std::optional<double> first_contact(double limit, double from = 0) const;
   // Distance, direction and nearest points of primitive and segment. `distance` is negative if the segment reaches into
   // a box. `direction` is the unit vector from the primitive to the segment. If they intersect, it is the direction of

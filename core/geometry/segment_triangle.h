@@ -15,8 +15,8 @@ namespace locus {
 bool segment_crosses_triangle(Vec3d center, Vec3d half_axis, Vec3d a, Vec3d b, Vec3d c);
 
 // Returns the squared distance between the segment and the triangle: 0 if they cross, else the minimum of the distances
-// from the ends of the segment to the triangle, and from the segment to the three edges. The result is never less than
-// the exact one by more than a few roundings of the coordinates.
+// from the ends of the segment to the triangle, and from the segment to the three edges. The result is at least the
+// exact squared distance, except for an error of a few roundings of the coordinates.
 // Source: Ericson, Real-Time Collision Detection, 2005, 5.1.10.
 double squared_distance_segment_triangle(Vec3d center, Vec3d half_axis, Vec3d a, Vec3d b, Vec3d c);
 

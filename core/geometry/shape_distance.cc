@@ -101,9 +101,9 @@ double squared_gap(const Aabbd& a, const Aabbd& b) {
 
 bool is_ball_or_point(const Shape& shape) { return shape.kind == ShapeKind::kPoint || shape.kind == ShapeKind::kBall; }
 
-// Returns the same result for balls and points as the general code of distance_between(), bit for bit, but faster: the
-// squared distance of segments of length 0 is computed from their centres, and the square root for the distance of the
-// bounds is seldom needed.
+// Returns the distance between two balls or points. The result equals that of the general code of distance_between(),
+// bit for bit, but is computed faster. The cores have length 0, so the squared distance of the centres suffices, and
+// the square root for the distance of the bounds is seldom needed.
 double distance_of_balls(const Shape& a, const Shape& b) {
   const auto radius = [](const Shape& shape) { return shape.kind == ShapeKind::kBall ? double{shape.radius} : 0.0; };
   const double apart = std::sqrt(squared_length(b.position - a.position)) - radius(a) - radius(b);

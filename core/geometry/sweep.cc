@@ -109,7 +109,8 @@ Contact contact_of(const std::optional<BoxOverlap>& overlap, const Mover& box, V
   return {overlap ? -overlap->depth : 0, box.way * t + box.rotation.to_world(shared), normal};
 }
 
-// Returns `t`, the first moment of contact with `primitive`, or nullopt if `at_start` excludes a contact at t = 0.
+// Returns `t`, the first moment of contact with `primitive`. Returns nullopt instead if `t` is 0 and `at_start`
+// excludes this contact.
 template <class Primitive>
 std::optional<double> with_rule(std::optional<double> t, const Mover& mover, const Primitive& primitive,
                                 AtStart at_start) {

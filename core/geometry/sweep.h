@@ -2,9 +2,9 @@
 // and shapes are closed solids, so touching counts. A triangle is a closed surface with two sides. Points, and
 // triangles without area, are found too.
 //
-// Error: consider the mover shrunk by 2^-20 of the sum of its distance from the origin and its size. If the shrunk
-// mover hits the primitive, the sweep reports a hit that is not later. At a reported hit, the distance between mover
-// and primitive is at most about 2^-44 of the magnitudes involved.
+// Error bounds: let the mover be shrunk by 2^-20 of the sum of its distance from the origin and its size. If the shrunk
+// mover hits the primitive, the sweep reports a hit at the same time or earlier. At a reported hit, the distance
+// between mover and primitive is at most about 2^-44 of the magnitudes involved.
 //
 // Pure functions in double, of products, sums, quotients and square roots in a fixed order. O(1); any thread.
 #ifndef LOCUS_CORE_GEOMETRY_SWEEP_H_

@@ -1,7 +1,7 @@
-// Collectors: visitors that test the candidates of a structure and store the results: the nearest hit of a ray, any
-// hit, the nearest few hits, or all values whose bounds overlap a ray or a region. Collectors are separate from
-// traversal, so that every structure supports every kind of query. One object per query and thread; each object borrows
-// its query.
+// Collectors: visitors that test the candidates of an index structure and store the results. Results are the nearest
+// hit of a ray, any hit, the nearest few hits, or all values whose bounds overlap a ray or a region. Collectors are
+// separate from traversal, so that every structure supports every kind of query. One object per query and thread; each
+// object borrows its query.
 #ifndef LOCUS_CORE_INDEX_COLLECTORS_H_
 #define LOCUS_CORE_INDEX_COLLECTORS_H_
 

@@ -47,9 +47,9 @@ inline constexpr auto kBoundsDecide = [](const auto&) { return true; };
 }  // namespace internal
 
 // Finds the first hit among several indices of one value type. If there is a hit at a distance strictly less than
-// `distance`, sets `value` and `distance` to the value and distance of the nearest hit and returns true; otherwise
-// leaves `value` and `distance` unchanged and returns false. The limit for each index is the nearest distance found in
-// the indices before it. Among hits at equal distance the lower id wins, also across indices. Do not join calls of
+// `distance`, sets `value` and `distance` to the value and distance of the nearest hit and returns true. Otherwise
+// leaves both unchanged and returns false. The limit for each index is the nearest distance found in the indices before
+// it. Among hits at equal distance the lower id wins, even if the hits are in different indices. Do not join calls of
 // first_ray() by || instead: a hit in the first index would skip the second index, which may hold a nearer hit.
 template <class V, SpatialIndex... Indices>
 bool first_ray_of(const typename PrimitiveTraits<V>::RayQuery& ray, V& value, ScalarOf<V>& distance, Work* work,

@@ -69,7 +69,8 @@ class BoxRegion {
 
 // Region of a capsule: overlaps() returns true for the boxes that may_reach() accepts and that overlap the bounds of
 // the capsule. overlaps() is not monotone: near the surface of the capsule, the result depends on rounding. So a
-// visitor may use this region only to cull values whose own test is stricter by more than this rounding.
+// visitor may use this region only if the visitor's exact test of a value is stricter than overlaps() by more than this
+// rounding.
 class CapsuleRegion {
  public:
   explicit CapsuleRegion(const Capsule& capsule)

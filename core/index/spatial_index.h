@@ -25,9 +25,10 @@ concept RayVisitor = requires(Visitor& visitor, const Value& value) {
   { visitor.visit(value) } -> std::same_as<bool>;
 };
 
-// Visitor of the candidates of a region. overlaps(box) returns false only if no value within the box can be a result.
-// overlaps() is monotone: if it returns true for a box, it returns true for every superset of that box. bounds()
-// returns a box that overlaps the bounds of every result. visit() returns false to end the visit.
+// Visitor of the candidates of a region. overlaps(box) returns true whenever a value within the box can be a result; it
+// may also return true otherwise. overlaps() is monotone: if it returns true for a box, it returns true for every
+// superset of that box. bounds() returns a box that overlaps the bounds of every result. visit() returns false to end
+// the visit.
 template <class Visitor, class Value>
 concept RegionVisitor = requires(Visitor& visitor, const Value& value, const Aabb<ScalarOf<Value>>& box) {
   { std::as_const(visitor).bounds() } -> std::same_as<Aabb<ScalarOf<Value>>>;
@@ -77,8 +78,8 @@ concept SpatialIndex = Bounded<typename Index::Value> &&
 };
 
 // Structure that can be changed. Precondition of insert(): no value in the index has the same id. remove() and
-// contains() find a value by its id, but the caller must pass the value with the position at which it was inserted,
-// since contains() may compare positions, too.
+// contains() find a value by its id. The caller must nevertheless pass the value with the position at which it was
+// inserted, since contains() may compare the position as well.
 template <class Index>
 concept MutableSpatialIndex = SpatialIndex<Index> &&
     requires(Index& index, const Index& const_index, const typename Index::Value& value) {

@@ -18,8 +18,8 @@ struct Edge {
 };
 
 // Edges of a mesh, grouped by their lower corner: ends_[start_[i]] to ends_[start_[i + 1] - 1] are the edges whose
-// lower corner is i. Each value has the higher corner of its edge in the upper bits. Its lowest bit is set if the edge
-// goes from the higher to the lower corner.
+// lower corner is i. Each element of ends_ has the higher corner of its edge in the upper bits. Its lowest bit is set
+// if the edge goes from the higher to the lower corner.
 class EdgesByCorner {
  public:
   // `for_each` calls its argument with each edge, in the same order each time.

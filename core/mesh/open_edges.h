@@ -10,7 +10,7 @@ namespace locus {
 
 // Returns the number of open edges. An edge is a pair of corners with different coordinates. For each edge, compares
 // the number of triangles that use the edge in one direction with the number of triangles that use it in the other
-// direction; the result is the sum of the absolute differences over all edges. Corners with equal coordinates are the
+// direction. The result is the sum of the absolute differences over all edges. Corners with equal coordinates are the
 // same corner, even if their indices differ; -0 equals 0. `vertices` has 3 coordinates for each vertex, and `indices`
 // has 3 valid vertex indices for each triangle. O(n) if triangles share vertices by index, otherwise O(n log n). Needs
 // at most about 40 bytes of memory for each triangle, or 130 bytes if no triangles share a vertex.

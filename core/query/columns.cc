@@ -10,7 +10,7 @@ namespace {
 constexpr uint64_t kBlockOverhead = 256;
 constexpr uint64_t kReplyOverhead = 256;
 // Upper bounds of encoded sizes for each query, in bytes: its row count, its index in the list of truncated queries,
-// its effective time, and its index in the list of queries without an anchor.
+// its index in the list of unanchored queries, and its effective time.
 constexpr uint64_t kCountBytes = 4;
 constexpr uint64_t kTruncatedBytes = 4;
 constexpr uint64_t kAnchorBytes = 4;

@@ -98,9 +98,9 @@ ColumnSet served_columns(const QueryBlock& block);
 // requests no columns. Returns no columns if count_only is set.
 ColumnSet returned_columns(const QueryBlock& block);
 
-// Layout of a block's result. kDense has one row per query, also for a miss. kBytes has one byte per query and no rows.
-// kMatrix has the same number of bytes, bytes_per_query(), for each query and no rows. kCounted has any number of rows
-// per query, and a column with the number of rows of each query; with count_only, only this column.
+// Layout of a block's result. kDense has one row per query, even for a miss. kBytes has no rows, but one byte per
+// query. kMatrix has no rows, but bytes_per_query() bytes per query. kCounted has any number of rows per query, and a
+// column with the number of rows of each query; with count_only, only this column.
 enum class RowLayout : uint8_t { kDense, kBytes, kMatrix, kCounted };
 RowLayout row_layout(const QueryBlock& block);
 // Returns the number of bytes of each query of a kBytes or kMatrix block.
@@ -108,9 +108,9 @@ size_t bytes_per_query(const QueryBlock& block);
 // Returns the maximum number of rows of each query of a kCounted block.
 uint64_t max_rows_per_query(const QueryBlock& block);
 
-// Returns an upper bound of the encoded size of a reply in bytes, without the rows of kCounted blocks: dense rows,
-// bytes of kBytes and kMatrix blocks, row counts, effective times, lists of truncated and unanchored queries, and field
-// headers.
+// Returns an upper bound of the encoded size of a reply in bytes, without the rows of kCounted blocks. Includes dense
+// rows, bytes of kBytes and kMatrix blocks, row counts, effective times, lists of truncated and unanchored queries, and
+// field headers.
 uint64_t fixed_reply_bytes(const QueryBatch& batch);
 // Returns the batch's max_reply_bytes, or limits::kDefaultReplyBytes if max_reply_bytes is 0.
 uint64_t reply_limit(const QueryBatch& batch);

@@ -107,8 +107,8 @@ class BlockCheck {
   }
 
   // Returns whether all points, given relative to the frame, lie within the world: |coordinate| <= kMaxCoordinate. The
-  // loop has no branch per value, because nearly all batches are valid: check_points_from() searches for the invalid
-  // point only if this function returns false.
+  // loop has no branch per value, because nearly all batches are valid. Only if this function returns false,
+  // check_points_from() searches for the invalid point.
   bool all_within_world(absl::Span<const float> values) const {
     bool all = values.size() % 3 == 0;
     for (size_t i = 0; i + 2 < values.size(); i += 3)

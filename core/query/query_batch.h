@@ -73,7 +73,7 @@ struct AfterColumns {
 
 struct RayColumns {
   absl::Span<const float> origins;     // N entries x y z, relative to the frame
-  absl::Span<const float> directions;  // N entries x y z, or one for all rays; no entry is the zero vector
+  absl::Span<const float> directions;  // N entries x y z, or one for all rays; the zero vector is refused
   absl::Span<const float> t_max;       // maximum t of a hit, >= 0; default: +inf
   RayMode mode = RayMode::kFirst;
   Cull cull = Cull::kNone;
@@ -157,7 +157,7 @@ struct SightColumns {
 
 // Pairs of objects within a distance of each other. A block of this kind has one query.
 struct PairColumns {
-  float max_distance = 0;    // inclusive, 0 .. limits::kMaxCoordinate, or +inf if count is not 0
+  float max_distance = 0;    // inclusive, 0 .. limits::kMaxCoordinate; +inf is allowed if count is not 0
   Layers first_mask = 0;     // 0 means all layers
   Layers second_mask = 0;    // 0 means all layers
   uint32_t count = 0;        // maximum number of nearest objects of each object; 0: each pair has one row

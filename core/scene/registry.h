@@ -3,10 +3,10 @@
 // until its deletion is logged; a mesh is hidden before its deletion is logged, and is visible again if the log fails.
 //
 // Threads: every member may be called from any thread. Changes of scenes run one at a time and wait for the log.
-// Changes of meshes run one at a time, too, and may take seconds to write a mesh. delete_scene() also waits for a batch
-// that is being applied. delete_mesh() waits for running changes of scenes and of meshes. All other members never wait.
-// Lock order: mesh_changes_mutex_, changes_mutex_, then the locks of a scene. mutex_ is held only for a lookup or an
-// insertion; while it is held, only Scene::mutex_ may be locked.
+// Changes of meshes run one at a time as well; a change that writes a mesh may take seconds. delete_scene() also waits
+// for a batch that is being applied. delete_mesh() waits for running changes of scenes and of meshes. All other members
+// never wait. Lock order: mesh_changes_mutex_, changes_mutex_, then the locks of a scene. mutex_ is held only for a
+// lookup or an insertion; while it is held, only Scene::mutex_ may be locked.
 #ifndef LOCUS_CORE_SCENE_REGISTRY_H_
 #define LOCUS_CORE_SCENE_REGISTRY_H_
 

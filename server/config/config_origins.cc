@@ -35,8 +35,8 @@ std::string lines_that_set(const std::string& path, const std::string& name) {
 constexpr std::pair<absl::string_view, bool ServerConfig::*> kFlags[] = {
     {"accept-compression", &ServerConfig::accept_compression}, {"insecure", &ServerConfig::insecure}};
 
-// Returns the option's value as text. The parser was built over `config`, which holds the values in use, so CLI11 shows
-// these values as the defaults of the options.
+// Returns the option's value as text. The parser was built for `config`, which holds the values in use, so CLI11
+// reports these values as the defaults of the options.
 std::string value_of(const CLI::Option& option, const ServerConfig& config) {
   if (option.get_expected_max() == 0) {  // a flag without a value
     for (const auto& [name, member] : kFlags)

@@ -10,7 +10,7 @@ namespace locus::server {
 inline constexpr size_t kMaxLabelledScenes = 100;    // scenes with their own label in /metrics; other scenes are summed
 inline constexpr size_t kMaxRefusalNames = 64;       // pairs of reason and limit that /metrics counts separately
 inline constexpr uint32_t kHttpThreads = 2;          // threads that make pages
-inline constexpr uint32_t kMaxHttpConnections = 64;  // connections that are served at once; others wait in the kernel
+inline constexpr uint32_t kMaxHttpConnections = 64;  // connections served concurrently; others wait in the kernel
 inline constexpr uint32_t kMaxHttpRequestBytes = 8192;     // request line and headers
 inline constexpr uint32_t kHttpTimeoutMs = 2000;           // timeout of TLS and a request together, and of the answer
 inline constexpr size_t kMaxRequestIdLength = 64;          // characters of a caller's x-request-id

@@ -64,8 +64,8 @@ std::string name_of(const std::map<std::string, T>& names, T value) {
 
 enum class ZeroBytes : uint8_t { kAllowed, kRefused };
 
-// Returns a validator that accepts sizes from `min` bytes to limits::kMaxMemory, and also 0 if `zero` allows it.
-// `min_text` is the text of `min` in the error. CLI11 has already converted a size such as 16MiB to a plain number.
+// Returns a validator that accepts sizes from `min` bytes to limits::kMaxMemory, and 0 if `zero` allows it. `min_text`
+// is the text of `min` in the error. CLI11 has already converted a size such as 16MiB to a plain number.
 CLI::Validator size_from(uint64_t min, const char* min_text, ZeroBytes zero) {
   const auto check = [min, min_text, zero](const std::string& text) -> std::string {
     uint64_t bytes = 0;

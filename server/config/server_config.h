@@ -37,10 +37,10 @@ struct ServerConfig {
 
   // Address of the HTTP pages: /metrics for Prometheus, /healthz, /readyz. `host:port` or `[v6]:port`; port 0 means any
   // free port; empty = no pages. If the default address is in use, the daemon logs a warning and runs without the
-  // pages; any other address that is in use is an error. With `tls_cert`, the pages use TLS as the other TCP
-  // connections do. With access control, /metrics needs the right `metrics`, because the page shows the names and the
-  // use of scenes; /healthz and /readyz are for everybody. Change this option so that a scraper on another machine can
-  // read the pages; that also needs `tls_cert` and `access_file`, or `insecure`.
+  // pages; any other address that is in use is an error. With `tls_cert`, the pages use TLS, like all other TCP
+  // connections. With access control, a reader of /metrics needs the right `metrics`, because the page shows the names
+  // and the use of scenes; /healthz and /readyz are for everybody. Change this option so that a scraper on another
+  // machine can read the pages; that also needs `tls_cert` and `access_file`, or `insecure`.
   std::string http_listen = kDefaultHttpListen;
 
   // File to write the port of the HTTP pages to, once they are served; empty = no file.
@@ -94,10 +94,11 @@ struct ServerConfig {
   // use up processor time by sending compressed messages.
   bool accept_compression = false;
 
-  // Maximum numbers of connections: of all clients (0 = 4096, or fewer if the process may open only few files), of one
-  // address, and of new connections a second of one address. An address may open twice the last number at once. For
-  // unix sockets, a user counts as an address. Excess connections are closed at once. Raise the last two if many
-  // clients share one address, as behind a proxy.
+  // Maximum numbers: of the connections of all clients (0 = 4096, or fewer if the process may open only few files), of
+  // the connections of one address, and of the connections that one address may open in a second, on average. In a
+  // burst, an address may open twice the last number. For unix sockets, each user counts as an address. Excess
+  // connections are closed immediately. Raise the last two numbers if many clients share one address, as behind a
+  // proxy.
   uint32_t max_connections = 0;
   uint32_t max_connections_per_address = 1024;
   uint32_t max_new_connections = 200;
@@ -112,24 +113,26 @@ struct ServerConfig {
   uint32_t idle_timeout_s = 0;
 
   // Bytes of memory that the process may use; 0 = three quarters of the memory of the machine or its control group. As
-  // memory runs short, histories lose their oldest ticks first. Then uploads, dumps, inserts and placements are refused
-  // when 7/8 of the limit are in use, moves when 29/32 are, and queries when 15/16 are or, for a limit above 1 GiB, at
-  // 64 MiB below the limit. The rest is a reserve for small messages and answers. Removals are never refused. Lower the
-  // option to leave memory to other processes. With a value above the default, the kernel may kill the process.
+  // memory runs short, histories lose their oldest ticks first. Then calls are refused, depending on how much of the
+  // limit is in use: uploads, dumps, inserts and placements from 7/8 on, moves from 29/32 on, and queries from 15/16
+  // on. With a limit above 1 GiB, queries are refused only when less than 64 MiB are left. The rest is a reserve for
+  // small messages and answers. Removals are never refused. Lower the option to leave memory to other processes. With a
+  // value above the default, the kernel may kill the process.
   uint64_t memory_limit = 0;
 
-  // Bytes of replaced data per scene that batches and dumps may keep alive by reading older revisions; 0 = 256 MiB, or
-  // four times the size of the scene if that is more; with a `memory_limit` below 1 GiB, 0 = a quarter of that limit.
-  // If the readers keep more bytes alive, the oldest readers are cancelled, and updates wait until these readers have
-  // ended. Lower the value if memory is short; batches that run for several ticks are then cancelled sooner.
+  // Bytes of replaced data per scene that batches and dumps may keep alive by reading older revisions; 0 selects the
+  // default. The default is 256 MiB, or four times the size of the scene if that is more; with a `memory_limit` below 1
+  // GiB it is a quarter of that limit. If the readers keep more bytes alive, the oldest readers are cancelled, and
+  // updates wait until these readers have ended. Lower the value if memory is short; batches that run for several ticks
+  // are then cancelled sooner.
   uint64_t pinned_limit = 0;
 
   // Seconds that running calls may take to finish after SIGTERM. Raise it if batches run long; keep it below the time
   // after which the service manager kills the process.
   uint32_t drain_grace_s = 10;
 
-  // Files of the server's certificate chain and its key, in PEM; both or none. With them, all TCP connections use
-  // TLS 1.2 or 1.3, those of the HTTP pages too. The files are read again when they change.
+  // Files of the server's certificate chain and its key, in PEM; both or none. With them, all TCP connections use TLS
+  // 1.2 or 1.3, including those of the HTTP pages. The files are read again when they change.
   std::string tls_cert;
   std::string tls_key;
 
@@ -193,7 +196,8 @@ struct Invocation {
 Invocation read_invocation(const std::vector<std::string>& arguments, const Environment& environment);
 
 // Returns INVALID_ARGUMENT if an address cannot be parsed, or if other machines can reach it and `config` has neither
-// TLS with an access file nor `insecure`; also for a malformed `unix_mode`, or an option that needs another one.
+// TLS with an access file nor `insecure`. Returns INVALID_ARGUMENT, too, if `unix_mode` is malformed, or if an option
+// is set without another option that it needs.
 absl::Status check_config(const ServerConfig& config);
 
 }  // namespace locus::server

@@ -220,10 +220,9 @@ void Acceptor::ended(uint64_t id) {
   const Entry entry = std::move(found->second);
   entries_.erase(found);
   limiter_.leave(entry.peer.limit_key);
-  // Charge the address of a client that misused its connection. Otherwise a client that floods would connect again at
-  // once, and each connection may cost some megabytes before the guard closes it.
-  // Users of unix sockets are not charged: the user may run a proxy, and the charge would refuse the proxy's other
-  // clients too.
+  // Charge the address of a client that misused its connection. Otherwise a client that floods would connect again
+  // immediately, and each connection may cost some megabytes before the guard closes it. Users of unix sockets are not
+  // charged: the user may run a proxy, and the charge would refuse the proxy's other clients too.
   if (entry.connection->was_misused() && !entry.peer.uid)
     limiter_.charge(entry.peer.limit_key, options_.limits.new_per_second);
   guard_.forget(*entry.connection);

@@ -3,8 +3,8 @@
 // descriptor, so that it can close the connection itself, and releases the duplicate when the connection has ended.
 //
 // Threads: one thread does all work and calls the hooks; the members may be called from any thread. Invariant: each
-// admitted connection is counted by the limiter until it has ended, and is in exactly one of two states: opening, with
-// the acceptor owning its only descriptor, or handed over, with an entry in the table.
+// admitted connection is counted by the limiter until it has ended, and is in exactly one of two states: opening (the
+// acceptor owns its only descriptor) or handed over (the table has an entry for it).
 #ifndef LOCUS_SERVER_CONNECTIONS_ACCEPTOR_H_
 #define LOCUS_SERVER_CONNECTIONS_ACCEPTOR_H_
 
@@ -47,8 +47,8 @@ struct AcceptorHooks {
 
 class Acceptor {
  public:
-  // Starts the thread. `sockets` already listen, so clients wait until this is called. `table` and `guard` must outlive
-  // the acceptor.
+  // Starts the thread. `sockets` already listen, so clients that connect earlier wait for the acceptor. `table` and
+  // `guard` must outlive the acceptor.
   Acceptor(std::vector<ListeningSocket> sockets, const AcceptorOptions& options, ConnectionTable& table,
            FloodGuard& guard, AcceptorHooks hooks);
   // Ends the thread and releases all connections, whether they are opening or handed over.
@@ -94,7 +94,7 @@ class Acceptor {
 
   std::vector<ListeningSocket> sockets_;
   const AcceptorOptions options_;
-  ConnectionTable& table_;  // the acceptor also updates its counters
+  ConnectionTable& table_;  // the acceptor also updates the table's counters
   FloodGuard& guard_;
   const AcceptorHooks hooks_;
   const int epoll_;
@@ -105,7 +105,7 @@ class Acceptor {
   Entries entries_;
   uint64_t next_id_;
   size_t opening_ = 0;
-  bool closed_ = false;  // the listening sockets are closed
+  bool closed_ = false;  // whether the listening sockets are closed
   bool paused_ = false;
   Time resume_at_;
   Time next_check_;

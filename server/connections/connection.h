@@ -28,7 +28,8 @@ struct Peer {
   std::optional<uint32_t> uid;  // user id of the process at the other end; unix sockets only
 };
 
-// Counts of the calls of a connection and of their messages since it was accepted; `calls_open` is the present number.
+// Counts of the calls of a connection, and of the messages of these calls, since the connection was accepted. Only
+// `calls_open` is a present number.
 struct CallCounts {
   uint64_t calls_begun = 0;
   uint64_t calls_open = 0;
@@ -73,9 +74,9 @@ class Connection {
     const uint64_t open = calls_open_.fetch_sub(1, std::memory_order_relaxed);
     LOCUS_DCHECK_GT(open, 0u);
   }
-  // Counts a call that the peer ended before its answer. Closes the connection at once if, since begin_cancel_window(),
-  // the peer has cancelled more than kMaxCancelled calls, and more calls than it let finish. The periodic checks of the
-  // guard would detect this too late, because gRPC accepts calls very fast.
+  // Counts a call that the peer ended before its answer. Closes the connection immediately if, since
+  // begin_cancel_window(), the peer has cancelled more than kMaxCancelled calls, and more calls than it let finish. The
+  // periodic checks of the guard would detect this too late, because gRPC accepts calls very fast.
   void call_cancelled();
   // Restarts the count of cancelled calls. While bytes arrive, the guard calls it about once a second.
   void begin_cancel_window();
@@ -104,9 +105,9 @@ class Connection {
   std::shared_ptr<const void> identity() const LOCUS_EXCLUDES(mutex_);
   void set_identity(std::shared_ptr<const void> identity) LOCUS_EXCLUDES(mutex_);
 
-  // Shuts the connection down in both directions and discards what the transport has not read yet; its calls end as if
-  // the peer had gone. `reason` must be a constant. Returns false if the connection is already closed or has no
-  // descriptor.
+  // Shuts the connection down in both directions and discards the bytes that the transport has not read yet. The
+  // connection's calls end as if the peer had gone. `reason` must be a constant. Returns false if the connection is
+  // already closed or has no descriptor.
   bool close(const char* reason, Misuse misuse = Misuse::kYes) LOCUS_EXCLUDES(mutex_);
   // Returns the reason given to the first close(); null if the connection was not closed from this side.
   const char* close_reason() const { return close_reason_.load(); }
@@ -116,8 +117,8 @@ class Connection {
   // Returns the counts of the kernel; zeros if the connection is not TCP or its descriptor is released.
   ReceivedCounts received() const LOCUS_EXCLUDES(mutex_);
 
-  // Returns the number of bytes that the kernel has received since the previous use of this function, less the bytes of
-  // the messages that were read since then; 0 for connections that are not TCP.
+  // Returns the number of bytes that the kernel has received since the previous use of this function, minus the bytes
+  // of the messages that were read since then; 0 for connections that are not TCP.
   uint64_t unexplained_since_last_look();
 
   // Returns the descriptor; -1 after release(). Only for the thread that calls release().
@@ -132,8 +133,8 @@ class Connection {
   std::atomic<uint64_t> metadata_bytes_{0};
   std::atomic<uint64_t> calls_open_{0};
   std::atomic<uint64_t> calls_cancelled_{0};
-  std::atomic<uint64_t> window_cancelled_{0};  // calls_cancelled when the window began
-  std::atomic<uint64_t> window_ended_{0};      // calls ended when the window began
+  std::atomic<uint64_t> window_cancelled_{0};  // value of calls_cancelled when the window began
+  std::atomic<uint64_t> window_ended_{0};      // number of ended calls when the window began
   std::atomic<uint64_t> messages_read_{0};
   std::atomic<uint64_t> message_bytes_{0};
   std::atomic<uint64_t> bytes_written_{0};
@@ -147,9 +148,9 @@ class Connection {
 };
 
 // Returns the peer of the connected socket `descriptor`, with the name that gRPC gives the connection. gRPC names a
-// unix connection after its descriptor, such as fd:7; the peer of such a connection also has the user id of the other
-// process. The limit key is the IPv4 address, the first 64 bits of the IPv6 address (a subscriber owns all addresses
-// that begin with these bits), or the user id. Returns nullopt if the peer has already gone.
+// unix connection after its descriptor, such as fd:7; the peer of such a connection has the user id of the other
+// process, too. The limit key is the IPv4 address, the first 64 bits of the IPv6 address (a subscriber owns all
+// addresses that begin with these bits), or the user id. Returns nullopt if the peer has already gone.
 std::optional<Peer> peer_of(int descriptor);
 
 }  // namespace locus::server

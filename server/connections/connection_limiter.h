@@ -19,7 +19,7 @@ struct ConnectionLimits {
   uint32_t connections = 4096;              // maximum for all addresses together
   uint32_t connections_per_address = 1024;  // maximum for one address
   uint32_t new_per_second = 200;            // new connections a second from one address, on average
-  uint32_t burst = 400;                     // new connections that an address may open at once
+  uint32_t burst = 400;                     // new connections that an address may open in a burst
 };
 
 enum class Admission : uint8_t { kAdmitted, kFull, kAddressFull, kTooFast };

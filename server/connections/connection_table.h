@@ -34,11 +34,11 @@ class ConnectionTable {
   // other callers get the same stand-in.
   std::shared_ptr<Connection> find(absl::string_view name);
 
-  // Closes the connections that seem to use the most memory. The weight of a connection is the sum of the bytes that
-  // its calls have claimed, and of the bytes that it has received since the previous use of this function and that
-  // belong to no message. Closes connections whose weight is at least `min_bytes` and at least half of the largest
-  // weight. If `close` is false, closes none and only records the received bytes for the next use. Returns the number
-  // of closed connections. O(connections), with a system call for each; one thread at a time.
+  // Closes the connections that seem to use the most memory. The weight of a connection is the sum of two numbers: the
+  // bytes that its calls have claimed, and the bytes outside of messages that it has received since the previous use of
+  // this function. Closes connections whose weight is at least `min_bytes` and at least half of the largest weight. If
+  // `close` is false, closes none and only records the received bytes for the next use. Returns the number of closed
+  // connections. O(connections), with a system call for each; one thread at a time.
   size_t shed_heaviest(bool close, uint64_t min_bytes, const char* reason);
 
   // Closes the accepted connections for which `is_chosen` is true, without a charge for their addresses. Returns the

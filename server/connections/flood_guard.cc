@@ -18,7 +18,7 @@ using std::chrono::steady_clock;
 constexpr milliseconds kLookInterval{10};
 // Interval between two checks of the connections during kAlertTime after a connection was closed or had many
 // unexplained bytes. It is short because a client that floods sends a megabyte or begins 100 streams in a millisecond,
-// and connects again at once.
+// and connects again immediately.
 constexpr milliseconds kAlertInterval{2};
 constexpr std::chrono::seconds kAlertTime{1};
 constexpr double kAlertBytes = 1 << 20;

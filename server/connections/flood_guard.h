@@ -1,8 +1,8 @@
 // Closes connections that send more bytes than their calls explain: floods of small frames, endless headers, and calls
 // that are begun only to be cancelled. gRPC does not report such bytes to the application, so the guard compares the
-// bytes that the kernel has received with the bytes that the calls of the connection have read. gRPC also begins calls
-// faster than the application can accept and end them, so the guard asks gRPC how many streams of a connection it keeps
-// in memory. The code that serves calls only updates the counts of its connection.
+// bytes that the kernel has received with the bytes that the calls of the connection have read. gRPC begins calls
+// faster than the application can accept and end them, so, in addition, the guard asks gRPC how many streams of a
+// connection are still in gRPC's memory. The code that serves calls only updates the counts of its connection.
 //
 // Threads: watch() and forget() may be called from any thread. The guard's thread periodically checks the connections
 // that have received bytes since its previous check; idle connections cost nothing.
@@ -26,13 +26,13 @@ namespace locus::server {
 // Limits on the traffic of one connection. See assess().
 struct FloodLimits {
   uint64_t bytes_per_second = uint64_t{1} << 20;  // unexplained bytes that are always accepted
-  uint64_t burst_bytes = uint64_t{4} << 20;       // unexplained bytes that are accepted at once
+  uint64_t burst_bytes = uint64_t{4} << 20;       // unexplained bytes that are accepted in a burst
   // Limits on bytes of messages that have arrived and that no call has read yet: `message_bytes`, the maximum size of a
   // message, for each open call or stream, and `buffered_bytes`, the size of gRPC's buffers, for all of them together.
   uint64_t message_bytes = uint64_t{32} << 20;
   uint64_t buffered_bytes = uint64_t{256} << 20;
   uint64_t cancelled_per_second = 1000;  // cancelled calls that are always accepted
-  // Streams that the transport may keep in memory for a connection: more than a client may have open at once.
+  // Streams that the transport may keep in memory for a connection: more than a client may have open at a time.
   uint64_t streams = 4096;
 };
 

@@ -28,9 +28,9 @@ class FrameCheck {
   // Maximum CONTINUATION frames of a block. A client needs one for each 16 KiB after the first.
   static constexpr uint32_t kMaxContinuations = 8;
   // Rates for three counts: cancelled calls in excess of half of all calls; frames that carry nothing; and PING frames
-  // in excess of the other frames of calls. Each count may grow by kPerSecond in a second, and by kBurst at once. A
-  // client may cancel all its open calls at once, because they reach their deadlines together; clients in Go send a
-  // PING after each piece of a reply.
+  // in excess of the other frames of calls. Each count may grow by kPerSecond in a second and, in a burst, by kBurst
+  // more. Honest clients need bursts: all open calls of a client can be cancelled together when they reach the same
+  // deadline, and clients in Go send a PING after each piece of a reply.
   static constexpr double kPerSecond = 1000;
   static constexpr double kBurst = 1000;
   // Maximum calls that begin in the bytes of one read. The maximum is needed because gRPC creates all of these calls

@@ -62,9 +62,9 @@ struct Host : RpcState {
   }
   static SnapshotterOptions snapshotter_options(const ServerConfig& config);
 
-  // Returns the memory budget in bytes of the readers of a scene: the option pinned_limit. If the option is not set,
-  // returns 0, which selects the default of ReaderTracker, or a quarter of the memory limit if that is less than the
-  // default.
+  // Returns the memory budget in bytes of the readers of a scene: the option pinned_limit if it is set. Otherwise, if a
+  // quarter of the memory limit is below limits::kPinnedBytes, returns this quarter, but at least
+  // limits::kMinPinnedBytes. Otherwise returns 0, which selects the default of ReaderTracker.
   uint64_t pinned_limit() const {
     const uint64_t share = config.memory_limit / 4;
     if (config.pinned_limit != 0 || share >= limits::kPinnedBytes) return config.pinned_limit;

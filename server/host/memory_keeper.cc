@@ -97,9 +97,9 @@ void MemoryKeeper::keep() {
 }
 
 // Closes the connections that hold or send most if the measured memory exceeds the ceiling of moves; otherwise only
-// measures them. Inserts and uploads are refused and histories are shortened below this ceiling, so the memory that
-// still grows is memory that gRPC allocates and that no call has claimed, for example for calls that are cancelled at
-// once, or for endless headers.
+// measures them. When memory comes near this ceiling, inserts and uploads are already refused and histories already
+// shortened. So the memory that still grows is allocated by gRPC and claimed by no call, for example for calls that are
+// cancelled immediately, or for endless headers.
 void MemoryKeeper::shed_connections() {
   const bool is_full = budget_.measured() > budget_.ceiling(MemoryLine::kMoves);
   const size_t closed = shed_(is_full);

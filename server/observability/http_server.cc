@@ -37,7 +37,7 @@ tcp protocol_of(int descriptor) {
   return known && address.ss_family == AF_INET6 ? tcp::v6() : tcp::v4();
 }
 
-// Accepts and serves connections of a listening socket, at most `max_connections` at once: when one ends, the next is
+// Accepts and serves connections of a listening socket, at most `max_connections` at a time: when one ends, the next is
 // accepted. The operations on the socket run one at a time, on its strand. `socket` must outlive the listener.
 class HttpListener {
  public:

@@ -7,7 +7,7 @@
 // request. Only GET and HEAD are served; other methods are answered with 405 and unknown paths with 404.
 //
 // Threads: the page functions and the function that returns certificates are called on threads of the HTTP server,
-// several at once.
+// possibly by several threads at the same time.
 #ifndef LOCUS_SERVER_OBSERVABILITY_HTTP_SERVER_H_
 #define LOCUS_SERVER_OBSERVABILITY_HTTP_SERVER_H_
 

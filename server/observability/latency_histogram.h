@@ -1,5 +1,5 @@
 // Histogram of durations. It has two ranges between any two consecutive powers of two, from 2^10 ns (a microsecond) to
-// 2^34 ns (17 s), so that the relative error of a quantile that is computed from the histogram is below one half.
+// 2^34 ns (17 s), so a quantile that is computed from the histogram has a relative error below one half.
 //
 // Threads: any thread may call any member at any time. record() costs two relaxed additions, without a lock or an
 // allocation.

@@ -18,8 +18,8 @@ class LineLimit {
 
   explicit LineLimit(uint32_t lines_per_second) : max_(lines_per_second) {}
 
-  // Returns the number of lines that were left out since the last line, if a line may be written now. Otherwise counts
-  // a line that is left out and returns nullopt.
+  // If a line may be written now, returns the number of lines that were left out since the last written line. Otherwise
+  // counts the line as left out and returns nullopt.
   std::optional<uint64_t> admit(Time now) LOCUS_EXCLUDES(mutex_) {
     const MutexLock lock(mutex_);
     if (now - second_ >= std::chrono::seconds(1)) {

@@ -2,7 +2,7 @@
 // parsed, and runs its body on a thread of its own. Calls of unknown methods are refused with UNIMPLEMENTED.
 //
 // gRPC's synchronous services are not used: they parse a message before any of our code runs, so that a message of a
-// few megabytes could use gigabytes. Also, they answer malformed bytes with INTERNAL and an empty text.
+// few megabytes could use gigabytes of memory. Moreover, they answer malformed bytes with INTERNAL and an empty text.
 //
 // Threads: one thread calls add() and listen(), before the server serves. Calls arrive on IO loops.
 #ifndef LOCUS_SERVER_RPC_BLOCKING_CALLS_H_
@@ -23,7 +23,7 @@ namespace locus::server {
 
 class BlockingCalls {
  public:
-  // At most `max_threads` calls run at once.
+  // At most `max_threads` calls run at a time.
   BlockingCalls(RpcState& state, uint32_t max_threads) : state_(state), threads_(max_threads) {}
 
   void add(BlockingMethod method);

@@ -87,8 +87,8 @@ class Caller {
   absl::StatusOr<QuotaHold> hold_quota(QuotaKind kind, double amount) const;
 
   // Claims `bytes` on `line` of the server's memory budget, and takes them from the quota bytes_in_flight of the
-  // caller's identity and connection. For the lines of moves, requests and replies, the bytes also count against the
-  // shares (MemoryBudget::connection_share()) of the connection and of the caller's identity. Returns
+  // caller's identity and connection. For the lines of moves, requests and replies, the bytes count against two shares,
+  // too: that of the connection and that of the caller's identity (MemoryBudget::connection_share()). Returns
   // RESOURCE_EXHAUSTED, naming the limit or quota, if one of them does not suffice.
   absl::StatusOr<CallMemory> claim(MemoryLine line, absl::string_view field, uint64_t bytes) const;
   // Claims `bytes` for work that is never refused, such as work that frees memory, or an answer that is built already.
@@ -97,8 +97,8 @@ class Caller {
   // Remembers the scene or mesh that a blocking call is about, for the audit log. Call it on the call's own thread.
   void set_subject(absl::string_view subject) const { subject_ = std::string(subject); }
   const std::string& subject() const { return subject_; }
-  // Appends a line to the audit log, if there is one: `status` says whether the call changed `subject`, a scene or
-  // mesh, or why the call was refused.
+  // Appends a line about the call to the audit log, if there is an audit log. `subject` is the scene or mesh that the
+  // call is about. `status` is OK if the call succeeded; otherwise it says why the call was refused.
   void audit(absl::string_view subject, const absl::Status& status) const;
   // Appends a line to the audit log for a call that names a scene that the caller may not read. Does nothing if
   // promise_audit() was called and `scene` is the call's subject, because the line that audit() will append names the
@@ -113,7 +113,7 @@ class Caller {
   // have changed something.
   static bool is_audited(const absl::Status& status, bool is_change);
 
-  // Cancels the call at once, even while it is blocked in a read or write.
+  // Cancels the call immediately, even while it is blocked in a read or write.
   void cancel() const { context_.TryCancel(); }
 
   // Returns the ids that name this call in logs: the caller's metadata x-request-id and traceparent if they are valid,
@@ -127,7 +127,8 @@ class Caller {
 
  private:
   bool has_quotas() const;
-  // Returns UNAUTHENTICATED, and closes the connection, if the caller's certificate has expired since it connected.
+  // Returns UNAUTHENTICATED, and closes the connection, if the caller's certificate has expired since the caller
+  // connected.
   absl::Status check_certificate() const;
   // Returns whether the method needs a right that must be checked.
   bool needs_right() const;
@@ -157,13 +158,13 @@ inline constexpr const char* kRequestIdMetadata = "x-request-id";
 // Returns UNAVAILABLE while the server recovers its scenes from the disk, or drains.
 absl::Status check_serving(const RpcState& state);
 
-// Returns whether `status`, the error of one message, must end the whole stream: true if the caller ended the call, the
-// call's deadline passed, or the error is UNAVAILABLE, because the server drains or its disk fails.
+// Returns whether `status`, the error of one message, must end the whole stream. This is the case if the caller ended
+// the call, if the call's deadline passed, or if the error is UNAVAILABLE (the server drains or its disk fails).
 bool ends_stream(const Caller& caller, const absl::Status& status);
 
 // Counts a call, or one message of a stream, that was answered with `status`. If `status` is not OK, logs a line at
-// debug level and, for queries and updates, writes a line to the audit log as Caller::is_audited() says; `scene` is the
-// scene that the message names, empty if it is not known.
+// debug level and, for queries and updates for which Caller::is_audited() returns true, writes a line to the audit log.
+// `scene` is the scene that the message names; empty if it is not known.
 void record_answer(CallMetrics& metrics, const Caller& caller, Rpc rpc, const absl::Status& status, SteadyTime arrived,
                    absl::string_view scene = "");
 

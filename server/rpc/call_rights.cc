@@ -221,8 +221,10 @@ CallMemory Caller::claim_anyway(MemoryLine line, uint64_t bytes) const {
   return {state_.memory.claim_anyway(line, bytes), std::move(quota), nullptr, nullptr};
 }
 
-// Returns false for calls that were ended by their deadline, by their caller or by the server's shutdown, for failures
-// of the server, and for names that do not exist or are taken. audit_hidden() audits calls that name hidden scenes.
+// Returns true for refusals because of missing rights or exceeded limits and, for calls that would have changed
+// something, for wrong requests. Returns false for all other errors: the call was ended by its deadline, by its caller
+// or by the server's shutdown, the server failed, or a name does not exist or is taken. audit_hidden() audits calls
+// that name hidden scenes.
 bool Caller::is_audited(const absl::Status& status, bool is_change) {
   switch (status.code()) {
     case absl::StatusCode::kUnauthenticated:

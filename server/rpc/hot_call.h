@@ -10,7 +10,7 @@
 //
 // A stream has at most kSlots messages that are being processed or whose answers wait to be written. If it has kSlots
 // such messages, it reads the next message only after an answer has been written, so a caller that does not read its
-// answers can use only bounded memory; a call whose answer is not taken within RpcState::stall_limit is cancelled.
+// answers can use only bounded memory. A call whose answer is not taken within RpcState::stall_limit is cancelled.
 // Reads, one write and the work on several messages proceed concurrently. If Method::kInOrder is true, answers are
 // written in the order of the messages, otherwise as they complete.
 #ifndef LOCUS_SERVER_RPC_HOT_CALL_H_
@@ -48,9 +48,9 @@ class HotCall;
 
 // Acceptor of the calls of one rpc on one IO loop; keeps the slots of ended calls for reuse. Outlives the loop's calls.
 //
-// A Method has the types Request, Response and Work; the constants kRpc, kPath, kStream and kInOrder; listen(), which
-// requests the next call from gRPC; make_work(), which returns the Work of a CallSlot; and begin(), which begins the
-// work on a message. Work::give_up() asks the work to answer soon if it has not answered yet.
+// A Method has the types Request, Response and Work, and the constants kRpc, kPath, kStream and kInOrder. Its functions
+// are listen(), which requests the next call from gRPC; make_work(), which returns the Work of a CallSlot; and begin(),
+// which begins the work on a message. Work::give_up() asks the work to answer soon if it has not answered yet.
 template <class Method>
 class Listener {
  public:
@@ -164,8 +164,8 @@ class HotCall final : private IoLoop::ActiveCall {
       listener_.io_.release();
   }
 
-  // Handles one event of the call: changes the state by `change`, then calls advance(). If calls of act() nest, because
-  // work answers at once, only the outermost calls advance(). May delete the call.
+  // Handles one event of the call: changes the state by `change`, then calls advance(). Calls of act() nest if work
+  // answers immediately; then only the outermost call of act() calls advance(). May delete the call.
   template <class Change>
   void act(const Change& change) {
     ++acting_;
@@ -299,8 +299,9 @@ class HotCall final : private IoLoop::ActiveCall {
     });
   }
 
-  // Returns the scene that a message is about: on a stream the scene that the first message named, empty if none was
-  // accepted; for a unary call the scene that the request names, empty if it names none or was not read.
+  // Returns the scene that a message is about. On a stream this is the scene that the first message named; empty if
+  // that message was not accepted. For a unary call it is the scene that the request names; empty if the request names
+  // none or was not read.
   const std::string& scene_of(const Slot& slot) const {
     return Method::kStream ? scene_.scene() : slot.request_.scene();
   }

@@ -37,7 +37,7 @@ class IoLoop final : private EventSource, public EventLoop {
    public:
     // Handles the beginning of the server's drain. Called on the loop.
     virtual void drain() = 0;
-    // Ends the call if its caller may no longer make it. Called on the loop when rights may have changed.
+    // Ends the call if its caller no longer has the right to make it. Called on the loop when rights may have changed.
     virtual void recheck() = 0;
     // Ends the call if it has waited for its caller for too long. Called on the loop about once a second.
     virtual void end_if_stalled(EventLoop::Time now) = 0;

@@ -15,9 +15,9 @@ class MessageStream {
   virtual ~MessageStream() = default;
 
   // Reads the caller's next message into `request`. Returns false if the caller sends no more or the call has ended.
-  // Blocks, but at most for RpcState::stall_limit, after which the call is cancelled. INVALID_ARGUMENT if the bytes are
-  // not a message of this type or exceed its limits; RESOURCE_EXHAUSTED if there is not enough memory for the message.
-  // Claims the message's memory until the next call of read() or the end of the call.
+  // Blocks, but at most for RpcState::stall_limit, after which the call is cancelled. Returns INVALID_ARGUMENT if the
+  // bytes are not a message of this type or if the message exceeds a limit, and RESOURCE_EXHAUSTED if there is not
+  // enough memory for the message. Claims the message's memory until the next call of read() or the end of the call.
   template <class Request>
   absl::StatusOr<bool> read(Request& request) {
     return read_planned(wire_plan<Request>(), request);

@@ -33,8 +33,8 @@ constexpr int kSliceBytes = 1 << 20;
 constexpr uint32_t kMaxEnvelopeText = 256;
 constexpr int kMaxEnvelopeBytes = 2048;
 
-// Copies one field to `to` if it is a number or a short text of the message `type`; skips it otherwise. Returns false
-// if the bytes end within the field.
+// Copies one field of a message of the type `type` from `from` to `to` if the field is a number or a short text;
+// otherwise skips it. Returns false for a group, and if the bytes end within the field.
 bool copy_scalar(uint32_t tag, const Descriptor& type, CodedInputStream& from, CodedOutputStream& to) {
   const FieldDescriptor* const field = type.FindFieldByNumber(WireFormatLite::GetTagFieldNumber(tag));
   const WireFormatLite::WireType wire = WireFormatLite::GetTagWireType(tag);

@@ -30,7 +30,7 @@ struct RpcState {
   ConnectionTable connections;      // calls find the connection that they came on
   AdmissionLimiter calls;           // running calls that have no other limiter
   AdmissionLimiter streams;         // open streams of queries and updates
-  MemoryBudget memory;              // limit of the process
+  MemoryBudget memory;              // memory limit of the process
   ClientShares shares;              // what each identity has claimed of `memory`
   uint64_t max_inflated_bytes = 0;  // maximum size of an inflated message; 0 = gRPC refuses compressed ones
   // Identities and rights of callers. Set before the first call; null in servers without access control.

@@ -1,8 +1,8 @@
 // Counts the streams that gRPC keeps in memory for a connection: the streams that the client has begun and that gRPC
 // has not destroyed yet. The numbers come from gRPC's own statistics (channelz). gRPC 1.51 creates a stream for each
 // HEADERS frame, before the server accepts the stream's call, and keeps the stream after the client has reset it. gRPC
-// does not limit the number of such streams. A client that resets each call at once makes about 130,000 calls a second,
-// three times as many as the server accepts and ends, so the server's own count of calls misses most of them.
+// does not limit the number of such streams. A client that resets each call immediately makes about 130,000 calls a
+// second, three times as many as the server accepts and ends, so the server's own count of calls misses most of them.
 //
 // Threads: one thread at a time. A count takes about 15 us; the first count of a connection takes longer, because it
 // asks for the numbers of all connections that gRPC has added since the last such question. Remove this class once gRPC

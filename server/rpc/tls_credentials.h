@@ -35,8 +35,8 @@ struct TlsHooks {
   // after the call use the new files.
   std::function<void()> authority_removed = [] {};
   std::function<void()> second_passed = [] {};  // called each second
-  // Called when changed files were put into use (OK), or could not be used (the reason); also called with OK when files
-  // that could not be used have been replaced by those in use.
+  // Called with OK when changed files were put into use, and with the reason when changed files could not be used. Also
+  // called with OK when files that could not be used have been replaced by the files that are in use.
   std::function<void(const absl::Status&)> reloaded = [](const absl::Status&) {};
 };
 
@@ -53,7 +53,7 @@ class TlsCredentials {
   // a certificate that one of them has signed.
   std::shared_ptr<grpc::ServerCredentials> grpc_credentials();
 
-  // Reads the files again at once. Returns whether they have changed and are in use from now on.
+  // Reads the files again immediately. Returns true if the files have changed and the new contents are now in use.
   bool reload() LOCUS_EXCLUDES(mutex_);
 
   // Returns the contents in use.
@@ -71,7 +71,8 @@ class TlsCredentials {
     std::string before;
     std::string now;
   };
-  // Replaces the contents in use if `contents` are new and valid; otherwise returns nullopt.
+  // If `contents` are new and valid, puts them into use and returns the change of the client CA. Otherwise returns
+  // nullopt.
   std::optional<Change> replace(absl::StatusOr<TlsContents> contents) LOCUS_EXCLUDES(mutex_);
   void run() LOCUS_EXCLUDES(mutex_);
   void note_failure(const absl::Status& why) LOCUS_REQUIRES(mutex_);

@@ -112,7 +112,7 @@ struct WirePlan::Field {
   uint32_t value_bytes = 0;   // columns: bytes of one value in memory
   uint32_t overhead = 0;      // strings and messages: bytes in memory in addition to the content
   const Type* type = nullptr;
-  const WireLimit* limit = nullptr;  // null: not repeated
+  const WireLimit* limit = nullptr;  // null: not a repeated string or message
   uint32_t limit_index = 0;          // index of `limit` among the limits of the plan
 };
 

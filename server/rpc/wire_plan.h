@@ -32,8 +32,8 @@ struct WireLimit {
   uint32_t max;
 };
 
-// Maximum number of fields in the bytes of a message, those of its sub-messages included. A column counts as one field
-// if it is packed, as Protobuf's libraries write it, otherwise each of its values counts.
+// Maximum number of fields in the bytes of a message, those of its sub-messages included. A packed column, as
+// Protobuf's libraries write it, counts as one field. In a column that is not packed, each value counts.
 inline constexpr uint32_t kMaxWireFields = 1u << 20;
 // Maximum number of fields of a message that are not in this build's schema. Clients of a later version may send some.
 inline constexpr uint32_t kMaxUnknownFields = 256;
@@ -46,8 +46,9 @@ class WirePlan {
   ~WirePlan();
   WirePlan(WirePlan&&) noexcept;
 
-  // Returns an upper bound in bytes of the memory of the parsed message. INVALID_ARGUMENT (MALFORMED) if the bytes are
-  // no message of this type; INVALID_ARGUMENT (LIMIT) naming field and limit if a field has too many values.
+  // Returns an upper bound in bytes of the memory of the parsed message. Returns INVALID_ARGUMENT (MALFORMED) if the
+  // bytes are no message of this type, and INVALID_ARGUMENT (LIMIT), naming the field and the limit, if a field has too
+  // many values.
   absl::StatusOr<uint64_t> scan(const grpc::ByteBuffer& bytes) const;
 
  private:

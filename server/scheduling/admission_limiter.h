@@ -56,8 +56,8 @@ class AdmissionLimiter {
   explicit AdmissionLimiter(uint32_t max, Sharing sharing = Sharing::kFirstCome)
       : max_(max), reserve_(sharing == Sharing::kFair ? (max + 2) / 3 : 0) {}
 
-  // Returns a permit for `owner`, which is empty if the limiter is full, or if the owner holds its share already. Never
-  // waits.
+  // Returns a permit for `owner`. The permit is empty if the limiter is full, or if the owner already holds its share.
+  // Never waits.
   Permit enter(uint64_t owner = 0) LOCUS_EXCLUDES(mutex_) {
     MutexLock lock(mutex_);
     const auto found = held_.find(owner);

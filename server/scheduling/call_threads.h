@@ -1,5 +1,5 @@
-// Threads for calls that block: each task runs at once, on an idle thread or on a new one. No queue is needed, because
-// the admission of calls limits the number of tasks. A few idle threads are kept for later tasks.
+// Threads for calls that block: each task starts immediately, on an idle thread or on a new one. No queue is needed,
+// because the admission of calls limits the number of tasks. A few idle threads are kept for later tasks.
 //
 // Threads: run() may be called from any thread. Invariant: at most max() threads exist.
 #ifndef LOCUS_SERVER_SCHEDULING_CALL_THREADS_H_

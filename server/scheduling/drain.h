@@ -40,7 +40,7 @@ class Drain {
   void end() { ended_.store(true); }
 
  private:
-  // Adds a listener; calls it at once if draining has begun.
+  // Adds a listener. If draining has already begun, calls the listener immediately.
   std::list<Listener>::iterator add(Listener listener) LOCUS_EXCLUDES(mutex_);
   void remove(std::list<Listener>::iterator position) LOCUS_EXCLUDES(mutex_);
 

@@ -5,10 +5,10 @@
 // has received more work than the virtual time, the queue remembers this amount of work, and the client starts at this
 // amount when it has entries again. Source: Goyal, Vin, Cheng, Start-time Fair Queueing, 1996.
 //
-// Threads: one thread at a time. Every operation costs O(log clients), remove() also O(entries of the client). Memory:
-// one record for each waiting client, and for at most kMaxIdleClients idle clients. Invariants: every client is in
-// exactly one of two sets, `waiting_` if it has entries, else `idle_`, both ordered by the work served to the client;
-// virtual_time_ never decreases.
+// Threads: one thread at a time. Every operation costs O(log clients); remove() costs O(entries of the client) in
+// addition. Memory: one record for each waiting client, and for at most kMaxIdleClients idle clients. Invariants: every
+// client is in exactly one of two sets, `waiting_` if it has entries, else `idle_`, both ordered by the work served to
+// the client; virtual_time_ never decreases.
 #ifndef LOCUS_SERVER_SCHEDULING_FAIR_QUEUE_H_
 #define LOCUS_SERVER_SCHEDULING_FAIR_QUEUE_H_
 

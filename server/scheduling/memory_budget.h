@@ -13,8 +13,8 @@
 // memory during the delay if take_shortage() returns true. Cost: a claim that fits takes no lock. The memory of the
 // process is measured in three cases: refresh() is called, a claim does not seem to fit, or the claims that have ended
 // since the last measurement add up to more than 1 / kStepShare of the limit. Invariants: claimed_ is the sum of the
-// live claims; when claim() succeeds, measured memory plus live claims is at most the ceiling of its line, or the live
-// claims that use the reserve are at most the reserve.
+// live claims; when claim() succeeds, either the measured memory plus the live claims are at most the ceiling of the
+// line, or the claim uses the reserve, and all claims that use it fit into it.
 #ifndef LOCUS_SERVER_SCHEDULING_MEMORY_BUDGET_H_
 #define LOCUS_SERVER_SCHEDULING_MEMORY_BUDGET_H_
 
@@ -129,7 +129,8 @@ class MemoryBudget {
   uint64_t claimed(MemoryLine line) const { return lines_[static_cast<size_t>(line)].load(); }
   uint64_t refused(MemoryLine line) const { return refused_[static_cast<size_t>(line)].load(); }
   // Returns the largest sum of claims of moves, requests and replies that one connection, or one identity on all of its
-  // connections, may hold: half of the memory that is left for claims, so that one client leaves room for all others.
+  // connections, may hold. This is half of the memory that is left for claims, so that one client leaves memory for all
+  // others.
   uint64_t connection_share() const;
 
  private:

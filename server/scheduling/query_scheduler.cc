@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kNanosecondsPerMs = 1e6;
 constexpr uint32_t kMaxRetryMs = 10'000;
-// While jobs of both classes wait, about one of kLargeShare turns is given to a large job.
+// While jobs of both classes wait, about one turn in kLargeShare is given to a large job.
 constexpr uint64_t kLargeShare = 5;
 // Maximum number of withdrawn tickets that stay queued until their turn. Beyond this number, all withdrawn tickets are
 // removed from the queue.

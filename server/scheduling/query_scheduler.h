@@ -1,10 +1,11 @@
 // Scheduler of large query batches (jobs) on a few threads of low priority. Small jobs have precedence over large jobs,
 // all clients get equal shares, and a client that is alone gets all threads. Batches whose estimated work is below a
 // budget are run by their caller instead (runs_inline()). The number of jobs and their estimated work are limited, for
-// each class and for both classes together; a job that exceeds a limit is refused at once.
+// each class and for both classes together; a job that exceeds a limit is refused immediately.
 //
 // Threads: every member may be called from any thread, and no member waits for a pool thread, which may be preempted at
-// any point. Several pool threads may call a job's work() at once; after these calls, one thread calls done(), once.
+// any point. Several pool threads may call a job's work() at the same time. After the last of these calls has returned,
+// one thread calls done(), once.
 #ifndef LOCUS_SERVER_SCHEDULING_QUERY_SCHEDULER_H_
 #define LOCUS_SERVER_SCHEDULING_QUERY_SCHEDULER_H_
 
@@ -30,7 +31,7 @@ class QueryJob {
  public:
   virtual ~QueryJob() = default;
 
-  // Works for about `nanoseconds`, then returns. Several threads may call it at once.
+  // Works for about `nanoseconds`, then returns. Several threads may call it at the same time.
   virtual Progress work(uint64_t nanoseconds) = 0;
 
   // Reports that the job is complete. Called once, after a call of work() has returned kDone and all other calls of
@@ -99,9 +100,9 @@ class QueryScheduler {
   // called.
   absl::StatusOr<TicketPtr> submit(QueryJob& job, uint64_t client, uint64_t nanoseconds) LOCUS_EXCLUDES(mutex_);
 
-  // Removes the job and returns true if the job is not done and no thread is working on it; done() is then not called.
-  // Otherwise returns false: done() was called already or will be called. To have it called soon, the job must end its
-  // work early.
+  // If the job is not done and no thread is working on it, removes the job and returns true; done() is then not called.
+  // Otherwise returns false: done() was called already or will be called. The job must then end its work early, so that
+  // done() is called soon.
   bool withdraw(Ticket& ticket);
 
   SchedulerStats stats() const;

@@ -9,8 +9,9 @@
 
 namespace locus::server {
 
-// Sets the priority of a thread that answers large batches. kNice also requests short time slices. Without this
-// request, Linux lets even a thread of low priority run for milliseconds after another thread has woken up.
+// Sets the priority of a thread that answers large batches. With kNice, the thread requests short time slices, too.
+// Without this request, Linux lets even a thread of low priority run for milliseconds after another thread has woken
+// up.
 void take_batch_priority(BatchPriority priority);
 
 // Requests time slices of 0.1 ms from Linux 6.12 or later: the thread keeps its share of a core, but starts sooner

@@ -13,7 +13,7 @@ namespace locus::server {
 
 class Turns {
  public:
-  // Allows at most `max` turns at once. `max` must be at least 1.
+  // Allows at most `max` turns at a time. `max` must be at least 1.
   explicit Turns(uint32_t max) {
     for (uint32_t i = 0; i < max; ++i) free_.post();
   }

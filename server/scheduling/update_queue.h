@@ -80,8 +80,8 @@ class UpdateQueue {
   UpdateQueue(const UpdateQueue&) = delete;
   UpdateQueue& operator=(const UpdateQueue&) = delete;
 
-  // Queues `update`, which is borrowed until done(), or applies it at once. If post() returns an error, the batch was
-  // refused and done() is not called.
+  // Queues `update`, which is borrowed until done(), or applies it immediately. If post() returns an error, the batch
+  // was refused and done() is not called.
   absl::StatusOr<Posted> post(const ScenePtr& scene, PendingUpdate& update, WhenFull when_full) LOCUS_EXCLUDES(mutex_);
 
   UpdateQueueStats stats() const LOCUS_EXCLUDES(mutex_);

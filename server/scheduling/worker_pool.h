@@ -1,7 +1,7 @@
 // Thread pool for parallel_for(), used for building trees. The calling thread runs a part of the loop itself, so the
 // loop ends even if every helper is busy or the queue is full.
 //
-// Threads: parallel_for() may be called from any number of threads at once, also from within its own loop body.
+// Threads: parallel_for() may be called from any number of threads at the same time, and from within its own loop body.
 // Invariant: fn is called exactly once for each index below n, and all calls have returned when parallel_for() returns.
 #ifndef LOCUS_SERVER_SCHEDULING_WORKER_POOL_H_
 #define LOCUS_SERVER_SCHEDULING_WORKER_POOL_H_

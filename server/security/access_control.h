@@ -77,7 +77,7 @@ class AccessControl {
 
   // Returns the files to watch (see file_watcher.h).
   std::vector<std::string> files() const;
-  // Returns the warnings about the files in use, one sentence each, for example that others can read a token file.
+  // Returns the warnings about the files in use, one sentence each, for example that other users can read a token file.
   std::vector<std::string> warnings() const;
   // Returns the audit log; nullptr if there is none.
   AuditLog* audit() const { return audit_.get(); }

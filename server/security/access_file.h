@@ -7,7 +7,8 @@
 // `connection:*`, which means each connection. Rights to scenes (read, update, admin) need scene patterns, rights to
 // the server have none; the names are in rights.h and quota.h. Calls that no line grants are refused. If several lines
 // set the same quota for a caller, the last line counts. Connections can have only quotas of rates, bytes_in_flight and
-// open_streams. `burst_s=SECONDS` says how many seconds of an unused rate may be used at once.
+// open_streams. `burst_s=SECONDS` says for how many seconds an unused rate is saved up; the saved amount may be used in
+// one burst.
 #ifndef LOCUS_SERVER_SECURITY_ACCESS_FILE_H_
 #define LOCUS_SERVER_SECURITY_ACCESS_FILE_H_
 

@@ -18,7 +18,7 @@ void cut(std::string& text) {
 
 }  // namespace
 
-// Entries that the writer took from the queue at once.
+// Entries that the writer took from the queue in one step.
 struct AuditLog::Batch {
   std::deque<AuditEntry> entries;
   std::vector<AuditEntry> notes;  // one for each caller with refusals that were only counted

@@ -18,10 +18,10 @@ namespace locus::server {
 
 class JwtVerifier {
  public:
-  // Parses the text of a JWKS file; `file` is its name in errors. Keys that are not for signatures or of another type
-  // are skipped, with a sentence in `warnings`. Returns INVALID_ARGUMENT if the text is no JWKS, contains a private or
-  // secret key, contains a key that is wrong or too weak (RSA below 2048 bits), or has no usable key; also if
-  // `audience` is empty.
+  // Parses the text of a JWKS file; `file` is its name in errors. Keys that are not for signatures, and keys of types
+  // that are not accepted, are skipped, with a sentence in `warnings`. Returns INVALID_ARGUMENT if the text is no JWKS,
+  // contains a private or secret key, contains a key that is wrong or too weak (RSA below 2048 bits), or has no usable
+  // key. Returns INVALID_ARGUMENT, too, if `audience` is empty.
   static absl::StatusOr<JwtVerifier> parse(absl::string_view file, absl::string_view text, absl::string_view audience,
                                            absl::string_view issuer, std::vector<std::string>& warnings);
 

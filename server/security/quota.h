@@ -21,7 +21,7 @@ enum class QuotaKind : uint8_t {
   kOpenStreams,
   kObjects,    // objects in the scenes that the identity created
   kScenes,     // scenes that the identity created
-  kMeshBytes,  // memory of the meshes that the identity uploaded; a content with several names counts for each name
+  kMeshBytes,  // memory of the meshes that the identity uploaded; content with two names counts twice
   // Sum of history_bytes, the maximum memory of a scene's history, of the scenes that the identity created.
   kHistoryBytes,
 };
@@ -44,7 +44,7 @@ inline constexpr double kDefaultBurstSeconds = 2;
 struct Quota {
   std::array<double, kQuotaKinds> limits = {kNoQuota, kNoQuota, kNoQuota, kNoQuota, kNoQuota,
                                             kNoQuota, kNoQuota, kNoQuota, kNoQuota};
-  double burst_s = kDefaultBurstSeconds;  // seconds of an unused rate that may be used at once
+  double burst_s = kDefaultBurstSeconds;  // seconds of an unused rate that may be used in one burst
 
   double of(QuotaKind kind) const { return limits[static_cast<size_t>(kind)]; }
 };

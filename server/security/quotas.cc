@@ -26,7 +26,7 @@ std::string in_full(double value) {
   return absl::StrCat(value);
 }
 
-// Returns the capacity of a rate's bucket: the maximum that may be used at once.
+// Returns the capacity of a rate's bucket: the maximum that may be used in one burst.
 double capacity_of(const Quota& quota, QuotaKind kind) { return quota.of(kind) * quota.burst_s; }
 
 absl::Status refuse_quota(absl::string_view subject, QuotaKind kind, double limit, double asked,
@@ -57,7 +57,7 @@ absl::Status refuse_rate(absl::string_view subject, const Quota& quota, QuotaKin
   return refuse_quota(subject, kind, rate, asked, absl::StrCat("try again in ", retry, " ms"), retry);
 }
 
-// Returns advice for a caller whose quota of an amount is used up.
+// Returns advice for a caller that has used up its quota of the kind `kind`, an amount in use.
 absl::string_view advice_for(QuotaKind kind, bool waiting_helps) {
   switch (kind) {
     case QuotaKind::kBytesInFlight:

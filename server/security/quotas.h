@@ -32,7 +32,7 @@ struct QuotaUse {
   // For a rate, the mean per second over the last second or more; for an amount, the amount in use now.
   double used = 0;
   double limit = kNoQuota;  // kNoQuota = unlimited
-  double available = 0;     // amount that may be used at once; negative = overdrawn
+  double available = 0;     // amount that may be used immediately; negative = overdrawn
 };
 struct SubjectUse {
   std::string subject;
@@ -50,8 +50,8 @@ class Quotas {
   explicit Quotas(QuotaOf quota_of, size_t max_subjects = kMaxQuotaSubjects);
 
   // Takes `amount` from a quota. An amount in use must be released by release() later; an amount of a rate is used up.
-  // Returns RESOURCE_EXHAUSTED naming the quota, its value, the amount, and when to try again. With `amount` 0, checks
-  // that a rate is not overdrawn.
+  // If the quota does not suffice, returns RESOURCE_EXHAUSTED, naming the quota, its value, the amount, and when to try
+  // again. With `amount` 0, checks that a rate is not overdrawn.
   absl::Status take(absl::string_view subject, QuotaKind kind, double amount, uint64_t now) LOCUS_EXCLUDES(mutex_);
   absl::Status take(const Identity& identity, QuotaKind kind, double amount, uint64_t now) {
     return take(identity.principal, kind, amount, now);
@@ -64,7 +64,7 @@ class Quotas {
   using Besides = absl::FunctionRef<double()>;
   // Takes `amount` from the quota of each subject or, if one quota does not suffice, from none, and returns the error
   // of take(). `kind` must be an amount in use. The result releases the amount when it is destroyed. The result of
-  // `besides` counts as in use too.
+  // `besides` is added to the amount in use before the check.
   absl::StatusOr<QuotaHold> hold(
       absl::Span<const std::string> subjects, QuotaKind kind, double amount, uint64_t now,
       Besides besides = [] { return 0.0; }) LOCUS_EXCLUDES(mutex_);

@@ -20,7 +20,7 @@ inline constexpr std::array<absl::string_view, kRights> kRightNames = {"read",  
                                                                        "backup", "metrics", "reflection"};
 
 constexpr absl::string_view right_name(Right right) { return kRightNames[static_cast<size_t>(right)]; }
-// Returns whether grants of this right name scenes.
+// Returns whether this is a right to scenes. A grant of such a right names the scenes to which it applies.
 constexpr bool is_scene_right(Right right) { return right <= Right::kAdmin; }
 
 // Condition under which an rpc is allowed.
@@ -28,7 +28,7 @@ enum class Need : uint8_t {
   kNothing,      // everybody
   kAnyGrant,     // everybody who has at least one right (AccessRules::knows)
   kSceneRight,   // `right` to the scene that the request names
-  kServerRight,  // `right`
+  kServerRight,  // `right`, a right to the server as a whole
   kListed,       // like kAnyGrant, but the answer contains only scenes to which the caller has `right`
 };
 
@@ -45,7 +45,8 @@ struct RpcRight {
   Need need;
   Right right;  // meaningless for kNothing; for kAnyGrant used only in the texts of refusals
   SceneField scene = SceneField::kNone;
-  // True if the request can also name a scene to read, in `spec.static_from`; kRead to that scene is needed too.
+  // True if the request can name a second scene, in `spec.static_from`. The caller then needs the right kRead to that
+  // scene, too.
   bool reads_static_from = false;
 };
 

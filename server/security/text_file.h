@@ -26,11 +26,11 @@ absl::StatusOr<TextFile> read_text_file(const std::string& file);
 // text or the complete new text, even after a power loss.
 absl::Status replace_text_file(const std::string& file, absl::string_view text, mode_t mode);
 
-// Returns INVALID_ARGUMENT for a line of a file: `FILE:LINE: message`.
+// Returns an INVALID_ARGUMENT error about a line of a file. Its text is `FILE:LINE: message`.
 absl::Status refuse_line(absl::string_view file, size_t line, absl::string_view message);
 
-// Returns a word of a file for an error: in quotation marks, with unprintable characters escaped, and cut if it is
-// long.
+// Returns a word of a file in the form in which an error repeats it: in quotation marks, with unprintable characters
+// escaped, and cut if it is long.
 std::string quoted_word(absl::string_view word);
 
 }  // namespace locus::server

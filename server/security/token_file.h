@@ -5,7 +5,7 @@
 // EXPIRES may also be `never`. An id has 1 to 63 characters of a-z, 0-9 and -, and begins and ends with a letter or
 // digit.
 //
-// A table is immutable; any thread. The functions that change the file may be called by several processes at once.
+// A table is immutable; any thread. Several processes may call the functions that change the file at the same time.
 #ifndef LOCUS_SERVER_SECURITY_TOKEN_FILE_H_
 #define LOCUS_SERVER_SECURITY_TOKEN_FILE_H_
 

@@ -30,7 +30,7 @@ uint64_t inserted(const UpdateBatch& batch) {
   return items;
 }
 
-// Returns the maximum number of objects by which the batch makes the scene larger. O(ids).
+// Returns an upper bound of the number of objects by which the batch makes the scene larger. O(ids).
 uint64_t growth_of(const Scene& scene, const UpdateBatch& batch) {
   const SnapshotPtr snapshot = scene.latest();
   absl::flat_hash_set<Id> removed;

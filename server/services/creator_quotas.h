@@ -29,8 +29,8 @@ absl::StatusOr<std::vector<QuotaHold>> hold_scene(Host& host, const SceneSpec& s
 // Takes the bytes of a mesh.
 absl::StatusOr<QuotaHold> hold_mesh_bytes(Host& host, const std::string& creator, uint64_t bytes);
 // Takes the objects that the batch inserts. If the quota does not suffice for all of them, takes only the growth of the
-// scene: ids that the scene has already are not counted, and objects that the batch clears or removes by id are
-// subtracted. Objects that the batch removes by group are not subtracted.
+// scene: inserts of ids that the scene already has are not counted. Objects that the batch clears or removes by id are
+// subtracted, but objects that it removes by group are not.
 absl::StatusOr<QuotaHold> hold_objects(Host& host, const Scene& scene, const UpdateBatch& batch);
 
 }  // namespace locus::server

@@ -1,8 +1,8 @@
 // The standard health service, grpc.health.v1.Health: reports whether the server, or one of its services, is serving.
 // Load balancers, orchestrators and `locus health` use it.
 //
-// gRPC's own implementation is not used: it adds completion queues whose threads also read from every connection and
-// pass the messages on to the IO threads, which costs one wake-up for each message.
+// gRPC's own implementation is not used, because it adds completion queues with threads of their own. These threads
+// also read from every connection and pass the messages on to the IO threads, which costs one wake-up for each message.
 //
 // Threads: every member may be called from any thread. Each watcher occupies a thread of the server; at most
 // kMaxHealthWatchers watchers are admitted.

@@ -14,8 +14,8 @@
 namespace locus::server {
 namespace {
 
-// Upper bound of the bytes of a piece beside its parts, vertices and indices: the description of the mesh, and the
-// protobuf tags and lengths of the columns.
+// Upper bound of the size in bytes of everything in a piece except its parts, vertices and indices: the description of
+// the mesh, and the protobuf tags and lengths of the columns.
 constexpr size_t kFrameBytes = 1024;
 static_assert(limits::kMaxNameLength + sizeof(Sha256) + 64 < kFrameBytes);
 constexpr size_t kRoom = limits::kDefaultReplyBytes - kFrameBytes;
@@ -98,8 +98,8 @@ bool send_mesh(const Registry::NamedMesh& mesh, const TakeMeshPiece& take) {
   return pieces.finish();
 }
 
-// Returns the maximum memory in bytes that a download needs at any time: an unpacked copy of the vertices, and one
-// piece, both as a message, whose columns double as they grow, and as bytes.
+// Returns the maximum memory in bytes that a download needs at any time, for an unpacked copy of the vertices and for
+// one piece. The piece exists as a message, whose columns double as they grow, and as bytes.
 uint64_t download_cost(const StaticMesh& mesh) {
   const uint64_t columns =
       uint64_t{kTripleBytes} * mesh.vertex_count() + uint64_t{kTripleBytes} * mesh.triangle_count();

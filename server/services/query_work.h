@@ -31,8 +31,8 @@
 // CallSlot::answered() once and sets the state to IDLE. give_up() has an effect in PARKED and QUEUED only: in the other
 // states the running code checks Caller::stop() itself.
 //
-// Threads: all members run on the call's IO loop, except run_deferred() (a thread of the loop, without its lock), and
-// work() and done() (pool threads, work() on several at once).
+// Threads: all members run on the call's IO loop, except three. run_deferred() runs on a thread of the loop, without
+// the loop's lock. work() and done() run on pool threads, work() on several of them at the same time.
 #ifndef LOCUS_SERVER_SERVICES_QUERY_WORK_H_
 #define LOCUS_SERVER_SERVICES_QUERY_WORK_H_
 

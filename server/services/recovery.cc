@@ -120,8 +120,9 @@ class Recovery {
     return recover_mesh(log_, stored, options);
   }
 
-  // Recovers one scene. Starts a new epoch in two cases: acks did not wait for the disk and the last process crashed,
-  // so acknowledged updates may be missing; or the directory is a restored backup, so the original may have advanced.
+  // Recovers one scene. Starts a new epoch in two cases. First: acks did not wait for the disk and the last process
+  // crashed, so acknowledged updates may be missing. Second: the directory is a restored backup, so the original scene
+  // may have advanced since.
   absl::StatusOr<ScenePtr> recover_sound(StoredScene stored) {
     if (!stored.damage.ok()) return stored.damage;
     ASSIGN_OR_RETURN(SceneSpec spec, decode_spec(stored.spec));

@@ -164,8 +164,9 @@ bool dump_snapshot(const SceneSnapshot& snapshot, const DumpOrder& order, const 
   return dump.finish();
 }
 
-// Returns the maximum memory in bytes that a dump of the snapshot needs at any time: the sorted lists of its objects
-// and instances, and one piece, both as a message, whose columns double as they grow, and as bytes.
+// Returns the maximum memory in bytes that a dump of the snapshot needs at any time, for the sorted lists of its
+// objects and instances and for one piece. The piece exists as a message, whose columns double as they grow, and as
+// bytes.
 uint64_t dump_cost(const SceneSnapshot& snapshot) {
   const uint64_t things = snapshot.objects.size() + snapshot.statics->size();
   return things * sizeof(GridRef) + 3 * std::min<uint64_t>(things, kThingsPerPiece) * kMaxBytesPerThing;

@@ -76,7 +76,7 @@ v1::Scene describe(Host& host, const Caller& caller, const Listed& listed) {
 
 // Upper bound in bytes of the memory of a described scene: its labels and the message.
 constexpr uint64_t kDescribedSceneBytes = 1024 + limits::kMaxLabels * (2 * limits::kMaxLabelLength + 128);
-// Number of copies of a page that exist at once: the message and its bytes.
+// Number of copies of a page that exist at the same time: the message and its bytes.
 constexpr uint64_t kPageCopies = 2;
 
 absl::Status list_scenes(const Caller& caller, Host& host, const v1::ListScenesRequest& request,

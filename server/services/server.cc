@@ -40,7 +40,7 @@ using std::chrono::system_clock;
 // Maximum number of calls of the health and reflection services on one connection. These services have limits of their
 // own.
 constexpr uint32_t kOtherCalls = kMaxHealthWatchers + kMaxHealthChecks + kMaxReflections;
-// Maximum number of bytes that gRPC reads from a connection at once.
+// Maximum number of bytes that gRPC takes from a connection in one read.
 constexpr int kMaxReadBytes = 256 << 10;
 // Time after which the connections are closed when gRPC has not ended by itself.
 constexpr std::chrono::seconds kCloseAfter{2};

@@ -39,12 +39,13 @@ class Server {
   // Returns the port of the HTTP pages; 0 if they are not served.
   uint16_t http_port() const;
 
-  // Reads the files of TLS at once, as the server does each second. Returns whether they have changed and are in use.
+  // Reads the files of TLS immediately. The server also reads them by itself each second. Returns whether they have
+  // changed and are in use.
   bool reload_tls();
   // Reads all files of access control and TLS again. A file with a mistake is logged, and the old content stays in use.
   void reload();
 
-  // Shuts down: health reports NOT_SERVING, streams and new calls end with REASON_DRAINING, running calls may finish
+  // Shuts down. Health reports NOT_SERVING; streams and new calls end with REASON_DRAINING. Running calls may finish
   // within `grace` and are cancelled after it. Returns when no call runs any more.
   void drain(std::chrono::milliseconds grace);
 

@@ -1,6 +1,6 @@
-// Events of the server that no call causes, for /metrics and the audit log: changed files of TLS or access control that
-// were put into use, or could not be used; connections that were refused or closed. Other code writes the lines of the
-// log.
+// Reports events of the server that no call causes to /metrics and to the audit log. One kind of event is a changed
+// file of TLS or access control that was put into use or could not be used. The other kind is a connection that was
+// refused or closed. Other code writes lines about these events to the normal log.
 #ifndef LOCUS_SERVER_SERVICES_SERVER_EVENTS_H_
 #define LOCUS_SERVER_SERVICES_SERVER_EVENTS_H_
 

@@ -249,8 +249,8 @@ absl::Status RocksdbLog::back_up(const std::string& path) {
     RETURN_IF_ERROR(database_->sync());
     scenes_.mark_synced(written);
     scenes_.fill_marker(0, durable_marker);
-    // Mark the scenes as copied, so that they get a new epoch when the copy is opened: the original scenes continue in
-    // this directory with the old epoch, and the two sequences of revisions differ.
+    // Mark the scenes as copied, so that they get a new epoch when the copy is opened. The original scenes continue in
+    // this directory with the old epoch, so the two sequences of revisions will differ.
     for (SceneMarker& scene_marker : durable_marker.scene_markers) scene_marker.copied = true;
   }
   {

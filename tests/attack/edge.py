@@ -67,7 +67,9 @@ class Edge(Process):
 
 
 class EdgedDaemon(Daemon):
-    """A locusd on a unix socket, and the front before it. With `client_ca` the front requires client certificates."""
+    """A locusd on a unix socket, and the front through which clients reach it. With `client_ca` the front requires
+    client certificates.
+    """
 
     def __init__(self, program, limit, options=(), client_ca=False):
         self.edge, self.client_ca = None, client_ca

@@ -36,14 +36,14 @@ def one(function):
 
 
 class Job:
-    """One run of an attack. In the long form each step lasts `seconds`. In the quick form all steps together last
-    `seconds`, and some of them may be skipped.
+    """One run of an attack. In a quick run (`quick`) the steps share `seconds`, and some steps may be skipped. In any
+    other run each step lasts `seconds`.
     """
 
     def __init__(self, target, seconds, quick, pipe, front="plain"):
         self.target, self.seconds, self.quick, self.pipe, self.front = target, seconds, quick, pipe, front
         self.until = time.monotonic() + seconds
-        self.end = self.until + seconds  # time after which a quick attack begins no step
+        self.end = self.until + seconds  # time after which a quick run begins no step
         self.wrongs = set()
 
     def never_ends(self, path):

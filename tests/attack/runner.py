@@ -61,8 +61,8 @@ class Row:
         return self.during.get("p99_ms", 0) / max(self.idle.get("p99_ms", 0), 1.0)
 
     def slower_connections(self):
-        """Returns the factor by which the p99 of the victim's new connections grew; it includes the first call on the
-        connection.
+        """Returns the factor by which the p99 of the victim's new connections grew. The time of a connection includes
+        its first call.
         """
         return self.during.get("connect_p99_ms", 0) / max(self.idle.get("connect_p99_ms", 0), 1.0)
 
@@ -72,7 +72,7 @@ class Row:
         return calls - sum(self.during.get("errors", {}).values()), calls
 
     def failures(self, quick):
-        """Returns the failures of the row, each in a few words. Durations are checked only in the long form."""
+        """Returns the failures of the row, each in a few words. Checks durations only if the run is not quick."""
         found = [f"{how} in {step}" if step else how for step, how in self.deaths]
         if not self.served:
             found.append("the victim is not served afterwards")
@@ -204,8 +204,9 @@ def worst_step(began, samples):
 
 
 def settle(row, daemon, quick):
-    """Waits until the daemon has returned descriptors and memory, but at most RETURN_SECONDS. In the long form memory
-    must shrink to RETURN_SHARE times the memory before the attack. Returns whether the daemon still runs.
+    """Waits until the daemon has returned descriptors and memory, but at most RETURN_SECONDS. If the run is not quick,
+    also waits until memory has shrunk to RETURN_SHARE times the memory before the attack. Returns whether the daemon
+    still runs.
     """
     until = time.monotonic() + RETURN_SECONDS
     while daemon.alive():
@@ -262,8 +263,8 @@ def run_life(row, options, first):
 
 
 def run(attack, options):
-    """Runs one row and returns it. If the daemon dies in the long form, a new daemon is started for the remaining
-    steps, unless the daemon runs at a given address or has died MAX_DEATHS times.
+    """Runs one row and returns it. If the daemon dies, starts a new daemon for the remaining steps, except in three
+    cases: the run is quick, the daemon runs at a given address, or daemons have died MAX_DEATHS times.
     """
     row, step = Row(attack, options.limit, options.front), 0
     while step is not None:

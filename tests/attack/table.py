@@ -1,4 +1,4 @@
-"""The table of all attacks, the groups of the quick form, and the rows that locusd still fails."""
+"""The table of all attacks, the groups of attacks for quick runs, and the rows that locusd still fails."""
 import functools
 import multiprocessing
 import time
@@ -7,13 +7,13 @@ import wire
 from job import SHIELDED, Attack, Job, Lost, one
 from rows import calls, connections, frames, messages, replies
 
-# Rows that locusd fails at present, each with the observed effect. The quick form skips these rows, unless a front
+# Rows that locusd fails at present, each with the observed effect. Quick runs skip these rows, unless a front
 # shields locusd. Remove a row's name once the row passes.
 NOT_YET = {
 }
 
-# Rows that the attack `union` runs at the same time: the rows that cost the daemon most. It withstands each of them
-# alone.
+# Rows that the attack `union` runs at the same time: the rows that cost the daemon most. The daemon withstands each of
+# them alone.
 TOGETHER = ("reset-queries", "settings", "ping", "garbage", "slow-bodies", "wrong-bytes", "honest", "unread", "continuation")
 
 
@@ -23,8 +23,8 @@ OWN_ADDRESSES = {"honest": "127.0.0.3", "wrong-bytes": "127.0.0.4"}
 
 
 class Ended:
-    """Replacement for the pipe of an attack that is part of the union: forwards codes and errors, but not the begin of
-    steps.
+    """Replacement for the pipe of an attack that is part of the union. Forwards codes and wrong results, and drops all
+    other reports, such as the begin of a step.
     """
 
     def __init__(self, name, pipe, lock):
@@ -84,7 +84,7 @@ def by_name():
 
 
 def chosen(word, front="plain"):
-    """Returns (attacks, whether to run the quick form, names of the attacks left out). `word` is `all`, `quick`,
+    """Returns (attacks, whether the run is quick, names of the attacks left out). `word` is `all`, `quick`,
     `quick:GROUP`, or names separated by commas.
     """
     head, _, group = word.partition(":")

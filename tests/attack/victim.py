@@ -18,7 +18,8 @@ CONNECT_EVERY = 25
 WAIT_SECONDS = 5.0
 MEMORY = 1 << 30
 
-# One batch, or one connection with its first batch: time of the answer, duration, and status code.
+# One batch, or one new connection with its first batch (`connect` is true): time of the answer, duration, and status
+# code.
 Sample = collections.namedtuple("Sample", "at seconds code connect")
 
 

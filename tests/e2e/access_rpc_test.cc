@@ -395,8 +395,8 @@ TEST_F(AccessRpcTest, MoreConnectionsGiveAnIdentityNoMoreMemory) {
         .status;
   };
   log.hold();
-  // Each of the connections has a fourth of the calls, so that no connection reaches the share of memory of one
-  // connection.
+  // Each of the four connections makes a fourth of the calls, so that no connection reaches the limit of memory for a
+  // single connection.
   std::vector<Stubs> connections;
   for (int i = 0; i < 4; ++i) connections.emplace_back(running_->address());
   std::vector<std::future<grpc::Status>> calls;

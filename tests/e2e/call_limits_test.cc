@@ -13,7 +13,7 @@ namespace {
 constexpr uint32_t kFewCalls = 6;
 constexpr uint32_t kFewStreams = 6;
 
-// A server with few calls and streams, and the connection of a second client.
+// A server that permits only few calls and streams, and the connection of a second client.
 class CallLimitsTest : public RpcTest {
  protected:
   CallLimitsTest()
@@ -26,8 +26,8 @@ class CallLimitsTest : public RpcTest {
         }()),
         other_(running_.address()) {}
 
-  // Waits until `count` of a limit are used. Reads the metrics, because an RPC would use a permit itself, and so could
-  // take the permit that the last call under test needs.
+  // Waits until `count` permits of a limit are used. Reads the metrics, because an RPC would use a permit itself, and
+  // so could take the permit that the last call under test needs.
   void wait_until_used(const std::string& limit, uint32_t count) {
     const std::string line = "locus_limit_used{limit=\"" + limit + "\"} " + std::to_string(count) + "\n";
     while (http_get(running_.server().http_port(), "/metrics").body.find(line) == std::string::npos)

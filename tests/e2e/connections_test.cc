@@ -106,7 +106,8 @@ TEST_F(ConnectionsTest, AFloodOfContinuationsIsClosed) {
   EXPECT_TRUE(victim_is_served());
 }
 
-// The block is far below what the flood guard accepts, so only the check of headers can close the connection.
+// The block of headers stays far below the limits of the flood guard, so only the check of headers can close the
+// connection.
 TEST_F(ConnectionsTest, ABlockOfHeadersThatIsTooLongClosesItsConnectionAtOnce) {
   const std::string begin = http2_frame(kHeaders, 0, 1, headers_of("/locus.v1.QueryService/Query"));
   const std::string part = http2_frame(kContinuation, 0, 1, header("name", std::string(100, 'v')));

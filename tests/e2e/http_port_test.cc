@@ -21,7 +21,8 @@ class HttpPortTest : public ::testing::Test {
   std::string address() const {
     return "127.0.0.1:" + std::to_string(DaemonProcess::wait_for_port(folder_.file("port")));
   }
-  // Returns the HTTP port. The daemon writes it before the gRPC port, so address() has waited for it.
+  // Returns the HTTP port. The daemon writes this port to its file before the gRPC port, so address(), which waits for
+  // the gRPC port, has waited long enough.
   int http_port() const { return std::atoi(text_of(folder_.file("http")).c_str()); }
 
   TemporaryFolder folder_;

@@ -15,7 +15,7 @@ class InstanceRpcTest : public RpcTest {
     ASSERT_TRUE(upload({whole_mesh("cube")}).ok());
   }
 
-  // Expects the change to be refused naming the field, and the scene to be unchanged.
+  // Expects the change to be refused as `expected` describes, and the scene to be unchanged.
   void expect_change_refused(const v1::ChangeInstancesRequest& request, const Refused& expected) {
     const std::string before = dump();
     expect_refused(change(request), expected);

@@ -16,21 +16,21 @@ class FullMemoryRpcTest : public RpcTest {
   FullMemoryRpcTest() : RpcTest(with_memory(1)) {}
 };
 
-// Server whose memory limit leaves 512 MiB.
+// Server whose memory limit leaves 512 MiB free.
 class ScarceMemoryRpcTest : public RpcTest {
  protected:
   static constexpr uint64_t kRoom = uint64_t{512} << 20;
   ScarceMemoryRpcTest() : RpcTest(with_memory(server::resident_bytes() + kRoom)) {}
 };
 
-// Server whose memory limit leaves 128 MiB, of which one connection may hold half.
+// Server whose memory limit leaves 128 MiB free, of which one connection may hold half.
 class SharedMemoryRpcTest : public RpcTest {
  protected:
   static constexpr uint64_t kRoom = uint64_t{128} << 20;
   SharedMemoryRpcTest() : RpcTest(with_memory(server::resident_bytes() + kRoom)) {}
 };
 
-// Server whose memory limit leaves 2 GiB. One upload takes much less, also with the larger allocations of
+// Server whose memory limit leaves 2 GiB free. One upload takes much less, also with the larger allocations of
 // AddressSanitizer. So when many uploads fill the memory, one of them is refused before memory is so full that
 // connections are closed.
 class RoomyMemoryRpcTest : public RpcTest {

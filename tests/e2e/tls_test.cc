@@ -250,11 +250,11 @@ TEST_F(TlsTest, AServerWithABadNewFileServesNewConnections) {
   }
 }
 
-// Fixture whose clients call without a pause, with tokens and on old and new connections, while every file of TLS and
-// access control is replaced.
+// Fixture whose clients call without a pause while every file of TLS and access control is replaced. The clients send
+// tokens or JWTs, some on a kept connection and some on new connections.
 class TlsReloadTest : public TlsTest {
  protected:
-  // With `mutual`, the server requires client certificates, and the file of the clients' authorities changes too.
+  // If `mutual` is true, the server requires client certificates, and the file of the clients' authorities changes too.
   explicit TlsReloadTest(bool mutual = false) : mutual_(mutual) {
     change_access(0);
     change_keys();

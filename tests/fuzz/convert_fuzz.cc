@@ -81,7 +81,7 @@ LOCUS_FUZZ_TARGET(queries) {
   if (queries_of(*batch) > kMaxRunQueries) return;
   const absl::StatusOr<test::BatchResult> found = test::run_batch(*snapshot, *batch, {});
   if (!found.ok()) return check_refusal(found.status());
-  // Brute force does another amount of work, so max_work would truncate its results at another place.
+  // Brute force does a different amount of work, so max_work would truncate its results at a different place.
   if (batch->max_work != 0) return;
   RunOptions all;
   all.brute_force = true;

@@ -1,7 +1,7 @@
 // Registration of fuzz targets, and helpers that split one input into several pieces. A target is a function that feeds
 // untrusted bytes to one reader of the product and verifies properties of the result with LOCUS_CHECK. The same source
 // is linked into a libFuzzer program (fuzz_main.cc) and into the test that runs the committed seeds (seeds_test.cc).
-// Targets keep no state between inputs; one thread.
+// Targets keep no state between inputs and run on one thread.
 #ifndef LOCUS_TESTS_FUZZ_FUZZ_TARGET_H_
 #define LOCUS_TESTS_FUZZ_FUZZ_TARGET_H_
 

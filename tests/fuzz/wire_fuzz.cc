@@ -54,8 +54,8 @@ grpc::ByteBuffer in_two_slices(absl::string_view bytes) {
   return {slices.data(), slices.size()};
 }
 
-// Verifies that an accepted message takes no more memory than the scan says, and that the scan accepts a message that
-// Protobuf has serialized, or refuses it because of a limit.
+// Verifies the scan in two ways. A message that the scan accepts takes no more memory than the scan says. A message
+// that Protobuf has serialized is accepted, or refused because of a limit.
 void check_request(const Request& request, absl::string_view input) {
   const absl::StatusOr<uint64_t> scanned = request.plan.scan(in_two_slices(input));
   if (!scanned.ok()) fuzz::check_error(scanned.status());

@@ -1,4 +1,4 @@
-// Ten minutes of a writer at full speed beside readers that compare the scene with a model. `tests/run.sh --long` runs
+// Runs a writer at full speed for ten minutes while readers compare the scene with a model. `tests/run.sh --long` runs
 // this test; its log contains the line that the test writes at its end.
 #include <gtest/gtest.h>
 

@@ -139,9 +139,9 @@ class SweepTrial {
     return mover;
   }
 
-  // Returns a description of the error in an answer; empty if there is none. Until it is e away from the found contact,
-  // the mover shrunk by e must touch nothing; at the contact, the mover grown by e must touch a triangle. e is 2^-20 of
-  // the sum of the start's distance from the origin and the mover's size.
+  // Returns a description of the error in an answer; empty if there is none. The mover shrunk by e must touch nothing
+  // until it is e away from the found contact. At the contact, the mover grown by e must touch a triangle. e is 2^-20
+  // of the sum of the start's distance from the origin and the mover's size.
   std::string fault_of(const RealMover& mover, std::optional<Real> found) const {
     const Real e = 0x1p-20L * (length(mover.start) + mover.size()), way = length(mover.way);
     const Real before = !found ? 1 : way == 0 ? -1 : *found - e / way;

@@ -108,8 +108,8 @@ inline SceneSketch far_lattice(Random& random) {
   return lattice_scene("far lattice", random.chance(0.5) ? 1 : 64, {offset, -offset / 2, offset / 8}, random);
 }
 
-// Generates boxes, and rays between two notable points of a box, which graze or cross the box exactly at corners and
-// edges, or run along edges; also ordinary rays.
+// Generates boxes, and rays through two notable points of a box: these rays graze or cross the box exactly at corners
+// and edges, or run along edges. Also generates ordinary rays.
 inline SceneSketch edges_and_corners(Random& random) {
   SceneSketch sketch{"edges and corners", {}, {}, {}, {}};
   for (int i = 0; i < 24; ++i) {

@@ -35,8 +35,8 @@ inline bool is_judged(const OwnedBlock& block) {
 }
 
 // Returns the rows of each query at `precision`, with detail kTriangles for nearest queries and mode kAll for rays and
-// sweeps. To get all rows of each query, it requests rows instead of counts, removes the page position (the `after`
-// columns), and sets the highest maximum number of results.
+// sweeps. To get all rows of each query, the function requests rows instead of counts, removes the page position (the
+// `after` columns), and sets the highest maximum number of results.
 inline std::vector<Found> found_by(const SceneSnapshot& snapshot, OwnedBlock block, Precision precision) {
   block.settings.precision = precision;
   block.settings.max_results = limits::kMaxMaxResults;
@@ -131,7 +131,7 @@ class RealQuery {
   }
   static Real entry(const std::vector<float>& column, size_t i) { return column[column.size() == 1 ? 0 : i]; }
 
-  // Returns the half extents of the bounds of the box, which may be rotated.
+  // Returns the half extents of the bounds, in world axes, of the box of query `i`. The box may be rotated.
   static Vec3r half_bounds(const OwnedBlock& block, size_t i) {
     const Vec3r half = triple(block.sizes, i);
     if (block.extras.empty()) return half;

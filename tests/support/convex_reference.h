@@ -1,6 +1,6 @@
 // References for closed convex solids in long double, by search instead of formulas: a solid is the set where a convex
 // function, its gauge, is at most zero. If a point moves by e, its gauge changes by at most e. So `gauge <= e` holds
-// for all points within e of the solid, and `gauge <= -e` only for points that stay inside when moved by e.
+// for all points within e of the solid, and `gauge <= -e` holds only for points that stay inside when moved by e.
 #ifndef LOCUS_TESTS_SUPPORT_CONVEX_REFERENCE_H_
 #define LOCUS_TESTS_SUPPORT_CONVEX_REFERENCE_H_
 

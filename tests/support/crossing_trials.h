@@ -1,6 +1,6 @@
 // Meshes and points for testing the crossings of half lines, from which winding numbers are computed. Each family is
-// known to reveal one kind of error. The points are generated from seeds. For the tests of the crossing kernels, of
-// TriangleBvh::visit_half_line() and of planted bugs in them.
+// known to reveal one kind of error. The points are generated from seeds. Used by the tests of the crossing kernels, of
+// TriangleBvh::visit_half_line(), and of planted bugs in both.
 #ifndef LOCUS_TESTS_SUPPORT_CROSSING_TRIALS_H_
 #define LOCUS_TESTS_SUPPORT_CROSSING_TRIALS_H_
 
@@ -35,8 +35,7 @@ class CrossingTrial {
     tree_.for_each([&](const Triangle& triangle) { triangles_.push_back(triangle); });
   }
 
-  // Returns the first half line for which TriangleBvh::visit_half_line() results in another sum; empty if there is
-  // none.
+  // Returns the first half line for which TriangleBvh::visit_half_line() gives a wrong sum; empty if there is none.
   std::string difference() const {
     return first_fault([this](Vec3d point, HalfLine line, const Sum& expected) {
       Sum found(point, line);
@@ -46,8 +45,8 @@ class CrossingTrial {
     });
   }
 
-  // Returns the first half line for which the kernel results in another sum, or in another cost than visit_half_line();
-  // empty if there is none.
+  // Returns the first half line for which the kernel gives a wrong sum, or its cost differs from that of
+  // visit_half_line(); empty if there is none.
   std::string difference(const CrossingKernels& kernels, CrossingCost* cost = nullptr) const {
     return first_fault([&](Vec3d point, HalfLine line, const Sum& expected) -> std::string {
       WindingSearch search(kernels, tree_, point, WindingWay::out(line));

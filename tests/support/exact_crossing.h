@@ -1,5 +1,5 @@
-// Reference of crossings in integers, so that every sign is exact. Shares no arithmetic with the product. For tests of
-// points in meshes.
+// Reference of crossings in integers, so that every sign is exact. Shares no arithmetic with the product. Used by tests
+// of points in meshes.
 #ifndef LOCUS_TESTS_SUPPORT_EXACT_CROSSING_H_
 #define LOCUS_TESTS_SUPPORT_EXACT_CROSSING_H_
 

@@ -1,9 +1,9 @@
 // The machine's file system with injected disk faults: it tracks which data is synced, so that a test can get the state
 // after a power loss, and returns errors on request. It never syncs files itself, which makes tests fast. A power loss
 // preserves for each file the bytes written before the file's last sync, and for each folder the entries at the
-// folder's last sync; a removed or replaced file exists again if its folder was not synced after the change.
+// folder's last sync. So a removed or replaced file exists again if its folder was not synced after the change.
 //
-// Threads: any, as RocksDB uses it.
+// Threads: may be used from any thread, as RocksDB does.
 #ifndef LOCUS_TESTS_SUPPORT_FAULTY_FILES_H_
 #define LOCUS_TESTS_SUPPORT_FAULTY_FILES_H_
 

@@ -1,5 +1,5 @@
-// Comparison of hash grids with a list (ListIndex, which tests every value). For the random tests, which expect no
-// difference, and for the tests of planted bugs, which expect a difference. Every function with a parameter `random`
+// Comparison of hash grids with a list (ListIndex, which tests every value). Used by the random tests, which expect no
+// difference, and by the tests of planted bugs, which expect a difference. Every function with a parameter `random`
 // takes all random numbers from it.
 #ifndef LOCUS_TESTS_SUPPORT_GRID_COMPARISON_H_
 #define LOCUS_TESTS_SUPPORT_GRID_COMPARISON_H_
@@ -39,9 +39,9 @@ inline std::string grid_difference(const ObjectScene& scene, Random& random) {
   return "";
 }
 
-// Compares the objects that a grid passes for a ball with tests of all objects: for the ball alone, for the ball in a
-// RegionWalk, and for a RegionWalk with the ball's bounds only. Uses the balls of the scene and balls that just touch
-// some of its objects.
+// Compares the objects that a grid passes to the visitor of a ball with tests of all objects: for the ball alone, for
+// the ball in a RegionWalk, and for a RegionWalk with the ball's bounds only. Uses the balls of the scene and balls
+// that just touch some of its objects.
 inline std::string grid_ball_difference(const ObjectScene& scene, Random& random) {
   ObjectGrid grid(random_grid_options(random));
   grid.apply({}, scene.values);

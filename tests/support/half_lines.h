@@ -1,4 +1,4 @@
-// All half lines of a point: both directions along each axis. For tests that compare half lines.
+// All half lines of a point: both directions along each axis. Used by tests that compare half lines.
 #ifndef LOCUS_TESTS_SUPPORT_HALF_LINES_H_
 #define LOCUS_TESTS_SUPPORT_HALF_LINES_H_
 

@@ -1,5 +1,5 @@
-// Queries for the ray kernels, and verification of the answers: every answer of an instruction set's kernels that is
-// not undecided is compared with a test of all triangles, bit for bit. For the tests of the kernels and for tests of
+// Queries for the ray kernels, and verification of the answers: every answer of a kernel is compared, bit for bit, with
+// a test of all triangles, unless the kernel left the query undecided. Used by the tests of the kernels and by tests of
 // planted bugs in the kernels.
 #ifndef LOCUS_TESTS_SUPPORT_KERNEL_JUDGE_H_
 #define LOCUS_TESTS_SUPPORT_KERNEL_JUDGE_H_

@@ -1,5 +1,5 @@
-// Comparisons of containment, views, sight, pairs and cells with simple references. For the tests of these query kinds
-// and for the tests of planted bugs in them.
+// Comparisons of containment, views, sight, pairs and cells with simple references. Used by the tests of these query
+// kinds and by the tests of planted bugs in them.
 #ifndef LOCUS_TESTS_SUPPORT_KIND_TRIALS_H_
 #define LOCUS_TESTS_SUPPORT_KIND_TRIALS_H_
 
@@ -143,8 +143,9 @@ inline std::string pair_difference() {
   return "";
 }
 
-// Returns a description of the error if the cell of a point between a ball and a wall of many triangles has not exactly
-// three rows: one for the cell itself, one plane for the wall and one for the ball.
+// Checks the cell of a point between a ball and a wall of many triangles. The cell must have exactly three rows: one
+// for the cell itself, one for the plane of the wall and one for the plane of the ball. Returns a description of the
+// error; empty if there is none.
 inline std::string cell_difference() {
   std::vector<Triangle> wall;
   for (int y = -8; y < 8; ++y)

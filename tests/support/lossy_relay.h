@@ -1,5 +1,5 @@
-// A network that loses replies: a port that forwards connections to a gRPC server and closes them on request, after the
-// server has processed the request and before the client receives the reply.
+// A network that loses replies: a port that forwards connections to a gRPC server. If a test asks for it, the relay
+// closes a connection after the server has processed a request and before the client receives the reply.
 //
 // Threads: every member may be called from any thread. Source of the frame format: RFC 9113, HTTP/2, section 4.1.
 #ifndef LOCUS_TESTS_SUPPORT_LOSSY_RELAY_H_

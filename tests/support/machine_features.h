@@ -1,5 +1,5 @@
-// Features of the machine that some tests need. They are determined without the tested code, so that a fault of this
-// code fails a test instead of skipping it. Free functions; any thread.
+// Features of the machine that some tests need. They are determined without the code under test, so that a fault of
+// that code makes a test fail instead of being skipped. Free functions; any thread.
 #ifndef LOCUS_TESTS_SUPPORT_MACHINE_FEATURES_H_
 #define LOCUS_TESTS_SUPPORT_MACHINE_FEATURES_H_
 
@@ -27,7 +27,8 @@ inline bool has_ipv6() {
   return bound;
 }
 
-// Returns whether the kernel supports filters of system calls that end the process.
+// Returns whether the kernel supports filters of system calls (seccomp) that kill a process which makes a forbidden
+// call.
 inline bool kernel_filters_system_calls() {
   std::ifstream file("/proc/sys/kernel/seccomp/actions_avail");
   const std::string actions(std::istreambuf_iterator<char>(file), {});

@@ -50,8 +50,8 @@ class MemoryLog : public UpdateLog {
   explicit MemoryLog(const Kept& kept) : kept_(kept) { list_stored(kept); }
 
   // Returns the data that remains if the machine stops now. A scene keeps its synced records and the first `unsynced`
-  // of its unsynced records. If these are all of its records, and its last append failed, the scene also keeps the
-  // first `left_over` records of that append.
+  // of its unsynced records. If the scene keeps all of its records, and its last append failed, it also keeps the first
+  // `left_over` records of the failed append.
   Kept crash(uint64_t unsynced = 0, uint64_t left_over = 0) const {
     const MutexLock lock(mutex_);
     Kept kept = kept_;

@@ -1,5 +1,5 @@
 // Families of points for testing the nearest kernels: each family is known to reveal one kind of error. The points are
-// generated from seeds. For the tests of the nearest kernels and of planted bugs in them.
+// generated from seeds. Used by the tests of the nearest kernels and of planted bugs in them.
 #ifndef LOCUS_TESTS_SUPPORT_NEAREST_TRIALS_H_
 #define LOCUS_TESTS_SUPPORT_NEAREST_TRIALS_H_
 
@@ -20,7 +20,7 @@
 namespace locus::test {
 
 // Arguments of searches from one point in mesh axes. A search must return all triangles within `limit`. A search for
-// only the nearest triangle must return those that are farther than the nearest one by at most `slack`.
+// only the nearest triangle must return this triangle, and all triangles that are farther away by at most `slack`.
 struct NearestTarget {
   Vec3d point;
   double limit = std::numeric_limits<double>::infinity();
@@ -177,9 +177,10 @@ inline std::vector<NearestTrial> scaled_nearest_trials() {
   return trials;
 }
 
-// Makes meshes of one point, whose box has no extent, so that the distance to the box equals that to the triangle,
-// which is the limit of the search. The queries are so near to the origin that the pad of their points is small. So
-// only the pad of boxes prevents the search from dropping a box whose squared distance is rounded up.
+// Makes meshes that consist of a single point. The box of such a mesh has no extent, so the distances to the box and to
+// the triangle are equal. This distance is the limit of the search. The queries are so near to the origin that the pad
+// of their points is small. So only the pad of boxes prevents the search from dropping a box whose squared distance is
+// rounded up.
 inline std::vector<NearestTrial> point_nearest_trials() {
   Random random(20);
   std::vector<NearestTrial> trials;

@@ -1,5 +1,5 @@
-// Oracle of pairs of objects, in the slow and simple way that query_oracle.h describes: it measures all pairs, sorts
-// and truncates. For tests of queries.
+// Oracle of pairs of objects. It works in the slow and simple way that query_oracle.h describes: it measures all pairs,
+// sorts and truncates. Used by tests of queries.
 #ifndef LOCUS_TESTS_SUPPORT_ORACLE_PAIRS_H_
 #define LOCUS_TESTS_SUPPORT_ORACLE_PAIRS_H_
 

@@ -1,5 +1,5 @@
-// Oracle of rays, sweeps and sight, in the slow and simple way that query_oracle.h describes: it tests everything,
-// sorts and truncates. For tests of queries.
+// Oracle of rays, sweeps and sight. It works in the slow and simple way that query_oracle.h describes: it tests
+// everything, sorts and truncates. Used by tests of queries.
 #ifndef LOCUS_TESTS_SUPPORT_ORACLE_RAYS_H_
 #define LOCUS_TESTS_SUPPORT_ORACLE_RAYS_H_
 

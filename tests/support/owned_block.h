@@ -1,4 +1,4 @@
-// A block of queries that owns its columns, and comparison of two results. For tests of queries.
+// A block of queries that owns its columns, and comparison of two results. Used by tests of queries.
 #ifndef LOCUS_TESTS_SUPPORT_OWNED_BLOCK_H_
 #define LOCUS_TESTS_SUPPORT_OWNED_BLOCK_H_
 
@@ -65,7 +65,7 @@ struct OwnedBlock {
     return part;
   }
 
-  // Calls visit(column, width) for each column with `width` values for each query.
+  // Calls visit(column, width) for each column; `width` is the number of values that the column has for each query.
   template <class Visit>
   void for_each_column(const Visit& visit) {
     const QueryBlock::Kind& kind = settings.kind;

@@ -1,5 +1,5 @@
 // Content of a scene as plain values, and functions that make a snapshot of this content. The content is inserted in a
-// given or a shuffled order, and optionally after other content was inserted and removed. For tests of queries.
+// given or a shuffled order, and optionally after other content was inserted and removed. Used by tests of queries.
 #ifndef LOCUS_TESTS_SUPPORT_QUERY_WORLD_H_
 #define LOCUS_TESTS_SUPPORT_QUERY_WORLD_H_
 

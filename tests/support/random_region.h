@@ -1,5 +1,5 @@
 // Random balls and boxes on and near the triangles of a mesh, of sizes from zero to the whole mesh; some of them only
-// touch a triangle. For the tests of the region kernels and for tests of planted bugs in the kernels.
+// touch a triangle. Used by the tests of the region kernels and by tests of planted bugs in the kernels.
 #ifndef LOCUS_TESTS_SUPPORT_RANDOM_REGION_H_
 #define LOCUS_TESTS_SUPPORT_RANDOM_REGION_H_
 
@@ -60,8 +60,8 @@ class RandomRegions {
     for (int steps = random_.whole(0, 2); steps > 0; --steps) ball.radius = std::nextafter(ball.radius, toward);
     return ball;
   }
-  // Generates a box that touches a triangle, up to a few units in the last place of its half extents; or any box if it
-  // would have to grow eightfold or more to touch the triangle.
+  // Generates a box that touches a triangle, up to a few units in the last place of its half extents. To touch the
+  // triangle, a random box is scaled; if it would have to grow eightfold or more, it is returned unscaled.
   Obbf touching_box(bool turned) {
     Obbf box = this->box(turned);
     const auto scale = static_cast<float>(touching_scale(box, random_.pick(triangles_)));

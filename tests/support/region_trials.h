@@ -1,5 +1,5 @@
 // Families of balls and boxes for testing the region kernels: each family is known to reveal one kind of error. The
-// regions are generated from seeds. For the tests of planted bugs in the region kernels.
+// regions are generated from seeds. Used by the tests of planted bugs in the region kernels.
 #ifndef LOCUS_TESTS_SUPPORT_REGION_TRIALS_H_
 #define LOCUS_TESTS_SUPPORT_REGION_TRIALS_H_
 

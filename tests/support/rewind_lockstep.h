@@ -2,8 +2,8 @@
 // teleports, relabels and removes objects at random, and queries the scene at random times. It compares every column of
 // the answers bit for bit, with every instruction set, on one and two threads, and in the brute-force mode. A tick has
 // one batch or several batches, in which the same object can move far and back, be replaced, teleport, be removed and
-// be inserted again. For the random tests, which expect no difference, and for the tests of planted bugs, which expect
-// one.
+// be inserted again. Used by the random tests, which expect no difference, and by the tests of planted bugs, which
+// expect one.
 //
 // The trials before commit 476c028 did not see the fault of PlantedBug::kRewindFastBox, by which a rewind missed an
 // object that moved twice in one tick: ticks had several batches, but only by rare chance did an object move far in one

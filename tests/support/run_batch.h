@@ -1,5 +1,5 @@
 // Function that answers a batch synchronously, into columns that the result owns. The server uses BatchRun with the
-// columns of its reply instead. Threads: any number of calls may run at once on one snapshot.
+// columns of its reply instead. Threads: any number of calls may run at the same time on one snapshot.
 #ifndef LOCUS_TESTS_SUPPORT_RUN_BATCH_H_
 #define LOCUS_TESTS_SUPPORT_RUN_BATCH_H_
 

@@ -59,7 +59,8 @@ class SceneSchedule {
   }
 
   // Applies the changes of revision `revision` of the schedule as one batch. Preconditions: the scene is at the
-  // previous revision, and this revision changes at least one object, as it does if there are many objects.
+  // previous revision, and this revision changes at least one object. The second precondition holds if there are many
+  // objects.
   void advance(Scene& scene, uint64_t revision) const {
     std::vector<uint64_t> gone, come, move;
     for (Id id = 1 + (revision + kTurns - 1) % kTurns; id <= objects_; id += kTurns) {

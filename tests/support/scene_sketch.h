@@ -68,7 +68,7 @@ inline void append_closed_box(std::vector<Triangle>& triangles, const Placement&
 }
 
 // Appends the triangles of a placement. A flat placement becomes a rectangle of two triangles, which may have no area.
-// Any other placement becomes a closed box, or a single triangle within the box before it is rotated.
+// Any other placement becomes a closed box, or a single triangle within the unrotated box.
 inline void append_triangles(std::vector<Triangle>& triangles, const Placement& placement, Random& random) {
   const Vec3d h = placement.half;
   if (h.x == 0 || h.y == 0 || h.z == 0) {

@@ -1,5 +1,5 @@
-// A few triangles and objects with whole coordinates, so that the answers to queries are easy to derive. For tests of
-// queries.
+// A few triangles and objects with whole coordinates, so that the answers to queries are easy to derive. Used by tests
+// of queries.
 #ifndef LOCUS_TESTS_SUPPORT_SMALL_WORLD_H_
 #define LOCUS_TESTS_SUPPORT_SMALL_WORLD_H_
 

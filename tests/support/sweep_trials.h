@@ -1,5 +1,5 @@
 // Comparison of sweeps with the predicates of overlap queries at single moments, on random movers, triangles and
-// shapes. For the tests of sweeps and for the tests of planted bugs in them.
+// shapes. Used by the tests of sweeps and by the tests of planted bugs in sweeps.
 #ifndef LOCUS_TESTS_SUPPORT_SWEEP_TRIALS_H_
 #define LOCUS_TESTS_SUPPORT_SWEEP_TRIALS_H_
 
@@ -82,7 +82,7 @@ inline const Shape& swept_form(const Shape& shape) { return shape; }
 
 // Returns a description of the first difference between a sweep and overlaps at single moments; empty if there is none.
 // Before the first contact, the mover shrunk by epsilon must overlap nothing; at the contact, the mover grown by
-// epsilon must overlap; and PASS must skip only primitives that are touched at the start.
+// epsilon must overlap the primitive; and PASS must skip a primitive if and only if the mover touches it at the start.
 template <class Primitive>
 std::string sweep_fault(const SweepTrial<Primitive>& trial, Random& random) {
   const auto form = swept_form(trial.primitive);

@@ -1,5 +1,5 @@
 // Random triangles of every kind, including slivers and triangles without area, and their distance from a point,
-// computed by search in long double. For tests.
+// computed by search in long double. Used by tests.
 #ifndef LOCUS_TESTS_SUPPORT_TRIANGLE_REFERENCE_H_
 #define LOCUS_TESTS_SUPPORT_TRIANGLE_REFERENCE_H_
 

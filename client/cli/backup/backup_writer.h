@@ -21,7 +21,7 @@ using BackupProgress = std::function<void(uint64_t done, uint64_t total)>;
 
 class BackupWriter final : public client::BackupSink {
  public:
-  // Borrows `directory`. Precondition: PartialDirectory::make() was not called on `directory`, since begin() calls it.
+  // Borrows `directory`. Precondition: directory.make() has not been called yet, because begin() calls it.
   BackupWriter(PartialDirectory& directory, BackupProgress progress);
 
   absl::Status begin(const client::BackupSize& announced) override;

@@ -21,8 +21,8 @@ namespace locus::cli {
 
 inline constexpr uint32_t kDefaultBulkBatch = 8192;
 inline constexpr uint32_t kMaxBulkBatch = 65536;
-// Maximum number of batches that are sent and not yet answered. It limits memory: no other batch is held except the one
-// that the reader is filling.
+// Maximum number of batches that are sent and not yet answered. This limits the memory used, because the only other
+// batch in memory is the one that the reader is filling.
 inline constexpr size_t kBulkWindow = 4;
 // Deadline of one batch, in seconds, if --timeout is not given. It is longer than the deadline of a single call,
 // because a batch waits until the batches before it are answered.

@@ -2,10 +2,10 @@
 // the input. For insert, move and remove. Holds at most kBulkWindow batches in memory, however long the input is.
 //
 // Each batch becomes one revision. A batch ends after --batch rows, or when the input has no data ready (see
-// kRowPause): if a process writes the moves of one time step to a pipe and then waits, these moves are applied as one
-// revision. A row that the server refuses is listed in the report, and the rest of its batch is applied. A malformed
-// row (text instead of a number, a missing column) ends the run: no row of its batch is sent, and the message contains
-// the number of rows applied before that batch.
+// kRowPause). Therefore, if a process writes the moves of one time step to a pipe and then waits, these moves become
+// one revision. A row that the server refuses is listed in the report, and the rest of its batch is applied. A
+// malformed row (text instead of a number, a missing column) ends the run: no row of its batch is sent, and the message
+// contains the number of rows applied before that batch.
 #ifndef LOCUS_CLIENT_CLI_COMMANDS_BULK_UPDATE_H_
 #define LOCUS_CLIENT_CLI_COMMANDS_BULK_UPDATE_H_
 
@@ -29,10 +29,10 @@ struct BulkUpdate {
   std::function<v1::UpdateBatch(const RowBatch& batch)> batch_of;
 };
 
-// Reads rows and sends updates until the input ends, and writes one report. When an ack arrives, the items that it
-// lists as refused are written at once as rows (line, id, reason). The report ends with applied, refused, batches,
-// revision, tick and epoch. Returns the first error. Without such an error, returns OK if the server refused no item,
-// otherwise NOT_FOUND if all refused items have unknown ids, and FAILED_PRECONDITION if not.
+// Reads rows and sends updates until the input ends, and writes one report. As soon as an ack arrives, the items that
+// it lists as refused are written as rows (line, id, reason). The report ends with applied, refused, batches, revision,
+// tick and epoch. Returns the first error. Without such an error, returns OK if the server refused no item, otherwise
+// NOT_FOUND if all refused items have unknown ids, and FAILED_PRECONDITION if not.
 absl::Status run_bulk_update(const BulkUpdate& update, const std::string& scene, const BulkOptions& bulk,
                              Context& context);
 

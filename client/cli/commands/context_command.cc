@@ -1,4 +1,5 @@
-// `locus context`: named connection options of servers; one name is the default.
+// `locus context`: manages contexts, which are the connection options of servers, stored under names. One context may
+// be the default.
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>

@@ -36,7 +36,7 @@ struct DemoOptions {
   std::string compare;
 };
 
-// Table of the demo's results. It also counts the wrong answers of all rows.
+// Table of the demo's results, with the total number of wrong answers in its rows.
 class DemoTable {
  public:
   void add(const std::string& what, Json rest) {
@@ -135,8 +135,8 @@ absl::Status check_leaks(const client::Client& client, const DemoOptions& option
   return absl::OkStatus();
 }
 
-// Returns a batch with one block of each of the demo's four kinds of query, large enough that the server splits the
-// batch into chunks.
+// Returns a batch with one block for each of the demo's four kinds of query. The batch is large enough that the server
+// splits it into chunks.
 v1::QueryBatch mixed_batch(const DemoWorld& world, uint64_t seed) {
   DemoRandom random(seed);
   v1::QueryBatch mixed;

@@ -1,4 +1,5 @@
-// `locus token`: bearer tokens in the token file of locusd. Runs on the server's machine and needs no server.
+// `locus token`: bearer tokens in the token file of locusd. Runs on the server's machine; the server need not be
+// running.
 #include <memory>
 #include <optional>
 #include <string>

@@ -1,5 +1,5 @@
-// Parsed `expect` line: `EXPR OP EXPR`, with OP one of == != < <= > >= contains, optionally followed by
-// `within TOLERANCE` after ==. For the runner of scripts. Functions without state.
+// Parsed `expect` line: `EXPR OP EXPR`, with OP one of == != < <= > >= contains. If OP is ==, `within TOLERANCE` may
+// follow. For the runner of scripts. Functions without state.
 #ifndef LOCUS_CLIENT_CLI_SCRIPT_EXPECTATION_H_
 #define LOCUS_CLIENT_CLI_SCRIPT_EXPECTATION_H_
 

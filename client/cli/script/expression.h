@@ -7,8 +7,9 @@
 //   primary = number | number,number,number | text | true | false | null | variable | function "(" [sum {"," sum}] ")"
 //           | "(" list ")" | "{" list "}"
 //
-// Three numbers separated by commas without blanks are one vector, which is formed before any operator is applied. For
-// statements and words. Functions without state. The result of an expression with an unknown value is unknown.
+// Three numbers separated by commas without blanks are one vector, which is formed before any operator is applied. The
+// result of an expression with an unknown value is unknown. Used by the parsers of statements and of words. Functions
+// without state.
 #ifndef LOCUS_CLIENT_CLI_SCRIPT_EXPRESSION_H_
 #define LOCUS_CLIENT_CLI_SCRIPT_EXPRESSION_H_
 

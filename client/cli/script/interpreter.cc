@@ -31,7 +31,8 @@ std::vector<std::string> texts_of(const std::vector<Word>& words) {
   return texts;
 }
 
-// Removes `-> NAME` from the end of `words` and returns the name; returns an empty text if `words` does not end so.
+// Removes `-> NAME` from the end of `words` and returns the name. Returns an empty text if `words` has no `->`, and
+// INVALID_ARGUMENT if a `->` is not followed by exactly one name.
 absl::StatusOr<std::string> take_target(std::vector<Word>& words) {
   for (size_t i = 0; i < words.size(); ++i) {
     if (!words[i].bare || words[i].text != "->") continue;

@@ -31,8 +31,8 @@ int order(T a, T b) {
   return a < b ? -1 : (a > b ? 1 : 0);
 }
 
-// Compares an integer and a double without rounding: splits `b` into its fraction and its integer part, which fits 128
-// bits after the range check.
+// Compares an integer and a double without rounding. Method: `b` is split into its integer part and its fraction. The
+// integer part fits 128 bits, because the range of `b` is checked first.
 int compare_exactly(absl::int128 a, double b) {
   if (std::abs(b) >= 0x1p65) return b > 0 ? -1 : 1;
   const double whole = std::trunc(b);

@@ -30,7 +30,8 @@ double real(const Number& number);
 // Returns `value`, or OUT_OF_RANGE if it is not finite.
 absl::StatusOr<Number> finite(double value);
 
-// Calculate a result. The result of two integers is an integer whenever it is integral, also for divide().
+// Calculate a result. If both operands are integers and the exact result is integral, the result is an integer; for
+// example, divide() of 6 and 3 returns the integer 2.
 absl::StatusOr<Number> add(const Number& a, const Number& b);
 absl::StatusOr<Number> subtract(const Number& a, const Number& b);
 absl::StatusOr<Number> multiply(const Number& a, const Number& b);

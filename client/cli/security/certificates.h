@@ -1,5 +1,5 @@
 // Development certificates: an authority, and the certificates that it signs for servers and clients. Keys are on the
-// curve P-256, signatures use SHA-256. For `locus cert`. Functions without state; any thread.
+// curve P-256, signatures use SHA-256. For `locus cert`. Functions without state, which any thread may call.
 #ifndef LOCUS_CLIENT_CLI_SECURITY_CERTIFICATES_H_
 #define LOCUS_CLIENT_CLI_SECURITY_CERTIFICATES_H_
 

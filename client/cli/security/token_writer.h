@@ -1,6 +1,7 @@
 // Token files of locusd: functions that make, list and revoke bearer tokens. For `locus token`. A token is `locus_`,
-// its id, `_` and 43 characters: 32 random bytes in base64url. The file has one line for each token. It contains the
-// token's SHA-256 instead of the token itself. A line that begins with `#` is a comment. The form of a token's line is:
+// its id, `_` and 43 characters: 32 random bytes in base64url. The file has one line for each token. The line contains
+// the token's SHA-256 instead of the token itself. A line that begins with `#` is a comment. The form of a token's line
+// is:
 //   ID SHA256-HEX CREATED EXPIRES-or-never [COMMENT]
 // CREATED and EXPIRES are UTC times such as 2024-05-31T12:00:00Z. An id has 1 to 63 of a-z, 0-9 and -, and does not
 // begin or end with -. Functions without state; several processes may change one file at the same time.

@@ -1,10 +1,10 @@
-"""One tick of an anti-wallhack filter, which sends to each player only the players that it sees or that are near it.
+"""One tick of an anti-wallhack filter: finds for each player the other players that this player sees or is close to.
 
     PYTHONPATH=build/release/python /usr/bin/python3 anti_wallhack.py [ADDRESS]
 
-One call queries the sight between all pairs of players, which is returned as a matrix. Each player has its own group,
-so that the body of a player does not block its sight. Each body has three sample points, so that a player whose head is
-above a wall counts as seen.
+The server of a game would send each player the positions of only these other players. One call queries the sight
+between all pairs of players; the result is a matrix. Each player has its own group, so that the body of a player does
+not block its sight. Each body has three sample points, so that a player whose head is above a wall counts as seen.
 """
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def make_scene(client: locus.Client, positions: list[list[float]]) -> locus.Ack:
 
 
 def visible(client: locus.Client, ack: locus.Ack, positions: list[list[float]]) -> list[list[int]]:
-    """Returns for each player the indices of the other players that it sees or that are close to it."""
+    """Returns for each player the indices of the other players that this player sees or is close to."""
     eyes = [[x, 1.7, z] for x, _, z in positions]
     bodies = [[x, height, z] for x, _, z in positions for height in SAMPLES]
     groups = list(range(1, PLAYERS + 1))

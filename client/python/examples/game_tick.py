@@ -33,7 +33,9 @@ class Tick(NamedTuple):
 
 
 def positions(players: int, tick: int) -> "array.array[float]":
-    """Returns the players' positions, 3N float32: they walk on three circles around the wall, in both directions."""
+    """Returns the positions of the players, three float32 each. They walk on three circles around the wall, in both
+    directions.
+    """
     column = array.array("f")
     for player in range(players):
         distance = 10.0 + 5.0 * (player % 3)
@@ -71,8 +73,8 @@ class Game:
         ack = self.updates.send(locus.UpdateBatch(tick=number).move(self.ids, here)).result()
         batch = locus.QueryBatch(at_least=ack)
         batch.balls(here, REACH, block=locus.Block(ignore_groups=self.ids, ignore_ids=[WALL]))
-        # Each ray goes from a player to the next player and ignores the group of the first. So its first hit is the
-        # next player, or an obstacle that hides the next player.
+        # Each ray goes from a player to the next player, and ignores the group of the player where it starts. So its
+        # first hit is the next player, or an obstacle that hides the next player.
         batch.rays(here, difference(shifted(here), here), t_max=1.0, block=locus.Block(ignore_groups=self.ids))
         near, sight = self.queries.send(batch).result().blocks
         next_ids = self.ids[1:] + self.ids[:1]

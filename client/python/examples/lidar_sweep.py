@@ -33,8 +33,8 @@ class Cost(NamedTuple):
 
 
 def directions(rays: int) -> "array.array[float]":
-    """Returns the unit directions of one revolution, 3N float32 for `rays` rays; z is up. The directions of all rings
-    at one yaw are consecutive.
+    """Returns the unit directions of the `rays` rays of one revolution, three float32 each; z is up. The directions of
+    all rings at one yaw are consecutive.
     """
     steps = -(-rays // RINGS)
     column = array.array("f")
@@ -66,7 +66,7 @@ def build_street(client: locus.Client, scene: str) -> locus.Revision:
 def measured_sweep(client: locus.Client, scene: str, sweep: int, zeros: Any, directed: Any,
                    built: locus.Revision) -> Tuple[locus.BlockResult, Cost]:
     """Runs one sweep and returns its hits and its times. All rays start at the origin of the frame, so only the frame
-    changes.
+    changes from sweep to sweep.
     """
     begin = time.perf_counter_ns()
     batch = locus.QueryBatch(at_least=built)

@@ -48,20 +48,20 @@ def connect(address: str = DEFAULT_ADDRESS, *, timeout: float = 10.0, long_timeo
     """Connects to a locusd at `host:port`, `host` (port 7575) or `unix:/path`.
 
     `timeout`: maximum duration of a call in seconds, including retries; `long_timeout`: maximum duration, in seconds,
-    of mesh transfers and changes of instances. With `wait_for_server`, connect() retries until `timeout`; without it, a
-    refused connection fails at once with LocusError UNAVAILABLE, which names the address. `max_send_bytes`,
-    `max_receive_bytes`: maximum message sizes; the server accepts 32 MiB by default, and an answer may have up to the
-    batch's `max_reply_bytes`.
+    of mesh transfers and changes of instances. With `wait_for_server`, connect() retries until `timeout` seconds have
+    passed; without it, a refused connection fails immediately with LocusError UNAVAILABLE, which names the address.
+    `max_send_bytes`, `max_receive_bytes`: maximum message sizes; the server accepts 32 MiB by default, and an answer
+    may have up to the batch's `max_reply_bytes`.
 
     `tls` encrypts the connection; `ca`, `cert` and `server_name` imply it. `ca`: file with the certificates of the
-    authorities that the server's certificate may come from, default those that gRPC trusts; `cert`, `key`: files with
-    the client's certificate chain and its key, for mutual TLS; `server_name`: name in the server's certificate if it is
-    not the host of the address. All files are in PEM format and are read once.
+    authorities that may have signed the server's certificate, by default the authorities that gRPC trusts; `cert`,
+    `key`: files with the client's certificate chain and its key, for mutual TLS; `server_name`: name in the server's
+    certificate if it is not the host of the address. All files are in PEM format and are read once.
 
     `token`: bearer token that every call carries; `token_file`: file that contains only the token, read again when it
-    has changed and when the server refuses the token. A token is sent only over TLS, to loopback addresses and to unix
-    sockets, unless `allow_token_without_tls`. Raises ValueError for options that contradict each other or that would
-    send a token unencrypted to another machine, OSError for a file that cannot be read.
+    has changed and when the server refuses the token. Without TLS, a token is sent only to loopback addresses and unix
+    sockets, unless `allow_token_without_tls` is set. Raises ValueError for options that contradict each other or that
+    would send a token unencrypted to another machine, OSError for a file that cannot be read.
     """
     credentials = Credentials(tls=tls, ca=ca, cert=cert, key=key, server_name=server_name, token=token,
                               token_file=token_file, allow_token_without_tls=allow_token_without_tls)

@@ -22,10 +22,10 @@ def connect_from_environment(context: str = "", **options: Any) -> Client:
     Reads LOCUS_ADDRESS, LOCUS_TLS, LOCUS_CA, LOCUS_CERT, LOCUS_KEY, LOCUS_SERVER_NAME, LOCUS_TOKEN_FILE and
     LOCUS_TOKEN. Options that are not set by these variables come from a named context. Its name is `context`, or the
     value of LOCUS_CONTEXT if `context` is empty. If both are empty and LOCUS_ADDRESS is not set, the user's default
-    context is used; it is not used for another address, so that its credentials do not reach another server. `options`:
-    further options of connect(); they take precedence over the environment. Raises ValueError for an unknown context, a
-    malformed file of contexts or a wrong LOCUS_TLS, OSError for a file of contexts that cannot be read, and the errors
-    of connect().
+    context is used. If LOCUS_ADDRESS is set, the default context is not used, so that its credentials do not reach
+    another server. `options`: further options of connect(); they take precedence over the environment. Raises
+    ValueError for an unknown context, a malformed file of contexts or a wrong LOCUS_TLS, OSError for a file of contexts
+    that cannot be read, and the errors of connect().
     """
     return connect(**{**endpoint(context), **options})
 
@@ -52,7 +52,9 @@ def _variable(option: str) -> str:
 
 
 def _complete(found: Dict[str, Any], name: str) -> None:
-    """Adds the options of a context that are not given; those of the default context if `name` is empty."""
+    """Adds to `found` the options that it lacks, from the context `name` or, if `name` is empty, from the default
+    context.
+    """
     default, contexts = _read_contexts(_contexts_path())
     name = name or default
     if not name:

@@ -1,6 +1,6 @@
-"""Base class of UpdateStream and QueryStream: a bidirectional call with a bounded number of messages in flight, whose
-responses are matched by sequence number. After a broken connection the stream opens a new call and sends the unanswered
-messages again. Internal to the package.
+"""Base class of UpdateStream and QueryStream: a bidirectional call with a bounded number of messages in flight. A
+response is matched to its message by sequence number. After a broken connection the stream opens a new call and sends
+the unanswered messages again. Internal to the package.
 
 One thread per stream opens the calls, one after another, and reads the responses; gRPC's thread writes the messages.
 Invariants: `_items` contains the messages that were accepted and not answered, in the order of sending. After `_ended`
@@ -37,7 +37,8 @@ class Item(Generic[Result]):
 class PipelinedStream(Generic[Result]):
     """Common part of UpdateStream and QueryStream. Thread-safe.
 
-    Use as a context manager: leaving it waits for all answers, or cancels the stream after an exception.
+    Use as a context manager: the end of the `with` block waits for all answers, or cancels the stream after an
+    exception.
     """
 
     def __init__(self, connection: Connection, path: str, scene: str, max_in_flight: int, retry: Retry) -> None:

@@ -23,9 +23,9 @@ class Block(NamedTuple):
     - `frame`: three floats, the origin that the server adds to every position of the block. Column POINT of the result
       is relative to the frame, but column POSE is absolute.
     - `source`: search static instances, moving objects or both; `precision`: exact shapes or their bounds.
-    - `columns`: columns to return for each row, by default T, ID and TRIANGLE for rays, sweeps and nearest queries, ID
-      for balls, boxes, capsules, frustums and contains (TRIANGLE too if their detail is triangles), ID and POSE for
-      lookups, ID and OTHER for pairs (T too with `k`), T, ID, TRIANGLE and NORMAL for cells.
+    - `columns`: columns to return for each row. Defaults: T, ID and TRIANGLE for rays, sweeps and nearest queries; ID
+      for balls, boxes, capsules, frustums and contains, with TRIANGLE if their detail is triangles; ID and POSE for
+      lookups; ID and OTHER for pairs, with T if `k` is given; T, ID, TRIANGLE and NORMAL for cells.
     - `masks`: N uint32 or one; only objects and instances with (layers & mask) != 0 are found.
     - `ignore_groups`: N uint64 or one; the query ignores objects and instances of this group.
     - `ignore_ids`: at most 64 uint64 ids to ignore, for the whole block.
@@ -200,7 +200,7 @@ class QueryBatch:
         the centre, 3N float32 each, or three for `ends`; `radii`: N float32 or one, above 0; `half_axes`: 3N float32 or
         three, from the centre to one end of the inner segment; `half_extents`: 3N float32 or three, along the box's own
         axes; `rotations`: 4N float32 or four, unit quaternions x, y, z, w, for boxes; `at_start`: how objects and
-        triangles are treated that the solid touches at t = 0.
+        triangles that the solid touches at t = 0 are treated.
         """
         new = _NewBlock(self._blocks, "sweeps")
         new.first("starts", starts, FLOAT32, 3)
@@ -262,9 +262,9 @@ class QueryBatch:
               pairwise: bool = False, block: Block = Block()) -> "QueryBatch":
         """Adds a block of V viewers that look at M targets; BlockResult.sight has a byte for each viewer and target.
         `viewers`: float32, `eyes` points for each viewer; `targets`: float32, `samples` points for each target;
-        `viewer_groups`: V uint64 or one, `target_groups`: M uint64 or one: objects and instances of these groups do not
-        block the sight of this viewer, or of this target; `max_distances`: V float32 or one, inclusive; `pairwise`:
-        viewer i looks only at target i.
+        `viewer_groups`: V uint64 or one, `target_groups`: M uint64 or one: objects and instances in the group of a
+        viewer or of a target do not block the sight between these two; `max_distances`: V float32 or one, inclusive;
+        `pairwise`: viewer i looks only at target i.
         """
         new = _NewBlock(self._blocks, "sight")
         new.first("viewers", viewers, FLOAT32, 3 * eyes)

@@ -30,9 +30,9 @@ class QueryStream(PipelinedStream[QueryResult]):
     def send(self, batch: QueryBatch) -> "Future[QueryResult]":
         """Sends a batch. Blocks while `max_in_flight` batches are unanswered.
 
-        The future receives the result, or the LocusError of this batch. The batch is encoded before send() returns and
-        may be used again. Raises LocusError if the stream has ended. To keep a local server busy, 8 batches of 1,024
-        queries in flight are enough, or 2 batches of 8,192.
+        The future receives the result, or the LocusError of this batch. The batch is encoded before send() returns, so
+        the caller can use it again. Raises LocusError if the stream has ended. To keep a local server busy, 8 batches
+        of 1,024 queries in flight are enough, or 2 batches of 8,192.
         """
         return self._send(batch.batch_bytes())
 

@@ -40,8 +40,8 @@ class UpdateStream(PipelinedStream[Ack]):
         """Sends a batch. Blocks while `max_in_flight` batches are unanswered, which slows a caller down to the rate of
         the server.
 
-        The future receives the Ack, or the LocusError of this batch. The batch is copied and may be used again; the
-        stream replaces the `writer` and `number` of the copy. Raises LocusError if the stream has ended.
+        The future receives the Ack, or the LocusError of this batch. The batch is copied, so the caller can use it
+        again. The stream replaces the `writer` and `number` of the copy. Raises LocusError if the stream has ended.
         """
         return self._send(batch.message.SerializeToString())
 

@@ -13,12 +13,12 @@ _Request = schema.message("ApplyUpdatesRequest")
 class UpdateBatch:
     """Changes that are applied as one revision, in this order: clear, removes, inserts, moves, relabels.
 
-    N is the number of ids of a call. Every other column has N entries, one entry for all ids, or none for its default.
-    `positions` are 3N float32 relative to `frame` (three floats, the origin by default); `positions_f64` are 3N
-    float64, absolute; give exactly one of these two columns. `rotations` are 4N float32, unit quaternions x, y, z, w;
-    without them, inserted objects have the identity, and moved objects keep their rotations. `layers` are N uint32
-    (none = bit 0; the value 0 hides the object), `groups` and `tags` N uint64 (none = 0). Ids are uint64, chosen by the
-    caller, never 0. Lengths are in the caller's unit.
+    N is the number of ids of a call. Every other column has N entries, one entry for all ids, or no entry, which means
+    its default. `positions` are 3N float32 relative to `frame` (three floats, the origin by default); `positions_f64`
+    are 3N float64, absolute; give exactly one of these two columns. `rotations` are 4N float32, unit quaternions x, y,
+    z, w; without them, inserted objects have the identity, and moved objects keep their rotations. `layers` are N
+    uint32 (none = bit 0; the value 0 hides the object), `groups` and `tags` N uint64 (none = 0). Ids are uint64, chosen
+    by the caller, never 0. Lengths are in the caller's unit.
 
     Columns are checked for type and length here (TypeError and ValueError name the column). Values are checked by the
     server, which refuses wrong items individually and lists them in Ack.errors, or, with `all_or_nothing`, refuses the
@@ -107,7 +107,7 @@ class UpdateBatch:
     def move(self, ids: ColumnLike, positions: ColumnLike = None, *, positions_f64: ColumnLike = None,
              rotations: ColumnLike = None, teleport: bool = False) -> "UpdateBatch":
         """Moves N objects: sets their centres and, if `rotations` is given, their rotations. With `teleport`, queries
-        at a time between the previous tick and this one do not interpolate between the old and the new position.
+        at a time between the previous tick and the batch's tick do not interpolate between the old and new positions.
         """
         with _new_entry(self.message.moves, "moves", ids) as entry:
             entry.pose(positions, positions_f64, rotations)

@@ -137,7 +137,7 @@ class Limit:
 @dataclasses.dataclass(frozen=True)
 class Quota:
     """Quota of an identity or connection, and its use. `used` is the amount in use now or, for names that end in
-    `_per_s`, the mean rate. `available` is the amount that may be used immediately. `limit` and `available` are None if
+    `_per_s`, the mean rate. `available` is the amount that can be used immediately. `limit` and `available` are None if
     there is no limit.
     """
 

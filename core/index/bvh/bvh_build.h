@@ -14,8 +14,8 @@
 
 namespace locus {
 
-// Version of the build algorithm. Must be incremented with every change that results in other trees for the same input,
-// so that stored topologies of older builds (tree_topology.h) are recognised as possibly worse than a new build.
+// Version of the build algorithm. Must be incremented whenever a change of the algorithm changes the tree of some
+// input, so that stored topologies of older builds (tree_topology.h) are recognised as possibly worse than a new build.
 inline constexpr uint32_t kBvhBuilderVersion = 1;
 
 struct BvhOptions {

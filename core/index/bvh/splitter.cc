@@ -108,7 +108,7 @@ template <class S>
 class Orders {
  public:
   // Computes the rank of each reference on each axis, which is the number of references before it in sorted order. All
-  // pairs of references are compared, on all axes at once and without a branch.
+  // pairs of references are compared, on all axes together and without a branch.
   explicit Orders(BoxReferences<S> references) {
     LOCUS_DCHECK_LE(references.size(), kMaxSorted);
     std::array<Quad<S>, kMaxSorted> centers, ranks;

@@ -1,6 +1,7 @@
 // Bounding volume hierarchy over the triangles of one mesh, in the layout that the vector kernels read. TriangleBvh has
-// the same visit functions as Bvh, and also visit functions for a path and for a half line. They pass triangles to
-// visitors (spatial_index.h). Callers that need no visitor pass tree() to the faster vector kernels in kernels/.
+// the same visit functions as Bvh, and also visit functions for a path and for a half line. All visit functions pass
+// triangles to visitors (spatial_index.h). Callers that need no visitor pass tree() to the faster vector kernels in
+// kernels/.
 //
 // Threads: immutable after build() or restore(); every member may run concurrently.
 // Invariants: the box of a child slot contains all triangles below it; the depth is at most limits::kMaxBvhDepth;

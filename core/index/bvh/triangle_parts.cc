@@ -29,7 +29,7 @@ std::array<float, 8> corner_distances(const Aabbf& box) {
 
 // Returns, for each octant, the order of slots from far to near along the octant's diagonal. Unused slots come first;
 // slots at equal distances are in increasing order. A slot's rank is the number of slots before it; the ranks for all
-// octants are computed at once, without a branch.
+// octants are computed together, without a branch.
 OctantOrders orders_of(absl::Span<const Aabbf> boxes) {
   std::array<std::array<float, 8>, kTreeWidth> distances;
   std::array<OctantOrders, kTreeWidth> ranks{};

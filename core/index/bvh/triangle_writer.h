@@ -1,8 +1,8 @@
 // Converts a binary tree over triangles to the nodes and blocks of a TriangleBvh. The children of a node are in order
 // of increasing area; nodes and blocks are stored depth-first, the blocks of a node before its child nodes. The writer
 // divides the tree into chunks: each node near the root is a chunk, and so is each whole subtree below these nodes. A
-// first pass counts the nodes, blocks and triangles of each chunk, from which the chunk's offsets in the output arrays
-// follow; a second pass writes the chunks. Both passes process subtrees in parallel. Internal to this folder.
+// first pass counts the nodes, blocks and triangles of each chunk. The counts determine where each chunk begins in the
+// output arrays. A second pass writes the chunks. Both passes process subtrees in parallel. Internal to this folder.
 #ifndef LOCUS_CORE_INDEX_BVH_TRIANGLE_WRITER_H_
 #define LOCUS_CORE_INDEX_BVH_TRIANGLE_WRITER_H_
 

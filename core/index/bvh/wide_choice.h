@@ -1,6 +1,6 @@
 // Choice of how a binary node is collapsed into nodes of up to eight children at minimum cost. A wide node has eight
-// child slots. For each number of slots that the binary node may occupy in a wide node, the choice is either to make
-// the binary node a wide node of its own, or to open the binary node: its two children then share the slots, and the
+// child slots. For each number of slots that the binary node may occupy in a wide node, the choice tells whether the
+// binary node becomes a wide node of its own or is opened. If it is opened, its two children share the slots, and the
 // choice contains the number of slots of the left child. Choices are computed from the leaves upwards by dynamic
 // programming. The cost of a wide node is its area plus a small constant, which keeps the number of nodes low.
 // Immutable. Invariants: the cost never increases with the number of slots; each child of an opened node gets at least

@@ -1,7 +1,7 @@
 // Cells over the bounds of a closed mesh, with the winding number of the mesh around all points of each clear cell. A
 // cell is clear if it overlaps the bounds of no triangle and its winding number is stored (see kMaxSets). A point in a
-// clear cell needs no search. From any other point, the search along a half line may end in the next clear cell: the
-// crossings beyond are already included in the winding number of this cell.
+// clear cell needs no search. From any other point, the search along a half line can end in the next clear cell,
+// because the winding number of this cell already includes the crossings beyond it.
 //
 // Proof. Cells are intervals of coordinates on each axis, so a clear cell is a box without a point of the surface, and
 // the winding number is the same around all its points. Two clear cells with a common side have the same winding
@@ -50,7 +50,7 @@ class WindingCells {
   // O(n); up to 9 bytes of temporary memory for each cell.
   static WindingCells build(const TriangleBvh& tree);
 
-  // Returns where the search from `point` may end: in its own cell, in a clear cell near it, or outside the mesh.
+  // Returns where the search from `point` can end: in its own cell, in a clear cell near it, or outside the mesh.
   // `tree` must be the tree that was passed to build(). O(1).
   WindingWay way_from(const TriangleBvh& tree, const Vec3d& point) const;
 

@@ -13,7 +13,7 @@ namespace {
 constexpr uint32_t kMinSorted = 48;
 constexpr uint32_t kSortedPerChange = 8;  // min ratio of sorted values to changes for appending to the log
 constexpr uint32_t kSortedPerDead = 4;    // min ratio of sorted values to dead values for appending to the log
-constexpr size_t kPrefetchValues = 16;    // number of values between a prefetch and its use
+constexpr size_t kPrefetchValues = 16;    // distance, in values, from a prefetch to the use of its data
 
 // Mark of an unchanged value in sorted_changes_ and recent_changes_, larger than every index of a move.
 constexpr uint32_t kStays = ~0u - 1;
@@ -58,8 +58,8 @@ BrickPtr BrickBuilder::build(const Brick* old, const BrickGeometry& geometry, ui
   return sorted_by_cell(old, sources_);
 }
 
-// Checks that each change refers to an existing arrival, or to a live slot of `old` and, unless the value leaves, to an
-// existing move. O(changes).
+// Checks the changes. The change of a value that arrives must refer to an existing arrival. Every other change must
+// refer to a live slot of `old` and, unless the value leaves, to an existing move. O(changes).
 void BrickBuilder::check_changes(const Brick* old, absl::Span<const BrickChange> changes) const {
   for (const BrickChange& change : changes) {
     if (arrives(change)) {

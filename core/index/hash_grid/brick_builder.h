@@ -36,8 +36,9 @@ class BrickBuilder {
   void end() { clear_scratch(sources_); }
 
   // Returns the next version of the brick, or null if no value remains. `old` is the present version, null for a brick
-  // that was empty. `index` is the index of the brick in the grid's array. A value occurs at most once in `changes`,
-  // except that a value that leaves may also arrive. O(values of the brick) or, for few changes, O(changes).
+  // that was empty. `index` is the index of the brick in the grid's array. `changes` has at most one change for each
+  // handle, or two if a value leaves and a new value with the same handle arrives. O(values of the brick) or, for few
+  // changes, O(changes).
   BrickPtr apply(const Brick* old, const BrickGeometry& geometry, uint32_t index,
                  absl::Span<const BrickChange> changes);
 

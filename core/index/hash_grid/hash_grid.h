@@ -163,7 +163,8 @@ class HashGrid {
   std::vector<internal::BrickChange> grouped_;  // changes, grouped by brick in the order of touched_
   std::vector<GridItem> arrivals_;
   internal::BrickBuilder builder_;
-  // Values of a brick that the current update neither removes nor moves to another brick, collected by gather_all().
+  // Result of gather_all() for one brick: the values that stay in the brick. Values that the current batch moves to
+  // another brick are not included.
   struct GatheredBrick {
     bool is_gathered = false;  // false: `sources` is unused, and the next version is made from the changes
     absl::Span<const internal::BrickSource> sources;

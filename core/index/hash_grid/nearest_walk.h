@@ -59,8 +59,8 @@ class NearestShells {
 // Candidates of one shell: values that are collected from several bricks and then visited from near to far.
 class NearCandidates {
  public:
-  // Adds the values whose key is in (above, up_to]. Searches the cells `cells`, relative to the brick, of the brick's
-  // sorted block, and the whole log of the brick.
+  // Adds the values whose key is in (above, up_to]. Searches the cells `cells` (relative to the brick) of the brick's
+  // sorted block, and the brick's whole log.
   void collect(const Brick& brick, const KeyRange& cells, const Vec3d& point, float above, float up_to, Work& work);
 
   // Calls visit(GridRef) for each candidate within the squared distance limit(), the nearest first, until visit()

@@ -1,12 +1,12 @@
-// March of a ray through one level of the hash grid: lists slabs of bricks perpendicular to the ray's dominant axis
-// (the axis of the direction's largest component), from near to far, each with the rectangle of bricks whose values the
-// ray can intersect in that slab. Immutable; any thread.
+// March of a ray through one level of the hash grid. Lists slabs of bricks, from near to far. The slabs are
+// perpendicular to the ray's dominant axis, the axis of the direction's largest component. Each slab has the rectangle
+// of bricks whose values the ray can intersect in that slab. Immutable; any thread.
 //
-// The bounds of every slab are computed from its integer index, never accumulated along the ray, and widened by the
-// largest extent of the level, the padding of the slab test and the rounding of the bounds themselves. Therefore a
-// value that passes the slab test is always stored in a brick that a slab lists, and each brick is listed at most once.
-// Compare Amanatides and Woo, A Fast Voxel Traversal Algorithm for Ray Tracing, 1987, whose accumulated steps miss
-// cells on long rays.
+// The bounds of every slab are computed from its integer index, never accumulated along the ray. The bounds are widened
+// by the largest extent of the level, the padding of the slab test and the rounding of the bounds themselves. Therefore
+// a value that passes the slab test is always stored in a brick that a slab lists, and each brick is listed at most
+// once. Compare Amanatides and Woo, A Fast Voxel Traversal Algorithm for Ray Tracing, 1987, whose accumulated steps
+// miss cells on long rays.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_SLAB_MARCH_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_SLAB_MARCH_H_
 
@@ -51,7 +51,7 @@ class SlabMarch {
 
  private:
   // Part of the ray with t <= `limit` between the planes at `index` * `edge` and (`index` + 1) * `edge` on the dominant
-  // axis: its near value, as in Slab, and the bounds of the positions of the values that this part can intersect.
+  // axis. `near` has the same meaning as in Slab. `positions` covers the values that this part can intersect.
   struct Crossing {
     double near;
     Aabbd positions;  // bounds of the positions of these values; may be empty

@@ -56,7 +56,7 @@ class HitCollector {
     }
     answer_.hits.push_back(hit);
     if (answer_.hits.size() == capacity_) {
-      // The front of the heap is the last hit in the order of nearer(), which a better hit replaces.
+      // Makes the last hit in the order of nearer() the front of the heap. A later, better hit replaces the front.
       if (is_heap_)
         std::push_heap(answer_.hits.begin(), answer_.hits.end(), nearer);
       else

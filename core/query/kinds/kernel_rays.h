@@ -1,7 +1,7 @@
 // Intersection of many rays with the scene's static instances by the vector kernels, which are efficient only with many
 // rays per call. Each ray visits the instances from near to far. All rays advance in rounds: each ray moves to its next
 // instance, then the kernels trace all rays that wait at instances of the same mesh in one call. Once a ray's collector
-// is full, its worst retained hit limits the t up to which the ray is traced. Supports EXACT rays of all modes, but no
+// is full, its worst retained hit limits the t up to which the ray is traced. Supports EXACT rays of all modes, but not
 // RayRequest::after.
 //
 // Threads: any thread may call trace_meshes() with a QueryTask and rays of its own.

@@ -207,9 +207,9 @@ class TrianglesNear {
   // Visits the triangles near `point`, the query's point in mesh axes, by the vector kernels, with the same result as
   // QueryTask::visit_nearest(). Precondition: NearestSearch::served(tree, point).
   void search(const TriangleBvh& tree, Vec3d point, NearestSearch::Find find) {
-    // The rows of two triangles are equally near if the distances in world axes are equal after rounding to float:
-    // their distances in mesh axes, multiplied by the scale, then differ by at most twice epsilon_ plus the error of
-    // this rounding.
+    // The rows of two triangles are equally near if the distances in world axes are equal after rounding to float. In
+    // that case, their distances in mesh axes, multiplied by the scale, differ by at most twice epsilon_ plus the error
+    // of this rounding.
     const double slack = 2 * (epsilon_ + std::numeric_limits<float>::min()) / transform_.scale;
     NearestSearch search(tree, point, mesh_limit(), find, slack);
     NearestSearch::Squared squared;
@@ -228,9 +228,9 @@ class TrianglesNear {
   // Returns the limit of distances in mesh axes.
   double mesh_limit() const { return (raised(rows_.farthest()) + epsilon_) / transform_.scale; }
   // Returns an upper bound of the difference between a distance in world axes and the scaled distance in mesh axes. The
-  // bound covers the rounding errors of the transformations, which are relative to the magnitudes of their operands,
-  // and the rounding error of the distance to a triangle, which is at most 2^-30 of the triangle's size (the worst case
-  // is a very thin triangle).
+  // bound covers the rounding errors of the transformations, which are relative to the magnitudes of their operands. It
+  // also covers the rounding error of the distance to a triangle, which is at most 2^-30 of the triangle's size (the
+  // worst case is a very thin triangle).
   static double epsilon(const NearestRequest& request, const Instance& instance) {
     const Transform& transform = instance.transform;
     return 0x1p-26 * (max_component(abs(request.point)) + max_component(abs(transform.translation)) +

@@ -74,8 +74,8 @@ class NearestSearch {
   // Returns the limit, which a search with kNearest lowers when it finds a nearer triangle.
   float limit() const { return visit_.limit; }
 
-  // Return the number of candidates of the last call of next(), and its cost: the number of nodes opened and of
-  // triangles tested.
+  // Return the number of candidates that the last call of next() found, the number of nodes that it opened, and the
+  // number of triangles that it tested.
   uint32_t found() const { return visit_.found; }
   uint32_t nodes() const { return visit_.nodes; }
   uint32_t tests() const { return visit_.tests; }

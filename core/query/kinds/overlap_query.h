@@ -49,8 +49,8 @@ uint32_t nearest_overlapping(QueryTask& task, const Capsule& solid, const Instan
 OverlapAnswer with_objects(OverlapAnswer instances, FoundObjects& found, const SceneAtTime& moment,
                            const OverlapOptions& options);
 
-// Return the region of the grid of objects that run_ball(), run_box() or run_capsule() searches; for
-// QueryTask::walk_regions().
+// Return the region that run_ball(), run_box() or run_capsule() searches in the grid of objects.
+// QueryTask::walk_regions() uses these regions.
 GridRegion ball_region(const SceneAtTime& moment, const Balld& ball, const OverlapOptions& options);
 GridRegion box_region(const SceneAtTime& moment, const Obbd& box, const OverlapOptions& options);
 GridRegion capsule_region(const SceneAtTime& moment, const Capsule& capsule, const OverlapOptions& options);

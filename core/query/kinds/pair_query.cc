@@ -16,7 +16,7 @@
 namespace locus {
 namespace {
 
-// Second object of a row, and the distance.
+// Second object of a row, and its distance from the first object.
 struct Partner {
   Id other;
   float t;
@@ -27,7 +27,7 @@ struct Partner {
 bool lower_other(const Partner& a, const Partner& b) { return a.other < b.other; }
 bool nearer_partner(const Partner& a, const Partner& b) { return std::tie(a.t, a.other) < std::tie(b.t, b.other); }
 
-// Collector of the first rows in order. The rows of one object are offered at once, as a run, so that only runs are
+// Collector of the first rows in order. The rows of one object are offered in one call, as a run, so that only runs are
 // sorted. Invariant: between calls the collector has at most 2 * max_rows_ rows.
 class FirstPairs {
  public:

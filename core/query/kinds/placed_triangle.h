@@ -1,7 +1,7 @@
 // Axis-aligned bounds of an instance's triangles in world axes. CONSERVATIVE queries test the bounds of
-// PlacedTriangles. EXACT rays, sweeps and overlap queries find a triangle only if they also intersect the wider bounds
-// that LoosePlacedTriangles computes for the triangle: the exact tests run in mesh axes and in floats, and without this
-// condition they could report a triangle that is far away in the world.
+// PlacedTriangles. EXACT rays, sweeps and overlap queries find a triangle only if they also intersect its wider bounds,
+// which LoosePlacedTriangles computes. Without this condition, the exact tests could report a triangle that is far away
+// in the world, because they run in mesh axes and in floats.
 //
 // Both classes are immutable and borrow the instance; any number of threads may share one object.
 #ifndef LOCUS_CORE_QUERY_KINDS_PLACED_TRIANGLE_H_
@@ -31,8 +31,8 @@ inline Aabbd grown_around(const Corners& corners, double epsilon) {
 // grown by an epsilon that covers the rounding of the corners, which are transformed in double. The epsilon is about
 // 2^-40 times the sum of the magnitudes of the translation and of the scaled mesh. Both magnitudes count, since a mesh
 // may be far from its own origin while the translation cancels this offset. The bounds of each triangle lie within
-// Instance::bounds, which are grown by twice as much, so culling by Instance::bounds never changes a row: the t,
-// distance and point of a CONSERVATIVE row depend only on the triangle's bounds.
+// Instance::bounds, which are grown by twice as much. So culling by Instance::bounds never changes a CONSERVATIVE row:
+// its t, distance and point depend only on the triangle's bounds.
 class PlacedTriangles {
  public:
   explicit PlacedTriangles(const Instance& instance)
@@ -60,8 +60,8 @@ class PlacedTriangles {
 };
 
 // Wide bounds of the triangles of an instance. The bounds of a triangle are the box around its corners in world axes,
-// grown by an epsilon that covers all rounding errors of the exact tests, including the transformation into mesh axes
-// and one rounding to float in mesh axes.
+// grown by an epsilon that covers all rounding errors of the exact tests. These errors include those of the
+// transformation into mesh axes and of one rounding to float in mesh axes.
 class LoosePlacedTriangles {
  public:
   // `query_extent` is an upper bound of the largest |coordinate| that the query reaches; a larger value enlarges the
@@ -78,10 +78,10 @@ class LoosePlacedTriangles {
   }
 
   // Returns true if the test against bounds_of_triangle() can be omitted for a query of `size` around `center`, both in
-  // mesh axes, because a query that overlaps a triangle in mesh axes is sure to overlap the triangle's bounds in world
-  // axes. Rounding center and size to float moves the query by less than 2^-24 * sqrt(3) times their magnitude. If this
-  // magnitude, scaled to world axes, is at most 2 * extent_, the error is at most half of epsilon_. The other half
-  // covers the transformation back to world axes.
+  // mesh axes. In that case, a query that overlaps a triangle in mesh axes is sure to overlap the triangle's bounds in
+  // world axes. Rounding center and size to float moves the query by less than 2^-24 * sqrt(3) times their magnitude.
+  // If this magnitude, scaled to world axes, is at most 2 * extent_, the error is at most half of epsilon_. The other
+  // half covers the transformation back to world axes.
   bool bounds_follow(Vec3d center, double size) const {
     return transform_.scale * (max_component(abs(center)) + size) <= 2 * extent_;
   }

@@ -108,7 +108,7 @@ class QueryTask {
     if (++tests_ % limits::kTestsBetweenChecks != 0) return !ended_;
     return check();
   }
-  // Counts `tests` primitive tests at once. Returns false if the query must end now, like count_test().
+  // Counts `tests` primitive tests in one call. Returns false if the query must end now, like count_test().
   bool count_tests(uint64_t tests) {
     const uint64_t before = tests_ / limits::kTestsBetweenChecks;
     tests_ += tests;

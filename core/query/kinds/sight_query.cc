@@ -58,7 +58,7 @@ class Viewer {
     return filter;
   }
 
-  // Returns the index of sample `k` of a target in the block.
+  // Returns the index, within the block, of sample `k` of a target.
   uint32_t sample_of(uint32_t target, size_t k) const {
     const size_t samples = sight_.samples_per_target(), first = sight_.pairwise ? index_ * samples : 0;
     return static_cast<uint32_t>(first + target * samples + k);
@@ -124,9 +124,9 @@ class Look {
   // If the scene has at most this number of instances, all segments are tested against each instance. Otherwise each
   // segment searches the tree over instances.
   static constexpr size_t kFewInstances = 8;
-  // Number of segments that are tested at once in the first pass of trace(), which has one segment per target. A block
-  // of triangles that blocks one of these segments becomes the hint of the segments after it. The number doubles after
-  // each call that finds no blocked segment, because kernels are faster with many segments.
+  // Number of segments that are tested in one call in the first pass of trace(), which has one segment per target. A
+  // block of triangles that blocks one of these segments becomes the hint of the segments after it. The number doubles
+  // after each call that finds no blocked segment, because kernels are faster with many segments.
   static constexpr size_t kSegmentsAtOnce = 16;
 
   bool uses_kernels() const {

@@ -24,8 +24,8 @@ struct SightQuery {
   absl::Span<char> seen;
 };
 
-// Returns the number of viewers of a block that look_together() should search at once; 0 if look() is faster, because a
-// viewer has many segments or several eyes.
+// Returns the number of viewers of a block that one call of look_together() should search. Returns 0 if look() is
+// faster, because a viewer has many segments or several eyes.
 size_t viewers_together(const SightColumns& sight);
 
 // Does the same as look() for each of several viewers of one block, and searches the segments of all of them together.

@@ -2,8 +2,8 @@
 // example over the fields of a reply, so that each value is written once, at its final position. The batch never writes
 // columns that it does not return.
 //
-// Threads: one thread at a time calls a sink, but not always the same thread. Several threads may write at once to the
-// memory that a sink returned, each to its own rows.
+// Threads: one thread at a time calls a sink, but not always the same thread. Several threads may write at the same
+// time to memory that a sink has returned, each to its own rows.
 #ifndef LOCUS_CORE_QUERY_RUN_ANSWER_SINK_H_
 #define LOCUS_CORE_QUERY_RUN_ANSWER_SINK_H_
 
@@ -34,17 +34,18 @@ class AnswerSink {
   virtual char* add_matrix(size_t block, size_t bytes) = 0;
   // Appends `queries` entries to the row counts of the block. The caller writes the number of rows of each query.
   virtual uint32_t* add_counts(size_t block, size_t queries) = 0;
-  // Appends `queries` entries to the list of truncated queries of the block. The caller writes their indices in the
-  // block, ascending.
+  // Appends `queries` entries to the list of truncated queries of the block. The caller writes the indices that these
+  // queries have in the block, ascending.
   virtual uint32_t* add_truncated(size_t block, size_t queries) = 0;
   // Appends `queries` entries to the effective times of the block. The caller writes the time at which each query is
   // evaluated.
   virtual TimeSpans add_times(size_t block, size_t queries) = 0;
   // Appends `queries` entries to the list of clamped queries of the block: queries that requested a time outside the
-  // history and are answered at the nearest retained time. The caller writes their indices in the block, ascending.
+  // history and are answered at the nearest retained time. The caller writes the indices that these queries have in the
+  // block, ascending.
   virtual uint32_t* add_clamped(size_t block, size_t queries) = 0;
   // Appends `queries` entries to the block's list of unanchored queries (QueryOrigins::is_unanchored()). The caller
-  // writes their indices in the block, ascending.
+  // writes the indices that these queries have in the block, ascending.
   virtual uint32_t* add_unanchored(size_t block, size_t queries) = 0;
 };
 

@@ -1,16 +1,16 @@
 // Execution of a checked batch against one snapshot, in chunks that any thread may run. Used by the scheduler, which
 // assigns threads to batches and limits the time of each thread. The result depends only on the snapshot and the batch:
 // the sizes of chunks, their assignment to threads and the order in which chunks finish do not change any byte of the
-// result. Exception: max_work ends the batch early.
+// result. The only exception is a batch that ends early because its max_work is used up.
 //
-// Threads: any number of threads may call work() at once. All other members may be called only before the first or
+// Threads: any number of threads may call work() concurrently. All other members may be called only before the first or
 // after the last call of work(). Memory: at most about 2 * kMaxChunks chunks have rows that wait to be written out in
 // batch order, and the rows of each chunk are limited by the size of a reply.
 //
 // Invariants: chunks_ covers consecutive queries in batch order, from the first query that is not written out to
-// (next_block_, next_query_). Every chunk is unstarted, running or done; active_threads_ is the number of running
-// chunks plus the number of threads in work() that have finished a chunk but have not yet begun another one or left
-// work(). One thread at a time runs write_out(). work() returns kDone once.
+// (next_block_, next_query_). Every chunk is unstarted, running or done. active_threads_ is the sum of two numbers: the
+// running chunks, and the threads in work() that have finished a chunk and have not yet begun another one. One thread
+// at a time runs write_out(). work() returns kDone once.
 #ifndef LOCUS_CORE_QUERY_RUN_BATCH_RUN_H_
 #define LOCUS_CORE_QUERY_RUN_BATCH_RUN_H_
 
@@ -62,8 +62,8 @@ struct QueryCost {
 class BatchRun {
  public:
   // Maximum number of chunks that run, or that are done and wait until an earlier chunk is written out. While there are
-  // this many, no chunk of further queries is started. A chunk that split() made may be started while there are fewer
-  // than 2 * kMaxChunks such chunks, or if it is the first chunk in batch order.
+  // this many such chunks, no chunk of further queries is started. A chunk that split() made may be started while there
+  // are fewer than 2 * kMaxChunks such chunks, or if it is the first chunk in batch order.
   static constexpr size_t kMaxChunks = 16;
 
   // Prepares the execution of `batch`, which has passed check_batch(): resolves the as_of times of its queries and

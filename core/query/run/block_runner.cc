@@ -24,7 +24,7 @@ constexpr uint64_t kChunkWork = 16'384;
 // interrupted.
 constexpr uint64_t kCallWork = 65'536;
 // Limits of the number of rays per call of the ray kernels. The maxima bound the duration of a call whose rays are
-// unexpectedly expensive: with 4,096 triangle tests per ray, a call with the maximum number of rays takes 3 ms, or 6 ms
+// unexpectedly expensive. With 4,096 triangle tests per ray, a call with the maximum number of rays takes 3 ms, or 6 ms
 // in mode kAll, whose rays retain many hits. Twice as many rays per call would not be measurably faster.
 constexpr uint64_t kMinRaysPerCall = 8, kMaxRaysPerCall = 128, kMaxRaysOfManyHits = 64;
 

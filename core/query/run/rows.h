@@ -1,5 +1,5 @@
 // Functions that write hits into result columns: one row per hit, and in dense results also one row per miss. Several
-// threads may write different rows at once.
+// threads may write different rows at the same time.
 #ifndef LOCUS_CORE_QUERY_RUN_ROWS_H_
 #define LOCUS_CORE_QUERY_RUN_ROWS_H_
 

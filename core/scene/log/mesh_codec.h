@@ -1,6 +1,6 @@
-// Encodes and decodes meshes as chunks for the log: vertices and indices, which are stored once for all names of equal
-// content, and parts (named ranges of triangles), which are stored for each name. The tree is not included: its
-// topology is cached separately, see tree_codec.h. One thread at a time.
+// Encodes and decodes meshes as chunks for the log. Vertices and indices are stored once for all names of equal
+// content. Parts (named ranges of triangles) are stored for each name. The tree is not included: its topology is cached
+// separately, see tree_codec.h. One thread at a time.
 #ifndef LOCUS_CORE_SCENE_LOG_MESH_CODEC_H_
 #define LOCUS_CORE_SCENE_LOG_MESH_CODEC_H_
 
@@ -20,7 +20,7 @@ namespace locus {
 // Encoder of the vertices and indices of a mesh.
 class MeshWriter {
  public:
-  // Unpacks all vertices at once. next() unpacks the indices, one chunk at a time.
+  // Unpacks all vertices. The indices are unpacked later, by next(), one chunk at a time.
   explicit MeshWriter(std::shared_ptr<const StaticMesh> mesh);
 
   // Returns the next chunk, of at most UpdateLog::kMaxChunkBytes bytes, or nullopt at the end. May be passed to

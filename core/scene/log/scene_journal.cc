@@ -10,7 +10,7 @@ namespace locus {
 namespace {
 
 // The largest batch and the largest static change fit into a record. The values of one item take at most 128 bytes in
-// all columns together, the column lengths of one list take at most 256 bytes, and one instance takes at most 256
+// all columns together, and the column lengths of one list take at most 256 bytes. One instance takes at most 256
 // bytes, including the hash and the name of its mesh.
 static_assert(uint64_t{limits::kMaxUpdateItems} * 128 + uint64_t{limits::kMaxUpdateLists} * 256 <=
               UpdateLog::kMaxRecordBytes);

@@ -8,9 +8,9 @@
 //
 // Threads: every member may be called from any thread, but append() for a scene only from one thread at a time. Calls
 // wait for the disk. Errors of all members: RESOURCE_EXHAUSTED if the disk is full (queries need no disk: continue to
-// serve them and try again later), DATA_LOSS naming the damaged item, UNAVAILABLE if the disk fails otherwise. If a
-// call that writes fails, treat its data as not written, although a part of the data may be found after a restart. The
-// caller may repeat the call.
+// serve them and try again later), DATA_LOSS naming the damaged item, UNAVAILABLE if the disk fails in another way. If
+// a call that writes fails, treat its data as not written, although a part of the data may be found after a restart.
+// The caller may repeat the call.
 #ifndef LOCUS_CORE_SCENE_LOG_UPDATE_LOG_H_
 #define LOCUS_CORE_SCENE_LOG_UPDATE_LOG_H_
 
@@ -87,7 +87,7 @@ class UpdateLog {
   virtual const std::vector<StoredMesh>& stored_meshes() const = 0;
   // Returns DATA_LOSS if stored_scenes() or stored_meshes() may lack entries or contain deleted scenes or meshes.
   virtual absl::Status catalogue_damage() const = 0;
-  // Returns true if the previous process shut down cleanly, so that no record of AckLevel::kMemory is lost.
+  // Returns true if the previous process shut down cleanly, so that no record of AckLevel::kMemory was lost.
   virtual bool closed_in_order() const = 0;
 
   // Creates a scene with a snapshot at sequence number 0; `state` returns the chunks of the snapshot, of at most
@@ -97,8 +97,8 @@ class UpdateLog {
                                                 ChunkSource state) = 0;
   // Deletes a scene, damaged or not.
   virtual absl::Status delete_scene(SceneKey scene) = 0;
-  // Starts a new epoch for the records that follow. Required if acknowledged records may be lost, or if the scene is a
-  // copy and its original may have appended further records.
+  // Starts a new epoch for the records that follow. Required in two cases: acknowledged records may have been lost, or
+  // the scene is a copy and its original may have appended further records.
   virtual absl::Status restart_scene(SceneKey scene, uint64_t epoch) = 0;
 
   // Appends records in order, all or none, with one sync if `level` requires it; one sync may serve several scenes that
@@ -116,7 +116,7 @@ class UpdateLog {
   virtual absl::Status write_snapshot(SceneKey scene, uint64_t sequence, ChunkSource state) = 0;
   virtual absl::Status read_snapshot(SceneKey scene, ChunkSink sink) const = 0;
 
-  // Adds a mesh name. The content (vertices and indices) is stored once for all names of equal content: `content` is
+  // Adds a mesh name. The content (vertices and indices) is stored once for all names of equal content. So `content` is
   // called only if the content is not stored yet, or if read_mesh() has found the stored content damaged. The result of
   // `parts` is stored for each name.
   virtual absl::Status add_mesh(absl::string_view name, const std::array<uint8_t, 32>& sha256, ChunkSource content,

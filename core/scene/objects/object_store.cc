@@ -57,8 +57,8 @@ void ObjectStore::free_handle(uint32_t handle) {
   }
 }
 
-// Also frees the handles of objects removed in `oldest_tick`: the object set that the history has for this tick was
-// made at the end of the tick, and so does not contain these objects.
+// Frees even the handles of objects that were removed in `oldest_tick` itself. The history's object set for
+// `oldest_tick` was made at the end of that tick, and so does not contain these objects.
 void ObjectStore::start_tick(uint64_t tick, uint64_t oldest_tick) {
   LOCUS_CHECK(moves_ != nullptr);
   tick_ = tick;

@@ -36,8 +36,8 @@ class ObjectStore {
     moves_ = std::make_unique<TickMoves>();
   }
   // Begins `tick`. `oldest_tick` is the oldest tick of the history. Frees the quarantined handles of objects that were
-  // removed in `oldest_tick` or earlier, because no object set from `oldest_tick` on contains these objects. Requires
-  // track_lifetimes().
+  // removed in `oldest_tick` or earlier: the object sets that the history has for `oldest_tick` and for later ticks do
+  // not contain these objects. Requires track_lifetimes().
   void start_tick(uint64_t tick, uint64_t oldest_tick);
   // Returns the displacement of objects since start_tick(); an empty Displacement if lifetimes are not tracked.
   Displacement displacement() { return moves_ == nullptr ? Displacement() : moves_->displacement(); }

@@ -10,9 +10,8 @@
 namespace locus {
 namespace {
 
-// Held bytes are counted again only after updates have replaced 1 / kCountShare of the budget since the last count, so
-// that pins just below the budget do not cause a count for every batch. Pins may therefore exceed the budget by this
-// share.
+// Held bytes are counted again only after updates have replaced 1 / kCountShare of the budget since the last count. So
+// pins just below the budget do not cause a count for every batch. Pins may therefore exceed the budget by this share.
 constexpr uint64_t kCountShare = 64;
 // Upper bound of the ratio A / B for two revisions of a scene. A is the number of bytes that the earlier revision holds
 // and the later revision does not hold. B is the difference of their SceneSnapshot::replaced_bytes, which does not
@@ -123,8 +122,8 @@ std::vector<ReaderTracker::Holding> ReaderTracker::pinned_before(const SceneSnap
   return pinned;
 }
 
-// Compares each pinned revision with the next one. Bytes that several consecutive pinned revisions share are therefore
-// counted only once, for the last of these revisions.
+// Compares each pinned revision with the next pinned revision, and the last one with `latest`. Bytes that several
+// consecutive pinned revisions share are therefore counted only once, for the last of these revisions.
 uint64_t ReaderTracker::count(std::vector<Holding>& pinned, const SceneSnapshot& latest) {
   uint64_t held = 0;
   for (size_t i = 0; i < pinned.size(); ++i) {

@@ -3,9 +3,10 @@
 // until the revoked pins are released. Therefore slow readers cannot make memory grow without limit while updates
 // arrive.
 //
-// Threads: every member may be called from any thread; enforce_budget() from one thread at a time. Readers and the
-// writer block each other only while one of them accesses a small map: memory is counted outside the lock. Invariants:
-// each entry of pinned_ has at least one pin; revoked_ is the number of revoked entries; a revoked entry stays revoked.
+// Threads: every member may be called from any thread, but enforce_budget() only from one thread at a time. Readers and
+// the writer block each other only while one of them accesses a small map: memory is counted outside the lock.
+// Invariants: each entry of pinned_ has at least one pin; revoked_ is the number of revoked entries; a revoked entry
+// stays revoked.
 #ifndef LOCUS_CORE_SCENE_READERS_READER_TRACKER_H_
 #define LOCUS_CORE_SCENE_READERS_READER_TRACKER_H_
 
@@ -93,7 +94,7 @@ class ReaderTracker {
   // Revokes the oldest pins until the other pins hold at most `bytes`, regardless of the budget. Called when memory is
   // short. Returns the number of bytes that become free when the readers of the pins revoked by this call end.
   uint64_t revoke_beyond(const SceneSnapshot& latest, uint64_t bytes) LOCUS_EXCLUDES(mutex_);
-  // Closes the tracker: running and later calls of wait_until_returned() return true at once.
+  // Closes the tracker: running and later calls of wait_until_returned() return true immediately.
   void close() LOCUS_EXCLUDES(mutex_);
 
   struct Use {
@@ -126,8 +127,9 @@ class ReaderTracker {
   std::vector<Holding> pinned_before(const SceneSnapshot& latest) const LOCUS_REQUIRES(mutex_);
   // Sets Holding::bytes of each entry of `pinned`, which is in the order of revisions, and returns the sum.
   static uint64_t count(std::vector<Holding>& pinned, const SceneSnapshot& latest);
-  // Revokes the pins of a revision because all pins hold `held` bytes, more than `budget`. Returns false if the
-  // revision is no longer pinned, or if its pins are revoked already.
+  // Revokes the pins of the revision of `snapshot`. Stores two numbers for the error that readers get: `held`, the
+  // bytes that all pinned revisions hold, and `budget`, which `held` exceeds. Returns false if the revision is no
+  // longer pinned, or if its pins are revoked already.
   bool revoke(const SceneSnapshot& snapshot, uint64_t held, uint64_t budget) LOCUS_REQUIRES(mutex_);
 
   const uint64_t fixed_;  // budget passed to the constructor; 0: derived from the memory of the scene
@@ -144,8 +146,8 @@ class ReaderTracker {
   uint64_t counted_at_ LOCUS_GUARDED_BY(mutex_) = 0;
   uint64_t budget_ LOCUS_GUARDED_BY(mutex_);
   // enforced_at_ is SceneSnapshot::replaced_bytes of the last snapshot passed to enforce_budget(). late_bytes_ is a sum
-  // with one term for each revision that was pinned after the last count and was already outdated at the time of the
-  // pin: enforced_at_ at that time minus SceneSnapshot::replaced_bytes of the revision.
+  // over the revisions that were pinned after the last count and were already outdated when they were pinned. The term
+  // of such a revision is the value of enforced_at_ at that time minus SceneSnapshot::replaced_bytes of the revision.
   uint64_t enforced_at_ LOCUS_GUARDED_BY(mutex_) = 0;
   uint64_t late_bytes_ LOCUS_GUARDED_BY(mutex_) = 0;
 };

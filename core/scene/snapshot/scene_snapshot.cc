@@ -17,11 +17,12 @@ const HistoryRecord* first_record(const SceneSnapshot& snapshot, uint64_t tick) 
   return first == records.end() ? nullptr : first->get();
 }
 
-// Returns the bytes of the history records of `held` that `later` does not hold. A record whose tick `later` has
-// dropped counts with its HistoryRecord::bytes, which excludes the memory that the record shares with the next record
-// of `held`. If `later` has dropped the next record too, the excluded memory counts with that record; if not, `later`
-// still holds the excluded memory. For the last record of `held`, the excluded memory is shared with the first revision
-// after the tick of the record; this memory counts with held.objects, as far as held.objects still shares it.
+// Returns the bytes of the history records of `held` that `later` does not hold. For a record whose tick `later` has
+// dropped, adds HistoryRecord::bytes. This number does not include the memory that the record shares with the next
+// record of `held`. If `later` has dropped the next record as well, the shared memory is included in the bytes of the
+// next record; otherwise `later` still holds the shared memory. The last record of `held` has no next record: its bytes
+// do not include the memory that it shares with the first revision after its tick. The caller counts the part of this
+// memory that belongs to held.objects.
 uint64_t unshared_history_bytes(const SceneSnapshot& held, const SceneSnapshot& later) {
   if (held.history == nullptr || held.history == later.history) return 0;
   uint64_t bytes = 0;

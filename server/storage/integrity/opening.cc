@@ -139,8 +139,8 @@ absl::Status open_damaged(const StorageOptions& options, const rocksdb::Status& 
   }
   rocksdb::Status status = Database::open(wanted, OpenMode::kLenient, opened.database);
   if (!status.ok()) return unopenable(options, status.ToString());
-  // The lenient opening has removed a damaged log, so a strict opening may succeed now. Prefer a strict opening,
-  // because then RocksDB stops writing at a disk error, and recover() resumes it.
+  // The lenient opening has removed a damaged log, so a strict opening may succeed now. Prefer a strict opening: after
+  // it RocksDB stops writing at a disk error, and recover() resumes writing.
   opened.database = nullptr;
   if (Database::open(wanted, OpenMode::kStrict, opened.database).ok()) return absl::OkStatus();
   status = Database::open(wanted, OpenMode::kLenient, opened.database);

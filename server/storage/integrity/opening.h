@@ -48,8 +48,8 @@ StorageOptions with_defaults(StorageOptions options);
 DatabaseOptions database_options_of(const StorageOptions& options);
 
 // Opens and verifies the directory. Precondition: `options` are a result of with_defaults(). Errors:
-// FAILED_PRECONDITION if a process has the directory open, its format is unknown or a repair was interrupted, DATA_LOSS
-// if it is too damaged to be opened, UNAVAILABLE or RESOURCE_EXHAUSTED for an error of the disk.
+// FAILED_PRECONDITION if a process has the directory open, if its format is unknown or if a repair was interrupted;
+// DATA_LOSS if the directory is too damaged to be opened; UNAVAILABLE or RESOURCE_EXHAUSTED for an error of the disk.
 absl::StatusOr<OpenedDirectory> open_directory(const StorageOptions& options);
 
 // Compares RocksDB's list of its files, the MANIFEST, with the durable marker. DATA_LOSS if the database is missing.

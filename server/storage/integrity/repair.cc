@@ -158,8 +158,8 @@ absl::Status copy_mesh(const Database& source, const MeshHealth& found, Copier& 
     absl::Status parts = row.parts ? copy_mesh_chunks(source, row.sha256, *row.parts, copier) : absl::OkStatus();
     if (!parts.ok() && !absl::IsDataLoss(parts)) return parts;
     repaired.parts_dropped = !parts.ok();
-    // If the chunks of the parts are damaged, write the row without `parts`. In such a row, as in format 1, the chunks
-    // of the content include the parts. The chunks of this content include none, so the mesh then has no parts.
+    // If the chunks of the parts are damaged, write the row without `parts`. For such a row, as for a row of format 1,
+    // readers expect the parts among the chunks of the content. They find none there, so the mesh then has no parts.
     if (repaired.parts_dropped) row.parts = std::nullopt;
     put_row(content, with_checksum(content, encode(found.content)), result, copier);
     const std::string key = mesh_key(found.name);

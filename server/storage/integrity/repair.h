@@ -44,10 +44,11 @@ struct RepairReport {
   std::string finished_at;
 };
 
-// Repairs the directory. Needs disk space for a copy of the intact part. After an error or a crash the directory is
-// either unchanged, or the next call of repair() finishes this repair. Errors: NOT_FOUND if there is no data directory,
-// FAILED_PRECONDITION if a process has the directory open or this version of locusd does not know its format, DATA_LOSS
-// if no part is readable, RESOURCE_EXHAUSTED if the disk is full, UNAVAILABLE if the disk fails otherwise.
+// Repairs the directory. Needs disk space for a copy of the intact part. After an error or a crash, either the
+// directory is unchanged, or the next call of repair() finishes this repair. Errors: NOT_FOUND if there is no data
+// directory; FAILED_PRECONDITION if a process has the directory open or this version of locusd does not know its
+// format; DATA_LOSS if no part is readable; RESOURCE_EXHAUSTED if the disk is full; UNAVAILABLE if the disk fails
+// otherwise.
 absl::StatusOr<RepairReport> repair(const StorageOptions& options);
 
 // Returns the report as text for people, with one line for each damaged scene and mesh.

@@ -94,9 +94,9 @@ class SceneTable {
       LOCUS_EXCLUDES(mutex_);
   void remove(SceneKey scene, const CatalogueRow& totals) LOCUS_EXCLUDES(mutex_);
 
-  // Fills the members of the marker that concern scenes and the catalogue. Sets flushed_sequence if all written records
-  // are synced: to `database_sequence`, RocksDB's last sequence number, read before this call, or to a lower number
-  // while an append is in progress. Leaves the other members unchanged.
+  // Fills the members of the marker that concern scenes and the catalogue. If all written records are synced, also sets
+  // flushed_sequence. Its value is then `database_sequence` (RocksDB's last sequence number, read before this call), or
+  // a lower number while an append is in progress. Leaves the other members unchanged.
   void fill_marker(uint64_t database_sequence, DurableMarker& durable_marker) const LOCUS_EXCLUDES(mutex_);
 
  private:

@@ -17,14 +17,14 @@
 namespace locus::server {
 namespace {
 
-constexpr uint64_t kTableBytes = uint64_t{32} << 20;  // size of the memory table of snapshot and of mesh
-constexpr uint64_t kMetaBytes = uint64_t{4} << 20;    // size of the memory table of meta
+constexpr uint64_t kTableBytes = uint64_t{32} << 20;  // size of a memory table of family snapshot or mesh
+constexpr uint64_t kMetaBytes = uint64_t{4} << 20;    // size of a memory table of family meta
 constexpr size_t kBlockBytes = size_t{64} << 10;
 constexpr size_t kCacheBytes = size_t{8} << 20;
 constexpr int kBuffers = 4;
 // Numbers of tables in RocksDB's level 0. RocksDB merges the tables once there are kTablesToMerge of them, and would
-// stall writers once there are kUnlimitedTables. kUnlimitedTables is too large to be reached: a stall would only delay
-// updates.
+// stall writers once there are kUnlimitedTables. kUnlimitedTables is so large that it is never reached, because a stall
+// would only delay updates.
 constexpr int kTablesToMerge = 4;
 constexpr int kUnlimitedTables = 1 << 20;
 constexpr uint64_t kManifestBytes = uint64_t{4} << 20;
@@ -34,9 +34,9 @@ constexpr uint64_t kLogBuffersOnDisk = 4;
 constexpr uint64_t kRecoveryBytes = uint64_t{1} << 20;
 constexpr auto kBufferPoll = std::chrono::milliseconds(1);
 
-// Passes RocksDB's warnings and errors to a function. Without it RocksDB would write a text file into the database's
-// folder, which the read-only modes must not do; and on a full disk RocksDB 7.8 aborts the process at the first message
-// after one that could not be written.
+// Passes RocksDB's warnings and errors to a function. Without this logger RocksDB would write them to a text file in
+// the database's folder. The read-only modes must not write a file. And if the disk is full and RocksDB 7.8 could not
+// write a message to that file, it aborts the process at the next message.
 class WarningLogger final : public rocksdb::Logger {
  public:
   explicit WarningLogger(StorageWarning warn) : Logger(rocksdb::InfoLogLevel::WARN_LEVEL), warn_(std::move(warn)) {}
@@ -107,8 +107,8 @@ rocksdb::DBOptions database_options(const DatabaseOptions& options, OpenMode mod
   // flushes, so that RocksDB can delete a log file with an unreadable part.
   found.avoid_flush_during_recovery = mode != OpenMode::kLenient;
   // Leave off the option track_and_verify_wals_in_manifest of RocksDB 7.8, which records in the MANIFEST how far each
-  // log was synced. After a database was opened with the option, opening it damaged, read-only and without the option
-  // ends the process by an assertion. The durable marker detects the same damage.
+  // log was synced. If a database was opened with the option and was damaged later, opening it read-only without the
+  // option ends the process by an assertion. The durable marker detects the same damage.
   found.max_total_wal_size = kLogBuffersOnDisk * options.log_buffer_bytes;
   found.max_manifest_file_size = kManifestBytes;
   found.info_log = std::make_shared<WarningLogger>(options.warn);

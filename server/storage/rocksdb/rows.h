@@ -99,7 +99,7 @@ std::string content_key(const Sha256& sha256);
 std::string pending_snapshot_key(SceneKey scene, uint64_t content_id);
 std::string pending_mesh_key(const Sha256& sha256, uint64_t content_id);
 std::string log_key(SceneKey scene, uint64_t sequence);
-// Returns the first key after all keys that begin with `prefix`, which is the exclusive end of their range.
+// Returns the exclusive end of the range of keys that begin with `prefix`: the first key after all of them.
 std::string end_of(std::string prefix);
 std::string scene_prefix(SceneKey scene);
 std::string snapshot_prefix(SceneKey scene, uint64_t content_id);

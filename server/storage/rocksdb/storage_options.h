@@ -32,8 +32,8 @@ struct StorageOptions {
   std::optional<uint64_t> reserve_bytes;
 
   // Size in bytes of RocksDB's memory table for log records. With a larger table, snapshots delete more records before
-  // RocksDB writes them to the disk a second time, in a table file; but after a crash the daemon must read a longer
-  // write-ahead log when it starts.
+  // RocksDB writes them to the disk a second time, in a table file. But after a crash the daemon must then read a
+  // longer write-ahead log when it starts.
   uint64_t log_buffer_bytes = uint64_t{64} << 20;
 
   // Maximum delay between the append of a record with AckLevel::kMemory and the sync of that record.

@@ -24,7 +24,7 @@ DEPTH = 100_000
 WRITERS = 6000
 ANSWERED = ("OK", "RESOURCE_EXHAUSTED")
 SEED = 11
-HELD = 1100  # more calls than the daemon allows at once, of any kind
+HELD = 1100  # more calls than the daemon allows at the same time, whatever their kind
 HONEST_CALLS = ((GET_SERVER, b""), (CHECK, b""), (QUERY, protobuf.query(b"world", protobuf.rays(16))),
                 (STREAM_QUERIES, protobuf.stream_message(b"world", 1, protobuf.rays(16))))
 
@@ -139,7 +139,7 @@ def big_updates(job):
 
 
 def big_queries(job):
-    """Queries with the largest number of rays in a batch, several batches at once: an honest load."""
+    """Queries with the largest number of rays in a batch, several batches at the same time: an honest load."""
     with job.connect(window=64 << 20, timeout=20) as connection:
         body = wire.message(protobuf.query(b"world", protobuf.rays(65536)))
         while not job.over():

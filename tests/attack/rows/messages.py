@@ -19,8 +19,8 @@ GZIPPED = (HOT[0], HOT[3], "/locus.v1.SceneService/CreateScene")
 
 @functools.lru_cache(maxsize=None)
 def gzip_of_zeros(mebibytes):
-    """Returns a gzip stream of zeros, which is about a thousand times smaller than its content: a compressed piece of 1
-    MiB is repeated.
+    """Returns a gzip stream of zeros, made by repeating a compressed piece of 1 MiB. The stream is about a thousand
+    times smaller than its content.
     """
     piece = zlib.compressobj(9, zlib.DEFLATED, -15)
     packed = piece.compress(bytes(MIB)) + piece.flush(zlib.Z_FULL_FLUSH)
@@ -79,8 +79,8 @@ def send_filled(job, method, prefix, make, what):
 
 
 def amplify_steps(job):
-    """Returns a step for every Place of every request, and steps for unknown fields. The first steps fill the lists in
-    requests of the most frequent calls, which need most memory for each byte sent.
+    """Returns a step for every Place of every request, and steps for unknown fields. The steps that need most memory
+    for each byte sent come first: they fill the lists in requests of the most frequent calls.
     """
     schema, steps = protobuf.Schema(), []
     for method in schema.methods:

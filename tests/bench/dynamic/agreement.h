@@ -12,12 +12,12 @@
 
 namespace locus::bench::dynamic {
 
-// A peer may answer at most kDifferingQueries of kDifferingQueriesOf queries differently. One such query is always
+// A peer may answer at most kDifferingQueries of kDifferingQueriesOf queries differently. One differing query is always
 // tolerated.
 inline constexpr size_t kDifferingQueries = 20;
 inline constexpr size_t kDifferingQueriesOf = 10'000;
-// Tolerances: two distances along a ray, or two distances to a nearest object, are different if their difference
-// exceeds them.
+// Two distances count as different if they differ by more than kSameDistance (along a ray) or kSameNearDistance (to a
+// nearest object).
 inline constexpr float kSameDistance = 0.02f;
 inline constexpr float kSameNearDistance = 0.001f;
 

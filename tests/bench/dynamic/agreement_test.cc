@@ -26,7 +26,7 @@ class DynamicAgreementTest : public testing::Test {
     compare("ball", Task::kBall, world, queries, ours, "peer", theirs, report);
   }
 
-  // Returns the answers without the first ids of `wrong_queries` queries.
+  // Returns the answers without the first id of each of the first `wrong_queries` queries.
   Answers forgetful(size_t wrong_queries) const {
     Answers answers = balls;
     size_t begin = 0;

@@ -12,8 +12,8 @@
 
 namespace locus::bench::dynamic {
 
-// Load that runs beside the readers: none, a thread that only spins (to measure the cost of a busy second core alone),
-// or the writer.
+// Load that runs at the same time as the readers: none, a thread that only spins, or the writer. The spinning thread
+// shows what a busy second core alone costs.
 enum class Beside : uint8_t { kNothing, kSpinning, kWriter };
 
 // Priority of readers relative to the writer: equal, or below it, like the daemon's threads for large batches.

@@ -1,6 +1,8 @@
-// Three cases of one world. insert: all objects are inserted into an empty structure. reinsert: a tenth of the objects,
-// drawn with seed 9, is removed, then inserted again. memory: bytes of a structure with one live revision, including
-// the map of ids if the structure needs one, after ticks_before_queries() ticks. One thread.
+// Three cases of one world. One thread.
+//   insert    all objects are inserted into an empty structure
+//   reinsert  a tenth of the objects, drawn with seed 9, is removed, then inserted again
+//   memory    bytes of a structure with one live revision, after ticks_before_queries() ticks; they include the map of
+//             ids if the structure needs one
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_INSERT_CASES_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_INSERT_CASES_H_
 

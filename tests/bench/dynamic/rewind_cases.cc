@@ -23,8 +23,8 @@ std::string name_of_case(uint32_t age, uint32_t count) {
   return absl::StrCat("rewind/", name_of_age(age), "/", name_of_count(count));
 }
 
-// A world whose history is stored by locus, and also as lists of positions for the ticks around the times of the
-// queries.
+// A world whose history locus stores. For the ticks around the times of the queries, this class also keeps lists of all
+// positions.
 class PastWorld {
  public:
   explicit PastWorld(uint32_t count)

@@ -33,7 +33,7 @@ class SortedRebuild : public Contender {
     positions_.resize(count);
     for (size_t i = 0; i < count; ++i) positions_[i] = point_at(objects.positions, i);
     cells_.resize(count);
-    // The AVX2 loop reads kLanes floats at once, so it may read past the last object.
+    // The AVX2 loop reads kLanes floats in one load, so it may read past the last object.
     for (std::vector<float>* column : {&x_, &y_, &z_, &r_}) column->resize(count + kLanes);
     sorted_ids_.resize(count);
     build();

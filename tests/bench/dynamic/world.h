@@ -1,9 +1,13 @@
-// The moving objects of the dynamic suite: determined by a kind, a count and fixed seeds, and drawn in a fixed order,
-// so that the workload can be repeated in any server at any time. Only one thread uses a world.
+// The moving objects of the dynamic suite. A kind, a count and fixed seeds determine the objects, which are drawn in a
+// fixed order, so that the workload can be repeated in any server at any time. Only one thread uses a world.
 //
-// Random numbers are SplitMix64; f = (next >> 40) * 2^-24, uniform over [0, 1). All arithmetic is float; a product plus
-// a term is computed with one rounding (fused multiply-add). Seed 1: twenty towns (x and y 100 + 1800 f, drawn for
-// every kind), then the objects; seed 2: velocities; seed 5: mixed radii; seed 7: ids, each next >> 1.
+// In the formulas, `next` is the next 64-bit number of a SplitMix64 generator, and f = (next >> 40) * 2^-24 is uniform
+// over [0, 1). Each `next` and each f is a new draw. All arithmetic is float. A product plus a term is computed with
+// one rounding (fused multiply-add). There is one generator for each of these seeds:
+//   1  positions: first x and y of twenty towns, 100 + 1800 f each, even if the kind needs no towns; then the objects
+//   2  velocities
+//   5  radii of kMixed
+//   7  ids: next >> 1
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_WORLD_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_WORLD_H_
 
@@ -60,7 +64,8 @@ class World {
   std::vector<float> radii_;
 };
 
-// Queries about a world: the present positions of randomly drawn objects, moved by up to 5 on each axis.
+// Queries about a world. Centres and origins are the present positions of randomly drawn objects, moved by up to 5 on
+// each axis.
 struct Queries {
   std::vector<Vec3f> centers;  // seed 3: for balls, boxes and nearest
   std::vector<Rayf> rays;      // seed 4: drawn directions with z times 0.2, then normalised; length kRayLength

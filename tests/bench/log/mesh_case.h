@@ -1,5 +1,5 @@
-// Time until a mesh in a data directory can be queried again: its tree restored from the stored topology, compared with
-// a new build. On two threads, like a daemon with two cores.
+// Measures the time until a stored mesh of a data directory can be queried again. A tree that is restored from the
+// stored topology is compared with a newly built tree. Uses two threads, like a daemon with two cores.
 #ifndef LOCUS_TESTS_BENCH_LOG_MESH_CASE_H_
 #define LOCUS_TESTS_BENCH_LOG_MESH_CASE_H_
 

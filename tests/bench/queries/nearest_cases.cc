@@ -43,7 +43,7 @@ std::vector<Vec3f> points_of(const NearestCase& one, const BenchMesh& mesh, size
   points.reserve(count);
   for (const RayQuery& ray : rays) points.push_back(ray.origin);
   if (one.place == Place::kAnywhere) return points;
-  // balls() centres only the balls with even index on the surface.
+  // Only the balls with even index have their centre on the surface.
   const std::vector<Ballf> on_surface = balls(mesh, 2 * count, one.seed, 0);
   for (size_t i = 0; i < count; ++i) points[i] = on_surface[2 * i].center + rays[i].direction * (0.01f * mesh.diagonal);
   return points;

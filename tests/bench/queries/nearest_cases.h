@@ -1,5 +1,6 @@
-// Cases of the suite `queries` that measure distances to one mesh: the nearest triangle, compared with Embree's
-// rtcPointQuery, and contacts of balls beside plain overlaps.
+// Cases of the suite `queries` that measure distances to one mesh. Queries of the nearest triangle are compared with
+// Embree's rtcPointQuery. Rows of balls with the columns of contacts are compared with the same rows without these
+// columns.
 #ifndef LOCUS_TESTS_BENCH_QUERIES_NEAREST_CASES_H_
 #define LOCUS_TESTS_BENCH_QUERIES_NEAREST_CASES_H_
 

@@ -1,6 +1,6 @@
-// The suite `queries`: sweeps, sight, contains, cells, nearest, capsules, counts, pairs and frustums, as whole batches
-// through the query engine, compared with libraries that answer one query at a time or with another way of querying
-// locus. One thread.
+// The suite `queries`: sweeps, sight, contains, cells, nearest, capsules, counts, pairs and frustums. The queries run
+// as whole batches through the query engine. They are compared with libraries that answer one query at a time, or with
+// another way of querying locus. One thread.
 #ifndef LOCUS_TESTS_BENCH_QUERIES_QUERIES_SUITE_H_
 #define LOCUS_TESTS_BENCH_QUERIES_QUERIES_SUITE_H_
 

@@ -17,8 +17,8 @@
 namespace locus::bench::queries {
 namespace {
 
-// Positions of viewers and targets: close to the front of the surface, where most lines of sight are blocked if the
-// mesh has rooms or buildings; around the mesh; or above the mesh, where nothing is blocked.
+// Positions of viewers and targets. kSurface: close to the front of the surface, where most lines of sight are blocked
+// if the mesh has rooms or buildings. kAround: around the mesh. kAbove: above the mesh, where nothing is blocked.
 enum class Place : uint8_t { kSurface, kAround, kAbove };
 
 struct SightCase {

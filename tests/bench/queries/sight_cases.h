@@ -1,6 +1,6 @@
-// Cases of the suite `queries` in which viewers look for targets through one mesh, in two cases also through objects or
-// copies of the mesh: usually a matrix of 100 x 100 with three sample points per target, compared with the same
-// segments as rays of mode ANY in one batch.
+// Cases of the suite `queries` in which viewers look for targets through one mesh; one case adds objects, and one adds
+// copies of the mesh. Most cases query a matrix of 100 viewers x 100 targets. Each target has three sample points.
+// Every case is compared with the same segments as rays of mode ANY in one batch.
 #ifndef LOCUS_TESTS_BENCH_QUERIES_SIGHT_CASES_H_
 #define LOCUS_TESTS_BENCH_QUERIES_SIGHT_CASES_H_
 

@@ -1,6 +1,6 @@
-// Cases of the suite `queries` in which solids move through one mesh. They find the first contact (FIRST), and a solid
-// passes triangles that it touches at its start (PASS). Compared with Bullet's convexSweepTest, whose solids pass such
-// triangles too.
+// Cases of the suite `queries` in which solids move through one mesh. A sweep finds the first contact of its solid
+// (FIRST) and ignores triangles that the solid touches at its start (PASS). The cases are compared with Bullet's
+// convexSweepTest, which ignores such triangles too.
 #ifndef LOCUS_TESTS_BENCH_QUERIES_SWEEP_CASES_H_
 #define LOCUS_TESTS_BENCH_QUERIES_SWEEP_CASES_H_
 

@@ -8,9 +8,10 @@
 
 namespace locus::bench::serving {
 
-// Runs durable/256 (moves over one stream) and durable_queries/256 (queries beside such a stream). Both are measured
-// with acks that wait for the disk and with acks that do not, in turns, on one daemon. Runs restart/1M: seconds from
-// the start of a daemon that was killed to its first right answer, compared with a bar of one second.
+// Runs durable/256 (moves over one stream) and durable_queries/256 (queries while such a stream runs). Both are
+// measured with acks that wait for the disk and with acks that do not, in turns, on one daemon. Runs restart/1M: a
+// killed daemon is started again, and the seconds from this start to its first right answer are compared with a bar of
+// one second.
 absl::Status run_durable_cases(const ServingRun& run);
 
 }  // namespace locus::bench::serving

@@ -13,7 +13,7 @@ namespace {
 
 constexpr uint32_t kObjects = 100'000;
 constexpr double kMaxMs = 5;
-constexpr double kSettled = 0.05;  // seconds; settle() samples every tenth of this
+constexpr double kSettled = 0.05;  // in seconds; settle() waits a tenth of this between two samples
 constexpr const char* kDeadline = "deadline/1ms";
 constexpr const char* kCancel = "cancel/1000";
 
@@ -102,8 +102,8 @@ class EndingCases {
     }
   }
 
-  // Returns whether the call ended with `expected`. Only counts a refused call, which means that the server has not
-  // dropped the previous call yet. Stores any other status as wrong.
+  // Returns whether the call ended with `expected`. A refused call is counted but is not wrong: it means that the
+  // server has not dropped the previous call yet. Stores any other status as wrong.
   bool is_ended(const grpc::Status& status, grpc::StatusCode expected) {
     if (status.error_code() == grpc::StatusCode::RESOURCE_EXHAUSTED)
       ++refused_;

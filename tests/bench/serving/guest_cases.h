@@ -1,5 +1,6 @@
-// Effects of clients that do not read, and of hundreds of clients that connect and leave, on another client; and the
-// server's resources that stay occupied after these clients have left. For the suite serving.
+// Measures how a client is affected by other clients: by some that do not read, and by hundreds that connect and leave.
+// Also measures which of the server's resources stay occupied after these other clients have left. For the suite
+// serving.
 #ifndef LOCUS_TESTS_BENCH_SERVING_GUEST_CASES_H_
 #define LOCUS_TESTS_BENCH_SERVING_GUEST_CASES_H_
 

@@ -1,9 +1,12 @@
-// The program `locus-guests`: clients beside the measured one. locus-bench starts it as
+// The program `locus-guests`: clients that run at the same time as the measured client. locus-bench starts it as
 //   locus-guests bulk|silent|churn ADDRESS COUNT FILE
-// where FILE has the message that each client sends. Bulk is one client with COUNT messages in flight; COUNT silent
-// clients never read their answers; 2 COUNT clients of churn, at most COUNT at a time, connect, send one query and
-// leave. Churn ends by itself, the others by a signal. Silent and churn clients run at a lower priority, so that they
-// take no processor time from the server, as clients on other machines would not.
+// where FILE has the message that each client sends, and the first argument is the kind of clients:
+//   bulk    one client with COUNT messages in flight
+//   silent  COUNT clients that never read their answers
+//   churn   2 COUNT clients, at most COUNT at a time, that connect, send one query and leave
+// With churn the program ends by itself; with the other kinds it must be ended by a signal. Silent and churn clients
+// run at a lower priority, so that they take no processor time from the server. Clients on other machines would take
+// none either.
 #include <unistd.h>
 
 #include <cstdlib>

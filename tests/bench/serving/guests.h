@@ -1,7 +1,7 @@
-// Clients beside the measured one: one with large batches all the time, many that never read their answers, and many
-// that connect, send one query and leave. Each client has a connection and a stream of its own; one thread drives all
-// clients. They run in a separate program, since gRPC shares threads between the connections of a process: in one
-// process, the measured client would do work of the other clients while it waits.
+// Clients that run at the same time as the measured client: one with large batches all the time, many that never read
+// their answers, and many that connect, send one query and leave. Each client has a connection and a stream of its own;
+// one thread drives all clients. They run in a separate program, since gRPC shares threads between the connections of a
+// process: in one process, the measured client would do work of the other clients while it waits.
 #ifndef LOCUS_TESTS_BENCH_SERVING_GUESTS_H_
 #define LOCUS_TESTS_BENCH_SERVING_GUESTS_H_
 
@@ -59,7 +59,7 @@ class SilentReaders {
   std::vector<std::unique_ptr<Guest>> guests_;
 };
 
-// Clients that connect, send one query, and leave. At most `at_once` are connected; then each new guest replaces the
+// Clients that connect, send one query, and leave. Once `at_once` guests are connected, each new guest replaces the
 // oldest. Every second guest finishes its call, the others cancel it. At the end of run() all have left.
 class Churn {
  public:

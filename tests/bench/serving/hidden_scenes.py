@@ -1,11 +1,12 @@
-"""Compares the time that locusd takes to refuse a scene that the caller may not read with that for a missing scene:
+"""Compares the times that locusd takes to refuse two scenes: one that the caller may not read, and one that is missing.
 
     /usr/bin/python3 hidden_scenes.py BIN_DIRECTORY [CALLS]
 
-Starts a daemon with the scene `hidden-1` of 10,000 objects and a caller who may read other scenes. Sends CALLS (20,000)
-pairs of GetScene, CreateScene with static_from, and Query to the hidden scene and to one that does not exist, in random
-order, and prints quantiles and the p-value of a Mann-Whitney test, for a daemon with and without an audit file. Needs
-python3-grpcio and python3-numpy.
+Starts a daemon with the scene `hidden-1` of 10,000 objects, and sends calls as a caller who may not read this scene.
+Sends CALLS (default 20,000) GetScene calls for the hidden scene and as many for the missing scene, in random order.
+Then does the same with CreateScene (with static_from) and with Query. Prints quantiles of the durations of each method,
+and the p-value of a Mann-Whitney test. Repeats all this with a daemon that has an audit file. Needs python3-grpcio and
+python3-numpy.
 """
 
 import math

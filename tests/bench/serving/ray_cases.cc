@@ -13,7 +13,7 @@ namespace {
 constexpr size_t kThreads = 2;  // number of streams to the server, and of threads in process: one for each of two cores
 
 // A size of batches. `rays`: rays per batch. `window`: messages in flight per stream, so few that they fit into the
-// second-level cache. `overhead`: cost of a message beside its queries, in nanoseconds per ray. `share`: required part
+// second-level cache. `overhead`: cost of a message without its queries, in nanoseconds per ray. `share`: required part
 // of the rate that is possible with this overhead.
 struct Size {
   size_t rays;

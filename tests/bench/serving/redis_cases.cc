@@ -21,7 +21,7 @@ constexpr size_t kSearchWindow = 256;  // GEOSEARCH commands in flight to Redis
 constexpr float kReach = dynamic::kReach;
 
 // Metres on Redis's globe per unit of the world. Redis rounds positions to 52 bits, 0.6 m at the equator. At 20 m per
-// unit the world's 2,000 units are 40 km around (0, 0): there the globe's curvature distorts lengths by a relative
+// unit the world's 2,000 units are 40 km around (0, 0). There the globe's curvature distorts lengths by a relative
 // error below 5e-6, and the rounding error is up to 0.015 units on each axis.
 constexpr double kMetres = 20;
 constexpr double kEarthRadius = 6372797.560856;  // radius that Redis uses, in metres

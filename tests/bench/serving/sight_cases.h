@@ -1,4 +1,5 @@
-// Case sight/100x100x3: a matrix of sight over the network, beside the same segments as rays of mode ANY in one batch.
+// Case sight/100x100x3: a matrix of sight over the network, compared with the same segments as rays of mode ANY in one
+// batch.
 #ifndef LOCUS_TESTS_BENCH_SERVING_SIGHT_CASES_H_
 #define LOCUS_TESTS_BENCH_SERVING_SIGHT_CASES_H_
 

@@ -24,7 +24,8 @@
 
 namespace locus::bench::serving {
 
-// Maximum time without a message from the server; after that, run() assumes that the server hangs and fails.
+// Maximum time without a message from the server. After that, run() assumes that the server hangs, and returns an
+// error.
 inline constexpr std::chrono::seconds kSilence{60};
 
 inline absl::Status failed(const grpc::Status& status) {

@@ -48,7 +48,7 @@ class TlsCases {
   TlsCases(const ServingRun& run, const BenchMesh& mesh, TlsHost& plain, TlsHost& tls)
       : run_(run), mesh_(mesh), plain_(plain), tls_(tls) {}
 
-  // Measures neighbouring rays, whose computation hides the least of the cost of their messages.
+  // Measures neighbouring rays. They are cheap to compute, so that the cost of their messages shows most.
   absl::Status bulk() {
     if (!run_.wants(kBulk)) return absl::OkStatus();
     run_.progress(kBulk);

@@ -41,7 +41,7 @@ bool right(uint8_t answer, const RayAnswer& truth) { return hits(answer) == hits
 std::string words(const RayAnswer& answer) { return hits(answer) ? absl::StrFormat("t = %.9g", answer.t) : "a miss"; }
 std::string words(uint8_t answer) { return hits(answer) ? "a hit" : "a miss"; }
 
-// Returns a sentence with the number of differing rays, `count` of `of`, and a description of the first.
+// Returns a sentence which says that `count` of `of` rays differ. `first` describes the first of them.
 std::string difference(const std::string& case_name, const Peer& peer, size_t count, size_t of,
                        const std::string& first) {
   return absl::StrCat(case_name, ": ", peer.name(), " differs from us in ", count, " of ", of,

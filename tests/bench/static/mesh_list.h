@@ -1,6 +1,6 @@
-// List of meshes for the static suite: the meshes named in the options; otherwise small meshes in a quick run;
-// otherwise generated meshes, from the size of the first-level cache to beyond the last-level cache, and two real
-// levels if they were fetched.
+// List of meshes for the static suite. If the options name meshes, these are used. Otherwise a quick run uses small
+// meshes. Any other run uses generated meshes, from the size of the first-level cache to beyond the last-level cache,
+// and two real levels if they were fetched.
 #ifndef LOCUS_TESTS_BENCH_STATIC_MESH_LIST_H_
 #define LOCUS_TESTS_BENCH_STATIC_MESH_LIST_H_
 

@@ -48,7 +48,8 @@ bool kernels_hold(const RayQuery& ray, float magnitude) {
 
 TriangleRay triangle_ray(const RayQuery& ray) { return {to_double(ray.origin), to_double(ray.direction)}; }
 
-// Returns the float above t: the searches below exclude hits at their limit, the workloads include hits at t_max.
+// Returns the float above t. It is needed because the searches below exclude hits at their limit, but the workloads
+// include hits at t_max.
 float just_beyond(float t) { return std::nextafter(t, std::numeric_limits<float>::infinity()); }
 
 RayAnswer first_by_triangles(const TriangleBvh& tree, const RayQuery& ray) {
@@ -91,8 +92,9 @@ uint32_t all_by_triangles(const TriangleBvh& tree, const RayQuery& ray, uint32_t
   return static_cast<uint32_t>(found.size());
 }
 
-// Finds all hits of up to kAllBatch rays, by the kernel for the rays for which its bounds hold. Continues at the start
-// of `ids` if the remaining part could be too small for all triangles.
+// Finds all hits of up to kAllBatch rays by the kernel. Searches the tree instead for each ray that the kernel could
+// not decide, that may have more hits than kMaxRows, or for which the kernel's error bounds do not hold. Continues at
+// the start of `ids` if the remaining part could be too small for all triangles.
 void find_all(const TriangleBvh& tree, const RayKernels& kernels, absl::Span<const RayQuery> rays,
               absl::Span<uint32_t> ids, uint32_t* counts, KernelRow* rows) {
   std::array<KernelRay, kAllBatch> batch;

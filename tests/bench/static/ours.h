@@ -1,5 +1,5 @@
-// The only code of the static suite that measures locus, by the functions that the server's queries use for a mesh.
-// Immutable; any number of threads may use it.
+// The only code by which the static suite measures locus. It calls the functions that the server's queries use for a
+// mesh. Immutable; any number of threads may use it.
 #ifndef LOCUS_TESTS_BENCH_STATIC_OURS_H_
 #define LOCUS_TESTS_BENCH_STATIC_OURS_H_
 

@@ -45,9 +45,9 @@ class Peer {
   virtual void first(absl::Span<const RayQuery>, RayAnswer*) {}
   virtual void any(absl::Span<const RayQuery>, uint8_t*) {}
   // Writes to `ids` the numbers of all triangles that each ray, ball or box reaches, in any order, and to `counts` how
-  // many each query reaches. `ids` has room for all triangles of the mesh and kSpareIds more. A peer may continue at
-  // the start of `ids` when `ids` is full, or at each query. Therefore only a call with one query is sure to leave all
-  // its numbers in `ids`, from the start.
+  // many triangles each query reaches. `ids` has room for the numbers of all triangles of the mesh and kSpareIds more.
+  // A peer may write from the start of `ids` again when `ids` is full, or at each new query. Therefore all numbers are
+  // sure to be in `ids`, from its start, only after a call with one query.
   virtual void ray_ids(absl::Span<const RayQuery>, absl::Span<uint32_t> /*ids*/, uint32_t* /*counts*/) {}
   virtual void ball_ids(absl::Span<const Ballf>, absl::Span<uint32_t> /*ids*/, uint32_t* /*counts*/) {}
   virtual void box_ids(absl::Span<const Obbf>, absl::Span<uint32_t> /*ids*/, uint32_t* /*counts*/) {}

@@ -1,4 +1,4 @@
-// The smallest mesh that the tests of this suite share: two triangles, one above the other.
+// A minimal mesh that the tests of this suite share: two triangles, one above the other.
 #ifndef LOCUS_TESTS_BENCH_STATIC_TWO_SHEETS_H_
 #define LOCUS_TESTS_BENCH_STATIC_TWO_SHEETS_H_
 

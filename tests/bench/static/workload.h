@@ -1,7 +1,8 @@
-// The queries of the static suite: determined by a mesh and a seed and drawn in a fixed order, so that the workload can
-// be repeated in any server at any time. Pure functions.
+// The queries of the static suite. A mesh and a seed determine the queries, which are drawn in a fixed order, so that
+// the workload can be repeated in any server at any time. Pure functions.
 //
-// Random numbers are SplitMix64 from the seed; f = (next >> 40) * 2^-24, uniform over [0, 1). All arithmetic is float,
+// In the comments below, `next` is the next 64-bit number of a SplitMix64 generator with the given seed, and
+// f = (next >> 40) * 2^-24 is uniform over [0, 1). Each `next` and each f is a new draw. All arithmetic is float,
 // except that camera_rays() computes in double.
 #ifndef LOCUS_TESTS_BENCH_STATIC_WORKLOAD_H_
 #define LOCUS_TESTS_BENCH_STATIC_WORKLOAD_H_
@@ -33,13 +34,14 @@ std::vector<RayQuery> random_rays(const BenchMesh& mesh, size_t count, uint64_t 
 // and height must be multiples of 4.
 std::vector<RayQuery> camera_rays(const BenchMesh& mesh, int width, int height);
 
-// Returns balls of radius `fraction` * diagonal. Balls with even index are centred on the surface (triangle number next
-// % n of the n triangles, then u = sqrt(f), w = f; the corners' weights are 1 - u, u (1 - w), u w), those with odd
-// index anywhere in the bounds.
+// Returns balls of radius `fraction` * diagonal. The centre of a ball with odd index is anywhere in the bounds (three
+// draws for x, y, z). The centre of a ball with even index is on the surface: in the triangle with index next % n,
+// where n is the number of triangles. Then u = sqrt(f) and w = f are drawn; the weights of the triangle's corners are
+// 1 - u, u (1 - w) and u w.
 std::vector<Ballf> balls(const BenchMesh& mesh, size_t count, uint64_t seed, float fraction);
 
-// Returns axis-aligned boxes with the centres of balls(). Half extents along x, y, z are fraction * diagonal * (0.5 +
-// f), drawn with the seed `seed` ^ 0xB0B.
+// Returns axis-aligned boxes with the centres of balls(). The half extent along each axis is
+// `fraction` * diagonal * (0.5 + f). A generator with the seed `seed` ^ 0xB0B draws f for x, y, z of each box in turn.
 std::vector<Obbf> boxes(const BenchMesh& mesh, size_t count, uint64_t seed, float fraction);
 
 }  // namespace locus::bench

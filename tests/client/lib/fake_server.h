@@ -178,7 +178,7 @@ class FakeQueries final : public v1::QueryService::Service {
   }
 
   // Delays the answers of each pair of messages until both have arrived, then sends them in reverse order. If the
-  // member `stream_answer` is set, answers each message at once with its result instead.
+  // member `stream_answer` is set, answers each message immediately instead, with the result of `stream_answer`.
   grpc::Status StreamQueries(
       grpc::ServerContext*,
       grpc::ServerReaderWriter<v1::StreamQueriesResponse, v1::StreamQueriesRequest>* stream) override {
@@ -228,7 +228,7 @@ class FakeQueries final : public v1::QueryService::Service {
     return grpc::Status::OK;
   };
   std::function<v1::QueryResult(const v1::QueryBatch&)> stream_answer;
-  int silent_messages = 0;  // number of next messages on streams that are never answered
+  int silent_messages = 0;  // the next so many messages on streams are never answered
   int failing_calls = 0;
   grpc::Status failure{grpc::StatusCode::UNAVAILABLE, "planned"};
   int calls = 0;
@@ -367,7 +367,7 @@ class FakeScenes final : public v1::SceneService::Service {
   std::vector<uint32_t> indices;
   size_t largest_message = 0;
   std::vector<v1::DownloadMeshResponse> mesh_pieces;
-  int failing_downloads = 0;  // number of next downloads that fail after their first message
+  int failing_downloads = 0;  // the next so many downloads fail after their first message
   bool no_mesh = false;
   v1::ChangeInstancesRequest last_change;
   int creates = 0;

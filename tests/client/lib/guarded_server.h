@@ -40,7 +40,8 @@ class GuardedServer final : v1::QueryService::Service,
   std::string address() const { return "127.0.0.1:" + std::to_string(port_); }
   int port() const { return port_; }
 
-  // Refuses calls without this token from now on, and ends streams at their next message.
+  // From now on, refuses calls that do not carry this token. An open stream that does not carry it ends at its next
+  // message.
   void require(const std::string& token) {
     std::lock_guard lock(mutex_);
     required_ = "Bearer " + token;
@@ -62,7 +63,8 @@ class GuardedServer final : v1::QueryService::Service,
   }
 
  private:
-  // Records a call. Returns UNAUTHENTICATED if a token is required and the call has no token or another token.
+  // Records a call, or a message of a stream. Returns UNAUTHENTICATED if a token is required and the call has no token
+  // or another token.
   grpc::Status admit(const grpc::ServerContext& context, const std::string& method) {
     std::lock_guard lock(mutex_);
     ++calls_;

@@ -19,7 +19,8 @@ struct FewHashes {
 struct LastHash {
   uint64_t operator()(Id) const { return ~uint64_t{0}; }
 };
-// Hash whose highest six bits are the low six bits of an id: in a table of one leaf they select one of its 64 buckets.
+// Hash whose highest six bits are the low six bits of an id. In a table of one leaf, these six bits select one of the
+// 64 buckets.
 struct LowBits {
   uint64_t operator()(Id id) const { return id << 58; }
 };

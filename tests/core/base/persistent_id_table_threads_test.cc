@@ -1,5 +1,5 @@
-// Readers of snapshots run beside the writer of a table. The test checks the values that they read; ThreadSanitizer
-// detects data races.
+// Readers of snapshots run concurrently with the writer of a table. The test checks the values that the readers get;
+// ThreadSanitizer detects data races.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -32,7 +32,7 @@ class Published {
 };
 
 // The value of every id is the number of a generation. In each generation the writer replaces all values, some after
-// erasing their ids, and publishes a snapshot. No snapshot may contain two generations.
+// erasing their ids, and publishes a snapshot. No snapshot may contain values of two generations.
 TEST(PersistentIdTableTest, ReadersOfSnapshotsNeverSeeConcurrentWrites) {
   Published published;
   std::atomic<int> reads{0};

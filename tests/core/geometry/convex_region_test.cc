@@ -219,7 +219,8 @@ TEST(ConvexRegionTest, RandomTrianglesOverlapWhereTheyShareAPoint) {
       }
     (found ? overlapping : apart) += 1;
     // A grid point within the region proves an overlap. Every point of the triangle is less than 8 / kSteps away from a
-    // grid point, and so is every common point.
+    // grid point. So if the triangle and the region share a point, a grid point is less than 8 / kSteps away from the
+    // region.
     ASSERT_TRUE(found || best > 1e-9L) << "seed " << seed;
     ASSERT_TRUE(!found || best < 8.0L / kSteps) << "seed " << seed;
   }

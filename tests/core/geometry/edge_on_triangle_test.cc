@@ -16,7 +16,8 @@ using test::Vec3q;
 
 TEST(EdgeOnTriangleTest, CasesFoundByTheProofAgreeWithTheReference) { EXPECT_EQ(test::edge_on_difference(), ""); }
 
-// Triangle, its transform, and a ray almost within the triangle's plane: the sine of their angle is as low as 2^-60.
+// Triangle, its transform, and a ray almost within the triangle's plane: the sine of the angle between the ray and the
+// plane can be as small as 2^-60.
 struct Grazing {
   Triangle triangle;
   Transform transform;
@@ -94,8 +95,8 @@ TEST(EdgeOnTriangleTest, HitsAreWithinTheToleranceAtEveryAngle) {
   EXPECT_GT(flat, static_cast<int>(test::scaled_count(40'000) / 400));
 }
 
-// Fixture with a triangle almost perpendicular to x and a ray along z. The triangle's border is 2^-60 beside the ray, a
-// distance that the test in double cannot resolve.
+// Fixture with a triangle almost perpendicular to x and a ray along z. The triangle's border is 2^-60 away from the
+// ray, a distance that the test in double cannot resolve.
 class BesideTheBorderTest : public ::testing::Test {
  protected:
   std::optional<EdgeOnHit> hit(bool hit_in_double, Cull cull = Cull::kNone, double depth = 0) const {

@@ -47,8 +47,9 @@ struct RayCase {
   }
 };
 
-// Expects that the hit is not before the chord of the solid grown by the tolerance, and not after the beginning of the
-// chord of the solid shrunk by the tolerance.
+// Expects that the hit is between the beginning of the outer chord and the beginning of the inner chord. The outer
+// chord is the chord of the solid grown by the tolerance, the inner chord that of the solid shrunk by it. If there is
+// no inner chord, a hit is optional and may be anywhere on the outer chord.
 void expect_entry(const RayCase& c, const std::optional<ShapeHit>& hit) {
   const std::optional<RealInterval> outer = c.chord(c.tolerance), inner = c.chord(-c.tolerance);
   if (!outer || outer->far < 0) {

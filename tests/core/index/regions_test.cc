@@ -18,7 +18,8 @@ Aabb<S> random_box(Random& random, double size) {
   return {rounded<S>(low), rounded<S>(low + random.positive_vector(random.magnitude(-8, 0) * size))};
 }
 
-// Returns a box that contains `box`; many of its coordinates differ by only one representable number.
+// Returns a box that contains `box`. Coordinates that differ from those of `box` are often only one representable
+// number away.
 template <class S>
 Aabb<S> superset(const Aabb<S>& box, Random& random) {
   constexpr S kInf = std::numeric_limits<S>::infinity();

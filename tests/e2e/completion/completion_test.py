@@ -14,7 +14,7 @@ START_SECONDS = 30
 
 
 def last_part(offer):
-    """Returns the part after the last = or comma. Before it, each shell repeats another part of the typed word."""
+    """Returns the part after the last = or comma. The shells differ in what they repeat before this part."""
     return offer.split("=")[-1].split(",")[-1] if not offer.startswith("--") or "=" in offer else offer
 
 

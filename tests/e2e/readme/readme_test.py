@@ -2,12 +2,12 @@
 
     python3 readme_test.py README BIN_DIRECTORY [PYTHON_DIRECTORY]
 
-Blocks marked console hold `$ command` lines, each followed by its output; a block marked grpcurl holds one call, which is
-made with json_call in its place. EPOCH stands for the scene's random epoch. The block marked cpp was compiled as
-readme_example; its last comment says what it prints. Blocks marked python, here and in client/python/README.md, are
-scripts for the package in PYTHON_DIRECTORY (without which they are skipped); their last comments also say what they
-print. The address in them is replaced by that of the daemon. Blocks marked text are not run: the test only checks that
-their programs exist.
+Blocks marked console hold `$ command` lines, each followed by its output. A block marked grpcurl holds one call; the
+test makes this call with json_call instead of grpcurl. EPOCH stands for the scene's random epoch. The block marked cpp
+was compiled as readme_example; its last comment says what it prints. Blocks marked python, here and in
+client/python/README.md, are scripts for the package in PYTHON_DIRECTORY; without this argument they are skipped. The
+last comment of a script says what the script prints. The address in a script is replaced by that of the daemon. Blocks
+marked text are not run: the test only checks that their programs exist.
 """
 
 import os

@@ -177,8 +177,8 @@ class Bench {
   RpcState& state() { return state_; }
   v1::QueryService::Stub& stub() { return *stub_; }
 
-  // Runs `client` on a new thread, and turns of the loop until a call has arrived and all calls have ended. Then calls
-  // `ended`, and runs further turns until the client has ended.
+  // Runs `client` on a new thread. Meanwhile runs turns of the loop on this thread until a call has arrived and all
+  // calls have ended. Then calls `ended`, and runs further turns until the client has ended.
   void serve_until_idle(const std::function<void()>& client, const std::function<void()>& ended) {
     std::atomic<bool> over{false};
     std::thread thread([&] {
@@ -419,8 +419,9 @@ TEST(UnaryHotCallTest, ACallMayArriveWhileTheServerEnds) {
       v1::QueryResponse response;
       bench.stub().Query(&context, request, &response);
     });
-    // Because of the different delays, the server ends before the call's arrival, at about that time, or long after. A
-    // call that has arrived stays in the completion queue until end(), because the loop runs no turn before.
+    // Because of the different delays, the server ends before the call's arrival, at about the same time, or long after
+    // it. A call that has arrived stays in the completion queue until end(), because the loop runs no turn before
+    // end().
     std::this_thread::sleep_for(std::chrono::microseconds(100 * i));
     bench.end();
     client.join();

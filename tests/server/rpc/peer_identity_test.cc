@@ -19,7 +19,7 @@ namespace {
 using test::TestAuthority;
 using test::TestCertificate;
 
-// Service that ends every call at once and stores the name in the caller's certificate.
+// Service that ends every call immediately and stores the name in the caller's certificate.
 class NamingService final : public grpc::CallbackGenericService {
  public:
   std::optional<std::string> last_name() {

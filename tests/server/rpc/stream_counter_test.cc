@@ -18,7 +18,7 @@ namespace {
 using std::chrono::seconds;
 using std::chrono::system_clock;
 
-// A server that accepts only the first call of its client, and answers none.
+// A server that accepts only the first call of its client, and answers no call.
 class StreamCounterTest : public ::testing::Test {
  protected:
   struct Stream {

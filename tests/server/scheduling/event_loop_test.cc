@@ -14,7 +14,7 @@ namespace {
 
 using std::chrono::steady_clock;
 
-// Event source that returns tags from a queue. Fails the test if two threads wait in next() at once.
+// Event source that returns tags from a queue. Fails the test if two threads wait in next() at the same time.
 class QueueSource final : public EventSource {
  public:
   void put(EventTag& tag) {

@@ -49,7 +49,7 @@ class Book {
   std::vector<uint64_t> turns_ LOCUS_GUARDED_BY(mutex_);
 };
 
-// Job of `turns` turns. Any number of threads may run turns at once.
+// Job of `turns` turns. Any number of threads may run turns at the same time.
 class TurnsJob final : public QueryJob {
  public:
   TurnsJob(uint32_t turns, uint64_t client = 0, Book* book = nullptr) : turns_(turns), client_(client), book_(book) {}
@@ -368,7 +368,7 @@ TEST(QuerySchedulerTest, BothClassesTogetherHaveALimitToo) {
   SchedulerOptions options = options_of(1);
   options.limit.jobs = 2;
   QueryScheduler scheduler(options);
-  Blocker blocker(scheduler);  // occupies the first of two jobs
+  Blocker blocker(scheduler);  // takes one of the two permitted jobs
   TurnsJob second(1), third(1);
   ASSERT_TRUE(scheduler.submit(second, 1, kLarge).ok());
   EXPECT_EQ(refusal_of(scheduler.submit(third, 1, kSmall).status())->limit, "batches");

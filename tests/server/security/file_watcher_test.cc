@@ -129,7 +129,7 @@ TEST(FileWatcherTest, EachReplacementIsNoticed) {
         return true;
       },
       std::chrono::milliseconds(1));
-  EXPECT_TRUE(calls.reaches(1));  // the files are read at once
+  EXPECT_TRUE(calls.reaches(1));  // the files are read immediately
   for (int i = 2; i <= 6; ++i) {
     ASSERT_TRUE(replace_text_file(file, "a", 0600).ok());
     EXPECT_TRUE(calls.reaches(i)) << i;

@@ -35,8 +35,8 @@ constexpr Mutant kMutants[] = {
     {"UserFromAfar", PlantedBug::kUserFromAfar},
 };
 
-// Returns the exit code of all tests with a bug: 0 if they pass, 1 if one fails, any other code if the run did not
-// reach its end. Their output goes to /dev/null if a failure is expected.
+// Runs all tests with the bug `bug` and returns the exit code: 0 if all tests pass, 1 if one fails, any other code if
+// the run did not reach its end. If a failure is expected, the output of the tests goes to /dev/null.
 int result_with(PlantedBug bug) {
   std::fflush(stdout);
   const pid_t child = fork();

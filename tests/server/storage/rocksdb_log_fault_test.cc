@@ -1,5 +1,5 @@
-// A disk that fails for a while: failing syncs and writes, and a full disk. No record that is lost was acknowledged,
-// and the log accepts writes again without a restart.
+// A disk that fails for a while: failing syncs and writes, and a full disk. The log keeps every acknowledged record,
+// and accepts writes again without a restart.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>

@@ -26,7 +26,7 @@ struct Outcome {
   uint64_t acknowledged = 0;
 };
 
-// Writes to a log until the power fails; for some seeds the process is killed and restarted before. Returns the
+// Writes to a log until the power fails; for some seeds, the process is first killed and restarted. Returns the
 // difference between the acknowledged contents and the contents found afterwards.
 Outcome lose_power_once(uint64_t seed, Syncing syncing) {
   Random random(seed);
@@ -38,7 +38,7 @@ Outcome lose_power_once(uint64_t seed, Syncing syncing) {
   options.path = folder.file("disk/data");
   options.env = env.get();
   options.reserve_bytes = 0;
-  options.log_buffer_bytes = 0;  // RocksDB raises it to the minimum, so that it often writes tables
+  options.log_buffer_bytes = 0;  // RocksDB uses its minimum instead, and so often writes tables
   options.durable_marker_delay = std::chrono::milliseconds(1);
   options.memory_sync_delay = std::chrono::milliseconds(2);
   options.sync = syncing == Syncing::kAsPromised;

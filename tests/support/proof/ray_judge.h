@@ -1,5 +1,5 @@
-// Verifier of answers to rays by a reference in long double, which is computed from the stored values. For the proof
-// that no ray misses. The tolerance is e = 2^-20 (|origin in mesh axes| + mesh extent), in mesh axes:
+// Verifier of answers to rays by a reference in long double, which is computed from the stored values. Used by the
+// proof that no ray misses. The tolerance is e = 2^-20 (|origin in mesh axes| + mesh extent), in mesh axes:
 //
 // - miss: the reference hits a triangle at t, at least e within its border, and the answer has no hit up to t + e /
 //   |direction|.

@@ -1,6 +1,6 @@
 // Repetition of the rays of a block with other modes and limits, whose answers follow from the first hits: mode ANY,
-// the nearest row of mode ALL, and limits at the hits. For the proof that no ray misses. The other rows of mode ALL do
-// not follow from the first hits, so the reference verifies them.
+// the nearest row of mode ALL, and limits at the hits. Used by the proof that no ray misses. The other rows of mode ALL
+// do not follow from the first hits, so the reference verifies them.
 #ifndef LOCUS_TESTS_SUPPORT_PROOF_RAY_REPEATS_H_
 #define LOCUS_TESTS_SUPPORT_PROOF_RAY_REPEATS_H_
 

@@ -1,5 +1,6 @@
-// Overlap of a moving ball, capsule or box with a triangle, by search in long double: the distance of two convex solids
-// is a convex function of time. For the proof that no sweep misses; shares only vectors with the product.
+// Overlap of a moving ball, capsule or box with a triangle, by search in long double. The search finds the least
+// distance, because the distance of two convex solids is a convex function of time. Used by the proof that no sweep
+// misses. Shares only vectors with the product.
 #ifndef LOCUS_TESTS_SUPPORT_PROOF_REAL_SWEEP_H_
 #define LOCUS_TESTS_SUPPORT_PROOF_REAL_SWEEP_H_
 
@@ -54,7 +55,8 @@ class SweptTriangle {
     for (const Vec3r& corner : corners_) radius_ = std::max(radius_, length(corner - center_));
   }
 
-  // Returns false only if the mover, grown by `by`, touches the ball around the triangle at no time of its motion.
+  // Returns true whenever the mover, grown by `by`, touches the ball around the triangle at some time of its motion;
+  // may also return true otherwise.
   bool is_near(const RealMover& mover, Real by) const {
     const Real square = dot(mover.way, mover.way);
     const Real t = square == 0 ? 0 : std::clamp<Real>(dot(center_ - mover.start, mover.way) / square, 0, 1);

@@ -1,5 +1,5 @@
 // One triangle and one ray in long double: the point where they meet, its distance from the triangle's border, and the
-// slope of the ray. For the proof that no ray misses; shares only vectors with the product. Immutable.
+// slope of the ray. Used by the proof that no ray misses. Shares only vectors with the product. Immutable.
 #ifndef LOCUS_TESTS_SUPPORT_PROOF_REAL_TRIANGLE_H_
 #define LOCUS_TESTS_SUPPORT_PROOF_REAL_TRIANGLE_H_
 

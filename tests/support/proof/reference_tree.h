@@ -1,7 +1,7 @@
 // Tree over triangles in long double. It shares vectors, triangles and boxes with the product, but no ray test and no
 // tree. The tree makes it possible to verify more rays than a plain list of triangles does. It is split at medians, and
-// its boxes in double are widened by far more than any rounding error of the box test. For the proof that no ray
-// misses; a test compares the results of the tree with those of a plain list. Immutable after construction; safe from
+// its boxes in double are widened by far more than any rounding error of the box test. Used by the proof that no ray
+// misses. A test compares the results of the tree with those of a plain list. Immutable after construction; safe from
 // any thread.
 #ifndef LOCUS_TESTS_SUPPORT_PROOF_REFERENCE_TREE_H_
 #define LOCUS_TESTS_SUPPORT_PROOF_REFERENCE_TREE_H_
@@ -111,9 +111,9 @@ class ReferenceTree {
       return near <= far;
     }
 
-    // Returns false only if a hit is impossible. Returns true for rays almost parallel to the triangle. For any other
-    // ray, the error of the point where the ray meets the plane is about 2^-30 of the reach, and the tolerance of four
-    // pads is 2^-28 of the reach.
+    // Returns true whenever a hit is possible; may also return true otherwise. Always returns true for rays almost
+    // parallel to the triangle. For any other ray, the error of the point where the ray meets the plane is about 2^-30
+    // of the reach, and the tolerance of four pads is 2^-28 of the reach.
     bool may_meet(const Rough& triangle, double limit) const {
       const double slope = dot(triangle.normal, direction);
       if (std::abs(slope) < 0x1p-20 * longest) return true;

@@ -11,8 +11,8 @@ namespace {
 bool before(const FirstHit& a, const FirstHit& b) { return (a <=> b) < 0; }
 
 // Returns the t at which the ray enters the world bounds of the instance, or nullopt if the ray misses these bounds.
-// This t is a lower bound for the t of reported hits: if the computed t of a triangle is smaller because of rounding,
-// the hit is reported with the t of the entry, as the server does.
+// Because of rounding, the computed t of a hit on a triangle can be smaller than this t. Like the server,
+// first_on_instance() then uses this t as the t of the hit.
 std::optional<float> entry(const Rayd& ray, const CheckedInstance& instance) {
   const Interval<double> interval =
       SlabRay<double>(ray, kInstancePad).interval(bounds_to_world(instance.transform, instance.mesh_bounds));

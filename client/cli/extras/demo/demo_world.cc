@@ -9,7 +9,7 @@
 namespace locus::cli {
 namespace {
 
-constexpr float kInset = 0.98f;  // fraction of the level's size within which objects move, inside its walls
+constexpr float kInset = 0.98f;  // share of the level's size in which objects move, so that they stay inside its walls
 
 locus::Quaternion random_rotation(DemoRandom& random) {
   for (;;) {

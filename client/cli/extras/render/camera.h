@@ -48,9 +48,9 @@ struct CameraRay {
   Vec3f direction;
 };
 
-// Returns the axes of a view in direction `forward` in which `up` points upward in the image. Both vectors may have any
-// length. Returns INVALID_ARGUMENT if either is zero or not finite, or if they are parallel (sine of their angle below
-// 1e-6).
+// Returns the axes of a view in direction `forward`, such that `up` points upward in the image. Both vectors may have
+// any length. Returns INVALID_ARGUMENT if either is zero or not finite, or if they are parallel (sine of their angle
+// below 1e-6).
 absl::StatusOr<ViewAxes> view_axes(Vec3d forward, Vec3d up);
 
 // Returns half the image's height at distance 1 for a vertical angle of view of `degrees`, 0 < degrees < 180.

@@ -20,13 +20,14 @@ struct Lens {
 // is z, the view is towards +x, +y and -z.
 Vec3d three_quarter_view(Vec3d up);
 
-// Returns the camera with these axes and this lens that is nearest to `bounds` and shows all of it; with an
-// orthographic lens whose half_height is not 0, the picture may be too small for that. `bounds` must not be empty. A
-// box that is a single point is treated as a box of side 1. Method: a corner at (x, y) and depth z in the view's axes
-// is visible from the eye (ex, ey, ez) if |x - ex| <= w (z - ez), with w the slope of the view's edge. Let a be the
-// maximum of x - w z and b the maximum of -x - w z over all corners; then all corners are visible if a + w ez <= ex <=
-// -b - w ez. The eye nearest to the box has the largest ez, for which both bounds of ex are equal. The condition in y
-// gives a second maximum of ez; the smaller of the two maxima is used.
+// Returns the camera with these axes and this lens that is nearest to `bounds` and shows all of it. Exception: if the
+// lens is orthographic and its half_height is not 0, the picture can be too small to show all of it. `bounds` must not
+// be empty. A box that is a single point is treated as a box of side 1. Method: let w be the slope of the picture's
+// left and right edges. Seen from the eye (ex, ey, ez), a corner at (x, y) and depth z in the view's axes lies between
+// these edges if |x - ex| <= w (z - ez). Over all corners, let a be the maximum of x - w z, and b the maximum of -x - w
+// z. Then all corners lie between the edges if a + w ez <= ex <= -b - w ez. The eye nearest to the box has the largest
+// ez, for which both bounds of ex are equal. The condition in y gives a second maximum of ez; the smaller of the two
+// maxima is used.
 Camera frame_box(const Aabbd& bounds, const ViewAxes& axes, const Lens& lens);
 
 }  // namespace locus::cli

@@ -126,8 +126,8 @@ Json GlbWriter::add_primitive(const ImportedMesh& mesh, size_t first_index, size
 
 absl::Status GlbWriter::set_mesh(size_t mesh_index, const ImportedMesh& mesh) {
   LOCUS_DCHECK_LT(mesh_index, meshes_.size());
-  // Check the size before copying. `bytes` estimates the file's size: vertices that several parts share are copied once
-  // for each of these parts, and unused vertices are not copied.
+  // Check the size before copying. `bytes` is only an estimate of the file's size, because vertices that several parts
+  // share are copied once for each of these parts, and unused vertices are not copied.
   const uint64_t bytes = bytes_.size() + (mesh.vertices.size() + mesh.indices.size()) * sizeof(float) + kFrameBytes;
   if (bytes > kMaxExportBytes) return too_large(bytes);
   renumbered_.assign(mesh.vertices.size() / 3, kNoVertex);

@@ -2,9 +2,9 @@
 // the whole file. For the exporter. One writer writes one file in one thread. Source: Khronos Group, glTF 2.0
 // Specification, 2021 (ISO/IEC 12113:2022).
 //
-// The importer reads such files with assimp 5.2.5. This writer does not use assimp, because assimp alters a scene when
-// it writes it: it drops transforms within 0.01 of the identity and merges vertices nearer than 1e-5. It also needs 400
-// bytes of memory per triangle.
+// The importer reads such files with assimp 5.2.5. This writer does not use assimp, because assimp alters the scenes
+// that it writes: transforms within 0.01 of the identity are dropped, and vertices nearer than 1e-5 to each other are
+// merged. Moreover, assimp needs 400 bytes of memory per triangle.
 //
 // Invariants: every accessor lies within the file's single buffer; node 0 is the root, and every other top-level node
 // is its child.
@@ -26,8 +26,8 @@
 
 namespace locus::cli {
 
-// Maximum number of nodes in a file. A capsule takes four nodes, any other object or an instance takes one. The
-// RESOURCE_EXHAUSTED errors of GlbWriter name the limit that was exceeded.
+// Maximum number of nodes in a file. A capsule takes four nodes. An instance or an object of any other shape takes one
+// node. The RESOURCE_EXHAUSTED errors of GlbWriter name the limit that was exceeded.
 inline constexpr size_t kMaxExportNodes = size_t{1} << 20;
 // Maximum size of a file in bytes: the GLB format stores sizes in 32 bits.
 inline constexpr uint64_t kMaxExportBytes = UINT32_MAX;

@@ -16,9 +16,9 @@ inline constexpr uint64_t kMaxCityTriangles = uint64_t{1} << 27;
 // buildings are towers of two to four boxes that touch face to face. Units are metres, z is up. Each box is 12
 // consecutive triangles over 8 consecutive vertices of its own, closed and counter-clockwise seen from outside. The
 // slab is the first box. All coordinates are multiples of 0.5, so they are exact in float, and many faces are coplanar.
-// Parts: "ground" and "buildings". The mesh has at most `triangles` triangles and more than triangles - 12, but never
-// fewer than the slab's 12 nor more than kMaxCityTriangles. Equal arguments give equal bytes on every machine. Cost:
-// linear; memory: 240 bytes per box.
+// Parts: "ground" and "buildings". `triangles` is clamped to 12 (only the slab) .. kMaxCityTriangles; the mesh then has
+// the largest multiple of 12 triangles that is at most `triangles`. Equal arguments give equal bytes on every machine.
+// Cost: linear; memory: 240 bytes per box.
 ImportedMesh generate_city(uint64_t triangles, uint64_t seed);
 
 }  // namespace locus::cli

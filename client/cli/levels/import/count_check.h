@@ -16,7 +16,7 @@ struct ElementCounts {
   uint64_t triangles = 0;
 };
 
-// Returns the number of vertices of an OBJ file, and a lower bound of its triangles: one for each face.
+// Returns the number of vertices of an OBJ file, and its number of faces as a lower bound of its number of triangles.
 ElementCounts count_obj(absl::string_view bytes);
 
 // Returns the counts of an STL file: three vertices for each triangle. The header of a binary file declares the number

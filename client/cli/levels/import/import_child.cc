@@ -118,7 +118,7 @@ void send(const char* bytes, size_t size) {
 
 // Functions and types of the parent.
 
-// Child process. If it still runs, the destructor kills it; the destructor always waits for its end (reaps it).
+// Child process. The destructor kills the process if it still runs, and then waits for its end (reaps it).
 class Child {
  public:
   Child(pid_t pid, int pipe_end) : pid_(pid), pipe_end_(pipe_end) {}

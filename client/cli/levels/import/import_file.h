@@ -1,5 +1,5 @@
 // Entry point of the importers: reads a file into meshes that are ready for upload. For the import command. A function
-// without state; any number of threads may import at once.
+// without state; any number of threads may import at the same time.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_IMPORT_FILE_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_IMPORT_FILE_H_
 
@@ -25,12 +25,12 @@ struct ImportOptions {
 // (case-insensitive). Node transforms and the scale are baked into the vertices, polygons are triangulated, equal
 // vertices are merged, axes are kept as in the file. Triangles keep the file's order, and zero-area triangles are kept.
 // If the centre of the bounding box is further from the origin than 8 times the box's longest side, the level is
-// recentred: every mesh is moved by one shared translation in double before rounding to float, and
-// ImportedLevel::recentre is the inverse translation. The file is parsed by a child process (import_child.h), whose
-// answer is checked. Errors: NOT_FOUND (no such file or entry), INVALID_ARGUMENT (unknown type, damaged or empty file,
-// bad option, crash of the child), RESOURCE_EXHAUSTED (a limit of import_limits.h). Each message suggests a remedy.
-// Cost: the file is read once and held in memory; the child needs about 60 bytes of memory for each vertex, and the
-// mesh is copied twice.
+// recentred. To do this, all meshes are moved by the same translation, in double, before the coordinates are rounded to
+// float; ImportedLevel::recentre is the inverse translation. The file is parsed by a child process (import_child.h),
+// whose answer is checked. Errors: NOT_FOUND (no such file or entry), INVALID_ARGUMENT (unknown type, damaged or empty
+// file, bad option, crash of the child), RESOURCE_EXHAUSTED (a limit of import_limits.h). Each message suggests a
+// remedy. Cost: the file is read once and held in memory; the child needs about 60 bytes of memory for each vertex, and
+// the mesh is copied twice.
 absl::StatusOr<ImportedLevel> import_file(const std::string& path, const ImportOptions& options);
 
 }  // namespace locus::cli

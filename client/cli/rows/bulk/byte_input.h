@@ -28,8 +28,8 @@ class ByteInput {
   // Returns UNKNOWN if reading fails.
   absl::StatusOr<size_t> read(absl::Span<char> buffer);
 
-  // Waits at most `wait` for data. Returns whether read() would return at once; this is also true at the end of the
-  // input and after an error.
+  // Waits at most `wait` for data. Returns whether read() would return without waiting. The result is true at the end
+  // of the input and after an error, too.
   bool ready_within(std::chrono::milliseconds wait) const;
 
   const std::string& name() const { return name_; }

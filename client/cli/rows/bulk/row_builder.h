@@ -16,7 +16,7 @@ namespace locus::cli {
 
 class RowBuilder {
  public:
-  // Borrows the schema, whose vectors have at most 32 parts.
+  // Borrows the schema. Precondition: every vector field of the schema has at most 32 parts.
   explicit RowBuilder(const RowSchema& schema);
 
   // Returns an empty batch with the schema's columns.

@@ -51,9 +51,9 @@ struct CrossingVisit {
   bool over() const { return top == 0; }
 };
 
-// Kernels of one instruction set. run() continues a visit until it is complete, or until at least kMaxCrossingWork
-// nodes and triangles were opened and tested. It opens the same nodes, and tests the same triangles, in the same order
-// as TriangleBvh::visit_half_line().
+// Kernels of one instruction set. run() continues a visit until it is complete, or until the number of opened nodes
+// plus the number of tested triangles is at least kMaxCrossingWork. It opens the same nodes, and tests the same
+// triangles, in the same order as TriangleBvh::visit_half_line().
 struct CrossingKernels {
   const char* name;  // name of the instruction set
   void (*run)(const TriangleTree&, CrossingVisit&);

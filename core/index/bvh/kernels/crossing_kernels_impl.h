@@ -8,10 +8,9 @@
 // bounds of the triangle contain p, so |u.y|, |u.z|, |v.y| and |v.z| are at most E, the extent of the block. The
 // rounded point differs from p by at most `pad` on each axis, so the error of a difference is at most n = pad + e (E +
 // pad). The errors of the differences change the two products by 4 E n + 2 n^2 in total; the roundings of the two
-// products and of their difference add 4 e (E + n)^2. The sum is below 9 e (E + pad)^2 + 5 pad (E + pad). The bound is
-// 16 e (E + pad)^2 + 16 pad (E + pad), which covers the roundings of the bound itself too. The bound is infinite if a
-// product may overflow, so that no sign counts as certain. Products that underflow add at most 2^-147, which 2^-120
-// covers.
+// products and of their difference add 4 e (E + n)^2. The sum is below 9 e (E + pad)^2 + 5 pad (E + pad). Products that
+// underflow add at most 2^-147. The bound is 16 e (E + pad)^2 + 16 pad (E + pad) + 2^-120, which covers the roundings
+// of the bound itself too. The bound is infinite if a product may overflow, so that no sign counts as certain.
 //
 // Call the coordinate y of a point its height. An edge crosses the height of p if one of its ends is at the height of p
 // or below, and its other end is above. Either one rising and one falling edge of a triangle cross this height, or no
@@ -30,7 +29,7 @@
 namespace locus {
 namespace {
 
-// Returns the error bound `bound`, or 0 if `bug` is planted: a test then shows that the bound is needed.
+// Returns the error bound `bound`, or 0 if `bug` is planted. A test plants the bug to show that the bound is needed.
 static inline float unless(PlantedBug bug, float bound) { return planted(bug) ? 0 : bound; }
 
 static inline uint32_t count_of(uint32_t lanes) { return static_cast<uint32_t>(__builtin_popcount(lanes)); }

@@ -166,9 +166,9 @@ static inline Keys8 without(Keys8 keys, uint32_t key) {
   return {_mm256_or_si256(keys.v, _mm256_cmpeq_epi32(keys.v, _mm256_set1_epi32(static_cast<int>(key))))};
 }
 
-// Packs both `children` and `nears`: takes the eight elements that begin at index `from`, keeps those whose bits are
-// set in `set`, and moves them, in the same order, to the indices from `to` on. Precondition: `to` <= `from`. May read
-// and write eight elements of each array.
+// Packs both `children` and `nears`: takes the eight elements that begin at index `from`, keeps those in the mask
+// `set`, and moves them, in the same order, to the indices from `to` on. Precondition: `to` <= `from`. May read and
+// write eight elements of each array.
 static inline void pack_entries(uint32_t* children, float* nears, uint32_t from, uint32_t set, uint32_t to) {
   const __m256i packed = pack_permutation(set);
   const __m256i child = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(children + from));
@@ -253,7 +253,7 @@ static inline __m256i load_numbers(const uint32_t* from, uint32_t count) {
   return _mm256_maskload_epi32(reinterpret_cast<const int*>(from), within);
 }
 
-// Writes to `to` those of the `count` numbers at `from` whose bits are set in `set`; `count` is at most eight. May
+// Writes to `to` those of the `count` numbers at `from` that are in the mask `set`; `count` is at most eight. May
 // overwrite eight elements at `to`.
 static inline void pack_numbers(const uint32_t* from, uint32_t count, uint32_t set, uint32_t* to) {
   const __m256i all_numbers = load_numbers(from, count);

@@ -21,7 +21,8 @@ inline constexpr float kMaxNearestReach = 0x1p29f;
 inline constexpr uint32_t kMaxNearestTests = 4096;
 // Maximum of NearestVisit::room.
 inline constexpr uint32_t kMaxCandidates = 64;
-// Maximum number of levels of a tree: limits::kMaxBvhDepth.
+// Length of the stack NearestVisit::groups, which has at most one group for each level of a tree. A tree has at most
+// limits::kMaxBvhDepth levels.
 inline constexpr uint32_t kMaxNearestGroups = 64;
 
 // Triangle that may be nearest: lane `lane` of TriangleTree::blocks[block].
@@ -48,9 +49,9 @@ struct NearestVisit {
   NearestCandidate candidates[kMaxCandidates + kTreeWidth];
   uint32_t next;  // node to open next; kNoChild: take the nearest child of the top group
   uint32_t top;   // number of elements in the stack `groups`
-  // Stack with at most one group per tree level: an opened node with children that are not visited yet. `groups`
-  // contains the indices of these nodes. `keys` contains a sort key for each child slot of each node: the key increases
-  // with the distance of the child's box, and is kVisitedKey if the child was visited.
+  // Stack with at most one group per tree level. A group is an opened node with children that are not visited yet.
+  // `groups` contains the indices of these nodes. `keys` contains a sort key for each child slot of each node: the key
+  // increases with the distance of the child's box, and is kVisitedKey if the child was visited.
   uint32_t groups[kMaxNearestGroups];
   alignas(32) uint32_t keys[kMaxNearestGroups][kTreeWidth];
 

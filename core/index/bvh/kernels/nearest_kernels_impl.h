@@ -20,7 +20,7 @@ namespace {
 
 static_assert(kTreeWidth == 8, "a key holds a slot in three bits");
 
-// Returns the error bound `bound`, or 0 if `bug` is planted: a test then shows that the bound is needed.
+// Returns the error bound `bound`, or 0 if `bug` is planted. A test plants the bug to show that the bound is needed.
 static inline float unless(PlantedBug bug, float bound) { return planted(bug) ? 0 : bound; }
 
 // State of one call of NearestKernels::run().

@@ -21,7 +21,7 @@ namespace {
 
 constexpr uint32_t kMaxFlights = 32;  // maximum number of rays traced interleaved
 constexpr uint32_t kMaxPackets = 2;   // maximum number of packets traced interleaved
-// Maximum number of rays prepared at once. The index of a prepared ray fits in a byte.
+// Maximum number of rays that are prepared together. The index of a prepared ray fits in a byte.
 constexpr uint32_t kPreparedRays = 256;
 static_assert(kPreparedRays <= 256 && kPreparedRays % kTreeWidth == 0 && kMaxFlights <= 256);
 

@@ -65,7 +65,7 @@ constexpr float kSquarePad = 0x1p-19f;  // relative pad of squared distances to 
 // Returns the absolute pad that covers the underflow of squares and of products of more than two lengths.
 static inline float square_floor() { return planted(PlantedBug::kRegionFloor) ? 0 : 0x1p-120f; }
 
-// Returns the error bound `bound`, or 0 if `bug` is planted: a test then shows that the bound is needed.
+// Returns the error bound `bound`, or 0 if `bug` is planted. A test plants the bug to show that the bound is needed.
 static inline float bound_unless(PlantedBug bug, float bound) { return planted(bug) ? 0 : bound; }
 
 // Returns the squared distance from a point to an edge. `offset` is the vector from the start of the edge to the point,
@@ -77,7 +77,7 @@ static inline Floats8 squared_distance_to_edge(Vector8 offset, Vector8 edge, Flo
   return dot(rest, rest);
 }
 
-// Query of region_kernels_impl.h for a ball.
+// Ball to be tested with the nodes and blocks of a tree: the template argument Query of region_kernels_impl.h.
 class BallQuery {
  public:
   inline void set(const KernelBall& ball) {

@@ -72,7 +72,7 @@ struct OverlapBits {
   }
 };
 
-// Query of region_kernels_impl.h for a box.
+// Box to be tested with the nodes and blocks of a tree: the template argument Query of region_kernels_impl.h.
 template <bool kRotated>
 class BoxQuery {
  public:

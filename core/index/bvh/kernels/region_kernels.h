@@ -63,7 +63,7 @@ struct RegionVisit {
   uint32_t judged;     // number of tested triangles for which `judge` was called
   uint32_t top;        // number of elements in the stack `waiting`
   uint32_t next, end;  // range of unprocessed elements of `items`
-  NodeRange rest;  // numbers of a subtree inside the region that did not fit in `numbers` and are still to be copied
+  NodeRange rest;      // triangles inside the region, whose numbers are still to be copied to `numbers`
   alignas(32) uint32_t waiting[kTreeStack];  // stack of nodes to open and subtrees inside the region
   alignas(32) uint32_t items[kMaxRegionItems + kTreeWidth];
 
@@ -80,8 +80,8 @@ struct RegionVisit {
 };
 
 // Kernel of one kind of region.
-// - one() continues a visit until it is complete, `numbers` may have no room for another block, or at least
-//   kMaxRegionTests triangles were tested.
+// - one() continues a visit until it is complete, until `numbers` may have no room for the triangle numbers of another
+//   block, or until at least kMaxRegionTests triangles were tested.
 // - many() answers up to kMaxRegions regions and opens their nodes in turns, so that their memory accesses overlap.
 //   many() writes the triangle numbers found for each region to `numbers`, one region after the other, and the count of
 //   triangle numbers of each region to `counts`. `room` is the length of `numbers`. Returns the number of answered

@@ -1,9 +1,9 @@
 // Traversal of the region kernels, compiled once for each instruction set by the .cc file that includes it. A traversal
 // first opens nodes and collects items: blocks to test, and blocks and subtrees that are completely inside the region.
 // Then it processes the items one by one. The two phases alternate, so that mispredicted branches of one phase do not
-// delay the other. If a node is opened, its overlapping blocks become items at once, and its overlapping child nodes
-// are pushed from the last slot to the first, so that items are collected in storage order. region_ball_impl.h and
-// region_box_impl.h contain the tests and their error bounds.
+// delay the other. If a node is opened, its overlapping blocks immediately become items, and its overlapping child
+// nodes are pushed from the last slot to the first, so that items are collected in storage order. region_ball_impl.h
+// and region_box_impl.h contain the tests and their error bounds.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_REGION_KERNELS_IMPL_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_REGION_KERNELS_IMPL_H_
 
@@ -62,7 +62,7 @@ static inline uint32_t judged(const TriangleBlock& block, uint32_t undecided, co
 struct Sink {
   uint32_t* out;
   size_t count, room;
-  NodeRange rest;  // numbers of a subtree inside the region that did not fit and are still to be copied
+  NodeRange rest;  // triangles inside the region, whose numbers are still to be copied to `out`
   uint32_t tests, judged;
 
   // Returns whether the buffer may be too small for the numbers of one more block.

@@ -2,10 +2,10 @@
 // compiled once per instruction set. The kernels only cull; their callers apply the exact predicates, in double. Any
 // thread may call the kernels.
 //
-// A kernel never drops a value that satisfies the caller's original query, in spite of rounding, because callers widen
-// the query by kCullEpsilon times the magnitudes of the query's coordinates and the brick's coordinates. The widening
-// covers the rounding of the columns to float (2^-24 of a coordinate), of the query to float (2^-24), and of the sums,
-// products and fused products of the kernels (each 2^-24 of its result).
+// A kernel never drops a value that satisfies the caller's original query, in spite of rounding. For this purpose,
+// callers widen the query by kCullEpsilon times the magnitudes of the query's coordinates and the brick's coordinates.
+// The widening covers the rounding of the columns to float (2^-24 of a coordinate), of the query to float (2^-24), and
+// of the sums, products and fused products of the kernels (each 2^-24 of its result).
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_KERNELS_GRID_KERNELS_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_KERNELS_GRID_KERNELS_H_
 
@@ -27,7 +27,7 @@ struct GridRows {
   const float* y;
   const float* z;
   const float* extent;
-  const uint64_t* dead;  // one bit per slot, set if its value is dead, and 64 more bits; null if no value is dead
+  const uint64_t* dead;  // one bit per slot, set if the value is dead, then 64 bits of padding; null if none is dead
   uint32_t count;
   uint32_t begin[kMax];
   uint32_t end[kMax];
@@ -57,14 +57,15 @@ struct GridNear {
 
 struct GridKernels {
   const char* name;
-  // Write the slots of the values whose bounds may intersect the box, line or ball to `slots`, in increasing order
-  // within each row, and return their number. `slots` has room for kMaxValues elements and one vector of eight more.
+  // Write to `slots`, in increasing order within each row, the slots of the values whose bounds may intersect the box,
+  // line or ball. Return the number of these values. `slots` has room for kMaxValues elements and one vector of eight
+  // more.
   uint32_t (*cull_box)(const GridRows& rows, const GridBox& box, uint32_t* slots);
   uint32_t (*cull_line)(const GridRows& rows, const GridLine& line, uint32_t* slots);
   uint32_t (*cull_ball)(const GridRows& rows, const GridBall& ball, uint32_t* slots);
-  // Writes the slots of the values in the shell to `slots`, in increasing order within each row, and their keys to
-  // `keys`; returns the number of these values. A key never exceeds the exact squared distance. Both arrays have room
-  // for kMaxValues elements and one vector of eight more.
+  // Writes to `slots`, in increasing order within each row, the slots of the values in the shell, and writes the keys
+  // of these values to `keys`. Returns the number of these values. A key never exceeds the exact squared distance. Both
+  // arrays have room for kMaxValues elements and one vector of eight more.
   uint32_t (*collect_near)(const GridRows& rows, const GridNear& near, uint32_t* slots, float* keys);
   // Sorts at most kMaxSorted distinct integers in increasing order.
   void (*sort_few)(int32_t* values, uint32_t count);

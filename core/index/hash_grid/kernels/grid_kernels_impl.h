@@ -65,8 +65,8 @@ struct LanesOfMasks {
 constexpr LanesOfMasks kLanesOfMasks;
 #endif
 
-// Writes the slots of the lanes in the mask `kept`, one after the other; lane 0 is slot `slot`. May overwrite eight
-// elements of `slots`.
+// Writes the slots of the lanes in the mask `kept`, one after the other; lane 0 is slot `slot`. May overwrite the first
+// eight elements of `slots`, even if the mask has fewer lanes.
 inline void write_slots(uint32_t kept, uint32_t slot, uint32_t* slots) {
 #ifdef __AVX2__
   const __m256i lanes = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(static_cast<int64_t>(kLanesOfMasks.lanes[kept])));
@@ -120,8 +120,8 @@ struct RowVectors {
   uint32_t lanes[kMax];
 };
 
-// Writes the slots of the live values of the rows that keep() accepts. keep(slot) returns a mask with one bit for each
-// of the eight values from `slot` on. Returns the number of written slots.
+// Writes the slots of those values that are in the rows, are live, and are accepted by keep(). keep(slot) returns a
+// mask with one bit for each of the eight values from `slot` on. Returns the number of written slots.
 template <class Keep>
 inline uint32_t collect(const GridRows& rows, uint32_t* slots, const Keep& keep) {
   uint32_t count = 0;

@@ -1,4 +1,4 @@
-// Tests of `locus context`, and of lines that connect through a context.
+// Tests of `locus context`, and of command lines that connect through a context.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

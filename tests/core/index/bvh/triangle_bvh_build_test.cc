@@ -49,8 +49,8 @@ TEST(TriangleBvhBuildTest, CoincidentTrianglesGiveTheSameBytesOnAnyThreadsToo) {
   expect_equal_bytes(build_mesh(triangles, options), build_mesh(triangles));
 }
 
-// The first build is not cancelled and counts its tasks. Each further build is cancelled at one task, in steps of seven
-// tasks, and must return CANCELLED.
+// The first build is not cancelled and counts its tasks. Each further build is cancelled at one task (the 7th, the
+// 14th, and so on) and must return CANCELLED.
 TEST(TriangleBvhBuildTest, ABuildCancelledAnywhereEndsWithCancelled) {
   const std::vector<Triangle> triangles = large_mesh();
   size_t tasks = 0;

@@ -1,5 +1,5 @@
 // A march along a ray lists slabs of bricks. The brick of every value that passes the slab test is in exactly one slab,
-// whose `near` does not exceed the value's near value.
+// whose `near` is at most the `near` of the ray's interval in the value's bounds.
 #include "core/index/hash_grid/slab_march.h"
 
 #include <gtest/gtest.h>

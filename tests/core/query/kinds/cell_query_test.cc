@@ -1,6 +1,6 @@
 // Cells of free space in small and random worlds. In random worlds, these properties are checked in long double: the
-// cell contains the point, no sampled point of an object or triangle is in the cell, and the point of every plane is at
-// the reported distance.
+// cell contains the query's point; no sampled point of an object or triangle is in the cell; and the reported distance
+// of each plane is the distance between the query's point and the plane's reported point.
 #include "core/query/kinds/cell_query.h"
 
 #include <gmock/gmock.h>

@@ -1,5 +1,5 @@
-// Tests one writer at full speed beside readers. The readers compare the latest revision, and random past ticks, with a
-// model. tests/property/scene_proof_test.cc runs the same test for ten minutes.
+// Tests one writer at full speed and concurrent readers. The readers compare the latest revision, and random past
+// ticks, with a model. tests/property/scene_proof_test.cc runs the same test for ten minutes.
 #include <gtest/gtest.h>
 
 #include "tests/support/full_speed.h"

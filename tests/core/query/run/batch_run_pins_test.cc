@@ -1,5 +1,5 @@
-// Tests slow readers beside a writer at full speed: the memory that the readers pin is bounded, their pins are revoked,
-// and other readers are not affected.
+// Tests slow readers while a writer runs at full speed: the memory that the readers pin is bounded, their pins are
+// revoked, and other readers are not affected.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -52,7 +52,8 @@ bool all_same(const List& a, const List& b, const Same& is_same) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), is_same);
 }
 
-// Returns true if `b` equals `a`, except for columns that the shape's kind does not use.
+// Returns whether `b`, the decoded form of `a`, is correct. All columns must be equal, except the columns of an insert
+// that the kind of its shape does not use: these must be empty in `b`.
 bool same_batch(const UpdateBatch& a, const UpdateBatch& b) {
   return a.frame == b.frame && a.tick == b.tick && a.clear == b.clear && same(a.remove_ids, b.remove_ids) &&
          same(a.remove_groups, b.remove_groups) && all_same(a.inserts, b.inserts, same_insert) &&

@@ -1,4 +1,4 @@
-// Tests ReaderTracker through a scene: the memory that readers may hold, and the updates that wait for them.
+// Tests ReaderTracker through a scene: the memory that readers may hold, and updates that wait for readers.
 #include "core/scene/readers/reader_tracker.h"
 
 #include <atomic>

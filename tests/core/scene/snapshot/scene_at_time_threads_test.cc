@@ -1,4 +1,4 @@
-// Tests readers that query random past times beside a fast writer: every answer matches the recorded state.
+// Tests readers that query random past times while a fast writer runs: every answer matches the recorded state.
 #include <gtest/gtest.h>
 
 #include <atomic>

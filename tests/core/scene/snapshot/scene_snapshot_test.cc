@@ -1,5 +1,5 @@
-// Tests readers that run beside a fast writer and static changes: the readers never wait, and every read sees one
-// complete revision.
+// Tests readers that run concurrently with a fast writer and with static changes: the readers never wait, and every
+// read sees one complete revision.
 #include "core/scene/snapshot/scene_snapshot.h"
 
 #include <atomic>

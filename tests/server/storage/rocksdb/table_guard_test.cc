@@ -38,8 +38,9 @@ class TableGuardTest : public ::testing::Test {
 
 TEST_F(TableGuardTest, IntactTableOpens) { EXPECT_TRUE(opens(bytes_)); }
 
-// Flips a bit of each byte from the properties block, which RocksDB reads before it verifies the block, to the checksum
-// type, which is the first byte of the footer. RocksDB itself verifies the other bytes of the footer.
+// Flips a bit of each byte from the properties block to the checksum type. RocksDB reads the properties block before it
+// verifies this block. The checksum type is the first byte of the footer; RocksDB itself verifies the other bytes of
+// the footer.
 TEST_F(TableGuardTest, AnyFlippedByteFromPropertiesToFooterIsRefused) {
   const size_t properties = bytes_.find("rocksdb.block.based.table.index.type");
   ASSERT_NE(properties, std::string::npos);

@@ -8,8 +8,8 @@
 namespace locus::cli {
 namespace {
 
-// Position of a box in a picture: distances from the picture's centre to the box's left, right, lower and upper side,
-// in units of the distance to the picture's edge; and the depth of the box's nearest corner.
+// Position of a box in a picture. `left`, `right`, `down` and `up` are the distances from the picture's centre to the
+// box's sides, in units of the distance to the picture's edge. `nearest` is the depth of the box's nearest corner.
 struct Shown {
   double left = 0, right = 0, down = 0, up = 0;
   double nearest = HUGE_VAL;

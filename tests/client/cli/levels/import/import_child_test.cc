@@ -175,7 +175,8 @@ TEST_F(ImportChildTest, TheChildWritesOnlyToItsPipe) {
   EXPECT_EQ(answer->bytes, "n");
 }
 
-// Threads that allocate, throw and format all the time hold every lock that a fork could leave locked.
+// If a thread holds a lock during a fork, the lock stays locked in the child. Threads that allocate, throw and format
+// all the time often hold such locks.
 TEST_F(ImportChildTest, AChildOfAProcessWithBusyThreadsAnswers) {
   if (kSanitizedBuild) GTEST_SKIP() << "the allocator of AddressSanitizer 16 does not survive such a fork";
   std::atomic<bool> stop = false;

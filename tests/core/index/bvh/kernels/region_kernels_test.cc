@@ -151,8 +151,8 @@ TEST_P(RegionKernelsTest, FindTheSameAsThePredicatesAmongNearlyFlatTriangles) {
   compare(flat, scaled_count(1'000), 9);
 }
 
-// Blocks contain small and large triangles. For a small triangle, the kernel's error bound, which depends on the
-// block's extent, is much larger than a bound that depends on the triangle's own size.
+// The blocks of the tree contain both small and large triangles. For a small triangle, the kernel's error bound, which
+// depends on the block's extent, is much larger than a bound that depends on the triangle's own size.
 TEST_P(RegionKernelsTest, FindTheSameAsThePredicatesAmongTrianglesOfManySizes) {
   Random random(10);
   std::vector<Triangle> mixed;
@@ -244,8 +244,9 @@ TEST_P(RegionKernelsTest, RegionsWithoutRoomForTheirNumbersAreNotAnswered) {
     ASSERT_LT(answered, kMaxRegions);
     size_t end = 0;
     for (size_t i = 0; i < answered; ++i) EXPECT_EQ(end += together.counts[i], together.ends[i]) << i;
-    // The numbers of the answered regions fit into `room`; the numbers of the next region would not leave
-    // kMinRegionRoom, which a kernel needs because it may write beyond the last number.
+    // The triangle numbers of the answered regions fit into `room`. Behind the numbers of the next region, fewer than
+    // kMinRegionRoom entries of `room` would be left. A kernel needs these entries, because it may write beyond the
+    // last number.
     EXPECT_LE(end, room);
     EXPECT_LT(room, together.ends[answered] + kMinRegionRoom);
   }
