@@ -74,7 +74,7 @@ inline constexpr uint32_t kTestsBetweenChecks = 4096;         // primitive tests
 
 inline constexpr uint32_t kMaxHistoryTicks = 1u << 14;                 // ticks of history per scene
 inline constexpr uint64_t kDefaultHistoryBytes = uint64_t{256} << 20;  // bytes of history per scene
-inline constexpr uint64_t kMaxHistoryBytes = uint64_t{1} << 40;  // max bytes of history that a scene can request
+inline constexpr uint64_t kMaxHistoryBytes = uint64_t{1} << 40;        // max bytes of history that a scene can request
 
 inline constexpr uint32_t kReceiveBytes = 32u << 20;        // size in bytes of the largest received message
 inline constexpr uint32_t kMaxStreams = 1024;               // open update and query streams of one client
