@@ -4,9 +4,9 @@
 #   ./deploy/quickstart.sh [--seconds N] [--objects N] [--keep]
 #
 # Installs missing Debian packages (as root or with sudo), builds Release into build/release, fetches a level, starts
-# locusd on a free loopback port, and runs `locus demo`, which moves objects while clients query and compares their
-# answers with brute force. Then renders the scene to build/quickstart.png. Exits 1 on any difference. --keep leaves the
-# daemon running.
+# locusd on a free loopback port, and runs `locus demo`. The demo moves objects while clients query, and compares the
+# answers of these queries with brute force. Then renders the scene to build/quickstart.png. Exits 1 on any difference.
+# --keep leaves the daemon running.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 

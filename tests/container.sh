@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Builds the image of deploy/Dockerfile and tests a container of it, without a registry or a Docker daemon: the base
-# comes from this machine's Debian sources, buildah builds, podman runs. Checks the compose file and the systemd units
-# too. All files are in build/container; the next run uses them again. Needs root.
+# Builds the image of deploy/Dockerfile and tests a container of it. Needs root, but no registry and no Docker daemon:
+# buildah builds the image on a base made from this machine's Debian sources, and podman runs it. Checks the compose
+# file and the systemd units too. All files are in build/container; the next run uses them again.
 #
 #   ./tests/container.sh            ends with: N passed, M failed, K skipped
 #   ./tests/container.sh --fresh    first removes the files of earlier runs

@@ -37,8 +37,8 @@ std::ostream& operator<<(std::ostream& out, const Quaternion& quaternion);
 std::ostream& operator<<(std::ostream& out, const Number64& number);
 
 std::vector<uint64_t> values_of(const std::vector<Number64>& numbers);
-// Converts numbers to 32 bits. Precondition: every number fits in 32 bits, which the validator fits_32_bits() checks
-// when the command line is parsed.
+// Convert the values of an option to a column. Precondition of values32_of(): every number fits in 32 bits. The
+// validator fits_32_bits() checks this when the command line is parsed.
 std::vector<uint32_t> values32_of(const std::vector<Number64>& numbers);
 std::vector<float> floats_of(const std::vector<double>& numbers);
 std::vector<float> floats_of(const std::vector<Triple>& triples);

@@ -30,9 +30,9 @@ struct GlobalOptions {
 // terminal.
 enum class Progress { kSilent, kLive };
 
-// Source of the lines that run through a context: the program's own command line, a script, or the check of a script
-// before it runs. During the check every line is parsed, but nothing is sent. A script does not choose its connection:
-// the options before `run` on the program's command line do.
+// Source of lines. The lines that run through a context come from the program's own command line, from a script, or
+// from the check of a script before the script runs. During the check every line is parsed, but nothing is sent. A
+// script does not choose its connection; the options before `run` on the program's command line choose it.
 enum class Lines { kProgram, kScript, kScriptCheck };
 
 class Context {

@@ -1,6 +1,6 @@
-// Writer of a report whose rows arrive one after another, in any format: facts known before the rows, the rows, and
-// facts known only after the last row. For answers too large to hold in memory; write_report() uses ReportStream, too.
-// Not thread-safe.
+// Writer of a report whose rows arrive one after another, in any format. A report consists of facts known before the
+// rows, the rows, and facts known only after the last row. For answers too large to hold in memory; write_report() uses
+// ReportStream, too. Not thread-safe.
 //
 // Call order: begin() once, then add() for each row, then end() once.
 #ifndef LOCUS_CLIENT_CLI_REPORT_STREAM_H_

@@ -81,8 +81,9 @@ std::optional<Refusal> run_with_default_scene(const std::vector<std::string>& ar
   return parse_and_run(second, *longer);
 }
 
-// Makes the parser refuse --timeout and the options of the connection, and ignore their environment variables. For
-// lines of a script: all lines use one connection, whose options stand before `run` on the program's command line.
+// Makes the parser refuse --timeout and the options of the connection, and ignore their environment variables. Used for
+// the lines of a script, because all lines of a script use one connection. The options of this connection stand before
+// `run` on the program's command line.
 void restrict_to_script(CLI::App& app) {
   std::vector<const char*> names(std::begin(kConnectionOptionNames), std::end(kConnectionOptionNames));
   names.push_back("--timeout");

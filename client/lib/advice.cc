@@ -13,9 +13,9 @@ struct Advice {
   absl::string_view remedy;
 };
 
-// Advice for a connection that the server closed immediately. The advice names two possible causes, because gRPC's
-// message does not distinguish them: the server requires TLS, or it refused the client's certificate. With TLS 1.3 a
-// server refuses a certificate only after the client has completed its handshake.
+// Advice for a connection that the server closed immediately. There are two possible causes: the server requires TLS,
+// or it refused the client's certificate. The advice names both, because gRPC's message does not distinguish them. With
+// TLS 1.3 a server refuses a certificate only after the client has completed its handshake.
 constexpr absl::string_view kClosedAtOnce =
     "the server ended the connection at once: it may require TLS, or a client certificate that it knows";
 

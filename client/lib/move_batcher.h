@@ -22,9 +22,9 @@ namespace locus::client {
 // If an object is moved twice, the later move wins.
 class MoveBatcher {
  public:
-  // Callback that is called once for each message, with the message's ack, which lists refused moves (unknown ids), or
-  // with the error of the message or of the stream. It runs on a thread of the library, and must not block or call the
-  // batcher.
+  // Callback that is called once for each message, either with the message's ack or with the error of the message or of
+  // the stream. An ack lists refused moves (unknown ids). The callback runs on a thread of the library, and must not
+  // block or call the batcher.
   using AckCallback = std::function<void(const absl::StatusOr<v1::UpdateAck>&)>;
 
   explicit MoveBatcher(std::unique_ptr<UpdateStream> stream, const GatherLimits& limits = {}, AckCallback on_ack = {});

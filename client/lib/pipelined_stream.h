@@ -1,6 +1,6 @@
 // Pipelined stream: base of UpdateStream and QueryStream. Internal to the library. The stream is a bidirectional call
-// whose responses carry the sequence numbers of their requests, with a bounded number of requests in flight. After a
-// broken connection the stream reconnects and sends the unanswered requests again. A connection counts as broken if no
+// with a bounded number of requests in flight. A response carries the sequence number of its request. After a broken
+// connection the stream reconnects and sends the unanswered requests again. A connection counts as broken if no
 // response arrives for Options::patience while requests are unanswered.
 //
 // Threads: each stream owns one thread, the supervisor, which starts one call after another and waits for the end of
@@ -315,8 +315,8 @@ class PipelinedStream {
     return true;
   }
 
-  // Returns the wait before the next call; nothing if the stream must not open another call and ends with `end`. If the
-  // connection is lost while all requests are answered, the loss does not count as a failure.
+  // Returns the wait before the next call. Returns nothing if the stream must end with `end` instead of opening another
+  // call. If the connection is lost while all requests are answered, the loss does not count as a failure.
   std::optional<absl::Duration> wait_before_next(const absl::Status& end) {
     if (broken_off_ || !fatal_.ok() || end.ok() || !worth_reconnecting(end)) return std::nullopt;
     if (items_.empty()) return absl::ZeroDuration();

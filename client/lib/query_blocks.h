@@ -87,8 +87,9 @@ class BlockBuilder {
     block_->set_count_only(true);
     return derived();
   }
-  // Sets the time of each query. `ticks` has N entries or one for all queries. `fractions` contains fractions of the
-  // time from a query's tick to the next tick, at least 0 and less than 1: N entries, one for all queries, or none.
+  // Sets the time of each query. `ticks` has N entries or one for all queries. `fractions` has N entries, one for all
+  // queries, or none. A fraction is the share of the time from the query's tick to the next tick, at least 0 and less
+  // than 1.
   Derived& as_of(absl::Span<const uint64_t> ticks, absl::Span<const float> fractions = {}) {
     assign(*block_->mutable_as_of_ticks(), ticks);
     assign(*block_->mutable_as_of_fractions(), fractions);
@@ -128,8 +129,9 @@ class RayBlock : public BlockBuilder<RayBlock> {
   RayBlock& rays(absl::Span<const float> origins, absl::Span<const float> directions);
   // Sets the whole column of the maximum t, inclusive: N entries, or one for all rays.
   RayBlock& t_max(absl::Span<const float> t_max);
-  // Restricts the result to hits that follow (t, id, triangle) in the order of rows, to continue after a truncated
-  // result: N entries each, or one for all rays. Without ids, hits with the same t are left out.
+  // Restricts the result to hits that follow (t, id, triangle) in the order of rows. Used to continue after a truncated
+  // result. Each column has N entries, or one for all rays. Without `ids`, hits whose t equals the given t are left
+  // out.
   RayBlock& after(absl::Span<const float> ts, absl::Span<const uint64_t> ids = {},
                   absl::Span<const uint32_t> triangles = {});
 
@@ -292,7 +294,7 @@ class SightBlock : public BlockBuilder<SightBlock> {
   SightBlock& target_groups(absl::Span<const uint64_t> groups);
   // Sets the whole column of maximum distances of sight, inclusive: an entry for each viewer, or one for all.
   SightBlock& max_distances(absl::Span<const float> distances);
-  // Restricts the block to the pairs of viewer i and target i, instead of every viewer and every target.
+  // Makes viewer i look only at target i, instead of making every viewer look at every target.
   SightBlock& pairwise();
 
  private:
@@ -334,8 +336,8 @@ class CellBlock : public BlockBuilder<CellBlock> {
   v1::Cells* cells_;
 };
 
-// Block that looks up objects and instances either by ids, with one row for each id in the order of the ids, or by
-// groups.
+// Block that looks up objects and instances, either by ids or by groups. A lookup by ids returns one row for each id,
+// in the order of the ids.
 class LookupBlock : public BlockBuilder<LookupBlock> {
  public:
   explicit LookupBlock(v1::QueryBlock& block) : BlockBuilder(block), lookup_(block.mutable_lookup()) {}

@@ -75,9 +75,9 @@ class ResultRows {
   std::vector<size_t> begins_;  // first row of each query, followed by the total number of rows
 };
 
-// View of the rows of rays and sweeps, and of nearest queries, whose rows ascend by distance. In mode FIRST there is
-// one row per query, and a miss has id 0; in mode ALL the rows of a query ascend by t. Needs the columns T and ID,
-// which are returned by default.
+// View of the rows of rays, sweeps and nearest queries. The rows of a nearest query ascend by distance. For rays and
+// sweeps in mode FIRST there is one row per query, and a miss has id 0; in mode ALL the rows of a query ascend by t.
+// Needs the columns T and ID, which are returned by default.
 class RayHits {
  public:
   static absl::StatusOr<RayHits> of(const v1::BlockResult& block);
@@ -87,7 +87,7 @@ class RayHits {
   // Returns whether the ray has a hit.
   bool hit(size_t ray) const;
   // Return the columns of the ray's nearest hit; +infinity, 0 and kNoTriangle for a miss. triangle() also returns
-  // kNoTriangle for an object, or if the column was not requested.
+  // kNoTriangle for a hit on an object, and if the column of triangles was not requested.
   float t(size_t ray) const;
   uint64_t id(size_t ray) const;
   uint32_t triangle(size_t ray) const;

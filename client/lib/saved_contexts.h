@@ -1,5 +1,5 @@
-// Named contexts: the connection options of servers, in a file of the user, which `locus context` writes. For
-// endpoint_from_environment() and the command line.
+// Named contexts, which are the connection options of servers. They are stored in a file of the user; `locus context`
+// writes this file. For endpoint_from_environment() and the command line.
 //   default = prod
 //   [prod]
 //   address = game.example.com:7575

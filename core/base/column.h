@@ -43,7 +43,7 @@ class ColumnReader {
 enum class ColumnNeed { kEach, kEachOrOne, kOptional };
 
 // Name of a column in an error: "list[index].column", or "list.column" without an index. Borrows the strings `list` and
-// `column`. Only an error builds the text, because nearly all columns are valid.
+// `column`. The text is built only if there is an error, because nearly all columns are valid.
 struct ColumnName {
   absl::string_view list;
   std::optional<size_t> index;

@@ -57,9 +57,9 @@ inline constexpr uint32_t kDefaultCellPlanes = 32;
 inline constexpr uint32_t kDefaultReplyBytes = 4'000'000;
 inline constexpr uint32_t kMaxReplyBytes = 64u << 20;
 
-// Limits of the recent revisions that each scene retains for queries of one exact revision. kRecentRevisions is the
-// maximum number of retained revisions. kRecentBytes is the maximum size in bytes of the data that updates have
-// replaced since the oldest retained revision.
+// Each scene retains recent revisions, so that a query can ask for one exact revision. These are the limits:
+// kRecentRevisions is the maximum number of retained revisions. kRecentBytes is the maximum size in bytes of the data
+// that updates have replaced since the oldest retained revision.
 inline constexpr uint32_t kRecentRevisions = 64;
 inline constexpr uint64_t kRecentBytes = 2u << 20;
 // Readers that pin old revisions keep replaced data from being freed. The maximum size of this data per scene is

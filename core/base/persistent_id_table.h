@@ -7,11 +7,11 @@
 //
 // Invariants: a bucket is one cache line. The hash of an id selects its home bucket. An id is stored in the first
 // bucket, from its home bucket on, that had a free slot when the id was inserted. Each full bucket that an insertion
-// skipped counts the inserted id in `overflow`: a search ends at the first bucket with an overflow of 0, and erase()
+// skipped counts the inserted id in `overflow`. A search ends at the first bucket with an overflow of 0. erase()
 // decrements the counts, so no tombstones are needed. On average, at most three of the five slots of a bucket are used.
-// A leaf that two tables share is immutable: each leaf stores the owner that created it, as in PersistentArray. Source:
-// Knuth, The Art of Computer Programming 3, 6.4 (linear probing, buckets); Bronson and Shi, Open-sourcing F14, 2019
-// (overflow counts).
+// A leaf that two tables share is immutable. As in PersistentArray, each leaf stores the owner that created it, and a
+// table changes a leaf in place only if this owner equals the `owner_` of the table. Source: Knuth, The Art of Computer
+// Programming 3, 6.4 (linear probing, buckets); Bronson and Shi, Open-sourcing F14, 2019 (overflow counts).
 #ifndef LOCUS_CORE_BASE_PERSISTENT_ID_TABLE_H_
 #define LOCUS_CORE_BASE_PERSISTENT_ID_TABLE_H_
 
@@ -68,13 +68,13 @@ class PersistentIdTable {
   // Removes `id`; returns false if the id is absent. O(1), plus copies of leaves as in set(). The table keeps its
   // memory until fit() shrinks it.
   bool erase(Id id);
-  // Resizes the table for `ids` ids: grows it if `ids` exceeds its capacity; shrinks it if `ids` is at most a quarter
+  // Resizes the table for `ids` ids. Grows it if `ids` exceeds its capacity. Shrinks it if `ids` is at most a quarter
   // of its capacity and a table for twice `ids` has fewer leaves. Precondition: ids >= size(). O(size) if it resizes,
   // else O(1).
   void fit(size_t ids);
 
-  // Returns the size in bytes of the leaves that this table has replaced since the last call, and resets the count.
-  // Only snapshots still hold these leaves.
+  // Returns the size in bytes of the leaves that this table has replaced since the last call of this function. Only
+  // snapshots still hold the replaced leaves.
   size_t take_replaced_bytes() { return std::exchange(replaced_bytes_, 0); }
   size_t bytes() const { return unshared_bytes(PersistentIdTable()); }
   // Returns the size in bytes of the leaves, and of the array of leaf pointers, that this table does not share with

@@ -34,7 +34,7 @@ enum class PlantedBug {
   kCrossingInDouble,   // signs of crossings are taken from double even if double cannot decide them
   kCrossingMirror,     // a descending half line counts crossings with the sign of an ascending one
   kCellAtMax,          // on each axis, a triangle does not mark the last of several cells that it overlaps
-  kWayShort,           // a search along a half line that should end in another cell ends in its first cell
+  kWayShort,           // a search along a half line ends in the cell of its start, not in the cell where it should end
   kHalfLineRounding,   // boxes are compared with the point rounded to the nearest float
   kHalfLineStart,      // a half line misses a box that ends exactly at the start of the half line
   // The ray kernels:
@@ -48,8 +48,8 @@ enum class PlantedBug {
   kKernelLimit,       // a hit exactly at the limit is lost
   kKernelTie,         // among equal hits the highest triangle number wins
   kKernelPruneEqual,  // boxes that the ray enters exactly at its best hit are pruned
-  // In a query for all hits, a hit at the same t as the highest stored row, with a lower triangle number, does not
-  // replace that row.
+  // In a query for all hits, a hit does not replace the highest stored row if the hit has the same t as this row and a
+  // lower triangle number.
   kKernelRowTie,
   kKernelHitAfterGivingUp,  // an undecided ray of a packet still records later hits
   // The region kernels:

@@ -68,8 +68,8 @@ absl::Status refuse_limit(absl::string_view field, absl::string_view limit, doub
 absl::Status refuse_full(absl::string_view field, absl::string_view limit, double limit_value, double asked,
                          uint32_t retry_after_ms);
 
-// Returns NOT_FOUND for the scene `name`. Used if the scene does not exist, and also if the caller has no right to see
-// the scene: the text is the same, so that the caller cannot find out whether the scene exists.
+// Returns NOT_FOUND for the scene `name`. Used in two cases: the scene does not exist, or the caller has no right to
+// see it. The text is the same in both cases, so that the caller cannot find out whether the scene exists.
 absl::Status no_scene(absl::string_view name);
 
 // Returns the refusal that refuse() attached to `status`; nullopt if `status` has no refusal.

@@ -24,10 +24,10 @@ struct BoxOverlap {
   double depth = 0;  // length of the shortest way out at t = 0; has no meaning if they do not overlap at t = 0
 };
 
-// Return the overlap of a resting box of half extents `half` with a triangle or with another box. The triangle or the
-// other box moves by `velocity`. Return nullopt if they never share a point. The projections are widened by 2^-46 of
-// the magnitudes involved, which covers their rounding: a contact is never missed. The triangle may have no area, and
-// extents may be zero.
+// Return the overlap of a resting box of half extents `half` with a moving triangle or a moving box; `velocity` is the
+// velocity of this triangle or box. Return nullopt if the two never share a point. The projections are widened by 2^-46
+// of the magnitudes involved, which covers their rounding: a contact is never missed. A triangle without area and zero
+// extents are legal.
 std::optional<BoxOverlap> overlap_with_triangle(Vec3d half, Vec3d a, Vec3d b, Vec3d c, Vec3d velocity);
 // `rotation` rotates the other box's own axes to those of the resting box.
 std::optional<BoxOverlap> overlap_with_box(Vec3d half, Vec3d center, Vec3d other_half, const Rotation& rotation,

@@ -34,7 +34,7 @@ Plane normalized_plane(Vec3d normal, double offset);
 // Convex region. Invariant: the region has an interior point.
 class ConvexRegion {
  public:
-  // Makes the region of the points whose offsets from `origin` lie within all planes and which lie within the world.
+  // Makes the region of all points that lie within the world and whose offsets from `origin` lie within all planes.
   // Returns nullopt if the region has no interior point. At most limits::kMaxPlanes planes. O(planes^2).
   static std::optional<ConvexRegion> make(Vec3d origin, absl::Span<const Plane> planes);
 
@@ -67,9 +67,9 @@ bool region_overlaps(const ConvexRegion& region, const Shape& shape);
 // Relation of a ball to a region. For most objects, the relation of a ball around the object already determines whether
 // the object overlaps the region, so that its exact shape need not be tested.
 enum class RegionSide { kInside, kOutside, kUndecided };
-// Returns kOutside if a ball lies wholly outside of a plane, kInside if its centre lies within all planes, in both
-// cases by more than the sum of the rounding error and `slack`; otherwise kUndecided. `center` is in world axes;
-// `slack` is an upper bound of the error of `center`.
+// Let e be the sum of the rounding error and `slack`. Returns kOutside if the ball lies wholly outside of a plane,
+// farther than e from it. Returns kInside if the centre of the ball lies within each plane, farther than e from it.
+// Otherwise returns kUndecided. `center` is in world axes; `slack` is an upper bound of the error of `center`.
 RegionSide side_of_ball(const ConvexRegion& region, Vec3d center, double radius, double slack);
 
 // Planes of a region in the axes of a mesh, and for each plane the distance by which a corner of the mesh may be

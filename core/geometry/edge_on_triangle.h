@@ -38,11 +38,12 @@ struct EdgeOnVerdict {
 // Returns the hit in extended precision if the ray intersects the triangle at t >= -corner_error; a negative t is
 // returned as 0.
 //
-// If the ray misses in extended precision but hits in double, returns the point of the triangle's border nearest to the
-// ray among the points with t >= 0, provided that its distance from the ray is at most corner_error. So a hit in double
-// stays a hit, and no ray leaks between this triangle and a neighbour that is not nearly edge-on and is therefore
-// tested in double. The visible side of the triangle, on which culling depends, is always computed in extended
-// precision; a triangle that is exactly edge-on has no visible side, so Cull::kBack and Cull::kFront both ignore it.
+// If the ray misses in extended precision but hits in double, the result is a point of the triangle's border: of the
+// points with t >= 0, the one nearest to the ray. It is returned only if its distance from the ray is at most
+// corner_error. So a hit in double stays a hit, and no ray leaks between this triangle and a neighbour that is not
+// nearly edge-on and is therefore tested in double. The visible side of the triangle, on which culling depends, is
+// always computed in extended precision; a triangle that is exactly edge-on has no visible side, so Cull::kBack and
+// Cull::kFront both ignore it.
 //
 // Precondition: the largest component of the direction of `ray` in mesh axes lies within [0.5, 1).
 std::optional<EdgeOnHit> edge_on_hit(const StoredRay& ray, const Triangle& triangle, Cull cull,

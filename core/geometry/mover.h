@@ -28,9 +28,10 @@ enum class AtStart : uint8_t { kHit, kApproach, kPass };
 
 // Contact of a mover with a primitive.
 struct Contact {
-  // Ball or capsule: distance from the primitive to the mover's centre or inner segment. If the centre or segment
-  // reaches into an object, the distance is negative: minus the length of the shortest way out of the object. Box:
-  // minus the length of the box's shortest way out at t = 0; no meaning if the box does not overlap the primitive then.
+  // Ball or capsule: distance from the primitive to the mover's centre or inner segment. If this centre or segment
+  // reaches into a shape, the distance is negative: it is minus the length of the shortest way out of the shape.
+  // Box: the distance has a meaning only for the contact at t = 0, and only if the box overlaps the primitive then. It
+  // is minus the length of the box's shortest way out.
   double distance = 0;
   // Point of the primitive, relative to the mover's start, so that no precision is lost far from the world's origin. If
   // mover and primitive touch, the point belongs to both, up to rounding.

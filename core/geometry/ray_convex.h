@@ -27,9 +27,9 @@ struct Chord {
 };
 
 // Returns the interval of t with |origin + t * direction|^2 <= squared_radius; nullopt if the interval is empty. The
-// distance from the line to the ball's centre is computed by a cross product, which is exact for small integers and,
-// unlike the discriminant b^2 - 4ac, has no cancellation for far origins. A zero direction is legal: the interval is
-// then infinite or empty.
+// distance from the line to the ball's centre is computed by a cross product. The cross product is exact for small
+// integers. Unlike the discriminant b^2 - 4ac, it has no cancellation for far origins. A zero direction is legal: the
+// interval is then infinite or empty.
 std::optional<Interval<double>> line_in_ball(const Line& line, double squared_radius);
 
 // Returns the chord of the line in the ball of the given radius; nullopt if the line misses the ball. A tangent has a

@@ -106,8 +106,8 @@ RoundSweep::Separation RoundSweep::way_out_at(double t, const NearestPair& pair)
   const Vec3d motion = -velocity_;
   if (primitive_ == Primitive::kSegment) return {0, against(cross(half_axis_, b_), motion), pair};
   if (primitive_ == Primitive::kTriangle) return {0, against(cross(b_ - a_, c_ - a_), motion), pair};
-  // The shortest way out of a box is parallel to one of the box's axes, or perpendicular to one of them and to the
-  // segment: these are the normals of the faces of the box swept along the segment.
+  // The shortest way out of a box is parallel to a face normal of the box swept along the segment. These normals are
+  // the axes of the box, and the directions perpendicular to one of these axes and to the segment.
   const Vec3d offset = -(a_ + velocity_ * t);  // of the segment's midpoint from the box's centre
   double depth = std::numeric_limits<double>::infinity();
   Vec3d best;

@@ -34,8 +34,8 @@ class RoundSweep {
   bool touches(const NearestPair& pair, double t) const;
   // Returns the first t in 0 .. limit at which the distance is at most the radius, or nullopt. The result may be
   // earlier than the exact moment, by at most the epsilon of touches() divided by the speed of approach. It is later
-  // than the exact moment only by rounding errors. `from` >= 0 is a lower bound of the result, at which the search
-  // begins.
+  // than the exact moment only by rounding errors. The search begins at `from`, which must be a lower bound of the
+  // result and >= 0.
   std::optional<double> first_contact(double limit, double from = 0) const;
   // Distance, direction and nearest points of primitive and segment. `distance` is negative if the segment reaches into
   // a box. `direction` is the unit vector from the primitive to the segment. If they intersect, it is the direction of

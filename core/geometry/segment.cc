@@ -16,9 +16,9 @@ Vec3d gap_to_box(Vec3d point, Vec3d half) {
 }
 
 // Returns the breakpoints of the segment in ascending order. A breakpoint is a value of s, which selects the point
-// center + s * half_axis, -1 <= s <= 1. The breakpoints are -1 and 1, the ends of the segment, and for each axis the
-// two values of s at which the segment crosses the planes of the box's faces, clamped to -1 .. 1. For an axis to which
-// the segment is perpendicular, these two values are 1.
+// center + s * half_axis, -1 <= s <= 1. Two breakpoints are -1 and 1, the ends of the segment. The others are, for each
+// axis, the two values of s at which the segment crosses the planes of the box's faces, clamped to -1 .. 1. For an axis
+// to which the segment is perpendicular, these two values are 1.
 std::array<double, 8> breakpoints_of(Vec3d center, Vec3d half_axis, Vec3d half) {
   std::array<double, 8> breakpoints;
   breakpoints.fill(1);

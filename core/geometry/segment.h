@@ -17,10 +17,10 @@ Vec3d nearest_on_segment(Vec3d point, Vec3d half_axis);
 double squared_distance_to_segment(Vec3d point, Vec3d half_axis);
 
 // Returns the squared distance between two segments. `offset` is the midpoint of the second relative to the midpoint of
-// the first. The result is the minimum of the four distances between an end of one segment and the other segment and,
-// if the nearest points of the two lines lie inside both segments, of the distance between these two points. Since
-// every candidate is a distance between points of the segments, cancellation for nearly parallel segments never makes
-// the result too small.
+// the first. The result is the minimum of up to five distances: four between an end of one segment and the other
+// segment, and one between the nearest points of the two lines. The fifth distance counts only if these points lie
+// inside the segments. Since every candidate is a distance between points of the segments, cancellation for nearly
+// parallel segments never makes the result too small.
 // Source: Ericson, Real-Time Collision Detection, 2005, 5.1.9.
 double squared_distance_segments(Vec3d offset, Vec3d half_axis, Vec3d other_half_axis);
 

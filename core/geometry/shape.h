@@ -61,8 +61,8 @@ Aabbd bounds_of(const Shape& shape);
 std::optional<ShapeHit> ray_hit(const ObjectRay& ray, const Shape& shape);
 
 // Return whether the shape shares a point with the ball or the box; touching counts. ball_overlaps() also requires that
-// the ball reaches() the shape's own bounds, box_overlaps() that the bounds of the box overlap the shape's own bounds.
-// So culling by any superset of the shape's bounds never changes the result.
+// the ball reaches() the shape's own bounds. box_overlaps() also requires that the bounds of the box overlap the
+// shape's own bounds. So culling by any superset of the shape's bounds never changes the result.
 bool ball_overlaps(const Balld& ball, const Shape& shape);
 bool box_overlaps(const Obbd& box, const Shape& shape);
 

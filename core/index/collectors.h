@@ -37,9 +37,9 @@ class NearestVisitor {
     return true;
   }
 
-  // Returns the nearest value that was hit, or nullopt if there was no hit within the constructor's `distance`.
+  // Returns the nearest value that was hit, or nullopt if there was no hit nearer than the constructor's `distance`.
   const std::optional<V>& best() const { return best_; }
-  // Returns the distance of best(), or the constructor's `distance` if there was no hit.
+  // Returns the distance of best(), or the constructor's `distance` if best() is nullopt.
   S distance() const { return distance_; }
 
  private:
@@ -94,8 +94,8 @@ bool comes_before(const RayHit<V>& a, const RayHit<V>& b) {
   return PrimitiveTraits<V>::id(a.value) < PrimitiveTraits<V>::id(b.value);
 }
 
-// Collector of the nearest `max_hits` hits at distances strictly less than `distance`, appended to `result`. Until
-// finish() the appended part is a heap whose top is its farthest hit; a nearer hit replaces the top.
+// Collector of the nearest `max_hits` hits at distances strictly less than `distance`. Appends the hits to `result`.
+// Until finish() the appended part is a heap whose top is its farthest hit; a nearer hit replaces the top.
 template <Primitive V>
 class NearestFewVisitor {
   using Traits = PrimitiveTraits<V>;

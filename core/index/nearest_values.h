@@ -25,8 +25,8 @@ struct ValueAt {
   }
 };
 
-// Collector of nearest_values(). Until finish() the appended values are a heap whose top is the farthest value; a
-// nearer value replaces the top. One object per query and thread.
+// Collector of nearest_values(). Until finish() is called, the appended values are a heap whose top is the farthest
+// value. If the heap is full, a nearer value replaces the top. One object per query and thread.
 template <Measurable V>
 class NearestValuesVisitor {
  public:

@@ -49,8 +49,8 @@ class BallRegion {
   Aabb<S> bounds_;
 };
 
-// Region of the axis-aligned bounds of a box, which may be rotated, or of a capsule: overlaps() returns true for the
-// boxes that overlap these bounds, compared exactly.
+// Region of the axis-aligned bounds of a capsule or of a box, rotated or not. overlaps() returns true for the boxes
+// that overlap these bounds; the coordinates are compared exactly.
 template <std::floating_point S>
 class BoxRegion {
  public:

@@ -27,8 +27,9 @@ absl::Status check_parts(const std::vector<MeshPart>& parts, size_t triangles);
 class TriangleMesh {
  public:
   // Creates a mesh from the coordinates of V vertices and the vertex indices of T triangles, three numbers each.
-  // `parts` may be empty; otherwise the first part must begin at triangle 0. Returns INVALID_ARGUMENT naming either the
-  // field (`vertices`, `indices` or `parts`) and the invalid vertex, triangle or part, or the exceeded limit. O(V + T).
+  // `parts` may be empty; otherwise the first part must begin at triangle 0. Returns INVALID_ARGUMENT if the arguments
+  // are invalid. The error names the exceeded limit, or else the field (`vertices`, `indices` or `parts`) and the
+  // invalid vertex, triangle or part. O(V + T).
   static absl::StatusOr<TriangleMesh> create(std::vector<float> vertices, std::vector<uint32_t> indices,
                                              std::vector<MeshPart> parts);
 

@@ -100,7 +100,7 @@ ColumnSet returned_columns(const QueryBlock& block);
 
 // Layout of a block's result. kDense has one row per query, even for a miss. kBytes has no rows, but one byte per
 // query. kMatrix has no rows, but bytes_per_query() bytes per query. kCounted has any number of rows per query, and a
-// column with the number of rows of each query; with count_only, only this column.
+// column with the number of rows of each query. With count_only it has this column, but no rows.
 enum class RowLayout : uint8_t { kDense, kBytes, kMatrix, kCounted };
 RowLayout row_layout(const QueryBlock& block);
 // Returns the number of bytes of each query of a kBytes or kMatrix block.
@@ -115,8 +115,8 @@ uint64_t fixed_reply_bytes(const QueryBatch& batch);
 // Returns the batch's max_reply_bytes, or limits::kDefaultReplyBytes if max_reply_bytes is 0.
 uint64_t reply_limit(const QueryBatch& batch);
 
-// Returns an upper bound of the encoded size of the reply in bytes, rows of kCounted blocks included; at most
-// reply_limit().
+// Returns an upper bound of the encoded size of the reply in bytes, including the rows of kCounted blocks. The result
+// is at most reply_limit().
 uint64_t max_encoded_reply_bytes(const QueryBatch& batch);
 
 // Returns INVALID_ARGUMENT with reason LIMIT if fixed_reply_bytes() alone exceeds reply_limit().

@@ -191,8 +191,8 @@ struct QueryBlock {
   absl::Span<const uint64_t> as_of_ticks;    // tick of each query; default: the snapshot's latest state
   absl::Span<const float> as_of_fractions;   // fraction of the way to the next tick, >= 0 and < 1; default: 0
   OutsideHistory outside = OutsideHistory::kReject;
-  // N ids, the anchors of the queries. The positions of a query are relative to the position of its anchor, an object
-  // or an instance, which the query does not find.
+  // N ids of objects or instances: the anchor of each query. The positions of a query are relative to the position of
+  // its anchor, and the query does not find its anchor.
   absl::Span<const uint64_t> anchor_ids;
   bool count_only = false;  // only the number of rows of each query is returned
   using Kind = std::variant<RayColumns, BallColumns, BoxColumns, LookupColumns, NearestColumns, CapsuleColumns,

@@ -60,8 +60,8 @@ struct SceneSpec {
   std::string creator;  // caller who created the scene and whose quota it uses; empty: no creator
 };
 
-// Revision that a caller requests: the latest revision (kLatest ignores `revision`), `revision` or any later revision
-// (kAtLeast), or exactly `revision`. Epoch 0 matches every epoch.
+// Revision that a caller requests. kLatest requests the latest revision and ignores `revision`. kAtLeast requests
+// `revision` or any later revision. kExactly requests `revision`. Epoch 0 matches every epoch.
 struct View {
   enum class Kind : uint8_t { kLatest, kAtLeast, kExactly };
   Kind kind = Kind::kLatest;
@@ -184,9 +184,9 @@ class Scene {
   };
 
   // Drops the oldest ticks of the history until the rest takes at most `bytes`. If a tick is dropped, this call also
-  // drops the revisions that are retained for kExactly views, except the latest revision, whose number does not change.
-  // Waits for a batch that is being applied. Returns the number of bytes by which the history became smaller. Called
-  // when memory is short.
+  // drops the revisions that are retained for kExactly views, except the latest revision. The number of the latest
+  // revision does not change. Waits for a batch that is being applied. Returns the number of bytes by which the history
+  // became smaller. Called when memory is short.
   uint64_t trim_history(uint64_t bytes) LOCUS_EXCLUDES(writer_mutex_, mutex_);
   // Revokes the pins of the oldest revisions until pinned revisions hold at most `bytes`, and cancels the readers of
   // the revoked pins. Called when memory is short. Returns the bytes that become free once these readers have ended.

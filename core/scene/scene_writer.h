@@ -57,7 +57,7 @@ class SceneWriter {
   };
   // Applies the batches in order, as one revision. Calls log() once, before the first new batch is applied, or never if
   // no batch is new. If log() returns an error, applies nothing and returns this error. Preconditions: each batch has
-  // passed check_form(), and may_join() is true for the first batch and each other batch.
+  // passed check_form(), and may_join() is true for every pair of the first batch and another batch.
   absl::StatusOr<Joined> apply_joined(absl::Span<const UpdateBatch* const> batches,
                                       absl::FunctionRef<absl::Status()> log);
 

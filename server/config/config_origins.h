@@ -17,7 +17,7 @@ const char* origin_name(Origin origin);
 
 struct ConfigValue {
   std::string name;   // name of the option, without dashes
-  std::string value;  // value in use, also for defaults that are computed from the machine
+  std::string value;  // value in use; for a default that depends on the machine, the computed value
   Origin origin = Origin::kDefault;
   std::string place;  // where the value is set: the flag, the variable, or path:line of the file; empty for a default
 };

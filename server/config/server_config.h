@@ -51,9 +51,9 @@ struct ServerConfig {
   // directory on a disk of its own, because updates wait for that disk before they are acknowledged.
   std::string data_dir;
 
-  // Size in bytes of a scene's updates in the log at which a snapshot of the scene replaces these updates. For a scene
-  // that is larger than this value, the size of the scene is used instead. Lower the value for a faster start and a
-  // smaller directory; raise it if the log of updates uses most of the disk's bandwidth.
+  // When a scene's updates in the log have this size in bytes, they are replaced by a snapshot of the scene. For a
+  // scene that is larger than this value, the size of the scene is used instead. Lower the value for a faster start and
+  // a smaller directory; raise it if the log of updates uses most of the disk's bandwidth.
   uint64_t snapshot_after = limits::kSnapshotAfterBytes;
 
   // Number of threads that may work on one query batch; 0 = one for each core that this process may use by its affinity
@@ -76,9 +76,9 @@ struct ServerConfig {
   // Format of log lines. `json` writes one object a line, for log collectors.
   LogFormat log_format = LogFormat::kText;
 
-  // Milliseconds after which a query batch is logged as slow, measured from when its revision is available until its
-  // answer; 0 = no batch is logged. At most a few warnings a second are logged. Lower the value to find out what makes
-  // a server slow.
+  // Milliseconds after which a query batch is logged as slow, measured from the time when its revision is available to
+  // the time of its answer; 0 = no batch is logged. At most a few warnings a second are logged. Lower the value to find
+  // out what makes a server slow.
   uint32_t slow_query_ms = 1000;
 
   // Limits that may be lowered but not raised above their defaults; the refusal of a call names the exceeded limit.
@@ -94,11 +94,11 @@ struct ServerConfig {
   // use up processor time by sending compressed messages.
   bool accept_compression = false;
 
-  // Maximum numbers: of the connections of all clients (0 = 4096, or fewer if the process may open only few files), of
-  // the connections of one address, and of the connections that one address may open in a second, on average. In a
-  // burst, an address may open twice the last number. For unix sockets, each user counts as an address. Excess
-  // connections are closed immediately. Raise the last two numbers if many clients share one address, as behind a
-  // proxy.
+  // Three maxima: the number of connections of all clients (0 = 4096, or fewer if the process may open only few files),
+  // the number of connections of one address, and the number of connections that one address may open in a second, on
+  // average. In a burst, an address may open twice the last number. For unix sockets, each user counts as an address.
+  // Excess connections are closed immediately. Raise the last two numbers if many clients share one address, as behind
+  // a proxy.
   uint32_t max_connections = 0;
   uint32_t max_connections_per_address = 1024;
   uint32_t max_new_connections = 200;

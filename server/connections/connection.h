@@ -148,8 +148,8 @@ class Connection {
 };
 
 // Returns the peer of the connected socket `descriptor`, with the name that gRPC gives the connection. gRPC names a
-// unix connection after its descriptor, such as fd:7; the peer of such a connection has the user id of the other
-// process, too. The limit key is the IPv4 address, the first 64 bits of the IPv6 address (a subscriber owns all
+// unix connection after its descriptor, such as fd:7; in the peer of such a connection, `uid` is the user id of the
+// other process. The limit key is the IPv4 address, the first 64 bits of the IPv6 address (a subscriber owns all
 // addresses that begin with these bits), or the user id. Returns nullopt if the peer has already gone.
 std::optional<Peer> peer_of(int descriptor);
 

@@ -17,7 +17,7 @@ struct ConnectionCounters {
   std::atomic<uint64_t> late{0};              // did not begin in time
   std::atomic<uint64_t> idle{0};              // closed because they were idle for too long
   std::atomic<uint64_t> ended{0};             // ended after they were handed over to gRPC
-  std::atomic<uint64_t> long_headers{0};      // closed for a block of headers that was too long, without TLS
+  std::atomic<uint64_t> long_headers{0};      // connections without TLS, closed for a too long block of headers
   std::atomic<uint64_t> floods{0};            // closed for other floods; with TLS only those that the FloodGuard finds
 };
 

@@ -16,9 +16,9 @@ using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 
 constexpr milliseconds kLookInterval{10};
-// Interval between two checks of the connections during kAlertTime after a connection was closed or had many
-// unexplained bytes. It is short because a client that floods sends a megabyte or begins 100 streams in a millisecond,
-// and connects again immediately.
+// Interval between two checks of the connections while the guard is alert. The guard is alert for kAlertTime after a
+// connection was closed or had many unexplained bytes. The interval is short because a client that floods sends a
+// megabyte or begins 100 streams in a millisecond, and connects again immediately.
 constexpr milliseconds kAlertInterval{2};
 constexpr std::chrono::seconds kAlertTime{1};
 constexpr double kAlertBytes = 1 << 20;
@@ -30,11 +30,11 @@ constexpr uint64_t kCallBytes = 1024;
 // Bytes that frames and TLS add to messages: a fixed number for each message, and a share of all message bytes.
 constexpr uint64_t kBytesBesideMessage = 96;
 constexpr uint64_t kFrameShare = 32;  // 1/32: frames of 16 KiB need 0.06 %, records of TLS up to 2 %
-// A peer that reads a reply sends at most one byte of window updates for this number of written bytes.
+// While a peer reads a reply, it sends at most one byte of window updates for each kWrittenPerByte bytes of the reply.
 constexpr uint64_t kWrittenPerByte = 64;
 constexpr uint64_t kSegmentBytes = 64;
-// Received bytes outside of messages after which the streams of a connection are counted, which takes about 15 us. With
-// this number of bytes, a client that resets its calls can begin up to 600 streams.
+// After this number of received bytes outside of messages, the streams of a connection are counted. A count takes about
+// 15 us. With this number of bytes, a client that resets its calls can begin up to 600 streams.
 constexpr uint64_t kCountedBytes = 16 << 10;
 
 double explained_bytes(const CallCounts& now, const CallCounts& before) {

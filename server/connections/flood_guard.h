@@ -25,14 +25,16 @@ namespace locus::server {
 
 // Limits on the traffic of one connection. See assess().
 struct FloodLimits {
-  uint64_t bytes_per_second = uint64_t{1} << 20;  // unexplained bytes that are always accepted
+  uint64_t bytes_per_second = uint64_t{1} << 20;  // unexplained bytes a second that are always accepted
   uint64_t burst_bytes = uint64_t{4} << 20;       // unexplained bytes that are accepted in a burst
-  // Limits on bytes of messages that have arrived and that no call has read yet: `message_bytes`, the maximum size of a
-  // message, for each open call or stream, and `buffered_bytes`, the size of gRPC's buffers, for all of them together.
+  // Limits on the bytes of messages that have arrived but that no call has read yet. The limit for each open call or
+  // stream is `message_bytes`, the maximum size of a message. The limit for all of them together is `buffered_bytes`,
+  // the size of gRPC's buffers.
   uint64_t message_bytes = uint64_t{32} << 20;
   uint64_t buffered_bytes = uint64_t{256} << 20;
-  uint64_t cancelled_per_second = 1000;  // cancelled calls that are always accepted
-  // Streams that the transport may keep in memory for a connection: more than a client may have open at a time.
+  uint64_t cancelled_per_second = 1000;  // cancelled calls a second that are always accepted
+  // Maximum number of streams that the transport may keep in memory for a connection. It is larger than the number of
+  // streams that a client may have open at a time.
   uint64_t streams = 4096;
 };
 
@@ -57,14 +59,15 @@ enum class FloodVerdict : uint8_t { kHonest, kTooManyBytes, kTooManyCancelled, k
 // Assesses a connection by its sample, and updates `budget`. Before the first call, `last` and `second_begin` of the
 // budget must be the sample at the time when the connection was accepted. Received bytes are explained by the metadata
 // of calls, by messages with their frames, and by written bytes, for which the peer sends window updates. A segment
-// counts as at least 64 bytes, because a small segment costs as much work.
+// counts as at least 64 bytes, because handling a smaller segment costs as much work.
 FloodVerdict assess(const FloodSample& sample, const FloodLimits& limits, FloodBudget& budget);
 
 class FloodGuard {
  public:
   using OnClosed = std::function<void(const Connection& connection, const char* reason)>;
-  // Returns the number of streams of a connection that the transport keeps in memory: those that the peer has begun and
-  // that are not yet destroyed, whether or not their calls were accepted. Returns nullopt if the number is unknown.
+  // Function that returns how many streams of a connection the transport keeps in memory. These are the streams that
+  // the peer has begun and that are not yet destroyed, whether or not their calls were accepted. Returns nullopt if the
+  // number is unknown.
   using CountStreams = std::function<std::optional<uint64_t>(Connection& connection)>;
 
   // Starts the thread, which calls `count_streams` for unix connections that send bytes, and for other connections that

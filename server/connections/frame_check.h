@@ -53,8 +53,8 @@ class FrameCheck {
   // Checks a frame whose header is complete. Returns null if the frame is accepted, otherwise the reason of the
   // refusal.
   const char* begin_frame();
-  // Counts a HEADERS frame. It begins a call only if its stream number is odd, as those of clients are, and higher than
-  // the numbers of all earlier calls.
+  // Counts a HEADERS frame. It begins a call only if its stream number is odd, as the numbers of clients' streams are,
+  // and higher than the numbers of all earlier calls.
   void begin_headers();
   // Subtracts from each count the number that is accepted in the time since the last read.
   void let_time_pass(Time now);

@@ -96,10 +96,10 @@ void MemoryKeeper::keep() {
   log_refusals(now);
 }
 
-// Closes the connections that hold or send most if the measured memory exceeds the ceiling of moves; otherwise only
-// measures them. When memory comes near this ceiling, inserts and uploads are already refused and histories already
-// shortened. So the memory that still grows is allocated by gRPC and claimed by no call, for example for calls that are
-// cancelled immediately, or for endless headers.
+// If the measured memory exceeds the ceiling of moves, closes the connections that hold or send most; otherwise only
+// measures what the connections send. When memory comes near this ceiling, inserts and uploads are already refused and
+// histories already shortened. So the memory that still grows is allocated by gRPC and claimed by no call, for example
+// for calls that are cancelled immediately, or for endless headers.
 void MemoryKeeper::shed_connections() {
   const bool is_full = budget_.measured() > budget_.ceiling(MemoryLine::kMoves);
   const size_t closed = shed_(is_full);

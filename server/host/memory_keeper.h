@@ -40,12 +40,12 @@ class MemoryKeeper {
   MemoryKeeper(const MemoryKeeper&) = delete;
   MemoryKeeper& operator=(const MemoryKeeper&) = delete;
 
-  // Measures the process, and frees memory if it is short. The thread calls it; tests may.
+  // Measures the process, and frees memory if it is short. Called by the thread and by tests.
   void keep();
 
   // Returns the number of bytes by which histories were shortened so far.
   uint64_t trimmed_bytes() const { return trimmed_bytes_.load(); }
-  // Returns the number of bytes that the readers cancelled so far had held.
+  // Returns the sum of the bytes that the cancelled readers had held, over all readers cancelled so far.
   uint64_t revoked_bytes() const { return revoked_bytes_.load(); }
 
  private:

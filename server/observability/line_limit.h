@@ -1,5 +1,5 @@
-// Limit on the log lines a second of one kind of event, so that a flood of events does not become a flood of lines.
-// Threads: every member may be called from any thread.
+// Limits how many log lines a second one kind of event causes, so that a flood of events does not become a flood of
+// lines. Threads: every member may be called from any thread.
 #ifndef LOCUS_SERVER_OBSERVABILITY_LINE_LIMIT_H_
 #define LOCUS_SERVER_OBSERVABILITY_LINE_LIMIT_H_
 

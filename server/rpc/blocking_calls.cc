@@ -163,8 +163,8 @@ class BlockingCalls::Call final : private IoLoop::ActiveCall, private MessageStr
     return wait();
   }
 
-  // Sets the answer and claims its memory. The call keeps the claim itself, because the answer may still wait to be
-  // sent when the body and its claims have ended.
+  // Sets the answer and claims its memory. The claim is a member of the call, because the answer may still wait to be
+  // sent after the body and the body's claims have ended.
   void answer(const google::protobuf::Message& response) override {
     answer_ = to_bytes(response);
     caller_->connection().written(answer_.Length());

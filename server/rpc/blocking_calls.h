@@ -29,7 +29,8 @@ class BlockingCalls {
   void add(BlockingMethod method);
   void add(std::vector<BlockingMethod> methods);
 
-  // Returns the service to register with gRPC's server, which passes it every call that no other service serves.
+  // Returns the service to register with gRPC's server. The server passes to this service every call that no other
+  // service serves.
   grpc::AsyncGenericService& service() { return service_; }
   // Requests the first calls from gRPC. Call it once, after the server and before the IO threads have started.
   void listen(IoThreads& threads);

@@ -78,9 +78,9 @@ class Caller {
 
   // Returns the names under which the quotas of the caller's identity and connection are counted.
   std::array<std::string, 2> quota_subjects() const;
-  // Takes `amount` from the quota `kind` of the caller's identity and of its connection. See Quotas::take().
+  // Takes `amount` from the quotas `kind` of the caller's identity and the caller's connection. See Quotas::take().
   absl::Status take_quota(QuotaKind kind, double amount) const;
-  // Takes `amount` from the quota `kind` of the caller's identity and of its connection even if the quota does not
+  // Takes `amount` from the quotas `kind` of the caller's identity and the caller's connection, even if they do not
   // suffice, because the work is already done.
   void charge_quota(QuotaKind kind, double amount) const;
   // Takes `amount` of the quota `kind` until the result is destroyed.
@@ -88,8 +88,8 @@ class Caller {
 
   // Claims `bytes` on `line` of the server's memory budget, and takes them from the quota bytes_in_flight of the
   // caller's identity and connection. For the lines of moves, requests and replies, the bytes count against two shares,
-  // too: that of the connection and that of the caller's identity (MemoryBudget::connection_share()). Returns
-  // RESOURCE_EXHAUSTED, naming the limit or quota, if one of them does not suffice.
+  // too: that of the connection and that of the caller's identity (MemoryBudget::connection_share()). If a limit or
+  // quota does not suffice, returns RESOURCE_EXHAUSTED, which names it.
   absl::StatusOr<CallMemory> claim(MemoryLine line, absl::string_view field, uint64_t bytes) const;
   // Claims `bytes` for work that is never refused, such as work that frees memory, or an answer that is built already.
   CallMemory claim_anyway(MemoryLine line, uint64_t bytes) const;

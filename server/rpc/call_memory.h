@@ -19,8 +19,9 @@ namespace locus::server {
 class CallMemory {
  public:
   CallMemory() = default;
-  // Combines a claim with the quotas that were taken for it, and with the counters of claimed bytes that include it:
-  // Connection::claimed_bytes of `connection`, and `identity`, a counter of ClientShares. Either may be null.
+  // Combines a claim with the quotas that were taken for it, and with the two counters of claimed bytes that include
+  // the claim. These are Connection::claimed_bytes of `connection`, and `identity`, a counter of ClientShares.
+  // `connection` and `identity` may be null.
   CallMemory(MemoryBudget::Claim claim, QuotaHold quota, std::shared_ptr<Connection> connection,
              std::shared_ptr<ClientShares::Counter> identity)
       : claim_(std::move(claim)),

@@ -31,7 +31,8 @@ constexpr const char* kAuthorization = "authorization";
 // Number of wrong credentials after which a connection is closed, because checking them costs up to 0.2 ms each.
 constexpr uint32_t kMaxWrongCredentials = 32;
 
-// Identity that a connection proved with a bearer credential, so that its next call need not prove it again.
+// Identity that a connection has proved with a bearer credential. It is stored so that the connection's next call need
+// not prove it again.
 struct ProvedIdentity {
   std::string bearer;
   uint64_t generation = 0;

@@ -14,7 +14,8 @@ namespace locus::server {
 namespace {
 
 constexpr uint8_t kGzipFirst = 0x1f;
-// Sizes in bytes of the pieces of the result: each is twice as large as the one before.
+// Sizes in bytes of the first and the largest piece of the result. Each piece is twice as large as the one before,
+// until the largest size is reached.
 constexpr uint64_t kFirstPiece = 4096;
 constexpr uint64_t kLargestPiece = 1u << 20;
 constexpr int kGzipOnly = 16;  // added to zlib's windowBits, so that zlib accepts gzip streams only

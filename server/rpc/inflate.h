@@ -25,7 +25,7 @@ using ClaimBytes = absl::FunctionRef<absl::StatusOr<CallMemory>(uint64_t bytes)>
 // Replaces `bytes` by their inflated content. Returns the claims of the memory of the content; each is made by `claim`
 // before its memory is allocated. Returns RESOURCE_EXHAUSTED naming the limit receive_bytes if the content has more
 // than `max_bytes` bytes, INVALID_ARGUMENT (MALFORMED) for bytes that are not exactly one gzip stream, and errors of
-// `claim`; `bytes` are unchanged after an error. Cost: 3 ms for each MiB of the result.
+// `claim`. After an error, `bytes` are unchanged. Cost: 3 ms for each MiB of the result.
 absl::StatusOr<std::vector<CallMemory>> inflate_gzip(ClaimBytes claim, uint64_t max_bytes, grpc::ByteBuffer& bytes);
 
 }  // namespace locus::server

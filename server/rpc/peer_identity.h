@@ -10,9 +10,9 @@
 
 namespace locus::server {
 
-// Returns the name in the certificate that the caller has proved to own: the first URI among its alternative names, or
-// else the first DNS name, or else the common name of its subject. Returns nullopt if the caller has no certificate
-// that was verified.
+// Returns the name in the certificate that the caller has proved to own. The name is the first URI among the
+// certificate's alternative names, or else the first DNS name, or else the common name of the certificate's subject.
+// Returns nullopt if the caller has no certificate that was verified.
 std::optional<std::string> certificate_name(const grpc::ServerContextBase& context);
 
 // Returns the time in seconds since 1970 from which the caller's certificate is no longer valid; the largest number if

@@ -57,7 +57,7 @@ bool accept(SSL* ssl, absl::string_view bytes) {
   return reason == nullptr;
 }
 
-// Counts a handshake that has failed. `result` is the result of SSL_do_handshake() for one step of a handshake.
+// Counts the handshake if it has failed. `result` is the result of SSL_do_handshake() for one step of a handshake.
 void count_handshake(SSL* ssl, int result) {
   if (result > 0 || SSL_is_server(ssl) == 0) return;
   const int error = SSL_get_error(ssl, result);

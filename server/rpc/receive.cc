@@ -28,8 +28,8 @@ using google::protobuf::io::StringOutputStream;
 // Maximum size in bytes of a slice of a response.
 constexpr int kSliceBytes = 1 << 20;
 
-// Maximum sizes in bytes of one text in an envelope (see parse_envelope(); names of scenes are shorter), and of all
-// fields of an envelope.
+// Maximum sizes in bytes of one text in an envelope, and of all fields of an envelope. See parse_envelope(). Names of
+// scenes are shorter than the maximum of a text.
 constexpr uint32_t kMaxEnvelopeText = 256;
 constexpr int kMaxEnvelopeBytes = 2048;
 

@@ -29,7 +29,8 @@ class StreamCounter {
   std::optional<uint64_t> count(Connection& connection);
 
  private:
-  // Asks gRPC for the numbers of connections that it has not been asked for yet, and stores them in the connections.
+  // Asks gRPC for the connections' numbers from next_number_ on, and stores them in the connections. If kAskAllInterval
+  // has passed since it asked for all numbers, asks for all numbers again.
   void learn_numbers();
 
   ConnectionTable& table_;

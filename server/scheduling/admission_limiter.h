@@ -2,9 +2,10 @@
 // identities or the connections of callers: one owner holds at most max() permits, and all owners together hold at most
 // max_in_all().
 //
-// A fair limiter has a third more permits than one owner may hold. These are a reserve for owners that hold few
-// permits: while max() or more permits are in use, only an owner that holds less than 1 / kSmallShare of the reserve
-// gets another permit. So a single owner can hold max() permits, but does not shut others out while it keeps them.
+// A fair limiter has a third more permits than one owner may hold. The additional permits are a reserve for owners that
+// hold few permits: while max() or more permits are in use, only an owner that holds less than 1 / kSmallShare of the
+// reserve gets another permit. So a single owner can hold max() permits, but does not shut others out while it keeps
+// them.
 //
 // Threads: every member may be called from any thread. Invariants: used() permits exist, used() <= max_in_all(), and no
 // owner holds more than max() permits.

@@ -121,7 +121,8 @@ class MemoryBudget {
   uint64_t ceiling(MemoryLine line) const;
   // Returns the bytes that the process uses now.
   uint64_t used() const LOCUS_EXCLUDES(mutex_);
-  // Returns an upper bound of the memory in use: the last measurement plus all claims whose memory it may not include.
+  // Returns an upper bound of the memory in use: the last measurement plus all claims whose memory may be missing from
+  // it.
   uint64_t taken() const { return measured_.load() + ended_since_.load() + claimed_.load(); }
   // Returns the result of the last measurement.
   uint64_t measured() const { return measured_.load(); }

@@ -14,8 +14,8 @@ namespace locus::server {
 // up.
 void take_batch_priority(BatchPriority priority);
 
-// Requests time slices of 0.1 ms from Linux 6.12 or later: the thread keeps its share of a core, but starts sooner
-// after it wakes up, and yields sooner.
+// Requests time slices of 0.1 ms, which Linux supports from version 6.12 on. With short slices, the thread keeps its
+// share of a core, but starts sooner after it wakes up, and yields sooner.
 void take_short_slices();
 
 }  // namespace locus::server

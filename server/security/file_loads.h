@@ -1,5 +1,6 @@
-// Counts how often a set of files was read again because the files changed, and whether the newest files are in use.
-// There is one object for the files of TLS and one for the files of access control. For /metrics.
+// Counts how often a set of files was read again because the files changed, and stores whether the newest files are in
+// use. There is one object for the files of TLS and one for the files of access control. The page /metrics shows the
+// values of both objects.
 //
 // Threads: every member may be called from any thread.
 #ifndef LOCUS_SERVER_SECURITY_FILE_LOADS_H_

@@ -39,8 +39,8 @@ class FileChanges {
   using Mark = std::function<FileMark(const std::string& file)>;
   FileChanges(std::vector<std::string> files, Mark mark = mark_of);
 
-  // Polls all files. Returns true if their state differs from the last reported state and has not changed since the
-  // previous poll.
+  // Polls all files. Returns true if a change must be reported: the present state is equal to the state at the previous
+  // poll, and differs from the state that was reported last. The present state then counts as reported.
   bool look();
 
  private:

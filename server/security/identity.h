@@ -33,10 +33,10 @@ using IdentityPtr = std::shared_ptr<const Identity>;
 // Returns the identity of callers without credentials.
 const IdentityPtr& anonymous_identity();
 
-// Returns the principal of a name: the kind's prefix, then the name. In the name, `%XX` replaces each space, `%`, `*`,
-// `?` and byte that is not a printable ASCII character. Two names never have the same principal. Returns
-// INVALID_ARGUMENT if the name is empty or the principal is longer than kMaxPrincipalBytes. Precondition: `kind` is not
-// kAnonymous.
+// Returns the principal of a name: the kind's prefix, then the name. In the name, `%XX` replaces each space, each of
+// the characters `%`, `*` and `?`, and each byte that is not a printable ASCII character. Two names never have the same
+// principal. Returns INVALID_ARGUMENT if the name is empty or the principal is longer than kMaxPrincipalBytes.
+// Precondition: `kind` is not kAnonymous.
 absl::StatusOr<std::string> principal_of(IdentityKind kind, absl::string_view name);
 
 }  // namespace locus::server

@@ -22,7 +22,8 @@ enum class QuotaKind : uint8_t {
   kObjects,    // objects in the scenes that the identity created
   kScenes,     // scenes that the identity created
   kMeshBytes,  // memory of the meshes that the identity uploaded; content with two names counts twice
-  // Sum of history_bytes, the maximum memory of a scene's history, of the scenes that the identity created.
+  // Sum of history_bytes over the scenes that the identity created. history_bytes is the maximum memory of a scene's
+  // history.
   kHistoryBytes,
 };
 inline constexpr size_t kQuotaKinds = 9;

@@ -62,7 +62,7 @@ class Quotas {
   // Function that returns how much of a quota is in use in addition to the amounts that were taken from this object.
   // Called with the mutex held.
   using Besides = absl::FunctionRef<double()>;
-  // Takes `amount` from the quota of each subject or, if one quota does not suffice, from none, and returns the error
+  // Takes `amount` from the quota of each subject. If one quota does not suffice, takes nothing and returns the error
   // of take(). `kind` must be an amount in use. The result releases the amount when it is destroyed. The result of
   // `besides` is added to the amount in use before the check.
   absl::StatusOr<QuotaHold> hold(

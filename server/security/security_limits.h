@@ -27,7 +27,7 @@ inline constexpr size_t kMaxAuditTextBytes = 1024;  // each text of an audit lin
 inline constexpr uint32_t kAuditFiles = 5;          // audit files kept: the current one and four older ones
 // Pause between two looks at the watched files. A change takes effect when two looks in a row find the same state.
 inline constexpr uint32_t kFileWatchMilliseconds = 200;
-inline constexpr uint32_t kFileRetryMilliseconds = 1000;  // pause between two readings of files that fail
+inline constexpr uint32_t kFileRetryMilliseconds = 1000;  // pause before files that could not be used are read again
 
 static_assert(kMaxAuditedPairs <= kMaxAuditQueue);
 

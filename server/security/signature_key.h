@@ -19,13 +19,14 @@ namespace locus::server {
 // Algorithm of a signature. JWTs that name the algorithm `none` or one with a shared secret are never accepted.
 enum class SignatureAlgorithm : uint8_t { kRs256, kEs256, kEdDsa };
 
-// Returns the algorithm with a name of RFC 7518 or RFC 8037, such as "RS256"; nullopt if the algorithm is not accepted.
+// Returns the algorithm that RFC 7518 or RFC 8037 calls `name`, such as "RS256". Returns nullopt if that algorithm is
+// not accepted.
 std::optional<SignatureAlgorithm> signature_algorithm_named(absl::string_view name);
 
 class SignatureKey {
  public:
-  // Reads a JSON Web Key. Returns UNIMPLEMENTED with the reason for a key of another type or for another use, which the
-  // caller should skip. Returns INVALID_ARGUMENT for a key that is private, secret, too weak or wrong.
+  // Reads a JSON Web Key. Returns UNIMPLEMENTED with the reason if the key has another type or another use; the caller
+  // should skip such a key. Returns INVALID_ARGUMENT for a key that is private, secret, too weak or wrong.
   static absl::StatusOr<SignatureKey> read(const json_t* jwk);
 
   SignatureAlgorithm algorithm() const { return algorithm_; }

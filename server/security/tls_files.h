@@ -30,7 +30,7 @@ struct TlsContents {
 
 inline constexpr size_t kMaxTlsFileBytes = size_t{4} << 20;
 
-// Reads the files. Returns an error that names the file that cannot be read or is too large.
+// Reads the files. If a file cannot be read or is too large, returns an error that names this file.
 absl::StatusOr<TlsContents> read_tls_files(const TlsFiles& files);
 
 // Returns OK if servers can use `contents`: the certificates and the key can be read, and the key is that of the first
@@ -41,7 +41,7 @@ absl::Status check_tls_contents(const TlsFiles& files, const TlsContents& conten
 // followed by the certificate of their issuer.
 std::vector<std::string> warnings_about(const TlsFiles& files, const TlsContents& contents);
 
-// Returns the time in seconds since 1970 from which the first certificate in `pem` is no longer valid; 0 if there is no
+// Returns the time, in seconds since 1970, at which the first certificate in `pem` has expired; 0 if there is no
 // certificate that can be read.
 int64_t certificate_end(const std::string& pem);
 

@@ -183,7 +183,7 @@ absl::StatusOr<TokenTable> TokenTable::read(const std::string& file, std::vector
 }
 
 const TokenEntry* TokenTable::find(absl::string_view token, int64_t now) const {
-  static constexpr TokenHash kNobody{};  // compared for an unknown id, which then takes as long as a known id
+  static constexpr TokenHash kNobody{};  // compared if the id is unknown, to take as long as for a known id
   const absl::string_view id = id_of(token);
   if (id.empty()) return nullptr;
   const TokenHash hash = hash_of(token);

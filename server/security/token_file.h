@@ -44,8 +44,8 @@ class TokenTable {
   // to `warnings` if others can read it.
   static absl::StatusOr<TokenTable> read(const std::string& file, std::vector<std::string>& warnings);
 
-  // Returns the entry of a token; nullptr if there is none or it has expired at `now`. Takes the same time for a known
-  // id with another secret as for an unknown id. The pointer is valid until the table is destroyed.
+  // Returns the entry of a token; nullptr if there is none or it has expired at `now`. Takes as long for an unknown id
+  // as for a known id with a wrong secret. The pointer is valid until the table is destroyed.
   const TokenEntry* find(absl::string_view token, int64_t now) const;
   // Returns whether a token with this id and hash is listed and has not expired.
   bool contains(absl::string_view id, absl::string_view hash, int64_t now) const;
@@ -66,7 +66,7 @@ std::string new_token(absl::string_view id);
 // Returns the line of a token file, with its final newline.
 std::string token_line(const TokenEntry& entry);
 
-// Adds a new token to the file, which is created with mode 0600 if missing, and returns the token. Returns
+// Adds a new token to the file and returns the token. Creates the file with mode 0600 if it is missing. Returns
 // ALREADY_EXISTS if the id is listed, INVALID_ARGUMENT if the id or the comment is malformed. The file is replaced
 // atomically, with its mode.
 absl::StatusOr<std::string> add_token(const std::string& file, absl::string_view id, int64_t now,

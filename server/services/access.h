@@ -31,7 +31,7 @@ class Access {
 
   // Starts two threads. The first reads the files once more and then watches them. The second calls `recheck_calls`
   // twice a second, because credentials expire, and writes the counts of updates to the audit log. `recheck_calls` must
-  // make every running call check its rights. It is also called after each change of the files.
+  // make every running call check its rights; it is also called after each change of the files.
   void start(std::function<void()> recheck_calls);
   // Ends the threads. `recheck_calls` is not called afterwards.
   void stop();

@@ -31,8 +31,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr uint32_t kBackupRetryMs = 5000;
-// Name of the copy's directory inside kBackupDirectory. kBackupDirectory is used by the copy alone, so that removing
-// it also removes files that the log leaves beside the copy.
+// Name of the copy's directory inside kBackupDirectory. The directory kBackupDirectory is used for nothing else, so it
+// is removed as a whole, with any files that the log has left there beside the copy.
 constexpr const char* kCopy = "copy";
 // Upper bound of the memory of a backup, as a multiple of limits::kBackupPieceBytes. A piece's message and its
 // serialized bytes exist at the same time; the rest is a margin.

@@ -73,7 +73,8 @@ void log_ended(size_t closed, const char* reason) {
   log(LogLevel::kWarning, "connections closed", {{"count", absl::StrCat(closed)}, {"reason", reason}});
 }
 
-// Audits the TLS connections that failed since the counts `before`, and updates `before`. Called once a second.
+// Audits the TLS connections that failed since the counts in `before` were taken, and updates these counts. Called once
+// a second.
 void note_failed_tls(const RpcState& state, TlsCounts& before) {
   const TlsCounts now = tls_counts();
   const auto report = [&state](uint64_t count, const absl::Status& status) {
@@ -85,9 +86,9 @@ void note_failed_tls(const RpcState& state, TlsCounts& before) {
   before = now;
 }
 
-// Returns functions that report reloaded TLS files and failed handshakes. If clients need certificates, the functions
-// also close connections whose certificate may no longer be valid, since TLS checks a certificate only when a
-// connection begins.
+// Returns functions that report reloaded TLS files and failed handshakes. TLS checks a certificate only when a
+// connection begins. Therefore, if clients need certificates, the functions also close connections: those whose
+// certificate has expired and, after a client CA was removed, all TCP connections.
 TlsHooks tls_hooks(const ServerConfig& config, RpcState& state) {
   TlsHooks hooks;
   hooks.reloaded = [&state](const absl::Status& status) { report_reload(state, state.tls_loads, "TLS files", status); };

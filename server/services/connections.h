@@ -60,7 +60,7 @@ class Connections {
   void start(grpc::Server& server);
   // Reads the files of TLS again. Returns whether they have changed and are in use.
   bool reload_tls() { return tls_ != nullptr && tls_->reload(); }
-  // Returns the files of TLS in use, for other ports; null without TLS.
+  // Returns the files of TLS that are in use, so that other ports can use them; null without TLS.
   const TlsCredentials* tls() const { return tls_.get(); }
   // Closes the listening sockets; the connections stay.
   void stop_accepting();

@@ -82,7 +82,7 @@ uint64_t placed_count(const v1::ChangeInstancesRequest& request) {
 }
 
 // Chooses ids for placements without ids. With `no_wait` the reply contains the ids although the change is not built
-// yet, so the ids are drawn here: kChosenIdBit and 63 random bits below it.
+// yet, so the ids are drawn here. Each id is kChosenIdBit and 63 random bits below it.
 void choose_ids(v1::ChangeInstancesRequest& request) {
   std::random_device device;
   for (v1::Placement& placement : *request.mutable_place()) {

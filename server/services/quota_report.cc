@@ -20,7 +20,7 @@ constexpr uint64_t kEntryBytes = 2048;
 
 bool is_connection(const SubjectUse& use) { return absl::StartsWith(use.subject, kConnection); }
 
-// Adds the amounts of the scenes, objects and meshes that the subject created to `use`.
+// Adds to `use` the amounts of the scenes, objects and meshes that the subject created.
 void add_created(const CreatorUse& created, SubjectUse& use) {
   const std::pair<QuotaKind, uint64_t> amounts[] = {{QuotaKind::kObjects, created.objects},
                                                     {QuotaKind::kScenes, created.scenes},

@@ -19,8 +19,8 @@ namespace locus::server {
 absl::Status get_quotas(const Host& host, const Caller& caller, const v1::GetQuotasRequest& request,
                         v1::GetQuotasResponse& response);
 
-// Returns the name of each quota that an identity or connection has, with the largest share of that quota that one of
-// them uses (1 = all). Considers only identities and connections that use or created something.
+// Returns (name, share) of each quota that any identity or connection has. `share` is the largest part of its quota
+// that any one of them uses (1 = all of it). Considers only identities and connections that use or created something.
 std::vector<std::pair<std::string, double>> largest_quota_shares(const Host& host);
 
 }  // namespace locus::server

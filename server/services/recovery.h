@@ -1,6 +1,7 @@
-// Recovers meshes and scenes from the log when the server starts: meshes first, then the scenes that place them,
-// several at a time. Damaged meshes and scenes are registered as damaged, and calls that name them are refused; all
-// other meshes and scenes are served. Logs the progress. Chooses the epochs of new and of recovered scenes.
+// Recovers meshes and scenes from the log when the server starts: first all meshes, then the scenes that place them.
+// Recovers several meshes or scenes at the same time. Damaged meshes and scenes are registered as damaged, and calls
+// that name them are refused; all other meshes and scenes are served. Logs the progress. Chooses the epochs of new and
+// of recovered scenes.
 #ifndef LOCUS_SERVER_SERVICES_RECOVERY_H_
 #define LOCUS_SERVER_SERVICES_RECOVERY_H_
 
@@ -12,8 +13,8 @@
 
 namespace locus::server {
 
-// Returns a new epoch, which names one unbroken sequence of revisions: a random 64-bit number from std::random_device,
-// never 0. Equal epochs are practically impossible, also between runs of the server. Any thread.
+// Returns a new epoch: a random 64-bit number from std::random_device, never 0. An epoch names one unbroken sequence of
+// revisions. Equal epochs are practically impossible, also between runs of the server. Any thread.
 uint64_t new_epoch();
 
 // Fills host.registry with the meshes and scenes of the log. Call it before calls are served; `host` must have a log

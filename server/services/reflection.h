@@ -1,6 +1,6 @@
 // Server reflection (grpc.reflection.v1alpha): tells tools such as grpcurl the schema of this server. gRPC's own
-// implementation is a synchronous service, whose messages would be parsed before their memory is claimed. Functions
-// without state; any thread.
+// implementation is not used, because it is a synchronous service: gRPC would parse its messages before their memory is
+// claimed. Functions without state; any thread.
 #ifndef LOCUS_SERVER_SERVICES_REFLECTION_H_
 #define LOCUS_SERVER_SERVICES_REFLECTION_H_
 

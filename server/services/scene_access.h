@@ -27,8 +27,8 @@ absl::StatusOr<CallMemory> claim_copy(const Caller& caller, uint64_t bytes, Memo
 // server drains. If the server drains, the error is UNAVAILABLE, DRAINING.
 absl::StatusOr<SnapshotPin> wait_for(const Scene& scene, const View& view, SteadyTime until, const Caller& caller);
 
-// Waits until every reader whose pin on a snapshot of the scene was revoked has released the pin. Once the wait has
-// taken longer than a second, calls Scene::revoke_overdue_readers() repeatedly. Calls `stop` every 50 ms. If `stop`
+// Waits for the readers whose pins on snapshots of the scene were revoked, until they have released these pins. After
+// the first second of the wait, calls Scene::revoke_overdue_readers() repeatedly. Calls `stop` every 50 ms. If `stop`
 // returns DEADLINE_EXCEEDED, returns the scene's error, which names the limit pinned_bytes; returns any other error of
 // `stop` unchanged.
 absl::Status wait_for_readers(Scene& scene, const std::function<absl::Status()>& stop);

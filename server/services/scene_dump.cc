@@ -179,8 +179,8 @@ absl::Status dump_scene(Host& host, const Caller& caller, const v1::DumpSceneReq
   RETURN_IF_ERROR(check_work(caller));
   ASSIGN_OR_RETURN(SnapshotPin snapshot, wait_for(*scene, to_view(request.view()), caller.wait_until(false), caller));
   ASSIGN_OR_RETURN(const CallMemory claim, claim_copy(caller, dump_cost(*snapshot)));
-  // A caller that reads slowly could keep the snapshot pinned for any time. Therefore the call is cancelled when the
-  // pin is revoked.
+  // A caller that reads slowly could keep the snapshot pinned without a time limit. Therefore the call is cancelled
+  // when the pin is revoked.
   snapshot.on_revoke([&caller] { caller.cancel(); });
   const auto take = [&](const v1::DumpSceneResponse& piece) {
     return snapshot.status().ok() && caller.stop().ok() && stream.write(piece);

@@ -21,7 +21,7 @@
 namespace locus::server {
 namespace {
 
-// Maximum size in bytes of a page of meshes, which leaves room for the page token. A page has at least one mesh.
+// Maximum size in bytes of the meshes in a page. It leaves room for the page token. A page has at least one mesh.
 constexpr size_t kMaxPageBytes = 3'900'000;
 static_assert(kMaxPageBytes + limits::kMaxNameLength + 16 <= limits::kDefaultReplyBytes);
 

@@ -158,7 +158,7 @@ void audit_refusal(const Host& host, const HttpRequest& reader, const Identity& 
 }
 
 // Returns OK if the reader may read /metrics. Otherwise returns UNAUTHENTICATED if the credentials are missing or not
-// accepted, or PERMISSION_DENIED.
+// accepted, else PERMISSION_DENIED.
 absl::Status check_reader(const Host& host, const HttpRequest& reader) {
   if (host.access == nullptr || !host.access->enabled()) return absl::OkStatus();
   Credentials credentials;

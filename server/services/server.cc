@@ -51,7 +51,7 @@ constexpr int kPingAnswerMs = 10'000;
 // Minimum interval in milliseconds between keepalive pings from a client. With these pings a client detects that this
 // server is unreachable.
 constexpr int kMinPingIntervalMs = 5'000;
-// Maximum time after the end of all calls in which gRPC sends the last statuses and ends the health watchers.
+// Maximum time that gRPC has, after all calls have ended, to send the last statuses and to end the health watchers.
 constexpr milliseconds kLastWords{500};
 
 // Starts serving the HTTP pages, over TLS if `tls` is not null. Returns null if the config turns them off, or if they

@@ -1,6 +1,7 @@
-// Reports events of the server that no call causes to /metrics and to the audit log. One kind of event is a changed
-// file of TLS or access control that was put into use or could not be used. The other kind is a connection that was
-// refused or closed. Other code writes lines about these events to the normal log.
+// Reports two kinds of events that no call causes. The first kind: changed files of TLS or access control were put into
+// use, or could not be used. Such an event is counted for /metrics and written to the audit log. The second kind:
+// connections were refused or closed. Such an event is only written to the audit log. Other code writes lines about
+// these events to the normal log.
 #ifndef LOCUS_SERVER_SERVICES_SERVER_EVENTS_H_
 #define LOCUS_SERVER_SERVICES_SERVER_EVENTS_H_
 

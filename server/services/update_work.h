@@ -1,8 +1,8 @@
 // Work on one update batch, from its message to its ack: converts the batch, claims memory from the budget, and posts
 // the batch to the update queue.
 //
-// Threads: members run on the call's IO loop, except batch(), stop() and done(), which the update
-// queue calls on any thread.
+// Threads: members run on the call's IO loop, except batch(), stop() and done(), which the update queue calls on any
+// thread.
 #ifndef LOCUS_SERVER_SERVICES_UPDATE_WORK_H_
 #define LOCUS_SERVER_SERVICES_UPDATE_WORK_H_
 

@@ -40,8 +40,8 @@ def write(path, text):
 
 
 class MemoryGroup:
-    """Memory limit: a cgroup below that of this process or of one of its ancestors, or RLIMIT_AS if no cgroup can be
-    created. `kind` names which of the two is used.
+    """Memory limit: a new cgroup below the cgroup of this process or below one of its ancestors. If no cgroup can be
+    created, the limit is RLIMIT_AS. `kind` names what is used: `cgroup v1`, `cgroup v2` or `RLIMIT_AS`.
     """
 
     NAMES = {"cgroup v2": ("memory.max", "memory.peak", "memory.events"),

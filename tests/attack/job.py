@@ -16,8 +16,8 @@ MAX_SLOWER, MAX_SHIELDED_SLOWER = 10, 5  # factors by which the victim's p99 may
 # Status codes that give the caller no information, or that no request of a client may cause.
 NEVER = ("INTERNAL", "UNKNOWN", "CLOSED", "TIMEOUT", "RESET", "DATA_LOSS", "ABORTED")
 
-# HAProxy 2.6 sometimes refuses a call with a reset without headers (REFUSED_STREAM) before the client has sent the
-# whole message. gRPC reports such a reset as UNAVAILABLE.
+# HAProxy 2.6 sometimes refuses a call before the client has sent the whole message. It then sends a reset
+# (REFUSED_STREAM) and no headers. gRPC reports such a reset as UNAVAILABLE.
 REFUSED_STREAM = ("RESET", "HTTP status none")
 
 # One row of the table. `steps(job)` returns (name, function of job) pairs, which run one after another. `what`

@@ -70,7 +70,7 @@ def insert_balls(first, count):
 
 
 def move_balls(first, count, tick, height):
-    """Returns an UpdateBatch with a tick, which moves balls to a height."""
+    """Returns an UpdateBatch that has the tick `tick` and moves balls to the height `height`."""
     places = [v for i in range(count) for v in (float(i % 100), float(i // 100 % 100), height)]
     return fixed64(2, tick) + delimited(7, fixed64s(1, range(first, first + count)) + floats(2, places))
 
@@ -96,7 +96,9 @@ def awaiting(revision):
 
 
 def everything(count, reply_bytes):
-    """Returns a QueryBatch of balls that contain the whole scene, with every column. It causes the largest replies."""
+    """Returns a QueryBatch of balls, each of which contains the whole scene. It requests every column, and so causes
+    the largest replies.
+    """
     columns = delimited(4, bytes((2, 7, 8, 9, 10)))
     balls = delimited(17, floats(1, [0.0] * (3 * count)) + floats(2, [1e6]))
     return delimited(2, columns + number(8, 1 << 20) + balls) + fixed32(5, reply_bytes)

@@ -28,7 +28,7 @@ std::string bytes_of(size_t count) {
   return bytes;
 }
 
-// A server with a data directory, whose log is a fake that only makes backups.
+// A server with a data directory and a fake log, which can only make backups.
 class BackupRpcTest : public ::testing::Test {
  protected:
   BackupRpcTest() { log_.files = {{"CURRENT", "MANIFEST-1\n"}, {"empty", ""}, {"tables/000007.sst", "seven"}}; }

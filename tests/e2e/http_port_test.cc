@@ -96,7 +96,7 @@ TEST_F(HttpPortTest, WhileDrainingTheServerIsAliveAndNotReady) {
   create_scene(stubs, "world");
   EXPECT_EQ(http_get(http_port(), "/healthz").code, 200);
   EXPECT_EQ(http_get(http_port(), "/readyz").body, "ready\n");
-  // The upload runs until its caller has sent the whole mesh, which keeps the server from ending.
+  // This upload keeps the server from ending until the caller has sent the whole mesh.
   grpc::ClientContext context;
   set_timeout(context);
   v1::UploadMeshResponse uploaded;

@@ -2,8 +2,8 @@
 
 ctest reports a test as "not run" if its program is missing, if its fixture failed, or if it skipped itself; this
 program counts only the last case as skipped. A test that Python's unittest skipped gets its own line,
-because the ctest test that contains it can pass nevertheless. For the same reason, each attack (see tests/attack) of
-which all or some steps were skipped gets its own line.
+because the ctest test that contains it can pass nevertheless. For the same reason, an attack (see tests/attack) gets
+its own line if some or all of its steps were skipped.
 """
 import re
 import sys

@@ -45,7 +45,7 @@ void add_shell(const Mesh& other, float scale, Vec3f offset, bool reversed, Mesh
   number_in_order(mesh);
 }
 
-// Returns a torus of radii 1 and `inner`, whose corners are not shared by index.
+// Returns a torus of radii 1 and `inner`. Neighbouring triangles have bitwise equal corners.
 Mesh torus(int sides, double inner) {
   const auto corner = [&](int i, int j) {
     const double u = 2 * std::numbers::pi * (i % sides) / sides, v = 2 * std::numbers::pi * (j % sides) / sides;

@@ -1,5 +1,5 @@
-// No ray leaves a closed mesh: tens of thousands of rays from inside are aimed at corners and edges in each run, and a
-// million rays for each scale and distance in the long run.
+// No ray leaves a closed mesh. Each run aims tens of thousands of rays from inside at corners and edges; the long run
+// aims a million rays for each scale and distance.
 #include "tests/support/proof/leak_proof.h"
 
 #include <gtest/gtest.h>

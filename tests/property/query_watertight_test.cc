@@ -1,5 +1,5 @@
-// Every ray from inside a closed mesh hits the mesh, if it runs as a query of a batch: for placed, rotated, scaled and
-// distant instances, for meshes in two halves, and for modes FIRST and ANY.
+// Every ray from inside a closed mesh hits the mesh, also when the ray is a query of a batch. This holds for placed,
+// rotated, scaled and distant instances, for meshes in two halves, and for the modes FIRST and ANY.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

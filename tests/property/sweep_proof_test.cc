@@ -1,4 +1,4 @@
-// Proves that no sweep misses and none hits too early: balls, capsules and boxes move past the triangles of placed
+// Proves that no sweep misses and none hits too early. Balls, capsules and boxes move past the triangles of placed
 // meshes, and the answers of the query engine are compared with a search in long double. Each run tests a hundred
 // thousand sweeps; the long run tests ten million, or the number in LOCUS_PROOF_SWEEPS.
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
-// Paths of the programs of this build, which are in the folder of the running test. The paths are not compiled in, so
-// that checkouts in different folders share the entries of the compiler cache.
+// Paths of the programs of this build. The programs are in the folder of the running test. The paths are not compiled
+// in, so that checkouts in different folders share the entries of the compiler cache.
 #ifndef LOCUS_TESTS_SUPPORT_BUILT_PROGRAM_H_
 #define LOCUS_TESTS_SUPPORT_BUILT_PROGRAM_H_
 

@@ -193,8 +193,8 @@ inline std::vector<CrossingTrial> ordinary_crossing_trials() {
   return trials;
 }
 
-// Makes trials at many scales, some of which make products underflow or overflow, and trials far away from the origin,
-// the farthest of them where the rounding of a point to float exceeds the size of a triangle.
+// Makes trials at many scales; at some scales, products underflow or overflow. Also makes trials far from the origin;
+// in the farthest trial, the rounding of a point to float exceeds the size of a triangle.
 inline std::vector<CrossingTrial> scaled_crossing_trials() {
   std::vector<CrossingTrial> trials;
   const std::vector<Triangle> soup = triangle_soup(30, 4);
@@ -270,8 +270,8 @@ inline std::vector<Triangle> outward_city(int side, uint64_t seed) {
 }
 
 // Makes trials of closed meshes: meshes with winding numbers other than 0 and 1, a flat mesh, a mesh of many separate
-// spheres, a city, meshes of extreme sizes, and far meshes, the farthest so far away that cells are smaller than the
-// spacing of floats.
+// spheres, a city, meshes of extreme sizes, and meshes far from the origin. At the farthest mesh, cells are smaller
+// than the spacing of floats.
 inline std::vector<CrossingTrial> closed_crossing_trials() {
   const std::vector<Triangle> sphere = bumpy_sphere(12, 0.2, 7), inner = moved(bumpy_sphere(6, 0.1, 8), 0.4f, {});
   std::vector<std::vector<Triangle>> crowd, stack;

@@ -1,6 +1,6 @@
-// Rays that meet a triangle at an angle whose sine is at most 2^-36, each with the reference's answer. The ray proof
-// (proof/ray_proof.h) with 100,000,000 rays and seed 4 found that these rays were answered wrongly when they were
-// tested in double only. Plain data.
+// Rays that meet a triangle at an angle whose sine is at most 2^-36, each with the reference's answer. When rays were
+// tested in double only, these rays were answered wrongly. The ray proof (proof/ray_proof.h) found them with
+// 100,000,000 rays and seed 4. Plain data.
 #ifndef LOCUS_TESTS_SUPPORT_EDGE_ON_CASES_H_
 #define LOCUS_TESTS_SUPPORT_EDGE_ON_CASES_H_
 

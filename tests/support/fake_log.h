@@ -1,5 +1,5 @@
-// A log that stores nothing and whose backups contain the files that a test has set. Used by tests of the code that
-// handles a backup after the log has made it.
+// A log that stores nothing. Its backups contain the files that a test has set. Used by tests of the code that handles
+// a backup after the log has made it.
 //
 // Threads: back_up() may be called from any thread. A test sets the members before the server starts.
 #ifndef LOCUS_TESTS_SUPPORT_FAKE_LOG_H_

@@ -39,9 +39,9 @@ inline std::string grid_difference(const ObjectScene& scene, Random& random) {
   return "";
 }
 
-// Compares the objects that a grid passes to the visitor of a ball with tests of all objects: for the ball alone, for
-// the ball in a RegionWalk, and for a RegionWalk with the ball's bounds only. Uses the balls of the scene and balls
-// that just touch some of its objects.
+// Tests each ball in three ways: by a visit of the ball alone, in a RegionWalk of all balls, and in a RegionWalk of the
+// balls' bounds only. The number of objects found must equal that of a test of all objects. Uses the balls of the scene
+// and balls that just touch some of its objects.
 inline std::string grid_ball_difference(const ObjectScene& scene, Random& random) {
   ObjectGrid grid(random_grid_options(random));
   grid.apply({}, scene.values);

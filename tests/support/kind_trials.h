@@ -45,8 +45,8 @@ inline std::string contains_difference() {
   return "";
 }
 
-// Returns the first seed whose random triangle and point have another crossing than the one computed in integers; empty
-// if there is none.
+// Returns the first seed for whose random triangle and point crossing() differs from exact_crossing(), which computes
+// in integers; empty if there is none.
 inline std::string crossing_difference() {
   for (uint64_t seed = 0; seed < scaled_count(20'000); ++seed) {
     Random random(seed);
@@ -57,8 +57,8 @@ inline std::string crossing_difference() {
   return "";
 }
 
-// Returns the first seed whose random view has a point for which the view's planes and the point's clip coordinates
-// disagree whether the point is inside; empty if there is none.
+// Returns the first seed for which the planes of a random view and the clip coordinates of a random point disagree
+// about whether the point is in the view; empty if there is none.
 inline std::string view_difference() {
   for (uint64_t seed = 0; seed < scaled_count(300); ++seed) {
     Random random(seed);

@@ -161,8 +161,8 @@ inline std::vector<NearestTrial> uneven_nearest_trials() {
   return trials;
 }
 
-// Makes trials at many scales, some of which make squares and products underflow, and trials far away from the origin,
-// the farthest of them where the rounding of a point to float is about as large as a triangle.
+// Makes trials at many scales; at some scales, squares and products underflow. Also makes trials far from the origin;
+// in the farthest trial, the rounding of a point to float is about as large as a triangle.
 inline std::vector<NearestTrial> scaled_nearest_trials() {
   std::vector<NearestTrial> trials;
   const std::vector<Triangle> sphere = bumpy_sphere(4, 0.1, 1);

@@ -1,6 +1,6 @@
-// Random worlds of instances and objects, and random batches of queries about them, made from the sketches of
-// adversarial_scenes.h and grid_scenes.h, so that scenes that are difficult for one index are tested with all indexes
-// together.
+// Random worlds of instances and objects, and random batches of queries about these worlds. Both are made from the
+// sketches of adversarial_scenes.h and grid_scenes.h. So scenes that are difficult for one index are tested with all
+// indexes together.
 #ifndef LOCUS_TESTS_SUPPORT_RANDOM_QUERY_H_
 #define LOCUS_TESTS_SUPPORT_RANDOM_QUERY_H_
 

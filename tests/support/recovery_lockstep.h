@@ -1,7 +1,7 @@
-// Comparison between a scene that has a log and a model, which is a scene without a log. The test applies to the scene
-// every kind of event: random batches one at a time, several batches by apply_joined() or apply_each(), static changes,
-// snapshots, a full disk, and crashes, after which the scene is restored from its log. The model applies exactly the
-// changes that were logged, one call after another.
+// Comparison of a scene with its model. The scene has a log; the model is a scene without a log. The test applies every
+// kind of event to the scene: random batches one at a time, several batches by apply_joined() or apply_each(), static
+// changes, snapshots, a full disk, and crashes. After a crash, the scene is restored from its log. The model applies
+// exactly the changes that were logged, one call after another.
 #ifndef LOCUS_TESTS_SUPPORT_RECOVERY_LOCKSTEP_H_
 #define LOCUS_TESTS_SUPPORT_RECOVERY_LOCKSTEP_H_
 

@@ -5,10 +5,10 @@
 // be inserted again. Used by the random tests, which expect no difference, and by the tests of planted bugs, which
 // expect one.
 //
-// The trials before commit 476c028 did not see the fault of PlantedBug::kRewindFastBox, by which a rewind missed an
-// object that moved twice in one tick: ticks had several batches, but only by rare chance did an object move far in one
-// batch and back near its start in a later one. Also, all queries aimed at current positions, and none at the positions
-// between two ticks that the objects had at the queried time.
+// Before commit 476c028, the trials did not detect PlantedBug::kRewindFastBox: with this bug, a rewind misses an object
+// that moves twice in one tick. Ticks had several batches, but an object rarely moved far in one batch and back near
+// its start in a later one. Also, all queries aimed at current positions. None aimed at the positions that objects had
+// at the queried time between two ticks.
 #ifndef LOCUS_TESTS_SUPPORT_REWIND_LOCKSTEP_H_
 #define LOCUS_TESTS_SUPPORT_REWIND_LOCKSTEP_H_
 

@@ -22,8 +22,9 @@ namespace locus::test {
 struct BlockResult : CollectedRows {
   std::string hits;    // mode ANY only: one byte per query, 0 or 1
   std::string matrix;  // sight only: one byte for each viewer and target
-  // Set only for blocks with as_of_ticks: the effective time of each query, and in `clamped` the ascending indices of
-  // the queries whose time was outside the history, so that the nearest recorded time was used.
+  // The next three members are set only for blocks with as_of_ticks. The first two are the effective time of each
+  // query. If the time of a query was outside the history, the nearest recorded time was used, and `clamped` contains
+  // the query's index. The indices ascend.
   std::vector<uint64_t> resolved_ticks;
   std::vector<float> resolved_fractions;
   std::vector<uint32_t> clamped;

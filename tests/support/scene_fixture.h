@@ -1,5 +1,5 @@
-// Fixture with a scene, and short functions that change the scene by literals of batches and placements and that check
-// refusals.
+// Fixture with a scene. Its short functions check refusals, and change the scene by batches and placements that are
+// written as literals.
 #ifndef LOCUS_TESTS_SUPPORT_SCENE_FIXTURE_H_
 #define LOCUS_TESTS_SUPPORT_SCENE_FIXTURE_H_
 

@@ -1,6 +1,6 @@
-// Functions for tests of a log and its data directory: they append records and write snapshots whose bytes are computed
-// from the sequence numbers, read all data back and describe differences from the expected content. One thread at a
-// time for each scene.
+// Functions for tests of a log and its data directory. They append records and write snapshots; the bytes of both are
+// computed from the sequence numbers. They also read all data back and describe differences from the expected content.
+// One thread at a time for each scene.
 #ifndef LOCUS_TESTS_SUPPORT_STORED_LOG_H_
 #define LOCUS_TESTS_SUPPORT_STORED_LOG_H_
 

@@ -96,7 +96,8 @@ class TestAuthority {
     X509_EXTENSION_free(extension);
   }
 
-  // Makes a certificate for `key`, signed by this authority; self-signed if `issuer` is null.
+  // Makes a certificate for `key`, signed by this authority's key. A null `issuer` makes the authority's own
+  // certificate, which names itself as issuer.
   X509* make(const CertificateOptions& options, EVP_PKEY* key, X509* issuer) const {
     static std::atomic<long> serial{1};
     X509* made = X509_new();

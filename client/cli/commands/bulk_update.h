@@ -31,8 +31,8 @@ struct BulkUpdate {
 
 // Reads rows and sends updates until the input ends, and writes one report. As soon as an ack arrives, the items that
 // it lists as refused are written as rows (line, id, reason). The report ends with applied, refused, batches, revision,
-// tick and epoch. Returns the first error. Without such an error, returns OK if the server refused no item, otherwise
-// NOT_FOUND if all refused items have unknown ids, and FAILED_PRECONDITION if not.
+// tick and epoch. Returns the first error, if there is one. Without an error, returns OK if the server refused no item,
+// NOT_FOUND if all refused items have unknown ids, and FAILED_PRECONDITION in any other case.
 absl::Status run_bulk_update(const BulkUpdate& update, const std::string& scene, const BulkOptions& bulk,
                              Context& context);
 

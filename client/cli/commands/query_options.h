@@ -38,8 +38,7 @@ struct QueryOptions {
 // Adds the argument SCENE and the options shared by all queries.
 void add_query_options(CLI::App& command, QueryOptions& options);
 
-// Adds the option --detail, for queries that report objects and instances that a solid overlaps, and for nearest
-// queries.
+// Adds the option --detail. Overlap queries, frustum queries and nearest queries have this option.
 void add_detail_option(CLI::App& command, v1::StaticDetail& detail);
 
 // Adds the option --after-id, for queries whose rows are in ascending order of ids.
@@ -56,8 +55,8 @@ std::vector<v1::Column> overlap_columns(const QueryOptions& options, v1::StaticD
 // Returns a usage error if options exclude each other.
 absl::Status check(const QueryOptions& options);
 
-// Makes the batch see the changes that this context has made to `scene`: requires at least the revision of the last of
-// these changes that was acknowledged. Does nothing if no change was acknowledged.
+// Makes the batch see the changes that this context has made to `scene`. For this, the batch requires at least the
+// revision of the last acknowledged change. Does nothing if no change was acknowledged.
 void see_own(const std::string& scene, const Context& context, client::QueryBuilder& builder);
 
 // Sets the batch's revision, work budget and explain flag from the options. Without --at-least and --exactly, calls

@@ -21,9 +21,10 @@ Json point_json(const ResultRows& rows, size_t row, const client::Double3& frame
 
 Json triangle_json(uint32_t triangle) { return triangle == client::kNoTriangle ? Json() : Json(triangle); }
 
-// Sets the key or keys of `column` in `json`, which becomes the report's row for row `row` of the answer. The value is
-// null if the answer does not contain the column, or if the row has id 0. A row with id 0 is a miss or, in the answer
-// to a cell query, the ball that bounds the space. Exception: the t of such a ball is not null, but the ball's radius.
+// Sets the key or keys of `column` in `json`. `json` becomes the row of the report that shows row `row` of the answer.
+// The value is null if the answer does not contain the column, or if the row has id 0. A row with id 0 is a miss or, in
+// the answer to a cell query, the ball that bounds the space. Exception: the t of such a ball is not null, but the
+// ball's radius.
 void add_column(const ResultRows& rows, size_t row, const RowLayout& layout, v1::Column column, Json& json) {
   const bool hit = rows.ids().empty() || rows.ids()[row] != 0;
   const auto add = [&](const char* key, bool present, const auto& value) {

@@ -29,10 +29,10 @@ std::vector<std::string> row_keys(const RowLayout& layout);
 
 Json work_json(const v1::Work& work);
 
-// Returns the head of a report. It contains epoch, revision and tick, and where they exist: the indices of truncated
-// queries; the effective times of queries about the past, and the indices of the queries whose times were clamped to
-// the history; the indices of the queries for which ResultRows::unanchored() is true; the work that the server
-// reported.
+// Returns the head of a report. It contains epoch, revision and tick. It also contains, if there are any: the indices
+// of truncated queries; the effective times of queries about the past; the indices of the queries whose times were
+// clamped to the history; the indices of the queries for which ResultRows::unanchored() is true; the work that the
+// server reported.
 Json result_head(const v1::QueryResult& result);
 
 }  // namespace locus::cli

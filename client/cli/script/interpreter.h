@@ -36,8 +36,8 @@ class Interpreter {
   absl::StatusOr<Repetition> read_repetition(const Statement& statement) const;
   absl::Status set(const std::string& name, Value value);
 
-  // Mark the begin and the end of a loop. While a script is checked, variables that are set inside a loop have unknown
-  // values, because a later round of the loop may set them again.
+  // Mark the beginning and the end of a loop. While a script is checked, variables that are set inside a loop have
+  // unknown values, because a later round of the loop may set them again.
   void enter_loop() { ++loops_; }
   void leave_loop() { --loops_; }
 
@@ -53,7 +53,8 @@ class Interpreter {
   absl::Status keep_result(const std::string& name);
   absl::Status verify_failure(const std::string& reason, const absl::Status& outcome) const;
   absl::StatusOr<Value> read_value(const std::string& text) const;
-  // Returns the error for a mistake in the script itself: see execute().
+  // Converts an error into a usage error while the script is checked, and into FAILED_PRECONDITION while it runs.
+  // Returns OK unchanged.
   absl::Status mistake(const absl::Status& status) const;
   bool checks_only() const { return context_.lines() == Lines::kScriptCheck; }
 

@@ -18,7 +18,7 @@ namespace locus::cli {
 using Number = std::variant<absl::int128, double>;
 
 // Parses the whole text as a decimal or hexadecimal (0x) integer, or as a double with a point or an exponent. Returns
-// nullopt for any other text, also for "inf" and for integers that do not fit 64 bits.
+// nullopt for any other text, including "inf" and integers that do not fit 64 bits.
 std::optional<Number> parse_number(absl::string_view text);
 // Returns the number, or nullopt if the JSON value is not a number.
 std::optional<Number> number_from(const Json& json);
@@ -39,7 +39,8 @@ absl::StatusOr<Number> divide(const Number& a, const Number& b);
 // Returns the remainder of two integers, with the sign of `b`.
 absl::StatusOr<Number> modulo(const Number& a, const Number& b);
 
-// Returns a value below, equal to or above 0 for a < b, a == b or a > b. Exact, also between an integer and a double.
+// Returns a value below, equal to or above 0 for a < b, a == b or a > b. The comparison is exact, even between an
+// integer and a double.
 int compare(const Number& a, const Number& b);
 
 }  // namespace locus::cli

@@ -88,8 +88,8 @@ bool fits_in_batch(const Statement& statement) {
   return word == "insert" || word == "move" || word == "remove";
 }
 
-// Matcher of the begin and end of blocks. It stores the open blocks. A batch may contain repeat blocks, and a repeat
-// block may contain batches, but a batch may not contain a batch.
+// Matcher of the beginnings and ends of blocks. It stores the open blocks. A batch may contain repeat blocks, and a
+// repeat block may contain batches, but a batch may not contain a batch.
 class Blocks {
  public:
   explicit Blocks(std::vector<Statement>& statements) : statements_(statements) {}

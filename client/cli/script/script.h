@@ -25,9 +25,10 @@ struct Script {
   std::vector<Statement> statements;
 };
 
-// Parses a script. Returns a usage error that begins with name:line for an unclosed or overlapping block, a command
-// that is not allowed in a batch, an unknown failure after expect-error, a control character, or an exceeded limit of
-// script_limits.h. Does not parse the text of the statements. Cost: linear in the text.
+// Parses a script. Returns a usage error for an unclosed or overlapping block, a command that is not allowed in a
+// batch, an unknown failure after expect-error, a control character, or an exceeded limit of script_limits.h. The
+// error's message begins with name:line, or with the name alone if the script as a whole exceeds a limit. Does not
+// parse the text of the statements. Cost: linear in the text.
 absl::StatusOr<Script> parse_script(const std::string& name, absl::string_view text);
 
 // Returns the statement's place as "name:line".

@@ -83,7 +83,9 @@ class LocusError(Exception):
 
     @property
     def refused(self) -> bool:
-        """True if the server refused the request, so that nothing was changed; False also if the outcome is unknown."""
+        """True if the server refused the request, so that nothing was changed. False in any other case, for
+        example if the outcome is unknown.
+        """
         return self.reason != Reason.UNSPECIFIED
 
     @property

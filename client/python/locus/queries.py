@@ -17,8 +17,8 @@ _KINDS = {name: schema.numbers(name.capitalize())
 
 
 class Block(NamedTuple):
-    """Settings common to all kinds of block, for N queries. All settings are optional. For a setting with N numbers or
-    one, a single number applies to all queries.
+    """Settings common to all kinds of block, for N queries. All settings are optional. If a setting may have N numbers
+    or one, one number applies to all queries.
 
     - `frame`: three floats, the origin that the server adds to every position of the block. Column POINT of the result
       is relative to the frame, but column POSE is absolute.
@@ -56,8 +56,8 @@ class Block(NamedTuple):
     count_only: bool = False
 
     def write(self, block: wire.Parts, path: str, count: int) -> None:
-        """Appends the settings to a QueryBlock of `count` queries, which errors call `path`. Settings with default
-        values add no bytes.
+        """Appends the settings to a QueryBlock of `count` queries. `path` is the prefix of field names in errors.
+        Settings with default values add no bytes.
         """
         if self.frame is not None:
             block.add(_BLOCK["frame"], wire.vector(columns.vector(path + "frame", self.frame)))
@@ -262,8 +262,8 @@ class QueryBatch:
               pairwise: bool = False, block: Block = Block()) -> "QueryBatch":
         """Adds a block of V viewers that look at M targets; BlockResult.sight has a byte for each viewer and target.
         `viewers`: float32, `eyes` points for each viewer; `targets`: float32, `samples` points for each target;
-        `viewer_groups`: V uint64 or one, `target_groups`: M uint64 or one: objects and instances in the group of a
-        viewer or of a target do not block the sight between these two; `max_distances`: V float32 or one, inclusive;
+        `viewer_groups`: V uint64 or one; `target_groups`: M uint64 or one. Objects and instances in the group of a
+        viewer or of a target do not block the sight between these two. `max_distances`: V float32 or one, inclusive;
         `pairwise`: viewer i looks only at target i.
         """
         new = _NewBlock(self._blocks, "sight")

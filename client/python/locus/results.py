@@ -156,7 +156,7 @@ class QueryResult(Revision):
     @classmethod
     def of(cls, message: memoryview) -> "QueryResult":
         """Decodes the protocol's QueryResult. Columns are views of `message`, so the memory of `message` is freed only
-        after the last column.
+        after the last column has been freed.
         """
         found = wire.fields(message)
         result = cls.__new__(cls)

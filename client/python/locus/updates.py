@@ -25,7 +25,7 @@ class UpdateBatch:
     whole batch.
 
     Settings: `tick` is the caller's time step; `clear` removes every object first; with `upsert`, an insert replaces
-    the object that already has its id; `restart_ticks` drops the scene's history and accepts a `tick` lower than the
+    an existing object with the same id; `restart_ticks` drops the scene's history and accepts a `tick` lower than the
     scene's; `writer` (random, not 0) and `number` (1, 2, 3 ...) let the server recognize a repeated batch and apply it
     only once. Streams set `writer` and `number` automatically.
 

@@ -121,8 +121,8 @@ class BinaryBuilder {
     return {Part{&children[0], halves.parts[0], part.depth + 1}, Part{&children[1], halves.parts[1], part.depth + 1}};
   }
 
-  // Sets the two constants of a wide node's cost: area_share_, the factor that makes its area relative to the root's
-  // area, and node_cost_, a small fixed cost that keeps the number of nodes low.
+  // Sets the two constants of a wide node's cost. area_share_ is the factor that makes the node's area relative to the
+  // root's area. node_cost_ is a small fixed cost that keeps the number of nodes low.
   void measure_costs(const Extent<S>& total, uint32_t count) {
     const double area = half_area(total.bounds);
     area_share_ = area > 0 && std::isfinite(area) ? 1 / area : 0;

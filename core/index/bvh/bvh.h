@@ -5,9 +5,9 @@
 // Threads: immutable after build(); every member may run concurrently. Invariants: a node's box contains the bounds of
 // every value below it. The slab test is monotone: a ray that hits a box also hits every larger box. The tree therefore
 // never culls a value that a ListIndex, which tests every value, would report. The depth is at most
-// limits::kMaxBvhDepth, which sets the size of the fixed stack of a visit. Nodes and values are stored in depth-first
-// order. Source: Kay and Kajiya, Ray Tracing Complex Scenes, 1986; Wald, Benthin, Boulos, Getting Rid of Packets, 2008
-// (wide nodes).
+// limits::kMaxBvhDepth, which bounds the size of a visit's stack. Nodes and values are stored in depth-first order.
+// Source: Kay and Kajiya, Ray Tracing Complex Scenes, 1986; Wald, Benthin, Boulos, Getting Rid of Packets, 2008 (wide
+// nodes).
 #ifndef LOCUS_CORE_INDEX_BVH_BVH_H_
 #define LOCUS_CORE_INDEX_BVH_BVH_H_
 
@@ -57,9 +57,9 @@ class Bvh {
   size_t node_count() const { return nodes_.size(); }
   size_t bytes() const { return nodes_.size() * sizeof(BvhNode<S>) + values_.size() * sizeof(V); }
 
-  // Returns the expected number of nodes and leaves opened by a random ray that hits bounds(): 1 for the root plus, for
-  // each node and leaf below the root, its surface area divided by the surface area of bounds(). Returns 0 for an empty
-  // tree. O(nodes).
+  // Returns the expected number of nodes and leaves opened by a random ray that hits bounds(). The root counts as 1.
+  // Each node or leaf below the root counts as its surface area divided by the surface area of bounds(). Returns 0 for
+  // an empty tree. O(nodes).
   double sah_cost() const;
 
   // Passes candidates to `visitor` roughly in the order in which the ray enters their leaves: the children of each node

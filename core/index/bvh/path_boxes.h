@@ -1,5 +1,5 @@
-// Intervals of t in which a moving box touches each of eight boxes of a tree, or the boxes of eight triangles, computed
-// in float for culling. The moving box is a ray with an extent on each axis: a box of the tree is grown by the extent
+// The t at which a moving box begins to touch each of eight boxes of a tree, or the boxes of eight triangles. Computed
+// in float, for culling. The moving box is a ray with an extent on each axis: a box of the tree is grown by the extent
 // and by a pad, as in the slab test of core/geometry/ray.h. Every rounding step is monotone in the box, and the pad is
 // the same for all boxes of one tree, so no box is culled if entry() accepts a box inside it. The loops over eight
 // adjacent floats are compiled to vector instructions. Immutable; any thread.

@@ -109,8 +109,8 @@ class Restorer {
       if (arrays_.block_count - next_block < static_cast<uint32_t>(std::popcount(children.blocks)))
         return mismatch("too few blocks");
       // If no block is left, the position set here is never used: this node has only nodes as children, and a later
-      // check refuses the topology. It finds either that a node below needs more blocks than are left, or that the
-      // topology has too few nodes.
+      // check refuses the topology. This later check finds a node below that needs more blocks than are left, or finds
+      // too few nodes.
       arrays_.ranges[index].first =
           next_block < arrays_.block_count ? arrays_.blocks[next_block].first : arrays_.triangle_count;
       TriangleNode& node = arrays_.nodes[index];

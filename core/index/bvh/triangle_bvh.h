@@ -139,8 +139,8 @@ class TriangleBvh {
   TriangleArrays arrays_;
   Aabbf bounds_;
   float magnitude_ = 0;
-  // For each axis, the expected number of boxes of nodes and blocks that a random line through bounds(), parallel to
-  // the axis, meets per unit of length within bounds().
+  // For each axis: how many boxes of nodes and blocks a random line is expected to meet per unit of its length within
+  // bounds(). The line passes through bounds() and is parallel to the axis.
   Vec3d boxes_a_unit_;
 };
 

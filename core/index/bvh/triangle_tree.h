@@ -53,8 +53,8 @@ struct NodeRange {
 };
 
 // View of a whole tree, whose arrays it borrows. Node 0 is the root. Nodes, blocks and triangles are stored in
-// depth-first order: for each node first the blocks among its children in order of slots, then its child nodes in order
-// of slots, each followed by everything below it.
+// depth-first order. After a node come the blocks among its children, in order of slots. After these blocks come its
+// child nodes, in order of slots; each child node is followed by everything below it before the next child node.
 struct TriangleTree {
   const TriangleNode* nodes;
   const NodeRange* ranges;  // range of the triangles below each node, indexed by node

@@ -193,7 +193,7 @@ void WindingCells::set_ways() {
     const bool descending = direction >= 3;
     for (uint32_t row = 0; row < second.count * third.count; ++row) {
       const uint32_t start = row % second.count * second.stride + row / second.count * third.stride;
-      // Walks against the direction, beginning at the side of the bounds to which the direction leads.
+      // Walks opposite to `direction`, beginning at the side of the bounds to which `direction` leads.
       int steps = 0;
       for (uint32_t k = 0; k < axis.count; ++k) {
         const uint32_t index = start + (descending ? k : axis.count - 1 - k) * axis.stride;

@@ -1,5 +1,6 @@
-// Functions that scan the values of one brick, or of some of its cells: float kernels test eight values at a time and
-// drop the values that cannot satisfy the query; the other values are passed to a visitor. Plain functions; any thread.
+// Functions that scan the values of one brick, or of some of its cells. Float kernels test eight values at a time and
+// drop the values that cannot satisfy the query. The remaining values are passed to a visitor. Plain functions; any
+// thread.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_BRICK_SCAN_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_BRICK_SCAN_H_
 
@@ -48,15 +49,15 @@ class GridRef {
 
 namespace internal {
 
-// Rounding allowance, relative to the magnitudes of coordinates and extents. The bounds of a value may exceed its
-// extent by 2^-40 of these magnitudes (see bounds_of() in core/geometry/shape.h). The factor 2^-38 covers this excess
+// Rounding allowance, relative to the magnitudes of coordinates and extents. The bounds of a value may reach beyond its
+// extent, by up to 2^-40 of these magnitudes (see bounds_of() in core/geometry/shape.h). The factor 2^-38 covers this
 // and the rounding of the sums in core/index/hash_grid.
 inline constexpr double kBoundsGrowth = 0x1p-38;
 
 inline constexpr KeyRange kAllCells{{0, 0, 0}, {3, 3, 3}};
 
-// Returns the epsilon of the float tests that cull the values of `brick`. The epsilon covers the rounding of the
-// float columns, and the excess of a value's bounds over its extent.
+// Returns the epsilon of the float tests that cull the values of `brick`. The epsilon covers two lengths: the rounding
+// error of the float columns, and the length by which the bounds of a value may reach beyond its extent.
 inline double cull_epsilon(const Brick& brick) {
   const double coordinate = brick.geometry.edge;  // twice the largest coordinate in the float columns
   const double extent = brick.max_extent;
@@ -123,9 +124,9 @@ class CullRay {
       line_.point[axis] = static_cast<float>(point[axis]);
       line_.direction[axis] = static_cast<float>(toward[axis]);
     }
-    // Rounding of the line's direction and point moves the line, within the brick, by a few times 2^-24 of the
-    // coordinates of the point and of the brick's edge, plus 2^-50 of the distance to the origin of the ray. The radius
-    // covers this displacement.
+    // Rounding of the line's direction and point moves the line within the brick. This displacement is a few times
+    // 2^-24 of the coordinates of the point and of the brick's edge, plus 2^-50 of the distance to the origin of the
+    // ray. The radius covers it.
     line_.radius =
         static_cast<float>((cull_epsilon(brick) + ray_radius + 0x1p-46 * far +
                             4 * double{kCullEpsilon} * (max_component(abs(point)) + 2 * brick.geometry.edge)) *

@@ -15,12 +15,12 @@ namespace locus::internal {
 
 // Approximate number of sampled values.
 inline constexpr size_t kCellSizeSample = 2048;
-// Limit of choose_cell_exponent() for the mean number of other values in the cell of a random value: kMaxMeanPerCell
-// or, if larger, kMaxAddedPerCell more than the mean at the smallest cell size considered.
+// Let the mean of a cell size be the mean number of other values in the cell of a random value. choose_cell_exponent()
+// accepts a mean up to kMaxMeanPerCell or, if larger, kMaxAddedPerCell plus the mean of the smallest cell size that it
+// considers.
 inline constexpr double kMaxMeanPerCell = 24;
 inline constexpr double kMaxAddedPerCell = 12;
-// Range for cell_exponent_fits(): the function accepts a cell size that was chosen earlier if the mean number of other
-// values in the cell of a random value lies within this range.
+// cell_exponent_fits() accepts a cell size if the mean of this cell size, as defined above, is in this range.
 inline constexpr double kMinOthersPerCell = 6;
 inline constexpr double kMaxOthersPerCell = 64;
 

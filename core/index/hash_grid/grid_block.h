@@ -45,7 +45,8 @@ struct GridForm {
 
 // Value with all its parts, for example as the argument of an insertion. `handle` is the identifier that the caller
 // assigned. `reach` is the extent of the value: an upper bound of the distance from its position to its bounds along
-// any axis and under any rotation, not including the growth of bounds_of() by rounding; for balls the exact radius.
+// any axis and under any rotation, not including the growth of bounds_of() by rounding. The `reach` of a ball is
+// exactly its radius.
 struct GridItem {
   GridEntry entry;
   uint32_t handle = 0;
@@ -95,8 +96,8 @@ class GridBlock {
   // Returns the last slot of `handle` among the first `count` slots of a log, or `count` if these slots do not contain
   // the handle.
   uint32_t find_last(uint32_t handle, uint32_t count) const;
-  // Returns the slot of `handle` if it is one of the 16 slots around `slot`, else count(). A block of at most one
-  // vector is searched completely.
+  // Searches the 16 slots around `slot`, or the whole block if it has at most eight slots. Returns the slot of
+  // `handle`, or count() if the searched slots do not contain the handle.
   uint32_t find_near(uint32_t handle, uint32_t slot) const;
 
   std::array<uint32_t, kBrickCells + 1>& offsets() { return offsets_; }

@@ -86,18 +86,18 @@ class GridSnapshot {
   bool for_few_bricks(const Aabbd& region, size_t max_bricks, Work& work, const Fn& fn) const;
 
   // Calls visit(GridRef) for every value whose bounds have an interval on the ray with near <= far, far >= 0 and near
-  // <= limit(), and for some other values near the ray; roughly from near to far on each level. limit() may decrease
-  // during the visit. Ends if visit() returns false. `displacement_bound` is an upper bound of the distance between the
-  // true and the stored position of a value.
+  // <= limit(), and for some other values near the ray. The order on each level is roughly from near to far. limit()
+  // may decrease during the visit. Ends if visit() returns false. `displacement_bound` is an upper bound of the
+  // distance between the true and the stored position of a value.
   template <class Limit, class Visit>
   void visit_ray(const SlabRay<double>& ray, const Limit& limit, Work& work, const Visit& visit,
                  double displacement_bound = 0) const;
 
   // Calls visit(GridRef) for every value whose bounds have a squared_distance() of at most limit() from `point`, and
-  // for some other values near the point; roughly from near to far on each level. limit() may decrease during the
-  // visit. Ends if visit() returns false. The cost on each level is proportional to the number of cells within the
-  // final limit() plus the number of values in these cells. If the range of these cells has more bricks than the level,
-  // each brick of the level is tested once instead.
+  // for some other values near the point. The order on each level is roughly from near to far. limit() may decrease
+  // during the visit. Ends if visit() returns false. The cost on each level is proportional to the number of cells
+  // within the final limit() plus the number of values in these cells. If the range of these cells has more bricks than
+  // the level, each brick of the level is tested once instead.
   template <class Limit, class Visit>
   void visit_nearest(const Vec3d& point, const Limit& limit, Work& work, const Visit& visit) const;
 

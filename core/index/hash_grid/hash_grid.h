@@ -9,8 +9,8 @@
 // The cell size affects only the cost of a query, never its result. The grid chooses the size of the base cell again,
 // from a sample of the values, if the number of values has doubled since the last choice or has fallen to an eighth.
 // After each value has changed 64 times on average, the grid also checks whether the size still fits. If the size
-// changes, the grid moves the values to the new cells, a few thousand values per batch, which bounds the time of a
-// batch; until all values have moved, levels of the old and the new size exist side by side.
+// changes, the grid moves the values to the new cells. To bound the time of a batch, each batch moves only a few
+// thousand values. Until all values have moved, levels of the old and the new size exist side by side.
 //
 // Invariants: every value is stored in the brick that contains its position, on a level whose cells are at least as
 // wide as the value; no brick is empty; slots_ holds the location of each value. |position| <= limits::kMaxCoordinate
@@ -144,7 +144,7 @@ class HashGrid {
   std::vector<BrickInfo> brick_info_;           // records of all bricks, indexed by brick
   std::vector<uint32_t> free_bricks_;
   std::vector<uint32_t> stale_bricks_;     // bricks with values that may have to move to cells of the new size
-  std::vector<uint32_t> touched_indices_;  // index of each brick in touched_; valid only if touched_ has it there
+  std::vector<uint32_t> touched_indices_;  // index of each brick in touched_; valid if the brick is found there
   internal::BrickArray bricks_;
   std::vector<internal::GridSlot> slots_;  // locations of all values, indexed by handle
   internal::BrickIndices bricks_by_handle_;

@@ -11,7 +11,7 @@ constexpr double kFirstShellValues = 12;  // target number of values in the firs
 constexpr uint32_t kMinForEstimate = 4;   // min number of values for an estimate of the density
 constexpr double kShellGrowth = 1.6;      // ratio of shell_width_ to its value for the previous shell
 
-// Returns the input of the kernel collect_near() for a shell, relative to the brick.
+// Returns the input of the kernel collect_near() for a shell. Its point is relative to the centre of the brick.
 GridNear near_of(const Brick& brick, const Vec3d& point, float above, float up_to) {
   const Vec3d to_point = point - brick.geometry.center;
   GridNear near;
@@ -24,8 +24,8 @@ GridNear near_of(const Brick& brick, const Vec3d& point, float above, float up_t
 }
 
 // Returns the epsilon by which the region of a shell is widened, so that this region overlaps the bounds of every value
-// whose key lies in the shell. The returned epsilon is more than twice the epsilon of near_of() plus the rounding of
-// the region's sides.
+// whose key lies in the shell. The returned epsilon is greater than the sum of twice the epsilon of near_of() and the
+// rounding error of the region's sides.
 double epsilon_of(const Vec3d& point, const LevelGeometry& level) {
   const double edge = (1 << kBrickBits) / level.cells_per_unit;
   const double size = max_component(abs(point)) + magnitude(level.bounds);

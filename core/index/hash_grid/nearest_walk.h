@@ -3,9 +3,9 @@
 // besides the nearest ones, even if many values surround the point. Used by GridSnapshot; one object per query and
 // thread.
 //
-// The key of a value is the squared distance of its bounds from the point, in float and never greater than the exact
-// squared distance; the key is the same for every shell. A shell is a range of keys (above, up_to], so each value lies
-// in exactly one shell.
+// The key of a value is the squared distance of its bounds from the point, computed in float. A key never exceeds the
+// exact squared distance, and a value has the same key for every shell. A shell is a range of keys (above, up_to], so
+// each value lies in exactly one shell.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_NEAREST_WALK_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_NEAREST_WALK_H_
 

@@ -102,8 +102,8 @@ class RegionWalk {
   // million, and a third slower if the grid fits the caches.
   static bool pays(const GridSnapshot& grid) { return grid.size() >= 250'000; }
 
-  // Prepares a walk over region_of(begin) to region_of(end - 1). region_of() is called in this order, up to kAhead
-  // regions before the region is visited.
+  // Prepares a walk over region_of(begin) to region_of(end - 1). region_of() is called in this order. Each call is for
+  // a region at most kAhead regions ahead of the region to be visited next.
   RegionWalk(size_t begin, size_t end, std::function<GridRegion(size_t)> region_of);
 
   // Calls visit(GridRef) for the values near the next region until visit() returns false. Precondition: not all regions

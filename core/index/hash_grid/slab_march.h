@@ -42,7 +42,7 @@ class SlabMarch {
   // slabs(), and `limit` is at most the constructor's `limit`.
   Slab slab(int64_t n, double limit) const;
 
-  // Layer of cells within a slab, one cell thick; the four layers of a slab are counted from the near end.
+  // Layer of a slab: a part that is one cell thick. The four layers of a slab are counted from the near end.
   struct Layer {
     double near;
     KeyRange cells;  // keys of the cells whose values the ray may intersect in the layer; may be empty
@@ -63,7 +63,7 @@ class SlabMarch {
   Aabbd bounds_;
   double per_unit_;
   double slab_edge_;
-  double tube_radius_ = 0;  // upper bound of the distance from the ray to the position of a value that it intersects
+  double tube_radius_ = 0;  // upper bound of the distance from the ray to the position of a value that the ray hits
   Interval<double> part_{0, 0};
   int axis_ = 0;
   int64_t first_ = 0;

@@ -70,8 +70,8 @@ class ListIndex {
   }
 
  private:
-  // Checks that the array and the map have the same size. `slot` is the slot that has just changed: if the array still
-  // contains it, checks that the map has the entry of its value. O(1).
+  // Checks that the array and the map have the same size. `slot` is the slot that has just changed. If the array still
+  // has this slot, checks that the map has the entry of the value in the slot. O(1).
   void check_invariants(size_t slot) const {
     LOCUS_DCHECK_EQ(values_.size(), slots_.size());
     if (slot >= values_.size()) return;

@@ -1,5 +1,5 @@
-// Convex free space around a point: planes that separate the point from the objects and triangles near it, taken from
-// near to far. Free functions; any thread may call them with a QueryTask of its own.
+// Convex free space around a point: planes that separate the point from the objects and triangles near it. The objects
+// and triangles are processed from near to far. Free functions; any thread may call them with a QueryTask of its own.
 #ifndef LOCUS_CORE_QUERY_KINDS_CELL_QUERY_H_
 #define LOCUS_CORE_QUERY_KINDS_CELL_QUERY_H_
 

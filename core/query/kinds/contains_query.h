@@ -1,6 +1,6 @@
-// Search for the objects that contain a point, and for the instances whose mesh is closed and either has a nonzero
-// winding number around the point or contains the point in its surface. Rows ascend by id. Free functions; any thread
-// may call them with a QueryTask of its own.
+// Search for the objects and instances that contain a point. An instance contains the point if its mesh is closed and,
+// in addition, either has a nonzero winding number around the point or has the point on its surface. Rows ascend by id.
+// Free functions; any thread may call them with a QueryTask of its own.
 #ifndef LOCUS_CORE_QUERY_KINDS_CONTAINS_QUERY_H_
 #define LOCUS_CORE_QUERY_KINDS_CONTAINS_QUERY_H_
 

@@ -62,9 +62,9 @@ void FoundObjects::keep_lowest() {
   LOCUS_DCHECK_CALL(check_invariants());
 }
 
-// Sorts found_ by id, with sort_by_bucket() if possible. Distributing objects to buckets needs no comparisons of ids,
-// whose branches would be mispredicted half of the time for ids in random order. The distribution leaves the objects
-// almost sorted, so that insertion_sort() is fast.
+// Sorts found_ by id, with sort_by_bucket() if possible. Distributing objects to buckets needs no comparisons of ids.
+// If the ids are in random order, the branches of such comparisons would be mispredicted half of the time. The
+// distribution leaves the objects almost sorted, so that insertion_sort() is fast.
 void FoundObjects::sort() {
   if (found_.size() <= kFew || sort_by_bucket()) return insertion_sort(found_);
   std::sort(found_.begin(), found_.end(), lower_id);

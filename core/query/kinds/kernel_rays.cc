@@ -11,8 +11,8 @@
 namespace locus {
 namespace {
 
-// Maximum number of hits that the kernels return for one kAll ray in one mesh, which bounds the size of rows_. A ray
-// that may have more hits is traced triangle by triangle instead.
+// Maximum number of hits that the kernels return for one kAll ray in one mesh. This maximum bounds the size of rows_. A
+// ray that may have more hits is traced triangle by triangle instead.
 constexpr uint32_t kMaxRows = 128;
 
 // Pair of a ray and the instance that the ray has reached. The ray is not tested against the instance's triangles yet.

@@ -1,5 +1,5 @@
-// Lookup of objects and instances by id or group. Also finds hidden objects and instances (layers 0). Free functions;
-// any thread may call them with a QueryTask of its own.
+// Lookup of objects and instances by id or group. Hidden objects and instances (layers 0) are found too. Free
+// functions; any thread may call them with a QueryTask of its own.
 #ifndef LOCUS_CORE_QUERY_KINDS_LOOKUP_QUERY_H_
 #define LOCUS_CORE_QUERY_KINDS_LOOKUP_QUERY_H_
 

@@ -48,8 +48,8 @@ class LowestRows {
 
   // Adds a row without a triangle.
   void offer(const Hit& row);
-  // Adds one row for each of `triangles` of the instance of `row`. Several calls for one instance must pass its
-  // triangles in storage order.
+  // Adds one row for each entry of `triangles`, which are triangles of the instance of `row`. Several calls for one
+  // instance must pass its triangles in storage order.
   void offer(const Hit& row, absl::Span<const uint32_t> triangles);
   // Returns the retained rows, ascending by id, and empties the collector. Call it once.
   OverlapAnswer finish();

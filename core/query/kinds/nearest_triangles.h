@@ -63,7 +63,7 @@ class NearestSearch {
 
   // Returns whether all candidates have been returned.
   bool over() const { return visit_.over(); }
-  // Finds the next candidates, after at most about kMaxNearestTests tests. Their number may be 0.
+  // Finds the next candidates with at most about kMaxNearestTests tests. A call may find no candidate.
   void next() {
     LOCUS_DCHECK(!over());
     kernels_.run(tree_, visit_);
@@ -79,7 +79,7 @@ class NearestSearch {
   uint32_t found() const { return visit_.found; }
   uint32_t nodes() const { return visit_.nodes; }
   uint32_t tests() const { return visit_.tests; }
-  // Return candidate `i`, and its number in the uploaded mesh. Precondition: i < found().
+  // Return the triangle of candidate `i`, and its number in the uploaded mesh. Precondition: i < found().
   Triangle triangle(uint32_t i) const { return bvh_.triangle(block(i), lane(i)); }
   uint32_t number(uint32_t i) const { return tree_.numbers[block(i).first + lane(i)]; }
 

@@ -390,8 +390,8 @@ class InstanceSearch {
       task_.work().nodes += search.nodes();
       task_.work().tests += search.tests();
       more = rows.offer({triangles, found});
-      // Also counts the triangles of subtrees inside the region, which are found without a test, so that
-      // RunOptions::stop is called often enough.
+      // Counts `found` as well, because triangles of subtrees inside the region are found without a test. Otherwise
+      // RunOptions::stop might not be called often enough.
       more = task_.count_tests(search.tests() + found) && more;
     }
   }

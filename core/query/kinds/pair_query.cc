@@ -228,8 +228,8 @@ class PairGroup {
     return object.reach() * (search_.conservative ? double{kDiagonal} : 1.0);
   }
   // Returns the ball around the position of `member` that the kernel intersects with the balls of the candidates. The
-  // kernel culls candidates whose balls do not intersect it. The ball is so large that no candidate within max_distance
-  // of the member is culled.
+  // kernel culls the candidates whose balls do not intersect the returned ball. The returned ball is so large that no
+  // candidate within max_distance of the member is culled.
   GridBall ball_of(const Member& member) const {
     const Vec3d center = member.shape.position - center_;
     const double extent = planted(PlantedBug::kPairCullExtent) ? 0 : extent_of(member.object);
@@ -320,7 +320,7 @@ class NearestPartners {
 
  private:
   // Returns an upper bound of the distance from the object's position to any point of its solid or, with CONSERVATIVE,
-  // to any point of its bounds, whose corners may be farther away.
+  // to any point of its bounds. The corners of the bounds may be farther away than the solid.
   static double extent_of(const Shape& shape, const Aabbd& bounds, const GridRef& object, bool conservative) {
     if (!conservative) return object.reach() * (1 + 0x1p-40);
     const Vec3d corner = max(abs(bounds.min - shape.position), abs(bounds.max - shape.position));

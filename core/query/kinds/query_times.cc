@@ -7,7 +7,8 @@
 namespace locus {
 namespace {
 
-// Returns the part of the error message that explains why the history begins at its oldest tick and advises the caller.
+// Returns the part of the error message that explains why the history begins at its oldest tick and that advises the
+// caller what to do.
 std::string explanation(const SceneSnapshot& snapshot) {
   switch (snapshot.past_limit) {
     case PastLimit::kOff:

@@ -1,5 +1,5 @@
-// Intersection of rays with a snapshot: first with static instances, whose hits limit how far the ray continues, then
-// with moving objects. Free functions; any thread may call them with a QueryTask of its own.
+// Intersection of rays with a snapshot. Static instances are searched first, because their hits limit the part of a ray
+// in which moving objects are searched. Free functions; any thread may call them with a QueryTask of its own.
 #ifndef LOCUS_CORE_QUERY_KINDS_RAY_QUERY_H_
 #define LOCUS_CORE_QUERY_KINDS_RAY_QUERY_H_
 
@@ -19,7 +19,7 @@ struct RayRequest {
   Vec3d direction;
   float t_max;
   RayMode mode;
-  Cull cull;  // side of the triangles to ignore, for the stored winding
+  Cull cull;  // side of triangles that the ray ignores, given for the stored winding
   Inside inside;
   Source source;
   Precision precision;

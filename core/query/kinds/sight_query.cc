@@ -159,8 +159,9 @@ class Look {
     sort_by_direction();
   }
 
-  // Sorts the segments by the direction of their target's first segment. The direction crosses one face of a cube
-  // around the eye: sorts by this face, then along a Morton curve through the 8 x 8 squares of the face.
+  // Sorts the segments by the direction of their target's first segment. Each direction crosses one face of a cube
+  // around the eye. The segments are sorted by this face, then along a Morton curve through the 8 x 8 squares of the
+  // face.
   void sort_by_direction() {
     constexpr size_t kFew = 32;
     if (segments_.size() < kFew) return;

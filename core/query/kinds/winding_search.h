@@ -1,5 +1,5 @@
-// Search by the vector kernels for the winding number of a closed mesh around a point in mesh axes, along the half line
-// of a WindingWay. The search runs in steps, so that the caller can stop between two steps:
+// Search by the vector kernels for the winding number of a closed mesh around a point, which is in mesh axes. The
+// search follows the half line of a WindingWay. It runs in steps, so that the caller can stop between two steps:
 //
 //   WindingSearch search(tree, point, cells.way_from(tree, point));
 //   while (!search.over()) search.next();

@@ -131,8 +131,9 @@ class BatchRun {
   // Precondition: can_begin().
   Chunks::iterator begin_chunk() LOCUS_REQUIRES(mutex_);
   Chunks::iterator pop_unstarted() LOCUS_REQUIRES(mutex_);
-  // Moves the queries of `chunk` from `reached` on into two new, unstarted chunks of half the queries each, directly
-  // after `chunk`. With a single new chunk, one thread at a time would work on a block of few, expensive queries.
+  // Moves the queries of `chunk` from `reached` on into two new, unstarted chunks directly after `chunk`. Each gets
+  // half of these queries; a single query needs only one new chunk. If there were always only one new chunk, a block of
+  // few, expensive queries would be worked on by one thread at a time.
   void split(Chunks::iterator chunk, size_t reached) LOCUS_REQUIRES(mutex_);
   // Adds an unstarted chunk of the queries [begin, end) of the block of `before`, directly after `before`.
   void insert_unstarted(Chunks::iterator before, size_t begin, size_t end) LOCUS_REQUIRES(mutex_);

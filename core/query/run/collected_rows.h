@@ -31,7 +31,8 @@ inline RowSpans add_rows(CollectedRows& collected, ColumnSet columns, size_t row
   return spans;
 }
 
-// Returns pointers to the first of the last `rows` rows in each column of `columns`, valid like those of add_rows().
+// Returns pointers to the first of the last `rows` rows in each column of `columns`. The pointers stay valid until the
+// next call of add_rows() for the same `collected`.
 inline RowSpans last_rows(CollectedRows& collected, ColumnSet columns, size_t rows) {
   RowSpans spans;
   for_each_column_array([&](const auto& array) {

@@ -1,4 +1,4 @@
-// Complete state of a scene at one revision, except the history: the part that readers see, and the part that only the
+// State of a scene at one revision, without the history. The state has a part that readers see and a part that only the
 // writer uses. FrozenScene is written to the log as a snapshot; SceneState is the result of reading this snapshot. Also
 // defines the limits of a chunk. Plain data.
 #ifndef LOCUS_CORE_SCENE_LOG_SCENE_STATE_H_

@@ -7,10 +7,10 @@
 // AckLevel.
 //
 // Threads: every member may be called from any thread, but append() for a scene only from one thread at a time. Calls
-// wait for the disk. Errors of all members: RESOURCE_EXHAUSTED if the disk is full (queries need no disk: continue to
-// serve them and try again later), DATA_LOSS naming the damaged item, UNAVAILABLE if the disk fails in another way. If
-// a call that writes fails, treat its data as not written, although a part of the data may be found after a restart.
-// The caller may repeat the call.
+// wait for the disk. Errors of all members: RESOURCE_EXHAUSTED if the disk is full, DATA_LOSS naming the damaged item,
+// and UNAVAILABLE if the disk fails in another way. If the disk is full, the caller should continue to serve queries,
+// which need no disk, and try again later. If a call that writes fails, treat its data as not written, although a part
+// of the data may be found after a restart. The caller may repeat the call.
 #ifndef LOCUS_CORE_SCENE_LOG_UPDATE_LOG_H_
 #define LOCUS_CORE_SCENE_LOG_UPDATE_LOG_H_
 
@@ -91,8 +91,8 @@ class UpdateLog {
   virtual bool closed_in_order() const = 0;
 
   // Creates a scene with a snapshot at sequence number 0; `state` returns the chunks of the snapshot, of at most
-  // kMaxChunkBytes each. Returns the key of the scene. The scene is synced to the disk when this call returns; the same
-  // holds for all calls that write, except append() and keep_outline().
+  // kMaxChunkBytes each. Returns the key of the scene. When this call returns, the scene is synced to the disk. Every
+  // other call that writes also syncs its data before it returns, except append() and keep_outline().
   virtual absl::StatusOr<SceneKey> create_scene(absl::string_view name, absl::string_view spec, uint64_t epoch,
                                                 ChunkSource state) = 0;
   // Deletes a scene, damaged or not.

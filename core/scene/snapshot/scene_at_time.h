@@ -51,8 +51,9 @@ class SceneAtTime {
     return displacement_bound_;
   }
 
-  // Returns the region of the grid to search for the objects in the box `bounds` or, if `ball` is given, in `ball`,
-  // whose bounds are `bounds`. The region is the box or ball, widened by the displacement bound.
+  // Returns the region of the grid in which to search for objects. Without `ball`, the objects in the box `bounds` are
+  // wanted; otherwise the objects in `ball` are wanted, and `bounds` are the bounds of `ball`. The region is the box or
+  // ball, widened by the displacement bound.
   GridRegion region(const Aabbd& bounds, const std::optional<Balld>& ball) const;
   // Calls visit(GridRef) once for each object that may be in a box or ball with the bounds `bounds`: for each fast
   // mover whose path may intersect `bounds`, and for each other object that ask(visit) finds. `ask` must search the
@@ -85,7 +86,7 @@ class SceneAtTime {
 };
 
 // Returns the view of the scene at `time`, or nullopt if `time` is before the oldest recorded tick or after the
-// snapshot's own tick. O(log records).
+// snapshot's own tick. O(log n) for n recorded ticks.
 std::optional<SceneAtTime> find_scene_at(const SceneSnapshot& snapshot, const AsOf& time);
 // Returns the time nearest to `time` for which find_scene_at() returns a view.
 AsOf nearest_kept(const SceneSnapshot& snapshot, const AsOf& time);

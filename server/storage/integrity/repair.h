@@ -39,8 +39,8 @@ struct RepairReport {
   std::vector<SceneRepair> scenes;  // damaged scenes only
   std::vector<MeshRepair> meshes;   // damaged meshes only
   std::string kept_at;              // folder to which the old database was moved
-  // Folder of the old database of an earlier repair that was interrupted and that this call finished first; empty if
-  // there was none. The losses of that repair are not in this report.
+  // If an earlier repair was interrupted, this call finished it first. In that case `finished_at` is the folder of that
+  // repair's old database, and the losses of that repair are not in this report. Otherwise empty.
   std::string finished_at;
 };
 

@@ -23,8 +23,8 @@ constexpr size_t kBlockBytes = size_t{64} << 10;
 constexpr size_t kCacheBytes = size_t{8} << 20;
 constexpr int kBuffers = 4;
 // Numbers of tables in RocksDB's level 0. RocksDB merges the tables once there are kTablesToMerge of them, and would
-// stall writers once there are kUnlimitedTables. kUnlimitedTables is so large that it is never reached, because a stall
-// would only delay updates.
+// stall writers once there are kUnlimitedTables. A stall would only delay updates, so kUnlimitedTables is so large that
+// it is never reached.
 constexpr int kTablesToMerge = 4;
 constexpr int kUnlimitedTables = 1 << 20;
 constexpr uint64_t kManifestBytes = uint64_t{4} << 20;
@@ -140,7 +140,7 @@ rocksdb::Status Database::open(const DatabaseOptions& options, OpenMode mode, st
   wanted.wal_filter = &database->wal_watch_;
   wanted.listeners = {database->errors_};
   rocksdb::Status status;
-  // RocksDB would create the folder too, but would first report it as an error that the folder is missing.
+  // RocksDB would create the folder too, but would first report the missing folder as an error.
   if (mode == OpenMode::kCreate) status = wanted.env->CreateDirIfMissing(options.folder);
   if (!status.ok()) return status;
   rocksdb::DB* db = nullptr;

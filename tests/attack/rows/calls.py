@@ -17,8 +17,8 @@ UPLOAD = "/locus.v1.SceneService/UploadMesh"
 REFLECTION = "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo"
 NO_MESSAGES = {"ff": b"\xff\xff\xff\xff", "a cut field": b"\x0a\x7f", "a cut number": b"\x08\x80", "field 0": b"\x02\x00",
                "an end without a group": b"\x7c", "a text that is not UTF-8": b"\x0a\x02\xc3\x28"}
-# Codes that are also allowed, by kind of bytes. A text that is not UTF-8 is valid in requests whose field 1 is no
-# string.
+# Codes that are allowed in addition to INVALID_ARGUMENT, by kind of bytes. A text that is not UTF-8 is valid in
+# requests whose field 1 is no string.
 OTHER_ENDS = {"a text that is not UTF-8": ("OK", "NOT_FOUND", "UNIMPLEMENTED")}
 DEPTH = 100_000
 WRITERS = 6000

@@ -19,8 +19,8 @@ PIECE = wire.PIECE
 
 
 def until_over(job, attack_once):
-    """Runs the attack on one connection after another until the time is over. The daemon may close a connection; a new
-    one is then opened, at most MAX_CONNECTIONS in that time.
+    """Runs the attack on one connection after another until the time is over. If the daemon closes a connection, a new
+    one is opened. At most MAX_CONNECTIONS connections are opened.
     """
     for _ in range(MAX_CONNECTIONS):
         if job.over():

@@ -79,8 +79,8 @@ def send_filled(job, method, prefix, make, what):
 
 
 def amplify_steps(job):
-    """Returns a step for every Place of every request, and steps for unknown fields. The steps that need most memory
-    for each byte sent come first: they fill the lists in requests of the most frequent calls.
+    """Returns a step for every Place of every request, and steps for unknown fields. First come the steps that fill
+    lists in requests of the most frequent calls, because the daemon needs most memory for each byte of these.
     """
     schema, steps = protobuf.Schema(), []
     for method in schema.methods:

@@ -16,7 +16,8 @@ namespace locus::bench::dynamic {
 // shows what a busy second core alone costs.
 enum class Beside : uint8_t { kNothing, kSpinning, kWriter };
 
-// Priority of readers relative to the writer: equal, or below it, like the daemon's threads for large batches.
+// Priority of readers relative to the writer. kEqual: the same. kBelow: lower, as the daemon's threads for large
+// batches have it.
 enum class Readers : uint8_t { kEqual, kBelow };
 
 inline constexpr double kUnpaced = 0;

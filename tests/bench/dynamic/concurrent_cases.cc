@@ -44,8 +44,8 @@ class Rounds {
     return false;
   }
 
-  // Runs `window` for 2 s, or 0.05 s in a quick run. The first call makes the world, since not every case needs a
-  // world.
+  // Runs `window` for 2 s, or 0.05 s in a quick run. Makes the world at the first call and not earlier, since not every
+  // case needs it.
   Seen run(const Window& window) {
     if (arena_ == nullptr) arena_ = std::make_unique<Arena>(count_);
     Window timed = window;
@@ -63,7 +63,7 @@ class Rounds {
     return seen;
   }
 
-  // Measures one reader in three situations, in turns: alone, beside a thread that only spins, and beside the writer.
+  // Measures one reader in three situations, in turns: alone, while a thread only spins, and while the writer runs.
   void run_latencies() {
     progress_(name_of_case("concurrent_p99/1reader"));
     const Window windows[] = {

@@ -1,4 +1,4 @@
-// The suite `dynamic`: moving objects, in locus and in each peer. For main.cc.
+// The suite `dynamic`: moving objects, in locus and in each peer. Used by main.cc.
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_DYNAMIC_SUITE_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_DYNAMIC_SUITE_H_
 

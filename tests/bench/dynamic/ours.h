@@ -1,6 +1,6 @@
-// The code by which the dynamic suite calls locus, except for the batches of mixed_batches.h: the scene's writer, the
-// scene's index without the query engine, and whole batches as the server runs them. One thread; latest() and status()
-// may be called from any thread, like those of Scene.
+// The code by which the dynamic suite calls locus: the scene's writer, the scene's index without the query engine, and
+// whole batches as the server runs them. Only mixed_batches.h calls locus by code of its own. One thread; latest() and
+// status() may be called from any thread, like those of Scene.
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_OURS_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_OURS_H_
 
@@ -45,8 +45,8 @@ class Ours : public Contender {
   uint64_t tick_ = 0;
 };
 
-// Returns a contender that only answers queries about the scene of `ours`. Each call is one batch of one block, about
-// the present or, if given, about `time`. Borrows `ours`.
+// Returns a contender that only answers queries about the scene of `ours`. Each call is one batch of one block. The
+// queries are about `time` if it is given, otherwise about the present. Borrows `ours`.
 std::unique_ptr<Contender> batches_of(const Ours& ours, std::optional<AsOf> time = {});
 
 }  // namespace locus::bench::dynamic

@@ -1,4 +1,4 @@
-// Function that notes in a report whether a ratio reaches its required value. For suites that have requirements.
+// Function that notes in a report whether a ratio reaches its required value. Used by suites that require ratios.
 #ifndef LOCUS_TESTS_BENCH_FRAME_BAR_H_
 #define LOCUS_TESTS_BENCH_FRAME_BAR_H_
 

@@ -1,4 +1,4 @@
-// Filter for cases by name: it selects the names in which a regular expression matches anywhere. For every suite.
+// Filter for cases by name: it selects the names in which a regular expression matches anywhere. Used by every suite.
 // Copies are cheap, since they share the compiled expression; const members may run concurrently.
 #ifndef LOCUS_TESTS_BENCH_FRAME_CASE_FILTER_H_
 #define LOCUS_TESTS_BENCH_FRAME_CASE_FILTER_H_

@@ -1,4 +1,5 @@
-// Results of a benchmark: cells, each with a figure of locus and one of a peer, and notes about them. For every suite.
+// Results of a benchmark: cells, each with a figure of locus and one of a peer, and notes about them. Used by every
+// suite.
 #ifndef LOCUS_TESTS_BENCH_FRAME_CELL_H_
 #define LOCUS_TESTS_BENCH_FRAME_CELL_H_
 

@@ -1,5 +1,5 @@
-// Number of bytes that the process has allocated by malloc and not freed. For cases that measure memory. Any thread may
-// call it.
+// Number of bytes that the process has allocated by malloc and not freed. Used by cases that measure memory. Any thread
+// may call it.
 #ifndef LOCUS_TESTS_BENCH_FRAME_HEAP_H_
 #define LOCUS_TESTS_BENCH_FRAME_HEAP_H_
 

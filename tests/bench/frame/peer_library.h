@@ -1,5 +1,5 @@
-// Peer libraries, with a flag whether this program was configured with the library, and notes about missing libraries.
-// For every suite. Plain data and pure functions.
+// Peer libraries, each with a flag that says whether this program was configured with it; and notes about missing
+// libraries. Used by every suite. Plain data and pure functions.
 #ifndef LOCUS_TESTS_BENCH_FRAME_PEER_LIBRARY_H_
 #define LOCUS_TESTS_BENCH_FRAME_PEER_LIBRARY_H_
 

@@ -1,5 +1,5 @@
 // Races: the same work by several contestants in one process, interleaved in small chunks, so that other load on the
-// machine disturbs all of them equally. For every suite that measures in process; one thread runs a race.
+// machine disturbs all of them equally. Used by every suite that measures in process. One thread runs a race.
 #ifndef LOCUS_TESTS_BENCH_FRAME_RACE_H_
 #define LOCUS_TESTS_BENCH_FRAME_RACE_H_
 

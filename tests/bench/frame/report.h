@@ -1,4 +1,4 @@
-// Output of a report: a table for people, which grows case by case, and JSON for other programs. For main.cc.
+// Output of a report: a table for people, which grows case by case, and JSON for other programs. Used by main.cc.
 #ifndef LOCUS_TESTS_BENCH_FRAME_REPORT_H_
 #define LOCUS_TESTS_BENCH_FRAME_REPORT_H_
 

@@ -1,5 +1,5 @@
-// A hash of a sequence of results: the results of two runs, or of two machines, are compared by comparing one word.
-// Only one thread uses an object. Source: Fowler, Noll, Vo (FNV-1a), over 64-bit words.
+// A hash of a sequence of results. With it, the results of two runs, or of two machines, are compared by comparing one
+// word. Only one thread uses an object. Source: Fowler, Noll, Vo (FNV-1a), over 64-bit words.
 #ifndef LOCUS_TESTS_BENCH_FRAME_RESULTS_HASH_H_
 #define LOCUS_TESTS_BENCH_FRAME_RESULTS_HASH_H_
 

@@ -16,7 +16,7 @@ double percentile(std::vector<double> values, double share);
 // Returns (maximum - minimum) / median.
 double spread(const std::vector<double>& values);
 
-// Returns peer[i] / ours[i] for each round: both times were measured in the same round, so that other load disturbed
+// Returns peer[i] / ours[i] for each round i. Both times were measured in the same round, so that other load disturbed
 // both equally.
 std::vector<double> round_ratios(const std::vector<double>& ours, const std::vector<double>& peer);
 

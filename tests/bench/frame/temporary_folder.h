@@ -1,5 +1,5 @@
-// A new folder under TMPDIR, or under /tmp if TMPDIR is not set; the destructor removes it with its content. For suites
-// that write files. One thread at a time.
+// A new folder under TMPDIR, or under /tmp if TMPDIR is not set; the destructor removes it with its content. Used by
+// suites that write files. One thread at a time.
 #ifndef LOCUS_TESTS_BENCH_FRAME_TEMPORARY_FOLDER_H_
 #define LOCUS_TESTS_BENCH_FRAME_TEMPORARY_FOLDER_H_
 

@@ -159,7 +159,7 @@ absl::Status measure_commits(const LogRun& run, const Size& size) {
   return status;
 }
 
-// Measures writers that each have a scene and a thread: one sync of the log can serve the commits of all.
+// Measures writers that each have a scene and a thread. One sync of the log can serve the commits of all writers.
 absl::Status measure_writers(const LogRun& run, const Size& size) {
   const std::string name = absl::StrCat("writers/", kWriters, "/", size.moves);
   if (!run.options.filter.wants(name)) return absl::OkStatus();

@@ -67,8 +67,8 @@ test::BlockResult answer(const SceneSnapshot& snapshot, QueryBlock block, bool b
   return answer_of(snapshot, std::move(block), brute_force);
 }
 
-// Returns the sorted pairs, found by brute force: assigns the objects to cubes of space and measures the distances of
-// all objects in equal or adjacent cubes.
+// Finds the pairs by brute force and returns them sorted. Assigns the objects to cubes of space, and measures the
+// distances of all objects in equal or adjacent cubes.
 std::vector<ObjectPair> proved_pairs(const Arena& arena) {
   using Key = std::tuple<int, int, int>;
   std::map<Key, std::vector<size_t>> cubes;

@@ -1,5 +1,5 @@
-// Cases of the suite `queries` on 100,000 moving objects: pairs within a distance, objects in frustums and cells of
-// free space. Peers are Bullet's btDbvt and, for pairs, a ball query around each object.
+// Cases of the suite `queries` on 100,000 moving objects: pairs within a distance, cells of free space, and objects in
+// frustums. Peers are Bullet's btDbvt and, for pairs, a ball query around each object.
 #ifndef LOCUS_TESTS_BENCH_QUERIES_OBJECT_CASES_H_
 #define LOCUS_TESTS_BENCH_QUERIES_OBJECT_CASES_H_
 

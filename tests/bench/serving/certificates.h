@@ -1,5 +1,5 @@
 // Certificates of an authority, of a server on the loopback and of a client, and the options with which a daemon and
-// its clients use them. For the cases with TLS. One thread.
+// its clients use them. Used by the cases with TLS. One thread.
 #ifndef LOCUS_TESTS_BENCH_SERVING_CERTIFICATES_H_
 #define LOCUS_TESTS_BENCH_SERVING_CERTIFICATES_H_
 
@@ -25,8 +25,8 @@ class Certificates {
   Certificates(const Certificates&) = delete;
   Certificates& operator=(const Certificates&) = delete;
 
-  // Returns the options of locusd, and those of its clients. They name files of this object, which must outlive their
-  // use.
+  // Return the options of locusd and of its clients. The options name files of this object, so this object must outlive
+  // their use.
   std::vector<std::string> daemon_options(Transport transport) const;
   client::CredentialOptions client_options(Transport transport) const;
 

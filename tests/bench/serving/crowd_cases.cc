@@ -25,7 +25,7 @@ class CrowdCases {
  public:
   CrowdCases(const ServingRun& run, const BenchMesh& mesh) : run_(run), mesh_(mesh) {}
 
-  // Measures the time of small batches, sent one after another, in turns: alone, and beside another client's large
+  // Measures the time of small batches, sent one after another, in turns: alone, and while another client sends large
   // batches.
   absl::Status mixed(TwinScene& scene) const {
     run_.progress("mixed_p99/16");

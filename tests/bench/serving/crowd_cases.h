@@ -1,6 +1,6 @@
 // Cases that measure the effects of one client on another, and of a flood of calls on the server. They cover small
 // batches while another client sends large ones, more calls than the server admits, clients that do not read or that
-// reconnect, and expired and cancelled calls. For the suite serving.
+// reconnect, and expired and cancelled calls. Used by the suite serving.
 #ifndef LOCUS_TESTS_BENCH_SERVING_CROWD_CASES_H_
 #define LOCUS_TESTS_BENCH_SERVING_CROWD_CASES_H_
 

@@ -1,4 +1,4 @@
-// A locusd that the benchmark starts, and a client (of the client library) with which the cases fill it. For every
+// A locusd that the benchmark starts, and a client (of the client library) with which the cases fill it. Used by every
 // case. One thread.
 #ifndef LOCUS_TESTS_BENCH_SERVING_DAEMON_H_
 #define LOCUS_TESTS_BENCH_SERVING_DAEMON_H_

@@ -1,4 +1,4 @@
-// Cost of acks that wait for the disk, and the time until a daemon that was killed answers again. For the suite
+// Cost of acks that wait for the disk, and the time until a daemon that was killed answers again. Used by the suite
 // serving.
 #ifndef LOCUS_TESTS_BENCH_SERVING_DURABLE_CASES_H_
 #define LOCUS_TESTS_BENCH_SERVING_DURABLE_CASES_H_

@@ -1,5 +1,5 @@
 // Answer of the echo server: 24 bytes a ray, copied from the columns of the request, so that the answer costs little.
-// For the echo server, and for the benchmark that verifies its answers. Pure function.
+// Used by the echo server, and by the benchmark, which verifies its answers. Pure function.
 #ifndef LOCUS_TESTS_BENCH_SERVING_ECHO_ANSWER_H_
 #define LOCUS_TESTS_BENCH_SERVING_ECHO_ANSWER_H_
 

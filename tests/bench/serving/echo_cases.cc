@@ -62,7 +62,8 @@ class EchoCases {
   EchoCases(const ServingRun& run, const RawTcpServer& plain, TwinScene& scene)
       : run_(run), plain_(plain), scene_(scene) {}
 
-  // Measures columns that are sent to locus-echo and back: the server's code for calls, without queries.
+  // Measures columns that are sent to locus-echo and back. This takes the time of the server's code for calls, without
+  // queries.
   absl::Status echo(const Echo& echo) {
     const std::string name = echo_name(echo);
     if (!run_.wants(name)) return absl::OkStatus();
@@ -81,7 +82,8 @@ class EchoCases {
     return status;
   }
 
-  // Measures messages of the same size that are sent to the daemon: the rays are checked and run on an empty scene.
+  // Measures messages of the same size that are sent to the daemon, which checks the rays and runs them on an empty
+  // scene.
   absl::Status empty(const Echo& echo) {
     const std::string name = empty_name(echo);
     if (!run_.wants(name)) return absl::OkStatus();

@@ -1,5 +1,5 @@
 // A well-behaved client: it sends one small batch after another over a stream of its own. The times that it waits for
-// answers show the effect of other clients. For every case with other clients. One thread.
+// answers show the effect of other clients. Used by every case in which other clients run too. One thread.
 #ifndef LOCUS_TESTS_BENCH_SERVING_GOOD_CLIENT_H_
 #define LOCUS_TESTS_BENCH_SERVING_GOOD_CLIENT_H_
 

@@ -50,8 +50,8 @@ class GuestCases {
     int64_t most = 0;
   };
 
-  // Measures the good client alone and beside guests of a kind, on a new daemon. Guests of churn end by themselves;
-  // silent guests are killed.
+  // Measures the good client on a new daemon: alone, and while guests of the kind `kind` run. Guests of churn end by
+  // themselves; silent guests are killed.
   absl::Status beside(const std::string& name, const std::string& kind, size_t guests,
                       const v1::QueryBatch& batch) const {
     run_.progress(name);
@@ -102,8 +102,8 @@ class GuestCases {
 
   size_t count() const { return run_.options.quick ? 300 : 5000; }
 
-  // Returns the resources after waiting, for up to 5 s, until at most `files` files are open: connections close shortly
-  // after their calls.
+  // Waits up to 5 s until no more than `files` files are open, since connections close shortly after their calls. Then
+  // returns the resources.
   static Held held(const Daemon& daemon, int64_t files) {
     constexpr double kMaxSeconds = 5, kPatience = 0.02;
     for (double waited = 0; waited < kMaxSeconds && daemon.process().open_files() > files; waited += kPatience)

@@ -1,5 +1,5 @@
 // Measures how a client is affected by other clients: by some that do not read, and by hundreds that connect and leave.
-// Also measures which of the server's resources stay occupied after these other clients have left. For the suite
+// Also measures which of the server's resources stay occupied after these other clients have left. Used by the suite
 // serving.
 #ifndef LOCUS_TESTS_BENCH_SERVING_GUEST_CASES_H_
 #define LOCUS_TESTS_BENCH_SERVING_GUEST_CASES_H_
@@ -12,8 +12,8 @@ namespace locus::bench::serving {
 
 bool wants_guests(const ServingRun& run);
 
-// Runs silent_reader/1, silent_reader/32, churn/1000 (fewer in a quick run): 99th percentile of another client's
-// waiting times, alone and beside these clients.
+// Runs silent_reader/1, silent_reader/32, churn/1000 (fewer in a quick run): the 99th percentile of the good client's
+// waiting times, alone and while these clients run.
 absl::Status run_guest_cases(const ServingRun& run, const BenchMesh& mesh);
 
 }  // namespace locus::bench::serving

@@ -1,5 +1,5 @@
-// A program beside this one that serves gRPC on a free port of the loopback, and connections to that program. For the
-// daemon and for the echo server. One thread.
+// Starts a program that is in the folder of this program and serves gRPC on a free port of the loopback; and makes
+// connections to it. Used for the daemon (class Daemon) and for the echo server. One thread.
 #ifndef LOCUS_TESTS_BENCH_SERVING_LOCAL_SERVER_H_
 #define LOCUS_TESTS_BENCH_SERVING_LOCAL_SERVER_H_
 

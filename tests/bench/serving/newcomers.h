@@ -1,5 +1,5 @@
 // Clients that connect, send one unary query, and disconnect when it is answered; a few at the same time, each on a
-// thread of its own. For the cases that measure new connections. One thread at a time.
+// thread of its own. Used by the cases that measure new connections. One thread at a time.
 #ifndef LOCUS_TESTS_BENCH_SERVING_NEWCOMERS_H_
 #define LOCUS_TESTS_BENCH_SERVING_NEWCOMERS_H_
 

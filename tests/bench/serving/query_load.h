@@ -1,5 +1,5 @@
 // Repeated batches of queries: answered by a server, over streams with a connection each, or by threads of this
-// process. For every case that counts queries per second. One thread.
+// process. Used by every case that counts queries per second. One thread.
 #ifndef LOCUS_TESTS_BENCH_SERVING_QUERY_LOAD_H_
 #define LOCUS_TESTS_BENCH_SERVING_QUERY_LOAD_H_
 
@@ -32,8 +32,8 @@ class ServerLoad {
  public:
   ServerLoad(const LocalServer& server, Batches& batches, size_t streams, size_t window);
 
-  // Sends `passes` times as many messages as there are batches, divided among the streams, each of which repeats its
-  // part of the batches. Errors are stored in status().
+  // Sends `passes` times as many messages as there are batches, divided among the streams. Each stream repeats its part
+  // of the batches. Errors are stored in status().
   void run(size_t passes);
   // Sends every batch once; returns a hash of each answer, in the order of the batches, and sets rows() to the number
   // of rows in all answers.

@@ -1,6 +1,6 @@
 // Baseline with plain kernel sockets and the same bytes: a process that reads messages of a fixed size and answers each
-// with a message of another fixed size, and clients of that process. For the cases that measure the cost of messages.
-// One thread.
+// with a message of another fixed size, and clients of that process. Used by the cases that measure the cost of
+// messages. One thread.
 #ifndef LOCUS_TESTS_BENCH_SERVING_RAW_TCP_H_
 #define LOCUS_TESTS_BENCH_SERVING_RAW_TCP_H_
 

@@ -1,4 +1,4 @@
-// Rays in a level, messages of rays, and the comparison of their answers. For the cases that send rays. Functions
+// Rays in a level, messages of rays, and the comparison of their answers. Used by the cases that send rays. Functions
 // without state.
 #ifndef LOCUS_TESTS_BENCH_SERVING_RAY_BATCHES_H_
 #define LOCUS_TESTS_BENCH_SERVING_RAY_BATCHES_H_
@@ -17,7 +17,8 @@ namespace locus::bench::serving {
 // or if it was not fetched, a generated level.
 absl::StatusOr<BenchMesh> level_of(const ServingRun& run);
 
-// Returns rays from random points of the level in random directions, or neighbouring rays of a picture of it.
+// Return rays of the level: scattered_rays() from random points in random directions, coherent_rays() neighbouring rays
+// of a picture.
 std::vector<RayQuery> scattered_rays(const BenchMesh& mesh, size_t count);
 std::vector<RayQuery> coherent_rays(const BenchMesh& mesh, size_t count);
 

@@ -1,4 +1,4 @@
-// Moves and balls over one connection, in a flat world, compared with GEOADD and GEOSEARCH of Redis. For the suite
+// Moves and balls over one connection, in a flat world, compared with GEOADD and GEOSEARCH of Redis. Used by the suite
 // serving.
 #ifndef LOCUS_TESTS_BENCH_SERVING_REDIS_CASES_H_
 #define LOCUS_TESTS_BENCH_SERVING_REDIS_CASES_H_

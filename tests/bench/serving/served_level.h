@@ -1,4 +1,4 @@
-// The level of a run, placed in a locusd that the benchmark starts and in this process. For cases that compare the
+// The level of a run, placed in a locusd that the benchmark starts and in this process. Used by cases that compare the
 // daemon with direct calls of the core. One thread.
 #ifndef LOCUS_TESTS_BENCH_SERVING_SERVED_LEVEL_H_
 #define LOCUS_TESTS_BENCH_SERVING_SERVED_LEVEL_H_

@@ -1,5 +1,5 @@
 // The suite `serving`: a server and its client as two processes on the loopback, compared with the same work in this
-// process, with plain sockets and with Redis. For main.cc.
+// process, with plain sockets and with Redis. Used by main.cc.
 #ifndef LOCUS_TESTS_BENCH_SERVING_SERVING_SUITE_H_
 #define LOCUS_TESTS_BENCH_SERVING_SERVING_SUITE_H_
 

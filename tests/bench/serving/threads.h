@@ -1,4 +1,4 @@
-// Distribution of work among the threads of a load. For loads with several connections.
+// Distribution of work among the threads of a load. Used by loads with several connections.
 #ifndef LOCUS_TESTS_BENCH_SERVING_THREADS_H_
 #define LOCUS_TESTS_BENCH_SERVING_THREADS_H_
 

@@ -92,8 +92,8 @@ class TlsCases {
     return status;
   }
 
-  // Measures new connections to `guarded`, a daemon with TLS that may require certificates of its clients, and to the
-  // plain daemon, as the case `case_name`.
+  // Measures, as the case `case_name`, new connections to two daemons: `guarded`, which has TLS and may require
+  // certificates of its clients, and the plain daemon.
   absl::Status handshakes(const std::string& case_name, TlsHost& guarded) {
     if (!run_.wants(case_name)) return absl::OkStatus();
     run_.progress(case_name);

@@ -1,5 +1,5 @@
-// The cost of TLS: the same queries to two daemons, one of which serves TLS, and new connections to them. For the suite
-// serving.
+// The cost of TLS: the same queries to two daemons, one of which serves TLS, and new connections to them. Used by the
+// suite serving.
 #ifndef LOCUS_TESTS_BENCH_SERVING_TLS_CASES_H_
 #define LOCUS_TESTS_BENCH_SERVING_TLS_CASES_H_
 

@@ -1,5 +1,5 @@
-// A pair of equal scenes: one in a server, and one in this process, where the same batches run without a network. For
-// every case that compares the two. One thread fills the scenes; then any thread may read.
+// A pair of equal scenes: one in a server, and one in this process, where the same batches run without a network. Used
+// by every case that compares the two. One thread fills the scenes; then any thread may read.
 #ifndef LOCUS_TESTS_BENCH_SERVING_TWIN_SCENE_H_
 #define LOCUS_TESTS_BENCH_SERVING_TWIN_SCENE_H_
 
@@ -38,8 +38,8 @@ class TwinScene {
   Scene here_;
 };
 
-// Returns the columns of a message, which must outlive them. Supports only what the cases send: rays and balls; inserts
-// of points and balls, and moves.
+// Return the columns of a message. The message must outlive the columns. Only what the cases send is supported: queries
+// of rays and balls; inserts of points and balls, and moves.
 QueryBatch columns_of(const v1::QueryBatch& batch);
 UpdateBatch columns_of(const v1::UpdateBatch& batch);
 

@@ -1,5 +1,5 @@
-// Batches of updates that are sent repeatedly over one stream, in order. For every case that counts moves per second.
-// One thread.
+// Batches of updates that are sent repeatedly over one stream, in order. Used by every case that counts moves per
+// second. One thread.
 #ifndef LOCUS_TESTS_BENCH_SERVING_UPDATE_LOAD_H_
 #define LOCUS_TESTS_BENCH_SERVING_UPDATE_LOAD_H_
 

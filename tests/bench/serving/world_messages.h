@@ -1,4 +1,4 @@
-// Messages for a server with the objects and moves of a world of the dynamic suite. For cases that move objects.
+// Messages for a server with the objects and moves of a world of the dynamic suite. Used by cases that move objects.
 // Stateless functions.
 #ifndef LOCUS_TESTS_BENCH_SERVING_WORLD_MESSAGES_H_
 #define LOCUS_TESTS_BENCH_SERVING_WORLD_MESSAGES_H_

@@ -1,5 +1,5 @@
 // A level for the static suite, both as indexed triangles in the order of the import and as triangles with coordinates.
-// Triangles without area are left out. For the workloads, for locus and for every peer. Immutable once made; safe to
+// Triangles without area are left out. Used by the workloads, by locus and by every peer. Immutable once made; safe to
 // share.
 #ifndef LOCUS_TESTS_BENCH_STATIC_BENCH_MESH_H_
 #define LOCUS_TESTS_BENCH_STATIC_BENCH_MESH_H_

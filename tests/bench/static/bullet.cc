@@ -84,8 +84,8 @@ class Bullet : public Peer {
   }
 
  private:
-  // Returns the first hit. Bullet's rays need an end: from an origin within the bounds, or from the camera, no hit is
-  // further away than twice the diagonal.
+  // Returns the first hit. Bullet's rays need an end. Twice the diagonal suffices, since no hit is further away from an
+  // origin within the bounds or from the camera.
   RayAnswer first_of(const RayQuery& ray) {
     const float length = std::min(ray.t_max, 2 * mesh_.diagonal);
     const btVector3 from = vector_of(ray.origin), to = from + vector_of(ray.direction) * length;

@@ -26,8 +26,8 @@ class Ours : public Peer {
   std::shared_ptr<const StaticMesh> mesh_;
 };
 
-// Makes a builder of the tree from triangles, on one thread; bytes() returns the bytes of a StaticMesh, which contains
-// the uploaded mesh.
+// Makes a builder that builds the tree from triangles on one thread. Its bytes() returns the bytes of a StaticMesh,
+// which contains the uploaded mesh too.
 std::unique_ptr<Builder> our_builder(const BenchMesh& mesh);
 // Returns a hash of the order in which a built tree stores its triangles: the results_hash of the cases build and
 // memory.

@@ -1,6 +1,6 @@
-// Fake server of the real protocol inside the test's process, with configurable failures. For tests of the client
-// library and the command line. Handlers run on gRPC's threads, so tests configure failures before the first call, or
-// by members that lock a mutex.
+// Fake server of the real protocol inside the test's process, with configurable failures. Used by tests of the client
+// library and of the command line. Handlers run on gRPC's threads, so tests configure failures before the first call,
+// or by members that lock a mutex.
 #ifndef LOCUS_TESTS_CLIENT_LIB_FAKE_SERVER_H_
 #define LOCUS_TESTS_CLIENT_LIB_FAKE_SERVER_H_
 
@@ -228,7 +228,7 @@ class FakeQueries final : public v1::QueryService::Service {
     return grpc::Status::OK;
   };
   std::function<v1::QueryResult(const v1::QueryBatch&)> stream_answer;
-  int silent_messages = 0;  // the next so many messages on streams are never answered
+  int silent_messages = 0;  // number of next messages on streams that are never answered
   int failing_calls = 0;
   grpc::Status failure{grpc::StatusCode::UNAVAILABLE, "planned"};
   int calls = 0;
@@ -367,7 +367,7 @@ class FakeScenes final : public v1::SceneService::Service {
   std::vector<uint32_t> indices;
   size_t largest_message = 0;
   std::vector<v1::DownloadMeshResponse> mesh_pieces;
-  int failing_downloads = 0;  // the next so many downloads fail after their first message
+  int failing_downloads = 0;  // number of next downloads that fail after their first message
   bool no_mesh = false;
   v1::ChangeInstancesRequest last_change;
   int creates = 0;

@@ -17,7 +17,7 @@ std::string hash_of(const std::vector<float>& vertices, const std::vector<uint32
   return std::string(hash.begin(), hash.end());
 }
 
-// Fixture with a fake server that sends one mesh, two triangles with four vertices, in three messages.
+// Fixture with a fake server that sends one mesh in three messages. The mesh has two triangles and four vertices.
 class MeshDownloadTest : public ::testing::Test {
  protected:
   void SetUp() override {

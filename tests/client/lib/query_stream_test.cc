@@ -21,7 +21,7 @@ class QueryStreamTest : public ::testing::Test {
     open({.reconnect = kPatient});
   }
 
-  // Retry policy whose attempts last longer than the time for which any test keeps its server stopped.
+  // Retry policy that keeps trying for longer than any test keeps its server stopped.
   static constexpr RetryPolicy kPatient = {
       .max_attempts = 1000, .first_backoff = absl::Milliseconds(1), .max_backoff = absl::Milliseconds(20)};
 

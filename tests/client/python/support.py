@@ -75,7 +75,7 @@ class DaemonTest(unittest.TestCase):
         return self.client.query(self.scene, batch).blocks
 
     def command_line(self, *arguments):
-        """Runs `locus -o json ...` and returns its output as Python values; fails the test with its error text."""
+        """Runs `locus -o json ...` and returns its output as Python values. If it fails, the test fails with its error text."""
         command = [os.path.join(BIN, "locus"), "--address", self.daemon.address, "-o", "json", *arguments]
         done = subprocess.run(command, capture_output=True, text=True, timeout=WAIT_SECONDS)
         self.assertEqual(done.returncode, 0, done.stderr)

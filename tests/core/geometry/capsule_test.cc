@@ -18,8 +18,8 @@ using test::Random;
 using test::Real;
 using test::to_real;
 
-// Returns the least value of `distance_at` over the points of a segment, by a search that requires distance_at() to be
-// convex along the segment, as the distance to a convex set is.
+// Returns the least value of `distance_at` over the points of a segment. The search requires distance_at() to be convex
+// along the segment; the distance to a convex set is convex.
 template <class Distance>
 Real least_along(Vec3d half_axis, const Distance& distance_at) {
   const auto at = [&](Real s) { return distance_at(to_real(half_axis) * s); };

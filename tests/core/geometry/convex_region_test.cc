@@ -28,7 +28,8 @@ Planes box_planes(Vec3d center, Vec3d half, const Rotation& rotation = {}) {
   return planes;
 }
 
-// Returns the planes of a view from `eye` along +x, rotated: near and far planes, and sides of slope `slope`.
+// Returns the planes of a view from `eye` along the rotated x axis: a near plane, a far plane and four sides. In axes
+// that are not rotated, the sides bound |y| and |z| by `slope` * x.
 Planes view_planes(Vec3d eye, double slope, double near, double far, const Rotation& rotation) {
   Planes planes;
   const auto add = [&](Vec3d normal, double offset) {

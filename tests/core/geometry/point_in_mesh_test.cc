@@ -48,8 +48,8 @@ Real winding_by_angles(Vec3d point, const Mesh& mesh) {
   return sum / (4 * std::numbers::pi_v<Real>);
 }
 
-// Returns the boundary of the filled cells of a lattice of `side`^3 cells: for each face between a filled and an empty
-// cell two triangles, which face the empty cell. All corners have whole coordinates.
+// Returns the boundary of the filled cells of a lattice of `side`^3 cells. Each face between a filled cell and an empty
+// cell (or the outside) becomes two triangles that face away from the filled cell. All corners have whole coordinates.
 Mesh lattice_mesh(int side, const std::vector<bool>& filled) {
   const auto is_filled = [&](int x, int y, int z) {
     const bool within = std::min({x, y, z}) >= 0 && std::max({x, y, z}) < side;

@@ -1,5 +1,5 @@
-// Tests of the slab test: the ray's interval in a superset of a box contains the ray's interval in the box, which
-// contains the t of every point of the ray in the box.
+// Tests of the slab test. The ray's interval in a box contains the t of every point of the ray in the box. The ray's
+// interval in a superset of the box contains the ray's interval in the box.
 #include "core/geometry/ray.h"
 
 #include "gtest/gtest.h"

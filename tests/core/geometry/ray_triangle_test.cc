@@ -44,8 +44,8 @@ Vec3d point_of(const Triangle& t, double u, double v) {
   return to_double(t.a) + (to_double(t.b) - to_double(t.a)) * u + (to_double(t.c) - to_double(t.a)) * v;
 }
 
-// Edge functions have rounding errors, so the computed t of a plane that contains the origin may be slightly negative;
-// it must still be a hit.
+// If the ray starts in the triangle's plane, rounding errors of the edge functions can make the computed t slightly
+// negative. The triangle must be hit nevertheless.
 TEST(RayTriangleTest, ARayThatStartsOnAWallHitsItAtZeroInAnyDirection) {
   constexpr uint64_t kSeed = 57;
   Random random(kSeed);

@@ -59,8 +59,8 @@ TEST(SegmentTest, DistanceToTheSegmentIsExactForA345Triangle) {
   EXPECT_EQ(squared_distance_to_segment({2, 2, 2}, {7, 7, 7}), 0);
 }
 
-// The nearest point is at the fraction k / n of the half segment, which is mostly not a binary fraction; the distance
-// must be exact nevertheless.
+// The nearest point is at the fraction k / n of the half segment. Most of these fractions are not binary fractions, but
+// the distance must be exact nevertheless.
 TEST(SegmentTest, DistanceOfAnObliqueSegmentToAnEdgeIsExact) {
   for (int n = 3; n <= 49; n += 2) {
     for (int k = 1 - n; k < n; ++k) {

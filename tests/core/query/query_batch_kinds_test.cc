@@ -1,5 +1,5 @@
-// Refusals of invalid columns of frustums, sight, contains, pairs and cells, and of anchors, counts and pages: each
-// names the field and the index.
+// Tests refusals of invalid columns: those of frustums, sight, contains, pairs and cells, and those of anchors, counts
+// and pages. Each error names the field and, if the field's value at one index is wrong, this index.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -13,7 +13,8 @@
 namespace locus::test {
 namespace {
 
-// Expects that check_batch() refuses the block with an error that names `field` and `index`; -1: no index.
+// Expects that check_batch() refuses the block with an error that names `field` and `index`. If `index` is -1, the
+// error must name no index.
 void expect_refusal(const OwnedBlock& block, Reason reason, const std::string& field, int index) {
   QueryBatch batch;
   batch.blocks = {block.view()};

@@ -79,8 +79,8 @@ Refusal refusal_for(const std::vector<OwnedBlock>& blocks) {
   return refusal_of(status).value_or(Refusal{});
 }
 
-// Expects that check_batch() refuses a batch whose block 2 is `block`, with an error that names `field` and `index`;
-// `index` -1 = the error names no index.
+// Expects that check_batch() refuses a batch whose block 2 is `block`, with an error that names `field` and `index`. If
+// `index` is -1, the error must name no index.
 void expect_refusal(const OwnedBlock& block, Reason reason, const std::string& field, int index) {
   const Refusal refusal = refusal_for(three_blocks(block));
   EXPECT_EQ(reason_name(refusal.reason), reason_name(reason));

@@ -32,7 +32,7 @@ class Bash(Shell):
         return self.run("bash", "--norc", "-n", self.script)
 
     def offers(self, line):
-        """Calls the completion function as readline does, which also splits words at = and : characters."""
+        """Calls the completion function as readline does: readline splits words at = and : characters too."""
         words = re.findall(r"[=:]+|[^\s=:]+", line) + ([""] if line[-1] in " =:" else [])
         return self.run(
             "bash", "--norc", "-c",

@@ -186,7 +186,8 @@ TEST(FloodGuardTest, MoreStreamsThanMayBeOpenAreTooMany) {
   EXPECT_EQ(assess(sample, limits, budget), FloodVerdict::kTooManyStreams);
 }
 
-// Fixture with a guard whose requests for the number of streams are counted and answered with a constant.
+// Fixture with a guard. The fixture counts the guard's requests for the number of streams and answers them with a
+// constant.
 class FloodGuardThreadTest : public ::testing::Test {
  protected:
   void watch(std::optional<uint64_t> streams) {

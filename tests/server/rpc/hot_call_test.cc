@@ -361,7 +361,7 @@ TEST(UnaryHotCallTest, ACallMayEndInAnyWayAfterAnyEvent) {
   for (const uint64_t what : {kAtOnce, kElsewhere, kHeld, kRefused, kAside})
     for (const char* how : {"cancel", "break", "drain"}) {
       bool in_time = true;
-      // A call of kHeld has only one event before its end, its arrival, so further interruptions would wait for ever.
+      // Before its end, a call of kHeld has only one event: its arrival. So later interruptions would wait for ever.
       for (int before = 0; in_time && (what != kHeld || before < 2); ++before) {
         SCOPED_TRACE(testing::Message() << how << " " << what << " after " << before);
         Bench<Streamed<false>> bench;

@@ -1,6 +1,6 @@
-// Main function of the security tests that are linked with planted bugs: runs all tests once without a bug, where they
-// must pass, and once with each bug, where at least one must fail. Each run is a process of its own. Exits 0 if every
-// bug is caught.
+// Main function of the security tests that are linked with planted bugs. Runs all tests once without a bug: all must
+// pass. Then runs all tests once with each bug: at least one must fail. Each run is a process of its own. Exits 0 if
+// every bug is caught.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>

@@ -1,6 +1,6 @@
-// Damages a small data directory at one position at a time (flipped bytes, truncated, zeroed and missing files) and
-// opens the directory twice. Each scene must be either refused or identical to the scene that was written, and both
-// openings must report the same damage.
+// Damages a small data directory at one position at a time, and then opens it. A byte is flipped, or a file is
+// truncated, zeroed or missing. Each scene must be either refused or identical to the scene that was written. The
+// directory is opened twice (in the Long suite only every eighth one), and both openings must report the same damage.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -188,7 +188,7 @@ class RocksdbLogDamageTest : public ::testing::TestWithParam<Ending> {
     EXPECT_GT(served_beside_, 0u);
   }
 
-  // Flips bytes in the last blocks of tables, which RocksDB reads before it verifies any checksum.
+  // Flips bytes in the last blocks of tables. RocksDB reads these blocks before it verifies any checksum.
   void flip_ends_of_tables() {
     constexpr size_t kFromEnd = 130, kToEnd = 100;
     for (const auto& [name, bytes] : sample().files) {

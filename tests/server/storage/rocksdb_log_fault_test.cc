@@ -86,8 +86,8 @@ TEST_F(RocksdbLogFaultTest, FailedSyncAcknowledgesNothingAndWritingResumes) {
   expect_records(scene, 6);
 }
 
-// Right after opening, memory tables are empty. Then RocksDB's Resume() alone would continue to write to the log file
-// that failed.
+// Right after opening, the memory tables are empty. While they are empty, RocksDB's Resume() alone would continue to
+// write to the log file that failed.
 TEST_F(RocksdbLogFaultTest, WritingResumesAfterAWriteThatFailsRightAfterOpening) {
   const SceneKey scene = create_scene(*log_, "a", 1).value();
   for (int times = 0; times < 3; ++times) {

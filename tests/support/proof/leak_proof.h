@@ -1,5 +1,6 @@
-// The proof that no ray leaves a closed mesh: rays from positions inside the mesh, aimed at its corners and edges, are
-// traced by the server's query engine, with every instruction set, as first, any and all hits. One thread.
+// The proof that no ray leaves a closed mesh. Rays start inside the mesh and are aimed at its corners and edges. The
+// server's query engine traces each ray with every instruction set, for the first hit, any hit and all hits. One
+// thread.
 //
 // Precision of the aim: a request contains, as floats, the direction of a ray and the offset of its origin from the
 // frame. So the position inside the mesh is rounded twice: the offset to float, and frame + offset to double. The

@@ -1,6 +1,6 @@
-// Repetition of the rays of a block with other modes and limits, whose answers follow from the first hits: mode ANY,
-// the nearest row of mode ALL, and limits at the hits. Used by the proof that no ray misses. The other rows of mode ALL
-// do not follow from the first hits, so the reference verifies them.
+// Repeats the rays of a block with mode ANY, with mode ALL, or with limits at or just before the first hits. The first
+// hits, which are already verified, determine the answers of mode ANY, the nearest row of each answer of mode ALL, and
+// the answers with limits. The reference verifies the other rows of mode ALL. Used by the proof that no ray misses.
 #ifndef LOCUS_TESTS_SUPPORT_PROOF_RAY_REPEATS_H_
 #define LOCUS_TESTS_SUPPORT_PROOF_RAY_REPEATS_H_
 
@@ -47,7 +47,7 @@ inline RayTally repeat_as_all(const ProofScene& scene, OwnedBlock block, const B
   return tally;
 }
 
-// Repeats the rays with a limit exactly at the hit, which must not change the answer.
+// Repeats the rays, each with a limit exactly at its hit. The answers must not change.
 inline RayTally repeat_with_limit_at_hit(const ProofScene& scene, OwnedBlock block, const BlockResult& first) {
   RayTally tally;
   for (size_t i = 0; i < first.t.size(); ++i)

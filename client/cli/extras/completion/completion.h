@@ -1,8 +1,8 @@
 // Completion scripts for shells, generated from the command-line parser. A script consists of a table, with a line for
 // each command, option and positional argument, and shell functions that read the table. The shell computes the
 // candidates without running the program, except for scene names. To complete a scene name, the script runs the
-// program, which requests the names, with a timeout of one second, from the server that the command line selects.
-// Functions without state.
+// program. The program requests the scene names from the server that the command line selects, with a timeout of one
+// second. Functions without state.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_COMPLETION_COMPLETION_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_COMPLETION_COMPLETION_H_
 

@@ -37,8 +37,9 @@ class DemoChecker {
     uint64_t checked = 0;
     uint64_t differences = 0;
   };
-  // Compares the answers to the first `max_queries` queries of `batch`, which demo_batch() made, with brute force on
-  // the objects at the tick of `result`. Every id, triangle and distance must be equal bit for bit.
+  // Compares the answers in `result` to the first `max_queries` queries of `batch` with brute force on the objects at
+  // the tick of `result`. Every id, triangle and distance must be equal bit for bit. Precondition: demo_batch() made
+  // `batch`.
   Outcome check(DemoKind kind, const v1::QueryBatch& batch, const v1::QueryResult& result, int max_queries);
 
  private:

@@ -8,7 +8,7 @@
 namespace locus::cli {
 namespace {
 
-// Largest ratio of a box's longest side to its largest absolute coordinate for which the box is treated as a point.
+// A box is treated as a point if its longest side is at most this share of its largest absolute coordinate.
 constexpr double kSmallestExtent = 1e-9;
 
 std::array<Vec3d, 8> corners_of(const Aabbd& box) {

@@ -25,9 +25,9 @@ Vec3d three_quarter_view(Vec3d up);
 // be empty. A box that is a single point is treated as a box of side 1. Method: let w be the slope of the picture's
 // left and right edges. Seen from the eye (ex, ey, ez), a corner at (x, y) and depth z in the view's axes lies between
 // these edges if |x - ex| <= w (z - ez). Over all corners, let a be the maximum of x - w z, and b the maximum of -x - w
-// z. Then all corners lie between the edges if a + w ez <= ex <= -b - w ez. The eye nearest to the box has the largest
-// ez, for which both bounds of ex are equal. The condition in y gives a second maximum of ez; the smaller of the two
-// maxima is used.
+// z. Then all corners lie between the edges if a + w ez <= ex <= -b - w ez. The nearer the eye is to the box, the
+// larger is ez. The largest possible ez is the one at which both bounds of ex are equal. The condition in y gives a
+// second maximum of ez; the smaller of the two maxima is used.
 Camera frame_box(const Aabbd& bounds, const ViewAxes& axes, const Lens& lens);
 
 }  // namespace locus::cli

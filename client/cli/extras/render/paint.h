@@ -1,4 +1,4 @@
-// Painters that convert the hits of rays to pixels. For `locus render`. Functions without state, whose results are
+// Painters that convert the hits of rays to pixels. For `locus render`. Functions without state. Their results are
 // bit-identical on every machine.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_RENDER_PAINT_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_RENDER_PAINT_H_
@@ -16,7 +16,7 @@ namespace locus::cli {
 struct ValueScale {
   double min = 0;
   double median = 0;
-  double high = 0;  // 99th percentile; brightest colour of paint_heat(), so that outliers do not darken the rest
+  double high = 0;  // 99th percentile; paint_heat() is brightest from here on, so outliers do not darken the rest
   double max = 0;
 };
 

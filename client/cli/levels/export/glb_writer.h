@@ -54,15 +54,17 @@ class GlbWriter {
   // material of the part's name. Returns RESOURCE_EXHAUSTED if the file would exceed kMaxExportBytes.
   absl::Status set_mesh(size_t mesh_index, const ImportedMesh& mesh);
 
-  // Adds a node under the root that draws the mesh of index `mesh`. `extras` are glTF's application-specific
-  // properties, which editors show with the node. Returns RESOURCE_EXHAUSTED beyond kMaxExportNodes.
+  // Adds a node that is a child of the root and draws the mesh of index `mesh`. `extras` are glTF's
+  // application-specific properties, which editors show with the node. Returns RESOURCE_EXHAUSTED beyond
+  // kMaxExportNodes.
   absl::Status add_node(const std::string& name, const GlbPlace& place, size_t mesh, const Json& extras);
   // Mesh drawn by a child node of a group; `place` is relative to the group.
   struct Child {
     size_t mesh = 0;
     GlbPlace place;
   };
-  // Adds a node under the root with one child node for each of `children`. Returns the same errors as add_node().
+  // Adds a node that is a child of the root. The new node has one child node for each of `children`. Returns the same
+  // errors as add_node().
   absl::Status add_group(const std::string& name, const GlbPlace& place, const std::vector<Child>& children,
                          const Json& extras);
 

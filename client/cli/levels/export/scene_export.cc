@@ -23,7 +23,7 @@ Json facts_of(const SceneThing& thing) {
 
 std::string object_name(const SceneThing& thing) { return absl::StrCat("object ", thing.id); }
 
-// Returns the shortest rotation from +z to the direction of `axis`. `length` is the length of `axis`, not 0.
+// Returns the shortest rotation from +z to the direction of `axis`. `length` is the length of `axis` and must not be 0.
 std::array<float, 4> rotation_to(const std::array<float, 3>& axis, double length) {
   const double x = axis[0] / length;
   const double y = axis[1] / length;

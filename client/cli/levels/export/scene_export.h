@@ -33,9 +33,8 @@ class SceneExport {
   SceneExport(const std::string& name, UpAxis up, const std::array<double, 3>& recentre)
       : writer_(name, up), recentre_(recentre) {}
 
-  // Adds the node of an object or instance, named `object 7` or `instance 3 (mesh)`. The node's extras are id and
-  // layers, the shape of an object, and group and tag unless they are 0. Returns RESOURCE_EXHAUSTED beyond
-  // kMaxExportNodes.
+  // Adds the node of an object or instance, named `object 7` or `instance 3 (mesh)`. The node's extras are: id; layers;
+  // group and tag, unless they are 0; for an object, its shape. Returns RESOURCE_EXHAUSTED beyond kMaxExportNodes.
   absl::Status add(const SceneThing& thing);
 
   // Returns the names of the meshes that the added instances draw, in order of first use. set_mesh() must be called for

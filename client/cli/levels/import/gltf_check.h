@@ -1,6 +1,6 @@
-// Check of the JSON part of a glTF or GLB file before assimp reads the file: sizes, counts, nesting, and references to
-// other files. The nesting is checked because assimp visits nodes recursively, and the references because assimp opens
-// the referenced files. For the reader of level files. A function without state.
+// Check of the JSON part of a glTF or GLB file before assimp reads the file. Checks sizes, counts, nesting, and
+// references to other files. The nesting is checked because assimp visits nodes recursively, and the references because
+// assimp opens the referenced files. For the reader of level files. A function without state.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_GLTF_CHECK_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_GLTF_CHECK_H_
 

@@ -1,4 +1,4 @@
-// Error of the importers for an exceeded limit, whose message names the limit. A pure function.
+// Error of the importers for an exceeded limit. The error's message names the limit. A pure function.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_IMPORT_IMPORT_ERROR_H_
 #define LOCUS_CLIENT_CLI_LEVELS_IMPORT_IMPORT_ERROR_H_
 

@@ -1,5 +1,5 @@
-// Reader of csv or ndjson rows, batch by batch. For the commands that accept rows; of the readers in this folder they
-// use only RowReader. Not thread-safe. Holds at most one batch and one read buffer in memory.
+// Reader of csv or ndjson rows, batch by batch. For the commands that accept rows; these commands use no other reader
+// of this folder. Not thread-safe. Holds at most one batch and one read buffer in memory.
 #ifndef LOCUS_CLIENT_CLI_ROWS_BULK_ROW_READER_H_
 #define LOCUS_CLIENT_CLI_ROWS_BULK_ROW_READER_H_
 

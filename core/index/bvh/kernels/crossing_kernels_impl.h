@@ -17,8 +17,8 @@
 // edge does. If two edges do and the signs of both are certain, the triangle's winding in the projection is known. If
 // this winding is 0, p is off the triangle, because the two edges bound the triangle's section at this height. If it is
 // not 0, p may be on the triangle. If no edge crosses the height, the winding is 0, but p may be at the height of the
-// triangle's highest vertex and on the triangle. In both cases p is on the triangle only if the triangle's bounds,
-// along the half line, extend back to p.
+// triangle's highest vertex and on the triangle. In these two doubtful cases, p can be on the triangle only if the
+// bounds of the triangle extend back to p along the half line.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_CROSSING_KERNELS_IMPL_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_CROSSING_KERNELS_IMPL_H_
 

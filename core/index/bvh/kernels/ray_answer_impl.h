@@ -12,8 +12,8 @@ namespace {
 
 constexpr uint32_t kNoNumber = 0xFFFFFFFFu;
 
-// Table of the rows of TriangleNode::bounds that contain the planes through which a ray enters and leaves the boxes,
-// indexed by the octant of the ray's direction and the axis. A row is given by the offset of its first float in
+// Table of rows of TriangleNode::bounds. The octant of a ray's direction and an axis select two rows: those with the
+// planes through which the ray enters and leaves the boxes. A row is given by the offset of its first float in
 // `bounds`.
 struct RowTable {
   uint32_t entered[8][4], left[8][4];

@@ -1,8 +1,8 @@
-// Test of one ray with the eight triangles of a block, or of eight rays with one triangle: a test in float excludes
-// most triangles, and a test in double gives the result for the triangles that remain. A sheared coordinate is x or y
-// of a vertex, relative to the origin and projected along the ray to z = 0; TriangleRay computes the same value
-// multiplied by d. Error bounds, with R = max |origin| + max |vertex|, E = the block's extent, and d = the direction's
-// largest component:
+// Test of one ray with the eight triangles of a block, or of eight rays with one triangle. A test in float excludes
+// most triangles; a test in double gives the result for the triangles that remain. A sheared coordinate is x or y of a
+// vertex, relative to the origin and projected along the ray to z = 0; TriangleRay computes the same value multiplied
+// by d. Error bounds, with R = max |origin| + max |vertex|, E = the block's extent, and d = the direction's largest
+// component:
 //
 // - The error of a sheared coordinate is at most 10 * 2^-24 R: rounding of the origin, the differences, the shear, the
 //   product and the sum. A ray that hits the block's padded box passes within 2^-20 R of it, so sheared coordinates are

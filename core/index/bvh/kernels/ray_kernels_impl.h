@@ -120,7 +120,7 @@ class RayStream {
     if constexpr (kAny) {
       if (rays_[index].hint != kNoBlock) {
         flight.now = rays_[index].hint | kBlockBit;
-        flight.waiting[flight.top++] = 0;  // the root, if the block has no triangle that the ray hits
+        flight.waiting[flight.top++] = 0;  // the root: opened next if the ray hits no triangle of the block
         return next_steps.add(slot, kBlock);
       }
     }
@@ -174,7 +174,7 @@ class RayStream {
   }
 
   // Schedules resolve() if the opened block has candidates or the ray has exceeded kMaxKernelTests; resolve() then pops
-  // the next node or block. Otherwise pops the next node or block itself.
+  // the next node or block. In all other cases finish_block() pops the next node or block.
   inline void finish_block(uint32_t slot, WorkList& next_steps) {
     InFlightRay& flight = flights_[slot];
     // Computed without branches, because the processor would mispredict them too often.

@@ -1,8 +1,8 @@
-// Packet of eight coherent rays (rays close to each other with similar directions), traced through one tree together:
-// each box and each triangle is tested with all rays at once. Simulated cameras and sensors generate coherent rays. The
-// tests of a ray use the same arithmetic as if the ray were traced alone, so that its answer is the same. Boxes that no
-// ray can hit are culled first, eight at a time, by a frustum around the rays. Several packets take steps in turn, so
-// that one packet continues while another waits for memory.
+// Packet of eight coherent rays, traced through one tree together: each box and each triangle is tested with all eight
+// rays. Rays are coherent if they are close to each other and have similar directions. Simulated cameras and sensors
+// generate coherent rays. The tests of a ray use the same arithmetic as if the ray were traced alone, so that its
+// answer is the same. Boxes that no ray can hit are culled first, eight at a time, by a frustum around the rays.
+// Several packets take steps in turn, so that one packet continues while another waits for memory.
 //
 // Source: Wald, Slusallek, Benthin, Wagner, Interactive Rendering with Coherent Ray Tracing, 2001.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_RAY_PACKET_IMPL_H_
@@ -191,8 +191,8 @@ class Packet {
     return top;
   }
 
-  // Tests the rays in the mask `rays` with a block: each triangle with eight rays at once or, if few rays hit the
-  // block's box, each ray with eight triangles at once.
+  // Tests the rays in the mask `rays` with a block. If few rays hit the block's box, tests one ray after the other,
+  // each with eight triangles together; otherwise one triangle after the other, each with eight rays together.
   inline void open_block(const TriangleBlock& block, uint32_t rays) {
     for (uint32_t i = 0; i < kTreeWidth; ++i) hits_[i].tests += (rays >> i & 1u) * block.count;
     constexpr int kRayCost = 5, kTriangleCost = 2;  // measured relative costs

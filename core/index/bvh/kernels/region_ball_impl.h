@@ -117,8 +117,8 @@ class BallQuery {
   }
 
  private:
-  // Returns a mask with one bit per triangle, set if all its vertices lie beyond the plane that is perpendicular to the
-  // vector from the centre to the first vertex and has the distance sqrt(limit) from the centre. `square` is the
+  // Returns a mask with one bit per triangle, set if all its vertices lie beyond a plane at the distance sqrt(limit)
+  // from the centre. The plane is perpendicular to the vector from the centre to the first vertex. `square` is the
   // squared length of this vector, and `second` and `third` are its dot products with the vectors to the other two
   // vertices.
   static inline uint32_t are_beyond_plane(Floats8 square, Floats8 second, Floats8 third, Floats8 limit) {

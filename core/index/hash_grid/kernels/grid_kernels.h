@@ -1,6 +1,6 @@
-// Kernels that cull the values of the hash grid in float, eight at a time: plain data and a table of functions,
-// compiled once per instruction set. The kernels only cull; their callers apply the exact predicates, in double. Any
-// thread may call the kernels.
+// Kernels that cull the values of the hash grid in float, eight at a time. The kernels are compiled once per
+// instruction set; GridKernels is the table of the kernels for one instruction set. All other types are plain data. The
+// kernels only cull; their callers apply the exact predicates, in double. Any thread may call the kernels.
 //
 // A kernel never drops a value that satisfies the caller's original query, in spite of rounding. For this purpose,
 // callers widen the query by kCullEpsilon times the magnitudes of the query's coordinates and the brick's coordinates.
@@ -18,7 +18,7 @@ inline constexpr float kDiagonal =
     1.73206f;  // upper bound of sqrt(3): distance from a position to a corner of the bounds, in extents
 inline constexpr uint32_t kMaxSorted = 64;
 
-// Rows of consecutive values of one block.
+// Rows of one block. A row is a range of consecutive values.
 struct GridRows {
   static constexpr uint32_t kMax = 16;         // max rows
   static constexpr uint32_t kMaxValues = 512;  // max values in all rows of one call

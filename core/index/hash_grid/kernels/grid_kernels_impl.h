@@ -43,7 +43,7 @@ inline uint32_t bits_of(Lanes lanes) {
 #endif
 }
 
-// Returns a mask with one bit for each of the values `slot` to slot + 7, set if the value is dead.
+// Returns a mask with one bit for each of the eight values from `slot` on. A bit is set if its value is dead.
 inline uint32_t dead_bits(const uint64_t* dead, uint32_t slot) {
   uint16_t bits;
   std::memcpy(&bits, reinterpret_cast<const char*>(dead) + slot / 8, sizeof(bits));
@@ -51,7 +51,8 @@ inline uint32_t dead_bits(const uint64_t* dead, uint32_t slot) {
 }
 
 #ifdef __AVX2__
-// Table that maps a mask of lanes to the indices of the lanes in the mask, ascending, one byte each.
+// Table with one entry for each mask of lanes. An entry has the indices of the lanes in the mask, ascending, in one
+// byte each.
 struct LanesOfMasks {
   constexpr LanesOfMasks() {
     for (uint32_t mask = 0; mask < 256; ++mask) {

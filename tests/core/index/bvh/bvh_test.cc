@@ -127,8 +127,8 @@ TEST(BvhTest, RegionsAreVisitedInStorageOrder) {
   EXPECT_EQ(work.nodes, tree.node_count());
 }
 
-// If a primitive straddles two leaves, the leaf that the ray enters first may contain a farther hit than the next leaf
-// (Hughes et al., ch. 37, Fig. 37.15), so the hit that is found first need not be the nearest.
+// The boxes of two leaves can overlap. Then the leaf that the ray enters first may contain a farther hit than the leaf
+// that the ray enters next (Hughes et al., ch. 37, Fig. 37.15). So the hit that is found first need not be the nearest.
 TEST(BvhTest, AFartherHitInTheLeafVisitedFirstDoesNotHideANearerOneInALaterLeaf) {
   std::vector<Triangle> triangles;
   for (uint32_t i = 0; i < 8; ++i) triangles.push_back(across_x_axis(10, 1, i));

@@ -102,8 +102,8 @@ TEST(TriangleBvhBuildTest, ALargeTriangleGetsABlockOfItsOwn) {
     EXPECT_EQ(tree.blocks[block].count == 1, tree.numbers[tree.blocks[block].first] == 15);
 }
 
-// Visitor that searches for the first hit and counts the blocks that it visits: one for each triangle that is the first
-// of its block.
+// Visitor that searches for the first hit and counts the blocks that it visits. It counts a block when it visits the
+// first triangle of the block.
 class CountingRay {
  public:
   CountingRay(const TriangleRay& ray, const std::unordered_set<uint32_t>& first_of_block, size_t& blocks)

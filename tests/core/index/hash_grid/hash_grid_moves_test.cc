@@ -1,5 +1,5 @@
-// Batches that contain only moves, of a few, half or all of the values, with and without GridMoves::by_handle; and
-// snapshots that share a brick's log, to which later moves append.
+// Tests batches that contain only moves, with and without GridMoves::by_handle. A batch moves a few, about half or all
+// of the values. Also tests snapshots that share the log of a brick while later moves append to this log.
 #include <gtest/gtest.h>
 
 #include <atomic>

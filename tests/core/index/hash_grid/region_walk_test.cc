@@ -1,5 +1,5 @@
-// A walk of many regions visits for each region the same values as a separate visit of that region, in the same order
-// and with the same amount of work, after any moves and for any number of values or bricks in a region.
+// A walk of many regions equals separate visits of these regions: for each region it visits the same values in the same
+// order, with the same amount of work. This holds after any moves, and for any number of values or bricks in a region.
 #include "core/index/hash_grid/region_walk.h"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
-// A march along a ray lists slabs of bricks. The brick of every value that passes the slab test is in exactly one slab,
-// whose `near` is at most the `near` of the ray's interval in the value's bounds.
+// A march along a ray lists slabs of bricks. If a value passes the slab test, its brick is in exactly one slab, and the
+// `near` of this slab is at most the `near` of the ray's interval in the value's bounds.
 #include "core/index/hash_grid/slab_march.h"
 
 #include <gtest/gtest.h>
@@ -45,8 +45,8 @@ FiledLevel random_level(Random& random, Vec3d center) {
   return level;
 }
 
-// Returns a ray through a corner or a face of one of the values' bounds, or so little outside that the value passes the
-// slab test only because of the pad.
+// Returns a ray through a corner or a face of the bounds of a random value. Sometimes the ray passes just outside these
+// bounds, so that the value passes the slab test only because of the pad.
 Rayd grazing_ray(Random& random, const FiledLevel& level, double pad) {
   const Aabbd& box = random.pick(level.values).bounds;
   Vec3d through = random.chance(0.5) ? box.min : box.max;

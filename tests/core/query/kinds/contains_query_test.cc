@@ -1,5 +1,5 @@
-// Contains queries in a small world: a cube from -1 to 1, a ball at (5, 0, 0), a box at (5, 1, 0), and a wall at x = 0,
-// which is no closed mesh.
+// Contains queries in a small world: a cube from -1 to 1, a ball at (5, 0, 0), a box at (5, 1, 0), and a wall at x = 0.
+// The mesh of the wall is not closed.
 #include "core/query/kinds/contains_query.h"
 
 #include <gmock/gmock.h>
@@ -13,7 +13,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-// Returns a cube whose triangles face outwards, or inwards, from -size to size.
+// Returns a cube from -size to size. Its triangles face outwards, or inwards if `inwards` is true.
 StaticMeshPtr closed_cube(float size, bool inwards = false) {
   std::vector<Triangle> triangles;
   for (int axis = 0; axis < 3; ++axis)

@@ -1,5 +1,5 @@
-// Sight in a small world: a viewer at the origin, a wall at x = 4 of group 7, a ball of group 8 at x = 6, and targets
-// behind them.
+// Sight in a small world: a viewer at the origin, a wall of group 7 at x = 4, a ball of group 8 at x = 6, and targets
+// behind the wall and the ball.
 #include "core/query/kinds/sight_query.h"
 
 #include <gmock/gmock.h>

@@ -62,8 +62,8 @@ class RunBatchPinsTest : public ::testing::Test {
     ASSERT_TRUE(scene_->apply(batch).ok());
   }
 
-  // Expects that the pinned bytes are at most the limit, plus 1/16 of the limit (readers may pin so much before the
-  // bytes are counted again), plus the size of two revisions.
+  // Expects that the pinned bytes exceed the limit by at most 1/16 of the limit plus the size of two revisions. Readers
+  // can pin 1/16 of the limit before the bytes are counted again.
   void expect_bounded() const {
     const SceneStatus status = scene_->status();
     EXPECT_LE(status.pinned_bytes, status.max_pinned_bytes + status.max_pinned_bytes / 16 + 2 * scene_bytes_);
@@ -172,8 +172,8 @@ TEST_F(RunBatchPinsTest, QuickReadersAreNeverRevokedBesideOneThatKeepsAllRevisio
       ++quick;
     }
   });
-  // Stops on failure: if the quick reader fails, the hoarder pins no further revisions. Then no pin is revoked, and the
-  // loop would not end.
+  // The loop ends on failure, because it might never end otherwise: if the quick reader fails, the hoarder pins no
+  // further revisions, so that no further pin is revoked.
   for (uint64_t i = 0; (i < turns || revoked == 0) && !HasFailure(); ++i) {
     advance();
     expect_bounded();

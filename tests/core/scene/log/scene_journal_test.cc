@@ -1,4 +1,4 @@
-// Tests which records a scene appends to its log, when, and how it handles log errors.
+// Tests which records a scene appends to its log and when it appends them, and how the scene handles errors of the log.
 #include "core/scene/log/scene_journal.h"
 
 #include <gmock/gmock.h>

@@ -78,7 +78,7 @@ class DamagedTopologyTest : public ::testing::Test {
   std::string bytes_;
 };
 
-// In the encoded topology, the triangle numbers follow the kind, the builder version and the number of triangles.
+// In the encoded topology, the triangle numbers come after the kind, the builder version and the count of triangles.
 TEST_F(DamagedTopologyTest, ASwapOfTriangleNumbersIsAcceptedAndAnswersStayCorrect) {
   constexpr size_t kNumbers = 24;
   ASSERT_GT(scene_.values.size(), 20u);

@@ -48,8 +48,8 @@ void expect_whole(const SceneSnapshot& snapshot) {
   }
 }
 
-// Runs a batch of three blocks (a lookup of all objects, a ball around all objects, and a ray along the line of each
-// object) and expects that all answers are about one revision.
+// Runs a batch of three blocks and expects that all answers are about one revision. The blocks contain a lookup of all
+// objects, a ball around all objects, and a ray along the line of each object.
 void expect_answers_of_one_revision(const SceneSnapshot& snapshot) {
   std::vector<uint64_t> ids;
   std::vector<float> origins;

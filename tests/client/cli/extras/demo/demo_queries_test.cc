@@ -16,7 +16,7 @@ constexpr uint64_t kSeed = 7;
 constexpr uint64_t kTick = 13;
 constexpr int kQueries = 40;
 
-// Fixture with a small city with objects at kTick, and the correct answers to one batch of each kind.
+// Fixture with a small city, its objects at the tick kTick, and the correct answers to one batch of each kind.
 class DemoQueriesTest : public testing::Test {
  protected:
   DemoQueriesTest() : level_(make_level()), world_(level_.bounds, 5000, kSeed), checker_(level_.instances, world_) {

@@ -31,8 +31,8 @@ class NearestKernelsTest : public ::testing::TestWithParam<std::string> {
 
 TEST_P(NearestKernelsTest, FindAllThatIsNearInOrdinaryMeshes) {
   compare(ordinary_nearest_trials());
-  // A search may return up to 30 candidates on average, most of them necessary: all triangles around the nearest
-  // vertex, and the triangles that are farther than the nearest one by at most the search's slack.
+  // The searches may return fewer than 30 candidates on average. Most candidates are necessary: all triangles around
+  // the nearest vertex, and the triangles that are farther than the nearest one by at most the search's slack.
   EXPECT_LT(candidates_, 30 * searches_);
 }
 

@@ -115,7 +115,8 @@ TEST_P(RegionKernelsTest, FindTheSameAsThePredicatesAmongSliversAndTrianglesWith
   compare(slivers, scaled_count(1'000), 7);
 }
 
-// Tests balls around points above a triangle so narrow that all three edges are near the foot of the perpendicular.
+// Tests balls whose centres are on or above a triangle. The triangle is so narrow that all three of its edges are near
+// the projection of the centre on the triangle's plane.
 TEST_P(RegionKernelsTest, FindTheSameAsThePredicatesForBallsBesideNarrowTriangles) {
   Random random(12);
   for (size_t i = 0; i < scaled_count(20'000) && !HasFailure(); ++i) {
