@@ -82,9 +82,9 @@ struct Host : RpcState {
   UpdateQueue updates;
   Snapshotter snapshots{registry, log, snapshotter_options(config)};
   ChangeQueue changes{kChangeThreads, limits::kMaxPendingChanges};
-  MemoryKeeper memory_keeper{memory, registry, [this](bool close) {
-                               return connections.shed_heaviest(close, kMinShedBytes, "memory is nearly full");
-                             }};
+  MemoryKeeper memory_keeper{
+      memory, registry,
+      [this](bool close) { return connections.shed_heaviest(close, kMinShedBytes, "memory is nearly full"); }, log};
   // Calls that visit all objects of a scene, to describe or dump it, occupy at most half of the cores.
   Turns scene_visits{std::max(1u, config.threads / 2)};
   AdmissionLimiter health_watchers{kMaxHealthWatchers, Sharing::kFair};

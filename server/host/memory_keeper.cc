@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "core/base/check.h"
 #include "server/host/memory_lines.h"
 #include "server/observability/log.h"
@@ -28,6 +29,8 @@ constexpr milliseconds kIdleReleaseInterval{5000};
 constexpr milliseconds kReadersInterval{1000};
 // Minimum interval between two log entries about refused claims.
 constexpr milliseconds kRefusalsInterval{5000};
+// Minimum interval between two log entries with the use of each line.
+constexpr milliseconds kLinesInterval{60'000};
 
 std::vector<ScenePtr> all_scenes(const Registry& registry) {
   return registry.list_scenes("", std::numeric_limits<size_t>::max());
@@ -48,8 +51,8 @@ std::vector<uint64_t> shrunk_sizes(const std::vector<uint64_t>& sizes, uint64_t 
   return shrunk;
 }
 
-MemoryKeeper::MemoryKeeper(MemoryBudget& budget, Registry& registry, Shed shed)
-    : budget_(budget), registry_(registry), shed_(std::move(shed)) {
+MemoryKeeper::MemoryKeeper(MemoryBudget& budget, Registry& registry, Shed shed, const UpdateLog* log)
+    : budget_(budget), registry_(registry), shed_(std::move(shed)), log_(log) {
   thread_ = std::thread([this] { run(); });
 }
 
@@ -83,6 +86,7 @@ void MemoryKeeper::keep() {
   const steady_clock::time_point now = steady_clock::now();
   refused_ = budget_.take_shortage() || refused_;
   const bool is_needed = is_short || refused_;
+  if (is_needed) log_lines(now);
   if (now - last_release_ >= (is_needed ? kReleaseInterval : kIdleReleaseInterval)) {
     last_release_ = now;
     refused_ = false;
@@ -181,6 +185,19 @@ void MemoryKeeper::log_refusals(steady_clock::time_point now) {
          {"limit", absl::StrCat(budget_.limit())},
          {"hint", "`locus limits` shows what the memory is used for"}});
   }
+}
+
+void MemoryKeeper::log_lines(steady_clock::time_point now) {
+  if (last_lines_ != steady_clock::time_point() && now - last_lines_ < kLinesInterval) return;
+  last_lines_ = now;
+  const std::vector<MemoryLineUse> lines = memory_lines(budget_, registry_, log_);
+  log(LogLevel::kWarning, "memory is short: what it is used for",
+      {{"lines", absl::StrJoin(lines, " ",
+                               [](std::string* out, const MemoryLineUse& line) {
+                                 absl::StrAppend(out, line.name, "=", line.used);
+                               })},
+       {"memory_bytes", absl::StrCat(budget_.taken())},
+       {"limit", absl::StrCat(budget_.limit())}});
 }
 
 }  // namespace locus::server

@@ -3,7 +3,8 @@
 // then drops the oldest ticks of histories, so that histories give way before inserts and uploads are refused, and
 // after that cancels the readers of the oldest revisions. If memory is nearly full, its first step is to close the
 // connections that hold or send most. Only this thread does this work, because the work visits all scenes and the whole
-// heap. It logs what it dropped, cancelled or closed, and the lines of the budget on which claims were refused.
+// heap. It logs what it dropped, cancelled or closed, and the lines of the budget on which claims were refused. While
+// memory is short or claims are refused, it logs the use of each line once a minute.
 //
 // Threads: the constructor starts the thread, the destructor ends it.
 #ifndef LOCUS_SERVER_HOST_MEMORY_KEEPER_H_
@@ -18,6 +19,7 @@
 #include <vector>
 
 #include "core/base/mutex.h"
+#include "core/scene/log/update_log.h"
 #include "core/scene/registry.h"
 #include "server/scheduling/memory_budget.h"
 
@@ -34,8 +36,8 @@ class MemoryKeeper {
   // closed connections.
   using Shed = std::function<size_t(bool close)>;
 
-  // `budget` and `registry` must outlive the keeper.
-  MemoryKeeper(MemoryBudget& budget, Registry& registry, Shed shed);
+  // `budget`, `registry` and `log` must outlive the keeper. `log` may be null.
+  MemoryKeeper(MemoryBudget& budget, Registry& registry, Shed shed, const UpdateLog* log = nullptr);
   ~MemoryKeeper();
   MemoryKeeper(const MemoryKeeper&) = delete;
   MemoryKeeper& operator=(const MemoryKeeper&) = delete;
@@ -57,14 +59,16 @@ class MemoryKeeper {
   void shed_connections();
   void revoke_readers();
   void log_refusals(std::chrono::steady_clock::time_point now);
+  void log_lines(std::chrono::steady_clock::time_point now);
 
   MemoryBudget& budget_;
   Registry& registry_;
   const Shed shed_;
+  const UpdateLog* const log_;
   std::atomic<uint64_t> trimmed_bytes_{0};
   std::atomic<uint64_t> revoked_bytes_{0};
   // Used by the thread only.
-  std::chrono::steady_clock::time_point last_release_{}, last_readers_{}, last_refusals_{};
+  std::chrono::steady_clock::time_point last_release_{}, last_readers_{}, last_refusals_{}, last_lines_{};
   bool refused_ = false;  // a claim was refused since the last release
   std::array<uint64_t, kMemoryLines> logged_refusals_{};
   Mutex mutex_;

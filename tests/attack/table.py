@@ -14,7 +14,8 @@ NOT_YET = {
 
 # Rows that the attack `union` runs at the same time: the rows that cost the daemon most. The daemon withstands each of
 # them alone.
-TOGETHER = ("reset-queries", "settings", "ping", "garbage", "slow-bodies", "wrong-bytes", "honest", "unread", "continuation")
+TOGETHER = ("reset-queries", "settings", "ping", "garbage", "slow-bodies", "wrong-bytes", "honest", "unread", "continuation",
+            "gzip", "amplify", "history", "hpack")
 
 
 # Source addresses of those parts of the union whose calls must all be answered. They differ from the address of the

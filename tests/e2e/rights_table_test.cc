@@ -35,7 +35,10 @@ constexpr std::array kColumns = std::to_array<Column>({
     {"reader", "grant WHO read arena-*\n"},
     {"updater", "grant WHO update arena-*\n"},
     {"admin", "grant WHO admin *\n"},
-    {"operator", "grant WHO meshes,backup,metrics,reflection\n"},
+    {"meshes", "grant WHO meshes\n"},
+    {"backup", "grant WHO backup\n"},
+    {"metrics", "grant WHO metrics\n"},
+    {"reflection", "grant WHO reflection\n"},
     {"elsewhere", "grant WHO admin lobby-*\n"},
     {"without rights", ""},
 });
@@ -49,14 +52,18 @@ struct RpcRow {
 };
 
 constexpr Outcome kYes = Outcome::kServed, kNo = Outcome::kDenied, kHid = Outcome::kHidden, kWho = Outcome::kUnknown;
-constexpr Outcomes kReads = {kYes, kYes, kYes, kHid, kHid, kNo, kWho};
-constexpr Outcomes kUpdates = {kNo, kYes, kYes, kHid, kHid, kNo, kWho};
-constexpr Outcomes kDeletes = {kNo, kNo, kYes, kHid, kHid, kNo, kWho};
-constexpr Outcomes kCreates = {kNo, kNo, kYes, kNo, kNo, kNo, kWho};
+// Columns in order: reader, updater, admin, meshes, backup, metrics, reflection, elsewhere, without rights, without
+// credentials.
+constexpr Outcomes kReads = {kYes, kYes, kYes, kHid, kHid, kHid, kHid, kHid, kNo, kWho};
+constexpr Outcomes kUpdates = {kNo, kYes, kYes, kHid, kHid, kHid, kHid, kHid, kNo, kWho};
+constexpr Outcomes kDeletes = {kNo, kNo, kYes, kHid, kHid, kHid, kHid, kHid, kNo, kWho};
+constexpr Outcomes kCreates = {kNo, kNo, kYes, kNo, kNo, kNo, kNo, kNo, kNo, kWho};
 constexpr Outcomes kAdmins = kCreates;  // callers who administer all scenes
-constexpr Outcomes kServers = {kNo, kNo, kNo, kYes, kNo, kNo, kWho};
-constexpr Outcomes kKnown = {kYes, kYes, kYes, kYes, kYes, kNo, kWho};
-constexpr Outcomes kAll = {kYes, kYes, kYes, kYes, kYes, kYes, kYes};
+constexpr Outcomes kMeshes = {kNo, kNo, kNo, kYes, kNo, kNo, kNo, kNo, kNo, kWho};
+constexpr Outcomes kBackups = {kNo, kNo, kNo, kNo, kYes, kNo, kNo, kNo, kNo, kWho};
+constexpr Outcomes kReflects = {kNo, kNo, kNo, kNo, kNo, kNo, kYes, kNo, kNo, kWho};
+constexpr Outcomes kKnown = {kYes, kYes, kYes, kYes, kYes, kYes, kYes, kYes, kNo, kWho};
+constexpr Outcomes kAll = {kYes, kYes, kYes, kYes, kYes, kYes, kYes, kYes, kYes, kYes};
 
 constexpr std::array kRows = std::to_array<RpcRow>({
     {"/locus.v1.QueryService/Query", kReads},
@@ -67,18 +74,18 @@ constexpr std::array kRows = std::to_array<RpcRow>({
     {"/locus.v1.SceneService/GetScene", kReads},
     {"/locus.v1.SceneService/ListScenes", kKnown},
     {"/locus.v1.SceneService/DeleteScene", kDeletes},
-    {"/locus.v1.SceneService/UploadMesh", kServers},
-    {"/locus.v1.SceneService/ListMeshes", kServers},
-    {"/locus.v1.SceneService/DeleteMesh", kServers},
-    {"/locus.v1.SceneService/DownloadMesh", kServers},
+    {"/locus.v1.SceneService/UploadMesh", kMeshes},
+    {"/locus.v1.SceneService/ListMeshes", kMeshes},
+    {"/locus.v1.SceneService/DeleteMesh", kMeshes},
+    {"/locus.v1.SceneService/DownloadMesh", kMeshes},
     {"/locus.v1.SceneService/ChangeInstances", kUpdates},
     {"/locus.v1.SceneService/DumpScene", kReads},
     {"/locus.v1.ServerService/GetServer", kKnown},
     {"/locus.v1.ServerService/GetQuotas", kAdmins},
-    {"/locus.v1.ServerService/Backup", kServers},
+    {"/locus.v1.ServerService/Backup", kBackups},
     {"/grpc.health.v1.Health/Check", kAll},
     {"/grpc.health.v1.Health/Watch", kAll},
-    {"/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo", kServers},
+    {"/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo", kReflects},
 });
 
 // Returns whether an rpc has a row. The build fails if an rpc has no row, or if a row has no rpc.

@@ -18,6 +18,9 @@ struct ImportCommandOptions {
 absl::Status import(const ImportCommandOptions& options, Context& context) {
   ASSIGN_OR_RETURN(const ImportedLevel level, import_file(options.file, options.import));
   for (const std::string& note : level.notes) context.err() << "note: " << note << '\n';
+  if (!level.filtered)
+    context.err() << "note: this kernel took no filter of system calls; only limits of memory, time and open files "
+                     "confined the process that read the file\n";
   return upload_and_place(options.placement, level, context);
 }
 

@@ -7,6 +7,8 @@
 #include <numeric>
 #include <thread>
 
+#include "server/host/memory_lines.h"
+
 namespace locus::server {
 namespace {
 
@@ -142,6 +144,27 @@ TEST_F(MemoryKeeperTest, ConnectionsAreMeasuredWhenMemoryIsShortAndClosedWhenItI
   used_ = kLimit;
   keeper.keep();
   EXPECT_GE(closes_.load(), 1);
+}
+
+TEST_F(MemoryKeeperTest, TheUseOfEachLineIsLoggedOnceWhenMemoryIsShort) {
+  add_scene("a", 5);
+  const auto logged = [&] {
+    testing::internal::CaptureStderr();
+    {
+      MemoryKeeper keeper(budget_, registry_, shed_);
+      for (int i = 0; i < 3; ++i) keeper.keep();
+    }
+    return testing::internal::GetCapturedStderr();
+  };
+  used_ = kLimit / 2;
+  EXPECT_THAT(logged(), testing::Not(testing::HasSubstr("what it is used for")));
+  used_ = kLimit / 8 * 7;
+  const std::string text = logged();
+  const size_t first = text.find("what it is used for");
+  ASSERT_NE(first, std::string::npos) << text;
+  EXPECT_EQ(text.find("what it is used for", first + 1), std::string::npos) << text;
+  for (const MemoryLineUse& line : memory_lines(budget_, registry_, nullptr))
+    EXPECT_THAT(text, testing::HasSubstr(line.name + "="));
 }
 
 }  // namespace
