@@ -351,7 +351,7 @@ TEST_F(AccessRpcTest, AnInflatedMessageCountsForTheQuotaOfItsCaller) {
   create("arena-1");
   v1::ApplyUpdatesRequest update;
   update.set_scene("arena-1");
-  update.mutable_batch()->add_removes()->mutable_ids()->Resize(100'000, 1);
+  update.mutable_batch()->mutable_remove_ids()->Resize(100'000, 1);
   const auto apply = [&](grpc_compression_algorithm algorithm) {
     grpc::ClientContext context;
     set_timeout(context);
