@@ -13,7 +13,7 @@ namespace locus::cli {
 namespace {
 
 constexpr char kUsagePayload[] = "locus/usage";
-constexpr char kToldPayload[] = "locus/told";
+constexpr char kReportedPayload[] = "locus/reported";
 
 std::string name_of(v1::Reason reason) { return std::string(absl::StripPrefix(v1::Reason_Name(reason), "REASON_")); }
 
@@ -92,12 +92,12 @@ absl::Status usage_error(absl::string_view message) {
   return status;
 }
 
-absl::Status told(absl::Status status) {
-  status.SetPayload(kToldPayload, absl::Cord());
+absl::Status reported(absl::Status status) {
+  status.SetPayload(kReportedPayload, absl::Cord());
   return status;
 }
 
-bool is_told(const absl::Status& status) { return status.GetPayload(kToldPayload).has_value(); }
+bool is_reported(const absl::Status& status) { return status.GetPayload(kReportedPayload).has_value(); }
 
 std::string failure_name(const absl::Status& status) {
   if (status.GetPayload(kUsagePayload)) return "USAGE";

@@ -20,8 +20,8 @@ enum class ExitCode { kOk = 0, kFailed = 1, kUsage = 2, kUnreachable = 3, kDenie
 absl::Status usage_error(absl::string_view message);
 
 // Marks an error as already printed. run_line() then does not print it again, but the exit code still depends on it.
-absl::Status told(absl::Status status);
-bool is_told(const absl::Status& status);
+absl::Status reported(absl::Status status);
+bool is_reported(const absl::Status& status);
 
 // Returns the name of an error: USAGE for a usage error, else the server's reason without "REASON_", or the status
 // code's name if the server gave no reason.

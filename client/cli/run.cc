@@ -165,7 +165,7 @@ ExitCode run_line(const std::vector<std::string>& arguments, Context& context) {
     context.err() << refusal->err;
     return refusal->code == 0 ? ExitCode::kOk : ExitCode::kUsage;
   }
-  if (!context.outcome().ok() && !is_told(context.outcome()))
+  if (!context.outcome().ok() && !is_reported(context.outcome()))
     write_failure(context.err(), context.options().format, context.outcome());
   return exit_code_of(context.outcome());
 }

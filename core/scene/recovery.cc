@@ -180,10 +180,10 @@ absl::StatusOr<ScenePtr> recover(UpdateLog& log, const StoredScene& stored, cons
 // topology is not usable for the mesh; the caller then builds the tree.
 MeshPtr restore_mesh(const UpdateLog& log, const StoredMesh& stored, const TriangleMesh& columns,
                      const BvhOptions& options) {
-  const std::optional<std::string> kept = log.read_outline(stored.sha256);
+  const std::optional<std::string> kept = log.read_topology(stored.sha256);
   if (!kept) return nullptr;
   const AlignedBytes bytes(*kept);
-  const absl::StatusOr<TreeTopology> topology = decode_outline(bytes);
+  const absl::StatusOr<TreeTopology> topology = decode_topology(bytes);
   if (!topology.ok()) return nullptr;
   absl::StatusOr<MeshPtr> mesh = StaticMesh::restore(stored.name, stored.sha256, columns, *topology, options);
   return mesh.ok() ? *std::move(mesh) : nullptr;
@@ -210,7 +210,7 @@ absl::StatusOr<RecoveredMesh> recover_mesh(UpdateLog& log, const StoredMesh& sto
     return RecoveredMesh{std::move(restored), false};
   absl::StatusOr<MeshPtr> mesh = StaticMesh::build(stored.name, stored.sha256, *std::move(columns), options);
   if (!mesh.ok()) return named(name, mesh.status());
-  log.keep_outline(stored.sha256, encode_outline((*mesh)->tree().topology()));
+  log.store_topology(stored.sha256, encode_topology((*mesh)->tree().topology()));
   return RecoveredMesh{*std::move(mesh), true};
 }
 

@@ -272,7 +272,7 @@ absl::StatusOr<MeshPtr> Registry::add_mesh(const std::string& name, MeshPtr mesh
     PartsWriter parts(mesh);
     const auto next_parts = [&parts] { return parts.next(); };
     RETURN_IF_ERROR(log_->add_mesh(name, mesh->sha256(), next, next_parts));
-    if (content) log_->keep_outline(mesh->sha256(), encode_outline(mesh->tree().topology()));
+    if (content) log_->store_topology(mesh->sha256(), encode_topology(mesh->tree().topology()));
   }
   const MutexLock lock(mutex_);
   meshes_.emplace(name, mesh);

@@ -75,7 +75,7 @@ class Recovery {
   void recover(const std::vector<const StoredMesh*>& names) {
     if (!continues()) return;
     const steady_clock::time_point start = steady_clock::now();
-    const absl::StatusOr<RecoveredMesh> mesh = recover_sound(*names.front());
+    const absl::StatusOr<RecoveredMesh> mesh = recover_intact(*names.front());
     if (mesh.ok())
       log(LogLevel::kInfo, "mesh recovered",
           {{"mesh", names.front()->name},
@@ -96,7 +96,7 @@ class Recovery {
   void recover(const StoredScene& stored) {
     if (!continues()) return;
     const steady_clock::time_point start = steady_clock::now();
-    const absl::StatusOr<ScenePtr> scene = recover_sound(stored);
+    const absl::StatusOr<ScenePtr> scene = recover_intact(stored);
     if (scene.ok()) {
       host_.registry.restore_scene(*scene);
       log(LogLevel::kInfo, "scene recovered",
@@ -110,7 +110,7 @@ class Recovery {
     count();
   }
 
-  absl::StatusOr<RecoveredMesh> recover_sound(const StoredMesh& stored) {
+  absl::StatusOr<RecoveredMesh> recover_intact(const StoredMesh& stored) {
     if (!stored.damage.ok()) return stored.damage;
     BvhOptions options;
     options.cancel = &stop_;
@@ -123,7 +123,7 @@ class Recovery {
   // Recovers one scene. Starts a new epoch in two cases. First: acks did not wait for the disk and the last process
   // crashed, so acknowledged updates may be missing. Second: the directory is a restored backup, so the original scene
   // may have advanced since.
-  absl::StatusOr<ScenePtr> recover_sound(StoredScene stored) {
+  absl::StatusOr<ScenePtr> recover_intact(StoredScene stored) {
     if (!stored.damage.ok()) return stored.damage;
     ASSIGN_OR_RETURN(SceneSpec spec, decode_spec(stored.spec));
     // The stored limit on pinned memory is the option of the daemon that created the scene. Replace it by the option of

@@ -65,8 +65,8 @@ class RocksdbLog final : public UpdateLog {
   absl::Status read_mesh(const std::array<uint8_t, 32>& sha256, ChunkSink sink) const override
       LOCUS_EXCLUDES(catalogue_mutex_);
   absl::Status read_parts(absl::string_view name, ChunkSink sink) const override LOCUS_EXCLUDES(catalogue_mutex_);
-  void keep_outline(const std::array<uint8_t, 32>& sha256, absl::string_view bytes) override;
-  std::optional<std::string> read_outline(const std::array<uint8_t, 32>& sha256) const override;
+  void store_topology(const std::array<uint8_t, 32>& sha256, absl::string_view bytes) override;
+  std::optional<std::string> read_topology(const std::array<uint8_t, 32>& sha256) const override;
 
   uint64_t cache_bytes() const override;
   absl::Status back_up(const std::string& path) override LOCUS_EXCLUDES(catalogue_mutex_);

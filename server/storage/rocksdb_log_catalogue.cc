@@ -401,14 +401,14 @@ absl::Status RocksdbLog::read_mesh_chunks(const Sha256& sha256, const ContentRow
   return absl::DataLossError(absl::StrCat("a mesh is damaged: ", status.message(), repair_hint(options_.path)));
 }
 
-void RocksdbLog::keep_outline(const Sha256& sha256, absl::string_view bytes) {
-  if (!check_free_space("an outline", bytes.size()).ok()) return;
+void RocksdbLog::store_topology(const Sha256& sha256, absl::string_view bytes) {
+  if (!check_free_space("the topology of a tree", bytes.size()).ok()) return;
   topologies_.keep(sha256, bytes);
   written_bytes_ += bytes.size();
 }
 
 uint64_t RocksdbLog::cache_bytes() const { return database_->buffered_bytes() + database_->block_cache_bytes(); }
 
-std::optional<std::string> RocksdbLog::read_outline(const Sha256& sha256) const { return topologies_.read(sha256); }
+std::optional<std::string> RocksdbLog::read_topology(const Sha256& sha256) const { return topologies_.read(sha256); }
 
 }  // namespace locus::server

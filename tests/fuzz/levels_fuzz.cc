@@ -78,7 +78,7 @@ LOCUS_FUZZ_TARGET(pk3) {
     return;
   }
   LOCUS_CHECK_LE(level->bytes.size(), kMaxBspBytes);
-  LOCUS_CHECK(level->bytes.size() <= kMinJudgedBytes || level->bytes.size() / kMaxArchiveRatio <= input.size());
+  LOCUS_CHECK(level->bytes.size() <= kMinCheckedBytes || level->bytes.size() / kMaxArchiveRatio <= input.size());
   LOCUS_CHECK_LE(level->entry.size(), kMaxEntryNameBytes);
 }
 

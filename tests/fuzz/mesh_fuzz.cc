@@ -76,11 +76,11 @@ std::vector<Triangle> row_of_triangles(size_t count) {
 
 LOCUS_FUZZ_TARGET(tree) {
   const AlignedBytes aligned(input);
-  const absl::StatusOr<TreeTopology> topology = decode_outline(aligned);
+  const absl::StatusOr<TreeTopology> topology = decode_topology(aligned);
   if (!topology.ok()) return check_error(topology.status());
   // The decoder accepts any padding after a column, so only the second encoding is compared.
-  const std::string bytes = encode_outline(*topology);
-  const absl::StatusOr<TreeTopology> again = decode_outline(AlignedBytes(bytes));
+  const std::string bytes = encode_topology(*topology);
+  const absl::StatusOr<TreeTopology> again = decode_topology(AlignedBytes(bytes));
   LOCUS_CHECK(again.ok());
   LOCUS_CHECK(again->block_sizes == topology->block_sizes && again->nodes == topology->nodes);
   const size_t count = topology->numbers.size();
@@ -91,7 +91,7 @@ LOCUS_FUZZ_TARGET(tree) {
   if (!restored.ok()) return check_error(restored.status());
   LOCUS_CHECK_EQ(restored->size(), count);
   LOCUS_CHECK(restored->bounds().max.x == static_cast<float>(count) - 0.5f);
-  LOCUS_CHECK(encode_outline(restored->topology()) == bytes);
+  LOCUS_CHECK(encode_topology(restored->topology()) == bytes);
 }
 
 }  // namespace

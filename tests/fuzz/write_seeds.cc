@@ -107,14 +107,14 @@ void write_states(const SeedWriter& seeds) {
 void write_meshes(const SeedWriter& seeds) {
   seeds.write("mesh", "two_triangles", chunks_of(MeshWriter(two_triangles())));
   seeds.write("mesh_parts", "two_parts", chunks_of(PartsWriter(two_triangles())));
-  seeds.write("tree", "two_triangles", encode_outline(two_triangles()->tree().topology()));
+  seeds.write("tree", "two_triangles", encode_topology(two_triangles()->tree().topology()));
   std::vector<Triangle> many;
   for (int i = 0; i < 64; ++i) {
     const auto x = static_cast<float>(i);
     many.push_back({{x, 0, 0}, {x + 0.5f, 0, 0}, {x, 1, 0}});
   }
   const TriangleBvh tree = *TriangleBvh::build(many);
-  seeds.write("tree", "many_triangles", encode_outline(tree.topology()));
+  seeds.write("tree", "many_triangles", encode_topology(tree.topology()));
   SceneSpec spec;
   seeds.write("spec", "defaults", encode_spec(spec));
   spec.labels = {{"map", "delta"}, {"mode", "ctf"}};

@@ -22,7 +22,7 @@ namespace locus::test {
 // Sums over the searches of a trial: number of searches, of tested triangles, and of tested triangles for which the
 // kernel called `judge`.
 struct CrossingCost {
-  uint64_t searches = 0, tests = 0, judged = 0;
+  uint64_t searches = 0, tests = 0, exact_tests = 0;
 };
 
 // A mesh, which need not be closed, and points in mesh axes. The expected answers are the sums of crossing() over the
@@ -55,7 +55,7 @@ class CrossingTrial {
         search.next();
         spent.nodes += search.nodes();
         spent.tests += search.tests();
-        if (cost != nullptr) cost->judged += search.judged();
+        if (cost != nullptr) cost->exact_tests += search.exact_tests();
       }
       if (std::string what = fault(expected, search.on_surface(), search.winding()); !what.empty()) return what;
       Sum found(point, line);

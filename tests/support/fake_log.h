@@ -41,8 +41,8 @@ class FakeLog final : public UpdateLog {
   absl::Status delete_mesh(absl::string_view) override { return refusal(); }
   absl::Status read_mesh(const std::array<uint8_t, 32>&, ChunkSink) const override { return refusal(); }
   absl::Status read_parts(absl::string_view, ChunkSink) const override { return refusal(); }
-  void keep_outline(const std::array<uint8_t, 32>&, absl::string_view) override {}
-  std::optional<std::string> read_outline(const std::array<uint8_t, 32>&) const override { return std::nullopt; }
+  void store_topology(const std::array<uint8_t, 32>&, absl::string_view) override {}
+  std::optional<std::string> read_topology(const std::array<uint8_t, 32>&) const override { return std::nullopt; }
 
   // Writes `files` below the new directory `path`, then calls `afterwards` if the test has set it.
   absl::Status back_up(const std::string& path) override {

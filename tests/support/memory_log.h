@@ -252,11 +252,11 @@ class MemoryLog : public UpdateLog {
     return give(chunks, sink);
   }
 
-  void keep_outline(const std::array<uint8_t, 32>& sha256, absl::string_view bytes) override {
+  void store_topology(const std::array<uint8_t, 32>& sha256, absl::string_view bytes) override {
     const MutexLock lock(mutex_);
     if (failure_.ok()) kept_.topologies[sha256] = std::string(bytes);
   }
-  std::optional<std::string> read_outline(const std::array<uint8_t, 32>& sha256) const override {
+  std::optional<std::string> read_topology(const std::array<uint8_t, 32>& sha256) const override {
     const MutexLock lock(mutex_);
     const auto found = kept_.topologies.find(sha256);
     return found == kept_.topologies.end() ? std::nullopt : std::optional(found->second);

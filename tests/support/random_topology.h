@@ -12,21 +12,21 @@
 
 namespace locus::test {
 
-class RandomOutline {
+class RandomTopology {
  public:
   // Makes a random topology of `triangles` triangles, at least one.
-  RandomOutline(uint32_t triangles, Random& random) : numbers_(triangles) {
+  RandomTopology(uint32_t triangles, Random& random) : numbers_(triangles) {
     std::iota(numbers_.begin(), numbers_.end(), 0);
     random.shuffle(numbers_);
-    for (uint32_t left = triangles; left > 0; left -= outline_.block_sizes.back())
-      outline_.block_sizes.push_back(static_cast<uint8_t>(1 + random.below(std::min<uint32_t>(left, kTreeWidth))));
-    outline_.numbers = numbers_;
-    add_node(static_cast<uint32_t>(outline_.block_sizes.size()), random);
+    for (uint32_t left = triangles; left > 0; left -= topology_.block_sizes.back())
+      topology_.block_sizes.push_back(static_cast<uint8_t>(1 + random.below(std::min<uint32_t>(left, kTreeWidth))));
+    topology_.numbers = numbers_;
+    add_node(static_cast<uint32_t>(topology_.block_sizes.size()), random);
   }
-  RandomOutline(const RandomOutline&) = delete;
-  RandomOutline& operator=(const RandomOutline&) = delete;
+  RandomTopology(const RandomTopology&) = delete;
+  RandomTopology& operator=(const RandomTopology&) = delete;
 
-  const TreeTopology& topology() const { return outline_; }
+  const TreeTopology& topology() const { return topology_; }
 
  private:
   // Adds a node and its subtree, which contains `blocks` blocks in total. At most half of the blocks are below one
@@ -43,13 +43,13 @@ class RandomOutline {
       share += taken;
       left -= taken;
     }
-    const size_t number = outline_.nodes.size();
-    outline_.nodes.emplace_back();
+    const size_t number = topology_.nodes.size();
+    topology_.nodes.emplace_back();
     std::vector<uint32_t> below;
     for (uint32_t slot = 0; slot < children; ++slot) {
       // A node of a single block is valid, too.
       const bool is_block = shares[slot] == 1 && (blocks == 1 || random.chance(0.9));
-      NodeOutline& node = outline_.nodes[number];
+      TopologyNode& node = topology_.nodes[number];
       uint8_t& kind = is_block ? node.blocks : node.nodes;
       kind = static_cast<uint8_t>(kind | 1u << slot);
       if (!is_block) below.push_back(shares[slot]);
@@ -58,7 +58,7 @@ class RandomOutline {
   }
 
   std::vector<uint32_t> numbers_;
-  TreeTopology outline_;
+  TreeTopology topology_;
 };
 
 }  // namespace locus::test

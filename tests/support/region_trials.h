@@ -56,7 +56,7 @@ class RegionTrial {
     std::vector<uint32_t> numbers(tree_.size() + kMinRegionRoom);
     uint32_t count = 0;
     const Region region = kernel_region(shape);
-    const RegionJudge judge = judge_of(shape);
+    const RegionPredicate judge = predicate_of(shape);
     kernel.many(tree_.tree(), &region, &judge, 1, numbers.data(), numbers.size(), &count);
     numbers.resize(count);
     return numbers;

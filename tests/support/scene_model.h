@@ -52,9 +52,9 @@ class SceneModel {
     for (const auto& [id, object] : then.objects) {
       objects.push_back(object);
       const Objects& later = last ? objects_ : next->second.objects;
-      const Lives& lives = last ? lives_ : next->second.lives;
-      const auto life = lives.find(id);
-      if (gone == 0 || life == lives.end() || life->second != then.lives.at(id)) continue;
+      const Lifetimes& lifetimes = last ? lifetimes_ : next->second.lifetimes;
+      const auto life = lifetimes.find(id);
+      if (gone == 0 || life == lifetimes.end() || life->second != then.lifetimes.at(id)) continue;
       Shape& shape = objects.back().shape;
       const Shape& end = later.at(id).shape;
       for (int axis = 0; axis < 3; ++axis)
@@ -93,7 +93,7 @@ class SceneModel {
     }
     ack_ = {};
     next_ = batch.clear ? Objects{} : objects_;
-    next_lives_ = lives_;
+    next_lifetimes_ = lifetimes_;
     apply_items(batch);
     if (batch.all_or_nothing && ack_.refused > 0) return {absl::StatusCode::kInvalidArgument, {}, ack_.errors.front()};
     commit(batch);
@@ -105,14 +105,14 @@ class SceneModel {
   void commit(const UpdateBatch& batch) {
     uint64_t tick = batch.tick.value_or(tick_);
     if (!batch.restart_ticks) tick = std::max(tick, tick_);
-    std::erase_if(next_lives_, [this](const auto& life) { return !next_.contains(life.first); });
+    std::erase_if(next_lifetimes_, [this](const auto& life) { return !next_.contains(life.first); });
     const bool forgets = batch.restart_ticks && !past_.empty();
-    const bool reborn = history_ticks_ != 0 && next_lives_ != lives_;
-    if (tick != tick_ || next_ != objects_ || forgets || reborn) ++revision_;
+    const bool replaced = history_ticks_ != 0 && next_lifetimes_ != lifetimes_;
+    if (tick != tick_ || next_ != objects_ || forgets || replaced) ++revision_;
     if (history_ticks_ != 0) remember(batch, tick);
     tick_ = tick;
     objects_ = std::move(next_);
-    lives_ = std::move(next_lives_);
+    lifetimes_ = std::move(next_lifetimes_);
     ack_.revision = revision_;
     ack_.tick = tick_;
   }
@@ -120,7 +120,7 @@ class SceneModel {
   void remember(const UpdateBatch& batch, uint64_t tick) {
     if (batch.restart_ticks) return past_.clear();
     if (tick == tick_) return;
-    past_[tick_] = {objects_, lives_};
+    past_[tick_] = {objects_, lifetimes_};
     while (past_.size() > 1 && tick >= history_ticks_ && std::next(past_.begin())->first <= tick - history_ticks_)
       past_.erase(past_.begin());
   }
@@ -146,7 +146,7 @@ class SceneModel {
       if (group != 0) std::erase_if(next_, [group](const auto& entry) { return entry.second.group == group; });
       count(group == 0 ? Reason::kOutOfRange : Reason::kUnspecified, "remove_groups", i, kNoId);
     }
-    std::erase_if(next_lives_, [this](const auto& life) { return !next_.contains(life.first); });
+    std::erase_if(next_lifetimes_, [this](const auto& life) { return !next_.contains(life.first); });
     for (size_t list = 0; list < batch.inserts.size(); ++list)
       for (size_t i = 0; i < batch.inserts[list].ids.size(); ++i)
         insert(batch, batch.inserts[list], i, "inserts[" + std::to_string(list) + "]");
@@ -242,7 +242,7 @@ class SceneModel {
       if (fault.first.empty()) fault = read_shape(columns, i, object.shape);
     }
     read_labels(columns, i, object);
-    if (fault.first.empty() && !next_.contains(object.id)) next_lives_[object.id] = ++last_life_;
+    if (fault.first.empty() && !next_.contains(object.id)) next_lifetimes_[object.id] = ++last_life_;
     if (fault.first.empty()) next_[object.id] = object;
     count(fault.second, field + fault.first, i, object.id);
   }
@@ -254,7 +254,7 @@ class SceneModel {
     Shape shape = known->second.shape;
     const Fault fault = read_pose(batch, columns, i, shape);
     if (fault.first.empty()) known->second.shape = shape;
-    if (fault.first.empty() && columns.teleport) next_lives_[id] = ++last_life_;
+    if (fault.first.empty() && columns.teleport) next_lifetimes_[id] = ++last_life_;
     count(fault.second, field + fault.first, i, id);
   }
 
@@ -266,15 +266,15 @@ class SceneModel {
   }
 
   // For each object, the unique number of its life: a life begins when an unknown id is inserted, and at a teleport.
-  using Lives = std::map<Id, uint64_t>;
+  using Lifetimes = std::map<Id, uint64_t>;
   struct Then {
     Objects objects;
-    Lives lives;
+    Lifetimes lifetimes;
   };
 
   uint64_t history_ticks_;
   std::map<uint64_t, Then> past_;  // recorded states, by tick
-  Lives lives_, next_lives_;
+  Lifetimes lifetimes_, next_lifetimes_;
   uint64_t last_life_ = 0;
   std::set<Id> instances_;
   Objects objects_;

@@ -143,7 +143,7 @@ class StoredModel {
       ChunksFrom parts({parts_of(name)});
       const bool known = log.add_mesh(name, hash_of(number), content, parts).ok();
       meshes_[name] = {number, known ? kThere : kUnknown};
-      if (known) log.keep_outline(hash_of(number), outline_bytes(number));
+      if (known) log.store_topology(hash_of(number), topology_bytes(number));
     } else if (found->second.second == kThere) {
       if (log.delete_mesh(name).ok()) {
         meshes_.erase(found);
@@ -154,7 +154,7 @@ class StoredModel {
   }
 
   static std::string parts_of(const std::string& name) { return "parts of " + name; }
-  static std::string outline_bytes(uint8_t number) { return bytes_of(100u + number, 60); }
+  static std::string topology_bytes(uint8_t number) { return bytes_of(100u + number, 60); }
 
   static std::string scene_difference(const UpdateLog& log, const std::string& name, const Scene& scene,
                                       Refusals refusals) {
@@ -195,9 +195,9 @@ class StoredModel {
       if (known == meshes_.end()) return absl::StrCat("mesh ", mesh.name, " is back");
       if (mesh.sha256 != hash_of(known->second.first)) return absl::StrCat("mesh ", mesh.name, " is another");
       const auto chunks = read_mesh(log, mesh.sha256);
-      const std::optional<std::string> topology = log.read_outline(mesh.sha256);
-      if (topology && *topology != outline_bytes(known->second.first))
-        return absl::StrCat("mesh ", mesh.name, " has another outline");
+      const std::optional<std::string> topology = log.read_topology(mesh.sha256);
+      if (topology && *topology != topology_bytes(known->second.first))
+        return absl::StrCat("mesh ", mesh.name, " has another topology");
       if (absl::IsDataLoss(chunks.status()) && refusals == Refusals::kAllowed) continue;
       if (!chunks.ok()) return std::string(chunks.status().message());
       if (*chunks != std::vector<std::string>{bytes_of(known->second.first, 400)})

@@ -162,7 +162,7 @@ absl::Status render(const RenderOptions& given, Context& context) {
   RenderOptions options = given;
   RETURN_IF_ERROR(check_line(options));
   options.cast.mask = static_cast<uint32_t>(options.mask.value);
-  if (options.live) options.cast.moment = Moment::kLive;
+  if (options.live) options.cast.revisions = Revisions::kLive;
   if (options.heat != Heat::kNone) options.cast.work = WorkReport::kReported;
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());
   ASSIGN_OR_RETURN(const Aabbd target, find_target(options, *client));

@@ -102,7 +102,7 @@ class Runner {
     if (!is_expectation(statement)) ++counts_.broken;
     write_failure(context_.err(), context_.options().format, placed);
     const bool ends = after_ == AfterFailure::kStop || exit_code_of(status) == ExitCode::kUnreachable;
-    return ends ? told(placed) : absl::OkStatus();
+    return ends ? reported(placed) : absl::OkStatus();
   }
 
   const Script& script_;
@@ -134,7 +134,7 @@ absl::Status run_script(const Script& script, const Variables& variables, AfterF
   context.pending_batch().reset();
   RETURN_IF_ERROR(status);
   const uint64_t bad = counts.failed + counts.broken;
-  return bad == 0 ? absl::OkStatus() : told(absl::FailedPreconditionError(absl::StrCat(bad, " lines failed")));
+  return bad == 0 ? absl::OkStatus() : reported(absl::FailedPreconditionError(absl::StrCat(bad, " lines failed")));
 }
 
 }  // namespace locus::cli

@@ -102,7 +102,7 @@ class Restorer {
       if (now.depth > limits::kMaxBvhDepth) return mismatch("too deep");
       if (index > 0) arrays_.nodes[now.parent].child[now.slot] = index;
       arrays_.depth = std::max(arrays_.depth, now.depth);
-      const NodeOutline children = topology_.nodes[index];
+      const TopologyNode children = topology_.nodes[index];
       const uint32_t used = children.blocks | children.nodes;
       if ((children.blocks & children.nodes) != 0 || used == 0 || (used & (used + 1)) != 0)
         return mismatch("invalid children of a node");
@@ -198,7 +198,7 @@ TreeTopology topology_of(const TriangleArrays& arrays) {
     for (int slot = 0; slot < kTreeWidth; ++slot) {
       const uint32_t child = arrays.nodes[index].child[slot];
       if (child == kNoChild) continue;
-      NodeOutline& node = topology.nodes[index];
+      TopologyNode& node = topology.nodes[index];
       uint8_t& kind = (child & kBlockBit) != 0 ? node.blocks : node.nodes;
       LOCUS_DCHECK(slot == 0 || (node.blocks | node.nodes) >> (slot - 1) == 1);
       kind = static_cast<uint8_t>(kind | 1u << slot);

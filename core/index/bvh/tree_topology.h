@@ -23,11 +23,11 @@ namespace locus {
 
 // Kinds of the children of one node. Bit k of `blocks` is set if slot k holds a block, bit k of `nodes` if slot k holds
 // a node. Used slots are contiguous from slot 0 on.
-struct NodeOutline {
+struct TopologyNode {
   uint8_t blocks = 0;
   uint8_t nodes = 0;
 
-  friend bool operator==(const NodeOutline&, const NodeOutline&) = default;
+  friend bool operator==(const TopologyNode&, const TopologyNode&) = default;
 };
 
 // Topology of a whole tree, in the order of a TriangleTree: depth-first, the blocks of a node before the nodes below
@@ -35,7 +35,7 @@ struct NodeOutline {
 struct TreeTopology {
   absl::Span<const uint32_t> numbers;  // triangle number at each storage position; borrowed
   std::vector<uint8_t> block_sizes;    // number of triangles of each block, 1 to kTreeWidth
-  std::vector<NodeOutline> nodes;
+  std::vector<TopologyNode> nodes;
 };
 
 // Returns the topology of the tree in `arrays`. Precondition: the tree is not empty. Borrows the triangle numbers from

@@ -102,15 +102,15 @@ class BatchSearch {
 
   bool find_many(size_t count) {
     decltype(kernel_region(shapes_[0])) regions[kMaxRegions];
-    RegionJudge judges[kMaxRegions];
+    RegionPredicate predicates[kMaxRegions];
     for (size_t i = 0; i < count; ++i) {
       regions[i] = kernel_region(shapes_[done_ + i]);
-      judges[i] = judge_of(shapes_[done_ + i]);
+      predicates[i] = predicate_of(shapes_[done_ + i]);
     }
     uint32_t* const counts = counts_.data() + done_;
-    const size_t answered =
-        kernel_for(shapes_[done_])
-            .many(tree_.tree(), regions, judges, count, triangles_.data() + used_, triangles_.size() - used_, counts);
+    const size_t answered = kernel_for(shapes_[done_])
+                                .many(tree_.tree(), regions, predicates, count, triangles_.data() + used_,
+                                      triangles_.size() - used_, counts);
     for (size_t i = 0; i < answered; ++i) used_ += counts[i];
     done_ += answered;
     LOCUS_DCHECK_LE(answered, count);
@@ -158,8 +158,8 @@ KernelBox kernel_region(const Obbf& box) {
   return region;
 }
 
-RegionJudge judge_of(const Ballf& ball) { return {ball_meets, &ball}; }
-RegionJudge judge_of(const Obbf& box) { return {box_meets, &box}; }
+RegionPredicate predicate_of(const Ballf& ball) { return {ball_meets, &ball}; }
+RegionPredicate predicate_of(const Obbf& box) { return {box_meets, &box}; }
 
 size_t find_triangles(const TriangleBvh& tree, absl::Span<const Ballf> balls, absl::Span<uint32_t> counts,
                       absl::Span<uint32_t> triangles) {

@@ -28,8 +28,8 @@ KernelBox kernel_region(const Obbf& box);
 
 // Return the overlap test of a region in double, which the kernels call for triangles whose overlap they cannot
 // determine in float. The test borrows the region.
-RegionJudge judge_of(const Ballf& ball);
-RegionJudge judge_of(const Obbf& box);
+RegionPredicate predicate_of(const Ballf& ball);
+RegionPredicate predicate_of(const Obbf& box);
 
 // Return the kernel for a region. Precondition: active_region_kernels() is not null.
 inline auto kernel_for(const Ballf& /*ball*/) { return active_region_kernels()->ball; }
@@ -58,7 +58,7 @@ class TriangleSearch {
   TriangleSearch(const TriangleBvh& tree, const Shape& shape)
       : run_(kernel_for(shape).one), tree_(tree.tree()), region_(kernel_region(shape)) {
     LOCUS_DCHECK(served(tree, shape));
-    visit_.start(judge_of(shape));
+    visit_.start(predicate_of(shape));
   }
 
   // Returns whether all triangles have been returned.
@@ -80,7 +80,7 @@ class TriangleSearch {
   // tested in double because the test in float was not conclusive.
   uint32_t nodes() const { return visit_.nodes; }
   uint32_t tests() const { return visit_.tests; }
-  uint32_t judged() const { return visit_.judged; }
+  uint32_t exact_tests() const { return visit_.exact_tests; }
 
  private:
   const decltype(kernel_for(std::declval<Shape>()).one) run_;

@@ -34,7 +34,7 @@ class WindingSearch {
       : kernels_(kernels), bvh_(tree), tree_(tree.tree()), point_(point), way_(way) {
     LOCUS_DCHECK(!way.is_known);
     visit_.line = HalfLineBoxes(point, way.line, way.end).floats();
-    visit_.judge = {judge, this};
+    visit_.predicate = {exact_crossing, this};
     visit_.start();
   }
   // The kernel calls back with a pointer to this object.
@@ -53,14 +53,14 @@ class WindingSearch {
   // which crossing() was called.
   uint32_t nodes() const { return visit_.nodes; }
   uint32_t tests() const { return visit_.tests; }
-  uint32_t judged() const { return visit_.judged; }
+  uint32_t exact_tests() const { return visit_.exact_tests; }
   // Return the result of a complete search. The winding number is only known if the point is not on the surface.
   bool on_surface() const { return visit_.on_surface; }
   int64_t winding() const { return way_.winding + visit_.winding; }
   bool winds_around() const { return on_surface() || winding() != 0; }
 
  private:
-  static int judge(const void* context, const TriangleBlock& block, uint32_t lane) {
+  static int exact_crossing(const void* context, const TriangleBlock& block, uint32_t lane) {
     const auto& search = *static_cast<const WindingSearch*>(context);
     const Crossing found = crossing(search.point_, search.bvh_.triangle(block, lane), search.way_.line);
     return found.on_surface ? kOnTriangle : found.winding;

@@ -193,7 +193,7 @@ enum class BytesKind : uint32_t {
   kMeshParts = 0x504d'534c,
   kPartsHeader = 0x4850'534c,
   kMeshCreator = 0x434d'534c,
-  kTreeOutline = 0x5254'534c,
+  kTreeTopology = 0x5254'534c,
 };
 inline constexpr uint32_t kBytesVersion = 1;
 

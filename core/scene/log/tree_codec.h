@@ -13,12 +13,12 @@
 namespace locus {
 
 // Returns the encoded topology.
-std::string encode_outline(const TreeTopology& topology);
+std::string encode_topology(const TreeTopology& topology);
 
 // Returns a topology that borrows from `bytes`. Returns DATA_LOSS if the bytes are damaged, and FAILED_PRECONDITION if
 // another version of the tree builder made the topology. Does not check that the topology fits the mesh;
 // TriangleBvh::restore() checks this.
-absl::StatusOr<TreeTopology> decode_outline(const AlignedBytes& bytes);
+absl::StatusOr<TreeTopology> decode_topology(const AlignedBytes& bytes);
 
 }  // namespace locus
 

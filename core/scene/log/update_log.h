@@ -92,7 +92,7 @@ class UpdateLog {
 
   // Creates a scene with a snapshot at sequence number 0; `state` returns the chunks of the snapshot, of at most
   // kMaxChunkBytes each. Returns the key of the scene. When this call returns, the scene is synced to the disk. Every
-  // other call that writes also syncs its data before it returns, except append() and keep_outline().
+  // other call that writes also syncs its data before it returns, except append() and store_topology().
   virtual absl::StatusOr<SceneKey> create_scene(absl::string_view name, absl::string_view spec, uint64_t epoch,
                                                 ChunkSource state) = 0;
   // Deletes a scene, damaged or not.
@@ -129,8 +129,8 @@ class UpdateLog {
   // content. Writing ignores errors; reading returns nullopt if nothing is stored. The topology is deleted with the
   // last name of its content and is not part of a backup. For each content, only one thread at a time may call these
   // two functions.
-  virtual void keep_outline(const std::array<uint8_t, 32>& sha256, absl::string_view bytes) = 0;
-  virtual std::optional<std::string> read_outline(const std::array<uint8_t, 32>& sha256) const = 0;
+  virtual void store_topology(const std::array<uint8_t, 32>& sha256, absl::string_view bytes) = 0;
+  virtual std::optional<std::string> read_topology(const std::array<uint8_t, 32>& sha256) const = 0;
 
   // Returns the memory in bytes of the log's caches and of its write buffers, which hold records that are not in a
   // table file yet.

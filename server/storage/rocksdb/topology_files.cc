@@ -19,7 +19,7 @@ std::string name_of(const Sha256& sha256) {
 }
 
 // Returns whether `name` is the name of a topology file or of a temporary file of an interrupted keep().
-bool is_outline_name(absl::string_view name) {
+bool is_topology_name(absl::string_view name) {
   name = absl::StripSuffix(name, kUnfinished);
   return name.size() == 2 * Sha256().size() && name.find_first_not_of("0123456789abcdef") == name.npos;
 }
@@ -60,7 +60,7 @@ void TopologyFiles::drop_unused(const std::set<Sha256>& used) {
   std::vector<std::string> present;
   if (!env_.GetChildren(folder_, &present).ok()) return;
   for (const std::string& name : present) {
-    if (is_outline_name(name) && !names.contains(name)) env_.DeleteFile(path_of(name)).PermitUncheckedError();
+    if (is_topology_name(name) && !names.contains(name)) env_.DeleteFile(path_of(name)).PermitUncheckedError();
   }
 }
 

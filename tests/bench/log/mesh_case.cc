@@ -54,8 +54,8 @@ class MeshCase {
   // Removes the stored topology and releases the mesh. Recovery must then build the tree, as it must for a directory of
   // an earlier version, which stored no topology.
   void forget_topology() {
-    topology_ = log_->read_outline({1}).value_or("");
-    log_->keep_outline({1}, "");
+    topology_ = log_->read_topology({1}).value_or("");
+    log_->store_topology({1}, "");
     mesh_ = nullptr;
   }
   void forget_mesh() { mesh_ = nullptr; }

@@ -85,9 +85,9 @@ TEST(FailureTest, WithPlaceKeepsNameAndExitCode) {
 }
 
 TEST(FailureTest, AnAlreadyPrintedErrorKeepsItsExitCode) {
-  EXPECT_TRUE(is_told(told(absl::NotFoundError("x"))));
-  EXPECT_FALSE(is_told(absl::NotFoundError("x")));
-  EXPECT_EQ(exit_code_of(told(absl::NotFoundError("x"))), ExitCode::kNotFound);
+  EXPECT_TRUE(is_reported(reported(absl::NotFoundError("x"))));
+  EXPECT_FALSE(is_reported(absl::NotFoundError("x")));
+  EXPECT_EQ(exit_code_of(reported(absl::NotFoundError("x"))), ExitCode::kNotFound);
 }
 
 }  // namespace

@@ -60,9 +60,9 @@ TEST_F(RecoverTest, AMissingLastRecordIsDetected) {
   for (Id id = 1; id <= 3; ++id) apply(with(points({id}, {0, 0, 0})));
   MemoryLog::Kept kept = log_.crash();
   MemoryLog fewer(kept);
-  StoredScene promised = fewer.stored_scenes().front();
-  promised.last_sequence = 5;
-  EXPECT_EQ(recover_scene(fewer, promised, find_).status(),
+  StoredScene expected = fewer.stored_scenes().front();
+  expected.last_sequence = 5;
+  EXPECT_EQ(recover_scene(fewer, expected, find_).status(),
             absl::DataLossError("scene arena: records 4 to 5 are not there"));
 }
 
@@ -118,20 +118,20 @@ TEST_F(RecoverTest, AnUnusableTopologyIsReplacedByThatOfARebuiltTree) {
   of_other_triangles[24] = static_cast<char>(99);  // number of the first triangle
   for (const std::string& wrong : {of_another_builder, of_other_triangles, right.substr(0, 20), std::string()}) {
     MemoryLog again(kept);
-    again.keep_outline(mesh_->sha256(), wrong);
+    again.store_topology(mesh_->sha256(), wrong);
     for (const bool built : {true, false}) {
       const absl::StatusOr<RecoveredMesh> mesh = recover_mesh(again, again.stored_meshes().front());
       ASSERT_TRUE(mesh.ok()) << mesh.status();
       EXPECT_EQ(mesh->built, built);
       EXPECT_EQ(mesh->mesh->vertices(), mesh_->vertices());
     }
-    EXPECT_EQ(again.read_outline(mesh_->sha256()), right);
+    EXPECT_EQ(again.read_topology(mesh_->sha256()), right);
   }
   MemoryLog::Kept without = kept;
   without.topologies.clear();
   MemoryLog again(without);
   EXPECT_TRUE(recover_mesh(again, again.stored_meshes().front())->built);
-  EXPECT_EQ(again.read_outline(mesh_->sha256()), right);
+  EXPECT_EQ(again.read_topology(mesh_->sha256()), right);
 }
 
 TEST_F(RecoverTest, ASceneWithLostRecordsContinuesInAnotherEpoch) {

@@ -39,7 +39,7 @@ class RegistryLogTest : public SceneFixture {
     for (const StoredMesh& stored : log_->stored_meshes()) {
       const absl::StatusOr<RecoveredMesh> mesh = recover_mesh(*log_, stored);
       ASSERT_TRUE(mesh.ok()) << mesh.status();
-      EXPECT_FALSE(mesh->built) << "the outline was kept with the mesh";
+      EXPECT_FALSE(mesh->built) << "the topology was stored with the mesh";
       const absl::StatusOr<MeshPtr> named = recover_name(*log_, stored, mesh->mesh);
       ASSERT_TRUE(named.ok()) << named.status();
       registry_->restore_mesh(stored.name, *named);

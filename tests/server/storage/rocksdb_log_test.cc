@@ -307,23 +307,23 @@ TEST_F(RocksdbLogTest, AMeshWhosePartsCannotBeReadIsNotStored) {
   EXPECT_EQ(read_mesh(*log_, hash_of(1)).status().code(), absl::StatusCode::kNotFound);
 }
 
-TEST_F(RocksdbLogTest, OutlineIsKeptBesideTheMeshAndGoesWithIt) {
+TEST_F(RocksdbLogTest, TopologyIsKeptBesideTheMeshAndGoesWithIt) {
   ASSERT_EQ(add_mesh("a", 1, {"content"}), absl::OkStatus());
-  EXPECT_EQ(log_->read_outline(hash_of(1)), std::nullopt);
-  log_->keep_outline(hash_of(1), "outline");
-  EXPECT_EQ(log_->read_outline(hash_of(1)), "outline");
-  log_->keep_outline(hash_of(1), "another");
+  EXPECT_EQ(log_->read_topology(hash_of(1)), std::nullopt);
+  log_->store_topology(hash_of(1), "topology");
+  EXPECT_EQ(log_->read_topology(hash_of(1)), "topology");
+  log_->store_topology(hash_of(1), "another");
   open();
-  EXPECT_EQ(log_->read_outline(hash_of(1)), "another");
-  EXPECT_EQ(log_->read_outline(hash_of(2)), std::nullopt);
+  EXPECT_EQ(log_->read_topology(hash_of(1)), "another");
+  EXPECT_EQ(log_->read_topology(hash_of(2)), std::nullopt);
   ASSERT_EQ(log_->delete_mesh("a"), absl::OkStatus());
-  EXPECT_EQ(log_->read_outline(hash_of(1)), std::nullopt);
+  EXPECT_EQ(log_->read_topology(hash_of(1)), std::nullopt);
 }
 
-TEST_F(RocksdbLogTest, OpeningDeletesOutlinesWithoutMeshAndTemporaryFiles) {
+TEST_F(RocksdbLogTest, OpeningDeletesTopologiesWithoutMeshAndTemporaryFiles) {
   ASSERT_EQ(add_mesh("a", 1, {"content"}), absl::OkStatus());
-  log_->keep_outline(hash_of(1), "outline");
-  log_->keep_outline(hash_of(2), "of no mesh");
+  log_->store_topology(hash_of(1), "topology");
+  log_->store_topology(hash_of(2), "of no mesh");
   const std::filesystem::path topologies = std::filesystem::path(options_.path) / "outlines";
   ASSERT_EQ(std::distance(std::filesystem::directory_iterator(topologies), {}), 2);
   test::write_file_bytes((topologies / (std::string(64, 'a') + ".new")).string(), "half of one");
@@ -331,15 +331,15 @@ TEST_F(RocksdbLogTest, OpeningDeletesOutlinesWithoutMeshAndTemporaryFiles) {
   open();
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(topologies), {}), 2);
   EXPECT_TRUE(std::filesystem::exists(topologies / "of-somebody.svg"));
-  EXPECT_EQ(log_->read_outline(hash_of(1)), "outline");
+  EXPECT_EQ(log_->read_topology(hash_of(1)), "topology");
 }
 
-TEST_F(RocksdbLogTest, NoOutlineIsWrittenIntoTheReserve) {
+TEST_F(RocksdbLogTest, NoTopologyIsWrittenIntoTheReserve) {
   ASSERT_EQ(add_mesh("a", 1, {"content"}), absl::OkStatus());
   options_.reserve_bytes = ~uint64_t{0} / 2;
   open();
-  log_->keep_outline(hash_of(1), "outline");
-  EXPECT_EQ(log_->read_outline(hash_of(1)), std::nullopt);
+  log_->store_topology(hash_of(1), "topology");
+  EXPECT_EQ(log_->read_topology(hash_of(1)), std::nullopt);
 }
 
 TEST_F(RocksdbLogTest, SecondOpenerIsRefused) {

@@ -59,8 +59,8 @@ class Caster {
  private:
   v1::QueryBatch batch_of(const PixelRange& range) const {
     client::QueryBuilder builder;
-    if (options_.moment == Moment::kOne) builder.exactly(options_.revision);
-    if (options_.moment == Moment::kLive) builder.at_least(options_.revision);
+    if (options_.revisions == Revisions::kOne) builder.exactly(options_.revision);
+    if (options_.revisions == Revisions::kLive) builder.at_least(options_.revision);
     if (options_.work == WorkReport::kNone) {
       add_block(range, builder);
       return builder.build();
@@ -130,7 +130,7 @@ class Caster {
   static absl::Status misfit() { return absl::DataLossError("the answer does not have one row for each ray"); }
 
   absl::Status in_words(const absl::Status& status) const {
-    if (!absl::IsOutOfRange(status) || options_.moment == Moment::kLive) return status;
+    if (!absl::IsOutOfRange(status) || options_.revisions == Revisions::kLive) return status;
     return absl::OutOfRangeError(absl::StrCat(
         "the scene changed faster than its picture was taken: revision ", options_.revision.revision,
         " is kept no longer; give a smaller --size, or --live to let each batch of rays see the latest revision"));

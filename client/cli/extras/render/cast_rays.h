@@ -16,7 +16,7 @@
 namespace locus::cli {
 
 // Choice of the revision or revisions at which the rays are answered.
-enum class Moment {
+enum class Revisions {
   kOne,   // all rays at CastOptions::revision; fails if the server drops this revision meanwhile
   kLive,  // each batch at the newest revision, which is at least CastOptions::revision
 };
@@ -28,7 +28,7 @@ enum class WorkReport { kNone, kReported };
 struct CastOptions {
   std::string scene;
   client::Revision revision;
-  Moment moment = Moment::kOne;
+  Revisions revisions = Revisions::kOne;
   v1::Cull cull = v1::CULL_UNSPECIFIED;
   v1::Source source = v1::SOURCE_UNSPECIFIED;
   uint32_t mask = 0xFFFFFFFFu;
@@ -37,7 +37,7 @@ struct CastOptions {
 
 struct CastResult {
   RayImage image;
-  // Oldest and newest revision of the answers (equal with Moment::kOne), and the newest tick.
+  // Oldest and newest revision of the answers (equal with Revisions::kOne), and the newest tick.
   uint64_t first_revision = 0;
   uint64_t last_revision = 0;
   uint64_t tick = 0;

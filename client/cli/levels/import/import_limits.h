@@ -56,10 +56,10 @@ inline constexpr int kMaxPatchSubdivisions = 64;
 // Limits of archives.
 inline constexpr int64_t kMaxArchiveEntries = int64_t{1} << 16;
 inline constexpr size_t kMaxEntryNameBytes = 1024;
-// Maximum ratio of a level's unpacked size to its packed size, for levels of more than kMinJudgedBytes unpacked bytes.
+// Maximum ratio of a level's unpacked size to its packed size, for levels of more than kMinCheckedBytes unpacked bytes.
 // Levels of games reach a ratio of about 10; bytes that are all equal reach about 1000.
 inline constexpr uint64_t kMaxArchiveRatio = 200;
-inline constexpr size_t kMinJudgedBytes = size_t{1} << 20;
+inline constexpr size_t kMinCheckedBytes = size_t{1} << 20;
 // Maximum number of archive entries that a message lists, and maximum total length of their names in bytes.
 inline constexpr size_t kMaxListedEntries = 64;
 inline constexpr size_t kMaxListedBytes = 4096;

@@ -91,7 +91,7 @@ class CrossingWalk {
     visit_.top = more ? top_ : 0;
     visit_.nodes = nodes_;
     visit_.tests = tests_;
-    visit_.judged = judged_;
+    visit_.exact_tests = exact_tests_;
   }
 
  private:
@@ -143,18 +143,18 @@ class CrossingWalk {
     const uint32_t maybe_on = planted(PlantedBug::kCrossingTop) ? crossing : crossing | without_edges;
     const uint32_t undecided = met & (edges.doubtful | (near & maybe_on)), decided = met & ~undecided;
     winding_ += static_cast<int64_t>(count_of(edges.up & decided)) - count_of(edges.down & decided);
-    if (__builtin_expect(undecided != 0, 0)) return judge(block, met, undecided);
+    if (__builtin_expect(undecided != 0, 0)) return decide(block, met, undecided);
     tests_ += count_of(met);
     return true;
   }
 
   // Adds the crossings of the triangles in the mask `undecided`, and counts those in the mask `met`. Returns false if
   // the point lies on a triangle.
-  inline bool judge(const TriangleBlock& block, uint32_t met, uint32_t undecided) {
+  inline bool decide(const TriangleBlock& block, uint32_t met, uint32_t undecided) {
     for (; undecided != 0; undecided &= undecided - 1u) {
       const auto lane = static_cast<uint32_t>(__builtin_ctz(undecided));
-      ++judged_;
-      const int found = visit_.judge.crossing(visit_.judge.context, block, lane);
+      ++exact_tests_;
+      const int found = visit_.predicate.crossing(visit_.predicate.context, block, lane);
       if (found == kOnTriangle) {
         tests_ += count_of(met & ((2u << lane) - 1u));
         return false;
@@ -170,7 +170,7 @@ class CrossingWalk {
   const HalfLineFloats line_;
   const int first_, second_;  // the two axes perpendicular to the half line
   const Floats8 way_, along_high_, along_end_, low_[2], high_[2];
-  uint32_t top_, found_ = 0, nodes_ = 0, tests_ = 0, judged_ = 0;
+  uint32_t top_, found_ = 0, nodes_ = 0, tests_ = 0, exact_tests_ = 0;
   int64_t winding_ = 0;                          // sum of decided crossings, with the signs for an ascending half line
   alignas(32) uint32_t blocks_[kMaxLineBlocks];  // blocks still to be tested: `found_` elements
 };

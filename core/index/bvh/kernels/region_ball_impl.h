@@ -57,7 +57,7 @@ struct ChildResults {
 // Result masks for the triangles of a block; one bit per lane.
 struct TriangleResults {
   uint32_t certain;    // triangles that certainly overlap the region
-  uint32_t undecided;  // triangles that the RegionJudge must test
+  uint32_t undecided;  // triangles that the RegionPredicate must test
 };
 
 constexpr float kSquarePad = 0x1p-19f;  // relative pad of squared distances to boxes; their rounding error is 2^-21

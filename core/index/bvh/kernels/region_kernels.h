@@ -1,9 +1,9 @@
 // Region kernels: vector code that finds all triangles of one mesh's tree that overlap a ball or a box. The code tests
 // eight boxes or triangles at a time. The kernels of each instruction set are in an object file of their own. A kernel
 // accepts the result of a float test only if a documented bound of the rounding error proves that the result is right.
-// Otherwise the kernel calls the caller's RegionJudge, which uses the predicates of core/geometry/triangle_overlap.h,
-// so that the answers of kernels equal the answers of the predicates. The triangle numbers of a subtree that lies
-// completely inside the region are copied without tests. The kernels are used through
+// Otherwise the kernel calls the caller's RegionPredicate, which uses the predicates of
+// core/geometry/triangle_overlap.h, so that the answers of kernels equal the answers of the predicates. The triangle
+// numbers of a subtree that lies completely inside the region are copied without tests. The kernels are used through
 // core/query/kinds/triangle_search.h. Plain data; functions without state, safe from any thread.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_REGION_KERNELS_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_REGION_KERNELS_H_
@@ -47,29 +47,29 @@ inline constexpr uint32_t kMaxRegionItems = 56;
 
 // Exact predicate for the triangles that the float tests leave undecided. meets() returns whether the triangle in lane
 // `lane` of `block` overlaps `region`, which the caller owns.
-struct RegionJudge {
+struct RegionPredicate {
   bool (*meets)(const void* region, const TriangleBlock& block, uint32_t lane);
   const void* region;
 };
 
 // Resumable visit of one tree for one region: its state between two calls, and the output of the last call.
 struct RegionVisit {
-  RegionJudge judge;
-  uint32_t* numbers;   // output array of the next call; owned by the caller
-  size_t room;         // length of `numbers`, at least kMinRegionRoom; a call may overwrite all of it
-  size_t found;        // count of triangle numbers written by the last call; successive calls write in storage order
-  uint32_t nodes;      // number of nodes opened by the last call
-  uint32_t tests;      // number of triangles tested by the last call
-  uint32_t judged;     // number of tested triangles for which `judge` was called
-  uint32_t top;        // number of elements in the stack `waiting`
-  uint32_t next, end;  // range of unprocessed elements of `items`
-  NodeRange rest;      // triangles inside the region, whose numbers are still to be copied to `numbers`
+  RegionPredicate predicate;
+  uint32_t* numbers;     // output array of the next call; owned by the caller
+  size_t room;           // length of `numbers`, at least kMinRegionRoom; a call may overwrite all of it
+  size_t found;          // count of triangle numbers written by the last call; successive calls write in storage order
+  uint32_t nodes;        // number of nodes opened by the last call
+  uint32_t tests;        // number of triangles tested by the last call
+  uint32_t exact_tests;  // number of tested triangles for which `predicate` was called
+  uint32_t top;          // number of elements in the stack `waiting`
+  uint32_t next, end;    // range of unprocessed elements of `items`
+  NodeRange rest;        // triangles inside the region, whose numbers are still to be copied to `numbers`
   alignas(32) uint32_t waiting[kTreeStack];  // stack of nodes to open and subtrees inside the region
   alignas(32) uint32_t items[kMaxRegionItems + kTreeWidth];
 
   // Begins a visit at the root; undecided triangles will be tested by `by`.
-  void start(const RegionJudge& by) {
-    judge = by;
+  void start(const RegionPredicate& by) {
+    predicate = by;
     top = 1;
     next = end = 0;
     rest = {};
@@ -89,8 +89,8 @@ struct RegionVisit {
 template <class Region>
 struct RegionKernel {
   void (*one)(const TriangleTree&, const Region&, RegionVisit&);
-  size_t (*many)(const TriangleTree&, const Region*, const RegionJudge*, size_t regions, uint32_t* numbers, size_t room,
-                 uint32_t* counts);
+  size_t (*many)(const TriangleTree&, const Region*, const RegionPredicate*, size_t regions, uint32_t* numbers,
+                 size_t room, uint32_t* counts);
 };
 
 // Kernels of one instruction set.

@@ -48,12 +48,13 @@ struct Walk {
   }
 };
 
-// Returns those bits of `undecided` whose triangles overlap the region according to `judge`.
-static inline uint32_t judged(const TriangleBlock& block, uint32_t undecided, const RegionJudge& judge) {
+// Returns those bits of `undecided` whose triangles overlap the region according to `predicate`.
+static inline uint32_t decided_exactly(const TriangleBlock& block, uint32_t undecided,
+                                       const RegionPredicate& predicate) {
   uint32_t found = 0;
   for (; undecided != 0; undecided &= undecided - 1u) {
     const auto lane = static_cast<uint32_t>(__builtin_ctz(undecided));
-    if (judge.meets(judge.region, block, lane)) found |= 1u << lane;
+    if (predicate.meets(predicate.region, block, lane)) found |= 1u << lane;
   }
   return found;
 }
@@ -63,7 +64,7 @@ struct Sink {
   uint32_t* out;
   size_t count, room;
   NodeRange rest;  // triangles inside the region, whose numbers are still to be copied to `out`
-  uint32_t tests, judged;
+  uint32_t tests, exact_tests;
 
   // Returns whether the buffer may be too small for the numbers of one more block.
   inline bool full() const { return room - count < kTreeWidth; }
@@ -83,26 +84,26 @@ struct Sink {
   // not all fit in the buffer, the numbers not written stay in `rest`.
   template <class Query>
   __attribute__((always_inline)) inline void process_item(const TriangleTree& tree, const Query& query,
-                                                          const RegionJudge& judge, uint32_t item) {
+                                                          const RegionPredicate& predicate, uint32_t item) {
     if ((item & kBlockBit) == 0) {
       rest = tree.ranges[item & ~kContainedBit];
       return copy_rest(tree);
     }
     const TriangleBlock& block = tree.blocks[item & ~(kBlockBit | kContainedBit)];
-    const uint32_t found = (item & kContainedBit) != 0 ? (1u << block.count) - 1u : tested(query, judge, block);
+    const uint32_t found = (item & kContainedBit) != 0 ? (1u << block.count) - 1u : tested(query, predicate, block);
     pack_numbers(tree.numbers + block.first, block.count, found, out + count);
     count += static_cast<size_t>(__builtin_popcount(found));
   }
 
  private:
   template <class Query>
-  __attribute__((always_inline)) inline uint32_t tested(const Query& query, const RegionJudge& judge,
+  __attribute__((always_inline)) inline uint32_t tested(const Query& query, const RegionPredicate& predicate,
                                                         const TriangleBlock& block) {
     tests += block.count;
     const TriangleResults results = query.test_block(block);
     if (__builtin_expect(results.undecided == 0, 1)) return results.certain;
-    judged += static_cast<uint32_t>(__builtin_popcount(results.undecided));
-    return results.certain | locus::judged(block, results.undecided, judge);
+    exact_tests += static_cast<uint32_t>(__builtin_popcount(results.undecided));
+    return results.certain | decided_exactly(block, results.undecided, predicate);
   }
 };
 
@@ -121,7 +122,7 @@ static void find_one(const TriangleTree& tree, const Region& region, RegionVisit
   if (sink.rest.count != 0 && !sink.full()) sink.copy_rest(tree);
   while (sink.rest.count == 0 && sink.tests < kMaxRegionTests && !sink.full()) {
     if (next != walk.end) {
-      sink.process_item(tree, walk.query, visit.judge, visit.items[next++]);
+      sink.process_item(tree, walk.query, visit.predicate, visit.items[next++]);
       continue;
     }
     next = walk.end = 0;
@@ -135,7 +136,7 @@ static void find_one(const TriangleTree& tree, const Region& region, RegionVisit
   visit.found = sink.count;
   visit.nodes = walk.nodes;
   visit.tests = sink.tests;
-  visit.judged = sink.judged;
+  visit.exact_tests = sink.exact_tests;
 }
 
 // Traversals of up to kMaxRegions queries through one tree.
@@ -188,11 +189,11 @@ class Walks {
 // Completes a walk and writes the triangle numbers that it finds. Returns false if the buffer may be too small for
 // these numbers.
 template <class Query>
-static inline bool finish(const TriangleTree& tree, const RegionJudge& judge, Walk<Query>& walk, Sink& sink) {
+static inline bool finish(const TriangleTree& tree, const RegionPredicate& predicate, Walk<Query>& walk, Sink& sink) {
   for (;;) {
     for (uint32_t next = 0; next < walk.end; ++next) {
       if (sink.full()) return false;
-      sink.process_item(tree, walk.query, judge, walk.items[next]);
+      sink.process_item(tree, walk.query, predicate, walk.items[next]);
       if (sink.rest.count != 0) return false;
     }
     if (walk.top == 0) return true;
@@ -203,14 +204,14 @@ static inline bool finish(const TriangleTree& tree, const RegionJudge& judge, Wa
 
 // Implements RegionKernel::many.
 template <class Query, class Region>
-static size_t find_many(const TriangleTree& tree, const Region* regions, const RegionJudge* judges, size_t count,
-                        uint32_t* numbers, size_t room, uint32_t* counts) {
+static size_t find_many(const TriangleTree& tree, const Region* regions, const RegionPredicate* predicates,
+                        size_t count, uint32_t* numbers, size_t room, uint32_t* counts) {
   Walks<Query> walks(regions, count);
   walks.open_all(tree);
   Sink sink = {numbers, 0, room, {}, 0, 0};
   for (size_t i = 0; i < count; ++i) {
     const size_t before = sink.count;
-    if (!finish(tree, judges[i], walks[i], sink)) return i;
+    if (!finish(tree, predicates[i], walks[i], sink)) return i;
     counts[i] = static_cast<uint32_t>(sink.count - before);
   }
   return count;

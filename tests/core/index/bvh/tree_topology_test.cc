@@ -66,7 +66,7 @@ std::string difference_of_any_topology(const TestScene<Triangle>& scene) {
   TestScene<Triangle> numbered = scene;
   numbered.values = renumbered(scene.values);
   Random random(scene.values.size());
-  const RandomOutline made(static_cast<uint32_t>(scene.values.size()), random);
+  const RandomTopology made(static_cast<uint32_t>(scene.values.size()), random);
   const absl::StatusOr<TriangleBvh> tree = restore(made.topology(), numbered.values);
   if (!tree.ok()) return tree.status().ToString();
   const ListIndex<Triangle> oracle = make_list(numbered.values);
@@ -86,7 +86,7 @@ TEST(TreeTopologyTest, KernelsAnswerATreeOfAnyTopologyAsAllTrianglesDo) {
     if (kernels == nullptr) continue;  // the portable instruction set has no kernels
     for (uint64_t seed = 0; seed < 4; ++seed) {
       Random random(seed);
-      const RandomOutline made(static_cast<uint32_t>(triangles.size()), random);
+      const RandomTopology made(static_cast<uint32_t>(triangles.size()), random);
       absl::StatusOr<TriangleBvh> tree = restore(made.topology(), triangles);
       ASSERT_TRUE(tree.ok()) << tree.status();
       const KernelTrial trial(absl::StrCat("topology ", seed), triangles,
@@ -137,7 +137,7 @@ TEST_F(WrongTopologyTest, BlocksThatDoNotAddUpAreRefused) {
 }
 
 TEST_F(WrongTopologyTest, NodesThatDoNotFormATreeAreRefused) {
-  const std::vector<NodeOutline> nodes = wrong_.nodes;
+  const std::vector<TopologyNode> nodes = wrong_.nodes;
   wrong_.nodes.clear();
   EXPECT_EQ(refused(), "the topology does not fit the mesh: no nodes, or more nodes or blocks than triangles");
   wrong_.nodes = nodes;
@@ -146,13 +146,13 @@ TEST_F(WrongTopologyTest, NodesThatDoNotFormATreeAreRefused) {
   wrong_.nodes = nodes;
   wrong_.nodes.push_back({1, 0});
   EXPECT_EQ(refused(), "the topology does not fit the mesh: too many nodes");
-  for (const NodeOutline children : {NodeOutline{0, 0}, NodeOutline{1, 1}, NodeOutline{2, 0}, NodeOutline{4, 1}}) {
+  for (const TopologyNode children : {TopologyNode{0, 0}, TopologyNode{1, 1}, TopologyNode{2, 0}, TopologyNode{4, 1}}) {
     wrong_.nodes = nodes;
     wrong_.nodes.back() = children;
     EXPECT_EQ(refused(), "the topology does not fit the mesh: invalid children of a node");
   }
   wrong_.nodes = nodes;
-  const auto has_room = [](const NodeOutline& node) { return node.nodes == 0 && node.blocks < 0x7F; };
+  const auto has_room = [](const TopologyNode& node) { return node.nodes == 0 && node.blocks < 0x7F; };
   std::find_if(wrong_.nodes.rbegin(), wrong_.nodes.rend(), has_room)->blocks = 0xFF;
   EXPECT_EQ(refused(), "the topology does not fit the mesh: too few blocks");
   wrong_.nodes = nodes;
@@ -175,7 +175,7 @@ class Chain {
     random.shuffle(numbers_);
     topology_.numbers = numbers_;
     topology_.block_sizes.assign(blocks, kTreeWidth);
-    topology_.nodes.assign(levels - 1, NodeOutline{0x7F, 0x80});
+    topology_.nodes.assign(levels - 1, TopologyNode{0x7F, 0x80});
     topology_.nodes.push_back({0xFF, 0});
   }
   Chain(const Chain&) = delete;

@@ -15,23 +15,23 @@ namespace {
 
 absl::StatusOr<TriangleBvh> restore(const std::string& bytes, const std::vector<Triangle>& triangles) {
   const AlignedBytes aligned(bytes);
-  const absl::StatusOr<TreeTopology> topology = decode_outline(aligned);
+  const absl::StatusOr<TreeTopology> topology = decode_topology(aligned);
   if (!topology.ok()) return topology.status();
   const auto triangle = [&](uint32_t number) { return triangles[number]; };
   return TriangleBvh::restore(*topology, static_cast<uint32_t>(triangles.size()), triangle);
 }
 
 std::string encoded(const std::vector<Triangle>& triangles) {
-  return encode_outline(TriangleBvh::build(triangles)->topology());
+  return encode_topology(TriangleBvh::build(triangles)->topology());
 }
 
 TEST(TreeCodecTest, ATopologyRoundTripsAndTakesFiveBytesATriangle) {
   for (const std::vector<Triangle>& triangles : {bumpy_sphere(40, 0.05, 6), box_city(1, 1)}) {
     const TriangleBvh built = *TriangleBvh::build(triangles);
-    const std::string bytes = encode_outline(built.topology());
+    const std::string bytes = encode_topology(built.topology());
     EXPECT_LT(bytes.size(), 5 * triangles.size() + 64);
     const AlignedBytes aligned(bytes);
-    const absl::StatusOr<TreeTopology> topology = decode_outline(aligned);
+    const absl::StatusOr<TreeTopology> topology = decode_topology(aligned);
     ASSERT_TRUE(topology.ok()) << topology.status();
     EXPECT_EQ(topology->numbers, built.topology().numbers);
     EXPECT_EQ(topology->block_sizes, built.topology().block_sizes);

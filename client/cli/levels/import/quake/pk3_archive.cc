@@ -117,7 +117,7 @@ absl::Status check_unpacked(uint64_t bytes, const LevelEntry& level, const std::
     return exceeds(absl::StrCat(level.name, " in ", path), "more bytes unpacked", "level_bytes", kMaxBspBytes,
                    "give another level");
   }
-  if (bytes > kMinJudgedBytes && bytes / kMaxArchiveRatio > level.packed_bytes) {
+  if (bytes > kMinCheckedBytes && bytes / kMaxArchiveRatio > level.packed_bytes) {
     return exceeds(absl::StrCat(level.name, " in ", path),
                    absl::StrCat("more than ", kMaxArchiveRatio, " unpacked bytes for each of its ", level.packed_bytes,
                                 " packed bytes"),

@@ -72,7 +72,7 @@ TEST_F(CastRaysTest, AllRaysSeeTheGivenRevisionAfterTheSceneHasChanged) {
 
 TEST_F(CastRaysTest, LivePicturesSeeTheLatestRevision) {
   move_ball(20);
-  options_.moment = Moment::kLive;
+  options_.revisions = Revisions::kLive;
   const CastResult live = cast();
   EXPECT_EQ(live.last_revision, options_.revision.revision + 1);
   EXPECT_NEAR(live.image.t[middle()], 18, 0.1);

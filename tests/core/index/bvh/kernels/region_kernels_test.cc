@@ -63,21 +63,21 @@ class RegionKernelsTest : public ::testing::TestWithParam<std::string> {
       const size_t count = search.next(numbers, 64);
       found.insert(found.end(), numbers, numbers + count);
       tests_ += search.tests();
-      judged_ += search.judged();
+      exact_tests_ += search.exact_tests();
     }
     EXPECT_EQ(found, expected) << described(shape);
   }
 
   // Returns the share of the tested triangles for which the predicates were called.
-  double judged_share() const { return static_cast<double>(judged_) / static_cast<double>(tests_); }
+  double exact_share() const { return static_cast<double>(exact_tests_) / static_cast<double>(tests_); }
 
  private:
-  uint64_t tests_ = 0, judged_ = 0;
+  uint64_t tests_ = 0, exact_tests_ = 0;
 };
 
 TEST_P(RegionKernelsTest, FindTheSameAsThePredicatesInRandomRegions) {
   compare(bumpy_sphere(14, 0.1, 1), scaled_count(1'500), 1);
-  EXPECT_LT(judged_share(), 0.03);  // although half of the regions only touch a triangle
+  EXPECT_LT(exact_share(), 0.03);  // although half of the regions only touch a triangle
 }
 
 TEST_P(RegionKernelsTest, FindTheSameAsThePredicatesOnALattice) {
@@ -164,7 +164,7 @@ TEST_P(RegionKernelsTest, FindTheSameAsThePredicatesAmongTrianglesOfManySizes) {
   }
   number_in_order(mixed);
   compare(mixed, scaled_count(1'000), 11);
-  EXPECT_LT(judged_share(), 0.05);
+  EXPECT_LT(exact_share(), 0.05);
 }
 
 TEST_P(RegionKernelsTest, TrianglesInsideTheRegionAreNotTested) {
@@ -201,7 +201,7 @@ struct Together {
     for (size_t i = 0; i < kMaxRegions; ++i) {
       shapes[i] = {{0, 0, static_cast<float>(i) * 0.1f}, 0.15f * static_cast<float>(i)};
       balls[i] = kernel_region(shapes[i]);
-      judges[i] = judge_of(shapes[i]);
+      predicates[i] = predicate_of(shapes[i]);
       TriangleSearch<Ballf> search(tree, shapes[i]);
       while (!search.over()) {
         uint32_t found[64];
@@ -214,12 +214,12 @@ struct Together {
 
   size_t answered(const TriangleBvh& tree, size_t room) {
     numbers.assign(room, 0);
-    return active_region_kernels()->ball.many(tree.tree(), balls, judges, kMaxRegions, numbers.data(), room, counts);
+    return active_region_kernels()->ball.many(tree.tree(), balls, predicates, kMaxRegions, numbers.data(), room, counts);
   }
 
   Ballf shapes[kMaxRegions];
   KernelBall balls[kMaxRegions];
-  RegionJudge judges[kMaxRegions];
+  RegionPredicate predicates[kMaxRegions];
   uint32_t counts[kMaxRegions];
   std::vector<uint32_t> numbers, alone;
   std::vector<size_t> ends;  // end of each ball's numbers in `alone`

@@ -134,7 +134,7 @@ TEST(Pk3ArchiveTest, ALevelThatExpandsBeyondTheRatioIsRefusedEarly) {
 
 TEST(Pk3ArchiveTest, ASmallLevelMayExpandByAnyRatio) {
   const TempFolder folder;
-  const std::string zeros(kMinJudgedBytes, '\0');
+  const std::string zeros(kMinCheckedBytes, '\0');
   const auto level = read_pk3_level(archive_of(folder, {{"a.bsp", zeros}}), "a.pk3", "");
   ASSERT_TRUE(level.ok()) << level.status();
   EXPECT_EQ(level->bytes, zeros);
