@@ -1,11 +1,11 @@
 // Writer's store of a scene's objects: finds objects by id, applies batches of changes and makes immutable sets for
 // readers. One thread at a time uses the store; any thread may use the sets.
 //
-// A handle identifies one lifetime of an object, from its insertion to its removal. Invariants: every object has a
-// handle of its own, below handle_count(); the table from ids to handles and the grid hold the same objects; every
-// handle below handle_count() belongs to an object, is free, or is quarantined. A store that tracks lifetimes
-// quarantines the handle of a removed object: no other object gets the handle while an object set in the history
-// contains the removed object.
+// A handle identifies one lifetime of an object, from its insertion to its removal; if the store tracks lifetimes, a
+// teleport also ends a lifetime and begins the next. Invariants: every object has a handle of its own, below
+// handle_count(); the table from ids to handles and the grid hold the same objects; every handle below handle_count()
+// belongs to an object, is free, or is quarantined. A store that tracks lifetimes quarantines the handle of a removed
+// object: no other object gets the handle while an object set in the history contains the removed object.
 #ifndef LOCUS_CORE_SCENE_OBJECTS_OBJECT_STORE_H_
 #define LOCUS_CORE_SCENE_OBJECTS_OBJECT_STORE_H_
 
