@@ -2,8 +2,9 @@
 // of query can return, and computes their size in a reply.
 //
 // To add a column: add a value to Column (query_batch.h), a row to LOCUS_COLUMN_ARRAYS, and the column to the kinds
-// that return it (ServedColumns in columns.cc), and write its values in run/rows.cc. All code that allocates, copies,
-// measures or sends columns is generated from LOCUS_COLUMN_ARRAYS.
+// that return it (ServedColumns in columns.cc), and write its values in run/rows.cc. All code of the server that
+// allocates, copies, measures or sends columns is generated from LOCUS_COLUMN_ARRAYS. The clients list the columns that
+// they show; a test of each fails for a column of the protocol that it does not know.
 #ifndef LOCUS_CORE_QUERY_COLUMNS_H_
 #define LOCUS_CORE_QUERY_COLUMNS_H_
 

@@ -5,6 +5,8 @@
 
 #include <cmath>
 #include <limits>
+#include <set>
+#include <string>
 
 namespace locus::client {
 namespace {
@@ -39,6 +41,44 @@ TEST(ResultRowsTest, EffectiveTimesAndClampedQueriesAreReportedByQuery) {
   EXPECT_THAT(rows->resolved_fractions(), ElementsAre(0.5f, 0.0f));
   EXPECT_FALSE(rows->clamped(0));
   EXPECT_TRUE(rows->clamped(1));
+}
+
+// Adds `count` zeros to a repeated number field.
+void add_zeros(v1::BlockResult& block, const google::protobuf::FieldDescriptor& field, int count) {
+  const google::protobuf::Reflection& reflection = *block.GetReflection();
+  for (int i = 0; i < count; ++i) {
+    switch (field.cpp_type()) {
+      case google::protobuf::FieldDescriptor::CPPTYPE_FLOAT:
+        reflection.AddFloat(&block, &field, 0);
+        break;
+      case google::protobuf::FieldDescriptor::CPPTYPE_DOUBLE:
+        reflection.AddDouble(&block, &field, 0);
+        break;
+      case google::protobuf::FieldDescriptor::CPPTYPE_UINT32:
+        reflection.AddUInt32(&block, &field, 0);
+        break;
+      default:
+        reflection.AddUInt64(&block, &field, 0);
+    }
+  }
+}
+
+// A new result column of the protocol fails this test until ResultRows checks its length.
+TEST(ResultRowsTest, TheLengthOfEveryColumnIsChecked) {
+  const std::set<std::string> not_by_row = {"counts",  "truncated", "resolved_ticks", "resolved_fractions",
+                                            "clamped", "unanchored"};
+  const google::protobuf::Descriptor& type = *v1::BlockResult::descriptor();
+  int columns = 0;
+  for (int i = 0; i < type.field_count(); ++i) {
+    const google::protobuf::FieldDescriptor& field = *type.field(i);
+    if (!field.is_repeated() || not_by_row.count(field.name()) > 0) continue;
+    ++columns;
+    v1::BlockResult block;
+    block.add_counts(2);
+    add_zeros(block, field, 11);  // no column has 11 entries for two rows
+    EXPECT_TRUE(absl::IsDataLoss(ResultRows::of(block).status())) << field.name();
+  }
+  EXPECT_GE(columns, 12);
 }
 
 TEST(RayHitsTest, FirstHasOneRowPerRayAndReportsMisses) {

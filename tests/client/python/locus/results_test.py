@@ -32,6 +32,11 @@ class ResultsTest(unittest.TestCase):
             (block,) = answer(**{name: bytes(3 * size)}).blocks
             self.assertEqual(block.rows, 3, name)
 
+    def test_every_column_of_the_protocol_is_an_attribute(self):
+        (block,) = answer(ids=bytes(8)).blocks
+        missing = [name for name in schema.numbers("BlockResult") if not hasattr(block, name)]
+        self.assertEqual(missing, [])
+
     def test_columns_not_requested_are_empty(self):
         (block,) = answer(ids=bytes(8)).blocks
         for name in ("t", "triangles", "uvs", "normals", "points", "groups", "tags", "layers", "positions", "rotations",
