@@ -150,14 +150,14 @@ TEST_F(BulkUpdateTest, RowsWithoutAnAnswerAreNotReportedAsNotApplied) {
   server.updates.breaks = {.after_messages = 2,
                            .times = 1,
                            .apply_last = true,
-                           .status = grpc::Status(grpc::StatusCode::INTERNAL, "planned")};
+                           .status = grpc::Status(grpc::StatusCode::PERMISSION_DENIED, "planned")};
   const TestFile file("id,at.x,at.y,at.z\n1,0,0,0\n2,0,0,0\n3,0,0,0\n");
   std::ostringstream out, err;
   Context context(out, err, Progress::kSilent);
   EXPECT_EQ(
       run_line({"--address", server.address(), "insert", "world", "point", "--batch", "2", "--from-csv", file.path()},
                context),
-      ExitCode::kFailed);
+      ExitCode::kDenied);
   EXPECT_THAT(err.str(), HasSubstr("; whether 1 other rows were applied is not known"));
 }
 
