@@ -10,9 +10,9 @@
 #include <fstream>
 #include <string>
 
-#include "core/index/index_queries.h"
-#include "core/index/list/list_index.h"
 #include "gtest/gtest.h"
+#include "tests/support/index_queries.h"
+#include "tests/support/list_index.h"
 
 // Type of another library, in its own namespace.
 namespace game {

@@ -7,13 +7,13 @@
 // direction. If `work` is not null, the query adds its cost to `*work`. The cost of a query is the cost of the
 // structure's visit. Threads: queries only read the index, so any number of them may run concurrently. Source: Hughes
 // et al., Computer Graphics: Principles and Practice, 3rd ed., 2013, ch. 37 (the query interface).
-#ifndef LOCUS_CORE_INDEX_INDEX_QUERIES_H_
-#define LOCUS_CORE_INDEX_INDEX_QUERIES_H_
+#ifndef LOCUS_TESTS_SUPPORT_INDEX_QUERIES_H_
+#define LOCUS_TESTS_SUPPORT_INDEX_QUERIES_H_
 
 #include <cstddef>
 #include <vector>
 
-#include "core/index/collectors.h"
+#include "tests/support/collectors.h"
 
 namespace locus {
 
@@ -134,4 +134,4 @@ void conservative_box(const Index& index, const BoxQueryOf<Index>& box, std::vec
 
 }  // namespace locus
 
-#endif  // LOCUS_CORE_INDEX_INDEX_QUERIES_H_
+#endif  // LOCUS_TESTS_SUPPORT_INDEX_QUERIES_H_

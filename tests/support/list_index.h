@@ -4,8 +4,8 @@
 // Threads: const members may run concurrently; insert and remove need exclusive use.
 // Invariant: slots_ maps the id of each value in the list to its slot in values_, and has no other entries.
 // Source: Hughes et al., Computer Graphics: Principles and Practice, 3rd ed., 2013, ch. 37 (List).
-#ifndef LOCUS_CORE_INDEX_LIST_LIST_INDEX_H_
-#define LOCUS_CORE_INDEX_LIST_LIST_INDEX_H_
+#ifndef LOCUS_TESTS_SUPPORT_LIST_INDEX_H_
+#define LOCUS_TESTS_SUPPORT_LIST_INDEX_H_
 
 #include <cstdint>
 #include <utility>
@@ -94,4 +94,4 @@ class ListIndex {
 
 }  // namespace locus
 
-#endif  // LOCUS_CORE_INDEX_LIST_LIST_INDEX_H_
+#endif  // LOCUS_TESTS_SUPPORT_LIST_INDEX_H_

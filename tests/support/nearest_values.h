@@ -1,14 +1,14 @@
 // Query for the values nearest to a point, written once for every structure. The query is exact: it compares the
 // distances that PrimitiveTraits computes in double. All structures return the same results.
-#ifndef LOCUS_CORE_INDEX_NEAREST_VALUES_H_
-#define LOCUS_CORE_INDEX_NEAREST_VALUES_H_
+#ifndef LOCUS_TESTS_SUPPORT_NEAREST_VALUES_H_
+#define LOCUS_TESTS_SUPPORT_NEAREST_VALUES_H_
 
 #include <algorithm>
 #include <cstddef>
 #include <vector>
 
 #include "core/base/check.h"
-#include "core/index/index_queries.h"
+#include "tests/support/index_queries.h"
 
 namespace locus {
 
@@ -90,4 +90,4 @@ void nearest_values(const Index& index, const Vec3d& point, double max_distance,
 
 }  // namespace locus
 
-#endif  // LOCUS_CORE_INDEX_NEAREST_VALUES_H_
+#endif  // LOCUS_TESTS_SUPPORT_NEAREST_VALUES_H_

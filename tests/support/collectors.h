@@ -2,8 +2,8 @@
 // hit of a ray, any hit, the nearest few hits, or all values whose bounds overlap a ray or a region. Collectors are
 // separate from traversal, so that every structure supports every kind of query. One object per query and thread; each
 // object borrows its query.
-#ifndef LOCUS_CORE_INDEX_COLLECTORS_H_
-#define LOCUS_CORE_INDEX_COLLECTORS_H_
+#ifndef LOCUS_TESTS_SUPPORT_COLLECTORS_H_
+#define LOCUS_TESTS_SUPPORT_COLLECTORS_H_
 
 #include <algorithm>
 #include <cstddef>
@@ -199,4 +199,4 @@ class RegionCollector {
 
 }  // namespace locus
 
-#endif  // LOCUS_CORE_INDEX_COLLECTORS_H_
+#endif  // LOCUS_TESTS_SUPPORT_COLLECTORS_H_
