@@ -214,7 +214,8 @@ struct Together {
 
   size_t answered(const TriangleBvh& tree, size_t room) {
     numbers.assign(room, 0);
-    return active_region_kernels()->ball.many(tree.tree(), balls, predicates, kMaxRegions, numbers.data(), room, counts);
+    return active_region_kernels()->ball.many(tree.tree(), balls, predicates, kMaxRegions, numbers.data(), room,
+                                              counts);
   }
 
   Ballf shapes[kMaxRegions];
