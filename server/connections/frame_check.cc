@@ -14,8 +14,7 @@ constexpr uint8_t kEndStream = 1;  // flag of DATA
 
 const char* FrameCheck::refusal(absl::string_view bytes, Time now) {
   let_time_pass(now);
-  calls_of_read_ = cancelled_of_read_ = 0;
-  stream_before_read_ = last_stream_;
+  calls_of_read_ = 0;
   while (!bytes.empty()) {
     if (bytes_to_skip_ > 0) {
       const size_t skipped = static_cast<size_t>(std::min<uint64_t>(bytes_to_skip_, bytes.size()));
@@ -45,7 +44,7 @@ const char* FrameCheck::begin_frame() {
       ++continuations_;
       break;
     case Frame::kReset:
-      cancel();
+      ++cancelled_;
       break;
     case Frame::kPing:
       ++pings_;
@@ -63,7 +62,6 @@ const char* FrameCheck::begin_frame() {
   if (block_bytes_ > kMaxBlockBytes || continuations_ > kMaxContinuations) return kLongHeaders;
   if (cancelled_ > kBurst) return "more calls cancelled than finished";
   if (empty_ > kBurst || pings_ > kBurst) return "too many frames that carry nothing";
-  if (cancelled_of_read_ > kMaxCancelledOfRead) return "calls cancelled as soon as they began";
   if (calls_of_read_ > kMaxCallsOfRead) return "more calls at once than it may open";
   return nullptr;
 }
@@ -71,7 +69,8 @@ const char* FrameCheck::begin_frame() {
 void FrameCheck::begin_headers() {
   block_bytes_ = bytes_to_skip_;
   continuations_ = 0;
-  const uint32_t stream = this->stream();
+  const uint32_t stream = (uint32_t{frame_header_[5]} & 0x7f) << 24 | uint32_t{frame_header_[6]} << 16 |
+                          uint32_t{frame_header_[7]} << 8 | uint32_t{frame_header_[8]};
   const bool begins_call = stream % 2 == 1 && stream > last_stream_;
   if (!begins_call) {
     ++empty_;
@@ -81,17 +80,6 @@ void FrameCheck::begin_headers() {
   ++calls_of_read_;
   cancelled_ = std::max(0.0, cancelled_ - 0.5);
   pings_ = std::max(0.0, pings_ - 1);
-}
-
-void FrameCheck::cancel() {
-  ++cancelled_;
-  if (const uint32_t stream = this->stream(); stream > stream_before_read_ && stream <= last_stream_)
-    ++cancelled_of_read_;
-}
-
-uint32_t FrameCheck::stream() const {
-  return (uint32_t{frame_header_[5]} & 0x7f) << 24 | uint32_t{frame_header_[6]} << 16 |
-         uint32_t{frame_header_[7]} << 8 | uint32_t{frame_header_[8]};
 }
 
 void FrameCheck::let_time_pass(Time now) {

@@ -36,9 +36,6 @@ class FrameCheck {
   // Maximum calls that begin in the bytes of one read. The maximum is needed because gRPC creates all of these calls
   // before it accepts the first one. It is above the number of calls that a client may have open.
   static constexpr uint32_t kMaxCallsOfRead = 2048;
-  // Maximum calls that begin and are cancelled in the bytes of one read. Honest clients cancel calls later: at a
-  // deadline, or when their user gives up. So a rapid reset ends with its first read, before gRPC creates the calls.
-  static constexpr uint32_t kMaxCancelledOfRead = 64;
 
   // Reason for which a block of headers that exceeds kMaxBlockBytes or kMaxContinuations is refused. It is recognised
   // by its address, so it is an array: each file could have its own copy of a string literal.
@@ -59,10 +56,6 @@ class FrameCheck {
   // Counts a HEADERS frame. It begins a call only if its stream number is odd, as the numbers of clients' streams are,
   // and higher than the numbers of all earlier calls.
   void begin_headers();
-  // Counts a RST_STREAM frame.
-  void cancel();
-  // Returns the stream number of the current frame.
-  uint32_t stream() const;
   // Subtracts from each count the number that is accepted in the time since the last read.
   void let_time_pass(Time now);
 
@@ -71,11 +64,8 @@ class FrameCheck {
   size_t frame_header_size_ = 0;  // bytes of the next frame's header that have arrived
   uint64_t block_bytes_ = 0;
   uint32_t continuations_ = 0;
-  uint32_t last_stream_ = 0;  // number of the last stream that began a call
-  // Of the current read: the last stream before it, the calls that began in it, and those of them that were cancelled.
-  uint32_t stream_before_read_ = 0;
-  uint32_t calls_of_read_ = 0;
-  uint32_t cancelled_of_read_ = 0;
+  uint32_t last_stream_ = 0;    // number of the last stream that began a call
+  uint32_t calls_of_read_ = 0;  // calls that began in the current read
   // Counts that decrease by kPerSecond each second, but never below 0: cancelled calls, less half of all calls; frames
   // that carry nothing; and PING frames, less the frames that begin calls, carry data, or update windows.
   double cancelled_ = 0;

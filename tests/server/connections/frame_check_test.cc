@@ -88,16 +88,6 @@ TEST_F(FrameCheckTest, CallsThatAreCancelledAtOnceAreRefusedAfterTwiceTheBurst) 
   EXPECT_FALSE(accepts_cancelled(1));
 }
 
-TEST_F(FrameCheckTest, CallsThatBeginAndEndInOneReadAreRefusedBeforeTheBurst) {
-  std::string calls;
-  for (uint32_t i = 0; i < FrameCheck::kMaxCancelledOfRead; ++i) calls += cancelled_call();
-  EXPECT_TRUE(accepts(calls));
-  EXPECT_TRUE(accepts(cancelled_call())) << "each read is counted by itself";
-  calls.clear();
-  for (uint32_t i = 0; i <= FrameCheck::kMaxCancelledOfRead; ++i) calls += cancelled_call();
-  EXPECT_FALSE(accepts(calls));
-}
-
 TEST_F(FrameCheckTest, HeadersThatBeginNoCallDoNotPayForCancelledCalls) {
   int accepted = 0;
   const std::string trailers = http2_frame(kHeaders, kEndHeaders | kEndStream, 1, "");
