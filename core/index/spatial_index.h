@@ -1,6 +1,6 @@
 // Interface of every spatial structure, as concepts. A structure only culls: it passes candidates to a visitor, and the
 // visitor applies the exact predicates of the values. Results therefore do not depend on the structure, and ListIndex,
-// which culls no value, is the test oracle of the other structures.
+// which culls no value, is the test oracle of the other structures (tests/support/list_index.h).
 //
 // Threads: const members of one index may run concurrently; insert and remove need exclusive use.
 #ifndef LOCUS_CORE_INDEX_SPATIAL_INDEX_H_

@@ -86,7 +86,6 @@ void MemoryKeeper::keep() {
   const steady_clock::time_point now = steady_clock::now();
   refused_ = budget_.take_shortage() || refused_;
   const bool is_needed = is_short || refused_;
-  if (is_needed) log_lines(now);
   if (now - last_release_ >= (is_needed ? kReleaseInterval : kIdleReleaseInterval)) {
     last_release_ = now;
     refused_ = false;
@@ -98,6 +97,7 @@ void MemoryKeeper::keep() {
     revoke_readers();
   }
   log_refusals(now);
+  if (is_needed) log_lines(now);
 }
 
 // If the measured memory exceeds the ceiling of moves, closes the connections that hold or send most; otherwise only

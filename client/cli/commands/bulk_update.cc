@@ -121,8 +121,7 @@ class BulkUpdateRun {
     }
     const absl::StatusOr<v1::UpdateAck> ack = front.ack.get();
     if (!ack.ok()) {
-      const bool was_refused = client::error_of(ack.status()).has_value();
-      if (!was_refused) unknown_ += front.sent.rows();
+      if (!client::refused_by_server(ack.status())) unknown_ += front.sent.rows();
       return refused_rows(ack.status(), reader_->name(), front.sent);
     }
     count(*ack);

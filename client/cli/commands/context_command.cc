@@ -73,11 +73,12 @@ void make_absolute(std::string& path) {
 // Returns an error if a connection option stands before the command, because `context set` would not store its value.
 // Values from environment variables are ignored: they apply to every command and are not meant to be stored.
 absl::Status check_options_before(const CLI::App& program) {
-  for (const char* name : kConnectionOptionNames) {
+  for (const std::string name : kConnectionOptionNames) {
     const CLI::Option& option = *program.get_option(name);
     if (option.count() == 0) continue;
     const char* const variable = std::getenv(option.get_envname().c_str());
     if (variable != nullptr && option.results().front() == variable) continue;
+    if (name == "--context") return usage_error("`context set` has no --context: the name follows `set`");
     return usage_error(
         absl::StrCat(name, " before `context set` would have no effect: give the options to keep after the name"));
   }

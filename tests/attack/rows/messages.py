@@ -114,7 +114,7 @@ ROWS = [
     Attack("gzip", "messages", gzip_steps, "compressed messages of 2 MB that inflate to 2 GB and less", "13 messages"),
     # With --accept-compression, parsing a message takes up to 0.1 s on an IO loop, so a larger `slower` is allowed.
     Attack("gzip-accepted", "messages", gzip_steps, "the same, with a daemon that accepts compressed messages",
-           "13 messages", slower=40, flags=("--accept-compression",)),
+           "13 messages", slower=100, flags=("--accept-compression",)),
     Attack("amplify", "messages", amplify_steps,
            "one message of 32 MB, full of empty lists, numbers, map entries, texts or unknown fields, for each field",
            "32 MiB a message, one at a time"),

@@ -88,13 +88,15 @@ TEST_F(ContextCommandTest, ALineConnectsWithTheCredentialsOfItsContext) {
 }
 
 TEST_F(ContextCommandTest, AnOptionThatWouldNotBeKeptIsRefused) {
-  for (const std::vector<std::string>& options : std::vector<std::vector<std::string>>{
-           {"-a", "host:1"}, {"--tls"}, {"--token-file", "token"}, {"--context", "other"}}) {
+  for (const std::vector<std::string>& options :
+       std::vector<std::vector<std::string>>{{"-a", "host:1"}, {"--tls"}, {"--token-file", "token"}}) {
     std::vector<std::string> line = options;
     line.insert(line.end(), {"context", "set", "net", "--ca", "ca.pem"});
     EXPECT_EQ(run_with_contexts(line), ExitCode::kUsage) << options.front();
     EXPECT_THAT(err_.str(), HasSubstr("after the name"));
   }
+  EXPECT_EQ(run_with_contexts({"context", "set", "net", "--context", "other"}), ExitCode::kUsage);
+  EXPECT_THAT(err_.str(), HasSubstr("has no --context"));
   EXPECT_TRUE(client::read_contexts(path_)->by_name.empty());
   setenv("LOCUS_ADDRESS", "host:2", 1);
   EXPECT_EQ(run_with_contexts({"context", "set", "net", "-a", "host:1"}), ExitCode::kOk) << err_.str();
