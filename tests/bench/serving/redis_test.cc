@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "absl/strings/match.h"
+#include <filesystem>
 
 namespace locus::bench::serving {
 namespace {
@@ -31,8 +31,11 @@ TEST(RedisTest, EveryPrefixOfAReplyIsIncomplete) {
 }
 
 TEST(RedisTest, AStartedServerAnswersSearchesAndReportsErrors) {
+  // The machine decides on the skip, so that a fault of the code under test makes the test fail.
+  const bool is_installed =
+      std::filesystem::exists("/usr/bin/redis-server") || std::filesystem::exists("/usr/bin/redis-check-rdb");
+  if (!is_installed) GTEST_SKIP() << "Redis is not installed: deploy/packages.sh bench";
   const auto redis = Redis::start();
-  if (absl::StrContains(redis.status().message(), "is not installed")) GTEST_SKIP() << redis.status();
   ASSERT_TRUE(redis.ok()) << redis.status();
   (*redis)->run({redis_command({"GEOADD", "key", "0", "0", "a", "0.001", "0", "b", "1", "1", "c"})}, 1, 1);
   EXPECT_EQ((*redis)->counted(), 3u);

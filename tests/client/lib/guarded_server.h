@@ -40,8 +40,7 @@ class GuardedServer final : v1::QueryService::Service,
   std::string address() const { return "127.0.0.1:" + std::to_string(port_); }
   int port() const { return port_; }
 
-  // From now on, refuses calls that do not carry this token. An open stream that does not carry it ends at its next
-  // message.
+  // Makes the server refuse calls without this token. An open stream without the token ends at its next message.
   void require(const std::string& token) {
     std::lock_guard lock(mutex_);
     required_ = "Bearer " + token;
