@@ -42,6 +42,7 @@ failed=0
 skipped=0
 problems=()
 skips=()
+tested=()
 started=$SECONDS
 
 say() { printf '\n== [%4d s] %s\n' $((SECONDS - started)) "$*"; }
@@ -54,6 +55,9 @@ fail() {
 finish() {
   say "summary"
   for skip in ${skips[@]+"${skips[@]}"}; do echo "skipped: $skip"; done
+  for suite in ${tested[@]+"${tested[@]}"}; do
+    /usr/bin/python3 tests/house/read_results.py --failures "build/$suite/results.xml" || true
+  done
   for problem in ${problems[@]+"${problems[@]}"}; do echo "FAILED: $problem"; done
   echo "$passed passed, $failed failed, $skipped skipped"
   [ "$failed" -eq 0 ] && [ "$passed" -gt 0 ]
@@ -137,6 +141,7 @@ run_suite() {
   # Prints the result of each proof.
   grep -h '^proof: ' "build/$suite/Testing/Temporary/LastTest.log" || true
   count_results "$suite"
+  tested+=("$suite")
 }
 
 say "packages"

@@ -25,9 +25,10 @@ namespace {
 
 enum class Repeat { kNever, kWhenUnavailable };
 
-// Parameters of a call in addition to its request: token, timeout, retries, and the name of its scene (empty if the
-// call concerns no scene).
+// Parameters of a call in addition to its request: channel, token, timeout, retries, and the name of its scene (empty
+// if the call concerns no scene).
 struct CallPlan {
+  grpc::ChannelInterface& channel;
   Authorization& authorization;
   absl::Duration deadline;
   RetryPolicy retry;
@@ -42,13 +43,15 @@ absl::StatusOr<Response> call(Stub& stub, const CallPlan& plan, const Request& r
   Response response;
   uint64_t token = 0;
   const auto attempt = [&] {
+    continue_connecting(plan.channel, deadline);
     grpc::ClientContext context;
     token = prepare(context, {plan.authorization, deadline, plan.scene});
     response.Clear();
     return to_absl_status((stub.*method)(&context, request, &response));
   };
+  const auto wait = [&](absl::Duration duration) { wait_connecting(plan.channel, duration); };
   const auto attempts = [&] {
-    return plan.repeat == Repeat::kNever ? attempt() : with_retries(plan.retry, deadline, attempt);
+    return plan.repeat == Repeat::kNever ? attempt() : with_retries(plan.retry, deadline, attempt, wait);
   };
   absl::Status status = attempts();
   // Repeat even a call that is not safe to repeat: a server that refuses the token has changed nothing.
@@ -73,10 +76,10 @@ struct Client::Connection {
 
   const std::shared_ptr<grpc::Channel>& channel_of(Lane lane) const { return lane == Lane::kBulk ? bulk : channel; }
   CallPlan once(absl::string_view scene = {}) const {
-    return {*authorization, options.deadline, options.retry, Repeat::kNever, scene};
+    return {*channel, *authorization, options.deadline, options.retry, Repeat::kNever, scene};
   }
   CallPlan repeatable(absl::string_view scene = {}) const {
-    return {*authorization, options.deadline, options.retry, Repeat::kWhenUnavailable, scene};
+    return {*channel, *authorization, options.deadline, options.retry, Repeat::kWhenUnavailable, scene};
   }
   // Returns the header of a call whose deadline is `timeout` from now.
   CallHeader header(absl::Duration timeout, absl::string_view scene = {}) const {
@@ -177,9 +180,13 @@ absl::StatusOr<v1::UploadMeshResponse> Client::upload_mesh(const MeshColumns& me
 absl::StatusOr<DownloadedMesh> Client::download_mesh(absl::string_view name, const DownloadProgress& progress) const {
   const CallHeader header = connection_->header(connection_->options.long_deadline);
   absl::StatusOr<DownloadedMesh> mesh = absl::UnknownError("not asked yet");
-  with_retries(connection_->options.retry, header.deadline, [&] {
+  const auto attempt = [&] {
+    continue_connecting(*connection_->bulk, header.deadline);
     mesh = locus::client::download_mesh(*connection_->transfers, name, header, progress);
     return mesh.status();
+  };
+  with_retries(connection_->options.retry, header.deadline, attempt, [&](absl::Duration duration) {
+    wait_connecting(*connection_->bulk, duration);
   }).IgnoreError();
   return mesh;
 }

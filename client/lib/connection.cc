@@ -104,6 +104,22 @@ absl::Status await_connection(const std::shared_ptr<grpc::Channel>& channel, con
   return absl::OkStatus();
 }
 
+void continue_connecting(grpc::ChannelInterface& channel, absl::Time deadline) {
+  constexpr absl::Duration kMaxWait = absl::Milliseconds(100);
+  if (channel.GetState(/*try_to_connect=*/false) != GRPC_CHANNEL_TRANSIENT_FAILURE) return;
+  channel.WaitForStateChange(GRPC_CHANNEL_TRANSIENT_FAILURE,
+                             absl::ToChronoTime(std::min(absl::Now() + kMaxWait, deadline)));
+}
+
+void wait_connecting(grpc::ChannelInterface& channel, absl::Duration duration) {
+  const absl::Time end = absl::Now() + duration;
+  while (absl::Now() < end) {
+    const grpc_connectivity_state state = channel.GetState(/*try_to_connect=*/true);
+    if (state == GRPC_CHANNEL_READY) return absl::SleepFor(end - absl::Now());
+    channel.WaitForStateChange(state, absl::ToChronoTime(end));
+  }
+}
+
 uint64_t prepare(grpc::ClientContext& context, const CallHeader& header) {
   if (header.deadline != absl::InfiniteFuture()) context.set_deadline(absl::ToChronoTime(header.deadline));
   add_scene(context, header.scene);

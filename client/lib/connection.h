@@ -17,6 +17,7 @@
 namespace grpc {
 class Channel;
 class ChannelCredentials;
+class ChannelInterface;
 class ClientContext;
 }  // namespace grpc
 
@@ -41,6 +42,15 @@ std::shared_ptr<grpc::Channel> open_channel(const std::string& target, const Cli
 // the message names the cause and a remedy.
 absl::Status await_connection(const std::shared_ptr<grpc::Channel>& channel, const std::string& target,
                               const ClientOptions& options);
+
+// Lets a channel whose last attempt to connect failed continue to connect before a call is made, for at most 100 ms and
+// not beyond `deadline`; returns immediately for any other channel. gRPC continues an attempt to connect only while a
+// thread waits inside gRPC, or every 5 s. Without this wait, calls could fail for 15 s after the server has returned,
+// because calls on a failed channel return immediately.
+void continue_connecting(grpc::ChannelInterface& channel, absl::Time deadline);
+
+// Waits for `duration`; if the channel is not connected, it continues to connect during the wait.
+void wait_connecting(grpc::ChannelInterface& channel, absl::Duration duration);
 
 // Parameters of a call that are not part of its request: gRPC sends them as metadata or as the call's deadline.
 struct CallHeader {

@@ -35,6 +35,7 @@
 #include "client/lib/retry.h"
 #include "client/lib/status.h"
 #include "core/base/status_macros.h"
+#include "grpcpp/channel.h"
 #include "grpcpp/client_context.h"
 #include "grpcpp/support/client_callback.h"
 
@@ -76,6 +77,7 @@ class PipelinedStream {
   };
 
   struct Options {
+    std::shared_ptr<grpc::ChannelInterface> channel;  // channel of the stream's calls
     int max_in_flight;
     RetryPolicy reconnect;
     absl::Duration patience;  // maximum time without any response while requests are unanswered
@@ -89,6 +91,7 @@ class PipelinedStream {
         max_in_flight_(static_cast<size_t>(std::max(1, options.max_in_flight))),
         patience_(absl::ToChronoNanoseconds(options.patience)),
         backoff_(options.reconnect),
+        channel_(options.channel),
         authorization_(options.authorization),
         supervisor_([this] { supervise(); }) {}
 
@@ -269,6 +272,9 @@ class PipelinedStream {
         const absl::Status end = run_attempt(lock);
         if (const std::optional<absl::Duration> wait = wait_before_next(end)) {
           changed_.wait_for(lock, absl::ToChronoNanoseconds(*wait), [this] { return broken_off_; });
+          lock.unlock();
+          continue_connecting(*channel_, absl::InfiniteFuture());
+          lock.lock();
           continue;
         }
         finish(lock, end);
@@ -344,6 +350,7 @@ class PipelinedStream {
   std::mutex mutex_;
   std::condition_variable changed_;
   Backoff backoff_;
+  const std::shared_ptr<grpc::ChannelInterface> channel_;
   const std::shared_ptr<Authorization> authorization_;
   Items items_;
   // Start of the current wait for a response: the time of the last response, of the start of the call, or of the first

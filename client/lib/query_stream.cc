@@ -17,9 +17,10 @@ class QueryStream::Impl final : public Stream::Kind {
  public:
   Impl(std::shared_ptr<grpc::ChannelInterface> channel, std::shared_ptr<Authorization> authorization, std::string scene,
        const QueryStreamOptions& options)
-      : stub_(v1::QueryService::NewStub(std::move(channel))),
+      : stub_(v1::QueryService::NewStub(channel)),
         stream_(*this, std::move(scene),
-                {options.max_in_flight, options.reconnect, options.patience, std::move(authorization)}) {}
+                {std::move(channel), options.max_in_flight, options.reconnect, options.patience,
+                 std::move(authorization)}) {}
 
   Stream& stream() { return stream_; }
 

@@ -29,15 +29,15 @@ bool worth_repeating(const absl::Status& failure) {
   return absl::IsResourceExhausted(failure) && retry_after(failure) > absl::ZeroDuration();
 }
 
-absl::Status with_retries(const RetryPolicy& policy, absl::Time deadline,
-                          const std::function<absl::Status()>& attempt) {
+absl::Status with_retries(const RetryPolicy& policy, absl::Time deadline, const std::function<absl::Status()>& attempt,
+                          const std::function<void(absl::Duration)>& wait) {
   Backoff backoff(policy);
   while (true) {
     const absl::Status status = attempt();
     if (status.ok() || !worth_repeating(status)) return status;
-    const std::optional<absl::Duration> wait = backoff.after_failure(status);
-    if (!wait || absl::Now() + *wait >= deadline) return status;
-    absl::SleepFor(*wait);
+    const std::optional<absl::Duration> pause = backoff.after_failure(status);
+    if (!pause || absl::Now() + *pause >= deadline) return status;
+    wait(*pause);
   }
 }
 

@@ -32,9 +32,10 @@ class Backoff {
 bool worth_repeating(const absl::Status& failure);
 
 // Calls `attempt` until it succeeds or fails with an error that is not worth repeating, until the attempts of the
-// policy are used up, or until the next wait would reach `deadline`. Returns the last outcome. Sleeps in the caller's
-// thread.
-absl::Status with_retries(const RetryPolicy& policy, absl::Time deadline, const std::function<absl::Status()>& attempt);
+// policy are used up, or until the next wait would reach `deadline`. Returns the last outcome. Calls `wait` for
+// each wait, in the caller's thread.
+absl::Status with_retries(const RetryPolicy& policy, absl::Time deadline, const std::function<absl::Status()>& attempt,
+                          const std::function<void(absl::Duration)>& wait);
 
 }  // namespace locus::client
 

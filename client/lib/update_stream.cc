@@ -34,11 +34,12 @@ class UpdateStream::Impl final : public UpdatePipeline::Kind {
  public:
   Impl(std::shared_ptr<grpc::ChannelInterface> channel, std::shared_ptr<Authorization> authorization, std::string scene,
        const UpdateStreamOptions& options)
-      : stub_(v1::UpdateService::NewStub(std::move(channel))),
+      : stub_(v1::UpdateService::NewStub(channel)),
         writer_(options.writer != 0 ? options.writer : random_writer()),
         next_batch_(options.next_batch),
         stream_(*this, std::move(scene),
-                {options.max_in_flight, options.reconnect, options.patience, std::move(authorization)}) {}
+                {std::move(channel), options.max_in_flight, options.reconnect, options.patience,
+                 std::move(authorization)}) {}
 
   UpdatePipeline& stream() { return stream_; }
   uint64_t writer() const { return writer_; }

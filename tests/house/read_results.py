@@ -4,10 +4,14 @@ ctest reports a test as "not run" if its program is missing, if its fixture fail
 program counts only the last case as skipped. A test that Python's unittest skipped gets its own line,
 because the ctest test that contains it can pass nevertheless. For the same reason, an attack (see tests/attack) gets
 its own line if some or all of its steps were skipped.
+
+With --failures, prints the end of the output of each failed test instead.
 """
 import re
 import sys
 import xml.etree.ElementTree as ElementTree
+
+FAILURE_LINES = 20
 
 
 def outcome(case):
@@ -29,6 +33,13 @@ def left_out(case):
         [f"{name}: {what}" for name, what in re.findall(r"^\d+MiB ([\w-]+): skipped: (.*)$", output, re.MULTILINE)]
 
 
+def print_failures(path):
+    for case in ElementTree.parse(path).getroot().iter("testcase"):
+        if outcome(case) == "failed":
+            print(f"---- {case.get('name')}, the end of its output:")
+            print(*(case.findtext("system-out") or "").splitlines()[-FAILURE_LINES:], sep="\n")
+
+
 def main(path):
     for case in ElementTree.parse(path).getroot().iter("testcase"):
         print(outcome(case), case.get("name"))
@@ -39,4 +50,7 @@ def main(path):
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    if sys.argv[1] == "--failures":
+        print_failures(sys.argv[2])
+    else:
+        main(sys.argv[1])

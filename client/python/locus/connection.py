@@ -14,6 +14,7 @@ from .credentials import Credentials, Metadata, Token, stays_on_this_machine
 from .errors import LocusError, from_call, parsed
 
 DEFAULT_PORT = 7575
+_MAX_CONNECTING_SECONDS = 0.1
 _LEGAL_SCENE = re.compile(r"[a-z0-9-]{1,63}")
 _Answer = TypeVar("_Answer")
 
@@ -64,6 +65,7 @@ class Connection:
         self.timeout = timeout
         self.long_timeout = long_timeout
         self.retry = retry
+        self._lost = False  # whether the last call did not reach the server
         options: List[Tuple[str, object]] = [
             ("grpc.max_send_message_length", max_send_bytes), ("grpc.max_receive_message_length", max_receive_bytes),
             ("grpc.use_local_subchannel_pool", 1),
@@ -80,6 +82,36 @@ class Connection:
         """Returns the number of the token and the metadata of a call: the token and the scene."""
         number, authorization = self.token.metadata()
         return number, authorization + scene_metadata(scene)
+
+    def note_failure(self, error: LocusError) -> None:
+        """Notes the failure of a call, for continue_connecting()."""
+        self._lost = error.code == grpc.StatusCode.UNAVAILABLE and not error.refused
+
+    def continue_connecting(self, seconds: float = _MAX_CONNECTING_SECONDS) -> None:
+        """Lets the channel continue to connect before a call is made, if the last call did not reach the server.
+
+        gRPC continues an attempt to connect only while a thread waits inside gRPC, or every 5 s. Without this wait,
+        calls could fail for 15 s after the server has returned, because calls on a failed channel return immediately.
+        """
+        if not self._lost:
+            return
+        ready = grpc.channel_ready_future(self.channel)
+        try:
+            ready.result(timeout=max(0.0, min(seconds, _MAX_CONNECTING_SECONDS)))
+            self._lost = False
+        except grpc.FutureTimeoutError:
+            pass
+        finally:
+            ready.cancel()
+
+    def _wait_connecting(self, seconds: float) -> None:
+        """Waits. If the channel is not connected, it continues to connect during the wait."""
+        def ignore(_: grpc.ChannelConnectivity) -> None:
+            pass
+
+        self.channel.subscribe(ignore, try_to_connect=True)
+        time.sleep(seconds)
+        self.channel.unsubscribe(ignore)
 
     def unary(self, rpc: schema.Method, request: Any, *, scene: str = "", repeat: bool = False,
               timeout: Optional[float] = None) -> Any:
@@ -101,6 +133,7 @@ class Connection:
 
         def attempt() -> bytes:
             nonlocal used
+            self.continue_connecting(deadline - time.monotonic())
             used, metadata = self.metadata(scene)
             return bytes(call(request, timeout=max(0.0, deadline - time.monotonic()), metadata=metadata))
 
@@ -120,7 +153,8 @@ class Connection:
             except grpc.RpcError as failure:
                 failures += 1
                 error = from_call(failure)
+                self.note_failure(error)
                 wait = self.retry.wait_after(failures, error) if deadline and error.worth_repeating else None
                 if wait is None or deadline is None or time.monotonic() + wait >= deadline:
                     raise error from None
-            time.sleep(wait)
+            self._wait_connecting(wait)

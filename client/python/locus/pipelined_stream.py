@@ -165,6 +165,7 @@ class PipelinedStream(Generic[Result]):
         """Opens a call and reads its responses to the end. Returns the error that ended it, or None."""
         over = threading.Event()
         method = self._connection.channel.stream_stream(self._path)
+        self._connection.continue_connecting()
         try:
             with self._changed:
                 for item in self._items:
@@ -181,6 +182,7 @@ class PipelinedStream(Generic[Result]):
             return unreadable
         except grpc.RpcError as failure:
             error = from_call(failure)
+            self._connection.note_failure(error)
             if error.code == grpc.StatusCode.UNAUTHENTICATED and self._connection.token.has_newer(used):
                 return LocusError(grpc.StatusCode.UNAVAILABLE, f"the token has changed: {error.message}")
             return error

@@ -41,19 +41,22 @@ TEST(BackoffTest, TheServersHintIsAMinimum) {
 
 TEST(RetriesTest, UnavailableIsRetriedUntilTheAttemptsAreUsedUp) {
   int calls = 0;
-  const absl::Status status = with_retries(kQuick, absl::Now() + absl::Minutes(1), [&] {
-    ++calls;
-    return absl::UnavailableError("down");
-  });
+  const absl::Status status = with_retries(
+      kQuick, absl::Now() + absl::Minutes(1),
+      [&] {
+        ++calls;
+        return absl::UnavailableError("down");
+      },
+      absl::SleepFor);
   EXPECT_TRUE(absl::IsUnavailable(status));
   EXPECT_EQ(calls, 3);
 }
 
 TEST(RetriesTest, SuccessEndsTheRetries) {
   int calls = 0;
-  const absl::Status status = with_retries(kQuick, absl::Now() + absl::Minutes(1), [&] {
-    return ++calls < 2 ? absl::UnavailableError("down") : absl::OkStatus();
-  });
+  const absl::Status status = with_retries(
+      kQuick, absl::Now() + absl::Minutes(1),
+      [&] { return ++calls < 2 ? absl::UnavailableError("down") : absl::OkStatus(); }, absl::SleepFor);
   EXPECT_TRUE(status.ok());
   EXPECT_EQ(calls, 2);
 }
@@ -67,10 +70,13 @@ TEST(RetriesTest, ResourceExhaustedIsRetriedOnlyWithAHint) {
 
 TEST(RetriesTest, AWaitBeyondTheDeadlineIsNotStarted) {
   int calls = 0;
-  const absl::Status status = with_retries(kQuick, absl::Now() + absl::Seconds(5), [&] {
-    ++calls;
-    return exhausted(60'000);
-  });
+  const absl::Status status = with_retries(
+      kQuick, absl::Now() + absl::Seconds(5),
+      [&] {
+        ++calls;
+        return exhausted(60'000);
+      },
+      absl::SleepFor);
   EXPECT_TRUE(absl::IsResourceExhausted(status));
   EXPECT_EQ(calls, 1);
 }

@@ -21,11 +21,11 @@ WAIT_SECONDS = 60
 class Daemon:
     """Process of locusd on a free port, ended by stop()."""
 
-    def __init__(self, *options, address="127.0.0.1:0"):
+    def __init__(self, *options):
         self.folder = tempfile.TemporaryDirectory()
         port_file = os.path.join(self.folder.name, "port")
-        self.process = subprocess.Popen([os.path.join(BIN, "locusd"), "--listen", address, "--port-file", port_file, *options],
-                                        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        command = [os.path.join(BIN, "locusd"), "--listen", "127.0.0.1:0", "--port-file", port_file, *options]
+        self.process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         deadline = time.monotonic() + START_SECONDS
         while not os.path.exists(port_file):
             if self.process.poll() is not None or time.monotonic() > deadline:
