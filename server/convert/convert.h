@@ -43,6 +43,9 @@ v1::Work to_proto(const Work& work, uint64_t nanoseconds);
 
 // Converts the specification of a scene, except `static_from`, which the registry resolves.
 absl::StatusOr<SceneSpec> to_spec(const v1::SceneSpec& spec);
+// Converts a change of instances. Looks the meshes up in `registry`, and shares their ownership. Returns the error of
+// check_mesh_name() or Registry::find_mesh(), with the field of the mesh's name.
+absl::StatusOr<StaticChange> to_change(const v1::ChangeInstancesRequest& request, const Registry& registry);
 absl::Status check_labels(const google::protobuf::Map<std::string, std::string>& labels, const std::string& field);
 // Returns the description of a scene with `summary`, the scene's summary.
 v1::Scene to_proto(const Scene& scene, const SceneSummary& summary);

@@ -1,5 +1,6 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/limits.h"
+#include "core/base/names.h"
 #include "core/base/status_macros.h"
 #include "server/convert/convert.h"
 #include "server/convert/status.h"
@@ -41,6 +42,21 @@ absl::StatusOr<HistoryOptions> to_history(const v1::SceneSpec& spec) {
                         spec.history_bytes() == 0 ? limits::kDefaultHistoryBytes : spec.history_bytes()};
 }
 
+absl::StatusOr<PlacementColumns> to_placement(const v1::Placement& placement, const Registry& registry,
+                                              const std::string& field) {
+  RETURN_IF_ERROR(check_mesh_name(placement.mesh(), field));
+  PlacementColumns columns;
+  ASSIGN_OR_RETURN(columns.mesh, registry.find_mesh(placement.mesh(), field));
+  columns.ids = span_of(placement.ids());
+  columns.translations = span_of(placement.translations());
+  columns.rotations = span_of(placement.rotations());
+  columns.scales = span_of(placement.scales());
+  columns.layers = span_of(placement.layers());
+  columns.groups = span_of(placement.groups());
+  columns.tags = span_of(placement.tags());
+  return columns;
+}
+
 }  // namespace
 
 Vec3d to_vec(const v1::Vec3d& vec) { return {vec.x(), vec.y(), vec.z()}; }
@@ -64,6 +80,19 @@ View to_view(const v1::View& view) {
     out.revision = view.exactly();
   }
   return out;
+}
+
+absl::StatusOr<StaticChange> to_change(const v1::ChangeInstancesRequest& request, const Registry& registry) {
+  StaticChange change;
+  change.remove_ids = span_of(request.remove_ids());
+  change.remove_groups = span_of(request.remove_groups());
+  change.place.reserve(static_cast<size_t>(request.place_size()));
+  for (int i = 0; i < request.place_size(); ++i) {
+    ASSIGN_OR_RETURN(PlacementColumns placement,
+                     to_placement(request.place(i), registry, absl::StrCat("place[", i, "].mesh")));
+    change.place.push_back(std::move(placement));
+  }
+  return change;
 }
 
 absl::Status check_labels(const google::protobuf::Map<std::string, std::string>& labels, const std::string& field) {

@@ -4,7 +4,6 @@
 #include <random>
 
 #include "absl/strings/str_cat.h"
-#include "core/base/names.h"
 #include "core/base/status_macros.h"
 #include "server/convert/convert.h"
 #include "server/observability/log.h"
@@ -59,22 +58,6 @@ size_t placement_count(const v1::Placement& placement) {
   return static_cast<size_t>(placement.ids().empty() ? placement.translations_size() / 3 : placement.ids_size());
 }
 
-absl::StatusOr<PlacementColumns> to_placement(const Registry& registry, const v1::Placement& placement,
-                                              const std::string& field) {
-  RETURN_IF_ERROR(check_mesh_name(placement.mesh(), field + ".mesh"));
-  ASSIGN_OR_RETURN(MeshPtr mesh, registry.find_mesh(placement.mesh(), field + ".mesh"));
-  PlacementColumns columns;
-  columns.mesh = std::move(mesh);
-  columns.ids = span_of(placement.ids());
-  columns.translations = span_of(placement.translations());
-  columns.rotations = span_of(placement.rotations());
-  columns.scales = span_of(placement.scales());
-  columns.layers = span_of(placement.layers());
-  columns.groups = span_of(placement.groups());
-  columns.tags = span_of(placement.tags());
-  return columns;
-}
-
 uint64_t placed_count(const v1::ChangeInstancesRequest& request) {
   uint64_t placed = 0;
   for (const v1::Placement& placement : request.place()) placed += placement_count(placement);
@@ -98,13 +81,7 @@ absl::StatusOr<std::shared_ptr<OwnedChange>> read_change(const Registry& registr
   auto owned = std::make_shared<OwnedChange>();
   owned->request = request;
   if (request.no_wait()) choose_ids(owned->request);
-  owned->change.remove_ids = span_of(owned->request.remove_ids());
-  owned->change.remove_groups = span_of(owned->request.remove_groups());
-  for (int i = 0; i < owned->request.place_size(); ++i) {
-    ASSIGN_OR_RETURN(PlacementColumns placement,
-                     to_placement(registry, owned->request.place(i), absl::StrCat("place[", i, "]")));
-    owned->change.place.push_back(std::move(placement));
-  }
+  ASSIGN_OR_RETURN(owned->change, to_change(owned->request, registry));
   return owned;
 }
 

@@ -1,10 +1,12 @@
-// Messages of the protocol as a client can send them: queries, updates and specifications of scenes. Accepted messages
-// are within the limits, and a refusal names a field or a limit. Accepted update batches are applied to a small scene.
+// Messages of the protocol as a client can send them: queries, updates, changes of instances and specifications of
+// scenes. Accepted messages are within the limits, and a refusal names a field or a limit. Accepted update batches and
+// changes are applied to a small scene.
 // Accepted query batches of at most 256 queries are run on such a scene, and the results are compared with those of
 // brute force.
 #include "core/base/limits.h"
 #include "core/query/query_batch.h"
 #include "core/scene/log/record_codec.h"
+#include "core/scene/registry.h"
 #include "core/scene/scene.h"
 #include "core/scene/spec_codec.h"
 #include "server/convert/convert.h"
@@ -127,6 +129,42 @@ LOCUS_FUZZ_TARGET(updates) {
       for (int axis = 0; axis < 3; ++axis)
         LOCUS_CHECK(std::abs(object.shape.position[axis]) <= 2 * limits::kMaxCoordinate);
     });
+  }
+}
+
+// Applies up to four changes to a scene. The registry knows one mesh, `mesh`.
+LOCUS_FUZZ_TARGET(instances) {
+  constexpr size_t kMaxPieces = 4;
+  Registry registry;
+  auto triangle = TriangleMesh::create({0, 0, 0, 9, 0, 0, 0, 9, 0}, {0, 1, 2}, {});
+  LOCUS_CHECK(registry.add_mesh("mesh", *StaticMesh::build("mesh", Sha256{}, *std::move(triangle))).ok());
+  const std::unique_ptr<Scene> scene = small_scene();
+  for (size_t i = 0; i < kMaxPieces && !input.empty(); ++i) {
+    const absl::string_view piece = fuzz::next_piece(input);
+    v1::ChangeInstancesRequest message;
+    if (!message.ParseFromArray(piece.data(), static_cast<int>(piece.size()))) continue;
+    const absl::StatusOr<StaticChange> change = to_change(message, registry);
+    if (!change.ok()) {
+      check_refusal(change.status());
+      continue;
+    }
+    const SnapshotPtr before = scene->latest();
+    const absl::StatusOr<InstanceChange> done = scene->change_instances(*change);
+    const SnapshotPtr after = scene->latest();
+    if (!done.ok()) {
+      check_refusal(done.status());
+      LOCUS_CHECK(after == before);
+      continue;
+    }
+    LOCUS_CHECK_LE(after->statics->size(), limits::kMaxInstances);
+    for (const Id id : done->placed) {
+      const Instance* placed = after->statics->find(id);
+      LOCUS_CHECK(placed != nullptr);
+      for (int axis = 0; axis < 3; ++axis) {
+        LOCUS_CHECK_LE(placed->bounds.min[axis], placed->bounds.max[axis]);
+        LOCUS_CHECK(std::isfinite(placed->bounds.min[axis]) && std::isfinite(placed->bounds.max[axis]));
+      }
+    }
   }
 }
 

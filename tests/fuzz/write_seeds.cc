@@ -157,6 +157,31 @@ void write_queries(const SeedWriter& seeds) {
   seeds.write("queries", "nearest_and_lookup", others.SerializeAsString());
 }
 
+void write_instances(const SeedWriter& seeds) {
+  v1::ChangeInstancesRequest two;
+  v1::Placement* place = two.add_place();
+  place->set_mesh("mesh");
+  for (const uint64_t id : {100, 101}) place->add_ids(id);
+  for (const double value : {0., 0., 0., 5., 6., 7.}) place->add_translations(value);
+  for (const float value : {0.f, 0.f, 0.f, 1.f}) place->add_rotations(value);
+  place->add_scales(2);
+  place->add_groups(3);
+  v1::ChangeInstancesRequest replace;
+  replace.add_remove_ids(100);
+  replace.add_remove_groups(3);
+  place = replace.add_place();
+  place->set_mesh("mesh");
+  for (const double value : {1e6, 0., 3.}) place->add_translations(value);
+  std::string input;
+  append_piece(input, two.SerializeAsString());
+  append_piece(input, replace.SerializeAsString());
+  seeds.write("instances", "place_and_replace", input);
+  place->set_mesh("unknown");
+  input.clear();
+  append_piece(input, replace.SerializeAsString());
+  seeds.write("instances", "unknown_mesh", input);
+}
+
 void write_updates(const SeedWriter& seeds) {
   v1::UpdateBatch batch;
   v1::Insert* insert = batch.add_inserts();
@@ -182,6 +207,7 @@ void write_updates(const SeedWriter& seeds) {
   append_piece(input, batch.SerializeAsString());
   append_piece(input, second.SerializeAsString());
   seeds.write("updates", "two_batches", input);
+  write_instances(seeds);
   v1::SceneSpec spec;
   (*spec.mutable_labels())["map"] = "delta";
   spec.set_history_ticks(60);
