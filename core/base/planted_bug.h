@@ -25,6 +25,9 @@ enum class PlantedBug {
   kCapsuleCap,         // a capsule's inner segment is shortened by the radius at both ends
   kEndlessCapsule,     // a capsule's inner segment is a thousand times as long
   kSweepStart,         // a sweep does not find a primitive that the mover touches at the start
+  kSweepLineRadius,    // a sweep misses a triangle that its radius reaches beside the path of its centre
+  kSweepLineAxis,      // a sweep misses a triangle that its inner segment reaches beside the path of its centre
+  kSweepPassed,        // a sweep that passes what it touches also passes what the diameter reaches
   kPairBothSides,      // a pair of objects is reported twice, once for each object
   kPairCullExtent,     // the cull of pairs ignores the extent of the first object
   kCellBeyond,         // a cell of free space also has planes for primitives beyond its other planes

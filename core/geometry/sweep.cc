@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "core/base/check.h"
+#include "core/base/planted_bug.h"
 #include "core/geometry/box_sweep.h"
 #include "core/geometry/round_sweep.h"
 
@@ -73,6 +74,38 @@ inline double plane_bound(const Mover& mover, Vec3d a, Vec3d b, Vec3d c) {
   return (rest - mover.radius * std::sqrt(squared_length(normal))) / approach;
 }
 
+// Returns whether a ball or capsule that moves without end misses a triangle: whether, as seen along the path, one edge
+// of the triangle separates the triangle from the mover. The corners are relative to the mover's start. May return
+// false for a mover that misses.
+inline bool misses_along_path(const Mover& mover, const Corners& corners) {
+  // Covers the rounding of the products, and the epsilons of RoundSweep at any time of the path.
+  constexpr double kEpsilon = 0x1p-40;
+  const double way = max_component(abs(mover.way));
+  const double place = max_component(abs(mover.half_axis)) + mover.radius + way;
+  const double radius = planted(PlantedBug::kSweepLineRadius) ? 0 : mover.radius;
+  for (size_t i = 0; i < 3; ++i) {
+    const Vec3d from = corners[i], edge = corners[(i + 1) % 3] - from, other = corners[(i + 2) % 3];
+    // Separating axis, perpendicular to the path and to the edge, and the triangle's interval on it. The mover's
+    // interval is centred at 0. All are times the length of the axis.
+    const Vec3d axis = cross(edge, mover.way);
+    const double edge_at = dot(axis, from), other_at = dot(axis, other);
+    const double gap = std::max(std::min(edge_at, other_at), -std::max(edge_at, other_at));
+    const double size = max_component(max(abs(edge), abs(other - from)));
+    const double along_axis = planted(PlantedBug::kSweepLineAxis) ? 0 : std::abs(dot(axis, mover.half_axis));
+    const double rest = gap - along_axis - kEpsilon * size * way * (max_component(abs(from)) + size + place);
+    if (rest > 0 && rest * rest > radius * radius * squared_length(axis)) return true;
+  }
+  return false;
+}
+
+// Returns whether a corner, relative to the mover's start, is at most the radius away from the mover's centre at the
+// start. RoundSweep then finds a contact at t = 0 too, because its epsilon exceeds the rounding errors of its distance.
+inline bool touches_corner_at_start(const Mover& mover, const Corners& corners) {
+  const double squared = mover.radius * mover.radius * (planted(PlantedBug::kSweepPassed) ? 4 : 1);
+  return squared_length(corners[0]) <= squared || squared_length(corners[1]) <= squared ||
+         squared_length(corners[2]) <= squared;
+}
+
 RoundSweep round_sweep(const Mover& mover, const Corners& corners) {
   return RoundSweep::to_triangle(mover.half_axis, mover.radius, corners[0] - mover.start, corners[1] - mover.start,
                                  corners[2] - mover.start, -mover.way);
@@ -127,9 +160,11 @@ Mover mover_to_mesh(const Mover& mover, const Transform& transform) {
   result.start = transform.point_to_mesh(mover.start);
   result.way = transform.direction_to_mesh(mover.way);
   result.radius = mover.radius * inverse_scale;
-  result.half_axis = transform.direction_to_mesh(mover.half_axis);
-  result.half = mover.half * inverse_scale;
-  result.rotation = compose(inverse(transform.rotation), mover.rotation);
+  if (mover.kind == MoverKind::kCapsule) result.half_axis = transform.direction_to_mesh(mover.half_axis);
+  if (mover.kind == MoverKind::kBox) {
+    result.half = mover.half * inverse_scale;
+    result.rotation = compose(inverse(transform.rotation), mover.rotation);
+  }
   return result;
 }
 
@@ -143,9 +178,10 @@ std::optional<double> first_contact(const Mover& mover, const Shape& shape, AtSt
 std::optional<double> first_contact(const Mover& mover, const Corners& triangle, AtStart at_start, double limit) {
   if (mover.kind == MoverKind::kBox)
     return with_rule(first_moment(box_overlap(mover, triangle), limit), mover, triangle, at_start);
-  const double from =
-      plane_bound(mover, triangle[0] - mover.start, triangle[1] - mover.start, triangle[2] - mover.start);
-  if (!(from <= limit)) return std::nullopt;
+  const Corners corners = {triangle[0] - mover.start, triangle[1] - mover.start, triangle[2] - mover.start};
+  if (at_start == AtStart::kPass && touches_corner_at_start(mover, corners)) return std::nullopt;
+  const double from = plane_bound(mover, corners[0], corners[1], corners[2]);
+  if (!(from <= limit) || misses_along_path(mover, corners)) return std::nullopt;
   return with_rule(round_sweep(mover, triangle).first_contact(limit, from), mover, triangle, at_start);
 }
 

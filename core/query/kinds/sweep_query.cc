@@ -68,7 +68,7 @@ class ExactSweepTest {
   // `path` is the sweep in world axes. `nearest` is the t at which the sweep enters the instance's bounds.
   ExactSweepTest(const SweepRequest& request, const SweptBounds& path, const Instance& instance, double nearest)
       : mover_(mover_to_mesh(request.mover, instance.transform)),
-        mesh_path_(mover_, magnitude(instance.mesh->bounds())),
+        mesh_path_(mover_, instance.mesh->tree().tree().magnitude),
         path_(path),
         at_start_(request.at_start),
         placed_(instance),
