@@ -110,10 +110,12 @@ class BlockCheck {
   // loop has no branch per value, because nearly all batches are valid. Only if this function returns false,
   // check_points_from() searches for the invalid point.
   bool all_within_world(absl::Span<const float> values) const {
+    const Vec3d from = origin();
+    const auto within = [](double value) { return std::abs(value) <= limits::kMaxCoordinate; };
     bool all = values.size() % 3 == 0;
     for (size_t i = 0; i + 2 < values.size(); i += 3)
-      for (int axis = 0; axis < 3; ++axis)
-        all &= std::abs(origin()[axis] + double{values[i + static_cast<size_t>(axis)]}) <= limits::kMaxCoordinate;
+      all &= within(from.x + double{values[i]}) & within(from.y + double{values[i + 1]}) &
+             within(from.z + double{values[i + 2]});
     return all;
   }
   // Returns the point to which positions are relative. Returns the world's origin if the block has anchors: their

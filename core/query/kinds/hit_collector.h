@@ -29,11 +29,13 @@ class HitCollector {
   HitCollector(RayMode mode, uint32_t max_results, float t_max, bool count_only, const RowPosition& after)
       : mode_(mode),
         count_only_(count_only),
-        after_(after),
         // Retains one more hit than requested: the answer is truncated if this additional hit exists. The order in
         // which hits are found therefore does not matter.
         capacity_(mode == RayMode::kAll ? size_t{max_results} + 1 : 1),
-        limit_(t_max) {}
+        limit_(t_max) {
+    // Is usually not given, and copying what the caller has just written in parts would stall the processor.
+    if (after.is_given()) after_ = after;
+  }
 
   // Returns the largest t at which a hit may still be retained. Once the collector is full, a hit at exactly this t is
   // retained only if it precedes the last retained hit in the order of nearer().
@@ -75,7 +77,7 @@ class HitCollector {
   // Returns the hits in the order of nearer(), at most the requested number. Empties the collector; call it once.
   RayAnswer finish() {
     LOCUS_DCHECK_CALL(check_invariants());
-    std::sort(answer_.hits.begin(), answer_.hits.end(), nearer);
+    if (answer_.hits.size() > 1) std::sort(answer_.hits.begin(), answer_.hits.end(), nearer);
     answer_.truncated = mode_ == RayMode::kAll && answer_.hits.size() == capacity_;
     if (answer_.truncated) answer_.hits.pop_back();
     return std::move(answer_);
@@ -96,7 +98,7 @@ class HitCollector {
 
   const RayMode mode_;
   const bool count_only_;
-  const RowPosition after_;
+  RowPosition after_;
   const size_t capacity_;
   float limit_;
   bool is_heap_ = false;  // true once answer_.hits has capacity_ elements

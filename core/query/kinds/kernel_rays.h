@@ -19,6 +19,10 @@ namespace locus {
 // Ray in progress: its request, its filter, and the hits found so far.
 struct PendingRay {
   PendingRay(const RayRequest& ray, const Filter& ray_filter) : request(ray), filter(ray_filter), collector(ray) {}
+  // Makes query `i` of `block`, which `reader` reads. Builds the members in place, because copying them right after
+  // they were written in parts would stall the processor.
+  PendingRay(const RayReader& reader, const QueryBlock& block, size_t i)
+      : request(reader.request(i)), filter(block, i), collector(request) {}
 
   RayRequest request;
   Filter filter;

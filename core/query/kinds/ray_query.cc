@@ -81,10 +81,12 @@ class InstanceVisitor {
   HitCollector& collector_;
 };
 
-// Returns whether the vector kernels trace `ray` through the instances. The kernels return the first hits in a mesh, so
-// they cannot trace a ray that needs the first hits after a given position.
-bool uses_kernels(const QueryTask& task, const RayRequest& ray) {
-  return !ray.after.is_given() && ray.precision == Precision::kExact && task.ray_kernels() != nullptr;
+// Returns whether the vector kernels trace `rays` through the instances: all of them or none, because usually either
+// all rays of a block have a position `after`, or none. The kernels return the first hits in a mesh, so they cannot
+// trace a ray that needs the first hits after a given position.
+bool use_kernels(const QueryTask& task, const std::vector<PendingRay>& rays) {
+  if (rays.front().request.precision != Precision::kExact || task.ray_kernels() == nullptr) return false;
+  return std::none_of(rays.begin(), rays.end(), [](const PendingRay& ray) { return ray.request.after.is_given(); });
 }
 
 // Converts `cull` from the scene's `winding` to the counter-clockwise winding in which triangles are stored.
@@ -95,31 +97,26 @@ Cull stored_cull(Cull cull, Winding winding) {
 
 }  // namespace
 
-RayRequest ray_request(const QueryBlock& block, Vec3d origin, const RayColumns& rays, Winding winding, size_t i) {
-  LOCUS_DCHECK_LT(3 * i, rays.origins.size());
-  RayRequest request;
-  request.origin = origin + read_vec3d(ColumnReader<float>(rays.origins, 3).entry(i));
-  request.direction = read_vec3d(ColumnReader<float>(rays.directions, 3).entry(i));
-  request.t_max = ColumnReader<float>(rays.t_max, 1).value(i, std::numeric_limits<float>::infinity());
-  request.mode = rays.mode;
-  request.cull = stored_cull(rays.cull, winding);
-  request.inside = rays.inside;
-  request.source = block.source;
-  request.precision = block.precision;
-  request.max_results = block.max_results == 0 ? limits::kDefaultMaxResults : block.max_results;
-  request.count_only = block.count_only;
-  request.after = RowPosition::of(rays.after, i);
-  return request;
+RayReader::RayReader(const QueryBlock& block, const RayColumns& rays, const QueryOrigins& origins, Winding winding)
+    : origins_(origins),
+      starts_(rays.origins, 3),
+      directions_(rays.directions, 3),
+      limits_(rays.t_max, 1),
+      after_(rays.after.ts.empty() ? nullptr : &rays.after) {
+  common_.mode = rays.mode;
+  common_.cull = stored_cull(rays.cull, winding);
+  common_.inside = rays.inside;
+  common_.source = block.source;
+  common_.precision = block.precision;
+  common_.max_results = block.max_results == 0 ? limits::kDefaultMaxResults : block.max_results;
+  common_.count_only = block.count_only;
 }
 
 void find_hits(QueryTask& task, std::vector<PendingRay>& rays,
                absl::FunctionRef<const SceneAtTime&(size_t)> moment_of) {
   if (rays.empty()) return;
   const Source source = rays.front().request.source;
-  // Uses the kernels for all rays or for none, because usually either all rays of a block have a position `after`, or
-  // none.
-  const bool by_kernels =
-      std::all_of(rays.begin(), rays.end(), [&](const PendingRay& ray) { return uses_kernels(task, ray.request); });
+  const bool by_kernels = use_kernels(task, rays);
   if (by_kernels && source != Source::kDynamic) trace_meshes(task, rays);
   for (size_t i = 0; i < rays.size(); ++i) {
     PendingRay& ray = rays[i];
@@ -129,8 +126,10 @@ void find_hits(QueryTask& task, std::vector<PendingRay>& rays,
     }
     if (source != Source::kStatic && !ray.collector.done() && !task.ended()) {
       const SceneAtTime& moment = moment_of(i);
-      ObjectVisitor visitor(task, moment, ray.request, ray.filter, ray.collector);
-      if (moment.objects().grid().size() != 0) task.visit_objects_on_ray(moment, visitor.slabs(), visitor);
+      if (moment.objects().grid().size() != 0) {
+        ObjectVisitor visitor(task, moment, ray.request, ray.filter, ray.collector);
+        task.visit_objects_on_ray(moment, visitor.slabs(), visitor);
+      }
     }
     ray.is_cut = task.ended();
   }
@@ -141,9 +140,11 @@ RayAnswers run_rays(QueryTask& task, const QueryBlock& block, const RayColumns& 
   LOCUS_DCHECK_LT(begin, end);
   std::vector<PendingRay> rays;
   rays.reserve(end - begin);
+  const RayReader reader(block, columns, origins, winding);
+  const bool all_anchored = origins.unanchored().empty();
   for (size_t i = begin; i < end; ++i) {
-    rays.emplace_back(ray_request(block, origins.of(i), columns, winding, i), Filter(block, i));
-    if (origins.is_unanchored(i)) rays.back().filter.accept_nothing();
+    rays.emplace_back(reader, block, i);
+    if (!all_anchored && origins.is_unanchored(i)) rays.back().filter.accept_nothing();
   }
   find_hits(task, rays, [&](size_t i) -> const SceneAtTime& { return times.of(begin + i); });
   RayAnswers answers;

@@ -3,6 +3,7 @@
 #ifndef LOCUS_CORE_QUERY_KINDS_RAY_QUERY_H_
 #define LOCUS_CORE_QUERY_KINDS_RAY_QUERY_H_
 
+#include <limits>
 #include <vector>
 
 #include "absl/container/inlined_vector.h"
@@ -28,9 +29,28 @@ struct RayRequest {
   RowPosition after;     // only rows after this position are returned
 };
 
-// Returns the request of query `i` of a block of rays. The positions of the query are relative to `origin`. Converts
-// the block's cull from the scene's `winding` to the stored counter-clockwise winding.
-RayRequest ray_request(const QueryBlock& block, Vec3d origin, const RayColumns& rays, Winding winding, size_t i);
+// Reader of the requests of a block of rays. What all queries of the block have in common is computed once. Borrows the
+// block and the origins. Const access; any thread.
+class RayReader {
+ public:
+  // Converts the block's cull from the scene's `winding` to the stored counter-clockwise winding.
+  RayReader(const QueryBlock& block, const RayColumns& rays, const QueryOrigins& origins, Winding winding);
+
+  RayRequest request(size_t i) const {
+    RayRequest request = common_;
+    request.origin = origins_.of(i) + read_vec3d(starts_.entry(i));
+    request.direction = read_vec3d(directions_.entry(i));
+    request.t_max = limits_.value(i, std::numeric_limits<float>::infinity());
+    if (after_ != nullptr) request.after = RowPosition::of(*after_, i);
+    return request;
+  }
+
+ private:
+  RayRequest common_{};
+  const QueryOrigins& origins_;
+  const ColumnReader<float> starts_, directions_, limits_;
+  const AfterColumns* after_;  // null if no query has a position `after`
+};
 
 struct RayAnswer {
   absl::InlinedVector<Hit, 1> hits;  // kFirst and kAny: at most one; kAll: in the order of nearer()

@@ -142,10 +142,10 @@ void BlockRunner::write_hits(const Columns& columns, absl::Span<const Hit> hits,
 
 void BlockRunner::write_surfaces(const RayColumns& rays, absl::Span<const Hit> hits, size_t i, const RowSpans& to,
                                  size_t row) {
+  if (hits.empty()) return;
+  if (hits.front().id == kNoId) return write_no_surface(to, row);
   const Winding winding = task_.snapshot().winding;
-  // The surface columns of a miss are zero, so the request of the ray is not needed.
-  const bool is_miss = hits.empty() || hits.front().id == kNoId;
-  const RayRequest request = is_miss ? RayRequest() : ray_request(block_, origins_.of(i), rays, winding, i);
+  const RayRequest request = RayReader(block_, rays, origins_, winding).request(i);
   for (size_t k = 0; k < hits.size(); ++k) write_surface(request, block_.frame, hits[k], winding, to, row + k);
 }
 
@@ -273,8 +273,8 @@ void BlockRunner::write_answer(const Columns& columns, const RayAnswer& answer, 
     output_.bytes[i] = answer.hits.empty() ? '\0' : '\1';
     return;
   }
-  const Hit miss;
-  write_hits(columns, {answer.hits.empty() ? &miss : answer.hits.data(), 1}, i, output_.rows, i);
+  static constexpr Hit kMiss;
+  write_hits(columns, {answer.hits.empty() ? &kMiss : answer.hits.data(), 1}, i, output_.rows, i);
 }
 
 void BlockRunner::run_query(const SweepColumns& sweeps, size_t i) {

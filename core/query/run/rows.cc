@@ -64,6 +64,10 @@ void write_row(const Hit& hit, const RowSpans& to, size_t row) {
 
 void write_miss(const RowSpans& to, size_t row) {
   write_row(Hit(), to, row);
+  write_no_surface(to, row);
+}
+
+void write_no_surface(const RowSpans& to, size_t row) {
   if (to.uvs != nullptr) std::fill_n(to.uvs + 2 * row, 2, 0.0f);
   if (to.normals != nullptr) std::fill_n(to.normals + 3 * row, 3, 0.0f);
   if (to.points != nullptr) std::fill_n(to.points + 3 * row, 3, 0.0f);

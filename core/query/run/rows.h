@@ -19,6 +19,8 @@ namespace locus {
 void write_row(const Hit& hit, const RowSpans& to, size_t row);
 // Writes all columns of a row without a hit.
 void write_miss(const RowSpans& to, size_t row);
+// Writes zeros to the columns uv, normal and point of a row.
+void write_no_surface(const RowSpans& to, size_t row);
 // Writes one row of an overlap query for each of `triangles`, starting at row `row`. The columns id, group, tag, layers
 // and pose have the values of `hit`. The columns t, normal and point are not written.
 void write_triangle_rows(const Hit& hit, absl::Span<const uint32_t> triangles, const RowSpans& to, size_t row);
