@@ -82,8 +82,8 @@ class EndingSignals {
   }
 
  private:
-  // Blocks the signals in the calling thread and starts the thread. Must be called before any other thread starts, so
-  // that all threads inherit the signal mask and only the thread of this object receives the signals.
+  // Blocks the signals in the calling thread and starts the waiting thread. Must be called before any other thread
+  // starts, so that all threads inherit the signal mask and only the waiting thread receives the signals.
   EndingSignals() {
     sigemptyset(&signals_);
     sigaddset(&signals_, SIGTERM);

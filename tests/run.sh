@@ -89,8 +89,9 @@ run_container() {
   count_lines container < build/container/results.txt
 }
 
-# Runs all attacks through each front and with each memory limit, and counts each front as one result. Times are judged
-# only for the fronts that keep strangers from gRPC: through the others, rapid resets delay the victim.
+# Runs all attacks through each front and with each memory limit, and counts each front as one result. Times are checked
+# only for the fronts mtls-stranger and edge, which keep strangers from gRPC: through plain and mtls, rapid resets delay
+# the victim.
 run_attacks() {
   local front rows
   mkdir -p build/attacks
@@ -127,8 +128,8 @@ run_suite() {
   if [ "$long" = yes ]; then options+=(-DLOCUS_UNITY=OFF); fi
   if [ "$suite" = release ]; then options+=(-DLOCUS_BENCH=$([ "$bench" = yes ] && echo ON || echo OFF)); fi
   if [ "$suite" = release ] && [ "$long" = yes ]; then labels=(); fi
-  # Compiling the whole command line with AddressSanitizer takes half an hour, so only the long run does this. The file
-  # importers of the command line are tested with it in every run.
+  # Compiling the whole command line with AddressSanitizer takes half an hour, so only the long run does this. Every
+  # run with AddressSanitizer tests the file importers of the command line.
   if [ "$suite" = asan ] && [ "$long" = yes ]; then options+=(-DLOCUS_CLI=ON); fi
   say "$suite: configure"
   cmake --preset "$suite" "${options[@]}" || { fail "$suite: configure"; return; }

@@ -13,7 +13,7 @@
 
 namespace locus::cli {
 
-// Returns a validator for Option::check() that accepts only these words. Its error message lists them all.
+// Returns a validator for Option::check() that accepts only these words. Its error message lists all the words.
 CLI::Validator choices(const std::vector<std::string>& words);
 
 // Allowed words, each paired with its enum value. For Option::transform() of an option that stores an enum.

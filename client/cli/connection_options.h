@@ -25,7 +25,7 @@ void add_connection_options(CLI::App& app, ConnectionOptions& options);
 
 // Fills in the options that neither the command line nor the environment gives. Their values come from the named
 // context or, if no address is given, from the default context. `app` has parsed the line; `path` is the contexts file.
-// Returns NOT_FOUND for an unknown name, and the errors of client::read_contexts().
+// Returns NOT_FOUND for an unknown context, and the errors of client::read_contexts().
 absl::Status complete_from_context(const CLI::App& app, const std::string& path, ConnectionOptions& options);
 
 }  // namespace locus::cli

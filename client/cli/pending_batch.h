@@ -24,9 +24,9 @@ class PendingBatch {
   }
 
   // Adds the changes of one line of the script. Returns a usage error, and adds nothing, in these cases: the line names
-  // a scene other than scene(); it sets a tick; it differs from earlier lines in `upsert`; it has float positions
-  // relative to a frame; it has a change that the server would apply before an earlier line's change of the same
-  // object. A removal of all objects or of a group counts as a change of every object.
+  // a scene other than scene(); it sets a tick; its inserts differ from earlier inserts in `upsert`; it has a frame; it
+  // has a change that the server would apply before an earlier line's change of the same object. A removal of all
+  // objects or of a group counts as a change of every object.
   absl::Status add(const std::string& scene, const v1::UpdateBatch& line);
 
   // Returns the scene that all lines name; empty before the first add().

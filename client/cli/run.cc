@@ -176,7 +176,8 @@ absl::Status run_script_line(const std::vector<std::string>& arguments, Context&
   const std::optional<Refusal> refusal = run_with_default_scene(arguments, context);
   context.options() = before;
   // While a script is only checked, placeholders stand for unknown values. A placeholder can be invalid, or conflict
-  // with other options, although the real value would not. Therefore ignore errors of lines with placeholders.
+  // with other options, although the real value would not. Therefore, in lines with placeholders, ignore wrong values
+  // and the command's errors.
   const bool guessed = context.lines() == Lines::kScriptCheck && has_unknown(arguments);
   if (!refusal) return guessed ? absl::OkStatus() : context.outcome();
   if (refusal->code != 0) {

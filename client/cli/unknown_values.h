@@ -1,6 +1,6 @@
 // Placeholders for unknown values. All lines of a script are checked before the first line runs. At that time the
-// values of the script's variables are not known, so each value is replaced by a placeholder character, which the
-// parser accepts as a value of any option. For the reader of scripts and run_script_line().
+// results of commands are not known, so each unknown value is replaced by a placeholder character, which the parser
+// accepts as a value of any option. For the reader of scripts and run_script_line().
 #ifndef LOCUS_CLIENT_CLI_UNKNOWN_VALUES_H_
 #define LOCUS_CLIENT_CLI_UNKNOWN_VALUES_H_
 

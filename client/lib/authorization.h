@@ -52,7 +52,7 @@ class Authorization {
   bool has_newer(uint64_t used);
 
  private:
-  // State of a file; a different stamp means that the file has changed.
+  // State of a file. If two stamps of the same file differ, the file has changed.
   struct Stamp {
     uint64_t inode = 0;
     int64_t bytes = 0;

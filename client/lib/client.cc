@@ -72,7 +72,7 @@ struct Client::Connection {
   std::unique_ptr<v1::SceneService::StubInterface> scenes;
   std::unique_ptr<v1::UpdateService::StubInterface> updates;
   std::unique_ptr<v1::QueryService::StubInterface> queries;
-  std::unique_ptr<v1::SceneService::StubInterface> transfers;  // use `bulk`: uploads, downloads and dumps
+  std::unique_ptr<v1::SceneService::StubInterface> transfers;  // stub on `bulk`, for uploads, downloads and dumps
 
   const std::shared_ptr<grpc::Channel>& channel_of(Lane lane) const { return lane == Lane::kBulk ? bulk : channel; }
   CallPlan once(absl::string_view scene = {}) const {

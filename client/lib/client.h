@@ -45,10 +45,10 @@ inline constexpr char kDefaultAddress[] = "127.0.0.1:7575";
 // Health of a server or of one of its services, as reported by grpc.health.v1.
 enum class Health { kUnknown = 0, kServing = 1, kNotServing = 2, kServiceUnknown = 3 };
 
-// Callback that is called after each message of an upload with the number of bytes sent so far and in total.
+// Callback for the progress of an upload: `sent` of the `total` bytes of vertices and indices have been sent so far.
 using UploadProgress = std::function<void(uint64_t sent, uint64_t total)>;
 
-// Callback that is called after each message of a download with the number of bytes received so far and in total.
+// Callback for the progress of a download: `received` of the `total` bytes of vertices and indices have been received.
 using DownloadProgress = std::function<void(uint64_t received, uint64_t total)>;
 
 // Connection to one server. Thread-safe: any number of threads may call any methods at the same time. Streams share
@@ -59,8 +59,8 @@ class Client {
  public:
   // Connects to `address`: host:port, host alone (port 7575) or unix:/path. Blocks until the connection is established.
   // Returns UNAVAILABLE naming the address if no server answers or the TLS handshake fails, or INVALID_ARGUMENT for an
-  // empty address. Returns INVALID_ARGUMENT, NOT_FOUND or FAILED_PRECONDITION, with the cause in the message, if
-  // members of options.credentials contradict each other or name a file that cannot be used, or if a token would be
+  // empty address. Returns INVALID_ARGUMENT, NOT_FOUND or FAILED_PRECONDITION, with the cause in the message, in these
+  // cases: members of options.credentials contradict each other; one of them names an unusable file; a token would be
   // sent unencrypted to another machine (see CredentialOptions::allow_token_without_tls).
   static absl::StatusOr<std::unique_ptr<Client>> connect(absl::string_view address = kDefaultAddress,
                                                          const ClientOptions& options = {});
@@ -116,7 +116,8 @@ class Client {
 
   // Applies one batch. Retried only if the batch carries `writer` and `batch`. For regular batches use update_stream().
   absl::StatusOr<v1::UpdateAck> apply(absl::string_view scene, v1::UpdateBatch batch) const;
-  // Answers all queries of one batch at one revision. Retried. For regular batches use query_stream().
+  // Sends one batch of queries and returns the answers, all at one revision. Retried. For regular batches use
+  // query_stream().
   absl::StatusOr<v1::QueryResult> query(absl::string_view scene, v1::QueryBatch batch) const;
 
   // Open a stream for one scene. The stream starts its call to the server when the first batch is sent.

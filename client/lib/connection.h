@@ -1,5 +1,5 @@
-// Functions that open a gRPC channel and prepare the calls on it. They report a wrong address or a failed TLS handshake
-// immediately, with a clear message. Internal to the library.
+// Functions that open a gRPC channel and prepare the calls on it. await_connection() reports a wrong address or a
+// failed TLS handshake with a clear message. Internal to the library.
 #ifndef LOCUS_CLIENT_LIB_CONNECTION_H_
 #define LOCUS_CLIENT_LIB_CONNECTION_H_
 
@@ -43,13 +43,13 @@ std::shared_ptr<grpc::Channel> open_channel(const std::string& target, const Cli
 absl::Status await_connection(const std::shared_ptr<grpc::Channel>& channel, const std::string& target,
                               const ClientOptions& options);
 
-// Lets a channel whose last attempt to connect failed continue to connect before a call is made, for at most 100 ms and
-// not beyond `deadline`; returns immediately for any other channel. gRPC continues an attempt to connect only while a
-// thread waits inside gRPC, or every 5 s. Without this wait, calls could fail for 15 s after the server has returned,
+// Waits before a call while the channel tries to connect again: at most 100 ms, and not beyond `deadline`. Returns
+// immediately unless the channel's last attempt to connect has failed. gRPC continues an attempt to connect only while
+// a thread waits inside gRPC, or every 5 s. Without this wait, calls could fail for 15 s after the server has returned,
 // because calls on a failed channel return immediately.
 void continue_connecting(grpc::ChannelInterface& channel, absl::Time deadline);
 
-// Waits for `duration`; if the channel is not connected, it continues to connect during the wait.
+// Waits for `duration`. A channel that is not connected tries to connect during the wait.
 void wait_connecting(grpc::ChannelInterface& channel, absl::Duration duration);
 
 // Parameters of a call that are not part of its request: gRPC sends them as metadata or as the call's deadline.

@@ -1,5 +1,5 @@
-// Address and credentials of a server, read from the environment and from named contexts in the same way as by the
-// command line.
+// Address and credentials of a server, read from the environment and from named contexts by the rules of the command
+// line.
 //
 //   auto endpoint = locus::client::endpoint_from_environment();
 //   if (!endpoint.ok()) return endpoint.status();
@@ -40,8 +40,9 @@ struct GivenOptions {
 };
 
 // Fills in the members of `endpoint` that are not given. Their values come from the context `context` of the file
-// `contexts_path` or, if `context` is empty and no address is given, from its default context. If both a token and a
-// token file are given, drops the token. Returns NOT_FOUND for an unknown context, and the errors of read_contexts().
+// `contexts_path`. If `context` is empty, they come from the file's default context, unless an address is given. If
+// both a token and a token file are given, drops the token. Returns NOT_FOUND for an unknown context, and the errors of
+// read_contexts().
 absl::Status complete_endpoint(const std::string& contexts_path, const std::string& context, GivenOptions given,
                                Endpoint& endpoint);
 

@@ -37,8 +37,8 @@ class MoveBatcher {
   // moves are dropped, and flush() returns the stream's error.
   void move(uint64_t id, const Position& position, const std::optional<Rotation>& rotation = std::nullopt);
 
-  // Sends the gathered moves without further delay, and blocks until all moves added before are acked. Returns the
-  // error of the stream if it has ended.
+  // Sends the gathered moves without further delay, and blocks until all moves added before this call are acked. If the
+  // stream has ended, returns the stream's error.
   absl::Status flush();
 
  private:

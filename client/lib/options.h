@@ -18,7 +18,8 @@ struct RetryPolicy {
   int max_attempts = 5;
   // Wait before the second attempt.
   absl::Duration first_backoff = absl::Milliseconds(100);
-  // Maximum wait before the random variation is applied. A longer wait that the server requests is used unchanged.
+  // Maximum of the doubled wait, to which the random variation is then applied. It does not limit a wait that the
+  // server requests.
   absl::Duration max_backoff = absl::Seconds(2);
 };
 
@@ -44,7 +45,7 @@ struct CredentialOptions {
   std::string server_name = {};
   // Bearer token that every call carries: the text itself (`token`) or a file that contains only the token
   // (`token_file`), not both. The file is read again when it has changed, and when the server refuses the token. A
-  // unary call that was refused because of an old token is repeated once with the new one.
+  // unary call that was refused because of an old token is repeated with the new token.
   std::string token = {};
   std::string token_file = {};
   // True: the token may also be sent unencrypted to other machines, so everyone who can read the network traffic can

@@ -1,4 +1,4 @@
-// Files with certificates and keys, checked before gRPC uses them, since gRPC reports mistakes in them only to its own
+// Files with certificates and keys, checked before gRPC uses them, since gRPC reports a malformed file only in its own
 // log. Internal to the library. Functions without state, which any thread may call.
 #ifndef LOCUS_CLIENT_LIB_PEM_FILE_H_
 #define LOCUS_CLIENT_LIB_PEM_FILE_H_
@@ -18,8 +18,8 @@ inline constexpr size_t kMaxCredentialBytes = size_t{1} << 20;
 enum EmptyFile : bool { kMayBeEmpty = true, kMustHaveContent = false };
 
 // Returns the content of a file with credentials or contexts. `option` names the option in messages. Returns NOT_FOUND
-// if there is no such file, FAILED_PRECONDITION if it cannot be read, INVALID_ARGUMENT if it is empty and must have
-// content, or is larger than kMaxCredentialBytes.
+// if there is no such file, FAILED_PRECONDITION if the file cannot be read, and INVALID_ARGUMENT if the file is larger
+// than kMaxCredentialBytes, or is empty although `empty` is kMustHaveContent.
 absl::StatusOr<std::string> read_small_file(absl::string_view option, const std::string& file,
                                             EmptyFile empty = kMustHaveContent);
 

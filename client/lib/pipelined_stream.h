@@ -225,7 +225,7 @@ class PipelinedStream {
     assert(check_invariants());
   }
 
-  // Returns whether the invariants of the class comment hold. O(items). Precondition: the caller holds the lock.
+  // Returns whether the invariants in the file comment hold. O(items). Precondition: the caller holds the lock.
   bool check_invariants() const {
     return items_.size() <= max_in_flight_ && (!ended_ || items_.empty()) &&
            std::is_partitioned(items_.begin(), items_.end(), [](const Item& item) { return item.written; });

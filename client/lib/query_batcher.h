@@ -69,7 +69,7 @@ class QueryBatcher {
   void ray(const SingleRay& ray, HitCallback on_hit);
   void ball(const SingleBall& ball, IdsCallback on_ids);
 
-  // Sends the gathered queries without further delay, and blocks until all queries added before are answered.
+  // Sends the gathered queries without further delay. Blocks until all queries added before this call are answered.
   void flush();
 
  private:

@@ -213,7 +213,7 @@ class SweepBlock : public BlockBuilder<SweepBlock> {
   SweepBlock& rotations(absl::Span<const float> rotations);
 
  private:
-  // Appends start, end and filter, which sweeps of all solids have. Returns the number of sweeps that the block had
+  // Appends the start, end and filter of a sweep of any solid. Returns the number of sweeps that the block had
   // before.
   int append_path(const Float3& start, const Float3& end, const Filter& filter);
 
@@ -244,8 +244,8 @@ class NearestBlock : public BlockBuilder<NearestBlock> {
   v1::Nearest* nearest_;
 };
 
-// Block that finds what overlaps convex regions. A region is given by planes or by a view-projection matrix; one block
-// cannot mix both.
+// Block that finds the objects and instances that overlap convex regions. Either all regions of a block are given by
+// planes, or all by view-projection matrices.
 class FrustumBlock : public BlockBuilder<FrustumBlock> {
  public:
   explicit FrustumBlock(v1::QueryBlock& block) : BlockBuilder(block), frustums_(block.mutable_frustums()) {}
@@ -329,7 +329,7 @@ class CellBlock : public BlockBuilder<CellBlock> {
   // Appends a point. The answer is the free space around the point, at most `max_distance` in radius.
   CellBlock& point(const Float3& point, float max_distance, const Filter& filter = {});
   // Appends N points: 3N floats, and N maximum distances. If this call adds all points of the block, `max_distances`
-  // may instead contain one for all points.
+  // may instead contain one distance for all points.
   CellBlock& points(absl::Span<const float> points, absl::Span<const float> max_distances);
 
  private:

@@ -1,6 +1,6 @@
 // Builder of a query batch: blocks of columns, which are answered together at one revision. For callers of
-// Client::query and QueryStream. Not thread-safe. build() resets the builder and invalidates the block builders that it
-// has returned.
+// Client::query and QueryStream. Not thread-safe. build() resets the QueryBuilder and invalidates all block builders
+// that this QueryBuilder has returned.
 #ifndef LOCUS_CLIENT_LIB_QUERY_BUILDER_H_
 #define LOCUS_CLIENT_LIB_QUERY_BUILDER_H_
 

@@ -56,8 +56,8 @@ class QueryStream {
   // Sends a batch and returns a future for its answer. If the stream has ended, the future receives the stream's error.
   std::future<absl::StatusOr<v1::QueryResult>> send(v1::QueryBatch batch);
 
-  // Blocks until all sent batches are answered and their callbacks have returned. Returns the error of the stream if it
-  // has ended.
+  // Blocks until all sent batches are answered and their callbacks have returned. If the stream has ended, returns the
+  // stream's error.
   absl::Status flush();
   // Flushes and ends the stream. Later sends fail.
   absl::Status close();

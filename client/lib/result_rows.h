@@ -131,7 +131,8 @@ class Overlaps {
   ResultRows rows_;
 };
 
-// View of the result of a sight block: one byte for each viewer and target, or for each viewer of a pairwise block.
+// View of the result of a sight block: one byte for each pair of a viewer and a target. In a pairwise block, only the
+// pairs with equal indices have a byte.
 class SightMatrix {
  public:
   // Returns a view of the answer to `viewers` viewers and `targets` targets; for a pairwise block, `targets` is 1.

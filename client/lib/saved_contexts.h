@@ -54,7 +54,7 @@ std::string contexts_text(const SavedContexts& contexts);
 // INVALID_ARGUMENT for a file that is too large, and FAILED_PRECONDITION for a file that cannot be read.
 absl::StatusOr<SavedContexts> read_contexts(const std::string& path);
 
-// Returns the context of this name. If there is none, returns NOT_FOUND with the names of the existing contexts.
+// Returns the context `name`. If no context has this name, returns NOT_FOUND with the names of the existing contexts.
 absl::StatusOr<SavedContext> find_context(const SavedContexts& contexts, const std::string& name);
 
 // Returns OK if the name has 1 to 63 characters of a-z, A-Z, 0-9, `-`, `_` and `.`; otherwise INVALID_ARGUMENT.

@@ -28,8 +28,8 @@ absl::Duration retry_after(const absl::Status& status);
 bool refused_by_server(const absl::Status& status);
 
 // Converts a gRPC status: keeps code and message, and attaches the Error from `grpc-status-details-bin` for error_of().
-// Malformed details are dropped; code and message remain valid. Without details, the message of UNAUTHENTICATED,
-// PERMISSION_DENIED and a failed TLS handshake also contains advice.
+// Malformed details are dropped; code and message remain valid. Without details, advice is appended to the message of
+// UNAUTHENTICATED, of PERMISSION_DENIED, and of UNAVAILABLE if the cause of the failed connection is known.
 absl::Status to_absl_status(const grpc::Status& status);
 
 // Converts the error with which a stream answered one request. An invalid code (0, or not a gRPC code) becomes UNKNOWN,

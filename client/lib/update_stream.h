@@ -8,9 +8,9 @@
 //
 // The stream ends permanently in these cases: the server refuses the stream itself (for example because of the scene
 // name or of missing rights); the server has lost the state of the writer (because the scene was restarted without its
-// state); as many consecutive calls as the policy allows fail without an answer between them. Every unanswered batch
-// and every later send() gets the status of this failure. The outcome of the unanswered batches is unknown; acked
-// batches stay applied.
+// state); the server answers a batch with an error that has no reason; as many consecutive calls as the policy allows
+// fail without an answer between them. Every unanswered batch and every later send() gets the status of this failure.
+// The outcome of the unanswered batches is unknown; acked batches stay applied.
 #ifndef LOCUS_CLIENT_LIB_UPDATE_STREAM_H_
 #define LOCUS_CLIENT_LIB_UPDATE_STREAM_H_
 
@@ -73,8 +73,8 @@ class UpdateStream {
   // Sends a batch and returns a future for its ack. If the stream has ended, the future receives the stream's error.
   std::future<absl::StatusOr<v1::UpdateAck>> send(v1::UpdateBatch batch);
 
-  // Blocks until all sent batches are answered and their callbacks have returned. Returns the error of the stream if it
-  // has ended.
+  // Blocks until all sent batches are answered and their callbacks have returned. If the stream has ended, returns the
+  // stream's error.
   absl::Status flush();
   // Flushes and ends the stream. Later sends fail.
   absl::Status close();

@@ -1,6 +1,7 @@
-// Assertions of invariants and preconditions. A failed check is a bug in locus, never a user's mistake: it prints the
-// condition, the operands of a comparison, file and line, and aborts the process. Errors of users and of the system are
-// absl::Status instead. LOCUS_DCHECK* cost nothing in release builds. Any thread.
+// Assertions of invariants and preconditions. A check fails only because of a bug in locus, never because of a user's
+// mistake. The failure prints the condition, the operands of a comparison, the file and the line, and aborts the
+// process. Errors of users and of the system are absl::Status instead. LOCUS_DCHECK* cost nothing in release builds.
+// Any thread.
 #ifndef LOCUS_CORE_BASE_CHECK_H_
 #define LOCUS_CORE_BASE_CHECK_H_
 
@@ -19,9 +20,9 @@ template <class A, class B>
   check_failed(file, line, condition, operands.str());
 }
 
-// Aborts unless compare(a, b) returns true. A macro with local references to its operands would not be safe: in
-// LOCUS_CHECK_LE(x, std::min(y, 5)) such a reference would outlive a temporary. So the operands are parameters of a
-// function.
+// Aborts unless compare(a, b) returns true. The operands are parameters of a function, because a macro that stored
+// them in local references would not be safe: std::min(y, 5) in LOCUS_CHECK_LE(x, std::min(y, 5)) may return a
+// reference to a temporary.
 template <class Compare, class A, class B>
 constexpr void check_op(Compare compare, const A& a, const B& b, const char* file, int line, const char* condition) {
   if (!compare(a, b)) check_failed_op(file, line, condition, a, b);

@@ -1,6 +1,6 @@
 // Instruction set that the vector code of this process uses: the widest one that the processor supports, unless the
-// configuration names another. The process chooses the instruction set once, at the start; query results do not depend
-// on the choice.
+// configuration names a different instruction set. The process chooses the instruction set once, at the start; query
+// results do not depend on the choice.
 #ifndef LOCUS_CORE_BASE_INSTRUCTION_SET_H_
 #define LOCUS_CORE_BASE_INSTRUCTION_SET_H_
 

@@ -42,7 +42,7 @@ inline constexpr uint32_t kMaxQueries = 65536;        // queries per query batch
 inline constexpr uint32_t kMaxIgnoredIds = 64;        // ids that the queries of a block ignore
 inline constexpr uint32_t kDefaultMaxResults = 1024;  // results per query if the block sets no max_results
 inline constexpr uint32_t kMaxMaxResults = 1u << 20;  // largest max_results of a block
-inline constexpr uint32_t kMaxNearest = 65536;        // max k of a nearest query: its number of results
+inline constexpr uint32_t kMaxNearest = 65536;        // max k of a nearest query, which returns up to k results
 inline constexpr uint32_t kMinPlanes = 4;             // min planes of a convex region
 inline constexpr uint32_t kDefaultPlanes = 6;
 inline constexpr uint32_t kMaxPlanes = 32;
@@ -50,7 +50,7 @@ inline constexpr uint32_t kMaxRegionPlanes = 131'072;     // planes of all conve
 inline constexpr uint32_t kMaxSightSamples = 255;         // sample points of a target
 inline constexpr uint32_t kMaxSightEyes = 16;             // eyes of a viewer
 inline constexpr uint32_t kMaxSightSegments = 4'194'304;  // segments from an eye to a sample, per query batch
-inline constexpr uint32_t kMaxPairNeighbours = 1024;      // max nearest objects per first object of a query of pairs
+inline constexpr uint32_t kMaxPairNeighbours = 1024;      // max nearest objects of each object in a pairs query
 inline constexpr uint32_t kMaxCellPlanes = 64;            // planes of a cell of free space
 inline constexpr uint32_t kDefaultCellPlanes = 32;
 // Default maximum size of a reply in bytes. gRPC clients refuse messages over 4 MiB by default.
@@ -62,8 +62,8 @@ inline constexpr uint32_t kMaxReplyBytes = 64u << 20;
 // that updates have replaced since the oldest retained revision.
 inline constexpr uint32_t kRecentRevisions = 64;
 inline constexpr uint64_t kRecentBytes = 2u << 20;
-// Readers that pin old revisions keep replaced data from being freed. The maximum size of this data per scene is
-// kPinnedBytes or, if larger, kPinnedShare times the memory of the scene.
+// Readers that pin old revisions keep replaced data from being freed. The maximum size of this data per scene, in
+// bytes, is kPinnedBytes or, if larger, kPinnedShare times the memory of the scene.
 inline constexpr uint64_t kPinnedBytes = uint64_t{256} << 20;
 inline constexpr uint32_t kPinnedShare = 4;
 inline constexpr uint64_t kMinPinnedBytes = 1u << 20;         // smallest configurable value of kPinnedBytes

@@ -6,11 +6,12 @@
 // Threads: each array object is like a standard container. Arrays that share leaves are independent: a thread may
 // write, copy or destroy its own array while other threads read theirs.
 //
-// Invariants: a leaf or List that two arrays share is immutable. Each leaf and List stores an owner: the `owner_` of
-// the array that created the leaf or List, at the time of the creation. At the first write after snapshot(), an array
-// sets its `owner_` to a new number. An array changes a leaf or List in place only if the stored owner equals the
-// current `owner_` of the array, so no write needs to read reference counts. The number of leaves is the smallest that
-// holds size() values. Source of the owner numbers: Clojure's transient collections (Hickey).
+// Invariants: a leaf or List that two arrays share is immutable. Each leaf and List stores an owner. When an array
+// copies a leaf or List to write to the copy, the copy gets the array's current `owner_` as its owner. At the first
+// write after snapshot(), an array sets its `owner_` to a new number. An array changes a leaf or List in place only if
+// the stored owner equals the current `owner_` of the array, so no write needs to read reference counts. The number of
+// leaves is the smallest that holds size() values. Source of the owner numbers: Clojure's transient collections
+// (Hickey).
 #ifndef LOCUS_CORE_BASE_PERSISTENT_ARRAY_H_
 #define LOCUS_CORE_BASE_PERSISTENT_ARRAY_H_
 
@@ -43,8 +44,8 @@ class PersistentArray {
   PersistentArray() : list_(std::make_shared<List>()) {}
   PersistentArray(PersistentArray&&) noexcept = default;
   PersistentArray& operator=(PersistentArray&&) noexcept = default;
-  // Copies `other`. Precondition: `other` has not been written to since its creation or its last snapshot(). If it has,
-  // call other.snapshot() instead.
+  // Copies `other`. Precondition: `other` has not been written to since its creation or its last snapshot(). To copy
+  // an array that has been written to, call snapshot() of that array.
   PersistentArray(const PersistentArray& other) : list_(other.list_) {
     LOCUS_CHECK_EQ(other.owner_, internal::kNoOwner);
   }
@@ -72,7 +73,7 @@ class PersistentArray {
   // `other`. O(leaves).
   size_t unshared_bytes(const PersistentArray& other) const;
   // Calls fn(value, other_value) for each index whose leaf is not shared with `other`. `other_value` points to the
-  // value of `other` at the same index; it is null if index >= other.size(). O(leaves + calls).
+  // value of `other` at the same index, or is null if index >= other.size(). O(leaves + calls).
   template <class Fn>
   void for_each_apart_from(const PersistentArray& other, const Fn& fn) const;
 

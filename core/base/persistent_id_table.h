@@ -7,11 +7,12 @@
 //
 // Invariants: a bucket is one cache line. The hash of an id selects its home bucket. An id is stored in the first
 // bucket, from its home bucket on, that had a free slot when the id was inserted. Each full bucket that an insertion
-// skipped counts the inserted id in `overflow`. A search ends at the first bucket with an overflow of 0. erase()
-// decrements the counts, so no tombstones are needed. On average, at most three of the five slots of a bucket are used.
-// A leaf that two tables share is immutable. As in PersistentArray, each leaf stores the owner that created it, and a
-// table changes a leaf in place only if this owner equals the `owner_` of the table. Source: Knuth, The Art of Computer
-// Programming 3, 6.4 (linear probing, buckets); Bronson and Shi, Open-sourcing F14, 2019 (overflow counts).
+// skipped counts the inserted id in `overflow`. A search that has not found the id ends at the first bucket with an
+// overflow of 0. erase() decrements the counts, so no tombstones are needed. On average, at most three of the five
+// slots of a bucket are used. A leaf that two tables share is immutable. Each leaf stores as its owner the `owner_` of
+// the table at the time when the table created the leaf. A table changes a leaf in place only if this owner equals its
+// current `owner_`. Source: Knuth, The Art of Computer Programming 3, 6.4 (linear probing, buckets); Bronson and Shi,
+// Open-sourcing F14, 2019 (overflow counts).
 #ifndef LOCUS_CORE_BASE_PERSISTENT_ID_TABLE_H_
 #define LOCUS_CORE_BASE_PERSISTENT_ID_TABLE_H_
 
@@ -52,8 +53,8 @@ class PersistentIdTable {
   size_t size() const { return size_; }
   // Returns the value of `id`, or kNone if `id` is absent or kNoId. O(1).
   uint32_t find(Id id) const { return bucket_count_ == 0 ? kNone : find_from(bucket(home(id)), id); }
-  // Writes the value of ids[i], or kNone if that id is absent, to values[i]. Precondition: values.size() >= ids.size().
-  // Faster than one call per id, since it prefetches the buckets.
+  // Writes the value of ids[i], or kNone if that id is absent, to values[i]. Requires values.size() >= ids.size().
+  // Faster than one find(id) per id, because this function prefetches the buckets.
   void find(absl::Span<const Id> ids, absl::Span<uint32_t> values) const;
   // Prefetches the bucket that find(id) reads first. Always inlined, since GCC otherwise drops calls of functions that
   // only prefetch.
@@ -68,9 +69,9 @@ class PersistentIdTable {
   // Removes `id`; returns false if the id is absent. O(1), plus copies of leaves as in set(). The table keeps its
   // memory until fit() shrinks it.
   bool erase(Id id);
-  // Resizes the table for `ids` ids. Grows it if `ids` exceeds its capacity. Shrinks it if `ids` is at most a quarter
-  // of its capacity and a table for twice `ids` has fewer leaves. Precondition: ids >= size(). O(size) if it resizes,
-  // else O(1).
+  // Resizes the table for `ids` ids; `ids` must be at least size(). Grows the table if `ids` exceeds its capacity.
+  // Shrinks the table if `ids` is at most a quarter of its capacity and 2 * `ids` ids need fewer leaves than the table
+  // has. O(size) if the table is resized, else O(1).
   void fit(size_t ids);
 
   // Returns the size in bytes of the leaves that this table has replaced since the last call of this function. Only
@@ -94,7 +95,7 @@ class PersistentIdTable {
     Bucket() { values.fill(kNone); }
     std::array<Id, kSlots> ids{};
     std::array<uint32_t, kSlots> values;
-    uint32_t overflow = 0;  // number of ids in later buckets whose insertion skipped this full bucket
+    uint32_t overflow = 0;  // number of ids stored in later buckets because this bucket was full
   };
   static_assert(sizeof(Bucket) == 64);
   struct Leaf {

@@ -14,7 +14,7 @@ enum class PlantedBug {
   kGhostAfterMove,     // a move across a cell border leaves the object in its old cell
   kUnsignedCellIndex,  // cell indices are truncated towards zero, not rounded down
   kRewindReach,        // a query at a time between two ticks searches the grid without the displacement bound
-  kRewindFastBox,      // an object that moved far is recorded without its later, shorter moves of the same tick
+  kRewindFastBox,      // after a far move of an object, its shorter moves later in the same tick are not recorded
   kUnpaddedNear,       // the slab test of tree nodes does not pad the near side
   kEdgeOnInDouble,     // nearly edge-on triangles are tested only in double, like all other triangles
   kGridBallMargin,     // the float culling of ball queries in the grid omits the error bound
@@ -25,13 +25,13 @@ enum class PlantedBug {
   kCapsuleCap,         // a capsule's inner segment is shortened by the radius at both ends
   kEndlessCapsule,     // a capsule's inner segment is a thousand times as long
   kSweepStart,         // a sweep does not find a primitive that the mover touches at the start
-  kSweepLineRadius,    // a sweep misses a triangle that its radius reaches beside the path of its centre
-  kSweepLineAxis,      // a sweep misses a triangle that its inner segment reaches beside the path of its centre
-  kSweepPassed,        // a sweep that passes what it touches also passes what the diameter reaches
+  kSweepLineRadius,    // a sweep misses a triangle within the mover's radius beside the path of the mover's centre
+  kSweepLineAxis,      // a sweep misses a triangle reached by the inner segment, but not the centre, of the mover
+  kSweepPassed,        // AtStart::kPass also ignores triangles within the diameter of the mover, not only its radius
   kPairBothSides,      // a pair of objects is reported twice, once for each object
   kPairCullExtent,     // the cull of pairs ignores the extent of the first object
   kCellBeyond,         // a cell of free space also has planes for primitives beyond its other planes
-  kMatrixRow,          // a plane of a view is computed from the wrong row of its matrix
+  kMatrixRow,          // the left and right planes of a view are computed from the wrong row of the matrix
   kOwnGroupBlocks,     // the group of a viewer blocks its sight
   kClosedEdge,         // an edge includes both of its ends when crossings of a mesh are counted
   kCrossingInDouble,   // signs of crossings are taken from double even if double cannot decide them
@@ -61,7 +61,7 @@ enum class PlantedBug {
   kRegionBeyond,      // the test for a plane that separates a triangle from the ball omits the error bound
   kRegionNear,        // distances to edges are compared with the radius in float without an error bound
   kRegionPlane,       // distances to planes are compared with the radius in float without an error bound
-  kRegionWeight,      // the test that the ball's centre projects into a triangle omits the error bound
+  kRegionWeight,      // the test whether the ball's centre projects into a triangle omits the error bound
   kRegionOwnBounds,   // error bounds that depend on the size of a single triangle are zero
   kRegionFloor,       // squares and products that may underflow are compared without the pad for underflow
   kRegionHalf,        // half extents are used without their error bound
@@ -73,7 +73,7 @@ enum class PlantedBug {
   kRightLeftOut,         // a grant of any right to a scene grants every right to it
   kSceneLeftOut,         // a grant for some scenes grants its rights to every scene
   kUpdateIsAdmin,        // the right to update includes the right to administer
-  kGlobTooWide,          // a pattern matches every text with a matching prefix
+  kGlobTooWide,          // a pattern matches every text that begins with a match of the pattern
   kTokenByPrefix,        // only the beginning of a token, its id, is compared
   kTokenNeverExpires,    // the time at which a token expires is ignored
   kRevokedTokenStays,    // the streams of a revoked token are still valid

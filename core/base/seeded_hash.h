@@ -1,6 +1,6 @@
 // Fast hash of ids that clients choose. The hash is seeded at random in every process, so that clients cannot choose
-// ids that collide in a table. The hash of an id differs between processes, so no query result may depend on
-// it. A SeededHash is a value that any number of threads may use at the same time.
+// ids that collide in a table. The hash of an id differs between processes, so query results must not depend on
+// hashes. A SeededHash is a value that any number of threads may use at the same time.
 //
 // The upper bits of the hash are distributed as evenly as the lower bits. Sources: Yi, wyhash (products folded into 64
 // bits); Dietzfelbinger et al., A Reliable Randomized Algorithm for the Closest-Pair Problem, 1997 (random multiplier).
@@ -36,8 +36,8 @@ class SeededHash {
   // Returns the random seed of this process.
   static const Seed& process_seed();
 
-  // Odd constant without a regular bit pattern (fractional part of the golden ratio). The hash multiplies twice: if the
-  // first product, by the random multiplier, is similar for two keys, the second, by this constant, separates them.
+  // Odd constant without a regular bit pattern (fractional part of the golden ratio). The hash multiplies twice: first
+  // by the random multiplier, then by this constant, which separates keys whose first products are similar.
   static constexpr uint64_t kMixer = 0x9E3779B97F4A7C15;
 
   uint64_t mask_;

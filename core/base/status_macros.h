@@ -14,9 +14,10 @@
     if (absl::Status locus_status = (__VA_ARGS__); !locus_status.ok()) return locus_status; \
   } while (false)
 
-// Evaluates an expression of type absl::StatusOr<T>; returns its status from the calling function unless it is OK, and
-// otherwise moves the value into `declaration`, as in ASSIGN_OR_RETURN(const Level level, read_level(path)). The macro
-// expands to several statements, so put braces around it if it is the body of an `if` or a loop.
+// Evaluates an expression of type absl::StatusOr<T>. If the result is an error, returns its status from the calling
+// function. If the result is a value, moves the value into `declaration`. The macro expands to several statements, so
+// put braces around it if it is the body of an `if` or a loop. Example: ASSIGN_OR_RETURN(const Level level,
+// read_level(path)).
 #define ASSIGN_OR_RETURN(declaration, ...) \
   LOCUS_ASSIGN_OR_RETURN_(LOCUS_JOIN_(locus_status_or_, __LINE__), declaration, __VA_ARGS__)
 

@@ -84,7 +84,8 @@ inline double squared_limit(double distance) {
   return distance * distance * (1 + 0x1p-50);
 }
 
-// Returns the point of the box nearest to `point`: `point` itself if it is inside. The box must not be empty.
+// Returns the point of the box that is nearest to `point`. If the box contains `point`, this is `point` itself. The
+// box must not be empty.
 template <class S>
 constexpr Vec3<S> nearest_in(Vec3<S> point, const Aabb<S>& box) {
   return min(max(point, box.min), box.max);

@@ -58,11 +58,11 @@ class AxisTests {
 
  private:
   // Records the way out of the overlap along `axis` if it is the shortest so far. On this way the resting box moves by
-  // exit / |axis| in the direction of `axis`, or against it if the polytope is above the box.
+  // exit / |axis|, along -axis if the polytope is above the box on this axis, else along `axis`.
   void add_way_out(Vec3d axis, double exit, bool polytope_above) {
     const double length = std::sqrt(squared_length(axis));
-    // Compares exit / length with depth_ without a division, because an axis from parallel edges may have a length near
-    // 0.
+    // Compares exit / length with depth_ without a division: the cross product of nearly parallel edges is an axis
+    // whose length may be near 0.
     if (!(exit < depth_ * length)) return;
     depth_ = exit / length;
     overlap_.depth = depth_;
@@ -168,7 +168,7 @@ Vec3d shared_point(Vec3d half, Vec3d center, Vec3d other_half, const Rotation& r
       ++faces;
     }
   }
-  // If no face of the other box reaches into this box, the boxes are separate or this box lies inside the other.
+  // If no face of the other box reaches into this box, the boxes are separate or this box lies inside the other box.
   if (faces != 0) return sum * (1.0 / faces);
   return center + rotation.to_world(nearest_in(rotation.to_local(-center), Aabbd{-other_half, other_half}));
 }

@@ -17,19 +17,20 @@ namespace locus {
 // The time during which two polytopes share a point.
 struct BoxOverlap {
   Interval<double> time;  // computed for an endless motion, so it may begin before t = 0
-  // Unit vector from the moving polytope to the resting box. If they overlap at t = 0, it is the direction of the
-  // shortest way out: the shortest translation of the resting box that separates them. Otherwise it is the axis that
-  // separates them until the first moment of overlap.
+  // Unit vector from the moving polytope to the resting box. If the polytopes overlap at t = 0, it is the direction of
+  // the shortest way out: the shortest translation of the resting box that separates them. If not, it is the axis that
+  // separates the polytopes until the first moment of overlap.
   Vec3d normal;
-  double depth = 0;  // length of the shortest way out at t = 0; has no meaning if they do not overlap at t = 0
+  double depth = 0;  // length of the shortest way out at t = 0; no meaning if the polytopes do not overlap then
 };
 
 // Return the overlap of a resting box of half extents `half` with a moving triangle or a moving box; `velocity` is the
-// velocity of this triangle or box. Return nullopt if the two never share a point. The projections are widened by 2^-46
-// of the magnitudes involved, which covers their rounding: a contact is never missed. A triangle without area and zero
-// extents are legal.
+// velocity of this triangle or box. Return nullopt if the two never share a point. To cover rounding errors, the
+// projections are widened by 2^-46 of the magnitudes involved, so a contact is never missed. A triangle without area
+// and zero extents are legal.
 std::optional<BoxOverlap> overlap_with_triangle(Vec3d half, Vec3d a, Vec3d b, Vec3d c, Vec3d velocity);
-// `rotation` rotates the other box's own axes to those of the resting box.
+// `center`, `other_half` and `rotation` are the centre, half extents and rotation of the moving box, in the resting
+// box's axes.
 std::optional<BoxOverlap> overlap_with_box(Vec3d half, Vec3d center, Vec3d other_half, const Rotation& rotation,
                                            Vec3d velocity);
 

@@ -179,13 +179,13 @@ class NearestSearch {
     const double g = dot(first.normal, second.normal), determinant = 1 - g * g;
     if (determinant < kParallelPlanes) return false;
     const double va = value_at(first, center), vb = value_at(second, center);
-    // Offset from the centre to the line, and the line's direction.
+    // `offset`: from the centre to the nearest point of the planes' common line; `line`: direction of this line.
     const Vec3d offset =
         -(first.normal * ((va - g * vb) / determinant) + second.normal * ((vb - g * va) / determinant));
     const Vec3d line = cross(first.normal, second.normal);
     const double along = dot(line, half_axis), area = squared_length(line) * squared_length(half_axis) - along * along;
     if (!(area > 0)) return false;
-    // offset is perpendicular to the line, so the nearest point of the line is offset + line * s.
+    // `offset` is perpendicular to the common line, whose point nearest to the segment's line is offset + line * s.
     const double s = along * dot(offset, half_axis) / area;
     return is_near(center + offset + line * s);
   }
@@ -276,8 +276,8 @@ std::optional<ConvexRegion> ConvexRegion::make(Vec3d origin, absl::Span<const Pl
       plane.offset = limits::kMaxCoordinate - side * origin[axis];
     }
   }
-  // Computes the faces twice: first from squares as large as the world, whose corners have errors of micrometres, then
-  // from squares as large as the region.
+  // Computes the faces twice: first from squares as large as the world, which results in errors of micrometres at the
+  // corners, then from squares as large as the region.
   const FaceCorners rough = corners_of_faces(region.planes(), Vec3d{} - origin, 4 * limits::kMaxCoordinate);
   if (rough.count == 0) return std::nullopt;
   const Vec3d center = (rough.bounds.min + rough.bounds.max) * 0.5;
@@ -355,7 +355,7 @@ RegionInMesh::RegionInMesh(const ConvexRegion& region, const Transform& transfor
     Plane& local = planes_[count_];
     local.normal = transform.rotation.to_local(plane.normal);
     local.offset = value_at(plane, from) / double{transform.scale};
-    // The rounding error of the offset is proportional to the magnitudes of the terms of which it is the sum.
+    // The offset is a sum, and its rounding error is proportional to the magnitudes of the terms of this sum.
     const double terms = (dot(abs(plane.normal), abs(from)) + std::abs(plane.offset)) / double{transform.scale};
     epsilons_[count_++] = kPlaneEpsilon * (3 * double{magnitude} + terms);
   }

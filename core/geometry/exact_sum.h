@@ -3,9 +3,9 @@
 // Plain value; any thread. Each call of add(double) costs a few additions for each component. The sum has as many
 // components as its bits need, mostly one to five.
 //
-// Exact as long as no operation over- or underflows. Every summand and product must be below 2^990. Every summand, and
-// every product of the 26-bit halves into which factors are split, must be a multiple of 2^-1074; this is true for
-// products of up to three multiples of 2^-310.
+// Exact as long as no operation over- or underflows. The magnitude of every summand and product must be below 2^990.
+// Every summand, and every product of the 26-bit halves into which factors are split, must be a multiple of 2^-1074.
+// For a product of up to three factors it suffices that each factor is a multiple of 2^-310.
 //
 // Source: Shewchuk, Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates, 1997
 // (Grow-Expansion with zero elimination, theorem 10).

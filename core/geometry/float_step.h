@@ -1,5 +1,5 @@
-// Inline replacement of std::nextafter(): the call of the C library is measurable in code that needs it several times
-// per ray. Pure functions; any thread.
+// Inline replacement of std::nextafter(): code that takes several such steps per ray is measurably slower with calls
+// of the C library. Pure functions; any thread.
 #ifndef LOCUS_CORE_GEOMETRY_FLOAT_STEP_H_
 #define LOCUS_CORE_GEOMETRY_FLOAT_STEP_H_
 

@@ -18,7 +18,7 @@ struct Mover {
   double radius = 0;  // ball and capsule: >= 0
   Vec3d half_axis;    // capsule: from the centre to one end of the inner segment; zero for a ball
   Vec3d half;         // box: half extents along its own axes, >= 0
-  Rotation rotation;  // box: rotates its own axes to the axes of `start`
+  Rotation rotation;  // box: rotates the box's own axes to the axes of `start`
 };
 
 // Treatment of a primitive that the mover touches at t = 0. kHit: the primitive is hit at t = 0. kApproach: the
@@ -30,8 +30,8 @@ enum class AtStart : uint8_t { kHit, kApproach, kPass };
 struct Contact {
   // Ball or capsule: distance from the primitive to the mover's centre or inner segment. If this centre or segment
   // reaches into a shape, the distance is negative: it is minus the length of the shortest way out of the shape.
-  // Box: the distance has a meaning only for the contact at t = 0, and only if the box overlaps the primitive then. It
-  // is minus the length of the box's shortest way out.
+  // Box: defined only for the contact at t = 0 of a box that overlaps the primitive at t = 0: minus the length of the
+  // box's shortest way out.
   double distance = 0;
   // Point of the primitive, relative to the mover's start, so that no precision is lost far from the world's origin. If
   // mover and primitive touch, the point belongs to both, up to rounding.

@@ -67,11 +67,11 @@ __attribute__((noinline)) int exact_side(Vec3d point, const Corners& corners) {
   return sum.sign();
 }
 
-// Returns the same as exact_side(): 1 if the triangle appears clockwise from the point, that is, if the point is behind
-// the triangle. Computes in double if that proves the sign, otherwise exactly. `from` has the differences of the
-// corners from the point, rounded to double. Each summand has eight roundings: three differences, the product of two of
-// them, the subtraction of two such products, the product with the third difference, and two sums. Together they change
-// a summand by at most 2^-50 of its magnitude.
+// Returns the same as exact_side(): 1 if the triangle appears clockwise from the point, that is, if the point is
+// behind the triangle. Computes in double if the error bound proves the sign, otherwise exactly. `from` has the
+// differences of the corners from the point, rounded to double. Each summand has eight roundings: three differences,
+// the product of two of them, the subtraction of two such products, the product with the third difference, and two
+// sums. Together these roundings change a summand by at most 2^-50 of its magnitude.
 int side(Vec3d point, const Corners& corners, const Vec3d (&from)[3]) {
   const Vec3d a = from[0], b = from[1], c = from[2];
   const double yz[3] = {b.y * c.z, c.y * a.z, a.y * b.z}, zy[3] = {b.z * c.y, c.z * a.y, a.z * b.y};

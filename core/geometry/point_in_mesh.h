@@ -31,7 +31,7 @@ namespace locus {
 // Direction of a half line that begins at a point in mesh axes.
 struct HalfLine {
   int axis = 0;             // axis to which the half line is parallel: 0 for x, 1 for y, 2 for z
-  bool descending = false;  // it runs towards lower coordinates
+  bool descending = false;  // true if the half line runs towards lower coordinates
 };
 
 // Contribution of one triangle.
@@ -40,8 +40,8 @@ struct Crossing {
   bool on_surface = false;  // the point lies on the triangle, which includes its edges and vertices
 };
 
-// Returns `point` with coordinates below 2^-250 replaced by 0, so that no product of differences underflows. crossing()
-// expects such a point.
+// Returns `point` with coordinates below 2^-250 replaced by 0, so that no product of differences underflows. Apply
+// this function to a point before you pass the point to crossing().
 inline Vec3d without_tiny_coordinates(Vec3d point) {
   const auto kept = [](double value) { return std::abs(value) < 0x1p-250 ? 0 : value; };
   return {kept(point.x), kept(point.y), kept(point.z)};

@@ -1,6 +1,7 @@
 // Requirements on the values of a spatial index, as C++20 concepts. A value type needs no base class and no member
-// functions: specialise PrimitiveTraits for the type, and Bvh and ListIndex (core/index) can store its values. For a
-// missing member the compiler prints one error that names the concept's line. Pure functions; any thread.
+// functions: specialise PrimitiveTraits for the type, and Bvh (core/index) and ListIndex (tests/support) can store its
+// values. If a member is missing, the compiler prints one error with the line of the concept that requires the member.
+// Pure functions; any thread.
 //
 //   Scalar     float or double: the type of bounds and distances
 //   RayQuery   type of a preprocessed ray: slabs() returns its SlabRay for culling; to_scaled(t) converts t from units

@@ -28,8 +28,8 @@ namespace locus {
 // Side of a triangle that rays ignore. A ray hits the front of a triangle if the vertices, in uploaded order, appear
 // counter-clockwise from the ray's origin; queries of a scene with clockwise winding exchange kBack and kFront.
 enum class Cull : uint8_t { kNone, kBack, kFront };
-// Treatment of a ray that starts inside a closed solid: the ray hits at t = 0 (kSolid), where it leaves the solid
-// (kHollow) or not at all (kSkip).
+// Treatment of a ray that starts inside a closed solid. kSolid: the ray hits the solid at t = 0. kHollow: the ray hits
+// the solid at the point where the ray leaves it. kSkip: the ray does not hit the solid.
 enum class Inside : uint8_t { kSolid, kHollow, kSkip };
 
 // Ray: the points origin + t * direction for 0 <= t <= t_max, both included. t is in units of the given direction,
@@ -60,9 +60,9 @@ inline constexpr double kObjectPad = 0x1p-40;    // predicates of moving objects
 template <class S>
 class SlabRay {
  public:
-  // Makes a ray whose slab test widens every box by at least `reach` on each side, in addition to the pad. Used for a
-  // search along the path of a solid of this extent. A nonzero `reach` requires `pad` > 0. The constructor is always
-  // inlined, because a call would take 27 more instructions for each ray.
+  // Makes a ray whose slab test widens every box by at least `reach` on each side, in addition to the pad. A search
+  // along the path of a solid passes the extent of the solid as `reach`. A nonzero `reach` requires `pad` > 0. The
+  // constructor is always inlined, because a call would take 27 more instructions for each ray.
   [[gnu::always_inline]] SlabRay(const Ray<S>& ray, double pad, double reach = 0)
       : origin_(ray.origin),
         direction_(ray.direction),

@@ -2,11 +2,11 @@
 // is projected along the ray. Each of the three edge functions is the difference of two products. If the two vertices
 // of an edge are exchanged, only the sign of its edge function changes, so an edge that two triangles share has no gap
 // in spite of rounding. Boxes are culled in float, but hits are computed in double. In float the error of t would be
-// the rounding error divided by the sine of the angle between ray and plane. Measured in float, for 0.7 % of random
-// rays the hit was lost or its error was larger than hit() allows. If a triangle is so nearly edge-on that double is
-// not precise enough either, edge_on_hit() of edge_on_triangle.h computes the hit. Source: Woop, Benthin, Wald,
-// Watertight Ray/Triangle Intersection, 2013; the code here omits the divisions of the paper, so that results on small
-// integers are exact.
+// the rounding error divided by the sine of the angle between ray and plane: in a measurement with float, 0.7 % of
+// random rays lost the hit, or the error of the hit was larger than hit() allows. If a triangle is so nearly edge-on
+// that double is not precise enough either, edge_on_hit() of edge_on_triangle.h computes the hit. Source: Woop,
+// Benthin, Wald, Watertight Ray/Triangle Intersection, 2013; the code here omits the divisions of the paper, so that
+// results on small integers are exact.
 #ifndef LOCUS_CORE_GEOMETRY_RAY_TRIANGLE_H_
 #define LOCUS_CORE_GEOMETRY_RAY_TRIANGLE_H_
 

@@ -26,7 +26,7 @@ Quaternion normalized(const Quaternion& q);
 // linear interpolation in double, rounded once. Returns `from`, bit for bit, if `from` equals `to`.
 Quaternion blended(const Quaternion& from, const Quaternion& to, double weight);
 
-// Rotation matrix by rows; `to_world` is matrix * vector, `to_local` its transpose * vector.
+// Rotation matrix by rows; `to_world` is matrix * vector, `to_local` is transposed matrix * vector.
 struct Rotation {
   Vec3d row_x{1, 0, 0}, row_y{0, 1, 0}, row_z{0, 0, 1};
 

@@ -108,7 +108,7 @@ RoundSweep::Separation RoundSweep::way_out_at(double t, const NearestPair& pair)
   if (primitive_ == Primitive::kTriangle) return {0, against(cross(b_ - a_, c_ - a_), motion), pair};
   // The shortest way out of a box is parallel to a face normal of the box swept along the segment. These normals are
   // the axes of the box, and the directions perpendicular to one of these axes and to the segment.
-  const Vec3d offset = -(a_ + velocity_ * t);  // of the segment's midpoint from the box's centre
+  const Vec3d offset = -(a_ + velocity_ * t);  // from the box's centre to the segment's midpoint
   double depth = std::numeric_limits<double>::infinity();
   Vec3d best;
   for (int i = 0; i < 6; ++i) {

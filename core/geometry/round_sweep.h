@@ -1,6 +1,6 @@
 // Motion of a convex primitive towards a segment, with a radius around the segment: the relative motion of a mover and
-// a primitive if one of them is round. Computes the first moment at which the distance between the primitive and the
-// segment is at most the radius.
+// a primitive, at least one of which is round. Computes the first moment at which the distance between the primitive
+// and the segment is at most the radius.
 //
 // The distance between convex sets in relative translation is a convex function of time, so its tangent at any moment
 // is a lower bound. Newton's method from t = 0 therefore approaches the first contact from below and never passes it.
@@ -22,7 +22,7 @@ class RoundSweep {
  public:
   // Make the motion of a primitive (a segment, a triangle or a box) relative to the segment from -half_axis to
   // half_axis. `velocity` is the velocity of the primitive relative to the segment. Positions are those at t = 0,
-  // relative to the midpoint of `half_axis`; `radius` >= 0. All vectors of to_box() are in the box's own axes.
+  // relative to the midpoint of this segment; `radius` >= 0. All vectors of to_box() are in the box's own axes.
   static RoundSweep to_segment(Vec3d half_axis, double radius, Vec3d center, Vec3d other_half_axis, Vec3d velocity);
   static RoundSweep to_triangle(Vec3d half_axis, double radius, Vec3d a, Vec3d b, Vec3d c, Vec3d velocity);
   static RoundSweep to_box(Vec3d half_axis, double radius, Vec3d center, Vec3d half, Vec3d velocity);
@@ -37,9 +37,10 @@ class RoundSweep {
   // than the exact moment only by rounding errors. The search begins at `from`, which must be a lower bound of the
   // result and >= 0.
   std::optional<double> first_contact(double limit, double from = 0) const;
-  // Distance, direction and nearest points of primitive and segment. `distance` is negative if the segment reaches into
-  // a box. `direction` is the unit vector from the primitive to the segment. If they intersect, it is the direction of
-  // the shortest way out of the primitive; among several shortest ways, one against the segment's motion.
+  // Distance, direction and nearest points of primitive and segment. `distance` is negative if the segment reaches
+  // into a box. `direction` is the unit vector from the primitive to the segment. If the segment intersects the
+  // primitive, `direction` is the direction of the shortest way out of the primitive; among several shortest ways, one
+  // against the segment's motion.
   struct Separation {
     double distance;
     Vec3d direction;
@@ -60,8 +61,8 @@ class RoundSweep {
   Vec3d half_axis_;
   double radius_;
   Vec3d velocity_;
-  Vec3d a_, b_, c_;  // corners of a triangle; otherwise a_ is the centre, and b_ the half axis or the half extents
-  double size_ = 0;  // largest |component| of half_axis_, plus that of the primitive's b_ or of its edges at a_
+  Vec3d a_, b_, c_;  // corners of a triangle; for a segment or box, a_: centre, b_: half axis or half extents
+  double size_ = 0;  // largest |component| of half_axis_, plus that of b_ or, for a triangle, of b_ - a_ and c_ - a_
 };
 
 }  // namespace locus

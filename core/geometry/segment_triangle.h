@@ -14,10 +14,10 @@ namespace locus {
 // Source: Moller, Trumbore, Fast, Minimum Storage Ray/Triangle Intersection, 1997, for the volumes.
 bool segment_crosses_triangle(Vec3d center, Vec3d half_axis, Vec3d a, Vec3d b, Vec3d c);
 
-// Returns the squared distance between the segment and the triangle; 0 if they cross. If they do not cross, the result
-// is the minimum of five squared distances: from the two ends of the segment to the triangle, and from the segment to
-// the three edges. The result is at least the exact squared distance, except for an error of a few roundings of the
-// coordinates.
+// Returns the squared distance between the segment and the triangle; 0 if the segment crosses the triangle. If not,
+// the result is the minimum of five squared distances: from the two ends of the segment to the triangle, and from the
+// segment to the three edges. The result is at least the exact squared distance, except for an error of a few
+// roundings of the coordinates.
 // Source: Ericson, Real-Time Collision Detection, 2005, 5.1.10.
 double squared_distance_segment_triangle(Vec3d center, Vec3d half_axis, Vec3d a, Vec3d b, Vec3d c);
 

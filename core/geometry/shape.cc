@@ -154,8 +154,8 @@ bool ball_overlaps(const Balld& ball, const Shape& shape) {
   const bool meets =
       planted(PlantedBug::kStrictTie) ? distance < radius_sum * radius_sum : distance <= radius_sum * radius_sum;
   if (!meets) return false;
-  // Fast path: a round shape that is nearer than the radius sum by more than rounding errors needs no reaches() test,
-  // since its bounds are never farther away than the shape itself.
+  // Fast path: a ball or point whose distance is less than radius_sum by more than rounding errors needs no reaches()
+  // test, since its bounds are never farther away than the shape itself.
   const bool is_round = shape.kind == ShapeKind::kBall || shape.kind == ShapeKind::kPoint;
   if (is_round && distance < radius_sum * radius_sum * (1 - 0x1p-38) && radius_sum > 0x1p-256) return true;
   return reaches(ball, bounds_of(shape));

@@ -52,9 +52,9 @@ double squared_distance_to_box(Vec3d point, const RoundedCore& box) {
   return squared_length(gap);
 }
 
-// Returns the squared distance between two boxes that share no point. The nearest points are either a corner of one box
-// and a point of the other box, or a point on an edge of each box. `offset` is the centre of `b` from the centre of
-// `a`.
+// Returns the squared distance between two boxes that share no point. The nearest points are either a corner of one
+// box and a point of the other box, or a point on an edge of each box. `offset` is the vector from the centre of `a`
+// to the centre of `b`.
 double squared_distance_apart(const RoundedCore& a, const RoundedCore& b, Vec3d offset) {
   double least = std::numeric_limits<double>::infinity();
   for (int i = 0; i < 8; ++i) {
@@ -83,7 +83,7 @@ double squared_distance_apart(const RoundedCore& a, const RoundedCore& b, Vec3d 
   return least;
 }
 
-// Returns the squared distance between the cores; `offset` is the centre of `b` from the centre of `a`.
+// Returns the squared distance between the cores; `offset` is the vector from the centre of `a` to the centre of `b`.
 double squared_distance_of_cores(const RoundedCore& a, const RoundedCore& b, Vec3d offset) {
   if (!a.is_box && !b.is_box) return squared_distance_segments(offset, a.half_axis, b.half_axis);
   if (a.is_box && !b.is_box)

@@ -9,9 +9,9 @@
 namespace locus {
 
 // Returns the distance between the solids; 0 if they share a point. The result is never less than the distance between
-// their own bounds, so shapes may be culled by boxes that contain these bounds. Exchanging the two arguments may change
-// the rounding, so callers that need the same result in both cases must order the shapes, for example by id. O(1); two
-// boxes that are apart are compared by all of their edges, which takes microseconds.
+// the bounds of the solids, so shapes may be culled by boxes that contain these bounds. If the two arguments are
+// exchanged, the rounding may change, so callers that need a symmetric result must order the shapes, for example by
+// id. O(1); two boxes that are apart are compared by all of their edges, which takes microseconds.
 // Source: Ericson, Real-Time Collision Detection, 2005, 5.1 (distances of the features of convex solids).
 double distance_between(const Shape& a, const Shape& b);
 

@@ -20,7 +20,7 @@ struct RoundMotion {
   RoundSweep sweep;
   Rotation axes;        // rotates the axes of `sweep` to the axes in which the mover is given
   double shape_radius;  // part of the sweep's radius that belongs to the shape
-  bool is_reversed;     // true if the segment is the shape's
+  bool is_reversed;     // true if the segment belongs to the shape, false if it belongs to the mover
 };
 
 RoundMotion round_motion(const Mover& mover, const Shape& shape) {
@@ -59,8 +59,8 @@ Contact contact_of(const RoundMotion& motion, const Mover& mover, const Shape& s
 inline double plane_bound(const Mover& mover, Vec3d a, Vec3d b, Vec3d c) {
   const Vec3d ab = b - a, ac = c - a;
   const Vec3d normal = cross(ab, ac);
-  // Height of the plane above the mover's centre, and the rate at which the height changes, both times the length of
-  // the normal.
+  // Height of the plane above the mover's centre, and the rate at which the height changes. Each value is multiplied
+  // by the length of the normal.
   const double height = dot(normal, a), rate = -dot(normal, mover.way);
   constexpr double kEpsilon = 0x1p-44;  // covers the rounding of the normal and of the heights
   const double size = max_component(max(abs(ab), abs(ac)));
@@ -74,9 +74,9 @@ inline double plane_bound(const Mover& mover, Vec3d a, Vec3d b, Vec3d c) {
   return (rest - mover.radius * std::sqrt(squared_length(normal))) / approach;
 }
 
-// Returns whether a ball or capsule that moves without end misses a triangle: whether, as seen along the path, one edge
-// of the triangle separates the triangle from the mover. The corners are relative to the mover's start. May return
-// false for a mover that misses.
+// Returns true if one edge of the triangle, as seen along the path, separates the triangle from a ball or capsule. The
+// mover then misses the triangle, even if it moves without end. The corners are relative to the mover's start. May
+// return false for a mover that misses.
 inline bool misses_along_path(const Mover& mover, const Corners& corners) {
   // Covers the rounding of the products, and the epsilons of RoundSweep at any time of the path.
   constexpr double kEpsilon = 0x1p-40;
@@ -86,7 +86,7 @@ inline bool misses_along_path(const Mover& mover, const Corners& corners) {
   for (size_t i = 0; i < 3; ++i) {
     const Vec3d from = corners[i], edge = corners[(i + 1) % 3] - from, other = corners[(i + 2) % 3];
     // Separating axis, perpendicular to the path and to the edge, and the triangle's interval on it. The mover's
-    // interval is centred at 0. All are times the length of the axis.
+    // interval is centred at 0. All values are multiplied by the length of the axis.
     const Vec3d axis = cross(edge, mover.way);
     const double edge_at = dot(axis, from), other_at = dot(axis, other);
     const double gap = std::max(std::min(edge_at, other_at), -std::max(edge_at, other_at));

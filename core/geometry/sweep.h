@@ -38,7 +38,7 @@ inline Mover resting(const Capsule& capsule) {
   return mover;
 }
 
-// Returns the mover in mesh axes. Time is the same in both axes.
+// Returns the mover in mesh axes. A time t means the same in world axes and in mesh axes.
 Mover mover_to_mesh(const Mover& mover, const Transform& transform);
 
 // Return the first moment of contact in 0 .. limit, or nullopt. `at_start` selects the result for a primitive that is
@@ -46,8 +46,8 @@ Mover mover_to_mesh(const Mover& mover, const Transform& transform);
 std::optional<double> first_contact(const Mover& mover, const Shape& shape, AtStart at_start, double limit = 1);
 std::optional<double> first_contact(const Mover& mover, const Corners& triangle, AtStart at_start, double limit = 1);
 
-// Return the contact at time t. Mover and primitive usually touch at this time, but the contact is also defined if they
-// do not.
+// Return the contact at time t. Usually mover and primitive touch at this time, but the contact is defined at every t.
+// See Contact for the cases in which its distance is defined.
 Contact contact_at(const Mover& mover, const Shape& shape, double t);
 Contact contact_at(const Mover& mover, const Corners& triangle, double t);
 

@@ -1,6 +1,6 @@
 // Regions: the culling tests of ball, box and capsule queries, in the scalar type S of an index. A region has
 // axis-aligned bounds and a test of overlap with boxes; the visitors apply the exact tests to values. Regions are
-// immutable and cheap to copy; any number of threads may use one.
+// immutable and cheap to copy; any number of threads may use the same region.
 #ifndef LOCUS_CORE_INDEX_REGIONS_H_
 #define LOCUS_CORE_INDEX_REGIONS_H_
 

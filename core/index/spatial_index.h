@@ -25,10 +25,10 @@ concept RayVisitor = requires(Visitor& visitor, const Value& value) {
   { visitor.visit(value) } -> std::same_as<bool>;
 };
 
-// Visitor of the candidates of a region. overlaps(box) returns true whenever a value within the box can be a result; it
-// may also return true otherwise. overlaps() is monotone: if it returns true for a box, it returns true for every
-// superset of that box. bounds() returns a box that overlaps the bounds of every result. visit() returns false to end
-// the visit.
+// Visitor of the candidates of a region. overlaps(box) returns true for every box that contains a value that can be a
+// result; it may also return true for other boxes. overlaps() is monotone: if it returns true for a box, it returns
+// true for every superset of that box. bounds() returns a box that overlaps the bounds of every result. visit()
+// returns false to end the visit.
 template <class Visitor, class Value>
 concept RegionVisitor = requires(Visitor& visitor, const Value& value, const Aabb<ScalarOf<Value>>& box) {
   { std::as_const(visitor).bounds() } -> std::same_as<Aabb<ScalarOf<Value>>>;
@@ -37,8 +37,9 @@ concept RegionVisitor = requires(Visitor& visitor, const Value& value, const Aab
 };
 
 // Visitor of the candidates around a point. limit() returns the largest squared distance of interest and may decrease
-// during the visit. A structure may skip a value whose bounds have a larger squared_distance() from the point, but not
-// a value whose bounds are at a squared distance equal to limit(). visit() returns false to end the visit.
+// during the visit. A structure may skip a value whose bounds have a squared_distance() from the point greater than
+// limit(), but not a value whose bounds have a squared distance equal to limit(). visit() returns false to end the
+// visit.
 template <class Visitor, class Value>
 concept PointVisitor = requires(Visitor& visitor, const Value& value) {
   { std::as_const(visitor).limit() } -> std::same_as<double>;

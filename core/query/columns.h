@@ -3,8 +3,8 @@
 //
 // To add a column: add a value to Column (query_batch.h), a row to LOCUS_COLUMN_ARRAYS, and the column to the kinds
 // that return it (ServedColumns in columns.cc), and write its values in run/rows.cc. All code of the server that
-// allocates, copies, measures or sends columns is generated from LOCUS_COLUMN_ARRAYS. The clients list the columns that
-// they show; a test of each fails for a column of the protocol that it does not know.
+// allocates, copies, measures or sends columns is generated from LOCUS_COLUMN_ARRAYS. Each client lists the columns
+// that it shows; a test of the client fails if the protocol has a column that the client does not know.
 #ifndef LOCUS_CORE_QUERY_COLUMNS_H_
 #define LOCUS_CORE_QUERY_COLUMNS_H_
 
@@ -101,7 +101,7 @@ ColumnSet returned_columns(const QueryBlock& block);
 
 // Layout of a block's result. kDense has one row per query, even for a miss. kBytes has no rows, but one byte per
 // query. kMatrix has no rows, but bytes_per_query() bytes per query. kCounted has any number of rows per query, and a
-// column with the number of rows of each query. With count_only it has this column, but no rows.
+// column with the number of rows of each query. With count_only, a kCounted result has this column, but no rows.
 enum class RowLayout : uint8_t { kDense, kBytes, kMatrix, kCounted };
 RowLayout row_layout(const QueryBlock& block);
 // Returns the number of bytes of each query of a kBytes or kMatrix block.

@@ -17,8 +17,8 @@ struct Row {
   friend Row operator-(const Row& a, const Row& b) { return {a.xyz - b.xyz, a.w - b.w}; }
 };
 
-// Returns the determinant of the matrix with these rows, computed from the 2 x 2 minors of the first two rows and of
-// the last two rows.
+// Returns the determinant of the matrix with the rows `rows`, computed from the 2 x 2 minors of the first two rows
+// and of the last two rows.
 double determinant(const Row (&rows)[4]) {
   const auto minor = [](const Row& a, const Row& b, int i, int j) {
     const auto at = [](const Row& row, int k) { return k == 3 ? row.w : row.xyz[k]; };

@@ -1,10 +1,9 @@
 // Batch of queries as borrowed columns: a list of blocks, each of one kind. The service points the columns at the data
 // of a request without copying, and run/ answers the batch. Plain data; any number of threads may read it.
 //
-// The caller keeps the columns alive while the batch is in use. Let N be the number of queries of a block, which is the
-// number of entries of the first column of its kind. Unless stated otherwise, an entry of a column has 1, 3 or 4
-// values, and a column has N entries, one entry for all queries, or no entries. The default applies to a column without
-// entries.
+// The caller keeps the columns alive while the batch is in use. Let N be query_count(), the number of queries of a
+// block. Unless stated otherwise, a column has N entries, one entry for all queries, or no entries; the default
+// applies to a column without entries. An entry is one number, a vector of 3 numbers or a quaternion of 4 numbers.
 #ifndef LOCUS_CORE_QUERY_QUERY_BATCH_H_
 #define LOCUS_CORE_QUERY_QUERY_BATCH_H_
 
@@ -160,7 +159,7 @@ struct PairColumns {
   float max_distance = 0;    // inclusive, 0 .. limits::kMaxCoordinate; +inf is allowed if count is not 0
   Layers first_mask = 0;     // 0 means all layers
   Layers second_mask = 0;    // 0 means all layers
-  uint32_t count = 0;        // maximum number of nearest objects of each object; 0: each pair has one row
+  uint32_t count = 0;        // maximum number of nearest objects of each object; 0: all pairs, one row each
   uint64_t after_other = 0;  // requires QueryBlock::after_id: only rows after (after_id, after_other)
 };
 

@@ -42,10 +42,10 @@ absl::StatusOr<RecoveredMesh> recover_mesh(UpdateLog& log, const StoredMesh& sto
 // shares the bytes and the tree of `content`, which recover_mesh() returned for any name of the same content.
 absl::StatusOr<MeshPtr> recover_name(const UpdateLog& log, const StoredMesh& stored, const MeshPtr& content);
 
-// Returns a function that finds the meshes which `registry` restored from `log`; both outlive the function. Records of
-// data format 1, the oldest format, identify a mesh only by its content hash. For such a record the function returns
-// the mesh of the name that sorts first among the names of this content that were stored in format 1. Every recovery
-// makes the same choice for an existing instance, because a name cannot be deleted while instances use it.
+// Returns a function that finds the meshes which `registry` restored from `log`; both outlive the function. Records
+// of data format 1, the oldest format, identify a mesh only by its content hash. For such a record the function
+// returns the mesh whose name sorts first among the names that were stored for this content in format 1. Every
+// recovery makes the same choice for an existing instance, because a name cannot be deleted while instances use it.
 FindMesh find_restored_meshes(const UpdateLog& log, const Registry& registry);
 
 }  // namespace locus

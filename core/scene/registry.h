@@ -36,8 +36,9 @@ struct CreatorUse {
 
 class Registry {
  public:
-  // `log` may be null; otherwise it outlives the registry and its scenes. The registry outlives every call of
-  // Scene::change_instances() of its scenes, which check with the registry that a mesh is still registered.
+  // `log` may be null; otherwise the log outlives the registry and its scenes. The registry outlives every call of
+  // Scene::change_instances() of its scenes: with a log, these calls check with the registry that a mesh is still
+  // registered.
   explicit Registry(UpdateLog* log = nullptr) : log_(log) {}
 
   struct CreatedScene {

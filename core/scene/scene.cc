@@ -57,8 +57,8 @@ absl::Status readers_too_slow(uint64_t budget) {
       refusal);
 }
 
-// Returns the refusal of a change because an object took the id `id` while the change was built. `position` is the
-// index of the id among all placed ids of the change; the refusal names the placement that contains this index.
+// Returns the error that refuses a change because an object took the id `id` while the change was built. `position`
+// is the index of the id among all placed ids of the change; the error names the placement that contains this index.
 absl::Status taken_meanwhile(const StaticChange& change, size_t position, Id id) {
   size_t list = 0;
   while (position >= change.place[list].count()) position -= change.place[list++].count();
@@ -137,7 +137,7 @@ absl::StatusOr<Scene::Acks> Scene::apply_each(absl::Span<const UpdateBatch* cons
     RETURN_IF_ERROR(wait_for_readers(until));
     const MutexLock lock(writer_mutex_);
     RETURN_IF_ERROR(check_open());
-    if (pins_->over_budget()) continue;  // another batch exceeded the budget after the wait
+    if (pins_->over_budget()) continue;  // over budget again: another batch was applied after the wait
     absl::Span<const UpdateBatch* const> rest = good;
     bool logged = false;
     for (absl::StatusOr<UpdateAck>& ack : acks) {

@@ -48,7 +48,7 @@ class SceneWriter {
   // all_or_nothing, one refused item refuses the whole batch. Returns RESOURCE_EXHAUSTED if the scene would have too
   // many objects.
   absl::StatusOr<Applied> apply_new(const UpdateBatch& batch);
-  // Calls admit(), and then apply_new() if the batch is new. Returns the errors of both.
+  // Calls admit(), and then apply_new() if the batch is new. Returns the errors of both functions.
   absl::StatusOr<Applied> apply(const UpdateBatch& batch);
 
   struct Joined {

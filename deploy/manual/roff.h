@@ -1,5 +1,5 @@
 // Builder of a manual page in roff with the `man` macros (man(7)). The builder escapes all plain text. Used by
-// manual_page.h. Not thread-safe.
+// manual_page.cc. Not thread-safe.
 #ifndef LOCUS_DEPLOY_MANUAL_ROFF_H_
 #define LOCUS_DEPLOY_MANUAL_ROFF_H_
 

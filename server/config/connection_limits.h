@@ -8,7 +8,7 @@ namespace locus::server {
 
 // Default of --max-connections, if the process may open enough files.
 inline constexpr uint32_t kDefaultConnections = 4096;
-inline constexpr uint32_t kMinConnections = 16;  // minimum of that default, however few files may be open
+inline constexpr uint32_t kMinConnections = 16;  // minimum of the default, even if few files may be open
 // Maximum of --max-connections and --max-connections-per-address.
 inline constexpr uint32_t kMaxConnections = 1'000'000;
 inline constexpr uint32_t kMaxNewConnections = 100'000;        // maximum of --max-new-connections

@@ -20,15 +20,16 @@ struct ListenAddress {
   bool local = true;  // whether only this machine can reach the address: a loopback address or a unix socket
 };
 
-// Parses `host:port`, `[v6]:port` or `unix:/path`. A host name other than localhost is not local, because it may
-// resolve to another address later. For an invalid text returns INVALID_ARGUMENT with the reason and an example.
+// Parses `host:port`, `[v6]:port` or `unix:/path`. For a host name other than localhost, `local` is false, because the
+// name may resolve to another address later. For an invalid text returns INVALID_ARGUMENT with the reason and an
+// example.
 absl::StatusOr<ListenAddress> parse_listen_address(absl::string_view text);
 
 // Returns the address in the form that parse_listen_address() reads, with `port` instead of the address's own port.
 std::string to_string(const ListenAddress& address, uint16_t port);
 
-// Parses the permissions of a unix socket: three octal digits, which may follow a 0. Returns INVALID_ARGUMENT for any
-// other text.
+// Parses the permissions of a unix socket: three octal digits, with or without a leading 0. Returns INVALID_ARGUMENT
+// for any other text.
 absl::StatusOr<uint32_t> parse_unix_mode(absl::string_view text);
 
 }  // namespace locus::server

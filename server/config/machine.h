@@ -17,8 +17,9 @@ struct CgroupLimits {
 };
 
 // Returns the limits of the groups that the file `root`/proc/self/cgroup lists, read from `root`/sys/fs/cgroup. `root`
-// is empty for this machine; tests pass a folder. If the folder of a group is missing, uses the groups above it: this
-// happens in a container, which sees its own group as the topmost group. A file that cannot be read sets no limit.
+// is empty for this machine; tests pass a folder. The folder of a group can be missing in a container, which sees its
+// own group as the topmost group; then only the groups above the missing folder are read. A file that cannot be read
+// sets no limit.
 CgroupLimits read_cgroup_limits(const std::string& root);
 
 struct Machine {

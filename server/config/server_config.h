@@ -62,7 +62,8 @@ struct ServerConfig {
 
   // Priority of the threads that work on large query batches, relative to the threads that talk to clients and apply
   // updates: `nice` is 10 nice levels lower; `idle` runs only on cores that are otherwise idle. With `idle`, small
-  // calls wait half as long while large batches run, but large batches stop if other processes use all cores.
+  // calls wait half as long as with `nice` while large batches run, but large batches stop if other processes use all
+  // cores.
   BatchPriority batch_priority = BatchPriority::kNice;
 
   // Vector instructions that queries use: a name that `locusd` logs at its start, or portable for none; empty = the
@@ -96,9 +97,9 @@ struct ServerConfig {
 
   // Three maxima: the number of connections of all clients (0 = 4096, or fewer if the process may open only few files),
   // the number of connections of one address, and the number of connections that one address may open in a second, on
-  // average. In a burst, an address may open twice the last number. For unix sockets, each user counts as an address.
-  // Excess connections are closed immediately. Raise the last two numbers if many clients share one address, as behind
-  // a proxy.
+  // average. In a burst, an address may open twice `max_new_connections`. For unix sockets, each user counts as an
+  // address. Excess connections are closed immediately. Raise the last two maxima if many clients share one address, as
+  // behind a proxy.
   uint32_t max_connections = 0;
   uint32_t max_connections_per_address = 1024;
   uint32_t max_new_connections = 200;
@@ -115,9 +116,9 @@ struct ServerConfig {
   // Bytes of memory that the process may use; 0 = three quarters of the memory of the machine or its control group. As
   // memory runs short, histories lose their oldest ticks first. Then calls are refused, depending on how much of the
   // limit is in use: uploads, dumps, inserts and placements from 7/8 on, moves from 29/32 on, and queries from 15/16
-  // on. With a limit above 1 GiB, queries are refused only when less than 64 MiB are left. The rest is a reserve for
-  // small messages and answers. Removals are never refused. Lower the option to leave memory to other processes. With a
-  // value above the default, the kernel may kill the process.
+  // on. With a limit above 1 GiB, queries are refused only when less than 64 MiB are left. This remainder is a reserve
+  // for small messages and answers. Removals are never refused. Lower the option to leave memory to other processes.
+  // With a value above the default, the kernel may kill the process.
   uint64_t memory_limit = 0;
 
   // Bytes of replaced data per scene that batches and dumps may keep alive by reading older revisions; 0 selects the
@@ -140,8 +141,8 @@ struct ServerConfig {
   // no certificate. Set it to admit only machines that hold a certificate.
   std::string tls_client_ca;
 
-  // File of the access rules: which caller may make which calls. Empty = every client may call everything or, with a
-  // token file or JWKS file, every client with a valid token, JWT or certificate.
+  // File of the access rules: which caller may make which calls. If the option is empty, every client may call
+  // everything; with a token file or JWKS file, only clients with a valid token, JWT or certificate may.
   std::string access_file;
 
   // Files for the authentication of clients: hashes of the accepted tokens, and public keys (JWKS) that verify signed
@@ -155,8 +156,8 @@ struct ServerConfig {
   std::string jwt_issuer;
 
   // File to which calls that change something are logged, one JSON object a line; empty = none. Refused calls are
-  // written to the file with `.refused` after its name. Each file is replaced by a new one when it is larger than
-  // `audit_bytes`; four older ones are kept.
+  // written to a second file, whose name has `.refused` appended. Each of the two files is replaced by a new file when
+  // it is larger than `audit_bytes`; four older files of each are kept.
   std::string audit_file;
   uint64_t audit_bytes = uint64_t{64} << 20;
 

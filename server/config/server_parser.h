@@ -15,8 +15,8 @@ namespace locus::server {
 // not read the environment: see environment_variable().
 void build_parser(CLI::App& app, ServerConfig& config);
 
-// Adds the commands `check`, `repair` and `config`. Parsing a line with one of them sets `chosen`, which must outlive
-// `app`.
+// Adds the commands `check`, `repair` and `config`. Parsing a command line with one of these commands sets `chosen`,
+// which must outlive `app`.
 void add_maintenance(CLI::App& app, std::optional<Maintenance>& chosen);
 
 // Returns whether an empty environment variable sets the option to the empty string. For other options an empty

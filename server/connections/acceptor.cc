@@ -28,7 +28,7 @@ constexpr milliseconds kPause{100};  // pause after accept() has failed because 
 constexpr milliseconds kCheckInterval{1000};
 constexpr milliseconds kReportInterval{1000};
 
-// Ids of epoll events: the listening sockets by their index, the wake-up, then connections.
+// Ids of epoll events: below kWakeId, the index of a listening socket; kWakeId, the wake-up; above it, a connection.
 constexpr uint64_t kWakeId = 1u << 16;
 constexpr uint64_t kFirstConnectionId = kWakeId + 1;
 
@@ -170,7 +170,7 @@ void Acceptor::admit(int descriptor, const ListeningSocket& listening, Time now)
   entry.descriptor = descriptor;
   entry.since = now;
   ++opening_;
-  // With EPOLLET, epoll reports an incomplete opening once for each arrival of bytes, not continuously.
+  // With EPOLLET, epoll reports a connection with too few bytes once for each arrival of bytes, not continuously.
   add_event(descriptor, EPOLLIN | EPOLLRDHUP | EPOLLET, id);
 }
 
@@ -222,7 +222,7 @@ void Acceptor::ended(uint64_t id) {
   limiter_.leave(entry.peer.limit_key);
   // Charge the address of a client that misused its connection. Otherwise a client that floods would connect again
   // immediately, and each connection may cost some megabytes before the guard closes it. Users of unix sockets are not
-  // charged: the user may run a proxy, and the charge would refuse the proxy's other clients too.
+  // charged: a user may run a proxy, and after a charge the proxy's other clients would be refused too.
   if (entry.connection->was_misused() && !entry.peer.uid)
     limiter_.charge(entry.peer.limit_key, options_.limits.new_per_second);
   guard_.forget(*entry.connection);

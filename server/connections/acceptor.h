@@ -32,8 +32,8 @@ namespace locus::server {
 struct AcceptorOptions {
   ConnectionLimits limits;
   Transport tcp_transport = Transport::kPlain;   // unix sockets are always plain
-  std::chrono::milliseconds opening_timeout{0};  // maximum time for the first bytes of a client; 0 = none
-  std::chrono::milliseconds idle_timeout{0};     // maximum time without an open call; 0 = none
+  std::chrono::milliseconds opening_timeout{0};  // maximum time for the first bytes of a client; 0 = no limit
+  std::chrono::milliseconds idle_timeout{0};     // maximum time without an open call; 0 = no limit
 };
 
 // Functions that the acceptor calls on its thread.
@@ -47,8 +47,8 @@ struct AcceptorHooks {
 
 class Acceptor {
  public:
-  // Starts the thread. `sockets` already listen, so clients that connect earlier wait for the acceptor. `table` and
-  // `guard` must outlive the acceptor.
+  // Starts the thread. `sockets` already listen, so clients that connect before this call wait in the kernel. `table`
+  // and `guard` must outlive the acceptor.
   Acceptor(std::vector<ListeningSocket> sockets, const AcceptorOptions& options, ConnectionTable& table,
            FloodGuard& guard, AcceptorHooks hooks);
   // Ends the thread and releases all connections, whether they are opening or handed over.

@@ -1,6 +1,6 @@
 // Checks the bytes that the transport reads from connections without TLS, before the transport parses them. The
 // transport reads with recvmsg(), which server/rpc/read_hooks.h replaces by a function that passes each read to
-// CheckedReads::accept(). Bytes of other descriptors are always accepted.
+// CheckedReads::accept(). Bytes of descriptors that are not watched are always accepted.
 //
 // Threads: every member may be called from any thread; reads of different descriptors rarely wait for each other.
 // Invariant: bytes are checked only if their descriptor still refers to the watched socket. The transport closes
@@ -35,7 +35,7 @@ class CheckedReads {
   // Begins to check the reads from `descriptor`, the socket of `connection`, from which nothing was read yet.
   void watch(int descriptor, std::shared_ptr<Connection> connection);
 
-  // Stops checking the reads from `descriptor`, which is now another socket.
+  // Stops checking the reads from `descriptor`. Call it when the descriptor belongs to a socket that is not watched.
   static void forget(int descriptor);
 
   // Checks `count` bytes that were read from `descriptor` into `message`. Returns false if the bytes are refused; then

@@ -49,8 +49,8 @@ Peer ipv6_peer(const sockaddr_in6& socket_address) {
 }
 
 // Reads and discards the bytes that have arrived at a socket. After shutdown() the kernel may still hold megabytes of
-// them, and the transport would handle their frames. Because they are discarded, the transport sees a gap in the
-// stream, which is an error, and then the end of the stream.
+// these bytes, and the transport would handle the frames in them. Because the bytes are discarded, the transport sees a
+// gap in the stream, which is an error, and then the end of the stream.
 void discard_arrived(int descriptor) {
   std::array<char, 16 << 10> bytes;
   while (recv(descriptor, bytes.data(), bytes.size(), MSG_DONTWAIT) > 0) {

@@ -22,14 +22,14 @@ namespace locus::server {
 // The other end of a connection.
 struct Peer {
   std::string name;             // name that gRPC gives the connection, such as ipv4:10.0.0.7:41234
-  std::string label;            // name for people: `name`, or unix:uid=1000,pid=4711 with the pid if it is known
+  std::string label;            // for people: `name` or, for a unix socket, unix:uid=1000,pid=4711 (pid only if known)
   std::string address;          // address without port, such as 10.0.0.7; "unix" for a unix socket
   std::string limit_key;        // connections with equal keys share the limits of one address; see peer_of()
   std::optional<uint32_t> uid;  // user id of the process at the other end; unix sockets only
 };
 
-// Counts of the calls of a connection, and of the messages of these calls, since the connection was accepted. Only
-// `calls_open` is a present number.
+// Counts of the calls of a connection, and of the messages of these calls, since the connection was accepted.
+// Exception: `calls_open` is the number of calls that are open now.
 struct CallCounts {
   uint64_t calls_begun = 0;
   uint64_t calls_open = 0;
@@ -54,8 +54,8 @@ class Connection {
  public:
   static constexpr uint64_t kMaxCancelled = 1000;
 
-  // Takes ownership of `descriptor`, a duplicate of the socket's descriptor, or -1 if the connection cannot be closed
-  // from here.
+  // Takes ownership of `descriptor`, a duplicate of the socket's descriptor. -1 means that there is no duplicate; then
+  // close() has no effect.
   Connection(Peer peer, std::chrono::steady_clock::time_point accepted, int descriptor);
   ~Connection();
   Connection(const Connection&) = delete;
@@ -78,7 +78,7 @@ class Connection {
   // begin_cancel_window(), the peer has cancelled more than kMaxCancelled calls, and more calls than it let finish. The
   // periodic checks of the guard would detect this too late, because gRPC accepts calls very fast.
   void call_cancelled();
-  // Restarts the count of cancelled calls. While bytes arrive, the guard calls it about once a second.
+  // Restarts the count of cancelled calls. While bytes arrive, the guard calls this function about once a second.
   void begin_cancel_window();
   void message_read(uint64_t bytes) {
     messages_read_.fetch_add(1, std::memory_order_relaxed);
@@ -97,7 +97,7 @@ class Connection {
   // MemoryBudget::connection_share(). Calls add and subtract their claims.
   std::atomic<uint64_t> claimed_bytes{0};
 
-  // The transport's number of this connection; 0 until StreamCounter, which uses the number, has found it.
+  // Number of this connection in gRPC's statistics (channelz); 0 until StreamCounter has found the number.
   std::atomic<int64_t> transport_id{0};
 
   // Returns the identity that set_identity() stored last; null if there is none. The identity is kept so that later

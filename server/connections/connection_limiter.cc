@@ -22,7 +22,7 @@ Admission ConnectionLimiter::admit(const std::string& key, Time now) {
   }
   refill(address, now);
   if (address.tokens < 1) return Admission::kTooFast;
-  address.tokens -= 1;  // a refused attempt counts, too
+  address.tokens -= 1;  // an attempt that is refused below counts, too
   if (connections_ >= limits_.connections) return Admission::kFull;
   if (address.connections >= limits_.connections_per_address) return Admission::kAddressFull;
   ++address.connections;

@@ -1,5 +1,5 @@
-// Limits on connections: how many there may be in all and from one address, and how many new ones an address may open
-// in a second. The limiter only decides; the acceptor closes refused connections.
+// Limits on connections: on their number in all, on their number from one address, and on the number of new connections
+// that an address may open in a second. The limiter only decides; the acceptor closes refused connections.
 //
 // Threads: one thread at a time; the current time is an argument. Invariants, in check_invariants(): no address has
 // more connections than there are in all, and no limit is exceeded.

@@ -24,7 +24,7 @@ namespace locus::server {
 
 class ConnectionTable {
  public:
-  // Adds an accepted connection. It replaces an ended connection with the same name, if there is one.
+  // Adds an accepted connection. Replaces an ended connection with the same name, if there is one.
   void add(std::shared_ptr<Connection> connection);
   // Removes the connection, unless another one has replaced it.
   void remove(const Connection& connection);
@@ -41,8 +41,8 @@ class ConnectionTable {
   // connections. O(connections), with a system call for each; one thread at a time.
   size_t shed_heaviest(bool close, uint64_t min_bytes, const char* reason);
 
-  // Closes the accepted connections for which `is_chosen` is true, without a charge for their addresses. Returns the
-  // number of connections that were still open. O(connections).
+  // Closes the accepted connections for which `is_chosen` is true, without counting them as misused. Returns the number
+  // of connections that were still open. O(connections).
   size_t close_if(const std::function<bool(const Connection&)>& is_chosen, const char* reason);
 
   // Returns the number of accepted connections.

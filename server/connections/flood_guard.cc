@@ -74,8 +74,8 @@ FloodVerdict assess(const FloodSample& sample, const FloodLimits& limits, FloodB
   budget.unexplained = std::max(0.0, budget.unexplained + received - accepted);
   budget.last = sample;
   // gRPC reports a unary call only when its message has arrived, so more messages may be arriving than calls are open.
-  // Allow one message for each stream in memory or open call, whichever are more, and one for a stream that gRPC has
-  // not read yet.
+  // Allow as many messages as there are streams in memory or open calls, whichever number is larger, and one more for a
+  // stream that gRPC has not read yet.
   budget.streams = sample.streams.value_or(budget.streams);
   const uint64_t messages = std::max(budget.streams, sample.counts.calls_open) + 1;
   const uint64_t arriving = std::min(limits.buffered_bytes, messages * limits.message_bytes);
@@ -172,9 +172,9 @@ bool FloodGuard::must_count(const FloodSample& sample, Watched& watched) {
 
 void FloodGuard::look_at(const std::shared_ptr<Watched>& watched) {
   Connection& connection = *watched->connection;
-  // Read the calls' counts before the kernel's count: then a message that arrives between the two is explained at the
-  // next look. In the other order, the message would explain bytes that the kernel's count does not include yet, and
-  // these bytes would stay unexplained at the next look.
+  // Read the calls' counts before the kernel's count: then a message that arrives between the two reads is explained at
+  // the next check. In the other order, the message would explain bytes that the kernel's count does not include yet,
+  // and these bytes would stay unexplained at the next check.
   FloodSample sample;
   sample.time = steady_clock::now();
   sample.counts = connection.counts();

@@ -2,7 +2,7 @@
 // that are begun only to be cancelled. gRPC does not report such bytes to the application, so the guard compares the
 // bytes that the kernel has received with the bytes that the calls of the connection have read. gRPC begins calls
 // faster than the application can accept and end them, so, in addition, the guard asks gRPC how many streams of a
-// connection are still in gRPC's memory. The code that serves calls only updates the counts of its connection.
+// connection are still in gRPC's memory. Code that serves a call only updates the counts of the call's connection.
 //
 // Threads: watch() and forget() may be called from any thread. The guard's thread periodically checks the connections
 // that have received bytes since its previous check; idle connections cost nothing.
@@ -111,7 +111,7 @@ class FloodGuard {
   const OnClosed on_closed_;
   const int epoll_;
   std::atomic<uint64_t> closed_{0};
-  // Time until which the thread looks more often; used by the thread only.
+  // Time until which the guard's thread checks more often; used by this thread only.
   std::chrono::steady_clock::time_point alert_until_;
   Mutex mutex_;
   ConditionVariable end_;

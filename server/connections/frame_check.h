@@ -37,8 +37,8 @@ class FrameCheck {
   // before it accepts the first one. It is above the number of calls that a client may have open.
   static constexpr uint32_t kMaxCallsOfRead = 2048;
 
-  // Reason for which a block of headers that exceeds kMaxBlockBytes or kMaxContinuations is refused. It is recognised
-  // by its address, so it is an array: each file could have its own copy of a string literal.
+  // Reason for which a block of headers that exceeds kMaxBlockBytes or kMaxContinuations is refused. Callers recognise
+  // the reason by its address, so it is an array: each file could have its own copy of a string literal.
   static constexpr char kLongHeaders[] = "a block of headers that is too long or in too many frames";
 
   // Checks the next bytes of the connection, which were read at `now`. Returns null if the bytes are accepted.

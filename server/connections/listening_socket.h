@@ -21,7 +21,7 @@ namespace locus::server {
 // Permissions to connect to a unix socket.
 struct UnixAccess {
   uint32_t mode = 0600;  // permissions of the file; connecting needs write permission
-  std::string owner;     // user or user:group, by name or number; empty = those of the process
+  std::string owner;     // user or user:group, by name or number; empty = user and group of the process
 };
 
 // A non-blocking socket that listens. The destructor closes it and removes the file of a unix socket.
@@ -37,7 +37,7 @@ class ListeningSocket {
   uint16_t port() const;
   bool local() const { return !path_.empty(); }  // whether it is a unix socket
 
-  // Stops listening. Connections that nobody has accepted are reset.
+  // Stops listening. Connections that were not accepted yet are reset.
   void close();
 
  private:

@@ -52,9 +52,9 @@ struct Host : RpcState {
     options.clock = &thread_nanoseconds;
     return options;
   }
-  // Returns the options of the update queue. If there is a log, the queue has at least kLoggingThreads threads, however
-  // few cores there are, because these threads mostly wait for the disk, and batches that wait at the same time share
-  // one sync.
+  // Returns the options of the update queue. If there is a log, the queue has at least kLoggingThreads threads, even on
+  // a machine with few cores: the threads mostly wait for the disk, and batches that wait at the same time share one
+  // sync.
   static UpdateQueueOptions queue_options(const ServerConfig& config, const UpdateLog* log) {
     UpdateQueueOptions options;
     options.threads = log == nullptr ? config.threads : std::max(config.threads, kLoggingThreads);
@@ -75,7 +75,7 @@ struct Host : RpcState {
   UpdateLog* const log;
   SlowQueries slow_queries;
   Registry registry;
-  Mutex create_mutex;  // held while the scenes are counted and one is added
+  Mutex create_mutex;  // held while the scenes are counted and a scene is added
   WorkerPool pool;
   CostEstimates costs;
   QueryScheduler scheduler;

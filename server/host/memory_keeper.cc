@@ -29,7 +29,7 @@ constexpr milliseconds kIdleReleaseInterval{5000};
 constexpr milliseconds kReadersInterval{1000};
 // Minimum interval between two log entries about refused claims.
 constexpr milliseconds kRefusalsInterval{5000};
-// Minimum interval between two log entries with the use of each line.
+// Minimum interval between two log entries about the use of each line of the memory budget.
 constexpr milliseconds kLinesInterval{60'000};
 
 std::vector<ScenePtr> all_scenes(const Registry& registry) {
@@ -100,10 +100,10 @@ void MemoryKeeper::keep() {
   if (is_needed) log_lines(now);
 }
 
-// If the measured memory exceeds the ceiling of moves, closes the connections that hold or send most; otherwise only
-// measures what the connections send. When memory comes near this ceiling, inserts and uploads are already refused and
-// histories already shortened. So the memory that still grows is allocated by gRPC and claimed by no call, for example
-// for calls that are cancelled immediately, or for endless headers.
+// If the measured memory exceeds the ceiling of moves, closes the connections that claim and send most bytes; otherwise
+// only measures the bytes that they send. When memory comes near this ceiling, inserts and uploads are already refused
+// and histories already shortened. So the memory that still grows is allocated by gRPC and claimed by no call, for
+// example for calls that are cancelled immediately, or for endless headers.
 void MemoryKeeper::shed_connections() {
   const bool is_full = budget_.measured() > budget_.ceiling(MemoryLine::kMoves);
   const size_t closed = shed_(is_full);

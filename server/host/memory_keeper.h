@@ -1,10 +1,10 @@
 // Thread that keeps the memory of the process below its limit. It measures the process periodically. When memory is
 // short or a claim was refused, it drops old revisions and returns free memory to the kernel. When memory is short, it
 // then drops the oldest ticks of histories, so that histories give way before inserts and uploads are refused, and
-// after that cancels the readers of the oldest revisions. If memory is nearly full, its first step is to close the
-// connections that hold or send most. Only this thread does this work, because the work visits all scenes and the whole
-// heap. It logs what it dropped, cancelled or closed, and the lines of the budget on which claims were refused. While
-// memory is short or claims are refused, it logs the use of each line once a minute.
+// after that cancels the readers of the oldest revisions. If memory is nearly full, the thread first closes the
+// connections that claim and send most bytes. Only this thread does this work, because the work visits all scenes and
+// the whole heap. The thread logs what it dropped, cancelled or closed, and the lines of the budget on which claims
+// were refused. While memory is short or claims are refused, it logs the use of each line once a minute.
 //
 // Threads: the constructor starts the thread, the destructor ends it.
 #ifndef LOCUS_SERVER_HOST_MEMORY_KEEPER_H_
@@ -31,9 +31,9 @@ std::vector<uint64_t> shrunk_sizes(const std::vector<uint64_t>& sizes, uint64_t 
 
 class MemoryKeeper {
  public:
-  // Function that closes the connections that claim and send most. Sent bytes count, because they use memory inside
-  // gRPC that no claim includes. If `close` is false, the function only measures the sent bytes. Returns the number of
-  // closed connections.
+  // Function that closes the connections that claim and send most bytes. Sent bytes count, because they use memory
+  // inside gRPC that no claim includes. If `close` is false, the function only measures the sent bytes. Returns the
+  // number of closed connections.
   using Shed = std::function<size_t(bool close)>;
 
   // `budget`, `registry` and `log` must outlive the keeper. `log` may be null.
@@ -42,7 +42,8 @@ class MemoryKeeper {
   MemoryKeeper(const MemoryKeeper&) = delete;
   MemoryKeeper& operator=(const MemoryKeeper&) = delete;
 
-  // Measures the process, and frees memory if it is short. Called by the thread and by tests.
+  // Measures the process, and frees memory if memory is short, a claim was refused, or the allocator keeps much free
+  // memory. Called by the thread and by tests.
   void keep();
 
   // Returns the number of bytes by which histories were shortened so far.

@@ -13,7 +13,7 @@
 
 namespace locus::server {
 
-// Memory in bytes that applying a batch needs, and what the batch does to the memory of its scene.
+// Memory in bytes that applying a batch needs, and the kind of the batch by its effect on the memory of the scene.
 struct UpdateCost {
   enum class Kind : uint8_t {
     kRemoves,  // the batch only removes objects
@@ -32,7 +32,8 @@ UpdateCost cost_of(const UpdateBatch& batch);
 uint64_t upload_cost(uint32_t vertices, uint32_t triangles);
 uint64_t tree_cost(uint32_t triangles);
 
-// Returns the memory in bytes that a mesh name needs for its parts; the content may be shared with other names.
+// Returns the memory in bytes of a mesh's name and the names of its parts. Vertices and triangles are not included,
+// because several mesh names may share them.
 uint64_t parts_cost(absl::Span<const MeshPart> parts);
 
 // Returns the peak memory in bytes of a change that places `placed` instances in a scene that has `present` instances.

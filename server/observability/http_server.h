@@ -24,8 +24,8 @@ namespace locus::server {
 
 class HttpServer {
  public:
-  // Function that returns the checked certificates that new connections use; if it is empty, there is no TLS. If the
-  // contents have a client CA, only clients with a certificate signed by that CA are served.
+  // Function that returns the checked certificates that new connections use; an empty function means no TLS. If the
+  // function returns a client CA, too, only clients with a certificate signed by that CA are served.
   using Certificates = std::function<TlsContents()>;
 
   // Starts serving. `address` must be a TCP address. Returns UNAVAILABLE if the server cannot listen on it.

@@ -31,9 +31,9 @@ bool logs(LogLevel level);
 // characters, which may come from callers, are escaped, and values longer than 1,024 bytes are cut.
 void log(LogLevel level, absl::string_view message, std::initializer_list<LogField> fields = {});
 
-// Scope that names the call this thread is working on: during the scope's lifetime, every line that the thread logs has
-// the field request_id and, if the caller sent a traceparent, the field traceparent. Scopes may be nested; the ids of
-// the innermost scope are logged.
+// Scope that names the call on which this thread works: during the scope's lifetime, every line that the thread logs
+// has the field request_id and, if the caller sent a traceparent, the field traceparent. Scopes may be nested; the ids
+// of the innermost scope are logged.
 class LogScope {
  public:
   explicit LogScope(TraceContext trace);

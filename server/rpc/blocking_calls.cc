@@ -171,7 +171,7 @@ class BlockingCalls::Call final : private IoLoop::ActiveCall, private MessageStr
     reply_claim_ = caller_->claim_anyway(MemoryLine::kReplies, answer_.Length());
   }
 
-  // Waits for the event of the running operation. Cancels the call if the caller stalls.
+  // Waits for the end of the running operation. Cancels the call if that takes longer than RpcState::stall_limit.
   bool wait() {
     if (!operated_.wait_for(owner_.state_.stall_limit)) {
       context_.TryCancel();
@@ -206,7 +206,7 @@ class BlockingCalls::Call final : private IoLoop::ActiveCall, private MessageStr
     const absl::Status status = caller_->recheck(scene);
     if (status.ok()) return;
     is_revoked_ = true;
-    if (first_ == First::kReading) return give_up(status);  // which writes the audit line
+    if (first_ == First::kReading) return give_up(status);  // finish() writes the audit line
     caller_->audit(scene, status);
     context_.TryCancel();
   }
@@ -272,7 +272,7 @@ class BlockingCalls::Call final : private IoLoop::ActiveCall, private MessageStr
   std::atomic<First> first_{First::kTaken};
   grpc::ByteBuffer first_bytes_;                           // owned by gRPC while the first message is read
   grpc::ByteBuffer answer_;                                // set by answer()
-  std::atomic<SteadyTime> finishing_since_{SteadyTime()};  // time at which finish() was called; none before
+  std::atomic<SteadyTime> finishing_since_{SteadyTime()};  // time at which finish() was called; SteadyTime() before
   std::atomic<bool> gone_{false};                          // the caller no longer waits
   Semaphore operated_;                                     // posted when the running read or write has ended
   bool operation_ok_ = false;  // result of the last operation; written before operated_ is posted

@@ -1,6 +1,7 @@
 // One call as the services see it: its metadata, its deadline, and whether its caller still waits for an answer.
 //
-// Threads: a Caller may be used from any thread while the call lasts, except authorize(), set_subject() and trace().
+// Threads: while the call lasts, any thread may use a Caller. Exception: authorize(), set_subject() and trace() belong
+// to the call's own thread.
 #ifndef LOCUS_SERVER_RPC_CALL_H_
 #define LOCUS_SERVER_RPC_CALL_H_
 
@@ -43,7 +44,7 @@ class Caller {
   // the call has no deadline. For a message of a stream, the time is never later than limits::kDefaultWaitMs from now.
   SteadyTime wait_until(bool stream) const;
 
-  // Returns INVALID_ARGUMENT (MALFORMED) if the metadata `x-scene` is present and names another scene.
+  // Returns INVALID_ARGUMENT (MALFORMED) if the metadata `x-scene` names another scene than `scene`.
   absl::Status check_scene(const std::string& scene) const;
 
   // Counts the call and its metadata for its connection. Call it once, when the call was accepted.
@@ -73,7 +74,7 @@ class Caller {
   const Identity& identity() const { return *identity_; }
 
   // Returns an id of the client: a hash of its identity's name or, without an identity, of its connection's name. All
-  // calls of a client have the same id; other clients have other ids.
+  // calls of a client have the same id; different clients almost certainly have different ids.
   uint64_t client() const;
 
   // Returns the names under which the quotas of the caller's identity and connection are counted.
@@ -83,13 +84,13 @@ class Caller {
   // Takes `amount` from the quotas `kind` of the caller's identity and the caller's connection, even if they do not
   // suffice, because the work is already done.
   void charge_quota(QuotaKind kind, double amount) const;
-  // Takes `amount` of the quota `kind` until the result is destroyed.
+  // Takes `amount` from the same quotas as take_quota(), but only until the result is destroyed.
   absl::StatusOr<QuotaHold> hold_quota(QuotaKind kind, double amount) const;
 
   // Claims `bytes` on `line` of the server's memory budget, and takes them from the quota bytes_in_flight of the
   // caller's identity and connection. For the lines of moves, requests and replies, the bytes count against two shares,
   // too: that of the connection and that of the caller's identity (MemoryBudget::connection_share()). If a limit or
-  // quota does not suffice, returns RESOURCE_EXHAUSTED, which names it.
+  // quota does not suffice, returns RESOURCE_EXHAUSTED, naming the limit or quota.
   absl::StatusOr<CallMemory> claim(MemoryLine line, absl::string_view field, uint64_t bytes) const;
   // Claims `bytes` for work that is never refused, such as work that frees memory, or an answer that is built already.
   CallMemory claim_anyway(MemoryLine line, uint64_t bytes) const;
@@ -163,7 +164,7 @@ absl::Status check_serving(const RpcState& state);
 bool ends_stream(const Caller& caller, const absl::Status& status);
 
 // Counts a call, or one message of a stream, that was answered with `status`. If `status` is not OK, logs a line at
-// debug level and, for queries and updates for which Caller::is_audited() returns true, writes a line to the audit log.
+// debug level. For queries and updates, also writes a line to the audit log if Caller::is_audited() returns true.
 // `scene` is the scene that the message names; empty if it is not known.
 void record_answer(CallMetrics& metrics, const Caller& caller, Rpc rpc, const absl::Status& status, SteadyTime arrived,
                    absl::string_view scene = "");

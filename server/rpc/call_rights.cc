@@ -18,8 +18,8 @@
 namespace locus::server {
 namespace {
 
-// Returns whether kRpcRights has a row for the rpc. The build fails if a row is missing, because nobody could call the
-// rpc.
+// Returns whether kRpcRights has a row for the rpc. The build fails if a row is missing, because without the row nobody
+// could call the rpc.
 constexpr bool has_right(std::string_view path) {
   for (const RpcRight& row : kRpcRights)
     if (std::string_view(row.path.data(), row.path.size()) == path) return true;
@@ -55,8 +55,8 @@ absl::Status lacks(const Identity& identity, Right right, absl::string_view what
                                                   "; ask the operator for a line `grant` in the access file"));
 }
 
-// Adds `bytes` to `claimed`, the bytes that calls of the `owner`, a connection or an identity, have claimed. Returns
-// RESOURCE_EXHAUSTED, and adds nothing, if the sum would exceed `share`.
+// Adds `bytes` to `claimed`, the bytes that all calls of one owner have claimed. `owner` is the kind of the owner, for
+// the error: "connection" or "identity". Returns RESOURCE_EXHAUSTED, and adds nothing, if the sum would exceed `share`.
 absl::Status take_share(std::atomic<uint64_t>& claimed, absl::string_view owner, uint64_t share,
                         absl::string_view field, uint64_t bytes) {
   constexpr uint32_t kShareRetryMs = 200;

@@ -12,7 +12,7 @@
 // such messages, it reads the next message only after an answer has been written, so a caller that does not read its
 // answers can use only bounded memory. A call whose answer is not taken within RpcState::stall_limit is cancelled.
 // Reads, one write and the work on several messages proceed concurrently. If Method::kInOrder is true, answers are
-// written in the order of the messages, otherwise as they complete.
+// written in the order of the messages, otherwise in the order in which the answers become ready.
 #ifndef LOCUS_SERVER_RPC_HOT_CALL_H_
 #define LOCUS_SERVER_RPC_HOT_CALL_H_
 
@@ -46,7 +46,7 @@ namespace locus::server {
 template <class Method>
 class HotCall;
 
-// Acceptor of the calls of one rpc on one IO loop; keeps the slots of ended calls for reuse. Outlives the loop's calls.
+// Acceptor of the calls of one rpc on one IO loop; keeps some unused slots for reuse. Outlives the loop's calls.
 //
 // A Method has the types Request, Response and Work, and the constants kRpc, kPath, kStream and kInOrder. Its functions
 // are listen(), which requests the next call from gRPC; make_work(), which returns the Work of a CallSlot; and begin(),
@@ -164,8 +164,8 @@ class HotCall final : private IoLoop::ActiveCall {
       listener_.io_.release();
   }
 
-  // Handles one event of the call: changes the state by `change`, then calls advance(). Calls of act() nest if work
-  // answers immediately; then only the outermost call of act() calls advance(). May delete the call.
+  // Handles one event of the call: runs `change`, which changes the state, then advance(). act() nests if work answers
+  // immediately; then only the outermost act() runs advance(). May delete the call.
   template <class Change>
   void act(const Change& change) {
     ++acting_;
@@ -364,8 +364,8 @@ class HotCall final : private IoLoop::ActiveCall {
     end_status_ = std::move(status);
   }
 
-  // Stops reading and drops all answers, because the caller is gone or has lost its right, or because the error
-  // `status` of a message ends the stream.
+  // Stops reading and drops all answers, because the caller is gone or may no longer make the call, or because the
+  // error `status` of a message ends the stream.
   void stop(absl::Status status) {
     if (stopping_) return;
     end(std::move(status));

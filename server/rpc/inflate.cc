@@ -28,7 +28,7 @@ absl::Status too_large(uint64_t max_bytes) {
   return refuse_full("", "receive_bytes", static_cast<double>(max_bytes), static_cast<double>(max_bytes + 1), 0);
 }
 
-// A gzip stream that is read from slices, and its result, slice by slice.
+// Inflates one gzip stream, which is given as slices. Returns the result slice by slice.
 class Inflation {
  public:
   explicit Inflation(std::vector<grpc::Slice> input) : input_(std::move(input)) {

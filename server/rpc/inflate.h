@@ -22,10 +22,10 @@ bool is_gzip(const grpc::ByteBuffer& bytes);
 // Function that claims an amount of memory in bytes for the caller, such as Caller::claim().
 using ClaimBytes = absl::FunctionRef<absl::StatusOr<CallMemory>(uint64_t bytes)>;
 
-// Replaces `bytes` by their inflated content. Returns the claims of the memory of the content; each is made by `claim`
-// before its memory is allocated. Returns RESOURCE_EXHAUSTED naming the limit receive_bytes if the content has more
-// than `max_bytes` bytes, INVALID_ARGUMENT (MALFORMED) for bytes that are not exactly one gzip stream, and errors of
-// `claim`. After an error, `bytes` are unchanged. Cost: 3 ms for each MiB of the result.
+// Replaces `bytes` by their inflated content. Returns the claims of the content's memory. Each claim is made by `claim`
+// before the claimed memory is allocated. Returns RESOURCE_EXHAUSTED naming the limit receive_bytes if the content has
+// more than `max_bytes` bytes, INVALID_ARGUMENT (MALFORMED) for bytes that are not exactly one gzip stream, and errors
+// of `claim`. After an error, `bytes` are unchanged. Cost: 3 ms for each MiB of the result.
 absl::StatusOr<std::vector<CallMemory>> inflate_gzip(ClaimBytes claim, uint64_t max_bytes, grpc::ByteBuffer& bytes);
 
 }  // namespace locus::server

@@ -92,7 +92,7 @@ class IoLoop final : private EventSource, public EventLoop {
   std::atomic<bool> recheck_posted_{false};
   MemberTag<IoLoop> recheck_{*this, &IoLoop::recheck_active_calls};
   ActiveCalls active_calls_;
-  // True while the timer of check_stalled_calls() is set. It is set whenever there are active calls.
+  // True while the timer of check_stalled_calls() is set. The timer is set whenever there are active calls.
   bool stall_timer_set_ = false;
 };
 

@@ -14,7 +14,7 @@ class MessageStream {
  public:
   virtual ~MessageStream() = default;
 
-  // Reads the caller's next message into `request`. Returns false if the caller sends no more or the call has ended.
+  // Reads the caller's next message into `request`. Returns false if no more messages come or the call has ended.
   // Blocks, but at most for RpcState::stall_limit, after which the call is cancelled. Returns INVALID_ARGUMENT if the
   // bytes are not a message of this type or if the message exceeds a limit, and RESOURCE_EXHAUSTED if there is not
   // enough memory for the message. Claims the message's memory until the next call of read() or the end of the call.
@@ -23,7 +23,8 @@ class MessageStream {
     return read_planned(wire_plan<Request>(), request);
   }
 
-  // Writes a message to the caller. Returns false if the call has ended. Blocks until the network takes the message.
+  // Writes a message to the caller. Returns false if the call has ended. Blocks until the network takes the message,
+  // but at most for RpcState::stall_limit, after which the call is cancelled.
   virtual bool write(const google::protobuf::Message& response) = 0;
   // Sets the only response of the call, which is sent with the status after the body has returned OK. Does not block.
   virtual void answer(const google::protobuf::Message& response) = 0;

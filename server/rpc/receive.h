@@ -12,8 +12,8 @@
 
 namespace locus::server {
 
-// Parses `bytes`, which it empties, into `request`. Returns a claim of the memory of the parsed message. Errors: those
-// of inflate_gzip() if the server accepts compressed messages, those of WirePlan::scan() and Caller::claim(), and
+// Parses `bytes` into `request`, and empties `bytes`. Returns a claim of the memory of the parsed message. Errors are
+// those of inflate_gzip() if the server accepts compressed messages, those of WirePlan::scan() and Caller::claim(), and
 // INVALID_ARGUMENT (MALFORMED) if Protobuf cannot parse the bytes. After an error of scan() or claim(), `bytes` still
 // contain the message, inflated if it was compressed.
 absl::StatusOr<CallMemory> parse_request(const Caller& caller, const WirePlan& plan, grpc::ByteBuffer& bytes,

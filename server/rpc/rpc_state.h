@@ -31,12 +31,12 @@ struct RpcState {
   AdmissionLimiter calls;           // running calls that have no other limiter
   AdmissionLimiter streams;         // open streams of queries and updates
   MemoryBudget memory;              // memory limit of the process
-  ClientShares shares;              // what each identity has claimed of `memory`
-  uint64_t max_inflated_bytes = 0;  // maximum size of an inflated message; 0 = gRPC refuses compressed ones
+  ClientShares shares;              // bytes of `memory` that each identity has claimed
+  uint64_t max_inflated_bytes = 0;  // maximum size of an inflated message; 0 = gRPC refuses compressed messages
   // Identities and rights of callers. Set before the first call; null in servers without access control.
   AccessControl* access = nullptr;
-  FileLoads access_loads;  // of the access file, the token file and the JWKS file
-  FileLoads tls_loads;     // of the certificate, its key and the client CA
+  FileLoads access_loads;  // loads of the access file, the token file and the JWKS file
+  FileLoads tls_loads;     // loads of the certificate, its key and the client CA
   Quotas quotas{
       [this](absl::string_view subject) { return access == nullptr ? Quota() : access->rules()->quota_of(subject); }};
   Drain drain;

@@ -5,8 +5,8 @@
 // second, three times as many as the server accepts and ends, so the server's own count of calls misses most of them.
 //
 // Threads: one thread at a time. A count takes about 15 us; the first count of a connection takes longer, because it
-// asks for the numbers of all connections that gRPC has added since the last such question. Remove this class once gRPC
-// limits the number of calls that wait to be accepted.
+// must find the number by which channelz names the connection. For this it asks for the numbers of all connections that
+// gRPC has added since it last asked. Remove this class once gRPC limits the number of calls that wait to be accepted.
 #ifndef LOCUS_SERVER_RPC_STREAM_COUNTER_H_
 #define LOCUS_SERVER_RPC_STREAM_COUNTER_H_
 
@@ -30,7 +30,7 @@ class StreamCounter {
 
  private:
   // Asks gRPC for the connections' numbers from next_number_ on, and stores them in the connections. If kAskAllInterval
-  // has passed since it asked for all numbers, asks for all numbers again.
+  // has passed since the last request for all numbers, requests all numbers again.
   void learn_numbers();
 
   ConnectionTable& table_;

@@ -1,8 +1,8 @@
 // TLS for the connections of a server: the credentials for gRPC, and a thread that looks for changed files each second.
 // New connections use the newest valid files; existing connections keep the files with which they began, so no call is
 // dropped. Files that cannot be used are logged as an error once, and the previous files stay in use. Certificate, key
-// and client CA are always replaced together, in memory, so a key is never used with another certificate. The owner
-// ends the connections of clients that are no longer trusted, through TlsHooks.
+// and client CA are always replaced together, in memory, so a key is never used with another certificate. TlsHooks
+// notify the owner, which ends the connections of clients that are no longer trusted.
 //
 // When a connection begins, gRPC calls fetch() for new files, without a lock of its own. That is safe, because only the
 // acceptor's thread hands connections over to gRPC.

@@ -126,7 +126,7 @@ struct WirePlan::Scan {
   uint64_t memory = 0;
   uint32_t fields = 0;
   uint32_t unknown = 0;
-  // Number of values so far of the fields of each limit, by limit_index; grows as needed.
+  // Number of values scanned so far for each limit, indexed by limit_index; grows as needed.
   absl::InlinedVector<uint32_t, 16> counts;
 
   absl::Status message(const Type& type);
@@ -177,9 +177,9 @@ absl::Status WirePlan::Scan::count(const Field& field) {
   return refuse_limit(field.limit->path, field.limit->limit, field.limit->max, values);
 }
 
-// Counts the memory of one encoded field of a column. It contains any number of values (packed) or a single value; both
-// forms are legal. Each encoded field is charged kColumnBytes, although all encoded fields of a column share one
-// header.
+// Counts the memory of one encoded field of a column. An encoded field contains any number of values (packed) or a
+// single value; both forms are legal. Each encoded field is charged kColumnBytes, although all encoded fields of a
+// column share one header.
 absl::Status WirePlan::Scan::column(const Field& field, Wire wire) {
   uint32_t bytes = 0;
   if (!skip(wire, &bytes)) return no_message();
@@ -201,7 +201,7 @@ absl::Status WirePlan::Scan::content(const Field& field) {
   uint32_t length = 0;
   if (!in.ReadVarint32(&length) || length > INT32_MAX) return no_message();
   const CodedInputStream::Limit outer = in.PushLimit(static_cast<int>(length));
-  if (in.BytesUntilLimit() != static_cast<int>(length)) return no_message();  // the field ends after its message
+  if (in.BytesUntilLimit() != static_cast<int>(length)) return no_message();  // the field extends beyond its message
   RETURN_IF_ERROR(message(*field.type));
   in.PopLimit(outer);
   return absl::OkStatus();

@@ -1,6 +1,6 @@
-// Scan of a message's bytes before Protobuf parses them. Parsing turns two bytes into an object of a hundred bytes or
-// more, so a small message could otherwise use any amount of memory. The scan refuses bytes that are no message, counts
-// repeated sub-messages against their limits, and returns an upper bound of the memory that the parsed message takes.
+// Scan of a message's bytes before Protobuf parses them. Parsing can turn two bytes into an object of a hundred bytes
+// or more, so a small message could otherwise use any amount of memory. The scan refuses bytes that are no message,
+// counts repeated sub-messages against their limits, and returns an upper bound of the parsed message's memory.
 //
 // A WirePlan is built from the message's descriptor, once for each type. It is immutable; any thread may use it.
 // Cost of a scan: about 10 ns for each field; packed columns are skipped, not read.
@@ -40,8 +40,8 @@ inline constexpr uint32_t kMaxUnknownFields = 256;
 
 class WirePlan {
  public:
-  // Builds the plan of `type`. Every repeated sub-message, repeated string and map in it must have a row in `limits`.
-  // Precondition: the types below `type` do not contain themselves.
+  // Builds the plan of `type`. Every repeated sub-message, repeated string and map in `type` must have a row in
+  // `limits`. Precondition: neither `type` nor a message type inside it contains itself.
   WirePlan(const google::protobuf::Descriptor& type, const std::vector<WireLimit>& limits);
   ~WirePlan();
   WirePlan(WirePlan&&) noexcept;

@@ -55,7 +55,7 @@ void CallThreads::work(Threads::iterator self) {
   changed_.notify_all();
 }
 
-// Joins threads that have left work() or are about to.
+// Joins the threads that have returned from work() or are about to return.
 void CallThreads::join_ended() {
   Threads ended = std::move(ended_threads_);
   ended_threads_.clear();

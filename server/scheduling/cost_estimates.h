@@ -2,8 +2,8 @@
 // work. Estimates decide where and when a batch runs and whether it is admitted; they never change an answer.
 //
 // Threads: every member may be called from any thread, and no member takes a lock. If two threads call learn() at the
-// same time, one of their measurements may be lost. Memory is fixed: the entry of one scene may be replaced by that of
-// another scene; the next estimate for the replaced scene is then the default.
+// same time, one of their measurements may be lost. Memory is fixed: the entry of an estimate may be replaced by that
+// of another estimate. Then the replaced estimate is the default again, until the next call of learn() for it.
 #ifndef LOCUS_SERVER_SCHEDULING_COST_ESTIMATES_H_
 #define LOCUS_SERVER_SCHEDULING_COST_ESTIMATES_H_
 

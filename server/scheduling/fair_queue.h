@@ -7,8 +7,8 @@
 //
 // Threads: one thread at a time. Every operation costs O(log clients); remove() costs O(entries of the client) in
 // addition. Memory: one record for each waiting client, and for at most kMaxIdleClients idle clients. Invariants: every
-// client is in exactly one of two sets, `waiting_` if it has entries, else `idle_`, both ordered by the work served to
-// the client; virtual_time_ never decreases.
+// client is in exactly one of two sets: in `waiting_` if it has entries, otherwise in `idle_`. Both sets are ordered by
+// the work served to the client. virtual_time_ never decreases.
 #ifndef LOCUS_SERVER_SCHEDULING_FAIR_QUEUE_H_
 #define LOCUS_SERVER_SCHEDULING_FAIR_QUEUE_H_
 

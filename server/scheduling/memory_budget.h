@@ -6,7 +6,7 @@
 // Each claim belongs to a line, which is the purpose of the memory. Lines have different ceilings, so that work that
 // makes scenes grow is refused first, then updates, and queries last. Between the highest ceiling and the limit is a
 // reserve for small claims of moves, requests and replies that do not fit below their ceilings. Each client may use a
-// quarter of the reserve. So every client can always query what fills the memory, and delete it.
+// quarter of the reserve. So clients can usually still query and delete the data that fills the memory.
 //
 // Threads: every member may be called from any thread; the Meter is called by one thread at a time. No member frees
 // memory, because freeing takes long. Instead, a refusal contains a retry delay, and the owner of the budget frees
@@ -14,7 +14,7 @@
 // process is measured in three cases: refresh() is called, a claim does not seem to fit, or the claims that have ended
 // since the last measurement add up to more than 1 / kStepShare of the limit. Invariants: claimed_ is the sum of the
 // live claims; when claim() succeeds, either the measured memory plus the live claims are at most the ceiling of the
-// line, or the claim uses the reserve, and all claims that use it fit into it.
+// line, or the claim uses the reserve, and all such claims fit into it.
 #ifndef LOCUS_SERVER_SCHEDULING_MEMORY_BUDGET_H_
 #define LOCUS_SERVER_SCHEDULING_MEMORY_BUDGET_H_
 

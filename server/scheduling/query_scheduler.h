@@ -26,7 +26,7 @@
 namespace locus::server {
 
 // Query batch on which pool threads work in turns of limited time. The job itself ends its work early if its call was
-// cancelled or its deadline has passed.
+// cancelled or the call's deadline has passed.
 class QueryJob {
  public:
   virtual ~QueryJob() = default;

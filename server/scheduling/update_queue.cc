@@ -143,7 +143,7 @@ void UpdateQueue::apply_inline(SceneQueue& scene_queue, PendingUpdate& update, u
   if (!group.empty()) learn(items, start);
   std::unique_ptr<SceneQueue> empty;
   const MutexLock lock(mutex_);
-  stats_.applied_inline += group.size();  // none if the update was withdrawn
+  stats_.applied_inline += group.size();  // 0 if apply() dropped the update, because stop() returned an error
   empty = finish(scene_queue);
 }
 

@@ -4,8 +4,8 @@
 // disk are always queued, and the waiting batches of a scene share one sync.
 //
 // Threads: every member may be called from any thread; post() takes a lock that is held only briefly. Invariants: at
-// most one group of batches of a scene is being applied, and batches of a scene never overtake each other; the counts
-// of a SceneQueue and of the statistics equal the batches and items that wait.
+// most one group of batches of a scene is being applied, and batches of a scene never overtake each other. `items` of
+// a SceneQueue, and `updates` and `items` of the statistics, count exactly the waiting batches and items.
 #ifndef LOCUS_SERVER_SCHEDULING_UPDATE_QUEUE_H_
 #define LOCUS_SERVER_SCHEDULING_UPDATE_QUEUE_H_
 
@@ -98,7 +98,7 @@ class UpdateQueue {
     bool busy = false;           // a thread is applying batches
     SteadyTime retry_at = {};    // time of the next attempt, while readers stall the scene
     SteadyTime stalled_at = {};  // start of the stall
-    absl::Status late;           // error that began the stall, or OK; used by the busy thread only
+    absl::Status late;           // error of the last attempt if readers stalled it, else OK; for the busy thread only
   };
   using Group = std::vector<PendingUpdate*>;
 

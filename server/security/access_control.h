@@ -1,8 +1,8 @@
 // Access control: reads the security files, identifies callers and publishes the rules that say what they may do.
 //
-// Threads: every member may be called from any thread. Readers never wait for a reload, which prepares everything
-// before it swaps one pointer. Only files without a mistake are published: a reload that finds a mistake changes
-// nothing. The generation grows by one with each reload that publishes.
+// Threads: every member may be called from any thread. Readers never wait for a reload: it prepares a new state, then
+// swaps one pointer. If any file has a mistake, a reload publishes nothing and the old state stays in use. The
+// generation grows by one with each reload that publishes a state.
 #ifndef LOCUS_SERVER_SECURITY_ACCESS_CONTROL_H_
 #define LOCUS_SERVER_SECURITY_ACCESS_CONTROL_H_
 
@@ -31,7 +31,7 @@ namespace locus::server {
 struct Credentials {
   absl::string_view bearer;            // see bearer_of_header(); empty = none
   absl::string_view certificate_name;  // of the verified client certificate: first URI SAN, else first DNS SAN, else CN
-  std::optional<uint32_t> unix_uid;    // user of the peer of a unix socket; counts only if `local`
+  std::optional<uint32_t> unix_uid;    // user id of the peer of a unix socket; ignored unless `local`
   bool local = false;                  // whether the peer is on this machine
 };
 
@@ -81,7 +81,7 @@ class AccessControl {
   std::vector<std::string> warnings() const;
   // Returns the audit log; nullptr if there is none.
   AuditLog* audit() const { return audit_.get(); }
-  // Returns the counts of updates for the audit log; nullptr if there is none.
+  // Returns the counts of updates for the audit log; nullptr if there is no audit log.
   AuditUpdates* audit_updates() const { return audit_updates_.get(); }
 
  private:

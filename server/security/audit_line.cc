@@ -12,7 +12,7 @@ constexpr uint32_t kLastCharacter = 0x10FFFF;
 constexpr uint32_t kFirstSurrogate = 0xD800, kLastSurrogate = 0xDFFF, kFirstLowSurrogate = 0xDC00;
 constexpr uint32_t kFirstWide = 0x10000;  // first character that needs two surrogates
 
-// Returns the number of bytes of a UTF-8 character by its first byte; 0 for a byte that begins none.
+// Returns the number of bytes of the UTF-8 character that begins with `first`; 0 if no character begins with this byte.
 size_t length_of(uint8_t first) {
   if (first < 0x80) return 1;
   if (first >= 0xC2 && first < 0xE0) return 2;
@@ -24,7 +24,7 @@ size_t length_of(uint8_t first) {
 // Removes and returns the first character of `text`, which must not be empty; returns kReplacement for a byte that is
 // not UTF-8.
 uint32_t take_character(absl::string_view& text) {
-  // Smallest character of each length: a longer form of a smaller character is not UTF-8.
+  // Smallest character of each length in bytes: UTF-8 forbids encodings that are longer than necessary.
   constexpr uint32_t kSmallest[] = {0, 0, 0x80, 0x800, kFirstWide};
   const auto first = static_cast<uint8_t>(text[0]);
   const size_t length = length_of(first);

@@ -1,5 +1,5 @@
 // Audit log: each change is one line of JSON in FILE, each refusal is one line in FILE.refused. Refusals have a file of
-// their own, so that many of them cannot displace the lines of changes when a full file is replaced. A caller's
+// their own, so that many refusals cannot displace the lines of changes when a full file is rotated. A caller's
 // refusals beyond a few a second are counted instead of written (refusal_tally.h). Callers never wait for the disk: one
 // thread writes the lines of a bounded queue. If the queue was full, a line reports how many lines were dropped.
 // Refusals may fill only half of the queue.

@@ -2,7 +2,7 @@
 // line for each principal and scene reports how many updates there were.
 //
 // Threads: every member may be called from any thread. Counting takes 0.2 us. Invariant: at most kMaxAuditedPairs pairs
-// of principal and scene are kept; before one more is added, the lines of all pairs are written.
+// of principal and scene are kept; to make room for one more pair, all pairs are removed and their lines are written.
 #ifndef LOCUS_SERVER_SECURITY_AUDIT_UPDATES_H_
 #define LOCUS_SERVER_SECURITY_AUDIT_UPDATES_H_
 

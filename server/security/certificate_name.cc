@@ -17,7 +17,7 @@ std::string text_of(const ASN1_STRING* text) {
   return std::string(bytes, static_cast<size_t>(ASN1_STRING_length(text)));
 }
 
-// Returns the first alternative name of a type, GEN_URI or GEN_DNS.
+// Returns the first alternative name of the type `type` (GEN_URI or GEN_DNS) that is not empty.
 std::string first_of_type(GENERAL_NAMES* names, int type) {
   for (int i = 0; i < sk_GENERAL_NAME_num(names); ++i) {
     const GENERAL_NAME* const name = sk_GENERAL_NAME_value(names, i);

@@ -9,8 +9,8 @@
 namespace locus::server {
 
 // Returns the first URI among the alternative names, or else the first DNS name, or else the common name of the
-// subject. The gRPC port uses the same rule. Returns an empty text if there is none. Does not verify the certificate:
-// that must be done before.
+// subject; an empty text if the certificate has none of these names. The gRPC port uses the same rule. Does not verify
+// the certificate: the caller must have verified it.
 std::string certificate_name(const X509& certificate);
 
 }  // namespace locus::server

@@ -54,7 +54,7 @@ class FileChanges {
 
 class FileWatcher {
  public:
-  // Calls `read` immediately, because files may have changed since their owner read them. Then polls the files every
+  // Calls `read` immediately, because the files may have changed since the caller read them. Then polls the files every
   // `pause` and calls `read` after each change. While `read` returns false, calls it again every `retry`, even without
   // a change.
   FileWatcher(std::vector<std::string> files, std::function<bool()> read,

@@ -1,4 +1,4 @@
-// Patterns in which `*` stands for any run of characters and `?` for one. Pure functions; any thread.
+// Patterns in which `*` stands for any number of characters and `?` for one character. Pure functions; any thread.
 #ifndef LOCUS_SERVER_SECURITY_GLOB_H_
 #define LOCUS_SERVER_SECURITY_GLOB_H_
 
@@ -9,7 +9,7 @@ namespace locus::server {
 // Returns whether the whole text matches the pattern. Time: at most the product of both lengths, without recursion.
 bool glob_matches(absl::string_view pattern, absl::string_view text);
 
-// Returns whether the pattern contains `*` or `?`. A pattern without them matches only a text equal to it.
+// Returns whether the pattern contains `*` or `?`. Any other pattern matches only the text that equals the pattern.
 bool is_glob(absl::string_view pattern);
 
 }  // namespace locus::server

@@ -78,7 +78,7 @@ struct JwtHeader {
 absl::StatusOr<JwtHeader> read_header(absl::string_view text) {
   const JsonPointer header = parse_json_object(text);
   if (header == nullptr) return not_accepted("its header is no JSON object");
-  // Refuse extensions that must be understood (crit) and compression, because none is supported.
+  // Refuse extensions that must be understood (crit) and compression, because this verifier supports none of them.
   for (const char* const name : {"crit", "zip", "b64"})
     if (json_object_get(header.get(), name) != nullptr)
       return not_accepted(absl::StrCat("its header has the unsupported member ", name));

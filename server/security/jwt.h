@@ -26,8 +26,8 @@ class JwtVerifier {
                                            absl::string_view issuer, std::vector<std::string>& warnings);
 
   // Returns the identity `jwt:SUBJECT` that a JWT proves at `now` (seconds since 1970). Returns UNAUTHENTICATED, with
-  // the reason, if the JWT's form, algorithm, signature, audience or issuer is wrong, or if `now` is outside of the
-  // JWT's times by more than kJwtSkewSeconds.
+  // the reason, if the JWT's form, algorithm, signature, audience or issuer is wrong. Also returns UNAUTHENTICATED
+  // if `now` is outside of the period of the claims nbf, iat and exp by more than kJwtSkewSeconds.
   absl::StatusOr<IdentityPtr> verify(absl::string_view jwt, int64_t now) const;
 
   // Returns whether a key with this thumbprint, as in Identity::credential, is in the file.

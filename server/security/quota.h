@@ -36,7 +36,7 @@ constexpr bool is_rate(QuotaKind kind) { return kind <= QuotaKind::kUpdateItems;
 // Returns whether a connection can have a quota of the kind. The other kinds count objects, scenes, meshes and
 // histories, which outlive connections.
 constexpr bool is_of_connections(QuotaKind kind) { return kind <= QuotaKind::kOpenStreams; }
-// Returns the kind of a name such as "open_streams"; nullopt if there is none.
+// Returns the kind of a name such as "open_streams"; nullopt if no kind has this name.
 std::optional<QuotaKind> quota_named(absl::string_view name);
 
 inline constexpr double kNoQuota = std::numeric_limits<double>::infinity();
@@ -45,7 +45,7 @@ inline constexpr double kDefaultBurstSeconds = 2;
 struct Quota {
   std::array<double, kQuotaKinds> limits = {kNoQuota, kNoQuota, kNoQuota, kNoQuota, kNoQuota,
                                             kNoQuota, kNoQuota, kNoQuota, kNoQuota};
-  double burst_s = kDefaultBurstSeconds;  // seconds of an unused rate that may be used in one burst
+  double burst_s = kDefaultBurstSeconds;  // seconds for which an unused rate is saved up, to be used in one burst
 
   double of(QuotaKind kind) const { return limits[static_cast<size_t>(kind)]; }
 };

@@ -43,7 +43,7 @@ absl::Status refuse_quota(absl::string_view subject, QuotaKind kind, double limi
                 refusal);
 }
 
-// Returns the refusal of the amount `asked` of a rate whose bucket contains only `level`.
+// Returns the error for a use of `asked` units of a rate whose bucket contains only `level` units.
 absl::Status refuse_rate(absl::string_view subject, const Quota& quota, QuotaKind kind, double level, double asked) {
   const double rate = quota.of(kind);
   if (rate == 0) return refuse_quota(subject, kind, rate, asked, "nothing is allowed", 0);
@@ -57,7 +57,7 @@ absl::Status refuse_rate(absl::string_view subject, const Quota& quota, QuotaKin
   return refuse_quota(subject, kind, rate, asked, absl::StrCat("try again in ", retry, " ms"), retry);
 }
 
-// Returns advice for a caller that has used up its quota of the kind `kind`, an amount in use.
+// Returns advice for a caller that has used up its quota `kind`, which must not be a rate.
 absl::string_view advice_for(QuotaKind kind, bool waiting_helps) {
   switch (kind) {
     case QuotaKind::kBytesInFlight:
@@ -240,7 +240,8 @@ QuotaUse Quotas::use_of(const Account& account, QuotaKind kind) {
   return use;
 }
 
-// Returns the account of a subject, filled up to `now`; nullptr if there is none and the table is full.
+// Returns the account of a subject, filled up to `now`. If the subject has no account, adds one. Returns nullptr if the
+// table is full and no account can be evicted.
 Quotas::Account* Quotas::account(absl::string_view subject, uint64_t now) {
   const auto found = slots_.find(subject);
   Account* const account = found != slots_.end() ? &accounts_[found->second] : add(subject, now);

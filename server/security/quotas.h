@@ -43,15 +43,15 @@ class QuotaHold;
 
 class Quotas {
  public:
-  // Function that returns the quota of a subject, such as AccessRules::quota_of. Called with the mutex held when a
-  // subject is first seen, and at its next use after refresh().
+  // Function that returns the quota of a subject, for example AccessRules::quota_of(). Called with the mutex held: when
+  // a subject is first seen, and at the subject's next use after refresh().
   using QuotaOf = std::function<Quota(absl::string_view subject)>;
 
   explicit Quotas(QuotaOf quota_of, size_t max_subjects = kMaxQuotaSubjects);
 
   // Takes `amount` from a quota. An amount in use must be released by release() later; an amount of a rate is used up.
   // If the quota does not suffice, returns RESOURCE_EXHAUSTED, naming the quota, its value, the amount, and when to try
-  // again. With `amount` 0, checks that a rate is not overdrawn.
+  // again. With `amount` 0, only checks that the rate is not overdrawn.
   absl::Status take(absl::string_view subject, QuotaKind kind, double amount, uint64_t now) LOCUS_EXCLUDES(mutex_);
   absl::Status take(const Identity& identity, QuotaKind kind, double amount, uint64_t now) {
     return take(identity.principal, kind, amount, now);

@@ -18,7 +18,7 @@ namespace locus::server {
 
 class RefusalTally {
  public:
-  static constexpr uint32_t kMaxLines = 4;   // lines in a window for each count, of a caller or shared
+  static constexpr uint32_t kMaxLines = 4;   // lines in a window for each caller's count and for the shared count
   static constexpr size_t kMaxCallers = 64;  // callers with a count of their own in a window
 
   // Counts a refusal. Returns whether the refusal must be written. A caller is a pair of principal and address.

@@ -82,7 +82,7 @@ inline constexpr Right kMetricsPageRight = Right::kMetrics;
 // Returns the row of an rpc by its full method path; nullptr for an unknown path, which nobody may call.
 const RpcRight* right_of(absl::string_view path);
 
-// Returns the right of a name such as "read"; nullopt if there is none.
+// Returns the right of a name such as "read"; nullopt if no right has this name.
 std::optional<Right> right_named(absl::string_view name);
 
 }  // namespace locus::server

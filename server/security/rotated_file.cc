@@ -52,7 +52,7 @@ absl::Status RotatedFile::reopen() {
 void RotatedFile::rename_all() const {
   for (uint32_t number = files_ - 1; number > 0; --number) {
     const std::string older = number == 1 ? file_ : absl::StrCat(file_, ".", number - 1);
-    ::rename(older.c_str(), absl::StrCat(file_, ".", number).c_str());  // the older one may not exist yet
+    ::rename(older.c_str(), absl::StrCat(file_, ".", number).c_str());  // `older` may not exist yet
   }
 }
 
@@ -67,8 +67,8 @@ absl::Status RotatedFile::append(absl::string_view line) {
     if (count < 0 && errno == EINTR) continue;
     if (count < 0) {
       const absl::Status status = absl::ErrnoToStatus(errno, absl::StrCat("cannot write ", file_));
-      // Cut off a partly written line, so that it does not join the next one. If that fails, the file has one malformed
-      // line.
+      // Cut off a partly written line, so that the next line is not appended to it. If truncating the file fails, the
+      // file has one malformed line.
       if (rest.size() < line.size() && ::ftruncate(descriptor_, static_cast<off_t>(size_)) != 0) size_ += line.size();
       return status;
     }

@@ -25,7 +25,7 @@ inline constexpr size_t kMaxAuditQueue = 4096;      // audit lines that wait for
 inline constexpr size_t kMaxAuditedPairs = 1024;    // pairs of principal and scene whose updates are counted
 inline constexpr size_t kMaxAuditTextBytes = 1024;  // each text of an audit line
 inline constexpr uint32_t kAuditFiles = 5;          // audit files kept: the current one and four older ones
-// Pause between two looks at the watched files. A change takes effect when two looks in a row find the same state.
+// Pause between two polls of the watched files. A change takes effect when two successive polls find the same state.
 inline constexpr uint32_t kFileWatchMilliseconds = 200;
 inline constexpr uint32_t kFileRetryMilliseconds = 1000;  // pause before files that could not be used are read again
 

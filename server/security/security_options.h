@@ -11,8 +11,8 @@ namespace locus::server {
 // If access_file, token_file and jwks_file are empty, access control is off: every caller is `anonymous` and may do
 // everything.
 struct SecurityOptions {
-  // File of grants and quotas (see access_file.h). If it is empty but a token file or JWKS file is given, every caller
-  // with a valid token, JWT or certificate may do everything, and all other callers may do nothing.
+  // File of grants and quotas (see access_file.h). If access_file is empty but token_file or jwks_file is set, callers
+  // with a valid token, JWT or certificate may do everything. All other callers may then do nothing.
   std::string access_file;
 
   // File of the tokens that are accepted (see token_file.h); empty = none.

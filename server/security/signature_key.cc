@@ -90,8 +90,8 @@ EVP_PKEY* to_openssl(jwk_t* jwk) {
   return d2i_PUBKEY(nullptr, &position, static_cast<long>(size));
 }
 
-// Returns an error if the key has another type than its JSON names, is too weak, is so large that verification is slow,
-// or is not on its curve.
+// Returns an error if the type of the key differs from `type`. Also returns an error if the key is too weak, is so
+// large that verification is slow, or is not on its curve.
 absl::Status check_key(EVP_PKEY* key, const KeyType& type) {
   if (key == nullptr || EVP_PKEY_get_base_id(key) != type.openssl_type)
     return absl::InvalidArgumentError("its public key is malformed");

@@ -25,7 +25,7 @@ std::optional<SignatureAlgorithm> signature_algorithm_named(absl::string_view na
 
 class SignatureKey {
  public:
-  // Reads a JSON Web Key. Returns UNIMPLEMENTED with the reason if the key has another type or another use; the caller
+  // Reads a JSON Web Key. Returns UNIMPLEMENTED with the reason if the key's type or use is not supported; the caller
   // should skip such a key. Returns INVALID_ARGUMENT for a key that is private, secret, too weak or wrong.
   static absl::StatusOr<SignatureKey> read(const json_t* jwk);
 

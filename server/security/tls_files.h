@@ -33,7 +33,7 @@ inline constexpr size_t kMaxTlsFileBytes = size_t{4} << 20;
 // Reads the files. If a file cannot be read or is too large, returns an error that names this file.
 absl::StatusOr<TlsContents> read_tls_files(const TlsFiles& files);
 
-// Returns OK if servers can use `contents`: the certificates and the key can be read, and the key is that of the first
+// Returns OK if servers can use `contents`: the certificates and the key can be read, and the key belongs to the first
 // certificate. Otherwise returns INVALID_ARGUMENT, which names the file and the reason.
 absl::Status check_tls_contents(const TlsFiles& files, const TlsContents& contents);
 

@@ -41,11 +41,11 @@ class TokenTable {
   // wrong and what to write instead.
   static absl::StatusOr<TokenTable> parse(absl::string_view file, absl::string_view text);
   // Reads a token file. Returns FAILED_PRECONDITION if users other than the file's owner can write it; adds a sentence
-  // to `warnings` if others can read it.
+  // to `warnings` if users outside the file's group can read it.
   static absl::StatusOr<TokenTable> read(const std::string& file, std::vector<std::string>& warnings);
 
-  // Returns the entry of a token; nullptr if there is none or it has expired at `now`. Takes as long for an unknown id
-  // as for a known id with a wrong secret. The pointer is valid until the table is destroyed.
+  // Returns the entry of a token; nullptr if the token is not listed or has expired at `now`. Takes as long for an
+  // unknown id as for a known id with a wrong secret. The pointer is valid until the table is destroyed.
   const TokenEntry* find(absl::string_view token, int64_t now) const;
   // Returns whether a token with this id and hash is listed and has not expired.
   bool contains(absl::string_view id, absl::string_view hash, int64_t now) const;
@@ -63,7 +63,7 @@ bool is_token(absl::string_view bearer);
 // Returns a new token with the id `id` and random bytes from OpenSSL.
 std::string new_token(absl::string_view id);
 
-// Returns the line of a token file, with its final newline.
+// Returns the line of a token file for `entry`, with the final newline.
 std::string token_line(const TokenEntry& entry);
 
 // Adds a new token to the file and returns the token. Creates the file with mode 0600 if it is missing. Returns

@@ -1,5 +1,5 @@
-// Access control of a server: reads the files of identities, rights and quotas, reads them again when they change, and
-// makes running calls check their rights after each change and once their credentials expire.
+// Access control of a server: reads the files of identities, rights and quotas, and reads them again when they change.
+// Makes running calls check their rights after each change, and check twice a second whether their credentials expired.
 //
 // Threads: reload() from any thread. Between start() and stop(), one thread watches the files, and another one makes
 // calls check for expired credentials.

@@ -19,8 +19,8 @@
 namespace locus::server {
 namespace {
 
-// Returns the configured maximum number of connections. If none is configured, returns the number of connections for
-// which the process may open enough files.
+// Returns the configured maximum number of connections. If none is configured, returns kDefaultConnections, or fewer if
+// the process may not open enough files for that many connections, but at least kMinConnections.
 uint32_t max_connections(const ServerConfig& config) {
   if (config.max_connections > 0) return config.max_connections;
   rlimit files{};

@@ -39,7 +39,7 @@ std::vector<ConnectionLimit> connection_limits(const ServerConfig& config, const
 
 // Number of connections that were refused or closed for a reason that is no configurable limit.
 struct ConnectionMisuse {
-  const char* name;  // as in the label of the metric
+  const char* name;  // value of the label `limit` of the metric locus_connections_refused_total
   uint64_t refused = 0;
 };
 // Returns the counts of all kinds of misuse.
@@ -58,7 +58,7 @@ class Connections {
   void add_to(grpc::ServerBuilder& builder, uint32_t streams);
   // Starts accepting connections for `server`, which `builder` of add_to() has built.
   void start(grpc::Server& server);
-  // Reads the files of TLS again. Returns whether they have changed and are in use.
+  // Reads the files of TLS again. Returns true if the files have changed and the new contents are in use.
   bool reload_tls() { return tls_ != nullptr && tls_->reload(); }
   // Returns the files of TLS that are in use, so that other ports can use them; null without TLS.
   const TlsCredentials* tls() const { return tls_.get(); }

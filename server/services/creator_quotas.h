@@ -20,8 +20,8 @@
 
 namespace locus::server {
 
-// Returns the name of the creator, the caller's principal, for a scene or mesh that the caller creates; empty without
-// access control.
+// Returns the creator's name for a scene or mesh that the caller creates: the caller's principal, or an empty text
+// without access control.
 std::string creator_name(const Caller& caller);
 
 // Takes one scene, and the bytes of the history that `spec` requests.

@@ -41,7 +41,7 @@ class HealthService {
   static Response::ServingStatus status_of(State state);
   void set(State state) LOCUS_EXCLUDES(mutex_);
   State state() const LOCUS_EXCLUDES(mutex_);
-  // Blocks until the state differs from `known` or the caller gives up, and returns the state.
+  // Blocks until the state differs from `known`, the state is kEnded, or the caller gives up. Returns the state.
   State wait(const Caller& caller, State known) LOCUS_EXCLUDES(mutex_);
 
   Host& host_;

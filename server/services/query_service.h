@@ -18,7 +18,7 @@ class QueryService final : public v1::QueryService::WithRawMethod_Query<
   ~QueryService() override;
 
   // Begins to accept calls. Call it once, after the server and before the IO threads have started. The threads must end
-  // before the service.
+  // before the service is destroyed.
   void listen(IoThreads& threads);
 
  private:

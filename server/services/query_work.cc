@@ -153,7 +153,7 @@ void QueryWork::run_deferred() { progress_ = host_.scheduler.run_inline(*this); 
 
 void QueryWork::on_deferred_done() {
   if (progress_ == Progress::kDone) return finished(true);
-  // Use the time that run_inline() has already taken as the estimate for the rest.
+  // Use the time that run_inline() has already taken as the estimate for the rest of the batch.
   submit(host_.scheduler.options().inline_nanoseconds);
 }
 

@@ -15,7 +15,7 @@ namespace locus::server {
 namespace {
 
 constexpr absl::string_view kConnection = "connection:";
-// Upper bound in bytes of the memory of an entry with all quotas, and of its encoding.
+// Upper bound in bytes of the memory of an entry with all quotas, its encoding included.
 constexpr uint64_t kEntryBytes = 2048;
 
 bool is_connection(const SubjectUse& use) { return absl::StartsWith(use.subject, kConnection); }

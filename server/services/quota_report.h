@@ -19,8 +19,9 @@ namespace locus::server {
 absl::Status get_quotas(const Host& host, const Caller& caller, const v1::GetQuotasRequest& request,
                         v1::GetQuotasResponse& response);
 
-// Returns (name, share) of each quota that any identity or connection has. `share` is the largest part of its quota
-// that any one of them uses (1 = all of it). Considers only identities and connections that use or created something.
+// Returns the name and the largest share of each quota that limits any identity or connection. A share is the part of
+// its quota that one identity or connection uses (1 = the whole quota). Considers only identities and connections that
+// use or created something.
 std::vector<std::pair<std::string, double>> largest_quota_shares(const Host& host);
 
 }  // namespace locus::server

@@ -137,7 +137,7 @@ class Recovery {
     return recover_scene(log_, stored, find_restored_meshes(log_, host_.registry));
   }
 
-  // Logs the error and returns whether it is damage (DATA_LOSS). Any other error ends the recovery.
+  // Logs the error and returns whether the error is damage (DATA_LOSS). Any other error ends the recovery.
   bool take_damage(const char* kind, const std::string& name, const absl::Status& status) LOCUS_EXCLUDES(mutex_) {
     log(LogLevel::kError, status.message(), {{kind, name}});
     const MutexLock lock(mutex_);

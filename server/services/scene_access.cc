@@ -15,7 +15,7 @@ using std::chrono::steady_clock;
 
 // Interval at which a waiting thread checks whether its call has ended.
 constexpr milliseconds kWaitSlice{50};
-// Time that readers have to release a revoked snapshot before wait_for_readers() calls revoke_overdue_readers().
+// Time that wait_for_readers() gives readers to release revoked snapshots before it calls revoke_overdue_readers().
 constexpr milliseconds kReadersMayTake{1000};
 
 }  // namespace

@@ -14,7 +14,7 @@
 namespace locus::server {
 
 // Checks the scene's name, the metadata x-scene and the caller's right to the scene, then returns the scene. `field` is
-// the field of the request that contains the name; the error for a malformed name says so.
+// the field of the request that contains the name; the error for a malformed name repeats `field`.
 absl::StatusOr<ScenePtr> find_scene(const Host& host, const Caller& caller, const std::string& name,
                                     absl::string_view field);
 
@@ -24,7 +24,7 @@ absl::StatusOr<CallMemory> claim_copy(const Caller& caller, uint64_t bytes, Memo
 
 // Waits for the revision that `view` names, but at most until the time `until`, and pins the revision's snapshot.
 // Returns at once when the revision is published or the scene is deleted, and within 50 ms when the call ends or the
-// server drains. If the server drains, the error is UNAVAILABLE, DRAINING.
+// server drains. If the server drains, the error is UNAVAILABLE with the reason DRAINING.
 absl::StatusOr<SnapshotPin> wait_for(const Scene& scene, const View& view, SteadyTime until, const Caller& caller);
 
 // Waits for the readers whose pins on snapshots of the scene were revoked, until they have released these pins. After

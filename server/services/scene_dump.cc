@@ -14,7 +14,8 @@ namespace locus::server {
 namespace {
 
 // Maximum number of things (objects and instances) in a piece, and maximum size in bytes of a thing. The size includes
-// the thing's entries in the columns, the protobuf tags and lengths of a new run, and a mesh's name.
+// the thing's entries in the columns, the protobuf tags and lengths of a new message Insert or Placement, and a mesh's
+// name.
 constexpr size_t kThingsPerPiece = 16384;
 constexpr size_t kMaxBytesPerThing = 8 + 24 + 16 + 16 + 4 + 8 + 8 + 64 + limits::kMaxNameLength;
 static_assert(kThingsPerPiece * kMaxBytesPerThing <= limits::kDefaultReplyBytes);

@@ -74,9 +74,9 @@ v1::Scene describe(Host& host, const Caller& caller, const Listed& listed) {
   return scene;
 }
 
-// Upper bound in bytes of the memory of a described scene: its labels and the message.
+// Upper bound in bytes of the memory of one scene's description in a response, its labels included.
 constexpr uint64_t kDescribedSceneBytes = 1024 + limits::kMaxLabels * (2 * limits::kMaxLabelLength + 128);
-// Number of copies of a page that exist at the same time: the message and its bytes.
+// Number of copies of a page that exist at the same time: the message and its serialized bytes.
 constexpr uint64_t kPageCopies = 2;
 
 absl::Status list_scenes(const Caller& caller, Host& host, const v1::ListScenesRequest& request,
@@ -148,7 +148,7 @@ absl::Status check_source(const Host& host, const Caller& caller, const std::str
   return host.registry.no_source(source);
 }
 
-// Adds the scene, or returns an existing one if the request permits it.
+// Adds the scene. If a scene of this name exists, returns that scene if request.if_absent(), else ALREADY_EXISTS.
 absl::StatusOr<Registry::CreatedScene> add_scene(Host& host, const v1::CreateSceneRequest& request,
                                                  const SceneSpec& spec) {
   const MutexLock lock(host.create_mutex);

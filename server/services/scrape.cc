@@ -157,8 +157,8 @@ void audit_refusal(const Host& host, const HttpRequest& reader, const Identity& 
   host.access->audit()->write(std::move(entry));
 }
 
-// Returns OK if the reader may read /metrics. Otherwise returns UNAUTHENTICATED if the credentials are missing or not
-// accepted, else PERMISSION_DENIED.
+// Returns OK if the reader may read /metrics. If not, returns UNAUTHENTICATED for missing or unaccepted credentials and
+// PERMISSION_DENIED for accepted ones.
 absl::Status check_reader(const Host& host, const HttpRequest& reader) {
   if (host.access == nullptr || !host.access->enabled()) return absl::OkStatus();
   Credentials credentials;

@@ -1,8 +1,8 @@
 // The pages of the HTTP port: /metrics, with the counters and the host's current state; /healthz, which reports that
 // the process is alive; /readyz, which reports whether calls are served.
 //
-// Threads: every member may be called from any thread; scrapes are serialised. A scrape reads the status of every
-// scene, as GetScene does: O(objects).
+// Threads: every member may be called from any thread; scrapes are serialised. A scrape calls Scene::status() for every
+// scene. Without pinned old revisions this takes at most O(objects and instances).
 #ifndef LOCUS_SERVER_SERVICES_SCRAPE_H_
 #define LOCUS_SERVER_SERVICES_SCRAPE_H_
 

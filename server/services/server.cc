@@ -42,7 +42,7 @@ using std::chrono::system_clock;
 constexpr uint32_t kOtherCalls = kMaxHealthWatchers + kMaxHealthChecks + kMaxReflections;
 // Maximum number of bytes that gRPC takes from a connection in one read.
 constexpr int kMaxReadBytes = 256 << 10;
-// Time after which the connections are closed when gRPC has not ended by itself.
+// Time that gRPC's Shutdown() has after its deadline. If it has not ended by then, all connections are closed.
 constexpr std::chrono::seconds kCloseAfter{2};
 // Interval in milliseconds between keepalive pings to clients, and maximum delay of the answer to a ping. The pings
 // detect clients whose machine is unreachable. The streams of such clients would otherwise stay open for ever.
@@ -189,7 +189,7 @@ void Server::reload() {
 void Server::drain(milliseconds grace) {
   const steady_clock::time_point deadline = steady_clock::now() + grace;
   Host& host = parts_->host;
-  // New connections are accepted until the end, so that probes get the answer that the server is not serving.
+  // Accept new connections until all calls have ended or `deadline` has passed, so that probes get NOT_SERVING.
   parts_->health_service.not_serving();
   host.drain.begin();
   parts_->access->stop();

@@ -39,8 +39,8 @@ class Server {
   // Returns the port of the HTTP pages; 0 if they are not served.
   uint16_t http_port() const;
 
-  // Reads the files of TLS immediately. The server also reads them by itself each second. Returns whether they have
-  // changed and are in use.
+  // Reads the files of TLS immediately. The server also reads them by itself each second. Returns true if the files
+  // have changed and the new contents are in use.
   bool reload_tls();
   // Reads all files of access control and TLS again. A file with a mistake is logged, and the old content stays in use.
   void reload();

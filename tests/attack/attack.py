@@ -1,4 +1,4 @@
-"""Attacks a locusd over loopback with one client and measures a victim; README.md has the table of attacks.
+"""Attacks a locusd over loopback and measures an honest client, the victim. README.md has the table of attacks.
 
     python3 attack.py --attack quick --locusd build/release/bin/locusd
     python3 attack.py --attack gzip,unread --limit 512MiB,2GiB --seconds 5 --locusd build/release/bin/locusd

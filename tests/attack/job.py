@@ -10,7 +10,8 @@ MAX_WRONG = 20
 DYING_SECONDS = 0.3
 MIN_STEP_SECONDS = 0.25
 STRANGER = "mtls-stranger"  # front name: TLS requires a client certificate, and the attacker has none
-# Fronts that must protect locusd from every attack: no row is left out, and the victim's p99 may grow less.
+# Fronts that must protect locusd from every attack: no row is left out, and the victim's p99 may grow only by
+# MAX_SHIELDED_SLOWER.
 SHIELDED = (STRANGER, "edge")
 MAX_SLOWER, MAX_SHIELDED_SLOWER = 10, 5  # factors by which the victim's p99 may grow: default, SHIELDED fronts
 # Status codes that give the caller no information, or that no request of a client may cause.
@@ -79,7 +80,7 @@ class Job:
         self.pipe.send(("skip", text))
 
     def check(self, reply, what, allowed=None, text=True):
-        """Counts a Reply. Reports it as wrong if its code is not allowed, or if it is an error without a text.
+        """Counts a Reply. Reports it as wrong if its code is not allowed or, with `text`, if an error has no text.
 
         A client without the required certificate (the front STRANGER) must get no reply at all.
         """

@@ -18,8 +18,8 @@ TOGETHER = ("reset-queries", "settings", "ping", "garbage", "slow-bodies", "wron
             "gzip", "amplify", "history", "hpack")
 
 
-# Source addresses of those parts of the union whose calls must all be answered. They differ from the address of the
-# other parts, because locusd may refuse connections from that address.
+# Source addresses of those parts of the union whose calls must all be answered. The other parts share another address,
+# from which locusd may refuse connections.
 OWN_ADDRESSES = {"honest": "127.0.0.3", "wrong-bytes": "127.0.0.4", "gzip": "127.0.0.5", "amplify": "127.0.0.6",
                  "history": "127.0.0.7"}
 

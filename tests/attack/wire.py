@@ -304,7 +304,7 @@ class Connection:
     # Calls.
 
     def start(self, path, extra=(), end=False):
-        """Opens a stream for a call. Returns its id."""
+        """Opens a stream for a call. Returns the id of the stream."""
         stream, self.next_id = self.next_id, self.next_id + 2
         self.stream_windows[stream] = self.initial_window
         self.send(frame(HEADERS, END_HEADERS | (END_STREAM if end else 0), stream, header_block(grpc_fields(path, extra))))

@@ -1,4 +1,4 @@
-"""Tests of the program locus-bench: python3 bench_test.py PROGRAM PEER... with the peers of its configuration."""
+"""Tests of the program locus-bench: python3 bench_test.py PROGRAM PEER..., with the peers built into PROGRAM."""
 
 import json
 import math

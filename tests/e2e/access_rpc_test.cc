@@ -102,7 +102,7 @@ TEST_F(AccessRpcTest, AConnectionEndsWithItsThirtyThirdWrongCredential) {
   const auto health = grpc::health::v1::Health::NewStub(running_->stubs().channel);
   grpc::ClientContext context;
   set_timeout(context);
-  const auto watch = health->Watch(&context, {});  // on the same connection, and ends with it
+  const auto watch = health->Watch(&context, {});  // ends with its connection, which the calls below share
   grpc::health::v1::HealthCheckResponse serving;
   ASSERT_TRUE(watch->Read(&serving));
   std::atomic<bool> ended{false};
@@ -294,7 +294,7 @@ TEST_F(AccessRpcTest, GuessesAtHiddenScenesAreAuditedOnce) {
   call("/locus.v1.SceneService/GetScene", "elsewhere", "arena-1");
   call("/locus.v1.QueryService/Query", "elsewhere", "arena-2");
   call("/locus.v1.SceneService/DeleteScene", "elsewhere", "arena-3");
-  call("/locus.v1.SceneService/GetScene", "reader", "arena-4");  // absent, but not hidden
+  call("/locus.v1.SceneService/GetScene", "reader", "arena-4");  // does not exist, but is not hidden from `reader`
   running_.reset();
   const std::string audit = read("audit.refused");
   EXPECT_THAT(audit, HasSubstr(R"("rpc":"/locus.v1.SceneService/GetScene","subject":"arena-1","code":"NOT_FOUND")"));

@@ -72,7 +72,7 @@ class DataFormatTest : public ::testing::Test {
     create_scene(daemon_.stubs(), name, parsed);
   }
 
-  // Inserts and removes so many objects that a snapshot is due, and waits until it is written.
+  // Inserts and removes so many objects that a snapshot is due, and waits until the snapshot is written.
   void make_a_snapshot_due(const std::string& scene) {
     std::string ids;
     for (int id = 1000; id < 6000; ++id) absl::StrAppend(&ids, id == 1000 ? "" : ",", id);

@@ -118,7 +118,7 @@ void FaultTest::give_up_calls(int count) {
     grpc::ClientContext context;
     set_timeout(context);
     const std::unique_ptr<QueryStream> stream = stubs().queries->StreamQueries(&context);
-    const int messages = i % 9;  // 0 to 8, the number of messages that a stream processes at once
+    const int messages = i % 9;  // 0 to 8; a stream processes up to 8 messages at once
     for (int m = 1; m <= messages; ++m) stream->Write(message(m, i % 2 == 0 ? heavy_batch(8192) : waiting));
     if (i % 3 == 0) stream->Write(message(99, {}));
     v1::StreamQueriesResponse response;

@@ -1,5 +1,5 @@
 // A daemon that is killed at random moments under load recovers every batch that it acknowledged. No batch is applied
-// twice or out of order. The suite named Long... kills it 100 times, or LOCUS_FAULT_RUNS times.
+// twice or out of order. The suite named Long... kills the daemon 100 times, or LOCUS_FAULT_RUNS times.
 #include <atomic>
 #include <cstdlib>
 #include <random>
@@ -18,8 +18,9 @@ constexpr uint64_t kKept = 50;    // number of latest batches whose points are i
 std::string scene_name(uint64_t writer) { return "arena-" + std::to_string(writer % kScenes); }
 uint64_t id_of(uint64_t writer, uint64_t batch) { return writer << 32 | batch; }
 
-// A writer whose applied batches can be read from the scene: each batch inserts a point of its own, removes the point
-// of the batch that is kKept batches older, and moves a counter point to x = the batch's number.
+// A writer whose applied batches can be read from the scene. Each batch inserts a point of its own, removes the point
+// of the batch that is kKept batches older, and moves a counter point to x = the batch's number. Batch 1 inserts the
+// counter point.
 class Writer {
  public:
   explicit Writer(uint64_t number) : number_(number) {}

@@ -139,7 +139,7 @@ v1::SceneSpec with_history(uint64_t bytes) {
 TEST_F(QuotaRpcTest, ScenesCountForTheirCreatorAlsoAfterARestart) {
   ASSERT_TRUE(create("a").ok());
   ASSERT_TRUE(create("others", {}, "other").ok());
-  set_quotas("quota token:* scenes=2\n");  // scenes that were created before the quota was set count
+  set_quotas("quota token:* scenes=2\n");  // also counts scenes that exist already
   ASSERT_TRUE(create("b").ok());
   for (int times = 0; times < 2; ++times) {
     expect_quota(create("c"), "scenes", "token:maker is 2, asked for 1; 2 are in use; delete a scene");

@@ -311,7 +311,7 @@ class TlsReloadTest : public TlsTest {
     replace_file(folder_.file("jwks"), absl::StrCat(R"({"keys":[)", key_.jwk(R"(,"kid":"kept")"), ",",
                                                     SigningKey::ed25519().jwk(R"(,"kid":"other")"), "]}"));
   }
-  // Changes the order of the authorities of clients, and now and then adds one. Removing one would end connections.
+  // Changes the order of the clients' authorities, and now and then adds one. A removal would end connections.
   void change_authorities(int number) {
     if (number % 50 == 0) authorities_.push_back(TestAuthority(absl::StrCat("authority ", number)).certificate());
     std::rotate(authorities_.begin(), authorities_.begin() + 1, authorities_.end());

@@ -1,8 +1,8 @@
 // Messages of the protocol as a client can send them: queries, updates, changes of instances and specifications of
 // scenes. Accepted messages are within the limits, and a refusal names a field or a limit. Accepted update batches and
 // changes are applied to a small scene.
-// Accepted query batches of at most 256 queries are run on such a scene, and the results are compared with those of
-// brute force.
+// Accepted query batches of at most 256 queries are run on an unchanged small scene, and the results are compared with
+// those of brute force.
 #include "core/base/limits.h"
 #include "core/query/query_batch.h"
 #include "core/scene/log/record_codec.h"

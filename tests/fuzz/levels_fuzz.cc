@@ -1,6 +1,6 @@
 // The project's own readers of level files (Quake 3 levels and archives), its checks of OBJ, STL, PLY and glTF files,
-// and the reader of the answer of the importer process. An accepted level is a valid mesh within the limits, and a
-// reference to a file stays in the file's folder.
+// and the reader of the answer of the importer process. An accepted level is a valid mesh within the limits. A glTF
+// file's references lead to no file outside the folder of the glTF file.
 #include <cmath>
 #include <filesystem>
 

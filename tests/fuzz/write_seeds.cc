@@ -1,5 +1,5 @@
 // Writes the seeds that need an encoder into tests/fuzz/seeds: fuzz_write_seeds FOLDER. The same folders also contain
-// seeds of text formats and inputs that once failed; this program does not change those.
+// seeds of text formats and inputs that once failed; this program does not change these other files.
 #include <filesystem>
 #include <fstream>
 #include <iostream>

@@ -1,7 +1,7 @@
 """The repository rules, each a test of its own.
 
     house_test.py --list                          names of the rules
-    house_test.py --root . [--build DIR] [RULE]   checks the tree (one rule or all), 0 if every rule holds, 77 if skipped
+    house_test.py --root . [--build DIR] [RULE]   checks one rule or all rules; exits 0 if all hold, 77 if skipped
     house_test.py --sizes                         lengths of files and functions
 
 Before a rule checks the tree, it runs on examples that break the rule and on examples that keep it (examples.py). If

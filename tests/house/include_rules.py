@@ -71,8 +71,8 @@ ALLOWED["core/index/hash_grid/kernels"] = ["core/base"]
 ALLOWED.update({"core/index/" + name: ["core/index", "core/geometry", "core/base"] for name in INDEX_STRUCTURES})
 ALLOWED["core/index/hash_grid"].append("core/index/hash_grid/kernels")
 
-# Prefixes of third-party headers, each with the folders that may include headers with this prefix. The folders below
-# these folders may include them too. Tests may include all headers.
+# Prefixes of third-party headers, each with the folders that may include headers with this prefix. A folder stands also
+# for all folders below it. Tests may include all headers.
 THIRD_PARTY = {
     "grpc": ["server/rpc", "server/services", "server/convert", "server/observability", "client/lib"],
     "google/protobuf/": ["server/rpc", "server/services", "server/convert", "client/lib"],

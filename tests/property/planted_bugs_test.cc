@@ -1,6 +1,6 @@
 // Proves that the suite catches known bugs (mutation testing). Each planted bug is enabled in turn, in a library that
 // is built with the bugs. With the bug, the comparison in the bug's row must find a difference. Without the bug, the
-// same comparison finds none in the random tests. A new bug needs a name in core/base/planted_bug.h, code that checks
+// same comparison must find no difference. A new bug needs a name in core/base/planted_bug.h, code that checks
 // planted(), and a row in the table of this file.
 #include <gtest/gtest.h>
 

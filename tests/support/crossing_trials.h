@@ -20,7 +20,7 @@
 namespace locus::test {
 
 // Sums over the searches of a trial: number of searches, of tested triangles, and of tested triangles for which the
-// kernel called `judge`.
+// kernel called the exact predicate of the visit.
 struct CrossingCost {
   uint64_t searches = 0, tests = 0, exact_tests = 0;
 };
@@ -154,7 +154,7 @@ inline Vec3d point_at(const Triangle& triangle, Random& random) {
   return random.chance(0.5) ? to_double(to_float(point)) : point;
 }
 
-// Makes points at random triangles, and some anywhere around the mesh.
+// Makes a trial with `count` points: most are at random triangles, the others anywhere in the bounds of the mesh.
 inline CrossingTrial random_crossing_trial(std::string name, const std::vector<Triangle>& mesh, size_t count,
                                            uint64_t seed) {
   RandomRegions regions(mesh, seed);

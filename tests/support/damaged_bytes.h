@@ -8,8 +8,8 @@
 
 namespace locus::test {
 
-// Returns a damaged copy of `bytes`: it is truncated, or one to three changes are made. A change flips a bit, or
-// overwrites a word with a small or large number, which does harm if a reader uses it as a length.
+// Returns a damaged copy of `bytes`: truncated, or with one to three changes. A change flips a bit, or overwrites a
+// word with a small or large number, which a reader may take for a length.
 inline std::string damaged(const std::string& bytes, Random& random) {
   std::string result = bytes;
   if (random.chance(0.2)) {

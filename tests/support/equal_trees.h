@@ -1,4 +1,4 @@
-// Byte-for-byte comparison of two trees over the triangles of a mesh, as they are in memory.
+// Byte-for-byte comparison of the arrays that store two trees over the triangles of a mesh.
 #ifndef LOCUS_TESTS_SUPPORT_EQUAL_TREES_H_
 #define LOCUS_TESTS_SUPPORT_EQUAL_TREES_H_
 

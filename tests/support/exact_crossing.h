@@ -68,8 +68,8 @@ inline Crossing exact_crossing(Vec3d point, const Triangle& triangle) {
     }
     return result;
   }
-  // The sign of each edge as seen from the moved point: the sign of the area; if the area is 0, the sign of its change
-  // along -z; if that is 0 too, the sign of its change along y.
+  // Determine the turn of each edge as seen from the moved point: the sign of the area. If the area is 0, use the sign
+  // of the area's change when the point moves along -z; if this change is 0, too, when the point moves along y.
   int lefts = 0, rights = 0;
   for (size_t i = 0; i < 3; ++i) {
     const IntegerVector &u = corners[i], &v = corners[(i + 1) % 3];

@@ -40,8 +40,8 @@ inline std::string grid_difference(const ObjectScene& scene, Random& random) {
 }
 
 // Tests each ball in three ways: by a visit of the ball alone, in a RegionWalk of all balls, and in a RegionWalk of the
-// balls' bounds only. The number of objects found must equal that of a test of all objects. Uses the balls of the scene
-// and balls that just touch some of its objects.
+// balls' bounds only. Each way must find as many objects as a test of all objects finds. Uses the balls of the scene
+// and balls that just touch objects of the scene.
 inline std::string grid_ball_difference(const ObjectScene& scene, Random& random) {
   ObjectGrid grid(random_grid_options(random));
   grid.apply({}, scene.values);

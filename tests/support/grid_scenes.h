@@ -8,8 +8,8 @@
 
 namespace locus::test {
 
-// Adds a ray in each of the 26 directions along axes and diagonals. The ray passes through a notable point of `sketch`
-// and starts 0 to 3 times direction * `step` before this point.
+// Adds a ray in each of the 26 directions along axes and diagonals. Each ray passes through a notable point of
+// `sketch`: the ray's origin is this point minus k * `step` * direction, for a random whole number k from 0 to 3.
 inline void add_lattice_rays(SceneSketch& sketch, double step, Random& random) {
   for (const Vec3d direction : lattice_directions()) {
     sketch.rays.push_back({notable_point(sketch, random) - direction * (step * random.whole(0, 3)), direction});

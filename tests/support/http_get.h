@@ -33,7 +33,7 @@ struct HttpReader {
   std::string key_file = {};
 };
 
-// Sends a request without a body. `method` is GET, HEAD or any other.
+// Sends a request without a body. `method` can be any method of HTTP, such as GET or HEAD.
 inline HttpAnswer http_get(int port, const std::string& path, const std::string& method = "GET",
                            const HttpReader& reader = {}) {
   const std::unique_ptr<CURL, decltype(&curl_easy_cleanup)> curl(curl_easy_init(), curl_easy_cleanup);

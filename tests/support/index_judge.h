@@ -1,7 +1,7 @@
-// Verifier of spatial indexes: runs every kind of query on an index and on an oracle and compares the answers, (t, id),
-// bit for bit. Also checks the contract of an index: the index passes to the visitor, exactly once, every value whose
-// ray interval or bounds satisfy the query's limit. Unit tests, random tests and tests of planted bugs share this
-// verifier.
+// Verifier of spatial indexes: runs every kind of query on an index and on an oracle and compares the answers, pairs of
+// t and id, bit for bit. Also checks the contract of an index: the index passes to the visitor, exactly once, every
+// value whose ray interval or bounds satisfy the query's limit. Used by unit tests, random tests and tests of planted
+// bugs.
 #ifndef LOCUS_TESTS_SUPPORT_INDEX_JUDGE_H_
 #define LOCUS_TESTS_SUPPORT_INDEX_JUDGE_H_
 

@@ -3,7 +3,7 @@
 // to the given vector and never overwrite its contents; overlap results are in the order of the structure. All
 // structures return the same results.
 //
-// A ray ends at the `distance` given here; the ray's own t_max is ignored. Distances are in units of the ray's
+// A ray ends at the parameter `distance`; the ray's own t_max is ignored. Distances are in units of the ray's
 // direction. If `work` is not null, the query adds its cost to `*work`. The cost of a query is the cost of the
 // structure's visit. Threads: queries only read the index, so any number of them may run concurrently. Source: Hughes
 // et al., Computer Graphics: Principles and Practice, 3rd ed., 2013, ch. 37 (the query interface).

@@ -1,4 +1,4 @@
-// A network that loses replies: a port that forwards connections to a gRPC server. If a test asks for it, the relay
+// A network that loses replies: a port that forwards connections to a gRPC server. On request of a test, the relay
 // closes a connection after the server has processed a request and before the client receives the reply.
 //
 // Threads: every member may be called from any thread. Source of the frame format: RFC 9113, HTTP/2, section 4.1.
@@ -45,9 +45,9 @@ class LossyRelay {
   int port() const { return port_; }
   // Sets the port to which new connections are forwarded from now on.
   void set_server(int port) { server_port_ = port; }
-  // Drops every `frames`-th DATA or HEADERS frame of the replies and closes its connection; 0 drops none.
+  // Drops every `frames`-th DATA or HEADERS frame of the replies and closes the frame's connection; 0 drops no frame.
   void lose_every(uint64_t frames) { lose_every_ = frames; }
-  // Drops only the next DATA or HEADERS frame of the replies and closes its connection.
+  // Drops only the next DATA or HEADERS frame of the replies and closes the frame's connection.
   void lose_one() { lose_one_ = true; }
   uint64_t lost() const { return lost_; }
 

@@ -80,7 +80,7 @@ class MemoryLog : public UpdateLog {
     held_ = false;
     released_.notify_all();
   }
-  // Waits until hold() blocks a call of one of the functions named there.
+  // Waits until a call is blocked by hold().
   void wait_for_writer() {
     const MutexLock lock(mutex_);
     while (waiting_ == 0) released_.wait(mutex_);

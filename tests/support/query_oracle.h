@@ -223,8 +223,8 @@ class QueryOracle : public RayOracle {
     }
   }
 
-  // Writes the contact of a ball or capsule with the object or the triangle of a row; for a row of a whole instance,
-  // with the nearest triangle that the solid overlaps.
+  // Writes the contact of a ball or capsule with the row's object or triangle. If the row is a whole instance, writes
+  // the contact with the nearest triangle that the solid overlaps. Conservative answers use bounds.
   template <class Solid>
   static void write_contact(const Row& row, const QueryBlock& block, const Solid& solid, BlockResult& result) {
     const ColumnSet columns = columns_of(block);

@@ -289,8 +289,8 @@ inline OwnedBlock box_block(const QueryScene& scene, const SceneSketch& sketch, 
   return block;
 }
 
-// Returns a block of capsules that start at the centres of the sketch's balls: points, and short and long capsules, in
-// whole, random or notable directions; some capsules have a radius of zero.
+// Returns a block of capsules that start at the centres of the sketch's balls. Each ends at an offset with whole
+// coordinates (which can be zero), at a short or long random offset, or at a notable point. Some radii are zero.
 inline OwnedBlock capsule_block(const QueryScene& scene, const SceneSketch& sketch, Random& random) {
   OwnedBlock block = block_at(sketch, random);
   block.settings.kind = CapsuleColumns{{}, {}, {}, random_detail(random)};
@@ -310,8 +310,8 @@ inline OwnedBlock capsule_block(const QueryScene& scene, const SceneSketch& sket
   return block;
 }
 
-// Returns a block of balls, capsules or boxes that move from the centres of the sketch's balls to notable points or by
-// whole offsets, or rest.
+// Returns a block of balls, capsules or boxes that start at the centres of the sketch's balls. Most move to a notable
+// point or by an offset with whole coordinates; the others rest.
 inline OwnedBlock sweep_block(const QueryScene& scene, const SceneSketch& sketch, Random& random) {
   OwnedBlock block = block_at(sketch, random);
   constexpr RayMode kModes[] = {RayMode::kFirst, RayMode::kFirst, RayMode::kAny, RayMode::kAll};
@@ -459,8 +459,8 @@ inline OwnedBlock sight_block(const QueryScene& scene, const SceneSketch& sketch
   return block;
 }
 
-// Returns a block that asks for all pairs within a distance, or for the nearest objects of each object; sometimes only
-// of some layers, or behind a page position.
+// Returns a block that asks for all pairs within a distance, or for the nearest objects of each object. Some blocks ask
+// only for objects of some layers, or only for pairs behind a page position.
 inline OwnedBlock pair_block(const QueryScene& scene, Random& random) {
   OwnedBlock block;
   PairColumns pairs;
@@ -537,8 +537,8 @@ inline QueryScene query_scene(const SceneSketch& sketch, Random& random) {
 
 inline SceneSketch random_sketch(uint64_t, Random& random) { return random_scene(random); }
 
-// Generates the sketch of `seed`: every third one from the families for grids, the others from the adversarial
-// families.
+// Generates the sketch of `seed`: from the families for grids if `seed` is a multiple of 3, otherwise from the
+// adversarial families.
 inline SceneSketch troublesome_sketch(uint64_t seed, Random& random) {
   return seed % 3 == 0 ? grid_scene(seed / 3, random) : adversarial_scene(seed, random);
 }

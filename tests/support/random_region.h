@@ -60,8 +60,8 @@ class RandomRegions {
     for (int steps = random_.whole(0, 2); steps > 0; --steps) ball.radius = std::nextafter(ball.radius, toward);
     return ball;
   }
-  // Generates a box that touches a triangle, up to a few units in the last place of its half extents. To touch the
-  // triangle, a random box is scaled; if it would have to grow eightfold or more, it is returned unscaled.
+  // Generates a random box and scales it so that it touches a triangle, up to a few units in the last place of the half
+  // extents. A box that would have to grow eightfold or more is returned unscaled.
   Obbf touching_box(bool turned) {
     Obbf box = this->box(turned);
     const auto scale = static_cast<float>(touching_scale(box, random_.pick(triangles_)));

@@ -3,11 +3,11 @@
 // the answers bit for bit, with every instruction set, on one and two threads, and in the brute-force mode. A tick has
 // one batch or several batches, in which the same object can move far and back, be replaced, teleport, be removed and
 // be inserted again. Used by the random tests, which expect no difference, and by the tests of planted bugs, which
-// expect one.
+// expect a difference.
 //
 // Before commit 476c028, the trials did not detect PlantedBug::kRewindFastBox: with this bug, a rewind misses an object
 // that moves twice in one tick. Ticks had several batches, but an object rarely moved far in one batch and back near
-// its start in a later one. Also, all queries aimed at current positions. None aimed at the positions that objects had
+// its start in a later batch. Also, all queries aimed at current positions, and none at the positions that objects had
 // at the queried time between two ticks.
 #ifndef LOCUS_TESTS_SUPPORT_REWIND_LOCKSTEP_H_
 #define LOCUS_TESTS_SUPPORT_REWIND_LOCKSTEP_H_

@@ -78,8 +78,8 @@ class BatchResultSink final : public AnswerSink {
 };
 
 // Answers `batch`, which has passed check_batch(), at `snapshot`. `parallel_for` distributes calls of BatchRun::work()
-// over threads; if it is empty, this thread makes all calls. Returns OUT_OF_RANGE for a time outside the history unless
-// the block's option `outside` is kClamp, or returns the status of RunOptions::stop.
+// over threads; if it is empty, this thread makes all calls. Returns OUT_OF_RANGE if a time is outside the history and
+// the block's option `outside` is not kClamp. If RunOptions::stop ends the batch, returns the status of `stop`.
 inline absl::StatusOr<BatchResult> run_batch(const SceneSnapshot& snapshot, const QueryBatch& batch,
                                              const RunOptions& options, const ParallelFor& parallel_for = {}) {
   BatchResult result;

@@ -1,6 +1,6 @@
 // Applies random update batches and static changes to a scene and to its model, and compares all visible state. This
 // state is acks and refusals, objects, the grid's content and answers, instances, and snapshots kept during the run.
-// Used by the random tests, which expect no difference, and by the tests of planted bugs, which expect one.
+// Used by the random tests, which expect no difference, and by the tests of planted bugs, which expect a difference.
 #ifndef LOCUS_TESTS_SUPPORT_SCENE_LOCKSTEP_H_
 #define LOCUS_TESTS_SUPPORT_SCENE_LOCKSTEP_H_
 

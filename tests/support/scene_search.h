@@ -1,5 +1,5 @@
 // Search of many seeded scenes for a scene on which a comparison finds a difference. The random tests expect no
-// difference; the tests of planted bugs expect one.
+// difference; the tests of planted bugs expect a difference.
 #ifndef LOCUS_TESTS_SUPPORT_SCENE_SEARCH_H_
 #define LOCUS_TESTS_SUPPORT_SCENE_SEARCH_H_
 

@@ -30,7 +30,7 @@ struct BlockRows {
   const RowBatch& batch;
   RowSpan rows;
   client::Double3 frame;
-  // Three per row: the position (field 0 of the schema) relative to `frame`. Empty if BulkQuery::has_position is false.
+  // Three floats per row: position (field 0 of the schema) relative to `frame`. Empty if has_position is false.
   std::vector<float> offsets;
 };
 
@@ -76,8 +76,8 @@ void apply_filter_columns(const QueryOptions& options, const BlockRows& rows, si
 absl::Status check(const QueryOptions& options, const BulkOptions& bulk);
 
 // Reads rows, sends queries and writes answers until the input ends. If a row is invalid, the error's message names the
-// line of the input. Before any error is returned, the answers to earlier rows are written; the message then contains
-// the number of answered rows, if there are any.
+// line of the input. If rows were answered before an error, their answers are written, and the error's message contains
+// the number of these rows.
 absl::Status run_bulk_query(const BulkQuery& query, const QueryOptions& options, const BulkOptions& bulk,
                             Context& context);
 

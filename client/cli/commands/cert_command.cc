@@ -31,8 +31,8 @@ std::string in_folder(const CertOptions& options, absl::string_view name) {
   return absl::StrCat(options.folder, "/", name);
 }
 
-// Writes the report. It contains the path of the certificate (BASE.pem), the path of the private key (BASE.key), and an
-// entry whose name is `use` and whose value is `next`, an example of a command that uses these two files.
+// Writes the report. It contains the path of the certificate (BASE.pem), the path of the private key (BASE.key), and
+// the text `next` under the name `use`. This text is an example of a command that uses these two files.
 void write_made(Context& context, const std::string& base, const std::string& use, const std::string& next) {
   Report report;
   report.head = {{"certificate", absl::StrCat(base, ".pem")}, {"key", absl::StrCat(base, ".key")}, {use, next}};

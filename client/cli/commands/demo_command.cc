@@ -144,8 +144,8 @@ v1::QueryBatch mixed_batch(const DemoWorld& world, uint64_t seed) {
   return mixed;
 }
 
-// Builds the same scene on the server options.compare and sends both servers the same batch. At the same tick, the
-// answers of the two servers must be equal byte for byte.
+// Builds a copy of the demo's scene at `tick` on a second server, options.compare, and sends one query batch to both
+// servers. The answers of the two servers must be equal byte for byte.
 absl::Status check_other(const client::Client& client, const DemoOptions& options, const ImportedLevel& level,
                          const DemoWorld& world, uint64_t tick, DemoTable& table) {
   ASSIGN_OR_RETURN(const std::unique_ptr<client::Client> other, client::Client::connect(options.compare));

@@ -27,7 +27,7 @@ class Cursor {
   absl::string_view rest() const { return text_.substr(at_); }
   absl::string_view since(size_t begin) const { return text_.substr(begin, at_ - begin); }
 
-  // Advances past `token` if the text at the cursor begins with it. Returns whether it does.
+  // Advances past `token` if the text at the cursor begins with `token`. Returns whether it does.
   bool accept(absl::string_view token) {
     const bool found = absl::StartsWith(rest(), token);
     if (found) at_ += token.size();

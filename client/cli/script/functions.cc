@@ -69,7 +69,7 @@ Answer to_integer(const Value& value, Function function) {
   return Value::of(Number(absl::int128(whole)));
 }
 
-// Returns the smallest (`sign` -1) or largest (`sign` 1) of all numbers and of all parts of vectors.
+// Returns the smallest (`sign` -1) or largest (`sign` 1) of all numbers and all parts of vectors in `arguments`.
 Answer extreme(const Arguments& arguments, int sign) {
   std::vector<Number> numbers;
   for (const Value& argument : arguments) {

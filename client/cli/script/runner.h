@@ -22,8 +22,8 @@ struct ScriptCounts {
 };
 
 // Checks every line as if it ran, including the options of its command. The results of commands are unknown, and each
-// loop has one round. Sends nothing and needs no server. If there is a mistake, returns a usage error for the first
-// one; its message begins with name:line.
+// loop has one round. Sends nothing and needs no server. If lines have mistakes, returns a usage error for the first
+// such line; the error's message begins with name:line.
 absl::Status check_script(const Script& script, const Variables& variables, Context& context, ScriptCounts& counts);
 
 // Runs a checked script. As soon as a line fails, writes its error, with name:line, to the context's error stream. With

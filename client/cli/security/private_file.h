@@ -1,5 +1,5 @@
-// Files that only their owner may read: contexts, token files, keys. They are written completely or not at all.
-// Functions without state; a FileLock belongs to one thread.
+// Files of contexts, tokens, keys and certificates. By default only the owner may read a new file. If writing fails, no
+// partial file remains. Functions without state; a FileLock belongs to one thread.
 #ifndef LOCUS_CLIENT_CLI_SECURITY_PRIVATE_FILE_H_
 #define LOCUS_CLIENT_CLI_SECURITY_PRIVATE_FILE_H_
 
@@ -24,20 +24,20 @@ struct SecurityFile {
   mode_t mode = kPrivateMode;
 };
 
-// Returns the file's content. Returns NOT_FOUND if there is none, FAILED_PRECONDITION if it cannot be read or has more
-// than kMaxSecurityFileBytes.
+// Returns the file's text and mode. Returns NOT_FOUND if there is no such file, FAILED_PRECONDITION if the file cannot
+// be read or is larger than kMaxSecurityFileBytes.
 absl::StatusOr<SecurityFile> read_security_file(const std::string& path);
 
 // Creates a file and syncs it to disk. Returns ALREADY_EXISTS, without a change, if the file exists.
 absl::Status create_security_file(const std::string& path, const SecurityFile& content);
 
 // Replaces the file, or creates it if it does not exist. Readers see either the old or the new content. The new file
-// has the owner and the group of the old one; returns FAILED_PRECONDITION, without a change, if this process is not
-// permitted to set them.
+// has the owner and the group of the old file. Returns FAILED_PRECONDITION, without a change, if this process is not
+// permitted to set owner and group.
 absl::Status replace_security_file(const std::string& path, const SecurityFile& content);
 
-// Lock of a file against other writers. The lock is the file PATH.lock, which is never deleted. The destructor releases
-// the lock.
+// Lock of the file PATH against other writers: an flock() of the file PATH.lock, which is never deleted. The destructor
+// releases the lock.
 class FileLock {
  public:
   // Waits until no other process holds the lock.

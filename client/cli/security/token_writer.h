@@ -3,8 +3,8 @@
 // the token's SHA-256 instead of the token itself. A line that begins with `#` is a comment. The form of a token's line
 // is:
 //   ID SHA256-HEX CREATED EXPIRES-or-never [COMMENT]
-// CREATED and EXPIRES are UTC times such as 2024-05-31T12:00:00Z. An id has 1 to 63 of a-z, 0-9 and -, and does not
-// begin or end with -. Functions without state; several processes may change one file at the same time.
+// CREATED and EXPIRES are UTC times such as 2024-05-31T12:00:00Z. An id has 1 to 63 characters (a-z, 0-9 and -) and
+// does not begin or end with -. Functions without state; several processes may change one file at the same time.
 #ifndef LOCUS_CLIENT_CLI_SECURITY_TOKEN_WRITER_H_
 #define LOCUS_CLIENT_CLI_SECURITY_TOKEN_WRITER_H_
 
@@ -23,7 +23,7 @@ namespace locus::cli {
 inline constexpr size_t kMaxTokenLines = 10'000;  // lines including comments; locusd refuses a longer file
 inline constexpr size_t kMaxTokenId = 63;
 
-// Line of a token file, without its hash.
+// Line of a token file, without the hash.
 struct TokenLine {
   std::string id;
   std::string created;
@@ -37,7 +37,7 @@ absl::StatusOr<absl::Duration> parse_lifetime(absl::string_view text);
 
 // Adds a new token to the file and returns the token. If the file does not exist, it is created with mode 0600. Without
 // `lifetime` the token never expires. Returns ALREADY_EXISTS if the id is listed, INVALID_ARGUMENT if the id or the
-// comment is malformed, FAILED_PRECONDITION if other users may write the file or if locusd could not read the new file.
+// comment is malformed, FAILED_PRECONDITION if other users may write the file or if locusd would refuse the new file.
 absl::StatusOr<std::string> create_token(const std::string& file, absl::string_view id, absl::Time now,
                                          std::optional<absl::Duration> lifetime, absl::string_view comment);
 

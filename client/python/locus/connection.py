@@ -65,7 +65,7 @@ class Connection:
         self.timeout = timeout
         self.long_timeout = long_timeout
         self.retry = retry
-        self._lost = False  # whether the last call did not reach the server
+        self._lost = False  # True if the last call did not reach the server
         options: List[Tuple[str, object]] = [
             ("grpc.max_send_message_length", max_send_bytes), ("grpc.max_receive_message_length", max_receive_bytes),
             ("grpc.use_local_subchannel_pool", 1),
@@ -88,7 +88,8 @@ class Connection:
         self._lost = error.code == grpc.StatusCode.UNAVAILABLE and not error.refused
 
     def continue_connecting(self, seconds: float = _MAX_CONNECTING_SECONDS) -> None:
-        """Lets the channel continue to connect before a call is made, if the last call did not reach the server.
+        """Waits while the channel tries to connect again, if the last call did not reach the server. Called before each
+        call.
 
         gRPC continues an attempt to connect only while a thread waits inside gRPC, or every 5 s. Without this wait,
         calls could fail for 15 s after the server has returned, because calls on a failed channel return immediately.
@@ -105,7 +106,7 @@ class Connection:
             ready.cancel()
 
     def _wait_connecting(self, seconds: float) -> None:
-        """Waits. If the channel is not connected, it continues to connect during the wait."""
+        """Waits for `seconds`. A channel that is not connected tries to connect during the wait."""
         def ignore(_: grpc.ChannelConnectivity) -> None:
             pass
 

@@ -64,9 +64,9 @@ class Credentials:
 
 
 class Token:
-    """Bearer token that calls carry. Thread-safe. Without a token, metadata() is empty.
+    """Bearer token that calls carry. Thread-safe. Without a token, the metadata are empty.
 
-    A token file is read again when it has changed. If it then cannot be read, the old token is kept.
+    A token file is read again when it has changed. If the changed file cannot be read, the old token is kept.
     """
 
     def __init__(self, credentials: Credentials, target: str) -> None:

@@ -55,8 +55,8 @@ class LocusError(Exception):
     `code` is the gRPC status code. If the server refused the request, `reason` is its reason, `field` the path of the
     wrong field (`blocks[2].rays.directions`) and `index` the wrong entry, from 0. If a limit was exceeded, `limit` is
     its name, `limit_value` its value and `asked` the requested value. `retry_after` is the time in seconds after which
-    the same request may succeed; 0 = it fails again unless it is changed. If the error did not come from the server,
-    `reason` is UNSPECIFIED and `hint` suggests a remedy.
+    the same request may succeed; 0 = the server stated no time. If the error did not come from the server, `reason` is
+    UNSPECIFIED, and `hint` suggests a remedy if one is known.
     """
 
     def __init__(self, code: grpc.StatusCode, message: str, *, reason: Reason = Reason.UNSPECIFIED, field: str = "",

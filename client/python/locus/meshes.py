@@ -16,7 +16,7 @@ _Change = schema.message("ChangeInstancesRequest")
 _Upload = schema.message("UploadMeshRequest")
 _BYTES_A_MESSAGE = 12 * 87_040  # a little under 1 MiB; a multiple of 12, the size of a vertex and of a triangle
 
-# Callback that is called after each message of an upload, with the number of bytes sent so far and the total number.
+# Callback for the progress of an upload: receives the number of bytes sent so far, and the total number of bytes.
 Progress = Callable[[int, int], None]
 
 

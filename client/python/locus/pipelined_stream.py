@@ -162,7 +162,7 @@ class PipelinedStream(Generic[Result]):
             return False
 
     def _run_call(self) -> Optional[LocusError]:
-        """Opens a call and reads its responses to the end. Returns the error that ended it, or None."""
+        """Opens a call and reads its responses to the end. Returns the error that ended the call, or None."""
         over = threading.Event()
         method = self._connection.channel.stream_stream(self._path)
         self._connection.continue_connecting()
@@ -195,8 +195,8 @@ class PipelinedStream(Generic[Result]):
                 self._changed.notify_all()
 
     def _requests(self, over: threading.Event) -> Iterator[bytes]:
-        """Yields the messages to send on one call, until `over` is set or the stream is closed. gRPC iterates over them
-        in its own thread.
+        """Yields the messages to send on one call, until `over` is set, or until the stream is closing and all messages
+        are answered. gRPC runs this iterator in a thread of its own.
         """
         while True:
             with self._changed:

@@ -1,7 +1,7 @@
 """Message classes of the protocol, with columns declared `bytes`; internal to the package.
 
-The mirrored schema (schema.binpb, made by make_schema.py) is loaded into its own descriptor pool, so that it does not
-conflict with classes that protoc generated from the real files in the same process. Classes are looked up by their name
+The mirrored schema (schema.binpb, made by make_schema.py) is loaded into a descriptor pool of its own. Therefore one
+process can also use the classes that protoc generates from the real protocol files. Classes are looked up by their name
 in the protocol: `message("QueryBatch")`.
 """
 from __future__ import annotations

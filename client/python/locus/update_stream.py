@@ -26,8 +26,9 @@ class UpdateStream(PipelinedStream[Ack]):
     After a broken connection every batch without an ack is sent again, in order; the ack of a batch that the server had
     already applied has `duplicate` set. A refused batch does not consume its number: the batches after it are
     renumbered and sent again. The stream ends if the server refuses the whole stream, if the server no longer knows
-    the writer (the scene has a new epoch), or if reconnecting fails as often as `reconnect` allows. The future of every
-    unanswered batch then raises the LocusError with which the stream ended; the outcome of these batches is unknown.
+    the writer (the scene has a new epoch), if a batch fails with an error without a reason, or if reconnecting fails as
+    often as `reconnect` allows. The future of every unanswered batch then raises the LocusError with which the stream
+    ended; the outcome of these batches is unknown.
     """
 
     def __init__(self, connection: Connection, scene: str, max_in_flight: int, retry: Retry) -> None:

@@ -3,8 +3,8 @@
 // the triangles of a mesh.
 //
 // Threads: immutable after build(); every member may run concurrently. Invariants: a node's box contains the bounds of
-// every value below it. The slab test is monotone: a ray that hits a box also hits every larger box. The tree therefore
-// never culls a value that a ListIndex, which tests every value, would report. The depth is at most
+// every value below it. The slab test is monotone: a ray that hits a box also hits every box that contains this box.
+// The tree therefore never culls a value that a ListIndex, which tests every value, would report. The depth is at most
 // limits::kMaxBvhDepth, which bounds the size of a visit's stack. Nodes and values are stored in depth-first order.
 // Source: Kay and Kajiya, Ray Tracing Complex Scenes, 1986; Wald, Benthin, Boulos, Getting Rid of Packets, 2008 (wide
 // nodes).

@@ -66,7 +66,7 @@ class HalfLineBoxes {
     return met;
   }
 
-  // Returns the same mask for the boxes around eight triangles, which are laid out as in TriangleBlock::vertices.
+  // Returns the mask of boxes_met() for the boxes around eight triangles, laid out as in TriangleBlock::vertices.
   uint32_t triangles_met(const float (&v)[9][kTreeWidth]) const {
     float bounds[6][kTreeWidth];
     for (int axis = 0; axis < 3; ++axis) {

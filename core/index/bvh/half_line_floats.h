@@ -11,15 +11,16 @@ namespace locus {
 struct HalfLineFloats {
   int axis;   // axis to which the half line is parallel: 0, 1 or 2
   float way;  // 1, or -1 if the half line runs towards lower coordinates
-  // `low` and `high` of p * way, where p is the point's coordinate on `axis`. A coordinate x on this axis is behind the
-  // point if x * way < along_high, beyond the point if x * way > along_low, and beyond the end of the search if
-  // along_end < x * way.
+  // Float neighbours of p * way, where p is the point's coordinate on `axis`: along_low <= p * way <= along_high. A
+  // coordinate x on this axis is behind the point if x * way < along_high, beyond the point if x * way > along_low,
+  // and beyond the end of the search if along_end < x * way.
   float along_low, along_high;
   float along_end;  // coordinate on `axis` where the search ends, multiplied by `way`; infinite for an endless search
-  // `low` and `high` of the point's coordinates on the axes (axis + 1) % 3 and (axis + 2) % 3.
+  // Float neighbours of the point's coordinates on the axes (axis + 1) % 3 and (axis + 2) % 3: low <= coordinate <=
+  // high.
   float low[2], high[2];
-  float rounded[2];  // the same coordinates, rounded to float
-  float pad;         // upper bound of the difference between a coordinate and its entry in `rounded`
+  float rounded[2];  // the point's coordinates on these two axes, rounded to the nearest float
+  float pad;         // upper bound of the difference between such a coordinate and its element of `rounded`
 };
 
 }  // namespace locus

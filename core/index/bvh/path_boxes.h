@@ -58,7 +58,8 @@ class PathBoxes {
     for (int i = 0; i < kTreeWidth; ++i) nears[i] = near_of(lx[i], ly[i], lz[i], hx[i], hy[i], hz[i]);
   }
 
-  // Writes the same for the boxes around eight triangles, whose vertices are laid out as in TriangleBlock::vertices.
+  // Writes the result of entry() for the box around each of eight triangles, laid out as in TriangleBlock::vertices;
+  // kMissed for nullopt.
   void to_triangles(const float (&v)[9][kTreeWidth], float (&nears)[kTreeWidth]) const {
     float bounds[6][kTreeWidth];
     for (int axis = 0; axis < 3; ++axis) {

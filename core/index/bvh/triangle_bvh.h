@@ -79,8 +79,9 @@ class TriangleBvh {
   template <RayVisitor<Triangle> Visitor>
   void visit_ray(const SlabRay<float>& slabs, Visitor& visitor, Work& work) const;
 
-  // Passes to `visitor` the triangles whose own boxes `path` enters at visitor.limit() or before, roughly from near to
-  // far. Precondition: the magnitude given to `path` is the largest |coordinate| of bounds(). Allocates no memory.
+  // Passes to `visitor` the triangles whose own boxes `path` enters at a t of at most visitor.limit(), roughly from
+  // near to far. Precondition: the magnitude given to `path` is the largest |coordinate| of bounds(). Allocates no
+  // memory.
   template <RayVisitor<Triangle> Visitor>
   void visit_path(const PathBoxes& path, Visitor& visitor, Work& work) const;
 

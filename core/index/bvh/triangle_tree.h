@@ -28,8 +28,8 @@ inline constexpr uint32_t kNoChild = 0xFFFFFFFFu;
 struct alignas(64) TriangleNode {
   float bounds[6][kTreeWidth];  // rows: min x, y, z and max x, y, z; one column for each slot
   uint32_t child[kTreeWidth];
-  // Slots from far to near, for each octant of ray directions (bit k of the octant is set if component k is negative):
-  // three bits per slot, the farthest slot in the lowest bits. Unused slots count as farthest.
+  // Slots from far to near, for each octant of ray directions (bit k of the octant is set if component k of the
+  // direction is negative): three bits per slot, the farthest slot in the lowest bits. Unused slots count as farthest.
   uint32_t order[kTreeWidth];
 };
 static_assert(sizeof(TriangleNode) == 256);
@@ -52,9 +52,9 @@ struct NodeRange {
   uint32_t count;
 };
 
-// View of a whole tree, whose arrays it borrows. Node 0 is the root. Nodes, blocks and triangles are stored in
-// depth-first order. After a node come the blocks among its children, in order of slots. After these blocks come its
-// child nodes, in order of slots; each child node is followed by everything below it before the next child node.
+// View of a whole tree; borrows the arrays of the tree. Node 0 is the root. Nodes, blocks and triangles are stored in
+// depth-first order. After a node come its child blocks, in order of slots, and then its child nodes, in order of
+// slots. Each child node is followed by everything below it before the next child node.
 struct TriangleTree {
   const TriangleNode* nodes;
   const NodeRange* ranges;  // range of the triangles below each node, indexed by node

@@ -42,7 +42,7 @@ class TriangleWriter {
   struct Offsets {
     uint32_t node = 0, block = 0, position = 0;
   };
-  // Unit of work: a single node of the tree's top, which has too many triangles below it for one chunk, or a whole
+  // Unit of work: either a single node near the root, with too many triangles below it for one chunk, or a whole
   // subtree.
   struct Chunk {
     const BinaryNode<float>* root;

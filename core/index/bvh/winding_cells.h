@@ -8,8 +8,8 @@
 // number. Let a half line from p reach a point q in a clear cell. The winding number around p is the winding number
 // around q plus the sum of the crossings between p and q: see core/geometry/point_in_mesh.h. If a triangle may cross
 // the line, the projection of its bounds along the line contains the line, so on the two other axes the bounds overlap
-// the intervals of the clear cell. Since the bounds do not overlap the cell, they lie completely before it or
-// completely beyond it along the line: before it if they begin before q, otherwise beyond it.
+// the intervals of the clear cell. Since the bounds do not overlap the cell, they lie completely before or completely
+// beyond the cell along the line: before the cell if the bounds begin before q, else beyond the cell.
 //
 // Threads: immutable after build(); every member may run concurrently.
 // Invariants: a cell that overlaps the bounds of a triangle is not clear; the end of a way (WindingWay) lies in a clear
@@ -33,7 +33,7 @@ struct WindingWay {
   bool is_known = false;  // no search is needed: `winding` is the winding number around the point itself
   int winding = 0;        // winding number around the end of the way
   HalfLine line;          // half line to search
-  float end = 0;          // coordinate on line.axis where the search ends; infinite if outside the mesh
+  float end = 0;          // coordinate on line.axis where the search ends; infinite if that is outside the mesh
 
   // Returns the way along a whole half line: the search ends outside the mesh, where the winding number is 0.
   static WindingWay out(HalfLine line) {
@@ -50,8 +50,8 @@ class WindingCells {
   // O(n); up to 9 bytes of temporary memory for each cell.
   static WindingCells build(const TriangleBvh& tree);
 
-  // Returns where the search from `point` can end: in its own cell, in a clear cell near it, or outside the mesh.
-  // `tree` must be the tree that was passed to build(). O(1).
+  // Returns where the search from `point` can end: at `point` itself if its cell is clear, in a clear cell near
+  // `point`, or outside the mesh. `tree` must be the tree that was passed to build(). O(1).
   WindingWay way_from(const TriangleBvh& tree, const Vec3d& point) const;
 
   // Returns the size in bytes of the memory allocated by this object; sizeof(WindingCells) is not included.
@@ -101,7 +101,8 @@ class WindingCells {
   void mark(const TriangleBvh& tree);
   // Sets the winding numbers of clear cells.
   void set_windings(const TriangleBvh& tree);
-  // Sets `first`, and all kUnset cells that are connected to it through common sides of kUnset cells, to `value`.
+  // Sets `first` to `value`, and also each kUnset cell that is connected to `first` by a chain of kUnset cells with
+  // common sides.
   void fill(uint32_t first, uint8_t value);
   // Sets the ways from cells that are not clear.
   void set_ways();

@@ -1,8 +1,8 @@
 // Brick: the unit in which the hash grid stores and shares values. A brick covers 4x4x4 cells. It has two blocks of
-// values: one sorted by cell, and the log, which holds the few values that were inserted or moved since the other block
-// was sorted. A Brick object is one version of a brick. A small batch makes a version that shares both blocks with the
-// previous version: the batch appends values to the log and marks the replaced and removed slots of both blocks as
-// dead. A large batch, or a full log, sorts all values into a new block.
+// values: the sorted block, ordered by cell, and the log, which holds the few values that were inserted or moved since
+// the sorted block was made. A Brick object is one version of a brick. A small batch makes a version that shares both
+// blocks with the previous version: the batch appends values to the log and marks the replaced and removed slots of
+// both blocks as dead. A large batch, or a full log, sorts all values into a new block.
 //
 // Threads: a version is immutable once shared; any thread.
 //

@@ -49,9 +49,9 @@ class GridRef {
 
 namespace internal {
 
-// Rounding allowance, relative to the magnitudes of coordinates and extents. The bounds of a value may reach beyond its
-// extent, by up to 2^-40 of these magnitudes (see bounds_of() in core/geometry/shape.h). The factor 2^-38 covers this
-// and the rounding of the sums in core/index/hash_grid.
+// Rounding allowance, relative to the magnitudes of coordinates and extents. The bounds of a value may reach beyond
+// its extent, by up to 2^-40 of these magnitudes (see bounds_of() in core/geometry/shape.h). The factor 2^-38 covers
+// this growth and the rounding of the sums in core/index/hash_grid.
 inline constexpr double kBoundsGrowth = 0x1p-38;
 
 inline constexpr KeyRange kAllCells{{0, 0, 0}, {3, 3, 3}};

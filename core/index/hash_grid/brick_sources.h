@@ -23,9 +23,9 @@ struct alignas(32) GridMove {
 struct GridMoves {
   absl::Span<const GridMove> moves;  // one move for each moved handle
   absl::Span<const Quaternion> rotations = {};
-  // For each handle, the index in `moves` of its move. Optional; reduces the cost of a batch that moves nearly all
-  // values. The entry of a handle without a move may be any number i, so a reader must compare moves[i].handle with the
-  // handle.
+  // For each handle, the index in `moves` of its move. Optional; reduces the cost of a batch that contains only moves,
+  // of at least half of all values. The entry of a handle without a move may be any number i, so a reader must compare
+  // moves[i].handle with the handle.
   absl::Span<const uint32_t> by_handle = {};
 };
 

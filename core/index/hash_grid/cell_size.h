@@ -30,11 +30,11 @@ struct SampledValue {
 };
 
 // Returns the exponent e of the largest cell edge 2^e at which a random value shares its cell with at most
-// kMaxMeanPerCell other values on average. The edge is at least the median diameter of the values. It is not much
-// larger than the bounds of all values, unless the median diameter requires a larger edge. The mean is estimated for
-// `population` values, of which `sample` is an even selection. Values that share a cell at every cell size raise the
-// limit (see kMaxAddedPerCell), so they do not prevent larger cells. Preconditions: `sample` is not empty, population
-// >= sample.size(). Cost: at most about fifty sorts of the sample.
+// kMaxMeanPerCell other values on average. The edge is at least the median diameter of the values. The edge is not
+// much larger than the bounds of all values, unless the median diameter requires a larger edge. The mean is estimated
+// for `population` values, of which `sample` is an even selection. Values that share a cell at every cell size raise
+// the limit (see kMaxAddedPerCell), so they do not prevent larger cells. Preconditions: `sample` is not empty,
+// population >= sample.size(). Cost: at most about fifty sorts of the sample.
 int choose_cell_exponent(absl::Span<const SampledValue> sample, size_t population);
 
 // Returns true if cells with an edge of 2^exponent are still suitable: a random value shares its cell with

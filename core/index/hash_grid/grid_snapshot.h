@@ -147,7 +147,8 @@ class GridSnapshot {
   // Returns the estimated number of values per cell of `level` near `point`.
   double values_per_cell(const internal::GridLevel& level, const Vec3d& point) const;
   // Visits the values of the present shell and of all later shells brick by brick, from near to far. Used if the range
-  // of a shell has more keys than the level has bricks. Returns false if visit() returned false.
+  // of a shell has more than 1024 brick keys, and more than the level has bricks. Returns false if visit() returned
+  // false.
   template <class Limit, class Visit>
   bool visit_nearest_bricks(const internal::GridLevel& level, const internal::NearestShells& shells, const Vec3d& point,
                             const Limit& limit, Work& work, const Visit& visit) const;

@@ -311,8 +311,9 @@ bool HashGrid::moves_nearly_all(const GridBatch& batch) const {
          moves >= size_ / 2;
 }
 
-// Has the same effect as move_all(), but iterates over the bricks and looks up the move of each value. Used if at least
-// half of all values move. The values of a brick are adjacent in memory, so the moves need not be grouped by brick.
+// Has the same effect as move_all(), but iterates over the bricks and looks up the move of each value. Used if the
+// batch contains only moves, of at least half of all values, and GridMoves::by_handle is given. The values of a brick
+// are adjacent in memory, so the moves need not be grouped by brick.
 void HashGrid::gather_all(const GridMoves& moves) {
   const internal::MoveFinder finder(moves);
   const auto bricks =

@@ -38,8 +38,8 @@ struct HashGridOptions {
 };
 
 // Changes of one batch, applied in the order of the members. Borrows all arrays. No handle occurs twice in `removed`
-// and `moves` together, nor twice in `inserted`. A handle may occur in both `removed` and `inserted`, which replaces
-// its value.
+// and `moves` together, nor twice in `inserted`. If a handle occurs in both `removed` and `inserted`, the inserted
+// value replaces the removed value.
 struct GridBatch {
   absl::Span<const uint32_t> removed;
   GridMoves moves;

@@ -3,10 +3,10 @@
 // does not fit the caches, each step of a query waits for memory whose address the previous step has read. In a walk,
 // only the first query waits.
 //
-// A walk belongs to one thread and borrows the grids. It visits for each region the same values as the visits of
-// GridSnapshot. A walk passes regions with more than a few bricks or values to GridSnapshot, since the waits for memory
-// are a small part of the cost of such regions. Source: Chen, Ailamaki, Gibbons, Mowry, Improving Hash Join Performance
-// through Prefetching, 2004 (software pipelining of dependent lookups).
+// A walk belongs to one thread and borrows the grids. For each region, a walk visits the same values as the visits of
+// GridSnapshot. A walk passes regions with more than a few bricks or values to GridSnapshot, since the waits for
+// memory are a small part of the cost of such regions. Source: Chen, Ailamaki, Gibbons, Mowry, Improving Hash Join
+// Performance through Prefetching, 2004 (software pipelining of dependent lookups).
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_REGION_WALK_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_REGION_WALK_H_
 

@@ -28,7 +28,7 @@ struct CellPlane {
   Vec3d normal;  // unit vector, pointing away from the query's point
 };
 
-// Convex space around a point: the points within `radius` of it and on its side of all planes.
+// Convex space around a point p: all points within `radius` of p that lie on the same side of every plane as p.
 struct CellAnswer {
   bool is_free = false;    // false: the point lies in or on an object or triangle, so there is no free space
   bool truncated = false;  // max_planes were not enough; `radius` is the distance of the first row without a plane
@@ -37,7 +37,7 @@ struct CellAnswer {
 };
 
 // Answers one query. Objects are searched as of `moment`, which the answer borrows. Cost: a nearest query for all
-// objects and triangles within the returned radius, and one test of each of them against each plane.
+// objects and triangles within the returned radius, and one test of each object and triangle against each plane.
 CellAnswer run_cell(QueryTask& task, const SceneAtTime& moment, const CellRequest& request, const Filter& filter);
 
 // Returns whether the object or triangle of `row` lies wholly on or beyond `plane`, which belongs to the cell around

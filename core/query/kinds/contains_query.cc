@@ -43,7 +43,8 @@ class InstancesAround {
   bool visit(const Instance& instance) {
     if (!task_.count_test()) return false;
     if (instance.id <= options_.after_id || !filter_.accepts(instance)) return true;
-    // The tree over instances may or may not cull by these bounds, and the result must not depend on culling.
+    // The test against instance.bounds is repeated here because the tree over instances may or may not cull by these
+    // bounds, and the result must not depend on culling.
     if (!instance.mesh->is_closed() || !reaches(ball_, instance.bounds)) return true;
     if (options_.precision == Precision::kConservative || winds_around(instance)) rows_.offer(hit_on(instance, 0));
     return !task_.ended();
@@ -53,7 +54,7 @@ class InstancesAround {
   bool winds_around(const Instance& instance) {
     const Vec3d point = without_tiny_coordinates(instance.transform.point_to_mesh(ball_.center));
     const TriangleBvh& tree = instance.mesh->tree();
-    // Brute force tests all triangles, so its half line has no end.
+    // A brute-force search tests all triangles, so it uses a half line without an end.
     const WindingWay way = task_.uses_kernels() ? instance.mesh->winding_cells().way_from(tree, point)
                                                 : WindingWay::out(tree.cheapest_half_line(point));
     if (way.is_known) return way.winding != 0;

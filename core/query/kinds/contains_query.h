@@ -1,6 +1,7 @@
-// Search for the objects and instances that contain a point. An instance contains the point if its mesh is closed and,
-// in addition, either has a nonzero winding number around the point or has the point on its surface. Rows ascend by id.
-// Free functions; any thread may call them with a QueryTask of its own.
+// Search for the objects and instances that contain a point. An instance with a closed mesh contains the points on
+// the surface of the mesh, and the points around which the mesh has a nonzero winding number. With CONSERVATIVE, the
+// bounds of an object, or of an instance with a closed mesh, must contain the point. Rows ascend by id. Free
+// functions; any thread may call them with a QueryTask of its own.
 #ifndef LOCUS_CORE_QUERY_KINDS_CONTAINS_QUERY_H_
 #define LOCUS_CORE_QUERY_KINDS_CONTAINS_QUERY_H_
 

@@ -25,12 +25,12 @@ void insertion_sort(std::vector<FoundObject>& found) {
 
 // Maximum number of objects that are sorted by insertion without buckets.
 constexpr size_t kFew = 12;
-// Minimum of the binary logarithm of the number of buckets. Unless this minimum applies, the number of buckets is at
-// most half and more than a quarter of the number of objects. If ids are evenly distributed, a bucket then contains two
-// to four objects.
+// Minimum of the binary logarithm of the number of buckets. A number of buckets above this minimum is at most half
+// and more than a quarter of the number of objects, so that evenly distributed ids fill each bucket with two to four
+// objects.
 constexpr int kMinBucketBits = 8;
-// Maximum number of objects in one bucket. If a bucket has more objects, the ids are unevenly distributed, and
-// std::sort() is used.
+// Maximum number of objects in one bucket. More objects in a bucket show that the ids are unevenly distributed;
+// std::sort() is then used instead of the buckets.
 constexpr uint32_t kMaxPerBucket = 16;
 
 }  // namespace

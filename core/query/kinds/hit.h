@@ -26,7 +26,7 @@ struct Hit {
   const Instance* instance = nullptr;   // null for an object and for a miss
   const SceneAtTime* moment = nullptr;  // time at which the object was found; null: the snapshot's latest state
 
-  // Returns the object's shape at the time at which it was found. Precondition: the hit is on an object.
+  // Returns the object's shape at the time at which the object was found. Precondition: the hit is on an object.
   Shape object_shape() const {
     LOCUS_DCHECK(static_cast<bool>(object));
     return moment == nullptr ? shape_of(object) : moment->shape(object);
@@ -47,7 +47,7 @@ struct RowPosition {
   Id id = std::numeric_limits<Id>::max();
   uint32_t triangle = kNoTriangle;
 
-  // Returns the position of query `i` in columns that have passed check_batch().
+  // Returns the row position that `columns` give for query `i`. Precondition: `columns` have passed check_batch().
   static RowPosition of(const AfterColumns& columns, size_t i) {
     RowPosition position;
     position.t = ColumnReader<float>(columns.ts, 1).value(i, position.t);

@@ -33,7 +33,8 @@ class HitCollector {
         // which hits are found therefore does not matter.
         capacity_(mode == RayMode::kAll ? size_t{max_results} + 1 : 1),
         limit_(t_max) {
-    // Is usually not given, and copying what the caller has just written in parts would stall the processor.
+    // Copies `after` only if it is given, which is rare: copying a value that was just written in parts would stall
+    // the processor.
     if (after.is_given()) after_ = after;
   }
 
@@ -58,7 +59,7 @@ class HitCollector {
     }
     answer_.hits.push_back(hit);
     if (answer_.hits.size() == capacity_) {
-      // Makes the last hit in the order of nearer() the front of the heap. A later, better hit replaces the front.
+      // Makes the last hit in the order of nearer() the front of the heap, where the next better hit replaces it.
       if (is_heap_)
         std::push_heap(answer_.hits.begin(), answer_.hits.end(), nearer);
       else

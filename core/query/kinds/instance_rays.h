@@ -10,10 +10,10 @@
 
 namespace locus {
 
-// Offers the ray's hits on triangles of `instance` to `collector`. `slabs` is the ray in world axes, prepared for tests
-// against boxes. `nearest` is the t at which the ray enters the instance's bounds; no hit has a lower t. Cost: one test
-// for each tree node that the ray enters within the collector's limit, and one for each triangle in the leaves among
-// these nodes.
+// Offers the ray's hits on triangles of `instance` to `collector`. `slabs` is the ray in world axes, prepared for
+// tests against boxes. `nearest` is the t at which the ray enters the instance's bounds; no hit has a lower t. Cost:
+// one test for each tree node that the ray enters within the collector's limit, and one test for each triangle in the
+// leaves among these nodes.
 void trace_instance(QueryTask& task, const RayRequest& request, const SlabRay<double>& slabs, const Instance& instance,
                     float nearest, HitCollector& collector);
 

@@ -1,8 +1,8 @@
-// Intersection of many rays with the scene's static instances by the vector kernels, which are efficient only with many
-// rays per call. Each ray visits the instances from near to far. All rays advance in rounds: each ray moves to its next
-// instance, then the kernels trace all rays that wait at instances of the same mesh in one call. Once a ray's collector
-// is full, its worst retained hit limits the t up to which the ray is traced. Supports EXACT rays of all modes, but not
-// RayRequest::after.
+// Intersection of many rays with the scene's static instances by the vector kernels, which are efficient only with
+// many rays per call. Each ray visits the instances from near to far. All rays advance in rounds: each ray moves to
+// its next instance, then the kernels trace all rays that wait at instances of the same mesh in one call. Once a
+// ray's collector is full, the worst retained hit limits the t up to which the ray is traced. Supports EXACT rays of
+// all modes, but not RayRequest::after.
 //
 // Threads: any thread may call trace_meshes() with a QueryTask and rays of its own.
 #ifndef LOCUS_CORE_QUERY_KINDS_KERNEL_RAYS_H_
@@ -19,8 +19,8 @@ namespace locus {
 // Ray in progress: its request, its filter, and the hits found so far.
 struct PendingRay {
   PendingRay(const RayRequest& ray, const Filter& ray_filter) : request(ray), filter(ray_filter), collector(ray) {}
-  // Makes query `i` of `block`, which `reader` reads. Builds the members in place, because copying them right after
-  // they were written in parts would stall the processor.
+  // Constructs the pending ray of query `i` of `block`; `reader` is the reader of this block. Constructs the members
+  // in place, because copying them right after they were written in parts would stall the processor.
   PendingRay(const RayReader& reader, const QueryBlock& block, size_t i)
       : request(reader.request(i)), filter(block, i), collector(request) {}
 

@@ -50,8 +50,8 @@ struct NearestSurface {
   Vec3d normal;
   float u = 0, v = 0;  // weights of the triangle's second and third vertex; 0 for an object and if CONSERVATIVE
 };
-// Returns the nearest point. It is computed again from the stored object or triangle, since a Hit does not store it.
-// `winding` is the scene's, which determines the fronts of triangles.
+// Returns the nearest point, computed again from the stored object or triangle, since a Hit does not store this
+// point. `winding` is the winding of the scene, which determines the front of each triangle.
 NearestSurface nearest_surface(const NearestRequest& request, const Hit& row, Winding winding);
 
 }  // namespace locus

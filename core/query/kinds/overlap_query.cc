@@ -182,8 +182,9 @@ struct RegionShape {
 template <class Kind>
 GridRegion search_region(const SceneAtTime& moment, const typename Kind::World& shape, const OverlapOptions& options) {
   const typename Kind::WorldRegion region(shape);
-  // Only an EXACT ball query can restrict the search to the ball. A CONSERVATIVE ball query also finds objects of which
-  // it overlaps only the bounds. Queries of other shapes search the axis-aligned bounds of the shape.
+  // Only an EXACT ball query can restrict the search to the ball. A CONSERVATIVE ball query also finds an object if
+  // the ball overlaps only the bounds of the object. Queries of other shapes search the axis-aligned bounds of the
+  // shape.
   return moment.region(region.bounds(), options.precision == Precision::kExact ? Kind::as_ball(shape) : std::nullopt);
 }
 

@@ -45,7 +45,7 @@ uint32_t nearest_overlapping(QueryTask& task, const Balld& solid, const Instance
 uint32_t nearest_overlapping(QueryTask& task, const Capsule& solid, const Instance& instance);
 
 // Merges the rows of `instances` with the objects in `found`. Returns at most options.max_results rows, ascending by
-// id. With count_only, returns only the sum of the numbers of rows.
+// id. With count_only, returns only the total number of rows.
 OverlapAnswer with_objects(OverlapAnswer instances, FoundObjects& found, const SceneAtTime& moment,
                            const OverlapOptions& options);
 

@@ -43,7 +43,7 @@ class FirstPairs {
   }
   // Returns whether rows of an object with this id can still be among the first rows.
   bool has_room_for(Id id) const { return count_only_ || id <= last_id_; }
-  // Returns the first rows in order, found at `moment`.
+  // Returns the first rows in order. `moment` is the time at which the rows were found.
   PairAnswer finish(const SceneAtTime& moment) {
     keep_first();
     PairAnswer answer;
@@ -177,7 +177,7 @@ class PairGroup {
     member.object = object, member.shape = shape;
     return true;
   }
-  // Offers the rows of all objects of the group and empties it.
+  // Offers the rows of all objects of the group, then empties the group.
   void search(FirstPairs& rows) {
     if (empty()) return;
     center_ = (bounds_.min + bounds_.max) * 0.5;
@@ -380,7 +380,7 @@ PairAnswer run_pairs(QueryTask& task, const SceneAtTime& moment, const QueryBloc
     const GridEntry& entry = object.entry();
     ++task.work().tests;
     if (!task.count_test()) return false;
-    // The object with the id after_id may have further rows, after after_other.
+    // The object with the id after_id may have further rows: rows with partners after after_other.
     const bool is_behind = entry.id > block.after_id || (entry.id == block.after_id && pairs.after_other != 0);
     if (!is_behind || !rows.has_room_for(entry.id) || !search.filter.accepts(entry)) return true;
     if (!by_groups) {

@@ -10,7 +10,8 @@
 
 namespace locus {
 
-// Row of a pair: the first object, and the id of the second. `first.t` is the distance between the solids.
+// Row of a pair: the first object, and the id of the second. `first.t` is the distance between the solids or, with
+// CONSERVATIVE, between the bounds.
 struct PairRow {
   Hit first;
   Id other = kNoId;

@@ -1,7 +1,7 @@
 // Axis-aligned bounds of an instance's triangles in world axes. CONSERVATIVE queries test the bounds of
-// PlacedTriangles. EXACT rays, sweeps and overlap queries find a triangle only if they also intersect its wider bounds,
-// which LoosePlacedTriangles computes. Without this condition, the exact tests could report a triangle that is far away
-// in the world, because they run in mesh axes and in floats.
+// PlacedTriangles. EXACT rays, sweeps and overlap queries find a triangle only if they also intersect its wider
+// bounds, which LoosePlacedTriangles computes. Without this condition, rounding could make the exact tests report a
+// triangle that is far away in the world, because these tests run in mesh axes.
 //
 // Both classes are immutable and borrow the instance; any number of threads may share one object.
 #ifndef LOCUS_CORE_QUERY_KINDS_PLACED_TRIANGLE_H_
@@ -60,7 +60,7 @@ class PlacedTriangles {
 };
 
 // Wide bounds of the triangles of an instance. The bounds of a triangle are the box around its corners in world axes,
-// grown by an epsilon that covers all rounding errors of the exact tests. These errors include those of the
+// grown by an epsilon that covers all rounding errors of the exact tests. These errors include the errors of the
 // transformation into mesh axes and of one rounding to float in mesh axes.
 class LoosePlacedTriangles {
  public:

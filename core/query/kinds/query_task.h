@@ -74,8 +74,8 @@ class BatchControl {
   // returns a status that is not OK, the batch stops with this status.
   BatchControl(uint64_t max_work, std::function<absl::Status()> stop) : max_work_(max_work), stop_(std::move(stop)) {}
 
-  // Adds `work` to the work done and calls `stop`. Returns false if the batch must end, because `stop` returned an
-  // error or the work budget is used up.
+  // Adds `work` to the work done. Returns false if the batch must end, because the work budget is used up or because
+  // `stop`, which this function calls, has returned an error.
   bool report_work(uint64_t work);
   // Returns whether the work budget is used up.
   bool out_of_work() const { return max_work_ != 0 && done_.load(std::memory_order_relaxed) >= max_work_; }

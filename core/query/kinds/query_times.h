@@ -1,6 +1,6 @@
-// Effective times of the queries of a block: the times at which the queries are evaluated. They result from the block's
-// as_of columns and the history that the snapshot retains. Immutable, so any thread may use it; borrows from the
-// snapshot.
+// Effective times of the queries of a block: the times at which the queries are evaluated. The times result from the
+// block's as_of columns and the history that the snapshot retains. Immutable, so any thread may use it; borrows from
+// the snapshot.
 #ifndef LOCUS_CORE_QUERY_KINDS_QUERY_TIMES_H_
 #define LOCUS_CORE_QUERY_KINDS_QUERY_TIMES_H_
 

@@ -81,9 +81,9 @@ class InstanceVisitor {
   HitCollector& collector_;
 };
 
-// Returns whether the vector kernels trace `rays` through the instances: all of them or none, because usually either
-// all rays of a block have a position `after`, or none. The kernels return the first hits in a mesh, so they cannot
-// trace a ray that needs the first hits after a given position.
+// Returns whether the vector kernels trace `rays` through the instances. They trace all of the rays or none: usually,
+// either all rays of a block have a position `after`, or no ray has one. The kernels return the first hits in a mesh,
+// so they cannot trace a ray that needs the first hits after a given position.
 bool use_kernels(const QueryTask& task, const std::vector<PendingRay>& rays) {
   if (rays.front().request.precision != Precision::kExact || task.ray_kernels() == nullptr) return false;
   return std::none_of(rays.begin(), rays.end(), [](const PendingRay& ray) { return ray.request.after.is_given(); });

@@ -29,8 +29,8 @@ struct RayRequest {
   RowPosition after;     // only rows after this position are returned
 };
 
-// Reader of the requests of a block of rays. What all queries of the block have in common is computed once. Borrows the
-// block and the origins. Const access; any thread.
+// Reader of the requests of a block of rays. The fields that are equal for all queries of the block are computed
+// once. Borrows the block and the origins. Const access; any thread.
 class RayReader {
  public:
   // Converts the block's cull from the scene's `winding` to the stored counter-clockwise winding.

@@ -240,8 +240,8 @@ class Look {
   }
 
   // Tests the segments of now_ against one instance by a kernel. Sets the hint of a blocked segment to the block of
-  // triangles that blocks it. Returns the hint of the last segment that the kernel found blocked, or `hint` if there is
-  // none.
+  // triangles that blocks it. Returns the hint of the last segment that the kernel found blocked, or `hint` if the
+  // kernel found no segment blocked.
   uint32_t trace(const Instance& instance, Vec3d origin, uint32_t hint) {
     if (now_.empty() || task_.ended()) return hint;
     const TriangleTree tree = instance.mesh->tree().tree();

@@ -1,6 +1,7 @@
-// Sight of one viewer: how many sample points of each target it sees. A sample is seen if a segment from one of the
-// viewer's eyes to the sample intersects no object and no triangle, except those in the group of the viewer or of the
-// target. Free functions; any thread may call them with a QueryTask of its own.
+// Sight of one viewer: how many sample points of each target the viewer sees. A sample is seen if, from one of the
+// viewer's eyes, the segment to the sample is not blocked. Objects and triangles that intersect a segment block it,
+// unless they belong to the group of the viewer or of the target. Free functions; any thread may call them with a
+// QueryTask of its own.
 #ifndef LOCUS_CORE_QUERY_KINDS_SIGHT_QUERY_H_
 #define LOCUS_CORE_QUERY_KINDS_SIGHT_QUERY_H_
 
@@ -28,8 +29,8 @@ struct SightQuery {
 // faster, because a viewer has many segments or several eyes.
 size_t viewers_together(const SightColumns& sight);
 
-// Does the same as look() for each of several viewers of one block, and searches the segments of all of them together.
-// Precondition: each viewer has one eye.
+// Does the same as look() for each of several viewers of one block, and searches the segments of all these viewers
+// together. Precondition: each viewer has one eye.
 void look_together(QueryTask& task, const QueryBlock& block, const SightColumns& sight,
                    absl::Span<const SightQuery> queries);
 

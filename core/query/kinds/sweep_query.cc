@@ -177,9 +177,9 @@ class SweptInstances {
   bool visit(const Instance& instance) {
     if (!task_.count_test()) return false;
     if (!filter_.accepts(instance)) return true;
-    // A sweep hits an instance only if it enters the instance's bounds, and no hit has a lower t than the entry. This
-    // test is repeated here because the tree over instances may or may not cull by these bounds, and the result must
-    // not depend on culling.
+    // A sweep hits an instance only if the sweep enters the instance's bounds, and no hit has a lower t than the
+    // entry. This test is repeated here because the tree over instances may or may not cull by these bounds, and the
+    // result must not depend on culling.
     const std::optional<double> nearest = path_.entry(instance.bounds);
     if (!nearest) return true;
     const ExactSweepTest exact(request_, path_, instance, *nearest);

@@ -37,7 +37,7 @@ class WindingSearch {
     visit_.predicate = {exact_crossing, this};
     visit_.start();
   }
-  // The kernel calls back with a pointer to this object.
+  // Cannot be copied, because the kernel calls exact_crossing() with a pointer to this object.
   WindingSearch(const WindingSearch&) = delete;
   WindingSearch& operator=(const WindingSearch&) = delete;
 

@@ -44,9 +44,9 @@ struct RunOptions {
   // Wall clock in nanoseconds with any origin, read before and after each chunk, on any thread. If `clock` is empty,
   // each call of work() runs one chunk.
   std::function<uint64_t()> clock;
-  // CPU time of the calling thread in nanoseconds. `work_clock` may be slow, because it is called only about twice for
-  // each call of work() and for each block that this call works on. If `work_clock` is empty, `clock` is used instead;
-  // if both clocks are empty, all times are 0.
+  // CPU time of the calling thread in nanoseconds. `work_clock` may be slow: each call of work() calls `work_clock`
+  // only about twice for each block on which the call works. If `work_clock` is empty, `clock` is used instead; if
+  // both clocks are empty, all times are 0.
   std::function<uint64_t()> work_clock;
   // Makes queries test every value instead of searching the index structures. Used to verify the index structures: the
   // results must be the same, and only the cost may differ.
@@ -131,9 +131,9 @@ class BatchRun {
   // Precondition: can_begin().
   Chunks::iterator begin_chunk() LOCUS_REQUIRES(mutex_);
   Chunks::iterator pop_unstarted() LOCUS_REQUIRES(mutex_);
-  // Moves the queries of `chunk` from `reached` on into two new, unstarted chunks directly after `chunk`. Each gets
-  // half of these queries; a single query needs only one new chunk. If there were always only one new chunk, a block of
-  // few, expensive queries would be worked on by one thread at a time.
+  // Moves the queries of `chunk` from `reached` on into two new, unstarted chunks directly after `chunk`. Each new
+  // chunk gets half of these queries; a single query needs only one new chunk. With only one new chunk in all cases,
+  // a block of few, expensive queries would be worked on by one thread at a time.
   void split(Chunks::iterator chunk, size_t reached) LOCUS_REQUIRES(mutex_);
   // Adds an unstarted chunk of the queries [begin, end) of the block of `before`, directly after `before`.
   void insert_unstarted(Chunks::iterator before, size_t begin, size_t end) LOCUS_REQUIRES(mutex_);

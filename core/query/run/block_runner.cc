@@ -73,7 +73,8 @@ bool BlockRunner::should_split() const { return work_done() >= kChunkWork && gro
 
 template <class Columns, class RegionOf>
 void BlockRunner::walk_regions(const Columns& columns, size_t begin, size_t end, const RegionOf& region_of) {
-  // A walk searches a region for every query, but an unanchored query (QueryOrigins::is_unanchored()) searches none.
+  // A walk needs one search for every query, but an unanchored query (QueryOrigins::is_unanchored()) searches no
+  // region.
   if (!origins_.unanchored().empty()) return;
   if (block_.source == Source::kStatic || !RegionWalk::pays(task_.snapshot().objects.grid())) return;
   const OverlapOptions options = overlap_options(block_, columns.detail);

@@ -1,5 +1,5 @@
-// Write-ahead journal of a scene: encodes each batch or static change that the scene is about to apply, and appends it
-// to the log. Does nothing if the scene has no log.
+// Write-ahead journal of a scene: encodes each batch or static change that the scene is about to apply, and appends
+// the encoded record to the log. Does nothing if the scene has no log.
 //
 // Threads: only the scene's writer, one thread at a time, calls append_...() and remove(), which wait for the disk; any
 // thread may call position(), total_bytes() and snapshot_written(), which never wait. Invariants of the position:

@@ -17,8 +17,8 @@
 
 namespace locus {
 
-// State of a scene at one revision, the input of StateWriter. Holding it while the scene changes costs little memory,
-// because its snapshot shares memory with later revisions.
+// State of a scene at one revision, the input of StateWriter. Holding a FrozenScene while the scene changes costs
+// little memory, because `snapshot` shares memory with later revisions.
 struct FrozenScene {
   SnapshotPtr snapshot;
   WriterTable writers;

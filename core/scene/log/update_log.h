@@ -58,7 +58,7 @@ struct StoredScene {
   uint64_t snapshot_sequence = 0;  // sequence number of the last record whose effect is in the snapshot
   uint64_t last_sequence = 0;      // sequence number of the last record
   uint64_t log_bytes = 0;          // size in bytes of the records after the snapshot
-  bool copied = false;  // true: copy made by back_up(); call restart_scene() first, as the original may have changed
+  bool copied = false;  // true: this is a copy made by back_up(); call restart_scene() before the first append()
   absl::Status damage;  // not OK (DATA_LOSS): the scene must not be served
 };
 
@@ -125,10 +125,10 @@ class UpdateLog {
   virtual absl::Status read_mesh(const std::array<uint8_t, 32>& sha256, ChunkSink sink) const = 0;
   virtual absl::Status read_parts(absl::string_view name, ChunkSink sink) const = 0;
 
-  // Write and read a cache that makes recovery faster: it has one tree topology (core/scene/log/tree_codec.h) for each
-  // content. Writing ignores errors; reading returns nullopt if nothing is stored. The topology is deleted with the
-  // last name of its content and is not part of a backup. For each content, only one thread at a time may call these
-  // two functions.
+  // Write and read a cache that makes recovery faster: the cache has one tree topology (core/scene/log/tree_codec.h)
+  // for each content. Writing ignores errors; reading returns nullopt if nothing is stored. The topology is deleted
+  // with the last name of its content and is not part of a backup. For each content, only one thread at a time may
+  // call these two functions.
   virtual void store_topology(const std::array<uint8_t, 32>& sha256, absl::string_view bytes) = 0;
   virtual std::optional<std::string> read_topology(const std::array<uint8_t, 32>& sha256) const = 0;
 

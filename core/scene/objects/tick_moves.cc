@@ -71,7 +71,7 @@ void TickMoves::add_fast(uint32_t handle, Start& start, Vec3d to, double length)
 }
 
 void TickMoves::list_fewer() {
-  LOCUS_DCHECK_GT(fast_length_, 0.0);  // if it were 0, doubling would not raise it
+  LOCUS_DCHECK_GT(fast_length_, 0.0);  // if fast_length_ were 0, doubling would not raise it
   while (fast_.size() > kMaxFast / 2) {
     fast_length_ *= 2;
     std::erase_if(fast_, [this](const FastMover& mover) {

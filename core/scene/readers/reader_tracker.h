@@ -120,8 +120,8 @@ class ReaderTracker {
   SnapshotPin::Entry add(const SnapshotPtr& snapshot) LOCUS_EXCLUDES(mutex_);
   void remove(SnapshotPin::Entry entry, const SnapshotPin::Revocation* revocation) LOCUS_EXCLUDES(mutex_);
   void add_revocation(std::shared_ptr<SnapshotPin::Revocation> revocation) LOCUS_EXCLUDES(mutex_);
-  // Returns true if pinned revisions may hold more memory than the budget. This is an estimate from the number of bytes
-  // that updates have replaced since the oldest pinned revision and since the last count of held memory.
+  // Returns true if pinned revisions may hold more memory than the budget. The result is estimated from the number of
+  // bytes that updates have replaced since the oldest pinned revision and since the last count of held memory.
   bool may_exceed(const SceneSnapshot& latest) const LOCUS_REQUIRES(mutex_);
   // Returns the pinned revisions before `latest`, oldest first.
   std::vector<Holding> pinned_before(const SceneSnapshot& latest) const LOCUS_REQUIRES(mutex_);
@@ -145,9 +145,10 @@ class ReaderTracker {
   uint64_t counted_ LOCUS_GUARDED_BY(mutex_) = 0;
   uint64_t counted_at_ LOCUS_GUARDED_BY(mutex_) = 0;
   uint64_t budget_ LOCUS_GUARDED_BY(mutex_);
-  // enforced_at_ is SceneSnapshot::replaced_bytes of the last snapshot passed to enforce_budget(). late_bytes_ is a sum
-  // over the revisions that were pinned after the last count and were already outdated when they were pinned. The term
-  // of such a revision is the value of enforced_at_ at that time minus SceneSnapshot::replaced_bytes of the revision.
+  // enforced_at_ is SceneSnapshot::replaced_bytes of the last snapshot passed to enforce_budget(). late_bytes_ is a
+  // sum over the revisions that were pinned after the last count and were already outdated when they were pinned. The
+  // term of such a revision is enforced_at_ at the time of its pin, minus SceneSnapshot::replaced_bytes of the
+  // revision.
   uint64_t enforced_at_ LOCUS_GUARDED_BY(mutex_) = 0;
   uint64_t late_bytes_ LOCUS_GUARDED_BY(mutex_) = 0;
 };

@@ -34,7 +34,7 @@ using HistoryPtr = std::shared_ptr<const History>;
 enum class PastLimit : uint8_t {
   kOff,       // the scene keeps no history
   kBegan,     // there is no earlier tick: the scene began, or restarted its ticks, at the oldest tick
-  kTicks,     // older ticks are more than HistoryOptions::ticks before the current tick
+  kTicks,     // older ticks are more than HistoryOptions::ticks ticks before the current tick
   kBytes,     // older ticks did not fit into HistoryOptions::bytes
   kMemory,    // older ticks were dropped because the server was short of memory
   kRestored,  // the scene was read from a snapshot on disk, which contains no history
@@ -70,8 +70,9 @@ class HistoryRecorder {
   // Drops the oldest records until the rest takes at most `bytes`. Called when memory is short. Returns true if a
   // record was dropped. Does not change the memory limit for records that are added later.
   bool trim(uint64_t bytes);
-  // Returns true if close() was called since the last drop(), even if all records were dropped to save memory. The
-  // result depends on the batches alone, so that a replay of the same batches produces the same revisions.
+  // Returns true if close() or restore(true) was called since the last drop(), even if all records were dropped to
+  // save memory. The result depends on the batches alone, so that a replay of the same batches produces the same
+  // revisions.
   bool has_past() const { return has_past_; }
   // Initialises the recorder of a scene that was read from disk. If `has_past` is true, the scene had a history, which
   // is lost.

@@ -34,11 +34,11 @@ struct SceneSnapshot {
 
 using SnapshotPtr = std::shared_ptr<const SceneSnapshot>;
 
-// Returns the bytes that `held` holds and `later`, a later revision of the same scene, does not: objects, instances and
-// history, but not meshes, which scenes share. The result is exact except for the history. It may overestimate the
-// bytes of the history if ticks were restarted between the two revisions. It may underestimate them if `later` has
-// dropped the last history record of `held`, and `held` is not the first revision after the tick of this record. O(size
-// of the difference).
+// Returns the bytes that `held` holds and `later`, a later revision of the same scene, does not: objects, instances
+// and history, but not meshes, which scenes share. The result is exact except for the bytes of the history. These
+// bytes may be overestimated if ticks were restarted between the two revisions. They may be underestimated if `later`
+// has dropped the last history record of `held`, and `held` is not the first revision after the tick of this record.
+// O(size of the difference).
 uint64_t unshared_bytes(const SceneSnapshot& held, const SceneSnapshot& later);
 
 // Returns the bytes of the snapshot without its history and meshes. O(objects).

@@ -139,8 +139,8 @@ absl::Status open_damaged(const StorageOptions& options, const rocksdb::Status& 
   }
   rocksdb::Status status = Database::open(wanted, OpenMode::kLenient, opened.database);
   if (!status.ok()) return unopenable(options, status.ToString());
-  // The lenient opening has removed a damaged log, so a strict opening may succeed now. Prefer a strict opening: after
-  // it RocksDB stops writing at a disk error, and recover() resumes writing.
+  // The lenient opening has removed a damaged log, so a strict opening may succeed now. Prefer a strict opening:
+  // RocksDB then refuses writes after a disk error until recover() has resumed the database.
   opened.database = nullptr;
   if (Database::open(wanted, OpenMode::kStrict, opened.database).ok()) return absl::OkStatus();
   status = Database::open(wanted, OpenMode::kLenient, opened.database);
@@ -154,7 +154,7 @@ absl::StatusOr<std::unique_ptr<DirectoryLock>> DirectoryLock::acquire(rocksdb::E
   const rocksdb::Status status = env.LockFile(absl::StrCat(path, "/", kName), &lock);
   if (status.ok()) return std::unique_ptr<DirectoryLock>(new DirectoryLock(env, lock));
   const std::string message = status.ToString();
-  // RocksDB's messages if another process holds the lock, and if this process holds it.
+  // RocksDB's messages: the first if another process holds the lock, the second if this process holds the lock.
   if (absl::StrContains(message, "Resource temporarily unavailable") || absl::StrContains(message, "lock hold")) {
     Refusal refusal;
     refusal.reason = Reason::kInUse;

@@ -60,8 +60,8 @@ class SceneTable {
   };
 
   void add(SceneLogStatePtr scene) LOCUS_EXCLUDES(mutex_);
-  // Returns the scene. NOT_FOUND if the table has no such scene; if the scene is damaged, the status that describes the
-  // damage.
+  // Returns the scene. Returns NOT_FOUND if the table has no such scene, and SceneLogState::damage if the scene is
+  // damaged.
   absl::StatusOr<SceneLogStatePtr> find(SceneKey scene) const LOCUS_EXCLUDES(mutex_);
   // Returns the scene even if it is damaged; null if the table has no such scene.
   SceneLogStatePtr find_any(SceneKey scene) const LOCUS_EXCLUDES(mutex_);

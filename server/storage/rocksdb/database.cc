@@ -28,7 +28,7 @@ constexpr int kBuffers = 4;
 constexpr int kTablesToMerge = 4;
 constexpr int kUnlimitedTables = 1 << 20;
 constexpr uint64_t kManifestBytes = uint64_t{4} << 20;
-constexpr size_t kMaxWarning = 1024;  // bytes of a message of RocksDB; longer messages are cut
+constexpr size_t kMaxWarning = 1024;  // maximum bytes of a message of RocksDB; longer ones are cut
 constexpr uint64_t kLogBuffersOnDisk = 4;
 // Disk space in bytes that recover() needs in addition to the size of the memory tables.
 constexpr uint64_t kRecoveryBytes = uint64_t{1} << 20;

@@ -70,8 +70,8 @@ class Database {
   bool needs_recovery() const;
   // Resumes writing after an error. Starts a new log file, because RocksDB reads no record that follows a torn one.
   // Waits until the calls of write() in progress have returned; new calls of write() fail meanwhile. Flushes all memory
-  // tables. If the disk's free space, `free_bytes`, is too small for them, returns RESOURCE_EXHAUSTED with the bytes
-  // needed. If writes were failing already, write() then returns this error instead of the earlier one.
+  // tables. If the disk's free space, `free_bytes`, is too small for the flush, returns RESOURCE_EXHAUSTED with the
+  // bytes needed. If writes were failing already, write() then returns this error instead of the earlier error.
   absl::Status recover(uint64_t free_bytes) LOCUS_EXCLUDES(mutex_);
   // Starts flushing all memory tables, so that RocksDB can delete old log files. Returns at once; if flushing fails,
   // the next write reports the error.

@@ -10,8 +10,8 @@
 // number to 3 and leaves all rows unchanged.
 //
 // Column families, the fields of their keys, and the value under each key (`scene` is a SceneKey, `id` a content id):
-// meta      "format"; "catalogue"; 's' scene: a scene; 'm' name: a mesh; 'c' sha256: a mesh's content; 'p' scene id
-//           and 'q' sha256 id: mark the chunks of a snapshot or mesh as unfinished
+// meta      "format"; "catalogue"; 's' scene: a scene; 'm' name: a mesh; 'c' sha256: a mesh's content; 'p' scene id:
+//           marks a snapshot's chunks as unfinished; 'q' sha256 id: marks a mesh's chunks as unfinished
 // log       scene sequence: a record. Its checksum covers the checksum of the record before, and so depends on all
 //           earlier records. Therefore a missing, exchanged or outdated record is detected.
 // snapshot  scene id index: a chunk of a scene's snapshot
@@ -123,8 +123,8 @@ std::optional<CatalogueRow> decode_catalogue(absl::string_view bytes);
 std::optional<ContentRow> decode_content(absl::string_view bytes);
 std::optional<MeshRow> decode_mesh(absl::string_view bytes);
 
-// The value of a record is its head, its bytes and a checksum. These three are built separately, so that the bytes are
-// copied only once, into the write batch.
+// The value of a record is its head, its bytes and a checksum. The three parts are built separately, so that the bytes
+// are copied only once, into the write batch.
 inline constexpr size_t kRecordHeadBytes = 1 + 8 + 8 + 8 + 4;
 inline constexpr size_t kRecordOverhead = kRecordHeadBytes + 8;
 std::string record_head(const LogEntry& entry);

@@ -16,8 +16,8 @@ class Env;
 
 namespace locus::server {
 
-// Receives the warnings and errors that RocksDB logs, one line of text each. RocksDB calls it on any thread, possibly
-// holding its locks: the function must not use the log.
+// Receives the warnings and errors that RocksDB logs, one line of text each. RocksDB calls the function on any thread,
+// possibly while RocksDB holds locks: the function must not call the RocksdbLog.
 using StorageWarning = std::function<void(absl::string_view)>;
 
 struct StorageOptions {
@@ -43,7 +43,7 @@ struct StorageOptions {
   // before a crash are later missing at the end of the log, the loss is not detected.
   std::chrono::milliseconds durable_marker_delay{10};
 
-  // Receives RocksDB's warnings; they are dropped if it is empty.
+  // Receives RocksDB's warnings. If the function is empty, the warnings are dropped.
   StorageWarning warn;
 
   // If false, records are acknowledged without a sync. Only for tests that must be able to detect lost records.

@@ -80,7 +80,7 @@ def send_filled(job, method, prefix, make, what):
 
 def amplify_steps(job):
     """Returns a step for every Place of every request, and steps for unknown fields. First come the steps that fill
-    lists in requests of the most frequent calls, because the daemon needs most memory for each byte of these.
+    lists in requests of the most frequent calls, because the daemon needs most memory for each byte of such a request.
     """
     schema, steps = protobuf.Schema(), []
     for method in schema.methods:

@@ -16,8 +16,8 @@ namespace locus::bench::dynamic {
 // shows what a busy second core alone costs.
 enum class Beside : uint8_t { kNothing, kSpinning, kWriter };
 
-// Priority of readers relative to the writer. kEqual: the same. kBelow: lower, as the daemon's threads for large
-// batches have it.
+// Priority of readers relative to the writer. kEqual: equal. kBelow: lower, like the priority of the daemon's threads
+// for large batches.
 enum class Readers : uint8_t { kEqual, kBelow };
 
 inline constexpr double kUnpaced = 0;

@@ -23,7 +23,7 @@ class ScatteredWriter {
  private:
   std::vector<uint64_t> ids_;
   std::vector<float> velocities_;
-  std::array<std::vector<float>, 2> positions_;  // [0]: at the next tick, [1]: before it; used alternately
+  std::array<std::vector<float>, 2> positions_;  // [0]: after the tick, [1]: before the tick; used alternately
   size_t next_ = 0, turn_ = 0;
 };
 

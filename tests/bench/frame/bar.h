@@ -9,8 +9,8 @@
 
 namespace locus::bench {
 
-// Notes whether the ratio of the last added cell is at least `bar`; `how` explains how `bar` was computed; empty if
-// `bar` is a constant.
+// Notes whether the ratio of the last added cell is at least `bar`. The text `how` follows `bar` in the note and
+// explains how `bar` was computed; it may be empty.
 inline void note_bar(Report& report, double bar, const std::string& how = "") {
   const Cell& cell = report.cells.back();
   report.notes.push_back(absl::StrFormat("%s beside %s: %.3f, required %.3f%s: %s", cell.case_name, cell.peer_name,

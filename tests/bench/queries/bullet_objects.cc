@@ -10,8 +10,8 @@
 namespace locus::bench::queries {
 namespace {
 
-// Two trees of Bullet: one of the bounding boxes of the balls, for frustums, and one of these boxes grown by half of
-// kPairDistance, for pairs. The grown boxes of two balls overlap if the balls are within kPairDistance.
+// Two trees of Bullet. The first stores the balls' bounding boxes and answers frustums. The second stores these boxes
+// grown by half of kPairDistance and answers pairs: the grown boxes of two balls within kPairDistance overlap.
 class BulletObjects : public ObjectPeer {
  public:
   explicit BulletObjects(const dynamic::Objects& objects) {

@@ -98,8 +98,8 @@ std::vector<ObjectPair> proved_pairs(const Arena& arena) {
   return pairs;
 }
 
-// Runs a ball query around each object, in as few batches as possible. The queries find each pair twice, and each
-// object itself. Returns the number of rows.
+// Runs a ball query around each object, in as few batches as possible. The queries find each pair twice, and each query
+// also finds its own object. Returns the number of rows.
 size_t run_balls(const Arena& arena) {
   size_t rows = 0;
   std::vector<float> radii;

@@ -48,7 +48,7 @@ class OurOverlaps {
     for_each_row(run(columns), begin, [&](size_t i, uint32_t triangle) { rows.emplace_back(i, triangle); });
   }
 
-  // Appends the same rows, found by a query of the balls around the capsules and a capsule test of each triangle found.
+  // Appends the rows of find_directly(), found by balls around the capsules and a capsule test of each triangle found.
   void find_in_two_passes(size_t begin, size_t end, std::vector<CapsuleRow>& rows) const {
     // Slightly more than the sum of radius and half length, so that rounding of the sum cannot lose a triangle.
     const float radius = (kCapsuleRadius + kCapsuleHalf) * mesh_.diagonal * (1 + 0x1p-18f);
@@ -61,7 +61,7 @@ class OurOverlaps {
     });
   }
 
-  // Returns the number of overlaps of the balls `begin` to end - 1, found by their rows or by counting only.
+  // Returns the number of overlaps of the balls `begin` to end - 1. If `count_only` is true, the query returns no rows.
   uint64_t count(size_t begin, size_t end, bool count_only) const {
     const float radius = kBallRadius * mesh_.diagonal;
     BallColumns columns;

@@ -1,6 +1,6 @@
 // Cases of the suite `queries` that compare two ways of finding overlaps with one mesh. One case compares a query of
-// capsules with a query of balls around the capsules and a test of each triangle found. Another compares a query that
-// returns rows with one that only counts them.
+// capsules with a query of balls around the capsules and a test of each triangle found. Another case compares a query
+// that returns rows with a query that only counts rows.
 #ifndef LOCUS_TESTS_BENCH_QUERIES_OVERLAP_CASES_H_
 #define LOCUS_TESTS_BENCH_QUERIES_OVERLAP_CASES_H_
 

@@ -123,7 +123,7 @@ void append(Vec3d point, std::vector<float>& values) {
   for (const double value : {point.x, point.y, point.z}) values.push_back(static_cast<float>(value));
 }
 
-// One case: the scene, the matrix and the same segments as rays.
+// One case: the scene, the matrix of sight, and the segments of the matrix as rays.
 struct SightWork {
   SnapshotPtr snapshot;
   std::vector<float> viewers, targets;

@@ -19,8 +19,8 @@ enum class Transport : uint8_t { kPlain, kTls, kMutualTls };
 
 class Certificates {
  public:
-  // Makes the certificates by the program `locus` beside this one. Returns UNAVAILABLE, with the output of `locus`, if
-  // there is no such program or it fails.
+  // Makes the certificates by the program `locus` in the folder of this program. Returns UNAVAILABLE if `locus` is
+  // missing or fails; in the second case the message contains the output of `locus`.
   static absl::StatusOr<std::unique_ptr<Certificates>> make();
   Certificates(const Certificates&) = delete;
   Certificates& operator=(const Certificates&) = delete;

@@ -1,6 +1,6 @@
-// Cases that measure the effects of one client on another, and of a flood of calls on the server. They cover small
-// batches while another client sends large ones, more calls than the server admits, clients that do not read or that
-// reconnect, and expired and cancelled calls. Used by the suite serving.
+// Cases that measure the effects of one client on another, and of a flood of calls on the server. They measure small
+// batches while another client sends large batches, a server that gets more calls than it admits, clients that do not
+// read or that reconnect, and expired and cancelled calls. Used by the suite serving.
 #ifndef LOCUS_TESTS_BENCH_SERVING_CROWD_CASES_H_
 #define LOCUS_TESTS_BENCH_SERVING_CROWD_CASES_H_
 
@@ -9,7 +9,8 @@
 
 namespace locus::bench::serving {
 
-// Runs mixed_p50/16, mixed_p99/16, overload/10x, and the cases of guest_cases.h and ending_cases.h.
+// Runs mixed_p50/16, mixed_p99/16, overload/10x/at_once, overload/10x/as_told, and the cases of guest_cases.h and
+// ending_cases.h.
 absl::Status run_crowd_cases(const ServingRun& run);
 
 }  // namespace locus::bench::serving

@@ -10,8 +10,8 @@ namespace locus::bench::serving {
 
 // Runs durable/256 (moves over one stream) and durable_queries/256 (queries while such a stream runs). Both are
 // measured with acks that wait for the disk and with acks that do not, in turns, on one daemon. Runs restart/1M: a
-// killed daemon is started again, and the seconds from this start to its first right answer are compared with a bar of
-// one second.
+// killed daemon is started again, and the seconds from this start to the daemon's first right answer are compared with
+// a required maximum of one second.
 absl::Status run_durable_cases(const ServingRun& run);
 
 }  // namespace locus::bench::serving

@@ -62,8 +62,7 @@ class EchoCases {
   EchoCases(const ServingRun& run, const RawTcpServer& plain, TwinScene& scene)
       : run_(run), plain_(plain), scene_(scene) {}
 
-  // Measures columns that are sent to locus-echo and back. This takes the time of the server's code for calls, without
-  // queries.
+  // Measures columns that are sent to locus-echo and back. locus-echo runs the server's code for calls, but no queries.
   absl::Status echo(const Echo& echo) {
     const std::string name = echo_name(echo);
     if (!run_.wants(name)) return absl::OkStatus();

@@ -1,7 +1,7 @@
-// The program `locus-echo`: it serves streams of queries with the server's own template for calls, number of IO threads
-// and limits. It has no scene and checks only the lengths of the request's columns. It answers every batch immediately
-// with columns of 24 bytes per ray, so that locus-bench can measure transport alone. locus-bench starts it with
-// locusd's options for the port.
+// The program `locus-echo`: it serves streams of queries. Its template for calls, number of IO threads and limits are
+// those of locusd. It has no scene and checks only the lengths of the request's columns. It answers every batch
+// immediately with columns of 24 bytes per ray, so that locus-bench can measure transport alone. locus-bench starts it
+// with locusd's options for the port.
 #include <fcntl.h>
 #include <grpcpp/resource_quota.h>
 #include <grpcpp/server.h>

@@ -111,8 +111,8 @@ class GuestCases {
     return {daemon.process().open_files(), daemon.process().resident_bytes()};
   }
 
-  // Notes whether the server released the guests' resources. It keeps freed memory for later guests, so its memory is
-  // compared with the memory after the first round.
+  // Notes whether the server released the guests' resources. The server keeps freed memory for later guests, so its
+  // memory is compared with its memory after the first round.
   void note_left_behind(const std::string& name, const LeftBehind& left) const {
     constexpr double kMaxGrowth = 1.1;
     const bool returned = left.last.files <= left.before.files &&

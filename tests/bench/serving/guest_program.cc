@@ -5,8 +5,7 @@
 //   silent  COUNT clients that never read their answers
 //   churn   2 COUNT clients, at most COUNT at a time, that connect, send one query and leave
 // With churn the program ends by itself; with the other kinds it must be ended by a signal. Silent and churn clients
-// run at a lower priority, so that they take no processor time from the server. Clients on other machines would take
-// none either.
+// run at a lower priority, so that they take no processor time from the server, as if they ran on other machines.
 #include <unistd.h>
 
 #include <cstdlib>

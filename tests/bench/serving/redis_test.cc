@@ -31,7 +31,7 @@ TEST(RedisTest, EveryPrefixOfAReplyIsIncomplete) {
 }
 
 TEST(RedisTest, AStartedServerAnswersSearchesAndReportsErrors) {
-  // The machine decides on the skip, so that a fault of the code under test makes the test fail.
+  // Determine without the code under test whether Redis is installed, so that a fault of that code makes the test fail.
   const bool is_installed =
       std::filesystem::exists("/usr/bin/redis-server") || std::filesystem::exists("/usr/bin/redis-check-rdb");
   if (!is_installed) GTEST_SKIP() << "Redis is not installed: deploy/packages.sh bench";

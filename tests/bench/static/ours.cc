@@ -48,8 +48,8 @@ bool kernels_hold(const RayQuery& ray, float magnitude) {
 
 TriangleRay triangle_ray(const RayQuery& ray) { return {to_double(ray.origin), to_double(ray.direction)}; }
 
-// Returns the float above t. It is needed because the searches below exclude hits at their limit, but the workloads
-// include hits at t_max.
+// Returns the float above t. Callers use it as the limit of a search, because the searches exclude hits at their limit,
+// but the workloads include hits at t_max.
 float just_beyond(float t) { return std::nextafter(t, std::numeric_limits<float>::infinity()); }
 
 RayAnswer first_by_triangles(const TriangleBvh& tree, const RayQuery& ray) {

@@ -228,7 +228,7 @@ class FakeQueries final : public v1::QueryService::Service {
     return grpc::Status::OK;
   };
   std::function<v1::QueryResult(const v1::QueryBatch&)> stream_answer;
-  int silent_messages = 0;  // number of next messages on streams that are never answered
+  int silent_messages = 0;  // number of the next stream messages that get no answer
   int failing_calls = 0;
   grpc::Status failure{grpc::StatusCode::UNAVAILABLE, "planned"};
   int calls = 0;
@@ -239,7 +239,7 @@ class FakeQueries final : public v1::QueryService::Service {
   std::mutex mutex_;
 };
 
-// Fake SceneService: stores scenes by name, the hashes of all uploaded meshes and the arrays of the last one.
+// Fake SceneService: stores scenes by name, the hashes of all uploaded meshes, and the arrays of the last mesh.
 class FakeScenes final : public v1::SceneService::Service {
  public:
   grpc::Status CreateScene(grpc::ServerContext*, const v1::CreateSceneRequest* request,
@@ -367,7 +367,7 @@ class FakeScenes final : public v1::SceneService::Service {
   std::vector<uint32_t> indices;
   size_t largest_message = 0;
   std::vector<v1::DownloadMeshResponse> mesh_pieces;
-  int failing_downloads = 0;  // number of next downloads that fail after their first message
+  int failing_downloads = 0;  // number of the next downloads that fail after their first message
   bool no_mesh = false;
   v1::ChangeInstancesRequest last_change;
   int creates = 0;
@@ -413,7 +413,7 @@ class FakeServerService final : public v1::ServerService::Service {
   // Sends the messages in `backup_pieces`, then the status `backup_end`.
   grpc::Status Backup(grpc::ServerContext*, const v1::BackupRequest*,
                       grpc::ServerWriter<v1::BackupResponse>* writer) override {
-    // Copies the messages, because a test that has cancelled a backup configures the next one while this call still
+    // Copies the messages, because a test that has cancelled a backup configures the next backup while this call still
     // runs.
     const std::vector<v1::BackupResponse> pieces = backup_pieces;
     for (const v1::BackupResponse& piece : pieces) {

@@ -32,7 +32,7 @@ TEST(SeededHashTest, RegularIdsSpreadOverTheUpperBits) {
     for (size_t pattern = 0; pattern < patterns.size(); ++pattern) {
       std::array<uint32_t, 4096> counts{};
       for (uint64_t i = 0; i < 3 * counts.size(); ++i) ++counts[hash(patterns[pattern](i)) >> 52];
-      EXPECT_LT(*std::max_element(counts.begin(), counts.end()), 25u) << seed << " " << pattern;  // 15 are typical
+      EXPECT_LT(*std::max_element(counts.begin(), counts.end()), 25u) << seed << " " << pattern;  // typically 15
     }
   }
 }

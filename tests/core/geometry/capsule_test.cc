@@ -77,7 +77,7 @@ TEST(SegmentTriangleTest, DistanceAgreesWithASearch) {
   EXPECT_GT(crossing, 30);
 }
 
-// A segment that crosses a parallelogram through its diagonal crosses one of the parallelogram's two triangles.
+// A segment that crosses the diagonal of a parallelogram crosses one of the parallelogram's two triangles.
 TEST(SegmentTriangleTest, NoSegmentPassesBetweenTwoTriangles) {
   constexpr uint64_t kSeed = 143;
   Random random(kSeed);

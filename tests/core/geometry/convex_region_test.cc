@@ -28,8 +28,8 @@ Planes box_planes(Vec3d center, Vec3d half, const Rotation& rotation = {}) {
   return planes;
 }
 
-// Returns the planes of a view from `eye` along the rotated x axis: a near plane, a far plane and four sides. In axes
-// that are not rotated, the sides bound |y| and |z| by `slope` * x.
+// Returns the planes of a view from `eye` along the rotated x axis: a near plane, a far plane and four sides. Relative
+// to `eye` and before the rotation, the sides bound |y| and |z| by `slope` * x.
 Planes view_planes(Vec3d eye, double slope, double near, double far, const Rotation& rotation) {
   Planes planes;
   const auto add = [&](Vec3d normal, double offset) {
@@ -74,8 +74,8 @@ TEST(ConvexRegionTest, ABoxOfPlanesIsABox) {
   EXPECT_FALSE(region_overlaps(region, ball({2.001, 3, 4}, 0)));
   EXPECT_TRUE(region_overlaps(region, ball({4, 2, 3}, 2)));
   EXPECT_FALSE(region_overlaps(region, ball({4, 2, 3}, 1.999f)));
-  // The centre of the first two balls is 5 away from an edge, by the offset (3, 4); that of the last two is 7 away from
-  // a corner, by the offset (2, 3, 6).
+  // The centre of the first two balls is 5 away from an edge, by the offset (3, 4). The centre of the last two balls is
+  // 7 away from a corner, by the offset (2, 3, 6).
   EXPECT_TRUE(region_overlaps(region, ball({5, 7, 3}, 5)));
   EXPECT_FALSE(region_overlaps(region, ball({5, 7, 3}, 4.999f)));
   EXPECT_TRUE(region_overlaps(region, ball({4, 6, 10}, 7)));

@@ -60,8 +60,8 @@ Grazing any_grazing(Random& random) {
   return grazing;
 }
 
-// Let e be the tolerance that tests/support/proof/ray_judge.h defines. No triangle is missed, and no hit is farther
-// than e / 2 from its triangle.
+// Let e be the tolerance that tests/support/proof/ray_judge.h defines. A triangle that is not culled is
+// hit if the ray crosses the triangle at least e within its border. No hit is farther than e / 2 from the triangle.
 TEST(EdgeOnTriangleTest, HitsAreWithinTheToleranceAtEveryAngle) {
   constexpr uint64_t kSeed = 92;
   Random random(kSeed);

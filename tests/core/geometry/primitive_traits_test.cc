@@ -106,7 +106,7 @@ TEST(PrimitiveTraitsTest, AStructOfAnotherNamespaceCanBeStoredAndQueried) {
 }
 
 // Tests the case of Figure 37.15 of Hughes et al. (the source named in primitive_traits.h): if two primitives overlap,
-// the ray may hit the one that is tested second before the one that is tested first.
+// the ray may enter the primitive that is tested second before it enters the primitive that is tested first.
 TEST(PrimitiveTraitsTest, TheNearerOfTwoOverlappingPrimitivesWinsInEitherOrder) {
   const game::Crate large{1, 10, 0, 0, 8}, small{2, 6, 0, 0, 2};  // the ray enters `large` at 6 and `small` at 5
   for (const bool large_first : {true, false}) {

@@ -225,7 +225,7 @@ TEST(RayObbTest, EachInsideModeHasItsAnswerFromInside) {
 }
 
 TEST(RayObbTest, ARotatedBoxIsHitOnItsRotatedFace) {
-  const float sin_45 = std::sqrt(0.5f);  // a rotation of 90 degrees around z
+  const float sin_45 = std::sqrt(0.5f);  // for the quaternion of a rotation by 90 degrees around z
   const Shape box = box_of({10, 0, 0}, {1, 2, 3}, {0, 0, sin_45, sin_45});
   const auto hit = ray_hit(test::ray_from({0, 0, 0}, {1, 0, 0}), box);
   ASSERT_TRUE(hit.has_value());

@@ -74,8 +74,8 @@ TEST(RayTriangleTest, ARayThatStartsVisiblyBehindATriangleMissesIt) {
   }
 }
 
-// Let e be 2^-20 (|origin| + extent of the triangle). If a ray hits a triangle at least e inside its edges, hit()
-// reports a hit, and its distance is wrong by at most e / 4.
+// Let e be 2^-20 (|origin| + extent of the triangle). If a ray crosses a triangle at least e inside the triangle's
+// edges, hit() reports a hit whose distance is wrong by at most e / 4.
 TEST(RayTriangleTest, NoMissAndNoLateHitAtAnyAngleAndDistance) {
   constexpr uint64_t kSeed = 51;
   Random random(kSeed);

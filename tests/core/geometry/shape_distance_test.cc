@@ -16,7 +16,7 @@
 namespace locus::test {
 namespace {
 
-// Returns the point of the solid nearest to `point`.
+// Returns the point of the shape's solid that is nearest to `point`.
 Vec3r nearest_of(const Shape& shape, Vec3r point) {
   const Vec3r local = turned_back(shape.rotation, point - to_real(shape.position));
   const Vec3r size = to_real(to_double(shape.size));

@@ -48,8 +48,8 @@ struct RayCase {
 };
 
 // Expects that the hit is between the beginning of the outer chord and the beginning of the inner chord. The outer
-// chord is the chord of the solid grown by the tolerance, the inner chord that of the solid shrunk by it. If there is
-// no inner chord, a hit is optional and may be anywhere on the outer chord.
+// chord is the chord of the solid grown by the tolerance, the inner chord is the chord of the solid shrunk by the
+// tolerance. If there is no inner chord, a hit is optional and may be anywhere on the outer chord.
 void expect_entry(const RayCase& c, const std::optional<ShapeHit>& hit) {
   const std::optional<RealInterval> outer = c.chord(c.tolerance), inner = c.chord(-c.tolerance);
   if (!outer || outer->far < 0) {
@@ -143,8 +143,8 @@ TEST_P(ShapeRayTest, RandomRaysAgreeWithTheReference) {
   EXPECT_GT(inside, 500);
 }
 
-// Compares verdicts with a reference for the shape grown by 1e-9. This reference is exact for shapes and rays with
-// whole coordinates: such a ray that comes within 1e-9 of the shape touches it.
+// Compares verdicts with a reference for the shape grown by 1e-9. This reference is exact, because shapes and rays have
+// whole coordinates here: a ray that comes within 1e-9 of a shape touches the shape.
 TEST_P(ShapeRayTest, LatticeVerdictsAreExact) {
   constexpr uint64_t kSeed = 202;
   constexpr Real kGrown = 1e-9L;

@@ -87,8 +87,8 @@ constexpr Corners kFloor = {Vec3d{-10, -10, 0}, Vec3d{30, -10, 0}, Vec3d{-10, 30
 TEST(SweepTest, ABallLandsOnAFaceAnEdgeAndACorner) {
   EXPECT_EQ(first_contact(ball({0, 0, 5}, {0, 0, 0}, 1), kFloor, AtStart::kHit), 0.8);
   EXPECT_EQ(first_contact(ball({0, 0, -5}, {0, 0, 0}, 1), kFloor, AtStart::kHit), 0.8);
-  // The ball passes beside an edge of the floor, 3 units away from it, so its radius of 5 reaches the edge at a height
-  // of 4.
+  // The next two balls, of radius 5, fall at a horizontal distance of 3 from an edge or a corner of the floor. So they
+  // touch the edge or corner when their centre is at a height of 4.
   EXPECT_NEAR(*first_contact(ball({0, -13, 8}, {0, -13, 0}, 5), kFloor, AtStart::kHit), 0.5, 1e-12);
   EXPECT_NEAR(*first_contact(ball({-13, -10, 8}, {-13, -10, 0}, 5), kFloor, AtStart::kHit), 0.5, 1e-12);
   EXPECT_EQ(first_contact(ball({-14, -14, 8}, {-14, -14, 0}, 5), kFloor, AtStart::kHit), std::nullopt);

@@ -30,7 +30,7 @@ TEST(TransformTest, PointToMeshInvertsPointToWorld) {
 }
 
 TEST(TransformTest, WorldIsTranslationPlusScaleTimesRotatedMesh) {
-  const float s = std::sqrt(0.5f);  // a rotation of 90 degrees around z
+  const float s = std::sqrt(0.5f);  // for the quaternion of a rotation by 90 degrees around z
   const Transform transform = make_transform({10, 20, 30}, {0, 0, s, s}, 2);
   EXPECT_LT(max_component(abs(transform.point_to_world({1, 2, 3}) - Vec3d{6, 22, 36})), 1e-14);
   EXPECT_LT(max_component(abs(transform.direction_to_mesh({0, 2, 0}) - Vec3d{1, 0, 0})), 1e-15);

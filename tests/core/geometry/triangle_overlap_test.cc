@@ -14,7 +14,7 @@ using test::reference_distance;
 using test::size_of;
 using test::to_real;
 
-// Returns whether the triangle overlaps the box after the box is grown by `grown` (shrunk if it is negative), by
+// Returns whether the triangle overlaps the box after the box is grown by `grown` (shrunk if `grown` is negative), by
 // polygon clipping in long double.
 bool reference_overlap(const Obbf& box, const Quaternion& rotation, const Triangle& t, Real grown) {
   const test::RealBox real = test::real_box(to_real(box.center), rotation, to_real(box.half));
@@ -115,8 +115,8 @@ TEST(TriangleOverlapTest, TrianglesWithoutAreaCountAsSegmentsAndPoints) {
   EXPECT_TRUE(ball_overlaps({{1, 1, -1}, 2}, point));
 }
 
-// A needle is a triangle whose height is tiny. A test of its interior by dot products can miss an overlap because of
-// cancellation; the distances to its three edges are still correct.
+// A needle is a triangle whose height is tiny. A test of the needle's interior by dot products can miss an overlap
+// because of cancellation; the distances to the needle's three edges are still correct.
 TEST(TriangleOverlapTest, NeedlesAreNotDropped) {
   const Triangle needle{{1000, 0, 0}, {1100, 0, 0}, {1050, 1e-5f, 0}, 0};
   EXPECT_TRUE(ball_overlaps({{1025, 0, 0.5f}, 0.5f}, needle));

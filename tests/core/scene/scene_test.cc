@@ -102,7 +102,7 @@ TEST_F(SceneTest, AtMostTheLimitOfRecentRevisionsIsKept) {
 }
 
 TEST_F(SceneTest, RecentRevisionsAreDroppedBeyondTheLimitOfReplacedBytes) {
-  // There are so many objects that a move of all objects replaces between a sixth and a fifth of limits::kRecentBytes.
+  // A move of all objects replaces between a sixth and a fifth of limits::kRecentBytes, the limit of replaced bytes.
   std::vector<Id> all(limits::kRecentBytes / 420);
   for (uint64_t i = 0; i < all.size(); ++i) all[i] = i + 1;
   apply(with(points(all, {0, 0, 0})));

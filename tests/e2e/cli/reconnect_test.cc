@@ -29,8 +29,8 @@ class ReconnectTest : public ::testing::Test {
     client_ = *std::move(client);
   }
 
-  // Starts a daemon and waits until it serves. The client uses its unix socket, because the port of a killed daemon
-  // could be taken by another process.
+  // Starts a daemon and waits until it serves. The client uses the daemon's unix socket, because the port of a killed
+  // daemon could be taken by another process.
   void start() {
     std::remove(folder_.file("port").c_str());
     daemon_ = std::make_unique<DaemonProcess>(
@@ -68,8 +68,8 @@ int calls_until_answered(int limit, const Call& call) {
   return calls;
 }
 
-// gRPC waits for at most 2 s between two attempts to connect. Without the library's own waits inside gRPC, calls would
-// fail for 10 to 15 s.
+// gRPC pauses for at most 2 s between two attempts to connect. If the client library did not wait inside gRPC before its
+// calls (see continue_connecting()), calls would fail for 10 to 15 s.
 TEST_F(ReconnectTest, CallsSucceedSoonAfterTheServerHasReturned) {
   EXPECT_TRUE(absl::IsNotFound(call()));
   kill();

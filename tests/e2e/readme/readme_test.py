@@ -4,7 +4,7 @@
 
 Blocks marked console hold `$ command` lines, each followed by its output. A block marked grpcurl holds one call; the
 test makes this call with json_call instead of grpcurl. EPOCH stands for the scene's random epoch. The block marked cpp
-was compiled as readme_example; its last comment says what it prints. Blocks marked python, here and in
+was compiled as readme_example; its last comment says what it prints. Blocks marked python, in README and in
 client/python/README.md, are scripts for the package in PYTHON_DIRECTORY; without this argument they are skipped. The
 last comment of a script says what the script prints. The address in a script is replaced by that of the daemon. Blocks
 marked text are not run: the test only checks that their programs exist.

@@ -112,11 +112,11 @@ class ShedTest : public testing::Test {
 
 TEST_F(ShedTest, TheConnectionThatSendsMostIsClosedAndOthersAreNot) {
   send(0, 5'000, 5'000);
-  EXPECT_EQ(table_.shed_heaviest(false, kMinBytes, "short"), 0u);  // records the 5,000 bytes, so only later ones count
+  EXPECT_EQ(table_.shed_heaviest(false, kMinBytes, "short"), 0u);  // records 5,000 bytes, so only later bytes count
   send(0, 6'000, 11'000);
   send(1, 9'000, 9'000);
   send(2, 1, 1);
-  EXPECT_EQ(table_.shed_heaviest(true, kMinBytes, "short"), 0u);  // none sent enough since the previous call
+  EXPECT_EQ(table_.shed_heaviest(true, kMinBytes, "short"), 0u);  // no client sent enough since the previous call
   send(1, 15'000, 24'000);
   EXPECT_EQ(table_.shed_heaviest(true, kMinBytes, "short"), 1u);
   EXPECT_STREQ(connections_[1]->close_reason(), "short");

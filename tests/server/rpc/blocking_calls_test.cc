@@ -25,8 +25,8 @@ constexpr const char* kLargeReply = "/test.Service/Bulky";  // its response fits
 constexpr size_t kLargeReplyBytes = 3u << 20;
 constexpr uint32_t kMaxCalls = 2;
 
-// A server with the two methods, which accepts at most kMaxCalls calls of one connection, and a client with one
-// connection.
+// A server with the methods kSmall and kLargeReply, and a client with one connection. The server accepts at most
+// kMaxCalls calls of one connection.
 class BlockingCallsTest : public ::testing::Test {
  protected:
   BlockingCallsTest() {

@@ -419,9 +419,9 @@ TEST(UnaryHotCallTest, ACallMayArriveWhileTheServerEnds) {
       v1::QueryResponse response;
       bench.stub().Query(&context, request, &response);
     });
-    // Because of the different delays, the server ends before the call's arrival, at about the same time, or long after
-    // it. A call that has arrived stays in the completion queue until end(), because the loop runs no turn before
-    // end().
+    // Because of the different delays, the server ends before the call arrives, at about the same time, or long after
+    // the arrival. A call that has arrived stays in the completion queue until end(), because the loop runs no turn
+    // before end().
     std::this_thread::sleep_for(std::chrono::microseconds(100 * i));
     bench.end();
     client.join();

@@ -81,7 +81,7 @@ class PeerIdentityTest : public ::testing::Test {
   std::unique_ptr<TlsCredentials> credentials_;
   NamingService service_;
   int port_ = 0;
-  std::unique_ptr<grpc::Server> server_;  // ends before the service and the credentials
+  std::unique_ptr<grpc::Server> server_;  // destroyed before the service and the credentials
 };
 
 TEST_F(PeerIdentityTest, AUriComesBeforeADnsNameAndThatBeforeTheCommonName) {

@@ -120,7 +120,7 @@ TEST(WirePlanTest, EmptySubMessagesAreCountedBeforeTheyExist) {
   const std::string lists = repeat(empty_insert, limits::kMaxUpdateLists + 1);
   expect_limit<v1::ApplyUpdatesRequest>(delimited(2, lists), "update_lists");
   expect_limit<v1::ApplyUpdatesRequest>(delimited(2, repeat(empty_insert, 16'000'000)), "update_lists");
-  // Counts add up if a list arrives in many parts of one merged message.
+  // Protobuf merges the copies of a sub-message that occurs more than once, so the counts of all copies add up.
   expect_limit<v1::ApplyUpdatesRequest>(repeat(delimited(2, repeat(empty_insert, 1000)), 100), "update_lists");
   EXPECT_TRUE(scan<v1::ApplyUpdatesRequest>(delimited(2, repeat(empty_insert, limits::kMaxUpdateLists))).ok());
 }
@@ -176,8 +176,8 @@ bool has_group(const google::protobuf::Message& message) {
   return false;
 }
 
-// The scan must accept every message that Protobuf parses, except messages with groups, and must not underestimate its
-// memory.
+// The scan must accept every message that Protobuf parses, except messages with groups, and must not underestimate the
+// memory of an accepted message.
 TEST(WirePlanTest, RandomlyChangedMessagesAreAcceptedIfProtobufParsesThem) {
   constexpr uint64_t kSeed = 20261123;
   test::Random random(kSeed);

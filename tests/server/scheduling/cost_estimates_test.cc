@@ -9,8 +9,8 @@
 namespace locus::server {
 namespace {
 
-// Makes a block of the given kind. The estimates depend on the lengths of its columns, which give the number of
-// queries, not on the values.
+// Makes a block of the given kind. The estimates depend on the lengths of the block's columns, which give the number of
+// queries, not on the values in the columns.
 QueryBlock block_of(decltype(QueryBlock::kind) kind, Source source = Source::kBoth) {
   QueryBlock block;
   block.kind = kind;

@@ -1,5 +1,5 @@
 // Tests random schedules of work against a model of the process's memory. The work is uploads and builds, moves with
-// history and pinned revisions, dumps, backups, and replies whose readers take them slowly or not at all. The memory
+// history and pinned revisions, dumps, backups, and replies that callers read slowly or not at all. The memory
 // must never exceed the limit, and no work that fits may wait for ever.
 #include <gtest/gtest.h>
 

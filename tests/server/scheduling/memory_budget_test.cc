@@ -12,7 +12,7 @@
 namespace locus::server {
 namespace {
 
-// Limit whose ceiling for growth is kCeiling.
+// Memory limit whose ceiling for growth is kCeiling, both in bytes.
 constexpr uint64_t kLimitBytes = 3657;
 constexpr uint64_t kCeiling = 3200;
 
@@ -36,7 +36,7 @@ TEST_F(MemoryBudgetTest, AConnectionMayHoldHalfOfWhatIsLeftForClaims) {
   EXPECT_EQ(budget.connection_share(), kLarge / 4);
   const absl::StatusOr<MemoryBudget::Claim> claim = budget.claim(MemoryLine::kReplies, "", kLarge / 4);
   ASSERT_TRUE(claim.ok());
-  used_ += kLarge / 4;  // the claimed memory exists now
+  used_ += kLarge / 4;  // the claimed memory is now allocated
   budget.refresh();
   EXPECT_EQ(budget.connection_share(), kLarge / 4) << "claims do not make it smaller";
   used_ = kLarge * 2;
@@ -139,7 +139,7 @@ TEST_F(MemoryBudgetTest, SmallClaimsHaveAReserveThatIsBounded) {
   MemoryBudget budget(kLimitBytes, meter());
   std::vector<MemoryBudget::Claim> claims;
   for (uint64_t owner = 0; owner < 4; ++owner) {
-    for (int i = 0; i < 16; ++i) {  // 1 MiB each
+    for (int i = 0; i < 16; ++i) {  // 1 MiB for each owner
       absl::StatusOr<MemoryBudget::Claim> claim = budget.claim(MemoryLine::kRequests, "", 64u << 10, owner);
       ASSERT_TRUE(claim.ok()) << claim.status();
       claims.push_back(*std::move(claim));
@@ -172,7 +172,7 @@ TEST_F(MemoryBudgetTest, OrdinaryClaimsLeaveTheReserveToOthers) {
     claims.push_back(*std::move(claim));
   }
   EXPECT_LT(budget.ceiling(MemoryLine::kReplies) - budget.taken(), 12u << 20);
-  for (int i = 0; i < 1000; ++i) {  // owner 1 claims the rest, and its part of the reserve
+  for (int i = 0; i < 1000; ++i) {  // owner 1 claims the rest, then its own part of the reserve
     absl::StatusOr<MemoryBudget::Claim> claim = budget.claim(MemoryLine::kReplies, "", 64u << 10, 1);
     if (!claim.ok()) break;
     claims.push_back(*std::move(claim));

@@ -93,8 +93,8 @@ TEST_F(SnapshotterTest, FewRecordsCauseNoSnapshot) {
     const Snapshotter snapshotter(registry_, &log_, options);
     std::this_thread::sleep_for(milliseconds(20));
     EXPECT_EQ(snapshotter.stats().written, 0u);
-    // One more record makes a snapshot due. If this snapshot is written, the snapshotter does check the scene, and it
-    // wrote nothing before because no snapshot was due.
+    // Appends one more record, which makes a snapshot due, and waits for this snapshot. So the snapshotter checks the
+    // scene, and wrote nothing before because no snapshot was due.
     apply(1);
     wait_for_snapshots(snapshotter, 1);
   }

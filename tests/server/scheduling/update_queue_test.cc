@@ -409,7 +409,7 @@ TEST_F(LoggedUpdateQueueTest, OneSyncServesAllWaitingBatchesAndEachIsARevision) 
 
 TEST_F(LoggedUpdateQueueTest, EmptyListsCountForTheSizeOfOneSync) {
   constexpr uint64_t kBatches = 7;
-  constexpr size_t kLists = 10'000;  // three times as many fit into one sync
+  constexpr size_t kLists = 10'000;  // three batches with so many lists fit into one sync
   std::vector<std::unique_ptr<Points>> batches;
   for (uint64_t i = 1; i <= kBatches; ++i) {
     batches.push_back(insert({i}));

@@ -320,9 +320,9 @@ TEST_F(AccessControlTest, RandomBearersAreNeverAccepted) {
   }
 }
 
-// The files alternate between two states: in one state, token `even` may read the scene `even` and token `odd` is
-// revoked; the other state is the reverse. Every reader must see one complete state, and the new state directly after a
-// reload.
+// The files alternate between two states. In one state, token `even` may read the scene `even`, and token `odd` is
+// revoked; in the other state, `odd` may read the scene `odd`, and `even` is revoked. Every reader must see one
+// complete state, and the new state directly after a reload.
 TEST_F(AccessControlTest, ReadersAtFullSpeedSeeWholeStatesWhileFilesAreReloaded) {
   use_all_files();
   const std::string tokens[2] = {add("even"), add("odd")};

@@ -11,8 +11,8 @@
 namespace locus::server {
 namespace {
 
-// Returns whether the pattern matches the text. Reference for glob_matches(): fills a table that contains for each pair
-// of a prefix of the pattern and a prefix of the text whether they match.
+// Returns whether the pattern matches the text. Reference for glob_matches(): fills a table that contains, for each
+// prefix of the pattern and each prefix of the text, whether the two match.
 bool matches_by_table(const std::string& pattern, const std::string& text) {
   std::vector<std::vector<bool>> table(pattern.size() + 1, std::vector<bool>(text.size() + 1, false));
   table[0][0] = true;

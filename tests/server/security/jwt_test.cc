@@ -275,7 +275,7 @@ TEST(JwtTest, RandomBytesAreNeverAccepted) {
     EXPECT_FALSE(by.verify(absl::StrCat(test::base64url(payload), ".", test::base64url(bytes), ".AAAA"), kNow).ok());
     EXPECT_FALSE(parsed(bytes).ok()) << "seed " << seed;
     EXPECT_FALSE(parsed(absl::StrCat(R"({"keys":[)", payload, "]}")).ok()) << "seed " << seed;
-    if (seed % 100 == 0) {  // the signature is right, the claims are not
+    if (seed % 100 == 0) {  // a valid signature of a random payload
       EXPECT_FALSE(by.verify(ed_key().jwt(header_of(ed_key()), payload), kNow).ok()) << "seed " << seed;
     }
   }

@@ -264,8 +264,8 @@ TEST_F(QuotasTest, UsageListsAmountsRatesAndWhatIsLeft) {
   EXPECT_EQ(usage[0].quotas[static_cast<size_t>(QuotaKind::kWork)].limit, kNoQuota);
 }
 
-// This holds for any sequence of requests: in the first t seconds, at most rate * (t + burst in seconds) queries are
-// granted. The number of objects in use stays within its quota.
+// For any sequence of requests, at most rate * (t + burst in seconds) queries are granted in the first t seconds, and
+// the number of objects in use never exceeds the quota of objects.
 TEST_F(QuotasTest, RandomUseNeverExceedsTheQuota) {
   for (uint64_t seed = 1; seed <= 20; ++seed) {
     test::Random random(seed);

@@ -1,6 +1,6 @@
 // Damages a small data directory at one position at a time, and then opens it. A byte is flipped, or a file is
-// truncated, zeroed or missing. Each scene must be either refused or identical to the scene that was written. The
-// directory is opened twice (in the Long suite only every eighth one), and both openings must report the same damage.
+// truncated, zeroed or missing. Each scene must be either refused or identical to the scene that was written. Each
+// directory (in the Long suite every eighth) is opened twice, and both openings must report the same damage.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -99,7 +99,7 @@ TEST_F(RocksdbLogFaultTest, WritingResumesAfterAWriteThatFailsRightAfterOpening)
   expect_records(scene, 3);
 }
 
-// RocksDB aborts the process if its own text log is on a full disk, so it must not write one.
+// RocksDB aborts the process if its own text log is on a full disk, so RocksDB must not write a text log.
 TEST_F(RocksdbLogFaultTest, RocksDbsWarningsAreReportedAndNotWrittenToAFile) {
   Mutex mutex;
   std::string warnings;

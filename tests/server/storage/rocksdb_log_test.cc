@@ -391,7 +391,7 @@ TEST_F(RocksdbLogTest, SnapshotsFreeTheDiskSpaceOfTheLog) {
   const auto size = [&] {
     uint64_t bytes = 0;
     for (const auto& file : std::filesystem::recursive_directory_iterator(options_.path)) {
-      // RocksDB may delete a file in the background between its listing and this call.
+      // RocksDB may delete a file in the background after the iterator has listed the file.
       std::error_code deleted;
       const uintmax_t file_bytes = file.is_regular_file(deleted) ? file.file_size(deleted) : 0;
       if (!deleted) bytes += file_bytes;

@@ -115,8 +115,8 @@ inline void add_ray(const ProofInstance& instance, const MeshRay& ray, Random& r
 inline constexpr size_t kBeamRays = 24;
 
 // Generates `count` rays from the families in turn. Origins are floats relative to the block's frame. In three of four
-// blocks the frame is at an instance, in the other blocks up to a kilometre away from it on each axis. The reference
-// uses the rounded values in the block.
+// blocks the frame is at the position of an instance, in the other blocks up to a kilometre from this position on each
+// axis. The reference uses the rounded values in the block.
 inline OwnedBlock proof_rays(const ProofScene& scene, size_t count, Random& random) {
   OwnedBlock block = rays_along_x(RayMode::kFirst, {});
   block.sizes.clear();

@@ -82,8 +82,8 @@ class RayJudge {
     return verdict;
   }
 
-  // Verifies the rows `begin` to `end` - 1, which are an answer with all hits: each row must be right, and no row
-  // missing.
+  // Verifies the rows `begin` to `end` - 1, which are an answer with all hits: each row must be right, and no row may
+  // be missing.
   Verdict judge_all(const BlockResult& answer, size_t begin, size_t end) const {
     Verdict verdict = Verdict::kRight;
     for (size_t row = begin; row < end; ++row) verdict = std::max(verdict, judge_row(ray_row(answer, row)));

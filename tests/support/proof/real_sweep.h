@@ -55,8 +55,8 @@ class SweptTriangle {
     for (const Vec3r& corner : corners_) radius_ = std::max(radius_, length(corner - center_));
   }
 
-  // Returns true whenever the mover, grown by `by`, touches the ball around the triangle at some time of its motion;
-  // may also return true otherwise.
+  // Returns true if the mover, grown by `by`, touches the ball around the triangle at some time of the mover's motion.
+  // Sometimes also returns true if the mover passes near this ball.
   bool is_near(const RealMover& mover, Real by) const {
     const Real square = dot(mover.way, mover.way);
     const Real t = square == 0 ? 0 : std::clamp<Real>(dot(center_ - mover.start, mover.way) / square, 0, 1);

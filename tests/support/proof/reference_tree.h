@@ -77,8 +77,8 @@ class ReferenceTree {
     double level, border[3];
   };
 
-  // A ray in double. `reach` is the length up to which it is tested. Rounding of the ray and of the test moves the ray
-  // by about 2^-51 of the reach; the pad is 2^-30 of the reach.
+  // A ray in double. `reach` is, on each axis, an upper bound of the length on which the ray is tested. Rounding of the
+  // ray and of the test moves the ray by about 2^-51 of the reach; the pad is 2^-30 of the reach.
   struct RoughRay {
     RoughRay(const RealRay& ray, double magnitude) {
       double reach = magnitude;
@@ -90,8 +90,8 @@ class ReferenceTree {
       }
       pad = 0x1p-30 * reach;
       for (int axis = 0; axis < 3; ++axis) {
-        // Treat the ray as parallel to the planes of a slab if, over the whole reach, its distance from them changes by
-        // less than the pad.
+        // Treat the ray as parallel to the planes of a slab if the ray's distance from the planes changes by less than
+        // the pad over the whole reach.
         parallel[axis] = std::abs(direction[axis]) < 1e-25 * longest;
         inverse[axis] = parallel[axis] ? 0 : 1 / direction[axis];
       }
@@ -111,7 +111,7 @@ class ReferenceTree {
       return near <= far;
     }
 
-    // Returns true whenever a hit is possible; may also return true otherwise. Always returns true for rays almost
+    // Returns true if a hit is possible, and sometimes if no hit is possible. Always returns true for rays almost
     // parallel to the triangle. For any other ray, the error of the point where the ray meets the plane is about 2^-30
     // of the reach, and the tolerance of four pads is 2^-28 of the reach.
     bool may_meet(const Rough& triangle, double limit) const {

@@ -6,7 +6,7 @@
 namespace locus::cli {
 namespace {
 
-// Shell functions that read the table. NAME is replaced by the program's name.
+// Shell functions that read the completion table (table.h). NAME is replaced by the program's name.
 constexpr char kFunctions[] = R"shell(
 # Prints the kind of value of the option $option of the command $place; nothing if it is a flag or unknown.
 function __NAME_value --argument-names place option

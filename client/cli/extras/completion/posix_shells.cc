@@ -6,7 +6,7 @@
 namespace locus::cli {
 namespace {
 
-// Shell functions that read the table, for both bash and zsh. NAME is replaced by the program's name.
+// Shell functions for bash and zsh that read the completion table (table.h). NAME is replaced by the program's name.
 constexpr char kReadersOfTheTable[] = R"shell(
 # Prints the kind of value of the option $2 of the command $1; nothing if it is a flag or unknown.
 _NAME_value() {

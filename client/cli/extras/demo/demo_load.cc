@@ -41,7 +41,7 @@ class FirstError {
 };
 
 // Sampler of batches from a run of unknown length. It stores every stride-th batch. When it has more than kSamplesAKind
-// samples, it drops every second one and doubles the stride, so that the samples stay evenly spread over the run.
+// samples, it drops every second sample and doubles the stride, so that the samples stay evenly spread over the run.
 class Sampler {
  public:
   explicit Sampler(std::vector<Sample>& samples) : samples_(samples) {}
@@ -61,8 +61,8 @@ class Sampler {
   size_t stride_ = 1;
 };
 
-// Sends query batches of the kinds `kinds` in rotation until `done` is set. Each batch is sent after the answer to the
-// previous one.
+// Sends query batches of the kinds `kinds` in rotation until `done` is set. Each batch is sent when the previous batch
+// has been answered.
 absl::Status ask(const client::Client& client, const DemoWorld& world, const LoadOptions& options,
                  const std::vector<DemoKind>& kinds, const std::atomic<bool>& done, LoadResult& result) {
   const std::unique_ptr<client::QueryStream> stream = client.query_stream(options.scene);

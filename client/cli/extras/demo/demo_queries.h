@@ -1,4 +1,4 @@
-// Query batches of `locus demo`, and a checker that compares the answers to them with brute force. The functions have
+// Query batches of `locus demo`, and a checker that compares the server's answers with brute force. The functions have
 // no state; the checker is not thread-safe.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_DEMO_DEMO_QUERIES_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_DEMO_DEMO_QUERIES_H_
@@ -37,7 +37,7 @@ class DemoChecker {
     uint64_t checked = 0;
     uint64_t differences = 0;
   };
-  // Compares the answers in `result` to the first `max_queries` queries of `batch` with brute force on the objects at
+  // Checks the first `max_queries` answers in `result`, which answers `batch`, against brute force on the objects at
   // the tick of `result`. Every id, triangle and distance must be equal bit for bit. Precondition: demo_batch() made
   // `batch`.
   Outcome check(DemoKind kind, const v1::QueryBatch& batch, const v1::QueryResult& result, int max_queries);

@@ -58,8 +58,9 @@ struct Aim {
   Vec3d away;  // offset of the ray's origin from the target
 };
 
-// Chooses a target on the edge and an origin for a ray to this target, such that the two triangles at the edge lie on
-// different sides of the edge when seen from the origin. Returns nullopt if the chosen origin does not satisfy this.
+// Chooses a target on the edge, and an origin for a ray to this target. Seen from the origin, the two triangles at the
+// edge lie on different sides of the edge. Returns nullopt if the edge is unsuitable, or if from the chosen origin the
+// triangles lie on the same side or a triangle is nearly edge-on.
 std::optional<Aim> aim(const Edge& edge, DemoRandom& random) {
   const std::optional<Vec3d> left = across(edge, edge.opposite[0]);
   const std::optional<Vec3d> right = across(edge, edge.opposite[1]);

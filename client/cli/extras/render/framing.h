@@ -16,7 +16,7 @@ struct Lens {
   double margin = 1.05;    // ratio of the picture's size to the size of the box in it
 };
 
-// Returns the unit direction of a view that looks down obliquely, at about 35 degrees. `up` must not be zero. If `up`
+// Returns the unit direction of a view that is inclined downwards by about 35 degrees. `up` must not be zero. If `up`
 // is z, the view is towards +x, +y and -z.
 Vec3d three_quarter_view(Vec3d up);
 

@@ -16,7 +16,7 @@ namespace locus::cli {
 struct ValueScale {
   double min = 0;
   double median = 0;
-  double high = 0;  // 99th percentile; paint_heat() is brightest from here on, so outliers do not darken the rest
+  double high = 0;  // 99th percentile; paint_heat() is brightest from this value up, so outliers do not darken the rest
   double max = 0;
 };
 

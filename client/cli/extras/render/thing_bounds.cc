@@ -13,7 +13,7 @@ namespace locus::cli {
 namespace {
 
 constexpr int kSections = 16;
-constexpr int kCuts = kSections - 1;  // number of cuts, and so of tested slabs, for each side
+constexpr int kCuts = kSections - 1;  // number of cutting planes, and so of tested slabs, per side
 constexpr int kSides = 6;             // lower and upper side of each axis: side = 2 axis + (1 if upper)
 constexpr int kMaxRounds = 16;        // enough, since 16^16 exceeds the resolution of doubles
 // A box is flat along an axis if its size along the axis is less than this share of its longest side.

@@ -24,7 +24,7 @@ struct MetricSample {
   std::vector<std::pair<std::string, std::string>> labels;
   double value = 0;
 
-  // Returns the value of the label `key`, or an empty string if the sample does not have it.
+  // Returns the value of the label `key`, or an empty string if the sample has no such label.
   absl::string_view label(absl::string_view key) const;
 };
 

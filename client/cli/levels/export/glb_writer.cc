@@ -58,7 +58,7 @@ void put(std::ostream& out, uint32_t value) { out.write(reinterpret_cast<const c
 }  // namespace
 
 GlbWriter::GlbWriter(const std::string& root_name, UpAxis up) : root_({{"name", root_name}}) {
-  // Matrix in column order that rotates z-up coordinates to y-up ones: x stays x, y becomes -z, z becomes y.
+  // Matrix in column order that rotates z-up to y-up coordinates: x stays x, y becomes -z, z becomes y.
   if (up == UpAxis::kZ) root_["matrix"] = {1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1};
 }
 

@@ -14,7 +14,7 @@ namespace locus::cli {
 double gradient_noise(const std::array<double, 3>& point, uint64_t seed);
 
 // Returns the weighted mean of `octaves` layers of gradient noise, in -1 .. 1. The first layer has wavelength
-// `wavelength`, a power of two. Each further layer has half the wavelength and half the weight of the one before.
+// `wavelength`, a power of two. Each further layer has half the wavelength and half the weight of the layer before.
 // `octaves` is at least 1. Source: Musgrave, Kolb, Mace, The Synthesis and Rendering of Eroded Fractal Terrains, 1989.
 // Cost: eight hashes per octave.
 double fractal_noise(const std::array<double, 3>& point, double wavelength, int octaves, uint64_t seed);

@@ -70,7 +70,7 @@ bool limit_resources(const ChildLimits& limits) {
 }
 
 // Restores the default action of the signals listed here, and unblocks all signals. The handlers of other signals stay,
-// for example that of SIGSEGV, because sanitizers report errors through them.
+// for example for SIGSEGV, because sanitizers report errors through them.
 void reset_signals() {
   for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGXCPU, SIGXFSZ, SIGUSR1, SIGUSR2, SIGALRM})
     signal(number, SIG_DFL);

@@ -12,13 +12,13 @@
 // underflow add at most 2^-147. The bound is 16 e (E + pad)^2 + 16 pad (E + pad) + 2^-120, which covers the roundings
 // of the bound itself too. The bound is infinite if a product may overflow, so that no sign counts as certain.
 //
-// Call the coordinate y of a point its height. An edge crosses the height of p if one of its ends is at the height of p
-// or below, and its other end is above. Either one rising and one falling edge of a triangle cross this height, or no
-// edge does. If two edges do and the signs of both are certain, the triangle's winding in the projection is known. If
-// this winding is 0, p is off the triangle, because the two edges bound the triangle's section at this height. If it is
-// not 0, p may be on the triangle. If no edge crosses the height, the winding is 0, but p may be at the height of the
-// triangle's highest vertex and on the triangle. In these two doubtful cases, p can be on the triangle only if the
-// bounds of the triangle extend back to p along the half line.
+// Call the coordinate y of a point its height. An edge crosses the height of p if one of its ends is at the height of
+// p or below, and its other end is above. Either one rising and one falling edge of a triangle cross this height, or
+// no edge crosses it. If two edges cross it and the signs of both areas are certain, the triangle's winding in the
+// projection is known. If this winding is 0, p is off the triangle, because the two edges bound the triangle's section
+// at this height. If the winding is not 0, p may be on the triangle. If no edge crosses the height, the winding is 0,
+// but p may be at the height of the triangle's highest vertex and on the triangle. In these two doubtful cases, p can
+// be on the triangle only if the bounds of the triangle extend back to p along the half line.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_CROSSING_KERNELS_IMPL_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_CROSSING_KERNELS_IMPL_H_
 
@@ -148,8 +148,8 @@ class CrossingWalk {
     return true;
   }
 
-  // Adds the crossings of the triangles in the mask `undecided`, and counts those in the mask `met`. Returns false if
-  // the point lies on a triangle.
+  // Adds the exact crossings of the triangles in the mask `undecided`, and counts the triangles in the mask `met` as
+  // tested. Returns false if the point lies on a triangle.
   inline bool decide(const TriangleBlock& block, uint32_t met, uint32_t undecided) {
     for (; undecided != 0; undecided &= undecided - 1u) {
       const auto lane = static_cast<uint32_t>(__builtin_ctz(undecided));

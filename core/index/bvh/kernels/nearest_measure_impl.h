@@ -58,7 +58,7 @@ __attribute__((always_inline)) inline Doubles4 squared_to_face(Vector4 ab, Vecto
   return within ? squared : farthest;
 }
 
-// Returns one coordinate, in mesh axes, of the same vertex of four triangles; `row` is its row in
+// Returns one coordinate, in mesh axes, of the same vertex of four triangles; `row` is the row of this coordinate in
 // TriangleBlock::vertices.
 static inline Doubles4 coordinate(const float* const* lanes, int row) {
   const int at = row * kTreeWidth;

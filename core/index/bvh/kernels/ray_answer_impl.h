@@ -52,9 +52,9 @@ struct KeptRows {
     return a.t < b.t || (a.t == b.t && a.number < b.number);
   }
 
-  // Stores a hit if it is among the lowest max_rows hits so far. `count` is the number of stored rows. Until it is
-  // max_rows, each stored hit increments it; after that, each stored hit replaces the highest row. Once max_rows rows
-  // are stored, sets `limit` to the t of the highest row.
+  // Stores a hit if it is among the lowest max_rows hits so far. `count` is the number of stored rows. While `count`
+  // is less than max_rows, each stored hit increments `count`; after that, each stored hit replaces the highest row.
+  // Once max_rows rows are stored, sets `limit` to the t of the highest row.
   inline void offer(const KernelRow& row, uint32_t& count, float& limit) const {
     if (row.t > limit) return;
     if (count < max_rows)

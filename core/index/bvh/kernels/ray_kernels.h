@@ -53,7 +53,7 @@ struct KernelHit {
   // triangle that the ray hits.
   uint32_t number;
   KernelVerdict verdict;
-  uint32_t nodes;  // number of nodes opened; of eight rays traced together, only the first counts their nodes
+  uint32_t nodes;  // number of nodes opened; of eight rays traced together, all but the first have 0
   uint32_t tests;  // number of triangles tested
 };
 

@@ -1,8 +1,8 @@
 // Packet of eight coherent rays, traced through one tree together: each box and each triangle is tested with all eight
 // rays. Rays are coherent if they are close to each other and have similar directions. Simulated cameras and sensors
-// generate coherent rays. The tests of a ray use the same arithmetic as if the ray were traced alone, so that its
-// answer is the same. Boxes that no ray can hit are culled first, eight at a time, by a frustum around the rays.
-// Several packets take steps in turn, so that one packet continues while another waits for memory.
+// generate coherent rays. The tests of a ray use the same arithmetic as if the ray were traced alone, so the answer to
+// the ray is the same in both cases. Boxes that no ray can hit are culled first, eight at a time, by a frustum around
+// the rays. Several packets take steps in turn, so that one packet continues while another waits for memory.
 //
 // Source: Wald, Slusallek, Benthin, Wagner, Interactive Rendering with Coherent Ray Tracing, 2001.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_RAY_PACKET_IMPL_H_
@@ -270,9 +270,9 @@ class Packet {
     return pairs;
   }
 
-  // Adds a triangle that ray `i` certainly hits. The exact t of the hit is computed later, because most hits found
-  // first are not the nearest. `limit` is an upper bound of this t. If `limit` is lower than the ray's limit, it
-  // becomes the new limit of the ray, and candidates beyond the new limit are removed.
+  // Adds a triangle that ray `i` certainly hits. The exact t of the hit is computed later, because a hit that is found
+  // early is seldom the nearest. `limit` is an upper bound of the t of the hit. If `limit` is lower than the ray's
+  // limit, it becomes the new limit of the ray, and candidates beyond the new limit are removed.
   inline void add_candidate(uint32_t i, const Candidate& candidate, float limit) {
     if (limit < limits_[i]) {
       limits_[i] = limit;

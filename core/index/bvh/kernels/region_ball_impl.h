@@ -29,9 +29,10 @@
 //   of two weights, 100 u for the square, and 60 u for the differences that leave the third weight. The sum is
 //   410 u E^3 L, within weight = 2^-15 E^3 L.
 // - In the error bounds of a single triangle, E is the length of its longer edge at vertex a, and R is the maximum of E
-//   and the length of the offset. The error of weights is 24 u E^3 R twice, 24 u E^3 R for the square and 10 u E^3 R,
-//   within 2^-17 E^3 R. The error of normals is 6 u E^2, the error of heights 10 u E^2 R and the error of the radius
-//   times the normal's length 10 u E^2 r, within 2^-19 E^2 (R + r).
+//   and the length of the offset. The errors of the weights, as in the list item before, are 24 u E^3 R for each of two
+//   weights, 24 u E^3 R for the square and 10 u E^3 R for the differences: within 2^-17 E^3 R. The error of normals is
+//   6 u E^2, the error of heights is 10 u E^2 R, and the error of the radius times the normal's length is 10 u E^2 r:
+//   within 2^-19 E^2 (R + r).
 //
 // The predicate's own rounding errors are smaller by a factor of 2^-28, or 2^-12 for squared distances, so that a
 // result that these tests call certain equals the result of the predicate. The predicate also tests whether the ball

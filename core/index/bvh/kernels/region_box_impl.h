@@ -149,7 +149,7 @@ class BoxQuery {
 
     Vector8 half, inner, outer;
     Floats8 across, plane;
-    bool in_range;  // whether no product of projections can underflow
+    bool in_range;  // true if no product of projections can underflow
   };
 
   static constexpr float kEdgeScale = 0x1p60f;

@@ -48,7 +48,8 @@ struct GridBall {
   float radius;
 };
 
-// Shell around a point: values whose key, the squared distance of their bounds, lies in (above, up_to].
+// Shell around a point: the values with above < key <= up_to. The key of a value is the squared distance of its bounds
+// from the point.
 struct GridNear {
   float point[3];
   float epsilon;  // added to the extent of a value

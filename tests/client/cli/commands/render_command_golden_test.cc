@@ -1,6 +1,6 @@
-// Pictures of generated scenes, rendered by a real server. Their hits must be the same on every machine and with any
-// number of threads, so their hashes are compared with tests/golden/renders.txt. If a hash differs, the picture is kept
-// in the build tree.
+// Pictures of generated scenes, rendered by a real server. The hits of a picture must be the same on every machine and
+// with any number of threads, so hashes of the hits are compared with tests/golden/renders.txt. If a hash differs, the
+// picture is kept in the build tree.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -10,8 +10,8 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// Evaluates `text` as one expression. Returns its value as text; "error: " and the reason if it is not valid; "rest: "
-// and the text that follows the expression.
+// Evaluates the expression at the start of `text`. Returns its value as text. If the expression is not valid, returns
+// "error: " and the reason; if other text follows the expression, returns "rest: " and that text.
 std::string worth(const std::string& text) {
   static const auto& variables = *new Variables(testing::some_variables());
   Cursor cursor(text);

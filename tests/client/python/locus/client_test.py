@@ -181,7 +181,7 @@ class ConnectTest(DaemonTest):
 
     def test_a_call_is_repeated_once_the_server_is_back(self):
         with tempfile.TemporaryDirectory() as folder:
-            path = "unix:" + os.path.join(folder, "locus.sock")  # another process can take a port that became free
+            path = "unix:" + os.path.join(folder, "locus.sock")  # not a port, which another process could take
             daemon = Daemon("--listen", path)
             client = locus.connect(path, retry=locus.Retry(attempts=10000, first_wait=0.05, max_wait=0.1),
                                    timeout=WAIT_SECONDS)

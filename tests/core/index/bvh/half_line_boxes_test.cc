@@ -94,7 +94,7 @@ TEST(HalfLineBoxesTest, TheCheapestHalfLineMeetsFewBoxes) {
     cheapest += cost_of(*city, point, city->cheapest_half_line(point));
     for (size_t k = 0; k < std::size(kHalfLines); ++k) fixed[k] += cost_of(*city, point, kHalfLines[k]);
   }
-  // Skip the half lines along z: each of them intersects about one house at most, so their cost is low, too.
+  // Skip the half lines along z: each of them intersects at most about one house, so they are cheap, too.
   for (size_t k = 0; k < std::size(kHalfLines); ++k) {
     if (kHalfLines[k].axis == 2) continue;
     EXPECT_LT(2 * cheapest, fixed[k]);

@@ -26,7 +26,7 @@ std::vector<Object> crowd(size_t count, double half, Random& random, bool with_f
   return objects;
 }
 
-// ObjectStore and a list of the objects that it must contain.
+// ObjectStore and a list of the objects that the store must contain.
 class Crowd {
  public:
   Crowd(size_t count, bool with_forms, uint64_t seed)

@@ -69,7 +69,7 @@ TEST(CellQueryTest, AnEmptyWorldLeavesTheWholeBall) {
 
 // Returns how far `samples`, points of an object or triangle, reach into the cell: the depth of the deepest sample
 // within the cell's ball. The depth of a sample is its least distance from a plane or from the ball's surface, measured
-// inward; it is negative outside a plane.
+// inward; the depth is negative if the sample is outside a plane.
 Real reach_into(const BlockResult& cell, Vec3r center, const std::vector<Vec3r>& samples) {
   Real most = -1e30L;
   for (const Vec3r sample : samples) {

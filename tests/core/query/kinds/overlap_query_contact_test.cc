@@ -78,8 +78,8 @@ TEST(OverlapContactTest, ConservativeMeasuresToTheBounds) {
   EXPECT_THAT(result.normals, ElementsAre(0, 0, 0));
 }
 
-// The depth of an overlap is radius - t: a ball that is moved out along the normal by this depth just touches the
-// object, and a ball that is moved out a little less still overlaps it.
+// The depth of an overlap is the ball's radius minus the reported distance t: a ball that is moved out along the normal
+// by this depth just touches the object, and a ball that is moved out a little less still overlaps the object.
 TEST(OverlapContactTest, TheBallMovedOutByItsDepthTouches) {
   size_t checked = 0;
   for (uint64_t seed = 0; seed < scaled_count(3'000); ++seed) {

@@ -63,7 +63,7 @@ TEST(PlacedTriangleTest, BoundsContainTheTriangleAndAreGrownByRoundingOnly) {
 }
 
 // The bounds of a placed triangle are within the instance's bounds. Therefore a search that culls by the instance's
-// bounds, or by the distance to these, never misses a triangle whose own bounds meet the query.
+// bounds, or by the distance to the instance's bounds, never misses a triangle whose own bounds meet the query.
 TEST(PlacedTriangleTest, BoundsLieWithinTheInstanceBounds) {
   for_each_triangle([](const Instance& instance, const PlacedTriangles& placed, const Triangle& triangle) {
     EXPECT_TRUE(contains(instance.bounds, placed.bounds_of_triangle(triangle)));

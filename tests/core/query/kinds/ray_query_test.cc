@@ -244,7 +244,7 @@ TEST(RayQueryTest, NormalsFollowTheUploadedWindingForBothSides) {
 TEST(RayQueryTest, NormalsRotateWithTheInstance) {
   QueryWorld world;
   world.instances = {placed(1, wall_mesh(), {0, 5, 0})};
-  world.instances[0].rotation = {0, 0, std::sqrt(0.5f), std::sqrt(0.5f)};  // x to y
+  world.instances[0].rotation = {0, 0, std::sqrt(0.5f), std::sqrt(0.5f)};  // turns x to y
   world.instances[0].scale = 3;
   OwnedBlock block = one_ray(RayMode::kFirst, {}, {0, 2, 0});
   block.settings.columns = {Column::kT, Column::kNormal};

@@ -109,7 +109,7 @@ TEST_F(SweepQueryTest, ACapsuleAndABoxTouchWithTheirOwnShape) {
 TEST_F(SweepQueryTest, AConservativeSweepMovesBoundsThroughBounds) {
   block_.settings.precision = Precision::kConservative;
   block_.settings.source = Source::kDynamic;
-  block_.points = {0, 0.7f, 0};  // passes the ball at a distance of 0.7 < 0.75: touches the ball later than its bounds
+  block_.points = {0, 0.7f, 0};  // passes 0.7 from the ball, radii sum to 0.75: touches the ball's bounds first
   block_.sizes = {10, 0.7f, 0};
   block_.settings.columns = {Column::kT, Column::kId, Column::kNormal, Column::kPoint};
   const BlockResult result = ask();

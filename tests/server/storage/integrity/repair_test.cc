@@ -54,7 +54,7 @@ class RepairTest : public ::testing::Test {
     size_t chunks = 0;
     for (rocksdb::ColumnFamilyHandle* const handle : handles) {
       const std::unique_ptr<rocksdb::Iterator> row(database->NewIterator(rocksdb::ReadOptions(), handle));
-      // The column family has one other row, whose key is one byte; all other rows are chunks.
+      // One row of the column family is not a chunk; its key is one byte. All other rows are chunks.
       for (row->SeekToFirst(); handle->GetName() == "mesh" && row->Valid(); row->Next())
         chunks += row->key().size() > 1;
       delete handle;

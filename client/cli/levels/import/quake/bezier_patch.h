@@ -28,8 +28,9 @@ PatchPoint bezier_curve_point(const PatchPoint& a, const PatchPoint& b, const Pa
 // Tessellates a grid of width x height control points, stored row by row; width and height are odd and at least 3. The
 // grid is made up of patches of 3 x 3 control points, and neighbouring patches share a row or column of points. Each
 // patch becomes subdivisions * subdivisions quads. A point on the border of a patch is computed only from the three
-// control points of that border, so two patches with equal border control points meet exactly, even if one stores them
-// in reverse order. Source of the method: Farin, Curves and Surfaces for CAGD, 2002 (tensor product patches).
+// control points of that border, so two patches with equal border control points meet exactly, even if one patch
+// stores them in reverse order. Source of the method: Farin, Curves and Surfaces for CAGD, 2002 (tensor product
+// patches).
 PatchGrid tessellate_patch(std::span<const PatchPoint> controls, size_t width, size_t height, int subdivisions);
 
 }  // namespace locus::cli

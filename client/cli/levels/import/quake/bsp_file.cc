@@ -101,7 +101,7 @@ absl::Status read_meshverts(const Lumps& lumps, BspFile& file) {
 }
 
 // Returns whether first + count <= size. The sum is computed in 64 bits, since it can exceed 2^32: a negative integer
-// in the file is read as a large unsigned one.
+// in the file is read as a large unsigned integer.
 bool is_range(uint32_t first, uint32_t count, size_t size) { return uint64_t{first} + count <= size; }
 
 absl::Status check_patch(size_t face_index, const BspFace& face) {

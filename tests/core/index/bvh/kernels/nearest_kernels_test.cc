@@ -31,8 +31,8 @@ class NearestKernelsTest : public ::testing::TestWithParam<std::string> {
 
 TEST_P(NearestKernelsTest, FindAllThatIsNearInOrdinaryMeshes) {
   compare(ordinary_nearest_trials());
-  // The searches may return fewer than 30 candidates on average. Most candidates are necessary: all triangles around
-  // the nearest vertex, and the triangles that are farther than the nearest one by at most the search's slack.
+  // A search must return fewer than 30 candidates on average. Most candidates are necessary: all triangles around the
+  // nearest vertex, and the triangles that are farther than the nearest triangle by at most the search's slack.
   EXPECT_LT(candidates_, 30 * searches_);
 }
 

@@ -34,8 +34,8 @@ class RegionKernelsTest : public ::testing::TestWithParam<std::string> {
   }
   void TearDown() override { ASSERT_TRUE(use_instruction_set("").ok()); }
 
-  // Compares the kernels with the predicates for `count` regions of each kind: balls, boxes and rotated boxes, some of
-  // which only touch a triangle.
+  // Compares the kernels with the predicates for `count` regions of each of six kinds: balls, boxes and rotated boxes,
+  // at random or just touching a triangle.
   void compare(const std::vector<Triangle>& triangles, size_t count, uint64_t seed) {
     const absl::StatusOr<TriangleBvh> tree = TriangleBvh::build(triangles);
     ASSERT_TRUE(tree.ok()) << tree.status();
@@ -246,9 +246,9 @@ TEST_P(RegionKernelsTest, RegionsWithoutRoomForTheirNumbersAreNotAnswered) {
     ASSERT_LT(answered, kMaxRegions);
     size_t end = 0;
     for (size_t i = 0; i < answered; ++i) EXPECT_EQ(end += together.counts[i], together.ends[i]) << i;
-    // The triangle numbers of the answered regions fit into `room`. Behind the numbers of the next region, fewer than
-    // kMinRegionRoom entries of `room` would be left. A kernel needs these entries, because it may write beyond the
-    // last number.
+    // The triangle numbers of the answered regions fit into `room` entries. Behind the numbers of the next region,
+    // fewer than kMinRegionRoom entries would be left. A kernel needs that many entries, because it may write beyond
+    // the last number.
     EXPECT_LE(end, room);
     EXPECT_LT(room, together.ends[answered] + kMinRegionRoom);
   }

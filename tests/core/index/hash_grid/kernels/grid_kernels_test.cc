@@ -77,8 +77,8 @@ class GridKernelsTest : public ::testing::TestWithParam<std::string> {
   }
 };
 
-// Returns 1 if `distance` is less than `extent` by more than an epsilon, -1 if it is greater by more than an epsilon,
-// otherwise 0.
+// Returns 1 if `distance` is less than `extent` by at least an epsilon, -1 if `distance` is greater than `extent` by
+// more than an epsilon, and 0 if the two differ by less.
 int verdict(double distance, double extent) {
   constexpr double kEpsilon = 1e-4;
   return distance <= extent - kEpsilon ? 1 : distance > extent + kEpsilon ? -1 : 0;

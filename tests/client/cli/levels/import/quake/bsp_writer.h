@@ -71,7 +71,7 @@ struct BspWriter {
 
 // Returns a level of one polygon (2 triangles, texture floor), one mesh face (1 triangle, texture crate), one flat 3 x
 // 3 patch (texture floor) and one billboard. The polygon is in the plane z = 0, the mesh face in z = 1 and the patch in
-// z = 2; they face +z.
+// z = 2; all three face +z.
 inline BspWriter small_level() {
   BspWriter level;
   level.textures = {"textures/floor", "models/crate"};
