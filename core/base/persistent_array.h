@@ -69,8 +69,8 @@ class PersistentArray {
   // are T(). O(1 + new leaves), plus the copies of the first writes after a snapshot (see the top of this file).
   void set(size_t index, T value);
 
-  // Returns the size in bytes of the leaves, and of the array of leaf pointers, that this array does not share with
-  // `other`. O(leaves).
+  // Returns the size in bytes of the parts that this array does not share with `other`: leaves, and the array of
+  // pointers to them. O(leaves).
   size_t unshared_bytes(const PersistentArray& other) const;
   // Calls fn(value, other_value) for each index whose leaf is not shared with `other`. `other_value` points to the
   // value of `other` at the same index, or is null if index >= other.size(). O(leaves + calls).

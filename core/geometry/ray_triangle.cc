@@ -68,7 +68,7 @@ struct TriangleRay::Projected {
   }
   // Returns whether the ray passes outside the triangle.
   bool is_outside() const { return min_weight < 0 && max_weight > 0; }
-  // Returns a bound of the rounding error of a corner, which is below 2^-44.8 R in each coordinate.
+  // Returns a bound of the rounding error of a corner. The error is below 2^-44.8 * magnitude in each coordinate.
   double corner_error() const { return 0x1p-43 * magnitude; }
   // Returns whether the ray passes outside the triangle by more than the error bounds above.
   bool is_clearly_outside() const {

@@ -156,7 +156,8 @@ std::optional<double> with_rule(std::optional<double> t, const Mover& mover, con
 
 Mover mover_to_mesh(const Mover& mover, const Transform& transform) {
   const double inverse_scale = 1.0 / transform.scale;
-  Mover result = mover;
+  Mover result;  // set member by member: copying a mover that was just written in parts would stall the processor
+  result.kind = mover.kind;
   result.start = transform.point_to_mesh(mover.start);
   result.way = transform.direction_to_mesh(mover.way);
   result.radius = mover.radius * inverse_scale;

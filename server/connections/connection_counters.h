@@ -18,7 +18,7 @@ struct ConnectionCounters {
   std::atomic<uint64_t> idle{0};              // closed because they were idle for too long
   std::atomic<uint64_t> ended{0};             // ended after they were handed over to gRPC
   std::atomic<uint64_t> long_headers{0};      // connections without TLS, closed for a too long block of headers
-  std::atomic<uint64_t> floods{0};            // closed for other floods; those with TLS only if FloodGuard closed them
+  std::atomic<uint64_t> floods{0};  // closed for other floods; TLS connections count only if FloodGuard closed them
 };
 
 }  // namespace locus::server

@@ -1,4 +1,5 @@
-// Chunks of a scene's snapshot: an accepted state is restored, written again, and read again to the same chunks.
+// Chunks of a scene's snapshot: a state that the reader accepts is restored and written again, and results in the same
+// chunks.
 #include <optional>
 
 #include "core/scene/log/state_reader.h"

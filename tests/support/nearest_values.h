@@ -1,4 +1,4 @@
-// Query for the values nearest to a point, written once for every structure. The query is exact: it compares the
+// Query for the values nearest to a point; one template serves every structure. The query is exact: it compares the
 // distances that PrimitiveTraits computes in double. All structures return the same results.
 #ifndef LOCUS_TESTS_SUPPORT_NEAREST_VALUES_H_
 #define LOCUS_TESTS_SUPPORT_NEAREST_VALUES_H_

@@ -40,7 +40,7 @@ inline void answer_block(const OracleScene& scene, const QueryBlock& block, cons
       return pairs.count == 0 ? x.other < y.other : std::tie(x.row.t, x.other) < std::tie(y.row.t, y.other);
     });
     if (pairs.count != 0 && own.size() > pairs.count) own.resize(pairs.count);
-    // Keep only the pairs behind the page position (after_id, after_other).
+    // Keep only the pairs that come after the page position (after_id, after_other).
     if (a.id < block.after_id || (a.id == block.after_id && pairs.after_other == 0)) continue;
     if (a.id == block.after_id && pairs.count == 0) {
       std::erase_if(own, [&](const Found& x) { return x.other <= pairs.after_other; });

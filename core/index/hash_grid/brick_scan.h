@@ -147,7 +147,7 @@ class CullRay {
   static constexpr double kFar = 0x1p120;
 
   GridLine line_;
-  double start_;  // signed distance along the line from its point to the ray's origin
+  double start_;  // position of the ray's origin on the line: signed distance from the point of line_
   double speed_;  // length of the ray's direction
 };
 

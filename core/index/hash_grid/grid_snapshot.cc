@@ -58,7 +58,7 @@ void GridSnapshot::check_invariants() const {
 }
 
 GridRef GridSnapshot::find_in(const internal::Brick& brick, uint32_t handle) {
-  // Searches the log first: a value that moved within the brick may still have a slot in `sorted`, which is dead.
+  // Searches the log first: a value that moved within the brick may still have a dead slot in `sorted`.
   if (const uint32_t slot = brick.find_recent(handle); slot != brick.recent_count)
     return {*brick.recent, slot, brick.index};
   const uint32_t slot = brick.sorted->find(handle);

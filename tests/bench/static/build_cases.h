@@ -1,4 +1,4 @@
-// The cases build (time in which one thread builds a tree from triangles) and memory (bytes per triangle that stay
+// The cases `build` (time in which one thread builds a tree from triangles) and `memory` (bytes per triangle that stay
 // resident after a build).
 #ifndef LOCUS_TESTS_BENCH_STATIC_BUILD_CASES_H_
 #define LOCUS_TESTS_BENCH_STATIC_BUILD_CASES_H_

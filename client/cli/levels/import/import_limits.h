@@ -12,8 +12,8 @@ namespace locus::cli {
 // Limits of input files. kMaxImportFileBytes limits the total size of a file and all files that it refers to.
 inline constexpr uint64_t kMaxImportFileBytes = uint64_t{4} << 30;
 inline constexpr size_t kMaxReferencedFiles = 256;
-inline constexpr size_t kMaxReferenceBytes = 1024;                 // length of a reference, except data: URIs
-inline constexpr size_t kMaxDataUriBytes = size_t{256} << 20;      // length of all data: URIs of a file together
+inline constexpr size_t kMaxReferenceBytes = 1024;                 // length of a reference that is no `data:` URI
+inline constexpr size_t kMaxDataUriBytes = size_t{256} << 20;      // total length of the `data:` URIs of a file
 inline constexpr size_t kMaxGltfJsonBytes = 2 * kMaxDataUriBytes;  // the JSON part of a glTF or GLB file
 inline constexpr size_t kMaxGltfDepth = 64;                        // nesting of objects and lists in the JSON part
 inline constexpr size_t kMaxSceneNodes = size_t{1} << 20;          // nodes of a scene
