@@ -56,7 +56,9 @@ finish() {
   say "summary"
   for skip in ${skips[@]+"${skips[@]}"}; do echo "skipped: $skip"; done
   for suite in ${tested[@]+"${tested[@]}"}; do
-    /usr/bin/python3 tests/house/read_results.py --failures "build/$suite/results.xml" || true
+    if [ -f "build/$suite/results.xml" ]; then
+      /usr/bin/python3 tests/house/read_results.py --failures "build/$suite/results.xml"
+    fi
   done
   for problem in ${problems[@]+"${problems[@]}"}; do echo "FAILED: $problem"; done
   echo "$passed passed, $failed failed, $skipped skipped"
@@ -138,7 +140,8 @@ run_suite() {
   say "$suite: test"
   rm -f "build/$suite/results.xml"
   ${wrapper[@]+"${wrapper[@]}"} ctest --preset "$suite" ${labels[@]+"${labels[@]}"} --parallel "$jobs" --no-tests=error \
-    --test-output-size-passed 65536 --output-junit "$PWD/build/$suite/results.xml" || echo "run.sh: ctest of $suite exited with $?"
+    --test-output-size-passed 65536 --test-output-truncation head --output-junit "$PWD/build/$suite/results.xml" ||
+    echo "run.sh: ctest of $suite exited with $?"
   # Prints the result of each proof.
   grep -h '^proof: ' "build/$suite/Testing/Temporary/LastTest.log" || true
   count_results "$suite"

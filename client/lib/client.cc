@@ -81,9 +81,11 @@ struct Client::Connection {
   CallPlan repeatable(absl::string_view scene = {}) const {
     return {*channel, *authorization, options.deadline, options.retry, Repeat::kWhenUnavailable, scene};
   }
-  // Returns the header of a call whose deadline is `timeout` from now.
-  CallHeader header(absl::Duration timeout, absl::string_view scene = {}) const {
-    return {*authorization, absl::Now() + timeout, scene};
+  // Prepares a call on `bulk`, whose deadline is `timeout` from now, and returns its header.
+  CallHeader bulk_header(absl::Duration timeout, absl::string_view scene = {}) const {
+    const absl::Time deadline = absl::Now() + timeout;
+    continue_connecting(*bulk, deadline);
+    return {*authorization, deadline, scene};
   }
 };
 
@@ -135,7 +137,7 @@ absl::StatusOr<Health> Client::health(absl::string_view service) const {
 
 absl::StatusOr<BackupSize> Client::backup(BackupSink& sink) const {
   const std::unique_ptr<v1::ServerService::StubInterface> server = v1::ServerService::NewStub(connection_->bulk);
-  return download_backup(*server, sink, connection_->header(connection_->options.backup_deadline));
+  return download_backup(*server, sink, connection_->bulk_header(connection_->options.backup_deadline));
 }
 
 absl::StatusOr<v1::Scene> Client::create_scene(const v1::CreateSceneRequest& request) const {
@@ -174,11 +176,11 @@ absl::Status Client::delete_scene(const v1::DeleteSceneRequest& request) const {
 absl::StatusOr<v1::UploadMeshResponse> Client::upload_mesh(const MeshColumns& mesh,
                                                            const UploadProgress& progress) const {
   return locus::client::upload_mesh(*connection_->transfers, mesh,
-                                    connection_->header(connection_->options.long_deadline), progress);
+                                    connection_->bulk_header(connection_->options.long_deadline), progress);
 }
 
 absl::StatusOr<DownloadedMesh> Client::download_mesh(absl::string_view name, const DownloadProgress& progress) const {
-  const CallHeader header = connection_->header(connection_->options.long_deadline);
+  const CallHeader header = connection_->bulk_header(connection_->options.long_deadline);
   absl::StatusOr<DownloadedMesh> mesh = absl::UnknownError("not asked yet");
   const auto attempt = [&] {
     continue_connecting(*connection_->bulk, header.deadline);
@@ -219,7 +221,7 @@ absl::StatusOr<v1::ChangeInstancesResponse> Client::change_instances(const v1::C
 absl::Status Client::dump(const v1::DumpSceneRequest& request,
                           const std::function<absl::Status(const v1::DumpSceneResponse&)>& on_message) const {
   grpc::ClientContext context;
-  prepare(context, connection_->header(connection_->options.long_deadline, request.scene()));
+  prepare(context, connection_->bulk_header(connection_->options.long_deadline, request.scene()));
   const auto reader = connection_->transfers->DumpScene(&context, request);
   v1::DumpSceneResponse response;
   absl::Status accepted;

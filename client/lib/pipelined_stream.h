@@ -272,6 +272,7 @@ class PipelinedStream {
         const absl::Status end = run_attempt(lock);
         if (const std::optional<absl::Duration> wait = wait_before_next(end)) {
           changed_.wait_for(lock, absl::ToChronoNanoseconds(*wait), [this] { return broken_off_; });
+          if (broken_off_) continue;
           lock.unlock();
           continue_connecting(*channel_, absl::InfiniteFuture());
           lock.lock();

@@ -74,32 +74,8 @@ inline double plane_bound(const Mover& mover, Vec3d a, Vec3d b, Vec3d c) {
   return (rest - mover.radius * std::sqrt(squared_length(normal))) / approach;
 }
 
-// Returns true if one edge of the triangle, as seen along the path, separates the triangle from a ball or capsule. The
-// mover then misses the triangle, even if it moves without end. The corners are relative to the mover's start. May
-// return false for a mover that misses.
-inline bool misses_along_path(const Mover& mover, const Corners& corners) {
-  // Covers the rounding of the products, and the epsilons of RoundSweep at any time of the path.
-  constexpr double kEpsilon = 0x1p-40;
-  const double way = max_component(abs(mover.way));
-  const double place = max_component(abs(mover.half_axis)) + mover.radius + way;
-  const double radius = planted(PlantedBug::kSweepLineRadius) ? 0 : mover.radius;
-  for (size_t i = 0; i < 3; ++i) {
-    const Vec3d from = corners[i], edge = corners[(i + 1) % 3] - from, other = corners[(i + 2) % 3];
-    // Separating axis, perpendicular to the path and to the edge, and the triangle's interval on it. The mover's
-    // interval is centred at 0. All values are multiplied by the length of the axis.
-    const Vec3d axis = cross(edge, mover.way);
-    const double edge_at = dot(axis, from), other_at = dot(axis, other);
-    const double gap = std::max(std::min(edge_at, other_at), -std::max(edge_at, other_at));
-    const double size = max_component(max(abs(edge), abs(other - from)));
-    const double along_axis = planted(PlantedBug::kSweepLineAxis) ? 0 : std::abs(dot(axis, mover.half_axis));
-    const double rest = gap - along_axis - kEpsilon * size * way * (max_component(abs(from)) + size + place);
-    if (rest > 0 && rest * rest > radius * radius * squared_length(axis)) return true;
-  }
-  return false;
-}
-
-// Returns whether a corner, relative to the mover's start, is at most the radius away from the mover's centre at the
-// start. RoundSweep then finds a contact at t = 0 too, because its epsilon exceeds the rounding errors of its distance.
+// Returns whether one of the corners, which are relative to the mover's start, is at most the radius away from the
+// mover's centre at the start. The mover then touches the triangle at t = 0.
 inline bool touches_corner_at_start(const Mover& mover, const Corners& corners) {
   const double squared = mover.radius * mover.radius * (planted(PlantedBug::kSweepPassed) ? 4 : 1);
   return squared_length(corners[0]) <= squared || squared_length(corners[1]) <= squared ||
@@ -153,6 +129,27 @@ std::optional<double> with_rule(std::optional<double> t, const Mover& mover, con
 }
 
 }  // namespace
+
+bool misses_along_path(const Mover& mover, const Corners& corners) {
+  // Covers the rounding of the products, and the epsilons of RoundSweep at any time of the path.
+  const double epsilon = planted(PlantedBug::kSweepLineEpsilon) ? 0 : 0x1p-40;
+  const double way = max_component(abs(mover.way));
+  const double place = max_component(abs(mover.half_axis)) + mover.radius + way;
+  const double radius = planted(PlantedBug::kSweepLineRadius) ? 0 : mover.radius;
+  for (size_t i = 0; i < 3; ++i) {
+    const Vec3d from = corners[i], edge = corners[(i + 1) % 3] - from, other = corners[(i + 2) % 3];
+    // Separating axis, perpendicular to the path and to the edge, and the triangle's interval on it. The mover's
+    // interval is centred at 0. All values are multiplied by the length of the axis.
+    const Vec3d axis = cross(edge, mover.way);
+    const double edge_at = dot(axis, from), other_at = dot(axis, other);
+    const double gap = std::max(std::min(edge_at, other_at), -std::max(edge_at, other_at));
+    const double size = max_component(max(abs(edge), abs(other - from)));
+    const double along_axis = planted(PlantedBug::kSweepLineAxis) ? 0 : std::abs(dot(axis, mover.half_axis));
+    const double rest = gap - along_axis - epsilon * size * way * (max_component(abs(from)) + size + place);
+    if (rest > 0 && rest * rest > radius * radius * squared_length(axis)) return true;
+  }
+  return false;
+}
 
 Mover mover_to_mesh(const Mover& mover, const Transform& transform) {
   const double inverse_scale = 1.0 / transform.scale;

@@ -41,6 +41,11 @@ inline Mover resting(const Capsule& capsule) {
 // Returns the mover in mesh axes. A time t means the same in world axes and in mesh axes.
 Mover mover_to_mesh(const Mover& mover, const Transform& transform);
 
+// Returns true if one edge of the triangle, as seen along the path, separates the triangle from a ball or capsule. The
+// mover then misses the triangle, even if it moves without end. The corners are relative to the mover's start. May
+// return false for a mover that misses, but never returns true if RoundSweep finds a contact. Public for its test.
+bool misses_along_path(const Mover& mover, const Corners& corners);
+
 // Return the first moment of contact in 0 .. limit, or nullopt. `at_start` selects the result for a primitive that is
 // touched at t = 0.
 std::optional<double> first_contact(const Mover& mover, const Shape& shape, AtStart at_start, double limit = 1);

@@ -2,7 +2,7 @@
 // into the message, which must outlive them. The functions refuse errors that only a protocol message can have (unknown
 // enum numbers, fields that exclude each other, kinds that are not served); the core checks lengths and values.
 //
-// Pure functions. Errors name the field as the protocol spells it.
+// Pure functions, except that to_change() reads the registry. Errors name the field as the protocol spells it.
 #ifndef LOCUS_SERVER_CONVERT_CONVERT_H_
 #define LOCUS_SERVER_CONVERT_CONVERT_H_
 

@@ -3,6 +3,8 @@
 // changes are applied to a small scene.
 // Accepted query batches of at most 256 queries are run on an unchanged small scene, and the results are compared with
 // those of brute force.
+#include <algorithm>
+
 #include "core/base/limits.h"
 #include "core/query/query_batch.h"
 #include "core/scene/log/record_codec.h"
@@ -157,6 +159,8 @@ LOCUS_FUZZ_TARGET(instances) {
       continue;
     }
     LOCUS_CHECK_LE(after->statics->size(), limits::kMaxInstances);
+    for (const uint64_t id : change->remove_ids)
+      LOCUS_CHECK(after->statics->find(id) == nullptr || std::ranges::count(done->placed, id) == 1);
     for (const Id id : done->placed) {
       const Instance* placed = after->statics->find(id);
       LOCUS_CHECK(placed != nullptr);

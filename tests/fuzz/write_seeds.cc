@@ -207,7 +207,6 @@ void write_updates(const SeedWriter& seeds) {
   append_piece(input, batch.SerializeAsString());
   append_piece(input, second.SerializeAsString());
   seeds.write("updates", "two_batches", input);
-  write_instances(seeds);
   v1::SceneSpec spec;
   (*spec.mutable_labels())["map"] = "delta";
   spec.set_history_ticks(60);
@@ -243,6 +242,7 @@ void write_all(const SeedWriter& seeds) {
   write_meshes(seeds);
   write_queries(seeds);
   write_updates(seeds);
+  write_instances(seeds);
   write_frames(seeds);
   seeds.write("bsp", "small_level", cli::small_level().bytes());
   cli::ImportedLevel level;

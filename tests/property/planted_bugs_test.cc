@@ -67,6 +67,8 @@ std::string compare_conservative_answers_with_bounds() { return search_placed_sc
 
 std::string compare_conservative_overlaps_with_exact() { return search_placed_scenes(touching_scene, superset_fault); }
 
+std::string compare_grazing_sweeps() { return grazing_difference(scaled_count(10'000)); }
+
 const std::vector<CrossingTrial>& crossing_trials() {
   static const std::vector<CrossingTrial>* const kTrials = new std::vector<CrossingTrial>(all_crossing_trials());
   return *kTrials;
@@ -142,6 +144,7 @@ constexpr Trial kTrials[] = {
     {"SweepThatIgnoresItsStart", PlantedBug::kSweepStart, sweep_difference},
     {"SweepOfACentreWithoutRadius", PlantedBug::kSweepLineRadius, sweep_difference},
     {"SweepOfACentreWithoutItsSegment", PlantedBug::kSweepLineAxis, sweep_difference},
+    {"SweepThatTrustsDoubleBesideItsPath", PlantedBug::kSweepLineEpsilon, compare_grazing_sweeps},
     {"SweepThatPassesTooMuch", PlantedBug::kSweepPassed, sweep_difference},
     {"CrossingsWithBothEndsOfAnEdge", PlantedBug::kClosedEdge, contains_difference},
     {"CrossingsDecidedInDouble", PlantedBug::kCrossingInDouble, crossing_difference},

@@ -162,24 +162,26 @@ class Client:
         rpc = _rpc("Scene", "UploadMesh")
         messages = meshes.upload_messages(name, vertices, indices, parts, progress)
         call = self._connection.channel.stream_unary(rpc.path, rpc.request.SerializeToString)
+        self._connection.continue_connecting()
         try:
             _, metadata = self._connection.metadata()
             raw = call(messages, timeout=self._connection.long_timeout, metadata=metadata)
         except grpc.RpcError as failure:
-            raise from_call(failure) from None
+            raise self._failed(failure) from None
         return Mesh.of(parsed(rpc.response, raw).mesh)
 
     def download_mesh(self, name: str) -> MeshColumns:
         """Returns an uploaded mesh with its columns, as the server stores it."""
         rpc = _rpc("Scene", "DownloadMesh")
         call = self._connection.channel.unary_stream(rpc.path)
+        self._connection.continue_connecting()
         try:
             _, metadata = self._connection.metadata()
             answers = call(rpc.request(mesh=name).SerializeToString(), timeout=self._connection.long_timeout,
                            metadata=metadata)
             pieces = [parsed(rpc.response, raw) for raw in answers]
         except grpc.RpcError as failure:
-            raise from_call(failure) from None
+            raise self._failed(failure) from None
         return MeshColumns.of(pieces)
 
     def meshes(self) -> List[Mesh]:
@@ -241,6 +243,11 @@ class Client:
             if not page.next_page_token:
                 return
             request.page_token = page.next_page_token
+
+    def _failed(self, failure: grpc.RpcError) -> LocusError:
+        error = from_call(failure)
+        self._connection.note_failure(error)
+        return error
 
     def _greet(self, wait_for_server: bool) -> None:
         """Makes a first call to the server, so that connect() itself fails with a clear message if the address is

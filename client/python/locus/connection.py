@@ -15,6 +15,7 @@ from .errors import LocusError, from_call, parsed
 
 DEFAULT_PORT = 7575
 _MAX_CONNECTING_SECONDS = 0.1
+_PROBE_SECONDS = 10.0
 _LEGAL_SCENE = re.compile(r"[a-z0-9-]{1,63}")
 _Answer = TypeVar("_Answer")
 
@@ -65,7 +66,7 @@ class Connection:
         self.timeout = timeout
         self.long_timeout = long_timeout
         self.retry = retry
-        self._lost = False  # True if the last call did not reach the server
+        self._probe: Any = None  # health check that waits for the channel to connect; see note_failure()
         options: List[Tuple[str, object]] = [
             ("grpc.max_send_message_length", max_send_bytes), ("grpc.max_receive_message_length", max_receive_bytes),
             ("grpc.use_local_subchannel_pool", 1),
@@ -84,35 +85,37 @@ class Connection:
         return number, authorization + scene_metadata(scene)
 
     def note_failure(self, error: LocusError) -> None:
-        """Notes the failure of a call, for continue_connecting()."""
-        self._lost = error.code == grpc.StatusCode.UNAVAILABLE and not error.refused
+        """Notes the failure of a call. If the call did not reach the server, starts a health check that waits until the
+        channel is connected.
+
+        gRPC continues an attempt to connect only while a call waits, or every 5 s, and calls on a channel whose last
+        attempt failed return immediately. Without the health check, all calls could fail for 15 s after the server has
+        returned.
+        """
+        if error.code != grpc.StatusCode.UNAVAILABLE or error.refused:
+            return
+        if self._probe is not None and not self._probe.done():
+            return
+        try:
+            self._probe = self.channel.unary_unary("/grpc.health.v1.Health/Check").future(
+                b"", timeout=_PROBE_SECONDS, wait_for_ready=True, metadata=self.metadata()[1])
+        except (ValueError, OSError):  # the channel is closed, or the token cannot be read
+            self._probe = None
 
     def continue_connecting(self, seconds: float = _MAX_CONNECTING_SECONDS) -> None:
-        """Waits while the channel tries to connect again, if the last call did not reach the server. Called before each
-        call.
-
-        gRPC continues an attempt to connect only while a thread waits inside gRPC, or every 5 s. Without this wait,
-        calls could fail for 15 s after the server has returned, because calls on a failed channel return immediately.
+        """Waits at most 0.1 s, and at most `seconds`, for the health check that note_failure() started. Called before
+        each call.
         """
-        if not self._lost:
+        probe = self._probe
+        if probe is None:
             return
-        ready = grpc.channel_ready_future(self.channel)
         try:
-            ready.result(timeout=max(0.0, min(seconds, _MAX_CONNECTING_SECONDS)))
-            self._lost = False
+            probe.exception(timeout=max(0.0, min(seconds, _MAX_CONNECTING_SECONDS)))
         except grpc.FutureTimeoutError:
+            return
+        except grpc.FutureCancelledError:  # the channel was closed
             pass
-        finally:
-            ready.cancel()
-
-    def _wait_connecting(self, seconds: float) -> None:
-        """Waits for `seconds`. A channel that is not connected tries to connect during the wait."""
-        def ignore(_: grpc.ChannelConnectivity) -> None:
-            pass
-
-        self.channel.subscribe(ignore, try_to_connect=True)
-        time.sleep(seconds)
-        self.channel.unsubscribe(ignore)
+        self._probe = None
 
     def unary(self, rpc: schema.Method, request: Any, *, scene: str = "", repeat: bool = False,
               timeout: Optional[float] = None) -> Any:
@@ -158,4 +161,4 @@ class Connection:
                 wait = self.retry.wait_after(failures, error) if deadline and error.worth_repeating else None
                 if wait is None or deadline is None or time.monotonic() + wait >= deadline:
                     raise error from None
-            self._wait_connecting(wait)
+            time.sleep(wait)

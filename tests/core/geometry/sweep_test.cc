@@ -163,5 +163,11 @@ TEST(SweepTest, ContactsInsideAnObjectPointToTheShortestWayOut) {
   EXPECT_EQ(contact_at(capsule, box, 0).normal, (Vec3d{0, 1, 0}));
 }
 
+TEST(SweepTest, NoGrazingContactIsExcludedBeforeTheExactTest) {
+  int contacts = 0;
+  EXPECT_EQ(test::grazing_difference(20'000, &contacts), "");
+  EXPECT_GT(contacts, 5'000);
+}
+
 }  // namespace
 }  // namespace locus

@@ -5,9 +5,11 @@
 
 #include <csignal>
 #include <cstdio>
+#include <functional>
 #include <future>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/time/clock.h"
@@ -20,10 +22,14 @@ namespace {
 
 class ReconnectTest : public ::testing::Test {
  protected:
+  using Call = std::function<absl::Status()>;
+
   void SetUp() override {
     start();
     client::ClientOptions options;
     options.connect_timeout = absl::Minutes(1);
+    options.retry.max_attempts = 10'000;
+    options.deadline = absl::Minutes(1);
     absl::StatusOr<std::unique_ptr<client::Client>> client = client::Client::connect(address_, options);
     ASSERT_TRUE(client.ok()) << client.status();
     client_ = *std::move(client);
@@ -43,50 +49,62 @@ class ReconnectTest : public ::testing::Test {
     daemon_->signal(SIGKILL);
     daemon_->wait();
   }
-  // Makes a call that is never retried.
-  absl::Status call() { return client_->delete_scene(request_); }
+
+  // Kills the daemon and starts it again, and verifies that a call that is never retried is answered soon afterwards.
+  // gRPC pauses for at most 2 s between two attempts to connect. If the client library did not wait inside gRPC before
+  // its calls (see continue_connecting()), calls would fail for 10 to 15 s.
+  void expect_an_answer_soon_after_a_restart(const Call& call) {
+    EXPECT_TRUE(absl::IsNotFound(call()));
+    kill();
+    EXPECT_TRUE(absl::IsUnavailable(call()));
+    absl::SleepFor(absl::Milliseconds(300));
+    EXPECT_TRUE(absl::IsUnavailable(call()));
+    start();
+    int calls = 1;
+    for (; calls < 60 && absl::IsUnavailable(call()); ++calls) absl::SleepFor(absl::Milliseconds(50));
+    EXPECT_LT(calls, 60);
+    EXPECT_TRUE(absl::IsNotFound(call()));
+  }
 
   TemporaryFolder folder_;
   const std::string address_ = "unix:" + folder_.file("socket");
   std::unique_ptr<DaemonProcess> daemon_;
   std::unique_ptr<client::Client> client_;
-  v1::DeleteSceneRequest request_ = [] {
-    v1::DeleteSceneRequest request;
-    request.set_name("arena");
-    return request;
-  }();
 };
 
-// Returns the number of calls, 50 ms apart, until one is answered; at most `limit`.
-template <class Call>
-int calls_until_answered(int limit, const Call& call) {
-  int calls = 1;
-  while (calls < limit && absl::IsUnavailable(call())) {
-    absl::SleepFor(absl::Milliseconds(50));
-    ++calls;
-  }
-  return calls;
+TEST_F(ReconnectTest, UnaryCallsSucceedSoonAfterTheServerHasReturned) {
+  v1::DeleteSceneRequest request;
+  request.set_name("arena");
+  expect_an_answer_soon_after_a_restart([&] { return client_->delete_scene(request); });
 }
 
-// gRPC pauses for at most 2 s between two attempts to connect. If the client library did not wait inside gRPC before its
-// calls (see continue_connecting()), calls would fail for 10 to 15 s.
-TEST_F(ReconnectTest, CallsSucceedSoonAfterTheServerHasReturned) {
-  EXPECT_TRUE(absl::IsNotFound(call()));
-  kill();
-  EXPECT_TRUE(absl::IsUnavailable(call()));
-  absl::SleepFor(absl::Milliseconds(300));
-  EXPECT_TRUE(absl::IsUnavailable(call()));
-  start();
-  EXPECT_LT(calls_until_answered(100, [this] { return call(); }), 60);
+TEST_F(ReconnectTest, TransfersSucceedSoonAfterTheServerHasReturned) {
+  v1::DumpSceneRequest request;
+  request.set_scene("arena");
+  expect_an_answer_soon_after_a_restart(
+      [&] { return client_->dump(request, [](const v1::DumpSceneResponse&) { return absl::OkStatus(); }); });
 }
 
 TEST_F(ReconnectTest, ACallThatIsRetriedReachesTheServerThatHasReturned) {
   kill();
-  EXPECT_TRUE(absl::IsUnavailable(call()));
   std::future<absl::Status> asked = std::async(std::launch::async, [this] { return client_->get_server().status(); });
   start();
   const absl::Status answered = asked.get();
   EXPECT_TRUE(answered.ok()) << answered;
+}
+
+// The attempts would be used up after 6 s if the stream did not wait inside gRPC before each of them.
+TEST_F(ReconnectTest, AStreamReachesTheServerThatHasReturned) {
+  client::QueryStreamOptions options;
+  options.reconnect = {60, absl::Milliseconds(50), absl::Milliseconds(100)};
+  const std::unique_ptr<client::QueryStream> stream = client_->query_stream("arena", options);
+  kill();
+  absl::Status answer = absl::UnknownError("not answered");
+  ASSERT_TRUE(stream->send({}, [&](const absl::StatusOr<v1::QueryResult>& result) { answer = result.status(); }).ok());
+  absl::SleepFor(absl::Milliseconds(300));
+  start();
+  EXPECT_TRUE(stream->flush().ok());
+  EXPECT_TRUE(absl::IsNotFound(answer)) << answer;
 }
 
 }  // namespace
