@@ -1,6 +1,7 @@
 #include "server/rpc/call.h"
 
 #include <algorithm>
+#include <functional>
 
 #include "core/base/refusal.h"
 #include "server/convert/status.h"
@@ -34,7 +35,8 @@ Caller::Caller(RpcState& state, const grpc::ServerContextBase& context, const st
       context_(context),
       gone_(gone),
       connection_(state.connections.find(context.peer())),
-      deadline_(to_steady(context.deadline())) {}
+      deadline_(to_steady(context.deadline())),
+      client_(std::hash<std::string>{}(connection_->peer().name)) {}
 
 void Caller::count_call() const {
   uint64_t bytes = 0;

@@ -75,7 +75,7 @@ class Caller {
 
   // Returns an id of the client: a hash of its identity's name or, without an identity, of its connection's name. All
   // calls of a client have the same id; different clients almost certainly have different ids.
-  uint64_t client() const;
+  uint64_t client() const { return client_; }
 
   // Returns the names under which the quotas of the caller's identity and connection are counted.
   std::array<std::string, 2> quota_subjects() const;
@@ -146,6 +146,7 @@ class Caller {
   SteadyTime deadline_;
   const RpcRight* rpc_right_ = nullptr;  // entry of the method in the table of rights; null before authorize()
   IdentityPtr identity_ = anonymous_identity();
+  uint64_t client_;                                        // result of client()
   std::shared_ptr<ClientShares::Counter> identity_share_;  // claims of the identity; null without an identity
   std::array<std::string, 2> quota_subjects_;  // result of quota_subjects(); set by authorize() with access control
   mutable std::string subject_;

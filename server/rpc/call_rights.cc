@@ -122,7 +122,10 @@ absl::Status Caller::authorize(absl::string_view path) {
   if (!needs_right()) return absl::OkStatus();
   ASSIGN_OR_RETURN(identity_, authenticate(*state_.access, *connection_, context_));
   quota_subjects_.front() = identity_->principal;
-  if (identity_->kind != IdentityKind::kAnonymous) identity_share_ = state_.shares.of(identity_->principal);
+  if (identity_->kind != IdentityKind::kAnonymous) {
+    client_ = std::hash<std::string>{}(identity_->principal);
+    identity_share_ = state_.shares.of(identity_->principal);
+  }
   return check_grants();
 }
 
@@ -166,12 +169,9 @@ absl::Status Caller::recheck(const std::string& scene) const {
   return scene.empty() ? absl::OkStatus() : check_right(scene);
 }
 
-uint64_t Caller::client() const {
-  const bool has_identity = identity_->kind != IdentityKind::kAnonymous;
-  return std::hash<std::string>{}(has_identity ? identity_->principal : connection_->peer().name);
+bool Caller::has_quotas() const {
+  return state_.access != nullptr && state_.access->enabled() && state_.access->rules()->has_quotas();
 }
-
-bool Caller::has_quotas() const { return state_.access != nullptr && state_.access->rules()->has_quotas(); }
 
 std::array<std::string, 2> Caller::quota_subjects() const {
   return {identity_->principal, absl::StrCat("connection:", connection_->peer().name)};
