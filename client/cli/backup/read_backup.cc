@@ -96,7 +96,7 @@ absl::StatusOr<std::map<std::string, uint64_t>> list_files(const std::string& ba
     const fs::file_status status = entry->symlink_status(why);
     if (why) break;
     if (fs::is_directory(status) || path == kChecksumFile) continue;
-    if (sizes.size() > client::kMaxBackupFiles) {
+    if (sizes.size() >= client::kMaxBackupFiles) {
       problems.add(path, "exceeds the maximum number of files");
       break;
     }
