@@ -30,7 +30,7 @@ struct RayRequest {
 };
 
 // Reader of the requests of a block of rays. The fields that are equal for all queries of the block are computed
-// once. Borrows the block and the origins. Const access; any thread.
+// once. Borrows the columns and the origins. Const access; any thread.
 class RayReader {
  public:
   // Converts the block's cull from the scene's `winding` to the stored counter-clockwise winding.
