@@ -11,7 +11,8 @@ namespace locus {
 namespace {
 
 // Held bytes are counted again only after updates have replaced 1 / kCountShare of the budget since the last count. So
-// pins just below the budget do not cause a count for every batch. Pins may therefore exceed the budget by this share.
+// pins just below the budget do not cause a count for every batch. Pins may therefore exceed the budget by up to
+// kMaxOfReplaced times this share.
 constexpr uint64_t kCountShare = 64;
 // Upper bound of the ratio A / B for two revisions of a scene. A is the number of bytes that the earlier revision holds
 // and the later revision does not hold. B is the difference of their SceneSnapshot::replaced_bytes, which does not
@@ -48,7 +49,7 @@ SnapshotPin::~SnapshotPin() {
 absl::Status SnapshotPin::status() const {
   const Pinned& pinned = entry_->second;
   if (!pinned.revoked.load(std::memory_order_acquire)) return absl::OkStatus();
-  return revoked_status(entry_->first, pinned.budget, pinned.held);
+  return revoked_status(entry_->first.revision, pinned.budget, pinned.held);
 }
 
 void SnapshotPin::on_revoke(std::function<void()> revocation) {
@@ -70,18 +71,18 @@ uint64_t ReaderTracker::budget_for(uint64_t scene_bytes) const {
 
 SnapshotPin::Entry ReaderTracker::add(const SnapshotPtr& snapshot) {
   const MutexLock lock(mutex_);
-  const auto [entry, added] = pinned_.try_emplace(snapshot->revision);
+  const auto [entry, added] = pinned_.try_emplace(SnapshotPin::Age::of(*snapshot));
   SnapshotPin::Pinned& pinned = entry->second;
   ++pinned.pins;
   if (!added) {
-    LOCUS_DCHECK_EQ(pinned.replaced_bytes, snapshot->replaced_bytes);
+    LOCUS_DCHECK(pinned.snapshot.lock() == snapshot);
     return entry;
   }
   pinned.snapshot = snapshot;
-  pinned.replaced_bytes = snapshot->replaced_bytes;
-  if (snapshot->replaced_bytes < enforced_at_) late_bytes_ += enforced_at_ - snapshot->replaced_bytes;
-  LOCUS_DCHECK(entry == pinned_.begin() || std::prev(entry)->second.replaced_bytes <= pinned.replaced_bytes);
-  LOCUS_DCHECK(std::next(entry) == pinned_.end() || pinned.replaced_bytes <= std::next(entry)->second.replaced_bytes);
+  const uint64_t replaced = snapshot->replaced_bytes;
+  if (replaced < enforced_at_) late_bytes_ += enforced_at_ - replaced;
+  LOCUS_DCHECK(entry == pinned_.begin() || std::prev(entry)->first.replaced_bytes <= replaced);
+  LOCUS_DCHECK(std::next(entry) == pinned_.end() || replaced <= std::next(entry)->first.replaced_bytes);
   LOCUS_DCHECK_CALL(check_invariants());
   return entry;
 }
@@ -105,18 +106,18 @@ void ReaderTracker::add_revocation(std::shared_ptr<SnapshotPin::Revocation> revo
 }
 
 bool ReaderTracker::may_exceed(const SceneSnapshot& latest) const {
-  if (pinned_.empty() || pinned_.begin()->first >= latest.revision) return false;
+  if (pinned_.empty() || pinned_.begin()->first >= SnapshotPin::Age::of(latest)) return false;
   LOCUS_DCHECK_GE(latest.replaced_bytes, counted_at_);
-  LOCUS_DCHECK_GE(latest.replaced_bytes, pinned_.begin()->second.replaced_bytes);
+  LOCUS_DCHECK_GE(latest.replaced_bytes, pinned_.begin()->first.replaced_bytes);
   const uint64_t since_count = latest.replaced_bytes - counted_at_;
-  const uint64_t since_oldest = latest.replaced_bytes - pinned_.begin()->second.replaced_bytes;
+  const uint64_t since_oldest = latest.replaced_bytes - pinned_.begin()->first.replaced_bytes;
   return since_count >= budget_ / kCountShare && kMaxOfReplaced * since_oldest > budget_ &&
          counted_ + kMaxOfReplaced * (late_bytes_ + since_count) > budget_;
 }
 
 std::vector<ReaderTracker::Holding> ReaderTracker::pinned_before(const SceneSnapshot& latest) const {
   std::vector<Holding> pinned;
-  for (auto entry = pinned_.begin(); entry != pinned_.lower_bound(latest.revision); ++entry)
+  for (auto entry = pinned_.begin(); entry != pinned_.lower_bound(SnapshotPin::Age::of(latest)); ++entry)
     if (SnapshotPtr snapshot = entry->second.snapshot.lock(); snapshot != nullptr)
       pinned.push_back({std::move(snapshot), 0});
   return pinned;
@@ -180,7 +181,7 @@ uint64_t ReaderTracker::revoke_beyond(const SceneSnapshot& latest, uint64_t byte
 }
 
 bool ReaderTracker::revoke(const SceneSnapshot& snapshot, uint64_t held, uint64_t budget) {
-  const auto entry = pinned_.find(snapshot.revision);
+  const auto entry = pinned_.find(SnapshotPin::Age::of(snapshot));
   if (entry == pinned_.end() || entry->second.revoked) return false;
   entry->second.budget = budget;
   entry->second.held = held;

@@ -12,6 +12,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <compare>
 #include <functional>
 #include <list>
 #include <map>
@@ -50,9 +51,16 @@ class SnapshotPin {
 
  private:
   friend class ReaderTracker;
+  // Age of a snapshot; an earlier snapshot of a scene has a lesser age. The revision alone does not suffice, because
+  // Scene::trim_history() replaces the snapshot of a revision by one with more replaced bytes.
+  struct Age {
+    uint64_t revision, replaced_bytes;
+
+    static Age of(const SceneSnapshot& snapshot) { return {snapshot.revision, snapshot.replaced_bytes}; }
+    friend auto operator<=>(const Age&, const Age&) = default;
+  };
   struct Pinned {
     std::weak_ptr<const SceneSnapshot> snapshot;
-    uint64_t replaced_bytes;  // SceneSnapshot::replaced_bytes
     uint32_t pins = 0;
     std::atomic<bool> revoked{false};
     // Budget and held bytes at the time of the revocation. Both are written before `revoked` is set, and so are safe to
@@ -60,7 +68,7 @@ class SnapshotPin {
     uint64_t budget = 0;
     uint64_t held = 0;
   };
-  using Entry = std::map<uint64_t, Pinned>::iterator;
+  using Entry = std::map<Age, Pinned>::iterator;
   using Revocation = std::pair<Pinned*, std::function<void()>>;
 
   std::shared_ptr<ReaderTracker> tracker_;
@@ -107,8 +115,8 @@ class ReaderTracker {
 
  private:
   friend class SnapshotPin;
-  // Pinned revision. `bytes` is the memory that this revision does not share with the next later pinned revision or, if
-  // there is none, with the latest revision.
+  // Pinned snapshot. `bytes` is the memory that it does not share with the next later pinned snapshot or, if there is
+  // none, with the latest snapshot.
   struct Holding {
     SnapshotPtr snapshot;
     uint64_t bytes = 0;
@@ -123,7 +131,7 @@ class ReaderTracker {
   // Returns true if pinned revisions may hold more memory than the budget. The result is estimated from the number of
   // bytes that updates have replaced since the oldest pinned revision and since the last count of held memory.
   bool may_exceed(const SceneSnapshot& latest) const LOCUS_REQUIRES(mutex_);
-  // Returns the pinned revisions before `latest`, oldest first.
+  // Returns the pinned snapshots before `latest`, oldest first.
   std::vector<Holding> pinned_before(const SceneSnapshot& latest) const LOCUS_REQUIRES(mutex_);
   // Sets Holding::bytes of each entry of `pinned`, which is in the order of revisions, and returns the sum.
   static uint64_t count(std::vector<Holding>& pinned, const SceneSnapshot& latest);
@@ -135,7 +143,7 @@ class ReaderTracker {
   const uint64_t fixed_;  // budget passed to the constructor; 0: derived from the memory of the scene
   mutable Mutex mutex_;
   mutable ConditionVariable returned_;
-  std::map<uint64_t, SnapshotPin::Pinned> pinned_ LOCUS_GUARDED_BY(mutex_);  // key: revision
+  std::map<SnapshotPin::Age, SnapshotPin::Pinned> pinned_ LOCUS_GUARDED_BY(mutex_);
   std::list<std::shared_ptr<SnapshotPin::Revocation>> revocations_ LOCUS_GUARDED_BY(mutex_);
   uint32_t revoked_ LOCUS_GUARDED_BY(mutex_) = 0;  // number of revoked entries of pinned_
   bool closed_ LOCUS_GUARDED_BY(mutex_) = false;

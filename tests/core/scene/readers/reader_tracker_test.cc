@@ -163,6 +163,32 @@ TEST_F(ReaderTrackerTest, APinOfAnOlderRevisionCountsTheBytesReplacedBefore) {
   EXPECT_EQ(scene_.status().pinned_bytes, unshared_bytes(*old, *scene_.latest()));
 }
 
+TEST_F(ReaderTrackerTest, PinsOfTheSameRevisionBeforeAndAfterTrimmingAreCountedSeparately) {
+  SceneSpec spec = bounded(kBudget);
+  spec.history = {10, uint64_t{1} << 30};
+  Scene scene("trimmed", spec, 1, StaticSet::empty());
+  const auto tick_to = [&](uint64_t tick) {
+    UpdateBatch batch = with(points(all_, std::vector<float>(3 * all_.size(), float(tick))));
+    batch.upsert = true;
+    batch.tick = tick;
+    ASSERT_TRUE(scene.apply(batch, kNow).ok());
+  };
+  for (uint64_t tick = 1; tick <= 3; ++tick) tick_to(tick);
+  std::optional<SnapshotPin> before = *scene.pin({}, kNow);
+  ASSERT_GT(scene.trim_history(0), 0u);
+  const SnapshotPin after = *scene.pin({}, kNow);
+  ASSERT_EQ((*before)->revision, after->revision);
+  EXPECT_EQ(scene.status().pinned_bytes, unshared_bytes(**before, *after));
+  EXPECT_GT(scene.status().pinned_bytes, 0u);
+  before.reset();
+  EXPECT_EQ(scene.status().pinned_bytes, 0u);
+  tick_to(4);
+  EXPECT_EQ(scene.status().pinned_bytes, unshared_bytes(*after, *scene.latest()));
+  EXPECT_GT(scene.status().pinned_bytes, 0u);
+  EXPECT_GT(scene.revoke_readers(0), 0u);
+  EXPECT_FALSE(after.status().ok());
+}
+
 TEST_F(ReaderTrackerTest, OnRevokeIsCalledOnceAndOnlyForRevokedPins) {
   std::vector<SnapshotPin> pins = pin_too_much();
   int first = 0, last = 0;
