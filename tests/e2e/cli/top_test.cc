@@ -24,6 +24,13 @@ server::ServerConfig with_http() {
   return config;
 }
 
+// Writes a file that only its owner may read. Returns its path.
+std::string write_private(const TemporaryFolder& folder, const std::string& name, const std::string& text) {
+  std::ofstream(folder.file(name)) << text;
+  std::filesystem::permissions(folder.file(name), std::filesystem::perms::owner_read);
+  return folder.file(name);
+}
+
 Outcome run_top(const std::string& address, const std::vector<std::string>& more) {
   std::vector<std::string> arguments = {"top", "--metrics-address", address, "--interval", "0.1"};
   arguments.insert(arguments.end(), more.begin(), more.end());
@@ -83,11 +90,7 @@ TEST_F(TopTest, AnUnreachableServerIsReportedWithAHint) {
 
 TEST(TopRightsTest, ATokenIsSentAndARefusalSaysWhichRightIsMissing) {
   const TemporaryFolder folder;
-  const auto write = [&](const std::string& name, const std::string& text) {
-    std::ofstream(folder.file(name)) << text;
-    std::filesystem::permissions(folder.file(name), std::filesystem::perms::owner_read);
-    return folder.file(name);
-  };
+  const auto write = [&](const char* name, const std::string& text) { return write_private(folder, name, text); };
   const TestAuthority authority("authority");
   const TestCertificate pair = authority.for_server();
   server::ServerConfig config = with_http();
@@ -104,6 +107,22 @@ TEST(TopRightsTest, ATokenIsSentAndARefusalSaysWhichRightIsMissing) {
   EXPECT_THAT(run_top(http, {"--once", "--ca", ca, "--token-file", other}).err, HasSubstr("lacks the right metrics"));
   EXPECT_THAT(run_top(http, {"--once", "--ca", ca}).err, HasSubstr("needs the right metrics"));
   EXPECT_NE(run_top(http, {"--once", "--token-file", scraper}).code, cli::ExitCode::kOk) << "without TLS";
+}
+
+TEST(TopServerNameTest, TheCertificateIsCheckedAgainstTheServerName) {
+  const TemporaryFolder folder;
+  const auto write = [&](const char* name, const std::string& text) { return write_private(folder, name, text); };
+  const TestAuthority authority("authority");
+  const TestCertificate pair = authority.issue({.common_name = "game", .alternative_names = "DNS:game.example.com"});
+  server::ServerConfig config = with_http();
+  config.tls_cert = write("crt", pair.certificate);
+  config.tls_key = write("key", pair.key);
+  const std::string ca = write("ca", authority.certificate());
+  RunningServer running(config);
+  const std::string http = "127.0.0.1:" + std::to_string(running.server().http_port());
+  EXPECT_NE(run_top(http, {"--once", "--ca", ca}).code, cli::ExitCode::kOk);
+  EXPECT_EQ(run_top(http, {"--once", "--ca", ca, "--server-name", "game.example.com"}).code, cli::ExitCode::kOk);
+  EXPECT_NE(run_top(http, {"--once", "--ca", ca, "--server-name", "other.example.com"}).code, cli::ExitCode::kOk);
 }
 
 TEST_F(TopTest, AGrpcPortOrAnInvalidAddressIsAnError) {

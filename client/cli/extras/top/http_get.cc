@@ -56,8 +56,8 @@ void set_credentials(CURL* curl, const client::CredentialOptions& credentials) {
   curl_easy_setopt(curl, CURLOPT_SSLVERSION, static_cast<long>(CURL_SSLVERSION_TLSv1_2));
 }
 
-struct FreeHeaders {
-  void operator()(curl_slist* headers) const { curl_slist_free_all(headers); }
+struct FreeList {
+  void operator()(curl_slist* list) const { curl_slist_free_all(list); }
 };
 
 }  // namespace
@@ -70,11 +70,17 @@ absl::StatusOr<std::string> http_get(const std::string& address, const std::stri
   ASSIGN_OR_RETURN(const std::shared_ptr<client::Authorization> authorization,
                    client::Authorization::make(credentials, address));
   const std::string header = authorization->header();
-  const std::unique_ptr<curl_slist, FreeHeaders> headers(
+  const std::unique_ptr<curl_slist, FreeList> headers(
       header.empty() ? nullptr : curl_slist_append(nullptr, absl::StrCat("Authorization: ", header).c_str()));
   const char* const scheme = client::uses_tls(credentials) ? "https" : "http";
+  // The certificate must belong to the host of the URL. With a server name, curl takes this name as the host, but
+  // connects to `address`.
+  const std::string& name = credentials.server_name;
+  const std::unique_ptr<curl_slist, FreeList> destination(
+      name.empty() ? nullptr : curl_slist_append(nullptr, absl::StrCat("::", address).c_str()));
   std::string body;
-  curl_easy_setopt(curl.get(), CURLOPT_URL, absl::StrCat(scheme, "://", address, path).c_str());
+  curl_easy_setopt(curl.get(), CURLOPT_URL, absl::StrCat(scheme, "://", name.empty() ? address : name, path).c_str());
+  curl_easy_setopt(curl.get(), CURLOPT_CONNECT_TO, destination.get());
   curl_easy_setopt(curl.get(), CURLOPT_PROTOCOLS_STR, scheme);
   curl_easy_setopt(curl.get(), CURLOPT_HTTPHEADER, headers.get());
   set_credentials(curl.get(), credentials);

@@ -1,6 +1,6 @@
 // Figures that `locus top` shows: rates, quantiles and latest values, computed from two scrapes of one server's
-// metrics. Plain data and a function without state. A figure that cannot be computed is null: a rate is null if a
-// restart of the server has reset its counter, and a quantile or a mean is null if there was nothing to measure.
+// metrics. Plain data and a function without state. A figure that cannot be computed is null: a rate is null if its
+// counter decreased, because the server restarted; a quantile or a mean is null if there was nothing to measure.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_TOP_TOP_FIGURES_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_TOP_TOP_FIGURES_H_
 
