@@ -1,6 +1,6 @@
-// Writer of a report whose rows arrive one after another, in any format. A report consists of facts known before the
-// rows, the rows, and facts known only after the last row. For answers too large to hold in memory; write_report() uses
-// ReportStream, too. Not thread-safe.
+// Writer of a report, in any output format, whose rows arrive one after another. A report consists of facts known
+// before the rows, the rows, and facts known only after the last row. For answers too large to hold in memory;
+// write_report() uses ReportStream, too. Not thread-safe.
 //
 // Call order: begin() once, then add() for each row, then end() once.
 #ifndef LOCUS_CLIENT_CLI_REPORT_STREAM_H_
@@ -47,7 +47,7 @@ class ReportStream {
   ReportShape shape_;
   Json head_ = Json::object();
   size_t rows_ = 0;
-  std::vector<std::vector<std::string>> held_;  // buffered lines of a table, until there are width_rows of them
+  std::vector<std::vector<std::string>> held_;  // table: buffered header and first width_rows rows
   std::vector<size_t> widths_;
 };
 

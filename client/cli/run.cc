@@ -94,8 +94,8 @@ void restrict_to_script(CLI::App& app) {
   }
 }
 
-// Returns the parser's message. If no command was recognized, appends the line, since the parser's message does not
-// quote it.
+// Returns the parser's message. If no command was recognized, appends the first kShownBytes bytes of the line, since
+// the parser's message does not quote the line.
 std::string in_words(const Refusal& refusal, const std::vector<std::string>& arguments) {
   if (refusal.message != CLI::RequiredError::Subcommand(1).what()) return refusal.message;
   constexpr size_t kShownBytes = 60;

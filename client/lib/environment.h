@@ -39,10 +39,12 @@ struct GivenOptions {
   bool tls = false;
 };
 
-// Fills in the members of `endpoint` that are not given. Their values come from the context `context` of the file
-// `contexts_path`. If `context` is empty, they come from the file's default context, unless an address is given. If
-// both a token and a token file are given, drops the token. Returns NOT_FOUND for an unknown context, and the errors of
-// read_contexts().
+// Fills in the members of `endpoint` that are not set: the address and `tls` unless they are `given`; the certificate
+// and its key if both are empty; the token file if there is neither a token file nor a token; the CA file and the
+// server name if they are empty. The values come from the context `context` of the file `contexts_path`. If `context`
+// is empty, they come from the file's default context; then nothing is filled in if the address is `given`. If
+// `endpoint` has both a token and a token file, drops the token. Returns NOT_FOUND for an unknown context, and the
+// errors of read_contexts().
 absl::Status complete_endpoint(const std::string& contexts_path, const std::string& context, GivenOptions given,
                                Endpoint& endpoint);
 

@@ -1,5 +1,5 @@
 // Gatherer of small items from many callers into one batch. A batch is sent when it is full, or when its first item has
-// waited for the maximum delay. Internal to the library: base of QueryBatcher and MoveBatcher.
+// waited for the maximum delay. Internal to the library: QueryBatcher and MoveBatcher use it.
 //
 // Threads: add() and flush() may be called from any thread; the gatherer calls `send` in a thread of its own, one batch
 // after another, without a lock held, so `send` may block. While `send` blocks, add() blocks as soon as the next batch

@@ -18,7 +18,7 @@ struct MeshColumns {
   std::string name;                           // unique on the server, 1 to 63 characters
   absl::Span<const float> vertices = {};      // x, y, z of each vertex
   absl::Span<const uint32_t> indices = {};    // three vertex indices per triangle
-  absl::Span<const v1::MeshPart> parts = {};  // ascending by first triangle; empty = one part without a name
+  absl::Span<const v1::MeshPart> parts = {};  // ascending by first triangle; empty = the mesh has no parts
 };
 
 // Owned columns of a mesh as the server stores it.

@@ -1,7 +1,7 @@
-// Pipelined stream: base of UpdateStream and QueryStream. Internal to the library. The stream is a bidirectional call
-// with a bounded number of requests in flight. A response carries the sequence number of its request. After a broken
-// connection the stream reconnects and sends the unanswered requests again. A connection counts as broken if no
-// response arrives for Options::patience while requests are unanswered.
+// Pipelined stream: implementation of UpdateStream and QueryStream. Internal to the library. The stream is a
+// bidirectional call with a bounded number of requests in flight. A response carries the sequence number of its
+// request. After a broken connection the stream reconnects and sends the unanswered requests again. A connection counts
+// as broken if no response arrives for Options::patience while requests are unanswered.
 //
 // Threads: each stream owns one thread, the supervisor, which starts one call after another and waits for the end of
 // each call. Messages are read and written on gRPC's callback threads. send(), flush() and close() may be called from
@@ -61,8 +61,7 @@ class PipelinedStream {
   };
   using Items = std::deque<Item>;
 
-  // Operations in which update streams and query streams differ. number() and answered() are called with the stream's
-  // lock held.
+  // Operations in which update streams and query streams differ. All of them are called with the stream's lock held.
   class Kind {
    public:
     virtual ~Kind() = default;

@@ -254,7 +254,7 @@ class FrustumBlock : public BlockBuilder<FrustumBlock> {
   // Appends regions of `planes_each` planes, 4 .. 32. A plane is four floats nx, ny, nz, d, and a point p is inside the
   // plane if n.p + d >= 0. All regions of a block have the same number of planes.
   FrustumBlock& planes(absl::Span<const float> planes, uint32_t planes_each = 6);
-  // Appends the views of cameras: column-major matrices of 16 floats from positions to clip coordinates.
+  // Appends the views of cameras: column-major matrices of 16 floats, which map positions to clip coordinates.
   FrustumBlock& view_projections(absl::Span<const float> matrices,
                                  v1::ClipDepth clip_depth = v1::CLIP_DEPTH_ZERO_TO_ONE);
 

@@ -39,7 +39,8 @@ class ResultRows {
   size_t queries() const { return begins_.size() - 1; }
   size_t rows() const { return begins_.back(); }
   RowRange rows_of(size_t query) const { return {begins_[query], begins_[query + 1]}; }
-  // Returns whether the query had more rows than are reported.
+  // Returns whether the query's answer may be incomplete, because a limit on rows, planes, work or the size of the
+  // reply was reached.
   bool truncated(size_t query) const;
   // Return the effective time of each query; empty for blocks without as_of().
   absl::Span<const uint64_t> resolved_ticks() const { return block_->resolved_ticks(); }
@@ -120,7 +121,8 @@ class Overlaps {
 
   const ResultRows& rows() const { return rows_; }
   size_t size() const { return rows_.queries(); }
-  // Returns the ids that the query found, in ascending order; the id of an instance repeats for each of its triangles.
+  // Returns the ids that the query found, in ascending order. If the block requested one row per triangle, the id of an
+  // instance is repeated for each triangle found.
   absl::Span<const uint64_t> ids(size_t query) const;
   // Returns the triangle of each entry of ids(query); empty if the column was not requested.
   absl::Span<const uint32_t> triangles(size_t query) const;

@@ -20,9 +20,9 @@ template <class A, class B>
   check_failed(file, line, condition, operands.str());
 }
 
-// Aborts unless compare(a, b) returns true. The operands are parameters of a function, because a macro that stored
-// them in local references would not be safe: std::min(y, 5) in LOCUS_CHECK_LE(x, std::min(y, 5)) may return a
-// reference to a temporary.
+// Aborts unless compare(a, b) returns true. The operands are function parameters, so that temporaries in them live
+// until the comparison ends. A macro with local references would not be safe: in LOCUS_CHECK_LE(x, std::min(y, 5)),
+// std::min() may return a reference to a temporary, which a local reference does not keep alive.
 template <class Compare, class A, class B>
 constexpr void check_op(Compare compare, const A& a, const B& b, const char* file, int line, const char* condition) {
   if (!compare(a, b)) check_failed_op(file, line, condition, a, b);

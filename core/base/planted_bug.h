@@ -27,7 +27,7 @@ enum class PlantedBug {
   kSweepStart,         // a sweep does not find a primitive that the mover touches at the start
   kSweepLineRadius,    // a sweep misses a triangle within the mover's radius beside the path of the mover's centre
   kSweepLineAxis,      // a sweep misses a triangle reached by the inner segment, but not the centre, of the mover
-  kSweepLineEpsilon,   // a sweep misses a triangle that its surface touches beside its path, because of rounding
+  kSweepLineEpsilon,   // a sweep misses, because of rounding, a triangle that the side of the mover just touches
   kSweepPassed,        // AtStart::kPass also ignores triangles within the diameter of the mover, not only its radius
   kPairBothSides,      // a pair of objects is reported twice, once for each object
   kPairCullExtent,     // the cull of pairs ignores the extent of the first object

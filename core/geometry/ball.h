@@ -30,8 +30,9 @@ constexpr bool reaches(const Ball<S>& ball, const Aabb<S>& box) {
 }
 
 // Returns the bounds of the ball, grown by 2^-40 (double) or 2^-20 (float) times the sum of the radius and the largest
-// |coordinate| of the centre. The bounds overlap every box that reaches() accepts, except boxes whose gaps to the
-// centre are below 2^-537, so that the squares of the gaps underflow.
+// |coordinate| of the centre. The bounds overlap every box that reaches() accepts, with one exception: if the
+// distance from the centre to the box is below 2^-510 on every axis, the squares of these distances underflow, and
+// reaches() may accept a box that the bounds do not overlap.
 template <class S>
 Aabb<S> bounds_of(const Ball<S>& ball) {
   LOCUS_DCHECK_GE(ball.radius, S{0});

@@ -3,7 +3,7 @@
 // one interval of time. The polytopes share a point in the intersection of these intervals of time.
 // Source: Eberly, Dynamic Collision Detection Using Oriented Bounding Boxes, 1999.
 //
-// All vectors are relative to the resting box's centre, in its own axes. Pure functions; any thread.
+// All vectors are relative to the resting box's centre, in the resting box's axes. Pure functions; any thread.
 #ifndef LOCUS_CORE_GEOMETRY_BOX_SWEEP_H_
 #define LOCUS_CORE_GEOMETRY_BOX_SWEEP_H_
 
@@ -26,8 +26,8 @@ struct BoxOverlap {
 
 // Return the overlap of a resting box of half extents `half` with a moving triangle or a moving box; `velocity` is the
 // velocity of this triangle or box. Return nullopt if the two never share a point. To cover rounding errors, the
-// projections are widened by 2^-46 of the magnitudes involved, so a contact is never missed. A triangle without area
-// and zero extents are legal.
+// projections are widened by 2^-46 of the magnitudes involved, so a contact is never missed. Triangles without area
+// and half extents of zero are legal.
 std::optional<BoxOverlap> overlap_with_triangle(Vec3d half, Vec3d a, Vec3d b, Vec3d c, Vec3d velocity);
 // `center`, `other_half` and `rotation` are the centre, half extents and rotation of the moving box, in the resting
 // box's axes.

@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kEpsilon = 0x1p-40;
 
-// Box as centre and half extents, which cover the given box up to rounding.
+// Box given by its centre and half extents. Covers the box from which it was computed, up to rounding.
 struct CenteredBox {
   Vec3d center, half;
 };

@@ -19,9 +19,9 @@ struct Capsule {
 // radius.
 Aabbd bounds_of(const Capsule& capsule);
 
-// Returns true if the capsule's bounds overlap the box and the enlarged capsule shares a point with the box. The radius
-// of the enlarged capsule is larger by 2^-40 of the sum of the magnitudes of capsule and box. This covers the rounding
-// of the box's coordinates.
+// Returns whether the box overlaps the capsule's bounds and shares a point with an enlarged copy of the capsule. The
+// radius of the copy is larger by 2^-40 of the sum of the magnitudes of capsule and box. The enlargement covers the
+// rounding of the box's coordinates.
 bool reaches(const Capsule& capsule, const Aabbd& box);
 
 // Returns true for every box that contains a point of the capsule. May also return true for a box that the capsule

@@ -268,7 +268,7 @@ std::optional<ConvexRegion> ConvexRegion::make(Vec3d origin, absl::Span<const Pl
   region.origin_ = origin;
   std::copy(planes.begin(), planes.end(), region.planes_.begin());
   region.count_ = planes.size();
-  // The sides of the world's box.
+  // Adds the six sides of the world as planes.
   for (int axis = 0; axis < 3; ++axis) {
     for (const double side : {-1.0, 1.0}) {
       Plane& plane = region.planes_[region.count_++];

@@ -1,6 +1,7 @@
 // Convex regions of space, bounded by planes, and their overlaps with shapes and triangles. A region is given relative
 // to an origin in world axes, so that a region far from the world's origin is as precise as a region near it. Every
-// region is clipped to the world's box. Pure functions in double; any thread.
+// region is clipped to the world: the cube of all points whose |coordinates| are at most limits::kMaxCoordinate. Pure
+// functions in double; any thread.
 //
 // A point p is within a plane with the normal n and the offset d if n.p + d >= -e, where e is 2^-40 of the magnitudes
 // of n.p and d. So a point that rounding has moved off a plane still counts as on the plane. A region and a solid
@@ -50,7 +51,7 @@ class ConvexRegion {
   ConvexRegion() = default;
 
   Vec3d origin_;
-  // The given planes, then those sides of the world's box that the region reaches.
+  // The given planes, then those sides of the world that the region reaches.
   std::array<Plane, limits::kMaxPlanes + 6> planes_;
   size_t count_ = 0;
   Vec3d interior_;

@@ -25,7 +25,7 @@ class DoubleDouble {
   // Returns the sign of the number: -1, 0 or 1.
   constexpr int sign() const { return (high_ > 0) - (high_ < 0); }
 
-  // Returns the sum with a relative error below 2^-102; the sum is exact if it fits 106 bits.
+  // Returns the sum with a relative error below 2^-102; the sum of two doubles is exact.
   friend constexpr DoubleDouble operator+(DoubleDouble a, DoubleDouble b) {
     const DoubleDouble high = sum(a.high_, b.high_), low = sum(a.low_, b.low_);
     const DoubleDouble first = ordered_sum(high.high_, high.low_ + low.high_);

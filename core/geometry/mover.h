@@ -30,8 +30,8 @@ enum class AtStart : uint8_t { kHit, kApproach, kPass };
 struct Contact {
   // Ball or capsule: distance from the primitive to the mover's centre or inner segment. If this centre or segment
   // reaches into a shape, the distance is negative: it is minus the length of the shortest way out of the shape.
-  // Box: defined only for the contact at t = 0 of a box that overlaps the primitive at t = 0: minus the length of the
-  // box's shortest way out.
+  // Box: defined only at t = 0, and only if the box overlaps the primitive at t = 0: minus the length of the box's
+  // shortest way out of the primitive.
   double distance = 0;
   // Point of the primitive, relative to the mover's start, so that no precision is lost far from the world's origin. If
   // mover and primitive touch, the point belongs to both, up to rounding.
@@ -39,7 +39,7 @@ struct Contact {
   Vec3d normal;  // unit vector from the primitive to the mover
 };
 
-// Returns half the size of the mover's axis-aligned bounds.
+// Returns the half extents of the mover's axis-aligned bounds.
 inline Vec3d extent_of(const Mover& mover) {
   const Vec3d radius{mover.radius, mover.radius, mover.radius};
   switch (mover.kind) {

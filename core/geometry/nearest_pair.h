@@ -25,7 +25,7 @@ struct NearestPair {
 // Source: Ericson, Real-Time Collision Detection, 2005, 5.1.9.
 NearestPair nearest_to_segment(Vec3d half_axis, Vec3d center, Vec3d other_half_axis);
 
-// Returns the nearest points of the segment and the triangle with corners a, b and c, which may have no area.
+// Returns the nearest points of the segment and the triangle with corners a, b and c. The triangle may have no area.
 // Source: Ericson, Real-Time Collision Detection, 2005, 5.1.10.
 NearestPair nearest_to_triangle(Vec3d half_axis, Vec3d a, Vec3d b, Vec3d c);
 

@@ -153,8 +153,8 @@ Crossing crossing(Vec3d point, const Triangle& triangle) {
   const int winding = projected_winding(point, corners, from);
   if (point.x < bounds.min.x) return {winding, false};
   const int behind = side(point, corners, from);
-  // The point is in the triangle's plane. Even if `winding` is 0, it may be on the triangle: on an edge or a corner
-  // that is not counted, or on a triangle parallel to the half line.
+  // The point is in the triangle's plane. Even if `winding` is 0, the point may be on the triangle: on an edge or a
+  // corner that is not counted, or on a triangle parallel to the half line.
   if (behind == 0) return {0, is_inside(point, corners, from)};
   return {winding * behind > 0 ? winding : 0, false};
 }

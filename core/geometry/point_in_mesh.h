@@ -5,10 +5,10 @@
 // Every sign is exact: it is computed in double if an error bound proves it, otherwise by an exact sum. So the sum of
 // the crossings is the winding number of the stored mesh around the given point. Edges are half-open. For a half line
 // along x, each edge is projected along x. The projected edge includes its end with the lower y, but not its end with
-// the upper y, and it counts as 0 for a point exactly on it. So two triangles that share an edge count it with opposite
-// signs, and the sum is right even if the half line meets edges or corners, or runs along faces. Sources: Haines, Point
-// in Polygon Strategies, Graphics Gems IV, 1994 (half-open edges); Shewchuk, Adaptive Precision Floating-Point
-// Arithmetic and Fast Robust Geometric Predicates, 1997 (filters and exact signs).
+// the upper y. If the point lies exactly on the projected edge, the edge counts as 0. So two triangles that share an
+// edge count this edge with opposite signs, and the sum is right even if the half line meets edges or corners, or runs
+// along faces. Sources: Haines, Point in Polygon Strategies, Graphics Gems IV, 1994 (half-open edges); Shewchuk,
+// Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates, 1997 (filters and exact signs).
 //
 // Every half line results in the same sum, unless the point is on the surface. Proof: the rule of half-open edges
 // treats the point as if it were moved by (0, d * d, -d) for an infinitely small d > 0. The half line from the moved

@@ -96,7 +96,7 @@ std::optional<double> RoundSweep::first_contact(double limit, double from) const
 RoundSweep::Separation RoundSweep::separation_at(double t) const {
   const NearestPair pair = pair_at(t);
   const double distance = std::sqrt(pair.squared_distance);
-  // A distance that consists of rounding errors has no meaningful direction.
+  // If the distance consists only of rounding errors, its direction has no meaning.
   if (distance > kPlaceEpsilon * (size_of(pair.on_primitive) + size_))
     return {distance, pair.offset() * (1 / distance), pair};
   return way_out_at(t, pair);

@@ -62,7 +62,8 @@ class RoundSweep {
   double radius_;
   Vec3d velocity_;
   Vec3d a_, b_, c_;  // corners of a triangle; for a segment or box, a_: centre, b_: half axis or half extents
-  double size_ = 0;  // largest |component| of half_axis_, plus that of b_ or, for a triangle, of b_ - a_ and c_ - a_
+  // Largest |component| of half_axis_, plus the largest |component| of b_ (for a triangle: of b_ - a_ and c_ - a_).
+  double size_ = 0;
 };
 
 }  // namespace locus

@@ -18,7 +18,7 @@ bool segment_crosses_triangle(Vec3d center, Vec3d half_axis, Vec3d a, Vec3d b, V
   if (!front && !back) return false;
   const Vec3d normal = cross(pb - pa, pc - pa);
   const double start = dot(normal, pa + half_axis), end = dot(normal, pa - half_axis);
-  if (start == 0 && end == 0) return false;  // in the plane: touching is found by the distances to the edges
+  if (start == 0 && end == 0) return false;  // in the plane: the distances to the edges detect a contact
   return (start <= 0 && end >= 0) || (start >= 0 && end <= 0);
 }
 

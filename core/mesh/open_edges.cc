@@ -86,7 +86,7 @@ size_t join_equal_corners(absl::Span<const float> vertices, std::vector<Edge>& e
 
 uint64_t count_open_edges(absl::Span<const float> vertices, absl::Span<const uint32_t> indices) {
   LOCUS_DCHECK_EQ(indices.size() % 3, size_t{0});
-  // First cancel opposite edges by vertex index, which leaves no or few edges of most meshes. Then cancel the remaining
+  // First cancels opposite edges by vertex index; in most meshes, no or few edges remain. Then cancels the remaining
   // edges by coordinates. Edges that cancel by index would also cancel by coordinates.
   EdgesByCorner by_index(vertices.size() / 3, [indices](const auto& visit) {
     for (size_t i = 0; i < indices.size(); i += 3)

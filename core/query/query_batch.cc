@@ -76,8 +76,8 @@ class BlockCheck {
     return absl::OkStatus();
   }
 
-  // Checks the columns that give positions in the order of rows. `kind` is the name of the block's kind in field names,
-  // such as rays.
+  // Checks the columns of `after`, which give each query's position in the order of rows. `kind` is the name of the
+  // block's kind in field names, such as rays.
   absl::Status check_after(const AfterColumns& after, const char* kind) const {
     const auto field = [kind](absl::string_view column) { return absl::StrCat(kind, ".", column); };
     if (after.ts.empty() && after.ids.empty() && after.triangles.empty()) return absl::OkStatus();
@@ -106,7 +106,7 @@ class BlockCheck {
     return check_column(values, width, n_, need, {"blocks", index_, field});
   }
 
-  // Returns whether all points, given relative to the frame, lie within the world: |coordinate| <= kMaxCoordinate. The
+  // Returns whether all points, given relative to origin(), lie within the world: |coordinate| <= kMaxCoordinate. The
   // loop has no branch per value, because nearly all batches are valid. Only if this function returns false,
   // check_points_from() searches for the invalid point.
   bool all_within_world(absl::Span<const float> values) const {

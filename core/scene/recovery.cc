@@ -32,8 +32,9 @@ absl::Status named(absl::string_view what, const absl::Status& status) {
   return status.ok() ? status : absl::Status(status.code(), absl::StrCat(what, ": ", status.message()));
 }
 
-// Lookup of meshes during replay. Returns a placeholder for a missing mesh, because the mesh may have been deleted
-// after a later record removed its instances. check() reports a placeholder that is still in use after the replay.
+// Lookup of the meshes that a snapshot and its later records use. Returns a placeholder for a missing mesh, because the
+// mesh may have been deleted after a later record removed its instances. check() reports a placeholder that is still in
+// use after the replay.
 class Meshes {
  public:
   explicit Meshes(const FindMesh& find) : find_(find) {}

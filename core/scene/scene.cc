@@ -57,8 +57,9 @@ absl::Status readers_too_slow(uint64_t budget) {
       refusal);
 }
 
-// Returns the error that refuses a change because an object took the id `id` while the change was built. `position`
-// is the index of the id among all placed ids of the change; the error names the placement that contains this index.
+// Returns the error that refuses a change because an object took the id `id` while the change was being built.
+// `position` is the index of the id among all placed ids of the change; the error names the placement that contains
+// this index.
 absl::Status taken_meanwhile(const StaticChange& change, size_t position, Id id) {
   size_t list = 0;
   while (position >= change.place[list].count()) position -= change.place[list++].count();
@@ -143,9 +144,9 @@ absl::StatusOr<Scene::Acks> Scene::apply_each(absl::Span<const UpdateBatch* cons
     for (absl::StatusOr<UpdateAck>& ack : acks) {
       if (!ack.ok()) continue;
       absl::StatusOr<SceneWriter::Admission> admission = writer_.admit(*rest.front());
-      // Log all batches from the first new batch on, because applying a batch may make a later batch of the same writer
-      // new. The batches before the first new batch are duplicates or refused, so they change nothing and are not
-      // logged. Logged batches must be applied, so there is no error return after the append.
+      // Log the first new batch and all batches after it. A later batch of the same writer may become new only when an
+      // earlier batch is applied. The batches before the first new batch are duplicates or refused, so they change
+      // nothing and are not logged. Logged batches must be applied, so there is no error return after the append.
       if (!logged && admission.ok() && !*admission) {
         RETURN_IF_ERROR(journal_.append_each(writer_.epoch(), rest));
         logged = true;

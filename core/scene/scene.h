@@ -121,9 +121,9 @@ class Scene {
   absl::StatusOr<Acks> apply_joined(absl::Span<const UpdateBatch* const> batches,
                                     Deadline until = ReaderTracker::kNever) LOCUS_EXCLUDES(writer_mutex_, mutex_);
 
-  // Removes instances and places new instances, as one revision. Builds the new tree of instances, one change at a
-  // time, without blocking update batches. Waits like apply() while readers exceed their budget, but without a
-  // deadline. Returns NOT_FOUND if a placed mesh was deleted: see check_meshes().
+  // Removes instances and places new instances, as one revision. Changes of one scene run one at a time. Update batches
+  // are not blocked while a change builds the new tree of instances. Waits like apply() while readers exceed their
+  // budget, but without a deadline. Returns NOT_FOUND if a placed mesh was deleted: see check_meshes().
   absl::StatusOr<InstanceChange> change_instances(const StaticChange& change) LOCUS_EXCLUDES(writer_mutex_, mutex_);
 
   using IsKept = std::function<bool(const StaticMesh*)>;
@@ -150,8 +150,8 @@ class Scene {
   // if kExactly requests a revision that is not among the recent revisions, and NOT_FOUND if the scene is closed.
   absl::StatusOr<SnapshotPtr> view(const View& view, Deadline deadline) const LOCUS_EXCLUDES(mutex_);
 
-  // Returns the snapshot of view() with a pin that registers the reader. Used by readers that hold the snapshot for a
-  // long time. These readers must poll SnapshotPin::status().
+  // Returns a pin of the snapshot that view() returns. Used by readers that hold the snapshot for a long time. These
+  // readers must poll SnapshotPin::status().
   absl::StatusOr<SnapshotPin> pin(const View& view, Deadline deadline) const LOCUS_EXCLUDES(mutex_);
   // Waits until all revoked pins are released or the scene is closed. Returns DEADLINE_EXCEEDED, naming the limit
   // pinned_bytes, if a revoked pin is still not released at `until`.
@@ -161,11 +161,11 @@ class Scene {
   void revoke_overdue_readers() { pins_->revoke_overdue(); }
 
   // Registration for one notification that the scene has reached a revision or was closed, for callers that must not
-  // block in view(). `notify` is called once: by the constructor if the scene has already reached the revision or is
-  // closed, otherwise by the thread that publishes the revision or closes the scene. The scene's lock is held during
-  // the call: `notify` must be quick, must not call the scene, and must not take a lock that is held while a Watch is
-  // created or destroyed. The destructor waits for a running call of `notify`. After the destructor has returned,
-  // `notify` is not called. The scene outlives the Watch.
+  // block in view(). `notify` is called at most once: by the constructor if the scene has already reached the revision
+  // or is closed, otherwise by the thread that publishes the revision or closes the scene. The scene's lock is held
+  // during the call: `notify` must be quick, must not call the scene, and must not take a lock that is held while a
+  // Watch is created or destroyed. The destructor waits for a running call of `notify`. After the destructor has
+  // returned, `notify` is not called. The scene outlives the Watch.
   class Watch {
    public:
     Watch(const Scene& scene, uint64_t revision, std::function<void()> notify);
@@ -188,8 +188,9 @@ class Scene {
   // revision does not change. Waits for a batch that is being applied. Returns the number of bytes by which the history
   // became smaller. Called when memory is short.
   uint64_t trim_history(uint64_t bytes) LOCUS_EXCLUDES(writer_mutex_, mutex_);
-  // Revokes the pins of the oldest revisions until pinned revisions hold at most `bytes`, and cancels the readers of
-  // the revoked pins. Called when memory is short. Returns the bytes that become free once these readers have ended.
+  // Revokes the pins of the oldest revisions until the other pinned revisions hold at most `bytes`, and cancels the
+  // readers of the revoked pins. Called when memory is short. Returns the bytes that become free once these readers
+  // have ended.
   uint64_t revoke_readers(uint64_t bytes) LOCUS_EXCLUDES(mutex_);
   // Drops the revisions that are retained for kExactly views, except the latest one. Called when memory is short.
   void forget_recent() LOCUS_EXCLUDES(mutex_);
@@ -200,7 +201,7 @@ class Scene {
   // Deletes the scene from its log and closes it. If the log fails, returns the log's error, and the scene stays open.
   absl::Status remove() LOCUS_EXCLUDES(writer_mutex_, mutex_);
 
-  // Returns the state to be written as the log's next snapshot: the latest revision and the sequence number of its
+  // Returns the state to be written as the log's next snapshot: the latest revision and the sequence number of the last
   // record. Waits for a batch that is being applied. The returned state does not block later batches.
   FrozenScene freeze() LOCUS_EXCLUDES(writer_mutex_, mutex_);
   // Returns the sequence numbers and the size of the scene's log.

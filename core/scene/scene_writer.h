@@ -126,9 +126,8 @@ class SceneWriter {
   bool drops_history(const UpdateBatch& batch) const { return batch.restart_ticks && has_past(); }
   // Returns the tick that the scene will have after the batch.
   uint64_t tick_of(const UpdateBatch& batch) const;
-  // Ends the current tick if the batch begins another tick: adds the state at the end of the current tick to the
-  // history, or drops the history if the batch restarts ticks. Does nothing for a scene without history. Call before
-  // the batch is applied.
+  // Drops the history if the batch restarts ticks. Otherwise, if the batch begins another tick, adds the state at the
+  // end of the current tick to the history. Does nothing for a scene without history. Call before the batch is applied.
   void start_tick(const UpdateBatch& batch);
   // Makes the next revision if `changes` is true or the batch begins a new tick. Then sets the epoch, revision and tick
   // of the ack in `result`.

@@ -20,7 +20,7 @@ inline constexpr uint32_t kMaxReflections = 32;            // streams of server 
 inline constexpr size_t kMaxReflectionRequestBytes = 512;  // bytes of one question to server reflection
 inline constexpr uint32_t kMaxSlowQueryMs = 3'600'000;     // maximum of --slow-query-ms
 inline constexpr uint32_t kMaxSlowQueryLines = 10;         // log lines a second; further slow queries are only counted
-inline constexpr uint32_t kMaxLibraryLines = 10;  // log lines a second for errors of gRPC; others are only counted
+inline constexpr uint32_t kMaxLibraryLines = 10;  // log lines a second for gRPC's errors; further ones are only counted
 
 }  // namespace locus::server
 

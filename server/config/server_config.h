@@ -141,8 +141,9 @@ struct ServerConfig {
   // no certificate. Set it to admit only machines that hold a certificate.
   std::string tls_client_ca;
 
-  // File of the access rules: which caller may make which calls. If the option is empty, every client may call
-  // everything; with a token file or JWKS file, only clients with a valid token, JWT or certificate may.
+  // File of the access rules: which caller may make which calls. If the option is empty, every client may make every
+  // call; if it is empty but there is a token file or JWKS file, every client with a valid token, JWT or certificate
+  // may make every call.
   std::string access_file;
 
   // Files for the authentication of clients: hashes of the accepted tokens, and public keys (JWKS) that verify signed
@@ -161,8 +162,8 @@ struct ServerConfig {
   std::string audit_file;
   uint64_t audit_bytes = uint64_t{64} << 20;
 
-  // Permits addresses that other machines can reach without encryption and authentication. Use it only behind a proxy
-  // or in a network where every machine is trusted.
+  // Allows the daemon to serve other machines without encryption and authentication. Use it only behind a proxy or in a
+  // network where every machine is trusted.
   bool insecure = false;
 };
 

@@ -1,5 +1,5 @@
-// The parser of locusd's command line and config file. server_config.cc uses this parser, and the manual is generated
-// from it. All other code of the server only uses a ServerConfig. Functions without state.
+// The parser of locusd's command line and config file. server_config.cc and config_origins.cc use this parser, and the
+// manual is generated from it. All other code of the server only uses a ServerConfig. Functions without state.
 #ifndef LOCUS_SERVER_CONFIG_SERVER_PARSER_H_
 #define LOCUS_SERVER_CONFIG_SERVER_PARSER_H_
 

@@ -93,8 +93,8 @@ class Connection {
   // Time in seconds since 1970 from which the peer's certificate is no longer valid; 0 until the first call has set it.
   std::atomic<int64_t> certificate_end{0};
 
-  // Bytes of memory that the connection's calls have claimed for moves, requests and replies, which must not exceed
-  // MemoryBudget::connection_share(). Calls add and subtract their claims.
+  // Bytes of memory that the connection's calls have claimed for moves, requests and replies. Calls add and subtract
+  // their claims, and keep the sum at or below MemoryBudget::connection_share().
   std::atomic<uint64_t> claimed_bytes{0};
 
   // Number of this connection in gRPC's statistics (channelz); 0 until StreamCounter has found the number.
@@ -123,7 +123,7 @@ class Connection {
 
   // Returns the descriptor; -1 after release(). Only for the thread that calls release().
   int descriptor() const LOCUS_EXCLUDES(mutex_);
-  // Closes the descriptor, once the connection has ended or the server ends.
+  // Closes the descriptor. Called when the connection has ended, or when the server ends.
   void release() LOCUS_EXCLUDES(mutex_);
 
  private:

@@ -7,7 +7,7 @@
 namespace locus::server {
 namespace {
 
-// Minimum number of remembered addresses at which the limiter forgets addresses without connections.
+// The limiter forgets idle addresses only if it remembers at least this many addresses. See forget_idle().
 constexpr size_t kManyAddresses = 1024;
 
 }  // namespace

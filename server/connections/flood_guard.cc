@@ -172,9 +172,9 @@ bool FloodGuard::must_count(const FloodSample& sample, Watched& watched) {
 
 void FloodGuard::look_at(const std::shared_ptr<Watched>& watched) {
   Connection& connection = *watched->connection;
-  // Read the calls' counts before the kernel's count: then a message that arrives between the two reads is explained at
-  // the next check. In the other order, the message would explain bytes that the kernel's count does not include yet,
-  // and these bytes would stay unexplained at the next check.
+  // Read the counts of calls and messages first, then the kernel's count of received bytes. If a message arrives
+  // between the two reads, its bytes look unexplained now, but the next check counts the message. In the other order,
+  // the message would be counted now and its bytes at the next check, when no new message explains them.
   FloodSample sample;
   sample.time = steady_clock::now();
   sample.counts = connection.counts();

@@ -27,10 +27,10 @@ class FrameCheck {
   static constexpr uint64_t kMaxBlockBytes = 64 << 10;
   // Maximum CONTINUATION frames of a block. A client needs one for each 16 KiB after the first.
   static constexpr uint32_t kMaxContinuations = 8;
-  // Rates for three counts: cancelled calls in excess of half of all calls; frames that carry nothing; and PING frames
-  // in excess of the other frames of calls. Each count may grow by kPerSecond in a second and, in a burst, by kBurst
-  // more. Honest clients need bursts: all open calls of a client can be cancelled together when they reach the same
-  // deadline, and clients in Go send a PING after each piece of a reply.
+  // Rates for three counts: cancelled calls, less half of all calls; frames that carry nothing; and PING frames, less
+  // the frames that begin calls, carry data, or update windows. Each count may grow by kPerSecond in a second and, in a
+  // burst, by kBurst more. Honest clients need bursts: all open calls of a client can be cancelled together when they
+  // reach the same deadline, and clients in Go send a PING after each piece of a reply.
   static constexpr double kPerSecond = 1000;
   static constexpr double kBurst = 1000;
   // Maximum calls that begin in the bytes of one read. The maximum is needed because gRPC creates all of these calls

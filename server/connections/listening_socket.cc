@@ -53,7 +53,7 @@ struct Owner {
   gid_t group = static_cast<gid_t>(-1);
 };
 
-// Finds the ids of `user` or `user:group`; the group alone if the part before the colon is empty.
+// Returns the ids of the names in `text`: `user`, `user:group` or `:group`. A name that is missing keeps the id -1.
 absl::StatusOr<Owner> find_owner(const std::string& text) {
   Owner owner;
   const size_t colon = text.find(':');

@@ -1,6 +1,7 @@
 // The only conversions between the protocol's messages and the core's types. Columns are borrowed: the results point
-// into the message, which must outlive them. The functions refuse errors that only a protocol message can have (unknown
-// enum numbers, fields that exclude each other, kinds that are not served); the core checks lengths and values.
+// into the message, which must outlive them. The functions refuse messages that the core's types cannot represent
+// (unknown enum numbers, fields that exclude each other, kinds that are not served); the core checks lengths and
+// values.
 //
 // Pure functions, except that to_change() reads the registry. Errors name the field as the protocol spells it.
 #ifndef LOCUS_SERVER_CONVERT_CONVERT_H_
@@ -30,7 +31,7 @@ auto span_of(const Repeated& column) {
 Vec3d to_vec(const v1::Vec3d& vec);
 v1::Vec3d to_proto(const Vec3d& vec);
 
-// Converts a view. As the schema defines, revision 0 means the latest revision, and epoch 0 means any epoch.
+// Converts a view. A view without a revision requests the latest revision; epoch 0 matches every epoch.
 View to_view(const v1::View& view);
 
 // Converts a batch of updates. Refuses more lists than limits::kMaxUpdateLists before anything is allocated for them.
@@ -47,7 +48,7 @@ absl::StatusOr<SceneSpec> to_spec(const v1::SceneSpec& spec);
 // check_mesh_name() or Registry::find_mesh(), with the field of the mesh's name.
 absl::StatusOr<StaticChange> to_change(const v1::ChangeInstancesRequest& request, const Registry& registry);
 absl::Status check_labels(const google::protobuf::Map<std::string, std::string>& labels, const std::string& field);
-// Returns the description of a scene with `summary`, the scene's summary.
+// Returns the description of a scene. `summary` is the summary of this scene.
 v1::Scene to_proto(const Scene& scene, const SceneSummary& summary);
 v1::Mesh to_proto(const Registry::NamedMesh& mesh);
 

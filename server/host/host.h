@@ -41,7 +41,8 @@ struct Host : RpcState {
         updates(queue_options(with, with_log)) {}
 
   static constexpr uint32_t kChangeThreads = 2;
-  // Minimum weight in bytes of a connection that is closed when memory is short; see ConnectionTable::shed_heaviest().
+  // Minimum weight in bytes of the connections that are closed when memory is nearly full; see
+  // ConnectionTable::shed_heaviest().
   static constexpr uint64_t kMinShedBytes = 128u << 10;
   static constexpr uint32_t kLoggingThreads = 8;
 
@@ -85,7 +86,8 @@ struct Host : RpcState {
   MemoryKeeper memory_keeper{
       memory, registry,
       [this](bool close) { return connections.shed_heaviest(close, kMinShedBytes, "memory is nearly full"); }, log};
-  // Calls that visit all objects of a scene, to describe or dump it, occupy at most half of the cores.
+  // Limits the calls that visit all objects of a scene, to describe or dump it: at the same time, at most half as many
+  // as `config.threads` work, but at least one.
   Turns scene_visits{std::max(1u, config.threads / 2)};
   AdmissionLimiter health_watchers{kMaxHealthWatchers, Sharing::kFair};
   AdmissionLimiter health_checks{kMaxHealthChecks, Sharing::kFair};

@@ -1,10 +1,10 @@
 // Thread that keeps the memory of the process below its limit. It measures the process periodically. When memory is
 // short or a claim was refused, it drops old revisions and returns free memory to the kernel. When memory is short, it
-// then drops the oldest ticks of histories, so that histories give way before inserts and uploads are refused, and
-// after that cancels the readers of the oldest revisions. If memory is nearly full, the thread first closes the
-// connections that claim and send most bytes. Only this thread does this work, because the work visits all scenes and
-// the whole heap. The thread logs what it dropped, cancelled or closed, and the lines of the budget on which claims
-// were refused. While memory is short or claims are refused, it logs the use of each line once a minute.
+// then drops the oldest ticks of histories, before inserts and uploads have to be refused. After that it cancels the
+// readers of the oldest revisions. If memory is nearly full, the thread first closes the connections that claim and
+// send most bytes. Only this thread does this work, because the work visits all scenes and the whole heap. The thread
+// logs what it dropped, cancelled or closed, and the lines of the budget on which claims were refused. While memory is
+// short or claims are refused, it logs the use of each line once a minute.
 //
 // Threads: the constructor starts the thread, the destructor ends it.
 #ifndef LOCUS_SERVER_HOST_MEMORY_KEEPER_H_

@@ -36,9 +36,9 @@ uint64_t tree_cost(uint32_t triangles);
 // because several mesh names may share them.
 uint64_t parts_cost(absl::Span<const MeshPart> parts);
 
-// Returns the peak memory in bytes of a change that places `placed` instances in a scene that has `present` instances.
-// The change begins with the check of the placements and ends when the new set of instances is built. Returns 0 for a
-// change without placements, which is never refused.
+// Returns the peak memory in bytes of a change that places `placed` instances in a scene that has `present` instances:
+// the peak from the check of the placements until the new set of instances is built. Returns 0 for a change without
+// placements, which is never refused.
 uint64_t change_cost(uint64_t present, uint64_t placed);
 
 }  // namespace locus::server

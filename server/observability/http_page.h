@@ -1,4 +1,4 @@
-// Pages of the HTTP port: what a page function gets and returns. Plain data.
+// Pages of the HTTP port: the argument and the result of a page function. Plain data.
 #ifndef LOCUS_SERVER_OBSERVABILITY_HTTP_PAGE_H_
 #define LOCUS_SERVER_OBSERVABILITY_HTTP_PAGE_H_
 
@@ -8,7 +8,7 @@
 
 namespace locus::server {
 
-// Reader of a page, as a page function sees it. `authorization` is what the reader sent, not verified; the other
+// Reader of a page, as a page function sees it. The reader chooses `authorization`, which is not verified; the other
 // members come from the connection.
 struct HttpRequest {
   std::string peer;              // Peer::label of the connection: address and port of the reader

@@ -87,7 +87,7 @@ class HttpServer::Parts {
   Parts(std::vector<ListeningSocket> sockets, HttpPages pages, Certificates certificates)
       : sockets_(std::move(sockets)), pages_(std::move(pages)) {
     if (certificates) tls_ = std::make_unique<HttpTls>(std::move(certificates));
-    // A name such as localhost has two addresses, and so two sockets, which share the limit.
+    // A name such as localhost may have two addresses, and so two sockets, which share the limit.
     const size_t share = std::max<size_t>(1, kMaxHttpConnections / sockets_.size());
     for (const ListeningSocket& socket : sockets_)
       listeners_.push_back(std::make_unique<HttpListener>(io_, socket, pages_, tls_.get(), share));

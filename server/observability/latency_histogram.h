@@ -22,8 +22,8 @@ inline constexpr uint32_t kHighestOctave = 34;  // 2^34 ns, 17 s
 // Number of ranges that have an upper bound. One more range has no upper bound.
 inline constexpr size_t kLatencyBounds = 2 * (kHighestOctave - kLowestOctave) + 1;
 
-// Returns the upper bound of a range, in nanoseconds: 2^k, 1.5 * 2^k, 2^(k+1) ... Precondition: `range` <
-// kLatencyBounds.
+// Returns the upper bound of a range, in nanoseconds: 2^10 for range 0, 1.5 * 2^10 for range 1, 2^11 for range 2 and so
+// on. Precondition: `range` < kLatencyBounds.
 constexpr uint64_t latency_bound(size_t range) {
   LOCUS_DCHECK_LT(range, kLatencyBounds);
   const uint64_t octave = uint64_t{1} << (kLowestOctave + range / 2);

@@ -30,10 +30,10 @@ absl::Status no_method(const std::string& path) {
 }  // namespace
 
 // One call that was requested from gRPC, or was accepted and is not over yet. Its events arrive on its IO loop. The
-// call reads its first message on the loop and is admitted only when the message has arrived, so a caller that sends no
-// message takes no thread and no permit. The method's body then runs on a thread of its own, starts one operation at a
-// time and waits for the operation's event. The call deletes itself on the loop when the first read has ended, the
-// status was sent (finished_) and gRPC has reported the end of the call (over_).
+// call reads its first message on the loop and is admitted only when this read has ended, so a call that still waits
+// for its first message holds no thread and no permit. The method's body then runs on a thread of its own, starts one
+// operation at a time and waits for the operation's event. The call deletes itself on the loop when the first read has
+// ended, the status was sent (finished_) and gRPC has reported the end of the call (over_).
 class BlockingCalls::Call final : private IoLoop::ActiveCall, private MessageStream {
  public:
   static void listen(BlockingCalls& owner, IoLoop& io) {
@@ -199,7 +199,7 @@ class BlockingCalls::Call final : private IoLoop::ActiveCall, private MessageStr
     if (finished_ && over_ && first_ != First::kReading && first_ != First::kGivenUp) delete this;
   }
 
-  // Cancels the call if its caller has lost the right to make it.
+  // Ends the call if its caller has lost the right to make it.
   void recheck() override {
     if (is_revoked_ || finishing_since_.load() != SteadyTime()) return;
     const std::string scene = this->scene();

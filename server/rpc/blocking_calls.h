@@ -32,7 +32,7 @@ class BlockingCalls {
   // Returns the service to register with gRPC's server. The server passes to this service every call that no other
   // service serves.
   grpc::AsyncGenericService& service() { return service_; }
-  // Requests the first calls from gRPC. Call it once, after the server and before the IO threads have started.
+  // Requests the first calls from gRPC. Call it once, after the server has started and before the IO threads start.
   void listen(IoThreads& threads);
 
  private:

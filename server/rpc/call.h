@@ -1,7 +1,7 @@
 // One call as the services see it: its metadata, its deadline, and whether its caller still waits for an answer.
 //
-// Threads: while the call lasts, any thread may use a Caller. Exception: authorize(), set_subject() and trace() belong
-// to the call's own thread.
+// Threads: while the call lasts, any thread may use a Caller. Exception: authorize(), set_subject(), subject(),
+// promise_audit() and audit_hidden() belong to the call's own thread.
 #ifndef LOCUS_SERVER_RPC_CALL_H_
 #define LOCUS_SERVER_RPC_CALL_H_
 
@@ -51,17 +51,18 @@ class Caller {
   void count_call() const;
 
   // Authenticates the caller, and checks the caller's rights to the server (not to scenes) that the method `path`
-  // needs. Returns UNAUTHENTICATED if the caller's credentials are not accepted or the caller's certificate has
-  // expired, or if a caller without credentials may do nothing on this server; PERMISSION_DENIED if the caller lacks a
-  // needed right; CANCELLED if the connection was closed. Call it before the other functions about rights.
+  // needs. Returns UNAUTHENTICATED if the caller's credentials are not accepted, if the caller's certificate has
+  // expired, or if the caller has no credentials and no grant is for callers without credentials. Returns
+  // PERMISSION_DENIED if the caller lacks a needed right, and CANCELLED if the connection was closed. Call it before
+  // the other functions about rights.
   absl::Status authorize(absl::string_view path);
   // Returns whether the caller has the right. A right to scenes is checked for `scene`; for other rights `scene` is
   // ignored.
   bool may(Right right, absl::string_view scene) const;
   // Returns whether the caller may administer every scene.
   bool administers_all() const;
-  // Returns OK if the caller has the right to `scene` that the method needs. Otherwise returns NOT_FOUND, as for a
-  // scene that does not exist, if the caller may not read the scene, and PERMISSION_DENIED if the caller may read it.
+  // Returns OK if the caller has the right to `scene` that the method needs. Otherwise returns PERMISSION_DENIED if the
+  // caller may at least read the scene. If not, returns NOT_FOUND, the error for a scene that does not exist.
   absl::Status check_right(const std::string& scene) const;
   // Returns PERMISSION_DENIED with a text that names the caller, the missing right and the scene.
   absl::Status lacks_right(Right right, absl::string_view scene) const;
@@ -101,9 +102,9 @@ class Caller {
   // Appends a line about the call to the audit log, if there is an audit log. `subject` is the scene or mesh that the
   // call is about. `status` is OK if the call succeeded; otherwise it says why the call was refused.
   void audit(absl::string_view subject, const absl::Status& status) const;
-  // Appends a line to the audit log for a call that names a scene that the caller may not read. Does nothing if
-  // promise_audit() was called and `scene` is the call's subject, because the line that audit() will append names the
-  // scene too. The scene need not exist.
+  // Appends a line to the audit log: the call names `scene`, which the caller may not read and which need not exist.
+  // Does nothing if promise_audit() was called and `scene` is the call's subject, because audit() will then append a
+  // line that names the scene.
   void audit_hidden(absl::string_view scene) const;
   // Tells audit_hidden() that audit() will be called with the final status of this call.
   void promise_audit() { is_answer_audited_ = true; }
@@ -117,8 +118,8 @@ class Caller {
   // Cancels the call immediately, even while it is blocked in a read or write.
   void cancel() const { context_.TryCancel(); }
 
-  // Returns the ids that name this call in logs: the caller's metadata x-request-id and traceparent if they are valid,
-  // otherwise a generated request id. Call it on the call's own thread only.
+  // Returns the ids that name this call in logs: the caller's metadata x-request-id and traceparent if they are valid.
+  // Without a valid x-request-id, the request id is generated.
   TraceContext trace() const;
 
   const RpcState& state() const { return state_; }
@@ -133,8 +134,8 @@ class Caller {
   absl::Status check_certificate() const;
   // Returns whether the method needs a right that must be checked.
   bool needs_right() const;
-  // Adds `bytes` to what the connection and the identity have claimed. Returns RESOURCE_EXHAUSTED, and adds nothing, if
-  // either would exceed its share.
+  // Adds `bytes` to the claims of the connection and to the claims of the identity. Returns RESOURCE_EXHAUSTED, and
+  // adds nothing, if the claims of either would exceed its share.
   absl::Status take_shares(absl::string_view field, uint64_t bytes) const;
   // Checks the rights that do not depend on a scene.
   absl::Status check_grants() const;

@@ -28,7 +28,7 @@ constexpr bool has_right(std::string_view path) {
 static_assert(std::all_of(kRpcPaths.begin(), kRpcPaths.end(), has_right), "add the new rpc to kRpcRights");
 
 constexpr const char* kAuthorization = "authorization";
-// Number of wrong credentials after which a connection is closed, because checking them costs up to 0.2 ms each.
+// A connection is closed after more wrong credentials than this number, because checking one takes up to 0.2 ms.
 constexpr uint32_t kMaxWrongCredentials = 32;
 
 // Identity that a connection has proved with a bearer credential. It is stored so that the connection's next call need
@@ -222,10 +222,10 @@ CallMemory Caller::claim_anyway(MemoryLine line, uint64_t bytes) const {
   return {state_.memory.claim_anyway(line, bytes), std::move(quota), nullptr, nullptr};
 }
 
-// Returns true for refusals because of missing rights or exceeded limits and, for calls that would have changed
-// something, for wrong requests. Returns false for all other errors: the call was ended by its deadline, by its caller
-// or by the server's shutdown, the server failed, or a name does not exist or is taken. audit_hidden() audits calls
-// that name hidden scenes.
+// Returns true for refusals because of credentials, missing rights or exceeded limits. Also returns true for wrong
+// requests, if the call would have changed something. Returns false for all other errors: the call was ended by its
+// deadline, by its caller or by the server's shutdown, the server failed, or a name does not exist or is taken.
+// audit_hidden() audits calls that name hidden scenes.
 bool Caller::is_audited(const absl::Status& status, bool is_change) {
   switch (status.code()) {
     case absl::StatusCode::kUnauthenticated:

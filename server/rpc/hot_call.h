@@ -56,7 +56,7 @@ class Listener {
  public:
   Listener(RpcState& state, const Method& rpc, IoLoop& io) : state_(state), rpc_(rpc), io_(io) {}
 
-  // Requests the first calls from gRPC. Call it once, after the server and before the IO threads have started.
+  // Requests the first calls from gRPC. Call it once, after the server has started and before the IO threads start.
   void listen() {
     for (int i = 0; i < kWaiting; ++i) HotCall<Method>::listen(*this);
   }
@@ -270,7 +270,7 @@ class HotCall final : private IoLoop::ActiveCall {
     return Method::kStream && refusal && refusal->reason != Reason::kMalformed && parse_envelope(bytes, request);
   }
 
-  // Begins the work on a message, or answers it with the error `status` with which it was refused already.
+  // Begins the work on a message. If `status` is an error, the message was refused already and is answered with it.
   void begin(Slot& slot, absl::Status status) {
     if constexpr (Method::kStream) {
       read_next();  // the next message may arrive while this one is processed

@@ -51,8 +51,8 @@ class IoLoop final : private EventSource, public EventLoop {
 
   grpc::ServerCompletionQueue* queue() { return queue_.get(); }
 
-  // Counts a call that was requested from gRPC. When such a call ends, leave() subtracts it; release() subtracts a call
-  // that gRPC reports as never accepted.
+  // Counts a call that was requested from gRPC, until leave() is called because the accepted call has ended, or
+  // release() because the call was never accepted.
   void acquire() { expected_or_active_.fetch_add(1); }
   void release();
   // Add an accepted call to the list of active calls, and remove it when the call ends. Only event handlers may call
@@ -104,8 +104,8 @@ class IoThreads {
   static uint32_t count_for(uint32_t cores);
   static constexpr uint32_t kThreadsOfALoop = 2;
 
-  // Creates one loop for each kThreadsOfALoop of the `count` threads, but at least one loop. Call it before `builder`
-  // starts the server. start() starts the threads.
+  // Creates `count` / kThreadsOfALoop loops, but at least one. Call it before `builder` starts the server. start() then
+  // starts `count` threads.
   IoThreads(grpc::ServerBuilder& builder, uint32_t count);
   ~IoThreads();
   IoThreads(const IoThreads&) = delete;

@@ -15,7 +15,7 @@ namespace locus::server {
 // Returns nullopt if the caller has no certificate that was verified.
 std::optional<std::string> certificate_name(const grpc::ServerContextBase& context);
 
-// Returns the time in seconds since 1970 from which the caller's certificate is no longer valid; the largest number if
+// Returns the time in seconds since 1970 from which the caller's certificate is no longer valid; the largest int64_t if
 // the caller has no certificate, and 0 if the certificate cannot be read.
 int64_t peer_certificate_end(const grpc::ServerContextBase& context);
 

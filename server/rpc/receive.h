@@ -21,8 +21,8 @@ absl::StatusOr<CallMemory> parse_request(const Caller& caller, const WirePlan& p
 
 // Parses only the envelope of a message: its numbers and short texts, without its sub-messages. The envelope of a
 // stream's message has the sequence number, which is needed to refuse a message that was not parsed. Claims no memory,
-// because an envelope takes at most a few kilobytes. Returns false if the bytes are not a message of this type, or if
-// the envelope is larger. Does not change `bytes`.
+// because an envelope has at most 2048 bytes. Returns false if the bytes are not a message of this type, or if the
+// envelope is too large. Does not change `bytes`.
 bool parse_envelope(const grpc::ByteBuffer& bytes, google::protobuf::Message& request);
 
 // Returns the bytes of a response.

@@ -18,9 +18,8 @@ using std::chrono::steady_clock;
 using Json = nlohmann::json;
 
 constexpr intptr_t kSocketsAtOnce = 256;
-// Interval at which the counter asks for the numbers of all connections. Other questions ask only for numbers above the
-// last known one. Asking for all numbers finds connections that gRPC listed late, after a connection with a higher
-// number.
+// Minimum interval between two requests for the channelz ids of all connections. All other requests are for ids above
+// the highest known one, so they miss a connection that gRPC lists only after a connection with a higher id.
 constexpr std::chrono::seconds kAskAllInterval{1};
 
 // Parses a text that gRPC has allocated, and frees it. Returns a discarded value if `text` is null or not JSON.

@@ -4,9 +4,9 @@
 // does not limit the number of such streams. A client that resets each call immediately makes about 130,000 calls a
 // second, three times as many as the server accepts and ends, so the server's own count of calls misses most of them.
 //
-// Threads: one thread at a time. A count takes about 15 us; the first count of a connection takes longer, because it
-// must find the number by which channelz names the connection. For this it asks for the numbers of all connections that
-// gRPC has added since it last asked. Remove this class once gRPC limits the number of calls that wait to be accepted.
+// Threads: one thread at a time. A count takes about 15 us. The first count of a connection takes longer, because the
+// counter must first find the channelz id of the connection: it requests the ids of all connections that gRPC has added
+// since its last request. Remove this class once gRPC limits the number of calls that wait to be accepted.
 #ifndef LOCUS_SERVER_RPC_STREAM_COUNTER_H_
 #define LOCUS_SERVER_RPC_STREAM_COUNTER_H_
 
@@ -29,12 +29,12 @@ class StreamCounter {
   std::optional<uint64_t> count(Connection& connection);
 
  private:
-  // Asks gRPC for the connections' numbers from next_number_ on, and stores them in the connections. If kAskAllInterval
-  // has passed since the last request for all numbers, requests all numbers again.
+  // Asks gRPC for the channelz ids of connections from next_number_ on, and stores them in the connections. If
+  // kAskAllInterval has passed since the last request for all ids, requests all ids again.
   void learn_numbers();
 
   ConnectionTable& table_;
-  int64_t next_number_ = 0;  // all lower numbers were already asked for
+  int64_t next_number_ = 0;  // all lower channelz ids were already asked for
   std::chrono::steady_clock::time_point ask_all_at_;
 };
 

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::chrono::seconds kLookForChanges{1};
 
-// Wraps credentials of gRPC's C interface for its C++ interface, whose own credentials cannot reload files.
+// Wraps credentials of gRPC's C interface for its C++ interface, whose SslServerCredentials cannot reload files.
 class FetchingCredentials final : public grpc::ServerCredentials {
  public:
   // Takes ownership of `credentials`.

@@ -1,9 +1,9 @@
 // Bytes of memory that the calls of each client have claimed on all of its connections together, so that a client
 // gains nothing by opening more connections. A client is named by its identity.
 //
-// Threads: any thread may call of(). Invariant: a client whose counter anybody holds has exactly one counter. Memory:
-// the entries are split into kParts parts. When a part has twice as many entries as after its last cleanup, and at
-// least kMinCleanup, a cleanup removes the entries of clients whose counters nobody holds.
+// Threads: any thread may call of(). Invariant: all live pointers to a client's counter point to the same counter.
+// Memory: the entries are split into kParts parts. When a part has twice as many entries as after its last cleanup, and
+// at least kMinCleanup, a cleanup removes the entries of clients whose counters nobody holds.
 #ifndef LOCUS_SERVER_SCHEDULING_CLIENT_SHARES_H_
 #define LOCUS_SERVER_SCHEDULING_CLIENT_SHARES_H_
 

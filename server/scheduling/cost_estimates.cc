@@ -11,8 +11,8 @@ namespace {
 
 // Fixed cost of a block, in nanoseconds, in addition to the cost of its queries.
 constexpr double kBlockNanoseconds = 500;
-// Estimated nanoseconds of a query before the first measurement, indexed by CostKind. Measured on scenes of 100,000
-// triangles and 10,000 objects.
+// Estimated nanoseconds of a query (for sight, of a segment) before the first measurement, indexed by CostKind.
+// Measured on scenes of 100,000 triangles and 10,000 objects.
 constexpr std::array<double, 15> kFirstGuess = {300,  200,  1000, 1000, 1000, 2000,       100,   20'000,
                                                 5000, 2000, 5000, 200,  1000, 50'000'000, 20'000};
 static_assert(kFirstGuess.size() == static_cast<size_t>(CostKind::kCell) + 1);

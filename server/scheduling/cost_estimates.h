@@ -2,8 +2,8 @@
 // work. Estimates decide where and when a batch runs and whether it is admitted; they never change an answer.
 //
 // Threads: every member may be called from any thread, and no member takes a lock. If two threads call learn() at the
-// same time, one of their measurements may be lost. Memory is fixed: the entry of an estimate may be replaced by that
-// of another estimate. Then the replaced estimate is the default again, until the next call of learn() for it.
+// same time, one of their measurements may be lost. Memory is fixed: a new estimate may overwrite the entry of another
+// estimate, which then has its default value until learn() is called for it again.
 #ifndef LOCUS_SERVER_SCHEDULING_COST_ESTIMATES_H_
 #define LOCUS_SERVER_SCHEDULING_COST_ESTIMATES_H_
 

@@ -28,7 +28,7 @@
 namespace locus::server {
 
 // Handler of an event. post() or the event source passes the tag to the loop, which calls arrived(). The tag must not
-// be destroyed before this call.
+// be destroyed before arrived() is called.
 class EventTag {
  public:
   virtual ~EventTag() = default;
@@ -85,8 +85,8 @@ class EventLoop {
   EventLoop(const EventLoop&) = delete;
   EventLoop& operator=(const EventLoop&) = delete;
 
-  // Passes `tag` to the loop, which calls tag.arrived(). This call, and the destruction of the tag after it, may happen
-  // before post() returns.
+  // Passes `tag` to the loop, which calls tag.arrived(). Before post() returns, arrived() may have been called and the
+  // tag may have been destroyed.
   void post(EventTag& tag);
 
   // Calls `callback` at `time`, unless the returned timer is passed to cancel() before.

@@ -144,7 +144,7 @@ class FairQueue {
   absl::flat_hash_map<uint64_t, ClientQueue> queues_;  // waiting and remembered clients
   std::set<Rank> waiting_;                             // clients with entries
   std::set<Rank> idle_;                                // clients without entries
-  // Largest value, over all calls of next(), of the work that the chosen client had received before.
+  // Maximum, over all calls of next(), of the work that the chosen client had received before the call.
   uint64_t virtual_time_ = 0;
 };
 

@@ -60,8 +60,8 @@ void MemoryBudget::measure() {
   ended_since_.fetch_sub(ended);
 }
 
-// Returns whether `bytes` more fit on `line`. Overestimates the memory in use, because memory that work in progress has
-// already allocated is counted twice: as measured and as claimed.
+// Returns whether a claim of `bytes` on `line` fits. Overestimates the memory in use, because memory that work in
+// progress has already allocated is counted twice: as measured and as claimed.
 bool MemoryBudget::fits(MemoryLine line, uint64_t bytes) const {
   const uint64_t sum = taken(), most = ceiling(line);
   return sum <= most && bytes <= most - sum;

@@ -1,5 +1,5 @@
-// Limits the number of threads that at the same time do long work outside of the query scheduler, such as visiting all
-// objects of a scene. Other threads wait, so the work occupies a bounded number of cores.
+// Limits how many threads at a time do long work outside of the query scheduler, such as visiting all objects of a
+// scene. Other threads wait, so the work occupies a bounded number of cores.
 //
 // Threads: any. Waiting threads are blocked; they take their turns in no particular order.
 #ifndef LOCUS_SERVER_SCHEDULING_TURNS_H_

@@ -269,7 +269,7 @@ void UpdateQueue::count(const Scene& scene, size_t updates) {
 // released their revoked pins. Other scenes do not wait.
 void UpdateQueue::stall(SceneQueue& scene_queue, const Group& group) {
   const SteadyTime now = steady_clock::now();
-  ScenePtr overdue;  // keeps the scene alive: another thread may free the SceneQueue before its readers are revoked
+  ScenePtr overdue;  // keeps the scene alive, because another thread may free the SceneQueue once mutex_ is released
   {
     const MutexLock lock(mutex_);
     LOCUS_DCHECK(scene_queue.busy && !group.empty());

@@ -1,4 +1,4 @@
-// Access control: reads the security files, identifies callers and publishes the rules that say what they may do.
+// Access control: reads the security files, identifies callers and publishes the rules that define their rights.
 //
 // Threads: every member may be called from any thread. Readers never wait for a reload: it prepares a new state, then
 // swaps one pointer. If any file has a mistake, a reload publishes nothing and the old state stays in use. The
@@ -35,7 +35,8 @@ struct Credentials {
   bool local = false;                  // whether the peer is on this machine
 };
 
-// Returns the bearer credential in the value of a header `authorization`, with or without `Bearer ` before it.
+// Returns the bearer credential in `value`, the value of a header `authorization`. The prefix `Bearer ` is optional and
+// is removed.
 absl::string_view bearer_of_header(absl::string_view value);
 
 class AccessControl {

@@ -30,8 +30,8 @@ class AccessRules {
   // Makes rules that grant nothing.
   AccessRules() = default;
 
-  // Parses the text of an access file; `file` is its name in errors. Returns INVALID_ARGUMENT naming the line, what is
-  // wrong and what to write instead.
+  // Parses the text of an access file; `file` is its name in errors. Returns INVALID_ARGUMENT, naming the line and the
+  // mistake, with advice on the correction.
   static absl::StatusOr<AccessRules> parse(absl::string_view file, absl::string_view text);
   // Makes rules that grant everything to everybody.
   static AccessRules all_allowed();

@@ -15,8 +15,8 @@ struct AuditEntry {
   std::string principal;  // identity of the caller, such as token:ci
   // Peer::label of the connection; an address if the entry stands for several connections or refusals.
   std::string peer;
-  // Peer::limit_key of the connection. Refusals are counted by principal and `address`. Written only in a line that
-  // reports counted refusals, as the peer.
+  // Peer::limit_key of the connection. Refusals are counted by principal and `address`. A line that reports counted
+  // refusals has `address` as its peer; other lines do not use `address`.
   std::string address;
   std::string rpc;      // full method path, HTTP page, or event of the server: connect, reload
   std::string subject;  // scene or mesh; empty = none

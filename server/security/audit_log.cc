@@ -113,7 +113,7 @@ bool AuditLog::take_batch(Batch& batch) {
   return true;
 }
 
-// Writes the lines of a batch. Returns the number of entries that the disk refused.
+// Writes the lines of a batch. Returns the number of entries that could not be written.
 uint64_t AuditLog::write_batch(const Batch& batch) {
   if (batch.reopen)
     for (const auto& file : files_) (void)file->reopen();  // after a failure the old file stays in use

@@ -47,7 +47,7 @@ class AuditLog {
   void reopen() LOCUS_EXCLUDES(mutex_);
   // Waits until everything queued before is written.
   void flush() LOCUS_EXCLUDES(mutex_);
-  // Returns the number of entries that were lost because the queue was full or because the disk refused them.
+  // Returns the number of entries that were lost because the queue was full or because they could not be written.
   uint64_t lost() const LOCUS_EXCLUDES(mutex_);
 
  private:

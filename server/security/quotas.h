@@ -62,9 +62,9 @@ class Quotas {
   // Function that returns how much of a quota is in use in addition to the amounts that were taken from this object.
   // Called with the mutex held.
   using Besides = absl::FunctionRef<double()>;
-  // Takes `amount` from the quota of each subject. If one quota does not suffice, takes nothing and returns the error
-  // of take(). `kind` must be an amount in use. The result releases the amount when it is destroyed. The result of
-  // `besides` is added to the amount in use before the check.
+  // Takes `amount` from the quota of each subject and returns a hold that releases it when destroyed. If one quota does
+  // not suffice, takes nothing and returns the error of take(). `kind` must not be a rate. The check adds the result of
+  // `besides` to the amount that is already in use.
   absl::StatusOr<QuotaHold> hold(
       absl::Span<const std::string> subjects, QuotaKind kind, double amount, uint64_t now,
       Besides besides = [] { return 0.0; }) LOCUS_EXCLUDES(mutex_);
@@ -127,7 +127,7 @@ class Quotas {
   mutable Mutex mutex_;
   std::vector<Account> accounts_ LOCUS_GUARDED_BY(mutex_);
   absl::flat_hash_map<std::string, size_t> slots_ LOCUS_GUARDED_BY(mutex_);  // positions in accounts_
-  size_t hand_ LOCUS_GUARDED_BY(mutex_) = 0;  // account at which the next eviction begins its search
+  size_t hand_ LOCUS_GUARDED_BY(mutex_) = 0;  // account after which the next eviction begins its search
 };
 
 // Amount of a quota that subjects have in use; the destructor releases it. An empty hold has taken nothing. Must not

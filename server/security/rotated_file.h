@@ -1,5 +1,5 @@
-// File to which whole lines are appended, with a maximum size after which it is renamed and begun anew: FILE becomes
-// FILE.1, FILE.1 becomes FILE.2 and so on. One thread at a time.
+// File to which whole lines are appended. If a line would make the file larger than its maximum size, the file is
+// renamed first and a new file is begun: FILE becomes FILE.1, FILE.1 becomes FILE.2 and so on. One thread at a time.
 #ifndef LOCUS_SERVER_SECURITY_ROTATED_FILE_H_
 #define LOCUS_SERVER_SECURITY_ROTATED_FILE_H_
 

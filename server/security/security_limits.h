@@ -1,4 +1,4 @@
-// Maxima of what the security files and bearer credentials may contain. Plain constants.
+// Limits and intervals of access control: security files, credentials, quotas and the audit log. Plain constants.
 #ifndef LOCUS_SERVER_SECURITY_SECURITY_LIMITS_H_
 #define LOCUS_SERVER_SECURITY_SECURITY_LIMITS_H_
 

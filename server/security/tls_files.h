@@ -17,7 +17,7 @@ namespace locus::server {
 struct TlsFiles {
   std::string certificate;  // the server's certificate, followed by its intermediate certificates
   std::string key;          // the key of the server's certificate, not encrypted
-  std::string client_ca;    // CA certificates that sign client certificates; empty = clients need none
+  std::string client_ca;    // CA certificates that sign client certificates; empty = clients need no certificate
 };
 
 // Contents of the files, in PEM.

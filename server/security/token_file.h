@@ -37,8 +37,8 @@ class TokenTable {
   // Makes a table without tokens.
   TokenTable() = default;
 
-  // Parses the text of a token file; `file` is its name in errors. Returns INVALID_ARGUMENT naming the line, what is
-  // wrong and what to write instead.
+  // Parses the text of a token file; `file` is its name in errors. Returns INVALID_ARGUMENT, naming the line and the
+  // mistake, with advice on the correction.
   static absl::StatusOr<TokenTable> parse(absl::string_view file, absl::string_view text);
   // Reads a token file. Returns FAILED_PRECONDITION if users other than the file's owner can write it; adds a sentence
   // to `warnings` if users outside the file's group can read it.
@@ -67,8 +67,8 @@ std::string new_token(absl::string_view id);
 std::string token_line(const TokenEntry& entry);
 
 // Adds a new token to the file and returns the token. Creates the file with mode 0600 if it is missing. Returns
-// ALREADY_EXISTS if the id is listed, INVALID_ARGUMENT if the id or the comment is malformed. The file is replaced
-// atomically, with its mode.
+// ALREADY_EXISTS if the id is listed, INVALID_ARGUMENT if the id or the comment is malformed. Replaces the file
+// atomically and keeps its mode.
 absl::StatusOr<std::string> add_token(const std::string& file, absl::string_view id, int64_t now,
                                       std::optional<int64_t> expires, absl::string_view comment);
 

@@ -29,9 +29,11 @@ class Access {
   Access(const Access&) = delete;
   Access& operator=(const Access&) = delete;
 
-  // Starts two threads. The first reads the files once more and then watches them. The second calls `recheck_calls`
-  // twice a second, because credentials expire, and writes the counts of updates to the audit log. `recheck_calls` must
-  // make every running call check its rights; it is also called after each change of the files.
+  // With access control, starts two threads. The first reads the files once more and then watches them. The second
+  // calls `recheck_calls` twice a second, because credentials expire, and writes the counts of updates to the audit
+  // log. Without access control, starts only the second thread, and only if there is an audit log, for the counts of
+  // updates. `recheck_calls` must make every running call check its rights; it is also called after each change of the
+  // files.
   void start(std::function<void()> recheck_calls);
   // Ends the threads. `recheck_calls` is not called afterwards.
   void stop();

@@ -31,7 +31,7 @@ namespace locus::server {
 struct ConnectionLimit {
   const char* name;      // as in `locus limits`
   double value = 0;      // 0 = no limit
-  double used = 0;       // number of open connections, for the limit on all of them; 0 for other limits
+  double used = 0;       // for the limit `connections`: number of open connections; 0 for all other limits
   uint64_t refused = 0;  // connections that were refused or closed because of this limit since the start
 };
 // Returns the limits on connections.

@@ -32,7 +32,8 @@
 // states the running code checks Caller::stop() itself.
 //
 // Threads: all members run on the call's IO loop, except three. run_deferred() runs on a thread of the loop, without
-// the loop's lock. work() and done() run on pool threads, work() on several of them at the same time.
+// the loop's lock, and calls work() there. After submit(), work() runs on several pool threads at the same time, and
+// then done() on one of them.
 #ifndef LOCUS_SERVER_SERVICES_QUERY_WORK_H_
 #define LOCUS_SERVER_SERVICES_QUERY_WORK_H_
 

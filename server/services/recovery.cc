@@ -149,7 +149,7 @@ class Recovery {
     return damage;
   }
 
-  // Counts a mesh or scene as recovered, and logs the progress every kReportEvery.
+  // Counts a mesh or scene whose recovery has ended, intact or damaged, and logs the progress every kReportEvery.
   void count() LOCUS_EXCLUDES(mutex_) {
     const MutexLock lock(mutex_);
     ++done_;

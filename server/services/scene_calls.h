@@ -21,7 +21,7 @@ absl::Status change_instances(Host& host, const Caller& caller, const v1::Change
 absl::Status check_work(const Caller& caller);
 
 // Returns the description of a scene, with the number of its pending changes. If the scene has changed since its last
-// description, waits for its turn to visit all objects (Host::scene_visits), and charges the caller for the visit.
+// description, waits for a turn of Host::scene_visits, visits all objects and charges the caller for the visit.
 v1::Scene describe(Host& host, const Caller& caller, const Scene& scene);
 
 // Serves one UploadMesh call: collects a mesh from the pieces of a stream, checks it against the announced counts and
@@ -34,8 +34,8 @@ absl::Status download_mesh(Host& host, const Caller& caller, const v1::DownloadM
                            MessageStream& stream);
 
 // Serves one DumpScene call: sends all objects and instances of a scene at one revision, in pieces of bounded size. A
-// piece consists of the messages Insert and Placement of updates and changes, so that a client can send these messages
-// back unchanged.
+// piece consists of messages Insert and Placement, so that a client can send them back unchanged in update batches and
+// in ChangeInstances calls.
 absl::Status dump_scene(Host& host, const Caller& caller, const v1::DumpSceneRequest& request, MessageStream& stream);
 
 }  // namespace locus::server

@@ -21,7 +21,7 @@
 namespace locus::server {
 namespace {
 
-// Maximum size in bytes of the meshes in a page. It leaves room for the page token. A page has at least one mesh.
+// Maximum size in bytes of the meshes in a page; a page of a single mesh may be larger. Leaves room for the page token.
 constexpr size_t kMaxPageBytes = 3'900'000;
 static_assert(kMaxPageBytes + limits::kMaxNameLength + 16 <= limits::kDefaultReplyBytes);
 
@@ -53,8 +53,8 @@ struct Listed {
   absl::Status damage;
 };
 
-// Returns the damaged scenes whose names follow `after`; no scene if the request filters by labels, because the labels
-// of damaged scenes are not known.
+// Returns the damaged scenes that the caller may read and whose names follow `after`. Returns no scene if the request
+// filters by labels, because the labels of damaged scenes are not known.
 std::vector<Listed> damaged_after(const Caller& caller, const Host& host, const std::string& after,
                                   const v1::ListScenesRequest& request) {
   std::vector<Listed> result;

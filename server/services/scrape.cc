@@ -157,8 +157,8 @@ void audit_refusal(const Host& host, const HttpRequest& reader, const Identity& 
   host.access->audit()->write(std::move(entry));
 }
 
-// Returns OK if the reader may read /metrics. If not, returns UNAUTHENTICATED for missing or unaccepted credentials and
-// PERMISSION_DENIED for accepted ones.
+// Returns OK if the reader may read /metrics. Returns UNAUTHENTICATED if the reader has no credentials or they are not
+// accepted, and PERMISSION_DENIED if they are accepted but the reader lacks the right.
 absl::Status check_reader(const Host& host, const HttpRequest& reader) {
   if (host.access == nullptr || !host.access->enabled()) return absl::OkStatus();
   Credentials credentials;

@@ -17,8 +17,8 @@ class UpdateService final : public v1::UpdateService::WithRawMethod_ApplyUpdates
   explicit UpdateService(Host& host);
   ~UpdateService() override;
 
-  // Begins to accept calls. Call it once, after the server and before the IO threads have started. The threads must end
-  // before the service is destroyed.
+  // Begins to accept calls. Call it once, after the server has started and before the IO threads start. The threads
+  // must end before the service is destroyed.
   void listen(IoThreads& threads);
 
  private:

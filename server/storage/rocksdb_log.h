@@ -33,8 +33,8 @@ class RocksdbLog final : public UpdateLog {
   // Opens the data directory; creates it if it is missing or empty. stored_scenes() and stored_meshes() also list
   // damaged scenes and meshes, with their damage. Errors: FAILED_PRECONDITION if a process has the directory open, if
   // this version of locusd does not know the directory's format, or if a repair was interrupted; DATA_LOSS if the
-  // directory is too damaged to be opened; RESOURCE_EXHAUSTED if the disk is full; UNAVAILABLE if the disk fails
-  // otherwise.
+  // directory is too damaged to be opened; RESOURCE_EXHAUSTED if the disk is full; UNAVAILABLE for any other error of
+  // the disk.
   static absl::StatusOr<std::unique_ptr<RocksdbLog>> open(const StorageOptions& options);
   // Syncs every record, then writes a durable marker. The marker's member `closed` is true if the sync succeeded.
   ~RocksdbLog() override;

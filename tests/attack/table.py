@@ -26,7 +26,7 @@ OWN_ADDRESSES = {"honest": "127.0.0.3", "wrong-bytes": "127.0.0.4", "gzip": "127
 
 class Ended:
     """Replacement for the pipe of an attack that is part of the union. Forwards codes and wrong results, and drops all
-    other reports, such as the begin of a step.
+    other reports, such as the start of a step.
     """
 
     def __init__(self, name, pipe, lock):

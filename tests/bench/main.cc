@@ -1,4 +1,5 @@
-// The program `locus-bench`: one suite of benchmarks against its peers, as a table and as JSON.
+// The program `locus-bench`: runs one suite of benchmarks, which compare locus with peers, and writes the results as a
+// table and as JSON.
 #include <malloc.h>
 
 #include <CLI/CLI.hpp>

@@ -18,8 +18,8 @@ constexpr std::array kMethods = {
     "/locus.v1.QueryService/StreamQueries",
 };
 
-// Deadline of a call, far above the time of any call that is answered. It ends calls that wait for revisions that are
-// never published.
+// Deadline of a call, far above the time of any call that is answered. A call can wait for a revision that is never
+// published; the deadline ends this call.
 constexpr std::chrono::seconds kRequestTimeout{15};
 
 class BadInputTest : public RpcTest {

@@ -226,7 +226,7 @@ TEST_F(DurabilityTest, RepairKeepsThePartsOfEveryName) {
   }
   const std::string meshes = meshes_now();
   EXPECT_EQ(daemon_.stop(), 0);
-  // Without the durable marker, all data counts as damaged. The repair copies what is intact.
+  // Without the durable marker, all data counts as damaged. The repair copies the intact data.
   std::filesystem::remove(std::filesystem::path(daemon_.directory()) / "HIGH_WATER");
   EXPECT_EQ(daemon_.maintain("repair"), 0) << daemon_.printed();
   EXPECT_EQ(daemon_.maintain("check"), 0) << daemon_.printed();

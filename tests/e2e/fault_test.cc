@@ -109,8 +109,8 @@ TEST_F(FaultTest, ADeadlineEndsLongWorkAndReleasesItsResources) {
 }
 
 // Makes and cancels calls with up to eight unanswered messages: half of the calls send batches that take long, the
-// other half batches that wait for a revision that is never reached. Every third call also sends an empty batch and
-// reads one answer.
+// other half wait for a revision that is never reached. Every third call also sends an empty batch and reads one
+// answer.
 void FaultTest::give_up_calls(int count) {
   v1::QueryBatch waiting;
   waiting.mutable_view()->set_at_least(99);

@@ -50,7 +50,7 @@ class Writer {
     return batch;
   }
 
-  // Returns the points of this writer that the scene must contain if batch `k` was the last one that was applied.
+  // Returns the points of this writer that the scene must contain if batch `k` was the last applied batch.
   std::map<uint64_t, PlacedPoint> model(uint64_t k) const {
     std::map<uint64_t, PlacedPoint> points;
     if (k > 0) points[id_of(number_, 0)] = {static_cast<double>(k), static_cast<double>(number_), 1};

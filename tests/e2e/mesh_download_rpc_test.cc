@@ -36,7 +36,7 @@ class MeshDownloadRpcTest : public RpcTest {
   }
 };
 
-// Returns a mesh of several pieces: 400,000 vertices, 500,000 triangles, and more parts than fit into one message.
+// Returns a mesh that is downloaded in several pieces: 400,000 vertices and 500,000 triangles, without parts.
 CubeMesh large_mesh() {
   CubeMesh mesh;
   for (uint32_t i = 0; i < 1'200'000 - 24; ++i) mesh.vertices.push_back(static_cast<float>(i % 1021));

@@ -80,7 +80,8 @@ TEST_F(PinnedRpcTest, ADumpThatIsNotReadIsCancelledAndUpdatesContinue) {
   ASSERT_TRUE(apply(move_heap(kObjects, 3)).ok());
   while (reader->Read(&piece)) {
   }
-  // The call notices the revoked pin by itself if it happens to write at that time; otherwise it is cancelled.
+  // The call ends with RESOURCE_EXHAUSTED if it notices the revoked pin before its cancellation takes effect; otherwise
+  // it ends with CANCELLED.
   EXPECT_THAT(reader->Finish().error_code(),
               testing::AnyOf(grpc::StatusCode::CANCELLED, grpc::StatusCode::RESOURCE_EXHAUSTED));
 }

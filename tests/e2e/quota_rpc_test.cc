@@ -1,5 +1,5 @@
-// Quotas of a server: each quota is enforced, a refusal says what the caller can do, and what was used up becomes
-// available again. After a restart, a scene still counts towards the quota of the caller that created it.
+// Quotas of a server: each quota is enforced, a refusal says what the caller can do, and released resources no longer
+// count towards the quota. After a restart, a scene still counts towards the quota of the caller that created it.
 #include <filesystem>
 #include <fstream>
 #include <map>

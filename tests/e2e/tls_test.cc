@@ -125,7 +125,7 @@ class RawTlsSocket {
   bool send(const std::string& bytes) {
     return SSL_write(ssl_.get(), bytes.data(), static_cast<int>(bytes.size())) == static_cast<int>(bytes.size());
   }
-  // Returns whether the server has not closed the connection.
+  // Returns true until the server closes the connection.
   bool is_open() const {
     pollfd end{socket_.descriptor(), POLLRDHUP, 0};
     return poll(&end, 1, 0) == 0;
@@ -341,7 +341,7 @@ class TlsReloadTest : public TlsTest {
     return end - begin;
   }
 
-  // Replaces the certificate and the other files, then adds a token and revokes it; does all this `times` times.
+  // Repeats these steps `times` times: replaces the certificate and the other files, adds a token, and revokes it.
   void reload(int times) {
     create_world();
     start_clients();

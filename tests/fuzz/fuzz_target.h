@@ -45,8 +45,8 @@ inline void append_piece(std::string& input, absl::string_view piece) {
   input.append(piece.data(), size);
 }
 
-// Removes and returns the first piece of `input`: two bytes with its length, then the piece. If fewer bytes are left,
-// the piece is all of them.
+// Removes and returns the first piece of `input`: two bytes with its length, then the piece. If fewer bytes than this
+// length are left, returns all of them. If the length is incomplete, returns an empty piece.
 inline absl::string_view next_piece(absl::string_view& input) {
   if (input.size() < 2) {
     input = {};

@@ -1,5 +1,5 @@
-// Chunks of a stored mesh, of its parts and of its tree: accepted parts are valid; an accepted mesh or tree that is
-// written, read and written again has equal bytes both times; and a tree that is restored for a mesh has the mesh's
+// Chunks of a stored mesh, of its parts and of its tree. Accepted parts are valid. If an accepted mesh or tree is
+// written, read and written again, both writings have equal bytes. A tree that is restored for a mesh has the mesh's
 // size and bounds.
 #include <optional>
 

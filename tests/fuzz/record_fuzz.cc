@@ -1,5 +1,5 @@
-// Records of a scene's log: an accepted record is encoded again, and the encoding is accepted and gives an equal
-// record.
+// Records of a scene's log: an accepted record is encoded, and its encoding is decoded and encoded again to equal
+// bytes.
 #include <memory>
 #include <variant>
 

@@ -1,5 +1,5 @@
-// Chunks of a scene's snapshot: a state that the reader accepts is restored and written again, and results in the same
-// chunks.
+// Chunks of a scene's snapshot. A state that the reader accepts is restored and written, and the result is accepted,
+// too. From the second writing on, the chunks stay the same.
 #include <optional>
 
 #include "core/scene/log/state_reader.h"

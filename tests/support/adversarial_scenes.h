@@ -222,8 +222,8 @@ inline SceneSketch long_and_short_directions(Random& random) {
   return sketch;
 }
 
-// Generates placements whose distances double from one to the next, so that a split at the middle of the bounds leaves
-// nearly all of them on one side.
+// Generates placements at distances from the origin that double from one placement to the next, so that a split at the
+// middle of the bounds leaves nearly all placements on one side.
 inline SceneSketch doubling_distances(Random& random) {
   SceneSketch sketch{"doubling distances", {}, {}, {}, {}};
   const Vec3d direction = random.chance(0.5) ? lattice_direction(random) : random.unit_vector();

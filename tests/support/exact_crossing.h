@@ -1,5 +1,5 @@
-// Reference of crossings in integers, so that every sign is exact. Shares no arithmetic with the product. Used by tests
-// of points in meshes.
+// Reference implementation of the crossing of a ray with a triangle, in integers, so that every sign is exact. Shares
+// no arithmetic with the code under test. Used by tests of points in meshes.
 #ifndef LOCUS_TESTS_SUPPORT_EXACT_CROSSING_H_
 #define LOCUS_TESTS_SUPPORT_EXACT_CROSSING_H_
 
@@ -69,7 +69,8 @@ inline Crossing exact_crossing(Vec3d point, const Triangle& triangle) {
     return result;
   }
   // Determine the turn of each edge as seen from the moved point: the sign of the area. If the area is 0, use the sign
-  // of the area's change when the point moves along -z; if this change is 0, too, when the point moves along y.
+  // of the area's change when the point moves along -z. If this change is 0, too, use the sign of the change when the
+  // point moves along y.
   int lefts = 0, rights = 0;
   for (size_t i = 0; i < 3; ++i) {
     const IntegerVector &u = corners[i], &v = corners[(i + 1) % 3];

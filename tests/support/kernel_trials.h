@@ -196,8 +196,7 @@ inline KernelTrial surface_trial() {
   return KernelTrial("from the surface", sphere, questions);
 }
 
-// Makes a mesh of which a tenth of the triangles has no area, and rays of which a fifth is parallel to the long edge of
-// a triangle.
+// Makes slivers, a tenth of them without area, and rays, a fifth of them parallel to the long edge of a sliver.
 inline KernelTrial sliver_trial() {
   Random random(7);
   std::vector<Triangle> slivers;

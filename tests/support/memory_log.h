@@ -41,7 +41,7 @@ class MemoryLog : public UpdateLog {
     std::map<SceneKey, KeptScene> scenes;
     std::map<std::string, std::array<uint8_t, 32>> meshes;
     std::map<std::array<uint8_t, 32>, std::vector<Bytes>> contents;
-    std::map<std::string, std::vector<Bytes>> parts;  // parts of each mesh, by name; none for a mesh of format 1
+    std::map<std::string, std::vector<Bytes>> parts;  // parts of each mesh, by name; no entry for a mesh of format 1
     std::map<std::array<uint8_t, 32>, std::string> topologies;
     SceneKey last_key = 0;
   };

@@ -1,5 +1,5 @@
-// Oracle of points in objects and closed meshes. It works in the slow and simple way that query_oracle.h describes: it
-// tests everything, sorts and truncates. Used by tests of queries.
+// Oracle of contains queries, which find the objects and closed meshes around points. It works in the slow and simple
+// way that query_oracle.h describes: it tests everything, sorts and truncates. Used by tests of queries.
 #ifndef LOCUS_TESTS_SUPPORT_ORACLE_CONTAINS_H_
 #define LOCUS_TESTS_SUPPORT_ORACLE_CONTAINS_H_
 

@@ -310,7 +310,7 @@ inline OwnedBlock capsule_block(const QueryScene& scene, const SceneSketch& sket
   return block;
 }
 
-// Returns a block of balls, capsules or boxes that start at the centres of the sketch's balls. Most move to a notable
+// Returns a block of sweeps by balls, capsules or boxes from the centres of the sketch's balls. Most move to a notable
 // point or by an offset with whole coordinates; the others rest.
 inline OwnedBlock sweep_block(const QueryScene& scene, const SceneSketch& sketch, Random& random) {
   OwnedBlock block = block_at(sketch, random);
@@ -459,8 +459,8 @@ inline OwnedBlock sight_block(const QueryScene& scene, const SceneSketch& sketch
   return block;
 }
 
-// Returns a block that asks for all pairs within a distance, or for the nearest objects of each object. Some blocks ask
-// only for objects of some layers, or only for pairs behind a page position.
+// Returns a block that queries all pairs within a distance, or the nearest objects of each object. Some blocks query
+// only objects of some layers, or only pairs behind a page position.
 inline OwnedBlock pair_block(const QueryScene& scene, Random& random) {
   OwnedBlock block;
   PairColumns pairs;

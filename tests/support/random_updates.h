@@ -133,8 +133,7 @@ class RandomUpdates {
   }
 
   // Sets the writer id and the batch number: usually the writer's next number, sometimes a lower or a higher one. A
-  // refused batch can leave a gap in a writer's numbers, which is permanent, so the writers are replaced from time to
-  // time.
+  // refused batch can leave a permanent gap in a writer's numbers, so the writers are replaced from time to time.
   void number(UpdateBatch& batch) {
     batch.writer = 1 + random_.below(3) + 3 * (drawn_++ / 100);
     uint64_t& next = next_numbers_[batch.writer];

@@ -119,8 +119,8 @@ inline std::vector<RegionTrial> small_region_trials() {
   return trials;
 }
 
-// Makes meshes of one point. Their box has no extent, so because of rounding, a region that touches the point may meet
-// only the padded box.
+// Makes meshes of one point, whose box has no extent. Because of rounding, a region that touches the point may miss
+// this box and meet only the padded box.
 inline std::vector<RegionTrial> point_region_trials() {
   Random random(20);
   std::vector<RegionTrial> trials;

@@ -265,7 +265,8 @@ class SceneModel {
     count(Reason::kUnspecified, field, i, columns.ids[i]);
   }
 
-  // For each object, the unique number of its life: a life begins when an unknown id is inserted, and at a teleport.
+  // For each object, the unique number of its lifetime. A lifetime begins when an id is inserted that the scene does
+  // not contain, and at a teleport.
   using Lifetimes = std::map<Id, uint64_t>;
   struct Then {
     Objects objects;

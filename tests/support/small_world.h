@@ -35,7 +35,7 @@ inline Object box_object(Id id, Vec3d position, Vec3f half = {1, 1, 1}) {
   return object;
 }
 
-// Returns a triangle at `x` that is perpendicular to the x axis and that the x axis passes through. Its front faces +x.
+// Returns a triangle that is perpendicular to the x axis and intersects this axis at `x`. Its front faces +x.
 inline Triangle wall_triangle(float x) { return {{x, -8, -8}, {x, 8, -8}, {x, 0, 8}}; }
 inline Triangle turned_over(const Triangle& triangle) { return {triangle.a, triangle.c, triangle.b, triangle.number}; }
 

@@ -44,8 +44,8 @@ class ChunksFrom {
   mutable size_t next_ = 0;  // mutable, because the caller's FunctionRef calls the const operator()
 };
 
-// The next two functions return the default content of a scene's record `sequence`, and that of the scene's snapshot at
-// this sequence number.
+// The next two functions return the default content of the scene's record `sequence`, and of the scene's snapshot at
+// `sequence`.
 inline std::string record_bytes(SceneKey scene, uint64_t sequence, size_t most = 200) {
   return bytes_of(scene * 1'000'003 + sequence, most);
 }

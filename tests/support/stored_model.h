@@ -1,5 +1,5 @@
-// Model of a log that a test uses: it stores which operations the log acknowledged. When the log is opened again after
-// a fault, the model checks that the log contains every acknowledged change and record, in order, and nothing that was
+// Model of a log, for tests: it stores which operations the log acknowledged. When the log is opened again after a
+// fault, the model checks that the log contains every acknowledged change and record, in order, and nothing that was
 // never requested. One thread.
 #ifndef LOCUS_TESTS_SUPPORT_STORED_MODEL_H_
 #define LOCUS_TESTS_SUPPORT_STORED_MODEL_H_

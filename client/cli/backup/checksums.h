@@ -25,7 +25,8 @@ struct Checksum {
 std::string checksum_text(const std::vector<Checksum>& checksums);
 
 // Parses a text in the format of checksum_text(). Returns DATA_LOSS, with the number of the line, if a line deviates
-// from this format in any byte, or if its path is repeated or leads out of the backup.
+// from this format in any byte, or if client::BackupPaths refuses the line's path, for example because the path is
+// repeated or leads out of the backup.
 absl::StatusOr<std::vector<Checksum>> parse_checksums(absl::string_view text);
 
 }  // namespace locus::cli

@@ -17,8 +17,9 @@
 namespace locus::cli {
 
 // Returns the error "cannot DOING PATH: ...", with advice for common causes. `error` is the errno of the failed call.
-// The code is NOT_FOUND for ENOENT, RESOURCE_EXHAUSTED for a full disk, and FAILED_PRECONDITION for any other errno. It
-// is not PERMISSION_DENIED for missing file permissions, because that code is reserved for denials by the server.
+// The code is NOT_FOUND for ENOENT, RESOURCE_EXHAUSTED for a full disk or an exceeded disk quota, and
+// FAILED_PRECONDITION for any other errno. Missing file permissions do not give PERMISSION_DENIED, because that code is
+// reserved for denials by the server.
 absl::Status file_error(absl::string_view doing, const std::string& path, int error);
 
 // Condition that the target must satisfy before the directory is made. kNothing: the target does not exist.

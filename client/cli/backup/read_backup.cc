@@ -86,7 +86,8 @@ absl::StatusOr<std::vector<Checksum>> read_checksums(const std::string& backup) 
       absl::StrCat("the backup ", backup, " is damaged: ", checksums.status().message(), "; take another backup"));
 }
 
-// Returns the size of every file below `backup` except SHA256SUMS, by relative path.
+// Returns the size of every regular file below `backup` except SHA256SUMS, by relative path. Adds every other file that
+// is not a folder to `problems`.
 absl::StatusOr<std::map<std::string, uint64_t>> list_files(const std::string& backup, Problems& problems) {
   std::map<std::string, uint64_t> sizes;
   std::error_code why;

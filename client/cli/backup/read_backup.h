@@ -11,11 +11,11 @@
 
 namespace locus::cli {
 
-// Reads every file of the directory `backup` once and verifies its hash. If `copy` is not null, calls copy->make() and
-// writes all files except SHA256SUMS to `copy`; the caller calls copy->keep() afterwards. Returns DATA_LOSS if files
-// are missing, changed or not listed in SHA256SUMS; the message names the first few of these files. If `copy` is not
-// null, reads no file if a file is missing or not listed, and stops at the first changed file. Returns NOT_FOUND if
-// there is no backup.
+// Reads once every file that is listed in the SHA256SUMS of the directory `backup`, and verifies its hash. If `copy` is
+// not null, calls copy->make() and writes these files to `copy`; the caller calls copy->keep() afterwards. Returns
+// DATA_LOSS if files are missing, changed or not listed in SHA256SUMS; the message names the first few of these files.
+// Without `copy`, all listed files are verified before DATA_LOSS is returned. With `copy`, no file is read if one is
+// missing or not listed, and reading stops at the first changed file. Returns NOT_FOUND if `backup` has no SHA256SUMS.
 absl::StatusOr<client::BackupSize> read_backup(const std::string& backup, PartialDirectory* copy,
                                                const BackupProgress& progress);
 

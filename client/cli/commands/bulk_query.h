@@ -59,7 +59,7 @@ client::Double3 frame_of(double x, double y, double z);
 // Returns the values of the column `positions` in `rows` relative to the frame, three floats for each row.
 std::vector<float> offsets_of(const RowColumn& positions, RowSpan rows, const client::Double3& frame);
 
-// Returns the field of a point, in the columns "at" or "position".
+// Returns the schema field of a position, whose column in the input is named "at" or "position".
 Field at_field();
 
 // Appends the fields that every kind of query has, mask and ignore_group, to the schema.

@@ -33,7 +33,7 @@ absl::Status check(const ExportOptions& options) {
 }
 
 // Returns the translation that recentres the scene, computed from the scene's current bounds. The dump is read later
-// and may have a newer revision, so the exported scene may be centred only approximately.
+// and may have another revision, so the exported scene may be centred only approximately.
 absl::StatusOr<std::array<double, 3>> find_recentre(const ExportOptions& options, client::Client& client) {
   ASSIGN_OR_RETURN(const v1::Scene scene, client.get_scene(options.scene));
   if (!scene.has_min() || !scene.has_max()) return std::array<double, 3>{};

@@ -10,8 +10,8 @@ namespace {
 
 struct NoOptions {};
 
-// Returns a limit's value as a JSON integer if the value is integral, so that counts are printed without a decimal
-// point. Returns any other value as a double.
+// Returns a limit's value as a JSON integer if it is an integer from 0 to 2^53, so that counts are printed without a
+// decimal point. Returns any other value as a double.
 Json number_json(double value) {
   constexpr double kExactIntegers = 9007199254740992.0;
   if (value < 0 || value > kExactIntegers || value != static_cast<double>(static_cast<uint64_t>(value))) return value;

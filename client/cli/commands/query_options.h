@@ -1,4 +1,4 @@
-// Options that every kind of query has, and the choice of a frame for its positions. For the query commands.
+// Options that every kind of query has, and the choice of a frame for a query's positions. For the query commands.
 #ifndef LOCUS_CLIENT_CLI_COMMANDS_QUERY_OPTIONS_H_
 #define LOCUS_CLIENT_CLI_COMMANDS_QUERY_OPTIONS_H_
 
@@ -49,7 +49,8 @@ void add_after_id_option(CLI::App& command, QueryOptions& options);
 std::vector<v1::Column> columns_behind(std::vector<v1::Column> first, const QueryOptions& options,
                                        const std::vector<v1::Column>& otherwise = {});
 
-// Returns the columns of an overlap query: ids always, and triangles if the detail makes each row a triangle.
+// Returns the columns of an overlap query: the ids, then the triangles if `detail` requests a row per triangle, then
+// the columns of --columns.
 std::vector<v1::Column> overlap_columns(const QueryOptions& options, v1::StaticDetail detail);
 
 // Returns a usage error if options exclude each other.

@@ -157,7 +157,7 @@ absl::Status query_box(const BoxOptions& options, Context& context) {
   return ask_and_report(options.query, builder, layout, "found", context);
 }
 
-// Queries capsules. Both ends of all capsules are sent as offsets from one frame.
+// Queries capsules. Without bulk input, both ends of all capsules are sent as offsets from one frame.
 absl::Status query_capsule(const CapsuleOptions& options, Context& context) {
   if (options.bulk.given()) return query_capsules_of_input(options, context);
   RETURN_IF_ERROR(check(options.bulk));
@@ -174,7 +174,8 @@ absl::Status query_capsule(const CapsuleOptions& options, Context& context) {
   return ask_and_report(options.query, builder, layout, "found", context);
 }
 
-// Adds the options of an overlap query: --detail, --after-id, and the options that all queries have.
+// Adds the options of an overlap query: --detail, --after-id, the options for bulk input, and the options that all
+// queries have.
 template <class Options>
 void add_overlap_options(CLI::App& command, Options& options) {
   add_detail_option(command, options.detail);

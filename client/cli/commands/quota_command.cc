@@ -13,7 +13,8 @@ struct QuotaOptions {
   bool all = false;
 };
 
-// Returns the number as a JSON integer if it is integral, so that amounts are printed without a decimal point.
+// Returns `value` as a JSON integer if it is an integer between -2^53 and 2^53, so that amounts are printed without a
+// decimal point. Returns any other value as a double.
 Json amount_json(double value) {
   constexpr double kExactIntegers = 9007199254740992.0;
   if (!(value > -kExactIntegers && value < kExactIntegers)) return value;

@@ -97,7 +97,8 @@ std::vector<double> heat_of(const RayImage& image, Heat heat) {
   return values;
 }
 
-// Paints the requested kind of picture. If the colours represent values, adds the range of these values to `head`.
+// Paints the requested kind of picture. Adds to `head` the range of the costs (with --heat) or of the depths
+// (otherwise).
 Picture paint(const RenderOptions& options, const RayImage& image, const Camera& camera, Json& head) {
   if (options.heat != Heat::kNone) {
     const std::vector<double> values = heat_of(image, options.heat);

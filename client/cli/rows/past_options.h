@@ -40,7 +40,7 @@ void apply_to_block(const PastOptions& options, Block& block) {
   block.as_of(ticks_of(options.as_of), fractions_of(options.as_of)).outside_history(options.outside);
 }
 
-// Returns the time at which each query was answered, in the form of --as-of. This time differs from the requested time
+// Returns the effective time of each query about the past, in the form of --as-of. It differs from the requested time
 // if the requested time was clamped to the recorded history.
 Json resolved_json(const v1::BlockResult& block);
 

@@ -31,8 +31,8 @@ Json work_json(const v1::Work& work);
 
 // Returns the head of a report. It contains epoch, revision and tick. It also contains, if there are any: the indices
 // of truncated queries; the effective times of queries about the past; the indices of the queries whose times were
-// clamped to the history; the indices of the queries for which ResultRows::unanchored() is true; the work that the
-// server reported.
+// clamped to the history; the indices of the queries that have no rows because of their anchor
+// (ResultRows::unanchored()); the work that the server reported.
 Json result_head(const v1::QueryResult& result);
 
 }  // namespace locus::cli

@@ -17,8 +17,8 @@ namespace locus::cli {
 absl::Status append_value(std::string& text, const Value& value);
 
 // Reads a quoted text. Precondition: the cursor is at the opening quote. Text in single quotes is taken literally. In
-// double quotes `$name` and `{expression}` are substituted, and \" \\ \$ \{ \n \t are escape sequences. Returns
-// INVALID_ARGUMENT if the closing quote is missing.
+// double quotes `$name` and `{expression}` are substituted, and \" \\ \$ \{ \} \n \t are escape sequences. Returns
+// INVALID_ARGUMENT if the closing quote is missing or a backslash begins no escape sequence.
 absl::StatusOr<Value> read_quoted_text(Cursor& cursor, const Variables& variables);
 
 }  // namespace locus::cli

@@ -1,6 +1,6 @@
-// Value of a script's variable: a number, a text, a list, a result of a command, or a column of its rows. For
-// expressions. Plain values; functions without state. Texts that are numbers, such as ids in answers, are treated as
-// numbers.
+// Value in a script: JSON data (such as a number, a text or a list), the result of a command, or one column of a
+// result's rows. For expressions. Plain values; functions without state. Texts that are numbers, such as ids in
+// answers, are treated as numbers.
 #ifndef LOCUS_CLIENT_CLI_SCRIPT_VALUE_H_
 #define LOCUS_CLIENT_CLI_SCRIPT_VALUE_H_
 
@@ -42,8 +42,9 @@ struct Value {
 };
 
 // Returns a field of a result or of a record. The fields of a result are the entries of its head, the columns of its
-// rows, the number of rows as `count`, and all rows under the name Report::rows_name. Returns NOT_FOUND with the
-// existing names if there is no such field.
+// rows, the number of rows as `count`, and all rows under the name Report::rows_name. If the list of rows is empty, its
+// columns are not known, so any other name is a column without rows. Returns NOT_FOUND with the existing names if there
+// is no such field.
 absl::StatusOr<Value> field_of(const Value& value, const std::string& name);
 // Returns an entry of a list or a row of a column, counted from 0. Returns OUT_OF_RANGE beyond the end.
 absl::StatusOr<Value> entry_of(const Value& value, const Number& index);

@@ -103,7 +103,8 @@ bool extend_for_use(X509* certificate, X509* issuer, const CertificatePlan& plan
          extend(certificate, issuer, NID_authority_key_identifier, "keyid");
 }
 
-// Sets a random serial number of 127 bits, the validity, the key and the names of the certificate.
+// Sets a random serial number of at most 127 bits, the validity, the key, the names and the extensions of the
+// certificate.
 bool fill_in(X509* certificate, X509* issuer, EVP_PKEY* key, const CertificatePlan& plan) {
   constexpr int kSerialBits = 127;
   const BigNumber serial(BN_new());

@@ -41,7 +41,7 @@ absl::StatusOr<absl::Duration> parse_lifetime(absl::string_view text);
 absl::StatusOr<std::string> create_token(const std::string& file, absl::string_view id, absl::Time now,
                                          std::optional<absl::Duration> lifetime, absl::string_view comment);
 
-// Returns the lines of the file, in their order.
+// Returns the lines of all tokens in the file, in their order.
 absl::StatusOr<std::vector<TokenLine>> list_tokens(const std::string& file, absl::Time now);
 
 // Removes a token from the file. Returns NOT_FOUND if the id is not listed.

@@ -242,7 +242,7 @@ class QueryBatch:
     def views(self, view_projections: ColumnLike, *, clip_depth: ClipDepth = ClipDepth.ZERO_TO_ONE,
               detail: StaticDetail = StaticDetail.INSTANCES, block: Block = Block()) -> "QueryBatch":
         """Adds a block of the views of N cameras, to find the objects and instances in view. `view_projections`: 16N
-        float32, column-major matrices from positions to clip coordinates.
+        float32, column-major matrices that map positions to clip coordinates.
         """
         new = _NewBlock(self._blocks, "frustums")
         new.first("view_projections", view_projections, FLOAT32, 16)

@@ -124,9 +124,10 @@ class Mesh:
 
 @dataclasses.dataclass(frozen=True)
 class Limit:
-    """Limit of the server. `value` is the maximum. `used` is the amount in use now; it is 0 for limits of a single
-    request or scene. `refused` is the number of calls, messages and connections that the limit has refused since the
-    server started. `used` and `refused` are 0 if Server.use_hidden is True.
+    """Limit of the server. `value` is the maximum. `used` is the amount in use now. For some limits of one client or
+    scene, such as `calls`, it is the sum over all clients or scenes; for limits of a single request it is 0. `refused`
+    is the number of calls, messages and connections that the limit has refused or ended since the server started.
+    `used` and `refused` are 0 if Server.use_hidden is True.
     """
 
     value: float

@@ -50,8 +50,9 @@ class WindingCells {
   // O(n); up to 9 bytes of temporary memory for each cell.
   static WindingCells build(const TriangleBvh& tree);
 
-  // Returns where the search from `point` can end: at `point` itself if its cell is clear, in a clear cell near
-  // `point`, or outside the mesh. `tree` must be the tree that was passed to build(). O(1).
+  // Returns where the search from `point` can end: at `point` itself if it is outside the bounds of the mesh or in a
+  // clear cell, otherwise in a clear cell near `point` or outside the mesh. `tree` must be the tree that was passed to
+  // build(). O(1).
   WindingWay way_from(const TriangleBvh& tree, const Vec3d& point) const;
 
   // Returns the size in bytes of the memory allocated by this object; sizeof(WindingCells) is not included.

@@ -261,7 +261,7 @@ BrickPtr BrickBuilder::sorted_by_cell(const Brick* old, absl::Span<const BrickSo
   return brick;
 }
 
-// Returns a version that shares both blocks of `old`: changed values are appended to the log behind the slots of
+// Returns a version that shares both blocks of `old`: changed values are appended to the log after the slots of
 // earlier versions, and their old slots are marked dead.
 BrickPtr BrickBuilder::change_few(const Brick& old, absl::Span<const BrickChange> changes) {
   auto brick = std::make_shared<Brick>(old);

@@ -32,7 +32,7 @@ class BrickBuilder {
   // Begins a batch. `slots`, indexed by handle, receives the new slot of each value that changes its slot. The arrays
   // of `parts` and `slots` are borrowed until end().
   void begin(const BatchParts& parts, std::vector<GridSlot>& slots);
-  // Ends the batch and frees large buffers.
+  // Ends the batch and frees the buffer of sources if it is large.
   void end() { clear_scratch(sources_); }
 
   // Returns the next version of the brick, or null if no value remains. `old` is the present version, null for a brick

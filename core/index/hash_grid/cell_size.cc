@@ -32,8 +32,8 @@ int exponent_of_all(absl::Span<const SampledValue> sample) {
   return exponent_covering(std::max(4 * width, 0x1p-16 * magnitude), kMinCellExponent, kMaxBaseExponent);
 }
 
-// Returns the expected number of other values in the cell of a random value. Estimates the fraction of pairs of values
-// that share a cell by the same fraction in the sample, so the sample size does not bias the result.
+// Returns the expected number of other values in the cell of a random value. The estimate assumes that the fraction of
+// pairs of values that share a cell is the same in the sample and in all values, so the sample size causes no bias.
 double mean_others_per_cell(absl::Span<const SampledValue> sample, size_t population, int exponent) {
   if (sample.size() < 2) return 0;
   std::vector<GridKey> cells;

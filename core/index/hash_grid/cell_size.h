@@ -32,8 +32,8 @@ struct SampledValue {
 // Returns the exponent e of the largest cell edge 2^e at which a random value shares its cell with at most
 // kMaxMeanPerCell other values on average. The edge is at least the median diameter of the values. The edge is not
 // much larger than the bounds of all values, unless the median diameter requires a larger edge. The mean is estimated
-// for `population` values, of which `sample` is an even selection. Values that share a cell at every cell size raise
-// the limit (see kMaxAddedPerCell), so they do not prevent larger cells. Preconditions: `sample` is not empty,
+// for `population` values, of which `sample` is an evenly spaced selection. Values that share a cell at every cell size
+// raise the limit (see kMaxAddedPerCell), so they do not prevent larger cells. Preconditions: `sample` is not empty,
 // population >= sample.size(). Cost: at most about fifty sorts of the sample.
 int choose_cell_exponent(absl::Span<const SampledValue> sample, size_t population);
 
@@ -42,7 +42,7 @@ int choose_cell_exponent(absl::Span<const SampledValue> sample, size_t populatio
 // choose_cell_exponent().
 bool cell_exponent_fits(absl::Span<const SampledValue> sample, size_t population, int exponent);
 
-// Even selection among `population` values, which are offered one by one. Selects all values if `population` is less
+// Evenly spaced sample of `population` values, which are offered one by one. Selects all values if `population` is less
 // than kCellSizeSample, else kCellSizeSample to 2 * kCellSizeSample values.
 class EvenSample {
  public:

@@ -5,7 +5,7 @@
 namespace locus::internal {
 
 GridBlock::GridBlock(uint32_t count, bool has_forms) : count_(count), stride_((count + kLanes - 1) / kLanes * kLanes) {
-  // A vector load that starts at the last value of the last float column reads beyond this column. The bytes behind the
+  // A vector load that starts at the last value of the last float column reads beyond this column. The bytes after the
   // column are the handles and entries, so the load does not read beyond memory_.
   const size_t floats = size_t{4} * stride_ * sizeof(float);
   const size_t handles = size_t{stride_} * sizeof(uint32_t);

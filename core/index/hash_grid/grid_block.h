@@ -2,7 +2,7 @@
 // to cull eight values at a time. The exact position in double and the other members of a value are stored as one
 // entry.
 //
-// Threads: immutable once shared; any thread. A log is the exception: its single writer appends values behind the slots
+// Threads: immutable once shared; any thread. A log is the exception: its single writer appends values after the slots
 // that earlier versions of the brick use, while readers of these versions read the same memory.
 //
 // Invariants: in a sorted block values are ordered by cell, and the values of cell c occupy the slots offsets[c] to
@@ -44,9 +44,9 @@ struct GridForm {
 };
 
 // Value with all its parts, for example as the argument of an insertion. `handle` is the identifier that the caller
-// assigned. `reach` is the extent of the value: an upper bound of the distance from its position to its bounds along
-// any axis and under any rotation, not including the growth of bounds_of() by rounding. The `reach` of a ball is
-// exactly its radius.
+// assigned. `reach` is the extent of the value: an upper bound of the distance from its position to any of its
+// points, and so of the distance to its bounds along any axis, under any rotation. It does not include the growth of
+// bounds_of() that covers rounding. The `reach` of a ball is exactly its radius.
 struct GridItem {
   GridEntry entry;
   uint32_t handle = 0;

@@ -96,8 +96,8 @@ class GridSnapshot {
   // Calls visit(GridRef) for every value whose bounds have a squared_distance() of at most limit() from `point`, and
   // for some other values near the point. The order on each level is roughly from near to far. limit() may decrease
   // during the visit. Ends if visit() returns false. The cost on each level is proportional to the number of cells
-  // within the final limit() plus the number of values in these cells. If the range of these cells has more bricks than
-  // the level, each brick of the level is tested once instead.
+  // within the final limit() plus the number of values in these cells. If the range of these cells has more than 1024
+  // brick keys, and more than the level has bricks, each brick of the level is tested once instead.
   template <class Limit, class Visit>
   void visit_nearest(const Vec3d& point, const Limit& limit, Work& work, const Visit& visit) const;
 

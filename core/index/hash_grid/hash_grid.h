@@ -9,8 +9,9 @@
 // The cell size affects only the cost of a query, never its result. The grid chooses the size of the base cell again,
 // from a sample of the values, if the number of values has doubled since the last choice or has fallen to an eighth.
 // After each value has changed 64 times on average, the grid also checks whether the size still fits. If the size
-// changes, the grid moves the values to the new cells. To bound the time of a batch, each batch moves only a few
-// thousand values. Until all values have moved, levels of the old and the new size exist side by side.
+// changes, the grid moves the values to the new cells. To bound the time of a batch, each batch moves about 8,000 of
+// the values or, if it has more changes than that, as many values as it has changes. Until all values have moved,
+// levels of the old and the new size exist side by side.
 //
 // Invariants: every value is stored in the brick that contains its position, on a level whose cells are at least as
 // wide as the value; no brick is empty; slots_ holds the location of each value. |position| <= limits::kMaxCoordinate

@@ -11,7 +11,7 @@ constexpr double kFirstShellValues = 12;  // target number of values in the firs
 constexpr uint32_t kMinForEstimate = 4;   // min number of values for an estimate of the density
 constexpr double kShellGrowth = 1.6;      // ratio of shell_width_ to its value for the previous shell
 
-// Returns the input of the kernel collect_near() for a shell. Its point is relative to the centre of the brick.
+// Returns the input of the kernel collect_near() for a shell. GridNear::point is relative to the centre of the brick.
 GridNear near_of(const Brick& brick, const Vec3d& point, float above, float up_to) {
   const Vec3d to_point = point - brick.geometry.center;
   GridNear near;

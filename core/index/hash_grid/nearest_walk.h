@@ -1,7 +1,6 @@
-// Nearest-value search of the hash grid: visits shells around a point, each wider than the shell before. The values of
-// a shell are collected by their distance in float and visited from near to far. So the search visits few values
-// besides the nearest ones, even if many values surround the point. Used by GridSnapshot; one object per query and
-// thread.
+// Nearest-value search of the hash grid: visits shells of growing radius around a point. The values of a shell are
+// collected by their distance in float and visited from near to far. So the search visits few values besides the
+// nearest ones, even if many values surround the point. Used by GridSnapshot; one object per query and thread.
 //
 // The key of a value is the squared distance of its bounds from the point, computed in float. A key never exceeds the
 // exact squared distance, and a value has the same key for every shell. A shell is a range of keys (above, up_to], so

@@ -31,7 +31,8 @@ struct CellPlane {
 // Convex space around a point p: all points within `radius` of p that lie on the same side of every plane as p.
 struct CellAnswer {
   bool is_free = false;    // false: the point lies in or on an object or triangle, so there is no free space
-  bool truncated = false;  // max_planes were not enough; `radius` is the distance of the first row without a plane
+  bool truncated = false;  // max_planes were not enough; `radius` is the distance of the nearest object or
+                           // triangle without a plane
   float radius = 0;
   std::vector<CellPlane> planes;
 };

@@ -7,8 +7,8 @@
 namespace locus {
 namespace {
 
-// Visitor of the triangles of one mesh that a half line may cross. Sums the crossings until the point is found to lie
-// on the surface.
+// Visitor of the triangles of one mesh that a half line may cross. Sums the crossings; stops if the point lies on the
+// surface.
 class Crossings {
  public:
   // `point` is in mesh axes. `winding` is the winding number around the end of the half line.

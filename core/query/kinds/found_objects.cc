@@ -25,9 +25,9 @@ void insertion_sort(std::vector<FoundObject>& found) {
 
 // Maximum number of objects that are sorted by insertion without buckets.
 constexpr size_t kFew = 12;
-// Minimum of the binary logarithm of the number of buckets. A number of buckets above this minimum is at most half
-// and more than a quarter of the number of objects, so that evenly distributed ids fill each bucket with two to four
-// objects.
+// Minimum of the binary logarithm of the number of buckets. If there are more buckets than this minimum, the number of
+// objects is at least two and less than four times the number of buckets. Evenly distributed ids then fill each bucket
+// with two to four objects.
 constexpr int kMinBucketBits = 8;
 // Maximum number of objects in one bucket. More objects in a bucket show that the ids are unevenly distributed;
 // std::sort() is then used instead of the buckets.

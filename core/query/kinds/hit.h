@@ -55,7 +55,7 @@ struct RowPosition {
     position.triangle = ColumnReader<uint32_t>(columns.triangles, 1).value(i, position.triangle);
     return position;
   }
-  // Returns whether this position excludes any row.
+  // Returns false for the default position, which excludes no row.
   bool is_given() const { return t != -std::numeric_limits<float>::infinity(); }
   // Returns whether `hit` comes after this position.
   bool is_before(const Hit& hit) const { return std::tie(t, id, triangle) < std::tie(hit.t, hit.id, hit.triangle); }

@@ -1,5 +1,5 @@
-// Search by the vector kernels for the triangles of a mesh that are nearest to a point in mesh axes. It runs in steps,
-// so that the caller can measure the candidates of a step, lower the limit and stop between two steps:
+// Search by the vector kernels for the triangles of a mesh that are nearest to a point in mesh axes. The search runs in
+// steps, so that the caller can measure the candidates of a step, lower the limit and stop between two steps:
 //
 //   NearestSearch search(tree, point, limit, NearestSearch::Find::kNearest, slack);
 //   while (!search.over()) {

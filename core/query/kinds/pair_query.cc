@@ -130,7 +130,8 @@ struct PairSearch {
   }
 };
 
-// Visitor of all objects that finds the objects within max_distance of one object. Used for brute force.
+// Visitor that finds the objects within max_distance of one object. Used only with brute force, so it visits all
+// objects.
 class Partners {
  public:
   Partners(const PairSearch& search, const GridRef& object, std::vector<Partner>& rows)

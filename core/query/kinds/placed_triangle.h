@@ -1,7 +1,7 @@
 // Axis-aligned bounds of an instance's triangles in world axes. CONSERVATIVE queries test the bounds of
-// PlacedTriangles. EXACT rays, sweeps and overlap queries find a triangle only if they also intersect its wider
-// bounds, which LoosePlacedTriangles computes. Without this condition, rounding could make the exact tests report a
-// triangle that is far away in the world, because these tests run in mesh axes.
+// PlacedTriangles. An EXACT ray, sweep or overlap query finds a triangle only if the query also intersects the wider
+// bounds of the triangle, which LoosePlacedTriangles computes. Without this condition, an exact test, which runs in
+// mesh axes, could report a triangle that is far away in the world, because of rounding.
 //
 // Both classes are immutable and borrow the instance; any number of threads may share one object.
 #ifndef LOCUS_CORE_QUERY_KINDS_PLACED_TRIANGLE_H_

@@ -9,7 +9,8 @@
 namespace locus {
 namespace {
 
-// Returns the position of an object at the time `moment`, or of an instance.
+// Returns the position of the object `id` at the time `moment`, or of the instance `id`. Returns nullopt if neither
+// exists.
 std::optional<Vec3d> position_of(const SceneSnapshot& snapshot, const SceneAtTime& moment, Id id) {
   if (const GridRef object = moment.objects().find_ref(id)) return moment.shape(object).position;
   if (const Instance* instance = snapshot.statics->find(id)) return instance->transform.translation;

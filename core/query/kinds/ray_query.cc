@@ -81,9 +81,10 @@ class InstanceVisitor {
   HitCollector& collector_;
 };
 
-// Returns whether the vector kernels trace `rays` through the instances. They trace all of the rays or none: usually,
-// either all rays of a block have a position `after`, or no ray has one. The kernels return the first hits in a mesh,
-// so they cannot trace a ray that needs the first hits after a given position.
+// Returns whether the vector kernels trace `rays` through the instances. The kernels trace EXACT rays only. They return
+// the first hits in a mesh, so they cannot trace a ray with a position `after`, which needs the first hits after this
+// position. If any ray has a position `after`, the kernels trace none of the rays, because usually either all rays of a
+// block or none have one.
 bool use_kernels(const QueryTask& task, const std::vector<PendingRay>& rays) {
   if (rays.front().request.precision != Precision::kExact || task.ray_kernels() == nullptr) return false;
   return std::none_of(rays.begin(), rays.end(), [](const PendingRay& ray) { return ray.request.after.is_given(); });

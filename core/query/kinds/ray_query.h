@@ -66,9 +66,9 @@ RayAnswers run_rays(QueryTask& task, const QueryBlock& block, const RayColumns& 
 
 struct PendingRay;
 
-// Finds the hits of rays that all have the same mode, precision and source, and offers them to their collectors.
-// moment_of(i) returns the objects at the time of ray i. Sets is_cut for rays whose search is not complete because the
-// batch ended.
+// Finds the hits of each ray and offers them to the collector of the ray. All rays must have the same mode, precision
+// and source. moment_of(i) returns the objects at the time of ray i. Sets is_cut for rays whose search is not complete
+// because the batch ended.
 void find_hits(QueryTask& task, std::vector<PendingRay>& rays, absl::FunctionRef<const SceneAtTime&(size_t)> moment_of);
 
 // Surface at a hit: barycentric weights of the triangle's second (u) and third (v) vertex, and the unit normal of the

@@ -27,7 +27,7 @@ struct Segment {
   bool is_blocked = false;
 };
 
-// One viewer of a block: its filter, and its segments.
+// One viewer of a block: computes the filters, vectors and rays of its segments.
 class Viewer {
  public:
   Viewer(const QueryBlock& block, const SightColumns& sight, size_t index)
@@ -124,9 +124,9 @@ class Look {
   // If the scene has at most this number of instances, all segments are tested against each instance. Otherwise each
   // segment searches the tree over instances.
   static constexpr size_t kFewInstances = 8;
-  // Number of segments that are tested in one call in the first pass of trace(), which has one segment per target. A
-  // block of triangles that blocks one of these segments becomes the hint of the segments after it. The number doubles
-  // after each call that finds no blocked segment, because kernels are faster with many segments.
+  // Initial number of segments per kernel call in the first pass of trace(), which tests one segment per target. If a
+  // call finds a blocked segment, the block of triangles that blocks the segment becomes the hint for the next calls.
+  // The number doubles after each call that finds no blocked segment, because kernels are faster with many segments.
   static constexpr size_t kSegmentsAtOnce = 16;
 
   bool uses_kernels() const {
@@ -139,9 +139,9 @@ class Look {
     if (sight_.eyes_per_viewer() > 1) is_seen_[sample] = 1;
   }
 
-  // Collects the segments from the eye to the samples that are not seen yet, sorted by target so that neighbouring
-  // targets have similar directions. Samples at the eye itself count as seen. Samples farther away than max_distance_
-  // are not seen.
+  // Collects the segments from the eye to the samples that are not seen yet. Segments of the same target stay together,
+  // and targets in similar directions are neighbours. Samples at the eye itself count as seen. Samples farther away
+  // than max_distance_ are not seen.
   void gather(absl::Span<char> seen) {
     segments_.clear();
     if (sight_.eyes_per_viewer() > 1 && is_seen_.empty()) is_seen_.resize(sight_.targets.size() / 3);

@@ -89,10 +89,10 @@ class TriangleSearch {
   RegionVisit visit_;
 };
 
-// Finds the triangles of many regions, with or without kernels, one region after another. Writes the number of
-// triangles of each region to `counts`, and the indices of these triangles to `triangles`. Returns the number of
-// regions answered. All regions are answered unless `triangles` is too short. A length of tree.size() + kMinRegionRoom
-// per region is always sufficient. `counts` has one entry per region.
+// Finds the triangles of many regions, with or without kernels. Writes the number of triangles of each region to
+// `counts`, and the indices of these triangles to `triangles`. Returns the number of regions answered. All regions are
+// answered unless `triangles` is too short. A length of tree.size() + kMinRegionRoom per region is always sufficient.
+// `counts` has one entry per region.
 size_t find_triangles(const TriangleBvh& tree, absl::Span<const Ballf> balls, absl::Span<uint32_t> counts,
                       absl::Span<uint32_t> triangles);
 size_t find_triangles(const TriangleBvh& tree, absl::Span<const Obbf> boxes, absl::Span<uint32_t> counts,

@@ -41,8 +41,8 @@ struct RunOptions {
   // any thread. If it returns a status that is not OK, the batch ends with this status. If `stop` is empty, the batch
   // is never stopped.
   std::function<absl::Status()> stop;
-  // Wall clock in nanoseconds with any origin, read before and after each chunk, on any thread. If `clock` is empty,
-  // each call of work() runs one chunk.
+  // Wall clock in nanoseconds with any origin, read at the start of each call of work() and after each chunk, on any
+  // thread. If `clock` is empty, each call of work() runs one chunk.
   std::function<uint64_t()> clock;
   // CPU time of the calling thread in nanoseconds. `work_clock` may be slow: each call of work() calls `work_clock`
   // only about twice for each block on which the call works. If `work_clock` is empty, `clock` is used instead; if
@@ -61,9 +61,10 @@ struct QueryCost {
 
 class BatchRun {
  public:
-  // Maximum number of chunks that run, or that are done and wait until an earlier chunk is written out. While there are
-  // this many such chunks, no chunk of further queries is started. A chunk that split() made may be started while there
-  // are fewer than 2 * kMaxChunks such chunks, or if it is the first chunk in batch order.
+  // Limit of the number of begun chunks: chunks that run, and chunks that are done but wait until an earlier chunk is
+  // written out. A chunk of further queries is started only if there are fewer than kMaxChunks begun chunks. A chunk
+  // that split() made is started only if there are fewer than 2 * kMaxChunks begun chunks, or if the chunk is the first
+  // one in batch order.
   static constexpr size_t kMaxChunks = 16;
 
   // Prepares the execution of `batch`, which has passed check_batch(): resolves the as_of times of its queries and
@@ -76,8 +77,8 @@ class BatchRun {
   // AnswerSink in batch order, up to the first chunk that is not finished.
   Progress work(uint64_t nanoseconds) LOCUS_EXCLUDES(mutex_);
 
-  // Returns OK, or the status with which RunOptions::stop ended the batch; the caller must then discard `answer`. Valid
-  // once work() has returned kDone.
+  // Returns OK, or the status with which RunOptions::stop ended the batch. The caller must discard `answer` if the
+  // status is not OK. Valid once work() has returned kDone.
   absl::Status status() const { return control_.stopped() ? control_.status() : absl::OkStatus(); }
   // Return the cost of the block with the index `block`, and the cost of the whole batch. Valid once work() has
   // returned kDone.
@@ -132,8 +133,8 @@ class BatchRun {
   Chunks::iterator begin_chunk() LOCUS_REQUIRES(mutex_);
   Chunks::iterator pop_unstarted() LOCUS_REQUIRES(mutex_);
   // Moves the queries of `chunk` from `reached` on into two new, unstarted chunks directly after `chunk`. Each new
-  // chunk gets half of these queries; a single query needs only one new chunk. With only one new chunk in all cases,
-  // a block of few, expensive queries would be worked on by one thread at a time.
+  // chunk gets half of these queries; a single query needs only one new chunk. If there were only one new chunk each
+  // time, only one thread at a time could work on a block of few, expensive queries.
   void split(Chunks::iterator chunk, size_t reached) LOCUS_REQUIRES(mutex_);
   // Adds an unstarted chunk of the queries [begin, end) of the block of `before`, directly after `before`.
   void insert_unstarted(Chunks::iterator before, size_t begin, size_t end) LOCUS_REQUIRES(mutex_);

@@ -26,23 +26,23 @@ void write_no_surface(const RowSpans& to, size_t row);
 void write_triangle_rows(const Hit& hit, absl::Span<const uint32_t> triangles, const RowSpans& to, size_t row);
 // Writes one row per object, starting at row 0. The pose of an object is its pose at `moment`.
 void write_object_rows(absl::Span<const FoundObject> objects, const SceneAtTime& moment, const RowSpans& to);
-// Writes those of the columns uv, normal and point that the block returns, for a hit of a ray. The point is relative to
-// `frame`.
+// Writes the columns uv, normal and point for a hit of a ray, except columns that the block does not return. The point
+// is relative to `frame`.
 void write_surface(const RayRequest& request, Vec3d frame, const Hit& hit, Winding winding, const RowSpans& to,
                    size_t row);
 
-// Writes those of the columns t, normal and point that the block returns, for a row of a ball or capsule query.
-// `solid` is the query's ball or capsule in world axes, represented by a mover that rests. `triangle` is the triangle
-// whose contact is computed, or kNoTriangle for an object. `triangle` is also kNoTriangle for a CONSERVATIVE row of a
-// whole instance: then the contact is with the bounds of the instance. The point is relative to `frame`.
+// Writes the columns t, normal and point for a row of a ball or capsule query, except columns that the block does not
+// return. `solid` is the query's ball or capsule in world axes, represented by a mover that rests. `triangle` is the
+// triangle whose contact is computed, or kNoTriangle for an object. `triangle` is also kNoTriangle for a CONSERVATIVE
+// row of a whole instance: then the contact is with the bounds of the instance. The point is relative to `frame`.
 void write_overlap_contact(const Mover& solid, Precision precision, Vec3d frame, const Hit& hit, uint32_t triangle,
                            const RowSpans& to, size_t row);
 
-// Writes those of the columns normal and point that the block returns, for a hit of a sweep. The point is relative to
-// `frame`.
-void write_contact(const SweepRequest& request, Vec3d frame, const Hit& hit, const RowSpans& to, size_t row);
-// Writes those of the columns uv, normal and point that the block returns, for a row of a nearest query. The point is
+// Writes the columns normal and point for a hit of a sweep, except columns that the block does not return. The point is
 // relative to `frame`.
+void write_contact(const SweepRequest& request, Vec3d frame, const Hit& hit, const RowSpans& to, size_t row);
+// Writes the columns uv, normal and point for a row of a nearest query, except columns that the block does not return.
+// The point is relative to `frame`.
 void write_nearest_surface(const NearestRequest& request, Vec3d frame, const Hit& hit, Winding winding,
                            const RowSpans& to, size_t row);
 

@@ -69,7 +69,7 @@ inline absl::Status data_loss(absl::string_view what) { return absl::DataLossErr
 class ByteReader {
  public:
   // Creates a reader that borrows `bytes`. Precondition: the address of `bytes` is a multiple of 8; AlignedBytes
-  // provides such bytes.
+  // provides aligned bytes.
   explicit ByteReader(absl::string_view bytes) : left_(bytes) {
     LOCUS_DCHECK(reinterpret_cast<uintptr_t>(bytes.data()) % ByteWriter::kAlignment == 0);
   }
@@ -95,8 +95,8 @@ class ByteReader {
     fail(what, "is out of range");
     return 0;
   }
-  // Reads the number of items that follow. Fails if the remaining bytes cannot hold so many items of at least
-  // `min_bytes` bytes each.
+  // Reads the number of items that follow. Fails if this number of items, of at least `min_bytes` bytes each, does not
+  // fit into the remaining bytes.
   uint64_t count(size_t min_bytes, const char* what) {
     LOCUS_DCHECK_GT(min_bytes, 0u);
     return number_upto(left_.size() / min_bytes, what);
@@ -115,8 +115,8 @@ class ByteReader {
     left_.remove_prefix(padded);
     return {first, values};
   }
-  // Reads a column that ByteWriter::shared_column() wrote: `entries` entries of `width` values each, or a single entry
-  // that applies to all items.
+  // Reads a column that ByteWriter::shared_column() wrote: `entries` entries of `width` values each, or one entry of
+  // `width` values if all entries are equal.
   template <class T>
   absl::Span<const T> shared_column(size_t entries, size_t width, const char* what) {
     const absl::Span<const T> values = column<T>(what);

@@ -1,6 +1,6 @@
-// Encodes and decodes meshes as chunks for the log. Meshes of different names with equal vertices and indices share one
-// stored copy of these. Parts (named ranges of triangles) are stored for each name. The tree is not included: its
-// topology is cached separately, see tree_codec.h. One thread at a time.
+// Encodes and decodes meshes as chunks for the log. Equal vertices and indices are stored once, even if several mesh
+// names use them. Parts (named ranges of triangles) are stored for each name. The tree is not included: its topology is
+// cached separately, see tree_codec.h. One thread at a time.
 #ifndef LOCUS_CORE_SCENE_LOG_MESH_CODEC_H_
 #define LOCUS_CORE_SCENE_LOG_MESH_CODEC_H_
 

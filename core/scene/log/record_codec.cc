@@ -19,9 +19,9 @@ enum Flag : uint32_t {
   kAllFlags = 31,
 };
 
-// Lower bounds of encoded sizes in bytes. The decoder refuses a count if the remaining bytes of the record cannot hold
-// so many items, because a damaged count could otherwise make the decoder reserve too much memory.
-constexpr size_t kMinListBytes = 32;  // at least four columns in each insert, move or relabel, with 8-byte lengths
+// Lower bounds of encoded sizes in bytes. The decoder refuses a count if the counted items cannot fit into the
+// remaining bytes of the record. Otherwise a damaged count could make the decoder reserve too much memory.
+constexpr size_t kMinListBytes = 32;  // an insert, move or relabel has at least four columns with 8-byte lengths
 constexpr size_t kMinBatchBytes = 96;
 constexpr size_t kMinPlacementBytes = 32 + 7 * 8;
 

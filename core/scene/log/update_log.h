@@ -1,10 +1,10 @@
-// Interface of the durable storage of scenes and meshes: for each scene a snapshot of its state, followed by records
-// with sequence numbers without gaps. The log stores bytes, which the caller encodes (core/scene/log/record_codec.h),
-// and detects damage of the stored bytes. Implemented in server/storage; the daemon's main() passes it to the scenes.
+// Interface of the durable storage of scenes and meshes. A scene is stored as a snapshot of its state and the later
+// records, which have consecutive sequence numbers. The log stores bytes, which the caller encodes
+// (core/scene/log/record_codec.h), and detects damage of the stored bytes. Implemented in server/storage; the daemon's
+// main() passes it to the scenes.
 //
-// A future replicated log can implement this interface. For this purpose, the sequence numbers of a scene have no gaps,
-// every record has the epoch of the scene and the writer id and number of its batch, and the durability of an ack is an
-// AckLevel.
+// A future replicated log can implement this interface. For this purpose, every record has the epoch of the scene and
+// the writer id and number of its batch, and the durability of an ack is an AckLevel.
 //
 // Threads: every member may be called from any thread, but append() for a scene only from one thread at a time. Calls
 // wait for the disk. Errors of all members: RESOURCE_EXHAUSTED if the disk is full, DATA_LOSS naming the damaged item,
@@ -40,7 +40,7 @@ enum class AckLevel : uint8_t {
 struct LogEntry {
   uint64_t epoch = 0;
   uint64_t writer = 0;      // writer id of the batch, or of the last joined batch; 0: no writer id
-  uint64_t batch = 0;       // number of this batch in the sequence of its writer; 0: no number
+  uint64_t batch = 0;       // number of the same batch in the sequence of its writer; 0: no number
   absl::string_view bytes;  // at most kMaxRecordBytes
 };
 

@@ -50,7 +50,8 @@ class TickMoves {
   // and every further move extends its FastMover::centers, however short the move is. kNewborn: the object was inserted
   // in this tick, so its moves do not count.
   enum class Kind : uint8_t { kOrdinary, kListed, kNewborn };
-  // State of an object when the tick began, written when the object first moves in the tick or is inserted.
+  // Entry of an object, written when the object is inserted or first moves in the tick. Its position and extent are
+  // those of the object when the tick began; they have no meaning if the object was inserted in the tick (kNewborn).
   struct Start {
     Vec3d position;
     uint64_t tick = 0;  // value of tick_ when this entry was written; if tick_ differs, the entry is stale

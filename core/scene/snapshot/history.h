@@ -63,7 +63,7 @@ class HistoryRecorder {
   // `tick` < `next_tick`. O(records + memory that the tick changed).
   void close(uint64_t tick, const ObjectSet& objects, const Displacement& since_last, uint64_t next_tick);
   // Measures how much memory of the last record is not shared with `now`, the current objects, and drops the oldest
-  // records if all records exceed HistoryOptions::bytes. Only the first call after each close() has an effect.
+  // records if all records together exceed HistoryOptions::bytes. Only the first call after each close() has an effect.
   void measure(const ObjectSet& now);
   // Drops all records.
   void drop();

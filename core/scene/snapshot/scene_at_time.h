@@ -32,7 +32,7 @@ class SceneAtTime {
  public:
   // Creates a view of `objects` at their stored positions.
   explicit SceneAtTime(const ObjectSet& objects) : at_(&objects) {}
-  // Creates a view of the objects `at`, interpolated towards `next` with 0 <= weight < 1. `displacement` is the
+  // Creates a view of the objects `at`, interpolated towards `next` with 0 <= weight <= 1. `displacement` is the
   // displacement from `at` to `next`.
   SceneAtTime(const ObjectSet& at, const ObjectSet& next, double weight, const Displacement& displacement);
 
@@ -73,8 +73,8 @@ class SceneAtTime {
                                      [](const FastMover& mover, uint32_t value) { return mover.handle < value; });
     return at != fast_->end() && at->handle == handle;
   }
-  // Calls visit() for each fast mover for which might_meet() returns true for the bounds of the mover along its path.
-  // Returns false as soon as visit() returns false.
+  // Passes the bounds of the path of each fast mover to might_meet(), and calls visit() for the mover if the result is
+  // true. Stops and returns false as soon as visit() returns false.
   template <class MightMeet, class Visit>
   bool visit_fast(const MightMeet& might_meet, Work& work, const Visit& visit) const;
 

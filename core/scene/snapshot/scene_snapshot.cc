@@ -17,12 +17,12 @@ const HistoryRecord* first_record(const SceneSnapshot& snapshot, uint64_t tick) 
   return first == records.end() ? nullptr : first->get();
 }
 
-// Returns the bytes of the history records of `held` that `later` does not hold. For a record whose tick `later` has
-// dropped, adds HistoryRecord::bytes. This number does not include the memory that the record shares with the next
-// record of `held`. If `later` has dropped the next record as well, the shared memory is included in the bytes of the
-// next record; otherwise `later` still holds the shared memory. The last record of `held` has no next record: its bytes
-// do not include the memory that it shares with the first revision after its tick. The caller counts the part of this
-// memory that belongs to held.objects.
+// Returns the number of bytes that the history of `held` holds and the history of `later` does not hold. For a record
+// whose tick `later` has dropped, adds HistoryRecord::bytes. This number does not include the memory that the record
+// shares with the next record of `held`. If `later` has dropped the next record as well, the shared memory is included
+// in the bytes of the next record; otherwise `later` still holds the shared memory. The last record of `held` has no
+// next record: its bytes do not include the memory that it shares with the first revision after its tick. The caller
+// counts the part of this memory that belongs to held.objects.
 uint64_t unshared_history_bytes(const SceneSnapshot& held, const SceneSnapshot& later) {
   if (held.history == nullptr || held.history == later.history) return 0;
   uint64_t bytes = 0;
@@ -42,8 +42,8 @@ uint64_t unshared_history_bytes(const SceneSnapshot& held, const SceneSnapshot& 
 uint64_t unshared_bytes(const SceneSnapshot& held, const SceneSnapshot& later) {
   LOCUS_DCHECK_LE(held.revision, later.revision);
   const uint64_t statics = held.statics == later.statics ? 0 : held.statics->bytes();
-  // Compare with the oldest set of objects since `held` that `later` holds: this set shares the most memory with
-  // `held`.
+  // Among the sets of objects that `later` holds, the first set at or after the tick of `held` shares the most memory
+  // with `held`.
   const HistoryRecord* next = first_record(later, held.tick);
   return statics + held.objects.unshared_bytes(next == nullptr ? later.objects : next->objects) +
          unshared_history_bytes(held, later);

@@ -15,7 +15,7 @@ enum class Winding : uint8_t { kCounterClockwise, kClockwise };
 
 struct SceneSnapshot {
   uint64_t epoch = 0;     // identifies one unbroken sequence of revisions
-  uint64_t revision = 0;  // one higher after each applied batch or static change
+  uint64_t revision = 0;  // one higher after each static change, and after each batch that changes the scene
   uint64_t tick = 0;      // time step of the caller, set by update batches
   Winding winding = Winding::kCounterClockwise;
   std::shared_ptr<const StaticSet> statics;

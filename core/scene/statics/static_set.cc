@@ -82,7 +82,7 @@ absl::Status refuse_group_zero(const StaticChange& change) {
                          static_cast<uint32_t>(zero - change.remove_groups.begin()), "0 means no group");
 }
 
-// Ids of the instances of a new set while it is built. Checks the ids of placements, or chooses ids for them.
+// Ids of the instances of a set that is being built. Checks the ids of placements, or chooses ids for them.
 class InstanceIds {
  public:
   InstanceIds(const std::function<bool(Id)>& is_object, uint64_t seed) : is_object_(is_object), next_id_(seed) {}

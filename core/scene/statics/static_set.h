@@ -49,9 +49,9 @@ class StaticSet {
     std::vector<Id> placed;  // ids of the placed instances, in the order of the request
   };
   // Returns a new set without the instances that the change removes, and with the instances that the change places.
-  // `is_object` returns true for the id of an object; no instance may get such an id. The ids that the set chooses have
-  // bit 63 set and count up from `seed` + 1, skipping ids that are taken. An error refuses the whole change and names
-  // the field and index of the invalid value. O(instances).
+  // `is_object` returns true for the id of an object; no instance may have the id of an object. The ids that the set
+  // chooses have bit 63 set and count up from `seed` + 1, skipping ids that are taken. An error refuses the whole
+  // change and names the field and index of the invalid value. O(instances).
   absl::StatusOr<Changed> apply(const StaticChange& change, const std::function<bool(Id)>& is_object,
                                 uint64_t seed) const;
 

@@ -17,7 +17,7 @@ namespace locus {
 
 class MoveApplier {
  public:
-  // Returns true if the batch only moves objects.
+  // Returns true if the batch only moves objects and does not restart ticks.
   static bool serves(const UpdateBatch& batch);
 
   // Reads one batch. Preconditions: the batch has passed check_form(), and serves(batch) is true. O(items).
@@ -31,7 +31,7 @@ class MoveApplier {
   void add(const ObjectStore& objects, const UpdateBatch& batch);
   void finish(const ObjectStore& objects);
 
-  // Removes the moves of the last run().
+  // Removes the moves of the last run() or finish().
   void clear() {
     clear_scratch(moves_);
     clear_scratch(rotations_);

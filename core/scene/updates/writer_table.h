@@ -1,9 +1,10 @@
 // Table of the last batch and ack of each known writer, so that a batch that is sent twice is applied once. If the
 // table is full, the least recently active writer is evicted. The next batch of an evicted writer is refused, because
-// the table cannot know whether this batch was applied before. If the stored acks would list more than kMaxKeptErrors
-// errors, the acks of all writers are dropped, but the writers and their batch numbers are kept. A value type; one
-// thread at a time. Invariants: at most limits::kMaxWriters writers are stored, no writer id is 0, and no activity
-// count exceeds clock_; kept_errors_ is the number of errors in all stored acks, at most kMaxKeptErrors.
+// the table cannot know whether this batch was applied before. However, if an evicted writer repeats its batch 1, the
+// table takes the writer for a new one, and the batch is applied again. If the stored acks would list more than
+// kMaxKeptErrors errors, the acks of all writers are dropped, but the writers and their batch numbers are kept. A value
+// type; one thread at a time. Invariants: at most limits::kMaxWriters writers are stored, no writer id is 0, and no
+// activity count exceeds clock_; kept_errors_ is the number of errors in all stored acks, at most kMaxKeptErrors.
 #ifndef LOCUS_CORE_SCENE_UPDATES_WRITER_TABLE_H_
 #define LOCUS_CORE_SCENE_UPDATES_WRITER_TABLE_H_
 

@@ -1,5 +1,5 @@
-// Verifies a data directory for `locusd check` and for repair(). Reads every byte of the directory and changes no file.
-// Free functions; any thread.
+// Verifies a data directory for `locusd check`; repair() uses the same report. Reads every byte of the database, unless
+// the database cannot be opened, and changes no file. Free functions; any thread.
 #ifndef LOCUS_SERVER_STORAGE_INTEGRITY_CHECK_H_
 #define LOCUS_SERVER_STORAGE_INTEGRITY_CHECK_H_
 

@@ -204,7 +204,7 @@ absl::Status make_copy(const Database& source, const DamageReport& damage_report
 
 // Moves the old database and marker into the folder before-repair-N, and the new database and marker from repaired/
 // into the data directory. Precondition: repaired/READY, which contains the path of before-repair-N, exists. Writing
-// READY is the commit point of a repair: after a later crash, the next call of repair() only does the moves that are
+// READY is the commit point of a repair: after a later crash, the next call of repair() first does the moves that are
 // still missing.
 absl::Status install_repaired(const StorageOptions& options, std::string& kept_at) {
   rocksdb::Env& env = *options.env;

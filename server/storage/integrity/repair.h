@@ -35,7 +35,7 @@ struct MeshRepair {
 
 struct RepairReport {
   DirectoryReport found;            // state found before the repair
-  bool changed = false;             // whether files were changed; false if everything was intact
+  bool changed = false;             // whether the database described by `found` was replaced by a repaired one
   std::vector<SceneRepair> scenes;  // damaged scenes only
   std::vector<MeshRepair> meshes;   // damaged meshes only
   std::string kept_at;              // folder to which the old database was moved
@@ -45,10 +45,9 @@ struct RepairReport {
 };
 
 // Repairs the directory. Needs disk space for a copy of the intact part. After an error or a crash, either the
-// directory is unchanged, or the next call of repair() finishes this repair. Errors: NOT_FOUND if there is no data
-// directory; FAILED_PRECONDITION if a process has the directory open or this version of locusd does not know its
-// format; DATA_LOSS if no part is readable; RESOURCE_EXHAUSTED if the disk is full; UNAVAILABLE if the disk fails
-// otherwise.
+// directory is unchanged, or the next call of repair() finishes this repair. Errors: NOT_FOUND if the directory does
+// not exist; FAILED_PRECONDITION if a process has it open or this version of locusd does not know its format; DATA_LOSS
+// if no part is readable; RESOURCE_EXHAUSTED if the disk is full; UNAVAILABLE for any other error of the disk.
 absl::StatusOr<RepairReport> repair(const StorageOptions& options);
 
 // Returns the report as text for people, with one line for each damaged scene and mesh.

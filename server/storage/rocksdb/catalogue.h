@@ -53,7 +53,8 @@ class Catalogue {
   void apply(const CatalogueChange& change);
   void fail(const CatalogueChange& change);
 
-  // Adds the checksums of `rows` to `totals.scene_sum` or `totals.mesh_sum`.
+  // Adds the checksums of the scene rows among `rows` to `totals.scene_sum`, those of all other rows to
+  // `totals.mesh_sum`.
   static void add_sums(const Rows& rows, CatalogueRow& totals);
 
  private:

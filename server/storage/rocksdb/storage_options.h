@@ -46,7 +46,8 @@ struct StorageOptions {
   // Receives RocksDB's warnings. If the function is empty, the warnings are dropped.
   StorageWarning warn;
 
-  // If false, records are acknowledged without a sync. Only for tests that must be able to detect lost records.
+  // If false, records and changes of the catalogue are acknowledged without a sync. Only for tests, which show with
+  // this option that they detect lost records.
   bool sync = true;
 };
 

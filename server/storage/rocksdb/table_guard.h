@@ -1,6 +1,6 @@
 // File system that refuses to open tables (.sst files) whose properties block is damaged. RocksDB uses that block
 // before it verifies the block's checksum, and Debian's build of RocksDB aborts the process if the block is damaged.
-// With this guard RocksDB returns an error instead, as for other damaged tables.
+// With this guard RocksDB returns an error instead, as it does if another part of a table is damaged.
 //
 // Threads: any thread, as rocksdb::FileSystem requires.
 #ifndef LOCUS_SERVER_STORAGE_ROCKSDB_TABLE_GUARD_H_
@@ -18,7 +18,8 @@ class TableGuard final : public rocksdb::FileSystemWrapper {
   explicit TableGuard(const std::shared_ptr<rocksdb::FileSystem>& files) : FileSystemWrapper(files) {}
 
   const char* Name() const override { return "locus.TableGuard"; }
-  // Opens a file. Returns Corruption if the file is a table whose last blocks do not match their checksums.
+  // Opens a file. Returns Corruption if the file is a table and its footer is malformed, or its metaindex or properties
+  // block does not match the block's checksum.
   rocksdb::IOStatus NewRandomAccessFile(const std::string& path, const rocksdb::FileOptions& options,
                                         std::unique_ptr<rocksdb::FSRandomAccessFile>* file,
                                         rocksdb::IODebugContext* context) override;

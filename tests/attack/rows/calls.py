@@ -51,7 +51,8 @@ def random_bytes(job):
             method = chance.choice([method for method in methods if "Watch" not in method.path])
             body = bytes(chance.randrange(256) for _ in range(chance.randrange(200)))
             job.check(connection.call(method.path, body), f"{method.path}, seed {SEED}")
-            if job.front == "edge":  # the front refuses more than 200 calls in 100 ms, and drops at 1,000
+            # The front refuses calls beyond 200 in 100 ms, and closes the connection beyond 1,000.
+            if job.front == "edge":
                 time.sleep(EDGE_PAUSE_SECONDS)
 
 

@@ -13,7 +13,7 @@
 namespace locus::bench::dynamic {
 
 // Load that runs at the same time as the readers: none, a thread that only spins, or the writer. The spinning thread
-// shows what a busy second core alone costs.
+// shows how much a busy second core alone slows the readers.
 enum class Beside : uint8_t { kNothing, kSpinning, kWriter };
 
 // Priority of readers relative to the writer. kEqual: equal. kBelow: lower, like the priority of the daemon's threads

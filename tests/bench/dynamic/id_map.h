@@ -37,7 +37,7 @@ class IdMap {
   std::vector<uint32_t> free_;
 };
 
-// A caller's object, by index.
+// Object of a contender that stores its objects in an array. IdMap translates an id to the index in this array.
 struct Body {
   Vec3f position;
   float radius = 0;

@@ -27,8 +27,8 @@ class MixedBatches {
   std::vector<float> centers_, origins_, directions_;
 };
 
-// Returns the number of objects that a box query far larger than the world finds: each object of the world exactly
-// once.
+// Counts the objects by a box query that is far larger than the world. The query must find each object of the world
+// exactly once.
 size_t count_objects(const SceneSnapshot& snapshot);
 
 }  // namespace locus::bench::dynamic

@@ -51,7 +51,7 @@ class MoveRace {
       ticks_.emplace_back(run_.world.moves());
     }
   }
-  // Reads the columns, so that every contender finds them in the caches, as a server does after it has received them.
+  // Reads the columns, so that they are in the caches for every contender, as in a server that has just received them.
   void touch() {
     for (const Tick& tick : ticks_)
       touched_ += static_cast<double>(std::accumulate(tick.ids.begin(), tick.ids.end(), uint64_t{0})) +

@@ -1,5 +1,5 @@
 // The code by which the dynamic suite calls locus: the scene's writer, the scene's index without the query engine, and
-// whole batches as the server runs them. Only mixed_batches.h calls locus by code of its own. One thread; latest() and
+// whole batches as the server runs them. Only mixed_batches.h also calls locus directly. One thread; latest() and
 // status() may be called from any thread, like those of Scene.
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_OURS_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_OURS_H_

@@ -12,7 +12,7 @@ namespace locus::bench::dynamic {
 namespace {
 
 constexpr std::array<uint32_t, 3> kAges = {1, 10, 30};  // age of a recorded tick: ticks before the present
-constexpr float kFraction = 0.5f;                       // time of the queries after the recorded tick, in ticks
+constexpr float kFraction = 0.5f;                       // queried time: this many ticks after a recorded tick
 constexpr uint32_t kTicks = 32;  // number of ticks that run before the queries, all kept in the history
 constexpr uint64_t kHistoryBytes = uint64_t{8} << 30;
 constexpr size_t kCalls = 10;     // number of batches into which the queries are divided

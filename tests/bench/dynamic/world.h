@@ -29,7 +29,7 @@ enum class Kind : uint8_t { kUniform, kClustered, kFar, kOneCell, kBorder, kGian
 inline constexpr std::array<Kind, 7> kKinds = {Kind::kUniform, Kind::kClustered, Kind::kFar,  Kind::kOneCell,
                                                Kind::kBorder,  Kind::kGiant,     Kind::kMixed};
 const char* name_of(Kind kind);
-// Returns whether all radii of such a world are 0.5.
+// Returns whether all radii of a world of this kind are 0.5.
 constexpr bool has_one_size(Kind kind) { return kind != Kind::kGiant && kind != Kind::kMixed; }
 // Returns the count in short form, such as 10k or 1M.
 std::string name_of_count(uint32_t count);

@@ -14,8 +14,9 @@ namespace locus::bench::log {
 
 class RawFile {
  public:
-  // Creates a file. If `reserved` is not 0, first writes at least this number of zeros to the disk, which the records
-  // then overwrite, so that a sync need not write a new file length. Returns the system's error on failure.
+  // Creates a file. If `reserved` is not 0, first writes at least this number of zero bytes to the file and syncs them.
+  // The records overwrite the zeros, so that a sync need not write a new file length. Returns the system's error on
+  // failure.
   static absl::StatusOr<std::unique_ptr<RawFile>> create(const std::string& path, uint64_t reserved);
   ~RawFile();
   RawFile(const RawFile&) = delete;

@@ -14,7 +14,7 @@ namespace {
 
 constexpr uint32_t kPlanes = 32;
 constexpr size_t kPoints = 1'000, kQuickPoints = 20;
-// Number of cells that are compared with those of a test of all triangles or objects.
+// Number of cells that are verified by a test of all triangles or objects.
 constexpr size_t kProvedCells = 10;
 constexpr float kDistance = 0.05f;  // distance at which the cells end, as a part of the mesh's diagonal
 constexpr uint64_t kSeed = 521;

@@ -24,7 +24,7 @@ struct CellWork {
 // Measures one case, and checks the cells of the first points.
 void run_cells(const Options& options, const std::string& name, const CellWork& work, Report& report);
 
-// Runs the case on a mesh: random points of its bounds.
+// Runs the case on a mesh: cells around random points of its bounds.
 void run_cell_cases(const Options& options, const Progress& progress, const BenchMesh& mesh, Report& report);
 
 }  // namespace locus::bench::queries

@@ -59,7 +59,7 @@ struct Arena {
 
   dynamic::Objects objects;
   SnapshotPtr snapshot;
-  std::unique_ptr<ObjectPeer> peer;  // null without a peer
+  std::unique_ptr<ObjectPeer> peer;  // null if Bullet is not installed
 };
 
 test::BlockResult answer(const SceneSnapshot& snapshot, QueryBlock block, bool brute_force = false) {

@@ -1,5 +1,6 @@
 // Cases of the suite `queries` on 100,000 moving objects: pairs within a distance, cells of free space, and objects in
-// frustums. Peers are Bullet's btDbvt and, for pairs, a ball query around each object.
+// frustums. The peers are Bullet's btDbvt for pairs and frustums, a ball query around each object for pairs, and a test
+// of all objects for cells.
 #ifndef LOCUS_TESTS_BENCH_QUERIES_OBJECT_CASES_H_
 #define LOCUS_TESTS_BENCH_QUERIES_OBJECT_CASES_H_
 

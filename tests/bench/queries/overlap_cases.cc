@@ -48,7 +48,8 @@ class OurOverlaps {
     for_each_row(run(columns), begin, [&](size_t i, uint32_t triangle) { rows.emplace_back(i, triangle); });
   }
 
-  // Appends the same rows as find_directly(), but asks balls around the capsules and tests each triangle of the answer.
+  // Appends the same rows as find_directly(), but queries balls around the capsules and tests each triangle of the
+  // answer.
   void find_in_two_passes(size_t begin, size_t end, std::vector<CapsuleRow>& rows) const {
     // Slightly more than the sum of radius and half length, so that rounding of the sum cannot lose a triangle.
     const float radius = (kCapsuleRadius + kCapsuleHalf) * mesh_.diagonal * (1 + 0x1p-18f);

@@ -16,8 +16,8 @@ namespace locus::bench::queries {
 // Returns a scene whose only content is the mesh, placed as instance 1 without rotation.
 SnapshotPtr scene_of(const BenchMesh& mesh);
 
-// Answers a batch of one block as the server does or, with `brute_force`, by testing all values. The batch must be
-// valid.
+// Answers a batch of one block as the server does. With `brute_force`, tests all objects and triangles instead of
+// searching the indexes. The batch must be valid.
 test::BlockResult answer_of(const SceneSnapshot& snapshot, QueryBlock block, bool brute_force = false);
 
 // Returns a cell of the suite for the results with this hash. `metric` is, for example, "ns/sweep".

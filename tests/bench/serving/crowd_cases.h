@@ -1,6 +1,6 @@
 // Cases that measure the effects of one client on another, and of a flood of calls on the server. They measure small
 // batches while another client sends large batches, a server that gets more calls than it admits, clients that do not
-// read or that reconnect, and expired and cancelled calls. Used by the suite serving.
+// read or that reconnect, and expired and cancelled calls. Used by the benchmark suite `serving`.
 #ifndef LOCUS_TESTS_BENCH_SERVING_CROWD_CASES_H_
 #define LOCUS_TESTS_BENCH_SERVING_CROWD_CASES_H_
 

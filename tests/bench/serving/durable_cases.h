@@ -1,5 +1,5 @@
-// Cost of acks that wait for the disk, and the time until a daemon that was killed answers again. Used by the suite
-// serving.
+// Cost of acks that wait for the disk, and the time until a daemon that was killed answers again. Used by the benchmark
+// suite `serving`.
 #ifndef LOCUS_TESTS_BENCH_SERVING_DURABLE_CASES_H_
 #define LOCUS_TESTS_BENCH_SERVING_DURABLE_CASES_H_
 

@@ -1,6 +1,6 @@
 // Cost of messages without the work of queries and updates: columns to the server and back, rays that hit nothing, and
-// duplicate moves, which are not applied again. They are compared with as many bytes over plain sockets; moves that are
-// applied are compared with moves in this process. Used by the suite serving.
+// duplicate moves, which are not applied again. These messages are compared with the same number of bytes over plain
+// sockets. Moves that are applied are compared with moves in this process. Used by the suite serving.
 #ifndef LOCUS_TESTS_BENCH_SERVING_ECHO_CASES_H_
 #define LOCUS_TESTS_BENCH_SERVING_ECHO_CASES_H_
 

@@ -112,8 +112,8 @@ class EndingCases {
     return status.error_code() == expected;
   }
 
-  // Waits until the server is idle. Returns how much processor time the server has used in excess of `before` seconds,
-  // in milliseconds. Processor time does not depend on the machine's other load.
+  // Waits until the server is idle. Returns the processor time in milliseconds that the server has used since
+  // computed() returned `before`. Processor time does not depend on the machine's other load.
   double settle(double before) const {
     double last = computed();
     for (int i = 0; i < 200; ++i) {

@@ -1,5 +1,5 @@
 // Processor time that the server spends on a call whose caller no longer waits, because the deadline has passed or the
-// call was cancelled. Used by the suite serving.
+// call was cancelled. Used by the benchmark suite `serving`.
 #ifndef LOCUS_TESTS_BENCH_SERVING_ENDING_CASES_H_
 #define LOCUS_TESTS_BENCH_SERVING_ENDING_CASES_H_
 

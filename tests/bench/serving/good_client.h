@@ -1,5 +1,5 @@
-// A well-behaved client: it sends one small batch after another over a stream of its own. The times that it waits for
-// answers show the effect of other clients. Used by every case in which other clients run too. One thread.
+// A well-behaved client: it sends one small batch after another over a stream of its own. Its latencies show the effect
+// of other clients. Used by every case in which other clients run too. One thread.
 #ifndef LOCUS_TESTS_BENCH_SERVING_GOOD_CLIENT_H_
 #define LOCUS_TESTS_BENCH_SERVING_GOOD_CLIENT_H_
 
@@ -16,7 +16,8 @@ class GoodClient {
  public:
   static constexpr size_t kRays = 16;  // rays per batch
 
-  // Opens a stream, and computes in this process the answers to `batches`, with which ask() compares the server's.
+  // Opens a stream, and computes in this process the expected answers to `batches`. ask() compares the server's answers
+  // with them.
   GoodClient(const ServingRun& run, TwinScene& scene, const std::string& case_name, Batches batches);
 
   // Sends `count` batches and appends to `seconds` the time until each was answered.

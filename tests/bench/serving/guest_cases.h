@@ -1,6 +1,6 @@
 // Measures how a client is affected by other clients: by some that do not read, and by hundreds that connect and leave.
-// Also measures which of the server's resources stay occupied after these other clients have left. Used by the suite
-// serving.
+// Also measures which of the server's resources stay occupied after these other clients have left. Used by the
+// benchmark suite `serving`.
 #ifndef LOCUS_TESTS_BENCH_SERVING_GUEST_CASES_H_
 #define LOCUS_TESTS_BENCH_SERVING_GUEST_CASES_H_
 

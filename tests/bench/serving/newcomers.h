@@ -17,7 +17,7 @@ class Newcomers {
   // Client number i sends the batch with index i modulo the number of batches. Borrows the daemon.
   Newcomers(const Daemon& daemon, const Batches& batches);
 
-  // Lets `count` clients come and go. Errors are stored in status().
+  // Runs `count` clients. Errors are stored in status().
   void run(size_t count);
   // Sends every batch by a client of its own; returns a hash of each answer, in the order of the batches.
   std::vector<uint64_t> hashes();

@@ -1,6 +1,6 @@
-// Programs that a benchmark starts, and their resources according to the kernel. Used by the suite serving. Only one
-// thread uses an object. The kernel kills a program when the thread that started it ends, even if that thread is
-// killed.
+// Programs that a benchmark starts, and their resources according to the kernel. Used by the benchmark suite `serving`.
+// Only one thread uses an object. The kernel kills a program when the thread that started it ends, even if that thread
+// is killed.
 #ifndef LOCUS_TESTS_BENCH_SERVING_PROCESS_H_
 #define LOCUS_TESTS_BENCH_SERVING_PROCESS_H_
 

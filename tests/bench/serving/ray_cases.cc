@@ -84,8 +84,9 @@ class RayCases {
  private:
   size_t chunks() const { return run_.options.quick ? 1 : 8; }
 
-  // Notes in the report whether the daemon's ray rate, divided by the ray rate of direct calls of the core, reaches its
-  // required minimum. The minimum is computed from `cost`, the nanoseconds that one core takes for a ray without gRPC.
+  // Notes in the report whether the ratio of the daemon's ray rate to the ray rate of direct calls of the library
+  // reaches its required minimum. The minimum is computed from `cost`: the nanoseconds that one thread takes for a ray
+  // in process, without gRPC.
   void note_overhead_bar(const Work& work, const Size& size, double cost) const {
     constexpr double kNameHolds = 0.2;
     note_bar(run_.report, size.share * cost / (cost + size.overhead),

@@ -1,5 +1,5 @@
-// Moves and balls over one connection, in a flat world, compared with GEOADD and GEOSEARCH of Redis. Used by the suite
-// serving.
+// Moves and balls over one connection, in a flat world, compared with GEOADD and GEOSEARCH of Redis. Used by the
+// benchmark suite `serving`.
 #ifndef LOCUS_TESTS_BENCH_SERVING_REDIS_CASES_H_
 #define LOCUS_TESTS_BENCH_SERVING_REDIS_CASES_H_
 

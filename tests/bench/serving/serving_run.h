@@ -51,8 +51,8 @@ inline void add_cell(const ServingRun& run, Cell cell, const std::string& peer, 
   run.report.add(std::move(cell));
 }
 
-// Returns the number of passes, at most 100, that together take about 0.1 s. In so many passes the time of starting
-// threads and filling windows does not matter. Calls `pass` once to measure it; in a quick run returns 1.
+// Returns the number of passes, at most 100, that together take about 0.1 s, so that the time of starting threads and
+// filling windows does not matter. Calls `pass` once to measure it; in a quick run returns 1.
 template <class Run>
 size_t passes_of_a_chunk(const ServingRun& run, const Run& pass) {
   if (run.options.quick) return 1;

@@ -50,7 +50,7 @@ test::BatchResult answer_here(const SceneSnapshot& snapshot, const QueryBatch& b
 uint64_t hash_of(const test::BatchResult& result);
 uint64_t hash_of(const v1::QueryResult& result);
 
-// Returns the number of rows of a result: one for each ray, and the objects in balls.
+// Returns the number of rows of a result: one for each ray, and one for each object in a ball.
 size_t rows_of(const v1::QueryResult& result);
 
 }  // namespace locus::bench::serving

@@ -40,8 +40,8 @@ struct RegionTally {
   size_t all_ids = 0;            // ids that locus found in all queries
   std::string first_difference;  // a sentence; empty if there is none
 };
-// Compares the ids of one query, which may be in any order. `overlaps(id)` returns whether the query reaches a
-// triangle, by core/geometry. Adds differences to the tally, and reports an error of locus at once.
+// Compares the ids of one query, which may be in any order. `overlaps(id)` tests by core/geometry whether the query
+// reaches triangle `id`. Adds differences to the tally, and reports an error of locus at once.
 template <class Overlaps>
 void compare_ids(const std::string& where, std::vector<uint32_t> ours, std::vector<uint32_t> theirs, Overlaps overlaps,
                  RegionTally& tally, Report& report);

@@ -28,7 +28,7 @@ struct BenchMesh {
 absl::StatusOr<BenchMesh> bench_mesh(const std::string& name, const std::vector<cli::ImportedMesh>& meshes);
 
 // Loads or generates `mesh`, a text whose form the help of the program describes. Returns the error of import_file() or
-// bench_mesh(), or INVALID_ARGUMENT for a generated mesh with a wrong number.
+// bench_mesh(), or INVALID_ARGUMENT if the text of a generated mesh has a wrong number.
 absl::StatusOr<BenchMesh> load_mesh(const std::string& mesh);
 
 }  // namespace locus::bench

@@ -1,6 +1,7 @@
-// The rays of the proof that no ray misses: random rays; rays aimed at the interiors, edges and corners of triangles;
-// rays that start on triangles, graze triangles or start far away; and rays along the lattice of a mesh from the planes
-// of the mesh's walls. The rays depend only on the state of the random generator.
+// Rays for the proof that no ray passes through a mesh without a hit: random rays; rays aimed at the interiors, edges
+// and corners of triangles; rays that start on triangles, graze triangles or start far away; and, for meshes whose
+// vertices lie on a lattice, rays that start at a lattice point, usually in the plane of a wall, and run along an axis
+// or a diagonal. The rays depend only on the state of the random generator.
 #ifndef LOCUS_TESTS_SUPPORT_PROOF_PROOF_RAYS_H_
 #define LOCUS_TESTS_SUPPORT_PROOF_PROOF_RAYS_H_
 

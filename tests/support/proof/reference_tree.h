@@ -90,8 +90,8 @@ class ReferenceTree {
       }
       pad = 0x1p-30 * reach;
       for (int axis = 0; axis < 3; ++axis) {
-        // Treat the ray as parallel to the planes of a slab if the ray's distance from the planes changes by less than
-        // the pad over the whole reach.
+        // Treat the ray as parallel to the planes of a slab if its direction component across them is tiny: then the
+        // ray's distance from the planes changes by far less than the pad over the whole reach.
         parallel[axis] = std::abs(direction[axis]) < 1e-25 * longest;
         inverse[axis] = parallel[axis] ? 0 : 1 / direction[axis];
       }

@@ -1,6 +1,6 @@
-// Completion script of each shell. The scripts for bash and zsh share functions that are written in the language of sh.
-// The functions of fish are written separately, because the language of fish differs. Internal to the completion
-// scripts.
+// Completion script of each shell. The scripts for bash and zsh share the functions that read the table, which use only
+// syntax that both shells accept. The functions for fish are written separately, because the language of fish differs.
+// Internal to extras/completion/.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_COMPLETION_SHELL_SCRIPTS_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_COMPLETION_SHELL_SCRIPTS_H_
 

@@ -2,8 +2,8 @@
 // without state; threads may share a camera.
 //
 // The rays are bit-identical on every machine: they are computed in double with only +, -, *, / and square roots, and
-// then rounded to float once. The tangent of the angle of view, in which math libraries differ, is rounded to float
-// immediately, which hides the difference.
+// then rounded to float once. The only other function is the tangent of half the angle of view. Math libraries differ
+// in its last bits, so it is rounded to float immediately, which hides the difference.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_RENDER_CAMERA_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_RENDER_CAMERA_H_
 
@@ -36,8 +36,8 @@ struct Camera {
   Vec3d eye;  // position in world coordinates
   ViewAxes axes;
   Projection projection = Projection::kPerspective;
-  // Half the height of the image in world units. For perspective projection this is the height at distance 1 from the
-  // eye; for orthographic projection the height is the same at every distance.
+  // Half the height of the image in world units. With perspective projection this is half the height at distance 1 from
+  // the eye; with orthographic projection it is the same at every distance.
   double half_height = 1;
 };
 

@@ -20,10 +20,8 @@ std::array<Vec3d, 8> corners_of(const Aabbd& box) {
 }
 
 // Maxima over all corners of a box. A corner is (x, y, z) in the view's axes (right, up, forward) relative to the box's
-// centre. w is the slope of the edge of the view: half the width of the picture at distance 1, and 0 for orthographic
-// projection. `right` is the maximum of x - w z, and `left` is the maximum of -x - w z. `up` and `down` are the same
-// maxima with y instead of x, and with half the picture's height in w instead of half its width. `near` is the maximum
-// of -z.
+// centre. w and h are half the width and half the height of the picture at distance 1; both are 0 for orthographic
+// projection. `right` is the maximum of x - w z, `left` of -x - w z, `up` of y - h z, `down` of -y - h z, `near` of -z.
 struct Reach {
   double right = -std::numeric_limits<double>::infinity();
   double left = right, up = right, down = right, near = right;

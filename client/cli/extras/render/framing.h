@@ -22,12 +22,13 @@ Vec3d three_quarter_view(Vec3d up);
 
 // Returns the camera with these axes and this lens that is nearest to `bounds` and shows all of it. Exception: if the
 // lens is orthographic and its half_height is not 0, the picture can be too small to show all of it. `bounds` must not
-// be empty. A box that is a single point is treated as a box of side 1. Method: let w be the slope of the picture's
-// left and right edges. Seen from the eye (ex, ey, ez), a corner at (x, y) and depth z in the view's axes lies between
-// these edges if |x - ex| <= w (z - ez). Over all corners, let a be the maximum of x - w z, and b the maximum of -x - w
-// z. Then all corners lie between the edges if a + w ez <= ex <= -b - w ez. The nearer the eye is to the box, the
-// larger is ez. The largest possible ez is the one at which both bounds of ex are equal. The condition in y gives a
-// second maximum of ez; the smaller of the two maxima is used.
+// be empty. A box that is a single point is treated as a box of side 1. Method for perspective projection: all
+// coordinates are along the view's axes (right, up, forward), and w is the slope of the picture's left and right edges.
+// Seen from the eye (ex, ey, ez), a corner (x, y, z) lies between these edges if |x - ex| <= w (z - ez). Over all
+// corners, let a be the maximum of x - w z, and b the maximum of -x - w z. Then all corners lie between the edges if
+// a + w ez <= ex <= -b - w ez. The nearer the eye is to the box, the larger is ez. The largest possible ez is the one
+// at which both bounds of ex are equal. The condition in y gives a second maximum of ez; the smaller of the two maxima
+// is used. Finally the distance to the box's centre is multiplied by the margin of the lens.
 Camera frame_box(const Aabbd& bounds, const ViewAxes& axes, const Lens& lens);
 
 }  // namespace locus::cli

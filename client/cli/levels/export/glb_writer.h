@@ -6,8 +6,8 @@
 // that it writes: transforms within 0.01 of the identity are dropped, and vertices nearer than 1e-5 to each other are
 // merged. Moreover, assimp needs 400 bytes of memory per triangle.
 //
-// Invariants: every accessor lies within the file's single buffer; node 0 is the root, and every other top-level node
-// is its child.
+// Invariants: every accessor lies within the file's single buffer; node 0 is the root, and the nodes that add_node()
+// and add_group() add are its children.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_EXPORT_GLB_WRITER_H_
 #define LOCUS_CLIENT_CLI_LEVELS_EXPORT_GLB_WRITER_H_
 

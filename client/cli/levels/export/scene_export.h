@@ -2,8 +2,8 @@
 // One object exports one file in one thread.
 //
 // The node of an instance draws the instance's mesh; each mesh is written once, however many instances use it. The node
-// of an object draws the unit shape of the object's kind, scaled to the object's size. A size of 0 is replaced by
-// kMinDrawnSize, since editors cannot handle a scale of 0.
+// of an object draws the unit shape of the object's kind, scaled to the object's size. Sizes below kMinDrawnSize are
+// replaced by kMinDrawnSize, since editors cannot handle a scale of 0.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_EXPORT_SCENE_EXPORT_H_
 #define LOCUS_CLIENT_CLI_LEVELS_EXPORT_SCENE_EXPORT_H_
 

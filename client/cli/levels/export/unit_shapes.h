@@ -1,6 +1,6 @@
-// Meshes of the object shapes at unit size. Each mesh is written once and drawn, scaled, by every object of its kind.
-// The meshes that make up one shape form a closed surface together. Triangles are counter-clockwise seen from outside.
-// Functions without state.
+// Meshes of the object shapes at unit size. Each mesh is written once; all objects of its kind draw it, each at its own
+// scale. The meshes that make up one shape form a closed surface together. Triangles are counter-clockwise seen from
+// outside. Functions without state.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_EXPORT_UNIT_SHAPES_H_
 #define LOCUS_CLIENT_CLI_LEVELS_EXPORT_UNIT_SHAPES_H_
 

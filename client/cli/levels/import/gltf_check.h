@@ -18,9 +18,9 @@ namespace locus::cli {
 // Returns RESOURCE_EXHAUSTED if a limit of import_limits.h is exceeded. The bytes are untrusted. Cost: linear.
 absl::StatusOr<std::vector<std::string>> check_gltf(absl::string_view bytes);
 
-// Returns the path in a file reference: `uri` without its percent-encoding. Returns INVALID_ARGUMENT for an absolute
-// path, a URL with a scheme, a path with "..", a backslash or a control character, and RESOURCE_EXHAUSTED for a path of
-// more than kMaxReferenceBytes.
+// Returns the path in a file reference: `uri` without its percent-encoding. Returns INVALID_ARGUMENT if the path is
+// empty, is absolute, or contains a colon (as a URL does), a folder "..", a backslash or a control character. Returns
+// RESOURCE_EXHAUSTED if `uri` has more than kMaxReferenceBytes.
 absl::StatusOr<std::string> path_of_reference(absl::string_view uri);
 
 }  // namespace locus::cli

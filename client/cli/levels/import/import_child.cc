@@ -79,7 +79,7 @@ void reset_signals() {
   sigprocmask(SIG_SETMASK, &none, nullptr);
 }
 
-// Closes all files except the pipe and the standard streams.
+// Moves the pipe to kAnswerDescriptor, and closes all other files except the standard streams.
 bool keep_only(int pipe_end) {
   if (pipe_end != kAnswerDescriptor && dup2(pipe_end, kAnswerDescriptor) < 0) return false;
   if (close_range(kAnswerDescriptor + 1, ~0u, 0) == 0) return true;

@@ -17,11 +17,11 @@ struct LevelFiles {
   std::map<std::string, std::string> referenced;  // content of each other file, keyed by its URI in the level file
 };
 
-// Reads a file and, if it is a glTF or GLB file, the files to which its buffers refer. Each of these files must be a
-// regular file in the folder of `path` or below it, even after symbolic links are followed. All files together must not
-// exceed kMaxImportFileBytes. No other file is read: neither images nor the material library of an OBJ file. Returns
-// the errors of read_input_file(), check_gltf() and path_of_reference(), NOT_FOUND for a missing file, INVALID_ARGUMENT
-// for a reference that leads out of the folder.
+// Reads the file `path` and, if it is a glTF or GLB file, the files to which its buffers refer. Each referenced file
+// must be a regular file in the folder of `path` or below it, even after symbolic links are followed. All files
+// together must not exceed kMaxImportFileBytes. No other file is read: neither images nor the material library of an
+// OBJ file. Returns the errors of read_input_file(), check_gltf() and path_of_reference(), NOT_FOUND for a missing
+// file, INVALID_ARGUMENT for a reference that leads out of the folder.
 absl::StatusOr<LevelFiles> read_level_files(const std::string& path);
 
 }  // namespace locus::cli

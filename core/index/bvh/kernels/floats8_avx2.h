@@ -260,7 +260,7 @@ static inline void pack_numbers(const uint32_t* from, uint32_t count, uint32_t s
   _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), _mm256_permutevar8x32_epi32(all_numbers, pack_permutation(set)));
 }
 
-// Copies `count` numbers from `from` to `to`. May overwrite up to seven elements behind the copied numbers.
+// Copies `count` numbers from `from` to `to`. May overwrite up to seven elements after the copied numbers.
 static inline void copy_numbers(const uint32_t* from, uint32_t count, uint32_t* to) {
   for (uint32_t done = 0; done < count; done += 8)
     _mm256_storeu_si256(reinterpret_cast<__m256i*>(to + done), load_numbers(from + done, count - done));

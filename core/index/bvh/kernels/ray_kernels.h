@@ -69,7 +69,7 @@ struct RayKernels {
   // Finds the nearest hit of each of `count` rays. One call with many rays is faster than many calls, because the rays
   // are traced interleaved. Each answer depends only on its own ray.
   void (*first)(const TriangleTree& tree, const KernelRay* rays, KernelHit* hits, size_t count);
-  // Determines whether each of `count` rays hits any triangle.
+  // Determines for each of `count` rays whether it hits a triangle.
   void (*any)(const TriangleTree& tree, const KernelRay* rays, KernelHit* hits, size_t count);
   // Finds all hits of each ray or, if a ray has more than `max_rows` hits, its lowest `max_rows` hits by (t, triangle
   // number). Precondition: `max_rows` >= 1. The rows of ray i begin at rows[i * max_rows] and are not sorted. The rows

@@ -114,7 +114,7 @@ class Projection {
 
  private:
   // Chooses the axis z in double for the rays in the mask `ties`, whose largest components are equal in float.
-  // TriangleRay must choose the same axis, because the last bits of t depend on it.
+  // The choice must be that of TriangleRay, because the last bits of t depend on the axis.
   void decide_ties(uint32_t ties, const KernelRay* rays, size_t count) {
     alignas(32) float x[kTreeWidth], y[kTreeWidth];
     is_x_.store(x);

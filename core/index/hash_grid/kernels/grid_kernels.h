@@ -58,9 +58,10 @@ struct GridNear {
 
 struct GridKernels {
   const char* name;
-  // Write to `slots`, in increasing order within each row, the slots of the values whose bounds may intersect the box,
-  // line or ball. Return the number of these values. `slots` has room for kMaxValues elements and one vector of eight
-  // more.
+  // Write to `slots`, in increasing order within each row, the slots of the values that may satisfy the query, and
+  // return their number. cull_box() and cull_line() keep every value whose bounds may intersect the box or line;
+  // cull_ball() keeps every value that may share a point with the ball. `slots` has room for kMaxValues elements and
+  // one vector of eight more.
   uint32_t (*cull_box)(const GridRows& rows, const GridBox& box, uint32_t* slots);
   uint32_t (*cull_line)(const GridRows& rows, const GridLine& line, uint32_t* slots);
   uint32_t (*cull_ball)(const GridRows& rows, const GridBall& ball, uint32_t* slots);

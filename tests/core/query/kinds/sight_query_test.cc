@@ -1,5 +1,5 @@
-// Sight in a small world: a viewer at the origin, a wall of group 7 at x = 4, a ball of group 8 at x = 6, and targets
-// behind the wall and the ball.
+// Sight, mostly in a small world with a wall of group 7 at x = 4 and a ball of group 8 at x = 6. Viewers and targets
+// stand on both sides of the wall and of the ball.
 #include "core/query/kinds/sight_query.h"
 
 #include <gmock/gmock.h>

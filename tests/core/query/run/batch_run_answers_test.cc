@@ -13,7 +13,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-// Returns a world of `count` balls around the origin, with ids from 1.
+// Returns a world of `count` balls, all centred at the origin, with ids from 1.
 QueryWorld crowd(Id count) {
   QueryWorld world;
   for (Id id = 1; id <= count; ++id) world.objects.push_back(ball_object(id, {0, 0, 0}));
