@@ -34,9 +34,10 @@ std::optional<BoxOverlap> overlap_with_triangle(Vec3d half, Vec3d a, Vec3d b, Ve
 std::optional<BoxOverlap> overlap_with_box(Vec3d half, Vec3d center, Vec3d other_half, const Rotation& rotation,
                                            Vec3d velocity);
 
-// Return a point that the box of half extents `half`, widened by 2^-36 of the magnitudes, shares with the triangle or
-// with the other box. If there is no such point, return the point of the triangle, or of the other box, that is nearest
-// to the centre of the box.
+// Return a point of the triangle, or of the other box, that lies in the box of half extents `half`. This box is first
+// widened by 2^-36 of the sum of its largest half extent and the largest |coordinate| of the triangle or other box, to
+// cover rounding errors. If there is no such point, return the point of the triangle, or of the other box, that is
+// nearest to the centre of the box.
 Vec3d shared_point(Vec3d half, Vec3d a, Vec3d b, Vec3d c);
 Vec3d shared_point(Vec3d half, Vec3d center, Vec3d other_half, const Rotation& rotation);
 

@@ -1,5 +1,6 @@
-// Distance between two shapes, and the extent of a shape along a direction. Shapes are closed solids. Pure functions of
-// products, sums, quotients and square roots in double, in a fixed order; any thread.
+// Distance between two shapes, and the extent of a shape along a direction. Shapes are closed solids. Pure
+// functions; any thread. They compute only with sums, products, quotients and square roots of doubles, in a fixed
+// order, so that results are the same on every machine.
 #ifndef LOCUS_CORE_GEOMETRY_SHAPE_DISTANCE_H_
 #define LOCUS_CORE_GEOMETRY_SHAPE_DISTANCE_H_
 

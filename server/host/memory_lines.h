@@ -1,8 +1,8 @@
 // The lines of the memory budget as an operator sees them: each use of memory, with its ceiling. The memory of work in
 // progress is claimed (server/scheduling/memory_budget.h); lasting data, such as scenes, is measured. All lines add up
 // to about the memory of the process, because all memory that is in no other line belongs to the line `network`. The
-// sum that the budget keeps below the memory limit can be larger than the sum of the lines: it counts memory that is
-// claimed and already allocated twice.
+// sum that the budget keeps below the memory limit can be larger than the sum of the lines, because it counts twice
+// the memory that is both claimed and allocated.
 //
 // Plain functions; any thread. Cost: O(scenes + meshes + memory that pinned revisions do not share).
 #ifndef LOCUS_SERVER_HOST_MEMORY_LINES_H_

@@ -71,11 +71,10 @@ http::response<http::string_body> response_of(const Request& request, HttpReply 
 std::string certificate_name_of(PlainStream&) { return {}; }
 
 std::string certificate_name_of(TlsStream& stream) {
-  X509* const certificate = SSL_get1_peer_certificate(stream.native_handle());
+  const std::unique_ptr<X509, decltype(&X509_free)> certificate(SSL_get1_peer_certificate(stream.native_handle()),
+                                                                X509_free);
   if (certificate == nullptr || SSL_get_verify_result(stream.native_handle()) != X509_V_OK) return {};
-  std::string name = certificate_name(*certificate);
-  X509_free(certificate);
-  return name;
+  return certificate_name(*certificate);
 }
 
 // One connection. The handler of each pending operation shares ownership of the session, so the session is destroyed

@@ -96,8 +96,8 @@ absl::Status UpdateQueue::refuse(const SceneQueue& scene_queue, uint64_t items) 
                      static_cast<double>(scene_queue.items + items), retry);
 }
 
-// Returns whether the caller may apply the batch itself. Batches that scan all objects, or whose ack waits for the
-// disk, are always queued.
+// Returns whether the caller may apply the batch itself. Batches that scan all objects or drop the history, or
+// whose ack waits for the disk, are always queued.
 bool UpdateQueue::fits_inline(const Scene& scene, const UpdateBatch& batch, uint64_t items) const {
   if (waits_for_disk(scene) || batch.clear || batch.restart_ticks || !batch.remove_groups.empty()) return false;
   const double nanoseconds = static_cast<double>(items) * nanoseconds_per_item_.load(std::memory_order_relaxed);

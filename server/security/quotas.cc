@@ -240,8 +240,8 @@ QuotaUse Quotas::use_of(const Account& account, QuotaKind kind) {
   return use;
 }
 
-// Returns the account of a subject, filled up to `now`. If the subject has no account, adds one. Returns nullptr if the
-// table is full and no account can be evicted.
+// Returns the account of a subject, after refilling its buckets for the time until `now` and adopting the current
+// quota. If the subject has no account, adds one. Returns nullptr if the table is full and no account can be evicted.
 Quotas::Account* Quotas::account(absl::string_view subject, uint64_t now) {
   const auto found = slots_.find(subject);
   Account* const account = found != slots_.end() ? &accounts_[found->second] : add(subject, now);

@@ -4,32 +4,32 @@
 // query scheduler.
 //
 //   READING
-//   begin() --> read() --error------------------------------------------------> done
+//   begin() --> read() --error--------------------------------------------> answer()
 //                 |
-//                 v      the revision may still be published, and no drain
-//               look() ------------------------------> PARKED --give_up()-----> done
+//                 v      not published yet, and no drain
+//               look() ------------------------------> PARKED --give_up()-> answer()
 //                 |  ^                                    |
 //                 |  +--- timer, or woken() by the watch -+
-//                 +--error: epoch, range, deadline, deleted, draining ---------> done
+//                 +--error: epoch, range, deadline, deleted, draining -----> answer()
 //                 | pinned
 //                 v
-//               run() --no memory, or error of BatchRun::prepare() ------------> done
+//               run() --no memory, or error of BatchRun::prepare() --------> answer()
 //                 |  \ estimate >= inline_nanoseconds
 //                 |   \-----------------------+
 //                 v                           v
-//              DEFERRED --not finished--> submit() --queue is full ------------> done
+//              DEFERRED --not finished--> submit() --queue is full --------> answer()
 //                 |                           |
 //                 | finished                  v
-//                 |                        QUEUED --give_up(), withdrawn ------> done
+//                 |                        QUEUED --give_up(), withdrawn --> answer()
 //                 |                           | all pool threads have left it
 //                 v                           v
 //              finished() <---- post ------ done()
 //                 |
-//                 +--> columns, metrics, or the error of the run --------------> done
+//                 +--> columns, metrics, or the error of the run ----------> answer()
 //
-// The words in capitals are values of State. `done` means answer(), which frees the work's data, calls
-// CallSlot::answered() once and sets the state to IDLE. give_up() has an effect in PARKED and QUEUED only: in the other
-// states the running code checks Caller::stop() itself.
+// The words in capitals are values of State. answer() frees the work's data, calls CallSlot::answered() once and sets
+// the state to IDLE. give_up() has an effect in PARKED and QUEUED only: in the other states the running code checks
+// Caller::stop() itself.
 //
 // Threads: all members run on the call's IO loop, except three. run_deferred() runs on a thread of the loop, without
 // the loop's lock, and calls work() there. After submit(), work() runs on several pool threads at the same time, and

@@ -250,7 +250,17 @@ TEST_F(FewCallsFaultTest, RefusedCallersThatRetryAreAllAnswered) {
   wait_until_nothing_is_in_work();
 }
 
-using LongFaultTest = FaultTest;
+// One address opens a thousand connections at once, more than the default limits admit.
+class LongFaultTest : public FaultTest {
+ protected:
+  LongFaultTest()
+      : FaultTest([] {
+          server::ServerConfig config = test_config();
+          config.max_connections_per_address = 4096;
+          config.max_new_connections = 4096;
+          return config;
+        }()) {}
+};
 
 TEST_F(LongFaultTest, AThousandCancelledCallsReleaseTheirResources) { give_up_calls(1000); }
 

@@ -216,7 +216,8 @@ inline KernelTrial sliver_trial() {
   return KernelTrial("slivers", slivers, questions);
 }
 
-// Makes a mesh that contains each triangle five times: among equal hits the lowest triangle number wins.
+// Makes a mesh that contains each triangle five times, and rays. Every hit is then a tie of five triangles, of which
+// the lowest triangle number must win.
 inline KernelTrial copies_trial() {
   std::vector<Triangle> copies;
   for (int copy = 0; copy < 5; ++copy)

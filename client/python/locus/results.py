@@ -75,12 +75,14 @@ class BlockResult:
 
     counts = _Column("Number of rows of each query: N uint32; empty if every query has one row (rays FIRST, lookups of "
                      "ids) or none (rays ANY, sight).", UINT32, by_row=False)
-    truncated = _Column("Indices of the queries that have more rows than are reported: uint32, ascending.",
+    truncated = _Column("Indices of the queries whose result is incomplete (more rows, work or planes than the limit): "
+                        "uint32, ascending.",
                         UINT32, by_row=False)
     hits = _Column("Rays ANY: N uint8, 1 if the ray has a hit, else 0.", UINT8, by_row=False)
     sight = _Column("Sight: VM uint8, viewer by viewer, the number of the target's samples that are seen; with `pairwise` "
                     "V uint8.", UINT8, by_row=False)
-    unanchored = _Column("Indices of the queries without rows because their anchor is unknown: uint32, ascending.",
+    unanchored = _Column("Indices of the queries without rows because their anchor is unknown or their position is outside "
+                         "the world: uint32, ascending.",
                          UINT32, by_row=False)
     t = _Column("R float32. Rays: t, whose unit is the length of the ray's direction; +infinity for a miss. Nearest: "
                 "the distance.", FLOAT32)

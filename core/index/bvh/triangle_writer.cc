@@ -51,8 +51,8 @@ TriangleArrays TriangleWriter::write() {
   return std::move(arrays_);
 }
 
-// Pushes the children in reverse order, so that the first child is popped next: the pops are in depth-first order.
-// Leaves are popped before inner nodes.
+// Pushes the inner nodes, then the leaves, each in reverse order of slots. So the leaves are popped first, then the
+// inner nodes, both in order of slots, and the pops are in depth-first order.
 void TriangleWriter::push_children(const WideChildren<float>& children, uint32_t parent, uint32_t depth,
                                    std::vector<Pending>& pending) {
   for (const bool leaves : {false, true})

@@ -205,7 +205,7 @@ class Look {
     }
     const Vec3d origin = instance.transform.point_to_mesh(eye_);
     uint32_t hint = kNoBlock;
-    // Search the first open segment of each target.
+    // Trace, for each target, the first of its segments in open_.
     now_.clear();
     const auto starts_target = [&](size_t k) {
       return k == 0 || segments_[open_[k]].target != segments_[open_[k - 1]].target;
@@ -222,7 +222,7 @@ class Look {
       now_.clear();
     }
     trace(instance, origin, hint);
-    // Search the other open segments of each target.
+    // Trace the remaining segments in open_.
     now_.clear();
     uint32_t first = 0;
     for (size_t k = 0; k < open_.size(); ++k) {

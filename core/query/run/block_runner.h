@@ -30,8 +30,8 @@ struct BlockOutput {
 
 class BlockRunner {
  public:
-  // Borrows all arguments. `max_bytes` is the free space of the reply in bytes: counted rows that exceed this space
-  // could not be written out, so the runner drops them and lists their queries as truncated.
+  // Borrows all arguments. `max_bytes` is the free space of the reply in bytes. The runner drops the rows of a kCounted
+  // block that do not fit into this space, and lists their queries as truncated.
   BlockRunner(QueryTask& task, const QueryBlock& block, const QueryTimes& times, const QueryOrigins& origins,
               BlockOutput& output, uint64_t max_bytes);
 

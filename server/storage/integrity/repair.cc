@@ -223,10 +223,13 @@ absl::Status install_repaired(const StorageOptions& options, std::string& kept_a
   }
   status = sync_folder(env, kept_at);
   if (status.ok()) status = sync_folder(env, here.string());
-  std::error_code failed;
-  if (status.ok()) fs::remove_all(repaired, failed);
-  if (status.ok()) status = sync_folder(env, here.string());
-  return status.ok() && !failed ? absl::OkStatus() : disk_error("finishing the repair", status);
+  if (status.ok()) {
+    std::error_code failed;
+    fs::remove_all(repaired, failed);
+    if (failed) return absl::UnavailableError(absl::StrCat("removing ", repaired.string(), ": ", failed.message()));
+    status = sync_folder(env, here.string());
+  }
+  return status.ok() ? absl::OkStatus() : disk_error("finishing the repair", status);
 }
 
 std::string next_backup_folder(const std::string& path) {
@@ -265,6 +268,17 @@ absl::StatusOr<std::unique_ptr<Database>> open_source(const StorageOptions& opti
   return database;
 }
 
+// Verifies the database and, unless it is intact, writes its intact parts to `folder`. Sets report.found. If the
+// database is intact, `folder` does not exist afterwards.
+absl::Status verify_and_copy(const StorageOptions& options, const DurableMarker* expected, const std::string& folder,
+                             RepairReport& report) {
+  ASSIGN_OR_RETURN(const auto source, open_source(options, expected, folder));
+  ASSIGN_OR_RETURN(const DamageReport damage_report, verify(*source, expected, Depth::kEverything));
+  report.found = report_of(damage_report);
+  if (report.found.intact() && !fs::exists(folder)) return absl::OkStatus();
+  return make_copy(*source, damage_report, expected, options, folder, report);
+}
+
 std::string outcome_of(const SceneRepair& scene) {
   if (scene.deleted) return "had been deleted and is deleted again: nothing is lost";
   if (scene.dropped) return "LOST: no part of it could be kept";
@@ -291,16 +305,11 @@ absl::StatusOr<RepairReport> repair(const StorageOptions& given) {
   fs::remove_all(folder, failed);
   const absl::StatusOr<DurableMarker> durable_marker = DurableMarkerFile::read(*options.env, options.path);
   const DurableMarker* expected = durable_marker.ok() ? &*durable_marker : nullptr;
-  {
-    ASSIGN_OR_RETURN(const auto source, open_source(options, expected, folder));
-    ASSIGN_OR_RETURN(const DamageReport damage_report, verify(*source, expected, Depth::kEverything));
-    report.found = report_of(damage_report);
-    if (report.found.intact() && !fs::exists(folder)) return report;
-    if (absl::Status status = make_copy(*source, damage_report, expected, options, folder, report); !status.ok()) {
-      fs::remove_all(folder, failed);
-      return status;
-    }
+  if (absl::Status copied = verify_and_copy(options, expected, folder, report); !copied.ok()) {
+    fs::remove_all(folder, failed);
+    return copied;
   }
+  if (!fs::exists(folder)) return report;
   fs::remove_all(absl::StrCat(folder, "/", kSalvageFolder), failed);
   rocksdb::Status status = sync_folder(*options.env, folder);
   if (status.ok())

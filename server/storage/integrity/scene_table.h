@@ -1,9 +1,8 @@
-// Table of the scenes' logs: the last written and the last synced record of each scene. fill_marker() copies this data
-// into the durable marker.
+// Table of the scenes' logs: the last written and the last synced record of each scene. fill_marker() copies the synced
+// positions into the durable marker, so the marker names only data that is already synced.
 //
 // Threads: every member may be called from any thread; the table's lock is held briefly, never during disk I/O.
 // Invariants: a scene's `synced` position is never after its `written` position, and neither position decreases.
-// Therefore fill_marker() names only data that is already synced.
 #ifndef LOCUS_SERVER_STORAGE_INTEGRITY_SCENE_TABLE_H_
 #define LOCUS_SERVER_STORAGE_INTEGRITY_SCENE_TABLE_H_
 

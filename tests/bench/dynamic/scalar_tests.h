@@ -1,5 +1,6 @@
-// Tests of one object, a ball, for peers that only cull by boxes: plain float code, as a user of such a library would
-// write it. Inline, since each peer's file is compiled on its own.
+// Intersection tests of a query with one object, a ball, for peers that only find candidates. Plain float code, as a
+// user of such a library would write it. Inline in a header, so that each peer's file compiles them with its own
+// options.
 #ifndef LOCUS_TESTS_BENCH_DYNAMIC_SCALAR_TESTS_H_
 #define LOCUS_TESTS_BENCH_DYNAMIC_SCALAR_TESTS_H_
 

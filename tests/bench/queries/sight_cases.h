@@ -9,8 +9,8 @@
 
 namespace locus::bench::queries {
 
-// Adds the cells of the cases that the filter wants. An answer that differs from the answers of its rays is a
-// disagreement.
+// Adds the cells of the cases that the filter wants. If the answer of a sight query differs from the answers to the
+// same segments as rays, adds a disagreement to the report.
 void run_sight_cases(const Options& options, const Progress& progress, const BenchMesh& mesh, Report& report);
 
 }  // namespace locus::bench::queries

@@ -8,8 +8,9 @@
 
 namespace locus::bench::serving {
 
-// Runs rays/90ns/1024, rays/90ns/8192, rays/270ns/1024, rays/270ns/8192, one_stream/1024, one_stream/8192. The required
-// ratio of the first four cases is computed from the cost of a ray in process.
+// Runs rays/90ns/1024, rays/90ns/8192, rays/270ns/1024, rays/270ns/8192, one_stream/1024, one_stream/8192. Each of the
+// first four cases must reach a minimum ratio of the daemon's ray rate to the ray rate of direct library calls; this
+// minimum is computed from the measured time of a ray in direct calls.
 absl::Status run_ray_cases(const ServingRun& run);
 
 }  // namespace locus::bench::serving

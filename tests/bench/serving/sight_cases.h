@@ -7,7 +7,8 @@
 
 namespace locus::bench::serving {
 
-// Runs the case if the options want it. Returns the error of a server that did not start or refused the level.
+// Runs the case if the options want it. Returns an error if the server does not start, refuses the
+// level, or fails a query.
 absl::Status run_sight_cases(const ServingRun& run);
 
 }  // namespace locus::bench::serving

@@ -4,7 +4,8 @@
 
 #include "tests/bench/static/two_sheets.h"
 
-// Tests of the drawn queries. Another program computed the expected values from the definition in workload.h.
+// Tests of the pseudo-random queries of the workload. An independent program computed the expected values from the
+// definition in workload.h.
 namespace locus::bench {
 namespace {
 

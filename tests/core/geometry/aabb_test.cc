@@ -59,7 +59,8 @@ TEST(AabbTest, SquaredDistanceIsZeroInsideAndExactOutside) {
   EXPECT_EQ(squared_distance(Vec3d{-3, 0.5, -4}, kUnit), 25);
 }
 
-// A superset of a box is never farther from a point and never smaller, so culling by any superset loses no result.
+// A superset of a box is never farther from a point than the box, and its magnitude() is never smaller. So culling by
+// any superset loses no result.
 TEST(AabbTest, ASupersetIsNeverFartherNorSmaller) {
   constexpr uint64_t kSeed = 71;
   test::Random random(kSeed);

@@ -148,7 +148,7 @@ Real core_distance(const ConvexRegion& region, const Shape& shape) {
     return length(projected(region, point) - point);
   };
   if (shape.kind == ShapeKind::kPoint || shape.kind == ShapeKind::kBall) return distance_of({});
-  // The distance is convex, so alternating projections on the region and the solid converge to the least distance.
+  // The distance is convex, so alternating projections onto the region and the core converge to the least distance.
   Vec3r local;
   Real best = distance_of(local);
   for (int round = 0; round < 3000; ++round) {

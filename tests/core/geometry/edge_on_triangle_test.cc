@@ -17,7 +17,7 @@ using test::Vec3q;
 TEST(EdgeOnTriangleTest, CasesFoundByTheProofAgreeWithTheReference) { EXPECT_EQ(test::edge_on_difference(), ""); }
 
 // Triangle, its transform, and a ray almost within the triangle's plane: the sine of the angle between the ray and the
-// plane can be as small as 2^-60.
+// plane can be below 2^-60.
 struct Grazing {
   Triangle triangle;
   Transform transform;
@@ -60,8 +60,8 @@ Grazing any_grazing(Random& random) {
   return grazing;
 }
 
-// Let e be the tolerance that tests/support/proof/ray_judge.h defines. A triangle that is not culled is
-// hit if the ray crosses the triangle at least e within its border. No hit is farther than e / 2 from the triangle.
+// Let e be the tolerance that tests/support/proof/ray_judge.h defines. A ray that crosses a triangle at least e inside
+// the triangle's border must hit the triangle, unless it is culled. No hit may be farther than e / 2 from the triangle.
 TEST(EdgeOnTriangleTest, HitsAreWithinTheToleranceAtEveryAngle) {
   constexpr uint64_t kSeed = 92;
   Random random(kSeed);

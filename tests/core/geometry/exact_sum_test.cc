@@ -30,7 +30,7 @@ TEST(ExactSumTest, ALargeNumberThatCancelsLeavesASmallOne) {
 }
 
 TEST(ExactSumTest, AProductIsAddedWithItsRoundingError) {
-  // (1 + e)^2 - (1 + 2 e) = e^2, which double rounds to 0.
+  // The exact value of (1 + e)^2 - (1 + 2 e) is e^2. In double, (1 + e)^2 is rounded to 1 + 2 e, so the result is 0.
   ExactSum<4> sum;
   const double e = 0x1p-40;
   sum.add(DoubleDouble(1 + e) * DoubleDouble(1 + e));

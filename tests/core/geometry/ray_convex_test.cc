@@ -23,7 +23,8 @@ TEST(RayBallTest, ATangentTouchesAndTheNextLineOutsideDoesNot) {
 }
 
 TEST(RayBallTest, AnObliqueTangentOfA345TriangleTouches) {
-  // The line through (5, 0) and (0, 20 / 3) is at distance 4 from the origin: 3-4-5 scaled.
+  // The line through (5, 0) and (0, 20 / 3) is at distance 4 from the origin, since this line and the axes form a
+  // triangle with sides in the ratio 3 : 4 : 5.
   const auto hit = ray_hit(test::ray_from({5, 0, 0}, {-3, 4, 0}), ball_at({0, 0, 0}, 4));
   ASSERT_TRUE(hit.has_value());
   EXPECT_DOUBLE_EQ(hit->t, 0.6);

@@ -141,7 +141,7 @@ Exact exact_verdict(const int64_t (&o)[3], const int64_t (&d)[3], const int64_t 
   const bool all_up = ab >= 0 && bc >= 0 && ca >= 0, all_down = ab <= 0 && bc <= 0 && ca <= 0;
   const int64_t sum = ab + bc + ca;
   if (!(all_up || all_down) || sum == 0) return Exact::kMiss;
-  // Proportional to the t at which the ray meets the triangle's plane, times the sign of `sum`.
+  // `height` times the sign of `sum` is a positive multiple of the t at which the ray meets the triangle's plane.
   const int64_t height = volume(p[0], p[1], p[2]);
   return (sum > 0 ? height : -height) >= 0 ? Exact::kHit : Exact::kMiss;
 }

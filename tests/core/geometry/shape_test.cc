@@ -147,8 +147,8 @@ TEST_P(ShapeOverlapTest, BoundsContainTheSolid) {
     if (shape.kind == ShapeKind::kCapsule)
       far = to_real(shape.size) * std::copysign(1.0L, dot(local, to_real(shape.size)));
     const Vec3r point = to_real(shape.position) + test::turned(shape.rotation, far) + unit * solid.core_radius();
-    // If the shape is not rotated, its bounds are sums that are exact except for one rounding, which the comparison
-    // must tolerate.
+    // Each bound of a ball or box without rotation is a sum that is rounded once. The comparison must tolerate this
+    // rounding.
     const Real magnitude = test::length(to_real(shape.position)) + test::largest_size(shape);
     const Real epsilon = shape.rotation.is_identity() ? 0x1p-52L * magnitude : 0;
     for (int axis = 0; axis < 3; ++axis) {

@@ -33,7 +33,9 @@ Columns unshared(const Columns& mesh) {
 
 uint64_t count(const Columns& mesh) { return count_open_edges(mesh.vertices, mesh.indices); }
 
-// Counts the uses of each edge in a map by coordinates.
+// Returns the number of open edges. Reference for count_open_edges(): a map contains, for each edge, the number of uses
+// in one direction minus the number of uses in the opposite direction. Edges are equal if their ends have equal
+// coordinates.
 uint64_t count_slowly(const Columns& mesh) {
   using Corner = std::tuple<float, float, float>;
   std::map<std::pair<Corner, Corner>, int64_t> uses;

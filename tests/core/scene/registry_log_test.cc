@@ -203,8 +203,8 @@ TEST_F(RegistryLogTest, ADeletedMeshIsNotPlaced) {
   ASSERT_TRUE(registry_->delete_mesh("m").ok());
   expect_refusal(scene->change_instances(placing(placement({5}, {0, 0, 0}))).status(), absl::StatusCode::kNotFound,
                  Reason::kNotFound, "place[0].mesh");
-  // placement() uses mesh_, the deleted StaticMesh, whose uses the registry would not count. So the change is still
-  // refused after a mesh with the same name and content is added.
+  // placement() refers to mesh_, the deleted StaticMesh. The registry does not count uses of a deleted StaticMesh, so
+  // the change is refused even after another mesh with the same name and content is added.
   ASSERT_TRUE(registry_->add_mesh("m", make_mesh("m", 1)).ok());
   EXPECT_EQ(scene->change_instances(placing(placement({5}, {0, 0, 0}))).status().code(), absl::StatusCode::kNotFound);
 }

@@ -33,7 +33,7 @@ TEST(SpecCodecTest, ASpecificationRoundTrips) {
   EXPECT_EQ(spec->creator, "token:ci");
 }
 
-// Data formats 1 and 2 have no creators, and their specifications stay readable.
+// Scene specifications of the data formats 1 and 2 have no creator. They must stay readable.
 TEST(SpecCodecTest, ASpecificationWithoutACreatorIsWrittenAsInFormat2) {
   SceneSpec spec = full_spec();
   const std::string owned = encode_spec(spec);

@@ -271,8 +271,8 @@ TEST_F(AcceptorTest, AUnixConnectionHasAUserIdAndIsFoundByItsDescriptor) {
   EXPECT_TRUE(wait_until([&] { return table_.size() == 0; }));
 }
 
-// A proxy in front of the server makes the connections of all its clients as one user, so that misuse by one client
-// could keep out the others.
+// A proxy in front of the server opens the connections of all its clients as one user. If misuse counted against this
+// user, one client could keep out the others.
 TEST_F(AcceptorTest, AUnixConnectionThatWasClosedForMisuseKeepsOutNoOther) {
   AcceptorOptions options;
   options.limits.new_per_second = 1;

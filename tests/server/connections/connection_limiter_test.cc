@@ -25,7 +25,7 @@ TEST(ConnectionLimiterTest, AnAddressMayHaveItsMaximumAndOthersTheirs) {
 TEST(ConnectionLimiterTest, AChargedAddressWaitsAndOthersDoNot) {
   ConnectionLimiter limiter(limits_of(100, 100, 10, 10));
   EXPECT_EQ(limiter.admit("a", Time()), Admission::kAdmitted);
-  limiter.charge("a", 14);  // 9 are left after the admission, so the address owes 5
+  limiter.charge("a", 14);  // 9 of 10 tokens are left after the admission, so the address owes 5 tokens
   limiter.charge("unknown", 100);
   EXPECT_EQ(limiter.admit("b", Time()), Admission::kAdmitted);
   EXPECT_EQ(limiter.admit("unknown", Time()), Admission::kAdmitted);

@@ -80,7 +80,7 @@ TEST(ConnectionTableTest, ThreadsFindTheirConnectionsWhileOthersComeAndGo) {
   EXPECT_EQ(table.size(), 0u);
 }
 
-// Three accepted connections of a table.
+// Fixture with a table of three accepted connections.
 class ShedTest : public testing::Test {
  protected:
   static constexpr uint64_t kMinBytes = 10'000;

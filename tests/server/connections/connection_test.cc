@@ -16,7 +16,7 @@ namespace {
 
 using std::chrono::steady_clock;
 
-// A server's end of a connection, without any limits.
+// Fixture that accepts connections without an Acceptor and its limits.
 class ConnectionTest : public ::testing::Test {
  protected:
   // Accepts one connection of `listening`, and returns its descriptor.

@@ -26,7 +26,7 @@ std::string repeated(const std::string& text, size_t times) {
   return all;
 }
 
-// A connection that has sent its preface.
+// Fixture with the FrameCheck of a connection whose client has sent its opening: the preface and a SETTINGS frame.
 class FrameCheckTest : public ::testing::Test {
  protected:
   FrameCheckTest() { EXPECT_TRUE(accepts(kHttp2Opening)); }
@@ -118,7 +118,7 @@ TEST_F(FrameCheckTest, AReadWithMoreCallsThanAClientMayOpenIsRefused) {
   EXPECT_FALSE(accepts(calls));
 }
 
-// grpc-go sends a PING for each reply, to measure the connection.
+// grpc-go sends a PING for each reply, to estimate the bandwidth-delay product of the connection.
 TEST_F(FrameCheckTest, APingAfterEachReplyIsAccepted) {
   const std::string ping = http2_frame(kPing, 0, 0, "12345678"), update = http2_frame(kWindowUpdate, 0, 0, "1234");
   for (int i = 0; i < 100'000; ++i) ASSERT_TRUE(accepts(call() + ping));

@@ -101,8 +101,8 @@ TEST(FairQueueTest, IdleClientsAreForgotten) {
   EXPECT_LE(queue.clients(), FairQueue<int>::kMaxIdleClients);
 }
 
-// The costs of turns are random. Clients whose entries always wait get equal work; the difference is at most the cost
-// of one turn.
+// The costs of turns are random. Clients whose entries always wait get equal work: the difference is at most the sum of
+// the maximum cost of a turn (kMax) and its estimated cost (kTurn).
 TEST(FairQueueTest, SharesAreEqualByWorkNotByTurns) {
   FairQueue<int> queue;
   std::mt19937 random(1);

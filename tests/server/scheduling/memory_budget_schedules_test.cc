@@ -144,7 +144,8 @@ class ModelProcess {
     }
     work.allocated = std::max(work.allocated, work.kept);
     const uint64_t left = work.allocated - work.kept;
-    free_heap_ = random_.below(left + 1);  // the allocator keeps some of the memory, in place of what it kept before
+    // The allocator keeps a random part of the freed memory, and releases the memory that it kept before.
+    free_heap_ = random_.below(left + 1);
     if (work.line == MemoryLine::kMoves) {
       const uint64_t pinned = random_.below(work.kept + 1);
       pinned_ += pinned;

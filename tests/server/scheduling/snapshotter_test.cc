@@ -93,8 +93,8 @@ TEST_F(SnapshotterTest, FewRecordsCauseNoSnapshot) {
     const Snapshotter snapshotter(registry_, &log_, options);
     std::this_thread::sleep_for(milliseconds(20));
     EXPECT_EQ(snapshotter.stats().written, 0u);
-    // Appends one more record, which makes a snapshot due, and waits for this snapshot. So the snapshotter checks the
-    // scene, and wrote nothing before because no snapshot was due.
+    // Appends one more record, which makes a snapshot due, and waits for this snapshot. The snapshot shows that the
+    // snapshotter checks the scene. So the snapshotter wrote nothing before only because no snapshot was due.
     apply(1);
     wait_for_snapshots(snapshotter, 1);
   }

@@ -49,7 +49,7 @@ class AccessControlTest : public testing::Test {
     EXPECT_TRUE(token.ok()) << token.status();
     return token.ok() ? *token : "";
   }
-  // Sets all three files; each test writes those that it uses.
+  // Configures all three files and writes them: two grants, no token, and the key set of key().
   void use_all_files() {
     options_.access_file = folder_.file("access");
     options_.token_file = folder_.file("tokens");

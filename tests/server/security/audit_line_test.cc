@@ -52,7 +52,7 @@ TEST(AuditLineTest, LongTextsAreCut) {
   EXPECT_LT(audit_line(entry).size(), kMaxAuditTextBytes + 300);
 }
 
-// A line is always one line of ASCII that a JSON parser reads, and valid UTF-8 is read back unchanged.
+// Every entry becomes one line of ASCII that a JSON parser accepts. Valid UTF-8 is read back unchanged.
 TEST(AuditLineTest, RandomTextsAreReadBackByAParser) {
   const std::string pieces[] = {"a", "\"", "\\", "\n", "\xc3\xa9", "\xe2\x82\xac", "\xf0\x9f\x98\x80", "\x7f", "\x01"};
   for (uint64_t seed = 1; seed <= test::scaled_count(20000); ++seed) {

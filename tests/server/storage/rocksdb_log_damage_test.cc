@@ -95,7 +95,7 @@ Sample make_sample(Ending ending, int max_steps) {
     const int steps = life == 2 ? max_steps / 2 : max_steps;
     const int failing = max_steps * 2 / 3;
     for (int step = 0; step < steps; ++step) {
-      // Makes a sync fail, because RocksDB writes tables when it recovers from an error.
+      // Makes a sync fail: RocksDB then writes tables while it recovers from the error, so the sample contains tables.
       if (life < 2 && step == failing) faulty->fail_syncs(1);
       sample.model.step(**log, random);
       while (life < 2 && step == failing && !write_mesh(**log))

@@ -26,8 +26,9 @@
 
 namespace locus::cli {
 
-// Maximum number of nodes in a file. A capsule takes four nodes. An instance or an object of any other shape takes one
-// node. The RESOURCE_EXHAUSTED errors of GlbWriter name the limit that was exceeded.
+// Maximum number of nodes in a file. A capsule takes four nodes, or one if its half axis is zero. An instance or an
+// object of any other shape takes one node. The RESOURCE_EXHAUSTED errors of GlbWriter name the limit that was
+// exceeded.
 inline constexpr size_t kMaxExportNodes = size_t{1} << 20;
 // Maximum size of a file in bytes: the GLB format stores sizes in 32 bits.
 inline constexpr uint64_t kMaxExportBytes = UINT32_MAX;

@@ -1,4 +1,4 @@
-"""Tests of areas of interest: anchored queries find what is near each player."""
+"""Tests of areas of interest: anchored queries find the objects near each player."""
 import importlib.util
 import math
 import os

@@ -32,8 +32,8 @@ Eight random_eight(Random& random, double extent, double size) {
   return eight;
 }
 
-// Uses the exact distance of one of the boxes as the limit, at any scale: a box whose distance in double is within the
-// limit must not be culled in float.
+// The limit is the distance to one of the boxes, computed in double. A box whose distance in double is within the limit
+// must not be culled in float. Positions and sizes range over many powers of two.
 TEST(BoxDistancesTest, NoBoxWithinTheLimitInDoubleIsCulledInFloat) {
   constexpr uint64_t kSeed = 61;
   Random random(kSeed);

@@ -15,8 +15,7 @@ TEST(BrickTableTest, AnEmptyTableFindsNoBrick) {
   EXPECT_TRUE(table.for_each([](uint32_t) { return false; }));
 }
 
-// Inserts and erases keys from a small range, so that probes cross positions where the table closed the gap of an
-// erased key.
+// Inserts and erases keys from a small range, so that searches probe slots whose entries erase() has moved.
 TEST(BrickTableTest, EqualsAMapThroughRandomInsertsAndErases) {
   test::Random random(7);
   BrickTable table;

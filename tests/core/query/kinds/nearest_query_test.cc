@@ -121,7 +121,7 @@ TEST(NearestQueryTest, TheNormalOfAPointOnATriangleIsThatOfTheFrontByTheWindingO
   EXPECT_THAT(counter.t, ElementsAre(0));
   EXPECT_THAT(clockwise.normals, ElementsAre(-counter.normals[0], 0, 0));
   EXPECT_EQ(std::abs(counter.normals[0]), 1);
-  // A ray that ignores backs hits the triangle from the side of this normal.
+  // The normal is on the front side of the triangle: a ray with Cull::kBack that starts on this side hits the triangle.
   OwnedBlock ray = one_ray(RayMode::kFirst, {5 + clockwise.normals[0], 0, 0}, {-clockwise.normals[0], 0, 0});
   rays_of(ray).cull = Cull::kBack;
   EXPECT_THAT(run_block(*snapshot_of(world), ray).t, ElementsAre(1));

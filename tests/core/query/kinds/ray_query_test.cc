@@ -355,9 +355,9 @@ TEST(RayQueryTest, ConservativeRaysEnterBoundsAndHaveNoSurface) {
   EXPECT_THAT(result.uvs, ElementsAre(0, 0));
 }
 
-// The hit may be early because of two paddings. The bounds of a placed triangle are grown by 2^-41 times the magnitudes
-// of the translation and the mesh. The slab test is padded by 2^-40 times the magnitudes of the ray's origin and the
-// bounds.
+// The hit may be early because of two paddings. The bounds of a placed triangle are grown by 2^-41 times the sum of the
+// magnitude of the translation and four times the magnitude of the mesh. The slab test is padded by 2^-40 times the sum
+// of the magnitudes of the ray's origin and of the bounds.
 TEST(RayQueryTest, ConservativeRaysEnterBoundsOfPlacedTrianglesWhereTheyAreFarFromTheOrigin) {
   for (const double away : {0.0, 1e3, 1e6, 1e9 - 100}) {
     QueryWorld world;

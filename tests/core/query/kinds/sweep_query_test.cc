@@ -109,7 +109,9 @@ TEST_F(SweepQueryTest, ACapsuleAndABoxTouchWithTheirOwnShape) {
 TEST_F(SweepQueryTest, AConservativeSweepMovesBoundsThroughBounds) {
   block_.settings.precision = Precision::kConservative;
   block_.settings.source = Source::kDynamic;
-  block_.points = {0, 0.7f, 0};  // passes 0.7 from the ball, radii sum to 0.75: touches the ball's bounds first
+  // The mover passes the ball's centre at a distance of 0.7. The radii sum to 0.75, so the mover touches the ball, but
+  // its bounds touch the ball's bounds earlier.
+  block_.points = {0, 0.7f, 0};
   block_.sizes = {10, 0.7f, 0};
   block_.settings.columns = {Column::kT, Column::kId, Column::kNormal, Column::kPoint};
   const BlockResult result = ask();

@@ -101,6 +101,14 @@ TEST_F(RepairTest, MeshesWhoseContentIsDamagedAreDroppedWithTheirParts) {
   EXPECT_TRUE(open()->stored_meshes().empty());
 }
 
+TEST_F(RepairTest, AFailureToReadTheDatabaseChangesNothing) {
+  std::filesystem::create_directories(options_.path);
+  const absl::StatusOr<RepairReport> nothing = repair(options_);
+  EXPECT_EQ(nothing.status().code(), absl::StatusCode::kUnavailable) << nothing.status();
+  EXPECT_FALSE(std::filesystem::exists(options_.path + "/" + std::string(kRepairedFolder)));
+  EXPECT_NE(open(), nullptr);
+}
+
 TEST_F(RepairTest, ARepairThatWasInterruptedIsFinishedAndReported) {
   store_two_meshes();
   // Make the files of a repair that was interrupted just before it would have moved the repaired database.

@@ -120,7 +120,8 @@ TEST_P(RayKernelsTest, FullRowsShortenTheRay) {
   EXPECT_LT(hit.tests, 60u);
 }
 
-// The ray hits the boxes of all triangles of a pile but misses each triangle, so the kernel gives up.
+// The ray hits the boxes of all triangles of a pile but misses each triangle. So the kernel tests more than
+// kMaxKernelTests triangles and leaves the ray undecided.
 TEST_P(RayKernelsTest, ARayThatTestsTooManyTrianglesIsLeftUndecided) {
   std::vector<Triangle> pile;
   for (uint32_t i = 0; i < 3 * kMaxKernelTests; ++i) pile.push_back(wall_at(static_cast<float>(i), i));

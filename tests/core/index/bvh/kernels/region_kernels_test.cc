@@ -246,9 +246,9 @@ TEST_P(RegionKernelsTest, RegionsWithoutRoomForTheirNumbersAreNotAnswered) {
     ASSERT_LT(answered, kMaxRegions);
     size_t end = 0;
     for (size_t i = 0; i < answered; ++i) EXPECT_EQ(end += together.counts[i], together.ends[i]) << i;
-    // The triangle numbers of the answered regions fit into `room` entries. Behind the numbers of the next region,
-    // fewer than kMinRegionRoom entries would be left. A kernel needs that many entries, because it may write beyond
-    // the last number.
+    // The triangle numbers of the answered regions fit into `room` entries. The next region is not answered, because
+    // fewer than kMinRegionRoom entries would be free after its numbers. A kernel needs kMinRegionRoom free entries,
+    // because it may write beyond the last number.
     EXPECT_LE(end, room);
     EXPECT_LT(room, together.ends[answered] + kMinRegionRoom);
   }

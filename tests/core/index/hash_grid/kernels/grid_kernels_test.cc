@@ -1,5 +1,5 @@
 // Compares the culling kernels of every instruction set with a test in double: a kernel must keep each value that
-// passes this test, and must drop each value that fails it by more than an epsilon.
+// passes this test by at least an epsilon, and must drop each value that fails this test by more than an epsilon.
 #include "core/index/hash_grid/kernels/grid_kernels.h"
 
 #include <gtest/gtest.h>
@@ -78,7 +78,7 @@ class GridKernelsTest : public ::testing::TestWithParam<std::string> {
 };
 
 // Returns 1 if `distance` is less than `extent` by at least an epsilon, -1 if `distance` is greater than `extent` by
-// more than an epsilon, and 0 if the two differ by less.
+// more than an epsilon, and 0 otherwise.
 int verdict(double distance, double extent) {
   constexpr double kEpsilon = 1e-4;
   return distance <= extent - kEpsilon ? 1 : distance > extent + kEpsilon ? -1 : 0;
