@@ -94,28 +94,23 @@ double squared_distance_of_cores(const RoundedCore& a, const RoundedCore& b, Vec
   return squared_distance_apart(a, b, offset);
 }
 
-// Returns the squared distance between two boxes.
-double squared_gap(const Aabbd& a, const Aabbd& b) {
-  return squared_length(max(max(a.min - b.max, b.min - a.max), Vec3d{}));
-}
-
 bool is_ball_or_point(const Shape& shape) { return shape.kind == ShapeKind::kPoint || shape.kind == ShapeKind::kBall; }
 
-// Returns the distance between two balls or points. The result equals that of the general code of distance_between(),
-// bit for bit, but is computed faster. The cores have length 0, so the squared distance of the centres suffices, and
-// the square root for the distance of the bounds is seldom needed.
+// Returns the distance between two balls or points, bit for bit as the general code of distance_between() computes it,
+// but faster: the cores have length 0, so the squared distance of the centres suffices.
 double distance_of_balls(const Shape& a, const Shape& b) {
+  if (a.kind == ShapeKind::kBall && b.kind == ShapeKind::kBall)
+    return distance_between(Balld{a.position, double{a.radius}}, Balld{b.position, double{b.radius}});
   const auto radius = [](const Shape& shape) { return shape.kind == ShapeKind::kBall ? double{shape.radius} : 0.0; };
   const double apart = std::sqrt(squared_length(b.position - a.position)) - radius(a) - radius(b);
-  const double gap = squared_gap(bounds_of(a), bounds_of(b));
-  // If this condition holds, the rounded square root of `gap` is at most `apart`.
-  if (apart > 0 && apart * apart > gap * (1 + 0x1p-50)) return apart;
-  return std::max(apart, std::sqrt(gap));
+  return std::max(apart, distance_between(bounds_of(a), bounds_of(b)));
 }
 
 }  // namespace
 
-double distance_between(const Aabbd& a, const Aabbd& b) { return std::sqrt(squared_gap(a, b)); }
+double distance_between(const Aabbd& a, const Aabbd& b) {
+  return std::sqrt(squared_length(max(max(a.min - b.max, b.min - a.max), Vec3d{})));
+}
 
 double distance_between(const Shape& a, const Shape& b) {
   if (is_ball_or_point(a) && is_ball_or_point(b)) return distance_of_balls(a, b);

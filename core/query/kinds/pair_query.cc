@@ -28,7 +28,7 @@ bool lower_other(const Partner& a, const Partner& b) { return a.other < b.other;
 bool nearer_partner(const Partner& a, const Partner& b) { return std::tie(a.t, a.other) < std::tie(b.t, b.other); }
 
 // Collector of the first rows in order. The rows of one object are offered in one call, as a run, so that only runs are
-// sorted. Invariant: between calls the collector has at most 2 * max_rows_ rows.
+// sorted. Invariant: between calls the collector has at most 2 * max_rows_ rows, those of each run one after another.
 class FirstPairs {
  public:
   FirstPairs(size_t max_rows, bool count_only) : max_rows_(max_rows), count_only_(count_only) {}
@@ -45,43 +45,64 @@ class FirstPairs {
   bool has_room_for(Id id) const { return count_only_ || id <= last_id_; }
   // Returns the first rows in order. `moment` is the time at which the rows were found.
   PairAnswer finish(const SceneAtTime& moment) {
-    keep_first();
+    if (partners_.size() > max_rows_) keep_first();
     PairAnswer answer;
     answer.count = count_;
     answer.truncated = truncated_;
     answer.rows.reserve(partners_.size());
-    for (const Run& run : runs_) {
+    const std::vector<Key> keys = sorted_keys();
+    for (size_t i = 0; i < keys.size(); ++i) {
+      // The runs are read in random order: load the following ones into the cache.
+      if (i + 2 * kAhead < keys.size()) __builtin_prefetch(&runs_[keys[i + 2 * kAhead].run]);
+      if (i + kAhead < keys.size()) __builtin_prefetch(&partners_[runs_[keys[i + kAhead].run].begin]);
+      const Key& key = keys[i];
+      const Run& run = runs_[key.run];
+      // Uses the id of the key, because the object's entry is usually not in the cache.
       for (const Partner& partner : absl::MakeConstSpan(partners_).subspan(run.begin, run.count))
-        answer.rows.push_back({hit_on(run.object, partner.t, moment), partner.other});
+        answer.rows.push_back({{partner.t, key.id, kNoTriangle, run.object, nullptr, &moment}, partner.other});
     }
     return answer;
   }
 
  private:
+  // Number of runs between a prefetch and the use of the memory.
+  static constexpr size_t kAhead = 8;
+
   struct Run {
     Id id;
     GridRef object;
     size_t begin, count;
   };
+  // Id of a run's object, and the run's index.
+  struct Key {
+    Id id;
+    uint32_t run;
+  };
 
-  // Sorts the rows and drops all rows after the first max_rows_ rows.
+  // Returns the keys of all runs, sorted by id.
+  std::vector<Key> sorted_keys() const {
+    std::vector<Key> keys(runs_.size());
+    for (uint32_t i = 0; i < keys.size(); ++i) keys[i] = {runs_[i].id, i};
+    std::sort(keys.begin(), keys.end(), [](const Key& a, const Key& b) { return a.id < b.id; });
+    return keys;
+  }
+  // Sorts the runs and drops all rows after the first max_rows_ rows. Precondition: there are more rows than that.
   void keep_first() {
-    std::sort(runs_.begin(), runs_.end(), [](const Run& a, const Run& b) { return a.id < b.id; });
     std::vector<Partner> kept;
-    kept.reserve(std::min(partners_.size(), max_rows_));
-    size_t runs = 0;
-    for (; runs < runs_.size() && kept.size() < max_rows_; ++runs) {
-      Run& run = runs_[runs];
+    kept.reserve(max_rows_);
+    std::vector<Run> runs;
+    for (const Key& key : sorted_keys()) {
+      if (kept.size() == max_rows_) break;
+      Run run = runs_[key.run];
       const auto from = partners_.begin() + static_cast<std::ptrdiff_t>(run.begin);
       run.begin = kept.size();
       run.count = std::min(run.count, max_rows_ - kept.size());
       kept.insert(kept.end(), from, from + static_cast<std::ptrdiff_t>(run.count));
+      runs.push_back(run);
     }
-    if (kept.size() < partners_.size()) {
-      truncated_ = true;
-      last_id_ = runs_[runs - 1].id;
-    }
-    runs_.resize(runs);
+    truncated_ = true;
+    last_id_ = runs.back().id;
+    runs_ = std::move(runs);
     partners_ = std::move(kept);
   }
 
@@ -102,6 +123,7 @@ struct PairSearch {
   const Layers first_mask, second_mask;
   const float max_distance;
   const bool conservative;
+  const bool by_balls;  // two balls are compared by their stored positions and extents
   const Id after_id, after_other;
 
   bool may_be_first(const GridEntry& entry) const { return (entry.layers & first_mask) != 0; }
@@ -261,8 +283,15 @@ class PairGroup {
     if (!search_.may_be_row(a, b)) return;
     ++search_.task.work().tests;
     if (!search_.task.count_test()) return;
-    const float distance = search_.distance(a.id, member.shape, b.id, search_.moment.shape(other));
+    const float distance = distance_to(member, other);
     if (distance <= search_.max_distance) member.rows.push_back({b.id, distance});
+  }
+  // Returns the rounded distance. Precondition: the member has the lower id.
+  float distance_to(const Member& member, const GridRef& other) const {
+    const GridEntry &a = member.object.entry(), &b = other.entry();
+    if (search_.by_balls && a.kind == ShapeKind::kBall && b.kind == ShapeKind::kBall)
+      return rounded_distance(distance_between(Balld{a.position, member.object.reach()}, {b.position, other.reach()}));
+    return search_.distance(a.id, member.shape, b.id, search_.moment.shape(other));
   }
 
   const PairSearch& search_;
@@ -372,6 +401,7 @@ PairAnswer run_pairs(QueryTask& task, const SceneAtTime& moment, const QueryBloc
                           mask(pairs.second_mask),
                           pairs.max_distance,
                           block.precision == Precision::kConservative,
+                          block.precision != Precision::kConservative && !moment.between(),
                           block.after_id,
                           pairs.after_other};
   FirstPairs rows(block.max_results == 0 ? limits::kDefaultMaxResults : block.max_results, block.count_only);
