@@ -57,6 +57,7 @@ enum class PlantedBug {
   kKernelRowTie,
   kKernelHitAfterGivingUp,  // an undecided ray of a packet still records later hits
   // The region kernels:
+  kRegionBrickReach,  // a brick is within a plane of a region if its centre is
   kRegionReach,       // boxes of nodes are tested against the ball without a pad
   kRegionInside,      // vertices are tested against the ball in float without an error bound
   kRegionBeyond,      // the test for a plane that separates a triangle from the ball omits the error bound

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "core/base/check.h"
+#include "core/base/planted_bug.h"
 #include "core/geometry/segment.h"
 
 namespace locus {
@@ -337,16 +338,40 @@ bool region_overlaps(const ConvexRegion& region, const Shape& shape) {
   return false;
 }
 
-RegionSide side_of_ball(const ConvexRegion& region, Vec3d center, double radius, double slack) {
+NearPlanes near_planes(const ConvexRegion& region, const Aabbd& centers, double radius, double slack) {
+  static_assert(limits::kMaxPlanes + 6 <= 64, "a PlaneSet has a bit for each plane");
+  const Vec3d middle = (centers.min + centers.max) * 0.5 - region.origin(), half = (centers.max - centers.min) * 0.5;
+  // The errors of `middle` and `half` are relative to the coordinates of the box in world axes, whence the last term.
+  const double largest = max_component(abs(middle)) + max_component(half) + 0x1p-12 * magnitude(centers);
+  NearPlanes near;
+  for (size_t i = 0; i < region.planes().size(); ++i) {
+    const Plane& plane = region.planes()[i];
+    const double value = value_at(plane, middle);
+    const double reach = planted(PlantedBug::kRegionBrickReach) ? 0 : dot(abs(plane.normal), half);
+    // Twice the error of side_of_ball(), since `value` and `reach` have rounding errors of their own.
+    const double error = 2 * slack + 8 * kPlaneEpsilon * (3 * largest + std::abs(plane.offset) + radius);
+    near.outside |= value + reach < -(radius + error);
+    if (!(value - reach > error)) near.planes |= PlaneSet{1} << i;
+  }
+  return near;
+}
+
+RegionSide side_of_ball(const ConvexRegion& region, PlaneSet planes, Vec3d center, double radius, double slack) {
   const Vec3d local = center - region.origin();
+  const double size = 3 * max_component(abs(local)) + radius;
   bool inside = true;
-  for (const Plane& plane : region.planes()) {
+  for (; planes != 0; planes &= planes - 1) {
+    const Plane& plane = region.planes()[static_cast<size_t>(__builtin_ctzll(planes))];
     const double value = value_at(plane, local);
-    const double error = slack + 4 * kPlaneEpsilon * (3 * max_component(abs(local)) + std::abs(plane.offset) + radius);
+    const double error = slack + 4 * kPlaneEpsilon * (size + std::abs(plane.offset));
     if (value < -(radius + error)) return RegionSide::kOutside;
     inside &= value > error;
   }
   return inside ? RegionSide::kInside : RegionSide::kUndecided;
+}
+
+RegionSide side_of_ball(const ConvexRegion& region, Vec3d center, double radius, double slack) {
+  return side_of_ball(region, (PlaneSet{1} << region.planes().size()) - 1, center, radius, slack);
 }
 
 RegionInMesh::RegionInMesh(const ConvexRegion& region, const Transform& transform, float magnitude) {

@@ -13,6 +13,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 
 #include "absl/types/span.h"
@@ -72,6 +73,19 @@ enum class RegionSide { kInside, kOutside, kUndecided };
 // farther than e from it. Returns kInside if the centre of the ball lies within each plane, farther than e from it.
 // Otherwise returns kUndecided. `center` is in world axes; `slack` is an upper bound of the error of `center`.
 RegionSide side_of_ball(const ConvexRegion& region, Vec3d center, double radius, double slack);
+
+// Set of planes of a region: bit i is plane i.
+using PlaneSet = uint64_t;
+// Planes of a region that many balls close to each other have to be compared with.
+struct NearPlanes {
+  bool outside = false;  // side_of_ball() is kOutside for every ball
+  PlaneSet planes = 0;   // all balls lie within each other plane
+};
+// Returns the planes for the balls with a centre in the box `centers` and a radius of at most `radius`.
+NearPlanes near_planes(const ConvexRegion& region, const Aabbd& centers, double radius, double slack);
+// Returns the result of side_of_ball() for one of the balls for which near_planes() returned `planes`, but compares the
+// ball only with these planes.
+RegionSide side_of_ball(const ConvexRegion& region, PlaneSet planes, Vec3d center, double radius, double slack);
 
 // Planes of a region in the axes of a mesh, and for each plane the distance by which a corner of the mesh may be
 // outside of the plane and still count as on it.

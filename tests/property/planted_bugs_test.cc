@@ -153,6 +153,7 @@ constexpr Trial kTrials[] = {
     {"CellsWithWaysThatEndTooEarly", PlantedBug::kWayShort, compare_winding_cells_with_list},
     {"HalfLineWithoutItsStart", PlantedBug::kHalfLineStart, compare_half_lines_with_list},
     {"ViewWithAWrongRowOfItsMatrix", PlantedBug::kMatrixRow, view_difference},
+    {"FrustumThatTrustsTheCentreOfABrick", PlantedBug::kRegionBrickReach, frustum_difference},
     {"PairsFromBothSides", PlantedBug::kPairBothSides, pair_difference},
     {"PairsCulledWithoutExtent", PlantedBug::kPairCullExtent, pair_difference},
     {"CellWithPlanesBeyondOthers", PlantedBug::kCellBeyond, cell_difference},

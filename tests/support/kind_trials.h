@@ -143,6 +143,33 @@ inline std::string pair_difference() {
   return "";
 }
 
+// Returns the first seed for which a frustum does not contain the same balls as a test of all balls; empty if there is
+// none. The balls fill many bricks of the grid, and a frustum contains some of the bricks whole.
+inline std::string frustum_difference() {
+  for (uint64_t seed = 0; seed < scaled_count(20); ++seed) {
+    Random random(seed);
+    QueryWorld world;
+    for (Id id = 1; id <= 2'000; ++id) world.objects.push_back(ball_object(id, random.vector(60)));
+    OwnedBlock block;
+    const Vec3d eye = random.vector(40);
+    for (int plane = 0; plane < 6; ++plane) {
+      const Vec3d normal = random.unit_vector();
+      for (const double value : {normal.x, normal.y, normal.z, random.between(5, 40) - dot(normal, eye)})
+        block.points.push_back(static_cast<float>(value));
+    }
+    FrustumColumns frustums;
+    frustums.planes_each = 6;
+    block.settings.kind = frustums;
+    block.settings.max_results = 5'000;
+    const SnapshotPtr snapshot = snapshot_of(world);
+    RunOptions brute_force;
+    brute_force.brute_force = true;
+    if (run_block(*snapshot, block).ids != run_block(*snapshot, block, brute_force).ids)
+      return "seed " + std::to_string(seed);
+  }
+  return "";
+}
+
 // Checks the cell of a point between a ball and a wall of many triangles. The cell must have exactly three rows: one
 // for the cell itself, one for the plane of the wall and one for the plane of the ball. Returns a description of the
 // error; empty if there is none.

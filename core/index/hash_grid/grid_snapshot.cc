@@ -72,6 +72,11 @@ GridRef GridSnapshot::at(uint32_t handle) const {
   return value;
 }
 
+GridBrickBounds GridSnapshot::brick_bounds(uint32_t brick) const {
+  LOCUS_DCHECK_LT(brick, bricks_.size());
+  return {internal::box_of_values(*bricks_[brick], 0), bricks_[brick]->max_extent};
+}
+
 GridRef GridSnapshot::find(uint32_t handle) const {
   if (handle >= bricks_by_handle_.size()) return {};
   const uint32_t index = bricks_by_handle_[handle];  // index of an earlier brick if the handle is not in use

@@ -61,6 +61,12 @@ struct GridCursor {
   size_t values = 0;  // number of values of the brick at `brick` that have been visited
 };
 
+// Bounds of the values of one brick.
+struct GridBrickBounds {
+  Aabbd positions;   // contains the positions of all values
+  float max_extent;  // upper bound of the values' extents
+};
+
 class GridSnapshot {
  public:
   GridSnapshot() = default;
@@ -118,6 +124,9 @@ class GridSnapshot {
   // Returns find(value.handle()) for a value of another snapshot of the same grid. Faster than find() if the slot of
   // the value in this snapshot is close to its slot in the other snapshot.
   GridRef find_like(const GridRef& value) const;
+
+  // Returns bounds of the values of a brick; `brick` is GridRef::brick() of one of them. O(1).
+  GridBrickBounds brick_bounds(uint32_t brick) const;
 
   // Returns counts and memory of this snapshot. O(values).
   GridStatistics statistics() const;

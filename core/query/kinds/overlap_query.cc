@@ -2,6 +2,7 @@
 
 #include <limits>
 #include <optional>
+#include <type_traits>
 
 #include "core/base/check.h"
 #include "core/base/planted_bug.h"
@@ -165,7 +166,20 @@ struct RegionShape {
   static bool overlaps_bounds(const ConvexRegion& region, const Aabbd& bounds) { return may_overlap(region, bounds); }
   static bool overlaps_object(const ConvexRegion& region, const Shape& shape) { return region_overlaps(region, shape); }
   static Verdict verdict(const ConvexRegion& region, const ObjectBounds& object) {
-    switch (side_of_ball(region, object.position, object.extent, object.displacement_bound)) {
+    return verdict_of(side_of_ball(region, object.position, object.extent, object.displacement_bound));
+  }
+  // Returns the verdict for an object of a brick of the grid, for which near_planes() returned `planes`.
+  static Verdict verdict(const ConvexRegion& region, const NearPlanes& near, const ObjectBounds& object) {
+    if (near.outside) return Verdict::kDisjoint;
+    return verdict_of(side_of_ball(region, near.planes, object.position, object.extent, object.displacement_bound));
+  }
+  // Returns the planes that the objects of a brick of the grid must be compared with.
+  static NearPlanes planes_near(const ConvexRegion& region, const GridBrickBounds& brick) {
+    const double epsilon = internal::kBoundsGrowth * (magnitude(brick.positions) + brick.max_extent);
+    return near_planes(region, brick.positions, brick.max_extent, epsilon);
+  }
+  static Verdict verdict_of(RegionSide side) {
+    switch (side) {
       case RegionSide::kInside:
         return Verdict::kOverlaps;
       case RegionSide::kOutside:
@@ -208,10 +222,25 @@ class ObjectRows {
   }
 
  private:
-  bool overlaps(const GridRef& object) const {
+  // Returns the verdict for an object by its stored position and bounds. A convex region may contain many bricks, so
+  // the planes near a brick are determined first, once for consecutive objects of the brick.
+  Verdict verdict(const GridRef& object) {
+    const ObjectBounds bounds = object_bounds(object, moment_.displacement_bound(object));
+    if constexpr (std::is_same_v<Kind, RegionShape>) {
+      if (moment_.between()) return Kind::verdict(shape_, bounds);
+      if (object.brick() != brick_) {
+        brick_ = object.brick();
+        near_planes_ = Kind::planes_near(shape_, moment_.objects().grid().brick_bounds(brick_));
+      }
+      return Kind::verdict(shape_, near_planes_, bounds);
+    } else {
+      return Kind::verdict(shape_, bounds);
+    }
+  }
+  bool overlaps(const GridRef& object) {
     const bool exact = options_.precision == Precision::kExact;
     if (exact) {  // avoids computing the shape of most objects at the time of the query
-      const Verdict verdict = Kind::verdict(shape_, object_bounds(object, moment_.displacement_bound(object)));
+      const Verdict verdict = this->verdict(object);
       if (verdict != Verdict::kUndecided) return verdict == Verdict::kOverlaps;
     }
     const Shape shape = moment_.shape(object);
@@ -224,6 +253,9 @@ class ObjectRows {
   const OverlapOptions& options_;
   const Filter& filter_;
   FoundObjects& found_;
+  // Brick of the last object, and the planes near it. Only used for convex regions.
+  uint32_t brick_ = std::numeric_limits<uint32_t>::max();
+  NearPlanes near_planes_;
 };
 
 // Adapter that adds the rows of one instance to a LowestRows: one row, or one row per triangle found. Triangles must be

@@ -242,5 +242,33 @@ TEST(ConvexRegionTest, TheSideOfABallAgreesWithItsOverlap) {
   }
 }
 
+TEST(ConvexRegionTest, ThePlanesNearABoxDecideTheSideOfItsBalls) {
+  size_t all = 0, some = 0, none = 0, outside = 0;
+  for (uint64_t seed = 0; seed < scaled_count(5'000); ++seed) {
+    Random random(seed);
+    const Vec3d origin = random.chance(0.5) ? Vec3d{} : random.vector(1e8);
+    const ConvexRegion region = region_of(
+        view_planes(random.vector(3), random.between(0.2, 2), 0.1, 5, rotation_of(random.rotation())), origin);
+    const double half = random.between(0, 1) * random.between(0, 3), radius = random.between(0, 0.5);
+    const Vec3d middle = origin + random.vector(6);
+    const Aabbd box = {middle - Vec3d{half, half, half}, middle + Vec3d{half, half, half}};
+    const NearPlanes near = near_planes(region, box, radius, 0);
+    const auto planes = static_cast<size_t>(__builtin_popcountll(near.planes));
+    ++(near.outside ? outside : planes == 0 ? none : planes == region.planes().size() ? all : some);
+    for (int i = 0; i < 30; ++i) {
+      // Includes the corners, which are the extreme centres.
+      const Vec3d at =
+          i < 8 ? Vec3d{i & 1 ? half : -half, i & 2 ? half : -half, i & 4 ? half : -half}
+                : Vec3d{random.between(-half, half), random.between(-half, half), random.between(-half, half)};
+      const Vec3d center = max(box.min, min(middle + at, box.max));
+      const double own = i % 2 == 0 ? radius : random.between(0, radius);
+      const RegionSide side = side_of_ball(region, center, own, 0);
+      const RegionSide found = near.outside ? RegionSide::kOutside : side_of_ball(region, near.planes, center, own, 0);
+      ASSERT_EQ(found, side) << "seed " << seed;
+    }
+  }
+  EXPECT_GT(std::min({some, none, outside}), scaled_count(100)) << all;
+}
+
 }  // namespace
 }  // namespace locus::test
