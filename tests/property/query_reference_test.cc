@@ -7,16 +7,13 @@
 
 #include "tests/support/adversarial_scenes.h"
 #include "tests/support/generated_meshes.h"
+#include "tests/support/proof/real_triangle.h"
 #include "tests/support/real.h"
 #include "tests/support/small_world.h"
 #include "tests/support/test_scale.h"
 
 namespace locus::test {
 namespace {
-
-struct RealRay {
-  Vec3r origin, direction;
-};
 
 // Returns the t at which the ray hits the triangle at least `inset` away from its edges.
 std::optional<Real> inner_hit(const RealRay& ray, const Triangle& triangle, Real inset) {

@@ -3,17 +3,13 @@
 // thousand sweeps; the long run tests ten million, or the number in LOCUS_PROOF_SWEEPS.
 #include <gtest/gtest.h>
 
-#include <atomic>
 #include <cstdio>
 #include <cstdlib>
-#include <mutex>
-#include <thread>
 
-#include "tests/support/generated_meshes.h"
+#include "tests/support/proof/proof_tally.h"
 #include "tests/support/proof/real_sweep.h"
-#include "tests/support/small_world.h"
+#include "tests/support/proof/real_world.h"
 #include "tests/support/test_scale.h"
-#include "tests/support/triangle_reference.h"
 
 namespace locus::test {
 namespace {
@@ -21,52 +17,19 @@ namespace {
 constexpr uint64_t kSweepSeed = 718;
 constexpr size_t kSweepsOfAMesh = 300;
 
-struct SweepTally {
-  uint64_t sweeps = 0, hits = 0, faults = 0;
-  std::string first_fault;
-
-  void note(const std::string& fault) {
-    if (faults++ == 0) first_fault = fault;
-  }
-};
-
-std::vector<Triangle> random_mesh(Random& random) {
-  const uint64_t seed = random.next();
-  if (random.chance(0.3)) return bumpy_sphere(6, 0.3, seed);
-  if (random.chance(0.3)) return box_city(3, seed);
-  std::vector<Triangle> mesh;
-  const Vec3f home = to_float(random.vector(4));
-  while (mesh.size() < 60) {
-    const Triangle t = random_triangle(random);
-    const float scale = static_cast<float>(2 / std::max(size_of(t), 1e-6));
-    const Vec3f place = home + to_float(random.vector(4));
-    mesh.push_back({(t.a - t.a) * scale + place, (t.b - t.a) * scale + place, (t.c - t.a) * scale + place});
-  }
-  number_in_order(mesh);
-  return mesh;
-}
-
 // One placed mesh, the random sweeps past it, and the verification of the answers.
 class SweepTrial {
  public:
-  explicit SweepTrial(uint64_t seed) : seed_(seed), random_(seed), mesh_(random_mesh(random_)) {
-    PlacedMesh placed;
-    placed.id = 1;
-    placed.mesh = mesh_of(mesh_);
-    if (random_.chance(0.7)) {
-      placed.rotation = random_.rotation();
-      placed.scale = static_cast<float>(random_.magnitude(-4, 4));
-      placed.translation = random_.vector(random_.magnitude(0, 16));
-    }
+  explicit SweepTrial(uint64_t seed) : seed_(seed), random_(seed), mesh_(random_proof_mesh(random_)) {
     QueryWorld world;
-    world.instances = {placed};
+    world.instances = {random_proof_placement(mesh_, random_)};
     snapshot_ = snapshot_of(world);
     transform_ = &snapshot_->statics->find(1)->transform;
     for (const Triangle& triangle : mesh_)
       triangles_.emplace_back(RealCorners{world_of(triangle.a), world_of(triangle.b), world_of(triangle.c)});
   }
 
-  void run(SweepTally& tally) {
+  void run(ProofTally& tally) {
     for (const MoverKind kind : {MoverKind::kBall, MoverKind::kCapsule, MoverKind::kBox}) run(kind, tally);
   }
 
@@ -99,7 +62,7 @@ class SweepTrial {
     block.rotations.insert(block.rotations.end(), {q.x, q.y, q.z, q.w});
   }
 
-  void run(MoverKind kind, SweepTally& tally) {
+  void run(MoverKind kind, ProofTally& tally) {
     OwnedBlock block;
     block.settings.kind = SweepColumns{};
     block.settings.frame = transform_->translation;
@@ -108,8 +71,8 @@ class SweepTrial {
     const BlockResult result = run_block(*snapshot_, block);
     for (size_t i = 0; i < kSweepsOfAMesh; ++i) {
       const RealMover mover = mover_of(kind, block, i);
-      ++tally.sweeps;
-      tally.hits += result.ids[i] != 0 ? 1 : 0;
+      ++tally.queries;
+      tally.found += result.ids[i] != 0 ? 1 : 0;
       std::optional<Real> found;
       if (result.ids[i] != 0) found = result.t[i];
       if (std::string fault = fault_of(mover, found); !fault.empty())
@@ -167,28 +130,15 @@ class SweepTrial {
 // Runs at least `sweeps` sweeps in total, on one thread for each processor, and expects that no answer is wrong.
 void expect_no_fault(uint64_t sweeps) {
   const uint64_t meshes = (sweeps + 3 * kSweepsOfAMesh - 1) / (3 * kSweepsOfAMesh);
-  std::atomic<uint64_t> next{0};
-  std::mutex mutex;
-  SweepTally all;
-  std::vector<std::thread> threads;
-  for (unsigned thread = 0; thread < std::max(1u, std::thread::hardware_concurrency()); ++thread)
-    threads.emplace_back([&] {
-      SweepTally own;
-      for (uint64_t i = next++; i < meshes; i = next++) SweepTrial(kSweepSeed + i).run(own);
-      const std::lock_guard lock(mutex);
-      all.sweeps += own.sweeps;
-      all.hits += own.hits;
-      all.faults += own.faults;
-      if (all.first_fault.empty()) all.first_fault = own.first_fault;
-    });
-  for (std::thread& thread : threads) thread.join();
+  const ProofTally all =
+      run_trials(meshes, [](uint64_t i, ProofTally& tally) { SweepTrial(kSweepSeed + i).run(tally); });
   std::printf("proof: %llu sweeps past %llu meshes, %llu hits: %llu faults; seed %llu\n",
-              static_cast<unsigned long long>(all.sweeps), static_cast<unsigned long long>(meshes),
-              static_cast<unsigned long long>(all.hits), static_cast<unsigned long long>(all.faults),
+              static_cast<unsigned long long>(all.queries), static_cast<unsigned long long>(meshes),
+              static_cast<unsigned long long>(all.found), static_cast<unsigned long long>(all.faults),
               static_cast<unsigned long long>(kSweepSeed));
   EXPECT_EQ(all.faults, 0u) << all.first_fault;
-  EXPECT_GE(all.sweeps, sweeps);
-  EXPECT_GT(all.hits, sweeps / 4) << "too few sweeps hit to prove anything";
+  EXPECT_GE(all.queries, sweeps);
+  EXPECT_GT(all.found, sweeps / 4) << "too few sweeps hit to prove anything";
 }
 
 TEST(SweepProofTest, NoSweepMissesAndNoneHitsTooEarly) { expect_no_fault(scaled_count(100'000)); }
