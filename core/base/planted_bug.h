@@ -31,6 +31,7 @@ enum class PlantedBug {
   kSweepPassed,        // AtStart::kPass also ignores triangles within the diameter of the mover, not only its radius
   kPairBothSides,      // a pair of objects is reported twice, once for each object
   kPairCullExtent,     // the cull of pairs ignores the extent of the first object
+  kRegionBrickReach,  // a brick is within a plane of a region if its centre is
   kCellBeyond,         // a cell of free space also has planes for primitives beyond its other planes
   kMatrixRow,          // the left and right planes of a view are computed from the wrong row of the matrix
   kOwnGroupBlocks,     // the group of a viewer blocks its sight
@@ -57,7 +58,6 @@ enum class PlantedBug {
   kKernelRowTie,
   kKernelHitAfterGivingUp,  // an undecided ray of a packet still records later hits
   // The region kernels:
-  kRegionBrickReach,  // a brick is within a plane of a region if its centre is
   kRegionReach,       // boxes of nodes are tested against the ball without a pad
   kRegionInside,      // vertices are tested against the ball in float without an error bound
   kRegionBeyond,      // the test for a plane that separates a triangle from the ball omits the error bound

@@ -339,7 +339,7 @@ bool region_overlaps(const ConvexRegion& region, const Shape& shape) {
 }
 
 NearPlanes near_planes(const ConvexRegion& region, const Aabbd& centers, double radius, double slack) {
-  static_assert(limits::kMaxPlanes + 6 <= 64, "a PlaneSet has a bit for each plane");
+  static_assert(limits::kMaxPlanes + 6 < 64, "a PlaneSet has a bit for each plane");
   const Vec3d middle = (centers.min + centers.max) * 0.5 - region.origin(), half = (centers.max - centers.min) * 0.5;
   // The errors of `middle` and `half` are relative to the coordinates of the box in world axes, whence the last term.
   const double largest = max_component(abs(middle)) + max_component(half) + 0x1p-12 * magnitude(centers);

@@ -78,10 +78,11 @@ RegionSide side_of_ball(const ConvexRegion& region, Vec3d center, double radius,
 using PlaneSet = uint64_t;
 // Planes of a region that many balls close to each other have to be compared with.
 struct NearPlanes {
-  bool outside = false;  // side_of_ball() is kOutside for every ball
-  PlaneSet planes = 0;   // all balls lie within each other plane
+  bool outside = false;  // side_of_ball() is kOutside for every ball; `planes` has no meaning then
+  PlaneSet planes = 0;   // the centres of all balls lie within every plane that is not in this set
 };
-// Returns the planes for the balls with a centre in the box `centers` and a radius of at most `radius`.
+// Returns the planes for the balls with a centre in the box `centers` and a radius of at most `radius`. `slack` is an
+// upper bound of the slack of each ball.
 NearPlanes near_planes(const ConvexRegion& region, const Aabbd& centers, double radius, double slack);
 // Returns the result of side_of_ball() for one of the balls for which near_planes() returned `planes`, but compares the
 // ball only with these planes.

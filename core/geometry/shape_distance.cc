@@ -97,7 +97,8 @@ double squared_distance_of_cores(const RoundedCore& a, const RoundedCore& b, Vec
 bool is_ball_or_point(const Shape& shape) { return shape.kind == ShapeKind::kPoint || shape.kind == ShapeKind::kBall; }
 
 // Returns the distance between two balls or points, bit for bit as the general code of distance_between() computes it,
-// but faster: the cores have length 0, so the squared distance of the centres suffices.
+// but faster: the cores have length 0, so the squared distance of the centres suffices. A point is no ball of radius 0:
+// the bounds of a ball are grown, those of a point are not.
 double distance_of_balls(const Shape& a, const Shape& b) {
   if (a.kind == ShapeKind::kBall && b.kind == ShapeKind::kBall)
     return distance_between(Balld{a.position, double{a.radius}}, Balld{b.position, double{b.radius}});

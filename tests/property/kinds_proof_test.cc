@@ -23,6 +23,7 @@ namespace {
 constexpr uint64_t kKindsSeed = 4711;
 constexpr uint64_t kQueriesOfAWorld = 100;
 constexpr size_t kObjectsOfPairs = 20;
+constexpr size_t kEyes = 10;  // number of viewers and of targets of a world
 
 void push(std::vector<float>& column, Vec3f v) { column.insert(column.end(), {v.x, v.y, v.z}); }
 
@@ -35,50 +36,51 @@ BlockResult answer(const RealWorld& world, const OwnedBlock& block, const Spoil&
   return result;
 }
 
-std::string words(const char* what, uint64_t query, Real value = 0) {
-  return std::string(what) + ", query " + std::to_string(query) + ": " + std::to_string(static_cast<double>(value));
+// Notes a fault of query `query` of a world.
+void note(ProofTally& tally, const RealWorld& world, const char* what, uint64_t query, Real value = 0) {
+  tally.note(std::string(what) + ", seed " + std::to_string(world.seed()) + ", query " + std::to_string(query) + ": " +
+             std::to_string(static_cast<double>(value)));
 }
 
 // Key of a row: id and triangle.
 using RowKey = std::pair<Id, uint32_t>;
 
-// Tests all primitives of a world against one query. `rows` maps each row of the answer to its t, and `gap` returns the
-// reference's distance of a primitive, whose magnitude must be at most `limit` to be found. Notes a fault if a
-// primitive nearer than the limit by more than `e` has no row, if a primitive farther by more than `e` has one, or if
-// the t of a row differs from the distance by more than `e`.
+// Compares the rows of one query with the reference's distances of all primitives, which may be negative. Notes a fault
+// if a primitive nearer than `limit` by more than `e` has no row, if a primitive farther by more than `e` has one, if
+// the t of a row differs from the distance by more than `e`, or if a row is of no primitive or occurs twice.
 class RowJudge {
  public:
-  RowJudge(const std::map<RowKey, float>& rows, Real limit, Real e, uint64_t query, ProofTally& tally)
-      : rows_(rows), limit_(limit), e_(e), query_(query), tally_(tally) {}
+  // The rows of `result` begin at `begin`.
+  RowJudge(const RealWorld& world, const BlockResult& result, size_t begin, uint64_t query, ProofTally& tally)
+      : world_(world), query_(query), tally_(tally) {
+    for (size_t row = begin; row < begin + result.counts[query]; ++row)
+      if (!rows_.emplace(RowKey{result.ids[row], result.triangles[row]}, result.t[row]).second) fault("a row twice");
+  }
 
-  // `t` is the value that the row must report; `gap` decides whether there must be a row.
-  void expect(RowKey key, Real gap, Real t) {
+  void expect(RowKey key, Real distance, Real limit, Real e) {
     const auto row = rows_.find(key);
     if (row == rows_.end()) {
-      if (gap < limit_ - e_) tally_.note(words("a miss", query_, gap));
+      if (distance < limit - e) fault("a miss", distance);
       return;
     }
     ++tally_.found;
-    if (gap > limit_ + e_) tally_.note(words("a row of nothing", query_, gap));
-    if (!(std::fabs(Real{row->second} - t) <= e_)) tally_.note(words("a wrong distance", query_, t));
+    if (distance > limit + e) fault("a row of nothing", distance);
+    if (!(std::fabs(Real{row->second} - distance) <= e)) fault("a wrong distance", distance);
+    rows_.erase(row);
+  }
+  // Call this after expect() was called for all primitives.
+  void finish() {
+    if (!rows_.empty()) fault("a row of no primitive");
   }
 
  private:
-  const std::map<RowKey, float>& rows_;
-  const Real limit_, e_;
+  void fault(const char* what, Real value = 0) { note(tally_, world_, what, query_, value); }
+
+  const RealWorld& world_;
   const uint64_t query_;
   ProofTally& tally_;
+  std::map<RowKey, float> rows_;
 };
-
-// Returns the rows of query `i` of a counted block.
-std::map<RowKey, float> rows_of(const BlockResult& result, size_t i) {
-  size_t begin = 0;
-  for (size_t q = 0; q < i; ++q) begin += result.counts[q];
-  std::map<RowKey, float> rows;
-  for (size_t row = begin; row < begin + result.counts[i]; ++row)
-    rows[{result.ids[row], result.triangles[row]}] = result.t[row];
-  return rows;
-}
 
 // Capsules and balls as overlaps, with contacts: t is the distance from the inner segment to the primitive, and
 // negative inside an object.
@@ -106,23 +108,20 @@ void prove_contacts(uint64_t seed, const Spoil& spoil, ProofTally& tally) {
     block.extras.push_back(radius);
   }
   const BlockResult result = answer(world, block, spoil);
-  for (uint64_t i = 0; i < kQueriesOfAWorld; ++i) {
+  size_t begin = 0;
+  for (uint64_t i = 0; i < kQueriesOfAWorld; begin += result.counts[i++]) {
     ++tally.queries;
     const Vec3r start = world.real_point(&block.points[3 * i]);
     const Vec3r end = balls ? start : world.real_point(&block.sizes[3 * i]);
     RealSolid solid{kNoId, ShapeKind::kCapsule, (start + end) * 0.5L, (end - start) * 0.5L, 0};
     const Real radius = balls ? block.sizes[i] : block.extras[i];
     const Real e = world.allowance(solid.center, solid.size() + radius);
-    const std::map<RowKey, float> rows = rows_of(result, i);
-    RowJudge judge(rows, radius, e, i, tally);
-    for (uint32_t triangle = 0; triangle < world.triangles().size(); ++triangle) {
-      const Real distance = world.distance_to_segment(triangle, solid);
-      judge.expect({1, triangle}, distance, distance);
-    }
-    for (const RealSolid& other : world.solids()) {
-      const Real gap = gap_between(solid, other);
-      judge.expect({other.id, kNoTriangle}, gap, gap);
-    }
+    RowJudge judge(world, result, begin, i, tally);
+    for (uint32_t triangle = 0; triangle < world.triangles().size(); ++triangle)
+      judge.expect({1, triangle}, world.distance_to_segment(triangle, solid), radius, e);
+    for (const RealSolid& other : world.solids())
+      judge.expect({other.id, kNoTriangle}, gap_between(solid, other), radius, e);
+    judge.finish();
   }
 }
 
@@ -148,13 +147,14 @@ void prove_nearest(uint64_t seed, const Spoil& spoil, ProofTally& tally) {
     std::vector<Real> sorted;
     for (const auto& [key, distance] : distances) sorted.push_back(distance);
     std::sort(sorted.begin(), sorted.end());
-    if (result.counts[i] != kRows) tally.note(words("too few rows", i));
+    if (result.counts[i] != kRows) note(tally, world, "too few rows", i);
     for (size_t k = 0; k < std::min<size_t>(kRows, result.counts[i]); ++k) {
       const size_t row = i * kRows + k;
       ++tally.found;
-      const Real own = distances[{result.ids[row], result.triangles[row]}];
-      if (std::fabs(Real{result.t[row]} - own) > e) tally.note(words("a wrong distance", i, own));
-      if (std::fabs(Real{result.t[row]} - sorted[k]) > e) tally.note(words("a nearer primitive", i, sorted[k]));
+      const auto own = distances.find({result.ids[row], result.triangles[row]});
+      if (own == distances.end() || std::fabs(Real{result.t[row]} - own->second) > e)
+        note(tally, world, "a wrong distance", i, result.t[row]);
+      if (std::fabs(Real{result.t[row]} - sorted[k]) > e) note(tally, world, "a nearer primitive", i, sorted[k]);
     }
   }
 }
@@ -189,8 +189,8 @@ Real polygon_distance(Vec3r point, const std::vector<Vec3r>& polygon) {
   return least;
 }
 
-// Frustums: triangles, and objects that are points. The allowance moves the planes, so where planes meet at a small
-// angle a point may be farther than the allowance from the region; the planes are at right angles or random.
+// Frustums. The allowance moves the planes. Triangles and points are clipped; other solids must be found if an end of
+// their segment lies within all planes, and must not be found if they lie wholly outside of one plane.
 void prove_frustums(uint64_t seed, const Spoil& spoil, ProofTally& tally) {
   constexpr size_t kPlanes = 6;
   RealWorld world(seed);
@@ -225,20 +225,29 @@ void prove_frustums(uint64_t seed, const Spoil& spoil, ProofTally& tally) {
       planes.push_back({real.normal, real.offset - dot(real.normal, to_real(world.frame()))});
     }
     std::set<RowKey> rows;
-    for (size_t end = row + result.counts[i]; row < end; ++row) rows.insert({result.ids[row], result.triangles[row]});
+    for (size_t end = row + result.counts[i]; row < end; ++row)
+      if (!rows.insert({result.ids[row], result.triangles[row]}).second) note(tally, world, "a row twice", i);
     const Real e = world.allowance(to_real(world.frame()), size);
-    const auto expect = [&](RowKey key, const std::vector<Vec3r>& polygon) {
-      const bool found = rows.contains(key);
+    const auto expect = [&](RowKey key, bool must, bool may) {
+      const bool found = rows.erase(key) != 0;
       tally.found += found ? 1 : 0;
-      if (!found && !clipped(polygon, planes, -e).empty()) tally.note(words("a miss", i));
-      if (found && clipped(polygon, planes, e).empty()) tally.note(words("a row of nothing", i));
+      if (!found && must) note(tally, world, "a miss", i);
+      if (found && !may) note(tally, world, "a row of nothing", i);
     };
     for (uint32_t triangle = 0; triangle < world.corners().size(); ++triangle) {
-      const RealCorners& corners = world.corners()[triangle];
-      expect({1, triangle}, {corners[0], corners[1], corners[2]});
+      const std::vector<Vec3r> corners(world.corners()[triangle].begin(), world.corners()[triangle].end());
+      expect({1, triangle}, !clipped(corners, planes, -e).empty(), !clipped(corners, planes, e).empty());
     }
-    for (const RealSolid& solid : world.solids())
-      if (solid.kind == ShapeKind::kPoint) expect({solid.id, kNoTriangle}, {solid.center});
+    for (const RealSolid& solid : world.solids()) {
+      const Vec3r ends[] = {solid.center - solid.half_axis, solid.center + solid.half_axis};
+      bool must = false, may = true;
+      for (const Vec3r& end : ends) must = must || !clipped({end}, planes, -e).empty();
+      for (const RealPlane& plane : planes)
+        may =
+            may && std::max(dot(plane.normal, ends[0]), dot(plane.normal, ends[1])) + plane.offset + solid.radius > -e;
+      expect({solid.id, kNoTriangle}, must, may);
+    }
+    if (!rows.empty()) note(tally, world, "a row of no primitive", i);
   }
 }
 
@@ -253,18 +262,17 @@ bool is_crossed(const RealCorners& corners, Vec3r from, Vec3r way, Real e) {
 // Sight: a sample is not seen if a triangle or an object clearly blocks the segment to it, and is seen if nothing is
 // near the segment.
 void prove_sight(uint64_t seed, const Spoil& spoil, ProofTally& tally) {
-  constexpr size_t kSide = 10;
   RealWorld world(seed, 10);
   OwnedBlock block;
   block.settings.frame = world.frame();
   block.settings.kind = SightColumns{};
-  for (size_t i = 0; i < kSide; ++i) push(block.points, world.point_near_a_triangle());
-  for (size_t i = 0; i < kSide; ++i) push(block.sizes, world.point_near_a_triangle());
+  for (size_t i = 0; i < kEyes; ++i) push(block.points, world.point_near_a_triangle());
+  for (size_t i = 0; i < kEyes; ++i) push(block.sizes, world.point_near_a_triangle());
   const BlockResult result = answer(world, block, spoil);
-  for (size_t i = 0; i < kSide * kSide; ++i) {
+  for (size_t i = 0; i < kEyes * kEyes; ++i) {
     ++tally.queries;
-    const Vec3r from = world.real_point(&block.points[i / kSide * 3]),
-                to = world.real_point(&block.sizes[i % kSide * 3]);
+    const Vec3r from = world.real_point(&block.points[i / kEyes * 3]),
+                to = world.real_point(&block.sizes[i % kEyes * 3]);
     const RealSolid segment{kNoId, ShapeKind::kCapsule, (from + to) * 0.5L, (to - from) * 0.5L, 0};
     const Real e = world.allowance(segment.center, segment.size());
     const bool seen = result.matrix[i] != 0;
@@ -280,8 +288,8 @@ void prove_sight(uint64_t seed, const Spoil& spoil, ProofTally& tally) {
       nearest = std::min(nearest, gap_between(segment, other));
       blocked = blocked || gap_between(segment, other) < -e;
     }
-    if (seen && blocked) tally.note(words("seen through a blocker", i));
-    if (!seen && nearest > e) tally.note(words("blocked by nothing", i, nearest));
+    if (seen && blocked) note(tally, world, "seen through a blocker", i);
+    if (!seen && nearest > e) note(tally, world, "blocked by nothing", i, nearest);
   }
 }
 
@@ -298,7 +306,7 @@ void prove_pairs(uint64_t seed, const Spoil& spoil, ProofTally& tally) {
   std::map<std::pair<Id, Id>, float> rows;
   for (size_t row = 0; row < result.ids.size(); ++row)
     if (!rows.emplace(std::pair(result.ids[row], result.others[row]), result.t[row]).second)
-      tally.note(words("a pair twice", row));
+      note(tally, world, "a pair twice", row);
   for (const RealSolid& a : world.solids())
     for (const RealSolid& b : world.solids()) {
       if (a.id >= b.id) continue;
@@ -307,11 +315,11 @@ void prove_pairs(uint64_t seed, const Spoil& spoil, ProofTally& tally) {
       const Real e = world.allowance(a.center, a.size() + b.size());
       const auto row = rows.find({a.id, b.id});
       if (row == rows.end()) {
-        if (gap < limit - e) tally.note(words("a miss", a.id, gap));
+        if (gap < limit - e) note(tally, world, "a miss", a.id, gap);
         continue;
       }
       ++tally.found;
-      if (gap > limit + e || std::fabs(Real{row->second} - gap) > e) tally.note(words("a wrong pair", a.id, gap));
+      if (gap > limit + e || std::fabs(Real{row->second} - gap) > e) note(tally, world, "a wrong pair", a.id, gap);
     }
 }
 
@@ -336,10 +344,10 @@ void prove_cells(uint64_t seed, const Spoil& spoil, ProofTally& tally) {
       nearest = std::min(nearest, world.distance_to_segment(triangle, point));
     for (const RealSolid& other : world.solids()) nearest = std::min(nearest, gap_between(point, other));
     if (result.counts[i] == 0) {
-      if (nearest > e) tally.note(words("no cell in free space", i, nearest));
+      if (nearest > e) note(tally, world, "no cell in free space", i, nearest);
       continue;
     }
-    if (nearest < -e) tally.note(words("a cell inside of an object", i, nearest));
+    if (nearest < -e) note(tally, world, "a cell inside of an object", i, nearest);
     const Real radius = result.t[row];
     std::vector<RealPlane> planes;
     for (size_t end = row++ + result.counts[i]; row < end; ++row) {
@@ -349,10 +357,14 @@ void prove_cells(uint64_t seed, const Spoil& spoil, ProofTally& tally) {
       // A plane of the cell faces inwards here.
       planes.push_back({normal * -1, dot(normal, at)});
       const Id id = result.ids[row];
+      if (id == 0 || id > 1 + world.solids().size() || (id == 1 && result.triangles[row] >= world.triangles().size())) {
+        note(tally, world, "a plane of no primitive", i);
+        continue;
+      }
       const Real distance = id == 1 ? world.distance_to_segment(result.triangles[row], point)
                                     : gap_between(point, world.solids()[id - 2]);
       if (std::fabs(distance - Real{result.t[row]}) > e || std::fabs(length(at - point.center) - distance) > e)
-        tally.note(words("a plane that does not touch its primitive", i, distance));
+        note(tally, world, "a plane that does not touch its primitive", i, distance);
     }
     const auto is_inside = [&](Vec3r p) {
       return length(p - point.center) < radius - e &&
@@ -362,13 +374,13 @@ void prove_cells(uint64_t seed, const Spoil& spoil, ProofTally& tally) {
     for (const RealCorners& corners : world.corners()) {
       const std::vector<Vec3r> part = clipped({corners[0], corners[1], corners[2]}, planes, -e);
       if (!part.empty() && polygon_distance(point.center, part) < radius - e)
-        tally.note(words("a triangle in the cell", i));
+        note(tally, world, "a triangle in the cell", i);
     }
     for (const RealSolid& other : world.solids())
       for (int k = -4; k <= 4; ++k) {
         const Vec3r at = other.center + other.half_axis * (Real(k) / 4), away = point.center - at;
         if (length(away) > other.radius && is_inside(at + unit(away) * other.radius))
-          tally.note(words("an object in the cell", i));
+          note(tally, world, "an object in the cell", i);
       }
   }
 }
@@ -376,9 +388,21 @@ void prove_cells(uint64_t seed, const Spoil& spoil, ProofTally& tally) {
 constexpr Id kUnusedId = 9999;
 
 void report_other_ids(BlockResult& result) { std::fill(result.ids.begin(), result.ids.end(), kUnusedId); }
+void report_other_triangles(BlockResult& result) {
+  for (uint32_t& triangle : result.triangles)
+    if (triangle != kNoTriangle) triangle ^= 1;
+}
 void report_other_distances(BlockResult& result) {
   for (float& t : result.t) t *= 1.01f;
 }
+void turn_normals(BlockResult& result) {
+  for (float& coordinate : result.normals) coordinate = -coordinate;
+}
+void move_points(BlockResult& result) {
+  for (float& coordinate : result.points) coordinate *= 1.01f;
+}
+void see_all(BlockResult& result) { std::fill(result.matrix.begin(), result.matrix.end(), 1); }
+void see_nothing(BlockResult& result) { std::fill(result.matrix.begin(), result.matrix.end(), 0); }
 
 struct Proof {
   const char* name;
@@ -389,12 +413,20 @@ struct Proof {
 };
 
 const std::vector<Proof> kProofs = {
-    {"contacts", prove_contacts, kQueriesOfAWorld, 0.5, {report_other_ids, report_other_distances}},
-    {"nearest", prove_nearest, kQueriesOfAWorld, 4, {report_other_distances}},
-    {"frustums", prove_frustums, kQueriesOfAWorld, 0.5, {report_other_ids}},
-    {"sight", prove_sight, 100, 0.1, {[](BlockResult& result) { result.matrix.assign(result.matrix.size(), 1); }}},
+    {"contacts",
+     prove_contacts,
+     kQueriesOfAWorld,
+     0.5,
+     {report_other_ids, report_other_triangles, report_other_distances}},
+    {"nearest", prove_nearest, kQueriesOfAWorld, 4, {report_other_ids, report_other_distances}},
+    {"frustums", prove_frustums, kQueriesOfAWorld, 0.5, {report_other_ids, report_other_triangles}},
+    {"sight", prove_sight, kEyes* kEyes, 0.1, {see_all, see_nothing}},
     {"pairs", prove_pairs, kObjectsOfPairs*(kObjectsOfPairs - 1) / 2, 0.05, {report_other_ids, report_other_distances}},
-    {"cells", prove_cells, kQueriesOfAWorld, 0.5, {report_other_distances}},
+    {"cells",
+     prove_cells,
+     kQueriesOfAWorld,
+     0.5,
+     {report_other_ids, report_other_distances, turn_normals, move_points}},
 };
 
 void PrintTo(const Proof& proof, std::ostream* out) { *out << proof.name; }

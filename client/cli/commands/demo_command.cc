@@ -39,7 +39,7 @@ struct DemoOptions {
 // Table of the demo's results, with the total number of wrong answers in its rows.
 class DemoTable {
  public:
-  void add(const std::string& what, Json rest) {
+  void add(const std::string& what, const Json& rest) {
     Json row = {{"what", what}};
     row.update(rest);
     report_.rows.push_back(std::move(row));

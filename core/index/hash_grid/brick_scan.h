@@ -65,11 +65,11 @@ inline double cull_epsilon(const Brick& brick) {
   return double{kCullEpsilon} * (coordinate + extent) + kBoundsGrowth * (magnitude + extent);
 }
 
-// Returns a box that contains the bounds of every value of the brick. Precondition: no value's extent exceeds
-// `max_extent`.
-inline Aabbd box_of_values(const Brick& brick, double max_extent) {
+// Returns a box that contains all points whose distance from the position of a value of the brick is at most `extent`
+// along each axis.
+inline Aabbd box_around_values(const Brick& brick, double extent) {
   const BrickGeometry& geometry = brick.geometry;
-  const double half = geometry.edge / 2 + max_extent;
+  const double half = geometry.edge / 2 + extent;
   return grown(Aabbd{geometry.center, geometry.center},
                half + kBoundsGrowth * (max_component(abs(geometry.center)) + half));
 }

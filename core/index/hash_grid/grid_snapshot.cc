@@ -74,7 +74,7 @@ GridRef GridSnapshot::at(uint32_t handle) const {
 
 GridBrickBounds GridSnapshot::brick_bounds(uint32_t brick) const {
   LOCUS_DCHECK_LT(brick, bricks_.size());
-  return {internal::box_of_values(*bricks_[brick], 0), bricks_[brick]->max_extent};
+  return {internal::box_around_values(*bricks_[brick], 0), bricks_[brick]->max_extent};
 }
 
 GridRef GridSnapshot::find(uint32_t handle) const {

@@ -370,7 +370,7 @@ bool GridSnapshot::visit_nearest_bricks(const internal::GridLevel& level, const 
   level.table->for_each([&](uint32_t index) {
     ++work.cells;
     const internal::Brick& brick = *bricks_[index];
-    const double distance = squared_distance(point, internal::box_of_values(brick, level.geometry.max_extent));
+    const double distance = squared_distance(point, internal::box_around_values(brick, level.geometry.max_extent));
     if (distance <= limit()) near.emplace_back(distance, &brick);
     return true;
   });

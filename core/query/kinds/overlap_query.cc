@@ -223,11 +223,12 @@ class ObjectRows {
 
  private:
   // Returns the verdict for an object by its stored position and bounds. A convex region may contain many bricks, so
-  // the planes near a brick are determined first, once for consecutive objects of the brick.
-  Verdict verdict(const GridRef& object) {
+  // the planes near a brick are determined first, once for consecutive objects of the brick. Between two ticks, objects
+  // may lie outside of their brick. A search by brute force must not depend on bricks.
+  Verdict verdict_by_bounds(const GridRef& object) {
     const ObjectBounds bounds = object_bounds(object, moment_.displacement_bound(object));
     if constexpr (std::is_same_v<Kind, RegionShape>) {
-      if (moment_.between()) return Kind::verdict(shape_, bounds);
+      if (moment_.between() || !task_.uses_kernels()) return Kind::verdict(shape_, bounds);
       if (object.brick() != brick_) {
         brick_ = object.brick();
         near_planes_ = Kind::planes_near(shape_, moment_.objects().grid().brick_bounds(brick_));
@@ -240,7 +241,7 @@ class ObjectRows {
   bool overlaps(const GridRef& object) {
     const bool exact = options_.precision == Precision::kExact;
     if (exact) {  // avoids computing the shape of most objects at the time of the query
-      const Verdict verdict = this->verdict(object);
+      const Verdict verdict = verdict_by_bounds(object);
       if (verdict != Verdict::kUndecided) return verdict == Verdict::kOverlaps;
     }
     const Shape shape = moment_.shape(object);

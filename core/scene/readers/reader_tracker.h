@@ -133,11 +133,11 @@ class ReaderTracker {
   bool may_exceed(const SceneSnapshot& latest) const LOCUS_REQUIRES(mutex_);
   // Returns the pinned snapshots before `latest`, oldest first.
   std::vector<Holding> pinned_before(const SceneSnapshot& latest) const LOCUS_REQUIRES(mutex_);
-  // Sets Holding::bytes of each entry of `pinned`, which is in the order of revisions, and returns the sum.
+  // Sets Holding::bytes of each entry of `pinned`, oldest first, and returns the sum.
   static uint64_t count(std::vector<Holding>& pinned, const SceneSnapshot& latest);
-  // Revokes the pins of the revision of `snapshot`. Stores two numbers for the error that readers get: `held`, the
-  // bytes that all pinned revisions hold, and `budget`, which `held` exceeds. Returns false if the revision is no
-  // longer pinned, or if its pins are revoked already.
+  // Revokes the pins of a snapshot. Stores two numbers for the error that readers get: `held`, the bytes that all
+  // pinned snapshots hold, and `budget`, which `held` exceeds. Returns false if the snapshot is no longer pinned, or if
+  // its pins are revoked already.
   bool revoke(const SceneSnapshot& snapshot, uint64_t held, uint64_t budget) LOCUS_REQUIRES(mutex_);
 
   const uint64_t fixed_;  // budget passed to the constructor; 0: derived from the memory of the scene

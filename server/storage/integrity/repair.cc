@@ -212,6 +212,8 @@ absl::Status install_repaired(const StorageOptions& options, std::string& kept_a
   const fs::path repaired = here / std::string(kRepairedFolder);
   const fs::path ready = repaired / std::string(kReadyName);
   rocksdb::Status status = rocksdb::ReadFileToString(&env, ready.string(), &kept_at);
+  // The path in READY may be relative to another working directory.
+  kept_at = (here / fs::path(kept_at).filename()).string();
   if (status.ok()) status = env.CreateDirIfMissing(kept_at);
   if (!status.ok()) return disk_error("finishing the repair", status);
   for (const absl::string_view name : {kDatabaseFolder, DurableMarkerFile::kName}) {
@@ -268,8 +270,8 @@ absl::StatusOr<std::unique_ptr<Database>> open_source(const StorageOptions& opti
   return database;
 }
 
-// Verifies the database and, unless it is intact, writes its intact parts to `folder`. Sets report.found. If the
-// database is intact, `folder` does not exist afterwards.
+// Verifies the database and writes its intact parts to `folder`. If the database could be opened and is intact, writes
+// nothing, and `folder` does not exist afterwards. Sets report.found.
 absl::Status verify_and_copy(const StorageOptions& options, const DurableMarker* expected, const std::string& folder,
                              RepairReport& report) {
   ASSIGN_OR_RETURN(const auto source, open_source(options, expected, folder));
@@ -300,8 +302,10 @@ absl::StatusOr<RepairReport> repair(const StorageOptions& given) {
   RepairReport report;
   if (!fs::exists(options.path)) return absl::NotFoundError(absl::StrCat(options.path, " is no data directory"));
   ASSIGN_OR_RETURN(const auto lock, DirectoryLock::acquire(*options.env, options.path));
-  if (fs::exists(absl::StrCat(folder, "/", kReadyName))) RETURN_IF_ERROR(install_repaired(options, report.finished_at));
   std::error_code failed;
+  // READY is empty if the machine lost power while it was written: then the repair was not committed.
+  const uint64_t ready_bytes = fs::file_size(absl::StrCat(folder, "/", kReadyName), failed);
+  if (!failed && ready_bytes > 0) RETURN_IF_ERROR(install_repaired(options, report.finished_at));
   fs::remove_all(folder, failed);
   const absl::StatusOr<DurableMarker> durable_marker = DurableMarkerFile::read(*options.env, options.path);
   const DurableMarker* expected = durable_marker.ok() ? &*durable_marker : nullptr;

@@ -90,17 +90,16 @@ TEST_F(TopTest, AnUnreachableServerIsReportedWithAHint) {
 
 TEST(TopRightsTest, ATokenIsSentAndARefusalSaysWhichRightIsMissing) {
   const TemporaryFolder folder;
-  const auto write = [&](const char* name, const std::string& text) { return write_private(folder, name, text); };
   const TestAuthority authority("authority");
   const TestCertificate pair = authority.for_server();
   server::ServerConfig config = with_http();
-  config.access_file = write("access", "grant token:scraper metrics\ngrant token:other backup\n");
+  config.access_file = write_private(folder, "access", "grant token:scraper metrics\ngrant token:other backup\n");
   config.token_file = folder.file("tokens");
-  const std::string scraper = write("a", *server::add_token(config.token_file, "scraper", 1'000'000, {}, ""));
-  const std::string other = write("b", *server::add_token(config.token_file, "other", 1'000'000, {}, ""));
-  config.tls_cert = write("crt", pair.certificate);
-  config.tls_key = write("key", pair.key);
-  const std::string ca = write("ca", authority.certificate());
+  const std::string scraper = write_private(folder, "a", *server::add_token(config.token_file, "scraper", 1'000'000, {}, ""));
+  const std::string other = write_private(folder, "b", *server::add_token(config.token_file, "other", 1'000'000, {}, ""));
+  config.tls_cert = write_private(folder, "crt", pair.certificate);
+  config.tls_key = write_private(folder, "key", pair.key);
+  const std::string ca = write_private(folder, "ca", authority.certificate());
   RunningServer running(config);
   const std::string http = "127.0.0.1:" + std::to_string(running.server().http_port());
   EXPECT_EQ(run_top(http, {"--once", "--ca", ca, "--token-file", scraper}).code, cli::ExitCode::kOk);
@@ -111,16 +110,15 @@ TEST(TopRightsTest, ATokenIsSentAndARefusalSaysWhichRightIsMissing) {
 
 TEST(TopServerNameTest, TheCertificateIsCheckedAgainstTheServerName) {
   const TemporaryFolder folder;
-  const auto write = [&](const char* name, const std::string& text) { return write_private(folder, name, text); };
   const TestAuthority authority("authority");
   const TestCertificate pair = authority.issue({.common_name = "game", .alternative_names = "DNS:game.example.com"});
   server::ServerConfig config = with_http();
-  config.tls_cert = write("crt", pair.certificate);
-  config.tls_key = write("key", pair.key);
-  const std::string ca = write("ca", authority.certificate());
+  config.tls_cert = write_private(folder, "crt", pair.certificate);
+  config.tls_key = write_private(folder, "key", pair.key);
+  const std::string ca = write_private(folder, "ca", authority.certificate());
   RunningServer running(config);
   const std::string http = "127.0.0.1:" + std::to_string(running.server().http_port());
-  EXPECT_NE(run_top(http, {"--once", "--ca", ca}).code, cli::ExitCode::kOk);
+  EXPECT_THAT(run_top(http, {"--once", "--ca", ca}).err, HasSubstr("--server-name"));
   EXPECT_EQ(run_top(http, {"--once", "--ca", ca, "--server-name", "game.example.com"}).code, cli::ExitCode::kOk);
   EXPECT_NE(run_top(http, {"--once", "--ca", ca, "--server-name", "other.example.com"}).code, cli::ExitCode::kOk);
 }

@@ -14,7 +14,7 @@
 namespace locus::test {
 
 struct ProofTally {
-  // `found` is the number of rows, hits or other findings that the reference confirmed.
+  // `found` is the number of rows, hits or other findings that were compared with the reference.
   uint64_t queries = 0, found = 0, faults = 0;
   std::string first_fault;
 

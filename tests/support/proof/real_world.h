@@ -1,5 +1,6 @@
 // A random scene in long double: the triangles of one placed mesh, and balls, capsules and points around the mesh. Used
-// by proofs that compare the answers of queries with distances in long double. Shares only vectors with the product.
+// by proofs that compare the answers of queries with distances in long double. Shares only vectors and the placement as
+// stored with the product.
 #ifndef LOCUS_TESTS_SUPPORT_PROOF_REAL_WORLD_H_
 #define LOCUS_TESTS_SUPPORT_PROOF_REAL_WORLD_H_
 
@@ -63,7 +64,8 @@ inline Real gap_between(const RealSolid& a, const RealSolid& b) {
 
 class RealWorld {
  public:
-  explicit RealWorld(uint64_t seed, size_t objects = 40) : random_(seed), mesh_(random_proof_mesh(random_)) {
+  explicit RealWorld(uint64_t seed, size_t objects = 40)
+      : seed_(seed), random_(seed), mesh_(random_proof_mesh(random_)) {
     QueryWorld world;
     world.instances = {random_proof_placement(mesh_, random_)};
     for (Id id = 2; id < 2 + objects; ++id) world.objects.push_back(random_object(id, world.instances[0]));
@@ -82,6 +84,7 @@ class RealWorld {
     }
   }
 
+  uint64_t seed() const { return seed_; }
   Random& random() { return random_; }
   const SceneSnapshot& snapshot() const { return *snapshot_; }
   // Returns the position of the mesh, used as the frame of queries, and its scale.
@@ -109,7 +112,11 @@ class RealWorld {
   }
   // Returns the largest difference between an answer and the reference that rounding may explain, for a query of this
   // size at this place.
-  Real allowance(Vec3r place, Real size) const { return 0x1p-20L * (length(place) + size + Real{scale()}); }
+  // Positions in world axes are double, sizes and the offsets from frame() are float.
+  Real allowance(Vec3r place, Real size) const {
+    const Real near = length(place - to_real(frame())) + size + 8 * Real{scale()};
+    return 0x1p-40L * length(place) + 0x1p-20L * near;
+  }
 
  private:
   Vec3r world_of(Vec3f corner) const {
@@ -126,6 +133,7 @@ class RealWorld {
     return object;
   }
 
+  const uint64_t seed_;
   Random random_;
   const std::vector<Triangle> mesh_;
   SnapshotPtr snapshot_;

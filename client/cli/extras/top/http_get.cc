@@ -30,6 +30,10 @@ absl::Status failure(CURLcode code, const std::string& address) {
     case CURLE_GOT_NOTHING:
       return absl::UnavailableError(
           absl::StrCat(address, " closed the connection; if it uses TLS, give --ca or --tls"));
+    case CURLE_PEER_FAILED_VERIFICATION:
+      return absl::UnavailableError(absl::StrCat("the certificate of ", address,
+                                                 " is not accepted: ", curl_easy_strerror(code),
+                                                 "; --ca names its authority, --server-name the name in it"));
     default:
       return absl::UnavailableError(absl::StrCat("no metrics from ", address, ": ", curl_easy_strerror(code),
                                                  "; locusd serves them where its --http-listen says"));

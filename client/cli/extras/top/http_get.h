@@ -15,7 +15,8 @@ namespace locus::cli {
 inline constexpr size_t kMaxPageBytes = 16u << 20;
 
 // Returns the body of the page `path` of the server `address` (host:port). Uses https if the credentials enable TLS,
-// otherwise http. Sends the token of the credentials, if there is one. Follows no redirection and uses no proxy.
+// otherwise http. The server's certificate must belong to the server name of the credentials or, without one, to the
+// host of `address`. Sends the token of the credentials, if there is one. Follows no redirection and uses no proxy.
 // Returns UNAVAILABLE if the connection fails or there is no complete answer within `timeout`, UNAUTHENTICATED for HTTP
 // status 401, PERMISSION_DENIED for 403, FAILED_PRECONDITION for any other status except 200, RESOURCE_EXHAUSTED for a
 // body of more than kMaxPageBytes, INVALID_ARGUMENT for a malformed address, and the errors of

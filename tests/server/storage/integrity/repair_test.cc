@@ -109,6 +109,18 @@ TEST_F(RepairTest, AFailureToReadTheDatabaseChangesNothing) {
   EXPECT_NE(open(), nullptr);
 }
 
+TEST_F(RepairTest, ARepairThatWasInterruptedBeforeItsCommitIsStartedAgain) {
+  store_two_meshes();
+  const std::filesystem::path repaired = std::filesystem::path(options_.path) / std::string(kRepairedFolder);
+  std::filesystem::create_directories(repaired);
+  test::write_file_bytes((repaired / "READY").string(), "");
+  const absl::StatusOr<RepairReport> report = repair(options_);
+  ASSERT_TRUE(report.ok()) << report.status();
+  EXPECT_FALSE(report->changed);
+  EXPECT_FALSE(std::filesystem::exists(repaired));
+  EXPECT_EQ(open()->stored_meshes().size(), 2u);
+}
+
 TEST_F(RepairTest, ARepairThatWasInterruptedIsFinishedAndReported) {
   store_two_meshes();
   // Make the files of a repair that was interrupted just before it would have moved the repaired database.
