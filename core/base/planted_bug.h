@@ -31,7 +31,7 @@ enum class PlantedBug {
   kSweepPassed,        // AtStart::kPass also ignores triangles within the diameter of the mover, not only its radius
   kPairBothSides,      // a pair of objects is reported twice, once for each object
   kPairCullExtent,     // the cull of pairs ignores the extent of the first object
-  kRegionBrickReach,  // a brick is within a plane of a region if its centre is
+  kRegionBrickReach,   // a brick is within a plane of a region if its centre is
   kCellBeyond,         // a cell of free space also has planes for primitives beyond its other planes
   kMatrixRow,          // the left and right planes of a view are computed from the wrong row of the matrix
   kOwnGroupBlocks,     // the group of a viewer blocks its sight

@@ -95,8 +95,10 @@ TEST(TopRightsTest, ATokenIsSentAndARefusalSaysWhichRightIsMissing) {
   server::ServerConfig config = with_http();
   config.access_file = write_private(folder, "access", "grant token:scraper metrics\ngrant token:other backup\n");
   config.token_file = folder.file("tokens");
-  const std::string scraper = write_private(folder, "a", *server::add_token(config.token_file, "scraper", 1'000'000, {}, ""));
-  const std::string other = write_private(folder, "b", *server::add_token(config.token_file, "other", 1'000'000, {}, ""));
+  const std::string scraper =
+      write_private(folder, "a", *server::add_token(config.token_file, "scraper", 1'000'000, {}, ""));
+  const std::string other =
+      write_private(folder, "b", *server::add_token(config.token_file, "other", 1'000'000, {}, ""));
   config.tls_cert = write_private(folder, "crt", pair.certificate);
   config.tls_key = write_private(folder, "key", pair.key);
   const std::string ca = write_private(folder, "ca", authority.certificate());
