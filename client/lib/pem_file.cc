@@ -1,10 +1,10 @@
 #include "client/lib/pem_file.h"
 
-#include <errno.h>
 #include <openssl/err.h>
 #include <openssl/pem.h>
 #include <openssl/x509.h>
 
+#include <cerrno>
 #include <cstring>
 #include <fstream>
 #include <memory>

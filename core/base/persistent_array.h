@@ -49,7 +49,10 @@ class PersistentArray {
   PersistentArray(const PersistentArray& other) : list_(other.list_) {
     LOCUS_CHECK_EQ(other.owner_, internal::kNoOwner);
   }
-  PersistentArray& operator=(const PersistentArray& other) { return *this = PersistentArray(other); }
+  PersistentArray& operator=(const PersistentArray& other) {
+    *this = PersistentArray(other);
+    return *this;
+  }
 
   // Returns a snapshot for readers. O(1).
   PersistentArray snapshot() {

@@ -22,12 +22,11 @@ absl::Status check_counts(const std::vector<float>& vertices, const std::vector<
   if (vertices.empty() || indices.empty())
     return refuse_argument(Reason::kMalformed, vertices.empty() ? "vertices" : "indices", {},
                            "a mesh needs at least one triangle");
-  if (vertices.size() / 3 > limits::kMaxMeshVertices)
-    return refuse_limit("vertices", "mesh_vertices", limits::kMaxMeshVertices,
-                        static_cast<double>(vertices.size() / 3));
-  if (indices.size() / 3 > limits::kMaxMeshTriangles)
-    return refuse_limit("indices", "mesh_triangles", limits::kMaxMeshTriangles,
-                        static_cast<double>(indices.size() / 3));
+  const size_t vertex_count = vertices.size() / 3, triangle_count = indices.size() / 3;
+  if (vertex_count > limits::kMaxMeshVertices)
+    return refuse_limit("vertices", "mesh_vertices", limits::kMaxMeshVertices, static_cast<double>(vertex_count));
+  if (triangle_count > limits::kMaxMeshTriangles)
+    return refuse_limit("indices", "mesh_triangles", limits::kMaxMeshTriangles, static_cast<double>(triangle_count));
   return absl::OkStatus();
 }
 

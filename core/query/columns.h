@@ -36,6 +36,7 @@ namespace locus {
 // which points to rows in a reply or in CollectedRows. Points are relative to the block's frame.
 template <template <class> class Array>
 struct ColumnArrays {
+// NOLINTNEXTLINE(bugprone-macro-parentheses): `array` is the name of a member
 #define LOCUS_ARRAY(column, name, type, array, width) Array<type> array{};
   LOCUS_COLUMN_ARRAYS(LOCUS_ARRAY)
 #undef LOCUS_ARRAY

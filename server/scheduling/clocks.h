@@ -2,10 +2,9 @@
 #ifndef LOCUS_SERVER_SCHEDULING_CLOCKS_H_
 #define LOCUS_SERVER_SCHEDULING_CLOCKS_H_
 
-#include <time.h>
-
 #include <chrono>
 #include <cstdint>
+#include <ctime>
 
 namespace locus::server {
 

@@ -5,10 +5,10 @@
 #define LOCUS_SERVER_SCHEDULING_SEMAPHORE_H_
 
 #include <semaphore.h>
-#include <time.h>
 
 #include <cerrno>
 #include <chrono>
+#include <ctime>
 
 #include "core/base/check.h"
 

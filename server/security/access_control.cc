@@ -1,9 +1,9 @@
 #include "server/security/access_control.h"
 
-#include <errno.h>
 #include <pwd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <utility>
 
 #include "absl/strings/ascii.h"

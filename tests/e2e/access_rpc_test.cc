@@ -413,7 +413,8 @@ TEST_F(AccessRpcTest, MoreConnectionsGiveAnIdentityNoMoreMemory) {
       std::async(std::launch::async, [&] { return apply(running_->stubs(), tokens_["admin"]); });
   std::this_thread::sleep_for(std::chrono::milliseconds(100));
   log.release();
-  EXPECT_TRUE(other.get().ok()) << "another identity has a share of its own";
+  const grpc::Status others = other.get();
+  EXPECT_TRUE(others.ok()) << "another identity has a share of its own; " << others.error_message();
   std::set<std::string> limits;
   for (std::future<grpc::Status>& call : calls)
     if (const grpc::Status status = call.get(); !status.ok()) limits.insert(error_of(status).limit());

@@ -1,9 +1,9 @@
 // `locus top`: rates and latencies of a server, computed from its metrics, as a table that is updated in place.
-#include <signal.h>
 #include <unistd.h>
 
 #include <chrono>
 #include <cmath>
+#include <csignal>
 #include <memory>
 #include <string>
 

@@ -13,6 +13,7 @@
 
 namespace locus::cli {
 
+// NOLINTNEXTLINE(bugprone-exception-escape): the move constructor of Json is noexcept; it contains an assertion
 struct Expectation {
   std::string text;  // text as written, without the comment
   Value left;

@@ -21,7 +21,7 @@ std::string fields_of(const Report& report) {
   for (const auto& [key, value] : report.head.items()) names.push_back(key);
   if (!report.rows_name.empty()) {
     names.push_back(report.rows_name);
-    names.push_back("count");
+    names.emplace_back("count");
   }
   if (!report.rows.empty()) {
     for (const auto& [key, value] : report.rows.front().items()) names.push_back(key);

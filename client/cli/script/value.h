@@ -20,6 +20,7 @@ namespace locus::cli {
 // Three parts of a vector: x, y, z.
 using Vector = std::array<double, 3>;
 
+// NOLINTNEXTLINE(bugprone-exception-escape): the move constructor of Json is noexcept; it contains an assertion
 struct Value {
   enum class Kind {
     kUnknown,  // unknown, because the script is only checked

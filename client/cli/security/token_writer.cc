@@ -98,7 +98,7 @@ std::string utc_text(absl::Time time) { return absl::FormatTime(kTokenTime, time
 }  // namespace
 
 absl::StatusOr<absl::Duration> parse_lifetime(absl::string_view text) {
-  constexpr int64_t kMaxHours = 100 * 365 * 24;
+  constexpr int64_t kMaxHours = int64_t{100} * 365 * 24;
   int64_t count = 0;
   int64_t hours = 0;
   if (!text.empty()) hours = text.back() == 'h' ? 1 : text.back() == 'd' ? 24 : text.back() == 'w' ? 7 * 24 : 0;

@@ -82,6 +82,7 @@ class PathBoxes {
                                lz * reciprocal_[2] - enter_[2]);
     const float far = minimum(minimum(hx * reciprocal_[0] - leave_[0], hy * reciprocal_[1] - leave_[1]),
                               hz * reciprocal_[2] - leave_[2]);
+    // NOLINTNEXTLINE(bugprone-narrowing-conversions): clang-tidy 14 takes infinity for a double
     return ((near > far) | (far < 0)) ? kMissed : near;
   }
 

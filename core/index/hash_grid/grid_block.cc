@@ -16,7 +16,7 @@ GridBlock::GridBlock(uint32_t count, bool has_forms) : count_(count), stride_((c
   handles_ = reinterpret_cast<uint32_t*>(memory_.get() + floats);
   entries_ = reinterpret_cast<GridEntry*>(memory_.get() + floats + handles);
   if (has_forms) forms_ = reinterpret_cast<GridForm*>(memory_.get() + floats + handles + entries);
-  for (int column = 0; column < 4; ++column)
+  for (size_t column = 0; column < 4; ++column)
     std::fill(floats_ + column * stride_ + count, floats_ + (column + 1) * stride_, 0.0f);
   std::fill(handles_ + count, handles_ + stride_, ~0u);  // not a valid handle
 }

@@ -47,8 +47,9 @@ double values_per_cell(const Brick& brick, const Vec3d& point) {
   int low[3], high[3];
   for (int axis = 0; axis < 3; ++axis) {
     const double cells = (point[axis] - brick.geometry.low[axis]) * brick.geometry.cells_per_unit;
-    low[axis] = std::clamp(static_cast<int>(cells - 0.5), 0, kLast);
-    high[axis] = std::clamp(static_cast<int>(cells + 0.5), 0, kLast);
+    // The numbers are truncated on purpose; the clamp corrects those below 0.
+    low[axis] = std::clamp(static_cast<int>(cells - 0.5), 0, kLast);   // NOLINT(bugprone-incorrect-roundings)
+    high[axis] = std::clamp(static_cast<int>(cells + 0.5), 0, kLast);  // NOLINT(bugprone-incorrect-roundings)
   }
   uint32_t values = 0;
   for (int z = low[2]; z <= high[2]; ++z) {

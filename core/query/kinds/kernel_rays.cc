@@ -104,7 +104,7 @@ class Rounds {
     const auto other = [&](const Stop& a, const Stop& b) { return tree(a) != tree(b); };
     if (std::adjacent_find(current_.begin(), current_.end(), other) == current_.end()) return;
     std::stable_sort(current_.begin(), current_.end(),
-                     [&](const Stop& a, const Stop& b) { return std::less<const TriangleBvh*>()(tree(a), tree(b)); });
+                     [&](const Stop& a, const Stop& b) { return std::less<>()(tree(a), tree(b)); });
   }
 
   // Traces the rays of stop `first` and of the stops after it whose instances have the same tree as the instance of

@@ -68,6 +68,7 @@ absl::Status ask(const client::Client& client, const DemoWorld& world, const Loa
   const std::unique_ptr<client::QueryStream> stream = client.query_stream(options.scene);
   DemoRandom random(options.seed * 1000 + static_cast<uint64_t>(kinds.front()));
   std::vector<Sampler> samplers;
+  samplers.reserve(kinds.size());
   for (const DemoKind kind : kinds) samplers.emplace_back(result.queries[static_cast<size_t>(kind)].samples);
   while (!done.load()) {
     for (size_t k = 0; k < kinds.size(); ++k) {

@@ -52,11 +52,17 @@ v1::QueryBatch demo_batch(DemoKind kind, const DemoWorld& world, DemoRandom& ran
   if (kind == DemoKind::kFirst || kind == DemoKind::kAny) {
     client::RayBlock rays = builder.rays();
     rays.frame(origin).mode(kind == DemoKind::kFirst ? v1::RAY_MODE_FIRST : v1::RAY_MODE_ANY);
-    for (int i = 0; i < count; ++i) rays.ray(float3(random_place(world, random)), float3(random.direction() * length));
+    for (int i = 0; i < count; ++i) {
+      const Vec3f direction = random.direction() * length;
+      rays.ray(float3(random_place(world, random)), float3(direction));
+    }
   } else if (kind == DemoKind::kBalls) {
     client::BallBlock balls = builder.balls();
     balls.frame(origin).detail(v1::STATIC_DETAIL_TRIANGLES_SORTED).max_results(kMaxRows);
-    for (int i = 0; i < count; ++i) balls.ball(float3(random_place(world, random)), length * 0.02f * random.unit());
+    for (int i = 0; i < count; ++i) {
+      const float radius = length * 0.02f * random.unit();
+      balls.ball(float3(random_place(world, random)), radius);
+    }
   } else {
     client::BoxBlock boxes = builder.boxes();
     boxes.frame(origin).detail(v1::STATIC_DETAIL_TRIANGLES_SORTED).max_results(kMaxRows);

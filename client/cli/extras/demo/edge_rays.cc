@@ -71,7 +71,8 @@ std::optional<Aim> aim(const Edge& edge, DemoRandom& random) {
   const Vec3d other = cross(*right, along * (1 / length));
   Vec3d away = side + other;
   if (squared_length(away) < 0.5) return std::nullopt;  // the fold is too sharp: the normals are almost opposite
-  const Vec3d jitter = *left * (0.4 * random.sign()) + along * (0.3 * random.sign() / length);
+  const double sideways = 0.4 * random.sign(), lengthways = 0.3 * random.sign() / length;
+  const Vec3d jitter = *left * sideways + along * lengthways;
   away = normalized(away) + jitter;
   if (random.unit() < 0.5f) away = -away;
   // Require that, seen from the origin, the two triangles lie on different sides of the edge and neither is nearly

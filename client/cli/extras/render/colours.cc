@@ -31,7 +31,7 @@ constexpr std::array<Colour, kStops> kInferno = {{{0x00, 0x00, 0x04},
                                                   {0xF7, 0xD0, 0x3C},
                                                   {0xFC, 0xFF, 0xA4}}};
 
-uint8_t byte_of(double value) { return static_cast<uint8_t>(std::clamp(value, 0.0, 255.0) + 0.5); }
+uint8_t byte_of(double value) { return static_cast<uint8_t>(std::lround(std::clamp(value, 0.0, 255.0))); }
 
 uint8_t between(uint8_t a, uint8_t b, double weight) { return byte_of(a + (b - a) * weight); }
 

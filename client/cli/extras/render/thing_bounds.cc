@@ -94,7 +94,7 @@ Aabbd narrowed(const Aabbd& box, const std::vector<bool>& reached) {
   Aabbd result = box;
   for (int side = 0; side < kSides; ++side) {
     int empty = 0;
-    while (empty < kCuts && !reached[static_cast<size_t>(side * kCuts + empty)]) ++empty;
+    while (empty < kCuts && !reached[static_cast<size_t>(side) * kCuts + static_cast<size_t>(empty)]) ++empty;
     if (empty == 0) continue;
     const Aabbd slab = slab_of(box, side, empty - 1);
     if (side % 2 == 0) result.min[side / 2] = slab.max[side / 2];

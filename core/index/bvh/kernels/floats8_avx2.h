@@ -70,8 +70,8 @@ static inline uint32_t signs_of(Floats8 a) { return static_cast<uint32_t>(_mm256
 // Table with one row for each bit mask of eight lanes. A row begins with the indices of the lanes in the mask, in
 // increasing order. Computed at compile time.
 struct PackTable {
-  alignas(64) uint8_t lanes[256][8];
-  constexpr PackTable() : lanes() {
+  alignas(64) uint8_t lanes[256][8] = {};
+  constexpr PackTable() {
     for (int set = 0; set < 256; ++set) {
       int count = 0;
       for (int lane = 0; lane < 8; ++lane)
@@ -205,8 +205,8 @@ static inline Doubles widened(float a, float b, float c) {
 
 // Table like PackTable, but the indices of the lanes are in decreasing order.
 struct FallingPackTable {
-  alignas(64) uint8_t lanes[256][8];
-  constexpr FallingPackTable() : lanes() {
+  alignas(64) uint8_t lanes[256][8] = {};
+  constexpr FallingPackTable() {
     for (int set = 0; set < 256; ++set) {
       int count = 0;
       for (int lane = 8; lane-- > 0;)

@@ -16,8 +16,8 @@ constexpr uint32_t kNoNumber = 0xFFFFFFFFu;
 // planes through which the ray enters and leaves the boxes. A row is given by the offset of its first float in
 // `bounds`.
 struct RowTable {
-  uint32_t entered[8][4], left[8][4];
-  constexpr RowTable() : entered(), left() {
+  uint32_t entered[8][4] = {}, left[8][4] = {};
+  constexpr RowTable() {
     for (int octant = 0; octant < 8; ++octant) {
       for (int axis = 0; axis < 3; ++axis) {
         const int negative = octant >> axis & 1;

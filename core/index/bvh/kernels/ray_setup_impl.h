@@ -53,11 +53,11 @@ class PreparedRay {
   inline PreparedRay() = default;
   inline PreparedRay(const PreparedRays& rays, size_t lane) : first_column_(&rays.columns[0][lane]) {}
 
-  inline float value(uint32_t column) const { return first_column_[column * kTreeWidth]; }
+  inline float value(uint32_t column) const { return first_column_[size_t{column} * kTreeWidth]; }
   inline Floats8 splat(uint32_t column) const { return Floats8::splat(value(column)); }
   inline uint32_t integer(uint32_t column) const {
     uint32_t bits;
-    __builtin_memcpy(&bits, first_column_ + column * kTreeWidth, sizeof(bits));
+    __builtin_memcpy(&bits, first_column_ + size_t{column} * kTreeWidth, sizeof(bits));
     return bits;
   }
 
