@@ -113,9 +113,11 @@ class BlockCheck {
     const Vec3d from = origin();
     const auto within = [](double value) { return std::abs(value) <= limits::kMaxCoordinate; };
     bool all = values.size() % 3 == 0;
-    for (size_t i = 0; i + 2 < values.size(); i += 3)
-      all &= within(from.x + double{values[i]}) & within(from.y + double{values[i + 1]}) &
-             within(from.z + double{values[i + 2]});
+    for (size_t i = 0; i + 2 < values.size(); i += 3) {
+      all &= within(from.x + double{values[i]});
+      all &= within(from.y + double{values[i + 1]});
+      all &= within(from.z + double{values[i + 2]});
+    }
     return all;
   }
   // Returns the point to which positions are relative. Returns the world's origin if the block has anchors: their

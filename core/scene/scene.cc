@@ -92,7 +92,7 @@ std::vector<const UpdateBatch*> well_formed(absl::Span<const UpdateBatch* const>
 
 }  // namespace
 
-Scene::Scene(std::string name, SceneSpec spec, uint64_t epoch, std::shared_ptr<const StaticSet> statics)
+Scene::Scene(std::string name, const SceneSpec& spec, uint64_t epoch, std::shared_ptr<const StaticSet> statics)
     : Scene(std::move(name), spec,
             SceneWriter(epoch, spec.winding, std::move(statics), limits::kMaxObjects, spec.history), SceneLog()) {}
 
@@ -103,7 +103,7 @@ Scene::Scene(std::string name, SceneSpec spec, SceneWriter writer, const SceneLo
       journal_(log),
       pins_(std::make_shared<ReaderTracker>(spec_.pinned_bytes)) {
   LOCUS_CHECK_NE(writer_.epoch(), uint64_t{0});
-  latest_ = writer_.published();
+  latest_ = writer_.published();  // NOLINT(cppcoreguidelines-prefer-member-initializer): writer_ must have an epoch
   recent_.push_back(latest_);
 }
 
@@ -320,6 +320,7 @@ void Scene::notify_watches(uint64_t revision) {
 Scene::Watch::Watch(const Scene& scene, uint64_t revision, std::function<void()> notify)
     : scene_(scene), notify_(std::move(notify)) {
   const MutexLock lock(scene_.mutex_);
+  // NOLINTNEXTLINE(cppcoreguidelines-prefer-member-initializer): needs the lock
   notified_ = scene_.closed_ || scene_.latest_->revision >= revision;
   if (notified_)
     notify_();

@@ -90,7 +90,7 @@ class Scene {
  public:
   // Creates a scene without a log. `epoch` is not 0 and differs from the epochs of all earlier scenes of this name.
   // `statics` may be shared with another scene.
-  Scene(std::string name, SceneSpec spec, uint64_t epoch, std::shared_ptr<const StaticSet> statics);
+  Scene(std::string name, const SceneSpec& spec, uint64_t epoch, std::shared_ptr<const StaticSet> statics);
   // Creates a scene that continues from the state of `writer`, which is the state after the last record in `log`.
   Scene(std::string name, SceneSpec spec, SceneWriter writer, const SceneLog& log);
 

@@ -11,12 +11,12 @@
 namespace locus {
 namespace {
 
-constexpr size_t kNumbersPerChunk = 3 * 65536;  // maximum number of coordinates or vertex indices in a chunk
+constexpr size_t kNumbersPerChunk = size_t{3} * 65536;  // maximum number of coordinates or vertex indices in a chunk
 static_assert(kNumbersPerChunk * sizeof(float) + 64 <= UpdateLog::kMaxChunkBytes);
 // Size in bytes after which no further part is added to a chunk. The last part of a chunk may exceed this size.
 constexpr size_t kPartsChunk = UpdateLog::kMaxChunkBytes / 2;
 static_assert(kPartsChunk + limits::kMaxLabelLength + 64 <= UpdateLog::kMaxChunkBytes);
-constexpr size_t kMinPart = 2 * 8;  // encoded size of a part with an empty name
+constexpr size_t kMinPart = size_t{2} * 8;  // encoded size of a part with an empty name
 
 // Reads the parts of one chunk and appends them to `parts`.
 void read_parts(ByteReader& reader, std::vector<MeshPart>& parts) {

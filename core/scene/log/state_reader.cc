@@ -13,8 +13,8 @@
 namespace locus {
 namespace {
 
-constexpr size_t kMinWriterBytes = 8 * 8;
-constexpr size_t kMinErrorBytes = 3 * 8;
+constexpr size_t kMinWriterBytes = size_t{8} * 8;
+constexpr size_t kMinErrorBytes = size_t{3} * 8;
 
 UpdateAck read_ack(ByteReader& reader) {
   UpdateAck ack;

@@ -39,9 +39,9 @@ void write_each(ByteWriter& writer, const Items& items, const Get& get) {
   std::vector<Entry> entries;
   entries.reserve(items.size());
   for (const auto& item : items) entries.push_back(get(item));
-  constexpr size_t width = std::tuple_size_v<Entry>;
-  writer.shared_column(absl::MakeConstSpan(reinterpret_cast<const Value*>(entries.data()), entries.size() * width),
-                       width);
+  constexpr size_t kWidth = std::tuple_size_v<Entry>;
+  writer.shared_column(absl::MakeConstSpan(reinterpret_cast<const Value*>(entries.data()), entries.size() * kWidth),
+                       kWidth);
 }
 
 template <class T, size_t N>
@@ -132,7 +132,7 @@ std::string StateWriter::next_instances() {
   for (const Instance& instance : instances) {
     if (!mesh_indices.emplace(instance.mesh.get(), static_cast<uint32_t>(contents.size())).second) continue;
     contents.push_back(instance.mesh->sha256());
-    names.push_back(instance.mesh->name());
+    names.emplace_back(instance.mesh->name());
   }
   std::string chunk;
   ByteWriter writer(chunk);

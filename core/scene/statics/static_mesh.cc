@@ -11,6 +11,7 @@ namespace locus {
 namespace {
 
 // Returns the triangles of `mesh`. Consumes the mesh, so that its columns are freed before the tree is built.
+// NOLINTNEXTLINE(performance-unnecessary-value-param): takes the mesh by value to consume it
 std::vector<Triangle> triangles_of(TriangleMesh mesh) {
   std::vector<Triangle> triangles;
   triangles.reserve(mesh.triangle_count());
