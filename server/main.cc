@@ -64,8 +64,8 @@ int wait_for_signal(const sigset_t& signals) {
 class EndingSignals {
  public:
   static EndingSignals& listen() {
-    static EndingSignals* const signals = new EndingSignals;
-    return *signals;
+    static EndingSignals* const kSignals = new EndingSignals;
+    return *kSignals;
   }
 
   // Returns a flag that becomes true when the first signal arrives.

@@ -49,7 +49,7 @@ std::string bold(const std::string& text) { return absl::StrCat("\\fB", escaped(
 std::string italic(const std::string& text) { return absl::StrCat("\\fI", escaped(text), "\\fR"); }
 
 RoffPage::RoffPage(const std::string& title, const std::string& section, const std::string& source) {
-  absl::StrAppend(&roff_, ".TH ", escaped(title), " ", section, " \"\" \"", escaped(source), "\"\n.nh\n.ad l\n");
+  absl::StrAppend(&roff_, ".TH ", escaped(title), " ", section, R"( "" ")", escaped(source), "\"\n.nh\n.ad l\n");
 }
 
 RoffPage& RoffPage::heading(const std::string& name) {

@@ -39,8 +39,9 @@ struct Shard {
 constexpr size_t kShards = 64;
 
 std::array<Shard, kShards>& shards() {
-  static auto* const made = new std::array<Shard, kShards>;  // never destroyed: threads may read until the process ends
-  return *made;
+  // Never destroyed: threads may read until the process ends.
+  static auto* const kMade = new std::array<Shard, kShards>;
+  return *kMade;
 }
 
 Shard& shard_of(int descriptor) { return shards()[static_cast<size_t>(descriptor) % kShards]; }

@@ -34,6 +34,7 @@ std::shared_ptr<Connection> ConnectionTable::find(absl::string_view name) {
 size_t ConnectionTable::shed_heaviest(bool close, uint64_t min_bytes, const char* reason) {
   const std::vector<std::shared_ptr<Connection>> all = accepted();
   std::vector<uint64_t> weights;
+  weights.reserve(all.size());
   for (const std::shared_ptr<Connection>& connection : all)
     weights.push_back(connection->unexplained_since_last_look() + connection->claimed_bytes.load());
   if (!close || all.empty()) return 0;

@@ -39,10 +39,11 @@ constexpr uint64_t kCountedBytes = 16 << 10;
 
 double explained_bytes(const CallCounts& now, const CallCounts& before) {
   const uint64_t messages = now.message_bytes - before.message_bytes;
-  return static_cast<double>(
-      messages + messages / kFrameShare + (now.messages_read - before.messages_read) * kBytesBesideMessage +
-      (now.calls_begun - before.calls_begun) * kCallBytes + (now.metadata_bytes - before.metadata_bytes) +
-      (now.bytes_written - before.bytes_written) / kWrittenPerByte);
+  const uint64_t frames = messages / kFrameShare,
+                 written = (now.bytes_written - before.bytes_written) / kWrittenPerByte;
+  return static_cast<double>(messages + frames + (now.messages_read - before.messages_read) * kBytesBesideMessage +
+                             (now.calls_begun - before.calls_begun) * kCallBytes +
+                             (now.metadata_bytes - before.metadata_bytes) + written);
 }
 
 double received_bytes(const ReceivedCounts& now, const ReceivedCounts& before) {

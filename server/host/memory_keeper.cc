@@ -47,6 +47,7 @@ std::vector<uint64_t> shrunk_sizes(const std::vector<uint64_t>& sizes, uint64_t 
   const uint64_t sum = std::accumulate(sizes.begin(), sizes.end(), uint64_t{0});
   const double kept = sum <= excess ? 0.0 : static_cast<double>(sum - excess) / static_cast<double>(sum);
   std::vector<uint64_t> shrunk;
+  shrunk.reserve(sizes.size());
   for (const uint64_t size : sizes) shrunk.push_back(static_cast<uint64_t>(static_cast<double>(size) * kept));
   return shrunk;
 }
@@ -149,6 +150,7 @@ void MemoryKeeper::trim_histories(uint64_t excess) {
 void MemoryKeeper::revoke_readers() {
   const std::vector<ScenePtr> scenes = all_scenes(registry_);
   std::vector<uint64_t> held;
+  held.reserve(scenes.size());
   for (const ScenePtr& scene : scenes) held.push_back(scene->status().pinned_bytes);
   const uint64_t sum = std::accumulate(held.begin(), held.end(), uint64_t{0});
   // If inserts are refused, cancel readers of old revisions, so that inserts succeed again.

@@ -37,7 +37,7 @@ constexpr size_t latency_range(uint64_t nanoseconds) {
   const uint64_t below = nanoseconds - 1;  // a duration equal to a bound belongs to the range below that bound
   const auto octave = static_cast<uint32_t>(std::bit_width(below)) - 1;
   const size_t half = below >> (octave - 1) & 1;
-  return std::min<size_t>(kLatencyBounds, 2 * (octave - kLowestOctave) + half + 1);
+  return std::min<size_t>(kLatencyBounds, size_t{2} * (octave - kLowestOctave) + half + 1);
 }
 
 // Counts of one histogram, or sums over several histograms: the number of durations in each range, and the sum of all

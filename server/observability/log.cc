@@ -36,12 +36,12 @@ spdlog::level::level_enum to_spdlog(LogLevel level) {
 }
 
 spdlog::logger& logger() {
-  static const std::shared_ptr<spdlog::logger> instance = [] {
+  static const std::shared_ptr<spdlog::logger> kInstance = [] {
     auto made = std::make_shared<spdlog::logger>("locusd", std::make_shared<spdlog::sinks::stderr_sink_mt>());
     made->set_level(spdlog::level::warn);
     return made;
   }();
-  return *instance;
+  return *kInstance;
 }
 
 // Appends `text` to `out` with JSON escapes. The text format uses these escapes too, because an unescaped line break or
@@ -61,7 +61,7 @@ void append_escaped(std::string& out, absl::string_view text) {
 }
 
 std::string json_line(absl::string_view message, const std::vector<LogField>& fields) {
-  std::string line = "\"message\":\"";
+  std::string line = R"("message":")";
   append_escaped(line, message);
   line += '"';
   for (const LogField& field : fields) {

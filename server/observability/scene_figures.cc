@@ -46,12 +46,11 @@ constexpr Figure kFigures[] = {
      &SceneFigures::pending_changes},
 };
 
-bool named_before(const SceneFigures& a, const SceneFigures& b) { return a.name < b.name; }
-
 }  // namespace
 
 std::vector<SceneFigures> SceneLabels::label(const std::vector<SceneFigures>& scenes) {
-  LOCUS_DCHECK(std::is_sorted(scenes.begin(), scenes.end(), named_before));
+  LOCUS_DCHECK(std::is_sorted(scenes.begin(), scenes.end(),
+                              [](const SceneFigures& a, const SceneFigures& b) { return a.name < b.name; }));
   std::set<std::string> present;
   for (const SceneFigures& scene : scenes)
     if (labelled_.contains(scene.name)) present.insert(scene.name);

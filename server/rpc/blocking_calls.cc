@@ -34,6 +34,7 @@ absl::Status no_method(const std::string& path) {
 // for its first message holds no thread and no permit. The method's body then runs on a thread of its own, starts one
 // operation at a time and waits for the operation's event. The call deletes itself on the loop when the first read has
 // ended, the status was sent (finished_) and gRPC has reported the end of the call (over_).
+// NOLINTNEXTLINE(cppcoreguidelines-virtual-class-destructor): a call deletes itself
 class BlockingCalls::Call final : private IoLoop::ActiveCall, private MessageStream {
  public:
   static void listen(BlockingCalls& owner, IoLoop& io) {
@@ -283,9 +284,8 @@ class BlockingCalls::Call final : private IoLoop::ActiveCall, private MessageStr
   bool over_ = false;        // gRPC has reported the end of the call
 };
 
-void BlockingCalls::add(BlockingMethod method) {
-  std::string path = method.path;
-  const bool added = methods_.emplace(std::move(path), std::move(method)).second;
+void BlockingCalls::add(const BlockingMethod& method) {
+  const bool added = methods_.emplace(method.path, method).second;
   LOCUS_CHECK(added);
 }
 

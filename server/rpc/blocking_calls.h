@@ -26,7 +26,7 @@ class BlockingCalls {
   // At most `max_threads` calls run at a time.
   BlockingCalls(RpcState& state, uint32_t max_threads) : state_(state), threads_(max_threads) {}
 
-  void add(BlockingMethod method);
+  void add(const BlockingMethod& method);
   void add(std::vector<BlockingMethod> methods);
 
   // Returns the service to register with gRPC's server. The server passes to this service every call that no other
@@ -36,6 +36,7 @@ class BlockingCalls {
   void listen(IoThreads& threads);
 
  private:
+  // NOLINTNEXTLINE(cppcoreguidelines-virtual-class-destructor): a call deletes itself
   class Call;
 
   // Returns the method of a path; null if there is none.
