@@ -44,7 +44,7 @@
 namespace locus::server {
 
 template <class Method>
-class HotCall;
+class HotCall;  // NOLINT(cppcoreguidelines-virtual-class-destructor): a call deletes itself
 
 // Acceptor of the calls of one rpc on one IO loop; keeps some unused slots for reuse. Outlives the loop's calls.
 //
@@ -86,12 +86,14 @@ class Listener {
 
 // One call of `Method`: waiting to be accepted, or accepted and not yet ended.
 template <class Method>
+// NOLINTNEXTLINE(cppcoreguidelines-virtual-class-destructor): a call deletes itself
 class HotCall final : private IoLoop::ActiveCall {
  public:
   using Request = typename Method::Request;
   using Response = typename Method::Response;
 
   // A message of a call, from its arrival until its answer is written.
+  // NOLINTNEXTLINE(cppcoreguidelines-virtual-class-destructor): only HotCall owns slots
   class Slot final : public CallSlot {
    public:
     explicit Slot(const Method& rpc) : work_(rpc.make_work(*this)) {}

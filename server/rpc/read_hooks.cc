@@ -81,8 +81,8 @@ void check_tls_reads(OnRefused on_refused) {
 }  // namespace locus::server
 
 extern "C" __attribute__((visibility("default"))) ssize_t recvmsg(int descriptor, msghdr* message, int flags) {
-  static const auto original = reinterpret_cast<decltype(&recvmsg)>(dlsym(RTLD_NEXT, "recvmsg"));
-  const ssize_t count = original(descriptor, message, flags);
+  static const auto kOriginal = reinterpret_cast<decltype(&recvmsg)>(dlsym(RTLD_NEXT, "recvmsg"));
+  const ssize_t count = kOriginal(descriptor, message, flags);
   if (count <= 0 || (flags & (MSG_PEEK | MSG_ERRQUEUE)) != 0) return count;
   if (locus::server::CheckedReads::accept(descriptor, *message, static_cast<size_t>(count))) return count;
   errno = ECONNRESET;
@@ -90,15 +90,15 @@ extern "C" __attribute__((visibility("default"))) ssize_t recvmsg(int descriptor
 }
 
 extern "C" __attribute__((visibility("default"))) int SSL_do_handshake(SSL* ssl) {
-  static const auto original = reinterpret_cast<decltype(&SSL_do_handshake)>(dlsym(RTLD_NEXT, "SSL_do_handshake"));
-  const int result = original(ssl);
+  static const auto kOriginal = reinterpret_cast<decltype(&SSL_do_handshake)>(dlsym(RTLD_NEXT, "SSL_do_handshake"));
+  const int result = kOriginal(ssl);
   locus::server::count_handshake(ssl, result);
   return result;
 }
 
 extern "C" __attribute__((visibility("default"))) int SSL_read(SSL* ssl, void* buffer, int size) {
-  static const auto original = reinterpret_cast<decltype(&SSL_read)>(dlsym(RTLD_NEXT, "SSL_read"));
-  const int count = original(ssl, buffer, size);
+  static const auto kOriginal = reinterpret_cast<decltype(&SSL_read)>(dlsym(RTLD_NEXT, "SSL_read"));
+  const int count = kOriginal(ssl, buffer, size);
   if (count <= 0) return count;
   const absl::string_view bytes(static_cast<const char*>(buffer), static_cast<size_t>(count));
   return locus::server::accept(ssl, bytes) ? count : -1;

@@ -45,8 +45,8 @@ absl::StatusOr<std::unique_ptr<TlsCredentials>> TlsCredentials::start(const TlsF
   return std::unique_ptr<TlsCredentials>(new TlsCredentials(files, std::move(hooks), std::move(contents)));
 }
 
-TlsCredentials::TlsCredentials(const TlsFiles& files, TlsHooks hooks, TlsContents contents)
-    : files_(files), hooks_(std::move(hooks)), contents_(std::move(contents)), thread_([this] { run(); }) {}
+TlsCredentials::TlsCredentials(TlsFiles files, TlsHooks hooks, TlsContents contents)
+    : files_(std::move(files)), hooks_(std::move(hooks)), contents_(std::move(contents)), thread_([this] { run(); }) {}
 
 TlsCredentials::~TlsCredentials() {
   {

@@ -64,7 +64,7 @@ class TlsCredentials {
   uint64_t failures() const { return failures_.load(); }
 
  private:
-  TlsCredentials(const TlsFiles& files, TlsHooks hooks, TlsContents contents);
+  TlsCredentials(TlsFiles files, TlsHooks hooks, TlsContents contents);
   static grpc_ssl_certificate_config_reload_status fetch(void* self, grpc_ssl_server_certificate_config** config);
   // Certificates of the client CA before and after a change of the files, in PEM.
   struct Change {

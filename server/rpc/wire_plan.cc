@@ -238,7 +238,7 @@ absl::Status WirePlan::Scan::message(const Type& type) {
   return in.ConsumedEntireMessage() ? absl::OkStatus() : no_message();
 }
 
-WirePlan::WirePlan(const Descriptor& type, const std::vector<WireLimit>& limits) { root_ = &add_type(type, limits); }
+WirePlan::WirePlan(const Descriptor& type, const std::vector<WireLimit>& limits) : root_(&add_type(type, limits)) {}
 WirePlan::~WirePlan() = default;
 WirePlan::WirePlan(WirePlan&&) noexcept = default;
 

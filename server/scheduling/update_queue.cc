@@ -288,6 +288,7 @@ void UpdateQueue::stall(SceneQueue& scene_queue, const Group& group) {
 }
 
 void UpdateQueue::requeue(SceneQueue& scene_queue, const Group& group) {
+  // NOLINTNEXTLINE(modernize-loop-convert): a range in reverse order would need std::views
   for (auto update = group.rbegin(); update != group.rend(); ++update) {
     const uint64_t items = items_of((*update)->batch());
     scene_queue.waiting.push_front(*update);

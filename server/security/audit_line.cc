@@ -74,7 +74,7 @@ std::string json_string(absl::string_view text) {
 
 std::string audit_line(const AuditEntry& entry) {
   const auto cut = [](absl::string_view text) { return json_string(text.substr(0, kMaxAuditTextBytes)); };
-  return absl::StrCat("{\"time\":\"", rfc3339(entry.unix_ms), "\",\"principal\":", cut(entry.principal),
+  return absl::StrCat(R"({"time":")", rfc3339(entry.unix_ms), R"(","principal":)", cut(entry.principal),
                       ",\"peer\":", cut(entry.peer), ",\"rpc\":", cut(entry.rpc), ",\"subject\":", cut(entry.subject),
                       ",\"code\":", json_string(absl::StatusCodeToString(entry.code))) +
          absl::StrCat(",\"request_id\":", cut(entry.request_id), ",\"text\":", cut(entry.text), "}\n");

@@ -29,8 +29,8 @@ absl::string_view prefix_of(IdentityKind kind) {
 }  // namespace
 
 const IdentityPtr& anonymous_identity() {
-  static const auto* const identity = new IdentityPtr(std::make_shared<const Identity>());
-  return *identity;
+  static const auto* const kIdentity = new IdentityPtr(std::make_shared<const Identity>());
+  return *kIdentity;
 }
 
 absl::StatusOr<std::string> principal_of(IdentityKind kind, absl::string_view name) {

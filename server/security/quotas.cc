@@ -314,6 +314,7 @@ void Quotas::adopt_quota(Account& account, uint64_t generation) const {
   for (size_t i = 0; i < kRates; ++i) {
     const double capacity = capacity_of(account.quota, static_cast<QuotaKind>(i));
     double& level = account.buckets[i].level;
+    // NOLINTNEXTLINE(bugprone-narrowing-conversions): clang-tidy 14 takes infinity for another type
     level = capacity == kNoQuota ? kNoQuota : std::min(level, capacity);
   }
 }

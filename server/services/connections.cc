@@ -139,8 +139,8 @@ std::vector<ConnectionMisuse> connection_misuses(const ConnectionTable& table) {
           {"tls_handshake", tls.failed_handshakes}};
 }
 
-Connections::Connections(const ServerConfig& config, RpcState& state)
-    : config_(config), state_(state), stream_counter_(state.connections) {}
+Connections::Connections(ServerConfig config, RpcState& state)
+    : config_(std::move(config)), state_(state), stream_counter_(state.connections) {}
 
 Connections::~Connections() = default;
 

@@ -71,7 +71,7 @@ class Connections {
   uint16_t port() const { return port_; }
 
  private:
-  Connections(const ServerConfig& config, RpcState& state);
+  Connections(ServerConfig config, RpcState& state);
 
   const ServerConfig config_;
   RpcState& state_;

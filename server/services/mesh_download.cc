@@ -9,6 +9,7 @@
 #include "core/base/status_macros.h"
 #include "core/scene/registry.h"
 #include "server/convert/convert.h"
+#include "server/services/scene_access.h"
 #include "server/services/scene_calls.h"
 
 namespace locus::server {

@@ -16,7 +16,7 @@ struct QueryMethod {
   static constexpr Rpc kRpc = Rpc::kQuery;
   static constexpr const char* kPath = "/locus.v1.QueryService/Query";
   static constexpr bool kStream = false;
-  static constexpr bool kInOrder = false;
+  [[maybe_unused]] static constexpr bool kInOrder = false;
 
   void listen(grpc::ServerContext* context, grpc::ByteBuffer* request,
               grpc::ServerAsyncResponseWriter<grpc::ByteBuffer>* wire, grpc::ServerCompletionQueue* queue,
