@@ -23,9 +23,8 @@ ResultColumns::ResultColumns(v1::QueryResult& result, size_t blocks) : result_(r
 RowSpans ResultColumns::add_rows(size_t number, ColumnSet columns, size_t rows) {
   v1::BlockResult& to = block(number);
   RowSpans spans;
-// NOLINTNEXTLINE(bugprone-macro-parentheses): `array` is the name of a member
 #define LOCUS_ADD_ROWS(column, name, type, array, width) \
-  if (columns.has(Column::column)) spans.array = grow(*to.mutable_##array(), width * rows);
+  if (columns.has(Column::column)) spans.array = grow(*to.mutable_##array(), (width)*rows);
   LOCUS_COLUMN_ARRAYS(LOCUS_ADD_ROWS)
 #undef LOCUS_ADD_ROWS
   return spans;

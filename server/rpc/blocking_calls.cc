@@ -289,8 +289,8 @@ void BlockingCalls::add(const BlockingMethod& method) {
   LOCUS_CHECK(added);
 }
 
-void BlockingCalls::add(std::vector<BlockingMethod> methods) {
-  for (BlockingMethod& method : methods) add(std::move(method));
+void BlockingCalls::add(const std::vector<BlockingMethod>& methods) {
+  for (const BlockingMethod& method : methods) add(method);
 }
 
 const BlockingMethod* BlockingCalls::find(const std::string& path) const {

@@ -27,7 +27,7 @@ class BlockingCalls {
   BlockingCalls(RpcState& state, uint32_t max_threads) : state_(state), threads_(max_threads) {}
 
   void add(const BlockingMethod& method);
-  void add(std::vector<BlockingMethod> methods);
+  void add(const std::vector<BlockingMethod>& methods);
 
   // Returns the service to register with gRPC's server. The server passes to this service every call that no other
   // service serves.

@@ -55,6 +55,7 @@ class Recovery {
     std::map<Sha256, std::vector<const StoredMesh*>> contents;
     for (const StoredMesh& mesh : meshes) contents[mesh.sha256].push_back(&mesh);
     std::vector<const std::vector<const StoredMesh*>*> lists;
+    lists.reserve(contents.size());
     for (const auto& [sha256, names] : contents) lists.push_back(&names);
     host_.pool.parallel_for(lists.size(), [&](size_t i) { recover(*lists[i]); });
     host_.pool.parallel_for(scenes.size(), [&](size_t i) { recover(scenes[i]); });

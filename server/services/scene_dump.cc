@@ -143,7 +143,8 @@ struct DumpOrder {
 
 DumpOrder order_of(const SceneSnapshot& snapshot) {
   DumpOrder order;
-  auto& [objects, instances] = order;
+  std::vector<GridRef>& objects = order.objects;
+  std::vector<const Instance*>& instances = order.instances;
   objects.reserve(snapshot.objects.size());
   snapshot.objects.grid().for_each([&objects](const GridRef& object) {
     objects.push_back(object);

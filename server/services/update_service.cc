@@ -16,7 +16,7 @@ struct ApplyUpdatesMethod {
   static constexpr Rpc kRpc = Rpc::kApplyUpdates;
   static constexpr const char* kPath = "/locus.v1.UpdateService/ApplyUpdates";
   static constexpr bool kStream = false;
-  static constexpr bool kInOrder = true;
+  [[maybe_unused]] static constexpr bool kInOrder = true;
 
   void listen(grpc::ServerContext* context, grpc::ByteBuffer* request,
               grpc::ServerAsyncResponseWriter<grpc::ByteBuffer>* wire, grpc::ServerCompletionQueue* queue,
