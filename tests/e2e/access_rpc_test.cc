@@ -377,11 +377,12 @@ TEST_F(AccessRpcTest, AnInflatedMessageCountsForTheQuotaOfItsCaller) {
 // Updates of one identity, on four connections, wait for the log and keep their claims of memory meanwhile. When they
 // have claimed the share of one identity, further updates of this identity must be refused.
 TEST_F(AccessRpcTest, MoreConnectionsGiveAnIdentityNoMoreMemory) {
-  constexpr uint64_t kRoom = uint64_t{128} << 20;
   MemoryLog log;
   running_.reset();
   server::ServerConfig scarce = config();
-  scarce.memory_limit = server::resident_bytes() + kRoom;
+  // The share of one identity must be less than the memory that is left, even in a process that is large already.
+  const uint64_t used = server::resident_bytes();
+  scarce.memory_limit = used + std::max(used, uint64_t{128} << 20);
   running_.emplace(scarce, &log);
   create("arena-1");
   v1::ApplyUpdatesRequest update;
