@@ -437,7 +437,7 @@ class KindsProofTest : public ::testing::TestWithParam<Proof> {
     const Proof& proof = GetParam();
     const ProofTally all = run_trials((queries + proof.queries - 1) / proof.queries,
                                       [&](uint64_t i, ProofTally& tally) { proof.prove(kKindsSeed + i, {}, tally); });
-    std::printf("proof: %llu queries of %s, %llu findings confirmed: %llu faults; seed %llu\n",
+    std::printf("proof: %llu queries of %s, %llu findings compared: %llu faults; seed %llu\n",
                 static_cast<unsigned long long>(all.queries), proof.name, static_cast<unsigned long long>(all.found),
                 static_cast<unsigned long long>(all.faults), static_cast<unsigned long long>(kKindsSeed));
     EXPECT_EQ(all.faults, 0u) << all.first_fault;

@@ -20,32 +20,21 @@ constexpr size_t kSweepsOfAMesh = 300;
 // One placed mesh, the random sweeps past it, and the verification of the answers.
 class SweepTrial {
  public:
-  explicit SweepTrial(uint64_t seed) : seed_(seed), random_(seed), mesh_(random_proof_mesh(random_)) {
-    QueryWorld world;
-    world.instances = {random_proof_placement(mesh_, random_)};
-    snapshot_ = snapshot_of(world);
-    transform_ = &snapshot_->statics->find(1)->transform;
-    for (const Triangle& triangle : mesh_)
-      triangles_.emplace_back(RealCorners{world_of(triangle.a), world_of(triangle.b), world_of(triangle.c)});
-  }
+  explicit SweepTrial(uint64_t seed) : world_(seed, 0), random_(world_.random()) {}
 
   void run(ProofTally& tally) {
     for (const MoverKind kind : {MoverKind::kBall, MoverKind::kCapsule, MoverKind::kBox}) run(kind, tally);
   }
 
  private:
-  Vec3r world_of(Vec3f corner) const {
-    return turned(transform_->quaternion, to_real(corner)) * Real{transform_->scale} + to_real(transform_->translation);
-  }
-
   // Adds a sweep that passes near a triangle. The path of the sweep is about as long as the distance from its start to
   // the triangle, so that the rounding of t to float stays within the documented error bound.
   void add_sweep(MoverKind kind, OwnedBlock& block) {
-    const Triangle& target = random_.pick(mesh_);
-    const double scale = transform_->scale, size = scale * random_.magnitude(-7, 1);
-    const Vec3d near =
-        transform_->point_to_world(to_double(target.a) * random_.unit() + to_double(target.b) * random_.unit() * 0.5) -
-        transform_->translation + random_.vector(size);
+    const Triangle& target = random_.pick(world_.mesh());
+    const double scale = world_.scale(), size = scale * random_.magnitude(-7, 1);
+    const Vec3d near = world_.transform().point_to_world(to_double(target.a) * random_.unit() +
+                                                         to_double(target.b) * random_.unit() * 0.5) -
+                       world_.frame() + random_.vector(size);
     const Vec3d start = near + random_.vector(scale * random_.magnitude(-2, 4));
     Vec3d way = (near - start) * random_.between(0.3, 3);
     if (random_.chance(0.1)) way[random_.whole(0, 2)] = 0;
@@ -65,10 +54,10 @@ class SweepTrial {
   void run(MoverKind kind, ProofTally& tally) {
     OwnedBlock block;
     block.settings.kind = SweepColumns{};
-    block.settings.frame = transform_->translation;
+    block.settings.frame = world_.frame();
     block.settings.columns = {Column::kT, Column::kId};
     for (size_t i = 0; i < kSweepsOfAMesh; ++i) add_sweep(kind, block);
-    const BlockResult result = run_block(*snapshot_, block);
+    const BlockResult result = run_block(world_.snapshot(), block);
     for (size_t i = 0; i < kSweepsOfAMesh; ++i) {
       const RealMover mover = mover_of(kind, block, i);
       ++tally.queries;
@@ -76,8 +65,8 @@ class SweepTrial {
       std::optional<Real> found;
       if (result.ids[i] != 0) found = result.t[i];
       if (std::string fault = fault_of(mover, found); !fault.empty())
-        tally.note("seed " + std::to_string(seed_) + " kind " + std::to_string(static_cast<int>(kind)) + " sweep " +
-                   std::to_string(i) + ": " + fault);
+        tally.note("seed " + std::to_string(world_.seed()) + " kind " + std::to_string(static_cast<int>(kind)) +
+                   " sweep " + std::to_string(i) + ": " + fault);
     }
   }
 
@@ -87,7 +76,7 @@ class SweepTrial {
     const auto at = [i](const std::vector<float>& column) {
       return Vec3r{column[3 * i], column[3 * i + 1], column[3 * i + 2]};
     };
-    mover.start = at(block.points) + to_real(transform_->translation);
+    mover.start = at(block.points) + to_real(world_.frame());
     mover.way = at(block.sizes) - at(block.points);
     if (kind != MoverKind::kBox) mover.radius = block.extras[i];
     if (kind == MoverKind::kCapsule) mover.half_axis = at(block.half_axes);
@@ -109,7 +98,7 @@ class SweepTrial {
     const Real e = 0x1p-20L * (length(mover.start) + mover.size()), way = length(mover.way);
     const Real before = !found ? 1 : way == 0 ? -1 : *found - e / way;
     bool touches = false;
-    for (const SweptTriangle& triangle : triangles_) {
+    for (const SweptTriangle& triangle : world_.triangles()) {
       if (!triangle.is_near(mover, e)) continue;
       if (triangle.is_overlapped(mover, -e, before))
         return found ? "a contact before " + std::to_string(static_cast<double>(*found)) : std::string("a miss");
@@ -119,12 +108,8 @@ class SweepTrial {
     return "nothing is touched at " + std::to_string(static_cast<double>(*found));
   }
 
-  const uint64_t seed_;
-  Random random_;
-  const std::vector<Triangle> mesh_;
-  SnapshotPtr snapshot_;
-  const Transform* transform_ = nullptr;
-  std::vector<SweptTriangle> triangles_;
+  RealWorld world_;
+  Random& random_;
 };
 
 // Runs at least `sweeps` sweeps in total, on one thread for each processor, and expects that no answer is wrong.

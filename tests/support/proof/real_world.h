@@ -87,6 +87,9 @@ class RealWorld {
   uint64_t seed() const { return seed_; }
   Random& random() { return random_; }
   const SceneSnapshot& snapshot() const { return *snapshot_; }
+  // Return the triangles of the mesh, in mesh axes, and their placement.
+  const std::vector<Triangle>& mesh() const { return mesh_; }
+  const Transform& transform() const { return *transform_; }
   // Returns the position of the mesh, used as the frame of queries, and its scale.
   Vec3d frame() const { return transform_->translation; }
   double scale() const { return transform_->scale; }
