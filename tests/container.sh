@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Builds the image of deploy/Dockerfile and tests a container of it. Needs root, but no registry and no Docker daemon:
-# buildah builds the image on a base made from this machine's Debian sources, and podman runs it. Checks the compose
-# file and the systemd units too. All files are in build/container; the next run uses them again.
+# buildah builds the image on a base made from this machine's Debian sources, and podman runs it. Checks the systemd
+# units and both compose files too, that of deploy/edge with a token through the front. All files are in build/container; the next run uses them again.
 #
 #   ./tests/container.sh            ends with: N passed, M failed, K skipped
 #   ./tests/container.sh --fresh    first removes the files of earlier runs
@@ -17,6 +17,7 @@ store=$PWD/build/container
 results=$store/results.txt
 log=$store/log.txt
 image=localhost/locus
+edge_image=localhost/locus-edge
 base=localhost/debian:12-slim
 
 case "${1-}" in
@@ -27,11 +28,11 @@ esac
 mkdir -p "$store" && : > "$results" && : > "$log" || exit
 
 containers=()
-composed=no
+composed=
 work=$(mktemp -d /tmp/locus-container.XXXXXX) || exit
 
 clean_up() {
-  if [ "$composed" = yes ]; then compose down --volumes; podman network rm "$(basename "$work" | tr -d .)_default"; fi
+  compose_ends
   for id in ${containers[@]+"${containers[@]}"}; do podman rm --force --volumes --time 1 "$id"; done
   rm -rf "$work"
 } >> "$log" 2>&1
@@ -75,7 +76,7 @@ set_up_podman() {
   [ "$(stat -f -c %T "$store")" = overlayfs ] && driver=vfs
   cat > "$work/containers.conf" << TEXT
 [containers]
-default_ulimits = ["nofile=1024:1024", "nproc=1024:1024"]
+default_ulimits = ["nofile=8192:8192", "nproc=1024:1024"]
 [engine]
 runtime = "runc"
 cgroup_manager = "cgroupfs"
@@ -111,6 +112,9 @@ build_image() {
   buildah build --isolation chroot --format docker --layers --build-arg BASE="$base" --file deploy/Dockerfile \
     --ignorefile deploy/Dockerfile.dockerignore --tag "$image" .
 }
+build_edge_image() {
+  buildah build --isolation chroot --format docker --layers --build-arg BASE="$base" --tag "$edge_image" deploy/edge
+}
 
 # Starts a container that is hardened as in compose.yaml, with the given options. Sets `id` to the container's id and
 # waits until the server in the container answers.
@@ -133,8 +137,17 @@ inside() { podman exec --interactive "$id" "$@"; }
 client() {
   podman run --rm --interactive --network host --env LOCUS_ADDRESS="$(podman port "$id" 7575/tcp)" --entrypoint locus "$image" "$@"
 }
+# Runs podman-compose with the compose file of `composed`.
 compose() {
-  LOCUS_PORT=$compose_port LOCUS_HTTP_PORT=$compose_http_port podman-compose --project-name "$(basename "$work" | tr -d .)" --file deploy/compose.yaml "$@"
+  LOCUS_PORT=$compose_port LOCUS_HTTP_PORT=$compose_http_port LOCUS_EDGE_PORT=$edge_port LOCUS_ETC=$work/etc podman-compose \
+    --project-name "$(basename "$work" | tr -d .)" --file "$composed" "$@"
+}
+# Removes the containers, volumes and network that compose has made.
+compose_ends() {
+  [ -n "$composed" ] || return 0
+  compose down --volumes
+  podman network rm "$(basename "$work" | tr -d .)_default"
+  composed=
 }
 
 free_port() { /usr/bin/python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])'; }
@@ -181,17 +194,53 @@ ends_in_order() {
     && podman logs "$id" 2>&1 | grep " ended"
 }
 http_ready() {
+  # Without -q: grep would close the pipe before the program has written the end of the line.
   /usr/bin/python3 -c 'import sys, urllib.request as r; print(r.urlopen(sys.argv[1], timeout=10).read().decode())' \
-    "http://127.0.0.1:$compose_http_port/readyz" | grep -q ready
+    "http://127.0.0.1:$compose_http_port/readyz" | grep ready
 }
 
 compose_starts() {
+  composed=deploy/compose.yaml
   compose up --detach || return
   for _ in $(seq 100); do
     podman run --rm --network host --env LOCUS_ADDRESS=127.0.0.1:"$compose_port" --entrypoint locus "$image" health && return
     sleep 0.2
   done
   return 1
+}
+
+# Runs a command of `locus` as root with the folder of the front's files, which it makes.
+in_etc() { podman run --rm --user 0:10001 --volume "$work/etc:/etc/locus" --workdir /etc/locus --entrypoint "$1" "$image" "${@:2}"; }
+# Writes a certificate of the front, a token and its right, readable by group 10001 only.
+edge_files() {
+  mkdir "$work/etc" && in_etc locus cert authority certs && in_etc locus cert server certs --name localhost || return
+  cat "$work"/etc/certs/server.{pem,key} > "$work/etc/edge.pem" || return
+  in_etc locus token create player --token-file tokens --expires 1d > "$work/etc/player.token" || return
+  echo 'grant token:player admin arena-*' > "$work/etc/access.conf"
+  in_etc chgrp -R 10001 . && in_etc chmod -R g+rX .
+}
+# Runs a command of `locus` as a client of the front.
+edge_client() {
+  podman run --rm --network host --user 0:10001 --volume "$work/etc:/etc/locus:ro" --entrypoint locus "$image" \
+    -a "localhost:$edge_port" --ca /etc/locus/certs/ca.pem "$@"
+}
+edge_starts() {
+  composed=deploy/edge/compose.yaml
+  compose up --detach --no-build || return
+  for _ in $(seq 100); do
+    edge_client --token-file /etc/locus/player.token health && return
+    sleep 0.2
+  done
+  compose logs
+  return 1
+}
+# edge_refuses WORD ARGUMENTS...: passes if a client of the front is refused with a message that contains WORD.
+edge_refuses() {
+  local output code
+  output=$(edge_client "${@:2}" 2>&1)
+  code=$?
+  printf '%s\n' "$output"
+  [ "$code" != 0 ] && grep -qi -- "$1" <<< "$output"
 }
 # Verifies a systemd unit after replacing its program by /bin/true, because systemd-analyze requires that the program is
 # installed.
@@ -252,7 +301,15 @@ check_image
 check_container
 compose_port=$(free_port)
 compose_http_port=$(free_port)
-composed=yes
+edge_port=$(free_port)
 check "compose starts it on this machine's loopback" compose_starts
 check "its HTTP port says that it is ready" http_ready
+check "compose ends it" compose_ends
+need "image of the front" build_edge_image
+need "certificate, token and right for the front" edge_files
+need "compose starts a daemon behind the front" edge_starts
+check "the front passes on a token" edge_client --token-file /etc/locus/player.token scene create arena-1
+check "the token's right is enforced behind the front" \
+  edge_refuses "token:player lacks the right admin" --token-file /etc/locus/player.token scene create other
+check "a client without a token is refused behind the front" edge_refuses "user:10002 lacks the right read" scene list
 finish
