@@ -283,7 +283,7 @@ void HashGrid::apply_to_bricks(const GridBatch& batch) {
       continue;
     remove(handle);
   }
-  if (moves_nearly_all(batch)) {
+  if (moves_at_least_half(batch)) {
     gather_all(batch.moves);
   } else {
     move_all(batch.moves);
@@ -305,7 +305,7 @@ void HashGrid::clear_batch() {
   builder_.end();
 }
 
-bool HashGrid::moves_nearly_all(const GridBatch& batch) const {
+bool HashGrid::moves_at_least_half(const GridBatch& batch) const {
   const size_t moves = batch.moves.moves.size();
   return !batch.moves.by_handle.empty() && batch.removed.empty() && batch.inserted.empty() && moves != 0 &&
          moves >= size_ / 2;

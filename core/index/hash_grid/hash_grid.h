@@ -124,7 +124,7 @@ class HashGrid {
   internal::BrickTable& writable_table(Level& level);
   void move_all(const GridMoves& moves);
   void apply_to_bricks(const GridBatch& batch);
-  bool moves_nearly_all(const GridBatch& batch) const;
+  bool moves_at_least_half(const GridBatch& batch) const;
   void gather_all(const GridMoves& moves);
   bool choice_is_stale() const;
   void choose_cell_size();
