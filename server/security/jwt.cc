@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <utility>
 
 #include "absl/strings/ascii.h"
@@ -66,7 +67,7 @@ bool names_audience(const json_t* claim, absl::string_view audience) {
 
 // Returns the first second in which the JWT is no longer accepted.
 int64_t end_of(const json_t* claims) {
-  return static_cast<int64_t>(json_number_value(json_object_get(claims, "exp"))) + kJwtSkewSeconds;
+  return static_cast<int64_t>(std::ceil(json_number_value(json_object_get(claims, "exp")))) + kJwtSkewSeconds;
 }
 
 // Members of a JWT's header that are used.

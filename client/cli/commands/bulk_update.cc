@@ -148,7 +148,8 @@ class BulkUpdateRun {
       errors_.emplace(context_.out(), context_.options().format,
                       ReportShape{.rows_name = "errors", .keys = {"line", "id", "reason"}, .width_rows = 1000});
       errors_->begin(Json::object());
-      first_refused_ = absl::StrCat(reader_->name(), ":", line.value_or(0), ", id ", item.id(), ": ", reason);
+      first_refused_ =
+          absl::StrCat(reader_->name(), line ? absl::StrCat(":", *line) : "", ", id ", item.id(), ": ", reason);
     }
     all_unknown_ &= item.reason() == v1::REASON_UNKNOWN_ID;
     errors_->add({{"line", line ? Json(*line) : Json()}, {"id", id_json(item.id())}, {"reason", reason}});

@@ -159,6 +159,13 @@ TEST(JwtTest, WithoutAKidFewKeysAreTried) {
   EXPECT_TRUE(by.verify(keys[4].jwt(header_of(keys[4], R"(,"kid":"k4")"), claims()), kNow).ok());
 }
 
+TEST(JwtTest, AFractionOfASecondDelaysTheEndOfTheIdentity) {
+  const std::string exp = absl::StrCat(R"("exp":)", kNow + 100);
+  const auto identity = verifier().verify(ec_key().jwt(header_of(ec_key()), claims_replaced(exp, exp + ".5")), kNow);
+  ASSERT_TRUE(identity.ok());
+  EXPECT_EQ((*identity)->expires, kNow + 101 + kJwtSkewSeconds);
+}
+
 TEST(JwtTest, TimesAreKeptWithASkewOfAMinute) {
   const JwtVerifier by = verifier();
   const std::string jwt = ec_key().jwt(header_of(ec_key()), claims());
