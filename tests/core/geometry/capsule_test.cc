@@ -77,24 +77,6 @@ TEST(SegmentTriangleTest, DistanceAgreesWithASearch) {
   EXPECT_GT(crossing, 30);
 }
 
-// A segment that crosses the diagonal of a parallelogram crosses one of the parallelogram's two triangles.
-TEST(SegmentTriangleTest, NoSegmentPassesBetweenTwoTriangles) {
-  constexpr uint64_t kSeed = 143;
-  Random random(kSeed);
-  for (int i = 0; i < 100000; ++i) {
-    const Vec3d a = random.vector(10), c = random.vector(10), b = random.vector(10), d = a + c - b;
-    const Vec3d on_diagonal = a + (c - a) * random.between(0.01, 0.99);
-    const Vec3d half_axis = random.vector(random.magnitude(0, 5));
-    const double sine = std::abs(dot(normalized(cross(c - a, b - a)), normalized(half_axis)));
-    if (!(sine > 1e-3)) continue;
-    const Vec3d center = on_diagonal + half_axis * random.between(-0.5, 0.5);
-    ASSERT_TRUE(segment_crosses_triangle(center, half_axis, a, b, c) ||
-                segment_crosses_triangle(center, half_axis, c, d, a) ||
-                segment_crosses_triangle(center, half_axis, a, c, d))
-        << "seed " << kSeed << " case " << i;
-  }
-}
-
 // Returns the distance from a point to a shape's solid; `offset` is relative to the shape's position.
 Real distance_to(const Shape& shape, test::Vec3r offset) {
   if (shape.kind != ShapeKind::kBox) return std::max(Real{0}, test::SolidReference(shape).gauge(offset));
