@@ -93,12 +93,13 @@ OverlapAnswer run_contains(QueryTask& task, const SceneAtTime& moment, Vec3d poi
     InstancesAround visitor(task, point, options, filter, rows);
     task.visit_region(task.snapshot().statics->tree(), visitor);
   }
-  OverlapAnswer instances = rows.finish();
-  if (options.source == Source::kStatic || moment.objects().size() == 0 || task.ended()) return instances;
+  OverlapAnswer answer = rows.finish();
+  if (options.source == Source::kStatic || moment.objects().size() == 0 || task.ended()) return answer;
   OverlapOptions of_objects = options;
   of_objects.source = Source::kDynamic;
   run_ball(task, moment, Balld{point, 0}, of_objects, filter);
-  return with_objects(std::move(instances), task.found_objects(), moment, options);
+  add_objects(answer, task.found_objects(), moment, options);
+  return answer;
 }
 
 }  // namespace locus

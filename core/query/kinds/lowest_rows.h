@@ -67,7 +67,10 @@ class LowestRows {
   const bool sorted_triangles_;
   const CountOnly count_only_;
   size_t rows_ = 0;
-  OverlapAnswer answer_;
+  uint64_t count_ = 0;  // number of rows that were offered
+  bool truncated_ = false;
+  std::vector<RowRun> runs_;
+  std::vector<uint32_t> triangles_;
 };
 
 }  // namespace locus

@@ -487,13 +487,14 @@ OverlapAnswer run_overlap(QueryTask& task, const SceneAtTime& moment, const type
     InstanceSearch<Kind> search(task, shape, options, filter, rows);
     task.visit_region(task.snapshot().statics->tree(), search);
   }
+  OverlapAnswer answer = rows.finish();
   const bool may_find_objects = options.source != Source::kStatic && moment.objects().size() != 0;
   if (may_find_objects && !task.ended()) {
     ObjectRows<Kind> search(task, moment, shape, options, filter);
     task.visit_objects_in_region(moment, search);
-    return with_objects(rows.finish(), task.found_objects(), moment, options);
+    add_objects(answer, task.found_objects(), moment, options);
   }
-  return rows.finish();
+  return answer;
 }
 
 }  // namespace
@@ -506,28 +507,27 @@ uint32_t nearest_overlapping(QueryTask& task, const Capsule& solid, const Instan
   return search_nearest<CapsuleShape>(task, solid, instance);
 }
 
-OverlapAnswer with_objects(OverlapAnswer instances, FoundObjects& found, const SceneAtTime& moment,
-                           const OverlapOptions& options) {
+void add_objects(OverlapAnswer& answer, FoundObjects& found, const SceneAtTime& moment, const OverlapOptions& options) {
   const absl::Span<const FoundObject> objects = found.finish();
-  instances.count += found.count();
-  if (options.count_only == CountOnly::kYes) return instances;
-  if (instances.runs.empty()) {
-    instances.objects = objects;
-    instances.truncated |= found.truncated();
-    return instances;
+  answer.count += found.count();
+  if (options.count_only == CountOnly::kYes) return;
+  if (answer.runs.empty()) {
+    answer.objects = objects;
+    answer.truncated |= found.truncated();
+    return;
   }
-  if (objects.empty()) return instances;
+  if (objects.empty()) return;
   LowestRows rows(options.max_results, options.detail == StaticDetail::kTrianglesSorted);
-  for (const RowRun& run : instances.runs) {
+  for (const RowRun& run : answer.runs) {
     if (run.triangle_count == 0)
       rows.offer(run.row);
     else
-      rows.offer(run.row, instances.triangles_of(run));
+      rows.offer(run.row, answer.triangles_of(run));
   }
   for (const FoundObject& found_object : objects) rows.offer(hit_on(found_object.object, 0, moment));
-  OverlapAnswer both = rows.finish();
-  both.truncated |= instances.truncated || found.truncated();
-  return both;
+  const bool truncated = answer.truncated || found.truncated();
+  answer = rows.finish();
+  answer.truncated |= truncated;
 }
 
 OverlapOptions overlap_options(const QueryBlock& block, StaticDetail detail) {

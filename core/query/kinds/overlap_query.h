@@ -44,10 +44,9 @@ OverlapAnswer run_region(QueryTask& task, const SceneAtTime& moment, const Conve
 uint32_t nearest_overlapping(QueryTask& task, const Balld& solid, const Instance& instance);
 uint32_t nearest_overlapping(QueryTask& task, const Capsule& solid, const Instance& instance);
 
-// Merges the rows of `instances` with the objects in `found`. Returns at most options.max_results rows, ascending by
-// id. With count_only, returns only the total number of rows.
-OverlapAnswer with_objects(OverlapAnswer instances, FoundObjects& found, const SceneAtTime& moment,
-                           const OverlapOptions& options);
+// Adds the objects in `found` to `answer`, which has the rows of instances: retains at most options.max_results rows,
+// ascending by id. With count_only, only adds to the number of rows.
+void add_objects(OverlapAnswer& answer, FoundObjects& found, const SceneAtTime& moment, const OverlapOptions& options);
 
 // Return the region that run_ball(), run_box() or run_capsule() searches in the grid of objects.
 // QueryTask::walk_regions() uses these regions.

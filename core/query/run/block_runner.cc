@@ -99,7 +99,7 @@ size_t BlockRunner::run_queries(const Columns& columns, size_t begin, size_t end
     });
   for (size_t i = begin; i < end; ++i) {
     if (i != begin && should_split()) return i;
-    if (origins_.is_unanchored(i))
+    if (origins_.is_unanchored(i) || task_.ended())
       write_nothing(i);
     else
       run_query(columns, i);
@@ -279,40 +279,31 @@ void BlockRunner::write_answer(const Columns& columns, const RayAnswer& answer, 
 }
 
 void BlockRunner::run_query(const SweepColumns& sweeps, size_t i) {
-  RayAnswer answer;
-  if (!task_.ended())
-    answer = run_sweep(task_, times_.of(i), sweep_request(block_, origins_.of(i), sweeps, i), Filter(block_, i));
-  write_answer(sweeps, answer, i);
+  const SweepRequest request = sweep_request(block_, origins_.of(i), sweeps, i);
+  write_answer(sweeps, run_sweep(task_, times_.of(i), request, Filter(block_, i)), i);
 }
 
 void BlockRunner::run_query(const BallColumns& balls, size_t i) {
-  OverlapAnswer answer;
   const Balld ball = ball_of(origins_.of(i), balls, i);
-  if (!task_.ended())
-    answer = run_ball(task_, times_.of(i), ball, overlap_options(block_, balls.detail), Filter(block_, i));
-  append_contacts(answer, ball, i);
+  append_contacts(run_ball(task_, times_.of(i), ball, overlap_options(block_, balls.detail), Filter(block_, i)), ball,
+                  i);
 }
 
 void BlockRunner::run_query(const BoxColumns& boxes, size_t i) {
-  OverlapAnswer answer;
-  if (!task_.ended())
-    answer = run_box(task_, times_.of(i), box_of(origins_.of(i), boxes, i), overlap_options(block_, boxes.detail),
-                     Filter(block_, i));
-  append_rows(answer, i);
+  const Obbd box = box_of(origins_.of(i), boxes, i);
+  append_rows(run_box(task_, times_.of(i), box, overlap_options(block_, boxes.detail), Filter(block_, i)), i);
 }
 
 void BlockRunner::run_query(const CapsuleColumns& capsules, size_t i) {
-  OverlapAnswer answer;
   const Capsule capsule = capsule_of(origins_.of(i), capsules, i);
-  if (!task_.ended())
-    answer = run_capsule(task_, times_.of(i), capsule, overlap_options(block_, capsules.detail), Filter(block_, i));
-  append_contacts(answer, capsule, i);
+  append_contacts(
+      run_capsule(task_, times_.of(i), capsule, overlap_options(block_, capsules.detail), Filter(block_, i)), capsule,
+      i);
 }
 
 void BlockRunner::run_query(const NearestColumns& nearest, size_t i) {
   const NearestRequest request = nearest_request(block_, origins_.of(i), nearest, i);
-  NearestAnswer answer;
-  if (!task_.ended()) answer = run_nearest(task_, times_.of(i), request, Filter(block_, i));
+  const NearestAnswer answer = run_nearest(task_, times_.of(i), request, Filter(block_, i));
   if (block_.count_only) return write_count(answer.count);
   const absl::Span<const Hit> rows = answer.rows;
   const size_t kept = std::min<uint64_t>(rows.size(), max_rows_ - rows_);
@@ -328,31 +319,24 @@ void BlockRunner::run_query(const FrustumColumns& frustums, size_t i) {
   const std::optional<ConvexRegion> region = ConvexRegion::make(origins_.of(i), FrustumPlanes(frustums, i).planes());
   // A region that is relative to an anchor may lie outside of the world.
   if (!region) return write_nothing(i);
-  OverlapAnswer answer;
-  if (!task_.ended())
-    answer = run_region(task_, times_.of(i), *region, overlap_options(block_, frustums.detail), Filter(block_, i));
-  append_rows(answer, i);
+  append_rows(run_region(task_, times_.of(i), *region, overlap_options(block_, frustums.detail), Filter(block_, i)), i);
 }
 
 void BlockRunner::run_query(const SightColumns& sight, size_t i) {
   const size_t bytes = sight.bytes_per_viewer();
   char* const to = output_.bytes + i * bytes;
   std::fill_n(to, bytes, '\0');
-  if (!task_.ended()) look(task_, times_.of(i), block_, sight, origins_.of(i), i, {to, bytes});
+  look(task_, times_.of(i), block_, sight, origins_.of(i), i, {to, bytes});
 }
 
 void BlockRunner::run_query(const ContainsColumns& contains, size_t i) {
-  OverlapAnswer answer;
   const Vec3d point = origins_.of(i) + read_vec3d(ColumnReader<float>(contains.points, 3).entry(i));
-  if (!task_.ended())
-    answer =
-        run_contains(task_, times_.of(i), point, overlap_options(block_, StaticDetail::kInstances), Filter(block_, i));
-  append_rows(answer, i);
+  const OverlapOptions options = overlap_options(block_, StaticDetail::kInstances);
+  append_rows(run_contains(task_, times_.of(i), point, options, Filter(block_, i)), i);
 }
 
 void BlockRunner::run_query(const PairColumns& pairs, size_t i) {
-  PairAnswer answer;
-  if (!task_.ended()) answer = run_pairs(task_, times_.of(i), block_, pairs);
+  const PairAnswer answer = run_pairs(task_, times_.of(i), block_, pairs);
   if (block_.count_only) return write_count(answer.count);
   const size_t kept = std::min<uint64_t>(answer.rows.size(), max_rows_ - rows_);
   const RowSpans to = add_rows(result_, columns_, kept);
@@ -365,8 +349,7 @@ void BlockRunner::run_query(const PairColumns& pairs, size_t i) {
 
 void BlockRunner::run_query(const CellColumns& cells, size_t i) {
   const CellRequest request = cell_request(block_, origins_.of(i), cells, i);
-  CellAnswer answer;
-  if (!task_.ended()) answer = run_cell(task_, times_.of(i), request, Filter(block_, i));
+  const CellAnswer answer = run_cell(task_, times_.of(i), request, Filter(block_, i));
   const size_t rows = answer.is_free ? 1 + answer.planes.size() : 0;
   const size_t kept = std::min<uint64_t>(rows, max_rows_ - rows_);
   write_cell(answer, request.point - block_.frame, add_rows(result_, columns_, kept), kept);
@@ -377,7 +360,7 @@ void BlockRunner::run_query(const CellColumns& cells, size_t i) {
 // last lookup was at the same time, so that consecutive queries with equal times share one lookup.
 void BlockRunner::look_up_groups_at(const LookupColumns& lookup, size_t i) {
   const bool same = groups_query_ && (!times_.asks_past() || times_.time(*groups_query_) == times_.time(i));
-  if (same || task_.ended()) return;
+  if (same) return;
   groups_query_ = i;
   groups_ = look_up_groups(task_, times_.of(i), lookup.groups, overlap_options(block_, StaticDetail::kInstances));
 }
