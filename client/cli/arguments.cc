@@ -13,12 +13,19 @@ namespace locus::cli {
 namespace {
 
 template <size_t N>
-bool parse_list(std::istream& in, std::array<double, N>& values) {
+bool parse_list(absl::string_view text, std::array<double, N>& values) {
+  const std::vector<absl::string_view> parts = absl::StrSplit(text, ',');
+  if (parts.size() != N) return false;
+  for (size_t i = 0; i < N; ++i)
+    if (!absl::SimpleAtod(parts[i], &values[i])) return false;
+  return true;
+}
+
+template <size_t N>
+bool read_list(std::istream& in, std::array<double, N>& values) {
   std::string text;
   in >> text;
-  const std::vector<absl::string_view> parts = absl::StrSplit(text, ',');
-  bool good = parts.size() == N;
-  for (size_t i = 0; good && i < N; ++i) good = absl::SimpleAtod(parts[i], &values[i]);
+  const bool good = parse_list(text, values);
   if (!good) in.setstate(std::ios::failbit);
   return good;
 }
@@ -32,13 +39,13 @@ bool parse_number(absl::string_view text, uint64_t& value) {
 
 std::istream& operator>>(std::istream& in, Triple& triple) {
   std::array<double, 3> values{};
-  if (parse_list(in, values)) triple = {values[0], values[1], values[2]};
+  if (read_list(in, values)) triple = {values[0], values[1], values[2]};
   return in;
 }
 
 std::istream& operator>>(std::istream& in, Quaternion& quaternion) {
   std::array<double, 4> values{};
-  if (parse_list(in, values)) {
+  if (read_list(in, values)) {
     quaternion = {static_cast<float>(values[0]), static_cast<float>(values[1]), static_cast<float>(values[2]),
                   static_cast<float>(values[3])};
   }
@@ -98,6 +105,27 @@ std::vector<float> floats_of(const std::vector<Quaternion>& quaternions) {
   std::vector<float> floats;
   for (const Quaternion& q : quaternions) floats.insert(floats.end(), {q.x, q.y, q.z, q.w});
   return floats;
+}
+
+CLI::Validator three_numbers() {
+  return CLI::Validator(
+      [](const std::string& text) -> std::string {
+        std::array<double, 3> values{};
+        if (parse_list(text, values)) return "";
+        return absl::StrCat("'", text, "' is not X,Y,Z: three numbers with commas and without blanks, such as 0,0,100");
+      },
+      "");
+}
+
+CLI::Validator four_numbers() {
+  return CLI::Validator(
+      [](const std::string& text) -> std::string {
+        std::array<double, 4> values{};
+        if (parse_list(text, values)) return "";
+        return absl::StrCat("'", text,
+                            "' is not X,Y,Z,W: four numbers with commas and without blanks, such as 0,0,0,1");
+      },
+      "");
 }
 
 CLI::Validator fits_32_bits() {

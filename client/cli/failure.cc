@@ -43,10 +43,13 @@ std::string hint_of_reason(v1::Reason reason, absl::string_view message) {
   }
 }
 
-std::string hint_of_code(absl::StatusCode code) {
+std::string hint_of_code(absl::StatusCode code, absl::string_view message) {
   switch (code) {
     case absl::StatusCode::kDeadlineExceeded:
-      return "give it more time with --timeout SECONDS; a change may have been made all the same";
+      // A query changes nothing. The client library words the error of a query that is late.
+      return absl::StartsWith(message, "the query")
+                 ? "give it more time with --timeout SECONDS"
+                 : "give it more time with --timeout SECONDS; a change may have been made all the same";
     case absl::StatusCode::kUnimplemented:
       return "is this a locus server? `locus version --server` says which";
     case absl::StatusCode::kUnavailable:
@@ -66,7 +69,7 @@ std::string hint_of(const absl::Status& status) {
   if (absl::StrContains(status.message(), "no connection to")) return "";
   const std::optional<v1::Error> error = client::error_of(status);
   std::string hint = error ? hint_of_reason(error->reason(), status.message()) : "";
-  if (hint.empty()) hint = hint_of_code(status.code());
+  if (hint.empty()) hint = hint_of_code(status.code(), status.message());
   return absl::StrContains(status.message(), hint) ? "" : hint;
 }
 

@@ -60,6 +60,17 @@ absl::StatusOr<Response> call(Stub& stub, const CallPlan& plan, const Request& r
   return response;
 }
 
+// Returns `status`, the outcome of a query. If the deadline passed in this client, so that the server sent no error of
+// its own, returns an error that says so and names the revision for which the query waits.
+absl::Status with_view(const absl::Status& status, absl::string_view scene, const v1::View& view) {
+  if (!absl::IsDeadlineExceeded(status) || error_of(status)) return status;
+  std::string message = "the query was not answered in time";
+  if (view.has_at_least())
+    absl::StrAppend(&message, "; scene '", scene, "' may not have reached revision ", view.at_least(),
+                    " yet, for which the query waits");
+  return absl::DeadlineExceededError(message);
+}
+
 }  // namespace
 
 struct Client::Connection {
@@ -228,7 +239,7 @@ absl::Status Client::dump(const v1::DumpSceneRequest& request,
   while (accepted.ok() && reader->Read(&response)) accepted = on_message(response);
   if (!accepted.ok()) context.TryCancel();
   const absl::Status end = to_absl_status(reader->Finish());
-  return accepted.ok() ? end : accepted;
+  return accepted.ok() ? with_view(end, request.scene(), request.view()) : accepted;
 }
 
 absl::StatusOr<v1::UpdateAck> Client::apply(absl::string_view scene, v1::UpdateBatch batch) const {
@@ -246,9 +257,10 @@ absl::StatusOr<v1::QueryResult> Client::query(absl::string_view scene, v1::Query
   v1::QueryRequest request;
   request.set_scene(std::string(scene));
   *request.mutable_batch() = std::move(batch);
-  ASSIGN_OR_RETURN(v1::QueryResponse response, call(*connection_->queries, connection_->repeatable(scene), request,
-                                                    &v1::QueryService::StubInterface::Query));
-  return std::move(*response.mutable_result());
+  absl::StatusOr<v1::QueryResponse> response =
+      call(*connection_->queries, connection_->repeatable(scene), request, &v1::QueryService::StubInterface::Query);
+  RETURN_IF_ERROR(with_view(response.status(), scene, request.batch().view()));
+  return std::move(*response->mutable_result());
 }
 
 std::unique_ptr<UpdateStream> Client::update_stream(absl::string_view scene, const UpdateStreamOptions& options) const {

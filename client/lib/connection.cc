@@ -22,10 +22,9 @@ constexpr char kDefaultPort[] = ":7575";
 
 void add_scene(grpc::ClientContext& context, absl::string_view scene) {
   constexpr size_t kMaxSceneName = 63;
-  const bool legal =
-      !scene.empty() && scene.size() <= kMaxSceneName && std::all_of(scene.begin(), scene.end(), [](unsigned char c) {
-        return absl::ascii_islower(c) || absl::ascii_isdigit(c) || c == '-';
-      });
+  // gRPC aborts on other characters. The server refuses the names that are printable, but not names of scenes.
+  const bool legal = !scene.empty() && scene.size() <= kMaxSceneName &&
+                     std::all_of(scene.begin(), scene.end(), [](unsigned char c) { return absl::ascii_isgraph(c); });
   if (legal) context.AddMetadata("x-scene", std::string(scene));
 }
 

@@ -7,17 +7,18 @@
 namespace locus {
 namespace {
 
-bool name_character(char c) { return absl::ascii_islower(c) || absl::ascii_isdigit(c); }
+bool letter_or_digit(char c) { return absl::ascii_islower(c) || absl::ascii_isdigit(c); }
 
 }  // namespace
 
 absl::Status check_scene_name(absl::string_view name, absl::string_view field) {
   bool good = !name.empty() && name.size() <= limits::kMaxNameLength && absl::ascii_islower(name.front()) &&
-              name_character(name.back());
-  for (const char c : name) good = good && (name_character(c) || c == '-');
+              letter_or_digit(name.back());
+  for (const char c : name) good = good && (letter_or_digit(c) || c == '-' || c == '_' || c == '.');
   if (good) return absl::OkStatus();
   return refuse_argument(Reason::kMalformed, field, {},
-                         "a scene's name has 1 to 63 of a-z, 0-9 and -, starts with a letter, does not end with -");
+                         "a scene's name has 1 to 63 of a-z, 0-9, -, _ and ., starts with a letter, ends with a letter "
+                         "or digit");
 }
 
 absl::Status check_mesh_name(absl::string_view name, absl::string_view field) {

@@ -8,7 +8,7 @@
 
 namespace locus {
 
-// Returns OK if `name` matches ^[a-z]([a-z0-9-]{0,61}[a-z0-9])?$, otherwise INVALID_ARGUMENT naming `field`.
+// Returns OK if `name` matches ^[a-z]([a-z0-9._-]{0,61}[a-z0-9])?$, otherwise INVALID_ARGUMENT naming `field`.
 absl::Status check_scene_name(absl::string_view name, absl::string_view field);
 // Returns OK if `name` has 1 to 63 printable ASCII characters and no space, otherwise INVALID_ARGUMENT naming `field`.
 absl::Status check_mesh_name(absl::string_view name, absl::string_view field);

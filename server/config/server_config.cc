@@ -340,7 +340,7 @@ Invocation help(const std::vector<std::string>& arguments) {
   const CLI::App* asked = &app;
   for (const CLI::App* command : app.get_subcommands({}))
     if (std::find(arguments.begin(), arguments.end(), command->get_name()) != arguments.end()) asked = command;
-  invocation.text = asked->help("locusd");
+  invocation.text = asked == &app ? app.help() : asked->help("locusd");
   return invocation;
 }
 

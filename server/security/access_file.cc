@@ -68,7 +68,7 @@ bool is_printable(absl::string_view word) {
 
 bool is_scene_pattern(absl::string_view word) {
   return std::all_of(word.begin(), word.end(), [](char c) {
-    return absl::ascii_islower(c) || absl::ascii_isdigit(c) || c == '-' || c == '*' || c == '?';
+    return absl::ascii_islower(c) || absl::ascii_isdigit(c) || absl::StrContains("-_.*?", c);
   });
 }
 
@@ -126,8 +126,8 @@ class AccessParser {
 
   absl::Status check_scene_pattern(absl::string_view word) const {
     if (word.size() <= kMaxPatternBytes && is_scene_pattern(word)) return absl::OkStatus();
-    return refuse(absl::StrCat("a scene pattern has at most ", kMaxPatternBytes, " of a-z, 0-9, -, * and ?, unlike ",
-                               quoted_word(word)));
+    return refuse(absl::StrCat("a scene pattern has at most ", kMaxPatternBytes,
+                               " of a-z, 0-9, -, _, ., * and ?, unlike ", quoted_word(word)));
   }
 
   absl::Status add_grant(const Words& words) {

@@ -39,6 +39,26 @@ absl::StatusOr<v1::UploadMeshResponse> upload(const std::string& name, const Imp
   return uploaded;
 }
 
+// Meshes that were uploaded but are not placed yet. Deletes them when it is destroyed, unless keep() was called. A mesh
+// that another client has placed meanwhile is not deleted, because the server refuses to.
+class NewMeshes {
+ public:
+  explicit NewMeshes(const client::Client& client) : client_(client) {}
+  ~NewMeshes() {
+    // The caller reports why the meshes were not placed. A mesh that cannot be deleted either does no harm.
+    for (const std::string& name : names_) client_.delete_mesh(name).IgnoreError();
+  }
+  NewMeshes(const NewMeshes&) = delete;
+  NewMeshes& operator=(const NewMeshes&) = delete;
+
+  void add(const std::string& name) { names_.push_back(name); }
+  void keep() { names_.clear(); }
+
+ private:
+  const client::Client& client_;
+  std::vector<std::string> names_;
+};
+
 absl::Status create_scene(const std::string& name, client::Client& client) {
   v1::CreateSceneRequest request;
   request.set_name(name);
@@ -64,7 +84,7 @@ void add_placement(const PlacementOptions& options, const ImportedLevel& level, 
 void add_placement_options(CLI::App& command, PlacementOptions& options) {
   command.add_flag("--create", options.create, "Create the scene if there is none");
   command.add_option("--mesh", options.mesh, "The mesh's name on the server [the level's]")->type_name("NAME");
-  command.add_option("--at", options.at, "Where its origin goes [0,0,0]")->type_name("X,Y,Z");
+  add_triple(command, "--at", options.at, "Where its origin goes [0,0,0]");
   command.add_option("--id", options.id, "The instance's id [chosen by the server]")->type_name("ID");
   command.add_option("--layers", options.layers, "Layer bits, matched with the masks of queries [1]")
       ->type_name("BITS")
@@ -77,7 +97,11 @@ absl::Status upload_and_place(const PlacementOptions& options, const ImportedLev
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());
   if (options.create) {
     RETURN_IF_ERROR(create_scene(options.scene, *client));
+  } else {
+    // Refuses a missing scene before the meshes are uploaded, which can take minutes.
+    RETURN_IF_ERROR(client->get_scene(options.scene).status());
   }
+  NewMeshes new_meshes(*client);
   Report report;
   report.rows_name = "meshes";
   v1::ChangeInstancesRequest change;
@@ -85,6 +109,7 @@ absl::Status upload_and_place(const PlacementOptions& options, const ImportedLev
   for (const ImportedMesh& mesh : level.meshes) {
     const std::string name = mesh_name(options, level, mesh);
     ASSIGN_OR_RETURN(const v1::UploadMeshResponse uploaded, upload(name, mesh, *client, context));
+    if (!uploaded.already_known()) new_meshes.add(name);
     add_placement(options, level, name, change);
     report.rows.push_back({{"mesh", name},
                            {"triangles", uploaded.mesh().triangles()},
@@ -92,6 +117,7 @@ absl::Status upload_and_place(const PlacementOptions& options, const ImportedLev
                            {"already_known", uploaded.already_known()}});
   }
   ASSIGN_OR_RETURN(const v1::ChangeInstancesResponse placed, client->change_instances(change));
+  new_meshes.keep();
   context.remember_own(options.scene, {placed.epoch(), placed.revision()});
   for (size_t i = 0; i < report.rows.size() && static_cast<int>(i) < placed.ids_size(); ++i) {
     report.rows[i]["id"] = id_json(placed.ids(static_cast<int>(i)));

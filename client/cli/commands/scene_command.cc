@@ -137,12 +137,13 @@ absl::Status describe_scene(const DescribeOptions& options, Context& context) {
 absl::Status delete_scene(const DeleteOptions& options, Context& context) {
   v1::DeleteSceneRequest request;
   request.set_name(options.name);
-  request.set_if_present(options.if_present);
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());
-  RETURN_IF_ERROR(client->delete_scene(request));
+  const absl::Status deleted = client->delete_scene(request);
+  const bool absent = absl::IsNotFound(deleted) && options.if_present;
+  if (!absent) RETURN_IF_ERROR(deleted);
   context.forget_own(options.name);
   Report report;
-  report.head["deleted"] = options.name;
+  report.head[absent ? "absent" : "deleted"] = options.name;
   context.write(report);
   return absl::OkStatus();
 }
@@ -155,7 +156,7 @@ void add_create(CLI::App& parent, Context& context) {
   locus scene create arena --if-absent --label map=delta --label mode=ctf
   locus scene create arena --history-ticks 64 --overload latest-wins
   locus scene create arena-copy --static-from arena)");
-  command.add_option("NAME", options->name, "Lower case letters, digits and dashes, at most 63")->required();
+  command.add_option("NAME", options->name, "Lower case letters, digits, - _ and ., at most 63")->required();
   command.add_flag("--if-absent", options->if_absent, "Accept a scene of that name as it is");
   add_repeatable(command, "--label", options->labels, "KEY=VALUE", "Your own label, by which `scene list` can filter");
   const NamedValues<v1::Winding> windings = {{"ccw", v1::WINDING_COUNTER_CLOCKWISE}, {"cw", v1::WINDING_CLOCKWISE}};

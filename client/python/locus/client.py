@@ -22,7 +22,7 @@ from . import columns, meshes, schema
 from .connection import Connection, Retry
 from .credentials import Credentials
 from .enums import OverloadPolicy, Winding
-from .errors import LocusError, from_call, connection_advice, parsed
+from .errors import LocusError, connection_advice, from_call, late_query, parsed
 from .meshes import InstanceChange, MeshColumns, PlacedInstances
 from .queries import QueryBatch
 from .query_stream import QueryStream
@@ -214,7 +214,12 @@ class Client:
 
     def query(self, scene: str, batch: QueryBatch) -> QueryResult:
         """Runs one batch of queries, all at one revision. For a sequence of batches use query_stream()."""
-        return QueryResult.from_bytes(self.query_bytes(scene, batch.request_bytes(scene)))
+        try:
+            return QueryResult.from_bytes(self.query_bytes(scene, batch.request_bytes(scene)))
+        except LocusError as error:
+            if error.code != grpc.StatusCode.DEADLINE_EXCEEDED or error.refused:
+                raise
+            raise late_query(scene, batch.waits_for) from error
 
     def query_bytes(self, scene: str, request: bytes) -> bytes:
         """Runs an encoded batch. `request` are the bytes from QueryBatch.request_bytes(). Returns the bytes of the

@@ -16,7 +16,7 @@ from .errors import LocusError, from_call, parsed
 DEFAULT_PORT = 7575
 _MAX_CONNECTING_SECONDS = 0.1
 _PROBE_SECONDS = 10.0
-_LEGAL_SCENE = re.compile(r"[a-z0-9-]{1,63}")
+_LEGAL_SCENE = re.compile(r"[!-~]{1,63}")
 _Answer = TypeVar("_Answer")
 
 

@@ -78,6 +78,8 @@ class LocusError(Exception):
         """Suggested remedy; empty if the message already contains a remedy, or if no remedy is known."""
         if self.refused or "nothing answers" in self.message:
             return ""
+        if self.code == grpc.StatusCode.DEADLINE_EXCEEDED and self.message.startswith("the query"):
+            return "give it more time (timeout)"  # a query changes nothing
         advice = connection_advice(self.message) if self.code == grpc.StatusCode.UNAVAILABLE else ""
         return advice or _HINTS.get(self.code, "")
 
@@ -127,6 +129,15 @@ def from_call(call: Any) -> LocusError:
             if error is not None:
                 return from_error(error)
     return LocusError(call.code(), call.details() or "")
+
+
+def late_query(scene: str, waits_for: Optional[int]) -> LocusError:
+    """Returns the error for a query whose deadline passed in this client. `waits_for` is the revision for which the query
+    waits; None if it waits for none.
+    """
+    waited = "" if waits_for is None else (f"; scene '{scene}' may not have reached revision {waits_for} yet, for which "
+                                           "the query waits")
+    return LocusError(grpc.StatusCode.DEADLINE_EXCEEDED, f"the query was not answered in time{waited}")
 
 
 def unreadable(what: str) -> LocusError:

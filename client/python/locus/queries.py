@@ -113,7 +113,8 @@ class QueryBatch:
     the server still retains it. By default the batch is answered at the latest revision. If the epoch of the given
     revision differs from the scene's epoch, the query raises LocusError with Reason.SCENE_RESTARTED. `max_work`:
     maximum total number of visited nodes and cells and of tests for the batch; `explain`: report the work done;
-    `max_reply_bytes`: the maximum size of the answer, 0 = 4,000,000.
+    `max_reply_bytes`: the maximum size of the answer, 0 = 4,000,000. The attribute `waits_for` is the number of the
+    minimum revision; None if the batch waits for none.
 
     The batch checks types and lengths of columns (TypeError and ValueError name the column); the server checks values.
     Buffers are borrowed: leave them unchanged until the batch was sent. A batch may be sent several times. Methods
@@ -125,6 +126,7 @@ class QueryBatch:
         if at_least is not None and exactly is not None:
             raise ValueError("give at_least or exactly, not both")
         self._parts = wire.Parts()
+        self.waits_for: Optional[int] = None if at_least is None else at_least.revision
         moment = at_least or exactly
         if moment is not None:
             view = wire.Parts()

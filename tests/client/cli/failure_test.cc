@@ -12,6 +12,7 @@ namespace locus::cli {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 absl::Status not_finite() {
   v1::Error error;
@@ -39,6 +40,14 @@ TEST(FailureTest, TextHasAnErrorLineAndAHintLine) {
   write_failure(err, Format::kTable, absl::DeadlineExceededError("too slow"));
   EXPECT_THAT(err.str(), HasSubstr("error: too slow\n"));
   EXPECT_THAT(err.str(), HasSubstr("hint: give it more time with --timeout"));
+}
+
+TEST(FailureTest, OnlyAChangeMayHaveBeenMadeAfterItsDeadline) {
+  std::ostringstream change, query;
+  write_failure(change, Format::kTable, absl::DeadlineExceededError("Deadline Exceeded"));
+  write_failure(query, Format::kTable, absl::DeadlineExceededError("the query was not answered in time"));
+  EXPECT_THAT(change.str(), HasSubstr("a change may have been made"));
+  EXPECT_THAT(query.str(), Not(HasSubstr("a change")));
 }
 
 TEST(FailureTest, JsonHasTheFieldsOfTheStructuredError) {

@@ -139,6 +139,23 @@ TEST(UsageTest, MistakesInTheLineAreUsageErrors) {
   }
 }
 
+TEST(UsageTest, AVectorHasThreeNumbers) {
+  for (const std::vector<std::string>& line :
+       std::vector<std::vector<std::string>>{{"insert", "arena", "box", "--id", "1", "--at", "0,0,0", "--half", "2"},
+                                             {"insert", "arena", "ball", "--id", "1", "--at", "2", "--radius", "1"},
+                                             {"move", "arena", "--id", "1", "--to", "2"},
+                                             {"query", "ray", "arena", "--from", "2", "--dir", "0,0,1"},
+                                             {"query", "ray", "arena", "--from", "2", "0", "0", "--dir", "0,0,1"},
+                                             {"render", "arena", "--up", "2", "x.png"},
+                                             {"import", "level.obj", "--scene", "arena", "--at", "2"}}) {
+    const Outcome outcome = run(line);
+    EXPECT_EQ(outcome.code, ExitCode::kUsage) << ::testing::PrintToString(line);
+    EXPECT_THAT(outcome.err, HasSubstr("'2' is not X,Y,Z: three numbers with commas")) << outcome.err;
+  }
+  EXPECT_THAT(run({"move", "arena", "--id", "1", "--to", "0,0,0", "--rotation", "1"}).err,
+              HasSubstr("'1' is not X,Y,Z,W: four numbers"));
+}
+
 TEST(UsageTest, VersionNeedsNoServer) {
   EXPECT_EQ(run({"version"}).code, ExitCode::kOk);
   EXPECT_THAT(run({"--version"}).out, HasSubstr(LOCUS_VERSION));
@@ -160,6 +177,7 @@ TEST_F(RunTest, ScenesAreCreatedListedDescribedAndDeleted) {
   EXPECT_EQ(json_of({"scene", "list"})["scenes"][0]["name"], "arena");
   EXPECT_EQ(json_of({"scene", "describe", "arena"})["state"], "ready");
   EXPECT_EQ(json_of({"scene", "delete", "arena"})["deleted"], "arena");
+  EXPECT_EQ(json_of({"scene", "delete", "arena", "--if-present"}), Json({{"absent", "arena"}}));
   const Outcome gone = run_here({"scene", "describe", "arena"});
   EXPECT_EQ(gone.code, ExitCode::kNotFound);
   EXPECT_THAT(gone.err, HasSubstr("hint: `locus scene list`"));
@@ -389,7 +407,7 @@ TEST_F(RunTest, AGeneratedCityIsUploadedAndPlaced) {
 TEST_F(RunTest, AGeneratedCityWrittenToAFileCanBeImported) {
   const std::string path = ::testing::TempDir() + "locus_run_test_city.obj";
   ASSERT_EQ(run({"generate", "city", "--triangles", "100", "--out", path}).code, ExitCode::kOk);
-  const Json answer = json_of({"import", path, "--scene", "arena", "--id", "5"});
+  const Json answer = json_of({"import", path, "--scene", "arena", "--id", "5", "--create"});
   std::remove(path.c_str());
   ASSERT_EQ(answer["meshes"].size(), 1u);
   EXPECT_GE(answer["meshes"][0]["triangles"], 12);

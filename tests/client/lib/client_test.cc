@@ -76,6 +76,21 @@ TEST_F(ClientTest, QueriesFailWhenTheAttemptsAreUsedUp) {
   EXPECT_EQ(server_.queries.calls, 4);
 }
 
+TEST_F(ClientTest, ALateQueryNamesTheRevisionForWhichItWaits) {
+  server_.queries.delay = std::chrono::milliseconds(500);
+  ClientOptions hasty = quick();
+  hasty.deadline = absl::Milliseconds(100);
+  const auto client = Client::connect(server_.address(), hasty);
+  ASSERT_TRUE(client.ok()) << client.status();
+  v1::QueryBatch batch = one_ray();
+  const absl::Status late = (*client)->query("arena", batch).status();
+  EXPECT_TRUE(absl::IsDeadlineExceeded(late));
+  EXPECT_EQ(late.message(), "the query was not answered in time");
+  batch.mutable_view()->set_at_least(9);
+  EXPECT_THAT(std::string((*client)->query("arena", batch).status().message()),
+              HasSubstr("scene 'arena' may not have reached revision 9 yet"));
+}
+
 TEST_F(ClientTest, RefusalsAreNotRetriedAndKeepTheirFields) {
   server_.queries.failing_calls = 1;
   v1::Error error;

@@ -6,6 +6,7 @@
 
 #include <grpcpp/grpcpp.h>
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -13,6 +14,7 @@
 #include <mutex>
 #include <set>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "client/lib/sha256.h"
@@ -166,6 +168,7 @@ class FakeQueries final : public v1::QueryService::Service {
  public:
   grpc::Status Query(grpc::ServerContext* context, const v1::QueryRequest* request,
                      v1::QueryResponse* response) override {
+    std::this_thread::sleep_for(delay);
     std::lock_guard lock(mutex_);
     ++calls;
     scene = metadata_of(*context, "x-scene");
@@ -228,7 +231,8 @@ class FakeQueries final : public v1::QueryService::Service {
     return grpc::Status::OK;
   };
   std::function<v1::QueryResult(const v1::QueryBatch&)> stream_answer;
-  int silent_messages = 0;  // number of the next stream messages that get no answer
+  int silent_messages = 0;             // number of the next stream messages that get no answer
+  std::chrono::milliseconds delay{0};  // of Query(), before it answers
   int failing_calls = 0;
   grpc::Status failure{grpc::StatusCode::UNAVAILABLE, "planned"};
   int calls = 0;

@@ -19,12 +19,13 @@ void expect_malformed(const absl::Status& status, const std::string& field) {
 }
 
 TEST(NamesTest, SceneNamesFollowTheirRule) {
-  for (const std::string& name :
-       {std::string("a"), std::string("a1"), std::string("a-b"), std::string("z--9"), std::string(63, 'x')})
+  for (const std::string& name : {std::string("a"), std::string("a1"), std::string("a-b"), std::string("z--9"),
+                                  std::string("a_b"), std::string("team.match-7_b"), std::string(63, 'x')})
     EXPECT_TRUE(check_scene_name(name, "name").ok()) << name;
   for (const std::string& name :
-       {std::string(), std::string("1a"), std::string("-a"), std::string("a-"), std::string("A"), std::string("a_b"),
-        std::string("a b"), std::string("\xc3\xa4"), std::string(64, 'x'), std::string("a\0b", 3)})
+       {std::string(), std::string("1a"), std::string("-a"), std::string("a-"), std::string("A"), std::string("a_"),
+        std::string("a."), std::string("_a"), std::string(".a"), std::string("a b"), std::string("\xc3\xa4"),
+        std::string(64, 'x'), std::string("a\0b", 3)})
     expect_malformed(check_scene_name(name, "name"), "name");
 }
 

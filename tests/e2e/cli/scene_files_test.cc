@@ -58,6 +58,16 @@ class SceneFilesTest : public RpcTest {
   const std::string path_ = ::testing::TempDir() + "scene_files_test_" + std::to_string(getpid()) + ".glb";
 };
 
+TEST_F(SceneFilesTest, AFailedPlacementLeavesNoMesh) {
+  EXPECT_EQ(run({"generate", "city", "--triangles", "600", "--scene", "nowhere"}).code, cli::ExitCode::kNotFound);
+  EXPECT_EQ(json_of({"mesh", "list"})["meshes"], Json::array());
+  text_of({"insert", "world", "point", "--id", "100", "--at", "0,0,0"});
+  const std::vector<std::string> taken = {"generate", "blob",   "--triangles", "600",  "--scene",
+                                          "world",    "--mesh", "blob",        "--id", "100"};
+  EXPECT_EQ(run(taken).code, cli::ExitCode::kFailed);
+  EXPECT_EQ(json_of({"mesh", "list"})["meshes"], Json::array());
+}
+
 TEST_F(SceneFilesTest, ADumpHasTheColumnsOfInsert) {
   fill_world();
   const Json dump = json_of({"dump", "world"});

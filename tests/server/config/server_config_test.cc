@@ -224,6 +224,8 @@ TEST_F(ServerConfigTest, HelpExplainsWithExamplesAndEndsWithZero) {
   EXPECT_EQ(help.exit_code, 0);
   for (const char* part : {"Examples:", "--listen", "--port-file", "LOCUS_DRAIN_GRACE_S", "--config", "memory"})
     EXPECT_THAT(help.text, HasSubstr(part));
+  EXPECT_THAT(help.text, HasSubstr("\nUsage: locusd [OPTIONS]"));
+  EXPECT_EQ(help.text.back(), '\n');
   const Invocation version = read({"--version"});
   EXPECT_EQ(version.exit_code, 0);
   EXPECT_EQ(version.text, "locusd " LOCUS_VERSION "\n");

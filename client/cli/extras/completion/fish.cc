@@ -33,7 +33,7 @@ function __NAME_scenes --argument-names program address
     set -l where
     test -n "$address"; and set where --address=$address
     $program $where --timeout 1 --output ndjson scene list 2>/dev/null </dev/null |
-        string replace -rf '^\{.*"name":"([a-z0-9-]*)".*' '$1'
+        string replace -rf '^\{.*"name":"([a-z0-9._-]*)".*' '$1'
 end
 
 # Prints the candidates for a value of the kind $wanted, each prefixed with $before, the part of the word before the

@@ -59,7 +59,7 @@ _NAME_walk() {
 # Prints the scenes of the server, using the program $1; nothing if the server does not answer within a second.
 _NAME_scenes() {
   "$1" ${address:+"--address=$address"} --timeout 1 --output ndjson scene list 2> /dev/null < /dev/null |
-    sed -n 's/^{.*"name":"\([a-z0-9-]*\)".*/\1/p'
+    sed -n 's/^{.*"name":"\([a-z0-9._-]*\)".*/\1/p'
 }
 )shell";
 

@@ -54,12 +54,10 @@ std::istream& operator>>(std::istream& in, ImageSize& size) {
 
 void add_camera_options(CLI::App& command, CameraOptions& options) {
   command.add_option("--at", options.at, "Frame this object or instance [the whole scene]")->type_name("ID");
-  command.add_option("--eye", options.eye, "Where the picture is taken from [where all of it shows]")
-      ->type_name("X,Y,Z");
-  command.add_option("--look-at", options.look_at, "The point in the middle of the picture; with --eye")
-      ->type_name("X,Y,Z");
-  command.add_option("--dir", options.direction, "Which way to look [from above and from a side]")->type_name("X,Y,Z");
-  command.add_option("--up", options.up, "Which way is up [0,0,1]")->type_name("X,Y,Z");
+  add_triple(command, "--eye", options.eye, "Where the picture is taken from [where all of it shows]");
+  add_triple(command, "--look-at", options.look_at, "The point in the middle of the picture; with --eye");
+  add_triple(command, "--dir", options.direction, "Which way to look [from above and from a side]");
+  add_triple(command, "--up", options.up, "Which way is up [0,0,1]");
   command.add_option("--fov", options.degrees, "Degrees between the lower and the upper edge [45]")
       ->type_name("DEGREES")
       ->check(CLI::Range(0.01, 170.0).description(""));

@@ -95,6 +95,8 @@ class ClientTest(DaemonTest):
             with self.assertRaises(locus.LocusError) as raised:
                 hasty.query(self.scene, QueryBatch(at_least=later).lookup(1))
         self.assertEqual(raised.exception.code, grpc.StatusCode.DEADLINE_EXCEEDED)
+        self.assertIn(f"may not have reached revision {later.revision} yet", str(raised.exception))
+        self.assertNotIn("a change may have been made", str(raised.exception))
 
     def test_a_query_waits_for_the_revision_it_names(self):
         built = self.apply(UpdateBatch().insert_points(1, [0, 0, 0]))

@@ -12,5 +12,6 @@ class ConnectionTest(unittest.TestCase):
 
     def test_only_a_legal_name_becomes_a_header(self):
         self.assertEqual(connection.scene_metadata("arena-1"), [("x-scene", "arena-1")])
-        for name in ("", "Arena", "a b", "a\n", "ä", "x" * 64):
+        self.assertEqual(connection.scene_metadata("team.match_7"), [("x-scene", "team.match_7")])
+        for name in ("", "a b", "a\n", "ä", "x" * 64):
             self.assertEqual(connection.scene_metadata(name), [])
