@@ -1,6 +1,7 @@
 #include "client/cli/arguments.h"
 
 #include <array>
+#include <cmath>
 #include <limits>
 
 #include "absl/strings/numbers.h"
@@ -105,6 +106,16 @@ std::vector<float> floats_of(const std::vector<Quaternion>& quaternions) {
   std::vector<float> floats;
   for (const Quaternion& q : quaternions) floats.insert(floats.end(), {q.x, q.y, q.z, q.w});
   return floats;
+}
+
+CLI::Validator positive_number() {
+  return CLI::Validator(
+      [](const std::string& text) -> std::string {
+        double number = 0;
+        const bool good = absl::SimpleAtod(text, &number) && number > 0 && std::isfinite(number);
+        return good ? "" : absl::StrCat("'", text, "' is not a number above 0");
+      },
+      "");
 }
 
 CLI::Validator three_numbers() {

@@ -54,6 +54,9 @@ std::vector<float> floats_of(const std::vector<Triple>& triples);
 std::vector<double> doubles_of(const std::vector<Triple>& triples);
 std::vector<float> floats_of(const std::vector<Quaternion>& quaternions);
 
+// Returns a validator that refuses values that are not a finite number above 0.
+CLI::Validator positive_number();
+
 // Return validators that refuse values that are not three numbers "X,Y,Z", or four numbers "X,Y,Z,W".
 CLI::Validator three_numbers();
 CLI::Validator four_numbers();

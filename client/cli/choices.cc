@@ -6,6 +6,7 @@
 #include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
 #include "absl/strings/strip.h"
+#include "core/base/similar_word.h"
 
 namespace locus::cli {
 namespace {
@@ -19,7 +20,11 @@ constexpr char kName[] = "choices:";
 CLI::Validator translated_choices(const std::vector<std::string>& words, const std::vector<std::string>& texts) {
   const auto translate = [words, texts](std::string& text) -> std::string {
     const auto found = std::find(words.begin(), words.end(), text);
-    if (found == words.end()) return absl::StrCat("'", text, "' is none of ", absl::StrJoin(words, ", "));
+    if (found == words.end()) {
+      const std::string similar = similar_word(text, words);
+      return absl::StrCat("'", text, "' is none of ", absl::StrJoin(words, ", "),
+                          similar.empty() ? "" : absl::StrCat("; did you mean '", similar, "'?"));
+    }
     text = texts[static_cast<size_t>(found - words.begin())];
     return "";
   };

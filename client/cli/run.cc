@@ -7,11 +7,12 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_join.h"
+#include "client/cli/arguments.h"
 #include "client/cli/choices.h"
 #include "client/cli/commands.h"
 #include "client/cli/connection_options.h"
 #include "client/cli/default_scene.h"
+#include "client/cli/mistakes.h"
 #include "client/cli/unknown_values.h"
 
 namespace locus::cli {
@@ -41,7 +42,7 @@ struct Refusal {
   int code = 0;
   std::string out;
   std::string err;
-  std::string message;           // the parser's message alone, without the advice that `err` also has
+  std::string message;           // the message alone, without the advice that `err` also has
   bool lacks_something = false;  // a required option or argument is missing
   bool wrong_value = false;
 };
@@ -56,10 +57,12 @@ std::optional<Refusal> parse_and_run(CLI::App& app, const std::vector<std::strin
     std::ostringstream out;
     std::ostringstream err;
     const int code = app.exit(error, out, err);
+    const Mistake mistake = code == 0 ? Mistake() : mistake_in(app, arguments, error);
     return Refusal{.code = code,
                    .out = out.str(),
-                   .err = err.str(),
-                   .message = error.what(),
+                   .err = absl::StrCat("error: ", mistake.message, "\nhint: `", mistake.command,
+                                       " --help` shows commands, options and examples\n"),
+                   .message = mistake.message,
                    .lacks_something = dynamic_cast<const CLI::RequiredError*>(&error) != nullptr,
                    .wrong_value = dynamic_cast<const CLI::ValidationError*>(&error) != nullptr ||
                                   dynamic_cast<const CLI::ConversionError*>(&error) != nullptr};
@@ -94,14 +97,6 @@ void restrict_to_script(CLI::App& app) {
   }
 }
 
-// Returns the parser's message. If no command was recognized, appends the first kShownBytes bytes of the line, since
-// the parser's message does not quote the line.
-std::string in_words(const Refusal& refusal, const std::vector<std::string>& arguments) {
-  if (refusal.message != CLI::RequiredError::Subcommand(1).what()) return refusal.message;
-  constexpr size_t kShownBytes = 60;
-  return absl::StrCat(refusal.message, ", found `", absl::StrJoin(arguments, " ").substr(0, kShownBytes), "`");
-}
-
 }  // namespace
 
 void build_cli(CLI::App& app, Context& context) {
@@ -116,7 +111,7 @@ void build_cli(CLI::App& app, Context& context) {
   app.add_option("--timeout", options.timeout_seconds,
                  "Seconds for each call [10; 600 for uploads and changes of instances; a day for backups]")
       ->type_name("SECONDS")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
   const NamedValues<Format> formats = {
       {"table", Format::kTable}, {"json", Format::kJson}, {"ndjson", Format::kNdjson}, {"csv", Format::kCsv}};
   app.add_option("-o,--output", options.format, "How to print: table, json, ndjson, csv [table]")
@@ -162,7 +157,7 @@ ExitCode run_line(const std::vector<std::string>& arguments, Context& context) {
   context.finish(absl::OkStatus());
   if (const std::optional<Refusal> refusal = run_with_default_scene(arguments, context)) {
     context.out() << refusal->out;
-    context.err() << refusal->err;
+    if (refusal->code != 0) context.err() << refusal->err;
     return refusal->code == 0 ? ExitCode::kOk : ExitCode::kUsage;
   }
   if (!context.outcome().ok() && !is_reported(context.outcome()))
@@ -182,7 +177,7 @@ absl::Status run_script_line(const std::vector<std::string>& arguments, Context&
   if (!refusal) return guessed ? absl::OkStatus() : context.outcome();
   if (refusal->code != 0) {
     if (refusal->wrong_value && guessed) return absl::OkStatus();
-    return usage_error(in_words(*refusal, arguments));
+    return usage_error(refusal->message);
   }
   if (context.lines() == Lines::kScript) context.out() << refusal->out;
   return absl::OkStatus();

@@ -8,11 +8,13 @@
 #include <utility>
 
 #include "absl/strings/ascii.h"
+#include "absl/strings/match.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "absl/strings/str_replace.h"
 #include "core/base/check.h"
+#include "core/base/similar_word.h"
 #include "core/base/status_macros.h"
 #include "server/config/config_origins.h"
 #include "server/config/connection_limits.h"
@@ -303,6 +305,25 @@ Invocation mistake(absl::string_view message) {
   return invocation;
 }
 
+// Returns the message for a command line with unexpected words. The parser's own message lists them in reverse order.
+std::string unexpected(const std::vector<std::string>& arguments, absl::string_view message) {
+  ServerConfig config;
+  CLI::App app;
+  build_parser(app, config);
+  std::vector<std::string> names;
+  for (const CLI::Option* option : std::as_const(app).get_options())
+    for (const std::string& name : option->get_lnames()) names.push_back(absl::StrCat("--", name));
+  for (const std::string& argument : arguments) {
+    if (!absl::StartsWith(argument, "--")) continue;
+    const std::string name = argument.substr(0, argument.find('='));
+    if (std::find(names.begin(), names.end(), name) != names.end()) continue;
+    const std::string similar = similar_word(name, names);
+    return absl::StrCat("there is no option `", name, "`",
+                        similar.empty() ? "" : absl::StrCat("; did you mean `", similar, "`?"));
+  }
+  return std::string(message);
+}
+
 // Parses and checks the command line into `invocation`. May throw CLI11's errors.
 void parse_all(const std::vector<std::string>& arguments, const Environment& environment, Invocation& invocation) {
   ServerConfig config;
@@ -416,6 +437,8 @@ Invocation read_invocation(const std::vector<std::string>& arguments, const Envi
     Invocation invocation;
     invocation.text = absl::StrCat(version.what(), "\n");
     return invocation;
+  } catch (const CLI::ExtrasError& error) {
+    return mistake(unexpected(arguments, error.what()));
   } catch (const CLI::Error& error) {
     return mistake(error.what());
   }

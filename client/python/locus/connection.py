@@ -50,8 +50,8 @@ def target_of(address: str) -> str:
 
 
 def scene_metadata(scene: str) -> List[Tuple[str, str]]:
-    """Returns the `x-scene` header, by which routers choose a server. Returns no header for an invalid scene name; the
-    server refuses such a name in the request.
+    """Returns the `x-scene` header, by which routers choose a server. Returns no header for a name that a header cannot
+    carry; the server refuses such a name in the request.
     """
     return [("x-scene", scene)] if _LEGAL_SCENE.fullmatch(scene) else []
 

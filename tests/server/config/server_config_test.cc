@@ -106,13 +106,22 @@ TEST_F(ServerConfigTest, TheFileMayListAddresses) {
 TEST_F(ServerConfigTest, MistakesEndWithTwoAndNameTheOption) {
   write_file("no-such-option = 1\n");
   const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
-      {{"--max-scenes", "0"}, "--max-scenes"},        {{"--max-scenes", "1000000"}, "--max-scenes"},
-      {{"--threads", "many"}, "--threads"},           {{"--log-level", "loud"}, "--log-level"},
-      {{"--listen", "nowhere"}, "nowhere"},           {{"--no-such-option"}, "--no-such-option"},
-      {{"--memory-limit", "lots"}, "--memory-limit"}, {{"--memory-limit", "1"}, "64MiB"},
-      {{"--memory-limit", "2PiB"}, "1PiB"},           {{"--memory-limit", "-1"}, "--memory-limit"},
-      {{"--pinned-limit", "1023"}, "1MiB"},           {{"--pinned-limit", "2PiB"}, "1PiB"},
-      {{"--config", file_}, "no-such-option"},        {{"--config", "/no/such/file"}, "/no/such/file"},
+      {{"--max-scenes", "0"}, "--max-scenes"},
+      {{"--max-scenes", "1000000"}, "--max-scenes"},
+      {{"--threads", "many"}, "--threads"},
+      {{"--log-level", "loud"}, "--log-level"},
+      {{"--listen", "nowhere"}, "nowhere"},
+      {{"--no-such-option"}, "--no-such-option"},
+      {{"--thread", "2"}, "there is no option `--thread`; did you mean `--threads`?"},
+      {{"--lisen=127.0.0.1:1", "--threads", "2"}, "did you mean `--listen`?"},
+      {{"--memory-limit", "lots"}, "--memory-limit"},
+      {{"--memory-limit", "1"}, "64MiB"},
+      {{"--memory-limit", "2PiB"}, "1PiB"},
+      {{"--memory-limit", "-1"}, "--memory-limit"},
+      {{"--pinned-limit", "1023"}, "1MiB"},
+      {{"--pinned-limit", "2PiB"}, "1PiB"},
+      {{"--config", file_}, "no-such-option"},
+      {{"--config", "/no/such/file"}, "/no/such/file"},
   };
   for (const auto& [arguments, named] : cases) {
     const Invocation invocation = read(arguments);
