@@ -12,6 +12,7 @@ namespace locus::cli {
 
 void add_scene_command(CLI::App& parent, Context& context);
 void add_mesh_command(CLI::App& parent, Context& context);
+void add_instance_command(CLI::App& parent, Context& context);
 void add_import_command(CLI::App& parent, Context& context);
 void add_generate_command(CLI::App& parent, Context& context);
 void add_insert_command(CLI::App& parent, Context& context);

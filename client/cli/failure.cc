@@ -37,7 +37,10 @@ std::string hint_of_reason(v1::Reason reason, absl::string_view message) {
     case v1::REASON_DUPLICATE_ID:
       return "choose another id, or replace the object with --upsert";
     case v1::REASON_UNKNOWN_ID:
-      return "`locus get SCENE --id ID` looks for an id";
+      return "`locus get SCENE --id ID` looks for an id; `locus remove` is for objects, `locus instance remove` for "
+             "instances";
+    case v1::REASON_IN_USE:
+      return "`locus instance list SCENE` shows the instances, `locus instance remove SCENE --id ID` removes one";
     default:
       return "";
   }
@@ -128,6 +131,9 @@ absl::Status with_place(const absl::Status& status, absl::string_view place) {
 
 ExitCode exit_code_of(const absl::Status& status) {
   if (status.GetPayload(kUsagePayload)) return ExitCode::kUsage;
+  // The server refuses an unknown id of an instance with FAILED_PRECONDITION, because the whole change is refused.
+  const std::optional<v1::Error> error = client::error_of(status);
+  if (error && error->reason() == v1::REASON_UNKNOWN_ID) return ExitCode::kNotFound;
   switch (status.code()) {
     case absl::StatusCode::kOk:
       return ExitCode::kOk;

@@ -130,6 +130,7 @@ void build_cli(CLI::App& app, Context& context) {
   }
   add_scene_command(app, context);
   add_mesh_command(app, context);
+  add_instance_command(app, context);
   add_import_command(app, context);
   add_generate_command(app, context);
   add_insert_command(app, context);

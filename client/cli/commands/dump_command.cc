@@ -1,9 +1,10 @@
+#include "client/cli/commands/dump_command.h"
+
 #include <memory>
 #include <string>
 #include <utility>
 
 #include "client/cli/commands.h"
-#include "client/cli/commands/view_options.h"
 #include "client/cli/default_scene.h"
 #include "client/cli/report_stream.h"
 #include "client/cli/rows/scene_rows.h"
@@ -13,7 +14,6 @@
 namespace locus::cli {
 namespace {
 
-constexpr char kRowsName[] = "things";
 constexpr size_t kDumpWidthRows = 1000;  // number of first rows that determine a table's column widths
 
 struct DumpOptions {
@@ -21,23 +21,28 @@ struct DumpOptions {
   ViewOptions view;
 };
 
-// Dumps a scene. Writes each row when it arrives. In a script (Context::keeps_reports()), collects all rows in one
-// report instead, so that later lines of the script can use the rows.
 absl::Status dump(const DumpOptions& options, Context& context) {
-  RETURN_IF_ERROR(check(options.view));
+  return dump_things(options.scene, options.view, {.rows_name = "things", .no_rows = "an empty scene"}, context);
+}
+
+}  // namespace
+
+absl::Status dump_things(const std::string& scene, const ViewOptions& view, const DumpTexts& texts, Context& context) {
+  RETURN_IF_ERROR(check(view));
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());
-  const Things things = things_of(options.view);
-  constexpr char kNoRows[] = "an empty scene";
+  const Things things = things_of(view);
   Report kept;
-  kept.rows_name = kRowsName;
-  kept.no_rows = kNoRows;
+  kept.rows_name = texts.rows_name;
+  kept.no_rows = texts.no_rows;
   kept.keys = thing_keys(things);
-  ReportStream stream(
-      context.out(), context.options().format,
-      {.rows_name = kRowsName, .keys = thing_keys(things), .no_rows = kNoRows, .width_rows = kDumpWidthRows});
+  ReportStream stream(context.out(), context.options().format,
+                      {.rows_name = texts.rows_name,
+                       .keys = thing_keys(things),
+                       .no_rows = texts.no_rows,
+                       .width_rows = kDumpWidthRows});
   bool begun = false;
   const auto take = [&](const v1::DumpSceneResponse& message) {
-    const Json head = {{"scene", options.scene}, {"epoch", id_json(message.epoch())}, {"revision", message.revision()}};
+    const Json head = {{"scene", scene}, {"epoch", id_json(message.epoch())}, {"revision", message.revision()}};
     if (!begun && !context.keeps_reports()) stream.begin(head);
     begun = true;
     kept.head = head;
@@ -51,13 +56,11 @@ absl::Status dump(const DumpOptions& options, Context& context) {
       return absl::OkStatus();
     });
   };
-  const absl::Status dumped = client->dump(dump_request(options.scene, options.view, context), take);
+  const absl::Status dumped = client->dump(dump_request(scene, view, context), take);
   if (context.keeps_reports() && dumped.ok()) context.write(kept);
   if (!context.keeps_reports() && begun) stream.end();
   return dumped;
 }
-
-}  // namespace
 
 void add_dump_command(CLI::App& parent, Context& context) {
   const auto options = std::make_shared<DumpOptions>();

@@ -7,6 +7,10 @@ namespace locus::cli {
 void add_view_options(CLI::App& command, ViewOptions& options) {
   command.add_flag("--objects", options.objects, "Only objects");
   command.add_flag("--instances", options.instances, "Only instances");
+  add_revision_options(command, options);
+}
+
+void add_revision_options(CLI::App& command, ViewOptions& options) {
   command.add_option("--at-least", options.at_least, "Wait for this revision")->type_name("REVISION");
   command.add_option("--exactly", options.exactly, "Read this revision, if it is still kept")->type_name("REVISION");
   command.add_option("--epoch", options.epoch, "Epoch of the revision")->type_name("EPOCH");

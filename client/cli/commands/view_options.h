@@ -23,8 +23,10 @@ struct ViewOptions {
   Number64 epoch;
 };
 
-// Adds the options --objects, --instances, --at-least, --exactly and --epoch.
+// Adds the options --objects and --instances, and those of add_revision_options().
 void add_view_options(CLI::App& command, ViewOptions& options);
+// Adds the options --at-least, --exactly and --epoch.
+void add_revision_options(CLI::App& command, ViewOptions& options);
 
 // Returns the kinds of things to read: only objects with --objects, only instances with --instances, and both if both
 // options are given or neither is.

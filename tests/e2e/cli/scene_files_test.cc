@@ -68,6 +68,27 @@ TEST_F(SceneFilesTest, AFailedPlacementLeavesNoMesh) {
   EXPECT_EQ(json_of({"mesh", "list"})["meshes"], Json::array());
 }
 
+TEST_F(SceneFilesTest, InstancesArePlacedListedAndRemoved) {
+  fill_world();
+  const Json placed = json_of({"instance", "place", "world", "--mesh", "city", "--at", "0,0,50", "--at", "0,0,90",
+                               "--id", "200", "--id", "201", "--scale", "0.5", "--group", "4"});
+  EXPECT_EQ(placed["instances"], (Json{{{"id", "200"}}, {{"id", "201"}}}));
+  const Json all = json_of({"instance", "list", "world"})["instances"];
+  ASSERT_EQ(all.size(), 4u) << "no objects";
+  EXPECT_EQ(all[3].dump(),
+            R"({"id":"201","mesh":"city","at":[0.0,0.0,90.0],"rotation":[0.0,0.0,0.0,1.0],"scale":0.5,"layers":1,)"
+            R"("group":"4","tag":"0"})");
+  const Outcome used = run({"mesh", "delete", "city"});
+  EXPECT_THAT(used.err, HasSubstr("hint: `locus instance list SCENE`"));
+  text_of({"instance", "remove", "world", "--id", "100", "--group", "4"});
+  EXPECT_EQ(json_of({"instance", "list", "world"})["instances"].size(), 1u);
+  text_of({"instance", "remove", "world", "--id", "101"});
+  EXPECT_THAT(text_of({"instance", "list", "world"}), HasSubstr("no instances"));
+  EXPECT_EQ(json_of({"mesh", "delete", "city"}), Json({{"deleted", "city"}}));
+  EXPECT_EQ(run({"instance", "remove", "world", "--id", "101"}).code, cli::ExitCode::kNotFound);
+  EXPECT_EQ(run({"instance", "remove", "world"}).code, cli::ExitCode::kUsage);
+}
+
 TEST_F(SceneFilesTest, ADumpHasTheColumnsOfInsert) {
   fill_world();
   const Json dump = json_of({"dump", "world"});

@@ -1,0 +1,148 @@
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "client/cli/arguments.h"
+#include "client/cli/commands.h"
+#include "client/cli/commands/dump_command.h"
+#include "client/cli/default_scene.h"
+#include "client/cli/failure.h"
+#include "client/lib/client.h"
+#include "core/base/status_macros.h"
+
+namespace locus::cli {
+namespace {
+
+struct PlaceOptions {
+  std::string scene;
+  std::string mesh;
+  std::vector<Triple> at;
+  std::vector<Quaternion> rotations;
+  std::vector<double> scales;
+  std::vector<Number64> ids;
+  std::vector<Number64> layers;
+  std::vector<Number64> groups;
+  std::vector<Number64> tags;
+};
+
+struct ListOptions {
+  std::string scene;
+  ViewOptions view;
+};
+
+struct RemoveOptions {
+  std::string scene;
+  std::vector<Number64> ids;
+  std::vector<Number64> groups;
+};
+
+template <class Values, class Column>
+void add_values(const Values& values, Column& column) {
+  column.Add(values.begin(), values.end());
+}
+
+absl::Status place(const PlaceOptions& options, Context& context) {
+  v1::ChangeInstancesRequest request;
+  request.set_scene(options.scene);
+  v1::Placement& placement = *request.add_place();
+  placement.set_mesh(options.mesh);
+  add_values(doubles_of(options.at), *placement.mutable_translations());
+  add_values(floats_of(options.rotations), *placement.mutable_rotations());
+  add_values(floats_of(options.scales), *placement.mutable_scales());
+  add_values(values_of(options.ids), *placement.mutable_ids());
+  add_values(values32_of(options.layers), *placement.mutable_layers());
+  add_values(values_of(options.groups), *placement.mutable_groups());
+  add_values(values_of(options.tags), *placement.mutable_tags());
+  ASSIGN_OR_RETURN(client::Client* const client, context.connect());
+  ASSIGN_OR_RETURN(const v1::ChangeInstancesResponse placed, client->change_instances(request));
+  context.remember_own(options.scene, {placed.epoch(), placed.revision()});
+  Report report;
+  report.head = {{"scene", options.scene}, {"mesh", options.mesh}, {"revision", placed.revision()}};
+  report.rows_name = "instances";
+  report.keys = {"id"};
+  for (const uint64_t id : placed.ids()) report.rows.push_back({{"id", id_json(id)}});
+  context.write(report);
+  return absl::OkStatus();
+}
+
+absl::Status list_instances(const ListOptions& options, Context& context) {
+  ViewOptions view = options.view;
+  view.instances = true;
+  return dump_things(options.scene, view, {.rows_name = "instances", .no_rows = "no instances"}, context);
+}
+
+absl::Status remove_instances(const RemoveOptions& options, Context& context) {
+  if (options.ids.empty() && options.groups.empty()) return usage_error("nothing to remove: give --id or --group");
+  v1::ChangeInstancesRequest request;
+  request.set_scene(options.scene);
+  add_values(values_of(options.ids), *request.mutable_remove_ids());
+  add_values(values_of(options.groups), *request.mutable_remove_groups());
+  ASSIGN_OR_RETURN(client::Client* const client, context.connect());
+  ASSIGN_OR_RETURN(const v1::ChangeInstancesResponse removed, client->change_instances(request));
+  context.remember_own(options.scene, {removed.epoch(), removed.revision()});
+  Report report;
+  report.head = {{"scene", options.scene}, {"revision", removed.revision()}};
+  context.write(report);
+  return absl::OkStatus();
+}
+
+void add_place(CLI::App& parent, Context& context) {
+  const auto options = std::make_shared<PlaceOptions>();
+  CLI::App& command = *parent.add_subcommand("place", "Place an uploaded mesh, once or more, as one change");
+  command.footer(R"(Examples:
+  locus instance place arena --mesh city-5000-1 --at 0,0,0
+  locus instance place arena --mesh door --id 7 --at 10,0,0 --rotation 0,0,0.7071068,0.7071068
+  locus instance place arena --mesh tree --at 1,0,0 --at 5,2,0 --scale 1.5
+
+An option given once stands for all instances.)");
+  add_scene_argument(command, options->scene);
+  command.add_option("--mesh", options->mesh, "The mesh's name on the server")->required()->type_name("NAME");
+  add_repeatable(command, "--at", options->at, "X,Y,Z", "Where its origin goes; repeat for more instances")->required();
+  add_repeatable(command, "--rotation", options->rotations, "X,Y,Z,W", "Unit quaternion [0,0,0,1]");
+  add_repeatable(command, "--scale", options->scales, "S", "Its size, as a multiple of the mesh's [1]");
+  add_repeatable(command, "--id", options->ids, "ID", "The instance's id [chosen by the server]");
+  add_repeatable(command, "--layers", options->layers, "BITS", "Layer bits, matched with the masks of queries [1]")
+      ->check(fits_32_bits());
+  add_repeatable(command, "--group", options->groups, "GROUP", "Its group [0: none]");
+  add_repeatable(command, "--tag", options->tags, "TAG", "Any number of your own [0]");
+  run_when_chosen(command, options, context, place);
+}
+
+void add_list(CLI::App& parent, Context& context) {
+  const auto options = std::make_shared<ListOptions>();
+  CLI::App& command = *parent.add_subcommand("list", "List the instances of a scene, by id");
+  command.footer("Examples:\n  locus instance list arena\n  locus -o ndjson instance list arena --at-least 12");
+  add_scene_argument(command, options->scene);
+  add_revision_options(command, options->view);
+  run_when_chosen(command, options, context, list_instances);
+}
+
+void add_remove(CLI::App& parent, Context& context) {
+  const auto options = std::make_shared<RemoveOptions>();
+  CLI::App& command = *parent.add_subcommand("remove", "Remove instances as one change; their meshes stay");
+  command.footer(R"(Examples:
+  locus instance remove arena --id 7
+  locus instance remove arena --id 7 --id 8
+  locus instance remove arena --group 3)");
+  add_scene_argument(command, options->scene);
+  add_repeatable(command, "--id", options->ids, "ID", "An instance");
+  add_repeatable(command, "--group", options->groups, "GROUP", "All instances of a group");
+  run_or_check_when_chosen(command, options, context, remove_instances);
+}
+
+}  // namespace
+
+void add_instance_command(CLI::App& parent, Context& context) {
+  CLI::App& command = *parent.add_subcommand("instance", "Place, list and remove instances of meshes");
+  command.footer(R"(Examples:
+  locus instance place arena --mesh city-5000-1 --at 0,0,0
+  locus instance list arena
+  locus instance remove arena --id 7)");
+  command.require_subcommand(1);
+  add_place(command, context);
+  add_list(command, context);
+  add_remove(command, context);
+}
+
+}  // namespace locus::cli
