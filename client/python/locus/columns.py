@@ -2,20 +2,23 @@
 
 A column is packed little-endian numbers. An entry that is a vector has several numbers: N positions are 3N float32.
 
-Arguments: a buffer of the right type (numpy array of any shape, array.array, memoryview) is read in C order and need
-not be contiguous; `bytes` and `bytearray` are used unchanged; numbers and (nested) lists are converted. A buffer of
-another type is refused, not converted: float64 given for float32 would be rounded, negative int64 given for ids would
-wrap around.
+Arguments: a buffer of the right type (numpy array, array.array, memoryview) is read in C order and need not be
+contiguous; `bytes` and `bytearray` are used unchanged; numbers and (nested) lists are converted. A buffer of another
+type is refused, not converted, because float64 given for float32 would be rounded; only int64 is accepted for ids,
+unless one is negative. If the entries are vectors, the last axis of an array must have the numbers of one entry (or its
+last axes, as of matrices), and so must each inner list: (N, 3), never (3, N).
 
-Results: a column is a numpy array of shape (R,) or (R, width) over the received bytes, not copied and therefore
-read-only. If numpy is not installed it is a flat array.array, copied once.
+Results: a column is a numpy array of shape (R,) or (R, width) over the received bytes, and therefore read-only. It is
+copied only if the received bytes are not aligned to its type. If numpy is not installed it is a flat array.array, copied
+once.
 """
 from __future__ import annotations
 
 import array
 import itertools
 import numbers
-from typing import Any, Iterable, Iterator, List, NamedTuple, Protocol, Tuple, Union
+import operator
+from typing import Any, Iterable, Iterator, List, NamedTuple, Protocol, Sequence, Tuple, Union
 
 try:
     import numpy
@@ -72,27 +75,73 @@ def _name_of(view: memoryview) -> str:
     return f"'{view.format}'"
 
 
-def _from_buffer(path: str, view: memoryview, kind: Kind) -> Raw:
+# Columns of positions that are relative to the frame of their block.
+_IN_FRAME = ("origins", "starts", "ends", "centers", "points", "viewers", "targets")
+
+
+def _remedy(path: str, view: memoryview, kind: Kind) -> str:
+    """Returns what to do about a buffer whose type is not `kind`."""
+    name = path.rsplit(".", 1)[-1]
+    if kind is FLOAT32 and view.format[-1:] == "d":
+        if name == "positions":
+            return "give it as positions_f64, because float32 rounds large coordinates"
+        if name in _IN_FRAME:
+            return ("give positions relative to a frame, (positions - frame).astype('float32') with frame=frame, because "
+                    "float32 rounds large coordinates; without a frame, convert it with .astype('float32')")
+    return f"convert it, for example with .astype('{kind.name}')"
+
+
+def _is_part(count: int, width: int) -> bool:
+    """Returns whether `count` numbers are an entry of `width` numbers, or one of its points, planes or rows of a matrix."""
+    return count == width or (count in (3, 4) and width % count == 0)
+
+
+def _check_shape(path: str, shape: Sequence[int], width: int) -> None:
+    """Raises ValueError unless the last axes of an array of vectors have the numbers of one entry."""
+    if width == 1 or len(shape) < 2 or 0 in shape or _is_part(shape[-1], width):
+        return
+    if width not in itertools.accumulate(reversed(shape), operator.mul):
+        raise ValueError(f"{path}: has the shape {tuple(shape)}: give {width} numbers for each entry along the last axis, "
+                         f"as in (N, {width})")
+
+
+def _check_not_negative(path: str, view: memoryview) -> None:
+    values = array.array("q", view.tobytes()) if numpy is None else numpy.asarray(view).ravel()
+    if len(values) and min(values if numpy is None else (values.min(),)) < 0:
+        index = next(index for index, value in enumerate(values) if value < 0)
+        raise ValueError(f"{path}[{index}]: is {values[index]}: give numbers from 0 to 2^64 - 1")
+
+
+def _from_buffer(path: str, view: memoryview, kind: Kind, width: int) -> Raw:
     """Returns the bytes of the numbers in `view`, in C order: borrowed if `view` is contiguous, else copied."""
+    _check_shape(path, view.shape or (), width)
     format = view.format
-    if view.itemsize != kind.size or (format not in kind.formats and format.lstrip("@=<") not in kind.formats):
-        raise TypeError(f"{path}: holds {_name_of(view)}, but {kind.name} is wanted: convert it, "
-                        f"for example with .astype('{kind.name}')")
+    if kind is UINT64 and view.itemsize == 8 and format.lstrip("@=<") in ("q", "l"):
+        _check_not_negative(path, view)
+    elif view.itemsize != kind.size or (format not in kind.formats and format.lstrip("@=<") not in kind.formats):
+        raise TypeError(f"{path}: holds {_name_of(view)}, but {kind.name} is wanted: "
+                        f"{_remedy(path, view, kind)}")
+    if view.nbytes == 0:  # a view with an axis of length 0 cannot be cast
+        return b""
     if view.c_contiguous and len(format) == 1:
         return view.cast("B")
     return view.tobytes()
 
 
-def _flat(value: Iterable[Any]) -> Iterable[Any]:
+def _flat(path: str, value: Iterable[Any], width: int) -> Iterable[Any]:
     items = value if isinstance(value, (list, tuple)) else list(value)
-    if not items or isinstance(items[0], (float, int, numbers.Number)):
+    if not items or isinstance(items[0], (float, int, numbers.Number, str)):
         return items
-    return list(itertools.chain.from_iterable(items))
+    vectors = [list(item) for item in items]
+    wrong = next((vector for vector in vectors if not _is_part(len(vector), width)), None)
+    if width > 1 and wrong is not None:
+        raise ValueError(f"{path}: has an entry of {len(wrong)} numbers: give {width} numbers for each entry")
+    return list(itertools.chain.from_iterable(vectors))
 
 
-def _from_numbers(path: str, value: Any, kind: Kind) -> bytes:
+def _from_numbers(path: str, value: Any, kind: Kind, width: int) -> bytes:
     try:
-        items = [value] if isinstance(value, (float, int, numbers.Number)) else _flat(value)
+        items = [value] if isinstance(value, (float, int, numbers.Number)) else _flat(path, value, width)
         return array.array(kind.code, items).tobytes()
     except (TypeError, OverflowError) as error:
         raise TypeError(f"{path}: {error}: give {kind.name} numbers, as a list or a buffer") from error
@@ -103,7 +152,8 @@ def borrow(path: str, value: ColumnLike, kind: Kind, width: int = 1) -> Raw:
     until the request was sent.
 
     `path` names the column in errors. Raises TypeError for numbers of another type, ValueError if the number of values
-    is not a multiple of `width`. Cost: linear for lists and for arrays that are not contiguous, else constant.
+    is not a multiple of `width`, if the shape is not that of entries of `width` numbers, or for a negative id. Cost:
+    linear for lists, for int64 and for arrays that are not contiguous, else constant.
     """
     if value is None:
         return b""
@@ -111,14 +161,14 @@ def borrow(path: str, value: ColumnLike, kind: Kind, width: int = 1) -> Raw:
     if isinstance(value, (bytes, bytearray)):
         raw = value
     elif isinstance(value, (float, int, list, tuple)):
-        raw = _from_numbers(path, value, kind)
+        raw = _from_numbers(path, value, kind, width)
     else:
         try:
             view = memoryview(value)
         except TypeError:
-            raw = _from_numbers(path, value, kind)
+            raw = _from_numbers(path, value, kind, width)
         else:
-            raw = _from_buffer(path, view, kind)
+            raw = _from_buffer(path, view, kind, width)
     if len(raw) % (kind.size * width):
         count = f"{len(raw) // kind.size} numbers" if len(raw) % kind.size == 0 else f"{len(raw)} bytes"
         raise ValueError(f"{path}: has {count}: give {width} {kind.name} for each entry")
@@ -160,6 +210,9 @@ def decode(raw: Raw, kind: Kind, width: int = 1) -> Values:
         column.frombytes(raw)
         return column
     flat = numpy.frombuffer(raw, _DTYPES[kind.code])
+    if not flat.flags.aligned:
+        flat = flat.copy()
+        flat.setflags(write=False)
     return flat if width == 1 else flat.reshape(-1, width)
 
 

@@ -1,5 +1,6 @@
 """Tests of columns: conversion of arguments and results, and errors that name the column."""
 import array
+import math
 import struct
 import unittest
 
@@ -46,7 +47,25 @@ class EncodeTest(unittest.TestCase):
         for code, found in (("d", "float64"), ("i", "int32"), ("q", "int64"), ("B", "uint8")):
             self.assertRefused(TypeError, f"^a.column: holds {found}, but float32 is wanted.*astype\\('float32'\\)",
                                array.array(code, [1, 2, 3]), FLOAT32, 3)
-        self.assertRefused(TypeError, "holds int64, but uint64 is wanted", array.array("q", [1]), UINT64)
+        self.assertRefused(TypeError, "holds int32, but uint64 is wanted", array.array("i", [1]), UINT64)
+
+    def test_float64_positions_are_told_to_use_a_frame_or_float64(self):
+        positions = array.array("d", [1, 2, 3])
+        for path, remedy in (("blocks[0].rays.origins", "with frame=frame"), ("moves[0].positions", "as positions_f64"),
+                             ("blocks[0].rays.directions", "^((?!frame).)*astype")):
+            with self.assertRaisesRegex(TypeError, remedy):
+                columns.encode(path, positions, FLOAT32, 3)
+
+    def test_int64_is_accepted_for_ids_unless_one_is_negative(self):
+        self.assertEqual(columns.encode("c", array.array("q", [1, 2**63 - 1]), UINT64), struct.pack("<2Q", 1, 2**63 - 1))
+        self.assertEqual(columns.encode("c", array.array("q"), UINT64), b"")
+        self.assertRefused(ValueError, r"^a.column\[1\]: is -7: give numbers from 0", array.array("q", [0, -7, -8]), UINT64)
+
+    def test_an_inner_list_has_the_numbers_of_one_entry(self):
+        for value in ([[1, 2], [3, 4], [5, 6]], [[1, 2, 3, 4, 5, 6]], [[1, 2, 3], [4, 5, 6, 7, 8, 9]], [[1], [2], [3]]):
+            self.assertRefused(ValueError, "^a.column: has an entry of [1-9] numbers: give 3 numbers", value, FLOAT32, 3)
+        rows = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+        self.assertEqual(len(columns.encode("c", rows, FLOAT32, 16)), 64)
 
     def test_values_without_numbers_are_refused(self):
         for value in ("abc", ["a"], [None], object(), [[1, 2], 3]):
@@ -75,6 +94,26 @@ class NumpyTest(unittest.TestCase):
         table = numpy.arange(1, 7, dtype="float32").reshape(2, 3)
         for value in (table, numpy.asfortranarray(table), numpy.repeat(table, 2, axis=1)[:, ::2], table.ravel()):
             self.assertEqual(columns.encode("c", value, FLOAT32, 3), ONE_TO_SIX)
+
+    def test_the_last_axes_have_the_numbers_of_one_entry(self):
+        for shape in ((3, 5), (6, 2), (2, 3, 2), (1, 9), (3, 1, 4)):
+            with self.assertRaisesRegex(ValueError, r"^a.column: has the shape .*along the last axis, as in \(N, 3\)"):
+                columns.encode("a.column", numpy.zeros(shape, "float32"), FLOAT32, 3)
+        for shape, width in (((5, 3), 3), ((2, 4, 3), 3), ((3, 1), 3), ((0, 5), 3), ((4, 4), 16), ((5, 4, 4), 16), ((7, 16), 16),
+                             ((5, 6, 4), 24), ((30, 4), 24), ((2, 3), 1)):
+            raw = columns.encode("a.column", numpy.zeros(shape, "float32"), FLOAT32, width)
+            self.assertEqual(len(raw), 4 * math.prod(shape))
+
+    def test_int64_is_accepted_for_ids_unless_one_is_negative(self):
+        self.assertEqual(columns.encode("c", numpy.array([[1, 2], [3, 4]])[:, ::-1], UINT64), struct.pack("<4Q", 2, 1, 4, 3))
+        with self.assertRaisesRegex(ValueError, r"^a.column\[2\]: is -1"):
+            columns.encode("a.column", numpy.array([1, 2, -1]), UINT64)
+
+    def test_received_columns_are_aligned_to_their_type(self):
+        for offset in range(9):
+            column = columns.decode(memoryview(b"x" * offset + struct.pack("<3Q", 1, 2, 3))[offset:], UINT64)
+            self.assertEqual(column.tolist(), [1, 2, 3])
+            self.assertTrue(column.flags.aligned and not column.flags.writeable)
 
     def test_read_only_arrays_and_scalars_are_accepted(self):
         frozen = numpy.arange(1, 7, dtype="float32")
