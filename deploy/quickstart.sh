@@ -49,7 +49,8 @@ if [ ! -f "$build/build.ninja" ]; then
   cmake --preset release -DLOCUS_TESTS=OFF > build.log.$$ 2>&1 || { cat build.log.$$; rm -f build.log.$$; exit 1; }
   rm -f build.log.$$
 fi
-cmake --build "$build" --target locusd locus locus_python
+# Everything that `cmake --install` installs.
+cmake --build "$build" --target locusd locus locus_python locus_completions locus_manual_pages
 
 # Downloads and unpacks the package of the level, but does not install it.
 download_level() {

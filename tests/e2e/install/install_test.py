@@ -9,6 +9,7 @@ import concurrent.futures
 import glob
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -74,6 +75,20 @@ class InstallTest(unittest.TestCase):
         shutil.rmtree(OPTIONS.folder, ignore_errors=True)
         if code != 0:
             raise RuntimeError(f"locusd ended with {code}")
+
+    def test_the_quickstart_builds_everything_that_is_installed(self):
+        with open(os.path.join(OPTIONS.source, "deploy/quickstart.sh"), encoding="utf-8") as file:
+            targets = re.search(r'^cmake --build "\$build" --target (.*)$', file.read(), re.MULTILINE).group(1).split()
+        commands = run("ninja", "-C", OPTIONS.build, "-t", "commands", *targets)
+        outputs = {line.split(": ")[0] for line in run("ninja", "-C", OPTIONS.build, "-t", "targets", "all").splitlines()}
+        installed = {"deploy/manual/pages.stamp"}
+        for script in glob.glob(os.path.join(OPTIONS.build, "**", "cmake_install.cmake"), recursive=True):
+            with open(script, encoding="utf-8") as file:
+                found = re.findall(rf'"{re.escape(OPTIONS.build)}/([^"]+)"', file.read())
+            installed.update(path for path in found if path in outputs and not path.endswith("cmake_install.cmake"))
+        self.assertIn("deploy/install/bash/locus", installed)
+        unbuilt = [path for path in installed if not re.search(rf"\b{re.escape(path)}(\s|$)", commands)]
+        self.assertEqual(unbuilt, [])
 
     def flags(self, *what):
         return run("pkg-config", *what, "locus-client", **self.pkgconfig).split()
