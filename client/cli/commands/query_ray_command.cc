@@ -50,7 +50,7 @@ absl::Status query_rays_of_input(const RayOptions& options, Context& context) {
   if (checked.ok() && !options.from.empty())
     checked = usage_error("give --from or an input with its columns, not both");
   checked.Update(at_most_one(options.directions, "--dir"));
-  checked.Update(at_most_one(options.t_max, "--max-t"));
+  checked.Update(at_most_one(options.t_max, "--t-max"));
   RETURN_IF_ERROR(checked);
   BulkQuery query = {.schema = {}, .layout = layout_of(options), .rows_name = "hits", .add_block = {}};
   if (options.mode == v1::RAY_MODE_ANY) {
@@ -59,7 +59,8 @@ absl::Status query_rays_of_input(const RayOptions& options, Context& context) {
   }
   query.schema = {{.name = "from", .kind = FieldKind::kCoordinate, .parts = "xyz", .required = true},
                   column_or_option({.name = "dir", .parts = "xyz", .required = true}, options.directions, "--dir"),
-                  column_or_option({.name = "max_t", .kind = FieldKind::kDistance}, options.t_max, "--max-t")};
+                  column_or_option({.name = "t_max", .kind = FieldKind::kDistance, .parts = {}, .aliases = {"max_t"}},
+                                   options.t_max, "--t-max")};
   add_filter_fields(options.query, query.schema);
   query.add_block = [&](const BlockRows& rows, client::QueryBuilder& builder) {
     const std::vector<RowColumn>& columns = rows.batch.columns;
@@ -94,7 +95,8 @@ void add_query_ray_options(CLI::App& command, RayOptions& options) {
   add_repeatable(command, "--from", options.from, "X,Y,Z", "Where it starts; repeat --from and --dir for more rays");
   add_repeatable(command, "--dir", options.directions, "X,Y,Z",
                  "Where it goes, any length but zero; t counts in this length; one for each or one for all");
-  add_repeatable(command, "--max-t", options.t_max, "T", "How far, in lengths of --dir [inf]");
+  add_repeatable(command, "--t-max", options.t_max, "T", "How far, in lengths of --dir [inf]");
+  add_repeatable(command, "--max-t", options.t_max, "T", "Former name of --t-max")->group("");
   const NamedValues<v1::RayMode> modes = {
       {"first", v1::RAY_MODE_FIRST}, {"any", v1::RAY_MODE_ANY}, {"all", v1::RAY_MODE_ALL}};
   command.add_option("--mode", options.mode, "Which hits: first, any (yes or no), all [first]")
@@ -120,14 +122,14 @@ void add_query_ray(CLI::App& parent, Context& context) {
   CLI::App& command = *parent.add_subcommand("ray", "Ask what rays hit");
   command.footer(R"(Examples:
   locus query ray arena --from 0,1,0 --dir 0,0,-1
-  locus query ray arena --from 0,1,0 --dir 0,0,-1 --max-t 100 --mode all --source static
+  locus query ray arena --from 0,1,0 --dir 0,0,-1 --t-max 100 --mode all --source static
   locus query ray arena --from 0,1,0 --from 5,1,0 --dir 0,-1,0 --mode any
   locus query ray arena --from 0,1,0 --dir 1,0,0 --mask 6 --ignore-group 3 --cull back --inside skip
   locus -o json query ray arena --from 0,1,0 --dir 1,0,0 --columns uv,group,tag
   locus -o csv query ray arena --from-csv rays.csv > hits.csv
-  generator | locus -o ndjson query ray arena --from-ndjson - --max-t 100
+  generator | locus -o ndjson query ray arena --from-ndjson - --t-max 100
 
-Rows: from.x,from.y,from.z,dir.x,dir.y,dir.z[,max_t,mask,ignore_group] or {"from": [0,1,0], "dir": [0,0,-1]};
+Rows: from.x,from.y,from.z,dir.x,dir.y,dir.z[,t_max,mask,ignore_group] or {"from": [0,1,0], "dir": [0,0,-1]};
 an option given once stands for a column. All rows are answered at one revision; see --follow.)");
   add_query_ray_options(command, *options);
   add_bulk_query_options(command, options->bulk);

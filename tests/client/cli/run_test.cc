@@ -258,7 +258,7 @@ TEST_F(RunTest, FirstHitsShowHitsAndMisses) {
     return grpc::Status::OK;
   };
   const std::vector<std::string> line = {"query", "ray",    "arena",  "--from",         "0,1,0", "--from",
-                                         "5,1,0", "--dir",  "0,0,-1", "--max-t",        "100",   "--mask",
+                                         "5,1,0", "--dir",  "0,0,-1", "--t-max",        "100",   "--mask",
                                          "6",     "--cull", "back",   "--ignore-group", "3"};
   const Json answer = json_of(line);
   EXPECT_EQ(answer["epoch"], "5");
@@ -276,6 +276,17 @@ TEST_F(RunTest, FirstHitsShowHitsAndMisses) {
   EXPECT_THAT(block.masks(), ElementsAre(6));
   EXPECT_THAT(block.ignore_groups(), ElementsAre(3));
   EXPECT_EQ(server_.queries.scene, "arena");
+}
+
+TEST_F(RunTest, TheFormerNameOfTMaxIsAcceptedAndHidden) {
+  server_.queries.answer = [](const v1::QueryRequest&, v1::QueryResult& result) {
+    result.add_blocks();
+    return grpc::Status::OK;
+  };
+  run_here({"query", "ray", "arena", "--from", "0,1,0", "--dir", "0,0,-1", "--max-t", "7"});
+  EXPECT_THAT(server_.queries.last_batch.blocks(0).rays().t_max(), ElementsAre(7));
+  EXPECT_THAT(run({"query", "ray", "--help"}).out, HasSubstr("--t-max"));
+  EXPECT_THAT(run({"query", "ray", "--help"}).out, ::testing::Not(HasSubstr("--max-t")));
 }
 
 TEST_F(RunTest, ModeAnyWritesYesOrNoForEachRay) {

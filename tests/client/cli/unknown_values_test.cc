@@ -29,7 +29,7 @@ class UnknownValuesTest : public ::testing::Test {
 
 TEST_F(UnknownValuesTest, AnyOptionAcceptsAnUnknownValue) {
   for (const std::vector<std::string>& line : std::vector<std::vector<std::string>>{
-           {"query", "ray", kMark, "--from", kMark, "--dir", kMark, "--mode", kMark, "--max-t", kMark, "--mask", kMark},
+           {"query", "ray", kMark, "--from", kMark, "--dir", kMark, "--mode", kMark, "--t-max", kMark, "--mask", kMark},
            {"query", "ray", "a", "--from=" + kMark, "--dir=0,0,1", "--columns", kMark, "-o", kMark},
            {"insert", kMark, kMark, "--id", kMark, "--at", kMark, "--rotation", kMark, "--tick", kMark},
            {"generate", "city", "--scene", kMark, "--triangles", kMark},

@@ -1,7 +1,7 @@
 // Schema of a bulk input (the columns that it may have), and a batch of rows, stored by column. For the row readers and
 // the commands that read rows. Plain data and lookups by name.
 //
-// A column has the name of the command's option without the leading dashes: from, dir, max_t (or max-t). Exception:
+// A column has the name of the command's option without the leading dashes: from, dir, t_max (or t-max). Exception:
 // capsules and sweeps have the column way, the vector from `from` to the other end, instead of to.
 // The parts of a vector are from.x, from.y, from.z in csv; ndjson also allows "from": [x, y, z].
 #ifndef LOCUS_CLIENT_CLI_ROWS_BULK_ROW_SCHEMA_H_

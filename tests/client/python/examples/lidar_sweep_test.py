@@ -46,7 +46,7 @@ class LidarSweepTest(DaemonTest):
         start = text(self.example.position(9))
         options = [word for begin in range(0, 3 * RAYS, 3)
                    for word in (f"--from={start}", f"--dir={text(directed[begin:begin + 3])}")]
-        report = self.command_line("query", "ray", scene, *options, f"--max-t={self.example.RANGE}", "--columns", "triangle")
+        report = self.command_line("query", "ray", scene, *options, f"--t-max={self.example.RANGE}", "--columns", "triangle")
         shown = [(number(row["id"]) if row["hit"] else 0, row["t"] if row["hit"] else math.inf) for row in report["hits"]]
         self.assertEqual([one for one, _ in shown], listed(hits.ids))
         self.assertEqual(array.array("f", [t for _, t in shown]).tolist(), listed(hits.t))
