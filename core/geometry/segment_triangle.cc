@@ -11,48 +11,53 @@ namespace locus {
 
 namespace {
 
-// Error bounds of the volume of a point and a triangle's plane, relative to the product of the largest coordinates.
+// Error bounds of a volume, relative to the product of the largest coordinates of its three vectors.
 constexpr double kDoubleError = 0x1p-46;
 constexpr double kDoubleDoubleError = 0x1p-96;
 
 Vec3<DoubleDouble> extended(Vec3d a) { return {a.x, a.y, a.z}; }
 
-// Returns whether no two of the three signs are opposite.
-bool agree(int first, int second, int third) {
-  return (first >= 0 && second >= 0 && third >= 0) || (first <= 0 && second <= 0 && third <= 0);
+// Returns the sign of a volume, 0 if it may be a rounding error.
+int sign_of(DoubleDouble volume, double product) {
+  return std::abs(volume.rounded()) <= kDoubleDoubleError * product ? 0 : volume.sign();
 }
 
-// Same as segment_crosses_triangle() for center 0, in extended precision; false if the segment lies in the plane of the
-// triangle.
-bool crosses_in_double_double(Vec3d half_axis, Vec3d a, Vec3d b, Vec3d c, double product) {
-  const Vec3<DoubleDouble> h = extended(half_axis), pa = extended(a), pb = extended(b), pc = extended(c);
-  const Vec3<DoubleDouble> normal = cross(pb + -pa, pc + -pa);
-  const DoubleDouble start = dot(normal, pa + h), end = dot(normal, pa + -h);
-  const double error = kDoubleDoubleError * product;
-  if (std::abs(start.rounded()) <= error && std::abs(end.rounded()) <= error) return false;
-  return start.sign() * end.sign() <= 0 &&
-         agree(dot(cross(pa, pb), h).sign(), dot(cross(pb, pc), h).sign(), dot(cross(pc, pa), h).sign());
+// Returns the sign of the volume of the edge from `a` to `b` and `half_axis`: on which side of the line through 0 along
+// `half_axis` the edge passes. In extended precision if double leaves doubt. The sign for the edge from `b` to `a` is
+// exactly the opposite, whatever the third corner of the triangle.
+int edge_sign(Vec3d a, Vec3d b, Vec3d half_axis) {
+  const double volume = dot(cross(a, b), half_axis);
+  const double product = max_component(abs(a)) * max_component(abs(b)) * max_component(abs(half_axis));
+  if (std::abs(volume) > kDoubleError * product) return volume > 0 ? 1 : -1;
+  return sign_of(dot(cross(extended(a), extended(b)), extended(half_axis)), product);
+}
+
+// Returns whether the ends half_axis and -half_axis lie on different sides of the triangle's plane; one of them may lie
+// in the plane, but not both.
+bool ends_on_both_sides(Vec3d half_axis, Vec3d a, Vec3d b, Vec3d c) {
+  const Vec3d first = b - a, second = c - a, normal = cross(first, second);
+  const double start = dot(normal, a + half_axis), end = dot(normal, a - half_axis);
+  const double product =
+      max_component(abs(first)) * max_component(abs(second)) * (max_component(abs(a)) + max_component(abs(half_axis)));
+  if (std::max(std::abs(start), std::abs(end)) > kDoubleError * product)
+    return (start <= 0 && end >= 0) || (start >= 0 && end <= 0);
+  const Vec3<DoubleDouble> corner = extended(a), axis = extended(half_axis);
+  const Vec3<DoubleDouble> exact_normal = cross(extended(b) + -corner, extended(c) + -corner);
+  const int start_sign = sign_of(dot(exact_normal, corner + axis), product);
+  const int end_sign = sign_of(dot(exact_normal, corner + -axis), product);
+  return start_sign * end_sign <= 0 && (start_sign != 0 || end_sign != 0);
 }
 
 }  // namespace
 
 bool segment_crosses_triangle(Vec3d center, Vec3d half_axis, Vec3d a, Vec3d b, Vec3d c) {
-  // The corners are taken relative to the midpoint first, so that an edge has the same volume, up to its sign, in both
-  // of its triangles.
+  // The corners are taken relative to the midpoint first, so that an edge has the same sign, up to its direction, in
+  // both of its triangles.
   const Vec3d pa = a - center, pb = b - center, pc = c - center;
-  const double ab = dot(cross(pa, pb), half_axis);
-  const double bc = dot(cross(pb, pc), half_axis);
-  const double ca = dot(cross(pc, pa), half_axis);
+  const int ab = edge_sign(pa, pb, half_axis), bc = edge_sign(pb, pc, half_axis), ca = edge_sign(pc, pa, half_axis);
   const bool front = ab >= 0 && bc >= 0 && ca >= 0, back = ab <= 0 && bc <= 0 && ca <= 0;
-  if (!front && !back) return false;
-  const Vec3d normal = cross(pb - pa, pc - pa);
-  const double start = dot(normal, pa + half_axis), end = dot(normal, pa - half_axis);
-  // For a segment in the plane of the triangle, or almost, all five signs may be rounding errors, wherever it lies.
-  const double product = max_component(abs(pb - pa)) * max_component(abs(pc - pa)) *
-                         (max_component(abs(pa)) + max_component(abs(half_axis)));
-  if (std::max(std::abs(start), std::abs(end)) <= kDoubleError * product)
-    return crosses_in_double_double(half_axis, pa, pb, pc, product);
-  return (start <= 0 && end >= 0) || (start >= 0 && end <= 0);
+  // For a segment in the plane, the distances to the edges detect a contact.
+  return (front || back) && ends_on_both_sides(half_axis, pa, pb, pc);
 }
 
 double squared_distance_segment_triangle(Vec3d center, Vec3d half_axis, Vec3d a, Vec3d b, Vec3d c) {

@@ -8,10 +8,10 @@
 
 namespace locus {
 
-// Returns whether the segment crosses the triangle, by the signs of five volumes. For two triangles that share an edge,
-// the computed volumes of this edge have equal magnitudes, so a segment cannot pass between the triangles. A segment
-// that only touches the triangle may be reported either way; one that lies in its plane, up to rounding errors, is
-// judged in extended precision, and is never reported far from the triangle.
+// Returns whether the segment crosses the triangle, by the signs of five volumes; signs that may be rounding errors are
+// computed in extended precision. Two triangles that share an edge have exactly opposite signs for it, so a segment
+// cannot pass between them. A segment that is reported crosses the triangle, up to a few roundings of the coordinates.
+// One that only touches it, or lies in its plane, up to such roundings, may be reported either way.
 // Source: Moller, Trumbore, Fast, Minimum Storage Ray/Triangle Intersection, 1997, for the volumes.
 bool segment_crosses_triangle(Vec3d center, Vec3d half_axis, Vec3d a, Vec3d b, Vec3d c);
 
