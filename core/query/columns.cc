@@ -164,7 +164,7 @@ uint64_t max_encoded_reply_bytes(const QueryBatch& batch) {
 absl::Status check_reply_size(const QueryBatch& batch) {
   const uint64_t bytes = fixed_reply_bytes(batch);
   if (bytes <= reply_limit(batch)) return absl::OkStatus();
-  return refuse_limit("max_reply_bytes", "reply_bytes", static_cast<double>(reply_limit(batch)),
+  return refuse_limit("max_reply_bytes", "max_reply_bytes", static_cast<double>(reply_limit(batch)),
                       static_cast<double>(bytes));
 }
 

@@ -448,7 +448,7 @@ absl::Status check_batch(const QueryBatch& batch) {
   if (const uint64_t segments = sight_segments(batch); segments > limits::kMaxSightSegments)
     return refuse_limit("blocks", "sight_segments", limits::kMaxSightSegments, static_cast<double>(segments));
   if (batch.max_reply_bytes > limits::kMaxReplyBytes)
-    return refuse_limit("max_reply_bytes", "reply_bytes", limits::kMaxReplyBytes, batch.max_reply_bytes);
+    return refuse_limit("max_reply_bytes", "max_reply_bytes", limits::kMaxReplyBytes, batch.max_reply_bytes);
   for (size_t i = 0; i < batch.blocks.size(); ++i) RETURN_IF_ERROR(BlockCheck(batch.blocks[i], i).run());
   return check_reply_size(batch);
 }

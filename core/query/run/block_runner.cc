@@ -99,7 +99,10 @@ size_t BlockRunner::run_queries(const Columns& columns, size_t begin, size_t end
     });
   for (size_t i = begin; i < end; ++i) {
     if (i != begin && should_split()) return i;
-    if (origins_.is_unanchored(i) || task_.ended())
+    // After the end of the batch no search begins, but lookups are still answered: they need no search, except the one
+    // that look_up_groups_at() may already have done for all groups of the block.
+    const bool searches = !std::is_same_v<Columns, LookupColumns>;
+    if (origins_.is_unanchored(i) || (searches && task_.ended()))
       write_nothing(i);
     else
       run_query(columns, i);
@@ -360,7 +363,7 @@ void BlockRunner::run_query(const CellColumns& cells, size_t i) {
 // last lookup was at the same time, so that consecutive queries with equal times share one lookup.
 void BlockRunner::look_up_groups_at(const LookupColumns& lookup, size_t i) {
   const bool same = groups_query_ && (!times_.asks_past() || times_.time(*groups_query_) == times_.time(i));
-  if (same) return;
+  if (same || task_.ended()) return;
   groups_query_ = i;
   groups_ = look_up_groups(task_, times_.of(i), lookup.groups, overlap_options(block_, StaticDetail::kInstances));
 }

@@ -211,6 +211,16 @@ TEST(RunBatchTest, MaxWorkEndsBatchesOfManySmallQueriesToo) {
   EXPECT_EQ(result.blocks[0].truncated.size(), 60'000u - first) << "each unanswered query is listed once";
 }
 
+TEST(RunBatchTest, LookupsOfAnEndedBatchAreStillAnswered) {
+  const SnapshotPtr snapshot = snapshot_of(crowd(5'000));
+  const std::vector<OwnedBlock> blocks = {one_ball({}, 1e6f), lookup_of_ids({1, 2, 3})};
+  QueryBatch batch = batch_of(blocks);
+  batch.max_work = 1;
+  const BatchResult result = run(*snapshot, batch);
+  ASSERT_FALSE(result.blocks[0].truncated.empty()) << "the batch has ended";
+  EXPECT_EQ(result.blocks[1].ids, (std::vector<uint64_t>{1, 2, 3}));
+}
+
 TEST(RunBatchTest, EnoughMaxWorkTruncatesNothing) {
   const SnapshotPtr snapshot = snapshot_of(crowd(4));
   const OwnedBlock block = rays_along_x(RayMode::kFirst, std::vector<float>(3 * 1'000, 0));
