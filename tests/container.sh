@@ -145,9 +145,7 @@ compose() {
 # Removes the containers, volumes and network that compose has made.
 compose_ends() {
   [ -n "$composed" ] || return 0
-  compose down --volumes
-  podman network rm "$(basename "$work" | tr -d .)_default"
-  composed=
+  compose down --volumes && podman network rm "$(basename "$work" | tr -d .)_default" && composed=
 }
 
 free_port() { /usr/bin/python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])'; }

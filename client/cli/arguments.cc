@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "absl/strings/match.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
@@ -16,7 +17,7 @@ namespace {
 template <size_t N>
 bool parse_list(absl::string_view text, std::array<double, N>& values) {
   const std::vector<absl::string_view> parts = absl::StrSplit(text, ',');
-  if (parts.size() != N) return false;
+  if (parts.size() != N || absl::StrContains(text, ' ')) return false;  // SimpleAtod() would skip blanks
   for (size_t i = 0; i < N; ++i)
     if (!absl::SimpleAtod(parts[i], &values[i])) return false;
   return true;

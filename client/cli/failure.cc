@@ -46,11 +46,10 @@ std::string hint_of_reason(v1::Reason reason, absl::string_view message) {
   }
 }
 
-std::string hint_of_code(absl::StatusCode code, absl::string_view message) {
-  switch (code) {
+std::string hint_of_code(const absl::Status& status) {
+  switch (status.code()) {
     case absl::StatusCode::kDeadlineExceeded:
-      // A query changes nothing. The client library words the error of a query that is late.
-      return absl::StartsWith(message, "the query")
+      return client::is_read_only(status)
                  ? "give it more time with --timeout SECONDS"
                  : "give it more time with --timeout SECONDS; a change may have been made all the same";
     case absl::StatusCode::kUnimplemented:
@@ -72,7 +71,7 @@ std::string hint_of(const absl::Status& status) {
   if (absl::StrContains(status.message(), "no connection to")) return "";
   const std::optional<v1::Error> error = client::error_of(status);
   std::string hint = error ? hint_of_reason(error->reason(), status.message()) : "";
-  if (hint.empty()) hint = hint_of_code(status.code(), status.message());
+  if (hint.empty()) hint = hint_of_code(status);
   return absl::StrContains(status.message(), hint) ? "" : hint;
 }
 
@@ -131,9 +130,6 @@ absl::Status with_place(const absl::Status& status, absl::string_view place) {
 
 ExitCode exit_code_of(const absl::Status& status) {
   if (status.GetPayload(kUsagePayload)) return ExitCode::kUsage;
-  // The server refuses an unknown id of an instance with FAILED_PRECONDITION, because the whole change is refused.
-  const std::optional<v1::Error> error = client::error_of(status);
-  if (error && error->reason() == v1::REASON_UNKNOWN_ID) return ExitCode::kNotFound;
   switch (status.code()) {
     case absl::StatusCode::kOk:
       return ExitCode::kOk;

@@ -110,8 +110,7 @@ class LineReader {
         if (!option->get_group().empty())
           for (const std::string& name : option->get_lnames()) names.push_back(absl::StrCat("--", name));
     const std::string name = argument.substr(0, argument.find('='));
-    const std::string two_dashes = absl::StartsWith(name, "--") ? name : absl::StrCat("-", name);
-    return absl::StrCat(in_quotes(command()), " has no option ", in_quotes(name), suggestion(two_dashes, names, ""));
+    return absl::StrCat(in_quotes(command()), " has no option ", in_quotes(name), suggestion(name, names, ""));
   }
 
   std::string unexpected(const std::string& argument) const {

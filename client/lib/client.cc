@@ -60,15 +60,16 @@ absl::StatusOr<Response> call(Stub& stub, const CallPlan& plan, const Request& r
   return response;
 }
 
-// Returns `status`, the outcome of a query. If the deadline passed in this client, so that the server sent no error of
-// its own, returns an error that says so and names the revision for which the query waits.
-absl::Status with_view(const absl::Status& status, absl::string_view scene, const v1::View& view) {
-  if (!absl::IsDeadlineExceeded(status) || error_of(status)) return status;
+// Returns the outcome of a query: `status`, marked by mark_read_only(). If the deadline passed in this client, so that
+// the server sent no error of its own, returns an error that names the revision for which the query waits.
+absl::Status outcome_of_query(const absl::Status& status, absl::string_view scene, const v1::View& view) {
+  if (status.ok()) return status;
+  if (!absl::IsDeadlineExceeded(status) || error_of(status)) return mark_read_only(status);
   std::string message = "the query was not answered in time";
   if (view.has_at_least())
     absl::StrAppend(&message, "; scene '", scene, "' may not have reached revision ", view.at_least(),
                     " yet, for which the query waits");
-  return absl::DeadlineExceededError(message);
+  return mark_read_only(absl::DeadlineExceededError(message));
 }
 
 }  // namespace
@@ -236,10 +237,14 @@ absl::Status Client::dump(const v1::DumpSceneRequest& request,
   const auto reader = connection_->transfers->DumpScene(&context, request);
   v1::DumpSceneResponse response;
   absl::Status accepted;
-  while (accepted.ok() && reader->Read(&response)) accepted = on_message(response);
+  bool arrived = false;
+  while (accepted.ok() && reader->Read(&response)) {
+    arrived = true;
+    accepted = on_message(response);
+  }
   if (!accepted.ok()) context.TryCancel();
   const absl::Status end = to_absl_status(reader->Finish());
-  return accepted.ok() ? with_view(end, request.scene(), request.view()) : accepted;
+  return accepted.ok() ? outcome_of_query(end, request.scene(), arrived ? v1::View() : request.view()) : accepted;
 }
 
 absl::StatusOr<v1::UpdateAck> Client::apply(absl::string_view scene, v1::UpdateBatch batch) const {
@@ -259,7 +264,7 @@ absl::StatusOr<v1::QueryResult> Client::query(absl::string_view scene, v1::Query
   *request.mutable_batch() = std::move(batch);
   absl::StatusOr<v1::QueryResponse> response =
       call(*connection_->queries, connection_->repeatable(scene), request, &v1::QueryService::StubInterface::Query);
-  RETURN_IF_ERROR(with_view(response.status(), scene, request.batch().view()));
+  RETURN_IF_ERROR(outcome_of_query(response.status(), scene, request.batch().view()));
   return std::move(*response->mutable_result());
 }
 

@@ -11,7 +11,8 @@ namespace locus::client {
 namespace {
 
 constexpr char kPayloadUrl[] = "type.googleapis.com/locus.v1.Error";
-constexpr int kLastCode = 16;  // UNAUTHENTICATED
+constexpr char kReadOnlyPayload[] = "locus/read-only";  // empty payload of mark_read_only()
+constexpr int kLastCode = 16;                           // UNAUTHENTICATED
 
 absl::StatusCode code_of(int code) {
   return code > 0 && code <= kLastCode ? static_cast<absl::StatusCode>(code) : absl::StatusCode::kUnknown;
@@ -36,6 +37,13 @@ std::optional<v1::Error> error_of(const absl::Status& status) {
   if (!payload || !error.ParseFromString(std::string(*payload))) return std::nullopt;
   return error;
 }
+
+absl::Status mark_read_only(absl::Status error) {
+  error.SetPayload(kReadOnlyPayload, absl::Cord());
+  return error;
+}
+
+bool is_read_only(const absl::Status& error) { return error.GetPayload(kReadOnlyPayload).has_value(); }
 
 absl::Duration retry_after(const absl::Status& status) {
   const std::optional<v1::Error> error = error_of(status);

@@ -27,6 +27,11 @@ absl::Duration retry_after(const absl::Status& status);
 // false.
 bool refused_by_server(const absl::Status& status);
 
+// Returns an error marked as the error of a call that only reads, so that nothing can have been changed, whatever the
+// outcome. is_read_only() returns whether an error is marked. Code, message and details are kept.
+absl::Status mark_read_only(absl::Status error);
+bool is_read_only(const absl::Status& error);
+
 // Converts a gRPC status: keeps code and message, and attaches the Error from `grpc-status-details-bin` for error_of().
 // Malformed details are dropped; code and message remain valid. Without details, advice is appended to the message of
 // UNAUTHENTICATED, of PERMISSION_DENIED, and of UNAVAILABLE if the cause of the failed connection is known.

@@ -2,11 +2,16 @@
 
 #include <algorithm>
 
+#include "absl/strings/match.h"
+#include "absl/strings/strip.h"
+
 namespace locus {
 namespace {
 
 // Words are compared up to this length. Commands and options are shorter.
 constexpr size_t kMaxCompared = 64;
+// Almost every word is similar to a shorter one.
+constexpr size_t kMinCompared = 2;
 
 // Returns the number of edits that turn `a` into `b`. A swap counts only if neither character is edited again.
 size_t edits(absl::string_view a, absl::string_view b) {
@@ -25,42 +30,53 @@ size_t edits(absl::string_view a, absl::string_view b) {
   return row[b.size()];
 }
 
-// Returns the longest candidate with which `word` begins, of at least 3 characters; an empty string if there is none.
-std::string longest_beginning(absl::string_view word, const std::vector<std::string>& candidates) {
-  constexpr size_t kMinBeginning = 3;
-  std::string longest;
-  for (const std::string& candidate : candidates) {
-    const bool begins = candidate.size() >= kMinBeginning && word.substr(0, candidate.size()) == candidate;
-    if (begins && candidate.size() > longest.size()) longest = candidate;
+absl::string_view without_dashes(absl::string_view word) {
+  while (absl::ConsumePrefix(&word, "-")) {
   }
-  return longest;
+  return word.substr(0, kMaxCompared);
 }
 
 bool abbreviates(absl::string_view word, absl::string_view candidate) {
-  if (word.size() < 2 || candidate.empty() || word.front() != candidate.front()) return false;
+  if (candidate.empty() || word.front() != candidate.front()) return false;
   size_t matched = 0;
   for (const char c : candidate)
     if (matched < word.size() && word[matched] == c) ++matched;
   return matched == word.size();
 }
 
+// Returns the first candidate for which `is_similar` returns true; an empty string if there is none.
+template <class IsSimilar>
+std::string first_of(const std::vector<std::string>& candidates, const IsSimilar& is_similar) {
+  const auto found = std::find_if(candidates.begin(), candidates.end(),
+                                  [&](const std::string& candidate) { return is_similar(without_dashes(candidate)); });
+  return found == candidates.end() ? "" : *found;
+}
+
 }  // namespace
 
 std::string similar_word(absl::string_view word, const std::vector<std::string>& candidates) {
-  word = word.substr(0, kMaxCompared);
+  word = without_dashes(word);
+  if (word.size() < kMinCompared) return "";
   const size_t max_edits = std::max<size_t>(1, word.size() / 3);
   const std::string* best = nullptr;
   size_t least = max_edits + 1;
   for (const std::string& candidate : candidates) {
-    const size_t distance = edits(word, absl::string_view(candidate).substr(0, kMaxCompared));
+    const absl::string_view compared = without_dashes(candidate);
+    const size_t distance = compared.size() < kMinCompared ? least : edits(word, compared);
     if (distance >= least) continue;
     least = distance;
     best = &candidate;
   }
   if (best != nullptr) return *best;
-  for (const std::string& candidate : candidates)
-    if (abbreviates(word, candidate)) return candidate;
-  return longest_beginning(word, candidates);
+  std::string begun =
+      first_of(candidates, [&](absl::string_view candidate) { return absl::StartsWith(candidate, word); });
+  if (!begun.empty()) return begun;
+  std::string longer = first_of(candidates, [&](absl::string_view candidate) { return abbreviates(word, candidate); });
+  if (!longer.empty()) return longer;
+  constexpr size_t kMinBeginning = 3;
+  return first_of(candidates, [&](absl::string_view candidate) {
+    return candidate.size() >= kMinBeginning && absl::StartsWith(word, candidate);
+  });
 }
 
 }  // namespace locus

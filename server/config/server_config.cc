@@ -309,10 +309,15 @@ Invocation mistake(absl::string_view message) {
 std::string unexpected(const std::vector<std::string>& arguments, absl::string_view message) {
   ServerConfig config;
   CLI::App app;
+  std::optional<Maintenance> maintenance;
   build_parser(app, config);
+  add_maintenance(app, maintenance);
+  std::vector<const CLI::App*> commands = {&app};
+  for (const CLI::App* command : app.get_subcommands({})) commands.push_back(command);
   std::vector<std::string> names;
-  for (const CLI::Option* option : std::as_const(app).get_options())
-    for (const std::string& name : option->get_lnames()) names.push_back(absl::StrCat("--", name));
+  for (const CLI::App* command : commands)
+    for (const CLI::Option* option : command->get_options())
+      for (const std::string& name : option->get_lnames()) names.push_back(absl::StrCat("--", name));
   for (const std::string& argument : arguments) {
     if (!absl::StartsWith(argument, "--")) continue;
     const std::string name = argument.substr(0, argument.find('='));

@@ -476,7 +476,7 @@ TEST_F(QueryRpcTest, LimitsOfABatchAreNamedWithWhatWasAsked) {
   refused(batch, "blocks[0].max_results", "max_results", limits::kMaxMaxResults, limits::kMaxMaxResults + 1.0);
   batch = ray_along_x();
   batch.set_max_reply_bytes(limits::kMaxReplyBytes + 1);
-  refused(batch, "max_reply_bytes", "reply_bytes", limits::kMaxReplyBytes, limits::kMaxReplyBytes + 1.0);
+  refused(batch, "max_reply_bytes", "max_reply_bytes", limits::kMaxReplyBytes, limits::kMaxReplyBytes + 1.0);
 }
 
 TEST_F(QueryRpcTest, RepliesAreTheSameBytesOnOneAndFourThreads) {

@@ -1,4 +1,5 @@
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "client/cli/default_scene.h"
 #include "client/cli/failure.h"
 #include "client/lib/client.h"
+#include "client/lib/status.h"
 #include "core/base/status_macros.h"
 
 namespace locus::cli {
@@ -42,7 +44,19 @@ void add_values(const Values& values, Column& column) {
   column.Add(values.begin(), values.end());
 }
 
+// Returns `status` with the code NOT_FOUND if it refuses an unknown id, as `locus remove` does for objects.
+absl::Status unknown_id_as_not_found(const absl::Status& status) {
+  const std::optional<v1::Error> error = client::error_of(status);
+  if (!error || error->reason() != v1::REASON_UNKNOWN_ID) return status;
+  absl::Status not_found = absl::NotFoundError(status.message());
+  status.ForEachPayload(
+      [&](absl::string_view type, const absl::Cord& payload) { not_found.SetPayload(type, payload); });
+  return not_found;
+}
+
 absl::Status place(const PlaceOptions& options, Context& context) {
+  if (!options.ids.empty() && options.ids.size() != options.at.size() && options.at.size() != 1)
+    return usage_error("give one --id for each --at, or none");
   v1::ChangeInstancesRequest request;
   request.set_scene(options.scene);
   v1::Placement& placement = *request.add_place();
@@ -79,10 +93,11 @@ absl::Status remove_instances(const RemoveOptions& options, Context& context) {
   add_values(values_of(options.ids), *request.mutable_remove_ids());
   add_values(values_of(options.groups), *request.mutable_remove_groups());
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());
-  ASSIGN_OR_RETURN(const v1::ChangeInstancesResponse removed, client->change_instances(request));
-  context.remember_own(options.scene, {removed.epoch(), removed.revision()});
+  const absl::StatusOr<v1::ChangeInstancesResponse> removed = client->change_instances(request);
+  if (!removed.ok()) return unknown_id_as_not_found(removed.status());
+  context.remember_own(options.scene, {removed->epoch(), removed->revision()});
   Report report;
-  report.head = {{"scene", options.scene}, {"revision", removed.revision()}};
+  report.head = {{"scene", options.scene}, {"revision", removed->revision()}};
   context.write(report);
   return absl::OkStatus();
 }
@@ -95,7 +110,7 @@ void add_place(CLI::App& parent, Context& context) {
   locus instance place arena --mesh door --id 7 --at 10,0,0 --rotation 0,0,0.7071068,0.7071068
   locus instance place arena --mesh tree --at 1,0,0 --at 5,2,0 --scale 1.5
 
-An option given once stands for all instances.)");
+Except --id, an option given once stands for all instances.)");
   add_scene_argument(command, options->scene);
   command.add_option("--mesh", options->mesh, "The mesh's name on the server")->required()->type_name("NAME");
   add_repeatable(command, "--at", options->at, "X,Y,Z", "Where its origin goes; repeat for more instances")->required();

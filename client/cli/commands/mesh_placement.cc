@@ -4,6 +4,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/lib/client.h"
+#include "client/lib/status.h"
 #include "core/base/status_macros.h"
 
 namespace locus::cli {
@@ -39,31 +40,18 @@ absl::StatusOr<v1::UploadMeshResponse> upload(const std::string& name, const Imp
   return uploaded;
 }
 
-// Meshes that were uploaded but are not placed yet. Deletes them when it is destroyed, unless keep() was called. A mesh
-// that another client has placed meanwhile is not deleted, because the server refuses to.
-class NewMeshes {
- public:
-  explicit NewMeshes(const client::Client& client) : client_(client) {}
-  ~NewMeshes() {
-    // The caller reports why the meshes were not placed. A mesh that cannot be deleted either does no harm.
-    for (const std::string& name : names_) client_.delete_mesh(name).IgnoreError();
-  }
-  NewMeshes(const NewMeshes&) = delete;
-  NewMeshes& operator=(const NewMeshes&) = delete;
-
-  void add(const std::string& name) { names_.push_back(name); }
-  void keep() { names_.clear(); }
-
- private:
-  const client::Client& client_;
-  std::vector<std::string> names_;
-};
-
 absl::Status create_scene(const std::string& name, client::Client& client) {
   v1::CreateSceneRequest request;
   request.set_name(name);
   request.set_if_absent(true);
   return client.create_scene(request).status();
+}
+
+// Deletes meshes that could not be placed. The server keeps a mesh that another client has placed meanwhile; one that
+// another client is about to place is deleted too, and that client then gets an error and can upload it again.
+void delete_meshes(const std::vector<std::string>& names, const client::Client& client) {
+  // The caller reports why the meshes were not placed. A mesh that cannot be deleted does no harm.
+  for (const std::string& name : names) client.delete_mesh(name).IgnoreError();
 }
 
 void add_placement(const PlacementOptions& options, const ImportedLevel& level, const std::string& mesh,
@@ -101,7 +89,7 @@ absl::Status upload_and_place(const PlacementOptions& options, const ImportedLev
     // Refuses a missing scene before the meshes are uploaded, which can take minutes.
     RETURN_IF_ERROR(client->get_scene(options.scene).status());
   }
-  NewMeshes new_meshes(*client);
+  std::vector<std::string> new_meshes;
   Report report;
   report.rows_name = "meshes";
   v1::ChangeInstancesRequest change;
@@ -109,20 +97,23 @@ absl::Status upload_and_place(const PlacementOptions& options, const ImportedLev
   for (const ImportedMesh& mesh : level.meshes) {
     const std::string name = mesh_name(options, level, mesh);
     ASSIGN_OR_RETURN(const v1::UploadMeshResponse uploaded, upload(name, mesh, *client, context));
-    if (!uploaded.already_known()) new_meshes.add(name);
+    if (!uploaded.already_known()) new_meshes.push_back(name);
     add_placement(options, level, name, change);
     report.rows.push_back({{"mesh", name},
                            {"triangles", uploaded.mesh().triangles()},
                            {"zero_area_triangles", uploaded.mesh().zero_area_triangles()},
                            {"already_known", uploaded.already_known()}});
   }
-  ASSIGN_OR_RETURN(const v1::ChangeInstancesResponse placed, client->change_instances(change));
-  new_meshes.keep();
-  context.remember_own(options.scene, {placed.epoch(), placed.revision()});
-  for (size_t i = 0; i < report.rows.size() && static_cast<int>(i) < placed.ids_size(); ++i) {
-    report.rows[i]["id"] = id_json(placed.ids(static_cast<int>(i)));
+  const absl::StatusOr<v1::ChangeInstancesResponse> placed = client->change_instances(change);
+  if (!placed.ok()) {
+    if (client::refused_by_server(placed.status())) delete_meshes(new_meshes, *client);
+    return placed.status();
   }
-  report.head = {{"scene", options.scene}, {"revision", placed.revision()}};
+  context.remember_own(options.scene, {placed->epoch(), placed->revision()});
+  for (size_t i = 0; i < report.rows.size() && static_cast<int>(i) < placed->ids_size(); ++i) {
+    report.rows[i]["id"] = id_json(placed->ids(static_cast<int>(i)));
+  }
+  report.head = {{"scene", options.scene}, {"revision", placed->revision()}};
   if (!level.source_format.empty()) report.head["format"] = level.source_format;
   context.write(report);
   return absl::OkStatus();

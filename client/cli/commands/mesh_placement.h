@@ -29,8 +29,8 @@ void add_placement_options(CLI::App& command, PlacementOptions& options);
 
 // Uploads all meshes, then places an instance of each mesh in one atomic change. The position of the instances is the
 // level's recentre translation plus `at`. Uploads nothing if the scene does not exist, and deletes the meshes that it
-// has uploaded if they cannot be placed. Writes a report with a row per mesh. Writes progress to the error stream if
-// Context::progress() is Progress::kLive.
+// has uploaded if the server refuses to place them. Writes a report with a row per mesh. Writes progress to the error
+// stream if Context::progress() is Progress::kLive.
 absl::Status upload_and_place(const PlacementOptions& options, const ImportedLevel& level, Context& context);
 
 }  // namespace locus::cli

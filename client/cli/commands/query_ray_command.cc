@@ -95,8 +95,9 @@ void add_query_ray_options(CLI::App& command, RayOptions& options) {
   add_repeatable(command, "--from", options.from, "X,Y,Z", "Where it starts; repeat --from and --dir for more rays");
   add_repeatable(command, "--dir", options.directions, "X,Y,Z",
                  "Where it goes, any length but zero; t counts in this length; one for each or one for all");
-  add_repeatable(command, "--t-max", options.t_max, "T", "How far, in lengths of --dir [inf]");
-  add_repeatable(command, "--max-t", options.t_max, "T", "Former name of --t-max")->group("");
+  CLI::Option* const t_max =
+      add_repeatable(command, "--t-max", options.t_max, "T", "How far, in lengths of --dir [inf]");
+  add_repeatable(command, "--max-t", options.t_max, "T", "Former name of --t-max")->group("")->excludes(t_max);
   const NamedValues<v1::RayMode> modes = {
       {"first", v1::RAY_MODE_FIRST}, {"any", v1::RAY_MODE_ANY}, {"all", v1::RAY_MODE_ALL}};
   command.add_option("--mode", options.mode, "Which hits: first, any (yes or no), all [first]")

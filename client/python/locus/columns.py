@@ -5,8 +5,8 @@ A column is packed little-endian numbers. An entry that is a vector has several 
 Arguments: a buffer of the right type (numpy array, array.array, memoryview) is read in C order and need not be
 contiguous; `bytes` and `bytearray` are used unchanged; numbers and (nested) lists are converted. A buffer of another
 type is refused, not converted, because float64 given for float32 would be rounded; only int64 is accepted for ids,
-unless one is negative. If the entries are vectors, the last axis of an array must have the numbers of one entry (or its
-last axes, as of matrices), and so must each inner list: (N, 3), never (3, N).
+unless one is negative. If the entries are vectors, the last axis of an array must have the numbers of one entry, or of
+one of its parts, as a row of a matrix, and so must each inner list: (N, 3), never (3, N).
 
 Results: a column is a numpy array of shape (R,) or (R, width) over the received bytes, and therefore read-only. It is
 copied only if the received bytes are not aligned to its type. If numpy is not installed it is a flat array.array, copied
@@ -17,7 +17,6 @@ from __future__ import annotations
 import array
 import itertools
 import numbers
-import operator
 from typing import Any, Iterable, Iterator, List, NamedTuple, Protocol, Sequence, Tuple, Union
 
 try:
@@ -91,16 +90,9 @@ def _remedy(path: str, view: memoryview, kind: Kind) -> str:
     return f"convert it, for example with .astype('{kind.name}')"
 
 
-def _is_part(count: int, width: int) -> bool:
-    """Returns whether `count` numbers are an entry of `width` numbers, or one of its points, planes or rows of a matrix."""
-    return count == width or (count in (3, 4) and width % count == 0)
-
-
-def _check_shape(path: str, shape: Sequence[int], width: int) -> None:
-    """Raises ValueError unless the last axes of an array of vectors have the numbers of one entry."""
-    if width == 1 or len(shape) < 2 or 0 in shape or _is_part(shape[-1], width):
-        return
-    if width not in itertools.accumulate(reversed(shape), operator.mul):
+def _check_shape(path: str, shape: Sequence[int], width: int, part: int) -> None:
+    """Raises ValueError unless the last axis of an array of vectors has the numbers of one entry or of a part of it."""
+    if width > 1 and len(shape) > 1 and 0 not in shape and shape[-1] not in (width, part):
         raise ValueError(f"{path}: has the shape {tuple(shape)}: give {width} numbers for each entry along the last axis, "
                          f"as in (N, {width})")
 
@@ -112,9 +104,9 @@ def _check_not_negative(path: str, view: memoryview) -> None:
         raise ValueError(f"{path}[{index}]: is {values[index]}: give numbers from 0 to 2^64 - 1")
 
 
-def _from_buffer(path: str, view: memoryview, kind: Kind, width: int) -> Raw:
+def _from_buffer(path: str, view: memoryview, kind: Kind, width: int, part: int) -> Raw:
     """Returns the bytes of the numbers in `view`, in C order: borrowed if `view` is contiguous, else copied."""
-    _check_shape(path, view.shape or (), width)
+    _check_shape(path, view.shape or (), width, part)
     format = view.format
     if kind is UINT64 and view.itemsize == 8 and format.lstrip("@=<") in ("q", "l"):
         _check_not_negative(path, view)
@@ -128,30 +120,31 @@ def _from_buffer(path: str, view: memoryview, kind: Kind, width: int) -> Raw:
     return view.tobytes()
 
 
-def _flat(path: str, value: Iterable[Any], width: int) -> Iterable[Any]:
+def _flat(path: str, value: Iterable[Any], width: int, part: int) -> Iterable[Any]:
     items = value if isinstance(value, (list, tuple)) else list(value)
     if not items or isinstance(items[0], (float, int, numbers.Number, str)):
         return items
     vectors = [list(item) for item in items]
-    wrong = next((vector for vector in vectors if not _is_part(len(vector), width)), None)
+    wrong = next((vector for vector in vectors if len(vector) not in (width, part)), None)
     if width > 1 and wrong is not None:
         raise ValueError(f"{path}: has an entry of {len(wrong)} numbers: give {width} numbers for each entry")
     return list(itertools.chain.from_iterable(vectors))
 
 
-def _from_numbers(path: str, value: Any, kind: Kind, width: int) -> bytes:
+def _from_numbers(path: str, value: Any, kind: Kind, width: int, part: int) -> bytes:
     try:
-        items = [value] if isinstance(value, (float, int, numbers.Number)) else _flat(path, value, width)
+        items = [value] if isinstance(value, (float, int, numbers.Number)) else _flat(path, value, width, part)
         return array.array(kind.code, items).tobytes()
     except (TypeError, OverflowError) as error:
         raise TypeError(f"{path}: {error}: give {kind.name} numbers, as a list or a buffer") from error
 
 
-def borrow(path: str, value: ColumnLike, kind: Kind, width: int = 1) -> Raw:
+def borrow(path: str, value: ColumnLike, kind: Kind, width: int = 1, part: int = 0) -> Raw:
     """Returns the encoded column; empty for None. A contiguous buffer is borrowed, not copied, so it must not change
     until the request was sent.
 
-    `path` names the column in errors. Raises TypeError for numbers of another type, ValueError if the number of values
+    `path` names the column in errors. `part` is the number of numbers of a part of an entry, for example 4 for the planes
+    of a region; 0 if the entry has no parts. Raises TypeError for numbers of another type, ValueError if the number of values
     is not a multiple of `width`, if the shape is not that of entries of `width` numbers, or for a negative id. Cost:
     linear for lists, for int64 and for arrays that are not contiguous, else constant.
     """
@@ -161,14 +154,14 @@ def borrow(path: str, value: ColumnLike, kind: Kind, width: int = 1) -> Raw:
     if isinstance(value, (bytes, bytearray)):
         raw = value
     elif isinstance(value, (float, int, list, tuple)):
-        raw = _from_numbers(path, value, kind, width)
+        raw = _from_numbers(path, value, kind, width, part)
     else:
         try:
             view = memoryview(value)
         except TypeError:
-            raw = _from_numbers(path, value, kind, width)
+            raw = _from_numbers(path, value, kind, width, part)
         else:
-            raw = _from_buffer(path, view, kind, width)
+            raw = _from_buffer(path, view, kind, width, part)
     if len(raw) % (kind.size * width):
         count = f"{len(raw) // kind.size} numbers" if len(raw) % kind.size == 0 else f"{len(raw)} bytes"
         raise ValueError(f"{path}: has {count}: give {width} {kind.name} for each entry")
@@ -191,9 +184,9 @@ def borrow_for(path: str, value: ColumnLike, kind: Kind, count: int, width: int 
     return raw
 
 
-def encode(path: str, value: ColumnLike, kind: Kind, width: int = 1) -> bytes:
+def encode(path: str, value: ColumnLike, kind: Kind, width: int = 1, part: int = 0) -> bytes:
     """Returns a copy of the encoded column. Arguments and errors are those of borrow()."""
-    return bytes(borrow(path, value, kind, width))
+    return bytes(borrow(path, value, kind, width, part))
 
 
 def encode_for(path: str, value: ColumnLike, kind: Kind, count: int, width: int = 1) -> bytes:

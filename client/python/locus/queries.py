@@ -237,7 +237,7 @@ class QueryBatch:
         0.
         """
         new = _NewBlock(self._blocks, "frustums")
-        new.first("planes", planes, FLOAT32, 4 * planes_each)
+        new.first("planes", planes, FLOAT32, 4 * planes_each, 4)
         new.options(planes_each=planes_each, detail=detail)
         return self._add(new, block)
 
@@ -247,7 +247,7 @@ class QueryBatch:
         float32, column-major matrices that map positions to clip coordinates.
         """
         new = _NewBlock(self._blocks, "frustums")
-        new.first("view_projections", view_projections, FLOAT32, 16)
+        new.first("view_projections", view_projections, FLOAT32, 16, 4)
         new.options(clip_depth=clip_depth, detail=detail)
         return self._add(new, block)
 
@@ -269,11 +269,11 @@ class QueryBatch:
         `pairwise`: viewer i looks only at target i.
         """
         new = _NewBlock(self._blocks, "sight")
-        new.first("viewers", viewers, FLOAT32, 3 * eyes)
+        new.first("viewers", viewers, FLOAT32, 3 * eyes, 3)
         new.column("viewer_groups", viewer_groups, UINT64)
         new.column("max_distances", max_distances, FLOAT32)
         viewer_count = new.count
-        new.first("targets", targets, FLOAT32, 3 * samples)
+        new.first("targets", targets, FLOAT32, 3 * samples, 3)
         new.column("target_groups", target_groups, UINT64)
         new.count = viewer_count
         new.options(eyes_per_viewer=eyes, samples_per_target=samples, pairwise=pairwise)
@@ -355,9 +355,9 @@ class _NewBlock:
         self.kind = wire.Parts()
         self.count = 0
 
-    def first(self, name: str, value: ColumnLike, number_type: columns.Kind, width: int = 1) -> None:
+    def first(self, name: str, value: ColumnLike, number_type: columns.Kind, width: int = 1, part: int = 0) -> None:
         """Adds the first column, which determines the number of queries."""
-        raw = columns.borrow(f"{self.path}{self.name}.{name}", value, number_type, width)
+        raw = columns.borrow(f"{self.path}{self.name}.{name}", value, number_type, width, part)
         self.count = columns.entries(raw, number_type, width)
         self.kind.add(_KINDS[self.name][name], raw)
 

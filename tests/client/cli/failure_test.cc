@@ -45,7 +45,7 @@ TEST(FailureTest, TextHasAnErrorLineAndAHintLine) {
 TEST(FailureTest, OnlyAChangeMayHaveBeenMadeAfterItsDeadline) {
   std::ostringstream change, query;
   write_failure(change, Format::kTable, absl::DeadlineExceededError("Deadline Exceeded"));
-  write_failure(query, Format::kTable, absl::DeadlineExceededError("the query was not answered in time"));
+  write_failure(query, Format::kTable, with_place(client::mark_read_only(absl::DeadlineExceededError("late")), "a:1"));
   EXPECT_THAT(change.str(), HasSubstr("a change may have been made"));
   EXPECT_THAT(query.str(), Not(HasSubstr("a change")));
 }

@@ -86,6 +86,7 @@ TEST_F(ClientTest, ALateQueryNamesTheRevisionForWhichItWaits) {
   const absl::Status late = (*client)->query("arena", batch).status();
   EXPECT_TRUE(absl::IsDeadlineExceeded(late));
   EXPECT_EQ(late.message(), "the query was not answered in time");
+  EXPECT_TRUE(is_read_only(late));
   batch.mutable_view()->set_at_least(9);
   EXPECT_THAT(std::string((*client)->query("arena", batch).status().message()),
               HasSubstr("scene 'arena' may not have reached revision 9 yet"));

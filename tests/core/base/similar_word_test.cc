@@ -22,6 +22,15 @@ TEST(SimilarWordTest, AnAbbreviationIsSimilar) {
   EXPECT_EQ(similar_word("desc", kCommands), "describe");
 }
 
+TEST(SimilarWordTest, OptionsAreComparedWithoutTheirDashes) {
+  const std::vector<std::string> options = {"--http-listen", "--tls-cert", "--tls-key", "--k", "--from", "--rotation"};
+  EXPECT_EQ(similar_word("--tls", options), "--tls-cert") << "a candidate that begins with the word";
+  EXPECT_EQ(similar_word("--form", options), "--from");
+  EXPECT_EQ(similar_word("rotation", options), "--rotation");
+  for (const char* word : {"-m", "--n", "--at", "--port", "--json", "-", "--"})
+    EXPECT_EQ(similar_word(word, options), "") << word;
+}
+
 TEST(SimilarWordTest, AWordIsSimilarToItsBeginning) {
   EXPECT_EQ(similar_word("--direction", {"--di", "--dir", "--from"}), "--dir");
   EXPECT_EQ(similar_word("removal", kCommands), "remove") << "fewer edits win";

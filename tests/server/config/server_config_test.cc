@@ -113,6 +113,8 @@ TEST_F(ServerConfigTest, MistakesEndWithTwoAndNameTheOption) {
       {{"--listen", "nowhere"}, "nowhere"},
       {{"--no-such-option"}, "--no-such-option"},
       {{"--thread", "2"}, "there is no option `--thread`; did you mean `--threads`?"},
+      {{"config", "--json", "--thread=2"}, "there is no option `--thread`; did you mean `--threads`?"},
+      {{"config", "--jsno"}, "did you mean `--json`?"},
       {{"--lisen=127.0.0.1:1", "--threads", "2"}, "did you mean `--listen`?"},
       {{"--memory-limit", "lots"}, "--memory-limit"},
       {{"--memory-limit", "1"}, "64MiB"},

@@ -20,7 +20,7 @@ class ClientTest(DaemonTest):
         self.assertEqual(server.version, self.command_line("version", "--server")["server_version"])
         self.assertIn("rays", server.features)
         self.assertFalse(server.insecure)
-        self.assertGreater(server.limits["reply_bytes"].value, 4_000_000)
+        self.assertGreater(server.limits["max_reply_bytes"].value, 4_000_000)
 
     def test_quotas_are_those_of_the_caller_and_its_connection(self):
         own, connection = self.client.quotas().items()

@@ -65,7 +65,7 @@ class EncodeTest(unittest.TestCase):
         for value in ([[1, 2], [3, 4], [5, 6]], [[1, 2, 3, 4, 5, 6]], [[1, 2, 3], [4, 5, 6, 7, 8, 9]], [[1], [2], [3]]):
             self.assertRefused(ValueError, "^a.column: has an entry of [1-9] numbers: give 3 numbers", value, FLOAT32, 3)
         rows = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
-        self.assertEqual(len(columns.encode("c", rows, FLOAT32, 16)), 64)
+        self.assertEqual(len(columns.encode("c", rows, FLOAT32, 16, 4)), 64)
 
     def test_values_without_numbers_are_refused(self):
         for value in ("abc", ["a"], [None], object(), [[1, 2], 3]):
@@ -96,12 +96,14 @@ class NumpyTest(unittest.TestCase):
             self.assertEqual(columns.encode("c", value, FLOAT32, 3), ONE_TO_SIX)
 
     def test_the_last_axes_have_the_numbers_of_one_entry(self):
-        for shape in ((3, 5), (6, 2), (2, 3, 2), (1, 9), (3, 1, 4)):
+        for shape in ((3, 5), (6, 2), (2, 3, 2), (1, 9), (3, 1, 4), (3, 1)):
             with self.assertRaisesRegex(ValueError, r"^a.column: has the shape .*along the last axis, as in \(N, 3\)"):
                 columns.encode("a.column", numpy.zeros(shape, "float32"), FLOAT32, 3)
-        for shape, width in (((5, 3), 3), ((2, 4, 3), 3), ((3, 1), 3), ((0, 5), 3), ((4, 4), 16), ((5, 4, 4), 16), ((7, 16), 16),
-                             ((5, 6, 4), 24), ((30, 4), 24), ((2, 3), 1)):
-            raw = columns.encode("a.column", numpy.zeros(shape, "float32"), FLOAT32, width)
+        with self.assertRaisesRegex(ValueError, "has the shape"):
+            columns.encode("points.T", numpy.zeros((3, 4), "float32"), FLOAT32, 12, 3)
+        for shape, width, part in (((5, 3), 3, 0), ((2, 4, 3), 3, 0), ((0, 5), 3, 0), ((4, 4), 16, 4), ((5, 4, 4), 16, 4),
+                                   ((7, 16), 16, 4), ((5, 6, 4), 24, 4), ((30, 4), 24, 4), ((2, 3), 1, 0)):
+            raw = columns.encode("a.column", numpy.zeros(shape, "float32"), FLOAT32, width, part)
             self.assertEqual(len(raw), 4 * math.prod(shape))
 
     def test_int64_is_accepted_for_ids_unless_one_is_negative(self):
