@@ -42,7 +42,7 @@ class SceneWriter {
 
   struct Applied {
     UpdateAck ack;
-    SnapshotPtr snapshot;  // null when nothing changed
+    SnapshotPtr snapshot;  // null if nothing changed, or if a replay defers snapshots
   };
   // Applies one batch. Precondition: admit() has returned nullopt for the batch. The ack lists refused items; with
   // all_or_nothing, one refused item refuses the whole batch. Returns RESOURCE_EXHAUSTED if the scene would have too
@@ -53,7 +53,7 @@ class SceneWriter {
 
   struct Joined {
     std::vector<absl::StatusOr<UpdateAck>> acks;  // one entry for each batch
-    SnapshotPtr snapshot;                         // null when nothing changed
+    SnapshotPtr snapshot;                         // null if nothing changed, or if a replay defers snapshots
   };
   // Applies the batches in order, as one revision. Calls log() once, before the first new batch is applied, or never if
   // no batch is new. If log() returns an error, applies nothing and returns this error. Preconditions: each batch has
@@ -107,7 +107,7 @@ class SceneWriter {
   // Applies a batch for which MoveApplier::serves() returns true.
   absl::StatusOr<Applied> apply_moves(const UpdateBatch& batch);
   // Applies the moves that moves_ has read, at the tick of `batch`. Returns the new snapshot, or null if nothing
-  // changed.
+  // changed or snapshots are deferred.
   SnapshotPtr publish_moves(const UpdateBatch& batch);
   // Returns true during a replay that builds no snapshots. A scene with history builds snapshots during replay, too,
   // because history records are made from snapshots.

@@ -1,5 +1,6 @@
 #include "server/convert/status.h"
 
+#include <random>
 #include <string>
 
 #include "absl/strings/str_cat.h"
@@ -28,6 +29,13 @@ std::string cut(absl::string_view text) {
   return std::string(text.substr(0, end));
 }
 
+// Returns `wait_ms` lengthened by up to a quarter, at random, so that clients that were refused together do not all
+// come back together. 0, which means that waiting does not help, stays 0.
+uint32_t lengthened(uint32_t wait_ms) {
+  thread_local std::minstd_rand random{std::random_device{}()};
+  return wait_ms + std::uniform_int_distribution<uint32_t>(0, wait_ms / 4)(random);
+}
+
 }  // namespace
 
 v1::Error to_error(const absl::Status& status) {
@@ -42,7 +50,7 @@ v1::Error to_error(const absl::Status& status) {
   error.set_limit(refusal->limit);
   error.set_limit_value(refusal->limit_value);
   error.set_asked(refusal->asked);
-  error.set_retry_after_ms(refusal->retry_after_ms);
+  error.set_retry_after_ms(lengthened(refusal->retry_after_ms));
   return error;
 }
 

@@ -28,7 +28,7 @@ namespace locus::server {
 template <class Entry>
 class FairQueue {
  public:
-  // Maximum number of idle clients that are remembered because they received more work than the virtual time.
+  // Maximum number of idle clients that are remembered because they have received more work than their fair share.
   static constexpr size_t kMaxIdleClients = 4096;
 
   bool empty() const { return waiting_.empty(); }

@@ -21,8 +21,8 @@ namespace locus::server {
 
 struct SnapshotterOptions {
   // Bytes of log records after which a scene is snapshotted again. If the estimated size of the scene's objects is
-  // larger, it is used instead, so that snapshots of scenes with few instances write hardly more bytes than the log. A
-  // smaller value makes a restart faster.
+  // larger, it is used instead, so that snapshots write hardly more bytes than the log; the estimate leaves out
+  // instances. A smaller value makes a restart faster.
   uint64_t log_bytes = limits::kSnapshotAfterBytes;
   // Time between two checks of all scenes.
   std::chrono::milliseconds poll_interval{250};

@@ -98,7 +98,7 @@ std::vector<NamedLimit> limits_of(const Host& host) {
       {"listed_item_errors", limits::kMaxListedItemErrors},
       {"reflection_request_bytes", kMaxReflectionRequestBytes},
       {"reflections", kMaxReflections, static_cast<double>(host.reflections.used())},
-      {"reply_bytes", limits::kMaxReplyBytes},
+      {"max_reply_bytes", limits::kMaxReplyBytes},
       {"max_results", limits::kMaxMaxResults},
       {"memory_bytes", static_cast<double>(host.memory.limit()), static_cast<double>(host.memory.used())},
       {"mesh_parts", limits::kMaxMeshParts},

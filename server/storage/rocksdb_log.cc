@@ -81,8 +81,8 @@ void RocksdbLog::list_stored() {
     log_state->copied = stored.copied = found.copied;
     log_state->written = {found.last, found.running_checksum};
     log_state->synced = log_state->written;  // open_directory() synced the log before reading it
-    // If the last records are missing, keep the sequence number in the durable marker, so that the next marker contains
-    // this number too and the loss stays visible.
+    // If the last records are missing, continue with the sequence number that the durable marker contains, so that the
+    // next marker does not contain a lower one, which would hide the loss.
     if (found.last < found.expected_sequence)
       log_state->synced.sequence = log_state->written.sequence = found.expected_sequence;
     scenes_.add(std::move(log_state));

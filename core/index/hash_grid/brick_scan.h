@@ -108,8 +108,9 @@ inline GridBall cull_ball_of(const Brick& brick, const Balld& ball) {
 // the centre of the brick. This choice of the point keeps the float coordinates small.
 class CullRay {
  public:
-  // Makes the line of `ray` relative to `brick`. `ray_radius` is the displacement bound of the values plus the padding
-  // of the slab test.
+  // Makes the line of `ray` relative to `brick`. `ray_radius` is an upper bound of the distance by which the line may
+  // miss a value's stored bounds although the ray hits the value: the rounding of the slab test and, for a query at a
+  // past time, the distance of the value from its stored position.
   CullRay(const Brick& brick, const SlabRay<double>& ray, double ray_radius) {
     const double longest = max_component(abs(ray.direction()));
     const Vec3d direction = ray.direction() * (1 / longest);

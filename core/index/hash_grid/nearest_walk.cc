@@ -23,9 +23,9 @@ GridNear near_of(const Brick& brick, const Vec3d& point, float above, float up_t
   return near;
 }
 
-// Returns the epsilon by which the region of a shell is widened, so that this region overlaps the bounds of every value
-// whose key lies in the shell. The returned epsilon is greater than the sum of twice the epsilon of near_of() and the
-// rounding error of the region's sides.
+// Returns the epsilon by which the sides of a shell's region are moved outwards, so that the region overlaps the bounds
+// of every value whose key lies in the shell. It covers the part of the rounding errors of keys and sides that does not
+// grow with the distance from the point; region_within() also scales the region, which covers the rest.
 double epsilon_of(const Vec3d& point, const LevelGeometry& level) {
   const double edge = (1 << kBrickBits) / level.cells_per_unit;
   const double size = max_component(abs(point)) + magnitude(level.bounds);

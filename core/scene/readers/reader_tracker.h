@@ -46,7 +46,7 @@ class SnapshotPin {
   absl::Status status() const;
 
   // Registers a callback for readers that may block, for example on a slow client. revoke_overdue() calls the callback
-  // under the tracker's lock, at most once, if the pin is revoked but not released. Call at most once for each pin.
+  // under the tracker's lock, at most once, if the pin is revoked but not released. A pin has at most one callback.
   void on_revoke(std::function<void()> revocation);
 
  private:
