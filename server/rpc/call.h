@@ -68,7 +68,8 @@ class Caller {
   absl::Status lacks_right(Right right, absl::string_view scene) const;
   // Returns OK while the caller may continue the call. `scene` is the scene that the call serves; empty if it serves
   // none. Returns UNAUTHENTICATED if the credentials were revoked or have expired since the call began; otherwise the
-  // errors of authorize() and check_right() for the rights that the caller has now.
+  // errors of authorize() for the rights that the caller has now, and those of check_right() once it has returned OK. A
+  // call whose right to the scene was not checked yet will be refused by that check, with the proper error.
   absl::Status recheck(const std::string& scene) const;
   // Returns the caller's identity. Before authorize(), and in servers without access control, this is the identity of
   // callers without credentials.
@@ -151,6 +152,7 @@ class Caller {
   std::shared_ptr<ClientShares::Counter> identity_share_;  // claims of the identity; null without an identity
   std::array<std::string, 2> quota_subjects_;  // result of quota_subjects(); set by authorize() with access control
   mutable std::string subject_;
+  mutable std::atomic<bool> had_right_{false};  // check_right() has returned OK
   bool is_answer_audited_ = false;
   const uint64_t number_ = next_request_number();
 };

@@ -151,8 +151,10 @@ bool Caller::administers_all() const {
 }
 
 absl::Status Caller::check_right(const std::string& scene) const {
-  if (rpc_right_ == nullptr || rpc_right_->need != Need::kSceneRight || may(rpc_right_->right, scene))
+  if (rpc_right_ == nullptr || rpc_right_->need != Need::kSceneRight || may(rpc_right_->right, scene)) {
+    had_right_.store(true);
     return absl::OkStatus();
+  }
   if (!may(Right::kRead, scene)) return no_scene(scene);
   return lacks_right(rpc_right_->right, scene);
 }
@@ -166,7 +168,7 @@ absl::Status Caller::recheck(const std::string& scene) const {
   if (!state_.access->still_valid(*identity_))
     return absl::UnauthenticatedError("the credentials were revoked or have expired; get new ones and call again");
   RETURN_IF_ERROR(check_grants());
-  return scene.empty() ? absl::OkStatus() : check_right(scene);
+  return scene.empty() || !had_right_.load() ? absl::OkStatus() : check_right(scene);
 }
 
 bool Caller::has_quotas() const {
