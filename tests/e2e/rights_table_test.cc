@@ -5,9 +5,11 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <thread>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_replace.h"
@@ -206,6 +208,22 @@ class RightsTableTest : public ::testing::Test {
   std::optional<RunningServer> running_;
   std::shared_ptr<grpc::Channel> unix_channel_;
 };
+
+TEST_F(RightsTableTest, RefusalsDuringReloadsHaveTheirProperError) {
+  std::atomic<bool> over{false};
+  std::thread reloading([&] {
+    for (int i = 0; !over.load(); ++i) {
+      write("access", absl::StrCat("grant token:root admin *\ngrant token:ann read arena-", i % 10, "\n"));
+      running_->server().reload();
+    }
+  });
+  for (int i = 0; i < 5000; ++i) {
+    const grpc::Status status = call(by_token(), "/locus.v1.SceneService/CreateScene");
+    EXPECT_EQ(status.error_code(), grpc::StatusCode::PERMISSION_DENIED) << status.error_message();
+  }
+  over.store(true);
+  reloading.join();
+}
 
 TEST_F(RightsTableTest, EveryRpcIsServedOrRefusedByTheRightsOfATokenAsItsRowSays) { expect_columns(by_token()); }
 TEST_F(RightsTableTest, EveryRpcIsServedOrRefusedByTheRightsOfAJwtAsItsRowSays) { expect_columns(by_jwt()); }
