@@ -32,6 +32,18 @@ bool read_list(std::istream& in, std::array<double, N>& values) {
   return good;
 }
 
+// Returns a validator that refuses values that are not N numbers. `form` and `example` are for its message.
+template <size_t N>
+CLI::Validator list_validator(const std::string& form, const std::string& example) {
+  return CLI::Validator(
+      [form, example](const std::string& text) -> std::string {
+        std::array<double, N> values{};
+        if (parse_list(text, values)) return "";
+        return absl::StrCat("'", text, "' is not ", form, " numbers with commas and without blanks, such as ", example);
+      },
+      "");
+}
+
 bool parse_number(absl::string_view text, uint64_t& value) {
   if (absl::ConsumePrefix(&text, "0x")) return absl::SimpleHexAtoi(text, &value);
   return absl::SimpleAtoi(text, &value);
@@ -119,26 +131,9 @@ CLI::Validator positive_number() {
       "");
 }
 
-CLI::Validator three_numbers() {
-  return CLI::Validator(
-      [](const std::string& text) -> std::string {
-        std::array<double, 3> values{};
-        if (parse_list(text, values)) return "";
-        return absl::StrCat("'", text, "' is not X,Y,Z: three numbers with commas and without blanks, such as 0,0,100");
-      },
-      "");
-}
+CLI::Validator three_numbers() { return list_validator<3>("X,Y,Z: three", "0,0,100"); }
 
-CLI::Validator four_numbers() {
-  return CLI::Validator(
-      [](const std::string& text) -> std::string {
-        std::array<double, 4> values{};
-        if (parse_list(text, values)) return "";
-        return absl::StrCat("'", text,
-                            "' is not X,Y,Z,W: four numbers with commas and without blanks, such as 0,0,0,1");
-      },
-      "");
-}
+CLI::Validator four_numbers() { return list_validator<4>("X,Y,Z,W: four", "0,0,0,1"); }
 
 CLI::Validator fits_32_bits() {
   return CLI::Validator(

@@ -1,7 +1,7 @@
 // Types for option values in the form in which users type them: triples, quaternions, ids. The option parser (CLI11)
-// reads a value with operator>>, which sets failbit unless the whole text has the expected form. None of the types may
-// be constructible from one number, because CLI11 would then read one number and construct the value from it. Plain
-// data.
+// reads a value with operator>>, which sets failbit unless the whole text has the expected form. A type of
+// several numbers must not be constructible from one number, because CLI11 would then read one number and construct the
+// value from it. Plain data.
 #ifndef LOCUS_CLIENT_CLI_ARGUMENTS_H_
 #define LOCUS_CLIENT_CLI_ARGUMENTS_H_
 
