@@ -271,7 +271,8 @@ absl::Status RocksdbLog::back_up(const std::string& path) {
 
 absl::Status RocksdbLog::check_free_space(absl::string_view what, uint64_t bytes) {
   if (written_bytes_ + bytes > kBytesBetweenPolls) poll_free_space();
-  const uint64_t free = free_bytes_;
+  const uint64_t polled = free_bytes_;
+  const uint64_t free = polled - std::min<uint64_t>(polled, written_bytes_);
   if (free < *options_.reserve_bytes || free - *options_.reserve_bytes < bytes)
     return refuse_full_disk(what, bytes, *options_.reserve_bytes, free);
   if (marker_failed_)

@@ -93,8 +93,18 @@ TEST_F(FullDiskTest, OnAFullDiskQueriesAreAnsweredNoUpdateIsAckedAndWritesResume
   EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED) << status.error_message();
   EXPECT_EQ(error_of(status).limit(), "disk_bytes");
   EXPECT_GT(error_of(status).retry_after_ms(), 0u);
+  // RocksDB may still delete old log files, so the ballast takes the space that becomes free, until three batches in a
+  // row are refused.
+  for (int refused = 0; refused < 3; ++refused) {
+    std::ofstream(ballast, std::ios::binary | std::ios::app) << std::string(size_t{48} << 20, 'x');
+    while ((status = apply(acked + 1)).ok()) {
+      ++acked;
+      refused = 0;
+    }
+    EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED) << status.error_message();
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  }
   expect_points_at(acked);
-  EXPECT_EQ(apply(acked + 1).error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
   EXPECT_EQ(get_scene(daemon_.stubs(), "arena").revision(), acked);
 
   std::filesystem::remove(ballast);

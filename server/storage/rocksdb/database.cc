@@ -33,6 +33,8 @@ constexpr uint64_t kLogBuffersOnDisk = 4;
 // Disk space in bytes that recover() needs in addition to the size of the memory tables.
 constexpr uint64_t kRecoveryBytes = uint64_t{1} << 20;
 constexpr auto kBufferPoll = std::chrono::milliseconds(1);
+constexpr int kFlushStartPolls =
+    10'000;  // maximum number of polls, at intervals of kBufferPoll, for the start of a flush
 
 // Passes RocksDB's warnings and errors to a function. Without this logger RocksDB would write them to a text file in
 // the database's folder. The read-only modes must not write a file. And if the disk is full and RocksDB 7.8 could not
@@ -83,9 +85,12 @@ rocksdb::ColumnFamilyOptions family_options(uint64_t buffer_bytes, OpenMode mode
 class Database::ErrorWatch final : public rocksdb::EventListener {
  public:
   std::atomic<bool> seen = false;
+  std::atomic<const Database*> database = nullptr;  // null until the database is open and during recover()
 
+  // RocksDB calls this function before it stops background work because of the error, without holding its mutex.
   void OnBackgroundError(rocksdb::BackgroundErrorReason, rocksdb::Status* error) override {
-    seen = true;
+    const Database* const opened = database;
+    if (!seen.exchange(true) && opened != nullptr) opened->wait_for_flush_start();
     if (error->IsIOError() && !error->IsIOFenced() && error->severity() > rocksdb::Status::Severity::kHardError)
       *error = rocksdb::Status(*error, rocksdb::Status::Severity::kHardError);
   }
@@ -150,6 +155,7 @@ rocksdb::Status Database::open(const DatabaseOptions& options, OpenMode mode, st
           : rocksdb::DB::Open(wanted, options.folder, families(options, mode), &database->families_, &db);
   if (!status.ok()) return status;
   database->db_.reset(db);
+  database->errors_->database = database.get();
   result = std::move(database);
   if (mode == OpenMode::kCreate) status = result->flush_to_new_log();
   return status;
@@ -157,6 +163,7 @@ rocksdb::Status Database::open(const DatabaseOptions& options, OpenMode mode, st
 
 Database::~Database() {
   LOCUS_DCHECK_EQ(writers_.load(), 0);
+  errors_->database = nullptr;
   if (db_ == nullptr) return;
   for (rocksdb::ColumnFamilyHandle* family : families_) db_->DestroyColumnFamilyHandle(family).PermitUncheckedError();
   db_->Close().PermitUncheckedError();
@@ -212,11 +219,13 @@ absl::Status Database::recover(uint64_t free_bytes) {
   // again before flush_to_new_log() has replaced this log file. Therefore wait until no call of write_now() is in
   // progress.
   while (writers_ > 0) std::this_thread::sleep_for(kBufferPoll);
+  errors_->database = nullptr;
   errors_->seen = false;
   rocksdb::Status status = db_->Resume();
   // If the memory tables are empty, Resume() flushes nothing and keeps the log file in which a write failed. Then
   // flush_to_new_log() fails too, but leaves a row in the memory tables, so that the next call of recover() succeeds.
   if (status.ok()) status = flush_to_new_log();
+  errors_->database = this;
   if (!status.ok()) {
     errors_->seen = true;
     MutexLock lock(mutex_);
@@ -256,6 +265,18 @@ void Database::wait_for_buffers(rocksdb::ColumnFamilyHandle* family) const {
   while (!needs_recovery() && db_->GetIntProperty(family, rocksdb::DB::Properties::kNumImmutableMemTable, &waiting) &&
          waiting >= 2)
     std::this_thread::sleep_for(kBufferPoll);
+}
+
+void Database::wait_for_flush_start() const {
+  const auto waits_for_start = [&] {
+    uint64_t running = 0;
+    uint64_t pending = 0;
+    if (!db_->GetIntProperty(rocksdb::DB::Properties::kNumRunningFlushes, &running) || running > 0) return false;
+    return std::any_of(families_.begin(), families_.end(), [&](rocksdb::ColumnFamilyHandle* family) {
+      return db_->GetIntProperty(family, rocksdb::DB::Properties::kMemTableFlushPending, &pending) && pending > 0;
+    });
+  };
+  for (int polls = 0; polls < kFlushStartPolls && waits_for_start(); ++polls) std::this_thread::sleep_for(kBufferPoll);
 }
 
 uint64_t Database::block_cache_bytes() const {

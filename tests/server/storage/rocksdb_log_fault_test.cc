@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <semaphore>
 #include <string>
 #include <thread>
 
@@ -97,6 +98,40 @@ TEST_F(RocksdbLogFaultTest, WritingResumesAfterAWriteThatFailsRightAfterOpening)
     open();
   }
   expect_records(scene, 3);
+}
+
+// The write that fills a memory table schedules a flush. If this write fails before the thread of flushes has started
+// the flush, RocksDB's flush returns at once but stays queued, and Resume() waits for it for ever.
+TEST_F(RocksdbLogFaultTest, WritingResumesAfterAWriteThatFailsBeforeItsFlushStarts) {
+  options_.path = folder_.file("disk/small");
+  options_.log_buffer_bytes = uint64_t{64} << 10;
+  open();
+  const SceneKey scene = create_scene(*log_, "a", 1).value();
+  const std::string bytes(size_t{1} << 10, 'x');
+  const auto append = [&](uint64_t sequence) {
+    const LogEntry entry = test::entry_of(7, sequence, bytes);
+    return log_->append(scene, {&entry, 1}, AckLevel::kMemory).status();
+  };
+  uint64_t kept = 0;
+  for (int until_failure = 30; until_failure < 70; ++until_failure) {
+    std::binary_semaphore flushes(0);  // RocksDB has one thread for flushes: this job keeps it busy
+    rocksdb::Env::Default()->Schedule([](void* held) { static_cast<std::binary_semaphore*>(held)->acquire(); },
+                                      &flushes, rocksdb::Env::Priority::HIGH);
+    for (int i = 0; i < until_failure; ++i) {
+      ASSERT_EQ(append(kept + 1), absl::OkStatus());
+      ++kept;
+    }
+    files_->fail_writes(1);
+    std::thread releases([&] {
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      flushes.release();
+    });
+    EXPECT_NE(append(kept + 1), absl::OkStatus());
+    releases.join();
+    ASSERT_EQ(succeeds_soon([&] { return append(kept + 1); }), absl::OkStatus());
+    ++kept;
+  }
+  EXPECT_EQ(log_->latest(scene).value(), kept);
 }
 
 // RocksDB aborts the process if its own text log is on a full disk, so RocksDB must not write a text log.
