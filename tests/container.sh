@@ -271,8 +271,8 @@ check_container() {
   check "its threads follow the processor time it is given" started_with threads=1
   check "its memory follows the limit it is given" started_with memory_bytes=201326592
   check "locus limits lists its memory" lists_its_memory
-  check "it answers the example script from inside" answers_inside client/cli/script/examples/first_steps.locus
-  check "it answers the example script through its port" answers_outside client/cli/script/examples/first_steps.locus
+  check "it answers the example script from inside" answers_inside client/cli/script/examples/first_steps.lua
+  check "it answers the example script through its port" answers_outside client/cli/script/examples/first_steps.lua
   check "it refuses a mesh that would not fit and lives on" refuses_what_does_not_fit
   check "it ends in order when it is stopped" ends_in_order
   if [ "$(nproc)" -gt 1 ]; then

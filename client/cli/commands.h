@@ -27,6 +27,7 @@ void add_backup_command(CLI::App& parent, Context& context);
 void add_restore_command(CLI::App& parent, Context& context);
 void add_demo_command(CLI::App& parent, Context& context);
 void add_run_command(CLI::App& parent, Context& context);
+void add_shell_command(CLI::App& parent, Context& context);
 void add_wait_command(CLI::App& parent, Context& context);
 void add_top_command(CLI::App& parent, Context& context);
 void add_limits_command(CLI::App& parent, Context& context);

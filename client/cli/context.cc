@@ -11,9 +11,6 @@ namespace locus::cli {
 
 absl::StatusOr<client::Client*> Context::connect() {
   if (lines_ == Lines::kScriptCheck) return absl::CancelledError("lines are only checked");
-  if (pending_batch_) {
-    return usage_error("only insert, move and remove are allowed between begin and commit");
-  }
   if (client_) return client_.get();
   RETURN_IF_ERROR(connection_mistake_);
   client::ClientOptions options;
@@ -32,13 +29,15 @@ absl::StatusOr<client::Client*> Context::connect() {
   }
   RETURN_IF_ERROR(client.status());
   client_ = *std::move(client);
+  connected_ = client_.get();
   return client_.get();
 }
 
-void Context::write(const Report& report) {
-  write_report(out_, options_.format, report);
-  if (keeps_reports_) kept_ = std::make_shared<const Report>(report);
+void Context::cancel_calls() {
+  if (client::Client* const client = connected_) client->cancel_calls();
 }
+
+void Context::write(const Report& report) { write_report(*out_, options_.format, report); }
 
 std::optional<client::Revision> Context::own(const std::string& scene) const {
   const auto found = own_.find(scene);

@@ -3,6 +3,7 @@
 #ifndef LOCUS_CLIENT_CLI_CONTEXT_H_
 #define LOCUS_CLIENT_CLI_CONTEXT_H_
 
+#include <atomic>
 #include <map>
 #include <memory>
 #include <optional>
@@ -14,7 +15,6 @@
 #include "absl/status/statusor.h"
 #include "client/cli/connection_options.h"
 #include "client/cli/output.h"
-#include "client/cli/pending_batch.h"
 #include "client/lib/client.h"
 
 namespace locus::cli {
@@ -38,10 +38,12 @@ enum class Lines { kProgram, kScript, kScriptCheck };
 class Context {
  public:
   // Borrows the streams.
-  Context(std::ostream& out, std::ostream& err, Progress progress) : out_(out), err_(err), progress_(progress) {}
+  Context(std::ostream& out, std::ostream& err, Progress progress) : out_(&out), err_(err), progress_(progress) {}
 
   GlobalOptions& options() { return options_; }
-  std::ostream& out() { return out_; }
+  std::ostream& out() { return *out_; }
+  // Makes out() return `out`, which is borrowed, and returns the previous stream. For scripts, which read answers.
+  std::ostream& redirect_out(std::ostream& out) { return *std::exchange(out_, &out); }
   std::ostream& err() { return err_; }
   Progress progress() const { return progress_; }
 
@@ -49,21 +51,15 @@ class Context {
   // named context can set the address.
   const std::string& address() const { return options_.connection.address; }
 
-  // Returns the connection to address(); the first call opens it. Errors: UNAVAILABLE, with advice, if no
-  // server answers; a usage error while a script's batch is open, since no other request may be sent before its
-  // `commit`; CANCELLED if lines are only checked.
+  // Returns the connection to address(); the first call opens it. Errors: UNAVAILABLE, with advice, if no server
+  // answers; CANCELLED if lines are only checked.
   absl::StatusOr<client::Client*> connect();
+
+  // Cancels the calls that the connection has in progress. Any thread may call this function.
+  void cancel_calls();
 
   // Writes `report` to out() in the format of options().
   void write(const Report& report);
-
-  // Makes write() also store each report, so that take_report() can return it. For scripts, which use the values of
-  // reports.
-  void keep_reports() { keeps_reports_ = true; }
-  bool keeps_reports() const { return keeps_reports_; }
-  // Returns the report that write() stored last, and removes it from the context. Returns null if write() was not
-  // called since the previous call of take_report().
-  std::shared_ptr<const Report> take_report() { return std::move(kept_); }
 
   // Returns the scene used by lines that name no scene. If the default scene is empty, every line must name its scene.
   const std::string& default_scene() const { return default_scene_; }
@@ -87,29 +83,23 @@ class Context {
   Lines lines() const { return lines_; }
   void set_lines(Lines lines) { lines_ = lines; }
 
-  // Returns the batch that a script's `begin` opened, or nullopt. While the batch is open, update commands add their
-  // changes to it instead of sending a batch of their own.
-  std::optional<PendingBatch>& pending_batch() { return pending_batch_; }
-
   // Stores the result of the command that ran, for outcome().
   void finish(absl::Status outcome) { outcome_ = std::move(outcome); }
   const absl::Status& outcome() const { return outcome_; }
 
  private:
-  std::ostream& out_;
+  std::ostream* out_;
   std::ostream& err_;
   const Progress progress_;
   GlobalOptions options_;
   std::string contexts_path_;
   absl::Status connection_mistake_;
   std::unique_ptr<client::Client> client_;
+  std::atomic<client::Client*> connected_ = nullptr;  // client_, for cancel_calls()
   absl::Status outcome_;
-  bool keeps_reports_ = false;
-  std::shared_ptr<const Report> kept_;
   std::string default_scene_;
   std::map<std::string, client::Revision> own_;
   Lines lines_ = Lines::kProgram;
-  std::optional<PendingBatch> pending_batch_;
 };
 
 }  // namespace locus::cli

@@ -13,7 +13,6 @@
 #include "client/cli/connection_options.h"
 #include "client/cli/default_scene.h"
 #include "client/cli/mistakes.h"
-#include "client/cli/unknown_values.h"
 
 namespace locus::cli {
 namespace {
@@ -44,7 +43,6 @@ struct Refusal {
   std::string err;
   std::string message;           // the message alone, without the advice that `err` also has
   bool lacks_something = false;  // a required option or argument is missing
-  bool wrong_value = false;
 };
 
 // Parses one line and runs its command. Returns nullopt if the command ran. CLI11 expects the arguments in reverse
@@ -63,9 +61,7 @@ std::optional<Refusal> parse_and_run(CLI::App& app, const std::vector<std::strin
                    .err = absl::StrCat("error: ", mistake.message, "\nhint: `", mistake.command,
                                        " --help` shows commands, options and examples\n"),
                    .message = mistake.message,
-                   .lacks_something = dynamic_cast<const CLI::RequiredError*>(&error) != nullptr,
-                   .wrong_value = dynamic_cast<const CLI::ValidationError*>(&error) != nullptr ||
-                                  dynamic_cast<const CLI::ConversionError*>(&error) != nullptr};
+                   .lacks_something = dynamic_cast<const CLI::RequiredError*>(&error) != nullptr};
   }
   return std::nullopt;
 }
@@ -92,7 +88,7 @@ void restrict_to_script(CLI::App& app) {
   names.push_back("--timeout");
   for (const char* name : names) {
     app.get_option(name)->envname("")->check([name](const std::string&) {
-      return absl::StrCat("a script has one connection: give ", name, " before `run`");
+      return absl::StrCat("a script has one connection: give ", name, " before `run` or `shell`");
     });
   }
 }
@@ -124,6 +120,7 @@ void build_cli(CLI::App& app, Context& context) {
       context.set_connection_mistake(complete_from_context(app, context.contexts_path(), context.options().connection));
     });
     add_run_command(app, context);
+    add_shell_command(app, context);
     add_context_command(app, context);
     add_token_command(app, context);
     add_cert_command(app, context);
@@ -151,7 +148,6 @@ void build_cli(CLI::App& app, Context& context) {
   add_version_command(app, context);
   add_completion_command(app, context);
   add_wait_command(app, context);
-  if (context.lines() == Lines::kScriptCheck) accept_unknown_values(app);
 }
 
 ExitCode run_line(const std::vector<std::string>& arguments, Context& context) {
@@ -171,15 +167,8 @@ absl::Status run_script_line(const std::vector<std::string>& arguments, Context&
   context.finish(absl::OkStatus());
   const std::optional<Refusal> refusal = run_with_default_scene(arguments, context);
   context.options() = before;
-  // While a script is only checked, placeholders stand for unknown values. A placeholder can be invalid, or conflict
-  // with other options, although the real value would not. Therefore, in lines with placeholders, ignore wrong values
-  // and the command's errors.
-  const bool guessed = context.lines() == Lines::kScriptCheck && has_unknown(arguments);
-  if (!refusal) return guessed ? absl::OkStatus() : context.outcome();
-  if (refusal->code != 0) {
-    if (refusal->wrong_value && guessed) return absl::OkStatus();
-    return usage_error(refusal->message);
-  }
+  if (!refusal) return context.outcome();
+  if (refusal->code != 0) return usage_error(refusal->message);
   if (context.lines() == Lines::kScript) context.out() << refusal->out;
   return absl::OkStatus();
 }

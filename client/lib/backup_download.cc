@@ -101,7 +101,7 @@ class BackupReceiver {
 
 absl::StatusOr<BackupSize> download_backup(v1::ServerService::StubInterface& stub, BackupSink& sink,
                                            const CallHeader& header) {
-  grpc::ClientContext context;
+  CancellableContext context(header.running);
   prepare(context, header);
   const auto reader = stub.Backup(&context, v1::BackupRequest());
   BackupReceiver receiver(sink);

@@ -30,6 +30,7 @@ enum class Repeat { kNever, kWhenUnavailable };
 struct CallPlan {
   grpc::ChannelInterface& channel;
   Authorization& authorization;
+  RunningCalls& running;
   absl::Duration deadline;
   RetryPolicy retry;
   Repeat repeat = Repeat::kNever;
@@ -44,7 +45,7 @@ absl::StatusOr<Response> call(Stub& stub, const CallPlan& plan, const Request& r
   uint64_t token = 0;
   const auto attempt = [&] {
     continue_connecting(plan.channel, deadline);
-    grpc::ClientContext context;
+    CancellableContext context(&plan.running);
     token = prepare(context, {plan.authorization, deadline, plan.scene});
     response.Clear();
     return to_absl_status((stub.*method)(&context, request, &response));
@@ -85,19 +86,20 @@ struct Client::Connection {
   std::unique_ptr<v1::UpdateService::StubInterface> updates;
   std::unique_ptr<v1::QueryService::StubInterface> queries;
   std::unique_ptr<v1::SceneService::StubInterface> transfers;  // stub on `bulk`, for uploads, downloads and dumps
+  std::unique_ptr<RunningCalls> running = std::make_unique<RunningCalls>();
 
   const std::shared_ptr<grpc::Channel>& channel_of(Lane lane) const { return lane == Lane::kBulk ? bulk : channel; }
   CallPlan once(absl::string_view scene = {}) const {
-    return {*channel, *authorization, options.deadline, options.retry, Repeat::kNever, scene};
+    return {*channel, *authorization, *running, options.deadline, options.retry, Repeat::kNever, scene};
   }
   CallPlan repeatable(absl::string_view scene = {}) const {
-    return {*channel, *authorization, options.deadline, options.retry, Repeat::kWhenUnavailable, scene};
+    return {*channel, *authorization, *running, options.deadline, options.retry, Repeat::kWhenUnavailable, scene};
   }
   // Prepares a call on `bulk`, whose deadline is `timeout` from now, and returns its header.
   CallHeader bulk_header(absl::Duration timeout, absl::string_view scene = {}) const {
     const absl::Time deadline = absl::Now() + timeout;
     continue_connecting(*bulk, deadline);
-    return {*authorization, deadline, scene};
+    return {*authorization, deadline, scene, running.get()};
   }
 };
 
@@ -224,6 +226,8 @@ absl::Status Client::delete_mesh(absl::string_view name) const {
       .status();
 }
 
+void Client::cancel_calls() const { connection_->running->cancel_all(); }
+
 absl::StatusOr<v1::ChangeInstancesResponse> Client::change_instances(const v1::ChangeInstancesRequest& request) const {
   CallPlan plan = connection_->once(request.scene());
   plan.deadline = connection_->options.long_deadline;
@@ -232,7 +236,7 @@ absl::StatusOr<v1::ChangeInstancesResponse> Client::change_instances(const v1::C
 
 absl::Status Client::dump(const v1::DumpSceneRequest& request,
                           const std::function<absl::Status(const v1::DumpSceneResponse&)>& on_message) const {
-  grpc::ClientContext context;
+  CancellableContext context(connection_->running.get());
   prepare(context, connection_->bulk_header(connection_->options.long_deadline, request.scene()));
   const auto reader = connection_->transfers->DumpScene(&context, request);
   v1::DumpSceneResponse response;

@@ -120,6 +120,10 @@ class Client {
   // query_stream().
   absl::StatusOr<v1::QueryResult> query(absl::string_view scene, v1::QueryBatch batch) const;
 
+  // Cancels the calls in progress, which then return CANCELLED; whether a change was made is unknown. Does not end
+  // streams.
+  void cancel_calls() const;
+
   // Open a stream for one scene. The stream starts its call to the server when the first batch is sent.
   std::unique_ptr<UpdateStream> update_stream(absl::string_view scene, const UpdateStreamOptions& options = {}) const;
   std::unique_ptr<QueryStream> query_stream(absl::string_view scene, const QueryStreamOptions& options = {}) const;

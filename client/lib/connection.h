@@ -13,6 +13,7 @@
 #include "absl/time/time.h"
 #include "client/lib/authorization.h"
 #include "client/lib/options.h"
+#include "client/lib/running_calls.h"
 
 namespace grpc {
 class Channel;
@@ -56,7 +57,8 @@ void wait_connecting(grpc::ChannelInterface& channel, absl::Duration duration);
 struct CallHeader {
   Authorization& authorization;
   absl::Time deadline = absl::InfiniteFuture();
-  absl::string_view scene = {};  // empty = the call concerns no scene
+  absl::string_view scene = {};     // empty = the call concerns no scene
+  RunningCalls* running = nullptr;  // set of calls to which the call's context is added; null = none
 };
 
 // Prepares the context of a call: sets its deadline, and adds the metadata entries `authorization` and `x-scene`.

@@ -89,7 +89,7 @@ class MeshReceiver {
 
 absl::StatusOr<DownloadedMesh> download_mesh(v1::SceneService::StubInterface& stub, absl::string_view name,
                                              const CallHeader& header, const DownloadProgress& progress) {
-  grpc::ClientContext context;
+  CancellableContext context(header.running);
   prepare(context, header);
   v1::DownloadMeshRequest request;
   request.set_mesh(std::string(name));

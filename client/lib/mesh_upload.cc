@@ -72,7 +72,7 @@ class Sender {
 absl::StatusOr<v1::UploadMeshResponse> upload_mesh(v1::SceneService::StubInterface& stub, const MeshColumns& mesh,
                                                    const CallHeader& header, const UploadProgress& progress) {
   RETURN_IF_ERROR(check(mesh));
-  grpc::ClientContext context;
+  CancellableContext context(header.running);
   prepare(context, header);
   v1::UploadMeshResponse response;
   const std::unique_ptr<Writer> writer = stub.UploadMesh(&context, &response);

@@ -31,10 +31,6 @@ absl::Status dump_things(const std::string& scene, const ViewOptions& view, cons
   RETURN_IF_ERROR(check(view));
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());
   const Things things = things_of(view);
-  Report kept;
-  kept.rows_name = texts.rows_name;
-  kept.no_rows = texts.no_rows;
-  kept.keys = thing_keys(things);
   ReportStream stream(context.out(), context.options().format,
                       {.rows_name = texts.rows_name,
                        .keys = thing_keys(things),
@@ -43,22 +39,15 @@ absl::Status dump_things(const std::string& scene, const ViewOptions& view, cons
   bool begun = false;
   const auto take = [&](const v1::DumpSceneResponse& message) {
     const Json head = {{"scene", scene}, {"epoch", id_json(message.epoch())}, {"revision", message.revision()}};
-    if (!begun && !context.keeps_reports()) stream.begin(head);
+    if (!begun) stream.begin(head);
     begun = true;
-    kept.head = head;
     return for_each_thing(message, [&](const SceneThing& thing) {
-      if (!is_among(things, thing.kind)) return absl::OkStatus();
-      if (context.keeps_reports()) {
-        kept.rows.push_back(thing_row(thing, things));
-      } else {
-        stream.add(thing_row(thing, things));
-      }
+      if (is_among(things, thing.kind)) stream.add(thing_row(thing, things));
       return absl::OkStatus();
     });
   };
   const absl::Status dumped = client->dump(dump_request(scene, view, context), take);
-  if (context.keeps_reports() && dumped.ok()) context.write(kept);
-  if (!context.keeps_reports() && begun) stream.end();
+  if (begun) stream.end();
   return dumped;
 }
 

@@ -16,9 +16,7 @@ struct DumpTexts {
   const char* no_rows;
 };
 
-// Writes the objects and instances of a scene that `view` selects, ascending by id, each row when it arrives. In a
-// script (Context::keeps_reports()), collects all rows in one report instead, so that later lines of the script can use
-// the rows.
+// Writes the objects and instances of a scene that `view` selects, ascending by id, each row when it arrives.
 absl::Status dump_things(const std::string& scene, const ViewOptions& view, const DumpTexts& texts, Context& context);
 
 }  // namespace locus::cli

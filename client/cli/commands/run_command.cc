@@ -1,141 +1,132 @@
-// `locus run`: a script of command lines, with variables, batches, loops and expectations.
-#include <fstream>
-#include <iostream>
-#include <iterator>
+// `locus run`: a script in Lua, or lines of `locus`.
 #include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "client/cli/arguments.h"
 #include "client/cli/commands.h"
 #include "client/cli/failure.h"
 #include "client/cli/script/runner.h"
-#include "client/cli/script/script.h"
-#include "client/cli/script/script_limits.h"
 #include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
 
-constexpr char kReference[] = R"(Lines of a script (one statement each, quotes as in a shell, # begins a comment):
-  query ray --from 0,0,9 --dir 0,0,-1 -> shot   any line of locus without the word; -> keeps its result
-  use arena                                     the scene of lines that name none
-  let aim = $shot.point + (0, 0, 1)             a number, a vector or a text
-  begin --tick 7 ... commit -> ack              insert, move, remove lines as one batch, one revision
-  repeat 10 as i ... end                        i counts from 0
-  expect $shot.t == 8.5 within 0.001            also != < <= > >= contains
-  expect-error UNKNOWN_ID move --id 9 --to 0,0,0
-  wait, echo TEXT, sleep SECONDS
-Values in lines:
-  $shot.revision, $shot.id[0]                   a fact of a result; a row of a column, one row needs no [0]
-  $near.count, ${name:-other}                   the number of rows; other where there is no value
-  {$i * 2 + 1}                                  + - * / % on numbers and vectors, and functions: abs cos cross
-                                                dot floor len length max min radians round sin sqrt unit
-Queries see the script's own last ack. Every line is checked before the first runs.
-Exit codes: 1 an expectation failed, 2 a mistake in the script, else that of the line that failed.
+constexpr char kReference[] =
+    R"(FILE is a script in Lua 5.4 with the module `locus` (FILE.lua), or has one command of `locus` without the word on
+each line (FILE.locus). Another file, and standard input, may have either.
+
+The module in short; client/cli/script/README.md has all of it:
+  local arena = locus.scene("arena")            a scene; arena:create(), arena:delete{if_present=true}
+  local updates = arena:updates()               a batch by row
+  updates:insert{id=7, at={0,0,30}, ball=0.5}:move{id=8, at={1,0,0}}:commit{tick=1}
+  local hits = arena:queries():ray{from={0,0,99}, dir={0,0,-1}}:run()
+  locus.expect_near(hits[1].t, 68.5, 1e-5)      also expect, expect_equal, expect_error
+  local near = locus.command("query ball arena --at 0,0,0 --radius 5")   any command; near.rows[1].id
+  locus.print(near)                             in the format of -o
+Queries see the changes that the script has made. --set NAME=VALUE sets args.NAME.
+Exit codes: 1 an expectation failed or the script raised an error, 2 it does not compile, else that of the command.
+
 Examples:
-  locus run first_steps.locus
-  locus -a 127.0.0.1:7575 -o ndjson run tick.locus --set players=64 --keep-going
+  locus run first_steps.lua
+  locus -a 127.0.0.1:7575 run game_tick.lua --set players=64 --keep-going
   echo 'scene list' | locus run -
-  locus run shots.locus --dry-run)";
+  locus run arena.locus --dry-run)";
 
 struct RunOptions {
   std::string file;
   std::vector<std::string> settings;
   bool keep_going = false;
   bool dry_run = false;
+  uint64_t max_memory_mib = ScriptLimits().memory_bytes >> 20;
+  double max_seconds = absl::ToDoubleSeconds(ScriptLimits().time);
+  ScriptLimits limits;
 };
 
-// Reads a whole script. Stops when more than kMaxScriptBytes are read, which is enough for the caller to detect and
-// refuse a script that is too long.
-absl::StatusOr<std::string> read_all(std::istream& in, const std::string& name) {
-  std::string text;
-  std::vector<char> part(size_t{1} << 16);
-  while (text.size() <= kMaxScriptBytes && in) {
-    in.read(part.data(), static_cast<std::streamsize>(part.size()));
-    text.append(part.data(), static_cast<size_t>(in.gcount()));
-  }
-  if (in.bad()) return absl::FailedPreconditionError(absl::StrCat("cannot read ", name));
-  return text;
-}
-
-absl::StatusOr<Script> read_script(const std::string& file) {
-  const bool from_pipe = file == "-";
-  std::ifstream opened;
-  if (!from_pipe) opened.open(file, std::ios::binary);
-  if (!from_pipe && !opened) return absl::NotFoundError(absl::StrCat("cannot open ", file, ": is there such a file?"));
-  const absl::StatusOr<std::string> text = read_all(from_pipe ? std::cin : opened, file);
-  return text.ok() ? parse_script(from_pipe ? "stdin" : file, *text) : text.status();
-}
-
-absl::StatusOr<Variables> variables_from(const std::vector<std::string>& settings) {
-  Variables variables;
+absl::StatusOr<std::vector<std::pair<std::string, std::string>>> read_settings(
+    const std::vector<std::string>& settings) {
+  std::vector<std::pair<std::string, std::string>> values;
   for (const std::string& setting : settings) {
     const size_t equals = setting.find('=');
-    if (equals == std::string::npos)
+    if (equals == std::string::npos || equals == 0)
       return usage_error(absl::StrCat("--set ", setting, " is not of the form NAME=VALUE"));
-    const absl::Status set = variables.set(setting.substr(0, equals), Value::of(Json(setting.substr(equals + 1))));
-    if (!set.ok()) return usage_error(absl::StrCat("--set ", setting, ": ", set.message()));
+    values.emplace_back(setting.substr(0, equals), setting.substr(equals + 1));
   }
-  return variables;
+  return values;
 }
 
-void write_checked(const Script& script, const ScriptCounts& counts, Context& context) {
-  if (context.options().format == Format::kTable) {
-    context.err() << script.name << ": " << counts.lines << " lines checked, no mistake found\n";
-    return;
-  }
-  Report report;
-  report.head = {{"script", script.name}, {"checked", counts.lines}};
-  write_report(context.err(), Format::kNdjson, report);
+// Writes the end of a script on one line of the error stream: a text, or JSON if the output is not a table.
+void write_end(const Json& facts, const std::string& text, Context& context) {
+  context.err() << (context.options().format == Format::kTable ? text : json_line(facts)) << '\n';
 }
 
-void write_end(const Script& script, const ScriptCounts& counts, Context& context) {
-  if (context.options().format != Format::kTable) {
-    Report report;
-    report.head = {{"script", script.name},
-                   {"lines", counts.lines},
-                   {"passed", counts.passed},
-                   {"failed", counts.failed},
-                   {"broken", counts.broken}};
-    write_report(context.err(), Format::kNdjson, report);
-    return;
+absl::Status run_as_lines(const Script& script, const RunOptions& options, AfterFailure after, Context& context) {
+  if (!options.settings.empty()) return usage_error("--set is for scripts in Lua");
+  LineCounts counts;
+  const absl::Status outcome = run_lines(script, after, options.dry_run, context, counts);
+  Json facts = {{"script", script.name}, {options.dry_run ? "checked" : "lines", counts.run}};
+  if (!options.dry_run) facts["failed"] = counts.failed;
+  const std::string end =
+      options.dry_run ? " lines checked, no mistake found" : absl::StrCat(" lines run, ", counts.failed, " failed");
+  if (outcome.ok() || is_reported(outcome)) write_end(facts, absl::StrCat(script.name, ": ", counts.run, end), context);
+  return outcome;
+}
+
+absl::Status run_as_lua(const Script& script, const RunOptions& options, AfterFailure after, Context& context) {
+  ASSIGN_OR_RETURN(const auto settings, read_settings(options.settings));
+  ScriptLimits limits = options.limits;
+  limits.memory_bytes = options.max_memory_mib << 20;
+  limits.time = absl::Seconds(options.max_seconds);
+  ScriptCounts counts;
+  const absl::Status outcome = run_lua(script, settings, limits, after, options.dry_run, context, counts);
+  if (options.dry_run) {
+    RETURN_IF_ERROR(outcome);
+    write_end({{"script", script.name}, {"checked", true}}, absl::StrCat(script.name, ": compiled, no mistake found"),
+              context);
+    return outcome;
   }
-  context.err() << script.name << ": " << counts.lines << " lines run, " << counts.passed << " expectations passed, "
-                << counts.failed << " failed";
-  if (counts.broken > 0) context.err() << ", " << counts.broken << " other lines failed";
-  context.err() << '\n';
+  if (!outcome.ok() && !is_reported(outcome)) write_failure(context.err(), context.options().format, outcome);
+  if (counts.passed + counts.failed > 0)
+    write_end({{"script", script.name}, {"passed", counts.passed}, {"failed", counts.failed}},
+              absl::StrCat(script.name, ": ", counts.passed, " expectations passed, ", counts.failed, " failed"),
+              context);
+  return outcome.ok() ? outcome : reported(outcome);
 }
 
 absl::Status run(const RunOptions& options, Context& context) {
-  ASSIGN_OR_RETURN(const Variables variables, variables_from(options.settings));
-  ASSIGN_OR_RETURN(const Script script, read_script(options.file));
-  ScriptCounts checked;
-  RETURN_IF_ERROR(check_script(script, variables, context, checked));
-  if (options.dry_run) {
-    write_checked(script, checked, context);
-    return absl::OkStatus();
-  }
-  ScriptCounts counts;
+  ASSIGN_OR_RETURN(const Script script, read_script(options.file, context));
   const AfterFailure after = options.keep_going ? AfterFailure::kGoOn : AfterFailure::kStop;
-  const absl::Status outcome = run_script(script, variables, after, context, counts);
-  write_end(script, counts, context);
-  return outcome;
+  return script.language == ScriptLanguage::kLua ? run_as_lua(script, options, after, context)
+                                                 : run_as_lines(script, options, after, context);
 }
 
 }  // namespace
 
 void add_run_command(CLI::App& parent, Context& context) {
   const auto options = std::make_shared<RunOptions>();
-  CLI::App& command = *parent.add_subcommand("run", "Run a script of command lines with expectations");
+  CLI::App& command = *parent.add_subcommand("run", "Run a script in Lua, or lines of locus");
   command.footer(kReference);
   command.add_option("FILE", options->file, "The script; - reads it from standard input")->required();
-  command.add_option("--set", options->settings, "A variable for the script; repeat for more")
+  command.add_option("--set", options->settings, "A field of the script's table args; repeat for more")
       ->type_name("NAME=VALUE")
       ->allow_extra_args(false);
-  command.add_flag("--keep-going", options->keep_going, "Continue after lines that fail; print and count their errors");
-  command.add_flag("--dry-run", options->dry_run, "Only check every line; needs no server");
+  command.add_flag("--keep-going", options->keep_going,
+                   "Continue after expectations and lines that fail; print and count their errors");
+  command.add_flag("--dry-run", options->dry_run, "Only compile the script or check the lines; needs no server");
+  command
+      .add_option("--max-instructions", options->limits.instructions,
+                  "Instructions of Lua after which the script ends; 0 = no limit [2000000000]")
+      ->type_name("N");
+  command.add_option("--max-memory", options->max_memory_mib, "Memory of Lua in MiB; 0 = no limit [256]")
+      ->type_name("MIB")
+      ->check(CLI::Range(uint64_t{0}, uint64_t{1} << 20));
+  command.add_option("--max-seconds", options->max_seconds, "Seconds after which the script ends; 0 = no limit [3600]")
+      ->type_name("SECONDS")
+      ->check(CLI::NonNegativeNumber);
+  command.add_flag("--unsafe", options->limits.unsafe,
+                   "Also offer os.execute, os.exit, io.popen, debug, finalizers and modules in C");
   run_when_chosen(command, options, context, run);
 }
 

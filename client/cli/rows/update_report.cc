@@ -9,7 +9,6 @@
 namespace locus::cli {
 
 absl::Status apply_and_report(const std::string& scene, v1::UpdateBatch batch, Context& context) {
-  if (context.pending_batch()) return context.pending_batch()->add(scene, batch);
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());
   ASSIGN_OR_RETURN(const v1::UpdateAck ack, client->apply(scene, std::move(batch)));
   context.remember_own(scene, {ack.epoch(), ack.revision()});

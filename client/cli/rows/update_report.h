@@ -11,8 +11,7 @@
 namespace locus::cli {
 
 // Sends the batch and writes its ack: applied, refused, revision, tick, epoch, and a row for each refused item that the
-// ack lists. Then returns the result of refused_items(), which is an error if items were refused. While a script's
-// batch is open (Context::pending_batch()), adds the changes to that batch instead, and writes nothing.
+// ack lists. Then returns the result of refused_items(), which is an error if items were refused.
 absl::Status apply_and_report(const std::string& scene, v1::UpdateBatch batch, Context& context);
 
 }  // namespace locus::cli

@@ -1,140 +1,140 @@
 #include "client/cli/script/runner.h"
 
-#include <string>
+#include <algorithm>
+#include <fstream>
+#include <iostream>
 #include <utility>
-#include <vector>
 
+#include "CLI/CLI.hpp"
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
 #include "client/cli/failure.h"
-#include "client/cli/script/interpreter.h"
-#include "client/cli/script/script_limits.h"
+#include "client/cli/run.h"
+#include "client/cli/script/words.h"
 #include "core/base/status_macros.h"
 
 namespace locus::cli {
 namespace {
 
-bool is_expectation(const Statement& statement) { return statement.verb == Verb::kExpect || !statement.reason.empty(); }
-
-// Runner of all statements of a script, with loops.
-class Runner {
- public:
-  Runner(const Script& script, const Variables& variables, AfterFailure after, Context& context, ScriptCounts& counts)
-      : script_(script), after_(after), context_(context), interpreter_(context, variables), counts_(counts) {}
-
-  absl::Status run() {
-    for (size_t next = 0; next < script_.statements.size();) {
-      const Statement& statement = script_.statements[next];
-      if (++counts_.lines > kMaxLinesRun) {
-        return with_place(absl::ResourceExhaustedError(absl::StrCat("more than ", kMaxLinesRun, " lines have run")),
-                          place_of(script_, statement));
-      }
-      const absl::StatusOr<size_t> following = step(next);
-      RETURN_IF_ERROR(count(statement, following.status()));
-      next = following.ok() ? *following : behind_failed(next);
-    }
-    return absl::OkStatus();
-  }
-
- private:
-  struct Loop {
-    size_t begin;  // index of the repeat statement
-    uint64_t done = 0;
-    uint64_t times = 0;
-    std::string counter;
-  };
-
-  // Runs the statement at index `place`. Returns the index of the next statement.
-  absl::StatusOr<size_t> step(size_t place) {
-    const Statement& statement = script_.statements[place];
-    if (statement.verb == Verb::kRepeat) return enter(place);
-    if (statement.verb == Verb::kEnd) return go_around(place);
-    const absl::Status status = interpreter_.execute(statement);
-    return status.ok() ? absl::StatusOr<size_t>(place + 1) : status;
-  }
-
-  // Returns the index of the statement with which the run continues after statement `place` failed. If the failed
-  // statement opens a block, the whole block is skipped.
-  size_t behind_failed(size_t place) const {
-    const Statement& statement = script_.statements[place];
-    const bool opens = statement.verb == Verb::kRepeat || statement.verb == Verb::kBegin;
-    return (opens ? statement.partner : place) + 1;
-  }
-
-  absl::StatusOr<size_t> enter(size_t place) {
-    const Statement& statement = script_.statements[place];
-    ASSIGN_OR_RETURN(Repetition repetition, interpreter_.read_repetition(statement));
-    const bool checks_only = context_.lines() == Lines::kScriptCheck;
-    // A check runs every loop once.
-    Loop loop{.begin = place, .times = checks_only ? 1 : *repetition.times, .counter = repetition.counter};
-    if (loop.times == 0) return statement.partner + 1;
-    interpreter_.enter_loop();
-    const absl::Status set = count_up(loop);
-    if (!set.ok()) {
-      interpreter_.leave_loop();
-      return set;
-    }
-    loops_.push_back(std::move(loop));
-    return place + 1;
-  }
-
-  absl::StatusOr<size_t> go_around(size_t place) {
-    Loop& loop = loops_.back();
-    if (++loop.done < loop.times) {
-      const absl::Status set = count_up(loop);
-      return set.ok() ? absl::StatusOr<size_t>(loop.begin + 1) : set;
-    }
-    loops_.pop_back();
-    interpreter_.leave_loop();
-    return place + 1;
-  }
-
-  absl::Status count_up(const Loop& loop) {
-    if (loop.counter.empty()) return absl::OkStatus();
-    return interpreter_.set(loop.counter, Value::of(Json(loop.done)));
-  }
-
-  // Counts the result of a statement, and prints its error if there is one. Returns the error if the run must end.
-  absl::Status count(const Statement& statement, const absl::Status& status) {
-    if (is_expectation(statement)) ++(status.ok() ? counts_.passed : counts_.failed);
-    if (status.ok()) return status;
-    const absl::Status placed = with_place(status, place_of(script_, statement));
-    if (context_.lines() == Lines::kScriptCheck) return placed;
-    if (!is_expectation(statement)) ++counts_.broken;
-    write_failure(context_.err(), context_.options().format, placed);
-    const bool ends = after_ == AfterFailure::kStop || exit_code_of(status) == ExitCode::kUnreachable;
-    return ends ? reported(placed) : absl::OkStatus();
-  }
-
-  const Script& script_;
-  const AfterFailure after_;
-  Context& context_;
-  Interpreter interpreter_;
-  ScriptCounts& counts_;
-  std::vector<Loop> loops_;
+struct Line {
+  size_t number;
+  std::vector<std::string> words;
 };
+
+// Reads a whole script. Stops when more than kMaxScriptBytes are read, which is enough to refuse it.
+absl::StatusOr<std::string> read_all(std::istream& in, const std::string& name) {
+  std::string text;
+  std::vector<char> part(size_t{1} << 16);
+  while (text.size() <= kMaxScriptBytes && in) {
+    in.read(part.data(), static_cast<std::streamsize>(part.size()));
+    text.append(part.data(), static_cast<size_t>(in.gcount()));
+  }
+  if (in.bad()) return absl::FailedPreconditionError(absl::StrCat("cannot read ", name));
+  if (text.size() > kMaxScriptBytes)
+    return usage_error(absl::StrCat(name, " is larger than the limit of scripts, ", kMaxScriptBytes, " bytes"));
+  return text;
+}
+
+absl::StatusOr<std::vector<Line>> lines_of(const Script& script) {
+  std::vector<Line> lines;
+  size_t number = 0;
+  for (const absl::string_view text : absl::StrSplit(script.text, '\n')) {
+    absl::StatusOr<std::vector<std::string>> words = split_words(text);
+    ++number;
+    if (!words.ok()) return with_place(words.status(), absl::StrCat(script.name, ":", number));
+    if (!words->empty()) lines.push_back({number, *std::move(words)});
+  }
+  return lines;
+}
+
+absl::StatusOr<ScriptLanguage> language_of(const Script& script, Context& context) {
+  if (absl::EndsWith(script.name, ".lua")) return ScriptLanguage::kLua;
+  if (absl::EndsWith(script.name, ".locus")) return ScriptLanguage::kLines;
+  Sandbox sandbox({});
+  if (sandbox.load(script.name, script.text).ok()) return ScriptLanguage::kLua;
+  const absl::StatusOr<std::vector<Line>> lines = lines_of(script);
+  const bool is_plain = lines.ok() && !lines->empty() && is_command(lines->front().words.front(), context);
+  return is_plain ? ScriptLanguage::kLines : ScriptLanguage::kLua;
+}
+
+// Runs `lines` in the mode `mode` of the context.
+absl::Status run_in_mode(const std::vector<Line>& lines, const Script& script, AfterFailure after, Lines mode,
+                         Context& context, LineCounts& counts) {
+  const Lines before = context.lines();
+  context.set_lines(mode);
+  absl::Status ended;
+  for (const Line& line : lines) {
+    ++counts.run;
+    const absl::Status status = run_script_line(line.words, context);
+    if (status.ok()) continue;
+    const absl::Status placed = with_place(status, absl::StrCat(script.name, ":", line.number));
+    ended = placed;
+    if (mode == Lines::kScriptCheck) break;
+    ++counts.failed;
+    write_failure(context.err(), context.options().format, placed);
+    ended = reported(placed);
+    if (after == AfterFailure::kStop || exit_code_of(status) == ExitCode::kUnreachable) break;
+    ended = reported(absl::FailedPreconditionError(absl::StrCat(counts.failed, " lines failed")));
+  }
+  context.set_lines(before);
+  return ended;
+}
 
 }  // namespace
 
-absl::Status check_script(const Script& script, const Variables& variables, Context& context, ScriptCounts& counts) {
-  const std::string scene = context.default_scene();
-  const Lines lines = context.lines();
-  context.set_lines(Lines::kScriptCheck);
-  const absl::Status status = Runner(script, variables, AfterFailure::kStop, context, counts).run();
-  context.set_lines(lines);
-  context.use_scene(scene);
-  return status;
+bool is_command(const std::string& word, Context& context) {
+  CLI::App app;
+  build_cli(app, context);
+  if (absl::StartsWith(word, "-")) return app.get_option_no_throw(word) != nullptr;
+  const std::vector<CLI::App*> commands = app.get_subcommands({});
+  return std::any_of(commands.begin(), commands.end(),
+                     [&](const CLI::App* command) { return command->check_name(word); });
 }
 
-absl::Status run_script(const Script& script, const Variables& variables, AfterFailure after, Context& context,
-                        ScriptCounts& counts) {
-  const Lines lines = context.lines();
+absl::StatusOr<Script> read_script(const std::string& file, Context& context) {
+  const bool from_pipe = file == "-";
+  std::ifstream opened;
+  if (!from_pipe) opened.open(file, std::ios::binary);
+  if (!from_pipe && !opened) return absl::NotFoundError(absl::StrCat("cannot open ", file, ": is there such a file?"));
+  Script script;
+  script.name = from_pipe ? "stdin" : file;
+  ASSIGN_OR_RETURN(script.text, read_all(from_pipe ? std::cin : opened, script.name));
+  ASSIGN_OR_RETURN(script.language, language_of(script, context));
+  return script;
+}
+
+absl::Status run_lines(const Script& script, AfterFailure after, bool check_only, Context& context,
+                       LineCounts& counts) {
+  ASSIGN_OR_RETURN(const std::vector<Line> lines, lines_of(script));
+  RETURN_IF_ERROR(run_in_mode(lines, script, after, Lines::kScriptCheck, context, counts));
+  if (check_only) return absl::OkStatus();
+  counts = {};
+  return run_in_mode(lines, script, after, Lines::kScript, context, counts);
+}
+
+absl::Status run_lua(const Script& script, const std::vector<std::pair<std::string, std::string>>& settings,
+                     const ScriptLimits& limits, AfterFailure after, bool check_only, Context& context,
+                     ScriptCounts& counts) {
+  Sandbox sandbox(limits);
+  ScriptModule module(sandbox, context, after);
+  lua_State* const state = sandbox.state();
+  lua_newtable(state);
+  for (const auto& [name, value] : settings) {
+    lua_pushlstring(state, value.data(), value.size());
+    lua_setfield(state, -2, name.c_str());
+  }
+  lua_setglobal(state, "args");
+  RETURN_IF_ERROR(sandbox.load(absl::StrCat("@", script.name), script.text));
+  if (check_only) return absl::OkStatus();
+  const Lines before = context.lines();
   context.set_lines(Lines::kScript);
-  const absl::Status status = Runner(script, variables, after, context, counts).run();
-  context.set_lines(lines);
-  context.pending_batch().reset();
+  const absl::Status status = sandbox.call(0, 0);
+  context.set_lines(before);
+  counts = module.counts();
   RETURN_IF_ERROR(status);
-  const uint64_t bad = counts.failed + counts.broken;
-  return bad == 0 ? absl::OkStatus() : reported(absl::FailedPreconditionError(absl::StrCat(bad, " lines failed")));
+  if (counts.failed == 0) return absl::OkStatus();
+  return reported(absl::FailedPreconditionError(absl::StrCat(counts.failed, " expectations failed")));
 }
 
 }  // namespace locus::cli

@@ -1,30 +1,22 @@
-// Limits of the size of a script and of the work it causes. For the parser and the runner of scripts. The error for an
-// exceeded limit contains the limit's value.
+// Limits of a script. Plain data. The error for an exceeded limit contains the limit's value.
 #ifndef LOCUS_CLIENT_CLI_SCRIPT_SCRIPT_LIMITS_H_
 #define LOCUS_CLIENT_CLI_SCRIPT_SCRIPT_LIMITS_H_
 
 #include <cstddef>
 #include <cstdint>
 
+#include "absl/time/time.h"
+
 namespace locus::cli {
 
 inline constexpr size_t kMaxScriptBytes = size_t{16} << 20;
-inline constexpr size_t kMaxScriptLines = 100'000;
-inline constexpr size_t kMaxLineBytes = 65'536;
-inline constexpr size_t kMaxBlockNesting = 16;
-inline constexpr uint64_t kMaxRepeats = 100'000;
-// Maximum number of lines that run; a line in a loop counts each time.
-inline constexpr uint64_t kMaxLinesRun = 1'000'000;
-inline constexpr size_t kMaxVariables = 1'000;
-// Maximum size of a word or text after substitution.
-inline constexpr size_t kMaxTextBytes = size_t{1} << 20;
-// Maximum nesting of parentheses, indexes, calls and quoted texts; the parser of expressions recurses at most this
-// deep.
-inline constexpr int kMaxExpressionDepth = 64;
-inline constexpr double kMaxSleepSeconds = 3600;
 
-static_assert(kMaxLineBytes <= kMaxTextBytes, "a line without variables fits a text");
-static_assert(kMaxRepeats <= kMaxLinesRun);
+struct ScriptLimits {
+  uint64_t instructions = 2'000'000'000;  // of Lua's virtual machine; 0 = no limit
+  uint64_t memory_bytes = 256u << 20;     // allocated by Lua; 0 = no limit
+  absl::Duration time = absl::Hours(1);   // since the script began; zero = no limit
+  bool unsafe = false;                    // also offers the functions of Lua that reach beyond the script
+};
 
 }  // namespace locus::cli
 

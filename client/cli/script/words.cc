@@ -1,51 +1,36 @@
 #include "client/cli/script/words.h"
 
-#include <utility>
-
-#include "client/cli/script/expression.h"
-#include "client/cli/script/quoted_text.h"
-#include "core/base/status_macros.h"
+#include "absl/strings/ascii.h"
+#include "client/cli/failure.h"
 
 namespace locus::cli {
-namespace {
 
-bool ends_word(const Cursor& cursor) { return cursor.ended() || cursor.peek() == ' ' || cursor.peek() == '\t'; }
-
-// Reads the variable, the expression in braces or the quoted text at the cursor.
-absl::StatusOr<Value> read_part(Cursor& cursor, const Variables& variables) {
-  if (cursor.accept("$")) return read_variable(cursor, variables);
-  if (cursor.peek() == '{') return read_braces(cursor, variables);
-  return read_quoted_text(cursor, variables);
-}
-
-absl::StatusOr<Word> read_word(Cursor& cursor, const Variables& variables) {
-  Word word;
-  while (!ends_word(cursor)) {
-    if (absl::StrContains("$'\"{", cursor.peek())) {
-      ASSIGN_OR_RETURN(const Value value, read_part(cursor, variables));
-      RETURN_IF_ERROR(append_value(word.text, value));
-      word.bare = false;
+absl::StatusOr<std::vector<std::string>> split_words(absl::string_view line) {
+  std::vector<std::string> words;
+  bool in_word = false;
+  char quote = 0;
+  for (size_t i = 0; i < line.size(); ++i) {
+    char c = line[i];
+    if (quote == 0 && absl::ascii_isspace(static_cast<unsigned char>(c))) {
+      in_word = false;
       continue;
     }
-    if (cursor.accept("\\")) {
-      if (cursor.ended())
-        return absl::InvalidArgumentError("nothing follows the last backslash: a line cannot be continued");
-      word.bare = false;
+    if (quote == 0 && !in_word && c == '#') break;
+    if (!in_word) words.emplace_back();
+    in_word = true;
+    if (c == quote) {
+      quote = 0;
+    } else if (quote == 0 && (c == '\'' || c == '"')) {
+      quote = c;
+    } else {
+      if (c == '\\' && quote != '\'') {
+        if (++i == line.size()) return usage_error("a backslash ends the line: it must precede a character");
+        c = line[i];
+      }
+      words.back() += c;
     }
-    word.text += cursor.next();
   }
-  return word;
-}
-
-}  // namespace
-
-absl::StatusOr<std::vector<Word>> read_words(absl::string_view line, const Variables& variables) {
-  std::vector<Word> words;
-  Cursor cursor(line);
-  for (cursor.skip_blanks(); !cursor.ended(); cursor.skip_blanks()) {
-    ASSIGN_OR_RETURN(Word word, read_word(cursor, variables));
-    words.push_back(std::move(word));
-  }
+  if (quote != 0) return usage_error(absl::string_view(quote == '"' ? "a \" is not closed" : "a ' is not closed"));
   return words;
 }
 

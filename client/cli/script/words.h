@@ -1,5 +1,4 @@
-// Parser that splits a line of a script into words as a shell does, and substitutes variables and expressions. For
-// statements. Functions without state.
+// Splitter of a line of `locus` into its arguments, with the quotes of a shell. Function without state; any thread.
 #ifndef LOCUS_CLIENT_CLI_SCRIPT_WORDS_H_
 #define LOCUS_CLIENT_CLI_SCRIPT_WORDS_H_
 
@@ -8,20 +7,13 @@
 
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
-#include "client/cli/script/variables.h"
 
 namespace locus::cli {
 
-struct Word {
-  std::string text;
-  bool bare = true;  // literal: nothing was quoted or substituted
-};
-
-// Splits a line at blanks; quotes and a backslash preserve blanks, and `#` at the beginning of a word begins a comment.
-// `$name.field`, `${name:-default}` and `{expression}` are substituted, and the result never splits a word. Returns
-// INVALID_ARGUMENT for an unclosed quote or brace, the errors of expressions, and RESOURCE_EXHAUSTED for a word of more
-// than kMaxTextBytes.
-absl::StatusOr<std::vector<Word>> read_words(absl::string_view line, const Variables& variables);
+// Splits a line at blanks. Text in single quotes is literal; in double quotes and outside of quotes a backslash makes
+// the next character literal. `#` at the beginning of a word begins a comment. Returns a usage error for a quote that
+// is not closed and for a backslash at the end of the line.
+absl::StatusOr<std::vector<std::string>> split_words(absl::string_view line);
 
 }  // namespace locus::cli
 

@@ -1,4 +1,5 @@
-// Tests that run scripts against a real locusd: the committed examples, and copies of the examples with mistakes.
+// Tests that run scripts against a real locusd: the committed examples, copies of the examples with mistakes, and the
+// module `locus`.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -17,8 +18,10 @@ namespace {
 using test::DaemonProcess;
 using test::TemporaryFolder;
 using test::text_of;
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 
 const std::string kExamples = std::string(LOCUS_SOURCE_DIR) + "/client/cli/script/examples/";
 
@@ -38,7 +41,7 @@ class RunCommandTest : public ::testing::Test {
   }
   static void TearDownTestSuite() {
     daemon_->signal(SIGTERM);
-    EXPECT_EQ(daemon_->wait(), 0);
+    EXPECT_EQ(daemon_->wait(), 0) << "no script harms the server";
     delete daemon_;
     delete folder_;
   }
@@ -51,12 +54,16 @@ class RunCommandTest : public ::testing::Test {
     const ExitCode code = run_line(arguments, context);
     return {code, out.str(), err.str()};
   }
-  // Writes a script to a file that is removed after the test, and returns its path.
-  std::string file_with(const std::string& text) {
-    std::ofstream(file_) << text;
-    return file_;
+  // Writes a script to a file that is removed with the suite, and returns its path.
+  static std::string file_with(const std::string& text, const std::string& ending = ".lua") {
+    const std::string file = folder_->file("script" + ending);
+    std::ofstream(file) << text;
+    return file;
   }
-  void TearDown() override { std::filesystem::remove(file_); }
+  static Outcome run_lua(const std::string& text, std::vector<std::string> options = {}) {
+    options.insert(options.begin(), {"run", file_with(text)});
+    return run(options);
+  }
 
   static std::vector<std::string> examples() {
     std::vector<std::string> paths;
@@ -64,11 +71,9 @@ class RunCommandTest : public ::testing::Test {
     return paths;
   }
 
- private:
   static TemporaryFolder* folder_;
   static DaemonProcess* daemon_;
   static std::string address_;
-  const std::string file_ = absl::StrCat(::testing::TempDir(), "locus_run_command_", getpid(), ".locus");
 };
 TemporaryFolder* RunCommandTest::folder_ = nullptr;
 DaemonProcess* RunCommandTest::daemon_ = nullptr;
@@ -80,75 +85,302 @@ TEST_F(RunCommandTest, EveryExamplePassesTwice) {
     for (int time = 0; time < 2; ++time) {
       const Outcome outcome = run({"run", example});
       EXPECT_EQ(outcome.code, ExitCode::kOk) << outcome.err;
-      EXPECT_THAT(outcome.err, HasSubstr(" expectations passed, 0 failed\n"));
+      EXPECT_THAT(outcome.err, AllOf(HasSubstr(" expectations passed, 0 failed\n"), Not(HasSubstr(" 0 expectations"))));
     }
   }
 }
 
-TEST_F(RunCommandTest, EveryExamplePassesTheCheckWithoutServer) {
+TEST_F(RunCommandTest, EveryExampleCompilesWithoutServer) {
   for (const std::string& example : examples()) {
     const Outcome outcome = run({"run", example, "--dry-run"}, "unix:/nonexistent/locus.sock");
     EXPECT_EQ(outcome.code, ExitCode::kOk) << outcome.err;
     EXPECT_THAT(outcome.out, IsEmpty());
-    EXPECT_THAT(outcome.err, HasSubstr(" lines checked, "));
+    EXPECT_THAT(outcome.err, HasSubstr(": compiled, no mistake found"));
   }
 }
 
 TEST_F(RunCommandTest, ABrokenCopyFailsWithLineAndValue) {
-  const std::string text = text_of(kExamples + "first_steps.locus");
-  const size_t place = text.find("expect $shot.id == 7");
+  const std::string text = text_of(kExamples + "first_steps.lua");
+  const size_t place = text.find("locus.expect_equal(shot.id, 7)");
   ASSERT_NE(place, std::string::npos);
   const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(place), '\n');
-  const std::string file = file_with(absl::StrReplaceAll(text, {{"expect $shot.id == 7", "expect $shot.id == 2"}}));
-  const Outcome outcome = run({"run", file});
+  const Outcome outcome =
+      run_lua(absl::StrReplaceAll(text, {{"expect_equal(shot.id, 7)", "expect_equal(shot.id, 2)"}}));
   EXPECT_EQ(outcome.code, ExitCode::kFailed);
-  EXPECT_THAT(outcome.err, HasSubstr(absl::StrCat(file, ":", line, ": expected $shot.id == 2, but it is 7\n")));
+  EXPECT_THAT(outcome.err, HasSubstr(absl::StrCat("script.lua:", line, ": expected 2, but it is 7\n")));
   EXPECT_THAT(outcome.err, HasSubstr("2 expectations passed, 1 failed\n"));
 }
 
-TEST_F(RunCommandTest, SettingsReachTheScript) {
-  const Outcome outcome = run({"run", kExamples + "first_steps.locus", "--set", "scene=elsewhere", "-o", "ndjson"});
+TEST_F(RunCommandTest, SettingsReachTheScriptAndTheEndIsJsonWhereTheOutputIs) {
+  const Outcome outcome = run({"run", kExamples + "first_steps.lua", "--set", "scene=elsewhere", "-o", "ndjson"});
   EXPECT_EQ(outcome.code, ExitCode::kOk) << outcome.err;
-  EXPECT_THAT(outcome.out, HasSubstr("\"name\":\"elsewhere\""));
   const Json end = Json::parse(outcome.err);
   EXPECT_EQ(end["failed"], 0);
   EXPECT_GT(end["passed"], 5);
+  EXPECT_EQ(run({"scene", "describe", "elsewhere"}).code, ExitCode::kOk);
+  EXPECT_EQ(run_lua("", {"--set", "novalue"}).code, ExitCode::kUsage);
+  EXPECT_EQ(run_lua("", {"--set", "=1"}).code, ExitCode::kUsage);
 }
 
-TEST_F(RunCommandTest, WrongSettingsAndFilesAreRefused) {
-  const std::string file = file_with("echo hi");
-  EXPECT_EQ(run({"run", file, "--set", "novalue"}).code, ExitCode::kUsage);
-  EXPECT_EQ(run({"run", file, "--set", "1x=2"}).code, ExitCode::kUsage);
-  EXPECT_EQ(run({"run", "/nonexistent/x.locus"}).code, ExitCode::kNotFound);
-  EXPECT_EQ(run({"run", file_with("end")}).code, ExitCode::kUsage);
+TEST_F(RunCommandTest, TheLanguageOfAFileIsItsEndingOrItsText) {
+  EXPECT_EQ(run({"run", "/nonexistent/x.lua"}).code, ExitCode::kNotFound);
+  EXPECT_THAT(run({"run", file_with("print(1 + 1)", ".txt")}).out, "2\n");
+  EXPECT_THAT(run({"run", file_with("# comment\nscene list -o csv", ".txt")}).out, HasSubstr("name,state"));
+  EXPECT_THAT(run({"run", file_with("print(1 + ", ".txt")}).err, HasSubstr("script.txt:1: unexpected symbol"));
+  EXPECT_THAT(run({"run", file_with("print(1)", ".locus")}).err, HasSubstr("has no command `print(1)`"));
+  EXPECT_EQ(run({"run", file_with("scene list", ".lua")}).code, ExitCode::kUsage);
+}
+
+TEST_F(RunCommandTest, LinesRunInOrderAndNameTheLineThatFails) {
+  const std::string lines = "scene create lines --if-absent\ninsert lines ball --id 7 --at 0,0,0 --radius 1 --upsert\n";
+  const Outcome good =
+      run({"-o", "ndjson", "run", file_with(lines + "query ray lines --from 0,0,9 --dir 0,0,-1", ".locus")});
+  EXPECT_EQ(good.code, ExitCode::kOk) << good.err;
+  EXPECT_THAT(good.out, HasSubstr("\"id\":\"7\""));
+  EXPECT_EQ(Json::parse(good.err)["lines"], 3);
+  const std::string bad = file_with("get lines --id 8\n\nscene list\n", ".locus");
+  const Outcome stopped = run({"run", bad});
+  EXPECT_EQ(stopped.code, ExitCode::kNotFound);
+  EXPECT_THAT(stopped.err, AllOf(HasSubstr("script.locus:1: "), HasSubstr("1 lines run, 1 failed")));
+  const Outcome went_on = run({"run", bad, "--keep-going"});
+  EXPECT_EQ(went_on.code, ExitCode::kFailed);
+  EXPECT_THAT(went_on.out, HasSubstr("lines"));
+  EXPECT_THAT(went_on.err, HasSubstr("2 lines run, 1 failed"));
 }
 
 TEST_F(RunCommandTest, AMistakeInTheLastLinePreventsTheFirstFromRunning) {
-  const Outcome outcome = run({"run", file_with("echo never\nquery ray arena\n")});
+  const Outcome outcome = run({"run", file_with("scene create never\nquery ray arena\n", ".locus")});
   EXPECT_EQ(outcome.code, ExitCode::kUsage);
   EXPECT_THAT(outcome.out, IsEmpty());
-  EXPECT_THAT(outcome.err, HasSubstr(".locus:2: give --from and --dir"));
+  EXPECT_THAT(outcome.err, HasSubstr("script.locus:2: give --from and --dir"));
+  EXPECT_EQ(run({"scene", "describe", "never"}).code, ExitCode::kNotFound);
 }
 
-TEST_F(RunCommandTest, ABatchHasTheEffectOfItsLines) {
-  const Outcome outcome = run({"run", file_with(R"(
-scene create order --if-absent
-use order
-remove --all
-insert point --id 1 --at 0,0,0
-begin
-  remove --id 1
-  insert point --id 1 --at 5,0,0
-  move --id 1 --to 6,0,0
-commit -> ack
-expect $ack.refused == 0
-get --id 1 -> one
-expect $one.position == 6,0,0
-expect $one.revision == $ack.revision
-wait --revision $ack.revision -> ready
-expect $ready.revision == $ack.revision
-)")});
+TEST_F(RunCommandTest, ErrorsCarryTheServersReasonFieldIndexAndThePlace) {
+  const Outcome outcome = run_lua(R"(
+local scene = locus.scene("errors")
+scene:delete{if_present = true}
+scene:create()
+scene:apply{inserts = {{ids = {1, 2}, positions_f64 = {{0, 0, 0}, {0, 0, 9}}, ball = {radii = 1}}}}
+local _, refused = pcall(function()
+  scene:query{blocks = {{balls = {centers = {{0, 0, 0}, {0, 0, 0}}, radii = {1, -1}}}}}
+end)
+print(refused.reason, refused.code, refused.field, refused.index, refused.file:match("[^/]+$"), refused.line)
+local _, unknown = pcall(scene.apply, scene, {moves = {{ids = {3}, positions_f64 = {{0, 0, 0}}}}})
+print(unknown.reason, unknown.line)
+local _, missing = pcall(function() locus.scene("nowhere"):describe() end)
+print(missing.reason, missing.code)
+locus.scene("nowhere"):describe()
+)");
+  EXPECT_EQ(outcome.code, ExitCode::kNotFound);
+  EXPECT_THAT(outcome.out, HasSubstr("script.lua\t7\n"));
+  EXPECT_THAT(outcome.out, HasSubstr("blocks[0].balls.radii\t1\tscript.lua"));
+  EXPECT_THAT(outcome.out, HasSubstr("UNKNOWN_ID\t10\n"));
+  EXPECT_THAT(outcome.out, HasSubstr("NOT_FOUND\tNOT_FOUND\n"));
+  EXPECT_THAT(outcome.err, HasSubstr("script.lua:14: scene: no scene is called 'nowhere'"));
+}
+
+TEST_F(RunCommandTest, IdsKeepAllBitsInEveryForm) {
+  const Outcome outcome = run_lua(R"(
+local scene = locus.scene("wide")
+scene:delete{if_present = true}
+scene:create()
+local ids = {locus.id(2^53 + 0) + 1, locus.id("9223372036854775808"), locus.id("18446744073709551615")}
+local updates = scene:updates()
+for i, id in ipairs(ids) do updates:insert{id = id, at = {0, 0, 10 * i}, ball = 1, group = id, tag = id} end
+updates:commit()
+local queries = scene:queries{columns = {"id", "group", "tag"}}
+for i = 1, 3 do queries:ball{at = {0, 0, 10 * i}, radius = 0.5} end
+for i, found in ipairs(queries:run()) do
+  locus.expect_equal(found[1].id, ids[i])
+  locus.expect_equal(found[1].group, ids[i])
+  locus.expect_equal(found[1].tag, ids[i])
+  locus.expect_equal(locus.command("get", "wide", "--id", ids[i]).id, ids[i])
+  locus.expect_equal(locus.command("query ball wide --radius 0.5 --at", {0, 0, 10 * i}).rows[1].id, ids[i])
+  print(found[1].id)
+end
+local moved = scene:updates()
+for i, id in ipairs(ids) do moved:move{id = id, at = {5, 0, 10 * i}} end
+locus.expect_equal(moved:commit().applied, 3)
+locus.print({{id = ids[3]}, {id = ids[1]}})
+)",
+                                  {"-o", "csv"});
   EXPECT_EQ(outcome.code, ExitCode::kOk) << outcome.err;
+  EXPECT_EQ(outcome.out,
+            "9007199254740993\n9223372036854775808\n18446744073709551615\n"
+            "id\n18446744073709551615\n9007199254740993\n");
+  for (const char* format : {"json", "csv", "ndjson"}) {
+    const Outcome dumped = run({"-o", format, "dump", "wide"});
+    for (const char* id : {"9007199254740993", "9223372036854775808", "18446744073709551615"})
+      EXPECT_THAT(dumped.out, HasSubstr(id)) << format;
+  }
+}
+
+TEST_F(RunCommandTest, KeepGoingCountsFailedExpectations) {
+  const std::string text =
+      "locus.expect(false, 'first')\nlocus.expect_near(1, 2, 0.5)\nlocus.expect(true)\n"
+      "locus.expect_error('NOT_FOUND', function() end)\nlocus.expect_error('X', error, 'thrown')\n";
+  const Outcome stopped = run_lua(text);
+  EXPECT_EQ(stopped.code, ExitCode::kFailed);
+  EXPECT_THAT(stopped.err, HasSubstr("script.lua:1: first\n"));
+  EXPECT_THAT(stopped.err, HasSubstr("0 expectations passed, 1 failed"));
+  const Outcome went_on = run_lua(text, {"--keep-going"});
+  EXPECT_EQ(went_on.code, ExitCode::kFailed);
+  EXPECT_THAT(went_on.err, HasSubstr("script.lua:2: expected 2 within 0.5, but it is 1\n"));
+  EXPECT_THAT(went_on.err, HasSubstr("script.lua:4: expected NOT_FOUND, but it succeeded\n"));
+  EXPECT_THAT(went_on.err, HasSubstr("script.lua:5: expected X, but it is an error of Lua: "));
+  EXPECT_THAT(went_on.err, HasSubstr("1 expectations passed, 4 failed\n"));
+}
+
+TEST_F(RunCommandTest, QueriesSeeTheScriptsOwnChangesOnAnyConnection) {
+  const Outcome outcome = run_lua(absl::StrCat("local other = locus.connect('", address_, R"(')
+local scene = other:scene("own")
+scene:delete{if_present = true}
+scene:create()
+for i = 1, 50 do
+  scene:updates():insert{id = i, at = {i, 0, 0}, ball = 0.1}:commit()
+  locus.expect_equal(#scene:queries():ball{at = {i, 0, 0}, radius = 0.1}:run()[1], 1)
+end
+locus.expect_equal(locus.command("query ball own --at 25,0,0 --radius 1.5").count, nil)
+locus.expect_equal(#locus.command("query ball own --at 25,0,0 --radius 1.5").rows, 3)
+locus.expect_equal(#other:list_scenes() > 0, true)
+)"));
+  EXPECT_EQ(outcome.code, ExitCode::kOk) << outcome.err;
+}
+
+TEST_F(RunCommandTest, EveryKindOfRowIsAnswered) {
+  const Outcome outcome = run_lua(R"(
+local scene = locus.scene("kinds")
+scene:delete{if_present = true}
+scene:create()
+scene:updates()
+  :insert{id = 1, at = {0, 0, 0}, ball = 1, layers = 2}
+  :insert{id = 2, at = {10, 0, 0}, box = {1, 1, 1}, rotation = {0, 0, 0, 1}, group = 5}
+  :insert{id = 3, at = {20, 0, 0}, capsule = {axis = {0, 0, 1}, radius = 0.5}, tag = 9}
+  :insert{id = 4, at = {30, 0, 0}}
+  :commit{all_or_nothing = true}
+local queries = scene:queries{columns = {"id", "group", "tag", "layers"}}
+queries:ray({from = {-9, 0, 0}, dir = {1, 0, 0}, mask = 1}, {columns = {"t", "id", "group"}})
+queries:ray{from = {-9, 0, 0}, dir = {1, 0, 0}, t_max = 5}
+queries:ball{at = {10, 0, 0}, radius = 0.5, ignore_group = 5}
+queries:ball{at = {10, 0, 0}, radius = 0.5}
+queries:box{at = {20, 0, 0}, half = {1, 1, 1}}
+queries:capsule{from = {0, 0, 0}, to = {10, 0, 0}, radius = 0.1}
+queries:sweep{from = {20, 0, 9}, to = {20, 0, -9}, radius = 0.5}
+queries:nearest({at = {29, 0, 0}, max_distance = 3}, {k = 2, columns = {"t", "id"}})
+queries:contains{at = {0, 0, 0.5}}
+local a = queries:run()
+locus.expect_equal(a[1].id, 2)
+locus.expect_equal(a[1].group, 5)
+locus.expect_equal(a[2], false)
+locus.expect_equal(#a[3], 0)
+locus.expect_equal(a[4][1].id, 2)
+locus.expect_equal(a[5][1].tag, 9)
+locus.expect_equal({a[6][1].id, a[6][2].id}, {1, 2})
+locus.expect_equal(a[7].id, 3)
+locus.expect_equal(a[8][1].id, 4)
+locus.expect_near(a[8][1].t, 1, 1e-6)
+locus.expect_equal(a[9][1].id, 1)
+locus.expect_equal(scene:queries():ray({from = {-9, 0, 0}, dir = {1, 0, 0}}, {mode = "any"}):run()[1], true)
+scene:updates():relabel{id = 1, tag = 4}:remove(2):remove_group(7):move{id = 3, at = {0, 50, 0}, teleport = true}:commit()
+locus.expect_equal(locus.command("get kinds --id 1").tag, 4)
+locus.expect_equal(scene:describe().objects, 3)
+locus.expect_error("an error", function() scene:updates():insert{id = 1, att = {0, 0, 0}} end)
+)",
+                                  {"--keep-going"});
+  EXPECT_THAT(outcome.err, HasSubstr("insert has no field 'att'; did you mean `at`?"));
+  EXPECT_THAT(outcome.err, HasSubstr("14 expectations passed, 1 failed")) << outcome.err;
+}
+
+TEST_F(RunCommandTest, StreamsAnswerInOrderAndKeepErrors) {
+  const Outcome outcome = run_lua(R"(
+local scene = locus.scene("streams")
+scene:delete{if_present = true}
+scene:create()
+local stream = scene:update_stream()
+stream:send{inserts = {{ids = {1}, positions_f64 = {{0, 0, 0}}, point = {}}}}
+stream:send{all_or_nothing = true, moves = {{ids = {2}, positions_f64 = {{0, 0, 0}}}}}
+locus.expect_equal(stream:send{moves = {{ids = {1}, positions_f64 = {{1, 0, 0}}}}}, 3)
+local acks = stream:flush()
+locus.expect_equal(#acks, 3)
+locus.expect_equal(acks[1].applied, 1)
+locus.expect_equal(acks[2].reason, "UNKNOWN_ID")
+locus.expect_equal(acks[3].applied, 1)
+locus.expect_equal(#stream:close(), 0)
+local asks = scene:query_stream()
+asks:send{blocks = {{balls = {centers = {1, 0, 0}, radii = {1}}}}}
+locus.expect_equal(asks:flush()[1].blocks[1].ids[1], 1)
+)");
+  EXPECT_EQ(outcome.code, ExitCode::kOk) << outcome.err;
+}
+
+TEST_F(RunCommandTest, MeshesAndInstancesAreMadeFromTables) {
+  const Outcome outcome = run_lua(R"(
+local server = locus.connect()
+local scene = server:scene("meshes")
+scene:delete{if_present = true}
+scene:create()
+server:upload_mesh{mesh = "square", vertices = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}, indices = {{0, 1, 2}, {0, 2, 3}}}
+local placed = scene:change_instances{place = {mesh = "square", translations = {{0, 0, 5}}}}
+local hit = scene:queries():ray{from = {0.5, 0.25, 9}, dir = {0, 0, -1}}:run()[1]
+locus.expect_equal(hit.id, placed.ids[1])
+locus.expect_near(hit.t, 4, 1e-6)
+scene:delete()
+server:delete_mesh("square")
+locus.expect_error("NOT_FOUND", server.delete_mesh, server, "square")
+)");
+  EXPECT_EQ(outcome.code, ExitCode::kOk) << outcome.err;
+}
+
+TEST_F(RunCommandTest, ResultsOfBulkQueriesAndTextsAreTables) {
+  const Outcome outcome = run_lua(absl::StrCat(R"(
+locus.command("scene create bulk --if-absent")
+locus.command("insert bulk ball --id 7 --at 0,0,0 --radius 1 --upsert")
+local file = io.open(")",
+                                               folder_->file("rays.csv"), R"(", "w")
+file:write("from.x,from.y,from.z\n0,0,9\n5,0,9\n")
+file:close()
+local hits = locus.command("query ray bulk --dir 0,0,-1 --from-csv", ")",
+                                               folder_->file("rays.csv"), R"(")
+locus.expect_equal(#hits.rows, 2)
+locus.expect_equal(hits.rows[1].id, 7)
+locus.expect_equal(hits.rows[2].hit, false)
+locus.expect_equal(locus.command("query ray --help").text:find("Usage") ~= nil, true)
+locus.expect_error("USAGE", locus.command, "query ray bulk -a 127.0.0.1:1 --from 0,0,0 --dir 0,0,1")
+locus.expect_error("USAGE", locus.command, "qury")
+)"));
+  EXPECT_EQ(outcome.code, ExitCode::kOk) << outcome.err;
+}
+
+TEST_F(RunCommandTest, LimitsEndAScriptWithPlaceAndLimitAndHarmNothing) {
+  const struct {
+    const char* text;
+    const char* message;
+  } cases[] = {
+      {"\nwhile true do end", "script.lua:2: the script ran more than its limit of 1000000 instructions"},
+      {"\nlocal t = {} while true do t[#t + 1] = ('x'):rep(1e5) .. #t end",
+       "script.lua:2: the script needs more than its limit of 16 MiB of memory"},
+      {"\nos.execute('true')", "script.lua:2: os.execute is not available to scripts: run them with --unsafe"},
+      {"\nlocus.expect_error('X', function() while true do end end)", "script.lua:2: the script ran more than"},
+      {"\ntable.sort({2, 1}, function() error('in a callback') end)", "script.lua:2: in a callback"},
+  };
+  for (const auto& [text, message] : cases) {
+    const Outcome outcome = run_lua(text, {"--max-instructions", "1000000", "--max-memory", "16"});
+    EXPECT_EQ(outcome.code, ExitCode::kFailed) << text;
+    EXPECT_THAT(outcome.err, HasSubstr(message));
+  }
+  const Outcome slept = run_lua("locus.sleep(3600)\nwhile true do end", {"--max-seconds", "0.05"});
+  EXPECT_THAT(slept.err, HasSubstr("ran longer than its limit of 50ms (--max-seconds)"));
+  EXPECT_EQ(run_lua("assert(os.execute('true'))", {"--unsafe"}).code, ExitCode::kOk);
+  EXPECT_EQ(run({"health"}).code, ExitCode::kOk);
+}
+
+TEST_F(RunCommandTest, PrintWritesTablesInTheFormatOfTheOutput) {
+  const std::string text = "locus.print({{id = 1, t = 0.5}, {id = 2}}, {'id', 't'})\nlocus.print({revision = 5})\n";
+  EXPECT_EQ(run_lua(text, {"-o", "csv"}).out, "id,t\n1,0.5\n2,\nrevision\n5\n");
+  EXPECT_EQ(run_lua(text, {"-o", "ndjson"}).out, "{\"id\":\"1\",\"t\":0.5}\n{\"id\":\"2\"}\n{\"revision\":5}\n");
+  EXPECT_EQ(run_lua("print(1, 'a', nil, 0.5)").out, "1\ta\tnil\t0.5\n");
+  EXPECT_EQ(run_lua("locus.print(5)").code, ExitCode::kFailed);
 }
 
 }  // namespace

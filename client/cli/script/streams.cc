@@ -1,0 +1,92 @@
+#include "client/cli/script/streams.h"
+
+#include <chrono>
+#include <future>
+#include <typeinfo>
+#include <utility>
+#include <vector>
+
+#include "client/cli/script/sandbox.h"
+#include "client/cli/script/tables.h"
+
+namespace locus::cli {
+namespace {
+
+template <class Stream, class Batch, class Answer>
+struct StreamObject {
+  static constexpr size_t kMaxUnread = 100'000;  // answers that wait for flush()
+  static constexpr std::chrono::milliseconds kPoll{20};
+
+  std::unique_ptr<Stream> stream;
+  std::vector<std::future<absl::StatusOr<Answer>>> answers;
+  uint64_t sent = 0;
+
+  static StreamObject& self(lua_State* state) {
+    return *static_cast<StreamObject*>(luaL_checkudata(state, 1, typeid(Stream).name()));
+  }
+
+  static int send(lua_State* state) {
+    StreamObject& object = self(state);
+    Batch batch;
+    if (absl::Status status = read_message(state, 2, batch); !status.ok()) raise(state, std::move(status));
+    if (object.answers.size() >= kMaxUnread)
+      raise(state, absl::ResourceExhaustedError("100000 answers wait to be read: call flush() more often"));
+    object.answers.push_back(object.stream->send(std::move(batch)));
+    lua_pushinteger(state, static_cast<lua_Integer>(++object.sent));
+    return 1;
+  }
+
+  static int flush(lua_State* state) {
+    StreamObject& object = self(state);
+    const Sandbox& sandbox = Sandbox::of(state);
+    std::vector<std::future<absl::StatusOr<Answer>>> answers = std::exchange(object.answers, {});
+    lua_createtable(state, static_cast<int>(answers.size()), 0);
+    lua_Integer place = 0;
+    for (std::future<absl::StatusOr<Answer>>& answer : answers) {
+      while (answer.wait_for(kPoll) != std::future_status::ready) {
+        if (sandbox.interrupted()) raise(state, absl::CancelledError("interrupted"));
+      }
+      const absl::StatusOr<Answer> got = answer.get();
+      got.ok() ? push_message(state, *got) : push_error(state, got.status());
+      lua_rawseti(state, -2, ++place);
+    }
+    return 1;
+  }
+
+  static int close(lua_State* state) {
+    flush(state);
+    if (absl::Status status = self(state).stream->close(); !status.ok()) raise(state, std::move(status));
+    return 1;
+  }
+
+  static int free(lua_State* state) {
+    self(state).~StreamObject();
+    return 0;
+  }
+
+  static void push(lua_State* state, std::unique_ptr<Stream> stream) {
+    new (lua_newuserdatauv(state, sizeof(StreamObject), 0)) StreamObject{std::move(stream), {}, 0};
+    if (luaL_newmetatable(state, typeid(Stream).name()) != 0) {
+      const luaL_Reg methods[] = {{"send", send}, {"flush", flush}, {"close", close}, {nullptr, nullptr}};
+      luaL_newlib(state, methods);
+      lua_setfield(state, -2, "__index");
+      lua_pushcfunction(state, free);
+      lua_setfield(state, -2, "__gc");
+      lua_pushliteral(state, "locus.stream");
+      lua_setfield(state, -2, "__metatable");  // scripts must not call __gc
+    }
+    lua_setmetatable(state, -2);
+  }
+};
+
+}  // namespace
+
+void push_stream(lua_State* state, std::unique_ptr<client::UpdateStream> stream) {
+  StreamObject<client::UpdateStream, v1::UpdateBatch, v1::UpdateAck>::push(state, std::move(stream));
+}
+
+void push_stream(lua_State* state, std::unique_ptr<client::QueryStream> stream) {
+  StreamObject<client::QueryStream, v1::QueryBatch, v1::QueryResult>::push(state, std::move(stream));
+}
+
+}  // namespace locus::cli
