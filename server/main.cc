@@ -3,10 +3,13 @@
 
 #include <malloc.h>
 #include <pthread.h>
+#include <sys/ioctl.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -19,6 +22,7 @@
 #include "absl/strings/str_join.h"
 #include "core/base/limits.h"
 #include "core/base/mutex.h"
+#include "core/base/progress_writer.h"
 #include "core/index/bvh/kernels/dispatch.h"
 #include "server/config/server_config.h"
 #include "server/config/version.h"
@@ -202,13 +206,30 @@ int print(const absl::StatusOr<Report>& report) {
   return EXIT_SUCCESS;
 }
 
+// Returns a writer of progress on standard error.
+ProgressWriter start_progress(ProgressChoice choice) {
+  const bool terminal = isatty(STDERR_FILENO) != 0;
+  winsize size{};
+  const bool wide = ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0;
+  return ProgressWriter({.style = progress_style(choice, terminal),
+                         .columns = wide ? size.ws_col : size_t{80},
+                         .now = [] { return std::chrono::steady_clock::now(); },
+                         .write = [](absl::string_view text) { std::fwrite(text.data(), 1, text.size(), stderr); }});
+}
+
 // Runs `locusd check` or `locusd repair` and returns the exit code: 0 if `check` finds no damage, or if the directory
 // can be used after `repair`.
 int maintain(const Maintenance& maintenance) {
   StorageOptions options;
   options.path = maintenance.directory;
-  if (maintenance.task == Maintenance::Task::kRepair) return print(repair(options));
-  const absl::StatusOr<DirectoryReport> report = check(options);
+  ProgressWriter progress = start_progress(maintenance.progress);
+  if (maintenance.task == Maintenance::Task::kRepair) {
+    const absl::StatusOr<RepairReport> report = repair(options, &progress);
+    progress.hide();
+    return print(report);
+  }
+  const absl::StatusOr<DirectoryReport> report = check(options, &progress);
+  progress.hide();
   const int printed = print(report);
   return printed == EXIT_SUCCESS && !report->intact() ? EXIT_FAILURE : printed;
 }

@@ -16,6 +16,7 @@
 #include "client/cli/connection_options.h"
 #include "client/cli/output.h"
 #include "client/lib/client.h"
+#include "core/base/progress_line.h"
 
 namespace locus::cli {
 
@@ -24,11 +25,10 @@ struct GlobalOptions {
   ConnectionOptions connection;
   std::optional<double> timeout_seconds;  // none = the library's defaults, which are longer for uploads
   Format format = Format::kTable;
+  ProgressChoice progress = ProgressChoice::kAuto;
 };
 
-// Choice whether progress lines are written to the error stream. A progress line overwrites itself, so it suits only a
-// terminal.
-enum class Progress { kSilent, kLive };
+using Progress = ProgressStyle;
 
 // Source of lines. The lines that run through a context come from the program's own command line, from a script, or
 // from the check of a script before the script runs. During the check every line is parsed, but nothing is sent. A
@@ -37,15 +37,17 @@ enum class Lines { kProgram, kScript, kScriptCheck };
 
 class Context {
  public:
-  // Borrows the streams.
-  Context(std::ostream& out, std::ostream& err, Progress progress) : out_(&out), err_(err), progress_(progress) {}
+  // Borrows the streams. `automatic` is the style of progress that the choice `auto` means: kLive if `err` is a
+  // terminal, else kSilent.
+  Context(std::ostream& out, std::ostream& err, Progress automatic) : out_(&out), err_(err), automatic_(automatic) {}
 
   GlobalOptions& options() { return options_; }
   std::ostream& out() { return *out_; }
   // Makes out() return `out`, which is borrowed, and returns the previous stream. For scripts, which read answers.
   std::ostream& redirect_out(std::ostream& out) { return *std::exchange(out_, &out); }
   std::ostream& err() { return err_; }
-  Progress progress() const { return progress_; }
+  // Returns the style in which commands write their progress to err().
+  Progress progress() const { return progress_style(options_.progress, automatic_ == Progress::kLive); }
 
   // Returns the address of the server. Must be called after the line was parsed, since the line, the environment or a
   // named context can set the address.
@@ -90,7 +92,7 @@ class Context {
  private:
   std::ostream* out_;
   std::ostream& err_;
-  const Progress progress_;
+  const Progress automatic_;
   GlobalOptions options_;
   std::string contexts_path_;
   absl::Status connection_mistake_;

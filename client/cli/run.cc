@@ -113,6 +113,14 @@ void build_cli(CLI::App& app, Context& context) {
   app.add_option("-o,--output", options.format, "How to print: table, json, ndjson, csv [table]")
       ->type_name("FORMAT")
       ->transform(choices(formats));
+  const NamedValues<ProgressChoice> progress = {
+      {"auto", ProgressChoice::kAuto}, {"always", ProgressChoice::kAlways}, {"never", ProgressChoice::kNever}};
+  app.add_option("--progress", options.progress,
+                 "When to show progress on standard error: auto (on a terminal), always (elsewhere a line a second), "
+                 "never [auto]")
+      ->envname("LOCUS_PROGRESS")
+      ->type_name("WHEN")
+      ->transform(choices(progress));
   if (context.lines() != Lines::kProgram) {
     restrict_to_script(app);
   } else {

@@ -401,7 +401,20 @@ void add_maintenance(CLI::App& app, std::optional<Maintenance>& chosen) {
     added.fallthrough();
     const auto directory = std::make_shared<std::string>();
     added.add_option("DIRECTORY", *directory, "The data directory [that of --data-dir]");
-    added.callback([&chosen, directory, task = command.task] { chosen = Maintenance{task, *directory}; });
+    const auto progress = std::make_shared<ProgressChoice>(ProgressChoice::kAuto);
+    added
+        .add_option(
+            "--progress", *progress,
+            "When to show progress on standard error: auto (on a\nterminal), always (elsewhere a line a second), "
+            "never [auto]")
+        ->type_name("WHEN")
+        ->transform(CLI::CheckedTransformer(std::map<std::string, ProgressChoice>{{"auto", ProgressChoice::kAuto},
+                                                                                  {"always", ProgressChoice::kAlways},
+                                                                                  {"never", ProgressChoice::kNever}})
+                        .description(""));
+    added.callback([&chosen, directory, progress, task = command.task] {
+      chosen = Maintenance{.task = task, .directory = *directory, .json = false, .progress = *progress};
+    });
   }
   CLI::App& config =
       *app.add_subcommand("config",
@@ -415,7 +428,9 @@ void add_maintenance(CLI::App& app, std::optional<Maintenance>& chosen) {
   config.fallthrough();
   const auto json = std::make_shared<bool>(false);
   config.add_flag("--json", *json, "Print one JSON object instead of a table");
-  config.callback([&chosen, json] { chosen = Maintenance{Maintenance::Task::kShowConfig, "", *json}; });
+  config.callback([&chosen, json] {
+    chosen = Maintenance{.task = Maintenance::Task::kShowConfig, .directory = "", .json = *json};
+  });
   app.require_subcommand(0, 1);
 }
 

@@ -12,6 +12,7 @@
 
 #include "absl/status/status.h"
 #include "core/base/limits.h"
+#include "core/base/progress_line.h"
 
 namespace locus::server {
 
@@ -179,8 +180,9 @@ std::optional<std::string> process_environment(const std::string& name);
 struct Maintenance {
   enum class Task : uint8_t { kCheck, kRepair, kShowConfig };
   Task task = Task::kCheck;
-  std::string directory;  // data directory, for check and repair
-  bool json = false;      // whether to print JSON, for config
+  std::string directory;                            // data directory, for check and repair
+  bool json = false;                                // whether to print JSON, for config
+  ProgressChoice progress = ProgressChoice::kAuto;  // when to show progress, for check and repair
 };
 
 // Parsed command line. If `config` is set, main() runs the server; if `maintenance` is set, main() runs that command;

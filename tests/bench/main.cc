@@ -1,16 +1,18 @@
 // The program `locus-bench`: runs one suite of benchmarks, which compare locus with peers, and writes the results as a
 // table and as JSON.
 #include <malloc.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <chrono>
 #include <iostream>
 #include <string>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
+#include "core/base/progress_writer.h"
 #include "tests/bench/dynamic/dynamic_suite.h"
 #include "tests/bench/frame/race.h"
 #include "tests/bench/frame/report.h"
@@ -60,7 +62,7 @@ std::string described_suites() {
                       }));
 }
 
-void add_options(CLI::App& app, Options& options, std::string& filter) {
+void add_options(CLI::App& app, Options& options, std::string& filter, std::string& progress) {
   std::vector<std::string> names;
   for (const Suite& suite : suites()) names.push_back(suite.name);
   app.description("Benchmarks that compare locus with other libraries: ratios, with results that must agree.");
@@ -79,6 +81,9 @@ void add_options(CLI::App& app, Options& options, std::string& filter) {
   app.add_option("--threads", options.threads, "Threads of the cases that use several [2]")
       ->type_name("N")
       ->check(CLI::Range(2, kMaxThreads));
+  app.add_option("--progress", progress, "When to show progress on standard error: auto, always, never [auto]")
+      ->type_name("WHEN")
+      ->check(CLI::IsMember(std::vector<std::string>{"auto", "always", "never"}));
   app.add_option("--levels", options.levels, "Folder of fetched levels [build/levels]")->type_name("FOLDER");
 }
 
@@ -87,17 +92,33 @@ int fail(const absl::Status& status, int code) {
   return code;
 }
 
-int run(const Options& options) {
+// Returns a writer of progress on standard error. `choice` is auto, always or never.
+ProgressWriter start_progress(const std::string& choice) {
+  ProgressChoice when = ProgressChoice::kAuto;
+  if (choice == "always") when = ProgressChoice::kAlways;
+  if (choice == "never") when = ProgressChoice::kNever;
+  return ProgressWriter({.style = progress_style(when, isatty(STDERR_FILENO) != 0),
+                         .now = [] { return std::chrono::steady_clock::now(); },
+                         .write = [](absl::string_view text) { std::cerr << text << std::flush; }});
+}
+
+int run(const Options& options, const std::string& progress_choice) {
   const std::vector<Suite> all = suites();
   const auto suite = std::find_if(all.begin(), all.end(), [&](const Suite& one) { return one.name == options.suite; });
-  const double start = wall_seconds();
-  const Progress progress = [start](const std::string& sentence) {
-    std::cerr << absl::StrFormat("[%5.0f s] %s", wall_seconds() - start, sentence) << std::endl;
+  ProgressWriter writer = start_progress(progress_choice);
+  const Progress progress = [&](const std::string& sentence) {
+    writer.begin({.action = "measuring", .subject = sentence});
   };
   Report report;
-  report.on_cell = [](const Cell& cell) { write_row(cell, std::cout); };
+  report.on_cell = [&](const Cell& cell) {
+    writer.hide();
+    write_row(cell, std::cout);
+    writer.show();
+  };
   write_heading(std::cout);
-  if (const absl::Status run = suite->run(options, progress, report); !run.ok()) return fail(run, 1);
+  const absl::Status run = suite->run(options, progress, report);
+  writer.hide();
+  if (!run.ok()) return fail(run, 1);
   write_closing(report, std::cout);
   if (!options.json.empty()) {
     const absl::Status written = write_json(report, options.json);
@@ -125,7 +146,8 @@ int main(int argc, char** argv) {
   locus::bench::Options options;
   options.levels = "build/levels";
   std::string filter;
-  locus::bench::add_options(app, options, filter);
+  std::string progress = "auto";
+  locus::bench::add_options(app, options, filter, progress);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -134,5 +156,5 @@ int main(int argc, char** argv) {
   const absl::StatusOr<CaseFilter> cases = CaseFilter::create(filter);
   if (!cases.ok()) return locus::bench::fail(cases.status(), 2);
   options.filter = *cases;
-  return locus::bench::run(options);
+  return locus::bench::run(options, progress);
 }

@@ -107,7 +107,7 @@ KERNELS = ("core/index/bvh/kernels/", "core/index/hash_grid/kernels/")
 # Files that may include a header of the system to advise the kernel about memory. madvise(), which asks for large
 # pages, is allowed because it changes no value.
 MEMORY_ADVICE = {"core/base/large_array.h": "sys/mman.h"}
-CLOCK_FILES = re.compile(r"core/base/mutex\.h|core/scene/(?:scene|readers/reader_tracker)\.(h|cc)")
+CLOCK_FILES = re.compile(r"core/(?:base/(?:mutex|progress_writer)|scene/(?:scene|readers/reader_tracker))\.(?:h|cc)")
 
 # Pairs of a folder and its parent that the rule about cycles treats as one folder, because the folder was split only to
 # limit its size.
@@ -172,7 +172,8 @@ def core_stands_alone(tree):
 
 
 def core_reads_no_clock(tree):
-    return [f"{path}: <chrono> is for core/base/mutex.h, core/scene/scene.* and core/scene/readers/reader_tracker.* only"
+    return [f"{path}: <chrono> is for core/base/{{mutex,progress_writer}}.*, core/scene/scene.* and core/scene/readers/"
+            "reader_tracker.* only"
             for path in tree.code("core") if not CLOCK_FILES.fullmatch(path)
             for _, target in includes(tree.files[path]) if target == "chrono"]
 

@@ -2,9 +2,9 @@
 #include <string>
 
 #include "client/cli/backup/backup_writer.h"
-#include "client/cli/backup/progress_line.h"
 #include "client/cli/commands.h"
 #include "client/cli/output.h"
+#include "client/cli/progress.h"
 #include "client/lib/client.h"
 #include "core/base/status_macros.h"
 
@@ -19,12 +19,14 @@ absl::Status back_up(const BackupOptions& options, Context& context) {
   PartialDirectory directory(options.directory, TargetRule::kNothing);
   RETURN_IF_ERROR(directory.check());
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());
-  ProgressLine line("backing up", context);
-  BackupWriter writer(directory, line.progress());
+  ProgressWriter progress = start_progress(context);
+  progress.begin({.action = "backing up", .subject = directory.target(), .unit = kProgressBytes});
+  BackupWriter writer(directory, [&](uint64_t done, uint64_t total) { progress.update(done, total); });
   const absl::StatusOr<client::BackupSize> size = client->backup(writer);
-  line.clear();
   RETURN_IF_ERROR(size.status());
+  progress.begin({.action = "syncing", .subject = directory.target()});
   RETURN_IF_ERROR(writer.finish());
+  progress.hide();
   Report report;
   report.head = {{"directory", directory.target()}, {"files", size->files}, {"bytes", size->bytes}};
   context.write(report);

@@ -31,7 +31,6 @@ BulkAnswers::BulkAnswers(const BulkQuery& query, bool follow, Context& context)
 absl::Status BulkAnswers::write(const v1::QueryResult& result, const SentRows& sent,
                                 const std::vector<client::Double3>& frames) {
   if (static_cast<size_t>(result.blocks_size()) != frames.size()) return no_fit();
-  hide_rows(context_);
   note(result);
   for (size_t i = 0; i < frames.size(); ++i) {
     const size_t end = i + 1 < frames.size() ? sent.list_starts[i + 1] : sent.rows();
@@ -109,7 +108,6 @@ void BulkAnswers::end() {
   context_.out().flush();
   const Format format = context_.options().format;
   if (truncated_ == 0 || (format != Format::kCsv && format != Format::kNdjson)) return;
-  hide_rows(context_);
   context_.err() << "warning: " << truncated_ << " rows found more than was reported, the first is "
                  << query_.layout.query << ' ' << truncated_rows_.front() << ": raise --max-results or lower --batch\n";
 }

@@ -106,12 +106,4 @@ absl::Status refused_rows(const absl::Status& status, const std::string& input, 
   return in_words(status, absl::StrCat(where, ": ", status.message()));
 }
 
-void show_rows(Context& context, const char* what, uint64_t rows) {
-  if (context.progress() == Progress::kLive) context.err() << "\r\x1b[K" << rows << ' ' << what << std::flush;
-}
-
-void hide_rows(Context& context) {
-  if (context.progress() == Progress::kLive) context.err() << "\r\x1b[K" << std::flush;
-}
-
 }  // namespace locus::cli

@@ -91,11 +91,6 @@ absl::Status in_words(const absl::Status& status, const std::string& message);
 // line of the item that the error names. If the error names no item, LINE is the range of all lines of the batch.
 absl::Status refused_rows(const absl::Status& status, const std::string& input, const SentRows& sent);
 
-// Write and clear the progress line "12345 WHAT" on the error stream. Do nothing if Context::progress() is not
-// Progress::kLive.
-void show_rows(Context& context, const char* what, uint64_t rows);
-void hide_rows(Context& context);
-
 }  // namespace locus::cli
 
 #endif  // LOCUS_CLIENT_CLI_COMMANDS_BULK_OPTIONS_H_

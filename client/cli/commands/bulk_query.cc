@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "client/cli/commands/bulk_answers.h"
 #include "client/cli/failure.h"
+#include "client/cli/progress.h"
 #include "core/base/check.h"
 #include "core/base/limits.h"
 #include "core/base/status_macros.h"
@@ -31,7 +32,12 @@ bool same(const client::Double3& a, const client::Double3& b) { return a.x == b.
 class BulkQueryRun {
  public:
   BulkQueryRun(const BulkQuery& query, const QueryOptions& options, const BulkOptions& bulk, Context& context)
-      : query_(query), options_(options), bulk_(bulk), context_(context), answers_(query, bulk.follow, context) {}
+      : query_(query),
+        options_(options),
+        bulk_(bulk),
+        context_(context),
+        progress_(start_progress(context)),
+        answers_(query, bulk.follow, context) {}
 
   absl::Status run() {
     // While a script is only checked, do not open the input: an earlier line of the script may create the file, and a
@@ -41,12 +47,13 @@ class BulkQueryRun {
     ASSIGN_OR_RETURN(client::Client* const client, context_.connect());
     reader_ = reader.get();
     stream_ = client->query_stream(options_.scene, {.max_in_flight = static_cast<int>(kBulkWindow), .reconnect = {}});
+    progress_.begin({.action = "querying", .subject = reader_->name(), .unit = "rows"});
     absl::Status status = ask_all();
     // After an error of the input, still write the answers to the batches that were already sent. After an error of the
     // server, do not wait for further answers.
     while (!refused_ && !in_flight_.empty()) status.Update(write_front());
+    progress_.hide();
     answers_.end();
-    hide_rows(context_);
     if (status.ok()) return stream_->close();
     if (answers_.rows() == 0) return status;
     return in_words(status, absl::StrCat(status.message(), "; ", answers_.rows(), " rows before it were answered"));
@@ -150,10 +157,12 @@ class BulkQueryRun {
           absl::StrCat(reader_->name(), ":", front.sent.line_range(), ": no answer within ", seconds, " s"));
     }
     const absl::StatusOr<v1::QueryResult> result = front.answer.get();
+    progress_.hide();
     absl::Status status =
         result.ok() ? answers_.write(*result, front.sent, front.frames) : explained(result.status(), front.sent);
     refused_ = !status.ok();
-    show_rows(context_, "rows answered", answers_.rows());
+    progress_.update_share(answers_.rows(), reader_->share_read());
+    progress_.show();
     return status;
   }
 
@@ -169,6 +178,7 @@ class BulkQueryRun {
   const QueryOptions& options_;
   const BulkOptions& bulk_;
   Context& context_;
+  ProgressWriter progress_;
   BulkAnswers answers_;
   RowReader* reader_ = nullptr;
   std::unique_ptr<client::QueryStream> stream_;

@@ -10,6 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/strip.h"
 #include "client/cli/failure.h"
+#include "client/cli/progress.h"
 #include "client/cli/report_stream.h"
 #include "client/lib/status.h"
 #include "core/base/check.h"
@@ -34,7 +35,7 @@ std::vector<size_t> list_starts_of(const v1::UpdateBatch& batch) {
 class BulkUpdateRun {
  public:
   BulkUpdateRun(const BulkUpdate& update, const std::string& scene, const BulkOptions& bulk, Context& context)
-      : update_(update), scene_(scene), bulk_(bulk), context_(context) {}
+      : update_(update), scene_(scene), bulk_(bulk), context_(context), progress_(start_progress(context)) {}
 
   absl::Status run() {
     // While a script is only checked, do not open the input: an earlier line of the script may create the file, and a
@@ -46,6 +47,7 @@ class BulkUpdateRun {
     client::UpdateStreamOptions options;
     options.max_in_flight = static_cast<int>(kBulkWindow);
     stream_ = client->update_stream(scene_, options);
+    progress_.begin({.action = "sending", .subject = reader_->name(), .unit = "rows"});
     absl::Status status = send_all();
     // Even after an error, wait for the acks of all batches in flight, since the report counts their items.
     while (!timed_out_ && !in_flight_.empty()) status.Update(take_front());
@@ -125,10 +127,13 @@ class BulkUpdateRun {
       return refused_rows(ack.status(), reader_->name(), front.sent);
     }
     count(*ack);
-    hide_rows(context_);
-    for (const v1::ItemError& item : ack->errors()) write_refused(item, front.sent);
-    context_.out().flush();
-    show_rows(context_, "rows applied", applied_);
+    if (ack->errors_size() > 0) {
+      progress_.hide();
+      for (const v1::ItemError& item : ack->errors()) write_refused(item, front.sent);
+      context_.out().flush();
+      progress_.show();
+    }
+    progress_.update_share(applied_ + refused_, reader_->share_read());
     return context_.out() ? absl::OkStatus() : absl::UnknownError("cannot write the output");
   }
 
@@ -156,7 +161,7 @@ class BulkUpdateRun {
   }
 
   void write_totals() {
-    hide_rows(context_);
+    progress_.hide();
     if (batches_ == 0) return;
     Report report;
     report.head = {{"applied", applied_},          {"refused", refused_},  {"batches", batches_},
@@ -179,6 +184,7 @@ class BulkUpdateRun {
   const std::string& scene_;
   const BulkOptions& bulk_;
   Context& context_;
+  ProgressWriter progress_;
   RowReader* reader_ = nullptr;
   std::unique_ptr<client::UpdateStream> stream_;
   std::deque<InFlight> in_flight_;

@@ -13,6 +13,7 @@
 #include "client/cli/extras/demo/edge_rays.h"
 #include "client/cli/levels/generate/city.h"
 #include "client/cli/levels/import/import_file.h"
+#include "client/cli/progress.h"
 #include "client/lib/query_builder.h"
 #include "client/lib/result_rows.h"
 #include "core/base/status_macros.h"
@@ -147,9 +148,9 @@ v1::QueryBatch mixed_batch(const DemoWorld& world, uint64_t seed) {
 // Builds a copy of the demo's scene at `tick` on a second server, options.compare, and sends one query batch to both
 // servers. The answers of the two servers must be equal byte for byte.
 absl::Status check_other(const client::Client& client, const DemoOptions& options, const ImportedLevel& level,
-                         const DemoWorld& world, uint64_t tick, DemoTable& table) {
+                         const DemoWorld& world, uint64_t tick, DemoTable& table, ProgressWriter& progress) {
   ASSIGN_OR_RETURN(const std::unique_ptr<client::Client> other, client::Client::connect(options.compare));
-  RETURN_IF_ERROR(create_level(*other, options.scene, level));
+  RETURN_IF_ERROR(create_level(*other, options.scene, level, progress));
   for (const v1::UpdateBatch& batch : {world.inserts(), world.moves(tick)})
     RETURN_IF_ERROR(other->apply(options.scene, batch).status());
   const v1::QueryBatch batch = mixed_batch(world, options.seed + 77);
@@ -179,27 +180,34 @@ void describe(const DemoOptions& options, const ImportedLevel& level, const Demo
 
 absl::Status demo(const DemoOptions& options, Context& context) {
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());
+  ProgressWriter progress = start_progress(context);
+  const bool generated = options.file.empty();
+  progress.begin({.action = generated ? "generating" : "reading", .subject = generated ? "city" : options.file});
   ASSIGN_OR_RETURN(const ImportedLevel level, load_level(options));
   if (level.meshes.empty()) return absl::InvalidArgumentError("the level holds no mesh");
   const DemoLevel placed = place_level(level);
-  context.err() << "level: " << level.meshes.front().name << ", " << placed.triangles << " triangles\n";
-  RETURN_IF_ERROR(create_level(*client, options.scene, level));
+  RETURN_IF_ERROR(create_level(*client, options.scene, level, progress));
 
   const DemoWorld world(placed.bounds, options.objects, options.seed);
   RETURN_IF_ERROR(client->apply(options.scene, world.inserts()).status());
-  context.err() << "moving " << options.objects << " objects " << options.rate << " times a second for "
-                << options.seconds << " s while clients query ...\n";
-  const LoadOptions load_options{options.scene, static_cast<uint64_t>(options.seconds * options.rate), options.rate,
-                                 options.seed};
+  const auto ticks = static_cast<uint64_t>(options.seconds * options.rate);
+  progress.begin({.action = "moving",
+                  .subject = absl::StrCat(options.objects, " objects while clients query"),
+                  .unit = "ticks",
+                  .total = ticks});
+  const LoadOptions load_options{options.scene, ticks, options.rate, options.seed,
+                                 [&](uint64_t sent) { progress.update(sent); }};
   ASSIGN_OR_RETURN(LoadResult load, run_load(*client, world, load_options));
 
-  context.err() << "checking answers by brute force ...\n";
+  progress.begin({.action = "checking", .subject = "answers by brute force"});
   DemoTable table;
   table.add_load("moves", load.moves, load.seconds);
   check_samples(options, placed, world, load, table);
   RETURN_IF_ERROR(check_leaks(*client, options, placed, table));
-  if (!options.compare.empty()) RETURN_IF_ERROR(check_other(*client, options, level, world, load.last_tick, table));
+  if (!options.compare.empty())
+    RETURN_IF_ERROR(check_other(*client, options, level, world, load.last_tick, table, progress));
   describe(options, level, placed, load, table);
+  progress.hide();
   context.write(table.report());
   if (table.all_wrong() == 0) return absl::OkStatus();
   return absl::InternalError(absl::StrCat(table.all_wrong(), " answers were wrong; please report this with the table"));

@@ -13,6 +13,7 @@
 #include "client/cli/failure.h"
 #include "client/cli/levels/export/scene_export.h"
 #include "client/cli/levels/mesh_fetch.h"
+#include "client/cli/progress.h"
 #include "client/lib/client.h"
 #include "core/base/status_macros.h"
 
@@ -44,7 +45,7 @@ absl::StatusOr<std::array<double, 3>> find_recentre(const ExportOptions& options
 // Reads the scene and adds to `file` the objects and instances that the options select. Returns the head of the report:
 // file, scene, epoch and revision.
 absl::StatusOr<Json> read_scene(const ExportOptions& options, SceneExport& file, client::Client& client,
-                                Context& context) {
+                                Context& context, ProgressWriter& progress) {
   Json head = {{"file", options.out}, {"scene", options.scene}};
   const auto take = [&](const v1::DumpSceneResponse& message) {
     head["epoch"] = id_json(message.epoch());
@@ -52,13 +53,11 @@ absl::StatusOr<Json> read_scene(const ExportOptions& options, SceneExport& file,
     absl::Status taken = for_each_thing(message, [&](const SceneThing& thing) {
       return is_among(things_of(options.view), thing.kind) ? file.add(thing) : absl::OkStatus();
     });
-    if (context.progress() == Progress::kLive)
-      context.err() << "\r\x1b[Kreading " << options.scene << ": " << file.things() << " things" << std::flush;
+    progress.update(file.things());
     return taken;
   };
-  const absl::Status read = client.dump(dump_request(options.scene, options.view, context), take);
-  if (context.progress() == Progress::kLive) context.err() << "\r\x1b[K" << std::flush;
-  RETURN_IF_ERROR(read);
+  progress.begin({.action = "reading", .subject = options.scene, .unit = "things"});
+  RETURN_IF_ERROR(client.dump(dump_request(options.scene, options.view, context), take));
   if (file.things() == 0)
     return absl::FailedPreconditionError(absl::StrCat("scene ", options.scene, " has nothing to export"));
   return head;
@@ -69,14 +68,17 @@ absl::Status export_scene(const ExportOptions& options, Context& context) {
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());
   ASSIGN_OR_RETURN(const auto recentre, find_recentre(options, *client));
   SceneExport file(options.scene, options.up, recentre);
-  ASSIGN_OR_RETURN(Json head, read_scene(options, file, *client, context));
+  ProgressWriter progress = start_progress(context);
+  ASSIGN_OR_RETURN(Json head, read_scene(options, file, *client, context, progress));
   uint64_t triangles = 0;
   for (const std::string& name : file.meshes()) {
-    ASSIGN_OR_RETURN(const ImportedMesh mesh, fetch_mesh(name, context));
+    ASSIGN_OR_RETURN(const ImportedMesh mesh, fetch_mesh(name, context, progress));
     triangles += mesh.indices.size() / 3;
     RETURN_IF_ERROR(file.set_mesh(name, mesh));
   }
+  progress.begin({.action = "writing", .subject = options.out});
   ASSIGN_OR_RETURN(const uint64_t bytes, file.writer().write(options.out));
+  progress.hide();
   if (recentre != std::array<double, 3>{}) {
     context.err() << "note: the file's coordinates are 32-bit floats: everything was moved by " << -recentre[0] << ","
                   << -recentre[1] << "," << -recentre[2] << " to the origin\n";

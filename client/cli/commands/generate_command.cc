@@ -11,6 +11,7 @@
 #include "client/cli/levels/generate/city.h"
 #include "client/cli/levels/generate/terrain.h"
 #include "client/cli/levels/obj_file.h"
+#include "client/cli/progress.h"
 
 namespace locus::cli {
 namespace {
@@ -33,10 +34,12 @@ struct GenerateOptions {
   PlacementOptions placement;
 };
 
-absl::Status write_file(const std::string& path, const ImportedMesh& mesh, Context& context) {
+absl::Status write_file(const std::string& path, const ImportedMesh& mesh, Context& context, ProgressWriter& progress) {
+  progress.begin({.action = "writing", .subject = path});
   std::ofstream file(path, std::ios::trunc);
   write_obj(file, mesh);
   file.close();
+  progress.hide();
   if (!file) return absl::FailedPreconditionError(absl::StrCat("cannot write ", path, ": check its folder and space"));
   Report report;
   report.head = {{"file", path}, {"triangles", mesh.indices.size() / 3}};
@@ -47,13 +50,15 @@ absl::Status write_file(const std::string& path, const ImportedMesh& mesh, Conte
 absl::Status generate(GenerateOptions options, Context& context) {
   if (options.out.empty() && options.placement.scene.empty()) options.placement.scene = context.default_scene();
   if (options.placement.scene.empty() == options.out.empty()) return usage_error("give either --scene or --out");
+  ProgressWriter progress = start_progress(context);
+  progress.begin({.action = "generating", .subject = options.kind.name});
   ImportedMesh mesh = options.kind.generate(options.triangles, options.seed);
-  if (!options.out.empty()) return write_file(options.out, mesh, context);
+  if (!options.out.empty()) return write_file(options.out, mesh, context, progress);
   if (options.placement.mesh.empty())
     mesh.name = absl::StrCat(options.kind.name, "-", options.triangles, "-", options.seed);
   ImportedLevel level;
   level.meshes.push_back(std::move(mesh));
-  return upload_and_place(options.placement, level, context);
+  return upload_and_place(options.placement, level, context, progress);
 }
 
 void add_kind(CLI::App& parent, Context& context, const Kind& kind) {

@@ -4,6 +4,7 @@
 #include "client/cli/commands.h"
 #include "client/cli/commands/mesh_placement.h"
 #include "client/cli/levels/import/import_file.h"
+#include "client/cli/progress.h"
 #include "core/base/status_macros.h"
 
 namespace locus::cli {
@@ -16,12 +17,15 @@ struct ImportCommandOptions {
 };
 
 absl::Status import(const ImportCommandOptions& options, Context& context) {
+  ProgressWriter progress = start_progress(context);
+  progress.begin({.action = "reading", .subject = options.file});
   ASSIGN_OR_RETURN(const ImportedLevel level, import_file(options.file, options.import));
+  progress.hide();
   for (const std::string& note : level.notes) context.err() << "note: " << note << '\n';
   if (!level.filtered)
     context.err() << "note: this kernel took no filter of system calls; only limits of memory, time and open files "
                      "confined the process that read the file\n";
-  return upload_and_place(options.placement, level, context);
+  return upload_and_place(options.placement, level, context, progress);
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include "client/cli/levels/mesh_fetch.h"
 #include "client/cli/levels/obj_file.h"
 #include "client/cli/output.h"
+#include "client/cli/progress.h"
 #include "core/base/status_macros.h"
 
 namespace locus::cli {
@@ -72,10 +73,13 @@ absl::Status show(const MeshOptions& options, Context& context) {
 }
 
 absl::Status download(const MeshOptions& options, Context& context) {
-  ASSIGN_OR_RETURN(const ImportedMesh mesh, fetch_mesh(options.name, context));
+  ProgressWriter progress = start_progress(context);
+  ASSIGN_OR_RETURN(const ImportedMesh mesh, fetch_mesh(options.name, context, progress));
+  progress.begin({.action = "writing", .subject = options.out});
   std::ofstream file(options.out, std::ios::trunc);
   write_obj(file, mesh);
   file.close();
+  progress.hide();
   if (!file)
     return absl::FailedPreconditionError(absl::StrCat("cannot write ", options.out, ": check its folder and space"));
   Report report;

@@ -10,34 +10,30 @@
 namespace locus::cli {
 namespace {
 
-// Returns the callback that updates the progress line of an upload. The line stays on the terminal after everything is
-// sent, because the server then builds the mesh's tree, which takes longest.
-client::UploadProgress progress_line(const std::string& name, Context& context) {
-  if (context.progress() == Progress::kSilent) return {};
-  return [&context, name](uint64_t sent, uint64_t total) {
-    constexpr uint64_t kMebibyte = 1u << 20;
-    context.err() << "\r\x1b[Kuploading " << name << ": " << sent / kMebibyte << " of " << total / kMebibyte << " MiB"
-                  << (sent == total ? ", the server is building its tree" : "") << std::flush;
-  };
-}
-
 std::string mesh_name(const PlacementOptions& options, const ImportedLevel& level, const ImportedMesh& mesh) {
   if (options.mesh.empty()) return mesh.name;
   return level.meshes.size() == 1 ? options.mesh : absl::StrCat(options.mesh, "-", mesh.name);
 }
 
-absl::StatusOr<v1::UploadMeshResponse> upload(const std::string& name, const ImportedMesh& mesh, client::Client& client,
-                                              Context& context) {
+// Uploads the mesh. After the last byte, the server builds the mesh's tree, which takes longest. `position` is added to
+// the mesh's name in the progress.
+absl::StatusOr<v1::UploadMeshResponse> upload(const std::string& name, const ImportedMesh& mesh,
+                                              const std::string& position, client::Client& client,
+                                              ProgressWriter& progress) {
   std::vector<v1::MeshPart> parts;
   for (const MeshPart& part : mesh.parts) {
     v1::MeshPart& sent = parts.emplace_back();
     sent.set_name(part.name);
     sent.set_first_triangle(part.first_triangle);
   }
-  absl::StatusOr<v1::UploadMeshResponse> uploaded = client.upload_mesh(
-      {.name = name, .vertices = mesh.vertices, .indices = mesh.indices, .parts = parts}, progress_line(name, context));
-  if (context.progress() == Progress::kLive) context.err() << "\r\x1b[K" << std::flush;
-  return uploaded;
+  const std::string subject = absl::StrCat(name, position);
+  progress.begin({.action = "uploading", .subject = subject, .unit = kProgressBytes});
+  const auto on_sent = [&](uint64_t sent, uint64_t total) {
+    progress.update(sent, total);
+    if (sent == total) progress.begin({.action = "building", .subject = absl::StrCat("the tree of ", subject)});
+  };
+  return client.upload_mesh({.name = name, .vertices = mesh.vertices, .indices = mesh.indices, .parts = parts},
+                            on_sent);
 }
 
 absl::Status create_scene(const std::string& name, client::Client& client) {
@@ -81,7 +77,8 @@ void add_placement_options(CLI::App& command, PlacementOptions& options) {
   command.add_option("--group", options.groups, "Its group [0: none]")->type_name("GROUP")->expected(1);
 }
 
-absl::Status upload_and_place(const PlacementOptions& options, const ImportedLevel& level, Context& context) {
+absl::Status upload_and_place(const PlacementOptions& options, const ImportedLevel& level, Context& context,
+                              ProgressWriter& progress) {
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());
   if (options.create) {
     RETURN_IF_ERROR(create_scene(options.scene, *client));
@@ -96,7 +93,9 @@ absl::Status upload_and_place(const PlacementOptions& options, const ImportedLev
   change.set_scene(options.scene);
   for (const ImportedMesh& mesh : level.meshes) {
     const std::string name = mesh_name(options, level, mesh);
-    ASSIGN_OR_RETURN(const v1::UploadMeshResponse uploaded, upload(name, mesh, *client, context));
+    const std::string position =
+        level.meshes.size() == 1 ? "" : absl::StrCat(" (", report.rows.size() + 1, " of ", level.meshes.size(), ")");
+    ASSIGN_OR_RETURN(const v1::UploadMeshResponse uploaded, upload(name, mesh, position, *client, progress));
     if (!uploaded.already_known()) new_meshes.push_back(name);
     add_placement(options, level, name, change);
     report.rows.push_back({{"mesh", name},
@@ -104,11 +103,13 @@ absl::Status upload_and_place(const PlacementOptions& options, const ImportedLev
                            {"zero_area_triangles", uploaded.mesh().zero_area_triangles()},
                            {"already_known", uploaded.already_known()}});
   }
+  progress.begin({.action = "placing", .subject = absl::StrCat("it in ", options.scene)});
   const absl::StatusOr<v1::ChangeInstancesResponse> placed = client->change_instances(change);
   if (!placed.ok()) {
     if (client::refused_by_server(placed.status())) delete_meshes(new_meshes, *client);
     return placed.status();
   }
+  progress.hide();
   context.remember_own(options.scene, {placed->epoch(), placed->revision()});
   for (size_t i = 0; i < report.rows.size() && static_cast<int>(i) < placed->ids_size(); ++i) {
     report.rows[i]["id"] = id_json(placed->ids(static_cast<int>(i)));

@@ -11,6 +11,7 @@
 #include "client/cli/arguments.h"
 #include "client/cli/context.h"
 #include "client/cli/levels/import/imported_mesh.h"
+#include "core/base/progress_writer.h"
 
 namespace locus::cli {
 
@@ -29,9 +30,10 @@ void add_placement_options(CLI::App& command, PlacementOptions& options);
 
 // Uploads all meshes, then places an instance of each mesh in one atomic change. The position of the instances is the
 // level's recentre translation plus `at`. Uploads nothing if the scene does not exist, and deletes the meshes that it
-// has uploaded if the server refuses to place them. Writes a report with a row per mesh. Writes progress to the error
-// stream if Context::progress() is Progress::kLive.
-absl::Status upload_and_place(const PlacementOptions& options, const ImportedLevel& level, Context& context);
+// has uploaded if the server refuses to place them. Writes a report with a row per mesh. Shows its phases through
+// `progress`, and hides it before it returns.
+absl::Status upload_and_place(const PlacementOptions& options, const ImportedLevel& level, Context& context,
+                              ProgressWriter& progress);
 
 }  // namespace locus::cli
 

@@ -16,6 +16,7 @@
 #include "client/cli/extras/render/picture.h"
 #include "client/cli/extras/render/thing_bounds.h"
 #include "client/cli/failure.h"
+#include "client/cli/progress.h"
 #include "core/base/status_macros.h"
 
 namespace locus::cli {
@@ -148,17 +149,6 @@ Json head_of(const RenderOptions& options, const Camera& camera, const CastResul
   return head;
 }
 
-// Returns the callback that updates the progress line, at most once in 100 ms.
-CastProgress progress_line(const RenderOptions& options, uint64_t rays, Context& context) {
-  if (context.progress() == Progress::kSilent) return {};
-  return [&context, rays, out = options.out, last = absl::InfinitePast()](uint64_t done) mutable {
-    const absl::Time now = absl::Now();
-    if (now - last < absl::Milliseconds(100)) return;
-    last = now;
-    context.err() << "\r\x1b[K" << out << ": " << 100 * done / rays << " % of " << rays << " rays" << std::flush;
-  };
-}
-
 absl::Status render(const RenderOptions& given, Context& context) {
   RenderOptions options = given;
   RETURN_IF_ERROR(check_line(options));
@@ -169,16 +159,18 @@ absl::Status render(const RenderOptions& given, Context& context) {
   ASSIGN_OR_RETURN(const Aabbd target, find_target(options, *client));
   const ImageSize size = *ray_image_size(options);
   ASSIGN_OR_RETURN(const Camera camera, camera_of(options.camera, target, size));
+  ProgressWriter progress = start_progress(context);
+  progress.begin({.action = "rendering", .subject = options.out, .unit = "rays", .total = size.pixels()});
   const absl::Time start = absl::Now();
-  const absl::StatusOr<CastResult> cast =
-      cast_rays(*client, camera, size, options.cast, progress_line(options, size.pixels(), context));
+  ASSIGN_OR_RETURN(const CastResult cast,
+                   cast_rays(*client, camera, size, options.cast, [&](uint64_t done) { progress.update(done); }));
   const absl::Duration took = absl::Now() - start;
-  if (context.progress() == Progress::kLive) context.err() << "\r\x1b[K" << std::flush;
-  RETURN_IF_ERROR(cast.status());
+  progress.begin({.action = "writing", .subject = options.out});
   Report report;
-  report.head = head_of(options, camera, *cast, took);
-  const Picture picture = paint(options, cast->image, camera, report.head);
+  report.head = head_of(options, camera, cast, took);
+  const Picture picture = paint(options, cast.image, camera, report.head);
   RETURN_IF_ERROR(write_png(options.out, reduced(picture, rays_a_side(options))));
+  progress.hide();
   context.write(report);
   return absl::OkStatus();
 }

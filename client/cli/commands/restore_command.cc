@@ -1,10 +1,10 @@
 #include <memory>
 #include <string>
 
-#include "client/cli/backup/progress_line.h"
 #include "client/cli/backup/read_backup.h"
 #include "client/cli/commands.h"
 #include "client/cli/output.h"
+#include "client/cli/progress.h"
 #include "core/base/status_macros.h"
 
 namespace locus::cli {
@@ -16,13 +16,19 @@ struct RestoreOptions {
   bool verify_only = false;
 };
 
+// Reads the backup, and copies it to `copy` unless that is null. Shows the progress as `action`.
+absl::StatusOr<client::BackupSize> read_with_progress(const std::string& backup, PartialDirectory* copy,
+                                                      const std::string& action, ProgressWriter& progress) {
+  progress.begin({.action = action, .subject = backup, .unit = kProgressBytes});
+  return read_backup(backup, copy, [&](uint64_t done, uint64_t total) { progress.update(done, total); });
+}
+
 absl::Status verify(const RestoreOptions& options, Context& context) {
-  ProgressLine line("verifying", context);
-  const absl::StatusOr<client::BackupSize> size = read_backup(options.backup, nullptr, line.progress());
-  line.clear();
-  RETURN_IF_ERROR(size.status());
+  ProgressWriter progress = start_progress(context);
+  ASSIGN_OR_RETURN(const client::BackupSize size, read_with_progress(options.backup, nullptr, "verifying", progress));
+  progress.hide();
   Report report;
-  report.head = {{"backup", options.backup}, {"files", size->files}, {"bytes", size->bytes}, {"whole", true}};
+  report.head = {{"backup", options.backup}, {"files", size.files}, {"bytes", size.bytes}, {"whole", true}};
   context.write(report);
   return absl::OkStatus();
 }
@@ -34,13 +40,13 @@ absl::Status restore(const RestoreOptions& options, Context& context) {
   if (options.data_dir.empty()) return usage_error("give the DATA_DIR to restore into, or --verify-only");
   PartialDirectory copy(options.data_dir, TargetRule::kNothingOrEmpty);
   RETURN_IF_ERROR(copy.check());
-  ProgressLine line("restoring", context);
-  const absl::StatusOr<client::BackupSize> size = read_backup(options.backup, &copy, line.progress());
-  line.clear();
-  RETURN_IF_ERROR(size.status());
+  ProgressWriter progress = start_progress(context);
+  ASSIGN_OR_RETURN(const client::BackupSize size, read_with_progress(options.backup, &copy, "restoring", progress));
+  progress.begin({.action = "syncing", .subject = copy.target()});
   RETURN_IF_ERROR(copy.keep());
+  progress.hide();
   Report report;
-  report.head = {{"data_dir", copy.target()}, {"files", size->files}, {"bytes", size->bytes}};
+  report.head = {{"data_dir", copy.target()}, {"files", size.files}, {"bytes", size.bytes}};
   context.write(report);
   context.err() << "next: `locusd check " << copy.target() << "`, then `locusd --data-dir " << copy.target()
                 << "`; where the daemon runs as another user, give it the directory first (chown -R)\n";

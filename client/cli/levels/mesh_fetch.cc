@@ -7,18 +7,11 @@
 
 namespace locus::cli {
 
-absl::StatusOr<ImportedMesh> fetch_mesh(const std::string& name, Context& context) {
+absl::StatusOr<ImportedMesh> fetch_mesh(const std::string& name, Context& context, ProgressWriter& progress) {
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());
-  client::DownloadProgress progress;
-  if (context.progress() == Progress::kLive) {
-    progress = [&](uint64_t received, uint64_t total) {
-      constexpr uint64_t kMebibyte = 1u << 20;
-      context.err() << "\r\x1b[Kdownloading " << name << ": " << received / kMebibyte << " of " << total / kMebibyte
-                    << " MiB" << std::flush;
-    };
-  }
-  absl::StatusOr<client::DownloadedMesh> mesh = client->download_mesh(name, progress);
-  if (context.progress() == Progress::kLive) context.err() << "\r\x1b[K" << std::flush;
+  progress.begin({.action = "downloading", .subject = name, .unit = kProgressBytes});
+  absl::StatusOr<client::DownloadedMesh> mesh =
+      client->download_mesh(name, [&](uint64_t received, uint64_t total) { progress.update(received, total); });
   RETURN_IF_ERROR(mesh.status());
   ImportedMesh result;
   result.name = name;

@@ -1,4 +1,4 @@
-// Download of a mesh from the server into memory, with a progress line. For commands that write meshes to files. A
+// Download of a mesh from the server into memory, with its progress. For commands that write meshes to files. A
 // function without state.
 #ifndef LOCUS_CLIENT_CLI_LEVELS_MESH_FETCH_H_
 #define LOCUS_CLIENT_CLI_LEVELS_MESH_FETCH_H_
@@ -8,12 +8,13 @@
 #include "absl/status/statusor.h"
 #include "client/cli/context.h"
 #include "client/cli/levels/import/imported_mesh.h"
+#include "core/base/progress_writer.h"
 
 namespace locus::cli {
 
-// Downloads the mesh `name` with all its parts. Writes progress to the error stream if Context::progress() is
-// Progress::kLive. Returns the errors of Context::connect() and of the download.
-absl::StatusOr<ImportedMesh> fetch_mesh(const std::string& name, Context& context);
+// Downloads the mesh `name` with all its parts. Returns the errors of Context::connect() and of the
+// download.
+absl::StatusOr<ImportedMesh> fetch_mesh(const std::string& name, Context& context, ProgressWriter& progress);
 
 }  // namespace locus::cli
 

@@ -56,7 +56,7 @@ DirectoryReport report_of(const DamageReport& damage_report) {
   return report;
 }
 
-absl::StatusOr<DirectoryReport> check(const StorageOptions& given) {
+absl::StatusOr<DirectoryReport> check(const StorageOptions& given, ProgressWriter* progress) {
   const StorageOptions options = with_defaults(given);
   const DatabaseOptions wanted = database_options_of(options);
   if (!options.env->FileExists(wanted.folder).ok() &&
@@ -74,6 +74,7 @@ absl::StatusOr<DirectoryReport> check(const StorageOptions& given) {
     report.damage = std::string(list.message());
     if (!list.ok()) return report;
   }
+  if (progress != nullptr) progress->begin({.action = "opening", .subject = options.path});
   std::unique_ptr<Database> database;
   const rocksdb::Status strict = Database::open(wanted, OpenMode::kReadOnly, database);
   if (!strict.ok() && !is_damage(strict)) return disk_error(absl::StrCat("opening ", options.path), strict);
@@ -81,8 +82,9 @@ absl::StatusOr<DirectoryReport> check(const StorageOptions& given) {
     report.damage = strict.ToString();
     return report;
   }
+  if (progress != nullptr) progress->begin({.action = "checking", .subject = options.path, .unit = kProgressBytes});
   ASSIGN_OR_RETURN(const DamageReport damage_report,
-                   verify(*database, durable_marker.ok() ? &*durable_marker : nullptr, Depth::kEverything));
+                   verify(*database, durable_marker.ok() ? &*durable_marker : nullptr, Depth::kEverything, progress));
   report = report_of(damage_report);
   report.closed_in_order = durable_marker.ok() && durable_marker->closed;
   return report;

@@ -47,8 +47,8 @@ struct DirectoryReport {
 
 // Verifies every byte of the data directory. Damage is part of the report, not an error. Errors: NOT_FOUND if there is
 // no data directory, FAILED_PRECONDITION if a process has the directory open or this version of locusd does not know
-// its format, UNAVAILABLE if the disk fails.
-absl::StatusOr<DirectoryReport> check(const StorageOptions& options);
+// its format, UNAVAILABLE if the disk fails. Shows its phases through `progress`, if that is not null.
+absl::StatusOr<DirectoryReport> check(const StorageOptions& options, ProgressWriter* progress = nullptr);
 
 // Converts the result of verify() to the report that `locusd check` prints.
 DirectoryReport report_of(const DamageReport& damage_report);

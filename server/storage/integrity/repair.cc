@@ -33,10 +33,12 @@ absl::Status move_if_exists(const fs::path& from, const fs::path& to) {
 // Writer of rows, records and chunks into the new database, in batches of about kBatchBytes.
 class Copier {
  public:
-  explicit Copier(Database& target) : target_(target) {}
+  Copier(Database& target, ProgressWriter* progress) : target_(target), progress_(progress) {}
 
   void put(rocksdb::ColumnFamilyHandle* family, const std::string& key, const std::string& value) {
     LOCUS_CHECK(batch_.Put(family, key, value).ok());
+    bytes_ += value.size();
+    if (progress_ != nullptr) progress_->update(bytes_);
   }
   absl::Status write_if_large() { return batch_.GetDataSize() < kBatchBytes ? absl::OkStatus() : write(false); }
   absl::Status write(bool sync) {
@@ -50,6 +52,8 @@ class Copier {
  private:
   Database& target_;
   rocksdb::WriteBatch batch_;
+  ProgressWriter* const progress_;
+  uint64_t bytes_ = 0;  // bytes of all values
 };
 
 absl::Status copy_chunks(const Database& source, rocksdb::ColumnFamilyHandle* from, rocksdb::ColumnFamilyHandle* to,
@@ -170,14 +174,16 @@ absl::Status copy_mesh(const Database& source, const MeshHealth& found, Copier& 
 }
 
 absl::Status make_copy(const Database& source, const DamageReport& damage_report, const DurableMarker* expected,
-                       const StorageOptions& options, const std::string& folder, RepairReport& report) {
+                       const StorageOptions& options, const std::string& folder, RepairReport& report,
+                       ProgressWriter* progress) {
+  if (progress != nullptr) progress->begin({.action = "copying", .subject = "the intact part", .unit = kProgressBytes});
   DatabaseOptions wanted = database_options_of(options);
   wanted.folder = absl::StrCat(folder, "/", kDatabaseFolder);
   std::unique_ptr<Database> target;
   rocksdb::Status opened = options.env->CreateDirIfMissing(folder);
   if (opened.ok()) opened = Database::open(wanted, OpenMode::kCreate, target);
   if (!opened.ok()) return disk_error("making the repaired database", opened);
-  Copier copier(*target);
+  Copier copier(*target, progress);
   Result result;
   DurableMarker& durable_marker = result.durable_marker;
   if (expected != nullptr) durable_marker.next_scene = expected->next_scene;
@@ -273,12 +279,14 @@ absl::StatusOr<std::unique_ptr<Database>> open_source(const StorageOptions& opti
 // Verifies the database and writes its intact parts to `folder`. If the database could be opened and is intact, writes
 // nothing, and `folder` does not exist afterwards. Sets report.found.
 absl::Status verify_and_copy(const StorageOptions& options, const DurableMarker* expected, const std::string& folder,
-                             RepairReport& report) {
+                             RepairReport& report, ProgressWriter* progress) {
+  if (progress != nullptr) progress->begin({.action = "opening", .subject = options.path});
   ASSIGN_OR_RETURN(const auto source, open_source(options, expected, folder));
-  ASSIGN_OR_RETURN(const DamageReport damage_report, verify(*source, expected, Depth::kEverything));
+  if (progress != nullptr) progress->begin({.action = "checking", .subject = options.path, .unit = kProgressBytes});
+  ASSIGN_OR_RETURN(const DamageReport damage_report, verify(*source, expected, Depth::kEverything, progress));
   report.found = report_of(damage_report);
   if (report.found.intact() && !fs::exists(folder)) return absl::OkStatus();
-  return make_copy(*source, damage_report, expected, options, folder, report);
+  return make_copy(*source, damage_report, expected, options, folder, report, progress);
 }
 
 std::string outcome_of(const SceneRepair& scene) {
@@ -296,7 +304,7 @@ std::string outcome_of(const MeshRepair& mesh) {
 
 }  // namespace
 
-absl::StatusOr<RepairReport> repair(const StorageOptions& given) {
+absl::StatusOr<RepairReport> repair(const StorageOptions& given, ProgressWriter* progress) {
   const StorageOptions options = with_defaults(given);
   const std::string folder = absl::StrCat(options.path, "/", kRepairedFolder);
   RepairReport report;
@@ -309,7 +317,7 @@ absl::StatusOr<RepairReport> repair(const StorageOptions& given) {
   fs::remove_all(folder, failed);
   const absl::StatusOr<DurableMarker> durable_marker = DurableMarkerFile::read(*options.env, options.path);
   const DurableMarker* expected = durable_marker.ok() ? &*durable_marker : nullptr;
-  if (absl::Status copied = verify_and_copy(options, expected, folder, report); !copied.ok()) {
+  if (absl::Status copied = verify_and_copy(options, expected, folder, report, progress); !copied.ok()) {
     fs::remove_all(folder, failed);
     return copied;
   }

@@ -47,8 +47,9 @@ struct RepairReport {
 // Repairs the directory. Needs disk space for a copy of the intact part. After an error or a crash, either the
 // directory is unchanged, or the next call of repair() finishes this repair. Errors: NOT_FOUND if the directory does
 // not exist; FAILED_PRECONDITION if a process has it open or this version of locusd does not know its format; DATA_LOSS
-// if no part is readable; RESOURCE_EXHAUSTED if the disk is full; UNAVAILABLE for any other error of the disk.
-absl::StatusOr<RepairReport> repair(const StorageOptions& options);
+// if no part is readable; RESOURCE_EXHAUSTED if the disk is full; UNAVAILABLE for any other error of the disk. Shows
+// its phases through `progress`, if that is not null.
+absl::StatusOr<RepairReport> repair(const StorageOptions& options, ProgressWriter* progress = nullptr);
 
 // Returns the report as text for people, with one line for each damaged scene and mesh.
 std::string to_text(const RepairReport& report);

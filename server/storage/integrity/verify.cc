@@ -111,20 +111,45 @@ std::string log_damage(SceneHealth& scene, const SceneMarker* scene_marker, cons
   return "";
 }
 
+// Counts the bytes that verify() reads, for its progress.
+class ReadCounter {
+ public:
+  explicit ReadCounter(ProgressWriter* progress) : progress_(progress) {}
+
+  // Adds bytes that will be read.
+  void expect(uint64_t bytes) { total_ += bytes; }
+  void count(size_t bytes) {
+    done_ += bytes;
+    if (progress_ != nullptr) progress_->update(done_, total_);
+  }
+
+ private:
+  ProgressWriter* const progress_;
+  uint64_t done_ = 0;
+  uint64_t total_ = 0;
+};
+
 // Reads every byte of the scene's snapshot and records. Returns a description of the damage; empty if all are intact.
-std::string deep_damage(const SceneHealth& scene, const Database& database, absl::Status& disk) {
+std::string deep_damage(const SceneHealth& scene, const Database& database, ReadCounter& counter, absl::Status& disk) {
   const SceneRow& row = *scene.row;
-  const auto discard = [](absl::string_view) { return absl::OkStatus(); };
+  const auto discard = [&](absl::string_view chunk) {
+    counter.count(chunk.size());
+    return absl::OkStatus();
+  };
   absl::Status status =
       read_chunks(database, database.snapshot(), snapshot_prefix(row.key, row.snapshot_id), row.snapshot, discard);
   if (!status.ok()) return absl::StrCat("its snapshot: ", damage_of(status, disk));
   status = read_records(database, row.key, row.snapshot_sequence + 1, scene.last, row.running_checksum,
-                        [](const LogRecord&) { return absl::OkStatus(); });
+                        [&](const LogRecord& record) {
+                          counter.count(record.entry.bytes.size());
+                          return absl::OkStatus();
+                        });
   return damage_of(status, disk);
 }
 
 absl::Status verify_scene(SceneHealth& scene, const SceneMarker* scene_marker, const DurableMarker* expected,
-                          const CatalogueState& catalogue, const Database& database, Depth depth) {
+                          const CatalogueState& catalogue, const Database& database, Depth depth,
+                          ReadCounter& counter) {
   absl::Status disk;
   if (scene_marker != nullptr) scene.expected_sequence = scene_marker->sequence;
   scene.copied = scene_marker != nullptr && scene_marker->copied;
@@ -135,14 +160,17 @@ absl::Status verify_scene(SceneHealth& scene, const SceneMarker* scene_marker, c
     std::string log =
         log_damage(scene, scene_marker, expected == nullptr ? DurableMarker() : *expected, database, disk);
     if (damage.empty()) damage = std::move(log);
-    if (damage.empty() && depth == Depth::kEverything) damage = deep_damage(scene, database, disk);
+    if (damage.empty() && depth == Depth::kEverything) {
+      counter.expect(scene.log_bytes);
+      damage = deep_damage(scene, database, counter, disk);
+    }
   }
   if (scene.damage.empty()) scene.damage = std::move(damage);
   return disk;
 }
 
 absl::Status find_scenes(const DurableMarker* expected, const CatalogueState& catalogue, const Database& database,
-                         Depth depth, DamageReport& found) {
+                         Depth depth, ReadCounter& counter, DamageReport& found) {
   std::map<SceneKey, SceneHealth> scenes;
   std::map<SceneKey, const SceneMarker*> scene_markers;
   for (const auto& [key, value] : found.rows) {
@@ -169,13 +197,13 @@ absl::Status find_scenes(const DurableMarker* expected, const CatalogueState& ca
   for (auto& [key, scene] : scenes) {
     const auto scene_marker = scene_markers.find(key);
     RETURN_IF_ERROR(verify_scene(scene, scene_marker == scene_markers.end() ? nullptr : scene_marker->second, expected,
-                                 catalogue, database, depth));
+                                 catalogue, database, depth, counter));
     found.scenes.push_back(std::move(scene));
   }
   return absl::OkStatus();
 }
 
-absl::Status find_meshes(const Database& database, Depth depth, DamageReport& found) {
+absl::Status find_meshes(const Database& database, Depth depth, ReadCounter& counter, DamageReport& found) {
   absl::Status disk;
   const std::string start(1, kMeshTag);
   for (auto row = found.rows.lower_bound(start); row != found.rows.end() && row->first[0] == kMeshTag; ++row) {
@@ -192,7 +220,10 @@ absl::Status find_meshes(const Database& database, Depth depth, DamageReport& fo
     if (list) mesh.content = *list;
     if (!list && mesh.damage.empty()) mesh.damage = "its content is lost";
     if (!mesh.damage.empty() || depth == Depth::kKeys) continue;
-    const auto nowhere = [](absl::string_view) { return absl::OkStatus(); };
+    const auto nowhere = [&](absl::string_view chunk) {
+      counter.count(chunk.size());
+      return absl::OkStatus();
+    };
     absl::Status read = read_chunks(database, database.mesh(), mesh_prefix(mesh.sha256, mesh.content.content_id),
                                     mesh.content.chunks, nowhere);
     if (read.ok() && mesh.parts)
@@ -203,9 +234,27 @@ absl::Status find_meshes(const Database& database, Depth depth, DamageReport& fo
   return disk;
 }
 
+// Adds to `counter` the bytes of all snapshots and meshes in the catalogue. The bytes of a log are known only after its
+// scan.
+void expect_rows(const DamageReport& found, ReadCounter& counter) {
+  for (const auto& [key, value] : found.rows) {
+    if (key[0] == kSceneTag) {
+      const std::optional<SceneRow> scene = decode_scene(*verified(key, value));
+      if (scene) counter.expect(scene->snapshot.bytes);
+    } else if (key[0] == kMeshTag) {
+      const std::optional<MeshRow> mesh = decode_mesh(*verified(key, value));
+      const auto content = mesh ? found.rows.find(content_key(mesh->sha256)) : found.rows.end();
+      if (content == found.rows.end()) continue;
+      const std::optional<ContentRow> list = decode_content(*verified(content->first, content->second));
+      if (list) counter.expect(list->chunks.bytes);
+    }
+  }
+}
+
 }  // namespace
 
-absl::StatusOr<DamageReport> verify(const Database& database, const DurableMarker* durable_marker, Depth depth) {
+absl::StatusOr<DamageReport> verify(const Database& database, const DurableMarker* durable_marker, Depth depth,
+                                    ProgressWriter* progress) {
   DamageReport found;
   RETURN_IF_ERROR(read_meta(database, found));
   CatalogueState catalogue;
@@ -221,8 +270,10 @@ absl::StatusOr<DamageReport> verify(const Database& database, const DurableMarke
     found.catalogue_damage =
         "the catalogue of scenes is not the latest one: names may be missing, or deleted ones may be present";
   }
-  absl::Status disk = find_scenes(durable_marker, catalogue, database, depth, found);
-  if (disk.ok()) disk = find_meshes(database, depth, found);
+  ReadCounter counter(progress);
+  if (progress != nullptr) expect_rows(found, counter);
+  absl::Status disk = find_scenes(durable_marker, catalogue, database, depth, counter, found);
+  if (disk.ok()) disk = find_meshes(database, depth, counter, found);
   RETURN_IF_ERROR(disk);
   return found;
 }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "core/base/progress_writer.h"
 #include "core/scene/log/update_log.h"
 #include "server/storage/integrity/durable_marker.h"
 #include "server/storage/rocksdb/catalogue.h"
@@ -58,7 +59,9 @@ enum class Depth : uint8_t { kKeys, kEverything };
 // Verifies the database against the durable marker. `durable_marker` is null if the marker is lost; then all scenes and
 // meshes count as damaged. Errors: UNAVAILABLE if the disk fails, FAILED_PRECONDITION if this version of locusd does
 // not know the directory's format.
-absl::StatusOr<DamageReport> verify(const Database& database, const DurableMarker* durable_marker, Depth depth);
+// With `progress`, counts in its current phase the bytes that were read.
+absl::StatusOr<DamageReport> verify(const Database& database, const DurableMarker* durable_marker, Depth depth,
+                                    ProgressWriter* progress = nullptr);
 
 // Returns advice on how to repair the data directory `path`, to be appended to an error message about damage.
 std::string repair_hint(const std::string& path);

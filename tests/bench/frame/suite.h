@@ -11,7 +11,7 @@
 
 namespace locus::bench {
 
-// Function that prints a sentence about the progress on standard error.
+// Function that shows a sentence as the phase of the progress.
 using Progress = std::function<void(const std::string& sentence)>;
 
 struct Suite {

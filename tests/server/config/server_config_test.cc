@@ -68,6 +68,12 @@ TEST_F(ServerConfigTest, CheckAndRepairTakeTheDirectoryFromTheLineOrFromTheOptio
   EXPECT_EQ(repair.maintenance->directory, "/kept");
 }
 
+TEST_F(ServerConfigTest, CheckAndRepairChooseWhenToShowProgress) {
+  EXPECT_EQ(read({"check", "/data"}).maintenance->progress, ProgressChoice::kAuto);
+  EXPECT_EQ(read({"repair", "/data", "--progress", "always"}).maintenance->progress, ProgressChoice::kAlways);
+  EXPECT_EQ(read({"check", "/data", "--progress", "sometimes"}).exit_code, 2);
+}
+
 TEST_F(ServerConfigTest, CheckWithoutADirectoryIsAMistake) {
   const Invocation invocation = read({"check"});
   EXPECT_FALSE(invocation.maintenance.has_value());

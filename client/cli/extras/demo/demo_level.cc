@@ -46,7 +46,8 @@ DemoLevel place_level(const ImportedLevel& level) {
   return placed;
 }
 
-absl::Status create_level(const client::Client& client, const std::string& scene, const ImportedLevel& level) {
+absl::Status create_level(const client::Client& client, const std::string& scene, const ImportedLevel& level,
+                          ProgressWriter& progress) {
   RETURN_IF_ERROR(remove_level(client, scene, level.meshes.size()));
   v1::CreateSceneRequest create;
   create.set_name(scene);
@@ -56,12 +57,18 @@ absl::Status create_level(const client::Client& client, const std::string& scene
   for (size_t i = 0; i < level.meshes.size(); ++i) {
     const ImportedMesh& mesh = level.meshes[i];
     const client::MeshColumns columns{mesh_name(scene, i), mesh.vertices, mesh.indices};
-    RETURN_IF_ERROR(client.upload_mesh(columns).status());
+    progress.begin({.action = "uploading", .subject = mesh.name, .unit = kProgressBytes});
+    const auto on_sent = [&](uint64_t sent, uint64_t total) {
+      progress.update(sent, total);
+      if (sent == total) progress.begin({.action = "building", .subject = absl::StrCat("the tree of ", mesh.name)});
+    };
+    RETURN_IF_ERROR(client.upload_mesh(columns, on_sent).status());
     v1::Placement& placement = *change.add_place();
     placement.set_mesh(columns.name);
     placement.add_ids(i + 1);
     for (const double x : level.recentre) placement.add_translations(x);
   }
+  progress.begin({.action = "placing", .subject = absl::StrCat("it in ", scene)});
   return client.change_instances(change).status();
 }
 

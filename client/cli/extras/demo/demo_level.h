@@ -10,6 +10,7 @@
 #include "client/cli/extras/demo/brute_force.h"
 #include "client/cli/levels/import/imported_mesh.h"
 #include "client/lib/client.h"
+#include "core/base/progress_writer.h"
 
 namespace locus::cli {
 
@@ -23,7 +24,9 @@ struct DemoLevel {
 DemoLevel place_level(const ImportedLevel& level);
 
 // Creates `scene` on the server and places the level's meshes in it. Deletes an existing scene of that name first.
-absl::Status create_level(const client::Client& client, const std::string& scene, const ImportedLevel& level);
+// Shows the uploads through `progress`.
+absl::Status create_level(const client::Client& client, const std::string& scene, const ImportedLevel& level,
+                          ProgressWriter& progress);
 
 }  // namespace locus::cli
 

@@ -109,6 +109,7 @@ absl::Status write(const client::Client& client, const DemoWorld& world, const L
       if (result.first_revision == 0) result.first_revision = ack->revision();
     });
     error.report(status);
+    if (options.on_tick) options.on_tick(tick);
     std::this_thread::sleep_until(start + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(
                                               static_cast<double>(tick) / options.ticks_a_second)));
   }

@@ -3,6 +3,7 @@
 #define LOCUS_CLIENT_CLI_EXTRAS_DEMO_DEMO_LOAD_H_
 
 #include <array>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,7 @@ struct LoadOptions {
   uint64_t ticks = 150;
   double ticks_a_second = 30;
   uint64_t seed = 1;
+  std::function<void(uint64_t ticks)> on_tick = {};  // called in the calling thread with the number of ticks sent
 };
 
 struct Sample {

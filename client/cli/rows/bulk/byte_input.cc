@@ -25,16 +25,21 @@ absl::StatusOr<ByteInput> ByteInput::open(const std::string& path) {
   if (descriptor < 0) return absl::InvalidArgumentError(absl::StrCat("cannot open ", path, ": ", words_of(errno)));
   ByteInput input(descriptor, path);
   struct stat status {};
-  if (fstat(descriptor, &status) == 0 && S_ISDIR(status.st_mode)) {
+  if (fstat(descriptor, &status) != 0) return input;
+  if (S_ISDIR(status.st_mode)) {
     return absl::InvalidArgumentError(absl::StrCat(path, " is a folder: give a file, or - for the standard input"));
   }
+  if (S_ISREG(status.st_mode)) input.size_ = static_cast<uint64_t>(status.st_size);
   return input;
 }
 
 ByteInput::ByteInput(int descriptor, std::string name) : descriptor_(descriptor), name_(std::move(name)) {}
 
 ByteInput::ByteInput(ByteInput&& other) noexcept
-    : descriptor_(std::exchange(other.descriptor_, -1)), name_(std::move(other.name_)) {}
+    : descriptor_(std::exchange(other.descriptor_, -1)),
+      name_(std::move(other.name_)),
+      size_(other.size_),
+      read_(other.read_) {}
 
 ByteInput::~ByteInput() {
   if (descriptor_ > STDIN_FILENO) close(descriptor_);
@@ -43,7 +48,10 @@ ByteInput::~ByteInput() {
 absl::StatusOr<size_t> ByteInput::read(absl::Span<char> buffer) {
   while (true) {
     const ssize_t count = ::read(descriptor_, buffer.data(), buffer.size());
-    if (count >= 0) return static_cast<size_t>(count);
+    if (count >= 0) {
+      read_ += static_cast<uint64_t>(count);
+      return static_cast<size_t>(count);
+    }
     if (errno != EINTR) return absl::UnknownError(absl::StrCat("cannot read ", name_, ": ", words_of(errno)));
   }
 }

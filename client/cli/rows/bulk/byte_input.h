@@ -3,8 +3,10 @@
 #ifndef LOCUS_CLIENT_CLI_ROWS_BULK_BYTE_INPUT_H_
 #define LOCUS_CLIENT_CLI_ROWS_BULK_BYTE_INPUT_H_
 
+#include <algorithm>
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <string>
 
 #include "absl/status/statusor.h"
@@ -33,12 +35,19 @@ class ByteInput {
   bool ready_within(std::chrono::milliseconds wait) const;
 
   const std::string& name() const { return name_; }
+  // Returns the part of a regular file that read() has returned, from 0 to 1; negative if the size of the input is
+  // unknown, as that of a pipe.
+  double share_read() const {
+    return size_ == 0 ? -1 : std::min(1.0, static_cast<double>(read_) / static_cast<double>(size_));
+  }
 
  private:
   ByteInput(int descriptor, std::string name);
 
   int descriptor_;
   std::string name_;
+  uint64_t size_ = 0;  // 0 = unknown
+  uint64_t read_ = 0;
 };
 
 }  // namespace locus::cli

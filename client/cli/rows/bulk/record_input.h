@@ -38,6 +38,7 @@ class RecordInput {
   absl::StatusOr<Arrival> next(Record& record, std::optional<Clock::time_point> pause_at);
 
   const std::string& name() const { return input_.name(); }
+  double share_read() const { return input_.share_read(); }
   // Returns the line where the record of the last call of next() begins, from 1, even if that call failed.
   uint64_t line() const { return line_; }
 

@@ -46,6 +46,8 @@ class RowReader {
 
   const RowSchema& schema() const { return schema_; }
   const std::string& name() const { return input_.name(); }
+  // Returns the part of the input that was read, as ByteInput::share_read().
+  double share_read() const { return input_.share_read(); }
 
  private:
   absl::StatusOr<BatchEnd> fill(size_t max_rows, Patience patience, RowBatch& batch);

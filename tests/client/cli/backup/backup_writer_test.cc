@@ -27,7 +27,7 @@ TEST_F(BackupCommandTest, TheBackupHasChecksumsThatCoreutilsVerifies) {
 
 TEST_F(BackupCommandTest, ProgressIsWrittenOnlyIfLive) {
   const Outcome outcome = run({"backup", backup_}, Progress::kLive);
-  EXPECT_THAT(outcome.err, HasSubstr("backing up: 0 of 0 MiB"));
+  EXPECT_THAT(outcome.err, HasSubstr("backing up " + backup_));
   EXPECT_THAT(run({"backup", folder_.file("quiet")}).err, IsEmpty());
 }
 
