@@ -39,6 +39,11 @@ void Context::cancel_calls() {
 
 void Context::write(const Report& report) { write_report(*out_, options_.format, report); }
 
+void Context::acknowledge(const Report& report, const std::string& text) {
+  if (options_.format != Format::kTable) return write(report);
+  if (!options_.quiet) *out_ << text << '\n';
+}
+
 std::optional<client::Revision> Context::own(const std::string& scene) const {
   const auto found = own_.find(scene);
   if (found == own_.end()) return std::nullopt;

@@ -26,6 +26,7 @@ struct GlobalOptions {
   std::optional<double> timeout_seconds;  // none = the library's defaults, which are longer for uploads
   Format format = Format::kTable;
   ProgressChoice progress = ProgressChoice::kAuto;
+  bool quiet = false;  // no progress, no acknowledgements in tables, no hints
 };
 
 using Progress = ProgressStyle;
@@ -47,7 +48,11 @@ class Context {
   std::ostream& redirect_out(std::ostream& out) { return *std::exchange(out_, &out); }
   std::ostream& err() { return err_; }
   // Returns the style in which commands write their progress to err().
-  Progress progress() const { return progress_style(options_.progress, automatic_ == Progress::kLive); }
+  Progress progress() const {
+    if (options_.quiet) return Progress::kSilent;
+    return progress_style(options_.progress, automatic_ == Progress::kLive);
+  }
+  Format format() const { return options_.format; }
 
   // Returns the address of the server. Must be called after the line was parsed, since the line, the environment or a
   // named context can set the address.
@@ -62,6 +67,9 @@ class Context {
 
   // Writes `report` to out() in the format of options().
   void write(const Report& report);
+  // Writes the report of a change that was made. In the format kTable, writes only the line `text`, or nothing with
+  // --quiet.
+  void acknowledge(const Report& report, const std::string& text);
 
   // Returns the scene used by lines that name no scene. If the default scene is empty, every line must name its scene.
   const std::string& default_scene() const { return default_scene_; }

@@ -145,8 +145,8 @@ ExitCode exit_code_of(const absl::Status& status) {
   }
 }
 
-void write_failure(std::ostream& err, Format format, const absl::Status& status) {
-  const std::string hint = hint_of(status);
+void write_failure(std::ostream& err, Format format, const absl::Status& status, Hints hints) {
+  const std::string hint = hints == Hints::kShown ? hint_of(status) : "";
   if (format == Format::kJson || format == Format::kNdjson) {
     Report report;
     report.head["error"] = failure_json(status, hint);

@@ -34,10 +34,13 @@ absl::Status with_place(const absl::Status& status, absl::string_view place);
 
 ExitCode exit_code_of(const absl::Status& status);
 
+// Choice whether a failure is written with its hint.
+enum class Hints { kShown, kHidden };
+
 // Writes a line "error: ..." and, if there is a hint, a line "hint: ...". With json and ndjson, writes one object on
 // one line instead: {"error": {"code", "message", "reason", "field", "index", "limit", "hint"}}. Keys without a value
 // are omitted.
-void write_failure(std::ostream& err, Format format, const absl::Status& status);
+void write_failure(std::ostream& err, Format format, const absl::Status& status, Hints hints = Hints::kShown);
 
 // Returns OK if the server refused no item of the batch. Otherwise returns an error that contains the number of refused
 // items and the reason of the first one. The code is NOT_FOUND if every refused item that the ack lists has an unknown

@@ -134,8 +134,10 @@ std::string in_words(const LineReader& reader, absl::string_view message) {
   const std::pair<absl::string_view, absl::string_view> parts = absl::StrSplit(rest, absl::MaxSplits(" = ", 1));
   const CLI::Option* const option = reader.find_option(std::string(parts.first));
   if (option == nullptr) return std::string(message);
+  int64_t number = 0;
+  const bool negative = absl::SimpleAtoi(parts.second, &number) && number < 0;
   return absl::StrCat(parts.first, " ", option->get_type_name(), ": cannot read '", parts.second.substr(0, kMaxQuoted),
-                      "'");
+                      negative ? "': it cannot be negative" : "'");
 }
 
 }  // namespace

@@ -41,6 +41,7 @@ struct Refusal {
   int code = 0;
   std::string out;
   std::string err;
+  std::string hint;
   std::string message;           // the message alone, without the advice that `err` also has
   bool lacks_something = false;  // a required option or argument is missing
 };
@@ -58,8 +59,8 @@ std::optional<Refusal> parse_and_run(CLI::App& app, const std::vector<std::strin
     const Mistake mistake = code == 0 ? Mistake() : mistake_in(app, arguments, error);
     return Refusal{.code = code,
                    .out = out.str(),
-                   .err = absl::StrCat("error: ", mistake.message, "\nhint: `", mistake.command,
-                                       " --help` shows commands, options and examples\n"),
+                   .err = absl::StrCat("error: ", mistake.message, "\n"),
+                   .hint = absl::StrCat("hint: `", mistake.command, " --help` shows commands, options and examples\n"),
                    .message = mistake.message,
                    .lacks_something = dynamic_cast<const CLI::RequiredError*>(&error) != nullptr};
   }
@@ -113,6 +114,8 @@ void build_cli(CLI::App& app, Context& context) {
   app.add_option("-o,--output", options.format, "How to print: table, json, ndjson, csv [table]")
       ->type_name("FORMAT")
       ->transform(choices(formats));
+  app.add_flag("-q,--quiet", options.quiet,
+               "No progress, no hints, and in tables no line that only says what was done");
   const NamedValues<ProgressChoice> progress = {
       {"auto", ProgressChoice::kAuto}, {"always", ProgressChoice::kAlways}, {"never", ProgressChoice::kNever}};
   app.add_option("--progress", options.progress,
@@ -163,10 +166,15 @@ ExitCode run_line(const std::vector<std::string>& arguments, Context& context) {
   if (const std::optional<Refusal> refusal = run_with_default_scene(arguments, context)) {
     context.out() << refusal->out;
     if (refusal->code != 0) context.err() << refusal->err;
+    // The parser sets no options if it refuses a line.
+    const bool quiet = std::any_of(arguments.begin(), arguments.end(),
+                                   [](const std::string& word) { return word == "-q" || word == "--quiet"; });
+    if (refusal->code != 0 && !quiet) context.err() << refusal->hint;
     return refusal->code == 0 ? ExitCode::kOk : ExitCode::kUsage;
   }
   if (!context.outcome().ok() && !is_reported(context.outcome()))
-    write_failure(context.err(), context.options().format, context.outcome());
+    write_failure(context.err(), context.format(), context.outcome(),
+                  context.options().quiet ? Hints::kHidden : Hints::kShown);
   return exit_code_of(context.outcome());
 }
 

@@ -28,7 +28,9 @@ std::vector<ColumnLength> lengths_of(const v1::BlockResult& block) {
           {"layers", block.layers_size(), 1},
           {"positions", block.positions_size(), 3},
           {"rotations", block.rotations_size(), 4},
-          {"others", block.others_size(), 1}};
+          {"others", block.others_size(), 1},
+          {"shapes", block.shapes_size(), 1},
+          {"sizes", block.sizes_size(), 4}};
 }
 
 absl::Status contradiction(absl::string_view what) {

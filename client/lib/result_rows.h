@@ -61,13 +61,16 @@ class ResultRows {
   absl::Span<const uint32_t> layers() const { return block_->layers(); }
   // Returns the second object of each pair.
   absl::Span<const uint64_t> others() const { return block_->others(); }
-  // Return columns with several values per row: 2 for uvs, 4 for rotations, 3 for normals, points and positions. A
-  // column that was not requested is empty.
+  // Returns the kind of shape of each object, as numbered in v1::BlockResult.shapes.
+  absl::Span<const uint32_t> shapes() const { return block_->shapes(); }
+  // Return columns with several values per row: 2 for uvs, 4 for rotations and sizes, 3 for normals, points and
+  // positions. A column that was not requested is empty.
   absl::Span<const float> uvs() const { return block_->uvs(); }
   absl::Span<const float> normals() const { return block_->normals(); }
   absl::Span<const float> points() const { return block_->points(); }
   absl::Span<const double> positions() const { return block_->positions(); }
   absl::Span<const float> rotations() const { return block_->rotations(); }
+  absl::Span<const float> sizes() const { return block_->sizes(); }
 
  private:
   ResultRows(const v1::BlockResult& block, std::vector<size_t> begins) : block_(&block), begins_(std::move(begins)) {}

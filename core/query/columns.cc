@@ -19,13 +19,13 @@ constexpr uint64_t kTimeBytes = 16;  // tick, fraction, and the index of the que
 struct ServedColumns {
   ColumnSet operator()(const RayColumns& rays) const {
     if (rays.mode == RayMode::kAny) return {};
-    return {Column::kT,     Column::kId,    Column::kTriangle, Column::kUv,     Column::kNormal,
-            Column::kPoint, Column::kGroup, Column::kTag,      Column::kLayers, Column::kPose};
+    return {Column::kT,     Column::kId,  Column::kTriangle, Column::kUv,   Column::kNormal, Column::kPoint,
+            Column::kGroup, Column::kTag, Column::kLayers,   Column::kPose, Column::kShape};
   }
   ColumnSet operator()(const SweepColumns& sweeps) const {
     if (sweeps.mode == RayMode::kAny) return {};
     return {Column::kT,     Column::kId,  Column::kTriangle, Column::kNormal, Column::kPoint,
-            Column::kGroup, Column::kTag, Column::kLayers,   Column::kPose};
+            Column::kGroup, Column::kTag, Column::kLayers,   Column::kPose,   Column::kShape};
   }
   ColumnSet operator()(const BallColumns&) const { return contact(); }
   ColumnSet operator()(const BoxColumns&) const { return overlap(); }
@@ -33,21 +33,22 @@ struct ServedColumns {
   ColumnSet operator()(const FrustumColumns&) const { return overlap(); }
   ColumnSet operator()(const SightColumns&) const { return {}; }
   ColumnSet operator()(const ContainsColumns&) const {
-    return {Column::kId, Column::kGroup, Column::kTag, Column::kLayers, Column::kPose};
+    return {Column::kId, Column::kGroup, Column::kTag, Column::kLayers, Column::kPose, Column::kShape};
   }
   ColumnSet operator()(const PairColumns&) const {
-    return {Column::kT, Column::kId, Column::kOther, Column::kGroup, Column::kTag, Column::kLayers, Column::kPose};
+    return {Column::kT,   Column::kId,     Column::kOther, Column::kGroup,
+            Column::kTag, Column::kLayers, Column::kPose,  Column::kShape};
   }
   ColumnSet operator()(const CellColumns&) const {
     return {Column::kT,     Column::kId,  Column::kTriangle, Column::kNormal, Column::kPoint,
-            Column::kGroup, Column::kTag, Column::kLayers,   Column::kPose};
+            Column::kGroup, Column::kTag, Column::kLayers,   Column::kPose,   Column::kShape};
   }
   ColumnSet operator()(const NearestColumns&) const {
-    return {Column::kT,     Column::kId,    Column::kTriangle, Column::kUv,     Column::kNormal,
-            Column::kPoint, Column::kGroup, Column::kTag,      Column::kLayers, Column::kPose};
+    return {Column::kT,     Column::kId,  Column::kTriangle, Column::kUv,   Column::kNormal, Column::kPoint,
+            Column::kGroup, Column::kTag, Column::kLayers,   Column::kPose, Column::kShape};
   }
   ColumnSet operator()(const LookupColumns&) const {
-    return {Column::kId, Column::kGroup, Column::kTag, Column::kLayers, Column::kPose};
+    return {Column::kId, Column::kGroup, Column::kTag, Column::kLayers, Column::kPose, Column::kShape};
   }
   static ColumnSet contact() {
     ColumnSet columns = overlap();
@@ -55,7 +56,8 @@ struct ServedColumns {
     return columns;
   }
   static ColumnSet overlap() {
-    return {Column::kId, Column::kTriangle, Column::kGroup, Column::kTag, Column::kLayers, Column::kPose};
+    return {Column::kId,     Column::kTriangle, Column::kGroup, Column::kTag,
+            Column::kLayers, Column::kPose,     Column::kShape};
   }
 };
 

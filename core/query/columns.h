@@ -30,7 +30,9 @@ namespace locus {
   X(kLayers, "LAYERS", uint32_t, layers, 1)        \
   X(kPose, "POSE", double, positions, 3)           \
   X(kPose, "POSE", float, rotations, 4)            \
-  X(kOther, "OTHER", uint64_t, others, 1)
+  X(kOther, "OTHER", uint64_t, others, 1)          \
+  X(kShape, "SHAPE", uint32_t, shapes, 1)          \
+  X(kShape, "SHAPE", float, sizes, 4)
 
 // Arrays of the result columns. Array<T> is a std::vector<T> in CollectedRows, which owns rows, and a T* in RowSpans,
 // which points to rows in a reply or in CollectedRows. Points are relative to the block's frame.

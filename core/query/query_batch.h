@@ -42,8 +42,9 @@ enum class Column : uint8_t {
   kLayers = 9,
   kPose = 10,
   kOther = 11,
+  kShape = 12,
 };
-inline constexpr Column kLastColumn = Column::kOther;
+inline constexpr Column kLastColumn = Column::kShape;
 
 // Set of result columns, one bit each.
 class ColumnSet {

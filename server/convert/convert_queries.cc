@@ -26,7 +26,7 @@ static_assert(kRayModes.size() == v1::RayMode_ARRAYSIZE && kCulls.size() == v1::
 static_assert(kOutsides.size() == v1::OutsideHistory_ARRAYSIZE);
 static_assert(kAtStarts.size() == v1::AtStart_ARRAYSIZE && kClipDepths.size() == v1::ClipDepth_ARRAYSIZE);
 static_assert(kInsides.size() == v1::Inside_ARRAYSIZE && kDetails.size() == v1::StaticDetail_ARRAYSIZE);
-static_assert(static_cast<int>(kLastColumn) == v1::COLUMN_OTHER && v1::Column_ARRAYSIZE == v1::COLUMN_OTHER + 1);
+static_assert(static_cast<int>(kLastColumn) == v1::COLUMN_SHAPE && v1::Column_ARRAYSIZE == v1::COLUMN_SHAPE + 1);
 
 template <class T, size_t kCount>
 absl::Status read_enum(int number, const std::array<T, kCount>& values, absl::string_view field, T* out) {

@@ -1,6 +1,7 @@
 #include <memory>
 #include <string>
 
+#include "absl/strings/str_cat.h"
 #include "client/cli/backup/backup_writer.h"
 #include "client/cli/commands.h"
 #include "client/cli/output.h"
@@ -29,7 +30,7 @@ absl::Status back_up(const BackupOptions& options, Context& context) {
   progress.hide();
   Report report;
   report.head = {{"directory", directory.target()}, {"files", size->files}, {"bytes", size->bytes}};
-  context.write(report);
+  context.acknowledge(report, absl::StrCat(directory.target(), ": ", size->files, " files, ", size->bytes, " bytes"));
   return absl::OkStatus();
 }
 

@@ -13,6 +13,13 @@ namespace {
 constexpr size_t kAnswerWidthRows = 1000;    // number of first rows that determine a table's column widths
 constexpr uint64_t kListedTruncated = 1000;  // maximum number of truncated queries that the report lists
 
+std::vector<std::string> keys_of(const BulkQuery& query) {
+  if (query.answer == BulkAnswer::kRows) return row_keys(query.layout);
+  std::vector<std::string> keys = {query.layout.query, query.answer == BulkAnswer::kHits ? "hit" : "seen"};
+  if (query.layout.as_of) keys.emplace_back("as_of");
+  return keys;
+}
+
 absl::Status no_fit() { return absl::DataLossError("the server's answer does not match the query"); }
 
 }  // namespace
@@ -22,11 +29,7 @@ BulkAnswers::BulkAnswers(const BulkQuery& query, bool follow, Context& context)
       follow_(follow),
       context_(context),
       report_(context.out(), context.options().format,
-              {.rows_name = query.rows_name,
-               .keys = query.answer == BulkAnswer::kHits   ? std::vector<std::string>{query.layout.query, "hit"}
-                       : query.answer == BulkAnswer::kSeen ? std::vector<std::string>{query.layout.query, "seen"}
-                                                           : row_keys(query.layout),
-               .width_rows = kAnswerWidthRows}) {}
+              {.rows_name = query.rows_name, .keys = keys_of(query), .width_rows = kAnswerWidthRows}) {}
 
 absl::Status BulkAnswers::write(const v1::QueryResult& result, const SentRows& sent,
                                 const std::vector<client::Double3>& frames) {
@@ -52,14 +55,13 @@ absl::Status BulkAnswers::write_block(const v1::BlockResult& block, size_t rows,
   clamped_ += static_cast<size_t>(block.clamped_size());
   if (query_.answer == BulkAnswer::kSeen) {
     ASSIGN_OR_RETURN(const client::SightMatrix matrix, client::SightMatrix::of(block, rows, 1));
-    for (size_t i = 0; i < rows; ++i)
-      report_.add({{layout.query, layout.first_query + i}, {"seen", matrix.seen(i, 0) != 0}});
+    for (size_t i = 0; i < rows; ++i) add_bit(block, i, layout, "seen", matrix.seen(i, 0) != 0);
     return absl::OkStatus();
   }
   if (query_.answer == BulkAnswer::kHits) {
     ASSIGN_OR_RETURN(const client::AnyHits hits, client::AnyHits::of(block));
     if (hits.size() != rows) return no_fit();
-    for (size_t i = 0; i < rows; ++i) report_.add({{layout.query, layout.first_query + i}, {"hit", hits.hit(i)}});
+    for (size_t i = 0; i < rows; ++i) add_bit(block, i, layout, "hit", hits.hit(i));
     return absl::OkStatus();
   }
   ASSIGN_OR_RETURN(const client::ResultRows answered, client::ResultRows::of(block));
@@ -67,6 +69,16 @@ absl::Status BulkAnswers::write_block(const v1::BlockResult& block, size_t rows,
   ASSIGN_OR_RETURN(const std::vector<Json> lines, rows_json(block, layout));
   for (const Json& line : lines) report_.add(line);
   return absl::OkStatus();
+}
+
+void BulkAnswers::add_bit(const v1::BlockResult& block, size_t query, const RowLayout& layout, const char* key,
+                          bool value) {
+  Json row = {{layout.query, layout.first_query + query}, {key, value}};
+  if (layout.as_of) {
+    const Json times = resolved_json(block);
+    row["as_of"] = query < times.size() ? times[query] : Json();
+  }
+  report_.add(row);
 }
 
 void BulkAnswers::note(const v1::QueryResult& result) {

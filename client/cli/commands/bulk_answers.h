@@ -39,6 +39,8 @@ class BulkAnswers {
 
  private:
   absl::Status write_block(const v1::BlockResult& block, size_t rows, RowLayout layout);
+  // Adds the row of a query whose answer is one bit.
+  void add_bit(const v1::BlockResult& block, size_t query, const RowLayout& layout, const char* key, bool value);
   void note(const v1::QueryResult& result);
   Json tail() const;
 

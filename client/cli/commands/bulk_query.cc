@@ -29,15 +29,20 @@ client::Double3 frame_of_row(const BulkQuery& query, const RowBatch& batch, size
 
 bool same(const client::Double3& a, const client::Double3& b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
 
+BulkQuery with_times(BulkQuery query, const QueryOptions& options, const Context& context) {
+  query.layout.as_of = rows_have_time(options.past, context.format());
+  return query;
+}
+
 class BulkQueryRun {
  public:
   BulkQueryRun(const BulkQuery& query, const QueryOptions& options, const BulkOptions& bulk, Context& context)
-      : query_(query),
+      : query_(with_times(query, options, context)),
         options_(options),
         bulk_(bulk),
         context_(context),
         progress_(start_progress(context)),
-        answers_(query, bulk.follow, context) {}
+        answers_(query_, bulk.follow, context) {}
 
   absl::Status run() {
     // While a script is only checked, do not open the input: an earlier line of the script may create the file, and a
@@ -174,7 +179,7 @@ class BulkQueryRun {
                                  answers_.revision()->revision, "; --follow lets later ones see newer revisions)"));
   }
 
-  const BulkQuery& query_;
+  const BulkQuery query_;
   const QueryOptions& options_;
   const BulkOptions& bulk_;
   Context& context_;

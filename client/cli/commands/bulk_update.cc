@@ -12,6 +12,7 @@
 #include "client/cli/failure.h"
 #include "client/cli/progress.h"
 #include "client/cli/report_stream.h"
+#include "client/cli/rows/update_report.h"
 #include "client/lib/status.h"
 #include "core/base/check.h"
 #include "core/base/status_macros.h"
@@ -169,7 +170,7 @@ class BulkUpdateRun {
     if (errors_) {
       errors_->end(report.head);
     } else {
-      context_.write(report);
+      context_.acknowledge(report, absl::StrCat(applied_text(applied_, last_), ", batches ", batches_));
     }
   }
 

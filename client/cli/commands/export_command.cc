@@ -90,7 +90,9 @@ absl::Status export_scene(const ExportOptions& options, Context& context) {
   report.head["meshes"] = file.meshes().size();
   report.head["triangles"] = triangles;
   report.head["bytes"] = bytes;
-  context.write(report);
+  context.acknowledge(
+      report, absl::StrCat(options.out, ": ", file.things(), " things, ", file.meshes().size(), " meshes, ", triangles,
+                           " triangles, ", bytes, " bytes, revision ", table_cell(report.head["revision"])));
   return absl::OkStatus();
 }
 

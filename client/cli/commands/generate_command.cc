@@ -43,7 +43,7 @@ absl::Status write_file(const std::string& path, const ImportedMesh& mesh, Conte
   if (!file) return absl::FailedPreconditionError(absl::StrCat("cannot write ", path, ": check its folder and space"));
   Report report;
   report.head = {{"file", path}, {"triangles", mesh.indices.size() / 3}};
-  context.write(report);
+  context.acknowledge(report, absl::StrCat(path, ": ", mesh.indices.size() / 3, " triangles"));
   return absl::OkStatus();
 }
 

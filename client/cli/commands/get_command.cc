@@ -26,8 +26,8 @@ struct GetOptions {
 };
 
 const std::vector<v1::Column>& columns() {
-  static const auto& columns =
-      *new std::vector<v1::Column>{v1::COLUMN_ID, v1::COLUMN_POSE, v1::COLUMN_GROUP, v1::COLUMN_TAG, v1::COLUMN_LAYERS};
+  static const auto& columns = *new std::vector<v1::Column>{v1::COLUMN_ID,    v1::COLUMN_SHAPE, v1::COLUMN_POSE,
+                                                            v1::COLUMN_GROUP, v1::COLUMN_TAG,   v1::COLUMN_LAYERS};
   return columns;
 }
 
@@ -70,9 +70,10 @@ absl::Status get(const GetOptions& options, Context& context) {
   Report report;
   report.head = result_head(result);
   report.rows_name = "things";
-  report.keys = row_keys({.columns = columns()});
+  const RowLayout layout = {.columns = columns(), .as_of = rows_have_time(options.past, context.format())};
+  report.keys = row_keys(layout);
   for (const v1::BlockResult& block : result.blocks()) {
-    ASSIGN_OR_RETURN(std::vector<Json> rows, rows_json(block, {.columns = columns()}));
+    ASSIGN_OR_RETURN(std::vector<Json> rows, rows_json(block, layout));
     for (Json& row : rows) {
       if (!row["id"].is_null()) report.rows.push_back(std::move(row));
     }

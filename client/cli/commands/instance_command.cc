@@ -98,7 +98,7 @@ absl::Status remove_instances(const RemoveOptions& options, Context& context) {
   context.remember_own(options.scene, {removed->epoch(), removed->revision()});
   Report report;
   report.head = {{"scene", options.scene}, {"revision", removed->revision()}};
-  context.write(report);
+  context.acknowledge(report, absl::StrCat("scene ", options.scene, ", revision ", removed->revision()));
   return absl::OkStatus();
 }
 

@@ -84,7 +84,7 @@ absl::Status download(const MeshOptions& options, Context& context) {
     return absl::FailedPreconditionError(absl::StrCat("cannot write ", options.out, ": check its folder and space"));
   Report report;
   report.head = {{"file", options.out}, {"triangles", mesh.indices.size() / 3}};
-  context.write(report);
+  context.acknowledge(report, absl::StrCat(options.out, ": ", mesh.indices.size() / 3, " triangles"));
   return absl::OkStatus();
 }
 
@@ -93,7 +93,7 @@ absl::Status delete_mesh(const MeshOptions& options, Context& context) {
   RETURN_IF_ERROR(client->delete_mesh(options.name));
   Report report;
   report.head["deleted"] = options.name;
-  context.write(report);
+  context.acknowledge(report, absl::StrCat("deleted ", options.name));
   return absl::OkStatus();
 }
 

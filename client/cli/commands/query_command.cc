@@ -21,8 +21,22 @@ absl::StatusOr<v1::QueryResult> ask_block(const QueryOptions& options, client::Q
   return result;
 }
 
+namespace {
+
+// Adds the key as_of to the rows of a report that has one row for each query.
+void add_times(const QueryOptions& options, const v1::BlockResult& block, const Context& context, Report& report) {
+  if (!rows_have_time(options.past, context.format())) return;
+  const Json times = resolved_json(block);
+  for (size_t i = 0; i < report.rows.size(); ++i) report.rows[i]["as_of"] = i < times.size() ? times[i] : Json();
+  report.keys.emplace_back("as_of");
+}
+
+}  // namespace
+
 absl::Status ask_and_report(const QueryOptions& options, client::QueryBuilder& builder, const RowLayout& layout,
                             const std::string& rows_name, Context& context) {
+  RowLayout with_time = layout;
+  with_time.as_of = rows_have_time(options.past, context.format());
   ASSIGN_OR_RETURN(const v1::QueryResult result, ask_block(options, builder, context));
   Report report;
   report.head = result_head(result);
@@ -32,9 +46,10 @@ absl::Status ask_and_report(const QueryOptions& options, client::QueryBuilder& b
     for (int i = 0; i < result.blocks(0).counts_size(); ++i)
       report.rows.push_back({{query, i}, {"count", result.blocks(0).counts(i)}});
     report.keys = {query, "count"};
+    add_times(options, result.blocks(0), context, report);
   } else {
-    ASSIGN_OR_RETURN(report.rows, rows_json(result.blocks(0), layout));
-    report.keys = row_keys(layout);
+    ASSIGN_OR_RETURN(report.rows, rows_json(result.blocks(0), with_time));
+    report.keys = row_keys(with_time);
   }
   context.write(report);
   return absl::OkStatus();
@@ -49,6 +64,7 @@ absl::Status ask_and_report_any(const QueryOptions& options, client::QueryBuilde
   report.rows_name = query + "s";
   report.keys = {query, "hit"};
   for (size_t i = 0; i < hits.size(); ++i) report.rows.push_back({{query, i}, {"hit", hits.hit(i)}});
+  add_times(options, result.blocks(0), context, report);
   context.write(report);
   return absl::OkStatus();
 }

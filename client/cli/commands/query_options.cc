@@ -16,7 +16,7 @@ const NamedValues<v1::Column>& column_names() {
       {"t", v1::COLUMN_T},         {"id", v1::COLUMN_ID},         {"triangle", v1::COLUMN_TRIANGLE},
       {"uv", v1::COLUMN_UV},       {"normal", v1::COLUMN_NORMAL}, {"point", v1::COLUMN_POINT},
       {"group", v1::COLUMN_GROUP}, {"tag", v1::COLUMN_TAG},       {"layers", v1::COLUMN_LAYERS},
-      {"pose", v1::COLUMN_POSE},   {"other", v1::COLUMN_OTHER}};
+      {"pose", v1::COLUMN_POSE},   {"other", v1::COLUMN_OTHER},   {"shape", v1::COLUMN_SHAPE}};
   return names;
 }
 

@@ -96,10 +96,16 @@ absl::Status query_sight(const SightOptions& options, Context& context) {
   report.head = result_head(result);
   report.rows_name = "sight";
   report.keys = {"viewer", "target", "seen"};
-  for (size_t viewer = 0; viewer < viewers; ++viewer)
-    for (size_t target = 0; target < targets; ++target)
-      report.rows.push_back(
-          {{"viewer", viewer}, {"target", options.pairwise ? viewer : target}, {"seen", matrix.seen(viewer, target)}});
+  const bool with_time = rows_have_time(options.query.past, context.format());
+  if (with_time) report.keys.emplace_back("as_of");
+  const Json times = with_time ? resolved_json(result.blocks(0)) : Json::array();
+  for (size_t viewer = 0; viewer < viewers; ++viewer) {
+    for (size_t target = 0; target < targets; ++target) {
+      Json& row = report.rows.emplace_back(Json{
+          {"viewer", viewer}, {"target", options.pairwise ? viewer : target}, {"seen", matrix.seen(viewer, target)}});
+      if (with_time) row["as_of"] = viewer < times.size() ? times[viewer] : Json();
+    }
+  }
   context.write(report);
   return absl::OkStatus();
 }

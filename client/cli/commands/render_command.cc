@@ -149,6 +149,13 @@ Json head_of(const RenderOptions& options, const Camera& camera, const CastResul
   return head;
 }
 
+// Returns the line that says what was rendered. `head` is the head of the report.
+std::string picture_text(const Json& head) {
+  const auto text = [&head](const char* key) { return table_cell(head[key]); };
+  return absl::StrCat(text("file"), ": ", text("width"), "x", text("height"), ", ", text("hits"), " of ", text("rays"),
+                      " rays hit, ", text("seconds"), " s, revision ", text("revision"));
+}
+
 absl::Status render(const RenderOptions& given, Context& context) {
   RenderOptions options = given;
   RETURN_IF_ERROR(check_line(options));
@@ -171,7 +178,7 @@ absl::Status render(const RenderOptions& given, Context& context) {
   const Picture picture = paint(options, cast.image, camera, report.head);
   RETURN_IF_ERROR(write_png(options.out, reduced(picture, rays_a_side(options))));
   progress.hide();
-  context.write(report);
+  context.acknowledge(report, picture_text(report.head));
   return absl::OkStatus();
 }
 

@@ -1,6 +1,7 @@
 #include <memory>
 #include <string>
 
+#include "absl/strings/str_cat.h"
 #include "client/cli/backup/read_backup.h"
 #include "client/cli/commands.h"
 #include "client/cli/output.h"
@@ -29,7 +30,8 @@ absl::Status verify(const RestoreOptions& options, Context& context) {
   progress.hide();
   Report report;
   report.head = {{"backup", options.backup}, {"files", size.files}, {"bytes", size.bytes}, {"whole", true}};
-  context.write(report);
+  context.acknowledge(report,
+                      absl::StrCat(options.backup, " is whole: ", size.files, " files, ", size.bytes, " bytes"));
   return absl::OkStatus();
 }
 
@@ -47,7 +49,8 @@ absl::Status restore(const RestoreOptions& options, Context& context) {
   progress.hide();
   Report report;
   report.head = {{"data_dir", copy.target()}, {"files", size.files}, {"bytes", size.bytes}};
-  context.write(report);
+  context.acknowledge(report, absl::StrCat(copy.target(), ": ", size.files, " files, ", size.bytes, " bytes"));
+  if (context.options().quiet) return absl::OkStatus();
   context.err() << "next: `locusd check " << copy.target() << "`, then `locusd --data-dir " << copy.target()
                 << "`; where the daemon runs as another user, give it the directory first (chown -R)\n";
   return absl::OkStatus();

@@ -144,7 +144,7 @@ absl::Status delete_scene(const DeleteOptions& options, Context& context) {
   context.forget_own(options.name);
   Report report;
   report.head[absent ? "absent" : "deleted"] = options.name;
-  context.write(report);
+  context.acknowledge(report, absl::StrCat(absent ? "absent " : "deleted ", options.name));
   return absl::OkStatus();
 }
 

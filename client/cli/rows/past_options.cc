@@ -52,6 +52,10 @@ std::vector<float> fractions_of(const std::vector<AsOf>& times) {
   return fractions;
 }
 
+bool rows_have_time(const PastOptions& options, Format format) {
+  return !options.as_of.empty() && (format == Format::kCsv || format == Format::kNdjson);
+}
+
 Json resolved_json(const v1::BlockResult& block) {
   Json times = Json::array();
   for (int i = 0; i < block.resolved_ticks_size(); ++i) {

@@ -40,6 +40,9 @@ void apply_to_block(const PastOptions& options, Block& block) {
   block.as_of(ticks_of(options.as_of), fractions_of(options.as_of)).outside_history(options.outside);
 }
 
+// Returns whether rows have the key as_of: the query is about the past, and the format shows only rows.
+bool rows_have_time(const PastOptions& options, Format format);
+
 // Returns the effective time of each query about the past, in the form of --as-of. It differs from the requested time
 // if the requested time was clamped to the recorded history.
 Json resolved_json(const v1::BlockResult& block);

@@ -1,6 +1,7 @@
 #include "client/cli/rows/query_report.h"
 
 #include <algorithm>
+#include <array>
 #include <map>
 #include <utility>
 
@@ -20,6 +21,21 @@ Json point_json(const ResultRows& rows, size_t row, const client::Double3& frame
 }
 
 Json triangle_json(uint32_t triangle) { return triangle == client::kNoTriangle ? Json() : Json(triangle); }
+
+// Sets the keys of COLUMN_SHAPE: the kind of shape, and those of its sizes that the kind has; the others are null.
+void add_shape(const ResultRows& rows, size_t row, Json& json) {
+  enum Kind : uint32_t { kPoint = 1, kBall = 2, kBox = 3, kCapsule = 4, kInstance = 5 };
+  constexpr std::array<const char*, 6> kNames = {nullptr, "point", "ball", "box", "capsule", "instance"};
+  const uint32_t kind = rows.shapes().empty() ? 0 : rows.shapes()[row];
+  for (const char* key : {"shape", "radius", "half", "axis", "scale"}) json[key] = Json();
+  if (kind == 0 || kind >= kNames.size()) return;
+  const absl::Span<const float> sizes = rows.sizes().subspan(row * 4, 4);
+  json["shape"] = kNames[kind];
+  if (kind == kBall || kind == kCapsule) json["radius"] = float_json(sizes[0]);
+  if (kind == kBox) json["half"] = floats_json(sizes.subspan(1));
+  if (kind == kCapsule) json["axis"] = floats_json(sizes.subspan(1));
+  if (kind == kInstance) json["scale"] = float_json(sizes[0]);
+}
 
 // Sets the key or keys of `column` in `json`. `json` becomes the row of the report that shows row `row` of the answer.
 // The value is null if the answer does not contain the column, or if the row has id 0. A row with id 0 is a miss or, in
@@ -56,6 +72,8 @@ void add_column(const ResultRows& rows, size_t row, const RowLayout& layout, v1:
       add("position", !rows.positions().empty(), [&] { return doubles_json(rows.positions().subspan(row * 3, 3)); });
       return add("rotation", !rows.rotations().empty(),
                  [&] { return floats_json(rows.rotations().subspan(row * 4, 4)); });
+    case v1::COLUMN_SHAPE:
+      return add_shape(rows, row, json);
     default:
       return;
   }
@@ -63,10 +81,19 @@ void add_column(const ResultRows& rows, size_t row, const RowLayout& layout, v1:
 
 const std::vector<std::string>& keys_of(v1::Column column) {
   static const auto& keys = *new std::map<v1::Column, std::vector<std::string>>{
-      {v1::COLUMN_T, {"t"}},         {v1::COLUMN_ID, {"id"}},         {v1::COLUMN_TRIANGLE, {"triangle"}},
-      {v1::COLUMN_UV, {"uv"}},       {v1::COLUMN_NORMAL, {"normal"}}, {v1::COLUMN_POINT, {"point"}},
-      {v1::COLUMN_GROUP, {"group"}}, {v1::COLUMN_TAG, {"tag"}},       {v1::COLUMN_LAYERS, {"layers"}},
-      {v1::COLUMN_OTHER, {"other"}}, {v1::COLUMN_UNSPECIFIED, {}},    {v1::COLUMN_POSE, {"position", "rotation"}}};
+      {v1::COLUMN_T, {"t"}},
+      {v1::COLUMN_ID, {"id"}},
+      {v1::COLUMN_TRIANGLE, {"triangle"}},
+      {v1::COLUMN_UV, {"uv"}},
+      {v1::COLUMN_NORMAL, {"normal"}},
+      {v1::COLUMN_POINT, {"point"}},
+      {v1::COLUMN_GROUP, {"group"}},
+      {v1::COLUMN_TAG, {"tag"}},
+      {v1::COLUMN_LAYERS, {"layers"}},
+      {v1::COLUMN_OTHER, {"other"}},
+      {v1::COLUMN_UNSPECIFIED, {}},
+      {v1::COLUMN_POSE, {"position", "rotation"}},
+      {v1::COLUMN_SHAPE, {"shape", "radius", "half", "axis", "scale"}}};
   const auto found = keys.find(column);
   return found == keys.end() ? keys.at(v1::COLUMN_UNSPECIFIED) : found->second;
 }
@@ -82,11 +109,13 @@ std::vector<std::string> row_keys(const RowLayout& layout) {
       if (std::find(keys.begin(), keys.end(), key) == keys.end()) keys.push_back(key);
     }
   }
+  if (layout.as_of) keys.emplace_back("as_of");
   return keys;
 }
 
 absl::StatusOr<std::vector<Json>> rows_json(const v1::BlockResult& block, const RowLayout& layout) {
   ASSIGN_OR_RETURN(const ResultRows rows, ResultRows::of(block));
+  const Json times = layout.as_of ? resolved_json(block) : Json::array();
   std::vector<Json> result;
   for (size_t query = 0; query < rows.queries(); ++query) {
     const client::RowRange range = rows.rows_of(query);
@@ -95,6 +124,7 @@ absl::StatusOr<std::vector<Json>> rows_json(const v1::BlockResult& block, const 
       if (!layout.query.empty()) json[layout.query] = layout.first_query + query;
       if (layout.dense) json["hit"] = rows.ids().empty() || rows.ids()[row] != 0;
       for (const v1::Column column : layout.columns) add_column(rows, row, layout, column, json);
+      if (layout.as_of) json["as_of"] = query < times.size() ? times[query] : Json();
       result.push_back(std::move(json));
     }
   }

@@ -18,10 +18,11 @@ struct RowLayout {
   client::Double3 frame = {};            // frame of the block, which is added to the points of the answer
   uint64_t first_query = 0;              // index of the block's first query in the whole input
   bool dense = false;                    // each query has one row, with `hit` false for a miss
+  bool as_of = false;                    // each row has its query's effective time, as the last key
 };
 
 // Returns the rows of one block. `layout` selects their keys among t, id, triangle, uv, normal, point, group, tag,
-// layers, other, position and rotation. In the row of a miss all these keys are null.
+// layers, other, position, rotation, shape and the sizes of the shape. In the row of a miss all these keys are null.
 absl::StatusOr<std::vector<Json>> rows_json(const v1::BlockResult& block, const RowLayout& layout);
 
 // Returns the keys of rows_json() for this layout, in their order.

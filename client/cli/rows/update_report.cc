@@ -2,11 +2,16 @@
 
 #include <utility>
 
+#include "absl/strings/str_cat.h"
 #include "absl/strings/strip.h"
 #include "client/cli/failure.h"
 #include "core/base/status_macros.h"
 
 namespace locus::cli {
+
+std::string applied_text(uint64_t applied, const v1::UpdateAck& ack) {
+  return absl::StrCat(applied, " applied, revision ", ack.revision(), ", tick ", ack.tick());
+}
 
 absl::Status apply_and_report(const std::string& scene, v1::UpdateBatch batch, Context& context) {
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());
@@ -25,7 +30,11 @@ absl::Status apply_and_report(const std::string& scene, v1::UpdateBatch batch, C
                            {"id", id_json(error.id())},
                            {"reason", std::string(absl::StripPrefix(v1::Reason_Name(error.reason()), "REASON_"))}});
   }
-  context.write(report);
+  if (report.rows_name.empty()) {
+    context.acknowledge(report, applied_text(ack.applied(), ack));
+  } else {
+    context.write(report);
+  }
   return refused_items(ack);
 }
 

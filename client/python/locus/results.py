@@ -23,7 +23,8 @@ _IN_RESPONSE = schema.numbers("QueryResponse")["result"]
 _COUNTS = _BLOCK["counts"]
 _ROW_BYTES = tuple((_BLOCK[name], size) for name, size in (
     ("ids", 8), ("t", 4), ("triangles", 4), ("uvs", 8), ("normals", 12), ("points", 12), ("groups", 8), ("tags", 8),
-    ("layers", 4), ("positions", 24), ("others", 8)))
+    ("layers", 4), ("positions", 24), ("others", 8),
+    ("shapes", 4), ("sizes", 16)))
 
 
 class _Column:
@@ -101,6 +102,9 @@ class BlockResult:
     rotations = _Column("4R float32: the rotation as stored, x, y, z, w; 0 for a miss.", FLOAT32, 4)
 
     others = _Column("R uint64 ids of the second object of each pair.", UINT64)
+    shapes = _Column("R uint32: 1 point, 2 ball, 3 box, 4 capsule, 5 instance of a mesh; 0 for a miss.", UINT32)
+    sizes = _Column("4R float32: radius (of an instance: scale), then the half extents of a box or the half axis of a "
+                    "capsule, in local axes; 0 where they do not apply.", FLOAT32, 4)
 
     resolved_ticks = _Column("N uint64: the effective tick of each query; empty without `as_of_ticks`.", UINT64,
                              by_row=False)

@@ -38,7 +38,25 @@ void write_point(T* column, size_t row, V x, V y, V z) {
   column[2] = z;
 }
 
+// Writes the columns SHAPE. The numbers of the shapes are those of the protocol's BlockResult.shapes.
+void write_shape(const Hit& hit, const RowSpans& to, size_t row) {
+  constexpr uint32_t kInstanceShape = 5;
+  uint32_t kind = 0;
+  std::array<float, 4> sizes = {};
+  if (hit.object) {
+    const Shape shape = hit.object_shape();
+    kind = static_cast<uint32_t>(shape.kind) + 1;
+    sizes = {shape.radius, shape.size.x, shape.size.y, shape.size.z};
+  } else if (hit.instance != nullptr) {
+    kind = kInstanceShape;
+    sizes[0] = hit.instance->transform.scale;
+  }
+  to.shapes[row] = kind;
+  std::copy_n(sizes.begin(), 4, to.sizes + 4 * row);
+}
+
 void write_labels(const Hit& hit, const RowSpans& to, size_t row) {
+  if (to.shapes != nullptr) write_shape(hit, to, row);
   const Labels labels = labels_of(hit);
   if (to.groups != nullptr) to.groups[row] = labels.group;
   if (to.tags != nullptr) to.tags[row] = labels.tag;
@@ -50,7 +68,8 @@ void write_labels(const Hit& hit, const RowSpans& to, size_t row) {
 }
 
 bool has_labels(const RowSpans& to) {
-  return to.groups != nullptr || to.tags != nullptr || to.layers != nullptr || to.positions != nullptr;
+  return to.groups != nullptr || to.tags != nullptr || to.layers != nullptr || to.positions != nullptr ||
+         to.shapes != nullptr;
 }
 
 }  // namespace

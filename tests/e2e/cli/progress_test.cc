@@ -96,7 +96,7 @@ TEST_F(ProgressTest, StandardOutputIsTheSameWithProgress) {
            {"-o", "csv", "query", "ray", "world", "--from-csv", folder_.file("rays.csv")},
            {"generate", "terrain", "--triangles", "2000", "--out", made},
            {"export", "world", made + ".glb"},
-           {"-o", "ndjson", "query", "ball", "world", "--from-csv", folder_.file("rows.csv")},
+           {"-o", "ndjson", "query", "ray", "world", "--mode", "any", "--from-csv", folder_.file("rays.csv")},
            {"restore", folder_.file("kept"), "--verify-only"}}) {
     std::vector<std::string> outputs;
     for (const std::string when : {"never", "always", "auto"}) {

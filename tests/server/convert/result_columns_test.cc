@@ -38,6 +38,8 @@ void fill(AnswerSink& sink) {
     count_up(to.layers, kRows, 9);
     count_up(to.positions, 3 * kRows, 10);
     count_up(to.rotations, 4 * kRows, 11);
+    count_up(to.shapes, kRows, 18);
+    count_up(to.sizes, 4 * kRows, 19);
     count_up(sink.add_counts(1, kRows), kRows, 12);
     count_up(sink.add_truncated(1, 2), 2, 13);
     count_up(sink.add_hits(1, kRows), kRows, 14);
@@ -71,6 +73,8 @@ TEST(ResultColumnsTest, EachColumnIsWrittenToItsProtocolField) {
   EXPECT_THAT(block.layers(), ElementsAreArray(expected.layers));
   EXPECT_THAT(block.positions(), ElementsAreArray(expected.positions));
   EXPECT_THAT(block.rotations(), ElementsAreArray(expected.rotations));
+  EXPECT_THAT(block.shapes(), ElementsAreArray(expected.shapes));
+  EXPECT_THAT(block.sizes(), ElementsAreArray(expected.sizes));
   EXPECT_THAT(block.resolved_ticks(), ElementsAreArray(expected.resolved_ticks));
   EXPECT_THAT(block.resolved_fractions(), ElementsAreArray(expected.resolved_fractions));
   EXPECT_THAT(block.clamped(), ElementsAreArray(expected.clamped));

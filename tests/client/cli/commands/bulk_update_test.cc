@@ -96,7 +96,7 @@ TEST_F(BulkUpdateTest, AWrongRowStopsItsBatchAndTheAppliedRowsAreCounted) {
   EXPECT_THAT(outcome.err,
               HasSubstr(absl::StrCat("error: ", file.path(),
                                      ":4: at: is missing; of the rows sent 2 were applied and 0 refused\n")));
-  EXPECT_THAT(outcome.out, HasSubstr("applied   2\n"));
+  EXPECT_THAT(outcome.out, HasSubstr("2 applied, revision "));
   EXPECT_EQ(json_of({"scene", "describe", "world"})["objects"], 2);
 }
 

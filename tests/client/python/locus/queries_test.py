@@ -169,11 +169,18 @@ class AnswersEqualTheCommandLineTest(DaemonTest):
     def test_lookups(self):
         ids = [1, 100, 159, 200, 300, 400]
         report = self.command_line("get", self.scene, *[f"--id={one}" for one in ids])
-        columns = Block(columns=[Column.ID, Column.POSE, Column.GROUP, Column.TAG, Column.LAYERS])
+        columns = Block(columns=[Column.ID, Column.SHAPE, Column.POSE, Column.GROUP, Column.TAG, Column.LAYERS])
         (block,) = self.ask(QueryBatch().lookup(ids, block=columns))
         rows = report[next(key for key, value in report.items() if isinstance(value, list))]
         self.assertEqual(len(rows), len(ids))
         self.check_rows(block, rows)
+        self.assertIn(5, listed(block.shapes), "an instance")
+        names = [None, "point", "ball", "box", "capsule", "instance"]
+        for row, shown in enumerate(rows):
+            self.assertEqual(shown["shape"], names[listed(block.shapes)[row]])
+            size = shown["scale"] if shown["shape"] == "instance" else shown["radius"] or 0
+            vector = shown["half"] or shown["axis"] or [0, 0, 0]
+            self.assertEqual(cut(listed(block.sizes), 4, row), floats([size, *vector]))
 
     def test_lookups_of_groups(self):
         (block,) = self.ask(QueryBatch().lookup_groups([9, 7, 8]))
