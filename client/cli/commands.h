@@ -26,6 +26,7 @@ void add_export_command(CLI::App& parent, Context& context);
 void add_backup_command(CLI::App& parent, Context& context);
 void add_restore_command(CLI::App& parent, Context& context);
 void add_demo_command(CLI::App& parent, Context& context);
+void add_call_command(CLI::App& parent, Context& context);
 void add_run_command(CLI::App& parent, Context& context);
 void add_shell_command(CLI::App& parent, Context& context);
 void add_wait_command(CLI::App& parent, Context& context);

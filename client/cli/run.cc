@@ -156,6 +156,7 @@ void build_cli(CLI::App& app, Context& context) {
   add_limits_command(app, context);
   add_quota_command(app, context);
   add_health_command(app, context);
+  add_call_command(app, context);
   add_version_command(app, context);
   add_completion_command(app, context);
   add_wait_command(app, context);

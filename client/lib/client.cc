@@ -15,6 +15,7 @@
 #include "core/base/status_macros.h"
 #include "grpc/health/v1/health.grpc.pb.h"
 #include "grpcpp/channel.h"
+#include "grpcpp/generic/generic_stub.h"
 #include "locus/v1/query_service.grpc.pb.h"
 #include "locus/v1/scene_service.grpc.pb.h"
 #include "locus/v1/server_service.grpc.pb.h"
@@ -60,6 +61,29 @@ absl::StatusOr<Response> call(Stub& stub, const CallPlan& plan, const Request& r
   RETURN_IF_ERROR(status);
   return response;
 }
+
+// Unary method that is known by its path only.
+class PathMethod {
+ public:
+  PathMethod(std::shared_ptr<grpc::ChannelInterface> channel, std::string path)
+      : stub_(std::move(channel)), path_(std::move(path)) {}
+
+  grpc::Status run(grpc::ClientContext* context, const grpc::ByteBuffer& request, grpc::ByteBuffer* response) {
+    grpc::CompletionQueue queue;
+    const auto reader = stub_.PrepareUnaryCall(context, path_, request, &queue);
+    reader->StartCall();
+    grpc::Status status;
+    reader->Finish(response, &status, nullptr);
+    void* tag = nullptr;
+    bool ok = false;
+    queue.Next(&tag, &ok);
+    return status;
+  }
+
+ private:
+  grpc::GenericStub stub_;
+  const std::string path_;
+};
 
 // Returns the outcome of a query: `status`, marked by mark_read_only(). If the deadline passed in this client, so that
 // the server sent no error of its own, returns an error that names the revision for which the query waits.
@@ -249,6 +273,19 @@ absl::Status Client::dump(const v1::DumpSceneRequest& request,
   if (!accepted.ok()) context.TryCancel();
   const absl::Status end = to_absl_status(reader->Finish());
   return accepted.ok() ? outcome_of_query(end, request.scene(), arrived ? v1::View() : request.view()) : accepted;
+}
+
+absl::StatusOr<std::string> Client::call_by_path(const std::string& path, absl::string_view request,
+                                                 absl::string_view scene) const {
+  PathMethod method(connection_->channel, path);
+  const grpc::Slice slice(request.data(), request.size());
+  ASSIGN_OR_RETURN(const grpc::ByteBuffer response,
+                   call(method, connection_->once(scene), grpc::ByteBuffer(&slice, 1), &PathMethod::run));
+  std::vector<grpc::Slice> slices;
+  if (!response.Dump(&slices).ok()) return absl::DataLossError("the answer cannot be read");
+  std::string bytes;
+  for (const grpc::Slice& part : slices) bytes.append(reinterpret_cast<const char*>(part.begin()), part.size());
+  return bytes;
 }
 
 absl::StatusOr<v1::UpdateAck> Client::apply(absl::string_view scene, v1::UpdateBatch batch) const {

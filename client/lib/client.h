@@ -124,6 +124,11 @@ class Client {
   // streams.
   void cancel_calls() const;
 
+  // Calls any unary method by its path, such as "/locus.v1.SceneService/GetScene", with a serialized request, and
+  // returns the serialized response. `scene` is the scene that the request names, or empty. Not retried.
+  absl::StatusOr<std::string> call_by_path(const std::string& path, absl::string_view request,
+                                           absl::string_view scene = "") const;
+
   // Open a stream for one scene. The stream starts its call to the server when the first batch is sent.
   std::unique_ptr<UpdateStream> update_stream(absl::string_view scene, const UpdateStreamOptions& options = {}) const;
   std::unique_ptr<QueryStream> query_stream(absl::string_view scene, const QueryStreamOptions& options = {}) const;

@@ -3,11 +3,11 @@
     python3 readme_test.py README BIN_DIRECTORY [PYTHON_DIRECTORY]
 
 Blocks marked console hold `$ command` lines, each followed by its output. A block marked grpcurl holds one call; the
-test makes this call with json_call instead of grpcurl. EPOCH stands for the scene's random epoch. The block marked cpp
-was compiled as readme_example; its last comment says what it prints. Blocks marked python, in README and in
-client/python/README.md, are scripts for the package in PYTHON_DIRECTORY; without this argument they are skipped. The
-last comment of a script says what the script prints. The address in a script is replaced by that of the daemon. Blocks
-marked text are not run: the test only checks that their programs exist.
+test makes this call with `locus call`, because Debian does not package grpcurl. EPOCH stands for the scene's random
+epoch. The block marked cpp was compiled as readme_example; its last comment says what it prints. Blocks marked python,
+in README and in client/python/README.md, are scripts for the package in PYTHON_DIRECTORY; without this argument they
+are skipped. The last comment of a script says what the script prints. The address in a script is replaced by that of
+the daemon. Blocks marked text are not run: the test only checks that their programs exist.
 """
 
 import os
@@ -84,7 +84,7 @@ class ReadmeTest(unittest.TestCase):
         words = shlex.split(command)
         self.assertEqual(words[:3], ["grpcurl", "-plaintext", "-d"])
         self.assertEqual(words[4], DEFAULT_ADDRESS)
-        call = ["json_call", self.address, words[5], words[3]]
+        call = ["locus", "call", words[5], words[3]]
         self.assertEqual(masked(self.run_shell(shlex.join(call))), masked(output))
 
     def test_3_program_prints_what_it_says(self):
