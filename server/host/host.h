@@ -5,6 +5,7 @@
 #define LOCUS_SERVER_HOST_HOST_H_
 
 #include <algorithm>
+#include <string>
 
 #include "core/base/mutex.h"
 #include "core/scene/log/update_log.h"
@@ -73,6 +74,9 @@ struct Host : RpcState {
   }
 
   const ServerConfig config;
+  // Host and port of the HTTP pages; the port is 0 if there are none. Set before the first call is served.
+  std::string http_host;
+  uint16_t http_port = 0;
   UpdateLog* const log;
   SlowQueries slow_queries;
   Registry registry;

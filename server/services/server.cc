@@ -146,6 +146,11 @@ absl::StatusOr<std::unique_ptr<Server>> Server::start(const ServerConfig& config
   parts->host.recovering = log != nullptr;
   ASSIGN_OR_RETURN(std::unique_ptr<HttpServer> http, start_http(config, parts->connections->tls(), parts->scrape));
   parts->http = std::move(http);
+  if (parts->http != nullptr) {
+    ASSIGN_OR_RETURN(const ListenAddress address, parse_listen_address(config.http_listen));
+    parts->host.http_host = address.host;
+    parts->host.http_port = parts->http->port();
+  }
   grpc::ServerBuilder builder;
   set_limits(config, builder);
   parts->connections->add_to(builder, config.max_streams + config.max_calls + kOtherCalls);

@@ -162,6 +162,8 @@ void get_server(Host& host, const Caller& caller, v1::GetServerResponse& respons
   }
   response.set_insecure(host.config.insecure);
   response.set_use_hidden(!shows_use);
+  response.set_http_port(host.http_port);
+  response.set_http_host(host.http_host);
 }
 
 }  // namespace

@@ -43,6 +43,17 @@ TEST_F(ServerRpcTest, AServerThatWasStartedInsecureSaysSo) {
   EXPECT_TRUE(get_server(insecure.stubs()).insecure());
 }
 
+TEST_F(ServerRpcTest, TheHttpPortIsSaid) {
+  EXPECT_EQ(get_server(stubs()).http_port(), 0u);
+  EXPECT_EQ(get_server(stubs()).http_host(), "");
+  server::ServerConfig config = test_config();
+  config.http_listen = "127.0.0.1:0";
+  RunningServer with_http(config);
+  const v1::GetServerResponse server = get_server(with_http.stubs());
+  EXPECT_EQ(server.http_port(), with_http.server().http_port());
+  EXPECT_EQ(server.http_host(), "127.0.0.1");
+}
+
 TEST_F(ServerRpcTest, LimitsAreListedInOrderWithTheirUse) {
   const v1::GetServerResponse server = get_server(stubs());
   std::vector<std::string> names;

@@ -9,6 +9,7 @@
 
 #include "client/cli/commands.h"
 #include "client/cli/extras/top/http_get.h"
+#include "client/cli/extras/top/metrics_address.h"
 #include "client/cli/extras/top/metrics_text.h"
 #include "client/cli/extras/top/top_figures.h"
 #include "client/cli/output.h"
@@ -24,7 +25,7 @@ constexpr std::chrono::milliseconds kTimeout{5000};
 constexpr const char* kClearScreen = "\x1b[H\x1b[2J";
 
 struct TopOptions {
-  std::string address = "127.0.0.1:7576";
+  std::string address;  // empty = the server is asked
   double interval = 2;
   bool once = false;
   bool json = false;
@@ -95,11 +96,17 @@ void write(Context& context, const TopFigures& figures) {
   context.write(report);
 }
 
-absl::Status top(const TopOptions& options, Context& context) {
+absl::Status top(const TopOptions& given, Context& context) {
   RETURN_IF_ERROR(context.connection_mistake());
-  if (options.json) context.options().format = Format::kJson;
-  const bool live = !options.once && isatty(STDOUT_FILENO) == 1 && context.options().format == Format::kTable;
+  if (given.json) context.options().format = Format::kJson;
+  const bool live = !given.once && isatty(STDOUT_FILENO) == 1 && context.options().format == Format::kTable;
   const EndSignals end_signals;
+  TopOptions options = given;
+  if (options.address.empty()) {
+    ASSIGN_OR_RETURN(client::Client* const client, context.connect());
+    ASSIGN_OR_RETURN(const v1::GetServerResponse server, client->get_server());
+    ASSIGN_OR_RETURN(options.address, metrics_address(context.address(), server));
+  }
   ASSIGN_OR_RETURN(Scraped before, scrape(options, context));
   while (end_signals.wait(options.interval)) {
     ASSIGN_OR_RETURN(Scraped now, scrape(options, context));
@@ -124,10 +131,11 @@ Examples:
   locus top --metrics-address 10.0.0.7:7576 --ca ca.pem --token-file metrics.token
   locus top --once --json
   locus -o csv top --once --interval 10)");
-  command.add_option("--metrics-address", options->address, "locusd's HTTP port (its --http-listen): host:port")
+  command
+      .add_option("--metrics-address", options->address,
+                  "locusd's HTTP port (its --http-listen): host:port [the server says it]")
       ->envname("LOCUS_METRICS_ADDRESS")
-      ->type_name("ADDRESS")
-      ->capture_default_str();
+      ->type_name("ADDRESS");
   command.add_option("--interval", options->interval, "Seconds between two updates, 0.1 to 3600 [2]")
       ->type_name("SECONDS")
       ->check(CLI::Range(0.1, 3600.0).description(""));

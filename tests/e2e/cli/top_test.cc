@@ -61,6 +61,29 @@ TEST_F(TopTest, OnceAsJsonIsOneDocument) {
   EXPECT_EQ(top["queries"].size(), kBlockKinds);
 }
 
+Outcome run_top_of(const std::string& address) {
+  std::ostringstream out;
+  std::ostringstream err;
+  cli::Context context(out, err, cli::Progress::kSilent);
+  const cli::ExitCode code =
+      cli::run_line({"--address", address, "top", "--once", "--json", "--interval", "0.1"}, context);
+  return {code, out.str(), err.str()};
+}
+
+TEST_F(TopTest, TheServerSaysItsHttpPort) {
+  const Outcome outcome = run_top_of(running_.address());
+  ASSERT_EQ(outcome.code, cli::ExitCode::kOk) << outcome.err;
+  EXPECT_EQ(Json::parse(outcome.out, nullptr, /*allow_exceptions=*/false)["server"]["ready"], true);
+}
+
+using TopWithoutHttpTest = RpcTest;
+
+TEST_F(TopWithoutHttpTest, AServerWithoutHttpPortIsReported) {
+  const Outcome outcome = run_top_of(running_.address());
+  EXPECT_EQ(outcome.code, cli::ExitCode::kFailed);
+  EXPECT_THAT(outcome.err, HasSubstr("no HTTP port"));
+}
+
 TEST_F(TopTest, OnceAsATableNamesTheSceneAndHasNoEscapes) {
   const Outcome outcome = run_top(http(), {"--once"});
   EXPECT_EQ(outcome.code, cli::ExitCode::kOk) << outcome.err;
