@@ -1,5 +1,5 @@
 // Checks the bytes that the transport reads from connections without TLS, before the transport parses them. The
-// transport reads with recvmsg(), which server/rpc/read_hooks.h replaces by a function that passes each read to
+// transport reads with recvmsg(), which server/rpc/read_hooks.cc replaces by a function that passes each read to
 // CheckedReads::accept(). Bytes of descriptors that are not watched are always accepted.
 //
 // Threads: every member may be called from any thread; reads of different descriptors rarely wait for each other.

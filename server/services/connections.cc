@@ -12,7 +12,7 @@
 #include "server/config/listen_address.h"
 #include "server/connections/frame_check.h"
 #include "server/observability/log.h"
-#include "server/rpc/read_hooks.h"
+#include "server/rpc/tls_reads.h"
 #include "server/scheduling/clocks.h"
 #include "server/services/server_events.h"
 

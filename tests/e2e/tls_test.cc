@@ -15,8 +15,8 @@
 
 #include "absl/strings/str_cat.h"
 #include "server/connections/frame_check.h"
-#include "server/rpc/read_hooks.h"
 #include "server/rpc/tls_credentials.h"
+#include "server/rpc/tls_reads.h"
 #include "server/scheduling/clocks.h"
 #include "server/security/token_file.h"
 #include "tests/support/raw_socket.h"
