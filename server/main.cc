@@ -2,13 +2,16 @@
 // repair` verify or repair a data directory instead.
 
 #include <malloc.h>
+#include <poll.h>
 #include <pthread.h>
 #include <sys/ioctl.h>
 #include <sys/resource.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
+#include <cerrno>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
@@ -120,6 +123,25 @@ class EndingSignals {
   Semaphore first_;
 };
 
+// Starts a thread that sends SIGTERM to this process when `parent`, the process that started it, has ended. Returns an
+// error if `parent` is not the parent process, as when it has already ended. Call it after EndingSignals::listen().
+absl::Status end_with(pid_t parent) {
+  const auto watched = static_cast<int>(syscall(SYS_pidfd_open, parent, 0));
+  // While `parent` is the parent process, its number is not given to another process, so `watched` is the right
+  // process.
+  if (watched < 0 || getppid() != parent) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("--end-with-parent: process ", parent, " is not the parent of this daemon, or it has ended"));
+  }
+  std::thread([watched] {
+    pollfd end{.fd = watched, .events = POLLIN, .revents = 0};
+    while (poll(&end, 1, /*timeout=*/-1) < 0 && errno == EINTR) {
+    }
+    kill(getpid(), SIGTERM);
+  }).detach();
+  return absl::OkStatus();
+}
+
 // Writes the port to a temporary file and renames that file to `path`, so that a reader never reads a part of the
 // number. Does nothing if `path` is empty. If writing fails, logs the error and returns false.
 bool write_port_file(const std::string& path, uint16_t port) {
@@ -170,6 +192,12 @@ int run(const ServerConfig& config) {
     return EXIT_FAILURE;
   }
   EndingSignals& signals = EndingSignals::listen();
+  if (config.end_with_parent != 0) {
+    if (const absl::Status ends = end_with(static_cast<pid_t>(config.end_with_parent)); !ends.ok()) {
+      log(LogLevel::kError, ends.message());
+      return EXIT_FAILURE;
+    }
+  }
   // The log is declared before the server, because the server writes to the log until it is destroyed.
   const absl::StatusOr<std::unique_ptr<UpdateLog>> update_log = open_log(config);
   if (!update_log.ok()) {

@@ -200,6 +200,9 @@ void add_options(CLI::App& app, ServerConfig& config) {
   app.add_option("--drain-grace-s", config.drain_grace_s, "Seconds that running calls may take after SIGTERM")
       ->check(CLI::Range(0u, limits::kMaxDrainGraceS))
       ->capture_default_str();
+  app.add_option("--end-with-parent", config.end_with_parent,
+                 "Process id of the process that starts the daemon, which then ends together with it; 0 = none")
+      ->capture_default_str();
   add_connection_options(app, config);
   add_security_options(app, config);
   app.add_flag("--insecure", config.insecure, "Listen beyond this machine without encryption or access control");

@@ -133,6 +133,10 @@ struct ServerConfig {
   // after which the service manager kills the process.
   uint32_t drain_grace_s = 10;
 
+  // Process id of the process that starts the daemon; 0 = none. When this process has ended, in whatever way, the
+  // daemon ends as after SIGTERM. Set it if the daemon serves only the program that starts it.
+  uint32_t end_with_parent = 0;
+
   // Files of the server's certificate chain and its key, in PEM; both or none. With them, all TCP connections use TLS
   // 1.2 or 1.3, including those of the HTTP pages. The files are read again when they change.
   std::string tls_cert;

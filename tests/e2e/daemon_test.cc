@@ -168,6 +168,28 @@ TEST_F(DaemonTest, ASecondSignalEndsItAtOnce) {
   EXPECT_FALSE(upload->Finish().ok());
 }
 
+TEST_F(DaemonTest, ItEndsWithItsParentHoweverThatEnds) {
+  // The shell is the parent of a daemon that it starts in the background, and is killed while the daemon serves.
+  const std::string command =
+      absl::StrCat(built_program("locusd"), " --listen 127.0.0.1:0 --http-listen '' --port-file ", folder_.file("port"),
+                   " --end-with-parent $$ & wait");
+  ChildProcess shell("/bin/sh", {"-c", command}, log());
+  Stubs stubs(address());
+  create_world(stubs);
+  shell.signal(SIGKILL);
+  shell.wait();
+  while (text_of(log()).find("ended") == std::string::npos) std::this_thread::yield();
+  EXPECT_THAT(text_of(log()), HasSubstr("draining"));
+}
+
+TEST_F(DaemonTest, ItDoesNotStartWithoutTheParentItIsToEndWith) {
+  std::vector<std::string> arguments = on_free_port();
+  arguments.insert(arguments.end(), {"--end-with-parent", "1"});
+  DaemonProcess daemon(arguments, log());
+  EXPECT_EQ(daemon.wait(), EXIT_FAILURE);
+  EXPECT_THAT(text_of(log()), HasSubstr("process 1 is not the parent of this daemon"));
+}
+
 TEST_F(DaemonTest, ItServesOverAUnixSocketAndRemovesIt) {
   std::vector<std::string> arguments = on_free_port();
   const std::string path = folder_.file("locus.sock");

@@ -1,7 +1,7 @@
 """Python client of locusd, a server for exact spatial queries: scenes, updates and queries in columns.
 
-Start at locus.connect(). Columns are given as numpy arrays, array.array, other buffers or lists, and returned as numpy
-arrays, or array.array if numpy is not installed.
+Start at locus.connect(), or at locus.embedded() for a server of one's own. Columns are given as numpy arrays,
+array.array, other buffers or lists, and returned as numpy arrays, or array.array if numpy is not installed.
 """
 import pkgutil
 
@@ -12,6 +12,7 @@ __path__ = pkgutil.extend_path(__path__, __name__)
 from .client import DEFAULT_ADDRESS, Client, connect
 from .columns import ColumnLike, Values
 from .connection import Retry
+from .embedded import EmbeddedClient, embedded
 from .enums import (AtStart, ClipDepth, Column, Cull, Inside, OutsideHistory, OverloadPolicy, Precision, RayMode, Reason,
                     SceneState, Source, StaticDetail, Winding)
 from .environment import connect_from_environment
@@ -26,10 +27,10 @@ from .values import Ack, ItemError, Limit, Mesh, MeshPart, Quota, Revision, Scen
 
 __all__ = [
     "Ack", "After", "AtStart", "Block", "BlockResult", "Client", "ClipDepth", "Column", "ColumnLike", "Cull",
-    "DEFAULT_ADDRESS", "Inside",
+    "DEFAULT_ADDRESS", "EmbeddedClient", "Inside",
     "InstanceChange", "ItemError", "Limit", "LocusError", "Mesh", "MeshColumns", "MeshPart", "NO_TRIANGLE",
     "OutsideHistory", "OverloadPolicy", "PlacedInstances", "Precision", "QueryBatch", "QueryResult", "QueryStream",
     "Quota", "RayMode", "Reason", "Retry", "Revision", "Scene", "SceneState", "Server", "Source", "StaticDetail",
     "UpdateBatch", "UpdateStream", "Values", "Winding", "Work", "connect",
-    "connect_from_environment",
+    "connect_from_environment", "embedded",
 ]

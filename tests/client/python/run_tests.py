@@ -1,7 +1,8 @@
-"""Runs one test file of the Python package: run_tests.py FILE --package DIR --bin DIR --protoc PROGRAM [--without-numpy].
+"""Runs one test file of the Python package: run_tests.py FILE --package DIR --bin DIR --protoc PROGRAM [--without-numpy]
+[--embedded].
 
 It tests the built package. With --without-numpy, importing numpy fails even if it is installed; without this option,
-every test fails if numpy is not installed.
+every test fails if numpy is not installed. With --embedded, tests of DaemonTest get their locusd from locus.embedded().
 """
 import argparse
 import importlib.util
@@ -18,6 +19,7 @@ def options():
     for name in ("package", "bin", "protoc"):
         parser.add_argument("--" + name, required=True)
     parser.add_argument("--without-numpy", action="store_true")
+    parser.add_argument("--embedded", action="store_true")
     return parser.parse_args()
 
 
@@ -25,7 +27,8 @@ def main():
     chosen = options()
     sys.dont_write_bytecode = True
     sys.path[:0] = [chosen.package, HERE, os.path.join(HERE, "../../../client/python")]
-    os.environ.update(LOCUS_PACKAGE=chosen.package, LOCUS_BIN=chosen.bin, LOCUS_PROTOC=chosen.protoc)
+    os.environ.update(LOCUS_PACKAGE=chosen.package, LOCUS_BIN=chosen.bin, LOCUS_PROTOC=chosen.protoc,
+                      LOCUS_EMBEDDED="1" if chosen.embedded else "")
     if chosen.without_numpy:
         sys.modules["numpy"] = None
     else:

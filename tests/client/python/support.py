@@ -51,17 +51,20 @@ class Daemon:
 
 
 class DaemonTest(unittest.TestCase):
-    """Base class whose tests share a locusd and a client; each test has a scene that is named after it."""
+    """Base class whose tests share a locusd and a client; each test has a scene that is named after it. The locusd is a
+    Daemon or, with run_tests.py --embedded, that of locus.embedded().
+    """
 
     @classmethod
     def setUpClass(cls):
+        if os.environ["LOCUS_EMBEDDED"]:
+            cls.client = cls.daemon = locus.embedded(program=os.path.join(BIN, "locusd"), timeout=WAIT_SECONDS)
+            cls.addClassCleanup(cls.client.close)
+            return
         cls.daemon = Daemon()
+        cls.addClassCleanup(cls.daemon.stop)
         cls.client = locus.connect(cls.daemon.address, timeout=WAIT_SECONDS)
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.client.close()
-        cls.daemon.stop()
+        cls.addClassCleanup(cls.client.close)
 
     def setUp(self):
         self.scene = self._testMethodName[:60].replace("_", "-").lower().rstrip("-")

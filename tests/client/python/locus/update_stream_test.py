@@ -13,19 +13,26 @@ class Relay:
     """TCP proxy in front of a server; cut() breaks every connection through it."""
 
     def __init__(self, address):
-        host, port = address.rsplit(":", 1)
-        self.target = (host, int(port))
+        self.target = address
         self.lock = threading.Lock()
         self.sockets = []
         self.listener = socket.create_server(("127.0.0.1", 0))
         self.address = "127.0.0.1:%d" % self.listener.getsockname()[1]
         threading.Thread(target=self.accept, daemon=True).start()
 
+    def connect(self):
+        if not self.target.startswith("unix:"):
+            host, port = self.target.rsplit(":", 1)
+            return socket.create_connection((host, int(port)))
+        connected = socket.socket(socket.AF_UNIX)
+        connected.connect(self.target[len("unix:"):])
+        return connected
+
     def accept(self):
         while True:
             try:
                 near, _ = self.listener.accept()
-                far = socket.create_connection(self.target)
+                far = self.connect()
             except OSError:
                 return
             with self.lock:
