@@ -50,7 +50,7 @@ if [ ! -f "$build/build.ninja" ]; then
   rm -f build.log.$$
 fi
 # Everything that `cmake --install` installs.
-cmake --build "$build" --target locusd locus locus_python locus_completions locus_manual_pages
+cmake --build "$build" --target locusd locus locus_embedded locus_python locus_completions locus_manual_pages
 
 # Downloads and unpacks the package of the level, but does not install it.
 download_level() {

@@ -67,6 +67,8 @@ absl::StatusOr<std::shared_ptr<Authorization>> Authorization::make(const Credent
   return made;
 }
 
+std::shared_ptr<Authorization> Authorization::none() { return std::shared_ptr<Authorization>(new Authorization("")); }
+
 uint64_t Authorization::add_to(grpc::ClientContext& context) {
   std::lock_guard lock(mutex_);
   if (!file_.empty() && !(stamp_of(file_) == stamp_)) read().IgnoreError();

@@ -39,6 +39,9 @@ class Authorization {
   static absl::StatusOr<std::shared_ptr<Authorization>> make(const CredentialOptions& options,
                                                              const std::string& target);
 
+  // Returns an Authorization without a token.
+  static std::shared_ptr<Authorization> none();
+
   // Adds the metadata entry `authorization` to a call. Reads the token file again if the file has changed, and keeps
   // the old token if the file cannot be read. Returns the number of the token that was added; tokens are numbered 1, 2,
   // ... in the order in which they were read.

@@ -26,10 +26,10 @@ namespace {
 
 enum class Repeat { kNever, kWhenUnavailable };
 
-// Parameters of a call in addition to its request: channel, token, timeout, retries, and the name of its scene (empty
+// Parameters of a call in addition to its request: link, token, timeout, retries, and the name of its scene (empty
 // if the call concerns no scene).
 struct CallPlan {
-  grpc::ChannelInterface& channel;
+  const Link& link;
   Authorization& authorization;
   RunningCalls& running;
   absl::Duration deadline;
@@ -44,14 +44,15 @@ absl::StatusOr<Response> call(Stub& stub, const CallPlan& plan, const Request& r
   const absl::Time deadline = absl::Now() + plan.deadline;
   Response response;
   uint64_t token = 0;
-  const auto attempt = [&] {
-    continue_connecting(plan.channel, deadline);
+  const auto attempt = [&]() -> absl::Status {
+    ASSIGN_OR_RETURN(const CallGate::Permit permit, CallGate::enter(plan.link.gate));
+    continue_connecting(plan.link, deadline);
     CancellableContext context(&plan.running);
     token = prepare(context, {plan.authorization, deadline, plan.scene});
     response.Clear();
     return to_absl_status((stub.*method)(&context, request, &response));
   };
-  const auto wait = [&](absl::Duration duration) { wait_connecting(plan.channel, duration); };
+  const auto wait = [&](absl::Duration duration) { wait_connecting(plan.link, duration); };
   const auto attempts = [&] {
     return plan.repeat == Repeat::kNever ? attempt() : with_retries(plan.retry, deadline, attempt, wait);
   };
@@ -103,8 +104,8 @@ struct Client::Connection {
   std::string address;
   ClientOptions options;
   std::shared_ptr<Authorization> authorization;
-  std::shared_ptr<grpc::Channel> channel;  // connection for Lane::kLatency and unary calls
-  std::shared_ptr<grpc::Channel> bulk;
+  Link latency;  // for Lane::kLatency and unary calls
+  Link bulk;
   std::unique_ptr<v1::ServerService::StubInterface> servers;
   std::unique_ptr<v1::SceneService::StubInterface> scenes;
   std::unique_ptr<v1::UpdateService::StubInterface> updates;
@@ -112,17 +113,30 @@ struct Client::Connection {
   std::unique_ptr<v1::SceneService::StubInterface> transfers;  // stub on `bulk`, for uploads, downloads and dumps
   std::unique_ptr<RunningCalls> running = std::make_unique<RunningCalls>();
 
-  const std::shared_ptr<grpc::Channel>& channel_of(Lane lane) const { return lane == Lane::kBulk ? bulk : channel; }
+  Connection(std::string with_address, const ClientOptions& with, std::shared_ptr<Authorization> with_authorization,
+             Link with_latency, Link with_bulk)
+      : address(std::move(with_address)),
+        options(with),
+        authorization(std::move(with_authorization)),
+        latency(std::move(with_latency)),
+        bulk(std::move(with_bulk)),
+        servers(v1::ServerService::NewStub(latency.channel)),
+        scenes(v1::SceneService::NewStub(latency.channel)),
+        updates(v1::UpdateService::NewStub(latency.channel)),
+        queries(v1::QueryService::NewStub(latency.channel)),
+        transfers(v1::SceneService::NewStub(bulk.channel)) {}
+
+  const Link& link_of(Lane lane) const { return lane == Lane::kBulk ? bulk : latency; }
   CallPlan once(absl::string_view scene = {}) const {
-    return {*channel, *authorization, *running, options.deadline, options.retry, Repeat::kNever, scene};
+    return {latency, *authorization, *running, options.deadline, options.retry, Repeat::kNever, scene};
   }
   CallPlan repeatable(absl::string_view scene = {}) const {
-    return {*channel, *authorization, *running, options.deadline, options.retry, Repeat::kWhenUnavailable, scene};
+    return {latency, *authorization, *running, options.deadline, options.retry, Repeat::kWhenUnavailable, scene};
   }
   // Prepares a call on `bulk`, whose deadline is `timeout` from now, and returns its header.
   CallHeader bulk_header(absl::Duration timeout, absl::string_view scene = {}) const {
     const absl::Time deadline = absl::Now() + timeout;
-    continue_connecting(*bulk, deadline);
+    continue_connecting(bulk, deadline);
     return {*authorization, deadline, scene, running.get()};
   }
 };
@@ -137,11 +151,15 @@ absl::StatusOr<std::unique_ptr<Client>> Client::connect(absl::string_view addres
   std::shared_ptr<grpc::Channel> channel = open_channel(target, options, credentials);
   RETURN_IF_ERROR(await_connection(channel, target, options));
   std::shared_ptr<grpc::Channel> bulk = open_channel(target, options, credentials);
-  auto connection = std::make_unique<Connection>(
-      Connection{target, options, std::move(authorization), channel, bulk, v1::ServerService::NewStub(channel),
-                 v1::SceneService::NewStub(channel), v1::UpdateService::NewStub(channel),
-                 v1::QueryService::NewStub(channel), v1::SceneService::NewStub(bulk)});
-  return std::unique_ptr<Client>(new Client(std::move(connection)));
+  return std::unique_ptr<Client>(
+      new Client(std::make_unique<Connection>(target, options, std::move(authorization), Link{channel}, Link{bulk})));
+}
+
+std::unique_ptr<Client> Client::in_process(const std::shared_ptr<grpc::Channel>& channel,
+                                           std::shared_ptr<CallGate> gate, const ClientOptions& options) {
+  const Link link{channel, std::move(gate)};
+  return std::unique_ptr<Client>(
+      new Client(std::make_unique<Connection>("in-process", options, Authorization::none(), link, link)));
 }
 
 const std::string& Client::address() const { return connection_->address; }
@@ -164,7 +182,7 @@ absl::StatusOr<std::vector<v1::IdentityQuotas>> Client::get_quotas(v1::GetQuotas
 
 absl::StatusOr<Health> Client::health(absl::string_view service) const {
   namespace health = grpc::health::v1;
-  const std::unique_ptr<health::Health::StubInterface> stub = health::Health::NewStub(connection_->channel);
+  const std::unique_ptr<health::Health::StubInterface> stub = health::Health::NewStub(connection_->latency.channel);
   health::HealthCheckRequest request;
   request.set_service(std::string(service));
   ASSIGN_OR_RETURN(const health::HealthCheckResponse response,
@@ -174,7 +192,9 @@ absl::StatusOr<Health> Client::health(absl::string_view service) const {
 }
 
 absl::StatusOr<BackupSize> Client::backup(BackupSink& sink) const {
-  const std::unique_ptr<v1::ServerService::StubInterface> server = v1::ServerService::NewStub(connection_->bulk);
+  ASSIGN_OR_RETURN(const CallGate::Permit permit, CallGate::enter(connection_->bulk.gate));
+  const std::unique_ptr<v1::ServerService::StubInterface> server =
+      v1::ServerService::NewStub(connection_->bulk.channel);
   return download_backup(*server, sink, connection_->bulk_header(connection_->options.backup_deadline));
 }
 
@@ -213,6 +233,7 @@ absl::Status Client::delete_scene(const v1::DeleteSceneRequest& request) const {
 
 absl::StatusOr<v1::UploadMeshResponse> Client::upload_mesh(const MeshColumns& mesh,
                                                            const UploadProgress& progress) const {
+  ASSIGN_OR_RETURN(const CallGate::Permit permit, CallGate::enter(connection_->bulk.gate));
   return locus::client::upload_mesh(*connection_->transfers, mesh,
                                     connection_->bulk_header(connection_->options.long_deadline), progress);
 }
@@ -220,14 +241,14 @@ absl::StatusOr<v1::UploadMeshResponse> Client::upload_mesh(const MeshColumns& me
 absl::StatusOr<DownloadedMesh> Client::download_mesh(absl::string_view name, const DownloadProgress& progress) const {
   const CallHeader header = connection_->bulk_header(connection_->options.long_deadline);
   absl::StatusOr<DownloadedMesh> mesh = absl::UnknownError("not asked yet");
-  const auto attempt = [&] {
-    continue_connecting(*connection_->bulk, header.deadline);
+  const auto attempt = [&]() -> absl::Status {
+    ASSIGN_OR_RETURN(const CallGate::Permit permit, CallGate::enter(connection_->bulk.gate));
+    continue_connecting(connection_->bulk, header.deadline);
     mesh = locus::client::download_mesh(*connection_->transfers, name, header, progress);
     return mesh.status();
   };
-  with_retries(connection_->options.retry, header.deadline, attempt, [&](absl::Duration duration) {
-    wait_connecting(*connection_->bulk, duration);
-  }).IgnoreError();
+  RETURN_IF_ERROR(with_retries(connection_->options.retry, header.deadline, attempt,
+                               [&](absl::Duration duration) { wait_connecting(connection_->bulk, duration); }));
   return mesh;
 }
 
@@ -260,6 +281,7 @@ absl::StatusOr<v1::ChangeInstancesResponse> Client::change_instances(const v1::C
 
 absl::Status Client::dump(const v1::DumpSceneRequest& request,
                           const std::function<absl::Status(const v1::DumpSceneResponse&)>& on_message) const {
+  ASSIGN_OR_RETURN(const CallGate::Permit permit, CallGate::enter(connection_->bulk.gate));
   CancellableContext context(connection_->running.get());
   prepare(context, connection_->bulk_header(connection_->options.long_deadline, request.scene()));
   const auto reader = connection_->transfers->DumpScene(&context, request);
@@ -310,12 +332,12 @@ absl::StatusOr<v1::QueryResult> Client::query(absl::string_view scene, v1::Query
 }
 
 std::unique_ptr<UpdateStream> Client::update_stream(absl::string_view scene, const UpdateStreamOptions& options) const {
-  return std::make_unique<UpdateStream>(connection_->channel_of(options.lane), connection_->authorization,
+  return std::make_unique<UpdateStream>(connection_->link_of(options.lane), connection_->authorization,
                                         std::string(scene), options);
 }
 
 std::unique_ptr<QueryStream> Client::query_stream(absl::string_view scene, const QueryStreamOptions& options) const {
-  return std::make_unique<QueryStream>(connection_->channel_of(options.lane), connection_->authorization,
+  return std::make_unique<QueryStream>(connection_->link_of(options.lane), connection_->authorization,
                                        std::string(scene), options);
 }
 

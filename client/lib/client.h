@@ -38,7 +38,13 @@
 #include "locus/v1/server_service.pb.h"
 #include "locus/v1/update_service.pb.h"
 
+namespace grpc {
+class Channel;
+}
+
 namespace locus::client {
+
+class CallGate;
 
 inline constexpr char kDefaultAddress[] = "127.0.0.1:7575";
 
@@ -64,11 +70,17 @@ class Client {
   // sent unencrypted to another machine (see CredentialOptions::allow_token_without_tls).
   static absl::StatusOr<std::unique_ptr<Client>> connect(absl::string_view address = kDefaultAddress,
                                                          const ClientOptions& options = {});
+  // Returns a client over `channel`, a channel to a server in the same process (grpc::Server::InProcessChannel). Both
+  // lanes use this channel. The server must close `gate` before it shuts down (client/lib/call_gate.h). The
+  // credentials, connect_timeout, wait_for_server and message sizes of `options` have no effect: the channel has none
+  // of them, or limits of its own. Programs use EmbeddedServer::connect() instead.
+  static std::unique_ptr<Client> in_process(const std::shared_ptr<grpc::Channel>& channel,
+                                            std::shared_ptr<CallGate> gate, const ClientOptions& options = {});
   ~Client();
   Client(const Client&) = delete;
   Client& operator=(const Client&) = delete;
 
-  // Returns the server's address, including the port.
+  // Returns the server's address, including the port; `in-process` for a client of in_process().
   const std::string& address() const;
 
   // Returns the server's version, features and limits. Retried.

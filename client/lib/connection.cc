@@ -103,19 +103,21 @@ absl::Status await_connection(const std::shared_ptr<grpc::Channel>& channel, con
   return absl::OkStatus();
 }
 
-void continue_connecting(grpc::ChannelInterface& channel, absl::Time deadline) {
+void continue_connecting(const Link& link, absl::Time deadline) {
   constexpr absl::Duration kMaxWait = absl::Milliseconds(100);
-  if (channel.GetState(/*try_to_connect=*/false) != GRPC_CHANNEL_TRANSIENT_FAILURE) return;
-  channel.WaitForStateChange(GRPC_CHANNEL_TRANSIENT_FAILURE,
-                             absl::ToChronoTime(std::min(absl::Now() + kMaxWait, deadline)));
+  if (link.gate != nullptr || link.channel->GetState(/*try_to_connect=*/false) != GRPC_CHANNEL_TRANSIENT_FAILURE)
+    return;
+  link.channel->WaitForStateChange(GRPC_CHANNEL_TRANSIENT_FAILURE,
+                                   absl::ToChronoTime(std::min(absl::Now() + kMaxWait, deadline)));
 }
 
-void wait_connecting(grpc::ChannelInterface& channel, absl::Duration duration) {
+void wait_connecting(const Link& link, absl::Duration duration) {
+  if (link.gate != nullptr) return absl::SleepFor(duration);
   const absl::Time end = absl::Now() + duration;
   while (absl::Now() < end) {
-    const grpc_connectivity_state state = channel.GetState(/*try_to_connect=*/true);
+    const grpc_connectivity_state state = link.channel->GetState(/*try_to_connect=*/true);
     if (state == GRPC_CHANNEL_READY) return absl::SleepFor(end - absl::Now());
-    channel.WaitForStateChange(state, absl::ToChronoTime(end));
+    link.channel->WaitForStateChange(state, absl::ToChronoTime(end));
   }
 }
 

@@ -12,6 +12,7 @@
 #include "absl/strings/string_view.h"
 #include "absl/time/time.h"
 #include "client/lib/authorization.h"
+#include "client/lib/call_gate.h"
 #include "client/lib/options.h"
 #include "client/lib/running_calls.h"
 
@@ -44,14 +45,22 @@ std::shared_ptr<grpc::Channel> open_channel(const std::string& target, const Cli
 absl::Status await_connection(const std::shared_ptr<grpc::Channel>& channel, const std::string& target,
                               const ClientOptions& options);
 
-// Waits before a call while the channel tries to connect again: at most 100 ms, and not beyond `deadline`. Returns
-// immediately unless the channel's last attempt to connect has failed. gRPC continues an attempt to connect only while
-// a thread waits inside gRPC, or every 5 s. Without this wait, calls could fail for 15 s after the server has returned,
-// because calls on a failed channel return immediately.
-void continue_connecting(grpc::ChannelInterface& channel, absl::Time deadline);
+// Channel of a client.
+struct Link {
+  std::shared_ptr<grpc::ChannelInterface> channel;
+  // Gate of the server, if it is in the same process; otherwise null. A channel in the process has no connection that
+  // could break, and gRPC does not report its state.
+  std::shared_ptr<CallGate> gate = nullptr;
+};
 
-// Waits for `duration`. A channel that is not connected tries to connect during the wait.
-void wait_connecting(grpc::ChannelInterface& channel, absl::Duration duration);
+// Waits before a call while the link's channel tries to connect again: at most 100 ms, and not beyond `deadline`.
+// Returns immediately unless the channel's last attempt to connect has failed. gRPC continues an attempt to connect
+// only while a thread waits inside gRPC, or every 5 s. Without this wait, calls could fail for 15 s after the server
+// has returned, because calls on a failed channel return immediately.
+void continue_connecting(const Link& link, absl::Time deadline);
+
+// Waits for `duration`. A link that is not connected tries to connect during the wait.
+void wait_connecting(const Link& link, absl::Duration duration);
 
 // Parameters of a call that are not part of its request: gRPC sends them as metadata or as the call's deadline.
 struct CallHeader {

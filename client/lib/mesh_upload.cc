@@ -1,13 +1,18 @@
 #include <algorithm>
+#include <condition_variable>
 #include <limits>
-#include <memory>
+#include <mutex>
+#include <optional>
 #include <string>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "client/lib/status.h"
 #include "client/lib/transfers.h"
 #include "core/base/status_macros.h"
 #include "grpcpp/client_context.h"
+#include "grpcpp/support/client_callback.h"
+#include "locus/v1/scene_service.grpc.pb.h"
 
 namespace locus::client {
 namespace {
@@ -16,7 +21,56 @@ namespace {
 constexpr size_t kValuesPerMessage = (1u << 18) - 1024;
 static_assert(kValuesPerMessage % 3 == 0, "messages end between triples");
 
-using Writer = grpc::ClientWriterInterface<v1::UploadMeshRequest>;
+// Writes the messages of one call, each in turn. Unlike gRPC's blocking writer it waits for the status of the call from
+// the beginning: over an in-process channel of gRPC 1.51, a write would otherwise not end when the server has answered
+// without reading the message. Used by one thread.
+class Writer final : public grpc::ClientWriteReactor<v1::UploadMeshRequest> {
+ public:
+  // Starts the call. Call finish() before the destructor.
+  Writer(v1::SceneService::StubInterface& stub, grpc::ClientContext& context) {
+    stub.async()->UploadMesh(&context, &response_, this);
+    AddHold();  // keeps the call from ending between two writes
+    StartCall();
+  }
+
+  // Returns false if the server has already answered.
+  bool write(const v1::UploadMeshRequest& request) {
+    std::unique_lock lock(mutex_);
+    state_ = State::kWriting;
+    StartWrite(&request);
+    changed_.wait(lock, [this] { return state_ != State::kWriting; });
+    return state_ == State::kWritten;
+  }
+  void end_writes() { StartWritesDone(); }
+  // Waits for the answer.
+  absl::StatusOr<v1::UploadMeshResponse> finish() {
+    RemoveHold();
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [this] { return end_.has_value(); });
+    RETURN_IF_ERROR(*end_);
+    return std::move(response_);
+  }
+
+ private:
+  enum class State { kWriting, kWritten, kAnswered };
+
+  void OnWriteDone(bool ok) override {
+    const std::lock_guard lock(mutex_);
+    state_ = ok ? State::kWritten : State::kAnswered;
+    changed_.notify_all();
+  }
+  void OnDone(const grpc::Status& status) override {
+    const std::lock_guard lock(mutex_);
+    end_ = to_absl_status(status);
+    changed_.notify_all();
+  }
+
+  v1::UploadMeshResponse response_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  State state_ = State::kWritten;
+  std::optional<absl::Status> end_;
+};
 
 absl::Status check(const MeshColumns& mesh) {
   constexpr size_t kMax = std::numeric_limits<uint32_t>::max();
@@ -52,7 +106,7 @@ class Sender {
       const absl::Span<const T> part = values.subspan(0, kValuesPerMessage);
       v1::UploadMeshRequest request;
       (request.*column)()->Add(part.begin(), part.end());
-      if (!writer_.Write(request)) return false;
+      if (!writer_.write(request)) return false;
       sent_ += part.size() * sizeof(T);
       if (progress_) progress_(sent_, total_);
       values.remove_prefix(part.size());
@@ -74,16 +128,13 @@ absl::StatusOr<v1::UploadMeshResponse> upload_mesh(v1::SceneService::StubInterfa
   RETURN_IF_ERROR(check(mesh));
   CancellableContext context(header.running);
   prepare(context, header);
-  v1::UploadMeshResponse response;
-  const std::unique_ptr<Writer> writer = stub.UploadMesh(&context, &response);
-  Sender sender(*writer, mesh, progress);
-  const bool all_sent = writer->Write(opening(mesh)) &&
+  Writer writer(stub, context);
+  Sender sender(writer, mesh, progress);
+  const bool all_sent = writer.write(opening(mesh)) &&
                         sender.send(mesh.vertices, &v1::UploadMeshRequest::mutable_vertices) &&
                         sender.send(mesh.indices, &v1::UploadMeshRequest::mutable_indices);
-  // If a write fails, the server has already answered, and Finish() returns its answer.
-  if (all_sent) writer->WritesDone();
-  RETURN_IF_ERROR(to_absl_status(writer->Finish()));
-  return response;
+  if (all_sent) writer.end_writes();
+  return writer.finish();
 }
 
 }  // namespace locus::client

@@ -76,7 +76,7 @@ class PipelinedStream {
   };
 
   struct Options {
-    std::shared_ptr<grpc::ChannelInterface> channel;  // channel of the stream's calls
+    Link link;  // link of the stream's calls
     int max_in_flight;
     RetryPolicy reconnect;
     absl::Duration patience;  // maximum time without any response while requests are unanswered
@@ -90,7 +90,7 @@ class PipelinedStream {
         max_in_flight_(static_cast<size_t>(std::max(1, options.max_in_flight))),
         patience_(absl::ToChronoNanoseconds(options.patience)),
         backoff_(options.reconnect),
-        channel_(options.channel),
+        link_(options.link),
         authorization_(options.authorization),
         supervisor_([this] { supervise(); }) {}
 
@@ -273,7 +273,7 @@ class PipelinedStream {
           changed_.wait_for(lock, absl::ToChronoNanoseconds(*wait), [this] { return broken_off_; });
           if (broken_off_) continue;
           lock.unlock();
-          continue_connecting(*channel_, absl::InfiniteFuture());
+          continue_connecting(link_, absl::InfiniteFuture());
           lock.lock();
           continue;
         }
@@ -286,8 +286,11 @@ class PipelinedStream {
 
   absl::Status run_attempt(std::unique_lock<std::mutex>& lock) {
     for (Item& item : items_) item.written = false;
-    attempt_ = std::make_unique<Attempt>(*this);
-    attempt_->start();
+    {
+      ASSIGN_OR_RETURN(const CallGate::Permit permit, CallGate::enter(link_.gate));
+      attempt_ = std::make_unique<Attempt>(*this);
+      attempt_->start();
+    }
     last_response_ = Clock::now();
     pump();
     const bool silent = !wait_for_end(lock);
@@ -350,7 +353,7 @@ class PipelinedStream {
   std::mutex mutex_;
   std::condition_variable changed_;
   Backoff backoff_;
-  const std::shared_ptr<grpc::ChannelInterface> channel_;
+  const Link link_;
   const std::shared_ptr<Authorization> authorization_;
   Items items_;
   // Start of the current wait for a response: the time of the last response, of the start of the call, or of the first

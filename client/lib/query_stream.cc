@@ -15,12 +15,11 @@ using Stream = PipelinedStream<v1::StreamQueriesRequest, v1::StreamQueriesRespon
 
 class QueryStream::Impl final : public Stream::Kind {
  public:
-  Impl(std::shared_ptr<grpc::ChannelInterface> channel, std::shared_ptr<Authorization> authorization, std::string scene,
+  Impl(const Link& link, std::shared_ptr<Authorization> authorization, std::string scene,
        const QueryStreamOptions& options)
-      : stub_(v1::QueryService::NewStub(channel)),
+      : stub_(v1::QueryService::NewStub(link.channel)),
         stream_(*this, std::move(scene),
-                {std::move(channel), options.max_in_flight, options.reconnect, options.patience,
-                 std::move(authorization)}) {}
+                {link, options.max_in_flight, options.reconnect, options.patience, std::move(authorization)}) {}
 
   Stream& stream() { return stream_; }
 
@@ -43,9 +42,9 @@ class QueryStream::Impl final : public Stream::Kind {
   Stream stream_;          // declared last: its thread uses all members above
 };
 
-QueryStream::QueryStream(std::shared_ptr<grpc::ChannelInterface> channel, std::shared_ptr<Authorization> authorization,
-                         std::string scene, const QueryStreamOptions& options)
-    : impl_(std::make_unique<Impl>(std::move(channel), std::move(authorization), std::move(scene), options)) {}
+QueryStream::QueryStream(const Link& link, std::shared_ptr<Authorization> authorization, std::string scene,
+                         const QueryStreamOptions& options)
+    : impl_(std::make_unique<Impl>(link, std::move(authorization), std::move(scene), options)) {}
 
 QueryStream::~QueryStream() = default;
 

@@ -14,13 +14,10 @@
 #include "client/lib/options.h"
 #include "locus/v1/query_service.pb.h"
 
-namespace grpc {
-class ChannelInterface;
-}
-
 namespace locus::client {
 
 class Authorization;
+struct Link;
 
 struct QueryStreamOptions {
   // Maximum number of unanswered batches, at least 1; send() blocks when this number is reached. 8 batches of 1,024
@@ -41,9 +38,9 @@ class QueryStream {
  public:
   using ResultCallback = std::function<void(absl::StatusOr<v1::QueryResult>)>;
 
-  // Opens a stream on `channel`. Callers use Client::query_stream instead.
-  QueryStream(std::shared_ptr<grpc::ChannelInterface> channel, std::shared_ptr<Authorization> authorization,
-              std::string scene, const QueryStreamOptions& options);
+  // Opens a stream on `link`. Callers use Client::query_stream instead.
+  QueryStream(const Link& link, std::shared_ptr<Authorization> authorization, std::string scene,
+              const QueryStreamOptions& options);
   // Cancels the stream; unanswered batches get CANCELLED.
   ~QueryStream();
   QueryStream(const QueryStream&) = delete;

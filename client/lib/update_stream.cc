@@ -32,14 +32,13 @@ bool batch_number_is_unused(const absl::Status& failure) {
 
 class UpdateStream::Impl final : public UpdatePipeline::Kind {
  public:
-  Impl(std::shared_ptr<grpc::ChannelInterface> channel, std::shared_ptr<Authorization> authorization, std::string scene,
+  Impl(const Link& link, std::shared_ptr<Authorization> authorization, std::string scene,
        const UpdateStreamOptions& options)
-      : stub_(v1::UpdateService::NewStub(channel)),
+      : stub_(v1::UpdateService::NewStub(link.channel)),
         writer_(options.writer != 0 ? options.writer : random_writer()),
         next_batch_(options.next_batch),
         stream_(*this, std::move(scene),
-                {std::move(channel), options.max_in_flight, options.reconnect, options.patience,
-                 std::move(authorization)}) {}
+                {link, options.max_in_flight, options.reconnect, options.patience, std::move(authorization)}) {}
 
   UpdatePipeline& stream() { return stream_; }
   uint64_t writer() const { return writer_; }
@@ -91,10 +90,9 @@ class UpdateStream::Impl final : public UpdatePipeline::Kind {
   UpdatePipeline stream_;             // declared last: its thread uses all members above
 };
 
-UpdateStream::UpdateStream(std::shared_ptr<grpc::ChannelInterface> channel,
-                           std::shared_ptr<Authorization> authorization, std::string scene,
+UpdateStream::UpdateStream(const Link& link, std::shared_ptr<Authorization> authorization, std::string scene,
                            const UpdateStreamOptions& options)
-    : impl_(std::make_unique<Impl>(std::move(channel), std::move(authorization), std::move(scene), options)) {}
+    : impl_(std::make_unique<Impl>(link, std::move(authorization), std::move(scene), options)) {}
 
 UpdateStream::~UpdateStream() = default;
 

@@ -27,13 +27,10 @@
 #include "client/lib/values.h"
 #include "locus/v1/update_service.pb.h"
 
-namespace grpc {
-class ChannelInterface;
-}
-
 namespace locus::client {
 
 class Authorization;
+struct Link;
 
 struct UpdateStreamOptions {
   // Maximum number of unanswered batches, at least 1. send() blocks when this number is reached, which limits the
@@ -58,9 +55,9 @@ class UpdateStream {
  public:
   using AckCallback = std::function<void(absl::StatusOr<v1::UpdateAck>)>;
 
-  // Opens a stream on `channel`. Callers use Client::update_stream instead.
-  UpdateStream(std::shared_ptr<grpc::ChannelInterface> channel, std::shared_ptr<Authorization> authorization,
-               std::string scene, const UpdateStreamOptions& options);
+  // Opens a stream on `link`. Callers use Client::update_stream instead.
+  UpdateStream(const Link& link, std::shared_ptr<Authorization> authorization, std::string scene,
+               const UpdateStreamOptions& options);
   // Cancels the stream; unanswered batches get CANCELLED. To wait for their acks, call close() before the destructor.
   ~UpdateStream();
   UpdateStream(const UpdateStream&) = delete;

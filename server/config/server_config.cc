@@ -247,15 +247,6 @@ std::vector<std::string> with_environment(const std::vector<std::string>& argume
   return all;
 }
 
-// Replaces the options `threads` and `memory_limit` by defaults for this machine if the operator left them at 0.
-void follow_machine(ServerConfig& config) {
-  const Machine machine = read_machine();
-  if (config.threads == 0) config.threads = std::min(machine.cores, limits::kMaxThreads);
-  if (config.memory_limit == 0) config.memory_limit = machine.memory_bytes / 4 * 3;
-  LOCUS_DCHECK_LE(1u, config.threads);
-  LOCUS_DCHECK_LE(config.threads, limits::kMaxThreads);
-}
-
 // Returns an error unless `config` has TLS and an access file. Call it for an address that other machines can reach.
 // `option` is the option that sets the address. `exposed` is text for the error: what anyone could do without TLS and
 // access control.
@@ -374,6 +365,14 @@ Invocation help(const std::vector<std::string>& arguments) {
 }
 
 }  // namespace
+
+void follow_machine(ServerConfig& config) {
+  const Machine machine = read_machine();
+  config.threads = std::min(config.threads == 0 ? machine.cores : config.threads, limits::kMaxThreads);
+  if (config.memory_limit == 0) config.memory_limit = machine.memory_bytes / 4 * 3;
+  LOCUS_DCHECK_LE(1u, config.threads);
+  LOCUS_DCHECK_LE(config.threads, limits::kMaxThreads);
+}
 
 void build_parser(CLI::App& app, ServerConfig& config) {
   describe(app);

@@ -203,6 +203,10 @@ struct Invocation {
 // The returned config has passed check_config(), and its `threads` and `memory_limit` are not 0.
 Invocation read_invocation(const std::vector<std::string>& arguments, const Environment& environment);
 
+// Replaces `threads` and `memory_limit` by the defaults for this machine if they are 0. Reduces `threads` to
+// limits::kMaxThreads if it is larger.
+void follow_machine(ServerConfig& config);
+
 // Returns INVALID_ARGUMENT if an address cannot be parsed, or if other machines can reach it and `config` has neither
 // TLS with an access file nor `insecure`. Returns INVALID_ARGUMENT, too, if `unix_mode` is malformed, or if an option
 // is set without another option that it needs.

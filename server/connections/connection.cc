@@ -165,4 +165,14 @@ void Connection::release() {
   descriptor_ = -1;
 }
 
+Peer peer_in_process() {
+  Peer peer;
+  peer.name = kInProcess;
+  peer.label = peer.name;
+  peer.address = peer.name;
+  peer.limit_key = peer.name;
+  peer.uid = geteuid();
+  return peer;
+}
+
 }  // namespace locus::server

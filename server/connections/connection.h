@@ -25,7 +25,7 @@ struct Peer {
   std::string label;            // for people: `name` or, for a unix socket, unix:uid=1000,pid=4711 (pid only if known)
   std::string address;          // address without port, such as 10.0.0.7; "unix" for a unix socket
   std::string limit_key;        // connections with equal keys share the limits of one address; see peer_of()
-  std::optional<uint32_t> uid;  // user id of the process at the other end; unix sockets only
+  std::optional<uint32_t> uid;  // user id of the process at the other end; no value for TCP
 };
 
 // Counts of the calls of a connection, and of the messages of these calls, since the connection was accepted.
@@ -152,6 +152,13 @@ class Connection {
 // other process. The limit key is the IPv4 address, the first 64 bits of the IPv6 address (a subscriber owns all
 // addresses that begin with these bits), or the user id. Returns nullopt if the peer has already gone.
 std::optional<Peer> peer_of(int descriptor);
+
+// Name of the peer of all callers in this process.
+inline constexpr const char* kInProcess = "in-process";
+// Returns the peer of all callers in this process, which call through gRPC's in-process channels. gRPC does not tell
+// the channels of a server apart, so these callers share the limits of one connection. `uid` is the user id of this
+// process: with access control, the callers have the identity of this user, as over a unix socket.
+Peer peer_in_process();
 
 }  // namespace locus::server
 

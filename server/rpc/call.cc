@@ -17,6 +17,12 @@ using std::chrono::system_clock;
 constexpr const char* kSceneMetadata = "x-scene";
 constexpr std::chrono::hours kNoDeadline{24 * 365};
 
+// Returns the name of the caller's connection. gRPC has no name for channels within a process.
+std::string peer_name(const grpc::ServerContextBase& context) {
+  std::string name = context.peer();
+  return name == "unknown" ? kInProcess : name;
+}
+
 SteadyTime to_steady(system_clock::time_point deadline) {
   const system_clock::time_point now = system_clock::now();
   if (deadline > now + kNoDeadline) return steady_clock::now() + kNoDeadline;
@@ -34,7 +40,7 @@ Caller::Caller(RpcState& state, const grpc::ServerContextBase& context, const st
     : state_(state),
       context_(context),
       gone_(gone),
-      connection_(state.connections.find(context.peer())),
+      connection_(state.connections.find(peer_name(context))),
       deadline_(to_steady(context.deadline())),
       client_(std::hash<std::string>{}(connection_->peer().name)) {}
 

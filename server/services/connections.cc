@@ -4,6 +4,8 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <chrono>
+#include <memory>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -169,6 +171,7 @@ absl::StatusOr<std::unique_ptr<Connections>> Connections::listen(const ServerCon
 }
 
 void Connections::add_to(grpc::ServerBuilder& builder, uint32_t streams) {
+  if (sockets_.empty()) return;
   max_streams_ = streams;
   builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, static_cast<int>(streams));
   builder.AddChannelArgument(GRPC_ARG_ENABLE_CHANNELZ, 1);  // for StreamCounter
@@ -179,6 +182,10 @@ void Connections::add_to(grpc::ServerBuilder& builder, uint32_t streams) {
 }
 
 void Connections::start(grpc::Server& server) {
+  if (sockets_.empty()) {
+    const auto now = std::chrono::steady_clock::now();
+    return state_.connections.add(std::make_shared<Connection>(peer_in_process(), now, /*descriptor=*/-1));
+  }
   intake_->started(server);
   guard_ = std::make_unique<FloodGuard>(
       flood_limits(config_, max_streams_), [this](Connection& connection) { return stream_counter_.count(connection); },

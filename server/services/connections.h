@@ -55,6 +55,7 @@ class Connections {
   Connections& operator=(const Connections&) = delete;
 
   // Prepares `builder`, so that its server takes over accepted connections, each with at most `streams` open streams.
+  // Like start(), does nothing if the configuration has no addresses.
   void add_to(grpc::ServerBuilder& builder, uint32_t streams);
   // Starts accepting connections for `server`, which `builder` of add_to() has built.
   void start(grpc::Server& server);

@@ -3,13 +3,16 @@
 #include <grpcpp/resource_quota.h>
 #include <grpcpp/server.h>
 #include <grpcpp/server_builder.h>
+#include <grpcpp/support/channel_arguments.h>
 
 #include <algorithm>
+#include <functional>
 #include <future>
 #include <thread>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/check.h"
 #include "core/base/status_macros.h"
 #include "server/config/listen_address.h"
 #include "server/host/host.h"
@@ -178,6 +181,11 @@ absl::StatusOr<std::unique_ptr<Server>> Server::start(const ServerConfig& config
   return server;
 }
 
+std::shared_ptr<grpc::Channel> Server::in_process_channel(const grpc::ChannelArguments& arguments) const {
+  LOCUS_CHECK(addresses().empty());
+  return parts_->grpc->InProcessChannel(arguments);
+}
+
 const std::vector<std::string>& Server::addresses() const { return parts_->connections->addresses(); }
 
 uint16_t Server::port() const { return parts_->connections->port(); }
@@ -191,7 +199,7 @@ void Server::reload() {
   reload_tls();
 }
 
-void Server::drain(milliseconds grace) {
+void Server::drain(milliseconds grace, const std::function<void()>& before_closing) {
   const steady_clock::time_point deadline = steady_clock::now() + grace;
   Host& host = parts_->host;
   // Accept new connections until all calls have ended or `deadline` has passed, so that probes get NOT_SERVING.
@@ -203,6 +211,7 @@ void Server::drain(milliseconds grace) {
   parts_->connections->stop_accepting();
   host.drain.end();
   parts_->health_service.end();
+  if (before_closing != nullptr) before_closing();
   const milliseconds last_words = idle ? milliseconds(kLastWords) : milliseconds(0);
   // Shutdown() waits without a limit for a client that does not read its responses. Therefore another thread closes all
   // connections if gRPC has not ended in time.

@@ -46,6 +46,10 @@ ALLOWED = {
     # The client library may include only status_macros.h of core, and only in sources, because this header is not
     # installed.
     "client/lib": ["proto", "core/base/status_macros.h"],
+    # The embedded server joins the client library and the server in one process.
+    "client/embedded": ["client/lib", "server/services", "server/storage", "server/observability", "server/config",
+                        "core/scene/log", "core/base/status_macros.h"],
+    "client/embedded/examples": ["client/embedded", "client/lib"],
     "client/cli": ["client/cli/security", "client/lib", "core/base"],
     "client/cli/security": ["client/lib", "core/base"],
     "client/cli/commands": ["client/cli/*", "client/lib", "core/geometry", "core/base"],
@@ -75,7 +79,7 @@ ALLOWED["core/index/hash_grid"].append("core/index/hash_grid/kernels")
 # Prefixes of third-party headers, each with the folders that may include headers with this prefix. A folder stands also
 # for all folders below it. Tests may include all headers.
 THIRD_PARTY = {
-    "grpc": ["server/rpc", "server/services", "server/convert", "server/observability", "client/lib"],
+    "grpc": ["server/rpc", "server/services", "server/convert", "server/observability", "client/lib", "client/embedded"],
     "google/protobuf/": ["server/rpc", "server/services", "server/convert", "client/lib", "client/cli/script"],
     "spdlog/": ["server/observability"],
     "zlib.h": ["server/rpc"],

@@ -165,7 +165,8 @@ def stale_exceptions(tree):
             if path not in tree.files]
 
 
-NAMESPACES = {"core": "locus", "server": "locus::server", "client/lib": "locus::client", "client/cli": "locus::cli",
+NAMESPACES = {"core": "locus", "server": "locus::server", "client/lib": "locus::client", "client/embedded": "locus::client",
+              "client/cli": "locus::cli",
               "tests": "locus"}
 OUTER_NAMESPACE = re.compile(r"^namespace ([\w:]+) \{", re.MULTILINE)
 FOREIGN_TO_CORE = re.compile(r"locus::(server|client|cli)\b")

@@ -43,10 +43,10 @@ class KeptFiles final : public BackupSink {
 };
 
 // Fixture with a fake server that sends a backup of three files as an announcement and three messages.
-class BackupDownloadTest : public ::testing::Test {
+class BackupDownloadTest : public ::testing::TestWithParam<testing::Way> {
  protected:
   void SetUp() override {
-    absl::StatusOr<std::unique_ptr<Client>> client = Client::connect(server_.address());
+    absl::StatusOr<std::unique_ptr<Client>> client = server_.connect(GetParam());
     ASSERT_TRUE(client.ok()) << client.status();
     client_ = *std::move(client);
     server_.servers.plan_backup(planned_);
@@ -67,7 +67,7 @@ class BackupDownloadTest : public ::testing::Test {
   std::unique_ptr<Client> client_;
 };
 
-TEST_F(BackupDownloadTest, FilesArriveCompleteAndAreCounted) {
+TEST_P(BackupDownloadTest, FilesArriveCompleteAndAreCounted) {
   KeptFiles kept;
   const absl::StatusOr<BackupSize> size = client_->backup(kept);
   ASSERT_TRUE(size.ok()) << size.status();
@@ -78,7 +78,7 @@ TEST_F(BackupDownloadTest, FilesArriveCompleteAndAreCounted) {
   EXPECT_EQ(size->bytes, 8u);
 }
 
-TEST_F(BackupDownloadTest, AFileMayArriveInManyMessages) {
+TEST_P(BackupDownloadTest, AFileMayArriveInManyMessages) {
   const v1::BackupResponse whole = pieces()[3];
   pieces()[3].clear_end();
   pieces()[3].set_data("th");
@@ -91,7 +91,7 @@ TEST_F(BackupDownloadTest, AFileMayArriveInManyMessages) {
   EXPECT_EQ(kept.files, planned_);
 }
 
-TEST_F(BackupDownloadTest, AStreamThatEndsEarlyWithoutAnErrorIsDataLoss) {
+TEST_P(BackupDownloadTest, AStreamThatEndsEarlyWithoutAnErrorIsDataLoss) {
   pieces().clear();
   expect_damaged("nothing came");
   pieces().pop_back();
@@ -102,14 +102,14 @@ TEST_F(BackupDownloadTest, AStreamThatEndsEarlyWithoutAnErrorIsDataLoss) {
   expect_damaged("less came than was announced");
 }
 
-TEST_F(BackupDownloadTest, MoreDataThanAnnouncedIsDataLoss) {
+TEST_P(BackupDownloadTest, MoreDataThanAnnouncedIsDataLoss) {
   pieces()[0].mutable_announced()->set_files(2);
   expect_damaged("more came than was announced");
   pieces()[0].mutable_announced()->set_bytes(7);
   expect_damaged("more came than was announced");
 }
 
-TEST_F(BackupDownloadTest, BytesWithAnotherHashAreDataLoss) {
+TEST_P(BackupDownloadTest, BytesWithAnotherHashAreDataLoss) {
   pieces()[1].set_data("onE");
   expect_damaged("its file \"CURRENT\" has another SHA-256 than the server says");
   pieces()[1].mutable_end()->set_bytes(4);
@@ -118,7 +118,7 @@ TEST_F(BackupDownloadTest, BytesWithAnotherHashAreDataLoss) {
   expect_damaged("its file \"empty\" has another SHA-256 than the server says");
 }
 
-TEST_F(BackupDownloadTest, AFileEndsOnlyAfterItsHashIsVerified) {
+TEST_P(BackupDownloadTest, AFileEndsOnlyAfterItsHashIsVerified) {
   pieces()[1].set_data("onE");
   KeptFiles kept;
   EXPECT_FALSE(client_->backup(kept).ok());
@@ -126,7 +126,7 @@ TEST_F(BackupDownloadTest, AFileEndsOnlyAfterItsHashIsVerified) {
   EXPECT_THAT(kept.files, IsEmpty());
 }
 
-TEST_F(BackupDownloadTest, MessagesOutOfOrderAreDataLoss) {
+TEST_P(BackupDownloadTest, MessagesOutOfOrderAreDataLoss) {
   pieces()[0].clear_announced();
   expect_damaged("the announcement is not exactly in the first message");
   pieces()[1].mutable_announced();
@@ -141,7 +141,7 @@ TEST_F(BackupDownloadTest, MessagesOutOfOrderAreDataLoss) {
   expect_damaged("1048577 files are announced");
 }
 
-TEST_F(BackupDownloadTest, InvalidPathsAreRefusedBeforeTheSinkReceivesThem) {
+TEST_P(BackupDownloadTest, InvalidPathsAreRefusedBeforeTheSinkReceivesThem) {
   for (const std::string path : {"../x", "/etc/x", "a/../../x", "a\nb"}) {
     pieces()[1].set_path(path);
     KeptFiles kept;
@@ -153,7 +153,7 @@ TEST_F(BackupDownloadTest, InvalidPathsAreRefusedBeforeTheSinkReceivesThem) {
   expect_damaged("its file \"CURRENT\" comes twice");
 }
 
-TEST_F(BackupDownloadTest, AnErrorOfTheSinkEndsTheBackup) {
+TEST_P(BackupDownloadTest, AnErrorOfTheSinkEndsTheBackup) {
   KeptFiles kept;
   kept.refused = "empty";
   const absl::Status status = client_->backup(kept).status();
@@ -161,11 +161,13 @@ TEST_F(BackupDownloadTest, AnErrorOfTheSinkEndsTheBackup) {
   EXPECT_THAT(kept.begun, ElementsAre("CURRENT", "empty"));
 }
 
-TEST_F(BackupDownloadTest, AnErrorOfTheServerIsReturned) {
+TEST_P(BackupDownloadTest, AnErrorOfTheServerIsReturned) {
   server_.servers.backup_end = {grpc::StatusCode::UNAVAILABLE, "planned"};
   KeptFiles kept;
   EXPECT_TRUE(absl::IsUnavailable(client_->backup(kept).status())) << "also after the last file was received";
 }
+
+INSTANTIATE_TEST_SUITE_P(Ways, BackupDownloadTest, testing::kBothWays, testing::way_name);
 
 }  // namespace
 }  // namespace locus::client

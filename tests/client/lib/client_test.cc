@@ -20,10 +20,10 @@ ClientOptions quick() {
   return options;
 }
 
-class ClientTest : public ::testing::Test {
+class ClientTest : public ::testing::TestWithParam<testing::Way> {
  protected:
   void SetUp() override {
-    absl::StatusOr<std::unique_ptr<Client>> client = Client::connect(server_.address(), quick());
+    absl::StatusOr<std::unique_ptr<Client>> client = server_.connect(GetParam(), quick());
     ASSERT_TRUE(client.ok()) << client.status();
     client_ = *std::move(client);
   }
@@ -61,7 +61,7 @@ TEST(ConnectTest, WaitingForAServerEndsWithTheTimeout) {
 
 TEST(ConnectTest, AnEmptyAddressIsRefusedAtOnce) { EXPECT_TRUE(absl::IsInvalidArgument(Client::connect("").status())); }
 
-TEST_F(ClientTest, QueriesAreRetriedWhileTheServerIsUnavailable) {
+TEST_P(ClientTest, QueriesAreRetriedWhileTheServerIsUnavailable) {
   server_.queries.failing_calls = 3;
   const absl::StatusOr<v1::QueryResult> result = client_->query("arena", one_ray());
   ASSERT_TRUE(result.ok()) << result.status();
@@ -70,17 +70,17 @@ TEST_F(ClientTest, QueriesAreRetriedWhileTheServerIsUnavailable) {
   EXPECT_EQ(server_.queries.scene, "arena") << "x-scene";
 }
 
-TEST_F(ClientTest, QueriesFailWhenTheAttemptsAreUsedUp) {
+TEST_P(ClientTest, QueriesFailWhenTheAttemptsAreUsedUp) {
   server_.queries.failing_calls = 100;
   EXPECT_TRUE(absl::IsUnavailable(client_->query("arena", one_ray()).status()));
   EXPECT_EQ(server_.queries.calls, 4);
 }
 
-TEST_F(ClientTest, ALateQueryNamesTheRevisionForWhichItWaits) {
+TEST_P(ClientTest, ALateQueryNamesTheRevisionForWhichItWaits) {
   server_.queries.delay = std::chrono::milliseconds(500);
   ClientOptions hasty = quick();
   hasty.deadline = absl::Milliseconds(100);
-  const auto client = Client::connect(server_.address(), hasty);
+  const auto client = server_.connect(GetParam(), hasty);
   ASSERT_TRUE(client.ok()) << client.status();
   v1::QueryBatch batch = one_ray();
   const absl::Status late = (*client)->query("arena", batch).status();
@@ -92,7 +92,7 @@ TEST_F(ClientTest, ALateQueryNamesTheRevisionForWhichItWaits) {
               HasSubstr("scene 'arena' may not have reached revision 9 yet"));
 }
 
-TEST_F(ClientTest, RefusalsAreNotRetriedAndKeepTheirFields) {
+TEST_P(ClientTest, RefusalsAreNotRetriedAndKeepTheirFields) {
   server_.queries.failing_calls = 1;
   v1::Error error;
   error.set_reason(v1::REASON_NOT_FINITE);
@@ -105,7 +105,7 @@ TEST_F(ClientTest, RefusalsAreNotRetriedAndKeepTheirFields) {
   EXPECT_EQ(server_.queries.calls, 1);
 }
 
-TEST_F(ClientTest, ResourceExhaustedWithAHintIsRetried) {
+TEST_P(ClientTest, ResourceExhaustedWithAHintIsRetried) {
   server_.queries.failing_calls = 1;
   v1::Error error;
   error.set_reason(v1::REASON_LIMIT);
@@ -115,13 +115,13 @@ TEST_F(ClientTest, ResourceExhaustedWithAHintIsRetried) {
   EXPECT_EQ(server_.queries.calls, 2);
 }
 
-TEST_F(ClientTest, AnUpdateWithoutWriterIsSentOnce) {
+TEST_P(ClientTest, AnUpdateWithoutWriterIsSentOnce) {
   server_.updates.failing_calls = 1;
   EXPECT_TRUE(absl::IsUnavailable(client_->apply("arena", {}).status()));
   EXPECT_EQ(server_.updates.calls, 1);
 }
 
-TEST_F(ClientTest, AnUpdateWithWriterAndBatchIsRetried) {
+TEST_P(ClientTest, AnUpdateWithWriterAndBatchIsRetried) {
   server_.updates.failing_calls = 2;
   v1::UpdateBatch batch;
   batch.set_writer(77);
@@ -133,7 +133,7 @@ TEST_F(ClientTest, AnUpdateWithWriterAndBatchIsRetried) {
   EXPECT_THAT(server_.updates.applied(), ElementsAre(5));
 }
 
-TEST_F(ClientTest, OtherChangesAreNeverRetried) {
+TEST_P(ClientTest, OtherChangesAreNeverRetried) {
   server_.scenes.failing_creates = 1;
   v1::CreateSceneRequest request;
   request.set_name("arena");
@@ -141,7 +141,7 @@ TEST_F(ClientTest, OtherChangesAreNeverRetried) {
   EXPECT_EQ(server_.scenes.creates, 1);
 }
 
-TEST_F(ClientTest, ASceneIsCreatedFoundListedAndDeleted) {
+TEST_P(ClientTest, ASceneIsCreatedFoundListedAndDeleted) {
   for (const char* name : {"a", "b", "c", "d", "e"}) {
     v1::CreateSceneRequest request;
     request.set_name(name);
@@ -158,18 +158,18 @@ TEST_F(ClientTest, ASceneIsCreatedFoundListedAndDeleted) {
   EXPECT_TRUE(absl::IsNotFound(client_->get_scene("c").status()));
 }
 
-TEST_F(ClientTest, ASceneNameThatIsIllegalInMetadataReachesTheServerAndIsRefusedThere) {
+TEST_P(ClientTest, ASceneNameThatIsIllegalInMetadataReachesTheServerAndIsRefusedThere) {
   EXPECT_TRUE(absl::IsNotFound(client_->get_scene("no\nsuch\x01name").status()));
 }
 
-TEST_F(ClientTest, HealthIsServingAndAnUnknownServiceIsNotFound) {
+TEST_P(ClientTest, HealthIsServingAndAnUnknownServiceIsNotFound) {
   const absl::StatusOr<Health> health = client_->health();
   ASSERT_TRUE(health.ok()) << health.status();
   EXPECT_EQ(*health, Health::kServing);
   EXPECT_TRUE(absl::IsNotFound(client_->health("no.such.Service").status()));
 }
 
-TEST_F(ClientTest, QuotasAreReadPageByPage) {
+TEST_P(ClientTest, QuotasAreReadPageByPage) {
   EXPECT_EQ(client_->get_quotas()->size(), 1u);
   v1::GetQuotasRequest request;
   request.set_all(true);
@@ -180,12 +180,12 @@ TEST_F(ClientTest, QuotasAreReadPageByPage) {
   EXPECT_FALSE(all->back().quotas(1).has_limit());
 }
 
-TEST_F(ClientTest, AStoppedServerIsUnavailable) {
+TEST_P(ClientTest, AStoppedServerIsUnavailable) {
   server_.stop();
   EXPECT_TRUE(absl::IsUnavailable(client_->get_server().status()));
 }
 
-TEST_F(ClientTest, ADumpEndsEarlyWithTheErrorOfItsCallback) {
+TEST_P(ClientTest, ADumpEndsEarlyWithTheErrorOfItsCallback) {
   int pieces = 0;
   v1::DumpSceneRequest request;
   request.set_scene("arena");
@@ -201,7 +201,7 @@ TEST_F(ClientTest, ADumpEndsEarlyWithTheErrorOfItsCallback) {
             absl::AbortedError("enough"));
 }
 
-TEST_F(ClientTest, AMeshArrivesCompleteInMessagesOfAtMostOneMebibyte) {
+TEST_P(ClientTest, AMeshArrivesCompleteInMessagesOfAtMostOneMebibyte) {
   std::vector<float> vertices(900'000);
   for (size_t i = 0; i < vertices.size(); ++i) vertices[i] = static_cast<float>(i);
   std::vector<uint32_t> indices(600'000);
@@ -217,7 +217,7 @@ TEST_F(ClientTest, AMeshArrivesCompleteInMessagesOfAtMostOneMebibyte) {
   EXPECT_EQ(reported, (vertices.size() + indices.size()) * 4);
 }
 
-TEST_F(ClientTest, AKnownMeshIsNotSentAgain) {
+TEST_P(ClientTest, AKnownMeshIsNotSentAgain) {
   const std::vector<float> vertices(30'000'000, 1.0f);
   const std::vector<uint32_t> indices = {0, 1, 2};
   const Sha256 hash = mesh_sha256(vertices, indices);
@@ -227,13 +227,18 @@ TEST_F(ClientTest, AKnownMeshIsNotSentAgain) {
       {.name = "level", .vertices = vertices, .indices = indices}, [&](uint64_t bytes, uint64_t) { sent = bytes; });
   ASSERT_TRUE(uploaded.ok()) << uploaded.status();
   EXPECT_TRUE(uploaded->already_known());
-  EXPECT_LT(sent, vertices.size() * 4) << "the upload continues although the server has answered";
+  // An in-process channel drops the messages that are written after the answer, without an error.
+  if (GetParam() == testing::Way::kLoopback) {
+    EXPECT_LT(sent, vertices.size() * 4) << "the upload continues although the server has answered";
+  }
 }
 
-TEST_F(ClientTest, AMeshWithIncompleteTriplesIsNotSent) {
+TEST_P(ClientTest, AMeshWithIncompleteTriplesIsNotSent) {
   const std::vector<float> vertices(10);
   EXPECT_TRUE(absl::IsInvalidArgument(client_->upload_mesh({.name = "level", .vertices = vertices}).status()));
 }
+
+INSTANTIATE_TEST_SUITE_P(Ways, ClientTest, testing::kBothWays, testing::way_name);
 
 }  // namespace
 }  // namespace locus::client

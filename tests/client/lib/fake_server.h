@@ -5,6 +5,7 @@
 #define LOCUS_TESTS_CLIENT_LIB_FAKE_SERVER_H_
 
 #include <grpcpp/grpcpp.h>
+#include <gtest/gtest.h>
 
 #include <chrono>
 #include <cstdint>
@@ -17,6 +18,9 @@
 #include <thread>
 #include <vector>
 
+#include "absl/status/statusor.h"
+#include "client/lib/call_gate.h"
+#include "client/lib/client.h"
 #include "client/lib/sha256.h"
 #include "locus/v1/query_service.grpc.pb.h"
 #include "locus/v1/scene_service.grpc.pb.h"
@@ -449,6 +453,13 @@ class FakeServerService final : public v1::ServerService::Service {
   grpc::Status backup_end;
 };
 
+// Ways of a client to a fake server. Tests of the library run over both.
+enum class Way { kLoopback, kInProcess };
+inline const auto kBothWays = ::testing::Values(Way::kLoopback, Way::kInProcess);
+inline std::string way_name(const ::testing::TestParamInfo<Way>& info) {
+  return info.param == Way::kLoopback ? "Loopback" : "InProcess";
+}
+
 // Fake server with all services on a free loopback port.
 class FakeServer {
  public:
@@ -460,11 +471,17 @@ class FakeServer {
 
   std::string address() const { return "127.0.0.1:" + std::to_string(port_); }
 
+  absl::StatusOr<std::unique_ptr<Client>> connect(Way way, const ClientOptions& options = {}) const {
+    if (way == Way::kLoopback) return Client::connect(address(), options);
+    return Client::in_process(server_->InProcessChannel({}), gate_, options);
+  }
+
   void stop() {
+    gate_->close();
     if (server_) server_->Shutdown(std::chrono::system_clock::now());
     server_.reset();
   }
-  // Restarts the server on the same port, with the same state.
+  // Restarts the server on the same port, with the same state. Clients in this process cannot reach it again.
   void restart() { start(address()); }
 
   FakeUpdates updates;
@@ -485,6 +502,7 @@ class FakeServer {
 
   int port_ = 0;
   std::unique_ptr<grpc::Server> server_;
+  const std::shared_ptr<CallGate> gate_ = std::make_shared<CallGate>();
 };
 
 }  // namespace locus::client::testing

@@ -18,12 +18,12 @@ std::string hash_of(const std::vector<float>& vertices, const std::vector<uint32
 }
 
 // Fixture with a fake server that sends one mesh in three messages. The mesh has two triangles and four vertices.
-class MeshDownloadTest : public ::testing::Test {
+class MeshDownloadTest : public ::testing::TestWithParam<testing::Way> {
  protected:
   void SetUp() override {
     ClientOptions options;
     options.retry = {.max_attempts = 2, .first_backoff = absl::Milliseconds(1), .max_backoff = absl::Milliseconds(2)};
-    absl::StatusOr<std::unique_ptr<Client>> client = Client::connect(server_.address(), options);
+    absl::StatusOr<std::unique_ptr<Client>> client = server_.connect(GetParam(), options);
     ASSERT_TRUE(client.ok()) << client.status();
     client_ = *std::move(client);
     pieces().resize(3);
@@ -53,7 +53,7 @@ class MeshDownloadTest : public ::testing::Test {
   std::unique_ptr<Client> client_;
 };
 
-TEST_F(MeshDownloadTest, MessagesBecomeOneMeshAndProgressIsReported) {
+TEST_P(MeshDownloadTest, MessagesBecomeOneMeshAndProgressIsReported) {
   std::vector<uint64_t> received;
   const absl::StatusOr<DownloadedMesh> mesh = client_->download_mesh("level", [&](uint64_t bytes, uint64_t total) {
     received.push_back(bytes);
@@ -68,7 +68,7 @@ TEST_F(MeshDownloadTest, MessagesBecomeOneMeshAndProgressIsReported) {
   EXPECT_EQ(received, (std::vector<uint64_t>{24, 60, 72}));
 }
 
-TEST_F(MeshDownloadTest, AnUploadedMeshIsDownloadedWithTheSameHash) {
+TEST_P(MeshDownloadTest, AnUploadedMeshIsDownloadedWithTheSameHash) {
   ASSERT_TRUE(client_->upload_mesh({.name = "level", .vertices = vertices_, .indices = indices_}).ok());
   const absl::StatusOr<DownloadedMesh> mesh = client_->download_mesh("level");
   ASSERT_TRUE(mesh.ok()) << mesh.status();
@@ -78,7 +78,7 @@ TEST_F(MeshDownloadTest, AnUploadedMeshIsDownloadedWithTheSameHash) {
   EXPECT_EQ(again.parts.size(), 1u);
 }
 
-TEST_F(MeshDownloadTest, AMissingOrRepeatedDescriptionIsDataLoss) {
+TEST_P(MeshDownloadTest, AMissingOrRepeatedDescriptionIsDataLoss) {
   *pieces()[1].mutable_mesh() = pieces()[0].mesh();
   expect_damaged("its description is not exactly in the first message");
   pieces()[0].clear_mesh();
@@ -87,7 +87,7 @@ TEST_F(MeshDownloadTest, AMissingOrRepeatedDescriptionIsDataLoss) {
   expect_damaged("nothing came");
 }
 
-TEST_F(MeshDownloadTest, MoreOfAnyColumnThanAnnouncedIsDataLoss) {
+TEST_P(MeshDownloadTest, MoreOfAnyColumnThanAnnouncedIsDataLoss) {
   pieces()[2].add_indices(0);
   expect_damaged("more came than was announced");
   pieces()[2].mutable_indices()->RemoveLast();
@@ -99,22 +99,22 @@ TEST_F(MeshDownloadTest, MoreOfAnyColumnThanAnnouncedIsDataLoss) {
   expect_damaged("more came than was announced");
 }
 
-TEST_F(MeshDownloadTest, LessThanAnnouncedIsDataLoss) {
+TEST_P(MeshDownloadTest, LessThanAnnouncedIsDataLoss) {
   pieces().pop_back();
   expect_damaged("less came than was announced");
 }
 
-TEST_F(MeshDownloadTest, AnIndexBeyondTheVerticesIsDataLoss) {
+TEST_P(MeshDownloadTest, AnIndexBeyondTheVerticesIsDataLoss) {
   pieces()[2].set_indices(0, 4);
   expect_damaged("an index is beyond its vertices");
 }
 
-TEST_F(MeshDownloadTest, AVertexThatIsNotFiniteIsDataLoss) {
+TEST_P(MeshDownloadTest, AVertexThatIsNotFiniteIsDataLoss) {
   pieces()[0].set_vertices(0, std::numeric_limits<float>::quiet_NaN());
   expect_damaged("a vertex is not finite");
 }
 
-TEST_F(MeshDownloadTest, PartsOutOfOrderOrBeyondTheMeshAreDataLoss) {
+TEST_P(MeshDownloadTest, PartsOutOfOrderOrBeyondTheMeshAreDataLoss) {
   pieces()[0].mutable_parts(0)->set_first_triangle(1);
   expect_damaged("its parts do not ascend");
   pieces()[0].mutable_parts(0)->set_first_triangle(0);
@@ -124,26 +124,28 @@ TEST_F(MeshDownloadTest, PartsOutOfOrderOrBeyondTheMeshAreDataLoss) {
   expect_damaged("its parts do not ascend");
 }
 
-TEST_F(MeshDownloadTest, BytesOfAnotherHashAreDataLoss) {
+TEST_P(MeshDownloadTest, BytesOfAnotherHashAreDataLoss) {
   pieces()[0].set_vertices(0, 0.5f);
   expect_damaged("its bytes have another SHA-256 than was announced");
   pieces()[0].mutable_mesh()->clear_sha256();
   expect_damaged("its bytes have another SHA-256 than was announced");
 }
 
-TEST_F(MeshDownloadTest, ADownloadIsRetriedWhenTheServerWasUnavailable) {
+TEST_P(MeshDownloadTest, ADownloadIsRetriedWhenTheServerWasUnavailable) {
   server_.scenes.failing_downloads = 1;
   EXPECT_TRUE(client_->download_mesh("level").ok());
   server_.scenes.failing_downloads = 2;
   EXPECT_TRUE(absl::IsUnavailable(client_->download_mesh("level").status()));
 }
 
-TEST_F(MeshDownloadTest, TheServersErrorForAnUnknownMeshIsReturned) {
+TEST_P(MeshDownloadTest, TheServersErrorForAnUnknownMeshIsReturned) {
   server_.scenes.mesh_pieces.clear();
   server_.scenes.no_mesh = true;
   const absl::Status status = client_->download_mesh("level").status();
   EXPECT_TRUE(absl::IsNotFound(status)) << status;
 }
+
+INSTANTIATE_TEST_SUITE_P(Ways, MeshDownloadTest, testing::kBothWays, testing::way_name);
 
 }  // namespace
 }  // namespace locus::client

@@ -16,10 +16,10 @@ using testing::FakeServer;
 
 constexpr absl::Duration kMoveDelay = absl::Hours(1);
 
-class MoveBatcherTest : public ::testing::Test {
+class MoveBatcherTest : public ::testing::TestWithParam<testing::Way> {
  protected:
   void SetUp() override {
-    absl::StatusOr<std::unique_ptr<Client>> client = Client::connect(server_.address());
+    absl::StatusOr<std::unique_ptr<Client>> client = server_.connect(GetParam());
     ASSERT_TRUE(client.ok()) << client.status();
     client_ = *std::move(client);
   }
@@ -28,7 +28,7 @@ class MoveBatcherTest : public ::testing::Test {
   std::unique_ptr<Client> client_;
 };
 
-TEST_F(MoveBatcherTest, MovesAddedTogetherAreOneMessageInOrder) {
+TEST_P(MoveBatcherTest, MovesAddedTogetherAreOneMessageInOrder) {
   MoveBatcher moves(client_->update_stream("arena"), {.max_items = 100, .max_delay = kMoveDelay});
   for (const uint64_t id : {7u, 8u, 7u}) moves.move(id, Float3{static_cast<float>(id), 0, 0});
   ASSERT_TRUE(moves.flush().ok());
@@ -38,7 +38,7 @@ TEST_F(MoveBatcherTest, MovesAddedTogetherAreOneMessageInOrder) {
   EXPECT_THAT(server_.updates.last_batch.moves(0).positions(), ElementsAre(7, 0, 0, 8, 0, 0, 7, 0, 0));
 }
 
-TEST_F(MoveBatcherTest, AFullMessageIsSentAndTheNextOneStarted) {
+TEST_P(MoveBatcherTest, AFullMessageIsSentAndTheNextOneStarted) {
   {
     MoveBatcher moves(client_->update_stream("arena"), {.max_items = 10, .max_delay = kMoveDelay});
     for (uint64_t id = 1; id <= 25; ++id) moves.move(id, Float3{0, 0, 0});
@@ -47,7 +47,7 @@ TEST_F(MoveBatcherTest, AFullMessageIsSentAndTheNextOneStarted) {
   EXPECT_EQ(server_.updates.last_batch.moves(0).ids_size(), 5);
 }
 
-TEST_F(MoveBatcherTest, EachMessageIsAcked) {
+TEST_P(MoveBatcherTest, EachMessageIsAcked) {
   std::vector<uint64_t> revisions;
   MoveBatcher moves(client_->update_stream("arena"), {.max_items = 1},
                     [&](const absl::StatusOr<v1::UpdateAck>& ack) { revisions.push_back(ack->revision()); });
@@ -56,7 +56,7 @@ TEST_F(MoveBatcherTest, EachMessageIsAcked) {
   EXPECT_THAT(revisions, ElementsAre(1, 2, 3));
 }
 
-TEST_F(MoveBatcherTest, EachMessageIsAppliedOnceDespiteABrokenConnection) {
+TEST_P(MoveBatcherTest, EachMessageIsAppliedOnceDespiteABrokenConnection) {
   server_.updates.breaks = {.after_messages = 2, .times = 4, .apply_last = true};
   const RetryPolicy quick = {.max_attempts = 20, .first_backoff = absl::Milliseconds(1)};
   MoveBatcher moves(client_->update_stream("arena", {.reconnect = quick}), {.max_items = 1});
@@ -65,7 +65,7 @@ TEST_F(MoveBatcherTest, EachMessageIsAppliedOnceDespiteABrokenConnection) {
   EXPECT_EQ(server_.updates.applied().size(), 12u);
 }
 
-TEST_F(MoveBatcherTest, FlushAndEachAckReportTheEndOfTheStream) {
+TEST_P(MoveBatcherTest, FlushAndEachAckReportTheEndOfTheStream) {
   std::vector<absl::StatusCode> codes;
   MoveBatcher moves(client_->update_stream("arena", {.reconnect = {.max_attempts = 1}}), {},
                     [&](const absl::StatusOr<v1::UpdateAck>& ack) { codes.push_back(ack.status().code()); });
@@ -76,6 +76,8 @@ TEST_F(MoveBatcherTest, FlushAndEachAckReportTheEndOfTheStream) {
   EXPECT_TRUE(absl::IsUnavailable(moves.flush()));
   EXPECT_THAT(codes, ElementsAre(absl::StatusCode::kUnavailable, absl::StatusCode::kUnavailable));
 }
+
+INSTANTIATE_TEST_SUITE_P(Ways, MoveBatcherTest, testing::kBothWays, testing::way_name);
 
 }  // namespace
 }  // namespace locus::client

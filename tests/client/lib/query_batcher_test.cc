@@ -36,11 +36,11 @@ v1::QueryResult answer_by_values(const v1::QueryBatch& batch) {
   return result;
 }
 
-class QueryBatcherTest : public ::testing::Test {
+class QueryBatcherTest : public ::testing::TestWithParam<testing::Way> {
  protected:
   void SetUp() override {
     server_.queries.stream_answer = answer_by_values;
-    absl::StatusOr<std::unique_ptr<Client>> client = Client::connect(server_.address());
+    absl::StatusOr<std::unique_ptr<Client>> client = server_.connect(GetParam());
     ASSERT_TRUE(client.ok()) << client.status();
     client_ = *std::move(client);
   }
@@ -53,7 +53,7 @@ class QueryBatcherTest : public ::testing::Test {
   std::unique_ptr<Client> client_;
 };
 
-TEST_F(QueryBatcherTest, QueriesAddedTogetherAreSentInOneMessageAndGetTheirOwnAnswers) {
+TEST_P(QueryBatcherTest, QueriesAddedTogetherAreSentInOneMessageAndGetTheirOwnAnswers) {
   std::vector<absl::StatusOr<SingleHit>> hits;
   std::vector<uint64_t> ids;
   QueryBatcher batcher(client_->query_stream("arena"), {.limits = {.max_items = 100, .max_delay = kQueryDelay}});
@@ -71,7 +71,7 @@ TEST_F(QueryBatcherTest, QueriesAddedTogetherAreSentInOneMessageAndGetTheirOwnAn
   EXPECT_THAT(ids, ElementsAre(1, 2, 3, 4));
 }
 
-TEST_F(QueryBatcherTest, AFullMessageIsSentAtOnce) {
+TEST_P(QueryBatcherTest, AFullMessageIsSentAtOnce) {
   std::promise<uint64_t> last;
   QueryBatcher batcher(client_->query_stream("arena"), {.limits = {.max_items = 2, .max_delay = kQueryDelay}});
   batcher.ray({.origin = {1, 0, 0}, .direction = {0, 0, 1}}, [](absl::StatusOr<SingleHit>) {});
@@ -80,7 +80,7 @@ TEST_F(QueryBatcherTest, AFullMessageIsSentAtOnce) {
   EXPECT_EQ(last.get_future().get(), 2u);
 }
 
-TEST_F(QueryBatcherTest, FilterFrameAndTMaxAreSentToo) {
+TEST_P(QueryBatcherTest, FilterFrameAndTMaxAreSentToo) {
   v1::QueryBatch seen;
   server_.queries.stream_answer = [&](const v1::QueryBatch& batch) {
     seen = batch;
@@ -98,7 +98,7 @@ TEST_F(QueryBatcherTest, FilterFrameAndTMaxAreSentToo) {
   EXPECT_THAT(seen.blocks(0).ignore_groups(), ElementsAre(8));
 }
 
-TEST_F(QueryBatcherTest, WhenTheStreamEndsEveryCallbackGetsItsError) {
+TEST_P(QueryBatcherTest, WhenTheStreamEndsEveryCallbackGetsItsError) {
   std::vector<absl::StatusOr<SingleHit>> hits;
   QueryBatcher batcher(client_->query_stream("arena", {.reconnect = {.max_attempts = 1}}));
   server_.stop();
@@ -111,7 +111,7 @@ TEST_F(QueryBatcherTest, WhenTheStreamEndsEveryCallbackGetsItsError) {
   EXPECT_TRUE(absl::IsUnavailable(hits[1].status())) << hits[1].status();
 }
 
-TEST_F(QueryBatcherTest, AnAnswerThatDoesNotMatchTheQueriesIsDataLoss) {
+TEST_P(QueryBatcherTest, AnAnswerThatDoesNotMatchTheQueriesIsDataLoss) {
   server_.queries.stream_answer = [](const v1::QueryBatch&) { return answer_by_values({}); };
   std::vector<absl::StatusOr<SingleHit>> hits;
   QueryBatcher batcher(client_->query_stream("arena"));
@@ -121,7 +121,7 @@ TEST_F(QueryBatcherTest, AnAnswerThatDoesNotMatchTheQueriesIsDataLoss) {
   EXPECT_EQ(hits[0].status().code(), absl::StatusCode::kDataLoss);
 }
 
-TEST_F(QueryBatcherTest, TheDestructorWaitsForAllAnswers) {
+TEST_P(QueryBatcherTest, TheDestructorWaitsForAllAnswers) {
   std::vector<absl::StatusOr<SingleHit>> hits;
   {
     QueryBatcher batcher(client_->query_stream("arena"), {.limits = {.max_items = 8, .max_delay = kQueryDelay}});
@@ -130,7 +130,7 @@ TEST_F(QueryBatcherTest, TheDestructorWaitsForAllAnswers) {
   EXPECT_EQ(hits.size(), 20u);
 }
 
-TEST_F(QueryBatcherTest, ManyThreadsShareOneBatcher) {
+TEST_P(QueryBatcherTest, ManyThreadsShareOneBatcher) {
   std::atomic<int> right = 0;
   {
     QueryBatcher batcher(client_->query_stream("arena"));
@@ -147,6 +147,8 @@ TEST_F(QueryBatcherTest, ManyThreadsShareOneBatcher) {
   }
   EXPECT_EQ(right, 800);
 }
+
+INSTANTIATE_TEST_SUITE_P(Ways, QueryBatcherTest, testing::kBothWays, testing::way_name);
 
 }  // namespace
 }  // namespace locus::client

@@ -12,10 +12,10 @@ namespace {
 using testing::FakeQueries;
 using testing::FakeServer;
 
-class QueryStreamTest : public ::testing::Test {
+class QueryStreamTest : public ::testing::TestWithParam<testing::Way> {
  protected:
   void SetUp() override {
-    absl::StatusOr<std::unique_ptr<Client>> client = Client::connect(server_.address());
+    absl::StatusOr<std::unique_ptr<Client>> client = server_.connect(GetParam());
     ASSERT_TRUE(client.ok()) << client.status();
     client_ = *std::move(client);
     open({.reconnect = kPatient});
@@ -40,7 +40,10 @@ class QueryStreamTest : public ::testing::Test {
   std::unique_ptr<QueryStream> stream_;
 };
 
-TEST_F(QueryStreamTest, AnswersOutOfOrderReachTheirOwnBatches) {
+// Tests that restart the server, which a client in the same process cannot reach again.
+class QueryStreamRestartTest : public QueryStreamTest {};
+
+TEST_P(QueryStreamTest, AnswersOutOfOrderReachTheirOwnBatches) {
   std::vector<std::future<absl::StatusOr<v1::QueryResult>>> answers;
   for (uint64_t number = 1; number <= 20; ++number) answers.push_back(ask(number));
   for (uint64_t number = 1; number <= 20; ++number) {
@@ -51,7 +54,7 @@ TEST_F(QueryStreamTest, AnswersOutOfOrderReachTheirOwnBatches) {
   EXPECT_TRUE(stream_->close().ok());
 }
 
-TEST_F(QueryStreamTest, ARefusedBatchDoesNotEndTheStream) {
+TEST_P(QueryStreamTest, ARefusedBatchDoesNotEndTheStream) {
   auto refused = ask(FakeQueries::kRefusedWork);
   auto answered = ask(7);
   const absl::Status status = refused.get().status();
@@ -60,7 +63,7 @@ TEST_F(QueryStreamTest, ARefusedBatchDoesNotEndTheStream) {
   EXPECT_EQ(answered.get()->revision(), 7u);
 }
 
-TEST_F(QueryStreamTest, AfterABreakUnansweredBatchesAreSentAgain) {
+TEST_P(QueryStreamTest, AfterABreakUnansweredBatchesAreSentAgain) {
   server_.queries.failing_calls = 2;
   auto first = ask(1);
   auto second = ask(2);
@@ -68,7 +71,7 @@ TEST_F(QueryStreamTest, AfterABreakUnansweredBatchesAreSentAgain) {
   EXPECT_EQ(second.get()->revision(), 2u);
 }
 
-TEST_F(QueryStreamTest, APermanentErrorReachesEveryUnansweredBatch) {
+TEST_P(QueryStreamTest, APermanentErrorReachesEveryUnansweredBatch) {
   server_.queries.failure = grpc::Status(grpc::StatusCode::PERMISSION_DENIED, "planned");
   server_.queries.failing_calls = 1;
   auto first = ask(1);
@@ -77,7 +80,7 @@ TEST_F(QueryStreamTest, APermanentErrorReachesEveryUnansweredBatch) {
   EXPECT_TRUE(absl::IsPermissionDenied(second.get().status()));
 }
 
-TEST_F(QueryStreamTest, ARestartedServerGetsTheRemainingBatches) {
+TEST_P(QueryStreamRestartTest, ARestartedServerGetsTheRemainingBatches) {
   server_.queries.stream_answer = [](const v1::QueryBatch& batch) {
     v1::QueryResult result;
     result.set_revision(batch.max_work());
@@ -95,7 +98,7 @@ TEST_F(QueryStreamTest, ARestartedServerGetsTheRemainingBatches) {
   }
 }
 
-TEST_F(QueryStreamTest, BatchesWithoutAnAnswerAreSentAgainOnANewConnection) {
+TEST_P(QueryStreamTest, BatchesWithoutAnAnswerAreSentAgainOnANewConnection) {
   server_.queries.stream_answer = [](const v1::QueryBatch&) {
     v1::QueryResult result;
     result.set_revision(5);
@@ -106,7 +109,7 @@ TEST_F(QueryStreamTest, BatchesWithoutAnAnswerAreSentAgainOnANewConnection) {
   EXPECT_EQ(ask(1).get()->revision(), 5u);
 }
 
-TEST_F(QueryStreamTest, AServerThatNeverAnswersBecomesUnavailable) {
+TEST_P(QueryStreamTest, AServerThatNeverAnswersBecomesUnavailable) {
   server_.queries.silent_messages = 1000;
   open({.reconnect = {.max_attempts = 3, .first_backoff = absl::Milliseconds(1)}, .patience = absl::Milliseconds(20)});
   auto answer = ask(1);
@@ -114,7 +117,7 @@ TEST_F(QueryStreamTest, AServerThatNeverAnswersBecomesUnavailable) {
   EXPECT_TRUE(absl::IsUnavailable(stream_->close()));
 }
 
-TEST_F(QueryStreamTest, EitherLaneReachesTheServer) {
+TEST_P(QueryStreamTest, EitherLaneReachesTheServer) {
   server_.queries.stream_answer = [](const v1::QueryBatch&) {
     v1::QueryResult result;
     result.set_revision(3);
@@ -125,6 +128,9 @@ TEST_F(QueryStreamTest, EitherLaneReachesTheServer) {
     EXPECT_EQ(ask(1).get()->revision(), 3u);
   }
 }
+
+INSTANTIATE_TEST_SUITE_P(Ways, QueryStreamRestartTest, ::testing::Values(testing::Way::kLoopback), testing::way_name);
+INSTANTIATE_TEST_SUITE_P(Ways, QueryStreamTest, testing::kBothWays, testing::way_name);
 
 }  // namespace
 }  // namespace locus::client

@@ -47,10 +47,10 @@ struct Outcomes {
   }
 };
 
-class UpdateStreamTest : public ::testing::Test {
+class UpdateStreamTest : public ::testing::TestWithParam<testing::Way> {
  protected:
   void SetUp() override {
-    absl::StatusOr<std::unique_ptr<Client>> client = Client::connect(server_.address());
+    absl::StatusOr<std::unique_ptr<Client>> client = server_.connect(GetParam());
     ASSERT_TRUE(client.ok()) << client.status();
     client_ = *std::move(client);
   }
@@ -69,7 +69,10 @@ class UpdateStreamTest : public ::testing::Test {
   std::unique_ptr<Client> client_;
 };
 
-TEST_F(UpdateStreamTest, BatchesAreAppliedAndAckedInOrder) {
+// Tests that restart the server, which a client in the same process cannot reach again.
+class UpdateStreamRestartTest : public UpdateStreamTest {};
+
+TEST_P(UpdateStreamTest, BatchesAreAppliedAndAckedInOrder) {
   const auto stream = open();
   Outcomes outcomes;
   send_ticks(*stream, 100, outcomes);
@@ -82,7 +85,7 @@ TEST_F(UpdateStreamTest, BatchesAreAppliedAndAckedInOrder) {
   EXPECT_THAT(server_.updates.scenes, ElementsAre("arena")) << "x-scene";
 }
 
-TEST_F(UpdateStreamTest, AfterABreakBatchesAppliedWithoutAckAreNotAppliedAgain) {
+TEST_P(UpdateStreamTest, AfterABreakBatchesAppliedWithoutAckAreNotAppliedAgain) {
   server_.updates.breaks = {.after_messages = 3, .times = 5, .apply_last = true};
   const auto stream = open();
   Outcomes outcomes;
@@ -95,7 +98,7 @@ TEST_F(UpdateStreamTest, AfterABreakBatchesAppliedWithoutAckAreNotAppliedAgain) 
   EXPECT_GE(server_.updates.duplicates, 1);
 }
 
-TEST_F(UpdateStreamTest, AfterABreakLostBatchesAreSentAgain) {
+TEST_P(UpdateStreamTest, AfterABreakLostBatchesAreSentAgain) {
   server_.updates.breaks = {.after_messages = 2, .times = 7, .apply_last = false};
   const auto stream = open();
   Outcomes outcomes;
@@ -105,7 +108,7 @@ TEST_F(UpdateStreamTest, AfterABreakLostBatchesAreSentAgain) {
   EXPECT_EQ(outcomes.ticks, one_to(50));
 }
 
-TEST_F(UpdateStreamTest, ARestartedServerWithItsStateGetsTheRemainingBatches) {
+TEST_P(UpdateStreamRestartTest, ARestartedServerWithItsStateGetsTheRemainingBatches) {
   const auto stream = open();
   Outcomes outcomes;
   send_ticks(*stream, 10, outcomes);
@@ -122,7 +125,7 @@ TEST_F(UpdateStreamTest, ARestartedServerWithItsStateGetsTheRemainingBatches) {
   EXPECT_EQ(outcomes.ticks, one_to(40));
 }
 
-TEST_F(UpdateStreamTest, ARefusedBatchDoesNotAffectOthersAndTheRestIsRenumbered) {
+TEST_P(UpdateStreamTest, ARefusedBatchDoesNotAffectOthersAndTheRestIsRenumbered) {
   server_.updates.refused_ticks = {1, 5, 6, 20};
   const auto stream = open();
   Outcomes outcomes;
@@ -139,7 +142,7 @@ TEST_F(UpdateStreamTest, ARefusedBatchDoesNotAffectOthersAndTheRestIsRenumbered)
   EXPECT_EQ(server_.updates.streams, 1) << "a refusal does not end the stream";
 }
 
-TEST_F(UpdateStreamTest, EachBatchIsAppliedOnceDespiteRefusalsAndBreaks) {
+TEST_P(UpdateStreamTest, EachBatchIsAppliedOnceDespiteRefusalsAndBreaks) {
   server_.updates.refused_ticks = {3, 17, 18, 33};
   server_.updates.breaks = {.after_messages = 5, .times = 12, .apply_last = true};
   const auto stream = open();
@@ -152,7 +155,7 @@ TEST_F(UpdateStreamTest, EachBatchIsAppliedOnceDespiteRefusalsAndBreaks) {
   EXPECT_EQ(outcomes.ticks, one_to(60));
 }
 
-TEST_F(UpdateStreamTest, AServerThatForgotTheWriterEndsTheStreamInsteadOfLosingBatches) {
+TEST_P(UpdateStreamTest, AServerThatForgotTheWriterEndsTheStreamInsteadOfLosingBatches) {
   const auto stream = open();
   ASSERT_TRUE(stream->send(batch_of_tick(1)).get().ok());
   server_.updates.forget_writers();
@@ -165,7 +168,7 @@ TEST_F(UpdateStreamTest, AServerThatForgotTheWriterEndsTheStreamInsteadOfLosingB
   EXPECT_THAT(server_.updates.applied(), ElementsAre(1));
 }
 
-TEST_F(UpdateStreamTest, WhenReconnectingFailsEveryUnansweredBatchGetsTheError) {
+TEST_P(UpdateStreamTest, WhenReconnectingFailsEveryUnansweredBatchGetsTheError) {
   const auto stream =
       client_->update_stream("arena", {.reconnect = {.max_attempts = 2, .first_backoff = absl::Milliseconds(1)}});
   server_.stop();
@@ -175,7 +178,7 @@ TEST_F(UpdateStreamTest, WhenReconnectingFailsEveryUnansweredBatchGetsTheError) 
   EXPECT_TRUE(absl::IsUnavailable(stream->send(batch_of_tick(2)).get().status()));
 }
 
-TEST_F(UpdateStreamTest, ARefusedStreamIsNotRetried) {
+TEST_P(UpdateStreamTest, ARefusedStreamIsNotRetried) {
   server_.updates.breaks = {
       .after_messages = 1, .times = 1, .status = {grpc::StatusCode::PERMISSION_DENIED, "planned"}};
   const auto stream = open();
@@ -184,7 +187,7 @@ TEST_F(UpdateStreamTest, ARefusedStreamIsNotRetried) {
   EXPECT_EQ(server_.updates.streams, 1);
 }
 
-TEST_F(UpdateStreamTest, AtMostMaxInFlightBatchesAreUnanswered) {
+TEST_P(UpdateStreamTest, AtMostMaxInFlightBatchesAreUnanswered) {
   const auto stream = open(/*max_in_flight=*/1);
   Outcomes outcomes;
   send_ticks(*stream, 30, outcomes);
@@ -193,14 +196,14 @@ TEST_F(UpdateStreamTest, AtMostMaxInFlightBatchesAreUnanswered) {
   EXPECT_TRUE(absl::IsFailedPrecondition(stream->send(batch_of_tick(31)).get().status())) << "closed";
 }
 
-TEST_F(UpdateStreamTest, ClosingAnUnusedStreamOpensNoCall) {
+TEST_P(UpdateStreamTest, ClosingAnUnusedStreamOpensNoCall) {
   const auto stream = open();
   EXPECT_TRUE(stream->close().ok());
   EXPECT_EQ(server_.updates.streams, 0);
   EXPECT_FALSE(stream->last_ack().has_value());
 }
 
-TEST_F(UpdateStreamTest, CancellingTheStreamFailsEveryUnansweredBatch) {
+TEST_P(UpdateStreamTest, CancellingTheStreamFailsEveryUnansweredBatch) {
   server_.updates.breaks = {.after_messages = 1, .times = 1'000'000};
   Outcomes outcomes;
   {
@@ -212,7 +215,7 @@ TEST_F(UpdateStreamTest, CancellingTheStreamFailsEveryUnansweredBatch) {
   EXPECT_THAT(outcomes.codes, Each(absl::StatusCode::kCancelled));
 }
 
-TEST_F(UpdateStreamTest, SeveralThreadsShareOneStream) {
+TEST_P(UpdateStreamTest, SeveralThreadsShareOneStream) {
   const auto stream = open();
   Outcomes outcomes;
   std::vector<std::thread> threads;
@@ -228,6 +231,9 @@ TEST_F(UpdateStreamTest, SeveralThreadsShareOneStream) {
   EXPECT_EQ(server_.updates.applied().size(), 200u);
   EXPECT_EQ(outcomes.ticks, server_.updates.applied());
 }
+
+INSTANTIATE_TEST_SUITE_P(Ways, UpdateStreamRestartTest, ::testing::Values(testing::Way::kLoopback), testing::way_name);
+INSTANTIATE_TEST_SUITE_P(Ways, UpdateStreamTest, testing::kBothWays, testing::way_name);
 
 }  // namespace
 }  // namespace locus::client

@@ -19,6 +19,7 @@ import unittest
 START_SECONDS = 30
 HERE = os.path.dirname(os.path.abspath(__file__))
 PROGRAM = os.path.join(HERE, "program.cc")
+EMBEDDED_PROGRAM = os.path.join(HERE, "embedded_program.cc")
 WANTED = "hit 8 at t = 59.5\n"
 
 
@@ -104,7 +105,8 @@ class InstallTest(unittest.TestCase):
                      "share/bash-completion/completions/locus", "share/zsh/site-functions/_locus",
                      "share/fish/vendor_completions.d/locus.fish", "share/doc/locus/locusd.conf.example",
                      "share/locus/proto/locus/v1/query_service.proto",
-                     "include/locus/client/lib/client.h", "include/locus/locus/v1/query_service.grpc.pb.h"):
+                     "include/locus/client/lib/client.h", "include/locus/client/embedded/embedded_server.h",
+                     "include/locus/locus/v1/query_service.grpc.pb.h"):
             self.assertIn(path, self.files)
 
     def test_all_headers_are_in_the_folder_of_the_project(self):
@@ -142,12 +144,21 @@ class InstallTest(unittest.TestCase):
         with concurrent.futures.ThreadPoolExecutor(2) as pool:
             list(pool.map(lambda call: run(*call), calls))
 
-    def test_a_program_is_built_through_find_package(self):
-        build = os.path.join(OPTIONS.folder, "project")
-        run(OPTIONS.cmake, "-S", os.path.join(HERE, "project"), "-B", build, "-G", "Ninja", f"-DPROGRAM={PROGRAM}",
-            f"-DCMAKE_PREFIX_PATH={self.tree}", f"-DCMAKE_CXX_COMPILER={OPTIONS.compiler}",
+    def build_project(self, library, program):
+        """Builds a user's project with a library of the installed tree and returns the folder of the build."""
+        build = os.path.join(OPTIONS.folder, "project-" + library)
+        run(OPTIONS.cmake, "-S", os.path.join(HERE, "project"), "-B", build, "-G", "Ninja", f"-DPROGRAM={program}",
+            f"-DLIBRARY={library}", f"-DCMAKE_PREFIX_PATH={self.tree}", f"-DCMAKE_CXX_COMPILER={OPTIONS.compiler}",
             "-DCMAKE_EXPORT_COMPILE_COMMANDS=ON")
         run(OPTIONS.cmake, "--build", build)
+        return build
+
+    def test_a_program_with_an_embedded_server_is_built_through_find_package(self):
+        build = self.build_project("embedded", EMBEDDED_PROGRAM)
+        self.assertEqual(run(os.path.join(build, "program")), WANTED)
+
+    def test_a_program_is_built_through_find_package(self):
+        build = self.build_project("client", PROGRAM)
         with open(os.path.join(build, "compile_commands.json"), encoding="utf-8") as file:
             (entry,) = json.load(file)
         for ours in ("-Werror", "-Wall", "-ffp-contract", "-fno-tree-slp-vectorize"):
