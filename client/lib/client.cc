@@ -299,7 +299,7 @@ absl::Status Client::dump(const v1::DumpSceneRequest& request,
 
 absl::StatusOr<std::string> Client::call_by_path(const std::string& path, absl::string_view request,
                                                  absl::string_view scene) const {
-  PathMethod method(connection_->channel, path);
+  PathMethod method(connection_->latency.channel, path);
   const grpc::Slice slice(request.data(), request.size());
   ASSIGN_OR_RETURN(const grpc::ByteBuffer response,
                    call(method, connection_->once(scene), grpc::ByteBuffer(&slice, 1), &PathMethod::run));

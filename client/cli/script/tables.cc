@@ -22,12 +22,7 @@
 namespace locus::cli {
 namespace {
 
-using google::protobuf::Descriptor;
-using google::protobuf::EnumDescriptor;
-using google::protobuf::EnumValueDescriptor;
-using google::protobuf::FieldDescriptor;
-using google::protobuf::Message;
-using google::protobuf::Reflection;
+namespace pb = google::protobuf;
 
 constexpr int kMaxNesting = 64;
 
@@ -57,7 +52,7 @@ std::string suggestion(const std::string& word, const std::vector<std::string>& 
 }
 
 // Returns the names of the values of an enum without their common prefix: RAY_MODE_FIRST becomes FIRST.
-std::string short_name(const EnumValueDescriptor& value) {
+std::string short_name(const pb::EnumValueDescriptor& value) {
   std::string prefix;
   for (const char c : value.type()->name()) {
     if (absl::ascii_isupper(static_cast<unsigned char>(c)) && !prefix.empty()) prefix += '_';
@@ -71,7 +66,7 @@ class MessageReader {
  public:
   explicit MessageReader(lua_State* state) : state_(state) {}
 
-  absl::Status read(int index, const std::string& path, Message& message) {
+  absl::Status read(int index, const std::string& path, pb::Message& message) {
     if (lua_type(state_, index) != LUA_TTABLE) return wrong(state_, index, path, "a table");
     if (++depth_ > kMaxNesting || lua_checkstack(state_, 8) == 0)
       return usage_error(absl::StrCat(path, " is nested too deeply"));
@@ -88,12 +83,12 @@ class MessageReader {
 
  private:
   // Reads the key and the value on top of the stack, and leaves them there.
-  absl::Status read_entry(const std::string& path, Message& message) {
+  absl::Status read_entry(const std::string& path, pb::Message& message) {
     if (lua_type(state_, -2) != LUA_TSTRING)
       return usage_error(
           absl::StrCat(path.empty() ? "the table" : path, " has fields with names, not ", shown(state_, -2)));
     const std::string name = lua_tostring(state_, -2);
-    const FieldDescriptor* const field = message.GetDescriptor()->FindFieldByName(name);
+    const pb::FieldDescriptor* const field = message.GetDescriptor()->FindFieldByName(name);
     if (field == nullptr) {
       std::vector<std::string> names;
       for (int i = 0; i < message.GetDescriptor()->field_count(); ++i)
@@ -108,8 +103,8 @@ class MessageReader {
   }
 
   // Adds the value on top of the stack, or the values of the list there, to the repeated `field`.
-  absl::Status read_list(const FieldDescriptor& field, const std::string& path, Message& message, int depth) {
-    const bool is_message = field.cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE;
+  absl::Status read_list(const pb::FieldDescriptor& field, const std::string& path, pb::Message& message, int depth) {
+    const bool is_message = field.cpp_type() == pb::FieldDescriptor::CPPTYPE_MESSAGE;
     if (lua_type(state_, -1) != LUA_TTABLE) return set(field, path, message);
     const auto size = static_cast<lua_Integer>(lua_rawlen(state_, -1));
     if (is_message && size == 0) {
@@ -129,13 +124,13 @@ class MessageReader {
     return absl::OkStatus();
   }
 
-  absl::Status read_map(const FieldDescriptor& field, const std::string& path, Message& message) {
+  absl::Status read_map(const pb::FieldDescriptor& field, const std::string& path, pb::Message& message) {
     if (lua_type(state_, -1) != LUA_TTABLE) return wrong(state_, -1, path, "a table");
-    const Descriptor& entry = *field.message_type();
+    const pb::Descriptor& entry = *field.message_type();
     absl::Status status;
     lua_pushnil(state_);
     while (status.ok() && lua_next(state_, -2) != 0) {
-      Message& added = *message.GetReflection()->AddMessage(&message, &field);
+      pb::Message& added = *message.GetReflection()->AddMessage(&message, &field);
       status = set(*entry.FindFieldByName("value"), absl::StrCat(path, "[", shown(state_, -2), "]"), added);
       lua_pushvalue(state_, -2);
       if (status.ok()) status = set(*entry.FindFieldByName("key"), path, added);
@@ -145,15 +140,15 @@ class MessageReader {
   }
 
   // Sets `field`, or adds to it if it is repeated, the value on top of the stack.
-  absl::Status set(const FieldDescriptor& field, const std::string& path, Message& message) {
-    const Reflection& reflection = *message.GetReflection();
+  absl::Status set(const pb::FieldDescriptor& field, const std::string& path, pb::Message& message) {
+    const pb::Reflection& reflection = *message.GetReflection();
     const bool repeated = field.is_repeated();
     switch (field.cpp_type()) {
-      case FieldDescriptor::CPPTYPE_MESSAGE:
+      case pb::FieldDescriptor::CPPTYPE_MESSAGE:
         return set_message(field, path, message);
-      case FieldDescriptor::CPPTYPE_ENUM:
+      case pb::FieldDescriptor::CPPTYPE_ENUM:
         return set_enum(field, path, message);
-      case FieldDescriptor::CPPTYPE_STRING: {
+      case pb::FieldDescriptor::CPPTYPE_STRING: {
         if (lua_type(state_, -1) != LUA_TSTRING) return wrong(state_, -1, path, "a text");
         size_t size = 0;
         const char* const text = lua_tolstring(state_, -1, &size);
@@ -161,21 +156,21 @@ class MessageReader {
                  : reflection.SetString(&message, &field, std::string(text, size));
         return absl::OkStatus();
       }
-      case FieldDescriptor::CPPTYPE_BOOL:
+      case pb::FieldDescriptor::CPPTYPE_BOOL:
         if (lua_type(state_, -1) != LUA_TBOOLEAN) return wrong(state_, -1, path, "true or false");
         reflection.SetBool(&message, &field, lua_toboolean(state_, -1) != 0);
         return absl::OkStatus();
-      case FieldDescriptor::CPPTYPE_FLOAT:
-      case FieldDescriptor::CPPTYPE_DOUBLE:
+      case pb::FieldDescriptor::CPPTYPE_FLOAT:
+      case pb::FieldDescriptor::CPPTYPE_DOUBLE:
         return set_real(field, path, message);
       default:
         return set_integer(field, path, message);
     }
   }
 
-  absl::Status set_message(const FieldDescriptor& field, const std::string& path, Message& message) {
-    const Reflection& reflection = *message.GetReflection();
-    Message& inner =
+  absl::Status set_message(const pb::FieldDescriptor& field, const std::string& path, pb::Message& message) {
+    const pb::Reflection& reflection = *message.GetReflection();
+    pb::Message& inner =
         field.is_repeated() ? *reflection.AddMessage(&message, &field) : *reflection.MutableMessage(&message, &field);
     const bool vector =
         field.message_type()->name() == "Vec3d" && lua_type(state_, -1) == LUA_TTABLE && lua_rawlen(state_, -1) == 3;
@@ -189,14 +184,14 @@ class MessageReader {
     return absl::OkStatus();
   }
 
-  absl::Status set_enum(const FieldDescriptor& field, const std::string& path, Message& message) {
+  absl::Status set_enum(const pb::FieldDescriptor& field, const std::string& path, pb::Message& message) {
     if (lua_type(state_, -1) != LUA_TSTRING) return wrong(state_, -1, path, "the name of a value");
     const std::string text = lua_tostring(state_, -1);
     const std::string wanted = absl::AsciiStrToUpper(text);
-    const EnumDescriptor& values = *field.enum_type();
+    const pb::EnumDescriptor& values = *field.enum_type();
     std::vector<std::string> names;
     for (int i = 0; i < values.value_count(); ++i) {
-      const EnumValueDescriptor& value = *values.value(i);
+      const pb::EnumValueDescriptor& value = *values.value(i);
       names.push_back(absl::AsciiStrToLower(short_name(value)));
       if (value.name() != wanted && short_name(value) != wanted) continue;
       field.is_repeated() ? message.GetReflection()->AddEnum(&message, &field, &value)
@@ -206,11 +201,11 @@ class MessageReader {
     return usage_error(absl::StrCat(path, " has no value '", text, "'", suggestion(text, names)));
   }
 
-  absl::Status set_real(const FieldDescriptor& field, const std::string& path, Message& message) {
+  absl::Status set_real(const pb::FieldDescriptor& field, const std::string& path, pb::Message& message) {
     if (lua_type(state_, -1) != LUA_TNUMBER) return wrong(state_, -1, path, "a number");
-    const Reflection& reflection = *message.GetReflection();
+    const pb::Reflection& reflection = *message.GetReflection();
     const double value = lua_tonumber(state_, -1);
-    if (field.cpp_type() == FieldDescriptor::CPPTYPE_DOUBLE) {
+    if (field.cpp_type() == pb::FieldDescriptor::CPPTYPE_DOUBLE) {
       field.is_repeated() ? reflection.AddDouble(&message, &field, value)
                           : reflection.SetDouble(&message, &field, value);
     } else {
@@ -221,10 +216,10 @@ class MessageReader {
     return absl::OkStatus();
   }
 
-  absl::Status set_integer(const FieldDescriptor& field, const std::string& path, Message& message) {
-    const Reflection& reflection = *message.GetReflection();
+  absl::Status set_integer(const pb::FieldDescriptor& field, const std::string& path, pb::Message& message) {
+    const pb::Reflection& reflection = *message.GetReflection();
     const std::optional<uint64_t> value = to_unsigned(state_, -1);
-    const bool wide = field.cpp_type() == FieldDescriptor::CPPTYPE_UINT64;
+    const bool wide = field.cpp_type() == pb::FieldDescriptor::CPPTYPE_UINT64;
     const uint64_t most = wide ? std::numeric_limits<uint64_t>::max() : std::numeric_limits<uint32_t>::max();
     if (!value || *value > most) {
       return wrong(state_, -1, path,
@@ -232,11 +227,11 @@ class MessageReader {
     }
     const auto narrow = static_cast<uint32_t>(*value);
     switch (field.cpp_type()) {
-      case FieldDescriptor::CPPTYPE_UINT64:
+      case pb::FieldDescriptor::CPPTYPE_UINT64:
         field.is_repeated() ? reflection.AddUInt64(&message, &field, *value)
                             : reflection.SetUInt64(&message, &field, *value);
         return absl::OkStatus();
-      case FieldDescriptor::CPPTYPE_UINT32:
+      case pb::FieldDescriptor::CPPTYPE_UINT32:
         field.is_repeated() ? reflection.AddUInt32(&message, &field, narrow)
                             : reflection.SetUInt32(&message, &field, narrow);
         return absl::OkStatus();
@@ -250,37 +245,37 @@ class MessageReader {
 };
 
 // Pushes the value of `field`, or its entry `i` if the field is repeated.
-void push_value(lua_State* state, const Message& message, const FieldDescriptor& field, int i) {
-  const Reflection& reflection = *message.GetReflection();
+void push_value(lua_State* state, const pb::Message& message, const pb::FieldDescriptor& field, int i) {
+  const pb::Reflection& reflection = *message.GetReflection();
   const bool repeated = field.is_repeated();
   switch (field.cpp_type()) {
-    case FieldDescriptor::CPPTYPE_MESSAGE:
+    case pb::FieldDescriptor::CPPTYPE_MESSAGE:
       return push_message(
           state, repeated ? reflection.GetRepeatedMessage(message, &field, i) : reflection.GetMessage(message, &field));
-    case FieldDescriptor::CPPTYPE_ENUM: {
-      const EnumValueDescriptor& value =
+    case pb::FieldDescriptor::CPPTYPE_ENUM: {
+      const pb::EnumValueDescriptor& value =
           *(repeated ? reflection.GetRepeatedEnum(message, &field, i) : reflection.GetEnum(message, &field));
       lua_pushstring(state, short_name(value).c_str());
       return;
     }
-    case FieldDescriptor::CPPTYPE_STRING: {
+    case pb::FieldDescriptor::CPPTYPE_STRING: {
       const std::string text =
           repeated ? reflection.GetRepeatedString(message, &field, i) : reflection.GetString(message, &field);
       lua_pushlstring(state, text.data(), text.size());
       return;
     }
-    case FieldDescriptor::CPPTYPE_BOOL:
+    case pb::FieldDescriptor::CPPTYPE_BOOL:
       return lua_pushboolean(state, reflection.GetBool(message, &field));
-    case FieldDescriptor::CPPTYPE_FLOAT:
+    case pb::FieldDescriptor::CPPTYPE_FLOAT:
       return lua_pushnumber(state, static_cast<double>(repeated ? reflection.GetRepeatedFloat(message, &field, i)
                                                                 : reflection.GetFloat(message, &field)));
-    case FieldDescriptor::CPPTYPE_DOUBLE:
+    case pb::FieldDescriptor::CPPTYPE_DOUBLE:
       return lua_pushnumber(
           state, repeated ? reflection.GetRepeatedDouble(message, &field, i) : reflection.GetDouble(message, &field));
-    case FieldDescriptor::CPPTYPE_UINT64:
+    case pb::FieldDescriptor::CPPTYPE_UINT64:
       return push_unsigned(
           state, repeated ? reflection.GetRepeatedUInt64(message, &field, i) : reflection.GetUInt64(message, &field));
-    case FieldDescriptor::CPPTYPE_UINT32:
+    case pb::FieldDescriptor::CPPTYPE_UINT32:
       return lua_pushinteger(
           state, repeated ? reflection.GetRepeatedUInt32(message, &field, i) : reflection.GetUInt32(message, &field));
     default:
@@ -289,11 +284,11 @@ void push_value(lua_State* state, const Message& message, const FieldDescriptor&
   }
 }
 
-void push_map(lua_State* state, const Message& message, const FieldDescriptor& field) {
-  const Reflection& reflection = *message.GetReflection();
+void push_map(lua_State* state, const pb::Message& message, const pb::FieldDescriptor& field) {
+  const pb::Reflection& reflection = *message.GetReflection();
   lua_newtable(state);
   for (int i = 0; i < reflection.FieldSize(message, &field); ++i) {
-    const Message& entry = reflection.GetRepeatedMessage(message, &field, i);
+    const pb::Message& entry = reflection.GetRepeatedMessage(message, &field, i);
     push_value(state, entry, *field.message_type()->FindFieldByName("key"), 0);
     push_value(state, entry, *field.message_type()->FindFieldByName("value"), 0);
     lua_rawset(state, -3);
@@ -302,16 +297,16 @@ void push_map(lua_State* state, const Message& message, const FieldDescriptor& f
 
 }  // namespace
 
-absl::Status read_message(lua_State* state, int index, Message& message) {
+absl::Status read_message(lua_State* state, int index, pb::Message& message) {
   return MessageReader(state).read(index, "", message);
 }
 
-void push_message(lua_State* state, const Message& message) {
+void push_message(lua_State* state, const pb::Message& message) {
   luaL_checkstack(state, 8, "the message is nested too deeply");
-  const Reflection& reflection = *message.GetReflection();
+  const pb::Reflection& reflection = *message.GetReflection();
   lua_newtable(state);
   for (int i = 0; i < message.GetDescriptor()->field_count(); ++i) {
-    const FieldDescriptor& field = *message.GetDescriptor()->field(i);
+    const pb::FieldDescriptor& field = *message.GetDescriptor()->field(i);
     if (field.has_presence() && !reflection.HasField(message, &field)) continue;
     if (field.is_map()) {
       push_map(state, message, field);
