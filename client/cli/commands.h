@@ -30,6 +30,7 @@ void add_call_command(CLI::App& parent, Context& context);
 void add_run_command(CLI::App& parent, Context& context);
 void add_shell_command(CLI::App& parent, Context& context);
 void add_wait_command(CLI::App& parent, Context& context);
+void add_bench_command(CLI::App& parent, Context& context);
 void add_top_command(CLI::App& parent, Context& context);
 void add_limits_command(CLI::App& parent, Context& context);
 void add_quota_command(CLI::App& parent, Context& context);

@@ -12,6 +12,12 @@ namespace locus::cli {
 absl::StatusOr<client::Client*> Context::connect() {
   if (lines_ == Lines::kScriptCheck) return absl::CancelledError("lines are only checked");
   if (client_) return client_.get();
+  ASSIGN_OR_RETURN(client_, open_connection());
+  connected_ = client_.get();
+  return client_.get();
+}
+
+absl::StatusOr<std::unique_ptr<client::Client>> Context::open_connection() const {
   RETURN_IF_ERROR(connection_mistake_);
   client::ClientOptions options;
   options.credentials = options_.connection.credentials;
@@ -27,10 +33,7 @@ absl::StatusOr<client::Client*> Context::connect() {
     return absl::UnavailableError(
         absl::StrCat("nothing answers at ", address(), ": start one with `locusd`, or give --address"));
   }
-  RETURN_IF_ERROR(client.status());
-  client_ = *std::move(client);
-  connected_ = client_.get();
-  return client_.get();
+  return client;
 }
 
 void Context::cancel_calls() {

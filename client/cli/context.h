@@ -65,6 +65,9 @@ class Context {
   // Cancels the calls that the connection has in progress. Any thread may call this function.
   void cancel_calls();
 
+  // Opens a further connection to address(), for commands that measure with several. Errors as those of connect().
+  absl::StatusOr<std::unique_ptr<client::Client>> open_connection() const;
+
   // Writes `report` to out() in the format of options().
   void write(const Report& report);
   // Writes the report of a change that was made. In the format kTable, writes only the line `text`, or nothing with

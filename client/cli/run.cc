@@ -30,6 +30,7 @@ constexpr char kExamples[] = R"(Examples:
   locus backup arena-backup
   locus -a unix:/run/locus.sock health
   locus top
+  locus bench --connections 4
 
 Exit codes: 0 ok, 1 failed, 2 usage, 3 unreachable, 4 denied, 5 not found.
 LOCUS_SCENE names the scene of commands that are given none. `locus context` keeps addresses and credentials by name.
@@ -152,6 +153,7 @@ void build_cli(CLI::App& app, Context& context) {
   add_backup_command(app, context);
   add_restore_command(app, context);
   add_demo_command(app, context);
+  add_bench_command(app, context);
   add_top_command(app, context);
   add_limits_command(app, context);
   add_quota_command(app, context);

@@ -62,6 +62,7 @@ ALLOWED = {
     "client/cli/levels/export": ["client/cli", "client/cli/rows", "client/cli/levels/import", "client/lib", "core/geometry",
                                  "core/base"],
     "client/cli/extras/demo": ["client/cli", "client/cli/levels/*", "client/lib", "core/geometry", "core/base"],
+    "client/cli/extras/bench": ["client/cli", "client/cli/extras/demo", "client/lib", "core/geometry", "core/base"],
     "client/cli/extras/completion": ["client/cli"],
     "client/cli/extras/top": ["client/cli", "client/lib", "core/base"],
     "client/cli/extras/render": ["client/cli", "client/lib", "core/geometry", "core/base"],
