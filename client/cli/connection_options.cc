@@ -1,5 +1,7 @@
 #include "client/cli/connection_options.h"
 
+#include "client/lib/saved_contexts.h"
+
 namespace locus::cli {
 void add_connection_options(CLI::App& app, ConnectionOptions& options) {
   app.add_option("-a,--address", options.address, "Where locusd listens: host:port or unix:/path")
@@ -30,6 +32,14 @@ void add_connection_options(CLI::App& app, ConnectionOptions& options) {
 absl::Status complete_from_context(const CLI::App& app, const std::string& path, ConnectionOptions& options) {
   const client::GivenOptions given{app.count("--address") > 0, app.count("--tls") > 0};
   return complete_endpoint(path, options.context, given, options);
+}
+
+std::string scene_from_context(const CLI::App& app, const std::string& path, const ConnectionOptions& options) {
+  if (options.context.empty() && app.count("--address") > 0) return "";
+  const absl::StatusOr<client::SavedContexts> contexts = client::read_contexts(path);
+  if (!contexts.ok()) return "";
+  const auto found = contexts->by_name.find(options.context.empty() ? contexts->default_name : options.context);
+  return found == contexts->by_name.end() ? "" : found->second.scene;
 }
 
 }  // namespace locus::cli

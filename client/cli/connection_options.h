@@ -28,6 +28,10 @@ void add_connection_options(CLI::App& app, ConnectionOptions& options);
 // Returns NOT_FOUND for an unknown context, and the errors of client::read_contexts().
 absl::Status complete_from_context(const CLI::App& app, const std::string& path, ConnectionOptions& options);
 
+// Returns the scene of the context that complete_from_context() would use; empty if there is no such context or if it
+// names no scene. Errors are left to complete_from_context().
+std::string scene_from_context(const CLI::App& app, const std::string& path, const ConnectionOptions& options);
+
 }  // namespace locus::cli
 
 #endif  // LOCUS_CLIENT_CLI_CONNECTION_OPTIONS_H_

@@ -74,12 +74,17 @@ std::optional<Refusal> run_with_default_scene(const std::vector<std::string>& ar
   CLI::App app;
   build_cli(app, context);
   const std::optional<Refusal> refusal = parse_and_run(app, arguments);
-  if (!refusal || !refusal->lacks_something || context.default_scene().empty()) return refusal;
+  if (!refusal || !refusal->lacks_something) return refusal;
+  // Options such as `import --scene` are required only if there is no default scene when the parser is built. So if the
+  // default scene comes from the context, which the first attempt has read, the same line is parsed again.
+  const bool from_context = context.default_scene().empty();
+  if (from_context) context.use_scene(scene_from_context(app, context.contexts_path(), context.options().connection));
+  if (context.default_scene().empty()) return refusal;
   const std::optional<std::vector<std::string>> longer = with_scene(app, arguments, context.default_scene());
-  if (!longer) return refusal;
+  if (!longer && !from_context) return refusal;
   CLI::App second;
   build_cli(second, context);
-  return parse_and_run(second, *longer);
+  return parse_and_run(second, longer.value_or(arguments));
 }
 
 // Makes the parser refuse --timeout and the options of the connection, and ignore their environment variables. Used for
@@ -130,6 +135,8 @@ void build_cli(CLI::App& app, Context& context) {
   } else {
     app.parse_complete_callback([&app, &context] {
       context.set_connection_mistake(complete_from_context(app, context.contexts_path(), context.options().connection));
+      if (context.default_scene().empty())
+        context.use_scene(scene_from_context(app, context.contexts_path(), context.options().connection));
     });
     add_run_command(app, context);
     add_shell_command(app, context);

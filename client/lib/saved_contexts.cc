@@ -29,6 +29,7 @@ constexpr ContextField kContextFields[] = {
     {"key", &SavedContext::key},
     {"server_name", &SavedContext::server_name},
     {"token_file", &SavedContext::token_file},
+    {"scene", &SavedContext::scene},
 };
 
 // Stores the option of one line `key = value` in `section`, or in `contexts` if the line is before the first section.
@@ -49,7 +50,7 @@ absl::Status store_line(absl::string_view line, SavedContext* section, SavedCont
     section->*field.value = value;
     return absl::OkStatus();
   }
-  return absl::InvalidArgumentError("write `KEY = VALUE`: address, tls, ca, cert, key, server_name, token_file");
+  return absl::InvalidArgumentError("write `KEY = VALUE`: address, tls, ca, cert, key, server_name, token_file, scene");
 }
 
 }  // namespace
@@ -123,7 +124,7 @@ absl::StatusOr<SavedContext> find_context(const SavedContexts& contexts, const s
   const std::string known = absl::StrJoin(
       contexts.by_name, ", ", [](std::string* out, const auto& entry) { absl::StrAppend(out, entry.first); });
   return absl::NotFoundError(absl::StrCat("there is no context ", name, "; there is ", known.empty() ? "none" : known,
-                                          ": `locus context set NAME` makes one"));
+                                          ": `locus context add NAME` makes one"));
 }
 
 }  // namespace locus::client

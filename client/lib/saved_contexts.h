@@ -5,6 +5,7 @@
 //   address = game.example.com:7575
 //   ca = /etc/game/ca.pem
 //   token_file = /etc/game/token
+//   scene = arena
 // Lines that begin with # are ignored, and are lost when the file is written. The file never contains a token. Plain
 // data and functions without state.
 #ifndef LOCUS_CLIENT_LIB_SAVED_CONTEXTS_H_
@@ -30,6 +31,7 @@ struct SavedContext {
   std::string key = {};
   std::string server_name = {};
   std::string token_file = {};
+  std::string scene = {};  // scene of command lines that name none
 };
 
 struct SavedContexts {

@@ -21,8 +21,12 @@ namespace {
 using client::SavedContext;
 using client::SavedContexts;
 
+constexpr char kAdd[] = "add";
+constexpr char kSet[] = "set";
+
 struct ContextOptions {
   const CLI::App* program = nullptr;  // the parser with the options that stand before the command
+  std::string verb = kSet;            // kSet or kAdd
   std::string name;
   SavedContext saved;
   bool tls = false;
@@ -70,25 +74,30 @@ void make_absolute(std::string& path) {
   if (!path.empty()) path = std::filesystem::absolute(path, ignored).string();
 }
 
-// Returns an error if a connection option stands before the command, because `context set` would not store its value.
-// Values from environment variables are ignored: they apply to every command and are not meant to be stored.
-absl::Status check_options_before(const CLI::App& program) {
+// Returns an error if a connection option stands before the command, because `context set` and `context add` would not
+// store its value. Values from environment variables are ignored: they apply to every command and are not meant to be
+// stored.
+absl::Status check_options_before(const CLI::App& program, const std::string& verb) {
   for (const std::string name : kConnectionOptionNames) {
     const CLI::Option& option = *program.get_option(name);
     if (option.count() == 0) continue;
     const char* const variable = std::getenv(option.get_envname().c_str());
     if (variable != nullptr && option.results().front() == variable) continue;
-    if (name == "--context") return usage_error("`context set` has no --context: the name follows `set`");
-    return usage_error(
-        absl::StrCat(name, " before `context set` would have no effect: give the options to keep after the name"));
+    if (name == "--context")
+      return usage_error(absl::StrCat("`context ", verb, "` has no --context: the name follows `", verb, "`"));
+    return usage_error(absl::StrCat(name, " before `context ", verb,
+                                    "` would have no effect: give the options to keep after the name"));
   }
   return absl::OkStatus();
 }
 
 absl::Status set_context(const ContextOptions& options, Context& context) {
-  RETURN_IF_ERROR(check_options_before(*options.program));
+  RETURN_IF_ERROR(check_options_before(*options.program, options.verb));
   RETURN_IF_ERROR(client::check_context_name(options.name));
   ASSIGN_OR_RETURN(SavedContexts contexts, client::read_contexts(context.contexts_path()));
+  if (options.verb == kAdd && contexts.by_name.contains(options.name))
+    return absl::AlreadyExistsError(absl::StrCat("there is a context ", options.name,
+                                                 " already: `locus context set` replaces it, `show` shows it"));
   SavedContext& saved = contexts.by_name[options.name];
   saved = options.saved;
   if (options.tls) saved.tls = "true";
@@ -114,11 +123,14 @@ CLI::App& add_one(CLI::App& parent, const char* name, const char* description, c
   return command;
 }
 
-void add_context_set(CLI::App& parent, Context& context) {
+// Adds the command `verb`, which stores a context: kAdd or kSet.
+void add_storing(CLI::App& parent, Context& context, const char* verb, const char* description) {
   const auto options = std::make_shared<ContextOptions>();
   options->program = parent.get_parent();
-  CLI::App& command = add_one(parent, "set", "Make a context, or replace one",
-                              "set prod --address game.example.com:7575 --ca ca.pem --token-file game.token");
+  options->verb = verb;
+  const std::string example =
+      absl::StrCat(verb, " prod --address game.example.com:7575 --ca ca.pem --token-file game.token --scene arena");
+  CLI::App& command = add_one(parent, verb, description, example.c_str());
   command.add_option("NAME", options->name, "Letters, digits, `-`, `_` and `.`, at most 63")->required();
   command.add_option("-a,--address", options->saved.address, "Where locusd listens")->type_name("ADDRESS");
   command.add_flag("--tls", options->tls, "Encrypt the connection; --ca, --cert and --server-name imply it");
@@ -129,6 +141,8 @@ void add_context_set(CLI::App& parent, Context& context) {
       ->type_name("NAME");
   command.add_option("--token-file", options->saved.token_file, "File with the token; only its name is kept")
       ->type_name("FILE");
+  command.add_option("--scene", options->saved.scene, "Scene of the commands that are given none; LOCUS_SCENE wins")
+      ->type_name("SCENE");
   run_when_chosen(command, options, context, set_context);
 }
 
@@ -141,7 +155,7 @@ An option on the line comes before its environment variable, and that before the
 only if the line names no context and neither the line nor LOCUS_ADDRESS gives an address, so that its credentials do not
 reach another server.
 Examples:
-  locus context set prod --address game.example.com:7575 --ca ca.pem --token-file game.token
+  locus context add prod --address game.example.com:7575 --ca ca.pem --token-file game.token --scene arena
   locus context use prod
   locus --context prod health)");
   command.require_subcommand(1);
@@ -153,7 +167,8 @@ Examples:
   CLI::App& use = add_one(command, "use", "Make a context the default", "use prod");
   use.add_option("NAME", options->name, "The context")->required();
   run_when_chosen(use, options, context, use_context);
-  add_context_set(command, context);
+  add_storing(command, context, kAdd, "Make a new context");
+  add_storing(command, context, kSet, "Make a context, or replace one");
   CLI::App& remove = add_one(command, "remove", "Remove a context; its files stay", "remove prod");
   remove.add_option("NAME", options->name, "The context")->required();
   run_when_chosen(remove, options, context, remove_context);

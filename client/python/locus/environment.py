@@ -99,9 +99,9 @@ def _read_contexts(path: Optional[str]) -> Tuple[str, Dict[str, _Context]]:
             section = contexts.setdefault(line[1:-1], {})
         elif section is None and key == "default":
             default = value
-        elif section is not None and (key in ("address",) + _OPTIONS or key == "tls" and value in ("true", "false")):
+        elif section is not None and (key in ("address", "scene") + _OPTIONS or key == "tls" and value in ("true", "false")):
             section[key] = value
         else:
             raise ValueError(f"{path}:{number}: neither `[NAME]` nor `KEY = VALUE` with address, tls, ca, cert, key, "
-                             "server_name or token_file")
+                             "server_name, token_file or scene")
     return default, contexts

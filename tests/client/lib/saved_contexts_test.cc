@@ -11,7 +11,7 @@ using ::testing::HasSubstr;
 TEST(SavedContextsTest, TheTextOfContextsIsParsedAgain) {
   SavedContexts contexts;
   contexts.default_name = "prod";
-  contexts.by_name["prod"] = {"host:1", "true", "/ca.pem", "/c.pem", "/c.key", "inner", "/token"};
+  contexts.by_name["prod"] = {"host:1", "true", "/ca.pem", "/c.pem", "/c.key", "inner", "/token", "arena"};
   contexts.by_name["bare"] = {};
   const absl::StatusOr<SavedContexts> read = parse_contexts("f", contexts_text(contexts));
   ASSERT_TRUE(read.ok()) << read.status();

@@ -21,6 +21,7 @@ cert = /prod.pem
 key = /prod.key
 server_name = inner
 token_file = /prod.token
+scene = arena
 """
 
 
