@@ -34,7 +34,7 @@ missing=$(./deploy/packages.sh --check build python || true)
 cat << TEXT
 This runs locus on a real game level, in six steps:
   1 packages  installs $(wc -w <<< "$missing") of $(./deploy/packages.sh --list build python | wc -w) Debian packages (with all of them missing: about 1 GB on the disk, 1 minute)
-  2 build     compiles locusd, locus and the Python package into $build (first time: about 5 minutes on 2 cores)
+  2 build     compiles locusd, locus and the Python package into $build (first time: about 3 minutes on 2 cores)
   3 level     downloads 40 MB of OpenArena's levels and unpacks one; nothing of it is installed
   4 - 6       start two daemons on loopback, check their answers by brute force for $seconds s, take a picture
 Everything is below $(pwd)/build; deleting that folder undoes all but the packages.

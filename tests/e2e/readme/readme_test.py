@@ -10,6 +10,7 @@ are skipped. The last comment of a script says what the script prints. The addre
 the daemon. Blocks marked text are not run: the test only checks that their programs exist.
 """
 
+import json
 import os
 import re
 import shlex
@@ -104,6 +105,12 @@ class ReadmeTest(unittest.TestCase):
                 file.write(script.replace(DEFAULT_ADDRESS, self.address))
             command = shlex.join(["env", "PYTHONPATH=" + PYTHON, "/usr/bin/python3", "-B", path])
             self.assertEqual(self.run_shell(command).strip(), wanted)
+
+    def test_6_the_preset_of_the_benchmarks_builds_them_after_the_quickstart(self):
+        # The quickstart configures the same folder without tests, which the benchmarks need.
+        with open(os.path.join(os.path.dirname(os.path.abspath(README)), "CMakePresets.json"), encoding="utf-8") as file:
+            (bench,) = [preset for preset in json.load(file)["configurePresets"] if preset["name"] == "bench"]
+        self.assertEqual(bench["cacheVariables"], {"LOCUS_BENCH": "ON", "LOCUS_TESTS": "ON"})
 
     def test_5_programs_to_read_about_exist(self):
         top = os.path.dirname(os.path.abspath(README))
