@@ -10,6 +10,7 @@
 #include "client/cli/levels/import/import_limits.h"
 #include "client/cli/levels/import/level_codec.h"
 #include "client/cli/levels/import/ply_check.h"
+#include "client/cli/levels/import/ply_strips.h"
 #include "client/cli/levels/import/quake/bsp_import.h"
 #include "client/cli/levels/import/quake/pk3_archive.h"
 #include "tests/fuzz/fuzz_target.h"
@@ -40,6 +41,9 @@ LOCUS_FUZZ_TARGET(bsp) {
 }
 
 LOCUS_FUZZ_TARGET(ply) {
+  const absl::StatusOr<std::optional<std::string>> unpacked = unpack_ply_strips(input);
+  if (!unpacked.ok()) return fuzz::check_error(unpacked.status());
+  if (unpacked->has_value()) LOCUS_CHECK(check_ply(**unpacked).ok());
   const absl::StatusOr<uint64_t> faces = check_ply(input);
   if (!faces.ok()) return fuzz::check_error(faces.status());
   LOCUS_CHECK_LE(*faces, kMaxImportTriangles);

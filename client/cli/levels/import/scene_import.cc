@@ -26,6 +26,7 @@
 #include "client/cli/levels/import/input_file.h"
 #include "client/cli/levels/import/level_builder.h"
 #include "client/cli/levels/import/ply_check.h"
+#include "client/cli/levels/import/ply_strips.h"
 #include "core/base/status_macros.h"
 
 namespace locus::cli {
@@ -262,9 +263,7 @@ void add_notes(const FaceCounts& found, uint64_t triangles_left, ImportedLevel& 
   }
 }
 
-}  // namespace
-
-absl::StatusOr<ImportedLevel> import_scene(const LevelFiles& files, const ImportOptions& options) {
+absl::StatusOr<ImportedLevel> import_faces(const LevelFiles& files, const ImportOptions& options) {
   // Check before parsing: assimp reads out of bounds on some files that this check refuses.
   ASSIGN_OR_RETURN(const std::optional<uint64_t> declared, check_bytes(files));
   Assimp::Importer importer;
@@ -282,6 +281,16 @@ absl::StatusOr<ImportedLevel> import_scene(const LevelFiles& files, const Import
   const FaceCounts left = count_faces(*scene);
   add_notes(found, left.faces - left.points_and_lines, level);
   return level;
+}
+
+}  // namespace
+
+absl::StatusOr<ImportedLevel> import_scene(const LevelFiles& files, const ImportOptions& options) {
+  if (lower_extension(files.name) == ".ply") {
+    ASSIGN_OR_RETURN(std::optional<std::string> unpacked, unpack_ply_strips(files.bytes));
+    if (unpacked.has_value()) return import_faces({files.name, *std::move(unpacked), {}}, options);
+  }
+  return import_faces(files, options);
 }
 
 }  // namespace locus::cli

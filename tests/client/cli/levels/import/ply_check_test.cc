@@ -68,9 +68,10 @@ TEST(PlyCheckTest, HugeDeclaredCountsStopAtTheEndOfTheBody) {
   EXPECT_THAT(message(header + std::string(8, '\xFF')), HasSubstr("face[0]"));
 }
 
-TEST(PlyCheckTest, TriangleStripsAreRefusedWithARemedy) {
+TEST(PlyCheckTest, TriangleStripsBesideFacesAreRefusedWithARemedy) {
   std::string strips = kTwoTriangles;
-  strips.replace(strips.find("face"), 4, "tristrips");
+  strips.insert(strips.find("end_header"), "element tristrips 1\nproperty list int int vertex_indices\n");
+  strips += "3 0 1 2\n";
   EXPECT_THAT(message(strips), HasSubstr("save it with faces"));
 }
 
