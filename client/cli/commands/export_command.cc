@@ -1,13 +1,14 @@
 #include <array>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
-#include "client/cli/choices.h"
 #include "client/cli/commands.h"
+#include "client/cli/commands/scene_up.h"
 #include "client/cli/commands/view_options.h"
 #include "client/cli/default_scene.h"
 #include "client/cli/failure.h"
@@ -23,7 +24,7 @@ namespace {
 struct ExportOptions {
   std::string scene;
   std::string out;
-  UpAxis up = UpAxis::kY;
+  std::optional<UpAxis> up;  // none = that of the scene
   ViewOptions view;
 };
 
@@ -35,8 +36,7 @@ absl::Status check(const ExportOptions& options) {
 
 // Returns the translation that recentres the scene, computed from the scene's current bounds. The dump is read later
 // and may have another revision, so the exported scene may be centred only approximately.
-absl::StatusOr<std::array<double, 3>> find_recentre(const ExportOptions& options, client::Client& client) {
-  ASSIGN_OR_RETURN(const v1::Scene scene, client.get_scene(options.scene));
+std::array<double, 3> find_recentre(const v1::Scene& scene) {
   if (!scene.has_min() || !scene.has_max()) return std::array<double, 3>{};
   return recentre_of({scene.min().x(), scene.min().y(), scene.min().z()},
                      {scene.max().x(), scene.max().y(), scene.max().z()});
@@ -66,8 +66,9 @@ absl::StatusOr<Json> read_scene(const ExportOptions& options, SceneExport& file,
 absl::Status export_scene(const ExportOptions& options, Context& context) {
   RETURN_IF_ERROR(check(options));
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());
-  ASSIGN_OR_RETURN(const auto recentre, find_recentre(options, *client));
-  SceneExport file(options.scene, options.up, recentre);
+  ASSIGN_OR_RETURN(const v1::Scene scene, client->get_scene(options.scene));
+  const std::array<double, 3> recentre = find_recentre(scene);
+  SceneExport file(options.scene, options.up.value_or(up_of(scene)), recentre);
   ProgressWriter progress = start_progress(context);
   ASSIGN_OR_RETURN(Json head, read_scene(options, file, *client, context, progress));
   uint64_t triangles = 0;
@@ -104,14 +105,13 @@ void add_export_command(CLI::App& parent, Context& context) {
       "export", "Write a scene's level and objects to a GLB file, for Blender and other editors");
   command.footer(R"(Examples:
   locus export arena arena.glb
-  locus export arena arena.glb --up z
+  locus export arena arena.glb --up y
   locus export arena level.glb --instances)");
   add_scene_argument(command, options->scene);
   command.add_option("OUT", options->out, "The file, ending in .glb")->required();
-  const NamedValues<UpAxis> axes = {{"y", UpAxis::kY}, {"z", UpAxis::kZ}};
-  command.add_option("--up", options->up, "Axis that points up in the scene: y (as in the file), z (rotated to y) [y]")
-      ->type_name("AXIS")
-      ->transform(choices(axes));
+  add_up_option(
+      command, options->up,
+      "Axis that points up in the scene: y (as in the file), z (rotated to y) [the scene's label up, else z]");
   add_view_options(command, options->view);
   run_when_chosen(command, options, context, export_scene);
 }

@@ -40,7 +40,7 @@ void add_import_command(CLI::App& parent, Context& context) {
   command.footer(R"(Examples:
   locus import level.glb --scene arena --create
   locus import pak1-maps.pk3 --entry maps/oa_dm1.bsp --scene arena --scale 0.0254
-  locus import house.obj --scene arena --mesh house --at 100,0,0 --layers 2)");
+  locus import house.obj --scene arena --mesh house --at 100,0,0 --layers 2 --up y)");
   command.add_option("FILE", options->file, "The file")->required();
   command.add_option("--scene", options->placement.scene, "The scene to place it in")
       ->required(context.default_scene().empty())
@@ -51,6 +51,10 @@ void add_import_command(CLI::App& parent, Context& context) {
       .add_option("--patch-subdivisions", options->import.patch_subdivisions,
                   "Quake 3: this many squared quads for each curved patch [6]")
       ->type_name("N");
+  add_up_option(
+      command, options->placement.up,
+      "Axis that points up in the file: y, z; with --create kept as the scene's label up [y for glTF and GLB, "
+      "else z]");
   add_placement_options(command, options->placement);
   run_when_chosen(command, options, context, import);
 }

@@ -36,11 +36,15 @@ absl::StatusOr<v1::UploadMeshResponse> upload(const std::string& name, const Imp
                             on_sent);
 }
 
-absl::Status create_scene(const std::string& name, client::Client& client) {
+// Creates the scene if that is requested and there is none. Returns the scene.
+absl::StatusOr<v1::Scene> find_scene(const PlacementOptions& options, UpAxis up, client::Client& client) {
+  // A missing scene is refused before the meshes are uploaded, which can take minutes.
+  if (!options.create) return client.get_scene(options.scene);
   v1::CreateSceneRequest request;
-  request.set_name(name);
+  request.set_name(options.scene);
   request.set_if_absent(true);
-  return client.create_scene(request).status();
+  (*request.mutable_spec()->mutable_labels())[kUpLabel] = up_name(up);
+  return client.create_scene(request);
 }
 
 // Deletes meshes that could not be placed. The server keeps a mesh that another client has placed meanwhile; one that
@@ -80,11 +84,12 @@ void add_placement_options(CLI::App& command, PlacementOptions& options) {
 absl::Status upload_and_place(const PlacementOptions& options, const ImportedLevel& level, Context& context,
                               ProgressWriter& progress) {
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());
-  if (options.create) {
-    RETURN_IF_ERROR(create_scene(options.scene, *client));
-  } else {
-    // Refuses a missing scene before the meshes are uploaded, which can take minutes.
-    RETURN_IF_ERROR(client->get_scene(options.scene).status());
+  const UpAxis up = options.up.value_or(up_of_format(level.source_format));
+  ASSIGN_OR_RETURN(const v1::Scene scene, find_scene(options, up, *client));
+  if (up_of(scene) != up && !context.options().quiet) {
+    progress.hide();
+    context.err() << "note: " << up_name(up) << " is up in this level, and " << up_name(up_of(scene)) << " in scene "
+                  << options.scene << "; its coordinates are kept\n";
   }
   std::vector<std::string> new_meshes;
   Report report;

@@ -9,6 +9,7 @@
 #include "client/cli/arguments.h"
 #include "client/cli/choices.h"
 #include "client/cli/commands.h"
+#include "client/cli/commands/scene_up.h"
 #include "client/cli/default_scene.h"
 #include "client/cli/extras/render/camera_options.h"
 #include "client/cli/extras/render/cast_rays.h"
@@ -70,10 +71,11 @@ absl::Status check_line(const RenderOptions& options) {
 }
 
 // Returns the bounds of what the picture must show: the object or instance given by --at, or the whole scene. Sets
-// options.cast.revision to the scene's current revision.
+// options.cast.revision to the scene's current revision, and options.camera.scene_up to its upward axis.
 absl::StatusOr<Aabbd> find_target(RenderOptions& options, const client::Client& client) {
   ASSIGN_OR_RETURN(const v1::Scene scene, client.get_scene(options.cast.scene));
   options.cast.revision = {scene.epoch(), scene.revision()};
+  if (up_of(scene) == UpAxis::kY) options.camera.scene_up = {0, 1, 0};
   if (!scene.has_min() || !scene.has_max()) {
     return absl::FailedPreconditionError(
         absl::StrCat("scene ", options.cast.scene,

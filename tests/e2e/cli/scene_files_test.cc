@@ -207,7 +207,7 @@ TEST_F(SceneFilesTest, AnExportHasTheMeshOnceAndEveryInstanceInItsPlace) {
 
 TEST_F(SceneFilesTest, AnExportedLevelImportedAgainAnswersTheSame) {
   fill_world();
-  text_of({"export", "world", path_, "--instances"});
+  text_of({"export", "world", path_, "--instances", "--up", "y"});
   const absl::StatusOr<cli::ImportedLevel> level = cli::import_file(path_, {});
   ASSERT_TRUE(level.ok()) << level.status();
   EXPECT_EQ(level->meshes[0].indices.size() / 3, 1200u);
@@ -223,6 +223,57 @@ TEST_F(SceneFilesTest, AnExportedLevelImportedAgainAnswersTheSame) {
   ASSERT_TRUE(there["hits"][0]["t"].is_number());
   EXPECT_NEAR(there["hits"][0]["t"].get<double>(), here["hits"][0]["t"].get<double>(), 1e-3);
   EXPECT_EQ(there["hits"][0]["normal"], here["hits"][0]["normal"]);
+}
+
+// Returns the matrix of the root of the exported scene; null if the root has none.
+Json root_matrix(const std::string& path) {
+  const cli::testing::GlbFile file = cli::testing::read_glb(path);
+  const Json& scene = file.json["scenes"][0];
+  const Json& root = file.json["nodes"][scene["nodes"][0].get<size_t>()];
+  return root.contains("matrix") ? root["matrix"] : Json();
+}
+
+TEST_F(SceneFilesTest, ImportLabelsASceneWithItsUpwardAxisAndExportUsesIt) {
+  fill_world();
+  text_of({"export", "world", path_});
+  EXPECT_FALSE(root_matrix(path_).is_null()) << "without a label, z is up";
+  text_of({"export", "world", path_, "--up", "y"});
+  EXPECT_TRUE(root_matrix(path_).is_null()) << "the option wins";
+  text_of({"import", path_, "--scene", "gltf", "--create"});
+  EXPECT_EQ(json_of({"scene", "describe", "gltf"})["labels"]["up"], "y");
+  text_of({"export", "gltf", path_});
+  EXPECT_TRUE(root_matrix(path_).is_null());
+  text_of({"export", "gltf", path_, "--up", "z"});
+  EXPECT_FALSE(root_matrix(path_).is_null());
+  text_of({"generate", "city", "--triangles", "600", "--scene", "made", "--create"});
+  EXPECT_EQ(json_of({"scene", "describe", "made"})["labels"]["up"], "z");
+  const std::string obj = path_ + ".obj";
+  text_of({"generate", "blob", "--triangles", "600", "--out", obj});
+  text_of({"import", obj, "--scene", "flat", "--create"});
+  EXPECT_EQ(json_of({"scene", "describe", "flat"})["labels"]["up"], "z");
+  text_of({"import", obj, "--scene", "tall", "--create", "--up", "y", "--mesh", "tall"});
+  EXPECT_EQ(json_of({"scene", "describe", "tall"})["labels"]["up"], "y");
+  EXPECT_THAT(run({"import", obj, "--scene", "tall", "--mesh", "other"}).err, HasSubstr("note: z is up in this level"));
+  unlink(obj.c_str());
+}
+
+TEST_F(SceneFilesTest, APictureUsesTheUpwardAxisOfItsScene) {
+  const std::string png = path_ + ".png";
+  const auto eye = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> line = {"render", "tall", png, "--size", "32x24"};
+    line.insert(line.end(), more.begin(), more.end());
+    return json_of(line)["eye"];
+  };
+  for (const char* const axis : {"y", "z"}) {
+    text_of({"scene", "create", "tall", "--label", std::string("up=") + axis});
+    text_of({"insert", "tall", "ball", "--id", "1", "--at", "0,0,0", "--radius", "1"});
+    const size_t up = axis[0] == 'y' ? 1 : 2;
+    EXPECT_GT(eye({})[up].get<double>(), 1) << "seen from above";
+    EXPECT_GT(eye({"--up", "1,0,0"})[0].get<double>(), 1) << "the option wins";
+    EXPECT_GT(eye({"--dir", up == 1 ? "0,-1,0" : "0,0,-1"})[up].get<double>(), 1) << "a plan needs no --up";
+    text_of({"scene", "delete", "tall"});
+  }
+  unlink(png.c_str());
 }
 
 TEST_F(SceneFilesTest, AFarSceneIsTranslatedAndTheOffsetReported) {

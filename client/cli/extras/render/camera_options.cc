@@ -19,10 +19,15 @@ constexpr double kThingMargin = 2;  // larger than kSceneMargin, to show the obj
 
 Vec3d vector_of(const Triple& triple) { return {triple.x, triple.y, triple.z}; }
 
-// Returns the axes of a view along `forward`. Without --up, z points upward, or y if the view is along z.
+// Returns the direction that points upward: that of --up, or the scene's.
+Vec3d up_of(const CameraOptions& options) { return options.up ? vector_of(*options.up) : options.scene_up; }
+
+// Returns the axes of a view along `forward`. Without --up, in a view along the scene's upward axis, y points upward
+// where z is the scene's upward axis, and -z where y is.
 absl::StatusOr<ViewAxes> axes_of(const CameraOptions& options, Vec3d forward) {
-  absl::StatusOr<ViewAxes> axes = view_axes(forward, options.up ? vector_of(*options.up) : Vec3d{0, 0, 1});
-  if (!axes.ok() && !options.up) axes = view_axes(forward, {0, 1, 0});
+  absl::StatusOr<ViewAxes> axes = view_axes(forward, up_of(options));
+  const Vec3d ahead = options.scene_up.z != 0 ? Vec3d{0, 1, 0} : Vec3d{0, 0, -1};
+  if (!axes.ok() && !options.up) axes = view_axes(forward, ahead);
   if (!axes.ok()) return usage_error(absl::StrCat(axes.status().message(), ": give another --eye, --dir or --up"));
   return axes;
 }
@@ -57,7 +62,7 @@ void add_camera_options(CLI::App& command, CameraOptions& options) {
   add_triple(command, "--eye", options.eye, "Where the picture is taken from [where all of it shows]");
   add_triple(command, "--look-at", options.look_at, "The point in the middle of the picture; with --eye");
   add_triple(command, "--dir", options.direction, "Which way to look [from above and from a side]");
-  add_triple(command, "--up", options.up, "Which way is up [0,0,1]");
+  add_triple(command, "--up", options.up, "Which way is up [the scene's label up, else 0,0,1]");
   command.add_option("--fov", options.degrees, "Degrees between the lower and the upper edge [45]")
       ->type_name("DEGREES")
       ->check(CLI::Range(0.01, 170.0).description(""));
@@ -82,7 +87,7 @@ absl::Status check(const CameraOptions& options) {
 }
 
 absl::StatusOr<Camera> camera_of(const CameraOptions& options, const Aabbd& target, const ImageSize& size) {
-  const Vec3d up = options.up ? vector_of(*options.up) : Vec3d{0, 0, 1};
+  const Vec3d up = up_of(options);
   if (up == Vec3d{}) return usage_error("--up 0,0,0 is no direction");
   Vec3d forward = options.direction ? vector_of(*options.direction) : three_quarter_view(up);
   const Vec3d centre = options.look_at ? vector_of(*options.look_at) : (target.min + target.max) * 0.5;

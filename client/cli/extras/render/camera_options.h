@@ -20,6 +20,7 @@ struct CameraOptions {
   std::optional<Triple> look_at = std::nullopt;
   std::optional<Triple> direction = std::nullopt;
   std::optional<Triple> up = std::nullopt;
+  Vec3d scene_up = {0, 0, 1};  // used without `up`
   double degrees = 45;
   std::optional<double> orthographic = std::nullopt;  // image height in world units; 0 = chosen to fit
   std::optional<Number64> at = std::nullopt;
