@@ -1,7 +1,6 @@
 // locusd: reads its options and serves until SIGTERM or SIGINT, then drains and ends. `locusd check` and `locusd
 // repair` verify or repair a data directory instead.
 
-#include <malloc.h>
 #include <poll.h>
 #include <pthread.h>
 #include <sys/ioctl.h>
@@ -31,6 +30,7 @@
 #include "server/config/version.h"
 #include "server/observability/log.h"
 #include "server/rpc/library_logs.h"
+#include "server/scheduling/allocator_use.h"
 #include "server/scheduling/semaphore.h"
 #include "server/services/server.h"
 #include "server/storage/integrity/check.h"
@@ -42,14 +42,6 @@ namespace {
 
 // Exit code after a second SIGTERM or SIGINT.
 constexpr int kEndedAtOnce = 130;
-
-// Makes glibc keep freed memory. By default, glibc returns the memory of large messages to the kernel each time, which
-// halves throughput. With these settings glibc keeps at most 512 MiB, or an eighth of the memory limit if that is less.
-void keep_freed_memory(uint64_t memory_limit) {
-  mallopt(M_MMAP_THRESHOLD, 64 << 20);
-  mallopt(M_TRIM_THRESHOLD, static_cast<int>(std::min(uint64_t{512} << 20, memory_limit / 8)));
-  mallopt(M_TOP_PAD, 16 << 20);
-}
 
 // Raises the limit on open files as far as the system permits, because each connection is a file.
 void allow_many_files() {

@@ -1,6 +1,7 @@
 #include "core/scene/registry.h"
 
 #include <algorithm>
+#include <limits>
 #include <set>
 #include <utility>
 
@@ -320,6 +321,8 @@ absl::Status Registry::delete_mesh(const std::string& name) {
   const MutexLock change(changes_mutex_);
   ASSIGN_OR_RETURN(MeshPtr taken, take_mesh(name));
   const absl::Status status = log_ == nullptr ? absl::OkStatus() : log_->delete_mesh(name);
+  if (taken != nullptr && status.ok())
+    for (const ScenePtr& scene : list_scenes("", std::numeric_limits<size_t>::max())) scene->forget_mesh(taken.get());
   const MutexLock lock(mutex_);
   if (taken == nullptr && status.ok()) damaged_meshes_.erase(name);
   if (taken == nullptr || status.ok()) return status;

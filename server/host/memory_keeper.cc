@@ -1,7 +1,5 @@
 #include "server/host/memory_keeper.h"
 
-#include <malloc.h>
-
 #include <algorithm>
 #include <limits>
 #include <numeric>
@@ -12,6 +10,8 @@
 #include "core/base/check.h"
 #include "server/host/memory_lines.h"
 #include "server/observability/log.h"
+#include "server/scheduling/allocator_use.h"
+#include "server/scheduling/clocks.h"
 
 namespace locus::server {
 namespace {
@@ -20,10 +20,18 @@ using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 
 constexpr milliseconds kInterval{50};
-// Minimum intervals between two releases of free memory: the first while memory is short or claims are refused, the
-// second at other times. They are long, because a release visits the whole heap.
+// Minimum interval between two releases of free memory while memory is short or claims are refused. It is long, because
+// a release visits the whole heap.
 constexpr milliseconds kReleaseInterval{1000};
-constexpr milliseconds kIdleReleaseInterval{5000};
+// Interval over which the load of the process is measured. The process is busy if it uses more than 1 / kBusyShare of
+// the time of one processor.
+constexpr milliseconds kLoadInterval{1000};
+constexpr int kBusyShare = 5;
+// Minimum intervals between two checks for free memory while memory is not short, for a process that is idle and one
+// that is busy. A check also waits kCheckShare times as long as the last check took.
+constexpr milliseconds kIdleCheckInterval{1000};
+constexpr milliseconds kBusyCheckInterval{30'000};
+constexpr int kCheckShare = 100;
 // Minimum interval between two checks of the readers of all scenes while memory is short. A check may visit much of the
 // data that the readers hold.
 constexpr milliseconds kReadersInterval{1000};
@@ -87,11 +95,12 @@ void MemoryKeeper::keep() {
   const steady_clock::time_point now = steady_clock::now();
   refused_ = budget_.take_shortage() || refused_;
   const bool is_needed = is_short || refused_;
-  if (now - last_release_ >= (is_needed ? kReleaseInterval : kIdleReleaseInterval)) {
+  if (is_needed && now - last_release_ >= kReleaseInterval) {
     last_release_ = now;
     refused_ = false;
-    release(is_needed);
+    release_needed();
   }
+  release_spare(now);
   if (const uint64_t taken = budget_.taken(); taken > enough) trim_histories(taken - enough);
   if (is_short && now - last_readers_ >= kReadersInterval) {
     last_readers_ = now;
@@ -113,14 +122,26 @@ void MemoryKeeper::shed_connections() {
       {{"connections", absl::StrCat(closed)}, {"memory_bytes", absl::StrCat(budget_.measured())}});
 }
 
-void MemoryKeeper::release(bool is_needed) {
-  if (is_needed) {
-    for (const ScenePtr& scene : all_scenes(registry_)) scene->forget_recent();
-  } else if (mallinfo2().fordblks <= cache_ceiling(budget_.limit())) {
-    return;
-  }
-  malloc_trim(0);
+void MemoryKeeper::release_needed() {
+  for (const ScenePtr& scene : all_scenes(registry_)) scene->forget_recent();
+  return_free_memory();
   budget_.refresh();
+}
+
+void MemoryKeeper::release_spare(steady_clock::time_point now) {
+  if (now - last_load_ < kLoadInterval) return;
+  const std::chrono::nanoseconds cpu(process_nanoseconds());
+  const bool is_busy = (cpu - std::exchange(cpu_at_load_, cpu)) * kBusyShare > now - std::exchange(last_load_, now);
+  if (now < next_check_ || (is_busy && now - last_check_ < kBusyCheckInterval)) return;
+  last_check_ = now;
+  const AllocatorUse use = allocator_use(budget_.measured());
+  unreturned_ = std::min(unreturned_, use.reusable);
+  if (use.reusable - unreturned_ > spare_ceiling(budget_.limit(), use.live)) {
+    return_free_memory();
+    budget_.refresh();
+    unreturned_ = allocator_use(budget_.measured()).reusable;
+  }
+  next_check_ = now + std::max<steady_clock::duration>(kIdleCheckInterval, (steady_clock::now() - now) * kCheckShare);
 }
 
 void MemoryKeeper::trim_histories(uint64_t excess) {
@@ -138,7 +159,7 @@ void MemoryKeeper::trim_histories(uint64_t excess) {
   for (size_t i = 0; i < scenes.size(); ++i) trimmed += scenes[i]->trim_history(shrunk[i]);
   if (trimmed == 0) return;
   trimmed_bytes_.fetch_add(trimmed);
-  malloc_trim(0);
+  return_free_memory();
   budget_.refresh();
   log(LogLevel::kWarning, "memory is short: the oldest ticks of histories were dropped",
       {{"dropped_bytes", absl::StrCat(trimmed)},

@@ -1,5 +1,7 @@
 // Thread that keeps the memory of the process below its limit. It measures the process periodically. When memory is
-// short or a claim was refused, it drops old revisions and returns free memory to the kernel. When memory is short, it
+// short or a claim was refused, it drops old revisions and returns free memory to the kernel. At other times it returns
+// free memory that is worth it: soon while the process is mostly idle, and rarely while it is busy, because a return
+// visits the whole heap and busy threads would soon take the memory again. When memory is short, the thread
 // then drops the oldest ticks of histories, before inserts and uploads have to be refused. After that it cancels the
 // readers of the oldest revisions. If memory is nearly full, the thread first closes the connections that claim and
 // send most bytes. Only this thread does this work, because the work visits all scenes and the whole heap. The thread
@@ -15,6 +17,7 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <thread>
 #include <vector>
 
@@ -53,9 +56,11 @@ class MemoryKeeper {
 
  private:
   void run() LOCUS_EXCLUDES(mutex_);
-  // Returns free memory to the kernel. If memory is needed, first drops all revisions of each scene except the latest
-  // one; otherwise does nothing unless much memory is free.
-  void release(bool is_needed);
+  // Drops all revisions of each scene except the latest one, and returns free memory to the kernel.
+  void release_needed();
+  // Returns free memory to the kernel if it has become more than spare_ceiling() since the last return. Does nothing if
+  // the last call is too recent; this depends on how busy the process was meanwhile.
+  void release_spare(std::chrono::steady_clock::time_point now);
   void trim_histories(uint64_t excess);
   void shed_connections();
   void revoke_readers();
@@ -70,6 +75,10 @@ class MemoryKeeper {
   std::atomic<uint64_t> revoked_bytes_{0};
   // Used by the thread only.
   std::chrono::steady_clock::time_point last_release_{}, last_readers_{}, last_refusals_{}, last_lines_{};
+  std::chrono::steady_clock::time_point last_load_{}, last_check_{}, next_check_{};
+  std::chrono::nanoseconds cpu_at_load_{0};  // processor time of the process at last_load_
+  // Least reusable bytes since the last return of free memory, which could not return these bytes.
+  uint64_t unreturned_ = std::numeric_limits<uint64_t>::max();
   bool refused_ = false;  // a claim was refused since the last release
   std::array<uint64_t, kMemoryLines> logged_refusals_{};
   Mutex mutex_;

@@ -36,8 +36,10 @@ std::vector<MemoryLineUse> memory_lines(const MemoryBudget& budget, const Regist
 uint64_t short_memory(uint64_t limit);
 // Returns the bytes that pinned revisions of all scenes may hold while memory is short.
 uint64_t pinned_ceiling(uint64_t limit);
-// Returns the bytes of free memory that the allocator may keep while memory is not short.
+// Returns the bytes that the caches of the log may take.
 uint64_t cache_ceiling(uint64_t limit);
+// Returns the bytes of free memory that the allocator of an idle process may keep, if `live` bytes are allocated.
+uint64_t spare_ceiling(uint64_t limit, uint64_t live);
 // Returns the bytes that gRPC's buffers may take, for messages in transit and for frames that no call has claimed.
 uint64_t network_ceiling(uint64_t limit);
 

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/base/check.h"
+#include "server/scheduling/allocator_use.h"
 
 namespace locus::server {
 
@@ -38,8 +39,19 @@ bool CallThreads::run(std::function<void()> task) {
 
 void CallThreads::work(Threads::iterator self) {
   MutexLock lock(mutex_);
+  bool rested = true;  // the thread has returned its free memory since its last task
+  auto rest_at = std::chrono::steady_clock::now();
   while (true) {
-    while (waiting_.empty() && !ending_ && idle_ <= kMaxIdle) changed_.wait(mutex_);
+    while (waiting_.empty() && !ending_ && idle_ <= kMaxIdle) {
+      if (rested) {
+        changed_.wait(mutex_);
+      } else if (!changed_.wait_until(mutex_, rest_at)) {
+        rested = true;
+        mutex_.unlock();
+        return_top_of_arena();
+        mutex_.lock();
+      }
+    }
     if (waiting_.empty()) break;
     std::function<void()> task = std::move(waiting_.front());
     waiting_.pop_front();
@@ -49,6 +61,8 @@ void CallThreads::work(Threads::iterator self) {
     task = nullptr;
     mutex_.lock();
     ++idle_;
+    rested = false;
+    rest_at = std::chrono::steady_clock::now() + kRest;
   }
   --idle_;
   ended_threads_.splice(ended_threads_.end(), threads_, self);

@@ -1,10 +1,12 @@
 // Threads for calls that block: each task starts immediately, on an idle thread or on a new one. No queue is needed,
-// because the admission of calls limits the number of tasks. A few idle threads are kept for later tasks.
+// because the admission of calls limits the number of tasks. A few idle threads are kept for later tasks. Each returns
+// its free memory to the system when it has been idle for a while: see return_top_of_arena().
 //
 // Threads: run() may be called from any thread. Invariant: at most max() threads exist.
 #ifndef LOCUS_SERVER_SCHEDULING_CALL_THREADS_H_
 #define LOCUS_SERVER_SCHEDULING_CALL_THREADS_H_
 
+#include <chrono>
 #include <cstdint>
 #include <deque>
 #include <functional>
@@ -32,6 +34,8 @@ class CallThreads {
  private:
   // Maximum number of idle threads that are kept.
   static constexpr size_t kMaxIdle = 16;
+  // Time after the end of its last task when a thread returns its free memory.
+  static constexpr std::chrono::seconds kRest{2};
   using Threads = std::list<std::thread>;
 
   void work(Threads::iterator self) LOCUS_EXCLUDES(mutex_);

@@ -1,4 +1,4 @@
-// Clocks: two clocks in nanoseconds for measuring work, and the calendar clock. Thread-safe.
+// Clocks: three clocks in nanoseconds for measuring work, and the calendar clock. Thread-safe.
 #ifndef LOCUS_SERVER_SCHEDULING_CLOCKS_H_
 #define LOCUS_SERVER_SCHEDULING_CLOCKS_H_
 
@@ -19,6 +19,13 @@ inline uint64_t steady_nanoseconds() {
 inline uint64_t thread_nanoseconds() {
   timespec now;
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<uint64_t>(now.tv_sec) * 1'000'000'000 + static_cast<uint64_t>(now.tv_nsec);
+}
+
+// Returns the processor time that all threads of the process have used. A call takes about 0.3 us.
+inline uint64_t process_nanoseconds() {
+  timespec now;
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
   return static_cast<uint64_t>(now.tv_sec) * 1'000'000'000 + static_cast<uint64_t>(now.tv_nsec);
 }
 

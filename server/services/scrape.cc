@@ -10,6 +10,7 @@
 #include "server/host/memory_lines.h"
 #include "server/observability/call_figures.h"
 #include "server/observability/process_figures.h"
+#include "server/scheduling/allocator_use.h"
 #include "server/scheduling/clocks.h"
 #include "server/security/access_control.h"
 #include "server/security/rights.h"
@@ -104,6 +105,12 @@ void add_memory(const Host& host, MetricPage& page) {
     const auto line = static_cast<MemoryLine>(i);
     page.add({{"line", std::string(memory_line_name(line))}}, static_cast<double>(host.memory.refused(line)));
   }
+  const AllocatorUse allocator = allocator_use(host.memory.used());
+  page.add_one("locus_memory_live_bytes", "Bytes of live allocations.", MetricKind::kGauge,
+               static_cast<double>(allocator.live));
+  page.add_one("locus_memory_reusable_bytes",
+               "Free bytes that the allocator holds for later allocations and has not returned to the system.",
+               MetricKind::kGauge, static_cast<double>(allocator.reusable));
   page.add_one("locus_memory_trimmed_bytes_total", "Bytes by which histories were shortened as memory ran short.",
                MetricKind::kCounter, static_cast<double>(host.memory_keeper.trimmed_bytes()));
   page.add_one("locus_memory_revoked_bytes_total", "Bytes held by readers that were cancelled as memory ran short.",

@@ -12,6 +12,7 @@
 #include "server/host/memory_lines.h"
 #include "server/rpc/call.h"
 #include "server/rpc/wire_plan.h"
+#include "server/scheduling/allocator_use.h"
 #include "server/services/backup.h"
 #include "server/services/connections.h"
 #include "server/services/quota_report.h"
@@ -60,6 +61,8 @@ void add_queues(const Host& host, std::vector<NamedLimit>& all) {
 void add_memory_lines(const Host& host, std::vector<NamedLimit>& all) {
   for (const MemoryLineUse& line : memory_lines(host.memory, host.registry, host.log))
     all.push_back({"memory_" + line.name, static_cast<double>(line.ceiling), static_cast<double>(line.used)});
+  const AllocatorUse allocator = allocator_use(host.memory.used());
+  all.push_back({"memory_live", static_cast<double>(host.memory.limit()), static_cast<double>(allocator.live)});
 }
 
 void add_connections(const Host& host, std::vector<NamedLimit>& all) {

@@ -111,7 +111,7 @@ INTRINSICS = "immintrin.h"
 KERNELS = ("core/index/bvh/kernels/", "core/index/hash_grid/kernels/")
 # Files that may include a header of the system to advise the kernel about memory. madvise(), which asks for large
 # pages, is allowed because it changes no value.
-MEMORY_ADVICE = {"core/base/large_array.h": "sys/mman.h"}
+MEMORY_ADVICE = {"core/base/large_array.cc": "sys/mman.h"}
 CLOCK_FILES = re.compile(r"core/(?:base/(?:mutex|progress_writer)|scene/(?:scene|readers/reader_tracker))\.(?:h|cc)")
 
 # Pairs of a folder and its parent that the rule about cycles treats as one folder, because the folder was split only to

@@ -35,6 +35,7 @@ class ChildProcess {
   ChildProcess(const ChildProcess&) = delete;
   ChildProcess& operator=(const ChildProcess&) = delete;
 
+  pid_t pid() const { return pid_; }
   void signal(int number) { kill(pid_, number); }
 
   // Waits for the end of the process and returns its exit code; -1 if a signal ended it.

@@ -40,9 +40,11 @@ void add_limits_command(CLI::App& parent, Context& context) {
       "limits", "List every limit of the server, how much is in use, and how often it refused something");
   command.footer(
       "The limits memory_... are what memory_bytes is used for. memory_history, memory_pinned, memory_scenes,\n"
-      "memory_meshes, memory_caches and memory_network are measured, the others claimed by work in progress. Of\n"
-      "pinned, caches and network, the value is the most that they may take; of the others, the use of the whole\n"
-      "process at which they give way or are refused.\n"
+      "memory_meshes, memory_caches, memory_reusable and memory_network are measured, the others claimed by work in\n"
+      "progress. Of pinned, caches and network, the value is the most that they may take; of the others, the use of\n"
+      "the whole process at which they give way or are refused. memory_reusable is free memory that the allocator\n"
+      "holds for later; an idle server returns it to the system if it exceeds the value. memory_live is the sum of\n"
+      "all live allocations, whatever they are used for.\n"
       "`refused` counts calls, messages and connections since the server started. On a server with access control,\n"
       "only callers with the right `metrics` or `admin *` see `used` and `refused`.\n"
       "Examples:\n  locus limits\n  locus -o json limits");

@@ -28,6 +28,19 @@ TEST(LargeArrayTest, ALargeArrayBeginsOnALargePage) {
   EXPECT_TRUE(is_aligned(make_large_array<uint32_t>(kLargeArray / 4).get(), kLargePage));
 }
 
+TEST(LargeArrayTest, OnlyLargeArraysAreMappingsOfTheirOwn) {
+  const uint64_t before = mapped_array_bytes();
+  {
+    const LargeArray<char> large = make_large_array<char>(kLargeArray + 1);
+    large[kLargeArray] = 'x';
+    const LargeArray<char> mapped = make_large_array<char>(kMappedArray);
+    mapped[kMappedArray - 1] = 'x';
+    const LargeArray<char> small = make_large_array<char>(kMappedArray - 1);
+    EXPECT_EQ(mapped_array_bytes(), before + kLargeArray + 1 + kMappedArray);
+  }
+  EXPECT_EQ(mapped_array_bytes(), before);
+}
+
 TEST(LargeArrayTest, AnEmptyArrayHasMemory) { EXPECT_NE(make_large_array<uint32_t>(0).get(), nullptr); }
 
 }  // namespace

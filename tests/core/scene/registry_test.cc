@@ -230,6 +230,27 @@ TEST_F(RegistryTest, AnUnusedMeshIsDeleted) {
   expect_refusal(registry_.delete_mesh("m"), absl::StatusCode::kNotFound, Reason::kNotFound, "mesh");
 }
 
+TEST_F(RegistryTest, ADeletedMeshIsFreedThoughRecentRevisionsContainedIt) {
+  mesh_ = *registry_.add_mesh("m", make_mesh("m", 1));
+  const ScenePtr scene = created("a");
+  ASSERT_TRUE(scene->change_instances(placing(placement({1}, {0, 0, 0}))).ok());
+  StaticChange removal;
+  const Id id = 1;
+  removal.remove_ids = {&id, 1};
+  ASSERT_TRUE(scene->change_instances(removal).ok());
+  ASSERT_TRUE(scene->apply(with(points({2}, {0, 0, 0}))).ok());
+  const std::weak_ptr<const StaticMesh> mesh = std::exchange(mesh_, nullptr);
+  const auto revision = [&](uint64_t number) {
+    return scene->view({View::Kind::kExactly, number, 0}, std::chrono::steady_clock::time_point::min());
+  };
+  EXPECT_TRUE(revision(1).ok()) << "recent revisions stay while the mesh is registered";
+  ASSERT_TRUE(registry_.delete_mesh("m").ok());
+  EXPECT_TRUE(mesh.expired());
+  EXPECT_EQ(revision(1).status().code(), absl::StatusCode::kOutOfRange);
+  EXPECT_TRUE(revision(2).ok()) << "revisions after the removal stay";
+  EXPECT_TRUE(revision(3).ok());
+}
+
 TEST_F(RegistryTest, AUsedMeshIsNotDeletedAndItsUsesOfAllScenesAreCounted) {
   ASSERT_TRUE(registry_.add_mesh("m", mesh_).ok());
   ASSERT_TRUE(created("a")->change_instances(placing(placement({1, 2}, {0, 0, 0}))).ok());

@@ -40,7 +40,7 @@ TEST(MemoryLinesTest, EveryLineHasACeilingAndTogetherTheyAccountForTheWholeProce
   MemoryBudget budget(kLimit, [] { return kUsed; });
   const absl::StatusOr<MemoryBudget::Claim> claim = budget.claim(MemoryLine::kDumps, "", 5000);
   const std::vector<MemoryLineUse> lines = memory_lines(budget, registry, nullptr);
-  EXPECT_EQ(lines.size(), 6 + kMemoryLines);
+  EXPECT_EQ(lines.size(), 7 + kMemoryLines);
   uint64_t sum = 0;
   for (const MemoryLineUse& line : lines) {
     EXPECT_GT(line.ceiling, 0u) << line.name;
