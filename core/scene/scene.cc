@@ -374,6 +374,17 @@ void Scene::forget_recent() {
   LOCUS_DCHECK_CALL(check_invariants());
 }
 
+void Scene::forget_mesh(const StaticMesh* mesh) {
+  std::deque<SnapshotPtr> forgotten;  // freed after the lock is released, because freeing takes long
+  const MutexLock lock(mutex_);
+  LOCUS_DCHECK_EQ(latest_->statics->uses(mesh), 0u);
+  const auto last = std::find_if(recent_.rbegin(), recent_.rend(),
+                                 [mesh](const SnapshotPtr& recent) { return recent->statics->uses(mesh) > 0; });
+  std::move(recent_.begin(), last.base(), std::back_inserter(forgotten));
+  recent_.erase(recent_.begin(), last.base());
+  LOCUS_DCHECK_CALL(check_invariants());
+}
+
 uint64_t Scene::revoke_readers(uint64_t bytes) {
   const uint64_t revoked = pins_->revoke_beyond(*latest(), bytes);
   pins_->revoke_overdue();
@@ -428,11 +439,15 @@ SceneStatus Scene::status() const {
     status.joined_updates = joined_updates_;
     status.last_build_error = last_build_error_;
     snapshot = latest_;
+    status.recent_bytes = latest_->replaced_bytes - recent_.front()->replaced_bytes;
   }
   status.memory_bytes = bytes_of(*snapshot);
+  status.mesh_bytes = snapshot->statics->mesh_bytes();
   const ReaderTracker::Use pinned = pins_->use(*snapshot, status.memory_bytes);
   status.pinned_bytes = pinned.held;
   status.max_pinned_bytes = pinned.budget;
+  status.past_limit = snapshot->past_limit;
+  status.forgotten_ticks = snapshot->forgotten_ticks;
   if (snapshot->history != nullptr) {
     status.history_bytes = snapshot->history->bytes;
     status.recorded_ticks = static_cast<uint32_t>(snapshot->history->records.size());

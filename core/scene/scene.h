@@ -77,10 +77,16 @@ struct InstanceChange {
 
 struct SceneStatus {
   uint64_t memory_bytes = 0;   // memory of the latest revision without meshes, which scenes share
+  uint64_t mesh_bytes = 0;     // memory of the meshes of the latest revision
   uint64_t history_bytes = 0;  // additional memory of the history
+  // Upper bound of the additional memory of the revisions that are retained for kExactly views, without meshes. The
+  // history may hold some of this memory as well.
+  uint64_t recent_bytes = 0;
   uint32_t recorded_ticks = 0;
-  uint64_t pinned_bytes = 0;      // memory held only by older revisions that are still being read
-  uint64_t max_pinned_bytes = 0;  // limit of pinned_bytes
+  PastLimit past_limit = PastLimit::kOff;  // see SceneSnapshot::past_limit
+  uint64_t forgotten_ticks = 0;            // see HistoryRecorder::forgotten_ticks()
+  uint64_t pinned_bytes = 0;               // memory held only by older revisions that are still being read
+  uint64_t max_pinned_bytes = 0;           // limit of pinned_bytes
   uint32_t pending_changes = 0;
   uint64_t joined_updates = 0;   // number of batches that share a revision with a later batch
   std::string last_build_error;  // message of the last static change that failed; later successes do not clear it

@@ -68,9 +68,9 @@ SnapshotPtr SceneWriter::freeze() {
   const bool stale = planted(PlantedBug::kStaleSnapshot) && published_ != nullptr;
   ObjectSet objects = stale ? published_->objects : objects_.snapshot();
   recorder_.measure(objects);
-  return std::make_shared<const SceneSnapshot>(
-      SceneSnapshot{epoch_, revision_, tick_, winding_, statics_, std::move(objects), recorder_.history(),
-                    objects_.displacement(), replaced_bytes_ + recorder_.dropped_bytes(), recorder_.limit()});
+  return std::make_shared<const SceneSnapshot>(SceneSnapshot{
+      epoch_, revision_, tick_, winding_, statics_, std::move(objects), recorder_.history(), objects_.displacement(),
+      replaced_bytes_ + recorder_.dropped_bytes(), recorder_.limit(), recorder_.forgotten_ticks()});
 }
 
 SnapshotPtr SceneWriter::next_revision() {

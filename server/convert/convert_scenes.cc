@@ -19,6 +19,24 @@ v1::SceneSpec spec_to_proto(const SceneSpec& spec) {
   return out;
 }
 
+v1::HistoryLimit to_proto(PastLimit limit) {
+  switch (limit) {
+    case PastLimit::kOff:
+      return v1::HISTORY_LIMIT_UNSPECIFIED;
+    case PastLimit::kBegan:
+      return v1::HISTORY_LIMIT_BEGAN;
+    case PastLimit::kTicks:
+      return v1::HISTORY_LIMIT_TICKS;
+    case PastLimit::kBytes:
+      return v1::HISTORY_LIMIT_BYTES;
+    case PastLimit::kMemory:
+      return v1::HISTORY_LIMIT_MEMORY;
+    case PastLimit::kRestored:
+      return v1::HISTORY_LIMIT_RESTORED;
+  }
+  return v1::HISTORY_LIMIT_UNSPECIFIED;
+}
+
 absl::Status check_served(const v1::SceneSpec& spec) {
   if (spec.idle_ttl_s() != 0) return not_served("spec.idle_ttl_s");
   if (!v1::Durability_IsValid(spec.durability())) return unknown_enum("spec.durability", spec.durability());
@@ -139,6 +157,10 @@ v1::Scene to_proto(const Scene& scene, const SceneSummary& summary) {
   out.set_instances(summary.instances);
   out.set_triangles(summary.triangles);
   out.set_memory_bytes(status.memory_bytes);
+  out.set_mesh_bytes(status.mesh_bytes);
+  out.set_recent_bytes(status.recent_bytes);
+  out.set_history_limit(to_proto(status.past_limit));
+  out.set_forgotten_ticks(status.forgotten_ticks);
   out.set_pending_changes(status.pending_changes);
   out.set_joined_updates(status.joined_updates);
   out.set_last_build_error(status.last_build_error);

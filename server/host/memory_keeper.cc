@@ -37,6 +37,8 @@ constexpr int kCheckShare = 100;
 constexpr milliseconds kReadersInterval{1000};
 // Minimum interval between two log entries about refused claims.
 constexpr milliseconds kRefusalsInterval{5000};
+// Interval between two checks for histories that forget ticks early.
+constexpr milliseconds kNoticesInterval{1000};
 // Minimum interval between two log entries about the use of each line of the memory budget.
 constexpr milliseconds kLinesInterval{60'000};
 
@@ -108,6 +110,10 @@ void MemoryKeeper::keep() {
   }
   log_refusals(now);
   if (is_needed) log_lines(now);
+  if (now - last_notices_ >= kNoticesInterval) {
+    last_notices_ = now;
+    history_notices_.check(all_scenes(registry_), now);
+  }
 }
 
 // If the measured memory exceeds the ceiling of moves, closes the connections that claim and send most bytes; otherwise

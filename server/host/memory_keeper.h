@@ -5,8 +5,8 @@
 // then drops the oldest ticks of histories, before inserts and uploads have to be refused. After that it cancels the
 // readers of the oldest revisions. If memory is nearly full, the thread first closes the connections that claim and
 // send most bytes. Only this thread does this work, because the work visits all scenes and the whole heap. The thread
-// logs what it dropped, cancelled or closed, and the lines of the budget on which claims were refused. While memory is
-// short or claims are refused, it logs the use of each line once a minute.
+// logs what it dropped, cancelled or closed, which histories forget ticks early, and the lines of the budget on which
+// claims were refused. While memory is short or claims are refused, it logs the use of each line once a minute.
 //
 // Threads: the constructor starts the thread, the destructor ends it.
 #ifndef LOCUS_SERVER_HOST_MEMORY_KEEPER_H_
@@ -24,6 +24,7 @@
 #include "core/base/mutex.h"
 #include "core/scene/log/update_log.h"
 #include "core/scene/registry.h"
+#include "server/host/history_notices.h"
 #include "server/scheduling/memory_budget.h"
 
 namespace locus::server {
@@ -81,6 +82,8 @@ class MemoryKeeper {
   uint64_t unreturned_ = std::numeric_limits<uint64_t>::max();
   bool refused_ = false;  // a claim was refused since the last release
   std::array<uint64_t, kMemoryLines> logged_refusals_{};
+  std::chrono::steady_clock::time_point last_notices_{};
+  HistoryNotices history_notices_;
   Mutex mutex_;
   ConditionVariable ended_changed_;
   bool ended_ LOCUS_GUARDED_BY(mutex_) = false;

@@ -48,6 +48,7 @@ std::vector<MemoryLineUse> memory_lines(const MemoryBudget& budget, const Regist
     lines[0].used += status.history_bytes;
     lines[1].used += status.pinned_bytes;
     lines[2].used += status.memory_bytes;
+    if (status.recorded_ticks == 0) lines[2].used += status.recent_bytes;  // else the history contains most of it
   }
   uint64_t known = 0;
   for (const MemoryLineUse& line : lines) known += line.used;

@@ -14,8 +14,13 @@ void add_up(const SceneFigures& scene, SceneFigures& sum) {
   sum.instances += scene.instances;
   sum.triangles += scene.triangles;
   sum.memory_bytes += scene.memory_bytes;
+  sum.mesh_bytes += scene.mesh_bytes;
+  sum.recent_bytes += scene.recent_bytes;
   sum.history_bytes += scene.history_bytes;
   sum.history_ticks += scene.history_ticks;
+  sum.history_asked_ticks += scene.history_asked_ticks;
+  sum.history_forgotten_ticks += scene.history_forgotten_ticks;
+  sum.history_short += scene.history_short;
   sum.pinned_bytes += scene.pinned_bytes;
   sum.log_bytes += scene.log_bytes;
   sum.pending_changes += scene.pending_changes;
@@ -35,9 +40,20 @@ constexpr Figure kFigures[] = {
     {"locus_scene_triangles", "Triangles of the scene's placed meshes.", &SceneFigures::triangles},
     {"locus_scene_memory_bytes", "Memory of the scene's latest revision without meshes, in bytes.",
      &SceneFigures::memory_bytes},
+    {"locus_scene_mesh_bytes", "Memory of the meshes that the scene places and shares with other scenes, in bytes.",
+     &SceneFigures::mesh_bytes},
+    {"locus_scene_recent_bytes", "Largest possible memory of the recent revisions that the scene retains, in bytes.",
+     &SceneFigures::recent_bytes},
     {"locus_scene_history_bytes", "Memory of the scene's history beyond its latest revision, in bytes.",
      &SceneFigures::history_bytes},
     {"locus_scene_history_ticks", "Ticks of the past that queries may ask about.", &SceneFigures::history_ticks},
+    {"locus_scene_history_asked_ticks", "Ticks of the past that the scene was created to retain.",
+     &SceneFigures::history_asked_ticks},
+    {"locus_scene_history_forgotten_ticks",
+     "Ticks that the history dropped for lack of memory before they were too old.",
+     &SceneFigures::history_forgotten_ticks},
+    {"locus_scene_history_short", "1 if the history lacks ticks that did not fit into its memory, otherwise 0.",
+     &SceneFigures::history_short},
     {"locus_scene_pinned_bytes", "Memory of older revisions of the scene that are still being read, in bytes.",
      &SceneFigures::pinned_bytes},
     {"locus_scene_log_bytes", "Updates of the scene in the log since its snapshot, in bytes.",

@@ -24,8 +24,13 @@ struct SceneFigures {
   uint64_t instances = 0;
   uint64_t triangles = 0;
   uint64_t memory_bytes = 0;
+  uint64_t mesh_bytes = 0;
+  uint64_t recent_bytes = 0;
   uint64_t history_bytes = 0;
   uint64_t history_ticks = 0;
+  uint64_t history_asked_ticks = 0;
+  uint64_t history_forgotten_ticks = 0;
+  uint64_t history_short = 0;  // 1 if the scene has forgotten ticks early, else 0
   uint64_t pinned_bytes = 0;
   uint64_t log_bytes = 0;
   uint64_t pending_changes = 0;

@@ -32,8 +32,13 @@ SceneFigures figures_of(const Host& host, const Scene& scene) {
   figures.instances = snapshot->statics->size();
   figures.triangles = snapshot->statics->triangle_count();
   figures.memory_bytes = status.memory_bytes;
+  figures.mesh_bytes = status.mesh_bytes;
+  figures.recent_bytes = status.recent_bytes;
   figures.history_bytes = status.history_bytes;
   figures.history_ticks = status.recorded_ticks;
+  figures.history_asked_ticks = scene.spec().history.ticks;
+  figures.history_forgotten_ticks = status.forgotten_ticks;
+  figures.history_short = forgets_early(status.past_limit) ? 1 : 0;
   figures.pinned_bytes = status.pinned_bytes;
   figures.log_bytes = scene.log_position().bytes;
   figures.pending_changes = std::max(status.pending_changes, host.changes.pending(snapshot->epoch));

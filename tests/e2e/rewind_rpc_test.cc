@@ -119,6 +119,8 @@ TEST_F(RewindRpcTest, ASceneReportsItsHistory) {
   EXPECT_EQ(scene.oldest_tick(), 20u);
   EXPECT_EQ(scene.recorded_ticks(), 10u);
   EXPECT_GT(scene.history_bytes(), 0u);
+  EXPECT_EQ(scene.history_limit(), v1::HISTORY_LIMIT_TICKS);
+  EXPECT_EQ(scene.forgotten_ticks(), 0u);
   EXPECT_EQ(scene.spec().history_ticks(), 10u);
   EXPECT_EQ(scene.spec().history_bytes(), limits::kDefaultHistoryBytes);
 }

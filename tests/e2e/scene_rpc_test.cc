@@ -51,6 +51,7 @@ TEST_F(SceneRpcTest, ASceneDescribesWhatIsInIt) {
   EXPECT_EQ(scene.instances(), 1u);
   EXPECT_EQ(scene.triangles(), 12u);
   EXPECT_GT(scene.memory_bytes(), 0u);
+  EXPECT_GT(scene.mesh_bytes(), 0u);
   EXPECT_NEAR(scene.min().x(), 2, 0.01);
   EXPECT_NEAR(scene.max().x(), 11, 0.01);
 }

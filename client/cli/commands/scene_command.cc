@@ -59,9 +59,21 @@ std::string state_name(v1::SceneState state) {
 }
 
 Json scene_summary(const v1::Scene& scene) {
-  return {{"name", scene.name()},           {"state", state_name(scene.state())},  {"revision", scene.revision()},
-          {"tick", scene.tick()},           {"objects", scene.objects()},          {"instances", scene.instances()},
-          {"triangles", scene.triangles()}, {"memory_bytes", scene.memory_bytes()}};
+  return {{"name", scene.name()},
+          {"state", state_name(scene.state())},
+          {"revision", scene.revision()},
+          {"tick", scene.tick()},
+          {"objects", scene.objects()},
+          {"instances", scene.instances()},
+          {"triangles", scene.triangles()},
+          {"memory_bytes", scene.memory_bytes()},
+          {"mesh_bytes", scene.mesh_bytes()},
+          {"past_bytes", scene.history_bytes() + scene.recent_bytes()}};
+}
+
+// Returns the reason why the history does not reach further back, such as "bytes".
+std::string limit_name(v1::HistoryLimit limit) {
+  return absl::AsciiStrToLower(absl::StripPrefix(v1::HistoryLimit_Name(limit), "HISTORY_LIMIT_"));
 }
 
 Json corner_of(bool present, const v1::Vec3d& corner) {
@@ -76,16 +88,18 @@ Report description_of(const v1::Scene& scene) {
   report.head["max"] = corner_of(scene.has_max(), scene.max());
   report.head["winding"] = scene.spec().winding() == v1::WINDING_CLOCKWISE ? "clockwise" : "counter-clockwise";
   if (scene.spec().history_ticks() != 0) {
-    report.head["history"] = {{"ticks", scene.spec().history_ticks()},
-                              {"bytes", scene.spec().history_bytes()},
-                              {"oldest_tick", scene.oldest_tick()},
-                              {"recorded_ticks", scene.recorded_ticks()},
-                              {"used_bytes", scene.history_bytes()}};
+    report.head["history"] = {
+        {"ticks", scene.spec().history_ticks()},     {"bytes", scene.spec().history_bytes()},
+        {"oldest_tick", scene.oldest_tick()},        {"recorded_ticks", scene.recorded_ticks()},
+        {"used_bytes", scene.history_bytes()},       {"limited_by", limit_name(scene.history_limit())},
+        {"forgotten_ticks", scene.forgotten_ticks()}};
   }
   if (scene.spec().overload() == v1::OVERLOAD_POLICY_LATEST_WINS) {
     report.head["overload"] = "latest-wins";
     report.head["joined_updates"] = scene.joined_updates();
   }
+  report.head["recent_bytes"] = scene.recent_bytes();
+  report.head["pinned_bytes"] = scene.pinned_bytes();
   report.head["pending_changes"] = scene.pending_changes();
   if (!scene.last_build_error().empty()) report.head["last_build_error"] = scene.last_build_error();
   Json labels = Json::object();
@@ -182,7 +196,10 @@ void add_create(CLI::App& parent, Context& context) {
 void add_list(CLI::App& parent, Context& context) {
   const auto options = std::make_shared<ListOptions>();
   CLI::App& command = *parent.add_subcommand("list", "List the scenes of the server");
-  command.footer("Examples:\n  locus scene list\n  locus -o ndjson scene list --label mode=ctf");
+  command.footer(
+      "memory_bytes is the memory of the objects and instances, mesh_bytes that of the placed meshes, which scenes\n"
+      "share, and past_bytes at most that of the history and of recent revisions.\n"
+      "Examples:\n  locus scene list\n  locus -o ndjson scene list --label mode=ctf");
   add_repeatable(command, "--label", options->labels, "KEY=VALUE", "Only scenes with this label");
   run_when_chosen(command, options, context, list_scenes);
 }
@@ -190,7 +207,10 @@ void add_list(CLI::App& parent, Context& context) {
 void add_describe(CLI::App& parent, Context& context) {
   const auto options = std::make_shared<DescribeOptions>();
   CLI::App& command = *parent.add_subcommand("describe", "Show everything about a scene");
-  command.footer("Examples:\n  locus scene describe arena\n  locus -o json scene describe arena");
+  command.footer(
+      "Of the history, limited_by says why it does not reach further back: ticks (as asked for), bytes (more ticks\n"
+      "did not fit into --history-bytes), memory (the server was short of it), began or restored.\n"
+      "Examples:\n  locus scene describe arena\n  locus -o json scene describe arena");
   add_scene_argument(command, options->name);
   run_when_chosen(command, options, context, describe_scene);
 }

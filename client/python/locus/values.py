@@ -59,7 +59,8 @@ class Scene(Revision):
     the bounding box of all objects and instances: its lower and its upper corner, each x, y, z in the caller's unit;
     None in an empty scene. The box may be somewhat too large. `history_ticks` is the maximum number of ticks in the
     history. At present the history contains `recorded_ticks` ticks, the first of which is `oldest_tick`, and takes
-    `history_bytes` bytes.
+    `history_bytes` bytes. `forgotten_ticks` ticks were dropped early for lack of memory. `mesh_bytes` is the memory of
+    the placed meshes, which scenes share, and `recent_bytes` at most that of recent revisions.
     """
 
     name: str
@@ -79,6 +80,9 @@ class Scene(Revision):
     recorded_ticks: int = 0
     history_bytes: int = 0
     overload: OverloadPolicy = OverloadPolicy.UNSPECIFIED
+    mesh_bytes: int = 0
+    recent_bytes: int = 0
+    forgotten_ticks: int = 0
 
     @classmethod
     def of(cls, message: Any) -> "Scene":
@@ -90,7 +94,8 @@ class Scene(Revision):
                    message.instances, message.triangles, message.memory_bytes, message.pending_changes,
                    message.last_build_error, dict(message.spec.labels), Winding(message.spec.winding), bounds,
                    message.spec.history_ticks, message.oldest_tick, message.recorded_ticks, message.history_bytes,
-                   OverloadPolicy(message.spec.overload))
+                   OverloadPolicy(message.spec.overload), message.mesh_bytes, message.recent_bytes,
+                   message.forgotten_ticks)
 
 
 @dataclasses.dataclass(frozen=True)

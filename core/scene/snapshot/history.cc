@@ -77,6 +77,7 @@ bool HistoryRecorder::trim(uint64_t bytes) {
 
 void HistoryRecorder::drop_first(History& history, size_t count, PastLimit reason) {
   if (count > 0) limit_ = reason;
+  if (forgets_early(reason)) forgotten_ticks_ += count;
   LOCUS_DCHECK_LE(count, history.records.size());
   for (size_t i = 0; i < count; ++i) dropped_bytes_ += history.records[i]->bytes;
   history.records.erase(history.records.begin(), history.records.begin() + static_cast<std::ptrdiff_t>(count));

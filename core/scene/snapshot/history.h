@@ -49,6 +49,9 @@ struct HistoryOptions {
   uint64_t bytes = 0;
 };
 
+// Returns true if ticks that HistoryOptions::ticks would keep were dropped to save memory.
+constexpr bool forgets_early(PastLimit limit) { return limit == PastLimit::kBytes || limit == PastLimit::kMemory; }
+
 // Recorder of the history, used by the writer: adds records and drops old records. One thread at a time.
 class HistoryRecorder {
  public:
@@ -80,6 +83,8 @@ class HistoryRecorder {
   PastLimit limit() const { return on() ? limit_ : PastLimit::kOff; }
   // Returns the memory of all records dropped so far. Never decreases.
   uint64_t dropped_bytes() const { return dropped_bytes_; }
+  // Returns the number of records that were dropped to save memory, and not because they were too old. Never decreases.
+  uint64_t forgotten_ticks() const { return forgotten_ticks_; }
   // Returns the tick of the oldest record, or `present`, the current tick, if there is no record.
   uint64_t oldest_tick(uint64_t present) const { return history_ == nullptr ? present : history_->records[0]->tick; }
 
@@ -97,6 +102,7 @@ class HistoryRecorder {
   bool has_past_ = false;
   PastLimit limit_ = PastLimit::kBegan;
   uint64_t dropped_bytes_ = 0;
+  uint64_t forgotten_ticks_ = 0;
 };
 
 }  // namespace locus

@@ -27,6 +27,7 @@ struct SceneSnapshot {
   // Never decreases.
   uint64_t replaced_bytes = 0;
   PastLimit past_limit = PastLimit::kOff;  // reason why the history has no ticks before oldest_tick()
+  uint64_t forgotten_ticks = 0;            // see HistoryRecorder::forgotten_ticks()
 
   // Returns the oldest tick at which queries may be evaluated.
   uint64_t oldest_tick() const { return history == nullptr ? tick : history->records.front()->tick; }

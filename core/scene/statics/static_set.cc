@@ -82,6 +82,14 @@ absl::Status refuse_group_zero(const StaticChange& change) {
                          static_cast<uint32_t>(zero - change.remove_groups.begin()), "0 means no group");
 }
 
+uint64_t bytes_of_meshes(const absl::flat_hash_map<const StaticMesh*, uint32_t>& uses) {
+  absl::flat_hash_set<Sha256> contents;
+  uint64_t bytes = 0;
+  for (const auto& [mesh, count] : uses)
+    bytes += mesh->bytes() - (contents.insert(mesh->sha256()).second ? 0 : mesh->shared_bytes());
+  return bytes;
+}
+
 // Ids of the instances of a set that is being built. Checks the ids of placements, or chooses ids for them.
 class InstanceIds {
  public:
@@ -204,6 +212,7 @@ absl::StatusOr<StaticSet::Changed> StaticSet::apply(const StaticChange& change,
     ++set->uses_[instance.mesh.get()];
     set->triangle_count_ += instance.mesh->triangle_count();
   }
+  set->mesh_bytes_ = bytes_of_meshes(set->uses_);
   LOCUS_DCHECK_CALL(set->check_invariants());
   return Changed{std::move(set), std::move(changing.placed())};
 }

@@ -22,7 +22,7 @@ namespace locus {
 // without entries.
 struct PlacementColumns {
   std::shared_ptr<const StaticMesh> mesh;
-  absl::Span<const uint64_t> ids;         // if empty, the set chooses the ids and sets their bit 63
+  absl::Span<const uint64_t> ids;         // if empty, the scene chooses the ids
   absl::Span<const double> translations;  // entries x y z; not empty
   absl::Span<const float> rotations;      // quaternions x y z w; default: no rotation
   absl::Span<const float> scales;         // > 0; default: 1
@@ -67,6 +67,8 @@ class StaticSet {
   uint32_t uses(const StaticMesh* mesh) const;
   // Returns the size in bytes of the set without the meshes, which are shared by several sets.
   uint64_t bytes() const;
+  // Returns the size in bytes of the meshes of all instances; a content that several meshes share counts once. O(1).
+  uint64_t mesh_bytes() const { return mesh_bytes_; }
 
  private:
   StaticSet() = default;
@@ -77,6 +79,7 @@ class StaticSet {
   absl::flat_hash_map<Id, uint32_t> positions_;  // index of each instance in tree_.values()
   absl::flat_hash_map<const StaticMesh*, uint32_t> uses_;
   uint64_t triangle_count_ = 0;
+  uint64_t mesh_bytes_ = 0;
 };
 
 }  // namespace locus

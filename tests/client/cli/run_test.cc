@@ -437,8 +437,9 @@ TEST_F(RunTest, EveryCommandAnswersInCsv) {
     EXPECT_EQ(outcome.code, ExitCode::kOk) << outcome.err;
     return outcome.out;
   };
-  EXPECT_EQ(csv({"scene", "list"}), "name,state,revision,tick,objects,instances,triangles,memory_bytes\n");
-  EXPECT_THAT(csv({"scene", "create", "arena"}), HasSubstr("\narena,ready,0,0,0,0,0,0,9223372036854775808,"));
+  EXPECT_EQ(csv({"scene", "list"}),
+            "name,state,revision,tick,objects,instances,triangles,memory_bytes,mesh_bytes,past_bytes\n");
+  EXPECT_THAT(csv({"scene", "create", "arena"}), HasSubstr("\narena,ready,0,0,0,0,0,0,0,0,9223372036854775808,"));
   EXPECT_THAT(csv({"scene", "describe", "arena"}), HasSubstr(",min.x,min.y,min.z,max.x,"));
   EXPECT_EQ(csv({"insert", "arena", "point", "--id", "1", "--at", "0,0,0"}),
             "applied,refused,revision,tick,epoch\n1,0,1,0,9\n");

@@ -196,6 +196,24 @@ TEST_F(SceneTest, MemoryIsCountedWithoutMeshes) {
   ASSERT_TRUE(scene_.change_instances(placing(placement({1}, {0, 0, 0}))).ok());
   EXPECT_GT(scene_.status().memory_bytes, 0u);
   EXPECT_LT(scene_.status().memory_bytes, mesh_->bytes());
+  EXPECT_EQ(scene_.status().mesh_bytes, mesh_->bytes());
+  ASSERT_TRUE(scene_.change_instances(placing(placement({2, 3}, {0, 0, 0}))).ok());
+  EXPECT_EQ(scene_.status().mesh_bytes, mesh_->bytes()) << "a mesh is counted once";
+  const std::shared_ptr<const StaticMesh> first = std::exchange(mesh_, StaticMesh::share("alias", {}, *mesh_));
+  ASSERT_TRUE(scene_.change_instances(placing(placement({4}, {0, 0, 0}))).ok());
+  EXPECT_EQ(scene_.status().mesh_bytes, first->bytes() + mesh_->bytes() - mesh_->shared_bytes());
+}
+
+TEST_F(SceneTest, RecentRevisionsAreCountedUntilTheyAreForgotten) {
+  EXPECT_EQ(scene_.status().recent_bytes, 0u);
+  std::vector<Id> all(1000);
+  for (uint64_t i = 0; i < all.size(); ++i) all[i] = i + 1;
+  apply(with(points(all, {0, 0, 0})));
+  for (int i = 1; i <= 100; ++i) apply(with(move_to(all, {float(i), 0, 0})));
+  EXPECT_GT(scene_.status().recent_bytes, limits::kRecentBytes / 2);
+  EXPECT_LE(scene_.status().recent_bytes, limits::kRecentBytes);
+  scene_.forget_recent();
+  EXPECT_EQ(scene_.status().recent_bytes, 0u);
 }
 
 }  // namespace

@@ -49,6 +49,18 @@ TEST_F(HistoryTest, KeepsTheConfiguredNumberOfTicks) {
   EXPECT_EQ(scene.latest()->oldest_tick(), 16u);
 }
 
+TEST_F(HistoryTest, TicksThatDoNotFitAreForgottenEarlyAndCounted) {
+  Scene enough("enough", spec(4, uint64_t{1} << 30), 1, StaticSet::empty());
+  live(enough, 20);
+  EXPECT_EQ(enough.status().past_limit, PastLimit::kTicks);
+  EXPECT_EQ(enough.status().forgotten_ticks, 0u);
+  Scene scene("scene", spec(300, 500'000), 1, StaticSet::empty());
+  live(scene, 20);
+  EXPECT_TRUE(forgets_early(scene.status().past_limit));
+  EXPECT_LT(recorded(scene), 20u);
+  EXPECT_EQ(scene.status().forgotten_ticks, 20 - recorded(scene));
+}
+
 TEST_F(HistoryTest, SkippedTicksCountTowardsTheLimit) {
   Scene scene("scene", spec(10, uint64_t{1} << 30), 1, StaticSet::empty());
   live(scene, 20, 5);
