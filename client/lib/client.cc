@@ -252,13 +252,53 @@ absl::StatusOr<DownloadedMesh> Client::download_mesh(absl::string_view name, con
   return mesh;
 }
 
-absl::StatusOr<std::vector<v1::Mesh>> Client::list_meshes() const {
+absl::Status Client::read_more_parts(v1::Mesh& mesh) const {
   v1::ListMeshesRequest request;
+  request.set_mesh(mesh.name());
+  while (static_cast<uint32_t>(mesh.parts_size()) < mesh.part_count()) {
+    request.set_first_part(static_cast<uint32_t>(mesh.parts_size()));
+    ASSIGN_OR_RETURN(v1::ListMeshesResponse page, call(*connection_->scenes, connection_->repeatable(), request,
+                                                       &v1::SceneService::StubInterface::ListMeshes));
+    if (page.meshes_size() != 1 || page.meshes(0).sha256() != mesh.sha256() || page.meshes(0).parts().empty() ||
+        page.meshes(0).part_count() != mesh.part_count())
+      return absl::AbortedError(absl::StrCat("mesh ", mesh.name(), " was replaced while its parts were read"));
+    mesh.mutable_parts()->MergeFrom(page.meshes(0).parts());
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<v1::Mesh> Client::get_mesh(absl::string_view name) const {
+  v1::ListMeshesRequest request;
+  request.set_mesh(std::string(name));
+  do {
+    ASSIGN_OR_RETURN(v1::ListMeshesResponse page, call(*connection_->scenes, connection_->repeatable(), request,
+                                                       &v1::SceneService::StubInterface::ListMeshes));
+    // An older server ignores the name in the request and lists all meshes.
+    for (v1::Mesh& mesh : *page.mutable_meshes()) {
+      if (mesh.name() != name) continue;
+      RETURN_IF_ERROR(read_more_parts(mesh));
+      return std::move(mesh);
+    }
+    request.set_page_token(page.next_page_token());
+  } while (!request.page_token().empty());
+  return absl::NotFoundError(absl::StrCat("no mesh is called '", name, "'"));
+}
+
+absl::StatusOr<std::vector<v1::Mesh>> Client::list_meshes(MeshParts parts) const {
+  v1::ListMeshesRequest request;
+  request.set_without_parts(parts == MeshParts::kNone);
   std::vector<v1::Mesh> meshes;
   do {
     ASSIGN_OR_RETURN(v1::ListMeshesResponse page, call(*connection_->scenes, connection_->repeatable(), request,
                                                        &v1::SceneService::StubInterface::ListMeshes));
-    for (v1::Mesh& mesh : *page.mutable_meshes()) meshes.push_back(std::move(mesh));
+    for (v1::Mesh& mesh : *page.mutable_meshes()) {
+      if (parts == MeshParts::kAll) {
+        const absl::Status status = read_more_parts(mesh);
+        if (absl::IsNotFound(status)) continue;  // deleted meanwhile
+        RETURN_IF_ERROR(status);
+      }
+      meshes.push_back(std::move(mesh));
+    }
     request.set_page_token(page.next_page_token());
   } while (!request.page_token().empty());
   return meshes;

@@ -114,8 +114,10 @@ class Client {
   // index beyond the vertices, a vertex that is not finite, parts out of order). Never holds more data than was
   // announced.
   absl::StatusOr<DownloadedMesh> download_mesh(absl::string_view name, const DownloadProgress& progress = {}) const;
-  // Returns all meshes of the server, read page by page. Retried.
-  absl::StatusOr<std::vector<v1::Mesh>> list_meshes() const;
+  // Returns all meshes of the server with all their parts, or without their parts, read page by page. Retried.
+  absl::StatusOr<std::vector<v1::Mesh>> list_meshes(MeshParts parts = MeshParts::kAll) const;
+  // Returns a mesh with all its parts, read page by page; NOT_FOUND if no mesh has the name. Retried.
+  absl::StatusOr<v1::Mesh> get_mesh(absl::string_view name) const;
   // Deletes a mesh. Not retried.
   absl::Status delete_mesh(absl::string_view name) const;
   // Applies one atomic change of a scene's instances. Returns when queries see the change or, if request.no_wait is
@@ -148,6 +150,8 @@ class Client {
  private:
   struct Connection;
   explicit Client(std::unique_ptr<Connection> connection);
+  // Appends the parts of a listed mesh that did not fit into the reply.
+  absl::Status read_more_parts(v1::Mesh& mesh) const;
 
   std::unique_ptr<Connection> connection_;
 };

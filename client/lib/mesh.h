@@ -21,6 +21,9 @@ struct MeshColumns {
   absl::Span<const v1::MeshPart> parts = {};  // ascending by first triangle; empty = the mesh has no parts
 };
 
+// Parts in the descriptions of meshes: all parts, or none of them but their number (v1::Mesh.part_count).
+enum class MeshParts : uint8_t { kAll, kNone };
+
 // Owned columns of a mesh as the server stores it.
 struct DownloadedMesh {
   v1::Mesh description;           // without its parts

@@ -50,7 +50,12 @@ absl::StatusOr<StaticChange> to_change(const v1::ChangeInstancesRequest& request
 absl::Status check_labels(const google::protobuf::Map<std::string, std::string>& labels, const std::string& field);
 // Returns the description of a scene. `summary` is the summary of this scene.
 v1::Scene to_proto(const Scene& scene, const SceneSummary& summary);
-v1::Mesh to_proto(const Registry::NamedMesh& mesh);
+// Maximum size in bytes of the parts in the description of a mesh, so that every client accepts a reply that contains
+// one description.
+inline constexpr size_t kMaxDescribedPartBytes = 3'800'000;
+// Returns the description of a mesh with its parts from `first_part` on, as many as fit into `max_part_bytes` bytes.
+v1::Mesh to_proto(const Registry::NamedMesh& mesh, size_t first_part = 0,
+                  size_t max_part_bytes = kMaxDescribedPartBytes);
 
 }  // namespace locus::server
 

@@ -8,6 +8,9 @@
 namespace locus::server {
 namespace {
 
+// Upper bound of the size in bytes of the protobuf tag and length of a mesh part.
+constexpr size_t kPartFrameBytes = 4;
+
 v1::SceneSpec spec_to_proto(const SceneSpec& spec) {
   v1::SceneSpec out;
   for (const auto& [key, value] : spec.labels) (*out.mutable_labels())[key] = value;
@@ -171,7 +174,7 @@ v1::Scene to_proto(const Scene& scene, const SceneSummary& summary) {
   return out;
 }
 
-v1::Mesh to_proto(const Registry::NamedMesh& mesh) {
+v1::Mesh to_proto(const Registry::NamedMesh& mesh, size_t first_part, size_t max_part_bytes) {
   v1::Mesh out;
   out.set_name(mesh.name);
   const Sha256& sha256 = mesh.mesh->sha256();
@@ -182,10 +185,16 @@ v1::Mesh to_proto(const Registry::NamedMesh& mesh) {
   out.set_open_edges(mesh.mesh->open_edges());
   out.set_bytes(mesh.mesh->bytes());
   out.set_uses(mesh.uses);
-  for (const MeshPart& part : mesh.mesh->parts()) {
-    v1::MeshPart* out_part = out.add_parts();
-    out_part->set_name(part.name);
-    out_part->set_first_triangle(part.first_triangle);
+  const std::vector<MeshPart>& parts = mesh.mesh->parts();
+  out.set_part_count(static_cast<uint32_t>(parts.size()));
+  size_t bytes = 0;
+  for (size_t i = first_part; i < parts.size(); ++i) {
+    v1::MeshPart part;
+    part.set_name(parts[i].name);
+    part.set_first_triangle(parts[i].first_triangle);
+    bytes += part.ByteSizeLong() + kPartFrameBytes;
+    if (bytes > max_part_bytes) break;
+    *out.add_parts() = std::move(part);
   }
   return out;
 }

@@ -36,8 +36,7 @@ using TakeMeshPiece = std::function<bool(const v1::DownloadMeshResponse&)>;
 class Pieces {
  public:
   Pieces(const Registry::NamedMesh& mesh, const TakeMeshPiece& take) : take_(take) {
-    *piece_.mutable_mesh() = to_proto(mesh);
-    piece_.mutable_mesh()->clear_parts();
+    *piece_.mutable_mesh() = to_proto(mesh, 0, 0);
   }
 
   void add(const MeshPart& part) {

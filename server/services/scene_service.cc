@@ -21,8 +21,9 @@
 namespace locus::server {
 namespace {
 
-// Maximum size in bytes of the meshes in a page; a page of a single mesh may be larger. Leaves room for the page token.
+// Maximum size in bytes of the meshes in a page. Leaves room for the page token.
 constexpr size_t kMaxPageBytes = 3'900'000;
+static_assert(kMaxDescribedPartBytes + limits::kMaxNameLength + 1024 <= kMaxPageBytes);
 static_assert(kMaxPageBytes + limits::kMaxNameLength + 16 <= limits::kDefaultReplyBytes);
 
 absl::StatusOr<size_t> read_page_size(uint32_t asked) {
@@ -107,8 +108,20 @@ absl::Status list_scenes(const Caller& caller, Host& host, const v1::ListScenesR
   return absl::OkStatus();
 }
 
+absl::Status describe_mesh(const Caller& caller, Host& host, const v1::ListMeshesRequest& request,
+                           v1::ListMeshesResponse& response) {
+  RETURN_IF_ERROR(check_mesh_name(request.mesh(), "mesh"));
+  ASSIGN_OR_RETURN(const MeshPtr mesh, host.registry.find_mesh(request.mesh(), "mesh"));
+  ASSIGN_OR_RETURN(const CallMemory claim, claim_copy(caller, kPageCopies * parts_cost(mesh->parts())));
+  const Registry::NamedMesh named{mesh->name(), mesh, host.registry.mesh_uses(mesh.get())};
+  *response.add_meshes() = to_proto(named, request.first_part(), request.without_parts() ? 0 : kMaxDescribedPartBytes);
+  return absl::OkStatus();
+}
+
 absl::Status list_meshes(const Caller& caller, Host& host, const v1::ListMeshesRequest& request,
                          v1::ListMeshesResponse& response) {
+  if (!request.mesh().empty()) return describe_mesh(caller, host, request, response);
+  const size_t max_part_bytes = request.without_parts() ? 0 : kMaxDescribedPartBytes;
   ASSIGN_OR_RETURN(const size_t page_size, read_page_size(request.page_size()));
   if (!request.page_token().empty())
     RETURN_IF_ERROR(check_page_token(check_mesh_name(request.page_token(), "page_token")));
@@ -118,7 +131,7 @@ absl::Status list_meshes(const Caller& caller, Host& host, const v1::ListMeshesR
   ASSIGN_OR_RETURN(const CallMemory claim, claim_copy(caller, kPageCopies * most));
   size_t listed = 0, bytes = 0;
   for (; listed < std::min(meshes.size(), page_size); ++listed) {
-    v1::Mesh mesh = to_proto(meshes[listed]);
+    v1::Mesh mesh = to_proto(meshes[listed], 0, max_part_bytes);
     bytes += mesh.ByteSizeLong();
     if (listed > 0 && bytes > kMaxPageBytes) break;
     *response.add_meshes() = std::move(mesh);

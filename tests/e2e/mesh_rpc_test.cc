@@ -1,6 +1,7 @@
 #include <cmath>
 #include <limits>
 
+#include "client/lib/client.h"
 #include "core/base/limits.h"
 #include "server/services/sha256.h"
 #include "tests/support/rpc_test.h"
@@ -145,6 +146,59 @@ TEST_F(MeshRpcTest, APageOfMeshesEndsBeforeAReplyThatClientsRefuse) {
   const std::vector<v1::Mesh> meshes = list();
   ASSERT_EQ(meshes.size(), 3u);
   for (const v1::Mesh& mesh : meshes) EXPECT_EQ(mesh.parts_size(), 8000) << mesh.name();
+}
+
+TEST_F(MeshRpcTest, RepliesHaveAsManyPartsAsClientsAcceptAndTheRestIsAskedFor) {
+  CubeMesh large;
+  while (large.indices.size() < size_t{3} * limits::kMaxMeshParts)
+    large.indices.push_back(large.indices[large.indices.size() % 36]);
+  v1::UploadMeshRequest request = whole_mesh("large", large);
+  for (uint32_t part = 0; part < limits::kMaxMeshParts; ++part) {
+    request.add_parts()->set_name(std::to_string(part) + std::string(limits::kMaxLabelLength - 5, 'p'));
+    request.mutable_parts(static_cast<int>(part))->set_first_triangle(part);
+  }
+  v1::UploadMeshResponse uploaded;
+  ASSERT_TRUE(upload({request}, &uploaded).ok());
+  EXPECT_LE(uploaded.ByteSizeLong(), limits::kDefaultReplyBytes);
+  EXPECT_EQ(uploaded.mesh().part_count(), limits::kMaxMeshParts);
+  EXPECT_GT(uploaded.mesh().parts_size(), 10'000);
+  const auto page_of = [this](const v1::ListMeshesRequest& request) {
+    v1::ListMeshesResponse page;
+    EXPECT_TRUE(call(*stubs().scenes, &v1::SceneService::Stub::ListMeshes, request, &page).ok());
+    return page;
+  };
+  v1::ListMeshesResponse page = page_of({});
+  ASSERT_EQ(page.meshes_size(), 1);
+  EXPECT_LE(page.ByteSizeLong(), limits::kDefaultReplyBytes);
+  EXPECT_EQ(page.meshes(0).part_count(), limits::kMaxMeshParts);
+  v1::ListMeshesRequest rest;
+  rest.set_mesh("large");
+  std::vector<v1::MeshPart> parts(page.meshes(0).parts().begin(), page.meshes(0).parts().end());
+  while (parts.size() < limits::kMaxMeshParts) {
+    rest.set_first_part(static_cast<uint32_t>(parts.size()));
+    page = page_of(rest);
+    ASSERT_EQ(page.meshes_size(), 1);
+    ASSERT_GT(page.meshes(0).parts_size(), 0);
+    parts.insert(parts.end(), page.meshes(0).parts().begin(), page.meshes(0).parts().end());
+  }
+  ASSERT_EQ(parts.size(), size_t{limits::kMaxMeshParts});
+  for (uint32_t part = 0; part < limits::kMaxMeshParts; ++part) ASSERT_EQ(parts[part].first_triangle(), part);
+  rest.Clear();
+  rest.set_without_parts(true);
+  EXPECT_EQ(page_of(rest).meshes(0).parts_size(), 0);
+  EXPECT_EQ(page_of(rest).meshes(0).part_count(), limits::kMaxMeshParts);
+  rest.set_mesh("missing");
+  v1::ListMeshesResponse none;
+  expect_refused(call(*stubs().scenes, &v1::SceneService::Stub::ListMeshes, rest, &none),
+                 {grpc::StatusCode::NOT_FOUND, v1::REASON_NOT_FOUND, "mesh"});
+  const auto client = client::Client::connect(running_.address());
+  ASSERT_TRUE(client.ok());
+  const absl::StatusOr<v1::Mesh> mesh = (*client)->get_mesh("large");
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  EXPECT_EQ(mesh->parts_size(), static_cast<int>(limits::kMaxMeshParts));
+  EXPECT_EQ((*client)->list_meshes()->front().parts_size(), static_cast<int>(limits::kMaxMeshParts));
+  EXPECT_EQ((*client)->list_meshes(client::MeshParts::kNone)->front().parts_size(), 0);
+  EXPECT_EQ((*client)->get_mesh("missing").status().code(), absl::StatusCode::kNotFound);
 }
 
 TEST_F(MeshRpcTest, OtherPartsUnderAKnownNameAreRefused) {

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <fstream>
 #include <memory>
 #include <string>
@@ -26,7 +27,7 @@ Json mesh_summary(const v1::Mesh& mesh) {
           {"triangles", mesh.triangles()},
           {"vertices", mesh.vertices()},
           {"uses", mesh.uses()},
-          {"parts", mesh.parts_size()},
+          {"parts", std::max<int64_t>(mesh.part_count(), mesh.parts_size())},  // older servers send no count
           {"zero_area_triangles", mesh.zero_area_triangles()},
           {"open_edges", mesh.open_edges()},
           {"bytes", mesh.bytes()},
@@ -35,7 +36,7 @@ Json mesh_summary(const v1::Mesh& mesh) {
 
 absl::Status list_meshes(const MeshOptions&, Context& context) {
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());
-  ASSIGN_OR_RETURN(const std::vector<v1::Mesh> meshes, client->list_meshes());
+  ASSIGN_OR_RETURN(const std::vector<v1::Mesh> meshes, client->list_meshes(client::MeshParts::kNone));
   Report report;
   report.rows_name = "meshes";
   report.no_rows = "no meshes";
@@ -52,24 +53,24 @@ absl::Status list_meshes(const MeshOptions&, Context& context) {
 
 absl::Status show(const MeshOptions& options, Context& context) {
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());
-  ASSIGN_OR_RETURN(const std::vector<v1::Mesh> meshes, client->list_meshes());
-  for (const v1::Mesh& mesh : meshes) {
-    if (mesh.name() != options.name) continue;
-    Report report;
-    report.head = mesh_summary(mesh);
-    report.rows_name = "parts";
-    report.no_rows = "no parts";
-    report.keys = {"part", "first_triangle", "triangles"};
-    for (int part = 0; part < mesh.parts_size(); ++part) {
-      const uint32_t first = mesh.parts(part).first_triangle();
-      const uint32_t end = part + 1 < mesh.parts_size() ? mesh.parts(part + 1).first_triangle() : mesh.triangles();
-      report.rows.push_back({{"part", mesh.parts(part).name()}, {"first_triangle", first}, {"triangles", end - first}});
-    }
-    report.head.erase("parts");
-    context.write(report);
-    return absl::OkStatus();
+  const absl::StatusOr<v1::Mesh> found = client->get_mesh(options.name);
+  if (absl::IsNotFound(found.status()))
+    return absl::NotFoundError(absl::StrCat("no mesh is named ", options.name, ": `locus mesh list` shows which are"));
+  RETURN_IF_ERROR(found.status());
+  const v1::Mesh& mesh = *found;
+  Report report;
+  report.head = mesh_summary(mesh);
+  report.rows_name = "parts";
+  report.no_rows = "no parts";
+  report.keys = {"part", "first_triangle", "triangles"};
+  for (int part = 0; part < mesh.parts_size(); ++part) {
+    const uint32_t first = mesh.parts(part).first_triangle();
+    const uint32_t end = part + 1 < mesh.parts_size() ? mesh.parts(part + 1).first_triangle() : mesh.triangles();
+    report.rows.push_back({{"part", mesh.parts(part).name()}, {"first_triangle", first}, {"triangles", end - first}});
   }
-  return absl::NotFoundError(absl::StrCat("no mesh is named ", options.name, ": `locus mesh list` shows which are"));
+  report.head.erase("parts");
+  context.write(report);
+  return absl::OkStatus();
 }
 
 absl::Status download(const MeshOptions& options, Context& context) {

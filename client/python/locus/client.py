@@ -14,6 +14,7 @@ call is repeated with the new token.
 """
 from __future__ import annotations
 
+import dataclasses
 from typing import Any, Dict, Iterator, List, Mapping, Optional, Sequence
 
 import grpc
@@ -168,7 +169,9 @@ class Client:
             raw = call(messages, timeout=self._connection.long_timeout, metadata=metadata)
         except grpc.RpcError as failure:
             raise self._failed(failure) from None
-        return Mesh.of(parsed(rpc.response, raw).mesh)
+        mesh = Mesh.of(parsed(rpc.response, raw).mesh)
+        # The reply may lack some of the parts, but the server's parts are those of this upload.
+        return dataclasses.replace(mesh, parts=tuple(MeshPart(part.name, part.first_triangle) for part in parts))
 
     def download_mesh(self, name: str) -> MeshColumns:
         """Returns an uploaded mesh with its columns, as the server stores it."""
@@ -186,7 +189,19 @@ class Client:
 
     def meshes(self) -> List[Mesh]:
         """Returns all uploaded meshes, ascending by name."""
-        return [Mesh.of(mesh) for page in self._pages(_rpc("Scene", "ListMeshes")) for mesh in page.meshes]
+        rpc = _rpc("Scene", "ListMeshes")
+        all_meshes = []
+        for page in self._pages(rpc):
+            for mesh in page.meshes:
+                # A reply has as many parts as clients accept; further replies have the rest.
+                while len(mesh.parts) < mesh.part_count:
+                    request = rpc.request(mesh=mesh.name, first_part=len(mesh.parts))
+                    more = [other for other in self._unary(rpc, request).meshes if other.parts]
+                    if len(more) != 1 or more[0].sha256 != mesh.sha256:
+                        raise LocusError(grpc.StatusCode.ABORTED, f"mesh {mesh.name} changed while its parts were read")
+                    mesh.parts.extend(more[0].parts)
+                all_meshes.append(Mesh.of(mesh))
+        return all_meshes
 
     def delete_mesh(self, name: str) -> None:
         """Deletes a mesh that no instance uses."""

@@ -30,6 +30,15 @@ class MeshesTest(DaemonTest):
         self.client.delete_mesh("parted")
         self.assertNotIn("parted", [mesh.name for mesh in self.client.meshes()])
 
+    def test_all_of_many_parts_are_listed(self):
+        squares = 10_000
+        vertices, indices = strip(squares)
+        parts = [MeshPart(f"{number:0250}", number) for number in range(2 * squares)]  # 5 MB, more than a reply
+        mesh = self.client.upload_mesh("many", vertices, indices, parts=parts)
+        self.assertEqual(mesh.parts, tuple(parts))
+        self.assertEqual([listed for listed in self.client.meshes() if listed.name == "many"], [mesh])
+        self.client.delete_mesh("many")
+
     def test_a_large_mesh_is_sent_in_chunks_and_only_once(self):
         squares, steps = 60_000, []
         vertices, indices = strip(squares)
