@@ -1,5 +1,5 @@
 // Identifiers in a scene. Objects and instances share one id space per scene. The caller chooses the ids; 0 is never an
-// id. If the caller places an instance without an id, locus chooses an id with bit 63 set (kChosenIdBit).
+// id. If the caller places an instance without an id, the scene chooses an id from kFirstChosenId on.
 #ifndef LOCUS_CORE_BASE_IDS_H_
 #define LOCUS_CORE_BASE_IDS_H_
 
@@ -13,7 +13,9 @@ using Tag = uint64_t;     // any value that the caller stores with an object; re
 using Layers = uint32_t;  // one bit per layer: the layers of an object, or the layers that a query searches
 
 inline constexpr Id kNoId = 0;
-inline constexpr Id kChosenIdBit = Id{1} << 63;
+inline constexpr Id kFirstChosenId = Id{1} << 32;
+// Ids from here on are not counted on from, so that a caller's large id does not make all chosen ids large.
+inline constexpr Id kEndOfChosenIds = Id{1} << 53;
 inline constexpr uint32_t kNoTriangle = 0xFFFFFFFFu;
 inline constexpr Layers kDefaultLayers = 1u;
 inline constexpr Layers kAllLayers = 0xFFFFFFFFu;

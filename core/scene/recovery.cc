@@ -132,7 +132,8 @@ class Replay {
   absl::Status apply(Record::Change& change) {
     for (size_t i = 0; i < change.meshes.size(); ++i) change.change.place[i].mesh = meshes_(change.meshes[i]);
     const auto is_object = [this](Id id) { return writer_.is_object(id); };
-    absl::StatusOr<StaticSet::Changed> changed = writer_.statics()->apply(change.change, is_object, 0);
+    absl::StatusOr<StaticSet::Changed> changed =
+        writer_.statics()->apply(change.change, is_object, ids_from(kFirstChosenId));
     // The change was valid when it was logged, so an error means damage.
     if (!changed.ok()) return data_loss(absl::StrCat("the change is wrong: ", changed.status().message()));
     writer_.replace_statics(std::move(changed->set));

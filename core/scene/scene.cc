@@ -106,6 +106,8 @@ Scene::Scene(std::string name, SceneSpec spec, SceneWriter writer, const SceneLo
   LOCUS_CHECK_NE(writer_.epoch(), uint64_t{0});
   latest_ = writer_.published();  // NOLINT(cppcoreguidelines-prefer-member-initializer): writer_ must have an epoch
   recent_.push_back(latest_);
+  // NOLINTNEXTLINE(cppcoreguidelines-prefer-member-initializer): needs latest_
+  next_chosen_id_ = std::max(latest_->statics->first_id_above(), kFirstChosenId + latest_->revision);
 }
 
 absl::Status Scene::closed_status() const {
@@ -252,13 +254,30 @@ absl::StatusOr<InstanceChange> Scene::change_instances(const StaticChange& chang
   return result;
 }
 
+Id Scene::next_chosen_id() {
+  const MutexLock lock(mutex_);
+  return next_chosen_id_++;
+}
+
+std::vector<Id> Scene::choose_ids(size_t count) {
+  const SnapshotPtr snapshot = latest();
+  std::vector<Id> ids;
+  ids.reserve(count);
+  while (ids.size() < count) {
+    const Id id = next_chosen_id();
+    if (!snapshot->objects.find_ref(id) && snapshot->statics->find(id) == nullptr) ids.push_back(id);
+  }
+  return ids;
+}
+
 absl::StatusOr<InstanceChange> Scene::build_and_publish(const StaticChange& change) {
   RETURN_IF_ERROR(wait_for_readers(ReaderTracker::kNever));
   // Building the tree takes long. During this time, hold only the instances of the current revision, not its objects;
   // is_object() therefore searches the objects of the revision that is the latest at each call.
   const auto is_object = [this](Id id) { return static_cast<bool>(latest()->objects.find_ref(id)); };
   const std::shared_ptr<const StaticSet> statics = latest()->statics;
-  ASSIGN_OR_RETURN(StaticSet::Changed changed, statics->apply(change, is_object, latest()->revision << 24));
+  const auto next_id = [this] { return next_chosen_id(); };
+  ASSIGN_OR_RETURN(StaticSet::Changed changed, statics->apply(change, is_object, next_id));
   const MutexLock lock(writer_mutex_);
   RETURN_IF_ERROR(check_open());
   // Objects inserted while the tree was being built may have taken an id.

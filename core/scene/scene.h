@@ -132,6 +132,13 @@ class Scene {
   // budget, but without a deadline. Returns NOT_FOUND if a placed mesh was deleted: see check_meshes().
   absl::StatusOr<InstanceChange> change_instances(const StaticChange& change) LOCUS_EXCLUDES(writer_mutex_, mutex_);
 
+  // Returns `count` ids for instances that will be placed. No object and no instance of the latest revision has these
+  // ids, and change_instances() chooses none of them for other instances. Chosen ids count up from kFirstChosenId, so
+  // that an id is never chosen twice by one Scene. After a restart they continue above the ids of all instances, and
+  // above kFirstChosenId plus the number of the revision, so that ids that clients may still remember are not reused
+  // unless a scene has chosen more ids than it has made revisions.
+  std::vector<Id> choose_ids(size_t count) LOCUS_EXCLUDES(mutex_);
+
   using IsKept = std::function<bool(const StaticMesh*)>;
   // Sets the check that a mesh is still registered: from now on change_instances() refuses to place a mesh for which
   // `is_kept` returns false. Call before other threads use the scene. For a mesh that a change places, in_use() returns
@@ -249,6 +256,7 @@ class Scene {
   void count_joined(const Acks& acks) LOCUS_EXCLUDES(mutex_);
   absl::StatusOr<InstanceChange> build_and_publish(const StaticChange& change) LOCUS_REQUIRES(change_mutex_)
       LOCUS_EXCLUDES(writer_mutex_, mutex_);
+  Id next_chosen_id() LOCUS_EXCLUDES(mutex_);
   absl::StatusOr<SnapshotPtr> recent(uint64_t revision) const LOCUS_REQUIRES(mutex_);
 
   const std::string name_;
@@ -272,6 +280,7 @@ class Scene {
   std::vector<const StaticMesh*> meshes_to_place_ LOCUS_GUARDED_BY(mutex_);  // meshes of pending changes
   std::string last_build_error_ LOCUS_GUARDED_BY(mutex_);
   uint64_t joined_updates_ LOCUS_GUARDED_BY(mutex_) = 0;
+  Id next_chosen_id_ LOCUS_GUARDED_BY(mutex_);
   bool closed_ LOCUS_GUARDED_BY(mutex_) = false;
   const std::shared_ptr<ReaderTracker> pins_;  // shared, because pins may outlive the scene
 };

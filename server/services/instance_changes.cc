@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <memory>
 #include <optional>
-#include <random>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "core/base/status_macros.h"
@@ -65,22 +65,20 @@ uint64_t placed_count(const v1::ChangeInstancesRequest& request) {
 }
 
 // Chooses ids for placements without ids. With `no_wait` the reply contains the ids although the change is not built
-// yet, so the ids are drawn here. Each id is kChosenIdBit and 63 random bits below it.
-void choose_ids(v1::ChangeInstancesRequest& request) {
-  std::random_device device;
+// yet, so the ids are chosen here.
+void choose_ids(Scene& scene, v1::ChangeInstancesRequest& request) {
   for (v1::Placement& placement : *request.mutable_place()) {
     if (!placement.ids().empty()) continue;
-    const size_t n = placement_count(placement);
-    placement.mutable_ids()->Reserve(static_cast<int>(n));
-    for (size_t i = 0; i < n; ++i) placement.add_ids(kChosenIdBit | uint64_t{device()} << 32 | device());
+    const std::vector<Id> ids = scene.choose_ids(placement_count(placement));
+    placement.mutable_ids()->Add(ids.begin(), ids.end());
   }
 }
 
-absl::StatusOr<std::shared_ptr<OwnedChange>> read_change(const Registry& registry,
+absl::StatusOr<std::shared_ptr<OwnedChange>> read_change(Scene& scene, const Registry& registry,
                                                          const v1::ChangeInstancesRequest& request) {
   auto owned = std::make_shared<OwnedChange>();
   owned->request = request;
-  if (request.no_wait()) choose_ids(owned->request);
+  if (request.no_wait()) choose_ids(scene, owned->request);
   ASSIGN_OR_RETURN(owned->change, to_change(owned->request, registry));
   return owned;
 }
@@ -132,7 +130,7 @@ absl::Status change_instances(Host& host, const Caller& caller, const v1::Change
   ASSIGN_OR_RETURN(SharedClaim room, make_room(caller, *scene, request));
   // Held until the response is written.
   ASSIGN_OR_RETURN(const CallMemory reply, claim_copy(caller, placed_count(request) * kReplyBytesAPlacement));
-  ASSIGN_OR_RETURN(const std::shared_ptr<OwnedChange> owned, read_change(host.registry, request));
+  ASSIGN_OR_RETURN(const std::shared_ptr<OwnedChange> owned, read_change(*scene, host.registry, request));
   // Check the placements without the scene's instances, because changes that were queued earlier may still alter those
   // instances.
   if (request.no_wait()) RETURN_IF_ERROR(StaticSet::check_placements(owned->change.place));

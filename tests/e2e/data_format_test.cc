@@ -88,8 +88,10 @@ class DataFormatTest : public ::testing::Test {
     upload_cube("cube", "");
     upload_cube("crate", "planks");
     create("arena", R"(labels { key: "level" value: "7" } history_ticks: 4 winding: WINDING_CLOCKWISE)");
-    change_instances(R"(scene: "arena" place { mesh: "cube" translations: [5, 0, 0, 9, 0.25, 0] layers: [1, 6] })");
-    change_instances(R"(scene: "arena" place { mesh: "crate" translations: [5, 9, 0] })");
+    // The ids are those that the server chose when the samples were made.
+    change_instances(R"(scene: "arena" place { mesh: "cube" ids: [9223372036854775809, 9223372036854775810]
+                                               translations: [5, 0, 0, 9, 0.25, 0] layers: [1, 6] })");
+    change_instances(R"(scene: "arena" place { mesh: "crate" ids: 9223372036871553025 translations: [5, 9, 0] })");
     apply("arena", R"(writer: 7 batch: 1 tick: 3
                       inserts { ids: [1, 2] positions_f64: [0.1, 2, 3, 4, 5, 6] point {} tags: [11, 12] }
                       inserts { ids: [3] positions: [1, 1, 1] ball { radii: 0.5 } groups: 9 }
@@ -103,8 +105,9 @@ class DataFormatTest : public ::testing::Test {
     gone.set_name("gone");
     call(*daemon_.stubs().scenes, &v1::SceneService::Stub::DeleteScene, gone);
     change_instances(R"(scene: "arena" remove_ids: [)" + first_instance() + R"(]
-                        place { mesh: "cube" translations: [0, 7, 0] rotations: [0, 0, 0.6, 0.8] tags: 5 }
-                        place { mesh: "crate" translations: [0, 9, 0] })");
+                        place { mesh: "cube" ids: 9223372036938661889 translations: [0, 7, 0]
+                                rotations: [0, 0, 0.6, 0.8] tags: 5 }
+                        place { mesh: "crate" ids: 9223372036938661890 translations: [0, 9, 0] })");
     apply("arena", R"(writer: 7 batch: 2 tick: 4
                       moves { ids: [1, 3] positions: [1.5, 0, 0, 2.5, 0, 0] }
                       relabels { ids: 2 tags: 99 groups: 4 layers: 8 }

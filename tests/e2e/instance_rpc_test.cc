@@ -80,7 +80,8 @@ TEST_F(InstanceRpcTest, GroupsAreRemovedWhole) {
   expect_change_refused(removal, {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_OUT_OF_RANGE, "remove_groups", 0});
 }
 
-TEST_F(InstanceRpcTest, ChosenIdsAreReturnedAndHaveTheHighBit) {
+TEST_F(InstanceRpcTest, ChosenIdsAreReturnedAndSmall) {
+  uint64_t last = kFirstChosenId - 1;
   for (const bool no_wait : {false, true}) {
     v1::ChangeInstancesRequest request = place_one("cube", 0);
     fill(request.mutable_place(0)->mutable_translations(), {0., 0., 0., 5., 0., 0.});
@@ -92,7 +93,7 @@ TEST_F(InstanceRpcTest, ChosenIdsAreReturnedAndHaveTheHighBit) {
     get_when_settled();
     v1::QueryBatch batch;
     for (const uint64_t id : response.ids()) {
-      EXPECT_NE(id & kChosenIdBit, 0u);
+      EXPECT_EQ(id, ++last);
       batch.mutable_blocks()->Clear();
       batch.add_blocks()->mutable_lookup()->add_ids(id);
       v1::QueryResult result;

@@ -118,7 +118,7 @@ inline void label(Random& random, QueryWorld& world) {
   size_t next = 0;
   const auto label_one = [&](auto& item) {
     const uint32_t number = ids[next++];
-    item.id = number % 5 == 0 ? kChosenIdBit | number : number;
+    item.id = number % 5 == 0 ? (Id{1} << 63) | number : number;
     item.group = random.below(4);
     item.tag = random.next();
     item.layers = random_layers(random);
@@ -499,7 +499,7 @@ inline OwnedBlock lookup_block(const QueryScene& scene, Random& random) {
   if (random.chance(0.5)) {
     for (int i = 0; i < 3; ++i) block.groups.push_back(1 + random.below(4));
   } else {
-    block.ids = {1 + random.below(100), 1 + random.below(10), kChosenIdBit | 5u};
+    block.ids = {1 + random.below(100), 1 + random.below(10), (Id{1} << 63) | 5u};
   }
   add_common(scene, random, block);
   block.masks.clear();

@@ -55,7 +55,7 @@ class RecoveryLockstep {
   // Change of instances: the instance to remove and the instance to place.
   struct Change {
     Id removed = kNoId;
-    std::optional<Id> placed;  // id of the placed instance; kNoId if the scene chooses it
+    std::optional<Id> placed;  // id of the placed instance, which the scene may have chosen in advance
     size_t mesh = 0;
     Vec3d translation;
   };
@@ -185,7 +185,7 @@ class RecoveryLockstep {
   std::string change_instances() {
     Change change;
     if (random_.chance(0.5)) change.removed = random_instance();
-    if (random_.chance(0.9)) change.placed = random_.chance(0.5) ? random_.below(kIds) : kNoId;
+    if (random_.chance(0.9)) change.placed = random_.chance(0.5) ? random_.below(kIds) : scene_->choose_ids(1).front();
     change.mesh = random_.below(meshes_.size());
     change.translation = random_.vector(100);
     const uint64_t before = scene_->log_position().sequence;
@@ -208,7 +208,7 @@ class RecoveryLockstep {
     if (change.placed) {
       PlacementColumns& place = columns.place.emplace_back();
       place.mesh = meshes_[change.mesh];
-      if (*change.placed != kNoId) place.ids = {&*change.placed, 1};
+      place.ids = {&*change.placed, 1};
       place.translations = {&change.translation.x, 3};
     }
     return scene.change_instances(columns);

@@ -211,7 +211,7 @@ absl::Status StateReader::place(const FindMesh& find_mesh) {
     change.place.push_back(std::move(place));
   }
   const auto no_object = [](Id) { return false; };
-  absl::StatusOr<StaticSet::Changed> changed = StaticSet::empty()->apply(change, no_object, 0);
+  absl::StatusOr<StaticSet::Changed> changed = StaticSet::empty()->apply(change, no_object, ids_from(kFirstChosenId));
   if (!changed.ok()) return data_loss(absl::StrCat("an instance is wrong: ", changed.status().message()));
   state_.statics = std::move(changed->set);
   return absl::OkStatus();

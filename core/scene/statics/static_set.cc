@@ -93,7 +93,8 @@ uint64_t bytes_of_meshes(const absl::flat_hash_map<const StaticMesh*, uint32_t>&
 // Ids of the instances of a set that is being built. Checks the ids of placements, or chooses ids for them.
 class InstanceIds {
  public:
-  InstanceIds(const std::function<bool(Id)>& is_object, uint64_t seed) : is_object_(is_object), next_id_(seed) {}
+  InstanceIds(const std::function<bool(Id)>& is_object, const std::function<Id()>& next_id)
+      : is_object_(is_object), next_id_(next_id) {}
 
   void take(Id id) { taken_.insert(id); }
 
@@ -127,13 +128,13 @@ class InstanceIds {
   Id choose_id() {
     Id id = kNoId;
     do {
-      id = kChosenIdBit | ++next_id_;
+      id = next_id_();
     } while (taken_.contains(id) || is_object_(id));
     return id;
   }
 
   const std::function<bool(Id)>& is_object_;
-  uint64_t next_id_;
+  const std::function<Id()>& next_id_;
   absl::flat_hash_set<Id> taken_;
 };
 
@@ -141,8 +142,8 @@ class InstanceIds {
 // removed, then the placed instances.
 class Changing {
  public:
-  Changing(const StaticSet& old, const std::function<bool(Id)>& is_object, uint64_t seed)
-      : old_(old), ids_(is_object, seed) {}
+  Changing(const StaticSet& old, const std::function<bool(Id)>& is_object, const std::function<Id()>& next_id)
+      : old_(old), ids_(is_object, next_id) {}
 
   absl::Status remove(const StaticChange& change) {
     absl::flat_hash_set<Id> removed;
@@ -198,8 +199,9 @@ void StaticSet::check_invariants() const {
 std::shared_ptr<const StaticSet> StaticSet::empty() { return std::shared_ptr<const StaticSet>(new StaticSet()); }
 
 absl::StatusOr<StaticSet::Changed> StaticSet::apply(const StaticChange& change,
-                                                    const std::function<bool(Id)>& is_object, uint64_t seed) const {
-  Changing changing(*this, is_object, seed);
+                                                    const std::function<bool(Id)>& is_object,
+                                                    const std::function<Id()>& next_id) const {
+  Changing changing(*this, is_object, next_id);
   RETURN_IF_ERROR(changing.remove(change));
   for (size_t i = 0; i < change.place.size(); ++i)
     RETURN_IF_ERROR(changing.place(change.place[i], absl::StrCat("place[", i, "]")));
@@ -219,10 +221,18 @@ absl::StatusOr<StaticSet::Changed> StaticSet::apply(const StaticChange& change,
 
 absl::Status StaticSet::check_placements(absl::Span<const PlacementColumns> place) {
   const std::function<bool(Id)> no_object = [](Id) { return false; };
-  InstanceIds ids(no_object, 0);
+  const std::function<Id()> next_id = ids_from(kFirstChosenId);
+  InstanceIds ids(no_object, next_id);
   for (size_t i = 0; i < place.size(); ++i)
     RETURN_IF_ERROR(ids.place(place[i], absl::StrCat("place[", i, "]"), [](const Instance&) {}));
   return absl::OkStatus();
+}
+
+Id StaticSet::first_id_above() const {
+  Id first = kFirstChosenId;
+  for (const Instance& instance : tree_.values())
+    if (instance.id < kEndOfChosenIds) first = std::max(first, instance.id + 1);
+  return first;
 }
 
 const Instance* StaticSet::find(Id id) const {

@@ -39,6 +39,11 @@ struct StaticChange {
   std::vector<PlacementColumns> place;
 };
 
+// Returns a function that returns `first`, and then one more at each call.
+inline std::function<Id()> ids_from(Id first) {
+  return [next = first]() mutable { return next++; };
+}
+
 class StaticSet {
  public:
   // Returns the set without instances.
@@ -49,11 +54,14 @@ class StaticSet {
     std::vector<Id> placed;  // ids of the placed instances, in the order of the request
   };
   // Returns a new set without the instances that the change removes, and with the instances that the change places.
-  // `is_object` returns true for the id of an object; no instance may have the id of an object. The ids that the set
-  // chooses have bit 63 set and count up from `seed` + 1, skipping ids that are taken. An error refuses the whole
-  // change and names the field and index of the invalid value. O(instances).
+  // `is_object` returns true for the id of an object; no instance may have the id of an object. `next_id` returns
+  // another id at each call; placements without ids get these ids, except ids that are taken. An error refuses the
+  // whole change and names the field and index of the invalid value. O(instances).
   absl::StatusOr<Changed> apply(const StaticChange& change, const std::function<bool(Id)>& is_object,
-                                uint64_t seed) const;
+                                const std::function<Id()>& next_id) const;
+  // Returns the least id from kFirstChosenId on that is above the ids of all instances below kEndOfChosenIds.
+  // O(instances).
+  Id first_id_above() const;
 
   // Returns the error that apply() would return for these placements in a scene without instances and objects, or OK.
   // Builds no set, and so needs only about 20 bytes of memory for each placement. O(placements).

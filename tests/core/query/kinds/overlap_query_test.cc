@@ -23,7 +23,7 @@ StaticMeshPtr ten_walls() {
 
 QueryWorld walls_and_solids() {
   QueryWorld world;
-  world.instances = {placed(4, ten_walls()), placed(kChosenIdBit | 1, ten_walls())};
+  world.instances = {placed(4, ten_walls()), placed(kFirstChosenId | 1, ten_walls())};
   world.objects = {ball_object(9, {0, 0, 0}), ball_object(2, {1, 0, 0}), box_object(6, {2, 0, 0})};
   return world;
 }
@@ -33,7 +33,7 @@ TEST(OverlapQueryTest, RowsAscendByIdOverInstancesAndObjects) {
   for (const OwnedBlock& block : {one_ball({0, 0, 0}, 4), one_box({0, 0, 0}, {4, 4, 4})}) {
     const BlockResult result = run_block(*snapshot, block);
     EXPECT_THAT(result.counts, ElementsAre(5));
-    EXPECT_THAT(result.ids, ElementsAre(2, 4, 6, 9, kChosenIdBit | 1));
+    EXPECT_THAT(result.ids, ElementsAre(2, 4, 6, 9, kFirstChosenId | 1));
     EXPECT_THAT(result.triangles, IsEmpty());
   }
 }
@@ -43,7 +43,7 @@ TEST(OverlapQueryTest, AnInstanceIsOneRowForAnyNumberOfTrianglesFound) {
   block.settings.columns = {Column::kId, Column::kTriangle};
   block.settings.source = Source::kStatic;
   const BlockResult result = run_block(*snapshot_of(walls_and_solids()), block);
-  EXPECT_THAT(result.ids, ElementsAre(4, kChosenIdBit | 1));
+  EXPECT_THAT(result.ids, ElementsAre(4, kFirstChosenId | 1));
   EXPECT_THAT(result.triangles, ElementsAre(kNoTriangle, kNoTriangle));
 }
 
@@ -65,14 +65,14 @@ TEST(OverlapQueryTest, TrianglesAreInStorageOrder) {
 TEST(OverlapQueryTest, SortedTrianglesAscend) {
   OwnedBlock block = one_box({5, 0, 0}, {1.5f, 1, 1}, StaticDetail::kTrianglesSorted);
   const BlockResult result = run_block(*snapshot_of(walls_and_solids()), block);
-  EXPECT_THAT(result.ids, ElementsAre(4, 4, 4, kChosenIdBit | 1, kChosenIdBit | 1, kChosenIdBit | 1));
+  EXPECT_THAT(result.ids, ElementsAre(4, 4, 4, kFirstChosenId | 1, kFirstChosenId | 1, kFirstChosenId | 1));
   EXPECT_THAT(result.triangles, ElementsAre(2, 5, 8, 2, 5, 8));  // the triangles at x = 4, 5 and 6
 }
 
 TEST(OverlapQueryTest, ObjectsAreOneRowAmongTriangles) {
   const OwnedBlock block = one_box({2, 0, 0}, {0.25f, 0.25f, 0.25f}, StaticDetail::kTrianglesSorted);
   const BlockResult result = run_block(*snapshot_of(walls_and_solids()), block);
-  EXPECT_THAT(result.ids, ElementsAre(2, 4, 6, kChosenIdBit | 1));
+  EXPECT_THAT(result.ids, ElementsAre(2, 4, 6, kFirstChosenId | 1));
   EXPECT_THAT(result.triangles, ElementsAre(kNoTriangle, 6, kNoTriangle, 6));
 }
 
@@ -166,7 +166,7 @@ TEST(OverlapQueryTest, SourceRestrictsTheSearchToStaticOrDynamic) {
   const SnapshotPtr snapshot = snapshot_of(walls_and_solids());
   OwnedBlock block = one_ball({0, 0, 0}, 4);
   block.settings.source = Source::kStatic;
-  EXPECT_THAT(run_block(*snapshot, block).ids, ElementsAre(4, kChosenIdBit | 1));
+  EXPECT_THAT(run_block(*snapshot, block).ids, ElementsAre(4, kFirstChosenId | 1));
   block.settings.source = Source::kDynamic;
   EXPECT_THAT(run_block(*snapshot, block).ids, ElementsAre(2, 6, 9));
 }

@@ -107,7 +107,7 @@ TEST(RayQueryTest, TheNearerOfAnInstanceAndAnObjectWins) {
 }
 
 TEST(RayQueryTest, AtEqualDistanceTheLowerIdWinsAcrossInstancesAndObjects) {
-  for (const Id instance : {Id{1}, Id{9}, kChosenIdBit | 1}) {
+  for (const Id instance : {Id{1}, Id{9}, kFirstChosenId | 1}) {
     QueryWorld world;
     world.objects = {box_object(5, {5, 0, 0})};
     world.instances = {placed(instance, wall_mesh(), {4, 0, 0})};

@@ -130,7 +130,7 @@ TEST_F(RecordCodecTest, AStaticChangeHasTheIdsThatWereChosenAndTheMeshesNamesAnd
   change.remove_ids = columns_.ids({3});
   change.remove_groups = columns_.ids({4, 4});
   std::string bytes;
-  encode_change(change, {5, kChosenIdBit | 1, kChosenIdBit | 2}, bytes);
+  encode_change(change, {5, kFirstChosenId | 1, kFirstChosenId | 2}, bytes);
   absl::StatusOr<Record> record = Record::decode(bytes);
   ASSERT_TRUE(record.ok()) << record.status();
   const auto& read = std::get<Record::Change>(record->content());
@@ -139,7 +139,7 @@ TEST_F(RecordCodecTest, AStaticChangeHasTheIdsThatWereChosenAndTheMeshesNamesAnd
   EXPECT_THAT(read.meshes, ElementsAre(mesh_->key(), mesh_->key()));
   ASSERT_EQ(read.change.place.size(), 2u);
   EXPECT_THAT(read.change.place[0].ids, ElementsAre(5));
-  EXPECT_THAT(read.change.place[1].ids, ElementsAre(kChosenIdBit | 1, kChosenIdBit | 2));
+  EXPECT_THAT(read.change.place[1].ids, ElementsAre(kFirstChosenId | 1, kFirstChosenId | 2));
   EXPECT_THAT(read.change.place[1].translations, ElementsAre(1, 2, 3, 4, 5, 6));
   EXPECT_THAT(read.change.place[1].scales, ElementsAre(2));
   EXPECT_THAT(read.change.place[1].tags, ElementsAre(7, 8));

@@ -1,6 +1,8 @@
 // Tests static changes: the removals and placements of a change become one revision or are refused together.
 #include "core/scene/statics/static_set.h"
 
+#include <gmock/gmock.h>
+
 #include <thread>
 
 #include "core/base/limits.h"
@@ -79,11 +81,10 @@ TEST_F(StaticSetTest, ColumnsOfOtherLengthsAreRefused) {
   expect_refused(placing(place), Reason::kColumnLength, "place[0].scales", {});
 }
 
-TEST_F(StaticSetTest, ChosenIdsHaveBit63AndAreReturnedInOrder) {
+TEST_F(StaticSetTest, ChosenIdsCountUpFromTheirFirstAndAreReturnedInOrder) {
   const std::vector<Id> placed = change(placing(placement({}, {1, 0, 0, 2, 0, 0}))).placed;
   ASSERT_EQ(placed.size(), 2u);
-  EXPECT_NE(placed[0], placed[1]);
-  for (const Id id : placed) EXPECT_NE(id & kChosenIdBit, 0u);
+  EXPECT_THAT(placed, testing::ElementsAre(kFirstChosenId, kFirstChosenId + 1));
   EXPECT_EQ(instance(placed[1])->transform.translation.x, 2);
 }
 
@@ -94,9 +95,30 @@ TEST_F(StaticSetTest, ChosenIdsAreNotUsedAgainAfterARemove) {
 }
 
 TEST_F(StaticSetTest, ChosenIdsAvoidThoseOfObjects) {
-  apply(with(points({kChosenIdBit | ((uint64_t{1} << 24) + 1)}, {0, 0, 0})));
+  apply(with(points({kFirstChosenId}, {0, 0, 0})));
   const Id placed = change(placing(placement({}, {0, 0, 0}))).placed[0];
   EXPECT_FALSE(object(placed).has_value());
+}
+
+TEST_F(StaticSetTest, IdsChosenInAdvanceAreFreeAndNotChosenAgain) {
+  apply(with(points({kFirstChosenId + 1}, {0, 0, 0})));
+  change(placing(placement({kFirstChosenId + 3}, {0, 0, 0})));
+  const std::vector<Id> chosen = scene_.choose_ids(3);
+  EXPECT_THAT(chosen, testing::ElementsAre(kFirstChosenId, kFirstChosenId + 2, kFirstChosenId + 4));
+  EXPECT_EQ(change(placing(placement({}, {0, 0, 0}))).placed[0], kFirstChosenId + 5);
+  EXPECT_EQ(change(placing(placement({chosen[1]}, {0, 0, 0}))).placed[0], chosen[1]);
+}
+
+TEST_F(StaticSetTest, ASceneThatBeginsWithInstancesChoosesIdsAboveTheirs) {
+  change(placing(placement({kFirstChosenId + 10}, {0, 0, 0})));
+  Scene copy("copy", {}, kEpoch + 1, scene_.latest()->statics);
+  EXPECT_EQ(copy.choose_ids(1).front(), kFirstChosenId + 11);
+}
+
+TEST_F(StaticSetTest, TheFirstIdAboveIgnoresLargeIdsOfCallers) {
+  EXPECT_EQ(StaticSet::empty()->first_id_above(), kFirstChosenId);
+  change(placing(placement({5, kFirstChosenId + 10, kEndOfChosenIds, ~Id{0}}, {0, 0, 0})));
+  EXPECT_EQ(scene_.latest()->statics->first_id_above(), kFirstChosenId + 11);
 }
 
 TEST_F(StaticSetTest, RemovesAndPlacesAreOneRevision) {
