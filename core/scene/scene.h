@@ -230,8 +230,9 @@ class Scene {
 
   SceneStatus status() const LOCUS_EXCLUDES(mutex_);
 
-  // Returns a summary of the latest revision, or of a revision that was published during the call. Costs O(objects)
-  // at most once for each snapshot: concurrent callers wait for the first caller and share its result.
+  // Returns a summary of the latest revision, or of a revision that was published during the call. Computes a summary
+  // at most once for each snapshot, at the cost of summarize(): concurrent callers wait for the first caller and share
+  // its result.
   SceneSummary summary() const LOCUS_EXCLUDES(summarizing_mutex_, mutex_);
   // Returns the summary of the latest revision if summary() has computed it already, else nullopt. O(1).
   std::optional<SceneSummary> known_summary() const LOCUS_EXCLUDES(mutex_);

@@ -72,6 +72,23 @@ GridRef GridSnapshot::at(uint32_t handle) const {
   return value;
 }
 
+Aabbd GridSnapshot::outer_bounds(std::array<const internal::Brick*, 6>& extreme) const {
+  Aabbd outer;
+  for (const internal::GridLevel& level : levels_) {
+    level.table->for_each([&](uint32_t index) {
+      const internal::Brick& brick = *bricks_[index];
+      const Aabbd box = internal::box_around_values(brick, brick.max_extent);
+      for (int axis = 0; axis < 3; ++axis) {
+        if (box.min[axis] < outer.min[axis]) extreme[static_cast<size_t>(axis)] = &brick;
+        if (box.max[axis] > outer.max[axis]) extreme[static_cast<size_t>(axis) + 3] = &brick;
+      }
+      outer = merge(outer, box);
+      return true;
+    });
+  }
+  return outer;
+}
+
 GridBrickBounds GridSnapshot::brick_bounds(uint32_t brick) const {
   LOCUS_DCHECK_LT(brick, bricks_.size());
   return {internal::box_around_values(*bricks_[brick], 0), bricks_[brick]->max_extent};

@@ -12,6 +12,9 @@
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_GRID_SNAPSHOT_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_GRID_SNAPSHOT_H_
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <memory>
 #include <vector>
 
@@ -128,6 +131,14 @@ class GridSnapshot {
   // Returns bounds of the values of a brick; `brick` is GridRef::brick() of one of them. O(1).
   GridBrickBounds brick_bounds(uint32_t brick) const;
 
+  // Returns the union of bounds_of(value) over all values, an Aabbd that is empty for an empty snapshot.
+  // bounds_of(GridRef) returns the bounds of a value, which lie within its extent. The result is exact, unless very
+  // many (131,072) values lie within rounding errors of one side; then this side may lie farther outside, by at most
+  // 2^-16 of the largest coordinate. Cost: O(bricks), the values of a few bricks, and those of the cells at the sides;
+  // values that are certainly not at a side are only culled in float or not visited at all.
+  template <class BoundsOf>
+  Aabbd bounds(const BoundsOf& bounds_of, Work& work) const;
+
   // Returns counts and memory of this snapshot. O(values).
   GridStatistics statistics() const;
   // Returns the size in bytes of the parts of this snapshot that are not shared with `other`, another snapshot of the
@@ -137,6 +148,10 @@ class GridSnapshot {
  private:
   // Checks the order and the sizes of the levels. O(levels).
   void check_invariants() const;
+  // Returns a box that contains the bounds of all values: the union of the boxes of all bricks, each grown by the
+  // largest extent of its values. Writes to `extreme` the brick whose box extends farthest on each side: low x, y, z,
+  // high x, y, z. Precondition: the snapshot is not empty.
+  Aabbd outer_bounds(std::array<const internal::Brick*, 6>& extreme) const;
   const internal::Brick* find_brick(const internal::GridLevel& level, const internal::GridKey& key) const;
   static GridRef find_in(const internal::Brick& brick, uint32_t handle);
   // Calls fn(brick) for the existing bricks in the range `bricks` of keys. Stops and returns false if fn() returns
@@ -386,6 +401,47 @@ bool GridSnapshot::visit_nearest_bricks(const internal::GridLevel& level, const 
     if (!candidates.visit(limit, work, visit)) return false;
   }
   return true;
+}
+
+// Begins with the bounds of the values in the bricks that extend farthest. Then, for each side, visits the values that
+// may extend beyond the bounds, and moves the side. If there are many, begins again with the moved side, beyond which
+// there are far fewer. If the side has hardly moved, many values lie at the side itself, within the rounding errors of
+// the culling; if there are too many to visit them all, moves the side outwards by more than these errors, unless a
+// value extends even farther.
+template <class BoundsOf>
+Aabbd GridSnapshot::bounds(const BoundsOf& bounds_of, Work& work) const {
+  // Maximum visits of a pass over the values beyond a side: of most passes, and of one that could not move the side.
+  constexpr size_t kFewVisits = 4096, kManyVisits = size_t{1} << 17;
+  Aabbd bounds;
+  if (size_ == 0) return bounds;
+  std::array<const internal::Brick*, 6> extreme{};
+  const Aabbd outer = outer_bounds(extreme);
+  const auto visit = [&](const GridRef& value) {
+    bounds = merge(bounds, bounds_of(value));
+    return true;
+  };
+  for (auto brick = extreme.begin(); brick != extreme.end(); ++brick)
+    if (std::find(extreme.begin(), brick, *brick) == brick) internal::for_each_value(**brick, visit);
+  const double margin = 0x1p-16 * magnitude(outer);
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const bool is_high : {false, true}) {
+      double& side = (is_high ? bounds.max : bounds.min)[axis];
+      const double outermost = (is_high ? outer.max : outer.min)[axis];
+      size_t limit = kFewVisits;
+      while (is_high ? side < outermost : side > outermost) {
+        const double before = side;
+        Aabbd beyond = outer;
+        (is_high ? beyond.min : beyond.max)[axis] = side;
+        size_t visits = 0;
+        visit_region(beyond, work, [&](const GridRef& value) { return visit(value) && ++visits < limit; });
+        if (visits < limit) break;
+        const bool has_moved = std::abs(side - before) > margin;
+        if (!has_moved && limit == kManyVisits) side = is_high ? before + margin : before - margin;
+        limit = has_moved || limit == kManyVisits ? kFewVisits : kManyVisits;
+      }
+    }
+  }
+  return bounds;
 }
 
 template <class Visit>

@@ -12,8 +12,9 @@ SceneSummary summarize(const SceneSnapshot& snapshot) {
   summary.instances = snapshot.statics->size();
   summary.triangles = snapshot.statics->triangle_count();
   summary.bounds = snapshot.statics->tree().bounds();
-  snapshot.objects.for_each(
-      [&summary](const Object& object) { summary.bounds = merge(summary.bounds, bounds_of(object.shape)); });
+  Work work;
+  const auto object_bounds = [](const GridRef& object) { return bounds_of(shape_of(object)); };
+  summary.bounds = merge(summary.bounds, snapshot.objects.grid().bounds(object_bounds, work));
   return summary;
 }
 

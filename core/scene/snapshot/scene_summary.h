@@ -17,10 +17,12 @@ struct SceneSummary {
   uint64_t objects = 0;
   uint64_t instances = 0;
   uint64_t triangles = 0;
-  Aabbd bounds;  // bounds of all objects and instances; empty if the scene has neither
+  // Contains all objects and instances; empty if the scene has neither. Exact but for the cases that
+  // GridSnapshot::bounds() names.
+  Aabbd bounds;
 };
 
-// Returns the summary of a revision. O(objects).
+// Returns the summary of a revision. Cost: see GridSnapshot::bounds().
 SceneSummary summarize(const SceneSnapshot& snapshot);
 
 }  // namespace locus

@@ -3,7 +3,9 @@
 #include <thread>
 #include <vector>
 
+#include "tests/support/random.h"
 #include "tests/support/scene_fixture.h"
+#include "tests/support/test_scale.h"
 
 namespace locus::test {
 namespace {
@@ -23,6 +25,95 @@ TEST_F(SceneSummaryTest, TheBoundsContainAllObjectsExactly) {
   EXPECT_EQ(summary.revision, 1u);
   EXPECT_EQ(summary.bounds.min, (Vec3d{-4, -8, 3}));
   EXPECT_EQ(summary.bounds.max, (Vec3d{7, 5, 9}));
+}
+
+// Returns the bounds of all objects by visiting each of them.
+Aabbd walked_bounds(const ObjectSet& objects) {
+  Aabbd bounds;
+  objects.for_each([&bounds](const Object& object) { bounds = merge(bounds, bounds_of(object.shape)); });
+  return bounds;
+}
+
+Aabbd grid_bounds(const ObjectSet& objects) {
+  Work work;
+  return objects.grid().bounds([](const GridRef& object) { return bounds_of(shape_of(object)); }, work);
+}
+
+TEST_F(SceneSummaryTest, BoundsEqualThoseOfAWalkAfterRandomUpdates) {
+  for (uint64_t seed = 1; seed <= scaled_count(20); ++seed) {
+    Random random(seed);
+    ObjectStore store;
+    const bool is_flat = seed % 3 == 0;
+    const double reach = random.magnitude(0, 16);
+    const auto position = [&] {
+      Vec3d at = random.vector(random.chance(0.02) ? reach : reach / 8);
+      if (is_flat) at.z = 7;
+      return at;
+    };
+    for (int step = 0; step < 60; ++step) {
+      std::vector<Object> removed, inserted;
+      for (Id id = 1; id <= 500; ++id) {
+        if (!random.chance(step == 0 ? 1 : 0.1)) continue;
+        if (const std::optional<Object> known = store.find(id)) removed.push_back(*known);
+        if (step > 0 && random.chance(0.2)) continue;
+        Object object;
+        object.id = id;
+        object.shape.kind = static_cast<ShapeKind>(random.whole(0, 3));
+        object.shape.position = position();
+        const float size = random.chance(0.01) ? 200.0f : 0.5f;
+        if (object.shape.kind == ShapeKind::kBall || object.shape.kind == ShapeKind::kCapsule)
+          object.shape.radius = size;
+        if (object.shape.kind == ShapeKind::kBox || object.shape.kind == ShapeKind::kCapsule)
+          object.shape.size = {size, size / 2, size / 4};
+        inserted.push_back(object);
+      }
+      store.apply(removed, inserted);
+      const ObjectSet objects = store.snapshot();
+      ASSERT_EQ(grid_bounds(objects), walked_bounds(objects)) << "seed " << seed << ", step " << step;
+    }
+  }
+}
+
+TEST_F(SceneSummaryTest, OnlyManyValuesAtOneSideMakeTheBoundsSomewhatTooLarge) {
+  constexpr Id kCount = 300'000;
+  Random random(1);
+  std::vector<Object> flat(kCount);
+  for (Id id = 1; id <= kCount; ++id) {
+    flat[id - 1].id = id;
+    flat[id - 1].shape.position = random.vector(1000);
+    flat[id - 1].shape.position.z = 5;
+  }
+  ObjectStore store;
+  store.apply({}, flat);
+  const ObjectSet objects = store.snapshot();
+  const Aabbd exact = walked_bounds(objects), bounds = grid_bounds(objects);
+  EXPECT_TRUE(contains(bounds, exact));
+  EXPECT_TRUE(contains(grown(exact, 0.1), bounds));
+  EXPECT_EQ(bounds.min.x, exact.min.x);
+  EXPECT_EQ(bounds.max.y, exact.max.y);
+}
+
+TEST_F(SceneSummaryTest, BoundsVisitFewOfManyObjects) {
+  constexpr Id kCount = 200'000;
+  Random random(2);
+  std::vector<Object> balls(kCount);
+  for (Id id = 1; id <= kCount; ++id) {
+    balls[id - 1].id = id;
+    balls[id - 1].shape = {ShapeKind::kBall, random.vector(1000), {}, {}, 0.5f};
+  }
+  ObjectStore store;
+  store.apply({}, balls);
+  const ObjectSet objects = store.snapshot();
+  size_t visits = 0;
+  Work work;
+  const Aabbd bounds = objects.grid().bounds(
+      [&visits](const GridRef& object) {
+        ++visits;
+        return bounds_of(shape_of(object));
+      },
+      work);
+  EXPECT_EQ(bounds, walked_bounds(objects));
+  EXPECT_LT(visits, kCount / 20);
 }
 
 TEST_F(SceneSummaryTest, ASummaryIsKnownUntilTheNextRevision) {
