@@ -3,6 +3,12 @@
 #include <utility>
 
 namespace locus {
+namespace {
+
+// Cost of finding an object through the list of its group, in visits of a scan of all objects.
+constexpr size_t kListedCost = 8;
+
+}  // namespace
 
 Hit look_up(const SceneSnapshot& snapshot, const SceneAtTime& moment, Id id) {
   if (const GridRef object = moment.objects().find_ref(id)) return hit_on(object, 0, moment);
@@ -23,10 +29,19 @@ absl::flat_hash_map<Group, OverlapAnswer> look_up_groups(QueryTask& task, const 
   };
   for (const Instance& instance : task.snapshot().statics->tree().values())
     offer(instance, [&] { return hit_on(instance, 0); });
-  moment.objects().grid().for_each([&](const GridRef& object) {
+  const ObjectSet& objects = moment.objects();
+  const auto visit = [&](const GridRef& object) {
     offer(object.entry(), [&] { return hit_on(object, 0, moment); });
     return !task.ended();
-  });
+  };
+  size_t members = 0;
+  for (const auto& [group, lowest] : rows) members += objects.count_in(group);
+  if (members * kListedCost >= objects.size()) {
+    objects.grid().for_each(visit);
+  } else {
+    for (const auto& [group, lowest] : rows)
+      if (!objects.for_each_in(group, visit)) break;
+  }
   absl::flat_hash_map<Group, OverlapAnswer> answers;
   for (auto& [group, lowest] : rows) answers.emplace(group, lowest.finish());
   return answers;

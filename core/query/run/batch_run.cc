@@ -19,7 +19,7 @@ constexpr size_t kChunkSegments = 1024;
 
 size_t max_chunk_queries(const QueryBlock& block) {
   const auto* const lookup = std::get_if<LookupColumns>(&block.kind);
-  // All groups of a block are looked up in one scan of all objects, so the block is not divided into chunks.
+  // All groups of a block are looked up at once, so the block is not divided into chunks.
   if (lookup != nullptr && !lookup->groups.empty()) return limits::kMaxQueries;
   if (const auto* const sight = std::get_if<SightColumns>(&block.kind)) {
     const size_t segments = sight->bytes_per_viewer() * sight->samples_per_target() * sight->eyes_per_viewer();

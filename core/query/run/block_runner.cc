@@ -359,7 +359,7 @@ void BlockRunner::run_query(const CellColumns& cells, size_t i) {
   count_rows(kept, answer.truncated || kept < rows, i);
 }
 
-// Looks up all groups of the block in one scan of the objects, at the effective time of query `i`. Does nothing if the
+// Looks up all groups of the block at once, at the effective time of query `i`. Does nothing if the
 // last lookup was at the same time, so that consecutive queries with equal times share one lookup.
 void BlockRunner::look_up_groups_at(const LookupColumns& lookup, size_t i) {
   const bool same = groups_query_ && (!times_.asks_past() || times_.time(*groups_query_) == times_.time(i));

@@ -4,12 +4,14 @@
 #ifndef LOCUS_CORE_SCENE_OBJECTS_OBJECT_SET_H_
 #define LOCUS_CORE_SCENE_OBJECTS_OBJECT_SET_H_
 
+#include <memory>
 #include <optional>
 #include <utility>
 
 #include "core/base/persistent_id_table.h"
 #include "core/index/hash_grid/grid_snapshot.h"
 #include "core/index/spatial_index.h"
+#include "core/scene/objects/group_lists.h"
 #include "core/scene/objects/object.h"
 
 namespace locus {
@@ -25,7 +27,9 @@ class ObjectSet {
   using Value = Object;
 
   ObjectSet() = default;
-  ObjectSet(GridSnapshot grid, PersistentIdTable<> handles) : grid_(std::move(grid)), handles_(std::move(handles)) {}
+  // `groups` may be null if no object belongs to a group.
+  ObjectSet(GridSnapshot grid, PersistentIdTable<> handles, std::shared_ptr<const GroupLists> groups)
+      : grid_(std::move(grid)), handles_(std::move(handles)), groups_(std::move(groups)) {}
 
   size_t size() const { return grid_.size(); }
   const GridSnapshot& grid() const { return grid_; }
@@ -37,6 +41,15 @@ class ObjectSet {
   bool contains(const Object& object) const {
     const GridRef known = find_ref(object.id);
     return known && known.entry().position == object.shape.position;
+  }
+
+  // Returns the number of objects that belong to `group`, which is not 0. O(1).
+  size_t count_in(Group group) const { return groups_ == nullptr ? 0 : groups_->count(group); }
+  // Calls visit(GridRef) for each object of `group`, until visit() returns false. Returns false if it did. Cost: for
+  // each object of the group, a search through the handles of one brick.
+  template <class Visit>
+  bool for_each_in(Group group, const Visit& visit) const {
+    return groups_ == nullptr || groups_->for_each(group, [&](uint32_t handle) { return visit(grid_.at(handle)); });
   }
 
   // Calls fn(object) for each object, in an order that depends only on the sequence of changes of the grid. O(size).
@@ -76,16 +89,20 @@ class ObjectSet {
   }
 
   GridStatistics statistics() const { return grid_.statistics(); }
-  // Returns the size in bytes of the objects, the bricks and the lookup tables. O(bricks).
+  // Returns the size in bytes of the objects, the bricks, the lookup tables and the lists of groups. O(bricks).
   size_t bytes() const { return unshared_bytes(ObjectSet()); }
   // Returns the bytes of this set that `other`, a set of the same scene, does not share. O(size of the difference).
   size_t unshared_bytes(const ObjectSet& other) const {
-    return grid_.unshared_bytes(other.grid_) + handles_.unshared_bytes(other.handles_);
+    const size_t groups = groups_ == nullptr || groups_ == other.groups_ ? 0
+                          : other.groups_ == nullptr                     ? groups_->unshared_bytes(GroupLists())
+                                                                         : groups_->unshared_bytes(*other.groups_);
+    return grid_.unshared_bytes(other.grid_) + handles_.unshared_bytes(other.handles_) + groups;
   }
 
  private:
   GridSnapshot grid_;
   PersistentIdTable<> handles_;
+  std::shared_ptr<const GroupLists> groups_;  // null if no object belongs to a group
 };
 
 }  // namespace locus

@@ -93,9 +93,17 @@ std::vector<uint32_t> ObjectStore::handles_of(absl::Span<const Object> objects) 
   return handles;
 }
 
+void ObjectStore::change_group(uint32_t handle, Group from, Group to) {
+  if (from == to) return;
+  groups_.remove(from, handle);
+  groups_.add(to, handle);
+  groups_changed_ = true;
+}
+
 GridItem ObjectStore::begin_life(const Object& object) {
   const uint32_t handle = new_handle();
   LOCUS_CHECK(handles_.set(object.id, handle));
+  change_group(handle, 0, object.group);
   if (moves_ != nullptr) moves_->born(handle);
   return grid_item_of(object, handle);
 }
@@ -112,8 +120,13 @@ size_t ObjectStore::apply(absl::Span<const Object> removed, absl::Span<const Obj
   std::vector<uint8_t> ends(removed.size(), 1);
   for (const uint32_t index : before)
     if (index != kNewLife) LOCUS_CHECK_EQ(std::exchange(ends[index], uint8_t{0}), 1);
-  for (size_t i = 0; i < removed.size(); ++i)
-    if (ends[i] != 0) LOCUS_CHECK(handles_.erase(removed[i].id));
+  for (size_t i = 0; i < removed.size(); ++i) {
+    if (ends[i] == 0) continue;
+    LOCUS_CHECK(handles_.erase(removed[i].id));
+    change_group(leaving[i], removed[i].group, 0);
+  }
+  for (size_t i = 0; i < inserted.size(); ++i)
+    if (before[i] != kNewLife) change_group(leaving[before[i]], removed[before[i]].group, inserted[i].group);
   handles_.fit(handles_.size() + static_cast<size_t>(std::count(before.begin(), before.end(), kNewLife)));
   std::vector<GridItem> items;
   items.reserve(inserted.size());
@@ -140,6 +153,7 @@ bool ObjectStore::fill(std::vector<std::vector<Object>> chunks, double cell_size
       if (i + kPrefetchObjects < chunk.size()) handles_.prefetch(chunk[i + kPrefetchObjects].id);
       const uint32_t handle = new_handle();
       if (!handles_.set(chunk[i].id, handle)) return false;
+      change_group(handle, 0, chunk[i].group);
       if (moves_ != nullptr) moves_->born(handle);
       items.push_back(grid_item_of(chunk[i], handle));
     }

@@ -3,7 +3,8 @@
 //
 // A handle identifies one lifetime of an object, from its insertion to its removal; if the store tracks lifetimes, a
 // teleport also ends a lifetime and begins the next. Invariants: every object has a handle of its own, below
-// handle_count(); the table from ids to handles and the grid hold the same objects; every handle below handle_count()
+// handle_count(); the table from ids to handles and the grid hold the same objects, and the lists of groups those of
+// them that belong to a group; every handle below handle_count()
 // belongs to an object, is free, or is quarantined. A store that tracks lifetimes quarantines the handle of a removed
 // object: no other object gets the handle while an object set in the history contains the removed object.
 #ifndef LOCUS_CORE_SCENE_OBJECTS_OBJECT_STORE_H_
@@ -79,6 +80,15 @@ class ObjectStore {
   // Removes the object with the id of `object`. Returns false and changes nothing if contains() is false.
   bool remove(const Object& object);
 
+  // Calls fn(object) for each object of `group`, which is not 0. O(objects of the group).
+  template <class Fn>
+  void for_each_in(Group group, const Fn& fn) const {
+    groups_.for_each(group, [&](uint32_t handle) {
+      fn(object_of(grid_.at(handle)));
+      return true;
+    });
+  }
+
   // Calls fn(object) for each object. O(size).
   template <class Fn>
   void for_each(Fn&& fn) const {
@@ -89,7 +99,11 @@ class ObjectStore {
   }
 
   // Returns an immutable set of the current objects. O(1) in the number of objects.
-  ObjectSet snapshot() { return {grid_.snapshot(), handles_.snapshot()}; }
+  ObjectSet snapshot() {
+    if (groups_changed_) groups_snapshot_ = std::make_shared<const GroupLists>(groups_.snapshot());
+    groups_changed_ = false;
+    return {grid_.snapshot(), handles_.snapshot(), groups_snapshot_};
+  }
 
  private:
   // Checks the invariants of the class comment. O(1).
@@ -97,11 +111,16 @@ class ObjectStore {
   uint32_t new_handle();
   void free_handle(uint32_t handle);
   std::vector<uint32_t> handles_of(absl::Span<const Object> objects) const;
+  // Puts the object `handle` from one group into another; 0 stands for no group.
+  void change_group(uint32_t handle, Group from, Group to);
   GridItem begin_life(const Object& object);
   GridItem continue_life(const Object& object, uint32_t handle);
 
   HashGrid grid_;
   PersistentIdTable<> handles_;
+  GroupLists groups_;
+  bool groups_changed_ = false;  // since groups_snapshot_ was made
+  std::shared_ptr<const GroupLists> groups_snapshot_;
   std::vector<uint32_t> free_handles_;
   uint32_t next_handle_ = 0;
   struct QuarantinedHandle {

@@ -85,12 +85,14 @@ void BatchApplier::remove_groups() {
     groups.insert(batch_.remove_groups[i]);
     ++applied_;
   }
-  if (groups.empty() || batch_.clear) return;
-  objects_.for_each([&](const Object& object) {
-    if (!groups.contains(object.group) || !current(object.id)) return;
-    changed_[object.id] = std::nullopt;
-    --count_;
-  });
+  if (batch_.clear) return;
+  for (const Group group : groups) {
+    objects_.for_each_in(group, [&](const Object& object) {
+      if (!current(object.id)) return;
+      changed_[object.id] = std::nullopt;
+      --count_;
+    });
+  }
 }
 
 bool BatchApplier::read_pose(const PoseReader& poses, uint32_t index, Id id, const std::string& field, Shape& shape) {

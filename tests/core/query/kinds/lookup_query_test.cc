@@ -76,6 +76,22 @@ TEST(LookupQueryTest, AGroupRequestedTwiceIsAnsweredTwice) {
   EXPECT_THAT(result.ids, ElementsAre(3, 5, 3, 5));
 }
 
+TEST(LookupQueryTest, SmallAndLargeGroupsAmongManyObjectsAreFound) {
+  QueryWorld world;
+  std::vector<Id> large;
+  for (Id id = 1; id <= 2000; ++id) {
+    world.objects.push_back(ball_object(id, {}));
+    world.objects.back().group = id % 500 == 0 ? 7 : id % 2 == 0 ? 8 : 0;
+    if (world.objects.back().group == 8) large.push_back(id);
+  }
+  const SnapshotPtr snapshot = snapshot_of(world);
+  EXPECT_THAT(run_block(*snapshot, lookup_of_groups({7})).ids, ElementsAre(500, 1000, 1500, 2000));
+  OwnedBlock block = lookup_of_groups({8});
+  block.settings.max_results = limits::kMaxMaxResults;
+  EXPECT_EQ(run_block(*snapshot, block).ids, large);
+  EXPECT_THAT(run_block(*snapshot, lookup_of_groups({9})).ids, IsEmpty());
+}
+
 // If each query stored a separate answer, the batch would need 65,536 * 2,000 rows.
 TEST(LookupQueryTest, ALargeGroupRequestedManyTimesIsKeptOnceAndTruncatedToTheReply) {
   QueryWorld world;

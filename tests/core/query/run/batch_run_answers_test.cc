@@ -234,6 +234,7 @@ TEST(RunBatchTest, EnoughMaxWorkTruncatesNothing) {
 TEST(RunBatchTest, WorkOfABatchIsTheSumOfItsBlocks) {
   const std::vector<OwnedBlock> blocks = {one_ball({}, 1), rays_along_x(RayMode::kAll), lookup_of_groups({1})};
   QueryWorld world = crowd(30);
+  for (Object& object : world.objects) object.group = 1;
   world.instances = {placed(100, wall_mesh())};
   const BatchResult result = run(*snapshot_of(world), batch_of(blocks));
   Work sum;

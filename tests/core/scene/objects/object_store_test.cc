@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <map>
+#include <set>
 
 #include "tests/support/random.h"
 
@@ -94,6 +95,39 @@ TEST(ObjectStoreTest, MovesOfAFewObjectsLeaveAllOthersUnchanged) {
     if (batch % 100 == 0) expect_holds(store.snapshot(), model);
   }
   expect_holds(store.snapshot(), model);
+}
+
+TEST(ObjectStoreTest, TheObjectsOfAGroupEqualThoseOfAWalkAfterRandomChanges) {
+  Random random(3);
+  ObjectStore store;
+  for (int step = 0; step < 100; ++step) {
+    std::vector<Object> removed, inserted;
+    absl::flat_hash_set<Id> replaced;
+    for (Id id = 1; id <= 300; ++id) {
+      if (!random.chance(0.1)) continue;
+      if (const std::optional<Object> known = store.find(id)) removed.push_back(*known);
+      if (random.chance(0.3)) continue;
+      Object object;
+      object.id = id;
+      object.group = random.below(6);
+      object.shape.position = random.vector(100);
+      inserted.push_back(object);
+      if (!removed.empty() && removed.back().id == id && random.chance(0.3)) replaced.insert(id);
+    }
+    store.apply(removed, inserted, replaced);
+    const ObjectSet objects = store.snapshot();
+    for (Group group = 1; group <= 6; ++group) {
+      std::set<Id> walked, listed, stored;
+      objects.for_each([&](const Object& object) {
+        if (object.group == group) walked.insert(object.id);
+      });
+      objects.for_each_in(group, [&](const GridRef& object) { return listed.insert(object.entry().id).second; });
+      store.for_each_in(group, [&](const Object& object) { stored.insert(object.id); });
+      ASSERT_EQ(listed, walked);
+      ASSERT_EQ(stored, walked);
+      ASSERT_EQ(objects.count_in(group), walked.size());
+    }
+  }
 }
 
 TEST(ObjectStoreTest, AnUnknownIdHasNoHandleAndNoObject) {

@@ -25,15 +25,15 @@ std::shared_ptr<const StaticMesh> build(const std::vector<float>& vertices, cons
   return *StaticMesh::build("mesh", {}, *std::move(mesh));
 }
 
-struct Columns {
+struct UploadedColumns {
   std::vector<float> vertices;
   std::vector<uint32_t> indices;
 };
 
 // Returns columns in which corners at equal positions share one vertex; vertices are numbered in the order of their
 // first use.
-Columns welded(const std::vector<Triangle>& triangles) {
-  Columns columns;
+UploadedColumns welded(const std::vector<Triangle>& triangles) {
+  UploadedColumns columns;
   std::map<std::array<float, 3>, uint32_t> known;
   for (const Triangle& triangle : triangles) {
     for (const Vec3f corner : {triangle.a, triangle.b, triangle.c}) {
@@ -46,12 +46,12 @@ Columns welded(const std::vector<Triangle>& triangles) {
 }
 
 double bytes_a_triangle(const std::vector<Triangle>& triangles) {
-  const Columns columns = welded(triangles);
+  const UploadedColumns columns = welded(triangles);
   return static_cast<double>(build(columns.vertices, columns.indices)->bytes()) / static_cast<double>(triangles.size());
 }
 
 TEST(StaticMeshTest, ReturnsTheUploadedColumnsUnchanged) {
-  const Columns columns = welded(box_city(9, 3));
+  const UploadedColumns columns = welded(box_city(9, 3));
   const auto mesh = build(columns.vertices, columns.indices);
   EXPECT_EQ(mesh->vertices(), columns.vertices);
   EXPECT_EQ(uploaded_indices(*mesh), columns.indices);
@@ -77,7 +77,7 @@ TEST(StaticMeshTest, ANegativeZeroStaysNegative) {
 
 TEST(StaticMeshTest, FindsEachTriangleByItsNumber) {
   const std::vector<Triangle> triangles = bumpy_sphere(40, 0.1, 2);
-  const Columns columns = welded(triangles);
+  const UploadedColumns columns = welded(triangles);
   const auto mesh = build(columns.vertices, columns.indices);
   ASSERT_EQ(mesh->triangle_count(), triangles.size());
   for (const Triangle& triangle : triangles) ASSERT_EQ(mesh->triangle(triangle.number), triangle);
@@ -127,7 +127,7 @@ TEST(StaticMeshTest, AMeshThatSharesContentHasItsOwnNameAndParts) {
 }
 
 TEST(StaticMeshTest, AMeshRestoredFromItsTopologyEqualsTheOriginal) {
-  const Columns columns = welded(box_city(9, 3));
+  const UploadedColumns columns = welded(box_city(9, 3));
   const std::vector<MeshPart> parts = {{"a", 0}, {"b", 7}};
   const auto built = build(columns.vertices, columns.indices, parts);
   const absl::StatusOr<TriangleMesh> mesh = TriangleMesh::create(columns.vertices, columns.indices, parts);
@@ -145,7 +145,7 @@ TEST(StaticMeshTest, AMeshRestoredFromItsTopologyEqualsTheOriginal) {
 }
 
 TEST(StaticMeshTest, TheTopologyOfAnotherMeshIsRefused) {
-  const Columns columns = welded(box_city(3, 3));
+  const UploadedColumns columns = welded(box_city(3, 3));
   const auto other = build({0, 0, 0, 1, 0, 0, 0, 1, 0}, {0, 1, 2});
   const absl::StatusOr<TriangleMesh> mesh = TriangleMesh::create(columns.vertices, columns.indices, {});
   EXPECT_EQ(StaticMesh::restore("mesh", {}, *mesh, other->tree().topology()).status().code(),
