@@ -162,9 +162,9 @@ TEST_F(MeshRpcTest, RepliesHaveAsManyPartsAsClientsAcceptAndTheRestIsAskedFor) {
   EXPECT_LE(uploaded.ByteSizeLong(), limits::kDefaultReplyBytes);
   EXPECT_EQ(uploaded.mesh().part_count(), limits::kMaxMeshParts);
   EXPECT_GT(uploaded.mesh().parts_size(), 10'000);
-  const auto page_of = [this](const v1::ListMeshesRequest& request) {
+  const auto page_of = [this](const v1::ListMeshesRequest& asked) {
     v1::ListMeshesResponse page;
-    EXPECT_TRUE(call(*stubs().scenes, &v1::SceneService::Stub::ListMeshes, request, &page).ok());
+    EXPECT_TRUE(call(*stubs().scenes, &v1::SceneService::Stub::ListMeshes, asked, &page).ok());
     return page;
   };
   v1::ListMeshesResponse page = page_of({});

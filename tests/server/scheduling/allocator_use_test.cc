@@ -1,12 +1,12 @@
 #include "server/scheduling/allocator_use.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <fstream>
 #include <memory>
 #include <vector>
-
-#include "server/observability/process_figures.h"
 
 namespace locus::server {
 namespace {
@@ -18,7 +18,11 @@ constexpr size_t kBlock = size_t{64} << 10;
 constexpr size_t kCount = 1024;
 constexpr uint64_t kSum = kBlock * kCount;
 
-AllocatorUse use_now() { return allocator_use(resident_bytes()); }
+AllocatorUse use_now() {
+  uint64_t mapped = 0, resident = 0;  // in pages
+  std::ifstream("/proc/self/statm") >> mapped >> resident;
+  return allocator_use(resident * static_cast<uint64_t>(sysconf(_SC_PAGESIZE)));
+}
 
 TEST(AllocatorUseTest, FreedMemoryIsReusableUntilItIsReturned) {
 #ifdef __SANITIZE_ADDRESS__
