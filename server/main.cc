@@ -117,19 +117,22 @@ class EndingSignals {
 
 // Starts a thread that sends SIGTERM to this process when `parent`, the process that started it, has ended. Returns an
 // error if `parent` is not the parent process, as when it has already ended. Call it after EndingSignals::listen().
-absl::Status end_with(pid_t parent) {
+absl::Status end_with(pid_t parent, const EndingSignals& signals) {
   const auto watched = static_cast<int>(syscall(SYS_pidfd_open, parent, 0));
   // While `parent` is the parent process, its number is not given to another process, so `watched` is the right
   // process.
+  if (watched < 0 && errno != ESRCH && errno != EINVAL)
+    return absl::FailedPreconditionError(
+        absl::StrCat("--end-with-parent needs the system call pidfd_open: ", std::strerror(errno)));
   if (watched < 0 || getppid() != parent) {
     return absl::FailedPreconditionError(
         absl::StrCat("--end-with-parent: process ", parent, " is not the parent of this daemon, or it has ended"));
   }
-  std::thread([watched] {
+  std::thread([watched, &signals] {
     pollfd end{.fd = watched, .events = POLLIN, .revents = 0};
     while (poll(&end, 1, /*timeout=*/-1) < 0 && errno == EINTR) {
     }
-    kill(getpid(), SIGTERM);
+    if (!signals.received()) kill(getpid(), SIGTERM);  // a second signal would end the daemon without a drain
   }).detach();
   return absl::OkStatus();
 }
@@ -185,7 +188,7 @@ int run(const ServerConfig& config) {
   }
   EndingSignals& signals = EndingSignals::listen();
   if (config.end_with_parent != 0) {
-    if (const absl::Status ends = end_with(static_cast<pid_t>(config.end_with_parent)); !ends.ok()) {
+    if (const absl::Status ends = end_with(static_cast<pid_t>(config.end_with_parent), signals); !ends.ok()) {
       log(LogLevel::kError, ends.message());
       return EXIT_FAILURE;
     }

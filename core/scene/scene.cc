@@ -396,7 +396,7 @@ void Scene::forget_recent() {
 void Scene::forget_mesh(const StaticMesh* mesh) {
   std::deque<SnapshotPtr> forgotten;  // freed after the lock is released, because freeing takes long
   const MutexLock lock(mutex_);
-  LOCUS_DCHECK_EQ(latest_->statics->uses(mesh), 0u);
+  if (latest_->statics->uses(mesh) > 0) return;  // placed again meanwhile, by a change that began before the deletion
   const auto last = std::find_if(recent_.rbegin(), recent_.rend(),
                                  [mesh](const SnapshotPtr& recent) { return recent->statics->uses(mesh) > 0; });
   std::move(recent_.begin(), last.base(), std::back_inserter(forgotten));

@@ -208,7 +208,7 @@ class Scene {
   // Drops the revisions that are retained for kExactly views, except the latest one. Called when memory is short.
   void forget_recent() LOCUS_EXCLUDES(mutex_);
   // Drops the retained revisions that contain instances of `mesh`, and all revisions before them. Called when the mesh
-  // was deleted, so that its memory becomes free. Precondition: the latest revision contains no instance of the mesh.
+  // was deleted, so that its memory becomes free. Drops nothing if the latest revision contains an instance.
   void forget_mesh(const StaticMesh* mesh) LOCUS_EXCLUDES(mutex_);
 
   // Closes the scene after its deletion: wakes all waiters. Later calls of view() and of the members that change the

@@ -28,10 +28,11 @@ class Server {
  public:
   // Starts a server that listens on all addresses of `config`. If there are none, only callers in this process can call
   // the server (in_process_channel()), and it uses nothing of the connections' protection: no sockets, no threads of
-  // the guard, and no functions in place of the system's (rpc/read_hooks.h). If it cannot listen on an address, returns
-  // an error that names the address and the reason. Scenes are stored in `log`, which must outlive the server; if `log`
-  // is null, scenes are stored in memory only. The scenes of the log are recovered before start() returns; meanwhile
-  // calls are answered with REASON_RECOVERING. Returns CANCELLED soon after `stop` becomes true during recovery.
+  // the guard, and no functions in place of the system's (rpc/read_hooks.cc). If it cannot listen on an address,
+  // returns an error that names the address and the reason. Scenes are stored in `log`, which must outlive the server;
+  // if `log` is null, scenes are stored in memory only. The scenes of the log are recovered before start() returns;
+  // meanwhile calls are answered with REASON_RECOVERING. Returns CANCELLED soon after `stop` becomes true during
+  // recovery.
   static absl::StatusOr<std::unique_ptr<Server>> start(const ServerConfig& config, UpdateLog* log = nullptr,
                                                        const std::atomic<bool>& stop = kNever);
 

@@ -178,8 +178,9 @@ TEST_F(DaemonTest, ItEndsWithItsParentHoweverThatEnds) {
   create_world(stubs);
   shell.signal(SIGKILL);
   shell.wait();
-  while (text_of(log()).find("ended") == std::string::npos) std::this_thread::yield();
-  EXPECT_THAT(text_of(log()), HasSubstr("draining"));
+  for (int i = 0; i < 6000 && text_of(log()).find("ended") == std::string::npos; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  EXPECT_THAT(text_of(log()), AllOf(HasSubstr("draining"), HasSubstr("ended")));
 }
 
 TEST_F(DaemonTest, ItDoesNotStartWithoutTheParentItIsToEndWith) {

@@ -5,6 +5,7 @@
 
 #include "tests/support/daemon_process.h"
 #include "tests/support/rpc_test.h"
+#include "tests/support/sanitized_build.h"
 
 namespace locus::test {
 namespace {
@@ -89,9 +90,7 @@ class ReplacedMeshTest : public ::testing::Test {
 };
 
 TEST_F(ReplacedMeshTest, TheMemoryOfReplacedAndDeletedMeshesIsGivenBack) {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-  GTEST_SKIP() << "the sanitizer's allocator keeps freed memory";
-#endif
+  if (kSanitizedBuild) GTEST_SKIP() << "the sanitizer's allocator keeps freed memory";
   v1::CreateSceneRequest scene;
   scene.set_name("world");
   v1::CreateSceneResponse created;

@@ -37,6 +37,9 @@ struct Server {
   void remember(const std::string& scene, client::Revision revision) {
     own != nullptr ? void(acked[scene] = revision) : module.context().remember_own(scene, revision);
   }
+  void forget(const std::string& scene) {
+    own != nullptr ? void(acked.erase(scene)) : module.context().forget_own(scene);
+  }
   std::optional<client::Revision> last(const std::string& scene) const {
     if (own == nullptr) return module.context().own(scene);
     const auto found = acked.find(scene);
@@ -61,7 +64,11 @@ void check_or_raise(lua_State* state, absl::Status status) {
   if (!status.ok()) raise(state, std::move(status));
 }
 
-client::Client& client_at(lua_State* state) { return *value_or_raise(state, server_at(state).client()); }
+client::Client& client_at(lua_State* state) {
+  Server& server = server_at(state);
+  server.module.sandbox().check(state);
+  return *value_or_raise(state, server.client());
+}
 
 std::string text_argument(lua_State* state, int index) {
   size_t size = 0;
@@ -107,8 +114,7 @@ int list_scenes(lua_State* state) { return push_list(state, value_or_raise(state
 int delete_scene(lua_State* state) {
   const auto request = message_argument<v1::DeleteSceneRequest>(state, 2);
   check_or_raise(state, client_at(state).delete_scene(request));
-  server_at(state).module.context().forget_own(request.name());
-  server_at(state).acked.erase(request.name());
+  server_at(state).forget(request.name());
   return 0;
 }
 
@@ -168,14 +174,22 @@ int free_server(lua_State* state) {
   return 0;
 }
 
-// internal.open(ADDRESS): a new connection with the credentials of the options; without ADDRESS, that of the context.
+// internal.open(ADDRESS): a new connection; without ADDRESS, that of the context. The token and the certificate of the
+// options are sent only to the address of the options.
 int open_server(lua_State* state) {
   ScriptModule& module = module_of(state);
   std::unique_ptr<client::Client> own;
   if (!lua_isnoneornil(state, 1)) {
     client::ClientOptions options;
     options.credentials = module.context().options().connection.credentials;
-    own = value_or_raise(state, client::Client::connect(text_argument(state, 1), options));
+    const std::string address = text_argument(state, 1);
+    if (address != module.context().address()) {
+      options.credentials.token.clear();
+      options.credentials.token_file.clear();
+      options.credentials.certificate_file.clear();
+      options.credentials.key_file.clear();
+    }
+    own = value_or_raise(state, client::Client::connect(address, options));
   } else {
     value_or_raise(state, module.context().connect());
   }
@@ -184,22 +198,29 @@ int open_server(lua_State* state) {
   return 1;
 }
 
-// Returns an argument of a command as the word that a user would type.
-std::string word_of(lua_State* state, int index) {
-  if (lua_type(state, index) == LUA_TTABLE) {
+// Returns an argument of a command as the word that a user would type: a text, a number, true or false, or a list of
+// texts and numbers, which are joined by commas.
+std::string word_of(lua_State* state, int index, bool is_entry = false) {
+  const int type = lua_type(state, index);
+  if (type == LUA_TTABLE && !is_entry && lua_rawlen(state, index) > 0) {
     std::string word;
     for (lua_Unsigned i = 1; i <= lua_rawlen(state, index); ++i) {
       lua_rawgeti(state, index, static_cast<lua_Integer>(i));
-      absl::StrAppend(&word, i == 1 ? "" : ",", word_of(state, -1));
+      absl::StrAppend(&word, i == 1 ? "" : ",", word_of(state, lua_gettop(state), true));
       lua_pop(state, 1);
     }
     return word;
   }
-  if (lua_type(state, index) == LUA_TNUMBER && lua_isinteger(state, index) == 0)
-    return text_of_number(lua_tonumber(state, index));
-  std::string word = luaL_tolstring(state, index, nullptr);
-  lua_pop(state, 1);
-  return word;
+  if (type == LUA_TNUMBER && lua_isinteger(state, index) == 0) return text_of_number(lua_tonumber(state, index));
+  if (type == LUA_TBOOLEAN) return lua_toboolean(state, index) != 0 ? "true" : "false";
+  const std::optional<uint64_t> number = type == LUA_TUSERDATA ? to_unsigned(state, index) : std::nullopt;
+  if (number) return absl::StrCat(*number);
+  if (type != LUA_TSTRING && type != LUA_TNUMBER)
+    raise(state, usage_error(absl::StrCat("a word of a command is a text, a number or a list of them, not a ",
+                                          luaL_typename(state, index))));
+  size_t size = 0;
+  const char* const text = lua_tolstring(state, index, &size);
+  return {text, size};
 }
 
 // Pushes the answer that a command wrote as a table; its rows are in the field `rows`, too.
@@ -221,18 +242,45 @@ void push_result(lua_State* state, const std::string& text) {
   lua_setfield(state, -2, "rows");
 }
 
+// While it exists, the context writes JSON to `answer`.
+class AnswerInJson {
+ public:
+  AnswerInJson(Context& context, std::ostream& answer)
+      : context_(context),
+        out_(context.redirect_out(answer)),
+        format_(std::exchange(context.options().format, Format::kJson)) {}
+  ~AnswerInJson() {
+    context_.options().format = format_;
+    context_.redirect_out(out_);
+  }
+  AnswerInJson(const AnswerInJson&) = delete;
+  AnswerInJson& operator=(const AnswerInJson&) = delete;
+
+ private:
+  Context& context_;
+  std::ostream& out_;
+  const Format format_;
+};
+
 // internal.command(LINE, WORD, ...): runs a line of the command line, with further words that are not split, and
 // returns its answer.
 int command(lua_State* state) {
   Context& context = module_of(state).context();
   std::vector<std::string> words = value_or_raise(state, split_words(text_argument(state, 1)));
-  for (int i = 2; i <= lua_gettop(state); ++i) words.push_back(word_of(state, i));
+  size_t bytes = 0;
+  for (int i = 2; i <= lua_gettop(state); ++i) {
+    words.push_back(word_of(state, i));
+    bytes += words.back().size();
+    if (bytes > kMaxScriptBytes)
+      raise(state, usage_error(absl::StrCat("the words of a command have more than ", kMaxScriptBytes, " bytes")));
+  }
+  module_of(state).sandbox().check(state);
   std::ostringstream answer;
-  std::ostream& out = context.redirect_out(answer);
-  const Format format = std::exchange(context.options().format, Format::kJson);
-  absl::Status status = run_script_line(words, context);
-  context.options().format = format;
-  context.redirect_out(out);
+  absl::Status status;
+  {
+    const AnswerInJson redirected(context, answer);
+    status = run_script_line(words, context);
+  }
   check_or_raise(state, std::move(status));
   push_result(state, std::move(answer).str());
   return 1;
@@ -261,8 +309,8 @@ int print(lua_State* state) {
   return 0;
 }
 
-absl::StatusOr<Report> report_of(lua_State* state) {
-  ASSIGN_OR_RETURN(Json value, read_json(state, 1));
+absl::StatusOr<Report> report_of(lua_State* state, int index) {
+  ASSIGN_OR_RETURN(Json value, read_json(state, index));
   Report report;
   Json rows = value;
   if (value.is_object()) {
@@ -276,17 +324,35 @@ absl::StatusOr<Report> report_of(lua_State* state) {
   if (!rows.is_array()) return usage_error("locus.print takes a table: a list of rows, or a result");
   report.rows_name = "rows";
   for (Json& row : rows) report.rows.push_back(row.is_object() ? std::move(row) : Json{{"value", std::move(row)}});
-  if (lua_istable(state, 2)) {
-    ASSIGN_OR_RETURN(const Json keys, read_json(state, 2));
-    for (const Json& key : keys) report.keys.push_back(key.is_string() ? key.get<std::string>() : key.dump());
-  }
   return report;
 }
 
 // locus.print(TABLE, COLUMNS): writes rows or a result in the format of -o.
 int print_table(lua_State* state) {
   luaL_checktype(state, 1, LUA_TTABLE);
-  module_of(state).context().write(value_or_raise(state, report_of(state)));
+  Report report = value_or_raise(state, report_of(state, 1));
+  if (lua_istable(state, 2)) {
+    const Json keys = value_or_raise(state, read_json(state, 2));
+    for (const Json& key : keys) report.keys.push_back(key.is_string() ? key.get<std::string>() : json_line(key));
+  }
+  module_of(state).context().write(report);
+  return 0;
+}
+
+// Prints its arguments as the shell shows values: tables in the format of -o, all others as print() does.
+int print_values(lua_State* state) {
+  ScriptModule& module = module_of(state);
+  const int values = lua_gettop(state);
+  for (int i = 1; i <= values; ++i) {
+    if (lua_istable(state, i)) {
+      module.context().write(value_or_raise(state, report_of(state, i)));
+    } else if (values > 1 || !lua_isnil(state, i)) {
+      size_t size = 0;
+      const char* const text = luaL_tolstring(state, i, &size);
+      module.context().out() << absl::string_view(text, size) << '\n';
+      lua_pop(state, 1);
+    }
+  }
   return 0;
 }
 
@@ -391,6 +457,16 @@ ScriptModule::ScriptModule(Sandbox& sandbox, Context& context, AfterFailure afte
   lua_pushglobaltable(state);
   set_functions(state, *this, globals);
   lua_pop(state, 1);
+}
+
+absl::Status ScriptModule::print_results() {
+  lua_State* const state = sandbox_.state();
+  const int values = lua_gettop(state);
+  if (lua_checkstack(state, 2) == 0) return absl::ResourceExhaustedError("too many values");
+  lua_pushlightuserdata(state, this);
+  lua_pushcclosure(state, print_values, 1);
+  lua_insert(state, 1);
+  return sandbox_.call(values, 0);
 }
 
 absl::Status ScriptModule::count(const absl::Status& error) {

@@ -33,6 +33,9 @@ class ScriptModule {
   Context& context() { return context_; }
   const ScriptCounts& counts() const { return counts_; }
 
+  // Prints and removes all values on the stack of the sandbox: tables in the format of -o, others as texts.
+  absl::Status print_results();
+
   // Counts an expectation. Returns the error to raise if the expectation failed and the script stops; `error` has the
   // place of the expectation.
   absl::Status count(const absl::Status& error);

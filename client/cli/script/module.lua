@@ -78,10 +78,50 @@ function Scene:updates()
 end
 
 local no_rotation <const> = { 0, 0, 0, 1 }
+-- Returns the field `name` of a row, a list of `width` numbers; nil if it is absent and not needed.
+local function vector(what, row, name, width, is_needed)
+  local value = row[name]
+  if value == nil and not is_needed then return nil end
+  if type(value) ~= "table" or #value ~= width then
+    locus.fail(what .. ": " .. name .. " is a list of " .. width .. " numbers")
+  end
+  return value
+end
+
+-- Returns the field `name` of a row, which is no table; `default` if it is absent.
+local function scalar(what, row, name, default)
+  local value = row[name]
+  if value == nil then return default end
+  if type(value) == "table" then locus.fail(what .. ": " .. name .. " is one value, not a table") end
+  return value
+end
+
 local insert_fields <const> = fields("id at rotation layers group tag point ball box capsule")
+local capsule_fields <const> = fields("axis radius")
 function Updates:insert(row)
   check_fields("insert", row, insert_fields)
-  local shape = row.ball and "ball" or row.box and "box" or row.capsule and "capsule" or "point"
+  local shapes = {}
+  for _, name in ipairs{ "point", "ball", "box", "capsule" } do
+    if row[name] then shapes[#shapes + 1] = name end
+  end
+  if #shapes > 1 then locus.fail("insert: an object has one shape, not " .. table.concat(shapes, " and ")) end
+  local shape = shapes[1] or "point"
+  local id, at = scalar("insert", row, "id"), vector("insert", row, "at", 3, true)
+  needed("insert", row, "id")
+  local rotation = vector("insert", row, "rotation", 4) or no_rotation
+  local layers, group, tag = scalar("insert", row, "layers", 1), scalar("insert", row, "group", 0),
+    scalar("insert", row, "tag", 0)
+  local radius, size
+  if shape == "ball" then
+    radius = scalar("insert", row, "ball")
+  elseif shape == "box" then
+    size = vector("insert", row, "box", 3, true)
+  elseif shape == "capsule" then
+    check_fields("capsule", row.capsule, capsule_fields)
+    radius, size = scalar("capsule", row.capsule, "radius"), vector("capsule", row.capsule, "axis", 3, true)
+    needed("capsule", row.capsule, "radius")
+  end
+  -- Everything is checked: a refused row adds nothing.
   local insert = self.shapes[shape]
   if not insert then
     insert = { ids = {}, positions_f64 = {}, rotations = {}, layers = {}, groups = {}, tags = {}, [shape] = {} }
@@ -89,23 +129,17 @@ function Updates:insert(row)
     table.insert(self.batch.inserts, insert)
   end
   local n = #insert.ids + 1
-  insert.ids[n] = needed("insert", row, "id")
-  insert.positions_f64[n] = needed("insert", row, "at")
-  insert.rotations[n] = row.rotation or no_rotation
-  insert.layers[n] = row.layers or 1
-  insert.groups[n] = row.group or 0
-  insert.tags[n] = row.tag or 0
+  insert.ids[n], insert.positions_f64[n], insert.rotations[n] = id, at, rotation
+  insert.layers[n], insert.groups[n], insert.tags[n] = layers, group, tag
   local columns = insert[shape]
-  if shape == "ball" then
+  local size_column = shape == "box" and "half_extents" or "half_axes"
+  if radius then
     columns.radii = columns.radii or {}
-    columns.radii[n] = row.ball
-  elseif shape == "box" then
-    columns.half_extents = columns.half_extents or {}
-    columns.half_extents[n] = row.box
-  elseif shape == "capsule" then
-    columns.radii, columns.half_axes = columns.radii or {}, columns.half_axes or {}
-    columns.radii[n] = needed("capsule", row.capsule, "radius")
-    columns.half_axes[n] = needed("capsule", row.capsule, "axis")
+    columns.radii[n] = radius
+  end
+  if size then
+    columns[size_column] = columns[size_column] or {}
+    columns[size_column][n] = size
   end
   return self
 end
@@ -113,17 +147,19 @@ end
 local move_fields <const> = fields("id at rotation teleport")
 function Updates:move(row)
   check_fields("move", row, move_fields)
+  needed("move", row, "id")
+  local id, at = scalar("move", row, "id"), vector("move", row, "at", 3, true)
+  local rotation, teleport = vector("move", row, "rotation", 4), row.teleport or false
   local moves = self.batch.moves
   local move = moves[#moves]
-  local turns = row.rotation ~= nil
-  if not move or move.teleport ~= (row.teleport or false) or (move.rotations ~= nil) ~= turns then
-    move = { ids = {}, positions_f64 = {}, rotations = turns and {} or nil, teleport = row.teleport or false }
+  local turns = rotation ~= nil
+  if not move or move.teleport ~= teleport or (move.rotations ~= nil) ~= turns then
+    move = { ids = {}, positions_f64 = {}, rotations = turns and {} or nil, teleport = teleport }
     moves[#moves + 1] = move
   end
   local n = #move.ids + 1
-  move.ids[n] = needed("move", row, "id")
-  move.positions_f64[n] = needed("move", row, "at")
-  if turns then move.rotations[n] = row.rotation end
+  move.ids[n], move.positions_f64[n] = id, at
+  if turns then move.rotations[n] = rotation end
   return self
 end
 
@@ -135,13 +171,18 @@ function Updates:relabel(row)
   return self
 end
 
+local function one_value(what, value)
+  if value == nil or type(value) == "table" then locus.fail(what .. " takes one value") end
+  return value
+end
+
 function Updates:remove(id)
-  table.insert(self.batch.remove_ids, id)
+  table.insert(self.batch.remove_ids, one_value("remove", id))
   return self
 end
 
 function Updates:remove_group(group)
-  table.insert(self.batch.remove_groups, group)
+  table.insert(self.batch.remove_groups, one_value("remove_group", group))
   return self
 end
 
@@ -177,18 +218,22 @@ end
 
 -- Kinds of queries: the kind's field in a block, the columns of needed fields, and the columns and defaults of others.
 local kinds <const> = {
-  ray = { block = "rays", needs = { from = "origins", dir = "directions" }, takes = { t_max = { "t_max", math.huge } } },
+  ray = { block = "rays", needs = { from = "origins", dir = "directions" },
+    takes = { t_max = { "t_max", math.huge } }, finds_first = true },
   ball = { block = "balls", needs = { at = "centers", radius = "radii" }, takes = {} },
   box = { block = "boxes", needs = { at = "centers", half = "half_extents" },
     takes = { rotation = { "rotations", no_rotation } } },
   capsule = { block = "capsules", needs = { from = "starts", to = "ends", radius = "radii" }, takes = {} },
-  sweep = { block = "sweeps", needs = { from = "starts", to = "ends", radius = "radii" }, takes = {} },
+  sweep = { block = "sweeps", needs = { from = "starts", to = "ends", radius = "radii" }, takes = {},
+    finds_first = true },
   nearest = { block = "nearest", needs = { at = "points" }, takes = { max_distance = { "max_distances", math.huge } } },
   contains = { block = "contains", needs = { at = "points" }, takes = {} },
 }
 -- Options that are fields of the protocol's QueryBlock; other options are fields of the kind's message.
 local block_options <const> = fields("frame source precision columns max_results after_id as_of_ticks as_of_fractions "
   .. "outside_history anchor_ids count_only")
+-- Numbers in a field of a row that is a list.
+local widths <const> = { from = 3, dir = 3, to = 3, at = 3, half = 3, rotation = 4 }
 -- Fields of a row of any kind: the column of the block, and the default.
 local row_options <const> = {
   mask = { "masks", 0xFFFFFFFF }, ignore_group = { "ignore_groups", 0 }, ignore_id = { "ignore_ids", 0 },
@@ -203,10 +248,26 @@ for kind, description in pairs(kinds) do
   -- batch.
   Queries[kind] = function(self, row, options)
     check_fields(kind, row, known)
+    for name in pairs(description.needs) do needed(kind, row, name) end
+    for name in pairs(known) do
+      if widths[name] then vector(kind, row, name, widths[name]) else scalar(kind, row, name) end
+    end
     local entry = self.blocks[kind]
+    if entry and options then
+      for name, value in pairs(options) do
+        if entry.options[name] ~= value then
+          locus.fail(kind .. ": option " .. name .. " holds for all queries of this kind in a batch: give it to the first")
+        end
+      end
+    end
     if not entry then
-      entry = { rows = 0, block = {}, columns = {} }
+      entry = { rows = 0, block = {}, columns = {}, options = options or {} }
       entry.block[description.block] = entry.columns
+      for name, value in pairs(entry.options) do
+        local target = block_options[name] and entry.block or entry.columns
+        target[name] = value
+      end
+      entry.finds_first = description.finds_first
       self.blocks[kind] = entry
       self.blocks[#self.blocks + 1] = entry
       entry.number = #self.blocks
@@ -214,14 +275,10 @@ for kind, description in pairs(kinds) do
     local n = entry.rows + 1
     for name, column in pairs(description.needs) do
       entry.columns[column] = entry.columns[column] or {}
-      entry.columns[column][n] = needed(kind, row, name)
+      entry.columns[column][n] = row[name]
     end
     for name, column in pairs(description.takes) do set_optional(entry.columns, column[1], n, row[name], column[2]) end
     for name, column in pairs(row_options) do set_optional(entry.block, column[1], n, row[name], column[2]) end
-    for name, value in pairs(options or {}) do
-      local target = block_options[name] and entry.block or entry.columns
-      target[name] = value
-    end
     entry.rows = n
     self.places[#self.places + 1] = { entry.number, n }
     return self
@@ -248,61 +305,88 @@ local function row_of(answer, n)
 end
 
 -- Returns the answer to query `n` of a block: of rays and sweeps that ask for the first hit, the row or false; of those
--- that ask for any hit, a boolean; else the list of rows.
-local function answer_of(answer, n)
+-- that ask for any hit, a boolean; with count_only, the number of rows; else the list of rows, with the field
+-- `truncated` if it may lack rows.
+local function answer_of(answer, n, counts_only)
   if #answer.hits > 0 then return answer.hits:byte(n) ~= 0 end
   if #answer.counts == 0 then
     local row = row_of(answer, n)
     return row.id ~= 0 and row
   end
-  local rows = {}
+  if counts_only then return answer.counts[n] end
+  local rows = { truncated = answer.is_truncated[n] }
   for i = answer.first_rows[n], answer.first_rows[n] + answer.counts[n] - 1 do rows[#rows + 1] = row_of(answer, i) end
   return rows
+end
+
+-- Returns columns that contain the id, by which a miss is known.
+local function with_id(columns)
+  if columns == nil then return nil end
+  local names = { "id" }
+  for _, name in ipairs(columns) do
+    if name:lower() ~= "id" and name ~= "COLUMN_ID" then names[#names + 1] = name end
+  end
+  return names
 end
 
 -- Sends the batch and returns the answers in the order of the queries, and the protocol's result. `view` asks for a
 -- revision: { at_least = N } or { exactly = N }. The builder is empty afterwards.
 function Queries:run(view)
+  local entries, places = self.blocks, self.places
+  self.blocks, self.places = {}, {}
   local blocks = {}
-  for i, entry in ipairs(self.blocks) do
+  for i, entry in ipairs(entries) do
     for name, value in pairs(self.options) do
       if entry.block[name] == nil then entry.block[name] = value end
     end
+    if entry.finds_first then entry.block.columns = with_id(entry.block.columns) end
     blocks[i] = entry.block
   end
   local result = self.scene:query{ view = view, blocks = blocks }
   for _, answer in ipairs(result.blocks) do
-    answer.first_rows = {}
+    answer.first_rows, answer.is_truncated = {}, {}
     local first = 1
     for n, count in ipairs(answer.counts) do
       answer.first_rows[n] = first
       first = first + count
     end
+    for _, query in ipairs(answer.truncated) do answer.is_truncated[query + 1] = true end
   end
   local answers = {}
-  for i, place in ipairs(self.places) do answers[i] = answer_of(result.blocks[place[1]], place[2]) end
-  self.blocks, self.places = {}, {}
+  for i, place in ipairs(places) do
+    answers[i] = answer_of(result.blocks[place[1]], place[2], blocks[place[1]].count_only)
+  end
   return answers, result
 end
 
 -- Expectations. An expectation that is not met ends the script, or with --keep-going is counted and written.
-local function shown(value)
+local most_nested <const> = 8
+local function shown(value, depth)
+  depth = depth or 1
+  if type(value) == "string" then return '"' .. value .. '"' end
   if type(value) ~= "table" then return tostring(value) end
+  if depth > most_nested then return "{...}" end
   local parts = {}
-  for i, part in ipairs(value) do parts[i] = shown(part) end
+  for i, part in ipairs(value) do parts[i] = shown(part, depth + 1) end
+  for key, part in pairs(value) do
+    if math.type(key) ~= "integer" then parts[#parts + 1] = tostring(key) .. " = " .. shown(part, depth + 1) end
+  end
   return "{" .. table.concat(parts, ", ") .. "}"
 end
 
-local function near(got, wanted, within)
-  if type(wanted) == "table" then
-    if type(got) ~= "table" or #got ~= #wanted then return false end
-    for i = 1, #wanted do
-      if not near(got[i], wanted[i], within) then return false end
+local function near(got, wanted, within, depth)
+  if got == wanted then return true end
+  depth = depth or 1
+  if type(wanted) == "table" and type(got) == "table" and depth <= most_nested then
+    for key, value in pairs(wanted) do
+      if not near(got[key], value, within, depth + 1) then return false end
+    end
+    for key in pairs(got) do
+      if wanted[key] == nil then return false end
     end
     return true
   end
-  if within == 0 or type(got) ~= "number" or type(wanted) ~= "number" then return got == wanted end
-  return math.abs(got - wanted) <= within
+  return within > 0 and type(got) == "number" and type(wanted) == "number" and math.abs(got - wanted) <= within
 end
 
 function locus.expect(condition, message)
@@ -317,6 +401,7 @@ function locus.expect_equal(got, wanted, message)
 end
 
 function locus.expect_near(got, wanted, within, message)
+  if type(within) ~= "number" then locus.fail("expect_near takes GOT, WANTED and WITHIN, a number") end
   local prefix = message and message .. ": " or ""
   internal.count(near(got, wanted, within),
     prefix .. "expected " .. shown(wanted) .. " within " .. shown(within) .. ", but it is " .. shown(got))

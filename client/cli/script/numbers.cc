@@ -42,11 +42,11 @@ int concatenate(lua_State* state) {
 
 // Returns whether argument 1 is less than argument 2, one of which is a large number.
 bool less(lua_State* state) {
-  const uint64_t* const left = large_number(state, 1);
-  const uint64_t* const right = large_number(state, 2);
-  if (left != nullptr && right != nullptr) return *left < *right;
-  return left == nullptr ? luaL_checknumber(state, 1) < static_cast<double>(*right)
-                         : static_cast<double>(*left) < luaL_checknumber(state, 2);
+  const std::optional<uint64_t> left = to_unsigned(state, 1);
+  const std::optional<uint64_t> right = to_unsigned(state, 2);
+  if (left && right) return *left < *right;
+  return left ? static_cast<double>(*left) < luaL_checknumber(state, 2)
+              : luaL_checknumber(state, 1) < static_cast<double>(*large_number(state, 2));
 }
 
 int is_less(lua_State* state) {

@@ -9,6 +9,7 @@
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
+#include "absl/strings/strip.h"
 #include "client/cli/failure.h"
 #include "client/cli/run.h"
 #include "client/cli/script/words.h"
@@ -48,11 +49,31 @@ absl::StatusOr<std::vector<Line>> lines_of(const Script& script) {
   return lines;
 }
 
+// Returns the text that Lua compiles: without a byte order mark, and with a first line `#!...` as a comment.
+std::string lua_text(absl::string_view text) {
+  absl::ConsumePrefix(&text, "\xEF\xBB\xBF");
+  return absl::StrCat(absl::StartsWith(text, "#!") ? "--" : "", text);
+}
+
+// Settings of a script, by name.
+using Settings = std::vector<std::pair<std::string, std::string>>;
+
+// Sets the global table `args`. A function of Lua, since values may be larger than the limit of memory.
+int set_args(lua_State* state) {
+  lua_newtable(state);
+  for (const auto& [name, value] : *static_cast<const Settings*>(lua_touserdata(state, 1))) {
+    lua_pushlstring(state, value.data(), value.size());
+    lua_setfield(state, -2, name.c_str());
+  }
+  lua_setglobal(state, "args");
+  return 0;
+}
+
 absl::StatusOr<ScriptLanguage> language_of(const Script& script, Context& context) {
   if (absl::EndsWith(script.name, ".lua")) return ScriptLanguage::kLua;
   if (absl::EndsWith(script.name, ".locus")) return ScriptLanguage::kLines;
   Sandbox sandbox({});
-  if (sandbox.load(script.name, script.text).ok()) return ScriptLanguage::kLua;
+  if (sandbox.load(script.name, lua_text(script.text)).ok()) return ScriptLanguage::kLua;
   const absl::StatusOr<std::vector<Line>> lines = lines_of(script);
   const bool is_plain = lines.ok() && !lines->empty() && is_command(lines->front().words.front(), context);
   return is_plain ? ScriptLanguage::kLines : ScriptLanguage::kLua;
@@ -119,13 +140,10 @@ absl::Status run_lua(const Script& script, const std::vector<std::pair<std::stri
   Sandbox sandbox(limits);
   ScriptModule module(sandbox, context, after);
   lua_State* const state = sandbox.state();
-  lua_newtable(state);
-  for (const auto& [name, value] : settings) {
-    lua_pushlstring(state, value.data(), value.size());
-    lua_setfield(state, -2, name.c_str());
-  }
-  lua_setglobal(state, "args");
-  RETURN_IF_ERROR(sandbox.load(absl::StrCat("@", script.name), script.text));
+  lua_pushcfunction(state, set_args);
+  lua_pushlightuserdata(state, const_cast<Settings*>(&settings));
+  RETURN_IF_ERROR(sandbox.call(1, 0));
+  RETURN_IF_ERROR(sandbox.load(absl::StrCat("@", script.name), lua_text(script.text)));
   if (check_only) return absl::OkStatus();
   const Lines before = context.lines();
   context.set_lines(Lines::kScript);

@@ -11,6 +11,7 @@
 #include "absl/time/clock.h"
 #include "client/cli/failure.h"
 #include "client/lib/status.h"
+#include "core/base/check.h"
 
 namespace locus::cli {
 namespace {
@@ -113,6 +114,21 @@ void refuse_debug(lua_State* state) {
   lua_pop(state, 1);
 }
 
+// Searcher of require for modules in Lua, of text only: Lua's own searcher also loads compiled modules.
+int find_module(lua_State* state) {
+  lua_getglobal(state, "package");
+  lua_getfield(state, -1, "searchpath");
+  lua_pushvalue(state, 1);
+  lua_getfield(state, -3, "path");
+  lua_call(state, 2, 2);
+  if (lua_isnil(state, -2)) return 1;  // the text that lists the files that were tried
+  lua_pop(state, 1);
+  const char* const file = lua_tostring(state, -1);
+  if (luaL_loadfilex(state, file, "t") != LUA_OK) lua_error(state);
+  lua_pushstring(state, file);
+  return 2;
+}
+
 // load() of Lua, for texts only.
 int load_text(lua_State* state) {
   lua_settop(state, 4);
@@ -140,6 +156,63 @@ int set_metatable(lua_State* state) {
   return 1;
 }
 
+// Functions in Lua that replace those of the libraries whose loops or calls the limits would not end: the handler of
+// xpcall() would run without checks, as would a closing variable of a coroutine that a limit has ended, and functions
+// in C could count to 2^63.
+constexpr char kBoundedFunctions[] = R"LUA(
+local begin_coroutine, refuse_if_ended = ...
+local pcall, error, select, type = pcall, error, select, type
+local pack, unpack, resume, close = table.pack, table.unpack, coroutine.resume, coroutine.close
+local create = coroutine.create
+local most <const> = 1e8
+
+function xpcall(f, handler, ...)
+  local results = pack(pcall(f, ...))
+  if results[1] then return unpack(results, 1, results.n) end
+  return false, handler(results[2])
+end
+
+function coroutine.create(f)
+  begin_coroutine()
+  return create(f)
+end
+
+local function finish(ok, ...)
+  if ok then return ... end
+  error((...), 0)
+end
+
+function coroutine.wrap(f)
+  local thread = coroutine.create(f)
+  return function(...) return finish(resume(thread, ...)) end
+end
+
+function coroutine.close(thread)
+  refuse_if_ended()
+  return close(thread)
+end
+
+local repeated = string.rep
+function string.rep(text, count, separator)
+  if #text + #(separator or "") == 0 then return "" end
+  return repeated(text, count, separator)
+end
+
+local moved = table.move
+function table.move(from, first, last, to, target)
+  if last - first > most then error("table.move of too many values", 2) end
+  return moved(from, first, last, to, target or from)
+end
+
+for _, name in ipairs{"insert", "remove", "sort"} do
+  local whole = table[name]
+  table[name] = function(list, ...)
+    if type(list) == "table" and #list > most then error("table." .. name .. " of too many values", 2) end
+    return whole(list, ...)
+  end
+end
+)LUA";
+
 void wrap_global(lua_State* state, const char* name, lua_CFunction wrapper) {
   lua_getglobal(state, name);
   lua_pushcclosure(state, wrapper, 1);
@@ -164,11 +237,12 @@ void raise(lua_State* state, absl::Status status) {
 absl::Status status_of(lua_State* state, int index) {
   if (const ScriptError* const error = error_at(state, index))
     return error->file.empty() ? error->status : with_place(error->status, absl::StrCat(error->file, ":", error->line));
+  // Converts without metamethods, which could raise an error that nobody catches.
+  if (lua_isstring(state, index) == 0)
+    return absl::FailedPreconditionError(absl::StrCat("the error is a ", luaL_typename(state, index)));
   size_t size = 0;
-  const char* const text = luaL_tolstring(state, index, &size);
-  absl::Status status = absl::FailedPreconditionError(absl::string_view(text, size));
-  lua_pop(state, 1);
-  return status;
+  const char* const text = lua_tolstring(state, index, &size);
+  return absl::FailedPreconditionError(absl::string_view(text, size));
 }
 
 Sandbox::Sandbox(const ScriptLimits& limits) : limits_(limits), state_(lua_newstate(allocate, this), lua_close) {
@@ -197,9 +271,12 @@ void Sandbox::open_libraries() {
   refuse_function(state, "io", "popen");
   refuse_function(state, "package", "loadlib");
   refuse_debug(state);
+  refuse_function(state, "string", "dump");
   // package.searchers: 1 = preloaded modules, 2 = files of Lua, 3 and 4 = libraries of C.
   lua_getglobal(state, "package");
   lua_getfield(state, -1, "searchers");
+  lua_pushcfunction(state, find_module);
+  lua_rawseti(state, -2, 2);
   for (const int searcher : {4, 3}) {
     lua_pushnil(state);
     lua_rawseti(state, -2, searcher);
@@ -210,6 +287,14 @@ void Sandbox::open_libraries() {
   lua_pop(state, 1);
   wrap_global(state, "load", load_text);
   wrap_global(state, "setmetatable", set_metatable);
+  luaL_getmetatable(state, LUA_FILEHANDLE);
+  lua_pushliteral(state, "FILE*");
+  lua_setfield(state, -2, "__metatable");  // scripts must not replace the finalizer of files
+  lua_pop(state, 1);
+  LOCUS_CHECK_EQ(luaL_loadbufferx(state, kBoundedFunctions, sizeof kBoundedFunctions - 1, kHiddenChunk, "t"), LUA_OK);
+  lua_pushcfunction(state, begin_coroutine);
+  lua_pushcfunction(state, refuse_if_ended);
+  LOCUS_CHECK_EQ(lua_pcall(state, 2, 0, 0), LUA_OK);
   for (const char* const name : {"dofile", "loadfile"}) {
     lua_pushnil(state);
     lua_setglobal(state, name);
@@ -244,6 +329,8 @@ absl::Status Sandbox::call(int arguments, int results) {
     status = absl::ResourceExhaustedError(absl::StrCat(memory_place_, memory_place_.empty() ? "" : ": ",
                                                        "the script needs more than its limit of ",
                                                        limits_.memory_bytes >> 20, " MiB of memory (--max-memory)"));
+  } else if (code < LUA_OK) {
+    status = absl::InternalError("a function of locus has failed");  // a C++ exception, which Lua does not know
   } else {
     status = status_of(state, -1);
   }
@@ -255,6 +342,28 @@ void Sandbox::wait(absl::Duration duration) const {
   constexpr absl::Duration kPoll = absl::Milliseconds(20);
   const absl::Time end = std::min(absl::Now() + duration, deadline_);
   while (!interrupted_ && absl::Now() < end) absl::SleepFor(std::min(kPoll, end - absl::Now()));
+}
+
+// A new coroutine begins its own count, so its creation counts as a whole step.
+int Sandbox::begin_coroutine(lua_State* state) {
+  Sandbox& self = of(state);
+  self.instructions_ += kCountStep;
+  self.check(state);
+  return 0;
+}
+
+int Sandbox::refuse_if_ended(lua_State* state) {
+  of(state).check(state);
+  return 0;
+}
+
+void Sandbox::check(lua_State* state) {
+  if (ended_.ok()) check_limits(state);
+  if (ended_.ok()) return;
+  // From now on every instruction raises the error, so that the script cannot go on after it has caught the error.
+  lua_sethook(state, on_count, LUA_MASKCOUNT, 1);
+  lua_rawgetp(state, LUA_REGISTRYINDEX, &kEndError);
+  lua_error(state);
 }
 
 void* Sandbox::allocate(void* sandbox, void* block, size_t old_size, size_t size) {
@@ -282,12 +391,7 @@ void* Sandbox::allocate(void* sandbox, void* block, size_t old_size, size_t size
 void Sandbox::on_count(lua_State* state, lua_Debug*) {
   Sandbox& self = of(state);
   self.instructions_ += kCountStep;
-  if (self.ended_.ok()) self.check_limits(state);
-  if (self.ended_.ok()) return;
-  // From now on every instruction raises the error, so that the script cannot go on after it has caught the error.
-  lua_sethook(state, on_count, LUA_MASKCOUNT, 1);
-  lua_rawgetp(state, LUA_REGISTRYINDEX, &kEndError);
-  lua_error(state);
+  self.check(state);
 }
 
 void Sandbox::check_limits(lua_State* state) {

@@ -58,11 +58,17 @@ class Sandbox {
   void interrupt() { interrupted_ = true; }
   bool interrupted() const { return interrupted_; }
 
+  // Raises the error of an exceeded limit or of interrupt(). For functions in C++ that take long; also every 1,000
+  // instructions of Lua.
+  void check(lua_State* state);
+
   // Waits for `duration`, or until the script has no time left or interrupt() is called.
   void wait(absl::Duration duration) const;
 
  private:
   static void* allocate(void* sandbox, void* block, size_t old_size, size_t size);
+  static int begin_coroutine(lua_State* state);
+  static int refuse_if_ended(lua_State* state);
   static void on_count(lua_State* state, lua_Debug* unused);
   void open_libraries();
   void check_limits(lua_State* state);

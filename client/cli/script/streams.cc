@@ -2,10 +2,11 @@
 
 #include <chrono>
 #include <future>
-#include <typeinfo>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
+#include "absl/strings/str_cat.h"
 #include "client/cli/script/sandbox.h"
 #include "client/cli/script/tables.h"
 
@@ -14,23 +15,24 @@ namespace {
 
 template <class Stream, class Batch, class Answer>
 struct StreamObject {
-  static constexpr size_t kMaxUnread = 100'000;  // answers that wait for flush()
+  static constexpr const char* kName =  // of the metatable
+      std::is_same_v<Stream, client::UpdateStream> ? "locus.update_stream" : "locus.query_stream";
+  static constexpr size_t kMaxUnread = 1000;  // answers that wait for flush()
   static constexpr std::chrono::milliseconds kPoll{20};
 
   std::unique_ptr<Stream> stream;
   std::vector<std::future<absl::StatusOr<Answer>>> answers;
   uint64_t sent = 0;
 
-  static StreamObject& self(lua_State* state) {
-    return *static_cast<StreamObject*>(luaL_checkudata(state, 1, typeid(Stream).name()));
-  }
+  static StreamObject& self(lua_State* state) { return *static_cast<StreamObject*>(luaL_checkudata(state, 1, kName)); }
 
   static int send(lua_State* state) {
     StreamObject& object = self(state);
     Batch batch;
     if (absl::Status status = read_message(state, 2, batch); !status.ok()) raise(state, std::move(status));
     if (object.answers.size() >= kMaxUnread)
-      raise(state, absl::ResourceExhaustedError("100000 answers wait to be read: call flush() more often"));
+      raise(state, absl::ResourceExhaustedError(
+                       absl::StrCat(kMaxUnread, " answers wait to be read: call flush() more often")));
     object.answers.push_back(object.stream->send(std::move(batch)));
     lua_pushinteger(state, static_cast<lua_Integer>(++object.sent));
     return 1;
@@ -38,13 +40,13 @@ struct StreamObject {
 
   static int flush(lua_State* state) {
     StreamObject& object = self(state);
-    const Sandbox& sandbox = Sandbox::of(state);
+    Sandbox& sandbox = Sandbox::of(state);
     std::vector<std::future<absl::StatusOr<Answer>>> answers = std::exchange(object.answers, {});
     lua_createtable(state, static_cast<int>(answers.size()), 0);
     lua_Integer place = 0;
     for (std::future<absl::StatusOr<Answer>>& answer : answers) {
       while (answer.wait_for(kPoll) != std::future_status::ready) {
-        if (sandbox.interrupted()) raise(state, absl::CancelledError("interrupted"));
+        sandbox.check(state);
       }
       const absl::StatusOr<Answer> got = answer.get();
       got.ok() ? push_message(state, *got) : push_error(state, got.status());
@@ -66,7 +68,7 @@ struct StreamObject {
 
   static void push(lua_State* state, std::unique_ptr<Stream> stream) {
     new (lua_newuserdatauv(state, sizeof(StreamObject), 0)) StreamObject{std::move(stream), {}, 0};
-    if (luaL_newmetatable(state, typeid(Stream).name()) != 0) {
+    if (luaL_newmetatable(state, kName) != 0) {
       const luaL_Reg methods[] = {{"send", send}, {"flush", flush}, {"close", close}, {nullptr, nullptr}};
       luaL_newlib(state, methods);
       lua_setfield(state, -2, "__index");

@@ -25,6 +25,8 @@ namespace {
 namespace pb = google::protobuf;
 
 constexpr int kMaxNesting = 64;
+constexpr uint64_t kMaxValues = 16'000'000;  // in one table that is read; shared tables count each time
+constexpr uint64_t kBytesPerValue = 16;      // a text counts as one value for each of these
 
 constexpr absl::string_view kUnsignedKeys[] = {"id", "group", "tag", "other", "epoch", "missing"};
 
@@ -45,6 +47,8 @@ std::string shown(lua_State* state, int index) {
 absl::Status wrong(lua_State* state, int index, const std::string& path, absl::string_view wanted) {
   return usage_error(absl::StrCat(path, " must be ", wanted, ", not ", shown(state, index)));
 }
+
+absl::Status too_many_values() { return usage_error(absl::StrCat("the table has more than ", kMaxValues, " values")); }
 
 std::string suggestion(const std::string& word, const std::vector<std::string>& candidates) {
   const std::string similar = similar_word(word, candidates);
@@ -107,11 +111,12 @@ class MessageReader {
     const bool is_message = field.cpp_type() == pb::FieldDescriptor::CPPTYPE_MESSAGE;
     if (lua_type(state_, -1) != LUA_TTABLE) return set(field, path, message);
     const auto size = static_cast<lua_Integer>(lua_rawlen(state_, -1));
-    if (is_message && size == 0) {
+    if (size == 0) {
       lua_pushnil(state_);
       if (lua_next(state_, -2) == 0) return absl::OkStatus();  // an empty list
       lua_pop(state_, 2);
-      return set(field, path, message);  // one message
+      return is_message ? set(field, path, message)  // one message
+                        : usage_error(absl::StrCat(path, " must be a list, not a table with names"));
     }
     if (depth > 2 || lua_checkstack(state_, 4) == 0) return usage_error(absl::StrCat(path, " is nested too deeply"));
     for (lua_Integer i = 1; i <= size; ++i) {
@@ -141,6 +146,7 @@ class MessageReader {
 
   // Sets `field`, or adds to it if it is repeated, the value on top of the stack.
   absl::Status set(const pb::FieldDescriptor& field, const std::string& path, pb::Message& message) {
+    if (++values_ > kMaxValues) return too_many_values();
     const pb::Reflection& reflection = *message.GetReflection();
     const bool repeated = field.is_repeated();
     switch (field.cpp_type()) {
@@ -152,6 +158,7 @@ class MessageReader {
         if (lua_type(state_, -1) != LUA_TSTRING) return wrong(state_, -1, path, "a text");
         size_t size = 0;
         const char* const text = lua_tolstring(state_, -1, &size);
+        values_ += size / kBytesPerValue;
         repeated ? reflection.AddString(&message, &field, std::string(text, size))
                  : reflection.SetString(&message, &field, std::string(text, size));
         return absl::OkStatus();
@@ -242,6 +249,7 @@ class MessageReader {
 
   lua_State* const state_;
   int depth_ = 0;
+  uint64_t values_ = 0;
 };
 
 // Pushes the value of `field`, or its entry `i` if the field is repeated.
@@ -360,7 +368,8 @@ void push_json(lua_State* state, const Json& value, bool unsigned_text) {
   }
 }
 
-absl::StatusOr<Json> read_json(lua_State* state, int index, bool unsigned_text, int depth) {
+absl::StatusOr<Json> read_json(lua_State* state, int index, bool unsigned_text, int depth, uint64_t& values) {
+  if (++values > kMaxValues) return too_many_values();
   if (depth > kMaxNesting || lua_checkstack(state, 8) == 0) return usage_error("the table is nested too deeply");
   index = lua_absindex(state, index);
   const int type = lua_type(state, index);
@@ -378,6 +387,8 @@ absl::StatusOr<Json> read_json(lua_State* state, int index, bool unsigned_text, 
   if (type != LUA_TTABLE) {
     size_t size = 0;
     const char* const text = luaL_tolstring(state, index, &size);
+    values += size / kBytesPerValue;
+    if (values > kMaxValues) return too_many_values();
     Json value = std::string(text, size);
     lua_pop(state, 1);
     return value;
@@ -386,7 +397,7 @@ absl::StatusOr<Json> read_json(lua_State* state, int index, bool unsigned_text, 
     Json list = Json::array();
     for (lua_Unsigned i = 1; i <= lua_rawlen(state, index); ++i) {
       lua_rawgeti(state, index, static_cast<lua_Integer>(i));
-      absl::StatusOr<Json> entry = read_json(state, -1, unsigned_text, depth + 1);
+      absl::StatusOr<Json> entry = read_json(state, -1, unsigned_text, depth + 1, values);
       lua_pop(state, 1);
       RETURN_IF_ERROR(entry.status());
       list.push_back(*std::move(entry));
@@ -399,7 +410,7 @@ absl::StatusOr<Json> read_json(lua_State* state, int index, bool unsigned_text, 
   while (status.ok() && lua_next(state, index) != 0) {
     const std::string key = luaL_tolstring(state, -2, nullptr);
     lua_pop(state, 1);
-    absl::StatusOr<Json> entry = read_json(state, -1, is_unsigned_key(key), depth + 1);
+    absl::StatusOr<Json> entry = read_json(state, -1, is_unsigned_key(key), depth + 1, values);
     status = entry.status();
     if (status.ok()) entries[key] = *std::move(entry);
     lua_pop(state, status.ok() ? 1 : 2);
@@ -415,6 +426,9 @@ absl::StatusOr<Json> read_json(lua_State* state, int index, bool unsigned_text, 
 
 void push_json(lua_State* state, const Json& value) { push_json(state, value, false); }
 
-absl::StatusOr<Json> read_json(lua_State* state, int index) { return read_json(state, index, false, 0); }
+absl::StatusOr<Json> read_json(lua_State* state, int index) {
+  uint64_t values = 0;
+  return read_json(state, index, false, 0, values);
+}
 
 }  // namespace locus::cli

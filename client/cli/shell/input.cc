@@ -18,7 +18,7 @@ InputKind kind_of_input(const std::string& line, const std::vector<TableEntry>& 
   const absl::string_view rest = absl::StripLeadingAsciiWhitespace(text.substr(end));
   if (word == "help" && !absl::StartsWith(rest, "=")) return InputKind::kHelp;
   if (word == "use" && !rest.empty() && !absl::StartsWith(rest, "=")) return InputKind::kUse;
-  if (absl::StartsWith(word, "-") && !absl::StartsWith(word, "--[")) return InputKind::kCommand;
+  if (absl::StartsWith(word, "-") && word != "--" && !absl::StartsWith(word, "--[")) return InputKind::kCommand;
   const std::string path = absl::StrCat("locus ", word);
   const bool known =
       std::any_of(table.begin(), table.end(), [&](const TableEntry& entry) { return entry.path == path; });

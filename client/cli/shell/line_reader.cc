@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <clocale>
 #include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <system_error>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -36,6 +39,10 @@ class TerminalReader final : public LineReader {
         editor_(el_init("locus", stdin, stdout, stderr), el_end) {
     LOCUS_CHECK(history_ != nullptr && editor_ != nullptr);
     std::setlocale(LC_CTYPE, "");  // the encoding of the terminal's characters
+    if (MB_CUR_MAX == 1) std::setlocale(LC_CTYPE, "C.UTF-8");
+    std::error_code ignored;  // without the folder no lines are kept
+    if (!history_path_.empty())
+      std::filesystem::create_directories(std::filesystem::path(history_path_).parent_path(), ignored);
     HistEvent event;
     history(history_.get(), &event, H_SETSIZE, kHistoryLines);
     history(history_.get(), &event, H_SETUNIQUE, 1);
@@ -63,8 +70,8 @@ class TerminalReader final : public LineReader {
     dropped_ = false;
     int size = 0;
     const char* const text = el_gets(editor_.get(), &size);
-    if (text == nullptr || size <= 0) return LineEnd::kEnded;
     if (dropped_) return LineEnd::kDropped;
+    if (text == nullptr || size <= 0) return LineEnd::kEnded;
     line.assign(text, static_cast<size_t>(size));
     if (!line.empty() && line.back() == '\n') line.pop_back();
     return LineEnd::kLine;

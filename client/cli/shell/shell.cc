@@ -53,7 +53,7 @@ class Shell {
  public:
   Shell(const ScriptLimits& limits, Context& context)
       : context_(context),
-        interrupts_([this] { interrupt(); }),
+        interrupts_(std::make_unique<InterruptWatch>([this] { interrupt(); })),
         table_(table_of(context)),
         sandbox_(limits),
         module_(sandbox_, context, AfterFailure::kStop) {
@@ -67,6 +67,10 @@ class Shell {
     if (on_terminal)
       context.out() << "locus " << LOCUS_VERSION << ", server " << context.address() << "; `help` explains the shell\n";
   }
+
+  ~Shell() { interrupts_ = nullptr; }
+  Shell(const Shell&) = delete;
+  Shell& operator=(const Shell&) = delete;
 
   void run() {
     std::string input;
@@ -147,27 +151,9 @@ class Shell {
     RETURN_IF_ERROR(loaded);
     const Running running(*this);
     absl::Status status = sandbox_.call(0, LUA_MULTRET);
-    if (status.ok()) status = print_values();
+    if (status.ok()) status = module_.print_results();
     lua_settop(sandbox_.state(), 0);
     return status;
-  }
-
-  // Prints the values on the stack of Lua: tables in the format of -o, all others as texts.
-  absl::Status print_values() {
-    lua_State* const state = sandbox_.state();
-    const int values = lua_gettop(state);
-    for (int i = 1; i <= values; ++i) {
-      if (lua_isnil(state, i) && values == 1) continue;
-      if (lua_istable(state, i)) {
-        lua_getglobal(state, "locus");
-        lua_getfield(state, -1, "print");
-      } else {
-        lua_getglobal(state, "print");
-      }
-      lua_pushvalue(state, i);
-      RETURN_IF_ERROR(sandbox_.call(1, 0));
-    }
-    return absl::OkStatus();
   }
 
   // While it exists, Ctrl-C ends what runs.
@@ -205,8 +191,8 @@ class Shell {
 
   Context& context_;
   uint64_t runs_ = 0;
-  std::atomic<uint64_t> running_ = 0;  // number of the command or the Lua that runs; 0 = none
-  InterruptWatch interrupts_;
+  std::atomic<uint64_t> running_ = 0;           // number of the command or the Lua that runs; 0 = none
+  std::unique_ptr<InterruptWatch> interrupts_;  // ends before the sandbox, which it interrupts
   const std::vector<TableEntry> table_;
   Sandbox sandbox_;
   ScriptModule module_;

@@ -132,10 +132,9 @@ class GridSnapshot {
   GridBrickBounds brick_bounds(uint32_t brick) const;
 
   // Returns the union of bounds_of(value) over all values, an Aabbd that is empty for an empty snapshot.
-  // bounds_of(GridRef) returns the bounds of a value, which lie within its extent. The result is exact, unless very
-  // many (131,072) values lie within rounding errors of one side; then this side may lie farther outside, by at most
-  // 2^-16 of the largest coordinate. Cost: O(bricks), the values of a few bricks, and those of the cells at the sides;
-  // values that are certainly not at a side are only culled in float or not visited at all.
+  // bounds_of(GridRef) returns the bounds of a value, which lie within its extent. Cost: O(bricks), the values of a few
+  // bricks, and those of the cells at the sides; values that are certainly not at a side are only culled in float or
+  // not visited at all. If very many (131,072) values may lie at one side, visits at most twice as many as there are.
   template <class BoundsOf>
   Aabbd bounds(const BoundsOf& bounds_of, Work& work) const;
 
@@ -405,9 +404,9 @@ bool GridSnapshot::visit_nearest_bricks(const internal::GridLevel& level, const 
 
 // Begins with the bounds of the values in the bricks that extend farthest. Then, for each side, visits the values that
 // may extend beyond the bounds, and moves the side. If there are many, begins again with the moved side, beyond which
-// there are far fewer. If the side has hardly moved, many values lie at the side itself, within the rounding errors of
-// the culling; if there are too many to visit them all, moves the side outwards by more than these errors, unless a
-// value extends even farther.
+// there are far fewer. If the side has hardly moved, many values lie at the side itself, or are long in another
+// direction, which the culling does not know; if there are too many to visit them all, visits all values of the
+// snapshot once.
 template <class BoundsOf>
 Aabbd GridSnapshot::bounds(const BoundsOf& bounds_of, Work& work) const {
   // Maximum visits of a pass over the values beyond a side: of most passes, and of one that could not move the side.
@@ -423,6 +422,7 @@ Aabbd GridSnapshot::bounds(const BoundsOf& bounds_of, Work& work) const {
   for (auto brick = extreme.begin(); brick != extreme.end(); ++brick)
     if (std::find(extreme.begin(), brick, *brick) == brick) internal::for_each_value(**brick, visit);
   const double margin = 0x1p-16 * magnitude(outer);
+  size_t all_visits = 0;
   for (int axis = 0; axis < 3; ++axis) {
     for (const bool is_high : {false, true}) {
       double& side = (is_high ? bounds.max : bounds.min)[axis];
@@ -435,9 +435,13 @@ Aabbd GridSnapshot::bounds(const BoundsOf& bounds_of, Work& work) const {
         size_t visits = 0;
         visit_region(beyond, work, [&](const GridRef& value) { return visit(value) && ++visits < limit; });
         if (visits < limit) break;
+        all_visits += visits;
         const bool has_moved = std::abs(side - before) > margin;
-        if (!has_moved && limit == kManyVisits) side = is_high ? before + margin : before - margin;
-        limit = has_moved || limit == kManyVisits ? kFewVisits : kManyVisits;
+        if ((!has_moved && limit == kManyVisits) || all_visits > size_) {
+          for_each(visit);
+          return bounds;
+        }
+        limit = has_moved ? kFewVisits : kManyVisits;
       }
     }
   }

@@ -59,7 +59,7 @@ TEST(ProgressWriterTest, LinesAreWrittenWhileTheWorkBlocks) {
   ProgressWriter writer(written.options(ProgressStyle::kLines));
   writer.begin({.action = "building", .subject = "a tree"});
   written.wait_for(2);
-  EXPECT_THAT(written.text(), EndsWith("building a tree  1 s\n"));
+  EXPECT_THAT(written.text(), ::testing::ContainsRegex("building a tree  [1-9][0-9]* s\n"));
 }
 
 TEST(ProgressWriterTest, TheEndErasesTheLine) {

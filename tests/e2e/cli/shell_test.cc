@@ -57,6 +57,10 @@ TEST_F(ShellTest, CommandsAndLuaRunAtThePrompt) {
   shell.read_until("locus> ");
   shell.type("get --id 7\r");
   EXPECT_THAT(shell.read_until("locus> "), HasSubstr("0.0,0.0,0.0"));
+  shell.type("locus, print = nil, nil\r");
+  shell.read_until("locus> ");
+  shell.type("5, {id = 6}\r");
+  EXPECT_THAT(shell.read_until("locus> "), AllOf(HasSubstr("\r\n5\r\n"), HasSubstr("6")));
   shell.type("exit\r");
   EXPECT_EQ(shell.wait(), 0);
 }
@@ -73,6 +77,8 @@ TEST_F(ShellTest, StatementsOfSeveralLinesAreReadToTheirEnd) {
   shell.type("for i = 1, 3 do\r");
   shell.read_until("...> ");
   shell.type(kCtrlC);
+  EXPECT_THAT(shell.read_until("locus> "), Not(HasSubstr("error")));
+  shell.type(kCtrlC);  // on an empty line
   shell.read_until("locus> ");
   shell.type("1 + 1\r");
   EXPECT_THAT(shell.read_until("locus> "), HasSubstr("\r\n2\r\n"));

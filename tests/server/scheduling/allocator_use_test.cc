@@ -8,6 +8,8 @@
 #include <memory>
 #include <vector>
 
+#include "tests/support/sanitized_build.h"
+
 namespace locus::server {
 namespace {
 
@@ -25,9 +27,7 @@ AllocatorUse use_now() {
 }
 
 TEST(AllocatorUseTest, FreedMemoryIsReusableUntilItIsReturned) {
-#ifdef __SANITIZE_ADDRESS__
-  GTEST_SKIP() << "AddressSanitizer replaces the allocator";
-#endif
+  if (test::kSanitizedBuild) GTEST_SKIP() << "a sanitizer replaces the allocator";
   const AllocatorUse before = use_now();
   Blocks blocks;
   for (size_t i = 0; i < kCount; ++i) {

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <thread>
 
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
 #include "client/lib/query_builder.h"
 #include "client/lib/status.h"
 #include "client/lib/update_builder.h"
@@ -21,6 +23,7 @@ constexpr float kRegionShare = 0.02f;  // largest size of a region, as part of t
 constexpr uint32_t kNearestCount = 4;
 constexpr float kObjectRadius = 0.5f;
 constexpr std::chrono::milliseconds kProgressPause{50};
+constexpr absl::Duration kRefusalPause = absl::Milliseconds(10);  // shortest wait after a refused batch
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -59,20 +62,21 @@ class Connection {
 
   // Sends batches one after another until `done`. Adds the items to `items` as they are answered.
   absl::Status run(const std::atomic<bool>& done, std::atomic<uint64_t>& items) {
-    while (!done.load(std::memory_order_relaxed)) {
+    do {
       const Clock::time_point start = Clock::now();
       uint64_t answered = 0;
       const absl::Status status = updates_ != nullptr ? move(answered) : query(answered);
       if (!status.ok()) {
-        if (!client::refused_by_server(status)) return status;
+        if (!absl::IsResourceExhausted(status)) return status;  // the next batch would fail, too
         ++figures_.refused;
+        absl::SleepFor(std::max(client::retry_after(status), kRefusalPause));
         continue;
       }
       figures_.milliseconds.push_back(1000 * seconds_since(start));
       ++figures_.batches;
       figures_.items += answered;
       items.fetch_add(answered, std::memory_order_relaxed);
-    }
+    } while (!done.load(std::memory_order_relaxed));
     return updates_ != nullptr ? updates_->close() : queries_->close();
   }
 

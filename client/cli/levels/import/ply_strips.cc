@@ -44,6 +44,7 @@ class FaceWriter {
   }
 
   uint64_t faces() const { return faces_; }
+  uint64_t vertices() const { return vertices_; }
   std::string take_bytes() { return std::move(bytes_); }
 
  private:
@@ -76,11 +77,11 @@ class FaceWriter {
 
 bool is_strips(const PlyElement& element) { return element.name == kStrips && element.count > 0; }
 
-// Returns the index at the front of `bytes`; kRestart if all its bits are set.
-int64_t read_index(const PlyProperty& property, PlyEncoding encoding, absl::string_view bytes) {
+// Returns the index at the front of `bytes`; kRestart if all its bits are set, unless this is the number of a vertex.
+int64_t read_index(const PlyProperty& property, PlyEncoding encoding, uint64_t vertices, absl::string_view bytes) {
   const uint64_t value = read_ply_integer(bytes, property.value_bytes, encoding);
   const uint64_t ones = property.value_bytes == 8 ? UINT64_MAX : (uint64_t{1} << (8 * property.value_bytes)) - 1;
-  if (value == ones) return kRestart;
+  if (value == ones && (property.value_is_signed || value >= vertices)) return kRestart;
   const bool negative = property.value_is_signed && value >> (8 * property.value_bytes - 1) != 0;
   return negative ? INT64_MIN : static_cast<int64_t>(value);
 }
@@ -94,7 +95,7 @@ absl::Status read_binary_row(const PlyElement& element, uint64_t row, PlyEncodin
     return ends_within(element, row);
   faces.restart();
   for (; count > 0; --count) {
-    RETURN_IF_ERROR(faces.add(read_index(property, encoding, body)));
+    RETURN_IF_ERROR(faces.add(read_index(property, encoding, faces.vertices(), body)));
     body.remove_prefix(property.value_bytes);
   }
   return absl::OkStatus();

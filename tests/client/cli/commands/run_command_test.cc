@@ -375,6 +375,80 @@ TEST_F(RunCommandTest, LimitsEndAScriptWithPlaceAndLimitAndHarmNothing) {
   EXPECT_EQ(run({"health"}).code, ExitCode::kOk);
 }
 
+TEST_F(RunCommandTest, WordsOfCommandsAreFlat) {
+  const Outcome outcome = run_lua(R"(
+local loop = {}
+loop[1] = loop
+for _, word in ipairs{loop, {{1}}, {}, print, {a = 1}} do locus.expect_error("USAGE", locus.command, "scene list", word) end
+locus.expect_error("USAGE", locus.command, "scene list", nil, "x")
+)");
+  EXPECT_EQ(outcome.code, ExitCode::kOk) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("6 expectations passed"));
+}
+
+TEST_F(RunCommandTest, EqualTablesHaveEqualFields) {
+  const Outcome outcome = run_lua(R"(
+locus.expect_equal({a = 1, b = {2}}, {a = 1, b = {2}})
+locus.expect_equal({a = 1}, {a = 2})
+locus.expect_equal({a = 1}, {})
+locus.expect_equal({}, {a = 1})
+locus.expect_equal("7", 7)
+)",
+                                  {"--keep-going"});
+  EXPECT_THAT(outcome.err, HasSubstr("1 expectations passed, 4 failed"));
+  EXPECT_THAT(outcome.err, HasSubstr("expected {a = 2}, but it is {a = 1}"));
+  EXPECT_THAT(outcome.err, HasSubstr("expected 7, but it is \"7\""));
+}
+
+TEST_F(RunCommandTest, ARefusedRowAddsNothing) {
+  const Outcome outcome = run_lua(R"(
+local scene = locus.scene("rows")
+scene:delete{if_present = true}
+scene:create()
+local updates = scene:updates()
+for _, row in ipairs{{id = 1}, {at = {0, 0, 0}}, {id = 1, at = {1, 2}}, {id = 1, at = {1, 2, 3, 4}},
+                     {id = 1, at = {x = 1}}, {id = 1, at = {0, 0, 0}, group = {}}, {id = 1, at = {0, 0, 0}, ball = 1, box = {1, 1, 1}},
+                     {id = 1, at = {0, 0, 0}, capsule = {radius = 1}}, {id = 1, at = {0, 0, 0}, rotation = {}}} do
+  locus.expect_error("FAILED_PRECONDITION", updates.insert, updates, row)
+end
+locus.expect_error("FAILED_PRECONDITION", updates.remove, updates)
+locus.expect_equal(updates:insert{id = 2, at = {0, 0, 0}, ball = 1}:commit().applied, 1)
+local queries = scene:queries{columns = {"t"}}
+locus.expect_error("FAILED_PRECONDITION", queries.ray, queries, {from = {0, 0}, dir = {0, 0, 1}})
+queries:ray{from = {0, 0, 9}, dir = {0, 0, 1}}:ray{from = {0, 0, 9}, dir = {0, 0, -1}}
+locus.expect_error("FAILED_PRECONDITION", queries.ray, queries, {from = {0, 0, 9}, dir = {0, 0, 1}}, {mode = "any"})
+local answers = queries:run()
+locus.expect_equal(answers[1], false)
+locus.expect_near(answers[2].t, 8, 1e-6)
+queries:ball{at = {0, 0, 0}, radius = -1}
+locus.expect(not pcall(queries.run, queries))
+locus.expect_equal(#scene:queries():ball{at = {0, 0, 0}, radius = 1}:run()[1], 1)
+locus.expect_equal(scene:queries{count_only = true}:ball{at = {0, 0, 0}, radius = 1}:run()[1], 1)
+)");
+  EXPECT_EQ(outcome.code, ExitCode::kOk) << outcome.err;
+}
+
+TEST_F(RunCommandTest, CutAnswersSayIt) {
+  const Outcome outcome = run_lua(R"(
+local scene = locus.scene("cut")
+scene:delete{if_present = true}
+scene:create()
+local updates = scene:updates()
+for i = 1, 10 do updates:insert{id = i, at = {0, 0, 0}} end
+updates:commit()
+local answers = scene:queries{max_results = 5}:ball{at = {0, 0, 0}, radius = 1}:ball{at = {9, 0, 0}, radius = 1}:run()
+locus.expect_equal(#answers[1], 5)
+locus.expect_equal(answers[1].truncated, true)
+locus.expect_equal(answers[2].truncated, nil)
+)");
+  EXPECT_EQ(outcome.code, ExitCode::kOk) << outcome.err;
+}
+
+TEST_F(RunCommandTest, ScriptsMayBeginAsPrograms) {
+  EXPECT_EQ(run_lua("#!/usr/bin/env -S locus run\nprint(1)").out, "1\n");
+  EXPECT_EQ(run_lua("\xEF\xBB\xBFprint(1)").out, "1\n");
+}
+
 TEST_F(RunCommandTest, PrintWritesTablesInTheFormatOfTheOutput) {
   const std::string text = "locus.print({{id = 1, t = 0.5}, {id = 2}}, {'id', 't'})\nlocus.print({revision = 5})\n";
   EXPECT_EQ(run_lua(text, {"-o", "csv"}).out, "id,t\n1,0.5\n2,\nrevision\n5\n");

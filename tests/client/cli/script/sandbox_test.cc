@@ -5,9 +5,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fstream>
 #include <thread>
 
 #include "client/cli/failure.h"
+#include "tests/support/temporary_folder.h"
 
 namespace locus::cli {
 namespace {
@@ -38,6 +40,14 @@ TEST(SandboxTest, EndlessLoopsEndWithPlaceAndLimit) {
            "\ntable.sort({1, 2, 3}, function() while true do end end)",
            "\nlocal t <close> = setmetatable({}, {__close = function() while true do end end}) while true do end",
            "\nload('while true do end')()",
+           "\nxpcall(function() while true do end end, function() while true do end end)",
+           "\nxpcall(error, function() while true do end end)",
+           "\nlocal function f(d) if d == 0 then return end for i = 1, 50 do coroutine.wrap(f)(d - 1) end end"
+           " for i = 1, 10 do coroutine.wrap(f)(100) end",
+           "\nlocal function f() local t <close> = setmetatable({}, {__close = function() while true do end end})"
+           " while true do end end coroutine.wrap(f)()",
+           "\nlocal function f() local t <close> = setmetatable({}, {__close = function() while true do end end})"
+           " while true do end end local c = coroutine.create(f) coroutine.resume(c) coroutine.close(c)",
        }) {
     const absl::Status status = run(text, kFewInstructions);
     EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted) << text << status;
@@ -111,10 +121,55 @@ TEST(SandboxTest, FunctionsThatReachBeyondTheScriptNeedUnsafe) {
 TEST(SandboxTest, ModulesInCAndCompiledTextsAreRefused) {
   EXPECT_THAT(message_of(run("require('lfs')")), HasSubstr("module 'lfs' not found"));
   EXPECT_EQ(run("assert(#package.searchers == 2 and package.cpath == '')"), absl::OkStatus());
-  EXPECT_EQ(run("assert(load(string.dump(function() end)) == nil)"), absl::OkStatus());
-  EXPECT_EQ(run("assert(load(string.dump(function() end), 'x', 'b') == nil)"), absl::OkStatus());
+  EXPECT_EQ(run("assert(load('\\27LuaT') == nil)"), absl::OkStatus());
+  EXPECT_EQ(run("assert(load('\\27LuaT', 'x', 'b') == nil)"), absl::OkStatus());
   EXPECT_EQ(run("assert(load('return a', 'x', 't', {a = 5})() == 5)"), absl::OkStatus());
   EXPECT_EQ(exit_code_of(run("\x1bLua")), ExitCode::kUsage);
+}
+
+TEST(SandboxTest, RequireLoadsModulesInLuaButNoCompiledOnes) {
+  const test::TemporaryFolder folder;
+  std::ofstream(folder.file("good.lua")) << "return {value = 5}";
+  std::ofstream(folder.file("compiled.lua"), std::ios::binary) << "\x1bLuaT";
+  const std::string path = "package.path = '" + folder.file("?.lua") + "' ";
+  EXPECT_EQ(run(path + "assert(require('good').value == 5)"), absl::OkStatus());
+  EXPECT_THAT(message_of(run(path + "require('compiled')")), HasSubstr("attempt to load a binary chunk"));
+  EXPECT_THAT(message_of(run("string.dump(print)")), HasSubstr("string.dump is not available"));
+}
+
+TEST(SandboxTest, FilesKeepTheirFinalizer) {
+  EXPECT_EQ(run("assert(getmetatable(io.stdout) == 'FILE*')"), absl::OkStatus());
+}
+
+TEST(SandboxTest, FunctionsInCCountOnlyToABound) {
+  EXPECT_THAT(message_of(run("table.move({}, 1, math.maxinteger - 1, 2)")), HasSubstr("too many values"));
+  EXPECT_THAT(
+      message_of(run("table.insert(setmetatable({}, {__len = function() return math.maxinteger - 1 end}), 1, 5)")),
+      HasSubstr("too many values"));
+  EXPECT_EQ(run("assert(string.rep('', math.maxinteger) == '' and ('ab'):rep(2, '-') == 'ab-ab')"), absl::OkStatus());
+  EXPECT_EQ(
+      run("local t = {3, 1, 2} table.sort(t) table.insert(t, 4) table.insert(t, 1, 0) assert(table.concat(t) == '01234'"
+          " and table.remove(t) == 4 and table.remove(t, 1) == 0 and #table.move(t, 1, 3, 2) == 4)"),
+      absl::OkStatus());
+}
+
+TEST(SandboxTest, CoroutinesAndHandlersWorkAsInLua) {
+  EXPECT_EQ(run("local next = coroutine.wrap(function(a) local b = coroutine.yield(a + 1) return a + b end)"
+                " assert(next(1) == 2 and next(5) == 6)"
+                " local ok, e = pcall(coroutine.wrap(function() error('x', 0) end)) assert(not ok and e == 'x')"
+                " local co = coroutine.create(function() coroutine.yield() end) coroutine.resume(co)"
+                " assert(coroutine.close(co) and coroutine.status(co) == 'dead')"
+                " assert(select('#', xpcall(function() return 1, nil end, print)) == 3)"
+                " assert(select(2, xpcall(error, function(e) return e .. '!' end, 'x')) == 'x!')"),
+            absl::OkStatus());
+}
+
+TEST(SandboxTest, ErrorsOfEveryTypeHaveAText) {
+  for (const char* text : {"error(setmetatable({}, {__tostring = function() error('x') end}))",
+                           "error(setmetatable({}, {__tostring = function() while true do end end}))", "error({})",
+                           "error(print)", "error()"}) {
+    EXPECT_THAT(message_of(run(text, kFewInstructions)), HasSubstr("the error is a ")) << text;
+  }
 }
 
 TEST(SandboxTest, ErrorsNameFileAndLine) {

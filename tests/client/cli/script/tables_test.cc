@@ -68,7 +68,7 @@ TEST_F(TablesTest, LargeNumbersCompareWithAllNumbers) {
   push_unsigned(state(), 1ull << 63);
   expect_true(
       "value < most and value <= value and not (value < value) and most > 5 and 5 < value and -1.5 < value and"
-      " not (value < 7) and value >= 7 and value ~= most");
+      " not (value < 7) and value >= 7 and value ~= most and math.maxinteger < value and value > math.maxinteger");
 }
 
 TEST_F(TablesTest, ValuesThatAreNoUnsignedNumbersAreRefused) {
@@ -134,6 +134,7 @@ TEST_F(TablesTest, MistakesNameTheFieldAndTheNearestOne) {
       {"{explain = 1}", "explain must be true or false, not 1"},
       {"{view = 5}", "view must be a table, not 5"},
       {"{blocks = 5}", "blocks must be a table, not 5"},
+      {"{blocks = {{masks = {x = 1}}}}", "blocks[1].masks must be a list, not a table with names"},
   };
   for (const auto& [table, message] : cases) {
     v1::QueryBatch batch;
@@ -150,6 +151,13 @@ TEST_F(TablesTest, TablesThatContainThemselvesAreRefused) {
   EXPECT_FALSE(read("{blocks = {{masks = loop}}}", batch).ok());
   evaluate("loop");
   EXPECT_FALSE(read_json(state(), -1).ok());
+}
+
+TEST_F(TablesTest, SharedTablesCountEachTime) {
+  ASSERT_EQ(sandbox_.load("=test", "shared = {} for i = 1, 60 do shared = {shared, shared} end"), absl::OkStatus());
+  ASSERT_EQ(sandbox_.call(0, 0), absl::OkStatus());
+  evaluate("shared");
+  EXPECT_THAT(read_json(state(), -1).status().message(), HasSubstr("more than 16000000 values"));
 }
 
 TEST_F(TablesTest, MessagesBecomeTables) {

@@ -25,6 +25,7 @@ TEST(InputTest, CommandsAndLuaAreDistinguished) {
       {"print(1)", InputKind::kLua},
       {"1 + 1", InputKind::kLua},
       {"--[[ a comment ]]", InputKind::kLua},
+      {"-- a comment", InputKind::kLua},
       {"help", InputKind::kHelp},
       {"help query ray", InputKind::kHelp},
       {"help = 1", InputKind::kLua},

@@ -97,7 +97,7 @@ class MeshesTest(DaemonTest):
     def test_the_server_chooses_ids_if_none_are_given(self):
         self.client.upload_mesh("square", *SQUARE)
         placed = self.client.change_instances(self.scene, InstanceChange().place("square", [[0, 0, 0], [5, 0, 0]]))
-        self.assertTrue(all(one >= 2**63 for one in listed(placed.ids)))
+        self.assertTrue(all(2**32 <= one < 2**33 for one in listed(placed.ids)))
         self.assertEqual(len(placed.ids), 2)
 
     def test_a_change_is_accepted_without_waiting(self):
