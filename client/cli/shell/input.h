@@ -15,6 +15,13 @@ enum class InputKind { kNothing, kHelp, kUse, kEnd, kCommand, kLua };
 // or index of Lua, such as `scene = 1` or `query(1)`. A line that begins with an option is a command, too.
 InputKind kind_of_input(const std::string& line, const std::vector<TableEntry>& table);
 
+// Returns `line` without the word `locus` before a command of `table`, as lines of a system shell have it.
+std::string without_program(const std::string& line, const std::vector<TableEntry>& table);
+
+// Returns "`WORD` is no command; did you mean `OTHER`?" for the first word of a line that is neither a command nor Lua;
+// empty if no command of `table` is similar to the word.
+std::string unknown_command(const std::string& line, const std::vector<TableEntry>& table);
+
 }  // namespace locus::cli
 
 #endif  // LOCUS_CLIENT_CLI_SHELL_INPUT_H_

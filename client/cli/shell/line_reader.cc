@@ -69,6 +69,8 @@ class TerminalReader final : public LineReader {
     prompt_ = prompt;
     dropped_ = false;
     int size = 0;
+    // Before the prompt: el_gets() would do it after the prompt, and Ctrl-D or Ctrl-C typed in between would be lost.
+    el_set(editor_.get(), EL_PREP_TERM, 1);
     const char* const text = el_gets(editor_.get(), &size);
     if (dropped_) return LineEnd::kDropped;
     if (text == nullptr || size <= 0) return LineEnd::kEnded;

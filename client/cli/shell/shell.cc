@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <iostream>
 #include <memory>
@@ -79,6 +80,7 @@ class Shell {
       const LineEnd end = reader_->read(kPrompt, input);
       if (end == LineEnd::kEnded) break;
       if (end == LineEnd::kDropped) continue;
+      input = without_program(input, table_);
       const InputKind kind = kind_of_input(input, table_);
       if (kind == InputKind::kEnd) break;
       absl::Status status = run_input(kind, input);
@@ -148,12 +150,31 @@ class Shell {
       absl::StrAppend(&input, "\n", line);
       loaded = sandbox_.load(kChunk, input);
     }
+    if (const std::string advice = unknown_command(input, table_);
+        !advice.empty() && (!loaded.ok() || is_undefined(input))) {
+      lua_settop(sandbox_.state(), 0);
+      return usage_error(advice);
+    }
     RETURN_IF_ERROR(loaded);
     const Running running(*this);
     absl::Status status = sandbox_.call(0, LUA_MULTRET);
     if (status.ok()) status = module_.print_results();
     lua_settop(sandbox_.state(), 0);
     return status;
+  }
+
+  // Returns whether `input` is only the name of a global variable that does not exist.
+  bool is_undefined(const std::string& input) {
+    const std::string name(absl::StripAsciiWhitespace(input));
+    const bool is_name =
+        std::all_of(name.begin(), name.end(), [](unsigned char c) { return absl::ascii_isalnum(c) || c == '_'; });
+    if (!is_name) return false;
+    lua_State* const state = sandbox_.state();
+    lua_pushglobaltable(state);
+    lua_pushlstring(state, name.data(), name.size());
+    const bool undefined = lua_rawget(state, -2) == LUA_TNIL;
+    lua_pop(state, 2);
+    return undefined;
   }
 
   // While it exists, Ctrl-C ends what runs.

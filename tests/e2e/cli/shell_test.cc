@@ -46,7 +46,11 @@ TEST_F(ShellTest, CommandsAndLuaRunAtThePrompt) {
   shell.type("query ball world --at 0,0,0 --radius 1\r");
   EXPECT_THAT(shell.read_until("locus> "), HasSubstr("7"));
   shell.type("qury ball\r");
-  EXPECT_THAT(shell.read_until("locus> "), HasSubstr("error: "));
+  EXPECT_THAT(shell.read_until("locus> "), HasSubstr("error: `qury` is no command; did you mean `query`?"));
+  shell.type("limts\r");
+  EXPECT_THAT(shell.read_until("locus> "), HasSubstr("did you mean `limits`?"));
+  shell.type("locus scene list\r");
+  EXPECT_THAT(shell.read_until("locus> "), AllOf(HasSubstr("world"), Not(HasSubstr("error"))));
   shell.type("query bal world\r");
   EXPECT_THAT(shell.read_until("locus> "), HasSubstr("did you mean `ball`?"));
   shell.type("error('thrown')\r");

@@ -39,5 +39,21 @@ TEST(InputTest, CommandsAndLuaAreDistinguished) {
   for (const auto& [line, kind] : cases) EXPECT_EQ(kind_of_input(line, table), kind) << line;
 }
 
+TEST(InputTest, TheProgramsNameMayPrecedeACommand) {
+  const std::vector<TableEntry> table = {{"locus", {}}, {"locus scene", {}}};
+  EXPECT_EQ(without_program("locus scene list", table), "scene list");
+  EXPECT_EQ(without_program("locus.scene('a')", table), "locus.scene('a')");
+  EXPECT_EQ(without_program("locus = 1", table), "locus = 1");
+}
+
+TEST(InputTest, TheNearestCommandIsNamed) {
+  const std::vector<TableEntry> table = {
+      {"locus", {}}, {"locus limits", {}}, {"locus query", {}}, {"locus query ray", {}}};
+  EXPECT_EQ(unknown_command("qurey ray arena", table), "`qurey` is no command; did you mean `query`?");
+  EXPECT_EQ(unknown_command(" limts ", table), "`limts` is no command; did you mean `limits`?");
+  EXPECT_EQ(unknown_command("nonsense", table), "");
+  EXPECT_EQ(unknown_command("limts = (1", table), "") << "Lua with a mistake";
+}
+
 }  // namespace
 }  // namespace locus::cli
