@@ -29,7 +29,7 @@ ByteUnit byte_unit_of(double scale) {
 
 std::string bytes_text(double bytes) {
   const ByteUnit unit = byte_unit_of(bytes);
-  return absl::StrFormat(unit.size == 1 ? "%.0f %s" : "%.1f %s", bytes / unit.size, unit.name);
+  return absl::StrFormat("%.*f %s", unit.size == 1 ? 0 : 1, bytes / unit.size, unit.name);
 }
 
 std::string amount_text(const ProgressPhase& phase, uint64_t done) {
@@ -39,13 +39,14 @@ std::string amount_text(const ProgressPhase& phase, uint64_t done) {
   }
   if (phase.total == 0) return bytes_text(static_cast<double>(done));
   const ByteUnit unit = byte_unit_of(static_cast<double>(phase.total));
-  return absl::StrFormat(unit.size == 1 ? "%.0f of %.0f %s" : "%.1f of %.1f %s", static_cast<double>(done) / unit.size,
+  const int digits = unit.size == 1 ? 0 : 1;
+  return absl::StrFormat("%.*f of %.*f %s", digits, static_cast<double>(done) / unit.size, digits,
                          static_cast<double>(phase.total) / unit.size, unit.name);
 }
 
 std::string rate_text(const ProgressPhase& phase, double rate) {
   if (phase.unit == kProgressBytes) return absl::StrCat(bytes_text(rate), "/s");
-  return absl::StrFormat(rate < 10 ? "%.1f/s" : "%.0f/s", rate);
+  return absl::StrFormat("%.*f/s", rate < 10 ? 1 : 0, rate);
 }
 
 std::string duration_text(double seconds) {
