@@ -3,9 +3,9 @@
 #include <functional>
 #include <thread>
 
+#include "core/base/sanitized_build.h"
 #include "tests/support/daemon_process.h"
 #include "tests/support/rpc_test.h"
-#include "tests/support/sanitized_build.h"
 
 namespace locus::test {
 namespace {

@@ -360,7 +360,7 @@ int Sandbox::refuse_if_ended(lua_State* state) {
 void Sandbox::check(lua_State* state) {
   if (ended_.ok()) check_limits(state);
   if (ended_.ok()) return;
-  // From now on every instruction raises the error, so that the script cannot go on after it has caught the error.
+  // Raise the error at every instruction from now on, so that the script cannot go on after it has caught the error.
   lua_sethook(state, on_count, LUA_MASKCOUNT, 1);
   lua_rawgetp(state, LUA_REGISTRYINDEX, &kEndError);
   lua_error(state);

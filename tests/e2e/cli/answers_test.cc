@@ -15,14 +15,7 @@ using ::testing::StartsWith;
 
 class AnswersTest : public RpcTest {
  protected:
-  Outcome run(std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), {"--address", running_.address()});
-    std::ostringstream out;
-    std::ostringstream err;
-    cli::Context context(out, err, cli::Progress::kSilent);
-    const cli::ExitCode code = cli::run_line(arguments, context);
-    return {code, out.str(), err.str()};
-  }
+  Outcome run(const std::vector<std::string>& arguments) { return run_cli(running_.address(), arguments); }
 
   std::string out_of(const std::vector<std::string>& arguments) {
     const Outcome outcome = run(arguments);

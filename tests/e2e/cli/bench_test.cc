@@ -14,14 +14,7 @@ using ::testing::HasSubstr;
 
 class BenchTest : public RpcTest {
  protected:
-  Outcome run(std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), {"--address", running_.address()});
-    std::ostringstream out;
-    std::ostringstream err;
-    cli::Context context(out, err, cli::Progress::kSilent);
-    const cli::ExitCode code = cli::run_line(arguments, context);
-    return {code, out.str(), err.str()};
-  }
+  Outcome run(const std::vector<std::string>& arguments) { return run_cli(running_.address(), arguments); }
 
   Json json_of(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), {"-o", "json"});

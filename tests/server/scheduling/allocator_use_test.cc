@@ -8,7 +8,7 @@
 #include <memory>
 #include <vector>
 
-#include "tests/support/sanitized_build.h"
+#include "core/base/sanitized_build.h"
 
 namespace locus::server {
 namespace {
@@ -27,7 +27,7 @@ AllocatorUse use_now() {
 }
 
 TEST(AllocatorUseTest, FreedMemoryIsReusableUntilItIsReturned) {
-  if (test::kSanitizedBuild) GTEST_SKIP() << "a sanitizer replaces the allocator";
+  if (kSanitizedBuild) GTEST_SKIP() << "a sanitizer replaces the allocator";
   const AllocatorUse before = use_now();
   Blocks blocks;
   for (size_t i = 0; i < kCount; ++i) {

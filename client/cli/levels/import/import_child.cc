@@ -18,8 +18,8 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/cli/levels/import/import_error.h"
-#include "client/cli/levels/import/sanitized_build.h"
 #include "client/cli/levels/import/syscall_filter.h"
+#include "core/base/sanitized_build.h"
 #include "core/base/status_macros.h"
 
 namespace locus::cli {

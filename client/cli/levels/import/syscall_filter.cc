@@ -10,7 +10,7 @@
 #include <memory>
 #include <type_traits>
 
-#include "client/cli/levels/import/sanitized_build.h"
+#include "core/base/sanitized_build.h"
 
 namespace locus::cli {
 namespace {

@@ -34,9 +34,15 @@ Aabbd walked_bounds(const ObjectSet& objects) {
   return bounds;
 }
 
-Aabbd grid_bounds(const ObjectSet& objects) {
+// Returns the bounds that the grid finds, and adds the number of visited objects to `visits`.
+Aabbd grid_bounds(const ObjectSet& objects, size_t& visits) {
   Work work;
-  return objects.grid().bounds([](const GridRef& object) { return bounds_of(shape_of(object)); }, work);
+  return objects.grid().bounds(
+      [&visits](const GridRef& object) {
+        ++visits;
+        return bounds_of(shape_of(object));
+      },
+      work);
 }
 
 TEST_F(SceneSummaryTest, BoundsEqualThoseOfAWalkAfterRandomUpdates) {
@@ -69,7 +75,8 @@ TEST_F(SceneSummaryTest, BoundsEqualThoseOfAWalkAfterRandomUpdates) {
       }
       store.apply(removed, inserted);
       const ObjectSet objects = store.snapshot();
-      ASSERT_EQ(grid_bounds(objects), walked_bounds(objects)) << "seed " << seed << ", step " << step;
+      size_t visits = 0;
+      ASSERT_EQ(grid_bounds(objects, visits), walked_bounds(objects)) << "seed " << seed << ", step " << step;
     }
   }
 }
@@ -92,13 +99,7 @@ TEST_F(SceneSummaryTest, BoundsOfManyObjectsAtOneSideVisitAtMostTwiceAsMany) {
     store.apply({}, flat);
     const ObjectSet objects = store.snapshot();
     size_t visits = 0;
-    Work work;
-    const Aabbd bounds = objects.grid().bounds(
-        [&visits](const GridRef& object) {
-          ++visits;
-          return bounds_of(shape_of(object));
-        },
-        work);
+    const Aabbd bounds = grid_bounds(objects, visits);
     EXPECT_EQ(bounds, walked_bounds(objects)) << size.x;
     EXPECT_LT(visits, 3 * kCount) << size.x;
   }
@@ -116,13 +117,7 @@ TEST_F(SceneSummaryTest, BoundsVisitFewOfManyObjects) {
   store.apply({}, balls);
   const ObjectSet objects = store.snapshot();
   size_t visits = 0;
-  Work work;
-  const Aabbd bounds = objects.grid().bounds(
-      [&visits](const GridRef& object) {
-        ++visits;
-        return bounds_of(shape_of(object));
-      },
-      work);
+  const Aabbd bounds = grid_bounds(objects, visits);
   EXPECT_EQ(bounds, walked_bounds(objects));
   EXPECT_LT(visits, kCount / 20);
 }

@@ -18,7 +18,7 @@
 #include <stdexcept>
 #include <thread>
 
-#include "client/cli/levels/import/sanitized_build.h"
+#include "core/base/sanitized_build.h"
 #include "tests/client/cli/levels/import/test_files.h"
 #include "tests/support/machine_features.h"
 

@@ -4,7 +4,7 @@
 
 #include "client/cli/levels/import/import_child.h"
 #include "client/cli/levels/import/import_file.h"
-#include "client/cli/levels/import/sanitized_build.h"
+#include "core/base/sanitized_build.h"
 #include "tests/client/cli/levels/import/test_files.h"
 #include "tests/support/machine_features.h"
 
