@@ -17,6 +17,7 @@ enum class PlantedBug {
   kRewindFastBox,      // after a far move of an object, its shorter moves later in the same tick are not recorded
   kUnpaddedNear,       // the slab test of tree nodes does not pad the near side
   kEdgeOnInDouble,     // nearly edge-on triangles are tested only in double, like all other triangles
+  kSparseBrickBounds,  // the bounds of a level of wider cells contain only the centres of its bricks
   kGridBallMargin,     // the float culling of ball queries in the grid omits the error bound
   kNearestLimit,       // a nearest query also prunes boxes at exactly the distance of its farthest result
   kNearestTreePad,     // distances to boxes of triangles are compared in float without the pad

@@ -130,6 +130,7 @@ constexpr Trial kTrials[] = {
     {"TreeThatLeavesOutWhatIsAsFar", PlantedBug::kNearestLimit, compare_trees_with_list},
     {"TreeWithUnpaddedDistances", PlantedBug::kNearestTreePad, compare_triangle_trees_with_list},
     {"GridThatDropsACell", PlantedBug::kDropCell, compare_grids_with_list},
+    {"GridWithForgottenSparseBricks", PlantedBug::kSparseBrickBounds, compare_moving_grids_with_list},
     {"GridThatTrustsFloatWithBalls", PlantedBug::kGridBallMargin, compare_balls_of_grids_with_list},
     {"GridWithTruncatedCellIndices", PlantedBug::kUnsignedCellIndex, compare_grids_with_list},
     {"GridWithAGhostAfterAMove", PlantedBug::kGhostAfterMove, compare_moving_grids_with_list},

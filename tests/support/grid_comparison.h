@@ -23,6 +23,7 @@ inline HashGridOptions random_grid_options(Random& random) {
   HashGridOptions options;
   options.cell_size = random.magnitude(-6, 12);
   if (random.chance(0.3)) options.first_choice = 1 + random.below(20);
+  if (random.chance(0.5)) options.dense_values = 2 + random.below(10);
   return options;
 }
 

@@ -1,5 +1,5 @@
 // Families of scenes built to break grids, in addition to the families of adversarial_scenes.h: placements on cell
-// borders of several levels, on both sides of zero, at the world's edge, or larger than all cells.
+// borders of several levels, on both sides of zero, at the world's edge, larger than all cells, or of uneven density.
 #ifndef LOCUS_TESTS_SUPPORT_GRID_SCENES_H_
 #define LOCUS_TESTS_SUPPORT_GRID_SCENES_H_
 
@@ -91,8 +91,25 @@ inline SceneSketch world_edges(Random& random) {
   return sketch;
 }
 
+// Generates one or two crowds of small placements in a world that is much wider than they are, with lone placements
+// around them, some of which are as wide as a crowd.
+inline SceneSketch hubs_in_open_country(Random& random) {
+  SceneSketch sketch{"hubs in open country", {}, {}, {}, {}};
+  const double hub = random.magnitude(-4, 4), country = hub * random.magnitude(2, 12);
+  const Vec3d hubs[] = {random.vector(country), random.vector(country / 2)};
+  for (int i = 0; i < 60; ++i) {
+    const bool lone = i % 3 == 0;
+    const Vec3d center = lone ? random.vector(country) : hubs[random.below(2)] + random.vector(hub);
+    const double size = random.chance(0.1) ? hub : hub / 100;
+    sketch.placements.push_back({center, random.positive_vector(size), random.rotation()});
+  }
+  add_queries(sketch, 8, random.chance(0.5) ? hub : country, random);
+  add_lattice_rays(sketch, country / 8, random);
+  return sketch;
+}
+
 inline constexpr SceneFamily kGridFamilies[] = {giants_among_small, points_on_borders, sizes_between_levels,
-                                                around_zero, world_edges};
+                                                around_zero,        world_edges,       hubs_in_open_country};
 
 inline SceneSketch grid_scene(uint64_t seed, Random& random) {
   return kGridFamilies[seed % std::size(kGridFamilies)](random);

@@ -14,7 +14,24 @@ namespace locus {
 namespace {
 
 constexpr size_t kChangesPerCheck = 64;    // changes per value, on average, before the cell size is checked again
-constexpr size_t kRefiledPerBatch = 8192;  // min number of values that a batch moves to cells of the new size
+constexpr size_t kRefiledPerBatch = 8192;  // min number of values that a batch moves to other levels
+constexpr size_t kArrivalShare = 8;        // the density is counted again after size() / kArrivalShare arrivals
+constexpr size_t kValuesPerSample = 32;    // values for each value of a sample from which the density is estimated
+
+using internal::DensityMap;
+using internal::SampledValue;
+
+// Sample of the values of a grid: a few for the choice of the cell size, and more for the density map.
+struct GridSample {
+  explicit GridSample(size_t population)
+      : few(population, internal::kCellSizeSample),
+        many(population, std::max(internal::kCellSizeSample, population / kValuesPerSample)) {}
+  void offer(Vec3d position, float extent) {
+    few.offer(position, 2.0 * double{extent});
+    many.offer(position, 2.0 * double{extent});
+  }
+  internal::EvenSample few, many;
+};
 
 }  // namespace
 
@@ -24,11 +41,11 @@ using internal::GridKey;
 using internal::GridSlot;
 
 HashGrid::HashGrid(const HashGridOptions& options)
-    : base_exponent_(
-          internal::exponent_covering(options.cell_size, internal::kMinCellExponent, internal::kMaxBaseExponent)),
-      first_choice_(std::max<size_t>(options.first_choice, 1)) {}
+    : density_(internal::exponent_covering(options.cell_size, internal::kMinCellExponent, internal::kMaxBaseExponent)),
+      first_choice_(std::max<size_t>(options.first_choice, 1)),
+      dense_values_(std::max<size_t>(options.dense_values, 2)) {}
 
-double HashGrid::cell_size() const { return std::ldexp(1.0, base_exponent_); }
+double HashGrid::cell_size() const { return std::ldexp(1.0, density_.base_exponent()); }
 
 GridRef HashGrid::at(uint32_t handle) const {
   LOCUS_DCHECK_LT(handle, slots_.size());
@@ -75,7 +92,8 @@ void HashGrid::check_brick(uint32_t brick) const {
   LOCUS_DCHECK(version.geometry.key == info.geometry.key);
   LOCUS_DCHECK_EQ(version.geometry.exponent, info.level->exponent);
   LOCUS_DCHECK_LE(double{version.max_extent}, info.level->max_extent);
-  LOCUS_DCHECK(contains(info.level->bounds, Aabbd{version.geometry.low, version.geometry.high}));
+  LOCUS_DCHECK(contains(info.level->bounds, Aabbd{version.geometry.low, version.geometry.high}) ||
+               planted(PlantedBug::kSparseBrickBounds));
   const auto has_key = [&](uint32_t candidate) { return brick_info_[candidate].geometry.key == info.geometry.key; };
   LOCUS_DCHECK_EQ(info.level->table->find(info.geometry.key, has_key), brick);
 }
@@ -92,12 +110,11 @@ void HashGrid::check_locations(const GridBatch& batch) const {
   for (const GridItem& item : batch.inserted) check(item.handle, item.entry.position);
 }
 
-int HashGrid::exponent_for(float extent) const {
-  return internal::exponent_covering(2.0 * double{extent}, base_exponent_, internal::kMaxCellExponent);
+int HashGrid::exponent_for(float extent, Vec3d position) const {
+  return internal::exponent_covering(2.0 * double{extent}, density_.exponent_at(position), internal::kMaxCellExponent);
 }
 
-HashGrid::Level& HashGrid::level_for(float extent) {
-  const int exponent = exponent_for(extent);
+HashGrid::Level& HashGrid::level_of(int exponent) {
   auto level = levels_.begin();
   while (level != levels_.end() && (*level)->exponent > exponent) ++level;
   if (level == levels_.end() || (*level)->exponent != exponent)
@@ -158,12 +175,13 @@ void HashGrid::remove(uint32_t handle) {
 
 void HashGrid::insert(const GridItem& item) {
   LOCUS_DCHECK(max_component(abs(item.entry.position)) <= limits::kMaxCoordinate);
-  Level& level = level_for(item.reach);
+  Level& level = level_of(exponent_for(item.reach, item.entry.position));
   const uint32_t brick =
       brick_for(level, internal::brick_of(internal::cell_of(item.entry.position, level.cells_per_unit)));
   level.max_extent = std::max(level.max_extent, double{item.reach});
   ++level.size;
   ++size_;
+  ++arrivals_since_count_;
   if (item.handle >= slots_.size()) slots_.resize(item.handle + 1);
   bricks_by_handle_.set(item.handle, brick);
   change(brick, {BrickChange::kArrives, static_cast<uint32_t>(arrivals_.size())});
@@ -345,9 +363,10 @@ size_t HashGrid::apply(const GridBatch& batch) {
   replaced_bytes_ = 0;
   // Choose the cell size before a bulk load, so that the load stores each value only once.
   if (size_ == 0 && batch.inserted.size() >= first_choice_) {
-    internal::EvenSample sample(batch.inserted.size());
-    for (const GridItem& item : batch.inserted) sample.offer(item.entry.position, 2.0 * double{item.reach});
-    base_exponent_ = internal::choose_cell_exponent(sample.values(), batch.inserted.size());
+    GridSample sample(batch.inserted.size());
+    for (const GridItem& item : batch.inserted) sample.offer(item.entry.position, item.reach);
+    density_ = internal::density_of(
+        sample.many, internal::choose_cell_exponent(sample.few.values(), batch.inserted.size()), dense_values_);
     size_at_choice_ = batch.inserted.size();
     changes_since_choice_ = 0;
   }
@@ -355,14 +374,21 @@ size_t HashGrid::apply(const GridBatch& batch) {
   const size_t changes = batch.removed.size() + batch.moves.moves.size() + batch.inserted.size();
   changes_since_choice_ += changes;
   if (stale_bricks_.empty() && choice_is_stale()) choose_cell_size();
+  if (stale_bricks_.empty() && density_is_stale()) count_density();
   if (!stale_bricks_.empty()) refile(std::max(changes, kRefiledPerBatch));
   return replaced_bytes_;
 }
 
 void HashGrid::fill(absl::Span<const GridItem> items, double cell_size) {
   LOCUS_CHECK_EQ(size_, 0u);
-  base_exponent_ = internal::exponent_covering(cell_size, internal::kMinCellExponent, internal::kMaxBaseExponent);
-  if (items.size() >= first_choice_) size_at_choice_ = items.size();
+  const int base = internal::exponent_covering(cell_size, internal::kMinCellExponent, internal::kMaxBaseExponent);
+  density_ = DensityMap(base);
+  if (items.size() >= first_choice_) {
+    size_at_choice_ = items.size();
+    GridSample sample(items.size());
+    for (const GridItem& item : items) sample.offer(item.entry.position, item.reach);
+    density_ = internal::density_of(sample.many, base, dense_values_);
+  }
   changes_since_choice_ = 0;
   apply_to_bricks({{}, {}, items});
 }
@@ -374,24 +400,67 @@ bool HashGrid::choice_is_stale() const {
 
 void HashGrid::choose_cell_size() {
   const bool similar_size = size_ < 2 * size_at_choice_ && size_ > size_at_choice_ / 8;
-  internal::EvenSample sample(size_);
+  GridSample sample(size_);
   for_each([&sample](const GridRef& value) {
-    sample.offer(value.entry().position, 2.0 * double{value.reach()});
+    sample.offer(value.entry().position, value.reach());
     return true;
   });
   changes_since_choice_ = 0;
-  if (similar_size && internal::cell_exponent_fits(sample.values(), size_, base_exponent_)) return;
+  const int base = density_.base_exponent();
+  if (similar_size && internal::cell_exponent_fits(sample.few.values(), size_, base)) return;
   size_at_choice_ = size_;
-  const int exponent = internal::choose_cell_exponent(sample.values(), size_);
-  if (exponent != base_exponent_) start_refiling(exponent);
+  const int exponent = internal::choose_cell_exponent(sample.few.values(), size_);
+  if (exponent != base) start_refiling(internal::density_of(sample.many, exponent, dense_values_));
 }
 
-// Adds all bricks to stale_bricks_, sorted so that neighbouring bricks are adjacent, because their values move to the
-// same new bricks. The sort order is descending, because refile() removes bricks from the end of stale_bricks_.
-void HashGrid::start_refiling(int base_exponent) {
-  base_exponent_ = base_exponent;
-  for (uint32_t brick = 0; brick < brick_info_.size(); ++brick)
-    if (bricks_[brick] != nullptr) stale_bricks_.push_back(brick);
+bool HashGrid::density_is_stale() const {
+  return size_at_choice_ != 0 && size_ >= first_choice_ &&
+         arrivals_since_count_ >= std::max(2 * dense_values_, size_ / kArrivalShare);
+}
+
+// Makes a density map of the present values. O(bricks).
+void HashGrid::count_density() {
+  measure_levels();
+  arrivals_since_count_ = 0;
+  Aabbd bounds;
+  for (const std::unique_ptr<Level>& level : levels_) bounds = merge(bounds, level->bounds);
+  internal::DensityCount count(density_.base_exponent(), bounds);
+  for (uint32_t brick = 0; brick < brick_info_.size(); ++brick) {
+    if (bricks_[brick] == nullptr) continue;
+    const BrickGeometry& geometry = brick_info_[brick].geometry;
+    count.add(geometry.key, geometry.exponent, static_cast<double>(bricks_[brick]->size()));
+  }
+  start_refiling(count.map(dense_values_, &density_));
+}
+
+// Computes the bounds and the extents of all levels again. They grow with each value that arrives, so they are too
+// large after values have left. O(bricks).
+void HashGrid::measure_levels() {
+  for (const std::unique_ptr<Level>& level : levels_) {
+    level->bounds = Aabbd();
+    level->max_extent = 0;
+    level->table->for_each([&](uint32_t brick) {
+      const BrickGeometry& geometry = brick_info_[brick].geometry;
+      const bool forgotten = planted(PlantedBug::kSparseBrickBounds) && geometry.exponent > density_.base_exponent();
+      level->bounds = merge(level->bounds,
+                            forgotten ? Aabbd{geometry.center, geometry.center} : Aabbd{geometry.low, geometry.high});
+      level->max_extent = std::max(level->max_extent, double{bricks_[brick]->max_extent});
+      return true;
+    });
+  }
+}
+
+// Begins to store values by the map `density`: adds to stale_bricks_ all bricks with values that may belong on another
+// level, sorted so that neighbouring bricks are adjacent, because their values move to the same new bricks. The sort
+// order is descending, because refile() removes bricks from the end of stale_bricks_.
+void HashGrid::start_refiling(DensityMap density) {
+  const bool same_base = density.base_exponent() == density_.base_exponent();
+  for (uint32_t brick = 0; brick < brick_info_.size(); ++brick) {
+    if (bricks_[brick] == nullptr) continue;
+    const BrickGeometry& geometry = brick_info_[brick].geometry;
+    if (!same_base || density.differs(density_, geometry.key, geometry.exponent)) stale_bricks_.push_back(brick);
+  }
+  density_ = std::move(density);
   const auto order = [this](uint32_t brick) {
     const GridKey& key = brick_info_[brick].geometry.key;
     constexpr int kGroupBits = 2;  // groups of 4x4x4 bricks
@@ -400,8 +469,8 @@ void HashGrid::start_refiling(int base_exponent) {
   std::sort(stale_bricks_.begin(), stale_bricks_.end(), [&](uint32_t a, uint32_t b) { return order(b) < order(a); });
 }
 
-// Moves values from the bricks in stale_bricks_ to the levels of the new base cell, a whole brick at a time, until at
-// least `max_values` values have moved or stale_bricks_ is empty.
+// Moves values from the bricks in stale_bricks_ to the levels on which density_ places them, a whole brick at a time,
+// until at least `max_values` values have moved or stale_bricks_ is empty.
 void HashGrid::refile(size_t max_values) {
   std::vector<uint32_t> leaving;
   std::vector<GridItem> items;
@@ -412,14 +481,16 @@ void HashGrid::refile(size_t max_values) {
     if (brick == nullptr) continue;
     const int exponent = brick->geometry.exponent;
     internal::for_each_value(*brick, [&](const GridRef& value) {
-      if (exponent_for(value.reach()) == exponent) return true;
+      if (exponent_for(value.reach(), value.entry().position) == exponent) return true;
       leaving.push_back(value.handle());
       items.push_back(value.item());
       return true;
     });
   }
-  if (stale_bricks_.empty()) std::vector<uint32_t>().swap(stale_bricks_);
   if (!items.empty()) apply_to_bricks({leaving, {}, items});
+  if (!stale_bricks_.empty()) return;
+  std::vector<uint32_t>().swap(stale_bricks_);
+  measure_levels();
 }
 
 GridSnapshot HashGrid::snapshot() {

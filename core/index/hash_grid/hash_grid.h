@@ -13,6 +13,11 @@
 // the values or, if it has more changes than that, as many values as it has changes. Until all values have moved,
 // levels of the old and the new size exist side by side.
 //
+// The base cell fits the places where most values are. Where values are much sparser, they are stored on a coarser
+// level (density_map.h). The grid counts the values of all bricks again after one value in eight has been inserted,
+// removed or moved to another brick, and moves the values of regions whose density has changed, in the same small
+// steps.
+//
 // Invariants: every value is stored in the brick that contains its position, on a level whose cells are at least as
 // wide as the value; no brick is empty; slots_ holds the location of each value. |position| <= limits::kMaxCoordinate
 // on each axis.
@@ -25,6 +30,7 @@
 
 #include "absl/types/span.h"
 #include "core/index/hash_grid/brick_builder.h"
+#include "core/index/hash_grid/density_map.h"
 #include "core/index/hash_grid/grid_snapshot.h"
 
 namespace locus {
@@ -36,6 +42,10 @@ struct HashGridOptions {
   // Number of values at which the grid chooses the cell size for the first time; the maximum of size_t means never. For
   // up to about a thousand values the choice results in one brick, which a query scans like a list.
   size_t first_choice = 8;
+  // Number of values in a region of 4x4x4 bricks from which on they are stored in these bricks; if there are fewer,
+  // they are stored in wider ones (density_map.h). Measured with 256, 512 and 1024: a smaller number saves no time
+  // where values are sparse, a larger number costs time at the edges of crowds.
+  size_t dense_values = 512;
 };
 
 // Changes of one batch, applied in the order of the members. Borrows all arrays. No handle occurs twice in `removed`
@@ -104,10 +114,10 @@ class HashGrid {
   void move_to_other_brick(const GridMove& move, const GridMoves& moves);
   void insert_moved(const GridItem& before, const GridMove& move, const GridMoves& moves);
   void insert(const GridItem& item);
-  // Returns the exponent of the level for values of extent `extent`.
-  int exponent_for(float extent) const;
-  // Returns the level for values of extent `extent`; creates the level if it does not exist.
-  Level& level_for(float extent);
+  // Returns the exponent of the level for a value.
+  int exponent_for(float extent, Vec3d position) const;
+  // Returns the level with the exponent `exponent`; creates the level if it does not exist.
+  Level& level_of(int exponent);
   // Returns the index of the brick with key `key`. If the brick does not exist, creates its entries in brick_info_ and
   // in the level's table; its version in bricks_ is null until rebuild_bricks().
   uint32_t brick_for(Level& level, const internal::GridKey& key);
@@ -128,17 +138,22 @@ class HashGrid {
   void gather_all(const GridMoves& moves);
   bool choice_is_stale() const;
   void choose_cell_size();
-  void start_refiling(int base_exponent);
+  void start_refiling(internal::DensityMap density);
+  bool density_is_stale() const;
+  void count_density();
   void refile(size_t max_values);
+  void measure_levels();
   void check_in_use(uint32_t handle) const;
   void check_invariants(const GridBatch& batch) const;
   void check_brick(uint32_t brick) const;
   void check_locations(const GridBatch& batch) const;
 
-  int base_exponent_;
+  internal::DensityMap density_;  // has the exponent of the base level
   size_t first_choice_;
+  size_t dense_values_;
   size_t size_at_choice_ = 0;
   size_t changes_since_choice_ = 0;
+  size_t arrivals_since_count_ = 0;  // values inserted, removed or moved to another brick since count_density()
   size_t size_ = 0;
   size_t replaced_bytes_ = 0;                   // size in bytes of the data that the current batch has replaced
   std::vector<std::unique_ptr<Level>> levels_;  // levels from coarse to fine

@@ -4,6 +4,7 @@
 
 #include "tests/bench/dynamic/check_values.h"
 #include "tests/bench/dynamic/concurrent_cases.h"
+#include "tests/bench/dynamic/country_cases.h"
 #include "tests/bench/dynamic/growth_case.h"
 #include "tests/bench/dynamic/insert_cases.h"
 #include "tests/bench/dynamic/move_cases.h"
@@ -99,6 +100,7 @@ absl::Status run_dynamic_suite(const Options& options, const Progress& progress,
       run_world(options, world, report);
     }
   }
+  run_country_cases(options, progress, report);
   run_growth_case(options, progress, report);
   run_rewind_cases(options, progress, report);
   run_concurrent_cases(options, progress, report);

@@ -71,7 +71,8 @@ absl::Span<const float> numbers_of(const Vec3f& first, size_t count) {
 
 class Batches : public Contender {
  public:
-  Batches(const Ours& ours, std::optional<AsOf> time) : Contender("ours_batch"), ours_(ours), time_(time) {}
+  Batches(const Ours& ours, std::optional<AsOf> time, float reach)
+      : Contender("ours_batch"), ours_(ours), time_(time), reach_(reach) {}
   bool does(Task task) const override { return task != Task::kMove && task != Task::kReinsert; }
   void load(const Objects&) override {}
   void move(const Moves&) override {}
@@ -79,14 +80,14 @@ class Batches : public Contender {
   void balls(absl::Span<const Vec3f> centers, Answers& answers) override {
     BallColumns columns;
     columns.centers = numbers_of(centers.front(), centers.size());
-    columns.radii = absl::MakeConstSpan(&kReach, 1);
+    columns.radii = absl::MakeConstSpan(&reach_, 1);
     ask(columns, answers);
   }
   void boxes(absl::Span<const Vec3f> centers, Answers& answers) override {
-    constexpr std::array<float, 3> kHalf = {kReach, kReach, kReach};
+    const std::array<float, 3> half = {reach_, reach_, reach_};
     BoxColumns columns;
     columns.centers = numbers_of(centers.front(), centers.size());
-    columns.half_extents = kHalf;
+    columns.half_extents = half;
     ask(columns, answers);
   }
   void rays(absl::Span<const Rayf> rays, Answers& answers) override {
@@ -147,6 +148,7 @@ class Batches : public Contender {
 
   const Ours& ours_;
   const std::optional<AsOf> time_;
+  const float reach_;
   std::vector<Vec3f> origins_, directions_;
 };
 
@@ -259,8 +261,8 @@ void Ours::nearest(absl::Span<const Vec3f> centers, Answers& answers) {
 
 void Ours::forget_past() { scene_.forget_recent(); }
 
-std::unique_ptr<Contender> batches_of(const Ours& ours, std::optional<AsOf> time) {
-  return std::make_unique<Batches>(ours, time);
+std::unique_ptr<Contender> batches_of(const Ours& ours, std::optional<AsOf> time, float reach) {
+  return std::make_unique<Batches>(ours, time, reach);
 }
 
 }  // namespace locus::bench::dynamic

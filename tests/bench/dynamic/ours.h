@@ -46,8 +46,9 @@ class Ours : public Contender {
 };
 
 // Returns a contender that only answers queries about the scene of `ours`. Each call is one batch of one block. The
-// queries are about `time` if it is given, otherwise about the present. Borrows `ours`.
-std::unique_ptr<Contender> batches_of(const Ours& ours, std::optional<AsOf> time = {});
+// queries are about `time` if it is given, otherwise about the present. `reach` is the radius of its balls and half the
+// edge of its boxes. Borrows `ours`.
+std::unique_ptr<Contender> batches_of(const Ours& ours, std::optional<AsOf> time = {}, float reach = kReach);
 
 }  // namespace locus::bench::dynamic
 

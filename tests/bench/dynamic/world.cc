@@ -41,6 +41,7 @@ class Places {
   }
   Vec3f next() {
     if (kind_ == Kind::kClustered && draws_.unit() < 0.8f) return in_town();
+    if (hub_side(kind_) > 0 && starts_in_hub(drawn_++)) return in_hub();
     Vec3f place;
     for (int axis = 0; axis < 3; ++axis) place[axis] = std::fma(size_[axis], draws_.unit(), low_[axis]);
     if (kind_ == Kind::kBorder)
@@ -55,9 +56,19 @@ class Places {
     return {std::fma(radius, std::cos(angle), town.x), std::fma(radius, std::sin(angle), town.y), 100 * draws_.unit()};
   }
 
+  Vec3f in_hub() {
+    const float side = hub_side(kind_);
+    const Vec3f hub = {side, side, 20};
+    Vec3f place;
+    for (int axis = 0; axis < 3; ++axis)
+      place[axis] = std::fma(hub[axis], draws_.unit() - 0.5f, low_[axis] + size_[axis] / 2);
+    return place;
+  }
+
   Draws draws_;
   Kind kind_;
   Vec3f low_, size_;
+  size_t drawn_ = 0;  // number of positions drawn in a world with a hub
   std::array<Vec3f, kTowns> towns_;
 };
 
@@ -102,8 +113,8 @@ Vec3f near_an_object(const World& world, Draws& draws) {
 }  // namespace
 
 const char* name_of(Kind kind) {
-  constexpr std::array<const char*, kKinds.size()> kNames = {"uniform", "clustered", "far",  "onecell",
-                                                             "border",  "giant",     "mixed"};
+  constexpr std::array<const char*, kKinds.size()> kNames = {"uniform", "clustered", "far",   "onecell", "border",
+                                                             "giant",   "mixed",     "hub20", "hub60",   "hub200"};
   return kNames[static_cast<size_t>(kind)];
 }
 

@@ -24,11 +24,20 @@ namespace locus::bench::dynamic {
 // Distribution of objects. kUniform: 2000 x 2000 x 100. kClustered: four of five objects are in towns, which are discs
 // of radius 100. kFar: uniform, 1e6 away from the origin in x and y. kOneCell: 8 x 8 x 8. kBorder: coordinates are
 // multiples of 8, and each tick moves an object by 8 along one axis. kGiant: uniform, the first object has the radius
-// 5000. kMixed: uniform, radii 0.25 * 2^(7 f f') with two draws f and f'. All other radii are 0.5.
-enum class Kind : uint8_t { kUniform, kClustered, kFar, kOneCell, kBorder, kGiant, kMixed };
-inline constexpr std::array<Kind, 7> kKinds = {Kind::kUniform, Kind::kClustered, Kind::kFar,  Kind::kOneCell,
-                                               Kind::kBorder,  Kind::kGiant,     Kind::kMixed};
+// 5000. kMixed: uniform, radii 0.25 * 2^(7 f f') with two draws f and f'. kHub20, kHub60, kHub200: every second object,
+// from the first on, is in a hub of 20, 60 or 200 in x and y and 20 in z around the centre; the others are uniform. All
+// other radii are 0.5.
+enum class Kind : uint8_t { kUniform, kClustered, kFar, kOneCell, kBorder, kGiant, kMixed, kHub20, kHub60, kHub200 };
+inline constexpr std::array<Kind, 10> kKinds = {Kind::kUniform, Kind::kClustered, Kind::kFar,   Kind::kOneCell,
+                                                Kind::kBorder,  Kind::kGiant,     Kind::kMixed, Kind::kHub20,
+                                                Kind::kHub60,   Kind::kHub200};
 const char* name_of(Kind kind);
+// Returns the size of the hub in x and y; 0 if a world of this kind has no hub.
+constexpr float hub_side(Kind kind) {
+  return kind == Kind::kHub20 ? 20 : kind == Kind::kHub60 ? 60 : kind == Kind::kHub200 ? 200 : 0;
+}
+// Returns whether the object with the index `object` starts in the hub of a world with a hub.
+constexpr bool starts_in_hub(size_t object) { return object % 2 == 0; }
 // Returns whether all radii of a world of this kind are 0.5.
 constexpr bool has_one_size(Kind kind) { return kind != Kind::kGiant && kind != Kind::kMixed; }
 // Returns the count in short form, such as 10k or 1M.

@@ -213,7 +213,9 @@ TEST(HashGridTest, AfterANewCellSizeEachBatchRefilesAFewValuesAndResultsStayCorr
     ASSERT_LT(objects.size(), 100'000u) << "no other cell size was chosen";
   }
   int batches = 1;
-  for (; grid.statistics().levels > 1; ++batches) {
+  // Each batch that moves values to other cells makes new bricks; an insertion in the middle alone does not.
+  for (size_t bricks = 0; bricks != grid.statistics().bricks; ++batches) {
+    bricks = grid.statistics().bricks;
     const double radius = random.chance(0.5) ? 1 : 200;
     const Balld ball_query{random.vector(3), radius};
     size_t expected = 0;
@@ -224,6 +226,61 @@ TEST(HashGridTest, AfterANewCellSizeEachBatchRefilesAFewValuesAndResultsStayCorr
   }
   EXPECT_GT(batches, 3);
   EXPECT_EQ(ids_near(grid, {}, 1e6).size(), objects.size());
+}
+
+// Half of the objects in a hub of 20 x 20 x 20, the others, one in 8,000 cubic units, around it.
+std::vector<Object> hub_in_open_country(Vec3d hub, uint64_t seed) {
+  Random random(seed);
+  std::vector<Object> objects;
+  for (Id id = 1; id <= 20'000; ++id)
+    objects.push_back(ball(id, id % 2 == 0 ? hub + random.vector(10) : random.vector(215), 0.1f));
+  return objects;
+}
+
+size_t cells_visited(const ObjectGrid& grid, Vec3d center, double radius) {
+  Work work;
+  ids_near(grid, center, radius, &work);
+  return work.cells;
+}
+
+TEST(HashGridTest, ACrowdElsewhereDoesNotMakeQueriesInOpenCountryVisitMoreCells) {
+  const std::vector<Object> objects = hub_in_open_country({}, 11);
+  std::vector<Object> country;
+  for (const Object& object : objects)
+    if (object.id % 2 != 0) country.push_back(object);
+  ObjectGrid with, without;
+  with.apply({}, objects);
+  without.apply({}, country);
+  for (const Vec3d center : {Vec3d{150, 150, 150}, Vec3d{-100, 120, -80}, Vec3d{0, 0, 200}}) {
+    EXPECT_LE(cells_visited(with, center, 50), 3 * cells_visited(without, center, 50));
+    EXPECT_EQ(ids_near(with, center, 50), ids_near(without, center, 50));
+  }
+  EXPECT_LE(with.statistics().bytes, 3 * without.statistics().bytes);
+}
+
+// The hub moves through the country a few thousand objects at a time: what was dense becomes sparse, and the reverse.
+TEST(HashGridTest, TheCellsFollowACrowdThatMoves) {
+  std::vector<Object> objects = hub_in_open_country({}, 12);
+  ObjectGrid grid;
+  grid.apply({}, objects);
+  const size_t bytes = grid.statistics().bytes, cells = cells_visited(grid, {150, 150, 150}, 50);
+  Random random(13);
+  for (int round = 1; round <= 4; ++round) {
+    const Vec3d hub = {100.0 * (round % 2), 100.0 * (round / 2 % 2), 0};
+    for (size_t first = 0; first < objects.size(); first += 2'000) {
+      const std::vector<Object> before(objects.begin() + static_cast<ptrdiff_t>(first),
+                                       objects.begin() + static_cast<ptrdiff_t>(first + 2'000));
+      for (size_t i = first; i < first + 2'000; ++i)
+        if (objects[i].id % 2 == 0) objects[i].shape.position = hub + random.vector(10);
+      grid.apply(before, absl::MakeConstSpan(objects).subspan(first, 2'000));
+    }
+    const std::set<Id> near = ids_near(grid, hub, 30);
+    size_t expected = 0;
+    for (const Object& object : objects) expected += ball_overlaps(Balld{hub, 30}, object.shape) ? 1 : 0;
+    EXPECT_EQ(near.size(), expected);
+    EXPECT_LE(cells_visited(grid, {150, 150, 150}, 50), 2 * cells) << "after round " << round;
+    EXPECT_LE(grid.statistics().bytes, 2 * bytes) << "after round " << round;
+  }
 }
 
 TEST(HashGridTest, OptionsRoundTheCellSizeUpToAPowerOfTwoWithinBounds) {
