@@ -23,7 +23,7 @@ inline HashGridOptions random_grid_options(Random& random) {
   HashGridOptions options;
   options.cell_size = random.magnitude(-6, 12);
   if (random.chance(0.3)) options.first_choice = 1 + random.below(20);
-  if (random.chance(0.5)) options.dense_values = 2 + random.below(10);
+  if (random.chance(0.5)) options.min_brick_values = random.between(1, 4);
   return options;
 }
 

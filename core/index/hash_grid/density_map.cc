@@ -1,5 +1,7 @@
 #include "core/index/hash_grid/density_map.h"
 
+#include <bit>
+
 #include "core/base/check.h"
 
 namespace locus::internal {
@@ -52,33 +54,56 @@ DensityCount::DensityCount(int base_exponent, const Aabbd& bounds) : base_(base_
   }
 }
 
-void DensityCount::add(const GridKey& key, int exponent, double values) {
-  LOCUS_DCHECK_GE(exponent, base_);
-  const int levels = std::max((exponent - base_ + kStep - 1) / kStep, 1);  // of the node that counts the values
-  const int node = base_ + levels * kStep;
-  if (node <= top_) counts_[static_cast<size_t>(levels - 1)][ancestor(key, node - exponent)] += values;
+void DensityCount::add(const Brick& brick) {
+  const BrickGeometry& geometry = brick.geometry;
+  LOCUS_DCHECK_GE(geometry.exponent, base_);
+  const int levels =
+      std::max((geometry.exponent - base_ + kStep - 1) / kStep, 1);  // of the node that counts the values
+  const int exponent = base_ + levels * kStep;
+  if (exponent > top_) return;
+  const int finer = exponent - geometry.exponent;  // 0 to kStep: the brick is so much finer than the node
+  LOCUS_DCHECK(0 <= finer && finer <= kStep);
+  Node& node = counts_[static_cast<size_t>(levels - 1)][ancestor(geometry.key, finer)];
+  node.values += brick.size();
+  const auto add_child = [&](int64_t cell) {
+    GridKey child;  // in units of the children, which are as wide as the cells of the node
+    for (int axis = 0; axis < 3; ++axis)
+      child[axis] = ((geometry.key[axis] << kBrickBits) + (cell >> (axis * kBrickBits) & 3)) >> finer;
+    node.children |= uint64_t{1} << index_in_brick(child);
+  };
+  const std::array<uint32_t, kBrickCells + 1>& offsets = brick.sorted->offsets();
+  for (int cell = 0; cell < kBrickCells; ++cell)
+    if (offsets[static_cast<size_t>(cell)] != offsets[static_cast<size_t>(cell) + 1]) add_child(cell);
+  for (uint32_t slot = 0; slot < brick.recent_count; ++slot)
+    if (!brick.is_recent_dead(slot)) add_child(geometry.cell_of(brick.recent->entry(slot).position));
 }
 
 void DensityCount::add(Vec3d position, double values) {
-  add(brick_of(internal::cell_of(position, cells_per_unit(base_))), base_, values);
+  if (counts_.empty()) return;
+  const GridKey child = brick_of(internal::cell_of(position, cells_per_unit(base_)));
+  Node& node = counts_[0][ancestor(child, kStep)];
+  node.values += values;
+  node.children |= uint64_t{1} << index_in_brick(child);
 }
 
-DensityMap DensityCount::map(size_t dense_values, const DensityMap* before) {
+DensityMap DensityCount::map(double min_brick_values, const DensityMap* before) {
   DensityMap result(base_);
   const bool was_sparse = before != nullptr && before->has_sparse_regions();
-  const auto enough = static_cast<double>(dense_values);
   size_t sparse_nodes = 0;
   for (size_t level = 0; level < counts_.size(); ++level) {
     DensityMap::Nodes& dense = result.dense_.emplace_back();
     const int exponent = base_ + kStep * static_cast<int>(level + 1);
-    for (const auto& [key, values] : counts_[level]) {
-      if (level + 1 < counts_.size()) counts_[level + 1][ancestor(key, kStep)] += values;
+    for (const auto& [key, node] : counts_[level]) {
       const bool was_dense = was_sparse && before->is_dense(key, exponent);
-      if (values >= (was_dense ? enough / 2 : enough)) {
-        dense.insert(key);
-      } else if (level == 0) {
-        ++sparse_nodes;
-      }
+      const bool fills_bricks = node.values >= min_brick_values * (was_dense ? 0.5 : 1) * std::popcount(node.children);
+      const bool is_dense = node.has_dense_child || fills_bricks;
+      if (is_dense) dense.insert(key);
+      if (!is_dense && level == 0) ++sparse_nodes;
+      if (level + 1 == counts_.size()) continue;
+      Node& parent = counts_[level + 1][ancestor(key, kStep)];
+      parent.values += node.values;
+      parent.children |= uint64_t{1} << index_in_brick(key);
+      parent.has_dense_child |= is_dense;
     }
   }
   const double share = kMinSparseShare * (was_sparse ? 0.5 : 1);
@@ -88,13 +113,13 @@ DensityMap DensityCount::map(size_t dense_values, const DensityMap* before) {
   return result;
 }
 
-DensityMap density_of(const EvenSample& sample, int base_exponent, size_t dense_values) {
+DensityMap density_of(const EvenSample& sample, int base_exponent, double min_brick_values) {
   LOCUS_CHECK(!sample.values().empty());
   Aabbd bounds;
   for (const SampledValue& value : sample.values()) bounds = merge(bounds, Aabbd{value.position, value.position});
   DensityCount count(base_exponent, bounds);
   for (const SampledValue& value : sample.values()) count.add(value.position, static_cast<double>(sample.stride()));
-  return count.map(dense_values, nullptr);
+  return count.map(min_brick_values, nullptr);
 }
 
 }  // namespace locus::internal

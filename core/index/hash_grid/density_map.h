@@ -4,10 +4,12 @@
 //
 // The map is an octree whose nodes are found by hash: the nodes are the bricks of the density levels, whose exponents
 // are base, base + 2, base + 4, ... up to the one whose bricks are as wide as all values together. So a cell of one
-// density level is a brick of the next finer one. A node is dense if it contains at least `dense_values` values, on all
-// levels together; a dense node remains dense until it has fewer than half of that, so that values do not move back and
-// forth. A value is stored on the finest density level whose next coarser node, at the position of the value,
-// is dense. Source of the structure: Gargantini, An Effective Way to Represent Quadtrees, 1982 (nodes in a table).
+// density level is a brick of the next finer one, and a node has 64 children. A node is dense if its values, those of
+// all levels together, would fill the bricks of its children: if the children that have values have at least
+// `min_brick_values` on average, or if a child is dense. A dense node remains dense until they have fewer than half of
+// that, so that values do not move back and forth. A value is stored on the finest density level whose next coarser
+// node, at the position of the value, is dense. Source of the structure: Gargantini, An Effective Way to Represent
+// Quadtrees, 1982 (nodes in a table).
 //
 // Threads: as for a standard container. Invariant: the parent of a dense node is dense.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_DENSITY_MAP_H_
@@ -19,8 +21,7 @@
 
 #include "absl/container/flat_hash_map.h"
 #include "absl/container/flat_hash_set.h"
-#include "absl/types/span.h"
-#include "core/index/hash_grid/cell_key.h"
+#include "core/index/hash_grid/brick.h"
 #include "core/index/hash_grid/cell_size.h"
 
 namespace locus::internal {
@@ -28,7 +29,7 @@ namespace locus::internal {
 // The map of a grid has sparse regions only if this share of the finest nodes is sparse. Otherwise, for example if only
 // nodes at the edge of a uniform world are sparse, wider cells would save less than a further level costs. The share is
 // half as large for a grid that already has sparse regions.
-inline constexpr double kMinSparseShare = 1.0 / 8;
+inline constexpr double kMinSparseShare = 1.0 / 4;
 
 class DensityMap {
  public:
@@ -63,23 +64,30 @@ class DensityCount {
   // `bounds` are the bounds of all positions; `base_exponent` is that of the grid.
   DensityCount(int base_exponent, const Aabbd& bounds);
 
-  // Adds `values` values of the brick with the key `key` on the level `exponent`, which may be any level from the base
-  // level on. Values of a brick that is wider than the coarsest node are ignored.
-  void add(const GridKey& key, int exponent, double values);
+  // Adds the values of a brick on any level from the base level on. Values of a brick that is wider than the coarsest
+  // node are ignored. O(cells of the brick).
+  void add(const Brick& brick);
   // Adds `values` values at `position`.
   void add(Vec3d position, double values);
   // Returns the map of all values added; `before` is the present map of the grid, or null if it has another base
   // exponent. O(nodes).
-  DensityMap map(size_t dense_values, const DensityMap* before);
+  DensityMap map(double min_brick_values, const DensityMap* before);
 
  private:
+  struct Node {
+    double values = 0;
+    uint64_t children = 0;  // one bit for each child that has values, numbered as by index_in_brick()
+    bool has_dense_child = false;
+  };
+  using Counts = absl::flat_hash_map<GridKey, Node, GridKeyHash>;
+
   int base_, top_;
-  // Number of values of each node of the levels base_ + 2, base_ + 4, ..., top_; map() adds those of its children.
-  std::vector<absl::flat_hash_map<GridKey, double, GridKeyHash>> counts_;
+  // Nodes of the levels base_ + 2, base_ + 4, ..., top_ with the values added; map() adds those of their children.
+  std::vector<Counts> counts_;
 };
 
 // Returns the density map of the values of which `sample` selects some. Precondition: the sample is not empty.
-DensityMap density_of(const EvenSample& sample, int base_exponent, size_t dense_values);
+DensityMap density_of(const EvenSample& sample, int base_exponent, double min_brick_values);
 
 }  // namespace locus::internal
 

@@ -112,6 +112,15 @@ GridRef GridSnapshot::find_like(const GridRef& value) const {
   return find(handle);
 }
 
+const internal::GridLevel* GridSnapshot::level_at(const Vec3d& point) const {
+  if (levels_.size() < 2) return nullptr;
+  for (auto level = levels_.rbegin(); level != levels_.rend(); ++level) {
+    const internal::GridKey cell = internal::cell_of(point, level->geometry.cells_per_unit);
+    if (find_brick(*level, internal::brick_of(cell)) != nullptr) return &*level;
+  }
+  return nullptr;
+}
+
 double GridSnapshot::values_per_cell(const internal::GridLevel& level, const Vec3d& point) const {
   const Vec3d inside = nearest_in(point, level.geometry.bounds);
   const internal::Brick* brick =

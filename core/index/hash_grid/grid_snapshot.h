@@ -103,10 +103,11 @@ class GridSnapshot {
                  double displacement_bound = 0) const;
 
   // Calls visit(GridRef) for every value whose bounds have a squared_distance() of at most limit() from `point`, and
-  // for some other values near the point. The order on each level is roughly from near to far. limit() may decrease
-  // during the visit. Ends if visit() returns false. The cost on each level is proportional to the number of cells
-  // within the final limit() plus the number of values in these cells. If the range of these cells has more than 1024
-  // brick keys, and more than the level has bricks, each brick of the level is tested once instead.
+  // for some other values near the point. The order on each level is roughly from near to far; the level with the most
+  // values at the point is visited first. limit() may decrease during the visit. Ends if visit() returns false. The
+  // cost on each level is proportional to the number of cells within the final limit() plus the number of values in
+  // these cells. If the range of these cells has more than 1024 brick keys, and more than the level has bricks, each
+  // brick of the level is tested once instead.
   template <class Limit, class Visit>
   void visit_nearest(const Vec3d& point, const Limit& limit, Work& work, const Visit& visit) const;
 
@@ -169,6 +170,13 @@ class GridSnapshot {
              const SlabRay<double>& ray, const Limit& limit, Work& work, const Visit& visit) const;
   // Returns the estimated number of values per cell of `level` near `point`.
   double values_per_cell(const internal::GridLevel& level, const Vec3d& point) const;
+  // Returns the finest level with a brick that contains `point`; null if there is none, or if there is only one level.
+  // The values nearest to the point are most likely on this level, so that visits of the other levels end early.
+  const internal::GridLevel* level_at(const Vec3d& point) const;
+  // Visits the values of one level near `point`. Returns false if visit() returned false.
+  template <class Limit, class Visit>
+  bool visit_nearest_on(const internal::GridLevel& level, const Vec3d& point, const Limit& limit, Work& work,
+                        const Visit& visit) const;
   // Visits the values of the present shell and of all later shells brick by brick, from near to far. Used if the range
   // of a shell has more than 1024 brick keys, and more than the level has bricks. Returns false if visit() returned
   // false.
@@ -356,25 +364,31 @@ bool GridSnapshot::visit_by_distance(const internal::GridLevel& level, double ma
 
 template <class Limit, class Visit>
 void GridSnapshot::visit_nearest(const Vec3d& point, const Limit& limit, Work& work, const Visit& visit) const {
+  const internal::GridLevel* const first = level_at(point);
+  if (first != nullptr && !visit_nearest_on(*first, point, limit, work, visit)) return;
+  for (const internal::GridLevel& level : levels_)
+    if (&level != first && !visit_nearest_on(level, point, limit, work, visit)) return;
+}
+
+template <class Limit, class Visit>
+bool GridSnapshot::visit_nearest_on(const internal::GridLevel& level, const Vec3d& point, const Limit& limit,
+                                    Work& work, const Visit& visit) const {
   constexpr size_t kFewBricks = 1024;  // a shell with at most this many brick keys is always visited key by key
   internal::NearCandidates candidates;
-  for (const internal::GridLevel& level : levels_) {
-    internal::NearestShells shells(point, level.geometry, values_per_cell(level, point));
-    while (shells.next(limit())) {
-      const internal::KeyRange cells = internal::cells_near(level, shells.region());
-      const internal::KeyRange bricks = internal::bricks_of(cells);
-      if (bricks.count() > static_cast<double>(std::max(level.table->size(), kFewBricks))) {
-        if (!visit_nearest_bricks(level, shells, point, limit, work, visit)) return;
-        break;
-      }
-      for_each_brick(level, bricks, work, [&](const internal::Brick& brick) {
-        candidates.collect(brick, internal::within_brick(cells, brick.geometry.key), point, shells.above(),
-                           shells.up_to(), work);
-        return true;
-      });
-      if (!candidates.visit(limit, work, visit)) return;
-    }
+  internal::NearestShells shells(point, level.geometry, values_per_cell(level, point));
+  while (shells.next(limit())) {
+    const internal::KeyRange cells = internal::cells_near(level, shells.region());
+    const internal::KeyRange bricks = internal::bricks_of(cells);
+    if (bricks.count() > static_cast<double>(std::max(level.table->size(), kFewBricks)))
+      return visit_nearest_bricks(level, shells, point, limit, work, visit);
+    for_each_brick(level, bricks, work, [&](const internal::Brick& brick) {
+      candidates.collect(brick, internal::within_brick(cells, brick.geometry.key), point, shells.above(),
+                         shells.up_to(), work);
+      return true;
+    });
+    if (!candidates.visit(limit, work, visit)) return false;
   }
+  return true;
 }
 
 template <class Limit, class Visit>

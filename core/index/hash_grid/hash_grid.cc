@@ -15,8 +15,9 @@ namespace {
 
 constexpr size_t kChangesPerCheck = 64;    // changes per value, on average, before the cell size is checked again
 constexpr size_t kRefiledPerBatch = 8192;  // min number of values that a batch moves to other levels
-constexpr size_t kArrivalShare = 8;        // the density is counted again after size() / kArrivalShare arrivals
-constexpr size_t kValuesPerSample = 32;    // values for each value of a sample from which the density is estimated
+constexpr size_t kArrivalShare = 8;        // the density is counted again after size() / kArrivalShare arrivals,
+constexpr double kMinArrivals = 32;        // but not before this many times HashGridOptions::min_brick_values
+constexpr size_t kValuesPerSample = 4;     // values for each value of a sample from which the density is estimated
 
 using internal::DensityMap;
 using internal::SampledValue;
@@ -43,7 +44,7 @@ using internal::GridSlot;
 HashGrid::HashGrid(const HashGridOptions& options)
     : density_(internal::exponent_covering(options.cell_size, internal::kMinCellExponent, internal::kMaxBaseExponent)),
       first_choice_(std::max<size_t>(options.first_choice, 1)),
-      dense_values_(std::max<size_t>(options.dense_values, 2)) {}
+      min_brick_values_(options.min_brick_values) {}
 
 double HashGrid::cell_size() const { return std::ldexp(1.0, density_.base_exponent()); }
 
@@ -366,7 +367,7 @@ size_t HashGrid::apply(const GridBatch& batch) {
     GridSample sample(batch.inserted.size());
     for (const GridItem& item : batch.inserted) sample.offer(item.entry.position, item.reach);
     density_ = internal::density_of(
-        sample.many, internal::choose_cell_exponent(sample.few.values(), batch.inserted.size()), dense_values_);
+        sample.many, internal::choose_cell_exponent(sample.few.values(), batch.inserted.size()), min_brick_values_);
     size_at_choice_ = batch.inserted.size();
     changes_since_choice_ = 0;
   }
@@ -387,7 +388,7 @@ void HashGrid::fill(absl::Span<const GridItem> items, double cell_size) {
     size_at_choice_ = items.size();
     GridSample sample(items.size());
     for (const GridItem& item : items) sample.offer(item.entry.position, item.reach);
-    density_ = internal::density_of(sample.many, base, dense_values_);
+    density_ = internal::density_of(sample.many, base, min_brick_values_);
   }
   changes_since_choice_ = 0;
   apply_to_bricks({{}, {}, items});
@@ -410,12 +411,11 @@ void HashGrid::choose_cell_size() {
   if (similar_size && internal::cell_exponent_fits(sample.few.values(), size_, base)) return;
   size_at_choice_ = size_;
   const int exponent = internal::choose_cell_exponent(sample.few.values(), size_);
-  if (exponent != base) start_refiling(internal::density_of(sample.many, exponent, dense_values_));
+  if (exponent != base) start_refiling(internal::density_of(sample.many, exponent, min_brick_values_));
 }
 
 bool HashGrid::density_is_stale() const {
-  return size_at_choice_ != 0 && size_ >= first_choice_ &&
-         arrivals_since_count_ >= std::max(2 * dense_values_, size_ / kArrivalShare);
+  return size_at_choice_ != 0 && size_ >= first_choice_ && arrivals_since_count_ >= size_ / kArrivalShare;
 }
 
 // Makes a density map of the present values. O(bricks).
@@ -425,12 +425,9 @@ void HashGrid::count_density() {
   Aabbd bounds;
   for (const std::unique_ptr<Level>& level : levels_) bounds = merge(bounds, level->bounds);
   internal::DensityCount count(density_.base_exponent(), bounds);
-  for (uint32_t brick = 0; brick < brick_info_.size(); ++brick) {
-    if (bricks_[brick] == nullptr) continue;
-    const BrickGeometry& geometry = brick_info_[brick].geometry;
-    count.add(geometry.key, geometry.exponent, static_cast<double>(bricks_[brick]->size()));
-  }
-  start_refiling(count.map(dense_values_, &density_));
+  for (uint32_t brick = 0; brick < brick_info_.size(); ++brick)
+    if (bricks_[brick] != nullptr) count.add(*bricks_[brick]);
+  start_refiling(count.map(min_brick_values_, &density_));
 }
 
 // Computes the bounds and the extents of all levels again. They grow with each value that arrives, so they are too

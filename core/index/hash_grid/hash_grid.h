@@ -42,10 +42,9 @@ struct HashGridOptions {
   // Number of values at which the grid chooses the cell size for the first time; the maximum of size_t means never. For
   // up to about a thousand values the choice results in one brick, which a query scans like a list.
   size_t first_choice = 8;
-  // Number of values in a region of 4x4x4 bricks from which on they are stored in these bricks; if there are fewer,
-  // they are stored in wider ones (density_map.h). Measured with 256, 512 and 1024: a smaller number saves no time
-  // where values are sparse, a larger number costs time at the edges of crowds.
-  size_t dense_values = 512;
+  // Minimum mean number of values in the occupied bricks of a region of 4x4x4 bricks. If there would be fewer, the
+  // values are stored in wider bricks (density_map.h). A brick costs about 900 bytes, as much as eight values.
+  double min_brick_values = 8;
 };
 
 // Changes of one batch, applied in the order of the members. Borrows all arrays. No handle occurs twice in `removed`
@@ -150,7 +149,7 @@ class HashGrid {
 
   internal::DensityMap density_;  // has the exponent of the base level
   size_t first_choice_;
-  size_t dense_values_;
+  double min_brick_values_;
   size_t size_at_choice_ = 0;
   size_t changes_since_choice_ = 0;
   size_t arrivals_since_count_ = 0;  // values inserted, removed or moved to another brick since count_density()
