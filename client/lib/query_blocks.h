@@ -3,7 +3,7 @@
 // until QueryBuilder::build(). The builders check nothing: if a value is invalid, the server refuses the whole batch
 // with an error that names block, column and index. Not thread-safe.
 //
-// Let N be the number of queries of a block. A per-query column (t_max, max_distances, masks, ignored groups,
+// Let N be the number of queries of a block. A per-query column (t_max, max_distances, masks, groups, tags, self ids,
 // rotations) is either filled row by row, or set as a whole column, which has N entries, one entry for all queries, or
 // no entries. Do not fill one column of a block both row by row and as a whole.
 #ifndef LOCUS_CLIENT_LIB_QUERY_BLOCKS_H_
@@ -21,10 +21,14 @@ namespace locus::client {
 
 inline constexpr uint32_t kEveryMask = 0xFFFFFFFFu;
 
-// Filter of one query by layers and group.
+// Filter of one query by layers, group, id and tag. An object or instance is found only if it passes all of them.
 struct Filter {
   uint32_t mask = kEveryMask;  // finds only objects and instances with (layers & mask) != 0
   uint64_t ignore_group = 0;   // group that the query does not find; 0 = no group is ignored
+  uint64_t only_group = 0;     // only group that the query finds; 0 = every group
+  uint64_t self_id = 0;        // id that the query does not find; 0 = no id
+  uint64_t tag = 0;            // finds only objects and instances with (their tag & tag_mask) == (tag & tag_mask)
+  uint64_t tag_mask = 0;       // 0 = every tag
 };
 
 // Settings that every kind of block has. Each function returns the builder of the block, so that calls can be chained.
@@ -64,6 +68,25 @@ class BlockBuilder {
   // Sets the ids that all queries of the block ignore, at most 64 ids.
   Derived& ignore_ids(absl::Span<const uint64_t> ids) {
     assign(*block_->mutable_ignore_ids(), ids);
+    return derived();
+  }
+  // Restricts each query to the members of some groups: `each` groups (1 .. 16) for each of N queries, or `each` groups
+  // for all queries. A group 0 is no group; it fills an entry that has fewer groups.
+  Derived& only_groups(absl::Span<const uint64_t> groups, uint32_t each = 1) {
+    assign(*block_->mutable_only_groups(), groups);
+    block_->set_only_groups_each(each);
+    return derived();
+  }
+  // Restricts each query to objects and instances with (tag & mask) == (entry of `tags` & mask). `tags` has N entries
+  // or one for all queries. `masks` has N entries, one for all queries, or none, which compares all bits.
+  Derived& tags(absl::Span<const uint64_t> tags, absl::Span<const uint64_t> masks = {}) {
+    assign(*block_->mutable_tags(), tags);
+    assign(*block_->mutable_tag_masks(), masks);
+    return derived();
+  }
+  // Sets the id that each query does not find, such as the object from which the query starts; 0 = no id.
+  Derived& self_ids(absl::Span<const uint64_t> ids) {
+    assign(*block_->mutable_self_ids(), ids);
     return derived();
   }
   // Sets the maximum number of rows per query; 0 = the default of 1,024.
@@ -107,6 +130,14 @@ class BlockBuilder {
   void filter_row(int rows_before, const Filter& filter) {
     append_row<uint32_t>(*block_->mutable_masks(), rows_before, filter.mask, kEveryMask);
     append_row<uint64_t>(*block_->mutable_ignore_groups(), rows_before, filter.ignore_group, 0);
+    append_row<uint64_t>(*block_->mutable_only_groups(), rows_before, filter.only_group, 0);
+    append_row<uint64_t>(*block_->mutable_self_ids(), rows_before, filter.self_id, 0);
+    // The server takes masks only together with tags, so both columns are filled once a row has a mask.
+    append_row<uint64_t>(*block_->mutable_tag_masks(), rows_before, filter.tag_mask, 0);
+    if (!block_->tag_masks().empty()) {
+      block_->mutable_tags()->Resize(rows_before, 0);
+      block_->add_tags(filter.tag);
+    }
   }
 
   v1::QueryBlock* block_;

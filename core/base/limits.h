@@ -40,6 +40,7 @@ inline constexpr uint32_t kMaxWriters = 4096;           // writer ids stored per
 inline constexpr uint32_t kMaxBlocks = 256;           // blocks per query batch
 inline constexpr uint32_t kMaxQueries = 65536;        // queries per query batch, summed over all blocks
 inline constexpr uint32_t kMaxIgnoredIds = 64;        // ids that the queries of a block ignore
+inline constexpr uint32_t kMaxOnlyGroups = 16;        // groups to which a query is restricted
 inline constexpr uint32_t kDefaultMaxResults = 1024;  // results per query if the block sets no max_results
 inline constexpr uint32_t kMaxMaxResults = 1u << 20;  // largest max_results of a block
 inline constexpr uint32_t kMaxNearest = 65536;        // max k of a nearest query, which returns up to k results

@@ -36,6 +36,10 @@ enum class PlantedBug {
   kCellBeyond,         // a cell of free space also has planes for primitives beyond its other planes
   kMatrixRow,          // the left and right planes of a view are computed from the wrong row of the matrix
   kOwnGroupBlocks,     // the group of a viewer blocks its sight
+  kFilterRayMeshes,    // rays ignore the filters for instances
+  kFilterFirstGroup,   // only the first of the groups to which a query is restricted is compared
+  kFilterTagMask,      // all bits of tags are compared, whatever the mask is
+  kFilterLabels,       // a query without ignored groups and ids compares layers only
   kClosedEdge,         // an edge includes both of its ends when crossings of a mesh are counted
   kCrossingInDouble,   // signs of crossings are taken from double even if double cannot decide them
   kCrossingMirror,     // a descending half line counts crossings with the sign of an ascending one

@@ -46,7 +46,20 @@ class BlockCheck {
       return refuse_limit(name("max_results"), "max_results", limits::kMaxMaxResults, block_.max_results);
     RETURN_IF_ERROR(check_length(block_.masks.size(), 1, ColumnNeed::kOptional, "masks"));
     RETURN_IF_ERROR(check_length(block_.ignore_groups.size(), 1, ColumnNeed::kOptional, "ignore_groups"));
+    RETURN_IF_ERROR(check_filters());
     return check_as_of();
+  }
+
+  absl::Status check_filters() const {
+    if (block_.only_groups_each > limits::kMaxOnlyGroups)
+      return refuse_limit(name("only_groups_each"), "only_groups", limits::kMaxOnlyGroups, block_.only_groups_each);
+    RETURN_IF_ERROR(
+        check_length(block_.only_groups.size(), block_.only_groups_per_query(), ColumnNeed::kOptional, "only_groups"));
+    RETURN_IF_ERROR(check_length(block_.tags.size(), 1, ColumnNeed::kOptional, "tags"));
+    RETURN_IF_ERROR(check_length(block_.tag_masks.size(), 1, ColumnNeed::kOptional, "tag_masks"));
+    if (!block_.tag_masks.empty() && block_.tags.empty())
+      return refuse_argument(Reason::kMalformed, name("tag_masks"), {}, "need tags: give both columns, or only tags");
+    return check_length(block_.self_ids.size(), 1, ColumnNeed::kOptional, "self_ids");
   }
 
   absl::Status check_as_of() const {

@@ -186,10 +186,19 @@ struct QueryBlock {
   absl::Span<const uint32_t> masks;          // layer mask of each query; default: all layers
   absl::Span<const uint64_t> ignore_groups;  // group that each query ignores; default: 0, no group
   absl::Span<const uint64_t> ignore_ids;     // at most limits::kMaxIgnoredIds ids that every query of the block ignores
-  uint32_t max_results = 0;                  // maximum number of rows per query; 0: limits::kDefaultMaxResults
-  Id after_id = kNoId;                       // overlaps, contains, pairs and groups return only higher ids
-  absl::Span<const uint64_t> as_of_ticks;    // tick of each query; default: the snapshot's latest state
-  absl::Span<const float> as_of_fractions;   // fraction of the way to the next tick, >= 0 and < 1; default: 0
+  // Entries of only_groups_per_query() groups, of which 0 is no group. A query whose entry has a group finds only
+  // members of the groups in the entry.
+  absl::Span<const uint64_t> only_groups;
+  uint32_t only_groups_each = 0;  // at most limits::kMaxOnlyGroups; 0 means 1
+  // A query finds only what has (tag & mask) == (entry of tags & mask), where mask is the entry of tag_masks; default:
+  // all 64 bits.
+  absl::Span<const uint64_t> tags;
+  absl::Span<const uint64_t> tag_masks;     // only with tags
+  absl::Span<const uint64_t> self_ids;      // id that each query ignores; default: 0, no id
+  uint32_t max_results = 0;                 // maximum number of rows per query; 0: limits::kDefaultMaxResults
+  Id after_id = kNoId;                      // overlaps, contains, pairs and groups return only higher ids
+  absl::Span<const uint64_t> as_of_ticks;   // tick of each query; default: the snapshot's latest state
+  absl::Span<const float> as_of_fractions;  // fraction of the way to the next tick, >= 0 and < 1; default: 0
   OutsideHistory outside = OutsideHistory::kReject;
   // N ids of objects or instances: the anchor of each query. The positions of a query are relative to the position of
   // its anchor, and the query does not find its anchor.
@@ -198,6 +207,8 @@ struct QueryBlock {
   using Kind = std::variant<RayColumns, BallColumns, BoxColumns, LookupColumns, NearestColumns, CapsuleColumns,
                             SweepColumns, FrustumColumns, SightColumns, ContainsColumns, PairColumns, CellColumns>;
   Kind kind;
+
+  size_t only_groups_per_query() const { return only_groups_each == 0 ? 1 : only_groups_each; }
 };
 
 // Returns the kind of the block. The value of a BlockKind is the index of its alternative in QueryBlock::kind, as

@@ -214,6 +214,11 @@ absl::Status read_block(const v1::QueryBlock& block, const std::string& field, Q
   out->masks = span_of(block.masks());
   out->ignore_groups = span_of(block.ignore_groups());
   out->ignore_ids = span_of(block.ignore_ids());
+  out->only_groups = span_of(block.only_groups());
+  out->only_groups_each = block.only_groups_each();
+  out->tags = span_of(block.tags());
+  out->tag_masks = span_of(block.tag_masks());
+  out->self_ids = span_of(block.self_ids());
   out->max_results = block.max_results();
   out->after_id = block.after_id();
   out->anchor_ids = span_of(block.anchor_ids());

@@ -111,6 +111,7 @@ std::vector<NamedLimit> limits_of(const Host& host) {
       {"name_length", limits::kMaxNameLength},
       {"nearest", limits::kMaxNearest},
       {"objects", limits::kMaxObjects},
+      {"only_groups", limits::kMaxOnlyGroups},
       {"page_size", limits::kMaxPageSize},
       {"pair_neighbours", limits::kMaxPairNeighbours},
       {"cell_planes", limits::kMaxCellPlanes},

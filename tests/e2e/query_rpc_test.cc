@@ -472,6 +472,9 @@ TEST_F(QueryRpcTest, LimitsOfABatchAreNamedWithWhatWasAsked) {
   refused(points, "blocks[0].nearest.k", "nearest", limits::kMaxNearest, limits::kMaxNearest + 1.0);
   refused(batch, "blocks[0].ignore_ids", "ignored_ids", limits::kMaxIgnoredIds, limits::kMaxIgnoredIds + 1.0);
   batch = ray_along_x();
+  batch.mutable_blocks(0)->set_only_groups_each(limits::kMaxOnlyGroups + 1);
+  refused(batch, "blocks[0].only_groups_each", "only_groups", limits::kMaxOnlyGroups, limits::kMaxOnlyGroups + 1.0);
+  batch = ray_along_x();
   batch.mutable_blocks(0)->set_max_results(limits::kMaxMaxResults + 1);
   refused(batch, "blocks[0].max_results", "max_results", limits::kMaxMaxResults, limits::kMaxMaxResults + 1.0);
   batch = ray_along_x();

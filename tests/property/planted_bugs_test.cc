@@ -159,6 +159,10 @@ constexpr Trial kTrials[] = {
     {"PairsCulledWithoutExtent", PlantedBug::kPairCullExtent, pair_difference},
     {"CellWithPlanesBeyondOthers", PlantedBug::kCellBeyond, cell_difference},
     {"SightThatTheOwnGroupBlocks", PlantedBug::kOwnGroupBlocks, sight_difference},
+    {"FilterOfRaysForObjectsOnly", PlantedBug::kFilterRayMeshes, filter_difference},
+    {"FilterByTheFirstOfSeveralGroups", PlantedBug::kFilterFirstGroup, filter_difference},
+    {"FilterByAllBitsOfATag", PlantedBug::kFilterTagMask, filter_difference},
+    {"FilterThatForgetsGroupsTagsAndIds", PlantedBug::kFilterLabels, filter_difference},
 #ifdef LOCUS_X86_KERNELS
     {"KernelWithoutEdgeBound", PlantedBug::kKernelEdgeBound, compare_kernels_with_list},
     {"KernelWithoutTBound", PlantedBug::kKernelTBound, compare_kernels_with_list},

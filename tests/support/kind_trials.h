@@ -192,6 +192,61 @@ inline std::string cell_difference() {
   return result.counts[0] == 3 ? "" : std::to_string(result.counts[0]) + " rows";
 }
 
+// Returns the first seed for which rays and balls with random filters find other ids than a plain test of each object
+// and instance; empty if there is none. Every query meets every object and instance, so only the filters decide.
+inline std::string filter_difference() {
+  for (uint64_t seed = 0; seed < scaled_count(400); ++seed) {
+    Random random(seed);
+    QueryWorld world;
+    Id next = 1;
+    const auto label = [&](auto item) {
+      item.id = next++;
+      item.group = random.below(4);
+      item.tag = random.below(8);
+      return item;
+    };
+    for (int i = 0; i < 4; ++i) world.instances.push_back(label(placed(0, wall_mesh())));
+    for (int i = 0; i < 6; ++i) world.objects.push_back(label(ball_object(0, {})));
+    OwnedBlock block;
+    block.settings.only_groups_each = 2;
+    constexpr uint64_t kTagMasks[] = {0, 1, 2, 6, ~uint64_t{0}};
+    for (int i = 0; i < 5; ++i) {
+      block.points.insert(block.points.end(), {-5, 0, 0});
+      block.self_ids.push_back(random.below(next));
+      block.tags.push_back(random.below(8));
+      block.tag_masks.push_back(random.pick(kTagMasks));
+      for (int k = 0; k < 2; ++k) block.only_groups.push_back(random.below(4));
+    }
+    if (random.chance(0.5)) block.self_ids.clear();
+    if (random.chance(0.5)) block.tags.clear(), block.tag_masks.clear();
+    if (random.chance(0.5)) block.only_groups.clear();
+    const auto wanted = [&](const auto& item, size_t i) {
+      const uint64_t a = block.only_groups.empty() ? 0 : block.only_groups[2 * i];
+      const uint64_t b = block.only_groups.empty() ? 0 : block.only_groups[2 * i + 1];
+      const bool in_group = (a == 0 && b == 0) || (item.group != 0 && (item.group == a || item.group == b));
+      const bool has_tag = block.tags.empty() || ((item.tag ^ block.tags[i]) & block.tag_masks[i]) == 0;
+      return in_group && has_tag && (block.self_ids.empty() || block.self_ids[i] != item.id);
+    };
+    std::vector<uint32_t> counts;
+    for (size_t i = 0; i < 5; ++i) {
+      uint32_t count = 0;
+      for (const PlacedMesh& mesh : world.instances) count += wanted(mesh, i) ? 1 : 0;
+      for (const Object& object : world.objects) count += wanted(object, i) ? 1 : 0;
+      counts.push_back(count);
+    }
+    const SnapshotPtr snapshot = snapshot_of(world);
+    RayColumns rays;
+    rays.mode = RayMode::kAll;
+    block.settings.kind = rays;
+    block.sizes = {1, 0, 0};
+    if (run_block(*snapshot, block).counts != counts) return "rays, seed " + std::to_string(seed);
+    block.settings.kind = BallColumns{};
+    block.sizes = {6};
+    if (run_block(*snapshot, block).counts != counts) return "balls, seed " + std::to_string(seed);
+  }
+  return "";
+}
+
 }  // namespace locus::test
 
 #endif  // LOCUS_TESTS_SUPPORT_KIND_TRIALS_H_

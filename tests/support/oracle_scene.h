@@ -116,7 +116,28 @@ class OracleScene {
     const uint64_t group = entry_for(block.ignore_groups, i, uint64_t{0});
     for (const uint64_t id : block.ignore_ids)
       if (id == item.id) return false;
+    if (entry_for(block.self_ids, i, uint64_t{0}) == item.id || !has_wanted_tag(block, i, item.tag)) return false;
+    if (!is_in_wanted_group(block, i, item.group)) return false;
     return (item.layers & mask) > 0 && (group == 0 || group != item.group);
+  }
+  // Returns whether the tag has the bits that query `i` asks for.
+  static bool has_wanted_tag(const QueryBlock& block, size_t i, uint64_t tag) {
+    const uint64_t wanted = entry_for(block.tags, i, uint64_t{0}), mask = entry_for(block.tag_masks, i, ~uint64_t{0});
+    for (int bit = 0; bit < 64 && !block.tags.empty(); ++bit)
+      if ((mask >> bit & 1) != 0 && (tag >> bit & 1) != (wanted >> bit & 1)) return false;
+    return true;
+  }
+  // Returns whether query `i` is not restricted to groups, or is restricted to some that include `group`.
+  static bool is_in_wanted_group(const QueryBlock& block, size_t i, uint64_t group) {
+    const size_t each = block.only_groups_each == 0 ? 1 : block.only_groups_each;
+    const size_t first = block.only_groups.size() == each ? 0 : i * each;
+    bool is_restricted = false;
+    for (size_t k = 0; k < each && !block.only_groups.empty(); ++k) {
+      const uint64_t wanted = block.only_groups[first + k];
+      if (wanted != 0 && wanted == group) return true;
+      is_restricted = is_restricted || wanted != 0;
+    }
+    return !is_restricted;
   }
 
   static void count(const QueryBlock& block, Rows& rows, size_t i, BlockResult& result) {

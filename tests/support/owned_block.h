@@ -37,6 +37,10 @@ struct OwnedBlock {
   std::vector<uint32_t> masks;
   std::vector<uint64_t> ignore_groups;
   std::vector<uint64_t> ignore_ids;
+  std::vector<uint64_t> only_groups;  // settings.only_groups_each has their number per query
+  std::vector<uint64_t> tags;
+  std::vector<uint64_t> tag_masks;
+  std::vector<uint64_t> self_ids;
   std::vector<uint64_t> as_of_ticks;
   std::vector<float> as_of_fractions;
 
@@ -46,6 +50,10 @@ struct OwnedBlock {
     block.masks = masks;
     block.ignore_groups = ignore_groups;
     block.ignore_ids = ignore_ids;
+    block.only_groups = only_groups;
+    block.tags = tags;
+    block.tag_masks = tag_masks;
+    block.self_ids = self_ids;
     block.anchor_ids = anchor_ids;
     block.as_of_ticks = as_of_ticks;
     block.as_of_fractions = as_of_fractions;
@@ -83,7 +91,10 @@ struct OwnedBlock {
     visit(half_axes, 3);
     visit(half_extents, 3);
     visit(rotations, 4);
-    for (auto* column : {&ids, &groups, &after_ids, &anchor_ids, &ignore_groups, &as_of_ticks}) visit(*column, 1);
+    for (auto* column :
+         {&ids, &groups, &after_ids, &anchor_ids, &ignore_groups, &as_of_ticks, &tags, &tag_masks, &self_ids})
+      visit(*column, 1);
+    visit(only_groups, settings.only_groups_per_query());
     for (auto* column : {&after_triangles, &masks}) visit(*column, 1);
     for (auto* column : {&after_ts, &as_of_fractions}) visit(*column, 1);
   }

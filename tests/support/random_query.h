@@ -30,6 +30,11 @@ inline Layers random_layers(Random& random) {
   return random.pick(kLayers);
 }
 
+inline Tag random_tag(Random& random) {
+  constexpr Tag kTags[] = {0, 1, 2, 3, Tag{1} << 63};
+  return random.pick(kTags);
+}
+
 // Generates a placement: unchanged, or moved to `near` (sometimes up to a million units from `near` on each axis) and
 // often rotated or scaled.
 inline PlacedMesh random_placement(Vec3d near, Random& random) {
@@ -120,7 +125,7 @@ inline void label(Random& random, QueryWorld& world) {
     const uint32_t number = ids[next++];
     item.id = number % 5 == 0 ? (Id{1} << 63) | number : number;
     item.group = random.below(4);
-    item.tag = random.next();
+    item.tag = random.chance(0.5) ? random.next() : random_tag(random);
     item.layers = random_layers(random);
   };
   for (PlacedMesh& placed : world.instances) label_one(placed);
@@ -160,6 +165,30 @@ inline void add_anchors(const QueryScene& scene, Random& random, OwnedBlock& blo
   if (!check_batch(batch).ok()) block.anchor_ids.clear();
 }
 
+// Restricts the queries of some blocks to groups, tags, or everything but an object or instance of each query.
+inline void add_rare_filters(const QueryScene& scene, Random& random, OwnedBlock& block) {
+  const size_t n = query_count(block.view());
+  const auto entries = [&] { return random.chance(0.5) ? n : size_t{1}; };
+  if (random.chance(0.15)) {
+    block.settings.only_groups_each = static_cast<uint32_t>(random.below(4));
+    for (size_t i = entries() * block.settings.only_groups_per_query(); i > 0; --i)
+      block.only_groups.push_back(random.below(5));
+  }
+  if (random.chance(0.15)) {
+    constexpr uint64_t kTagMasks[] = {0, 1, 2, 3, uint64_t{1} << 63, ~uint64_t{0}};
+    for (size_t i = entries(); i > 0; --i) block.tags.push_back(random_tag(random));
+    if (!block.tags.empty() && random.chance(0.8))
+      for (size_t i = entries(); i > 0; --i) block.tag_masks.push_back(random.pick(kTagMasks));
+  }
+  if (random.chance(0.8)) return;
+  for (size_t i = entries(); i > 0; --i) {
+    Id id = random.below(30);
+    if (!scene.world.objects.empty() && random.chance(0.5)) id = random.pick(scene.world.objects).id;
+    if (!scene.world.instances.empty() && random.chance(0.4)) id = random.pick(scene.world.instances).id;
+    block.self_ids.push_back(id);
+  }
+}
+
 inline void add_common(const QueryScene& scene, Random& random, OwnedBlock& block) {
   const size_t n = query_count(block.view());
   QueryBlock& settings = block.settings;
@@ -174,6 +203,7 @@ inline void add_common(const QueryScene& scene, Random& random, OwnedBlock& bloc
     for (size_t i = entries(); i > 0; --i) block.ignore_groups.push_back(random.below(5));
   if (random.chance(0.2) && !scene.world.objects.empty())
     for (int i = 0; i < 3; ++i) block.ignore_ids.push_back(random.pick(scene.world.objects).id);
+  add_rare_filters(scene, random, block);
   add_anchors(scene, random, block);
   const bool has_counts = row_layout(block.view()) == RowLayout::kCounted && block_kind(settings) != BlockKind::kCell;
   if (has_counts && random.chance(0.15)) settings.count_only = true;

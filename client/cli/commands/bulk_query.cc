@@ -218,6 +218,25 @@ void add_filter_fields(const QueryOptions& options, RowSchema& schema) {
   schema.push_back(column_or_option({.name = "mask", .kind = FieldKind::kBits}, options.masks, "--mask"));
   schema.push_back(
       column_or_option({.name = "ignore_group", .kind = FieldKind::kId}, options.ignore_groups, "--ignore-group"));
+  schema.push_back(column_or_option({.name = "self_id", .kind = FieldKind::kId}, options.self_ids, "--self-id"));
+  schema.push_back(
+      column_or_option({.name = "only_group", .kind = FieldKind::kId}, options.only_groups, "--only-group"));
+  schema.push_back(column_or_option({.name = "tag", .kind = FieldKind::kId}, options.tags, "--tag"));
+  schema.push_back(column_or_option({.name = "tag_mask", .kind = FieldKind::kId}, options.tag_masks, "--tag-mask"));
+}
+
+TagColumns tag_columns(const QueryOptions& options, const BlockRows& rows, size_t tag_field) {
+  const RowColumn &tag = rows.batch.columns[tag_field], &mask = rows.batch.columns[tag_field + 1];
+  if (!tag.any() && !mask.any()) return {values_of(options.tags), values_of(options.tag_masks)};
+  const uint64_t option_tag = options.tags.empty() ? 0 : options.tags.front().value;
+  const uint64_t option_mask = options.tag_masks.empty() ? ~uint64_t{0} : options.tag_masks.front().value;
+  TagColumns columns;
+  for (size_t row = rows.rows.begin; row < rows.rows.end; ++row) {
+    const bool given = tag.given[row] != 0 || !options.tags.empty();
+    columns.tags.push_back(tag.given[row] != 0 ? tag.integers[row] : option_tag);
+    columns.masks.push_back(!given ? 0 : mask.given[row] != 0 ? mask.integers[row] : option_mask);
+  }
+  return columns;
 }
 
 absl::Status check(const QueryOptions& options, const BulkOptions& bulk) {
@@ -225,6 +244,9 @@ absl::Status check(const QueryOptions& options, const BulkOptions& bulk) {
   status.Update(check(bulk));
   status.Update(at_most_one(options.masks, "--mask"));
   status.Update(at_most_one(options.ignore_groups, "--ignore-group"));
+  status.Update(at_most_one(options.self_ids, "--self-id"));
+  status.Update(at_most_one(options.tags, "--tag"));
+  status.Update(at_most_one(options.tag_masks, "--tag-mask"));
   status.Update(at_most_one(options.past.as_of, "--as-of"));
   if (status.ok() && options.after_id.value != 0)
     return usage_error("--after-id continues one truncated answer; it cannot be combined with an input");

@@ -62,14 +62,30 @@ std::vector<float> offsets_of(const RowColumn& positions, RowSpan rows, const cl
 // Returns the schema field of a position, whose column in the input is named "at" or "position".
 Field at_field();
 
-// Appends the fields that every kind of query has, mask and ignore_group, to the schema.
+// Appends the fields that every kind of query has to the schema: mask, ignore_group, self_id, only_group, tag and
+// tag_mask.
 void add_filter_fields(const QueryOptions& options, RowSchema& schema);
-// Sets the columns for mask and ignore_group of a block from the rows. `first` is the index of the field mask in the
-// schema; the field ignore_group follows it.
+
+// Columns tags and tag_masks of a block. Both are empty if no tag is given.
+struct TagColumns {
+  std::vector<uint64_t> tags;
+  std::vector<uint64_t> masks;
+};
+// Returns the columns for the fields tag, with index `tag_field` in the schema, and tag_mask, which follows it. A row
+// without a tag finds every tag, and a row without a mask compares all bits.
+TagColumns tag_columns(const QueryOptions& options, const BlockRows& rows, size_t tag_field);
+
+// Sets the filter columns of a block from the rows. `first` is the index of the field mask in the schema; the other
+// fields of add_filter_fields() follow it.
 template <class Block>
 void apply_filter_columns(const QueryOptions& options, const BlockRows& rows, size_t first, Block& block) {
-  block.masks(bits_column(rows.batch.columns[first], rows.rows, client::kEveryMask, values32_of(options.masks)));
-  block.ignore_groups(id_column(rows.batch.columns[first + 1], rows.rows, 0, values_of(options.ignore_groups)));
+  const std::vector<RowColumn>& columns = rows.batch.columns;
+  block.masks(bits_column(columns[first], rows.rows, client::kEveryMask, values32_of(options.masks)));
+  block.ignore_groups(id_column(columns[first + 1], rows.rows, 0, values_of(options.ignore_groups)));
+  block.self_ids(id_column(columns[first + 2], rows.rows, 0, values_of(options.self_ids)));
+  if (columns[first + 3].any()) block.only_groups(id_column(columns[first + 3], rows.rows, 0, {}));
+  const TagColumns tags = tag_columns(options, rows, first + 4);
+  block.tags(tags.tags, tags.masks);
 }
 
 // Returns a usage error for query options that cannot be combined with rows from an input.

@@ -41,6 +41,11 @@ void add_filter_options(CLI::App& command, QueryOptions& options) {
   add_repeatable(command, "--ignore-group", options.ignore_groups, "GROUP",
                  "Ignore a group; one for each query, or one for all");
   add_repeatable(command, "--ignore-id", options.ignore_ids, "ID", "Ignore an id; at most 64");
+  add_repeatable(command, "--self-id", options.self_ids, "ID", "Ignore an id; one for each query, or one for all");
+  add_repeatable(command, "--only-group", options.only_groups, "GROUP",
+                 "Find only members of these groups; at most 16");
+  add_repeatable(command, "--tag", options.tags, "TAG", "Find only this tag; one for each query, or one for all");
+  add_repeatable(command, "--tag-mask", options.tag_masks, "BITS", "Bits of the tag to compare with --tag [all]");
   add_repeatable(command, "--anchor", options.anchors, "ID",
                  "Count positions from this object, which is ignored; one for each query");
   command.add_flag("--count-only", options.count_only, "Report only the number of rows of each query");
@@ -102,6 +107,7 @@ std::vector<v1::Column> overlap_columns(const QueryOptions& options, v1::StaticD
 
 absl::Status check(const QueryOptions& options) {
   if (options.at_least && options.exactly) return usage_error("give --at-least or --exactly, not both");
+  if (options.tags.empty() && !options.tag_masks.empty()) return usage_error("--tag-mask needs --tag");
   return absl::OkStatus();
 }
 

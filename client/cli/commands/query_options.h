@@ -23,6 +23,10 @@ struct QueryOptions {
   std::vector<Number64> masks;
   std::vector<Number64> ignore_groups;
   std::vector<Number64> ignore_ids;
+  std::vector<Number64> only_groups;
+  std::vector<Number64> tags;
+  std::vector<Number64> tag_masks;
+  std::vector<Number64> self_ids;
   std::vector<Number64> anchors;
   bool count_only = false;
   uint32_t max_results = 0;
@@ -64,6 +68,13 @@ void see_own(const std::string& scene, const Context& context, client::QueryBuil
 // see_own().
 void apply_to_batch(const QueryOptions& options, const Context& context, client::QueryBuilder& builder);
 
+// Restricts all queries of a block to the groups of --only-group, if there are any.
+template <class Block>
+void apply_only_groups(const QueryOptions& options, Block& block) {
+  if (!options.only_groups.empty())
+    block.only_groups(values_of(options.only_groups), static_cast<uint32_t>(options.only_groups.size()));
+}
+
 // Sets those options of a block that all kinds of query share. The caller must set the block's kind and columns.
 template <class Block>
 void apply_to_block(const QueryOptions& options, Block& block) {
@@ -74,7 +85,10 @@ void apply_to_block(const QueryOptions& options, Block& block) {
       .ignore_ids(values_of(options.ignore_ids))
       .max_results(options.max_results)
       .after_id(options.after_id.value)
-      .anchors(values_of(options.anchors));
+      .anchors(values_of(options.anchors))
+      .tags(values_of(options.tags), values_of(options.tag_masks))
+      .self_ids(values_of(options.self_ids));
+  apply_only_groups(options, block);
   if (options.count_only) block.count_only();
   apply_to_block(options.past, block);
 }

@@ -131,7 +131,8 @@ void add_query_ray(CLI::App& parent, Context& context) {
   generator | locus -o ndjson query ray arena --from-ndjson - --t-max 100
 
 Rows: from.x,from.y,from.z,dir.x,dir.y,dir.z[,t_max,mask,ignore_group] or {"from": [0,1,0], "dir": [0,0,-1]};
-an option given once stands for a column. All rows are answered at one revision; see --follow.)");
+an option given once stands for a column. Rows of every kind of query may also have self_id, only_group, tag and
+tag_mask. All rows are answered at one revision; see --follow.)");
   add_query_ray_options(command, *options);
   add_bulk_query_options(command, options->bulk);
   add_query_options(command, options->query);

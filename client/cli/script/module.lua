@@ -231,12 +231,14 @@ local kinds <const> = {
 }
 -- Options that are fields of the protocol's QueryBlock; other options are fields of the kind's message.
 local block_options <const> = fields("frame source precision columns max_results after_id as_of_ticks as_of_fractions "
-  .. "outside_history anchor_ids count_only")
+  .. "outside_history anchor_ids count_only only_groups only_groups_each ignore_ids")
 -- Numbers in a field of a row that is a list.
 local widths <const> = { from = 3, dir = 3, to = 3, at = 3, half = 3, rotation = 4 }
+local every_tag_bit <const> = locus.id("18446744073709551615")
 -- Fields of a row of any kind: the column of the block, and the default.
 local row_options <const> = {
-  mask = { "masks", 0xFFFFFFFF }, ignore_group = { "ignore_groups", 0 }, ignore_id = { "ignore_ids", 0 },
+  mask = { "masks", 0xFFFFFFFF }, ignore_group = { "ignore_groups", 0 }, ignore_id = { "self_ids", 0 },
+  only_group = { "only_groups", 0 }, tag = { "tags", 0 }, tag_mask = { "tag_masks", 0 },
 }
 
 for kind, description in pairs(kinds) do
@@ -248,6 +250,7 @@ for kind, description in pairs(kinds) do
   -- batch.
   Queries[kind] = function(self, row, options)
     check_fields(kind, row, known)
+    if row.tag_mask ~= nil and row.tag == nil then locus.fail(kind .. ": tag_mask needs tag") end
     for name in pairs(description.needs) do needed(kind, row, name) end
     for name in pairs(known) do
       if widths[name] then vector(kind, row, name, widths[name]) else scalar(kind, row, name) end
@@ -278,7 +281,12 @@ for kind, description in pairs(kinds) do
       entry.columns[column][n] = row[name]
     end
     for name, column in pairs(description.takes) do set_optional(entry.columns, column[1], n, row[name], column[2]) end
-    for name, column in pairs(row_options) do set_optional(entry.block, column[1], n, row[name], column[2]) end
+    for name, column in pairs(row_options) do
+      local value = row[name]
+      -- A tag without a mask compares all bits; once a row has a tag, rows without one have the mask 0.
+      if name == "tag_mask" and row.tag ~= nil and value == nil then value = every_tag_bit end
+      set_optional(entry.block, column[1], n, value, column[2])
+    end
     entry.rows = n
     self.places[#self.places + 1] = { entry.number, n }
     return self

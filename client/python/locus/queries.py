@@ -29,6 +29,11 @@ class Block(NamedTuple):
     - `masks`: N uint32 or one; only objects and instances with (layers & mask) != 0 are found.
     - `ignore_groups`: N uint64 or one; the query ignores objects and instances of this group.
     - `ignore_ids`: at most 64 uint64 ids to ignore, for the whole block.
+    - `only_groups`: N uint64 or one; the query finds only objects and instances of this group; 0 = every group. With
+      `only_groups_each`, 1 .. 16, a query has that many groups instead of one; 0 fills an entry that has fewer.
+    - `tags`: N uint64 or one; only objects and instances with (tag & mask) == (tags & mask) are found. `tag_masks`: N
+      uint64 or one, the mask of each query, by default all bits; only with `tags`.
+    - `self_ids`: N uint64 or one; the query ignores the object or instance with this id, 0 = none.
     - `max_results`: maximum number of rows per query, 0 = 1,024.
     - `after_id`: return only rows with a higher id, to continue after a truncated result.
     - `as_of_ticks`: N uint64 or one; the query sees objects as they were at the end of this tick. `as_of_fractions`: N
@@ -54,6 +59,11 @@ class Block(NamedTuple):
     outside_history: OutsideHistory = OutsideHistory.UNSPECIFIED
     anchor_ids: ColumnLike = None
     count_only: bool = False
+    only_groups: ColumnLike = None
+    only_groups_each: int = 1
+    tags: ColumnLike = None
+    tag_masks: ColumnLike = None
+    self_ids: ColumnLike = None
 
     def write(self, block: wire.Parts, path: str, count: int) -> None:
         """Appends the settings to a QueryBlock of `count` queries. `path` is the prefix of field names in errors.
@@ -74,6 +84,14 @@ class Block(NamedTuple):
             block.add(_BLOCK["ignore_groups"], groups)
         if self.ignore_ids is not None:
             block.add(_BLOCK["ignore_ids"], columns.borrow(path + "ignore_ids", self.ignore_ids, UINT64))
+        if self.only_groups is not None:
+            each = self.only_groups_each
+            block.add(_BLOCK["only_groups"], columns.borrow_for(path + "only_groups", self.only_groups, UINT64, count, each))
+            if each != 1:
+                block.add_varint(_BLOCK["only_groups_each"], each)
+        for name, column in (("tags", self.tags), ("tag_masks", self.tag_masks), ("self_ids", self.self_ids)):
+            if column is not None:
+                block.add(_BLOCK[name], columns.borrow_for(path + name, column, UINT64, count))
         if self.max_results:
             block.add_varint(_BLOCK["max_results"], self.max_results)
         if self.after_id:

@@ -17,6 +17,7 @@
 #include "core/base/check.h"
 #include "core/base/column.h"
 #include "core/base/limits.h"
+#include "core/base/planted_bug.h"
 #include "core/index/bvh/kernels/dispatch.h"
 #include "core/index/work.h"
 #include "core/query/kinds/found_objects.h"
@@ -25,37 +26,68 @@
 
 namespace locus {
 
-// Filter of one query by layers, group and id; the query's anchor is not accepted. Borrows the block's ignored ids.
+// Filter of one query by layers, groups, tag and id; the query's anchor is not accepted. Borrows the block's columns.
+// Most queries filter by layers only; for these, accepts() makes no other comparison.
 class Filter {
  public:
   Filter(const QueryBlock& block, size_t query)
       : mask_(ColumnReader<uint32_t>(block.masks, 1).value(query, kAllLayers)),
         ignored_groups_{ColumnReader<uint64_t>(block.ignore_groups, 1).value(query, 0)},
+        ignored_ids_(block.ignore_ids),
         anchor_(block.anchor_ids.empty() ? kNoId : block.anchor_ids[query]),
-        ignored_ids_(block.ignore_ids) {}
+        self_(ColumnReader<uint64_t>(block.self_ids, 1).value(query, kNoId)) {
+    if (!block.only_groups.empty()) restrict_groups(block, query);
+    if (!block.tags.empty()) {
+      tag_mask_ = planted(PlantedBug::kFilterTagMask)
+                      ? ~Tag{0}
+                      : ColumnReader<uint64_t>(block.tag_masks, 1).value(query, ~Tag{0});
+      tag_ = ColumnReader<uint64_t>(block.tags, 1).value(query, 0) & tag_mask_;
+    }
+    layers_only_ = ignored_groups_[0] == 0 && ignored_ids_.empty() && anchor_ == kNoId &&
+                   ((self_ == kNoId && only_groups_.empty() && tag_mask_ == 0) || planted(PlantedBug::kFilterLabels));
+  }
 
   // Makes the filter ignore two more groups; 0 stands for no group. Another call replaces both groups.
   void ignore(Group first, Group second) {
     ignored_groups_[1] = first;
     ignored_groups_[2] = second;
+    if (first != 0 || second != 0) layers_only_ = false;
   }
   // Makes the filter accept nothing, for a query that has no answer.
   void accept_nothing() { mask_ = 0; }
   template <class Item>
   bool accepts(const Item& item) const {
     if ((item.layers & mask_) == 0) return false;
-    if (item.group != 0 &&
-        std::find(ignored_groups_.begin(), ignored_groups_.end(), item.group) != ignored_groups_.end())
-      return false;
-    if (item.id == anchor_) return false;
-    return std::find(ignored_ids_.begin(), ignored_ids_.end(), item.id) == ignored_ids_.end();
+    return layers_only_ || (accepts_group(item.group) && accepts_id(item.id) && (item.tag & tag_mask_) == tag_);
   }
 
  private:
+  void restrict_groups(const QueryBlock& block, size_t query) {
+    const size_t groups = block.only_groups_per_query();
+    const absl::Span<const uint64_t> entry(ColumnReader<uint64_t>(block.only_groups, groups).entry(query), groups);
+    if (std::any_of(entry.begin(), entry.end(), [](uint64_t group) { return group != 0; }))
+      only_groups_ = planted(PlantedBug::kFilterFirstGroup) ? entry.first(1) : entry;
+  }
+  bool accepts_group(Group group) const {
+    if (group == 0) return only_groups_.empty();
+    if (std::find(ignored_groups_.begin(), ignored_groups_.end(), group) != ignored_groups_.end()) return false;
+    if (only_groups_.empty()) return true;
+    return std::find(only_groups_.begin(), only_groups_.end(), group) != only_groups_.end();
+  }
+  bool accepts_id(Id id) const {
+    if (id == anchor_ || id == self_) return false;
+    return std::find(ignored_ids_.begin(), ignored_ids_.end(), id) == ignored_ids_.end();
+  }
+
   Layers mask_;
+  bool layers_only_;                     // every other condition accepts everything
   std::array<Group, 3> ignored_groups_;  // 0: none
-  Id anchor_;                            // kNoId if the query has no anchor
   absl::Span<const uint64_t> ignored_ids_;
+  absl::Span<const uint64_t> only_groups_;  // empty: every group; an entry 0 is no group
+  Id anchor_;                               // kNoId if the query has no anchor
+  Id self_;                                 // kNoId if the query ignores no object of its own
+  Tag tag_ = 0;                             // has no bit that tag_mask_ does not have
+  Tag tag_mask_ = 0;
 };
 
 // Returns the rotation of query `i` in an optional column of quaternions x, y, z, w. Returns the identity if the column

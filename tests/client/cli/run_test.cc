@@ -278,6 +278,23 @@ TEST_F(RunTest, FirstHitsShowHitsAndMisses) {
   EXPECT_EQ(server_.queries.scene, "arena");
 }
 
+TEST_F(RunTest, QueriesTakeGroupsTagsAndIdsToFilterBy) {
+  server_.queries.answer = [](const v1::QueryRequest&, v1::QueryResult& result) {
+    result.add_blocks();
+    return grpc::Status::OK;
+  };
+  run_here({"query", "ball", "arena", "--at", "0,1,0", "--radius", "5", "--only-group", "3", "--only-group", "4",
+            "--tag", "7", "--tag-mask", "15", "--self-id", "9"});
+  const v1::QueryBlock block = server_.queries.last_batch.blocks(0);
+  EXPECT_THAT(block.only_groups(), ElementsAre(3, 4));
+  EXPECT_EQ(block.only_groups_each(), 2u);
+  EXPECT_THAT(block.tags(), ElementsAre(7));
+  EXPECT_THAT(block.tag_masks(), ElementsAre(15));
+  EXPECT_THAT(block.self_ids(), ElementsAre(9));
+  EXPECT_THAT(run({"query", "ball", "arena", "--at", "0,1,0", "--radius", "5", "--tag-mask", "15"}).err,
+              HasSubstr("--tag-mask needs --tag"));
+}
+
 TEST_F(RunTest, TheFormerNameOfTMaxIsAcceptedAndHidden) {
   server_.queries.answer = [](const v1::QueryRequest&, v1::QueryResult& result) {
     result.add_blocks();

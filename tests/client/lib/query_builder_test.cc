@@ -33,6 +33,30 @@ TEST(QueryBuilderTest, RaysAddedByRowFillOnlyColumnsWhoseRowsDiffer) {
   EXPECT_EQ(block.rays().inside(), v1::INSIDE_SKIP);
 }
 
+TEST(QueryBuilderTest, FiltersOfARowFillTheirColumns) {
+  QueryBuilder builder;
+  builder.rays()
+      .ray({0, 1, 0}, {0, 0, -1})
+      .ray({1, 1, 0}, {0, 0, -2}, 50, {.only_group = 4, .self_id = 7, .tag = 0, .tag_mask = 0xFF})
+      .ray({2, 1, 0}, {0, 0, -3}, 50, {.tag = 5, .tag_mask = 6});
+  const v1::QueryBlock block = builder.build().blocks(0);
+  EXPECT_THAT(block.only_groups(), ElementsAre(0, 4, 0));
+  EXPECT_THAT(block.self_ids(), ElementsAre(0, 7, 0));
+  EXPECT_THAT(block.tags(), ElementsAre(0, 0, 5));
+  EXPECT_THAT(block.tag_masks(), ElementsAre(0, 0xFF, 6));
+}
+
+TEST(QueryBuilderTest, FiltersOfABlockAreWholeColumns) {
+  QueryBuilder builder;
+  builder.balls().balls({{0, 0, 0}}, {{1}}).only_groups({{3, 4}}, 2).tags({{5}}, {{6}}).self_ids({{7}});
+  const v1::QueryBlock block = builder.build().blocks(0);
+  EXPECT_THAT(block.only_groups(), ElementsAre(3, 4));
+  EXPECT_EQ(block.only_groups_each(), 2u);
+  EXPECT_THAT(block.tags(), ElementsAre(5));
+  EXPECT_THAT(block.tag_masks(), ElementsAre(6));
+  EXPECT_THAT(block.self_ids(), ElementsAre(7));
+}
+
 TEST(QueryBuilderTest, DefaultValuesLeaveColumnsEmpty) {
   QueryBuilder builder;
   builder.rays().ray({0, 1, 0}, {0, 0, -1});
@@ -40,6 +64,10 @@ TEST(QueryBuilderTest, DefaultValuesLeaveColumnsEmpty) {
   EXPECT_THAT(block.rays().t_max(), IsEmpty());
   EXPECT_THAT(block.masks(), IsEmpty());
   EXPECT_THAT(block.ignore_groups(), IsEmpty());
+  EXPECT_THAT(block.only_groups(), IsEmpty());
+  EXPECT_THAT(block.tags(), IsEmpty());
+  EXPECT_THAT(block.tag_masks(), IsEmpty());
+  EXPECT_THAT(block.self_ids(), IsEmpty());
 }
 
 TEST(QueryBuilderTest, AsOfTimesAreColumns) {

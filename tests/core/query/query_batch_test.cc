@@ -339,6 +339,43 @@ TEST(CheckBatchTest, MasksAndIgnoredGroupsHaveNEntriesOrOneOrNone) {
   expect_refusal(block, Reason::kColumnLength, "ignore_groups", -1);
 }
 
+TEST(CheckBatchTest, TagsAndSelfIdsHaveNEntriesOrOneOrNone) {
+  OwnedBlock block = twenty_rays();
+  for (const size_t entries : {0u, 1u, 20u}) {
+    block.tags.assign(entries, 1);
+    block.tag_masks.assign(entries, 1);
+    block.self_ids.assign(entries, 0);
+    EXPECT_TRUE(status_with(block).ok());
+  }
+  block.tags.assign(19, 1);
+  expect_refusal(block, Reason::kColumnLength, "tags", -1);
+  block.tags.assign(1, 1);
+  block.tag_masks.assign(2, 1);
+  expect_refusal(block, Reason::kColumnLength, "tag_masks", -1);
+  block.tags.clear();
+  block.tag_masks.assign(1, 1);
+  expect_refusal(block, Reason::kMalformed, "tag_masks", -1);
+  block.tag_masks.clear();
+  block.self_ids.assign(21, 1);
+  expect_refusal(block, Reason::kColumnLength, "self_ids", -1);
+}
+
+TEST(CheckBatchTest, OnlyGroupsHaveUpTo16GroupsForEachQueryOrForAll) {
+  OwnedBlock block = twenty_rays();
+  for (const uint32_t each : {0u, 1u, 3u, 16u}) {
+    block.settings.only_groups_each = each;
+    for (const size_t entries : {0u, 1u, 20u}) {
+      block.only_groups.assign(entries * std::max(each, 1u), 1);
+      EXPECT_TRUE(status_with(block).ok()) << each << " " << entries;
+    }
+    block.only_groups.push_back(1);
+    expect_refusal(block, Reason::kColumnLength, "only_groups", -1);
+  }
+  block.settings.only_groups_each = 17;
+  block.only_groups.assign(17, 1);
+  expect_refusal(block, Reason::kLimit, "only_groups_each", -1);
+}
+
 TEST(CheckBatchTest, AtMost64IdsAreIgnored) {
   OwnedBlock block = twenty_rays();
   block.ignore_ids.assign(64, 7);

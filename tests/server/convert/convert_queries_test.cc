@@ -24,6 +24,25 @@ TEST(ConvertQueriesTest, ColumnsPointIntoTheMessage) {
   EXPECT_EQ(queries->blocks[0].masks[0], 7u);
 }
 
+TEST(ConvertQueriesTest, FiltersAreColumnsOfTheBlock) {
+  v1::QueryBatch batch;
+  v1::QueryBlock& block = *batch.add_blocks();
+  block.mutable_balls();
+  block.set_only_groups_each(2);
+  for (const uint64_t group : {3u, 4u}) block.add_only_groups(group);
+  block.add_tags(5);
+  block.add_tag_masks(6);
+  block.add_self_ids(7);
+  const absl::StatusOr<QueryBatch> queries = to_queries(batch);
+  ASSERT_TRUE(queries.ok()) << queries.status();
+  const QueryBlock& read = queries->blocks[0];
+  EXPECT_EQ(read.only_groups_each, 2u);
+  EXPECT_THAT(read.only_groups, ElementsAre(3, 4));
+  EXPECT_THAT(read.tags, ElementsAre(5));
+  EXPECT_THAT(read.tag_masks, ElementsAre(6));
+  EXPECT_THAT(read.self_ids, ElementsAre(7));
+}
+
 TEST(ConvertQueriesTest, ZeroIsTheDefaultOfEveryEnum) {
   v1::QueryBatch batch;
   batch.add_blocks()->mutable_rays();

@@ -125,6 +125,23 @@ TEST_F(BulkQueryTest, EveryKindAndModeAcceptsRows) {
             "query,t,id,triangle\n0,0.0,2,\n2,0.0,3,\n");
 }
 
+TEST_F(BulkQueryTest, RowsFilterByGroupTagAndId) {
+  insert_balls();
+  const TestFile balls(
+      "at.x,at.y,at.z,radius,self_id,only_group,tag,tag_mask\n0,0,0,1,,,,\n0,0,0,1,1,,,\n0,0,0,1,,77,,\n0,0,0,1,,,"
+      "12345,\n"
+      "0,0,0,1,,,12345,0\n",
+      "at.csv");
+  EXPECT_EQ(out_of({"-o", "csv", "query", "ball", "world", "--from-csv", balls.path()}), "ball,id\n0,1\n4,1\n");
+  const TestFile plain("at.x,at.y,at.z,radius\n0,0,0,1\n", "plain.csv");
+  EXPECT_EQ(out_of({"-o", "csv", "query", "ball", "world", "--from-csv", plain.path(), "--only-group", "77",
+                    "--only-group", "78"}),
+            "ball,id\n");
+  EXPECT_EQ(
+      out_of({"-o", "csv", "query", "ball", "world", "--from-csv", plain.path(), "--tag", "12345", "--tag-mask", "0"}),
+      "ball,id\n0,1\n");
+}
+
 TEST_F(BulkQueryTest, AJsonAnswerIsTheSameDocumentAsFromOptions) {
   insert_balls();
   const TestFile rows("{\"at\":[0,0,0]}\n{\"at\":[4,0,0]}\n", "at.ndjson");

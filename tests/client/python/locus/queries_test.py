@@ -204,6 +204,28 @@ class AnswersEqualTheCommandLineTest(DaemonTest):
         (block,) = self.ask(QueryBatch().rays([[0, 0, 30]] * 2, [0, 0, -1], block=passing))
         self.assertEqual(listed(block.ids), [1, 200])
 
+    def test_each_query_finds_only_some_groups_one_tag_and_not_itself(self):
+        everything = [[0, 0, 0]] * 3
+        (whole,) = self.ask(QueryBatch().balls([0, 0, 0], 100, block=Block(columns=[Column.ID, Column.GROUP, Column.TAG])))
+        ids, groups, tags = listed(whole.ids), listed(whole.groups), listed(whole.tags)
+        of_groups = Block(only_groups=[7, 0, 7, 9, 0, 0], only_groups_each=2)
+        (block,) = self.ask(QueryBatch().balls(everything, 100, block=of_groups))
+        wanted = [[i for i, group in zip(ids, groups) if group in some] for some in ((7,), (7, 9))] + [ids]
+        self.assertEqual(listed(block.ids), sum(wanted, []))
+        self.assertEqual(listed(block.counts), [len(rows) for rows in wanted])
+        tag = max(tags)
+        (block,) = self.ask(QueryBatch().balls([0, 0, 0], 100, block=Block(tags=tag)))
+        self.assertEqual(listed(block.ids), [i for i, found in zip(ids, tags) if found == tag])
+        (block,) = self.ask(QueryBatch().balls([0, 0, 0], 100, block=Block(tags=0, tag_masks=1)))
+        self.assertEqual(listed(block.ids), [i for i, found in zip(ids, tags) if found % 2 == 0])
+        (block,) = self.ask(QueryBatch().balls(everything, 100, block=Block(self_ids=[ids[0], ids[1], 0])))
+        self.assertEqual(listed(block.ids), ids[1:] + ids[:1] + ids[2:] + ids)
+        with self.assertRaisesRegex(ValueError, r"^blocks\[0\].only_groups: has 3 numbers: give 2"):
+            QueryBatch().balls(everything, 1, block=Block(only_groups=[1, 2, 3], only_groups_each=2))
+        with self.assertRaises(locus.LocusError) as raised:
+            self.ask(QueryBatch().balls(everything, 1, block=Block(tag_masks=1)))
+        self.assertRefused(raised.exception, "INVALID_ARGUMENT", "MALFORMED", "blocks[0].tag_masks")
+
     def test_positions_and_answers_are_relative_to_the_frame(self):
         far = 1_000_000.25
         self.apply(locus.UpdateBatch(frame=(far, 0, 0)).insert_balls(5, [0, 0, 0], 0.5))
@@ -289,7 +311,8 @@ class RequestBytesTest(unittest.TestCase):
         settings = Block(frame=(1.5, 0, -2), source=locus.Source.STATIC, precision=locus.Precision.CONSERVATIVE,
                          columns=[Column.ID, Column.LAYERS], masks=[1, 2], ignore_groups=[3], ignore_ids=[4, 5], max_results=600,
                          after_id=2**63, as_of_ticks=[11, 12], as_of_fractions=0.5,
-                         outside_history=locus.OutsideHistory.CLAMP)
+                         outside_history=locus.OutsideHistory.CLAMP, only_groups=[1, 2, 3, 4], only_groups_each=2, tags=5,
+                         tag_masks=[6, 7], self_ids=8)
         batch = QueryBatch(at_least=locus.Revision(7, 8), max_work=9, explain=True, max_reply_bytes=10)
         batch.rays([0] * 6, [1, 0, 0], t_max=[5, 6], mode=RayMode.ALL, cull=locus.Cull.BACK, inside=locus.Inside.SKIP,
                    block=settings)
@@ -304,7 +327,8 @@ class RequestBytesTest(unittest.TestCase):
         first = blocks.add(source=2, precision=2, columns=[2, 9], masks=struct.pack("<2I", 1, 2), max_results=600,
                            ignore_groups=struct.pack("<Q", 3), ignore_ids=struct.pack("<2Q", 4, 5), after_id=2**63,
                            as_of_ticks=struct.pack("<2Q", 11, 12), as_of_fractions=struct.pack("<f", 0.5),
-                           outside_history=2)
+                           outside_history=2, only_groups=struct.pack("<4Q", 1, 2, 3, 4), only_groups_each=2,
+                           tags=struct.pack("<Q", 5), tag_masks=struct.pack("<2Q", 6, 7), self_ids=struct.pack("<Q", 8))
         first.frame.x, first.frame.y, first.frame.z = 1.5, 0, -2
         first.rays.MergeFrom(schema.message("Rays")(origins=bytes(24), directions=struct.pack("<3f", 1, 0, 0),
                                                     t_max=struct.pack("<2f", 5, 6), mode=3, cull=2, inside=3))

@@ -208,6 +208,39 @@ TEST(OverlapQueryTest, OneGroupPerQueryAndUpTo64IdsPerBlockAreIgnored) {
   EXPECT_THAT(run_block(*snapshot, block).ids, ElementsAre(2, 2, 2));
 }
 
+TEST(OverlapQueryTest, AQueryFindsOnlySomeGroupsOneTagAndNotItself) {
+  QueryWorld world;
+  world.objects = {ball_object(1, {}), ball_object(2, {}), ball_object(3, {})};
+  world.instances = {placed(4, wall_mesh())};
+  world.objects[0].group = world.instances[0].group = 8;
+  world.objects[1].group = 9;
+  world.objects[0].tag = 0x15;
+  world.objects[1].tag = 0x25;
+  world.instances[0].tag = 0x8000000000000005;
+  const SnapshotPtr snapshot = snapshot_of(world);
+  OwnedBlock all = one_ball({}, 1);
+  all.points.assign(9, 0);
+  OwnedBlock block = all;
+  block.settings.only_groups_each = 2;
+  block.only_groups = {8, 9, 0, 9, 0, 0};
+  BlockResult result = run_block(*snapshot, block);
+  EXPECT_THAT(result.counts, ElementsAre(3, 1, 4)) << "0 fills an entry and matches no object without a group";
+  EXPECT_THAT(result.ids, ElementsAre(1, 2, 4, 2, 1, 2, 3, 4));
+  block.ignore_groups = {8};
+  EXPECT_THAT(run_block(*snapshot, block).ids, ElementsAre(2, 2, 2, 3)) << "both filters apply";
+  block = all;
+  block.tags = {0x15, 0x5, 0xFF};
+  EXPECT_THAT(run_block(*snapshot, block).ids, ElementsAre(1));
+  block.tag_masks = {0xFF, 0xF, 0};
+  EXPECT_THAT(run_block(*snapshot, block).ids, ElementsAre(1, 1, 2, 4, 1, 2, 3, 4))
+      << "bits outside of a mask do not count";
+  block = all;
+  block.self_ids = {4, 77, 0};
+  EXPECT_THAT(run_block(*snapshot, block).counts, ElementsAre(3, 4, 4));
+  block.self_ids = {2};
+  EXPECT_THAT(run_block(*snapshot, block).ids, ElementsAre(1, 3, 4, 1, 3, 4, 1, 3, 4));
+}
+
 TEST(OverlapQueryTest, InstancesAreFoundAtTheirScaleAndPosition) {
   QueryWorld world;
   PlacedMesh instance = placed(1, wall_mesh(), {1e6, -1e6, 5});
