@@ -15,14 +15,16 @@
 #include "core/geometry/ball.h"
 #include "core/geometry/capsule.h"
 #include "core/geometry/mover.h"
+#include "core/geometry/obb.h"
 #include "core/geometry/shape.h"
 #include "core/geometry/transform.h"
 #include "core/geometry/triangle.h"
 
 namespace locus {
 
-// Return a ball or a capsule as a mover that rests. contact_at() of this mover at t = 0 returns the distance and the
-// nearest point of a primitive, as seen from the ball's centre or the capsule's inner segment.
+// Return a ball, a capsule or a box as a mover that rests. contact_at() of this mover at t = 0 returns the distance and
+// the nearest point of a primitive, as seen from the ball's centre or the capsule's inner segment. For a box, it
+// returns the contact with a primitive that the box overlaps, see Contact.
 inline Mover resting(const Balld& ball) {
   Mover mover;
   mover.start = ball.center;
@@ -35,6 +37,15 @@ inline Mover resting(const Capsule& capsule) {
   mover.start = capsule.center;
   mover.half_axis = capsule.half_axis;
   mover.radius = capsule.radius;
+  return mover;
+}
+
+inline Mover resting(const Obbd& box) {
+  Mover mover;
+  mover.kind = MoverKind::kBox;
+  mover.start = box.center;
+  mover.half = box.half;
+  mover.rotation = box.rotation;
   return mover;
 }
 

@@ -28,7 +28,7 @@ struct ServedColumns {
             Column::kGroup, Column::kTag, Column::kLayers,   Column::kPose,   Column::kShape};
   }
   ColumnSet operator()(const BallColumns&) const { return contact(); }
-  ColumnSet operator()(const BoxColumns&) const { return overlap(); }
+  ColumnSet operator()(const BoxColumns&) const { return contact(); }
   ColumnSet operator()(const CapsuleColumns&) const { return contact(); }
   ColumnSet operator()(const FrustumColumns&) const { return overlap(); }
   ColumnSet operator()(const SightColumns&) const { return {}; }

@@ -218,13 +218,12 @@ class QueryOracle : public RayOracle {
     count(block, rows, i, result);
     for (const Row& row : rows) {
       write(row, block, result);
-      if constexpr (std::is_same_v<Solid, Balld> || std::is_same_v<Solid, Capsule>)
-        write_contact(row, block, solid, result);
+      if constexpr (!std::is_same_v<Solid, ConvexRegion>) write_contact(row, block, solid, result);
     }
   }
 
-  // Writes the contact of a ball or capsule with the row's object or triangle. If the row is a whole instance, writes
-  // the contact with the nearest triangle that the solid overlaps. Conservative answers use bounds.
+  // Writes the contact of a ball, capsule or box with the row's object or triangle. If the row is a whole instance,
+  // writes the contact with the nearest triangle that the solid overlaps. Conservative answers use bounds.
   template <class Solid>
   static void write_contact(const Row& row, const QueryBlock& block, const Solid& solid, BlockResult& result) {
     const ColumnSet columns = columns_of(block);
@@ -259,7 +258,7 @@ class QueryOracle : public RayOracle {
               : PlacedTriangles(*row.instance).bounds_of_triangle(row.instance->mesh->triangle(row.triangle));
       const NearestPair pair = nearest_to_box(mover.half_axis, (bounds.min + bounds.max) * 0.5 - mover.start,
                                               (bounds.max - bounds.min) * 0.5);
-      contact = {std::sqrt(pair.squared_distance), pair.on_primitive, {}};
+      contact = {std::is_same_v<Solid, Obbd> ? 0 : std::sqrt(pair.squared_distance), pair.on_primitive, {}};
     }
     if (columns.has(Column::kT)) result.t.back() = static_cast<float>(contact.distance) + 0.0f;
     if (columns.has(Column::kNormal)) write_vector(to_float(contact.normal + Vec3d{}), result.normals);

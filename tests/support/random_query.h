@@ -315,7 +315,7 @@ inline OwnedBlock box_block(const QueryScene& scene, const SceneSketch& sketch, 
     if (turned) block.extras.insert(block.extras.end(), {q.x, q.y, q.z, q.w});
   }
   add_common(scene, random, block);
-  add_columns(kOverlapColumns, random, block);
+  add_columns(kContactColumns, random, block);
   return block;
 }
 

@@ -227,9 +227,11 @@ void add_query_box(CLI::App& parent, Context& context) {
   command.footer(R"(Examples:
   locus query box arena --at 0,0,0 --half 5,5,5
   locus query box arena --at 0,0,0 --half 5,1,1 --rotation 0,0,0.3826834,0.9238795
+  locus query box arena --at 0,0,0 --half 5,5,5 --columns t,normal,point
   locus -o ndjson query box arena --at 0,0,0 --half 9,9,9 --detail sorted --max-results 100
   generator | locus -o ndjson query box arena --from-ndjson - --half 5,5,5
 
+With the columns t, normal and point: moving the box by -t along the normal takes it out of the object or triangle.
 Rows: at.x,at.y,at.z,half.x,half.y,half.z[,rotation.x,rotation.y,rotation.z,rotation.w,mask,ignore_group] or
 {"at": [0,0,0], "half": [5,5,5]}; an option given once stands for a column. All rows are answered at one revision; see
 --follow.)");

@@ -178,7 +178,7 @@ class QueryBatch:
     def balls(self, centers: ColumnLike, radii: ColumnLike, *, detail: StaticDetail = StaticDetail.INSTANCES,
               block: Block = Block()) -> "QueryBatch":
         """Adds a block of N balls, to find the objects and instances that overlap them. `centers`: 3N float32; `radii`:
-        N float32 or one, 0 .. 1e9.
+        N float32 or one, 0 .. 1e9. Column T is the distance from the centre, negative inside an object.
         """
         new = _NewBlock(self._blocks, "balls")
         new.first("centers", centers, FLOAT32, 3)
@@ -190,7 +190,8 @@ class QueryBatch:
               detail: StaticDetail = StaticDetail.INSTANCES, block: Block = Block()) -> "QueryBatch":
         """Adds a block of N boxes, to find the objects and instances that overlap them. `centers`: 3N float32;
         `half_extents`: 3N float32 or three, along the box's own axes; `rotations`: 4N float32 or four, unit quaternions
-        x, y, z, w, none = axis-aligned.
+        x, y, z, w, none = axis-aligned. Column T is minus the depth of the overlap: moving the box by -T along column
+        NORMAL takes it out of the object or triangle.
         """
         new = _NewBlock(self._blocks, "boxes")
         new.first("centers", centers, FLOAT32, 3)

@@ -19,7 +19,8 @@ Contact overlap_contact(const Mover& solid, Precision precision, const Hit& hit,
       bounds = PlacedTriangles(*hit.instance).bounds_of_triangle(hit.instance->mesh->triangle(triangle));
     const Vec3d center = (bounds.min + bounds.max) * 0.5 - solid.start;
     const NearestPair pair = nearest_to_box(solid.half_axis, center, bounds.extent() * 0.5);
-    return {std::sqrt(pair.squared_distance), pair.on_primitive, {}};
+    const double distance = solid.kind == MoverKind::kBox ? 0 : std::sqrt(pair.squared_distance);
+    return {distance, pair.on_primitive, {}};
   }
   if (hit.object) return contact_at(solid, hit.object_shape(), 0);
   // The batch ended before the nearest triangle was found.

@@ -507,6 +507,10 @@ uint32_t nearest_overlapping(QueryTask& task, const Capsule& solid, const Instan
   return search_nearest<CapsuleShape>(task, solid, instance);
 }
 
+uint32_t nearest_overlapping(QueryTask& task, const Obbd& solid, const Instance& instance) {
+  return search_nearest<BoxShape>(task, solid, instance);
+}
+
 void add_objects(OverlapAnswer& answer, FoundObjects& found, const SceneAtTime& moment, const OverlapOptions& options) {
   const absl::Span<const FoundObject> objects = found.finish();
   answer.count += found.count();

@@ -38,11 +38,13 @@ OverlapAnswer run_capsule(QueryTask& task, const SceneAtTime& moment, const Caps
 OverlapAnswer run_region(QueryTask& task, const SceneAtTime& moment, const ConvexRegion& region,
                          const OverlapOptions& options, const Filter& filter);
 
-// Return the number of the triangle that is nearest to the ball's centre or to the capsule's inner segment, among the
-// triangles of the instance that the solid overlaps. Return the lowest number if several triangles are equally near,
-// and kNoTriangle if the solid overlaps no triangle. `solid` is in world axes.
+// Return the number of the triangle that is nearest to the ball's centre or to the capsule's inner segment, or into
+// which the box reaches most deeply, among the triangles of the instance that the solid overlaps. Return the lowest
+// number if several triangles are equally near, and kNoTriangle if the solid overlaps no triangle. `solid` is in world
+// axes.
 uint32_t nearest_overlapping(QueryTask& task, const Balld& solid, const Instance& instance);
 uint32_t nearest_overlapping(QueryTask& task, const Capsule& solid, const Instance& instance);
+uint32_t nearest_overlapping(QueryTask& task, const Obbd& solid, const Instance& instance);
 
 // Adds the objects in `found` to `answer`, which has the rows of instances: retains at most options.max_results rows,
 // ascending by id. With count_only, only adds to the number of rows.

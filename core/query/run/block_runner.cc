@@ -294,7 +294,7 @@ void BlockRunner::run_query(const BallColumns& balls, size_t i) {
 
 void BlockRunner::run_query(const BoxColumns& boxes, size_t i) {
   const Obbd box = box_of(origins_.of(i), boxes, i);
-  append_rows(run_box(task_, times_.of(i), box, overlap_options(block_, boxes.detail), Filter(block_, i)), i);
+  append_contacts(run_box(task_, times_.of(i), box, overlap_options(block_, boxes.detail), Filter(block_, i)), box, i);
 }
 
 void BlockRunner::run_query(const CapsuleColumns& capsules, size_t i) {

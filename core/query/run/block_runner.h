@@ -74,7 +74,7 @@ class BlockRunner {
   void write_surfaces(const SweepColumns& sweeps, absl::Span<const Hit> hits, size_t i, const RowSpans& to, size_t row);
   void append_rows(const OverlapAnswer& answer, size_t i);
   void append_runs(const OverlapAnswer& answer, size_t i);
-  // Appends the rows of a ball or capsule query, including the columns t, normal and point of their contacts.
+  // Appends the rows of a ball, capsule or box query, including the columns t, normal and point of their contacts.
   template <class Solid>
   void append_contacts(const OverlapAnswer& answer, const Solid& solid, size_t i);
   template <class Solid>

@@ -31,10 +31,11 @@ void write_object_rows(absl::Span<const FoundObject> objects, const SceneAtTime&
 void write_surface(const RayRequest& request, Vec3d frame, const Hit& hit, Winding winding, const RowSpans& to,
                    size_t row);
 
-// Writes the columns t, normal and point for a row of a ball or capsule query, except columns that the block does not
-// return. `solid` is the query's ball or capsule in world axes, represented by a mover that rests. `triangle` is the
-// triangle whose contact is computed, or kNoTriangle for an object. `triangle` is also kNoTriangle for a CONSERVATIVE
-// row of a whole instance: then the contact is with the bounds of the instance. The point is relative to `frame`.
+// Writes the columns t, normal and point for a row of a ball, capsule or box query, except columns that the block does
+// not return. `solid` is the query's ball, capsule or box in world axes, represented by a mover that rests. `triangle`
+// is the triangle whose contact is computed, or kNoTriangle for an object. `triangle` is also kNoTriangle for a
+// CONSERVATIVE row of a whole instance: then the contact is with the bounds of the instance. The point is relative to
+// `frame`.
 void write_overlap_contact(const Mover& solid, Precision precision, Vec3d frame, const Hit& hit, uint32_t triangle,
                            const RowSpans& to, size_t row);
 

@@ -475,18 +475,18 @@ TEST(CheckBatchTest, RaysOfModeAnyHaveNoColumns) {
 
 TEST(CheckBatchTest, ColumnsThatAKindDoesNotServeAreRefused) {
   for (const Column column : {Column::kT, Column::kUv, Column::kNormal, Column::kPoint}) {
-    for (OwnedBlock block : {twenty_boxes(), lookup_of_ids({1})}) {
-      block.settings.columns = {Column::kId, column};
-      expect_refusal(block, Reason::kMalformed, "columns", -1);
-    }
+    OwnedBlock block = lookup_of_ids({1});
+    block.settings.columns = {Column::kId, column};
+    expect_refusal(block, Reason::kMalformed, "columns", -1);
   }
   for (OwnedBlock block : {twenty_balls(), twenty_capsules(), twenty_points()}) {
     block.settings.columns = {Column::kId, Column::kOther};
     expect_refusal(block, Reason::kMalformed, "columns", -1);
   }
-  OwnedBlock balls = twenty_balls();
-  balls.settings.columns = {Column::kUv};
-  expect_refusal(balls, Reason::kMalformed, "columns", -1);
+  for (OwnedBlock block : {twenty_balls(), twenty_boxes(), twenty_capsules()}) {
+    block.settings.columns = {Column::kUv};
+    expect_refusal(block, Reason::kMalformed, "columns", -1);
+  }
   OwnedBlock lookup = lookup_of_groups({1});
   lookup.settings.columns = {Column::kTriangle};
   expect_refusal(lookup, Reason::kMalformed, "columns", -1);

@@ -156,6 +156,14 @@ class AnswersEqualTheCommandLineTest(DaemonTest):
         options = [f"--at={text(center)}" for center in centers] + ["--half=3,2,1", "--rotation=0.6,0,0,0.8"]
         self.check_overlaps("box", options, QueryBatch().boxes(centers, (3, 2, 1), rotations=(0.6, 0, 0, 0.8)))
 
+    def test_boxes_report_the_shortest_way_out(self):
+        wanted = Block(columns=[Column.T, Column.ID, Column.NORMAL, Column.POINT], source=locus.Source.STATIC)
+        (block,) = self.ask(QueryBatch().boxes([-9, -9, 0.25], [1, 1, 1], block=wanted))
+        self.assertEqual(listed(block.ids), [1])
+        self.assertAlmostEqual(block.t[0], -0.75, places=6)
+        self.assertEqual(listed(block.normals), [0, 0, 1])
+        self.assertAlmostEqual(listed(block.points)[2], 0, places=6)
+
     def test_nearest(self):
         points = triples(self.cloud(30))
         options = [f"--at={text(point)}" for point in points] + ["--k=4", "--max-distance=20"]
