@@ -49,6 +49,12 @@ RayBlock& RayBlock::rays(absl::Span<const float> origins, absl::Span<const float
   return *this;
 }
 
+RayBlock& RayBlock::rotation(const Rotation& rotation) {
+  block_->clear_rotation();
+  append_rotation(*block_->mutable_rotation(), rotation);
+  return *this;
+}
+
 RayBlock& RayBlock::t_max(absl::Span<const float> t_max) {
   assign(*rays_->mutable_t_max(), t_max);
   return *this;

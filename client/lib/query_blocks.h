@@ -99,8 +99,9 @@ class BlockBuilder {
     block_->set_after_id(id);
     return derived();
   }
-  // Sets the anchor of each query: N ids of objects or instances. The positions of a query are relative to the position
-  // of its anchor, and the query does not find its anchor. Points in the result stay relative to the frame.
+  // Sets the anchor of each query: N ids of objects or instances, or one for all queries. The positions of a query are
+  // relative to the position of its anchor, and the query does not find its anchor. Points in the result stay relative
+  // to the frame.
   Derived& anchors(absl::Span<const uint64_t> ids) {
     assign(*block_->mutable_anchor_ids(), ids);
     return derived();
@@ -156,8 +157,12 @@ class RayBlock : public BlockBuilder<RayBlock> {
   // Appends one ray. The direction may have any length except zero; this length is the unit of t.
   RayBlock& ray(const Float3& origin, const Float3& direction, float t_max = std::numeric_limits<float>::infinity(),
                 const Filter& filter = {});
-  // Appends N rays: 3N floats of origins and 3N floats of directions.
+  // Appends N rays: 3N floats of origins and 3N floats of directions. If this call adds all rays of the block,
+  // `origins` or `directions` may instead contain three floats for all rays.
   RayBlock& rays(absl::Span<const float> origins, absl::Span<const float> directions);
+  // Rotates the directions of all rays of the block, but not their origins. A sensor sends its pattern of directions
+  // unchanged, with the rotation and the one origin of the moment.
+  RayBlock& rotation(const Rotation& rotation);
   // Sets the whole column of the maximum t, inclusive: N entries, or one for all rays.
   RayBlock& t_max(absl::Span<const float> t_max);
   // Restricts the result to hits that follow (t, id, triangle) in the order of rows. Used to continue after a truncated

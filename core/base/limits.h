@@ -38,7 +38,8 @@ inline constexpr uint32_t kMaxListedItemErrors = 1000;  // max refused items lis
 inline constexpr uint32_t kMaxWriters = 4096;           // writer ids stored per scene, to detect batches sent twice
 
 inline constexpr uint32_t kMaxBlocks = 256;           // blocks per query batch
-inline constexpr uint32_t kMaxQueries = 65536;        // queries per query batch, summed over all blocks
+inline constexpr uint32_t kMaxQueries = 65536;        // queries other than rays per query batch, summed over all blocks
+inline constexpr uint32_t kMaxRays = 262'144;         // rays per query batch, summed over all blocks
 inline constexpr uint32_t kMaxIgnoredIds = 64;        // ids that the queries of a block ignore
 inline constexpr uint32_t kMaxOnlyGroups = 16;        // groups to which a query is restricted
 inline constexpr uint32_t kDefaultMaxResults = 1024;  // results per query if the block sets no max_results
@@ -93,6 +94,8 @@ inline constexpr uint32_t kMaxBackupFiles = 1u << 20;
 inline constexpr uint32_t kBackupPieceBytes = 1u << 20;  // bytes of a backup file per message
 
 static_assert(kMaxBlocks <= kMaxQueries);
+static_assert(uint64_t{kMaxRays} * 64 <= kReceiveBytes, "rays fit a message with origins, directions and filters");
+static_assert(uint64_t{kMaxRays} * 8 + 1024 <= kDefaultReplyBytes, "the distances of all rays fit a default reply");
 static_assert(kDefaultHistoryBytes <= kMaxHistoryBytes);
 static_assert(kDefaultMaxResults <= kMaxMaxResults);
 static_assert(kMaxNearest <= kMaxMaxResults);

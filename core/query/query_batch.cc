@@ -1,5 +1,6 @@
 #include "core/query/query_batch.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -26,6 +27,7 @@ class BlockCheck {
     RETURN_IF_ERROR(check_common());
     RETURN_IF_ERROR(check_columns_of_kind());
     RETURN_IF_ERROR(check_anchors());
+    RETURN_IF_ERROR(check_rotation());
     if (block_.count_only && (row_layout(block_) != RowLayout::kCounted || block_kind(block_) == BlockKind::kCell))
       return refuse_argument(Reason::kMalformed, name("count_only"), {}, "this kind of query has no counts");
     return std::visit([this](const auto& kind) { return check_kind(kind); }, block_.kind);
@@ -83,10 +85,18 @@ class BlockCheck {
     const BlockKind kind = block_kind(block_);
     if (kind == BlockKind::kLookup || kind == BlockKind::kPairs)
       return refuse_argument(Reason::kMalformed, name("anchor_ids"), {}, "this kind of query has no positions");
-    RETURN_IF_ERROR(check_length(anchors.size(), 1, ColumnNeed::kEach, "anchor_ids"));
+    RETURN_IF_ERROR(check_length(anchors.size(), 1, ColumnNeed::kEachOrOne, "anchor_ids"));
     for (size_t i = 0; i < anchors.size(); ++i)
       if (anchors[i] == kNoId) return wrong(Reason::kOutOfRange, "anchor_ids", i, "0 is not an id");
     return absl::OkStatus();
+  }
+
+  absl::Status check_rotation() const {
+    if (block_.rotation.empty()) return absl::OkStatus();
+    if (block_kind(block_) != BlockKind::kRay)
+      return refuse_argument(Reason::kMalformed, name("rotation"), {}, "only rays have directions to rotate");
+    RETURN_IF_ERROR(check_column(block_.rotation.size(), 4, 1, ColumnNeed::kOptional, {"blocks", index_, "rotation"}));
+    return check_rotations(block_.rotation, "rotation");
   }
 
   // Checks the columns of `after`, which give each query's position in the order of rows. `kind` is the name of the
@@ -203,7 +213,7 @@ class BlockCheck {
   }
 
   absl::Status check_kind(const RayColumns& rays) const {
-    RETURN_IF_ERROR(check_length(rays.origins.size(), 3, ColumnNeed::kEach, "rays.origins"));
+    RETURN_IF_ERROR(check_length(rays.origins.size(), 3, ColumnNeed::kEachOrOne, "rays.origins"));
     RETURN_IF_ERROR(check_length(rays.directions.size(), 3, ColumnNeed::kEachOrOne, "rays.directions"));
     RETURN_IF_ERROR(check_length(rays.t_max.size(), 1, ColumnNeed::kOptional, "rays.t_max"));
     RETURN_IF_ERROR(check_points(rays.origins, "rays.origins"));
@@ -402,7 +412,9 @@ class BlockCheck {
 };
 
 struct CountQueries {
-  size_t operator()(const RayColumns& rays) const { return rays.origins.size() / 3; }
+  size_t operator()(const RayColumns& rays) const {
+    return rays.origins.size() == 3 ? std::max<size_t>(rays.directions.size() / 3, 1) : rays.origins.size() / 3;
+  }
   size_t operator()(const BallColumns& balls) const { return balls.centers.size() / 3; }
   size_t operator()(const BoxColumns& boxes) const { return boxes.centers.size() / 3; }
   size_t operator()(const CapsuleColumns& capsules) const { return capsules.starts.size() / 3; }
@@ -452,8 +464,10 @@ size_t query_count(const QueryBlock& block) { return std::visit(CountQueries(), 
 absl::Status check_batch(const QueryBatch& batch) {
   if (batch.blocks.size() > limits::kMaxBlocks)
     return refuse_limit("blocks", "blocks", limits::kMaxBlocks, static_cast<double>(batch.blocks.size()));
-  size_t queries = 0;
-  for (const QueryBlock& block : batch.blocks) queries += query_count(block);
+  size_t rays = 0, queries = 0;
+  for (const QueryBlock& block : batch.blocks)
+    (block_kind(block) == BlockKind::kRay ? rays : queries) += query_count(block);
+  if (rays > limits::kMaxRays) return refuse_limit("blocks", "rays", limits::kMaxRays, static_cast<double>(rays));
   if (queries > limits::kMaxQueries)
     return refuse_limit("blocks", "queries", limits::kMaxQueries, static_cast<double>(queries));
   if (const uint64_t planes = region_planes(batch); planes > limits::kMaxRegionPlanes)

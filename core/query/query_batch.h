@@ -72,7 +72,7 @@ struct AfterColumns {
 };
 
 struct RayColumns {
-  absl::Span<const float> origins;     // N entries x y z, relative to the frame
+  absl::Span<const float> origins;     // N entries x y z, or one for all rays; relative to the frame
   absl::Span<const float> directions;  // N entries x y z, or one for all rays; the zero vector is refused
   absl::Span<const float> t_max;       // maximum t of a hit, >= 0; default: +inf
   RayMode mode = RayMode::kFirst;
@@ -200,10 +200,13 @@ struct QueryBlock {
   absl::Span<const uint64_t> as_of_ticks;   // tick of each query; default: the snapshot's latest state
   absl::Span<const float> as_of_fractions;  // fraction of the way to the next tick, >= 0 and < 1; default: 0
   OutsideHistory outside = OutsideHistory::kReject;
-  // N ids of objects or instances: the anchor of each query. The positions of a query are relative to the position of
-  // its anchor, and the query does not find its anchor.
+  // N ids of objects or instances, or one for all queries: the anchor of each query. The positions of a query are
+  // relative to the position of its anchor, and the query does not find its anchor.
   absl::Span<const uint64_t> anchor_ids;
   bool count_only = false;  // only the number of rows of each query is returned
+  // Rays only: a unit quaternion x y z w that rotates the directions of all rays; default: no rotation. Rotated
+  // directions are vectors of doubles and are not rounded to floats.
+  absl::Span<const float> rotation;
   using Kind = std::variant<RayColumns, BallColumns, BoxColumns, LookupColumns, NearestColumns, CapsuleColumns,
                             SweepColumns, FrustumColumns, SightColumns, ContainsColumns, PairColumns, CellColumns>;
   Kind kind;

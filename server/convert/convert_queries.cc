@@ -223,6 +223,7 @@ absl::Status read_block(const v1::QueryBlock& block, const std::string& field, Q
   out->after_id = block.after_id();
   out->anchor_ids = span_of(block.anchor_ids());
   out->count_only = block.count_only();
+  out->rotation = span_of(block.rotation());
   return read_columns(block, field, &out->columns);
 }
 

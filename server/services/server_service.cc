@@ -123,6 +123,7 @@ std::vector<NamedLimit> limits_of(const Host& host) {
       {"pending_changes", limits::kMaxPendingChanges},
       {"pinned_bytes", static_cast<double>(host.pinned_limit() != 0 ? host.pinned_limit() : limits::kPinnedBytes)},
       {"queries", limits::kMaxQueries},
+      {"rays", limits::kMaxRays},
       {"receive_bytes", static_cast<double>(host.config.max_receive_bytes)},
       {"recent_revisions", limits::kRecentRevisions},
       {"request_id_length", kMaxRequestIdLength},

@@ -261,6 +261,23 @@ TEST_F(QueryRpcTest, OnlyRequestedColumnsAreReturnedUpToAllOfThem) {
   EXPECT_THAT(one.ids(), IsEmpty());
 }
 
+TEST_F(QueryRpcTest, OneOriginServes262144DirectionsInABlockWithARotation) {
+  v1::QueryBatch batch;
+  v1::QueryBlock& block = *batch.add_blocks();
+  block.add_columns(v1::COLUMN_T);
+  fill(block.mutable_rotation(), {0.f, 0.f, std::sqrt(0.5f), std::sqrt(0.5f)});  // turns -y to x
+  fill(block.mutable_rays()->mutable_origins(), {0.f, 0.f, 0.f});
+  auto& directions = *block.mutable_rays()->mutable_directions();
+  directions.Resize(3 * limits::kMaxRays, 0.f);
+  for (uint32_t i = 0; i < limits::kMaxRays; ++i) directions.Set(static_cast<int>(3 * i + 1), i % 2 == 0 ? -1.f : 1.f);
+  const v1::QueryResult result = ask(batch);
+  ASSERT_EQ(result.blocks(0).t_size(), static_cast<int>(limits::kMaxRays));
+  for (uint32_t i = 0; i < limits::kMaxRays; ++i) {
+    const float t = result.blocks(0).t(static_cast<int>(i));
+    ASSERT_TRUE(i % 2 == 0 ? std::abs(t - 2) < 1e-6f : std::isinf(t)) << i << ": " << t;
+  }
+}
+
 TEST_F(QueryRpcTest, LookupsFindByIdAndByGroup) {
   v1::UpdateBatch relabel;
   fill(relabel.add_relabels()->mutable_ids(), {uint64_t{2}, uint64_t{4}});
@@ -462,8 +479,11 @@ TEST_F(QueryRpcTest, LimitsOfABatchAreNamedWithWhatWasAsked) {
   for (uint32_t i = 0; i <= limits::kMaxBlocks; ++i) batch.add_blocks();
   refused(batch, "blocks", "blocks", limits::kMaxBlocks, limits::kMaxBlocks + 1.0);
   batch = ray_along_x();
-  batch.mutable_blocks(0)->mutable_rays()->mutable_origins()->Resize(3 * (static_cast<int>(limits::kMaxQueries) + 1),
-                                                                     0);
+  batch.mutable_blocks(0)->mutable_rays()->mutable_origins()->Resize(3 * (static_cast<int>(limits::kMaxRays) + 1), 0);
+  refused(batch, "blocks", "rays", limits::kMaxRays, limits::kMaxRays + 1.0);
+  batch = points_near({0.f, 0.f, 0.f});
+  batch.mutable_blocks(0)->mutable_nearest()->mutable_points()->Resize(3 * (static_cast<int>(limits::kMaxQueries) + 1),
+                                                                       0);
   refused(batch, "blocks", "queries", limits::kMaxQueries, limits::kMaxQueries + 1.0);
   batch = ray_along_x();
   for (uint32_t i = 0; i <= limits::kMaxIgnoredIds; ++i) batch.mutable_blocks(0)->add_ignore_ids(i + 1);

@@ -65,6 +65,7 @@ TEST_F(ServerRpcTest, LimitsAreListedInOrderWithTheirUse) {
   EXPECT_EQ(limit_of(server, "meshes").used(), 0);
   EXPECT_EQ(limit_of(server, "calls").used(), 1);
   EXPECT_EQ(limit_of(server, "queries").value(), limits::kMaxQueries);
+  EXPECT_EQ(limit_of(server, "rays").value(), limits::kMaxRays);
   EXPECT_EQ(limit_of(server, "receive_bytes").value(), limits::kReceiveBytes);
 }
 

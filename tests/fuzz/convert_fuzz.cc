@@ -81,7 +81,7 @@ LOCUS_FUZZ_TARGET(queries) {
   if (!batch.ok()) return check_refusal(batch.status());
   LOCUS_CHECK_LE(batch->blocks.size(), limits::kMaxBlocks);
   if (const absl::Status status = check_batch(*batch); !status.ok()) return check_refusal(status);
-  LOCUS_CHECK_LE(queries_of(*batch), limits::kMaxQueries);
+  LOCUS_CHECK_LE(queries_of(*batch), limits::kMaxQueries + limits::kMaxRays);
   if (queries_of(*batch) > kMaxRunQueries) return;
   const absl::StatusOr<test::BatchResult> found = test::run_batch(*snapshot, *batch, {});
   if (!found.ok()) return check_refusal(found.status());

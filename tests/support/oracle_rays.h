@@ -88,6 +88,9 @@ class RayOracle : public OracleScene {
                       rays.cull,
                       rays.inside,
                       block.precision == Precision::kConservative};
+    if (!block.rotation.empty())
+      question.direction = rotation_of({block.rotation[0], block.rotation[1], block.rotation[2], block.rotation[3]})
+                               .to_world(question.direction);
     if (clockwise_ && rays.cull == Cull::kBack) question.cull = Cull::kFront;
     if (clockwise_ && rays.cull == Cull::kFront) question.cull = Cull::kBack;
     return question;
@@ -110,7 +113,8 @@ class RayOracle : public OracleScene {
   }
 
   void answer_kind(const QueryBlock& block, const RayColumns& rays, BlockResult& result) const {
-    for (size_t i = 0; i < rays.origins.size() / 3; ++i) {
+    const size_t origins = rays.origins.size() / 3;
+    for (size_t i = 0; i < (origins == 1 ? rays.directions.size() / 3 : origins); ++i) {
       const Question question = question_of(block, rays, i);
       Rows rows = ray_rows(block, question, i);
       if (rays.mode == RayMode::kAny) {

@@ -62,10 +62,11 @@ class OracleScene {
 
   // Returns the position of the anchor of query `i`; nullopt if the scene does not contain the anchor.
   std::optional<Vec3d> anchor(const QueryBlock& block, size_t i) const {
+    const uint64_t id = entry_for(block.anchor_ids, i, uint64_t{0});
     for (const Object& object : objects_)
-      if (object.id == block.anchor_ids[i]) return object.shape.position;
+      if (object.id == id) return object.shape.position;
     for (const Instance* instance : instances_)
-      if (instance->id == block.anchor_ids[i]) return instance->transform.translation;
+      if (instance->id == id) return instance->transform.translation;
     return std::nullopt;
   }
   // Returns the columns whose positions are relative to anchors, each with the number of points that it has per query.
@@ -111,7 +112,7 @@ class OracleScene {
 
   template <class Item>
   bool wanted(const QueryBlock& block, size_t i, const Item& item) const {
-    if (is_unanchored(block, i) || (!block.anchor_ids.empty() && block.anchor_ids[i] == item.id)) return false;
+    if (is_unanchored(block, i) || entry_for(block.anchor_ids, i, uint64_t{0}) == item.id) return false;
     const uint32_t mask = entry_for(block.masks, i, 0xFFFFFFFFu);
     const uint64_t group = entry_for(block.ignore_groups, i, uint64_t{0});
     for (const uint64_t id : block.ignore_ids)

@@ -41,6 +41,7 @@ struct OwnedBlock {
   std::vector<uint64_t> tags;
   std::vector<uint64_t> tag_masks;
   std::vector<uint64_t> self_ids;
+  std::vector<float> rotation;  // rays: one quaternion
   std::vector<uint64_t> as_of_ticks;
   std::vector<float> as_of_fractions;
 
@@ -54,6 +55,7 @@ struct OwnedBlock {
     block.tags = tags;
     block.tag_masks = tag_masks;
     block.self_ids = self_ids;
+    block.rotation = rotation;
     block.anchor_ids = anchor_ids;
     block.as_of_ticks = as_of_ticks;
     block.as_of_fractions = as_of_fractions;

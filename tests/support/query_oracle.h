@@ -33,7 +33,7 @@ class QueryOracle : public RayOracle {
   // Answers a block without a limit on the size of the reply.
   BlockResult answer(const QueryBlock& block) const {
     BlockResult result = block.count_only ? counts_of(block) : rows_of(block);
-    for (size_t i = 0; i < block.anchor_ids.size(); ++i)
+    for (size_t i = 0; i < (block.anchor_ids.empty() ? 0 : query_count(block)); ++i)
       if (is_unanchored(block, i)) result.unanchored.push_back(static_cast<uint32_t>(i));
     return result;
   }

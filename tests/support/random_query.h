@@ -153,7 +153,7 @@ inline void add_anchors(const QueryScene& scene, Random& random, OwnedBlock& blo
   const BlockKind kind = block_kind(block.settings);
   const size_t n = query_count(block.view());
   if (n == 0 || kind == BlockKind::kLookup || kind == BlockKind::kPairs || random.chance(0.85)) return;
-  for (size_t i = 0; i < n; ++i) {
+  for (size_t i = random.chance(0.2) ? 1 : n; i > 0; --i) {
     Id id = 1 + random.below(30);
     if (!scene.world.objects.empty() && random.chance(0.7)) id = random.pick(scene.world.objects).id;
     if (!scene.world.instances.empty() && random.chance(0.2)) id = random.pick(scene.world.instances).id;
@@ -213,7 +213,7 @@ inline void add_common(const QueryScene& scene, Random& random, OwnedBlock& bloc
 inline void add_after(Random& random, OwnedBlock& block) {
   if (random.chance(0.7)) return;
   constexpr float kTs[] = {-1, 0, 0.5f, 1, 1, 2, 3, 5, std::numeric_limits<float>::infinity()};
-  const size_t n = block.points.size() / 3;
+  const size_t n = query_count(block.view());
   const auto entries = [&] { return random.chance(0.5) ? n : size_t{1}; };
   for (size_t i = entries(); i > 0; --i) block.after_ts.push_back(random.pick(kTs));
   if (random.chance(0.3)) return;
@@ -275,9 +275,14 @@ inline OwnedBlock ray_block(const QueryScene& scene, const SceneSketch& sketch, 
     append_point(block, ray.origin);
     append(block.sizes, direction);
   }
+  if (random.chance(0.2) && block.points.size() > 3) block.points.resize(3);  // one origin for all directions
+  if (random.chance(0.2)) {
+    const Quaternion q = random.chance(0.2) ? Quaternion{} : random.rotation();
+    block.rotation = {q.x, q.y, q.z, q.w};
+  }
   if (random.chance(0.4)) {
     constexpr float kEnds[] = {0, 1, 0.5f, 2, 3, 1e-3f, 1e30f, std::numeric_limits<float>::infinity()};
-    for (size_t i = random.chance(0.5) ? 1 : block.points.size() / 3; i > 0; --i)
+    for (size_t i = random.chance(0.5) ? 1 : query_count(block.view()); i > 0; --i)
       block.extras.push_back(random.pick(kEnds));
   }
   add_after(random, block);

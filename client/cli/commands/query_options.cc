@@ -47,7 +47,7 @@ void add_filter_options(CLI::App& command, QueryOptions& options) {
   add_repeatable(command, "--tag", options.tags, "TAG", "Find only this tag; one for each query, or one for all");
   add_repeatable(command, "--tag-mask", options.tag_masks, "BITS", "Bits of the tag to compare with --tag [all]");
   add_repeatable(command, "--anchor", options.anchors, "ID",
-                 "Count positions from this object, which is ignored; one for each query");
+                 "Count positions from this object, which is ignored; one for each query, or one for all");
   command.add_flag("--count-only", options.count_only, "Report only the number of rows of each query");
 }
 

@@ -1,5 +1,6 @@
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -21,6 +22,7 @@ struct RayOptions {
   std::vector<Triple> from;
   std::vector<Triple> directions;
   std::vector<double> t_max;
+  std::optional<Quaternion> rotation;
   v1::RayMode mode = v1::RAY_MODE_FIRST;
   v1::Cull cull = v1::CULL_UNSPECIFIED;
   v1::Inside inside = v1::INSIDE_UNSPECIFIED;
@@ -40,6 +42,7 @@ void apply_to_rays(const RayOptions& options, const RowLayout& layout, const cli
                    client::RayBlock& block) {
   block.frame(frame).mode(options.mode).cull(options.cull).inside(options.inside);
   apply_to_block(options.query, block);
+  if (const auto& q = options.rotation) block.rotation({q->x, q->y, q->z, q->w});
   if (options.mode != v1::RAY_MODE_ANY) block.columns(layout.columns);
 }
 
@@ -92,9 +95,13 @@ absl::Status query_ray(const RayOptions& options, Context& context) {
 }
 
 void add_query_ray_options(CLI::App& command, RayOptions& options) {
-  add_repeatable(command, "--from", options.from, "X,Y,Z", "Where it starts; repeat --from and --dir for more rays");
+  add_repeatable(command, "--from", options.from, "X,Y,Z",
+                 "Where it starts; one for each or one for all; repeat --from and --dir for more rays");
   add_repeatable(command, "--dir", options.directions, "X,Y,Z",
                  "Where it goes, any length but zero; t counts in this length; one for each or one for all");
+  command.add_option("--rotation", options.rotation, "Unit quaternion that rotates every --dir [0,0,0,1]")
+      ->type_name("X,Y,Z,W")
+      ->check(four_numbers());
   CLI::Option* const t_max =
       add_repeatable(command, "--t-max", options.t_max, "T", "How far, in lengths of --dir [inf]");
   add_repeatable(command, "--max-t", options.t_max, "T", "Former name of --t-max")->group("")->excludes(t_max);
@@ -125,6 +132,7 @@ void add_query_ray(CLI::App& parent, Context& context) {
   locus query ray arena --from 0,1,0 --dir 0,0,-1
   locus query ray arena --from 0,1,0 --dir 0,0,-1 --t-max 100 --mode all --source static
   locus query ray arena --from 0,1,0 --from 5,1,0 --dir 0,-1,0 --mode any
+  locus query ray arena --from 0,1,0 --dir 1,0,0 --dir 1,0,0.1 --rotation 0,0.3826834,0,0.9238795
   locus query ray arena --from 0,1,0 --dir 1,0,0 --mask 6 --ignore-group 3 --cull back --inside skip
   locus -o json query ray arena --from 0,1,0 --dir 1,0,0 --columns uv,group,tag
   locus -o csv query ray arena --from-csv rays.csv > hits.csv

@@ -231,7 +231,7 @@ local kinds <const> = {
 }
 -- Options that are fields of the protocol's QueryBlock; other options are fields of the kind's message.
 local block_options <const> = fields("frame source precision columns max_results after_id as_of_ticks as_of_fractions "
-  .. "outside_history anchor_ids count_only only_groups only_groups_each ignore_ids")
+  .. "outside_history anchor_ids count_only only_groups only_groups_each ignore_ids rotation")
 -- Numbers in a field of a row that is a list.
 local widths <const> = { from = 3, dir = 3, to = 3, at = 3, half = 3, rotation = 4 }
 local every_tag_bit <const> = locus.id("18446744073709551615")

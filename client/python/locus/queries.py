@@ -40,8 +40,10 @@ class Block(NamedTuple):
       float32 or one, 0 <= f < 1, only with `as_of_ticks`: the query is answered for the time tick + f, f being a
       fraction of the time between that tick and the next. `outside_history`: how times outside the history are handled;
       by default they are refused.
-    - `anchor_ids`: N uint64, an object or instance for each query. The positions of the query are relative to the
+    - `anchor_ids`: N uint64 or one, an object or instance for each query. The positions of the query are relative to the
       position of this anchor, and the query does not find the anchor.
+    - `rotation`: four floats, a unit quaternion x, y, z, w, for rays only. It rotates the directions of all rays, but
+      not their origins, so a sensor sends the same pattern of directions in each block.
     - `count_only`: return only the number of rows of each query; `max_results` does not limit this number.
     """
 
@@ -64,6 +66,7 @@ class Block(NamedTuple):
     tags: ColumnLike = None
     tag_masks: ColumnLike = None
     self_ids: ColumnLike = None
+    rotation: ColumnLike = None
 
     def write(self, block: wire.Parts, path: str, count: int) -> None:
         """Appends the settings to a QueryBlock of `count` queries. `path` is the prefix of field names in errors.
@@ -105,6 +108,8 @@ class Block(NamedTuple):
             block.add_varint(_BLOCK["outside_history"], self.outside_history)
         if self.anchor_ids is not None:
             block.add(_BLOCK["anchor_ids"], columns.borrow_for(path + "anchor_ids", self.anchor_ids, UINT64, count))
+        if self.rotation is not None:
+            block.add(_BLOCK["rotation"], columns.borrow_for(path + "rotation", self.rotation, FLOAT32, 1, 4))
         if self.count_only:
             block.add_varint(_BLOCK["count_only"], 1)
 
@@ -162,13 +167,16 @@ class QueryBatch:
     def rays(self, origins: ColumnLike, directions: ColumnLike, *, t_max: ColumnLike = None,
              mode: RayMode = RayMode.FIRST, cull: Cull = Cull.NONE, inside: Inside = Inside.SOLID,
              after: Optional[After] = None, block: Block = Block()) -> "QueryBatch":
-        """Adds a block of N rays. `origins`: 3N float32; `directions`: 3N float32 or three, vectors of any length but
-        zero. Directions are not normalized: the unit of t is the length of the direction. `t_max`: N float32 or one,
-        the maximum t, inclusive, +infinity by default; `after`: only hits after this position.
+        """Adds a block of N rays. `origins`: 3N float32 or three; `directions`: 3N float32 or three, vectors of any
+        length but zero. Directions are not normalized: the unit of t is the length of the direction. `t_max`: N float32
+        or one, the maximum t, inclusive, +infinity by default; `after`: only hits after this position.
         """
         new = _NewBlock(self._blocks, "rays")
         new.first("origins", origins, FLOAT32, 3)
-        new.column("directions", directions, FLOAT32, 3)
+        if new.count == 1:
+            new.first("directions", directions, FLOAT32, 3)
+        else:
+            new.column("directions", directions, FLOAT32, 3)
         new.column("t_max", t_max, FLOAT32)
         new.after(after)
         if mode is not RayMode.FIRST or cull is not Cull.NONE or inside is not Inside.SOLID:

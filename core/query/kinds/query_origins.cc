@@ -57,10 +57,17 @@ struct WithinWorld {
 
 QueryOrigins::QueryOrigins(const SceneSnapshot& snapshot, const QueryBlock& block, const QueryTimes& times)
     : block_(block) {
-  positions_.reserve(block.anchor_ids.size());
-  for (size_t i = 0; i < block.anchor_ids.size(); ++i) {
-    const std::optional<Vec3d> position = position_of(snapshot, times.of(i), block.anchor_ids[i]);
-    positions_.push_back(position.value_or(Vec3d{}));
+  if (block.anchor_ids.empty()) return;
+  const ColumnReader<uint64_t> anchors(block.anchor_ids, 1);
+  const size_t queries = query_count(block);
+  const bool is_shared = block.anchor_ids.size() == 1 && !times.asks_past();
+  positions_.reserve(is_shared ? 1 : queries);
+  std::optional<Vec3d> position;
+  for (size_t i = 0; i < queries; ++i) {
+    if (i == 0 || !is_shared) {
+      position = position_of(snapshot, times.of(i), *anchors.entry(i));
+      positions_.push_back(position.value_or(Vec3d{}));
+    }
     if (!position || !std::visit(WithinWorld{*position, i}, block.kind))
       unanchored_.push_back(static_cast<uint32_t>(i));
   }

@@ -11,8 +11,8 @@
 
 namespace locus {
 
-// Invariant: positions_ has one entry for each query of a block with anchor_ids, and otherwise no entry; unanchored_
-// ascends.
+// Invariant: positions_ has one entry for each query of a block with anchor_ids, one entry if all queries have the same
+// anchor at the same time, and no entry without anchor_ids; unanchored_ ascends.
 class QueryOrigins {
  public:
   // Looks up the anchors of `block`, which has passed check_batch(), at the times of its queries. O(1) for each query.
@@ -21,8 +21,8 @@ class QueryOrigins {
   // Returns the point to which the positions of query `i` are relative. The point has no meaning if the query is
   // unanchored.
   Vec3d of(size_t i) const {
-    LOCUS_DCHECK(positions_.empty() || i < positions_.size());
-    return positions_.empty() ? block_.frame : positions_[i];
+    LOCUS_DCHECK(positions_.size() <= 1 || i < positions_.size());
+    return positions_.empty() ? block_.frame : positions_[positions_.size() == 1 ? 0 : i];
   }
   // Returns whether query `i` has no answer, because its anchor does not exist at the query's time, or because one of
   // its positions would lie outside the world.

@@ -34,7 +34,7 @@ class Filter {
       : mask_(ColumnReader<uint32_t>(block.masks, 1).value(query, kAllLayers)),
         ignored_groups_{ColumnReader<uint64_t>(block.ignore_groups, 1).value(query, 0)},
         ignored_ids_(block.ignore_ids),
-        anchor_(block.anchor_ids.empty() ? kNoId : block.anchor_ids[query]),
+        anchor_(ColumnReader<uint64_t>(block.anchor_ids, 1).value(query, kNoId)),
         self_(ColumnReader<uint64_t>(block.self_ids, 1).value(query, kNoId)) {
     if (!block.only_groups.empty()) restrict_groups(block, query);
     if (!block.tags.empty()) {

@@ -104,7 +104,9 @@ RayReader::RayReader(const QueryBlock& block, const RayColumns& rays, const Quer
       starts_(rays.origins, 3),
       directions_(rays.directions, 3),
       limits_(rays.t_max, 1),
-      after_(rays.after.ts.empty() ? nullptr : &rays.after) {
+      after_(rays.after.ts.empty() ? nullptr : &rays.after),
+      is_rotated_(!block.rotation.empty()),
+      rotation_(rotation_entry(block.rotation, 0)) {
   common_.mode = rays.mode;
   common_.cull = stored_cull(rays.cull, winding);
   common_.inside = rays.inside;

@@ -40,6 +40,7 @@ class RayReader {
     RayRequest request = common_;
     request.origin = origins_.of(i) + read_vec3d(starts_.entry(i));
     request.direction = read_vec3d(directions_.entry(i));
+    if (is_rotated_) request.direction = rotation_.to_world(request.direction);
     request.t_max = limits_.value(i, std::numeric_limits<float>::infinity());
     if (after_ != nullptr) request.after = RowPosition::of(*after_, i);
     return request;
@@ -50,6 +51,8 @@ class RayReader {
   const QueryOrigins& origins_;
   const ColumnReader<float> starts_, directions_, limits_;
   const AfterColumns* after_;  // null if no query has a position `after`
+  const bool is_rotated_;      // whether `rotation_` is applied to directions
+  const Rotation rotation_;
 };
 
 struct RayAnswer {

@@ -295,6 +295,19 @@ TEST_F(RunTest, QueriesTakeGroupsTagsAndIdsToFilterBy) {
               HasSubstr("--tag-mask needs --tag"));
 }
 
+TEST_F(RunTest, ARotationTurnsTheDirectionsOfOneOrigin) {
+  server_.queries.answer = [](const v1::QueryRequest&, v1::QueryResult& result) {
+    result.add_blocks();
+    return grpc::Status::OK;
+  };
+  run_here(
+      {"query", "ray", "arena", "--from", "0,1,0", "--dir", "1,0,0", "--dir", "0,1,0", "--rotation", "0,0.6,0,0.8"});
+  const v1::QueryBlock block = server_.queries.last_batch.blocks(0);
+  EXPECT_THAT(block.rays().origins(), ElementsAre(0, 1, 0));
+  EXPECT_THAT(block.rays().directions(), ElementsAre(1, 0, 0, 0, 1, 0));
+  EXPECT_THAT(block.rotation(), ElementsAre(0, 0.6f, 0, 0.8f));
+}
+
 TEST_F(RunTest, TheFormerNameOfTMaxIsAcceptedAndHidden) {
   server_.queries.answer = [](const v1::QueryRequest&, v1::QueryResult& result) {
     result.add_blocks();

@@ -57,6 +57,15 @@ TEST(QueryBuilderTest, FiltersOfABlockAreWholeColumns) {
   EXPECT_THAT(block.self_ids(), ElementsAre(7));
 }
 
+TEST(QueryBuilderTest, OneOriginAndARotationServeAllDirections) {
+  QueryBuilder builder;
+  builder.rays().rays({{1, 2, 3}}, {{1, 0, 0, 0, 1, 0}}).rotation({0, 0.6f, 0, 0.8f});
+  const v1::QueryBlock block = builder.build().blocks(0);
+  EXPECT_THAT(block.rays().origins(), ElementsAre(1, 2, 3));
+  EXPECT_THAT(block.rays().directions(), ElementsAre(1, 0, 0, 0, 1, 0));
+  EXPECT_THAT(block.rotation(), ElementsAre(0, 0.6f, 0, 0.8f));
+}
+
 TEST(QueryBuilderTest, DefaultValuesLeaveColumnsEmpty) {
   QueryBuilder builder;
   builder.rays().ray({0, 1, 0}, {0, 0, -1});

@@ -403,14 +403,64 @@ TEST(CheckBatchTest, ABatchHasAtMost256Blocks) {
   EXPECT_EQ(refusal.asked, 257);
 }
 
-TEST(CheckBatchTest, ABatchHasAtMost65536QueriesOverAllBlocks) {
-  std::vector<OwnedBlock> blocks(2, rays_along_x(RayMode::kAny, std::vector<float>(3 * 32768, 0)));
+TEST(CheckBatchTest, ABatchHasAtMost65536QueriesOtherThanRaysOverAllBlocks) {
+  std::vector<OwnedBlock> blocks(2, lookup_of_ids(std::vector<uint64_t>(32768, 1)));
+  for (OwnedBlock& block : blocks) block.settings.columns = {Column::kId};
+  EXPECT_TRUE(check_batch(batch_of(blocks)).ok());
+  blocks.push_back(rays_along_x(RayMode::kAny, {0, 0, 0}));
   EXPECT_TRUE(check_batch(batch_of(blocks)).ok());
   blocks.push_back(lookup_of_ids({1}));
   const Refusal refusal = refusal_for(blocks);
   EXPECT_EQ(refusal.reason, Reason::kLimit);
   EXPECT_EQ(refusal.limit, "queries");
   EXPECT_EQ(refusal.asked, 65537);
+}
+
+TEST(CheckBatchTest, ABatchHasAtMost262144RaysOverAllBlocksAndTheirDistancesFitADefaultReply) {
+  std::vector<OwnedBlock> blocks(2, rays_along_x(RayMode::kFirst, std::vector<float>(3 * 131'072, 0)));
+  for (OwnedBlock& block : blocks) block.settings.columns = {Column::kT};
+  EXPECT_TRUE(check_batch(batch_of(blocks)).ok());
+  blocks[0].settings.columns = blocks[1].settings.columns = {};
+  EXPECT_EQ(refusal_for(blocks).limit, "max_reply_bytes");
+  blocks.push_back(rays_along_x(RayMode::kAny, {0, 0, 0}));
+  const Refusal refusal = refusal_for(blocks);
+  EXPECT_EQ(refusal.reason, Reason::kLimit);
+  EXPECT_EQ(refusal.limit, "rays");
+  EXPECT_EQ(refusal.asked, 262'145);
+}
+
+TEST(CheckBatchTest, OneOriginServesAllDirections) {
+  OwnedBlock block = twenty_rays();
+  block.points.resize(3);
+  block.extras.assign(20, 1);
+  EXPECT_EQ(query_count(block.view()), 20u);
+  EXPECT_TRUE(status_with(block).ok());
+  block.extras.assign(19, 1);
+  expect_refusal(block, Reason::kColumnLength, "rays.t_max", -1);
+  block.extras.clear();
+  block.points = {0, 0, 0, 1, 1, 1};
+  expect_refusal(block, Reason::kColumnLength, "rays.directions", -1);
+  block.points.clear();
+  expect_refusal(block, Reason::kColumnLength, "rays.directions", -1);
+  block.points = {0, 0, std::numeric_limits<float>::infinity()};
+  expect_refusal(block, Reason::kNotFinite, "rays.origins", 0);
+}
+
+TEST(CheckBatchTest, ARotationIsOneUnitQuaternionAndForRaysOnly) {
+  OwnedBlock block = twenty_rays();
+  block.rotation = {0, 0.6f, 0, 0.8f};
+  EXPECT_TRUE(status_with(block).ok());
+  block.rotation.pop_back();
+  expect_refusal(block, Reason::kColumnLength, "rotation", -1);
+  block.rotation.assign(8, 0.5f);
+  expect_refusal(block, Reason::kColumnLength, "rotation", -1);
+  block.rotation = {0, 0, 0, 1.01f};
+  expect_refusal(block, Reason::kOutOfRange, "rotation", 0);
+  block.rotation = {0, 0, std::numeric_limits<float>::quiet_NaN(), 1};
+  expect_refusal(block, Reason::kNotFinite, "rotation", 0);
+  block = twenty_balls();
+  block.rotation = {0, 0, 0, 1};
+  expect_refusal(block, Reason::kMalformed, "rotation", -1);
 }
 
 TEST(CheckBatchTest, MaxReplyBytesHasALimit) {

@@ -289,12 +289,14 @@ filtered:ball{at = {10, 0, 0}, radius = 30, tag = 9}
 filtered:ball{at = {10, 0, 0}, radius = 30, tag = 1, tag_mask = 6}
 filtered:ball{at = {10, 0, 0}, radius = 30, ignore_id = 2}
 filtered:ball{at = {10, 0, 0}, radius = 30}
+filtered:ray({from = {0, 0, 0}, dir = {0, 1, 0}, only_group = 5}, {rotation = {0, 0, -0.70710678, 0.70710678}})
 local f = filtered:run()
 locus.expect_equal(ids_of(f[1]), {2})
 locus.expect_equal(ids_of(f[2]), {3})
 locus.expect_equal(ids_of(f[3]), {1, 2, 3, 4}, "bits outside of the mask do not count")
 locus.expect_equal(ids_of(f[4]), {1, 3, 4})
 locus.expect_equal(ids_of(f[5]), {1, 2, 3, 4}, "the id of one row is found by the others")
+locus.expect_equal(f[6].id, 2, "the rotation turns y to x")
 locus.expect_error("FAILED_PRECONDITION", function() filtered:ball{at = {0, 0, 0}, radius = 1, tag_mask = 1} end)
 locus.expect_equal(a[8][1].id, 4)
 locus.expect_near(a[8][1].t, 1, 1e-6)
@@ -307,7 +309,7 @@ locus.expect_error("an error", function() scene:updates():insert{id = 1, att = {
 )",
                                   {"--keep-going"});
   EXPECT_THAT(outcome.err, HasSubstr("insert has no field 'att'; did you mean `at`?"));
-  EXPECT_THAT(outcome.err, HasSubstr("20 expectations passed, 1 failed")) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("21 expectations passed, 1 failed")) << outcome.err;
 }
 
 TEST_F(RunCommandTest, StreamsAnswerInOrderAndKeepErrors) {

@@ -234,6 +234,21 @@ class AnswersEqualTheCommandLineTest(DaemonTest):
             self.ask(QueryBatch().balls(everything, 1, block=Block(tag_masks=1)))
         self.assertRefused(raised.exception, "INVALID_ARGUMENT", "MALFORMED", "blocks[0].tag_masks")
 
+    def test_one_origin_and_a_rotation_serve_all_directions(self):
+        beams = [(0, 0, 1), (1, 0, 0), (0, 1, 0)]
+        quarter = (0, 0, 0.5 ** 0.5, 0.5 ** 0.5)  # about z: x becomes y, y becomes -x
+        (block,) = self.ask(QueryBatch().rays([-9, -9, 0.5], beams, t_max=[5, 6, 7], block=Block(rotation=quarter)))
+        (wanted,) = self.ask(QueryBatch().rays([[-9, -9, 0.5]] * 3, [(0, 0, 1), (0, 1, 0), (-1, 0, 0)], t_max=[5, 6, 7]))
+        self.assertEqual(listed(block.ids), listed(wanted.ids))
+        for got, exact in zip(listed(block.t), listed(wanted.t)):
+            self.assertTrue(got == exact or abs(got - exact) < 1e-5)
+        for rotation, reason in (((0, 0, 0, 2), "OUT_OF_RANGE"), ((0, 0, float("nan"), 1), "NOT_FINITE")):
+            with self.assertRaises(locus.LocusError) as raised:
+                self.ask(QueryBatch().rays([0, 0, 0], beams, block=Block(rotation=rotation)))
+            self.assertRefused(raised.exception, "INVALID_ARGUMENT", reason, "blocks[0].rotation")
+        with self.assertRaisesRegex(ValueError, r"^blocks\[0\].rotation: has 3 numbers: give 4"):
+            QueryBatch().rays([0, 0, 0], beams, block=Block(rotation=(0, 0, 1)))
+
     def test_positions_and_answers_are_relative_to_the_frame(self):
         far = 1_000_000.25
         self.apply(locus.UpdateBatch(frame=(far, 0, 0)).insert_balls(5, [0, 0, 0], 0.5))
@@ -320,7 +335,7 @@ class RequestBytesTest(unittest.TestCase):
                          columns=[Column.ID, Column.LAYERS], masks=[1, 2], ignore_groups=[3], ignore_ids=[4, 5], max_results=600,
                          after_id=2**63, as_of_ticks=[11, 12], as_of_fractions=0.5,
                          outside_history=locus.OutsideHistory.CLAMP, only_groups=[1, 2, 3, 4], only_groups_each=2, tags=5,
-                         tag_masks=[6, 7], self_ids=8)
+                         tag_masks=[6, 7], self_ids=8, rotation=[0, 0, 0, 1])
         batch = QueryBatch(at_least=locus.Revision(7, 8), max_work=9, explain=True, max_reply_bytes=10)
         batch.rays([0] * 6, [1, 0, 0], t_max=[5, 6], mode=RayMode.ALL, cull=locus.Cull.BACK, inside=locus.Inside.SKIP,
                    block=settings)
@@ -336,7 +351,8 @@ class RequestBytesTest(unittest.TestCase):
                            ignore_groups=struct.pack("<Q", 3), ignore_ids=struct.pack("<2Q", 4, 5), after_id=2**63,
                            as_of_ticks=struct.pack("<2Q", 11, 12), as_of_fractions=struct.pack("<f", 0.5),
                            outside_history=2, only_groups=struct.pack("<4Q", 1, 2, 3, 4), only_groups_each=2,
-                           tags=struct.pack("<Q", 5), tag_masks=struct.pack("<2Q", 6, 7), self_ids=struct.pack("<Q", 8))
+                           tags=struct.pack("<Q", 5), tag_masks=struct.pack("<2Q", 6, 7), self_ids=struct.pack("<Q", 8),
+                           rotation=struct.pack("<4f", 0, 0, 0, 1))
         first.frame.x, first.frame.y, first.frame.z = 1.5, 0, -2
         first.rays.MergeFrom(schema.message("Rays")(origins=bytes(24), directions=struct.pack("<3f", 1, 0, 0),
                                                     t_max=struct.pack("<2f", 5, 6), mode=3, cull=2, inside=3))

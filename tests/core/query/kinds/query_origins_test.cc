@@ -41,6 +41,14 @@ TEST_F(QueryOriginsTest, PositionsCountFromTheAnchorWhichIsNotFound) {
   EXPECT_THAT(result.unanchored, IsEmpty());
 }
 
+TEST_F(QueryOriginsTest, OneAnchorServesAllQueries) {
+  const BlockResult result = ask(balls({1}, {0, 0, 0, 9.5f, 0, 0}, 2.5f));
+  EXPECT_THAT(result.counts, ElementsAre(1u, 1u));
+  EXPECT_THAT(result.ids, ElementsAre(2u, 3u));
+  EXPECT_THAT(ask(balls({99}, {0, 0, 0, 1, 0, 0}, 1)).unanchored, ElementsAre(0u, 1u));
+  EXPECT_THAT(ask(balls({1}, {1e9f, 0, 0, 0, 0, 0}, 1)).unanchored, ElementsAre(0u));
+}
+
 TEST_F(QueryOriginsTest, AnOffsetMovesTheQueryAwayFromItsAnchor) {
   EXPECT_THAT(ask(balls({1}, {9.5f, 0, 0}, 1)).ids, ElementsAre(3u));
 }
@@ -105,6 +113,8 @@ TEST(QueryOriginsHistoryTest, TheAnchorIsWhereItWasAtTheTimeOfTheQuery) {
   block.anchor_ids = {1, 1};
   block.as_of_ticks = {1, 2};
   EXPECT_THAT(run_block(*scene.latest(), block).counts, ElementsAre(0u, 1u));
+  block.anchor_ids = {1};
+  EXPECT_THAT(run_block(*scene.latest(), block).counts, ElementsAre(0u, 1u)) << "one anchor, two times";
 }
 
 }  // namespace

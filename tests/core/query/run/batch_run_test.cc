@@ -105,6 +105,35 @@ TEST(BatchRunTest, TheResultIsByteIdenticalForAnyNumberOfThreads) {
   }
 }
 
+// A sensor's largest sweep: each call works on a small part of the batch, so that other batches run in between, and the
+// parts together equal the answers of batches of few rays with directions that were rotated before.
+TEST(BatchRunTest, TheLargestBlockOfRaysFromOneOriginIsDividedIntoParts) {
+  const SnapshotPtr snapshot = snapshot_of(world_of(100));
+  OwnedBlock sweep = rays_along_x(RayMode::kFirst, {-5, 0, 0});
+  sweep.settings.columns = {Column::kT};
+  const Quaternion half_turn{0, 1, 0, 0};
+  sweep.rotation = {half_turn.x, half_turn.y, half_turn.z, half_turn.w};
+  sweep.sizes.clear();
+  OwnedBlock rotated = sweep;
+  rotated.rotation.clear();
+  for (uint32_t i = 0; i < limits::kMaxRays; ++i) {
+    const Vec3f direction{-1, static_cast<float>(i % 512) / 1024 - 0.25f, static_cast<float>(i / 512) / 1024 - 0.25f};
+    const Vec3f turned = to_float(rotation_of(half_turn).to_world(to_double(direction)));
+    sweep.sizes.insert(sweep.sizes.end(), {direction.x, direction.y, direction.z});
+    rotated.sizes.insert(rotated.sizes.end(), {turned.x, turned.y, turned.z});
+  }
+  Prepared prepared(*snapshot, {sweep});
+  size_t parts = 1;
+  while (prepared.run->work(0) == Progress::kMore) ++parts;
+  EXPECT_GE(parts, limits::kMaxRays / 256);
+  ASSERT_EQ(prepared.result.blocks[0].t.size(), limits::kMaxRays);
+  for (size_t begin = 0; begin < limits::kMaxRays; begin += 16'384) {
+    const BlockResult expected = run_block(*snapshot, rotated.part(begin, begin + 16'384));
+    const auto first = prepared.result.blocks[0].t.begin() + static_cast<std::ptrdiff_t>(begin);
+    ASSERT_TRUE(std::equal(expected.t.begin(), expected.t.end(), first)) << begin;
+  }
+}
+
 TEST(BatchRunTest, ABatchWithoutQueriesIsDoneAtTheFirstCall) {
   const SnapshotPtr snapshot = snapshot_of(world_of(1));
   Prepared prepared(*snapshot, {many_rays(RayMode::kFirst, 0)});
