@@ -139,10 +139,29 @@ void add_shapes(v1::QueryBatch& batch) {
   boxes->mutable_boxes()->set_detail(v1::STATIC_DETAIL_TRIANGLES);
 }
 
+void add_filters(v1::QueryBatch& batch) {
+  v1::QueryBlock* rays = batch.add_blocks();
+  for (float value : {0.f, 0.f, 100.f}) rays->mutable_rays()->add_origins(value);
+  for (float value : {0.f, 0.f, -1.f, 0.f, 1.f, -1.f}) rays->mutable_rays()->add_directions(value);
+  for (float value : {0.f, 0.6f, 0.f, 0.8f}) rays->add_rotation(value);
+  rays->set_only_groups_each(2);
+  for (uint64_t group : {3u, 0u, 0u, 0u}) rays->add_only_groups(group);
+  rays->add_self_ids(1);
+  v1::QueryBlock* boxes = batch.add_blocks();
+  for (float value : {0.f, 1.f, 0.f}) boxes->mutable_boxes()->add_centers(value);
+  for (float value : {3.f, 3.f, 3.f}) boxes->mutable_boxes()->add_half_extents(value);
+  for (v1::Column column : {v1::COLUMN_T, v1::COLUMN_NORMAL, v1::COLUMN_POINT}) boxes->add_columns(column);
+  boxes->add_tags(5);
+  boxes->add_tag_masks(4);
+}
+
 void write_queries(const SeedWriter& seeds) {
   v1::QueryBatch batch;
   add_shapes(batch);
   seeds.write("queries", "shapes", batch.SerializeAsString());
+  v1::QueryBatch filtered;
+  add_filters(filtered);
+  seeds.write("queries", "filters", filtered.SerializeAsString());
   v1::QueryBatch others;
   v1::QueryBlock* nearest = others.add_blocks();
   for (float value : {0.f, 1.f, 0.f}) nearest->mutable_nearest()->add_points(value);

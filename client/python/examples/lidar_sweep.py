@@ -1,6 +1,9 @@
-"""Spinning lidar on a vehicle: sweeps of rays from a moving sensor, and the client's cost of each ray.
+"""Spinning lidar on a vehicle: sweeps of rays from a moving and turning sensor, and the client's cost of each ray.
 
     PYTHONPATH=build/release/python /usr/bin/python3 client/python/examples/lidar_sweep.py --address 127.0.0.1:7575
+
+The pattern of beams is computed once. Each sweep sends it unchanged, with one origin for all rays, the sensor's position
+as the frame, and its orientation as the rotation of the block. A sweep has up to 262,144 rays.
 
 Creates a scene of its own, a street of boxes with balls, and deletes the scene at the end. "Client time" is the time
 that this process spends on encoding the request and decoding the answer into columns. Time in gRPC and in the network
@@ -13,7 +16,7 @@ import array
 import math
 import statistics
 import time
-from typing import Any, List, NamedTuple, Sequence, Tuple
+from typing import List, NamedTuple, Sequence, Tuple
 
 import locus
 
@@ -22,6 +25,8 @@ LOWEST, HIGHEST = math.radians(-24.8), math.radians(2.0)  # like common 64-ring 
 RANGE = 120.0
 HEIGHT = 1.75
 STEP = 0.25  # metres between sweeps; exact in float32
+TURN = math.radians(0.5)  # between sweeps, about the z axis
+ROW_BYTES = 20  # of the columns T, ID and TRIANGLE, and of the list of truncated queries
 
 
 class Cost(NamedTuple):
@@ -51,6 +56,11 @@ def position(sweep: int) -> Tuple[float, float, float]:
     return (STEP * sweep, 0.0, HEIGHT)
 
 
+def orientation(sweep: int) -> Tuple[float, float, float, float]:
+    """Returns the orientation of the sensor in the given sweep as a unit quaternion x, y, z, w."""
+    return (0.0, 0.0, math.sin(TURN * sweep / 2), math.cos(TURN * sweep / 2))
+
+
 def build_street(client: locus.Client, scene: str) -> locus.Revision:
     """Creates the scene with a ground, houses on both sides, and balls on the road; returns the resulting revision."""
     client.create_scene(scene)
@@ -63,14 +73,15 @@ def build_street(client: locus.Client, scene: str) -> locus.Revision:
     return client.apply(scene, batch)
 
 
-def measured_sweep(client: locus.Client, scene: str, sweep: int, zeros: Any, directed: Any,
+def measured_sweep(client: locus.Client, scene: str, sweep: int, pattern: "array.array[float]",
                    built: locus.Revision) -> Tuple[locus.BlockResult, Cost]:
-    """Runs one sweep and returns its hits and its times. All rays start at the origin of the frame, so only the frame
-    changes from sweep to sweep.
+    """Runs one sweep and returns its hits and its times. All rays start at the origin of the frame, so only the frame and
+    the rotation change from sweep to sweep.
     """
     begin = time.perf_counter_ns()
-    batch = locus.QueryBatch(at_least=built)
-    batch.rays(zeros, directed, t_max=RANGE, block=locus.Block(frame=position(sweep)))
+    batch = locus.QueryBatch(at_least=built, max_reply_bytes=max(4_000_000, ROW_BYTES * len(pattern) // 3 + 512))
+    batch.rays([0.0, 0.0, 0.0], pattern, t_max=RANGE,
+               block=locus.Block(frame=position(sweep), rotation=orientation(sweep)))
     request = batch.request_bytes(scene)
     asked = time.perf_counter_ns()
     answer = client.query_bytes(scene, request)
@@ -97,13 +108,13 @@ def main() -> None:
     parser.add_argument("--rays", type=int, default=8192)
     parser.add_argument("--sweeps", type=int, default=100)
     options = parser.parse_args()
-    zeros, directed = array.array("f", bytes(12 * options.rays)), directions(options.rays)
+    pattern = directions(options.rays)
     with locus.connect(options.address) as client:
         built = build_street(client, options.scene)
         try:
             costs, hits = [], 0
             for sweep in range(options.sweeps):
-                block, cost = measured_sweep(client, options.scene, sweep, zeros, directed, built)
+                block, cost = measured_sweep(client, options.scene, sweep, pattern, built)
                 costs.append(cost)
                 hits += sum(1 for thing in block.ids.tolist() if thing)
         finally:

@@ -40,18 +40,44 @@ class LidarSweepTest(DaemonTest):
     def test_answers_of_a_sweep_equal_those_of_the_command_line(self):
         scene = "street"
         built = self.example.build_street(self.client, scene)
-        zeros, directed = array.array("f", bytes(12 * RAYS)), self.example.directions(RAYS)
-        hits, cost = self.example.measured_sweep(self.client, scene, 9, zeros, directed, built)
+        directed = self.example.directions(RAYS)
+        hits, cost = self.example.measured_sweep(self.client, scene, 9, directed, built)
         self.assertTrue(all(part > 0 for part in cost))
         start = text(self.example.position(9))
-        options = [word for begin in range(0, 3 * RAYS, 3)
-                   for word in (f"--from={start}", f"--dir={text(directed[begin:begin + 3])}")]
+        options = [f"--dir={text(directed[begin:begin + 3])}" for begin in range(0, 3 * RAYS, 3)]
+        options += [f"--from={start}", f"--rotation={text(self.example.orientation(9))}"]
         report = self.command_line("query", "ray", scene, *options, f"--t-max={self.example.RANGE}", "--columns", "triangle")
         shown = [(number(row["id"]) if row["hit"] else 0, row["t"] if row["hit"] else math.inf) for row in report["hits"]]
         self.assertEqual([one for one, _ in shown], listed(hits.ids))
         self.assertEqual(array.array("f", [t for _, t in shown]).tolist(), listed(hits.t))
         self.assertGreater(len(set(listed(hits.ids))), 10)
         self.assertIn(0, listed(hits.ids))
+
+    def test_a_rotated_pattern_hits_what_rotated_directions_hit(self):
+        built = self.example.build_street(self.client, "turned-street")
+        directed = self.example.directions(RAYS)
+        hits, _ = self.example.measured_sweep(self.client, "turned-street", 9, directed, built)
+        _, _, z, w = self.example.orientation(9)
+        cosine, sine = w * w - z * z, 2 * w * z
+        rotated = array.array("f")
+        for begin in range(0, 3 * RAYS, 3):
+            x, y, up = directed[begin:begin + 3]
+            rotated.extend((cosine * x - sine * y, sine * x + cosine * y, up))
+        batch = locus.QueryBatch().rays([0, 0, 0], rotated, t_max=self.example.RANGE,
+                                        block=locus.Block(frame=self.example.position(9)))
+        wanted = self.client.query("turned-street", batch).blocks[0]
+        near = sum(abs(got - exact) <= 1e-3 * exact or got == exact for got, exact in zip(listed(hits.t), listed(wanted.t)))
+        self.assertGreater(near, 0.99 * RAYS)  # rays along an edge may hit either side of it
+        straight = self.client.query("turned-street", locus.QueryBatch().rays(
+            [0, 0, 0], directed, t_max=self.example.RANGE, block=locus.Block(frame=self.example.position(9)))).blocks[0]
+        self.assertNotEqual(listed(straight.t), listed(hits.t))
+
+    def test_the_largest_sweep_is_answered_whole(self):
+        built = self.example.build_street(self.client, "wide-street")
+        most = int(self.client.server().limits["rays"].value)
+        self.assertEqual(most, 262_144)
+        hits, _ = self.example.measured_sweep(self.client, "wide-street", 3, self.example.directions(most), built)
+        self.assertEqual((len(hits.t), len(hits.ids), listed(hits.truncated)), (most, most, []))
 
     def test_the_program_prints_the_cost_of_a_ray_and_deletes_its_scene(self):
         command = [sys.executable, "-B", EXAMPLE, "--address", self.daemon.address, "--rays", "256", "--sweeps", "3"]
