@@ -39,7 +39,7 @@ enum class PlantedBug {
   kFilterRayMeshes,    // rays ignore the filters for instances
   kFilterFirstGroup,   // only the first of the groups to which a query is restricted is compared
   kFilterTagMask,      // all bits of tags are compared, whatever the mask is
-  kFilterLabels,       // a query without ignored groups and ids compares layers only
+  kFilterLabels,       // the filters by ids, tag and wanted groups accept everything
   kClosedEdge,         // an edge includes both of its ends when crossings of a mesh are counted
   kCrossingInDouble,   // signs of crossings are taken from double even if double cannot decide them
   kCrossingMirror,     // a descending half line counts crossings with the sign of an ascending one

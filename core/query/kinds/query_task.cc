@@ -1,6 +1,26 @@
 #include "core/query/kinds/query_task.h"
 
+#include "core/base/planted_bug.h"
+
 namespace locus {
+
+bool Filter::passes_rare_filters(Group group, Tag tag, Id id) const {
+  if (planted(PlantedBug::kFilterLabels)) return true;
+  const QueryBlock& block = *block_;
+  if (std::find(block.ignore_ids.begin(), block.ignore_ids.end(), id) != block.ignore_ids.end()) return false;
+  if (ColumnReader<uint64_t>(block.self_ids, 1).value(query_, kNoId) == id) return false;
+  if (!block.tags.empty()) {
+    Tag mask = ColumnReader<uint64_t>(block.tag_masks, 1).value(query_, ~Tag{0});
+    if (planted(PlantedBug::kFilterTagMask)) mask = ~Tag{0};
+    if (((tag ^ *ColumnReader<uint64_t>(block.tags, 1).entry(query_)) & mask) != 0) return false;
+  }
+  if (block.only_groups.empty()) return true;
+  const size_t groups = planted(PlantedBug::kFilterFirstGroup) ? 1 : block.only_groups_per_query();
+  const ColumnReader<uint64_t> reader(block.only_groups, block.only_groups_per_query());
+  const absl::Span<const uint64_t> wanted(reader.entry(query_), groups);
+  if (group != 0 && std::find(wanted.begin(), wanted.end(), group) != wanted.end()) return true;
+  return std::all_of(wanted.begin(), wanted.end(), [](uint64_t one) { return one == 0; });
+}
 
 bool BatchControl::report_work(uint64_t work) {
   done_.fetch_add(work, std::memory_order_relaxed);

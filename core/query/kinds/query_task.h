@@ -17,7 +17,6 @@
 #include "core/base/check.h"
 #include "core/base/column.h"
 #include "core/base/limits.h"
-#include "core/base/planted_bug.h"
 #include "core/index/bvh/kernels/dispatch.h"
 #include "core/index/work.h"
 #include "core/query/kinds/found_objects.h"
@@ -26,26 +25,21 @@
 
 namespace locus {
 
-// Filter of one query by layers, groups, tag and id; the query's anchor is not accepted. Borrows the block's columns.
-// Most queries filter by layers only; for these, accepts() makes no other comparison.
+// Filter of one query by layers, groups, tag and id; the query's anchor is not accepted. Borrows the block. Most
+// queries filter by layers only, or also by one ignored group; the filter contains what these compare. It reads the
+// columns of all other filters where a block has some, so that it stays small: a call of the ray kernels has many
+// filters in use.
 class Filter {
  public:
   Filter(const QueryBlock& block, size_t query)
       : mask_(ColumnReader<uint32_t>(block.masks, 1).value(query, kAllLayers)),
+        query_(static_cast<uint32_t>(query)),
+        block_(&block),
         ignored_groups_{ColumnReader<uint64_t>(block.ignore_groups, 1).value(query, 0)},
-        ignored_ids_(block.ignore_ids),
         anchor_(ColumnReader<uint64_t>(block.anchor_ids, 1).value(query, kNoId)),
-        self_(ColumnReader<uint64_t>(block.self_ids, 1).value(query, kNoId)) {
-    if (!block.only_groups.empty()) restrict_groups(block, query);
-    if (!block.tags.empty()) {
-      tag_mask_ = planted(PlantedBug::kFilterTagMask)
-                      ? ~Tag{0}
-                      : ColumnReader<uint64_t>(block.tag_masks, 1).value(query, ~Tag{0});
-      tag_ = ColumnReader<uint64_t>(block.tags, 1).value(query, 0) & tag_mask_;
-    }
-    layers_only_ = ignored_groups_[0] == 0 && ignored_ids_.empty() && anchor_ == kNoId &&
-                   ((self_ == kNoId && only_groups_.empty() && tag_mask_ == 0) || planted(PlantedBug::kFilterLabels));
-  }
+        has_rare_filters_(
+            (block.ignore_ids.size() | block.only_groups.size() | block.tags.size() | block.self_ids.size()) != 0),
+        layers_only_(ignored_groups_[0] == 0 && anchor_ == kNoId && !has_rare_filters_) {}
 
   // Makes the filter ignore two more groups; 0 stands for no group. Another call replaces both groups.
   void ignore(Group first, Group second) {
@@ -58,36 +52,25 @@ class Filter {
   template <class Item>
   bool accepts(const Item& item) const {
     if ((item.layers & mask_) == 0) return false;
-    return layers_only_ || (accepts_group(item.group) && accepts_id(item.id) && (item.tag & tag_mask_) == tag_);
+    if (layers_only_) return true;
+    if (item.group != 0 &&
+        std::find(ignored_groups_.begin(), ignored_groups_.end(), item.group) != ignored_groups_.end())
+      return false;
+    if (item.id == anchor_) return false;
+    return !has_rare_filters_ || passes_rare_filters(item.group, item.tag, item.id);
   }
 
  private:
-  void restrict_groups(const QueryBlock& block, size_t query) {
-    const size_t groups = block.only_groups_per_query();
-    const absl::Span<const uint64_t> entry(ColumnReader<uint64_t>(block.only_groups, groups).entry(query), groups);
-    if (std::any_of(entry.begin(), entry.end(), [](uint64_t group) { return group != 0; }))
-      only_groups_ = planted(PlantedBug::kFilterFirstGroup) ? entry.first(1) : entry;
-  }
-  bool accepts_group(Group group) const {
-    if (group == 0) return only_groups_.empty();
-    if (std::find(ignored_groups_.begin(), ignored_groups_.end(), group) != ignored_groups_.end()) return false;
-    if (only_groups_.empty()) return true;
-    return std::find(only_groups_.begin(), only_groups_.end(), group) != only_groups_.end();
-  }
-  bool accepts_id(Id id) const {
-    if (id == anchor_ || id == self_) return false;
-    return std::find(ignored_ids_.begin(), ignored_ids_.end(), id) == ignored_ids_.end();
-  }
+  // Returns whether the filters by ignored ids, own id, wanted groups and tag accept an item.
+  bool passes_rare_filters(Group group, Tag tag, Id id) const;
 
   Layers mask_;
-  bool layers_only_;                     // every other condition accepts everything
+  uint32_t query_;
+  const QueryBlock* block_;
   std::array<Group, 3> ignored_groups_;  // 0: none
-  absl::Span<const uint64_t> ignored_ids_;
-  absl::Span<const uint64_t> only_groups_;  // empty: every group; an entry 0 is no group
-  Id anchor_;                               // kNoId if the query has no anchor
-  Id self_;                                 // kNoId if the query ignores no object of its own
-  Tag tag_ = 0;                             // has no bit that tag_mask_ does not have
-  Tag tag_mask_ = 0;
+  Id anchor_;                            // kNoId if the query has no anchor
+  bool has_rare_filters_;                // whether passes_rare_filters() must be called
+  bool layers_only_;                     // every other condition accepts everything
 };
 
 // Returns the rotation of query `i` in an optional column of quaternions x, y, z, w. Returns the identity if the column
