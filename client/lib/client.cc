@@ -371,6 +371,19 @@ absl::StatusOr<v1::QueryResult> Client::query(absl::string_view scene, v1::Query
   return std::move(*response->mutable_result());
 }
 
+absl::StatusOr<StepResult> Client::step(absl::string_view scene, v1::UpdateBatch update, v1::QueryBatch queries) const {
+  const bool once_only = update.writer() != 0 && update.batch() != 0;
+  v1::StepRequest request;
+  request.set_scene(std::string(scene));
+  *request.mutable_update() = std::move(update);
+  *request.mutable_queries() = std::move(queries);
+  ASSIGN_OR_RETURN(v1::StepResponse response,
+                   call(*connection_->queries, once_only ? connection_->repeatable(scene) : connection_->once(scene),
+                        request, &v1::QueryService::StubInterface::Step));
+  if (response.has_error()) return StepResult{std::move(*response.mutable_ack()), to_absl_status(response.error())};
+  return StepResult{std::move(*response.mutable_ack()), std::move(*response.mutable_result())};
+}
+
 std::unique_ptr<UpdateStream> Client::update_stream(absl::string_view scene, const UpdateStreamOptions& options) const {
   return std::make_unique<UpdateStream>(connection_->link_of(options.lane), connection_->authorization,
                                         std::string(scene), options);

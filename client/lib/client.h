@@ -12,9 +12,9 @@
 // structured error. UNAVAILABLE means that no server answered or that the server is draining. After DEADLINE_EXCEEDED
 // the outcome of a change is unknown. Methods whose comment says "Retried" repeat a call that fails with UNAVAILABLE,
 // or with RESOURCE_EXHAUSTED and a retry hint of the server, as often as RetryPolicy allows and until the deadline.
-// apply() does so only if its batch has `writer` and `batch`, by which the server recognizes a repeated batch. In
-// addition, if the server refuses the token of a unary call, and the token file then contains a new token, the call is
-// repeated with the new token.
+// apply() and step() do so only if the update has `writer` and `batch`, by which the server recognizes a repeated
+// batch. In addition, if the server refuses the token of a unary call, and the token file then contains a new token,
+// the call is repeated with the new token.
 #ifndef LOCUS_CLIENT_LIB_CLIENT_H_
 #define LOCUS_CLIENT_LIB_CLIENT_H_
 
@@ -133,6 +133,11 @@ class Client {
   // Sends one batch of queries and returns the answers, all at one revision. Retried. For regular batches use
   // query_stream().
   absl::StatusOr<v1::QueryResult> query(absl::string_view scene, v1::QueryBatch batch) const;
+  // Makes a step: applies `update`, then answers `queries` at a revision that contains it, in one call. An error means
+  // that the step was refused; if the server sent it, nothing was changed. An error of queries whose update was applied
+  // is in StepResult::result. Retried only if the update carries `writer` and `batch`. For a step every tick use
+  // QueryStream::step().
+  absl::StatusOr<StepResult> step(absl::string_view scene, v1::UpdateBatch update, v1::QueryBatch queries) const;
 
   // Cancels the calls in progress, which then return CANCELLED; whether a change was made is unknown. Does not end
   // streams.

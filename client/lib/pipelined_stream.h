@@ -70,9 +70,10 @@ class PipelinedStream {
     virtual void number(Request& request) = 0;
     // Converts a response into the outcome of its request.
     virtual absl::StatusOr<Result> outcome_of(Response& response) = 0;
-    // Handles the outcome of an item that was at index `position` of `items` and has been removed. May renumber the
-    // later items, the first of which is now at `position`. If an error is returned, the stream ends with this error.
-    virtual absl::Status answered(const absl::StatusOr<Result>& outcome, Items& items, size_t position) = 0;
+    // Handles the outcome of the item with `request`, which was at index `position` of `items` and has been removed.
+    // May renumber the later items by number_again(). If an error is returned, the stream ends with this error.
+    virtual absl::Status answered(const Request& request, const absl::StatusOr<Result>& outcome, Items& items,
+                                  size_t position) = 0;
   };
 
   struct Options {
@@ -116,6 +117,15 @@ class PipelinedStream {
     pump();
     changed_.notify_all();
     return absl::OkStatus();
+  }
+
+  // Numbers the items from `position` on again, and sends them again. For Kind::answered().
+  void number_again(Items& items, size_t position) {
+    for (size_t i = position; i < items.size(); ++i) {
+      items[i].request = std::make_shared<Request>(*items[i].request);
+      items[i].written = false;
+      kind_.number(*items[i].request);
+    }
   }
 
   absl::Status flush() {
@@ -240,11 +250,12 @@ class PipelinedStream {
     if (item == items_.end()) return;
     const size_t position = static_cast<size_t>(item - items_.begin());
     Callback done = std::move(item->done);
+    const std::shared_ptr<Request> request = std::move(item->request);
     items_.erase(item);
     backoff_.reset();
     last_response_ = Clock::now();
     absl::StatusOr<Result> outcome = kind_.outcome_of(response);
-    fatal_.Update(kind_.answered(outcome, items_, position));
+    fatal_.Update(kind_.answered(*request, outcome, items_, position));
     if (fatal_.ok()) {
       pump();
     } else {

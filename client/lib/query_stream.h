@@ -1,9 +1,14 @@
-// Pipelined stream of query batches against one scene. Answers may arrive in any order and are matched by sequence
-// number. For callers that query every tick. After a broken connection, unanswered batches are sent again on a new
-// connection, which is safe since queries change nothing.
+// Pipelined stream of query batches against one scene, and of steps: an update with queries that see it. Answers may
+// arrive in any order and are matched by sequence number. For callers that query every tick. After a broken connection,
+// unanswered batches are sent again on a new connection, which is safe: queries change nothing, and each step's update
+// carries the stream's random writer id and a consecutive batch number, by which the server applies it only once.
+//
+// As in an UpdateStream, a refused update does not use up its number: the stream renumbers the later steps and sends
+// everything after the refused step again. The stream ends permanently in the cases in which an UpdateStream ends.
 #ifndef LOCUS_CLIENT_LIB_QUERY_STREAM_H_
 #define LOCUS_CLIENT_LIB_QUERY_STREAM_H_
 
+#include <cstdint>
 #include <functional>
 #include <future>
 #include <memory>
@@ -13,11 +18,20 @@
 #include "absl/status/statusor.h"
 #include "client/lib/options.h"
 #include "locus/v1/query_service.pb.h"
+#include "locus/v1/update_service.pb.h"
 
 namespace locus::client {
 
 class Authorization;
 struct Link;
+
+// Outcome of a step whose update was applied, except refused items.
+struct StepResult {
+  v1::UpdateAck ack;
+  // The answer to the queries, at the revision of the ack or a later one; or their error. The update stays applied if
+  // the queries fail.
+  absl::StatusOr<v1::QueryResult> result;
+};
 
 struct QueryStreamOptions {
   // Maximum number of unanswered batches, at least 1; send() blocks when this number is reached. 8 batches of 1,024
@@ -30,6 +44,10 @@ struct QueryStreamOptions {
   absl::Duration patience = absl::Seconds(10);
   // Connection of the stream. Use kLatency for small batches whose answers are needed quickly.
   Lane lane = Lane::kBulk;
+  // Writer id of the steps; 0 = the stream generates a random id. `next_batch` is the number of the first step. Set
+  // these two options only to continue the batch numbers of an earlier stream's writer.
+  uint64_t writer = 0;
+  uint64_t next_batch = 1;
 };
 
 // Thread-safe: every method may be called from any thread. Callbacks run one at a time, in the order of the answers, on
@@ -37,6 +55,7 @@ struct QueryStreamOptions {
 class QueryStream {
  public:
   using ResultCallback = std::function<void(absl::StatusOr<v1::QueryResult>)>;
+  using StepCallback = std::function<void(absl::StatusOr<StepResult>)>;
 
   // Opens a stream on `link`. Callers use Client::query_stream instead.
   QueryStream(const Link& link, std::shared_ptr<Authorization> authorization, std::string scene,
@@ -52,6 +71,12 @@ class QueryStream {
   absl::Status send(v1::QueryBatch batch, ResultCallback on_result);
   // Sends a batch and returns a future for its answer. If the stream has ended, the future receives the stream's error.
   std::future<absl::StatusOr<v1::QueryResult>> send(v1::QueryBatch batch);
+
+  // Sends a step: the server applies `update`, then answers `queries` at a revision that contains it. Otherwise like
+  // send(). An error means that the step was refused: nothing was changed and no query was run. Steps are applied in
+  // the order sent. Overwrites `writer` and `batch` of the update.
+  absl::Status step(v1::UpdateBatch update, v1::QueryBatch queries, StepCallback on_result);
+  std::future<absl::StatusOr<StepResult>> step(v1::UpdateBatch update, v1::QueryBatch queries);
 
   // Blocks until all sent batches are answered and their callbacks have returned. If the stream has ended, returns the
   // stream's error.

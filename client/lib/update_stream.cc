@@ -1,32 +1,17 @@
 #include "client/lib/update_stream.h"
 
 #include <mutex>
-#include <random>
 #include <utility>
 
 #include "client/lib/pipelined_stream.h"
 #include "client/lib/status.h"
+#include "client/lib/writer.h"
 #include "locus/v1/update_service.grpc.pb.h"
 
 namespace locus::client {
 namespace {
 
 using UpdatePipeline = PipelinedStream<v1::StreamUpdatesRequest, v1::StreamUpdatesResponse, v1::UpdateAck>;
-
-uint64_t random_writer() {
-  std::random_device device;
-  uint64_t writer = 0;
-  while (writer == 0) writer = (uint64_t{device()} << 32) | device();
-  return writer;
-}
-
-// Returns whether the batch number of a failed batch can be used again: true if the server refused the batch with any
-// reason except REASON_BATCH_GAP. That reason means that the server has lost the state of the writer. After an error
-// without a reason it is unknown whether the server used the number, and continuing could lose a batch silently.
-bool batch_number_is_unused(const absl::Status& failure) {
-  const std::optional<v1::Error> error = error_of(failure);
-  return error && error->reason() != v1::REASON_UNSPECIFIED && error->reason() != v1::REASON_BATCH_GAP;
-}
 
 }  // namespace
 
@@ -63,8 +48,8 @@ class UpdateStream::Impl final : public UpdatePipeline::Kind {
     return absl::DataLossError("the server answered a batch with neither an ack nor an error");
   }
 
-  absl::Status answered(const absl::StatusOr<v1::UpdateAck>& outcome, UpdatePipeline::Items& items,
-                        size_t position) override {
+  absl::Status answered(const v1::StreamUpdatesRequest&, const absl::StatusOr<v1::UpdateAck>& outcome,
+                        UpdatePipeline::Items& items, size_t position) override {
     if (outcome.ok()) {
       std::lock_guard lock(ack_mutex_);
       last_ack_ = Revision{outcome->epoch(), outcome->revision()};
@@ -72,11 +57,7 @@ class UpdateStream::Impl final : public UpdatePipeline::Kind {
     }
     if (!batch_number_is_unused(outcome.status())) return outcome.status();
     next_batch_ -= items.size() - position + 1;
-    for (size_t behind = position; behind < items.size(); ++behind) {
-      items[behind].request = std::make_shared<v1::StreamUpdatesRequest>(*items[behind].request);
-      items[behind].written = false;
-      number(*items[behind].request);
-    }
+    stream_.number_again(items, position);
     return absl::OkStatus();
   }
 

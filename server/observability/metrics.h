@@ -48,8 +48,9 @@ enum class Rpc : uint8_t {
   kStreamUpdates,
   kQuery,
   kStreamQueries,
+  kStep,
 };
-inline constexpr size_t kRpcs = 17;
+inline constexpr size_t kRpcs = 18;
 // Returns the rpc's name in the protocol, such as "StreamQueries".
 absl::string_view rpc_name(Rpc rpc);
 

@@ -97,13 +97,12 @@ bool ends_stream(const Caller& caller, const absl::Status& status) {
 }
 
 void record_answer(CallMetrics& metrics, const Caller& caller, Rpc rpc, const absl::Status& status, SteadyTime arrived,
-                   absl::string_view scene) {
+                   absl::string_view scene, bool is_change) {
   metrics.record_call(rpc, status.code(), nanoseconds_since(arrived));
   if (status.ok()) return;
   metrics.record_refusal(status);
   const bool is_hot = rpc >= Rpc::kApplyUpdates;  // blocking calls write their own lines
-  const bool is_update = rpc == Rpc::kApplyUpdates || rpc == Rpc::kStreamUpdates;
-  if (is_hot && Caller::is_audited(status, is_update)) caller.audit(scene, status);
+  if (is_hot && Caller::is_audited(status, is_change)) caller.audit(scene, status);
   if (!logs(LogLevel::kDebug)) return;
   const LogScope scope(caller.trace());
   log(LogLevel::kDebug, "refused",

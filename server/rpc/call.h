@@ -169,9 +169,10 @@ bool ends_stream(const Caller& caller, const absl::Status& status);
 
 // Counts a call, or one message of a stream, that was answered with `status`. If `status` is not OK, logs a line at
 // debug level. For queries and updates, also writes a line to the audit log if Caller::is_audited() returns true.
-// `scene` is the scene that the message names; empty if it is not known.
+// `is_change` tells whether an error refused a change of the scene. `scene` is the scene that the message names; empty
+// if it is not known.
 void record_answer(CallMetrics& metrics, const Caller& caller, Rpc rpc, const absl::Status& status, SteadyTime arrived,
-                   absl::string_view scene = "");
+                   absl::string_view scene = "", bool is_change = false);
 
 }  // namespace locus::server
 

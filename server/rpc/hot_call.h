@@ -49,8 +49,10 @@ class HotCall;  // NOLINT(cppcoreguidelines-virtual-class-destructor): a call de
 // Acceptor of the calls of one rpc on one IO loop; keeps some unused slots for reuse. Outlives the loop's calls.
 //
 // A Method has the types Request, Response and Work, and the constants kRpc, kPath, kStream and kInOrder. Its functions
-// are listen(), which requests the next call from gRPC; make_work(), which returns the Work of a CallSlot; and begin(),
-// which begins the work on a message. Work::give_up() asks the work to answer soon if it has not answered yet.
+// are listen(), which requests the next call from gRPC; make_work(), which returns the Work of a CallSlot; begin(),
+// which begins the work on a message; and is_change(), which returns whether a message changes its scene. The Method of
+// a unary call may have put_error(), which puts an error into the response and returns true, or returns false if the
+// error is to be the call's status. Work::give_up() asks the work to answer soon if it has not answered yet.
 template <class Method>
 class Listener {
  public:
@@ -278,7 +280,11 @@ class HotCall final : private IoLoop::ActiveCall {
       read_next();  // the next message may arrive while this one is processed
       slot.response_.set_sequence(slot.request_.sequence());
       status.Update(scene_.check(slot.request_.scene()));
-      if (!status.ok()) return slot.answered(std::move(status));
+      if (!status.ok()) {
+        slot.response_.Clear();  // removes the answer of the slot's previous message
+        slot.response_.set_sequence(slot.request_.sequence());
+        return slot.answered(std::move(status));
+      }
       listener_.rpc_.begin(slot.work_, scene_.scene(), slot.request_, slot.response_);
     } else {
       listener_.rpc_.begin(slot.work_, slot.request_.scene(), slot.request_, slot.response_);
@@ -290,12 +296,15 @@ class HotCall final : private IoLoop::ActiveCall {
       LOCUS_CHECK(!slot.answered_);
       slot.answered_ = true;
       slot.holds_ = false;
-      record_answer(listener_.state_.metrics, *caller_, Method::kRpc, status, slot.arrived_, scene_of(slot));
+      record_answer(listener_.state_.metrics, *caller_, Method::kRpc, status, slot.arrived_, scene_of(slot),
+                    Method::is_change(slot.request_, slot.response_));
       if (stopping_ || status.ok()) return shrink_claim(slot);
       if constexpr (Method::kStream) {
         if (ends_stream(*caller_, status)) return stop(std::move(status));
         *slot.response_.mutable_error() = to_error(status);
       } else {
+        if constexpr (requires { Method::put_error(status, slot.response_); })
+          if (!ends_stream(*caller_, status) && Method::put_error(status, slot.response_)) return shrink_claim(slot);
         end(std::move(status));
       }
     });
@@ -356,7 +365,8 @@ class HotCall final : private IoLoop::ActiveCall {
 
   // Ends the call with an error that is not the answer to a message.
   void refuse(absl::Status status) {
-    record_answer(listener_.state_.metrics, *caller_, Method::kRpc, status, arrived_);
+    record_answer(listener_.state_.metrics, *caller_, Method::kRpc, status, arrived_, "",
+                  Method::is_change(Request::default_instance(), Response::default_instance()));
     end(std::move(status));
   }
 

@@ -53,6 +53,7 @@ struct RpcRight {
 inline constexpr std::array kRpcRights = std::to_array<RpcRight>({
     {"/locus.v1.QueryService/Query", Need::kSceneRight, Right::kRead, SceneField::kScene},
     {"/locus.v1.QueryService/StreamQueries", Need::kSceneRight, Right::kRead, SceneField::kFirstMessage},
+    {"/locus.v1.QueryService/Step", Need::kSceneRight, Right::kUpdate, SceneField::kScene},
     {"/locus.v1.UpdateService/ApplyUpdates", Need::kSceneRight, Right::kUpdate, SceneField::kScene},
     {"/locus.v1.UpdateService/StreamUpdates", Need::kSceneRight, Right::kUpdate, SceneField::kFirstMessage},
     {"/locus.v1.SceneService/CreateScene", Need::kSceneRight, Right::kAdmin, SceneField::kName, true},

@@ -1,5 +1,5 @@
-// QueryService over the scenes of a host: a Query call has one batch, a StreamQueries call has a stream of batches.
-// Both kinds of calls are served on IO loops.
+// QueryService over the scenes of a host: a Query call has one batch, a Step call an update and a batch, a
+// StreamQueries call a stream of batches, each with or without an update. All calls are served on IO loops.
 #ifndef LOCUS_SERVER_SERVICES_QUERY_SERVICE_H_
 #define LOCUS_SERVER_SERVICES_QUERY_SERVICE_H_
 
@@ -11,8 +11,8 @@
 
 namespace locus::server {
 
-class QueryService final : public v1::QueryService::WithRawMethod_Query<
-                               v1::QueryService::WithRawMethod_StreamQueries<v1::QueryService::Service>> {
+class QueryService final : public v1::QueryService::WithRawMethod_Query<v1::QueryService::WithRawMethod_Step<
+                               v1::QueryService::WithRawMethod_StreamQueries<v1::QueryService::Service>>> {
  public:
   explicit QueryService(Host& host);
   ~QueryService() override;

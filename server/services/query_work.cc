@@ -28,11 +28,42 @@ constexpr uint64_t kShortNanoseconds = 30'000;
 }  // namespace
 
 void QueryWork::begin(const std::string& scene, const v1::QueryBatch& batch, v1::QueryResult& result) {
+  begin_reading(batch, result);
+  if (absl::Status status = read(scene, batch); !status.ok()) return answer(std::move(status));
+  until_ = slot_.caller().wait_until(slot_.stream());
+  look();
+}
+
+void QueryWork::begin_reading(const v1::QueryBatch& batch, v1::QueryResult& result) {
   change({State::kIdle}, State::kReading);
+  is_step_ = false;
+  ack_bytes_ = 0;
   message_ = &batch;
   result_ = &result;
   result_->Clear();
-  if (absl::Status status = read(scene, batch); !status.ok()) return answer(std::move(status));
+}
+
+absl::Status QueryWork::prepare(const std::string& scene, const v1::QueryBatch& batch, v1::QueryResult& result) {
+  begin_reading(batch, result);
+  absl::Status status = read(scene, batch);
+  if (status.ok()) status = check_step_view();
+  if (!status.ok()) drop();
+  return status;
+}
+
+absl::Status QueryWork::check_step_view() const {
+  if (view_.kind == View::Kind::kExactly)
+    return refuse_argument(Reason::kMalformed, "view.exactly", {},
+                           "the queries of a step see its update, whose revision is not known yet; leave the view out");
+  if (view_.epoch == 0) return absl::OkStatus();
+  return scene_->view({View::Kind::kLatest, 0, view_.epoch}, SteadyTime::min()).status();
+}
+
+void QueryWork::start(uint64_t revision, uint64_t ack_bytes) {
+  is_step_ = true;
+  ack_bytes_ = ack_bytes;
+  view_.revision = view_.kind == View::Kind::kAtLeast ? std::max(view_.revision, revision) : revision;
+  view_.kind = View::Kind::kAtLeast;
   until_ = slot_.caller().wait_until(slot_.stream());
   look();
 }
@@ -54,16 +85,19 @@ absl::Status QueryWork::take_quotas() const {
   return slot_.caller().take_quota(QuotaKind::kWork, 0);  // with amount 0, fails only while the quota is overdrawn
 }
 
-// Ends the work with `status`. Charges the caller's quota for the work of the queries even if they failed or were given
-// up.
 void QueryWork::answer(absl::Status status) {
+  drop();
+  slot_.answered(std::move(status));
+}
+
+// Charges the caller's quota for the work of the queries even if they failed or were given up.
+void QueryWork::drop() {
   ticket_.reset();
   if (run_ != nullptr) slot_.caller().charge_quota(QuotaKind::kWork, static_cast<double>(run_->work_done()));
   run_.reset();
   pin_.reset();
   scene_.reset();
   change({State::kReading, State::kParked, State::kDeferred, State::kQueued}, State::kIdle);
-  slot_.answered(std::move(status));
 }
 
 void QueryWork::look() {
@@ -81,10 +115,10 @@ void QueryWork::look() {
 // Returns the error for a query batch that stops waiting for its revision, because the call has ended or because the
 // server drains and accepts no more updates. When the server drains, a unary call gets the draining error. A message of
 // a stream gets DEADLINE_EXCEEDED, because the draining error is the status of the whole stream, which ends only after
-// all its messages are answered.
+// all its messages are answered. A step gets the same, because the draining error means that nothing was changed.
 absl::Status QueryWork::no_longer() const {
   RETURN_IF_ERROR(slot_.caller().stop());
-  if (!slot_.stream()) return draining();
+  if (!slot_.stream() && !is_step_) return draining();
   return absl::DeadlineExceededError("the server is shutting down before the scene reached the revision");
 }
 
@@ -127,7 +161,7 @@ void QueryWork::give_up() {
 // Runs the pinned batch. The memory of the answer is claimed only here, so that parked batches claim no memory for
 // answers.
 void QueryWork::run() {
-  if (absl::Status status = slot_.claim_answer(max_encoded_reply_bytes(batch_)); !status.ok())
+  if (absl::Status status = slot_.claim_answer(max_encoded_reply_bytes(batch_) + ack_bytes_); !status.ok())
     return answer(std::move(status));
   started_ = steady_clock::now();
   RunOptions options;
@@ -197,7 +231,7 @@ void QueryWork::note_if_slow() {
   if (!slow.is_slow(nanoseconds)) return;
   const QueryCost cost = run_->cost();
   SlowQuery query;
-  query.rpc = rpc_name(slot_.stream() ? Rpc::kStreamQueries : Rpc::kQuery);
+  query.rpc = rpc_name(rpc_);
   query.scene = scene_->name();
   query.revision = (*pin_)->revision;
   query.nanoseconds = nanoseconds;

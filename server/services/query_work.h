@@ -3,6 +3,9 @@
 // not published yet is parked, short work is deferred until the handler has returned, and long work is submitted to the
 // query scheduler.
 //
+// A step (step_work.h) calls prepare(), which is read(), applies its update, and then calls start(), which continues
+// with look(); begin() does both at once.
+//
 //   READING
 //   begin() --> read() --error--------------------------------------------> answer()
 //                 |
@@ -59,10 +62,21 @@ namespace locus::server {
 
 class QueryWork final : private QueryJob, private DeferredTask {
  public:
-  QueryWork(Host& host, CallSlot& slot) : host_(host), slot_(slot) {}
+  // `rpc` is the rpc that is named in the log of slow queries.
+  QueryWork(Host& host, CallSlot& slot, Rpc rpc) : host_(host), slot_(slot), rpc_(rpc) {}
 
   // Begins the work. `batch` and `result` are borrowed until the slot is answered.
   void begin(const std::string& scene, const v1::QueryBatch& batch, v1::QueryResult& result);
+
+  // Checks the batch of a step, before its update is applied. Returns every error that the batch's form and values
+  // have, and FAILED_PRECONDITION if its view names another epoch; the work has then ended and the slot is not
+  // answered. Otherwise start() or drop() must follow. `batch` and `result` are borrowed until then.
+  absl::Status prepare(const std::string& scene, const v1::QueryBatch& batch, v1::QueryResult& result);
+  // Answers the prepared batch at `revision`, at which the step's update is visible, or a later revision. `ack_bytes`
+  // is the size of the step's ack, which is part of the same answer.
+  void start(uint64_t revision, uint64_t ack_bytes);
+  // Ends the work without answering the slot, and frees its data. Call it only after prepare(), instead of start().
+  void drop();
   // Makes the work answer soon: ends the wait for a revision, and withdraws a queued run if the caller has given up. A
   // run in progress is not interrupted here, because it polls Caller::stop() itself.
   void give_up();
@@ -76,6 +90,9 @@ class QueryWork final : private QueryJob, private DeferredTask {
     state_ = to;
   }
   absl::Status take_quotas() const;
+  // Refuses a view that could not contain the update of a step.
+  absl::Status check_step_view() const;
+  void begin_reading(const v1::QueryBatch& batch, v1::QueryResult& result);
   absl::Status read(const std::string& scene, const v1::QueryBatch& batch);
   void answer(absl::Status status);
 
@@ -105,12 +122,15 @@ class QueryWork final : private QueryJob, private DeferredTask {
 
   Host& host_;
   CallSlot& slot_;
+  const Rpc rpc_;
   State state_ = State::kIdle;
   const v1::QueryBatch* message_ = nullptr;
   v1::QueryResult* result_ = nullptr;
   ScenePtr scene_;
   View view_;
   QueryBatch batch_;
+  bool is_step_ = false;    // the answer contains the ack of an applied update
+  uint64_t ack_bytes_ = 0;  // size of that ack
   SteadyTime until_;
   SteadyTime started_;  // time at which run() began, which is after the wait for a revision
 

@@ -155,7 +155,7 @@ void get_server(Host& host, const Caller& caller, v1::GetServerResponse& respons
        {"after_t",  "anchors", "as_of",       "backup",     "balls",         "boxes",
         "capsules", "cells",   "contains",    "count_only", "download_mesh", "durability_local",
         "frustums", "history", "latest_wins", "lookup",     "nearest",       "pairs",
-        "rays",     "sight",   "static_from", "sweeps"})
+        "rays",     "sight",   "static_from", "step",       "sweeps"})
     if (serves(host, feature)) response.add_features(std::string(feature));
   for (const NamedLimit& limit : limits_of(host)) {
     v1::Limit* out = response.add_limits();

@@ -24,6 +24,7 @@ struct ApplyUpdatesMethod {
     service->RequestApplyUpdates(context, request, wire, queue, queue, tag);
   }
   Work make_work(CallSlot& slot) const { return Work(*host, slot); }
+  static bool is_change(const Request&, const Response&) { return true; }
   void begin(Work& work, const std::string& scene, const Request& request, Response& response) const {
     work.begin(scene, request.batch(), *response.mutable_ack());
   }
@@ -48,6 +49,7 @@ struct StreamUpdatesMethod {
     service->RequestStreamUpdates(context, wire, queue, queue, tag);
   }
   Work make_work(CallSlot& slot) const { return Work(*host, slot); }
+  static bool is_change(const Request&, const Response&) { return true; }
   void begin(Work& work, const std::string& scene, const Request& request, Response& response) const {
     work.begin(scene, request.batch(), *response.mutable_ack());
   }

@@ -280,6 +280,51 @@ TEST_F(AccessRpcTest, RefusedChangesAreAuditedWithTheirScenesAndRefusedQueriesOn
   EXPECT_THAT(audit, Not(HasSubstr(queries + R"("INVALID_ARGUMENT")")));
 }
 
+TEST_F(AccessRpcTest, AStepOnAStreamOfQueriesNeedsTheRightToUpdate) {
+  v1::StreamQueriesRequest step;
+  step.set_scene("arena-1");
+  *step.mutable_update() = insert_balls(1, 3);
+  const auto answer_to = [&](const v1::StreamQueriesRequest& request, const std::string& who) {
+    v1::StreamQueriesResponse answer;
+    EXPECT_TRUE(answer.ParseFromString(raw_call(running_->stubs().channel, "/locus.v1.QueryService/StreamQueries",
+                                                request.SerializeAsString(), kCallTimeout, tokens_[who])
+                                           .bytes));
+    return answer;
+  };
+  EXPECT_EQ(answer_to(step, "reader").error().code(), grpc::StatusCode::PERMISSION_DENIED);
+  EXPECT_THAT(answer_to(step, "reader").error().message(), HasSubstr("lacks the right update to scene 'arena-1'"));
+  EXPECT_EQ(answer_to(step, "elsewhere").error().code(), grpc::StatusCode::NOT_FOUND);
+  v1::StreamQueriesRequest without = step;
+  without.clear_update();
+  EXPECT_EQ(answer_to(without, "reader").result().revision(), 0u);
+  EXPECT_EQ(answer_to(step, "updater").ack().applied(), 3u);
+  step.mutable_update()->mutable_inserts(0)->clear_positions();
+  EXPECT_EQ(answer_to(step, "updater").error().code(), grpc::StatusCode::INVALID_ARGUMENT);
+  running_.reset();  // writes the queued lines
+  const std::string line = R"("rpc":"/locus.v1.QueryService/StreamQueries","subject":"arena-1","code":)";
+  EXPECT_THAT(read("audit.refused"), HasSubstr(line + R"("PERMISSION_DENIED")"));
+  EXPECT_THAT(read("audit.refused"), HasSubstr(line + R"("INVALID_ARGUMENT")"));
+  EXPECT_THAT(read("audit"), HasSubstr(line + R"("OK")"));
+  EXPECT_THAT(read("audit"), HasSubstr("1 batches changed 3 objects in "));
+}
+
+TEST_F(AccessRpcTest, QueriesOfAStepThatFailAfterItsUpdateAreNotAuditedAsARefusedChange) {
+  v1::StepRequest step;
+  step.set_scene("arena-1");
+  *step.mutable_update() = insert_balls(1, 3);
+  v1::QueryBlock* block = step.mutable_queries()->add_blocks();
+  block->mutable_lookup()->add_ids(1);
+  block->add_as_of_ticks(3);  // the scene has no history
+  v1::StepResponse response;
+  ASSERT_TRUE(response.ParseFromString(raw_call(running_->stubs().channel, "/locus.v1.QueryService/Step",
+                                                step.SerializeAsString(), kCallTimeout, tokens_["updater"])
+                                           .bytes));
+  EXPECT_EQ(response.error().code(), grpc::StatusCode::OUT_OF_RANGE);
+  EXPECT_EQ(response.ack().applied(), 3u);
+  running_.reset();  // writes the queued lines
+  EXPECT_THAT(read("audit.refused"), Not(HasSubstr("OUT_OF_RANGE")));
+}
+
 TEST_F(AccessRpcTest, CallersWithoutCredentialsFillNoAuditFile) {
   call("/locus.v1.SceneService/DeleteScene", "admin");
   for (int i = 0; i < 200; ++i) call("/locus.v1.SceneService/DeleteScene", "");

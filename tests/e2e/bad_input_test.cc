@@ -15,7 +15,7 @@ constexpr std::array kMethods = {
     "/locus.v1.SceneService/DeleteMesh",     "/locus.v1.SceneService/ChangeInstances",
     "/locus.v1.SceneService/DumpScene",      "/locus.v1.UpdateService/ApplyUpdates",
     "/locus.v1.UpdateService/StreamUpdates", "/locus.v1.QueryService/Query",
-    "/locus.v1.QueryService/StreamQueries",
+    "/locus.v1.QueryService/StreamQueries",  "/locus.v1.QueryService/Step",
 };
 
 // Deadline of a call, far above the time of any call that is answered. A call can wait for a revision that is never
@@ -105,6 +105,15 @@ std::vector<std::pair<std::string, std::string>> valid_requests() {
   v1::StreamQueriesRequest query_stream;
   query_stream.set_scene("world");
   *query_stream.mutable_batch() = query.batch();
+  v1::StepRequest step;
+  step.set_scene("world");
+  *step.mutable_update() = apply.batch();
+  *step.mutable_queries() = query.batch();
+  step.mutable_queries()->clear_view();
+  v1::StreamQueriesRequest step_stream;
+  step_stream.set_scene("world");
+  *step_stream.mutable_update() = step.update();
+  *step_stream.mutable_batch() = step.queries();
   v1::CreateSceneRequest create;
   create.set_name("other");
   (*create.mutable_spec()->mutable_labels())["a"] = "b";
@@ -118,6 +127,8 @@ std::vector<std::pair<std::string, std::string>> valid_requests() {
           {"/locus.v1.UpdateService/StreamUpdates", stream.SerializeAsString()},
           {"/locus.v1.QueryService/Query", query.SerializeAsString()},
           {"/locus.v1.QueryService/StreamQueries", query_stream.SerializeAsString()},
+          {"/locus.v1.QueryService/StreamQueries", step_stream.SerializeAsString()},
+          {"/locus.v1.QueryService/Step", step.SerializeAsString()},
           {"/locus.v1.SceneService/CreateScene", create.SerializeAsString()},
           {"/locus.v1.SceneService/GetScene", get.SerializeAsString()},
           {"/locus.v1.SceneService/DumpScene", dump.SerializeAsString()},

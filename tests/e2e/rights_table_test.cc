@@ -69,7 +69,8 @@ constexpr Outcomes kAll = {kYes, kYes, kYes, kYes, kYes, kYes, kYes, kYes, kYes,
 
 constexpr std::array kRows = std::to_array<RpcRow>({
     {"/locus.v1.QueryService/Query", kReads},
-    {"/locus.v1.QueryService/StreamQueries", kReads},
+    {"/locus.v1.QueryService/StreamQueries", kReads},  // messages with an update: access_rpc_test.cc
+    {"/locus.v1.QueryService/Step", kUpdates},
     {"/locus.v1.UpdateService/ApplyUpdates", kUpdates},
     {"/locus.v1.UpdateService/StreamUpdates", kUpdates},
     {"/locus.v1.SceneService/CreateScene", kCreates},

@@ -32,7 +32,7 @@ TEST_F(ServerRpcTest, TheServerReportsItsVersionAndFeatures) {
   EXPECT_THAT(server.features(),
               ::testing::ElementsAre("after_t", "anchors", "as_of", "balls", "boxes", "capsules", "cells", "contains",
                                      "count_only", "download_mesh", "frustums", "history", "latest_wins", "lookup",
-                                     "nearest", "pairs", "rays", "sight", "static_from", "sweeps"));
+                                     "nearest", "pairs", "rays", "sight", "static_from", "step", "sweeps"));
 }
 
 TEST_F(ServerRpcTest, AServerThatWasStartedInsecureSaysSo) {

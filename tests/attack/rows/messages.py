@@ -13,7 +13,7 @@ MIB = 1 << 20
 LARGEST = 32 * MIB - 64
 REFUSED = ("UNIMPLEMENTED", "RESOURCE_EXHAUSTED", "INVALID_ARGUMENT")
 HOT = ("/locus.v1.UpdateService/ApplyUpdates", "/locus.v1.UpdateService/StreamUpdates", "/locus.v1.QueryService/Query",
-       "/locus.v1.QueryService/StreamQueries")
+       "/locus.v1.QueryService/StreamQueries", "/locus.v1.QueryService/Step")
 GZIPPED = (HOT[0], HOT[3], "/locus.v1.SceneService/CreateScene")
 
 

@@ -53,6 +53,7 @@ struct EchoMethod {
     service->RequestStreamQueries(context, wire, queue, queue, tag);
   }
   Work make_work(server::CallSlot& slot) const { return Work(slot); }
+  static bool is_change(const Request&, const Response&) { return false; }
   void begin(Work& work, const std::string&, const Request& request, Response& response) const {
     work.begin(request.batch(), *response.mutable_result());
   }

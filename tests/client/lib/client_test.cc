@@ -133,6 +133,36 @@ TEST_P(ClientTest, AnUpdateWithWriterAndBatchIsRetried) {
   EXPECT_THAT(server_.updates.applied(), ElementsAre(5));
 }
 
+TEST_P(ClientTest, AStepReturnsTheAckAndTheAnswerOrTheErrorOfItsQueries) {
+  v1::QueryBatch queries;
+  const absl::StatusOr<StepResult> step = client_->step("arena", {}, queries);
+  ASSERT_TRUE(step.ok()) << step.status();
+  EXPECT_EQ(step->ack.revision(), 1u);
+  EXPECT_EQ(step->result->revision(), 1u);
+  EXPECT_THAT(server_.updates.scenes, ElementsAre("arena")) << "x-scene";
+  queries.set_max_work(testing::FakeQueries::kRefusedWork);
+  const absl::StatusOr<StepResult> failed = client_->step("arena", {}, queries);
+  ASSERT_TRUE(failed.ok()) << failed.status();
+  EXPECT_EQ(failed->ack.revision(), 2u);
+  EXPECT_TRUE(absl::IsInvalidArgument(failed->result.status()));
+  server_.updates.refused_ticks = {5};
+  v1::UpdateBatch update;
+  update.set_tick(5);
+  EXPECT_TRUE(absl::IsInvalidArgument(client_->step("arena", update, {}).status()));
+}
+
+TEST_P(ClientTest, OnlyAStepWithWriterAndBatchIsRetried) {
+  server_.updates.failing_calls = 1;
+  EXPECT_TRUE(absl::IsUnavailable(client_->step("arena", {}, {}).status()));
+  EXPECT_EQ(server_.updates.calls, 1);
+  server_.updates.failing_calls = 2;
+  v1::UpdateBatch update;
+  update.set_writer(77);
+  update.set_batch(1);
+  EXPECT_TRUE(client_->step("arena", update, {}).ok());
+  EXPECT_EQ(server_.updates.calls, 4);
+}
+
 TEST_P(ClientTest, OtherChangesAreNeverRetried) {
   server_.scenes.failing_creates = 1;
   v1::CreateSceneRequest request;

@@ -101,6 +101,18 @@ class FakeUpdates final : public v1::UpdateService::Service {
     return grpc::Status::OK;
   }
 
+  // Applies the update of a step. Returns nothing if the stream must break instead, with the status breaks.status;
+  // `messages` is the number of messages of the stream so far.
+  std::optional<v1::StreamUpdatesResponse> apply_step(const v1::UpdateBatch& batch, int messages) {
+    std::lock_guard lock(mutex_);
+    if (breaks.times > 0 && messages == breaks.after_messages) {
+      --breaks.times;
+      if (breaks.apply_last) apply(batch);
+      return std::nullopt;
+    }
+    return apply(batch);
+  }
+
   // Returns the ticks of the applied batches, in order; tests give each batch its own tick.
   std::vector<uint64_t> applied() const {
     std::lock_guard lock(mutex_);
@@ -167,9 +179,25 @@ class FakeUpdates final : public v1::UpdateService::Service {
   std::vector<uint64_t> applied_;
 };
 
-// Fake QueryService: answers each Query call with the result of `answer`.
+// Fake QueryService: answers each Query call with the result of `answer`. The updates of steps go to `updates`.
 class FakeQueries final : public v1::QueryService::Service {
  public:
+  explicit FakeQueries(FakeUpdates& updates) : updates_(updates) {}
+
+  // Answers at the revision of the ack. Queries with max_work = kRefusedWork fail after the update was applied.
+  grpc::Status Step(grpc::ServerContext* context, const v1::StepRequest* request, v1::StepResponse* response) override {
+    v1::ApplyUpdatesRequest update;
+    *update.mutable_batch() = request->update();
+    v1::ApplyUpdatesResponse applied;
+    if (const grpc::Status status = updates_.ApplyUpdates(context, &update, &applied); !status.ok()) return status;
+    *response->mutable_ack() = applied.ack();
+    if (request->queries().max_work() == kRefusedWork)
+      set_refused(*response->mutable_error());
+    else
+      response->mutable_result()->set_revision(applied.ack().revision());
+    return grpc::Status::OK;
+  }
+
   grpc::Status Query(grpc::ServerContext* context, const v1::QueryRequest* request,
                      v1::QueryResponse* response) override {
     std::this_thread::sleep_for(delay);
@@ -184,16 +212,33 @@ class FakeQueries final : public v1::QueryService::Service {
     return answer(*request, *response->mutable_result());
   }
 
-  // Delays the answers of each pair of messages until both have arrived, then sends them in reverse order. If the
-  // member `stream_answer` is set, answers each message immediately instead, with the result of `stream_answer`.
+  // Answers a step immediately. Delays the answers of each pair of messages until both have arrived, then sends them in
+  // reverse order. If the member `stream_answer` is set, answers each message immediately instead, with the result of
+  // `stream_answer`.
   grpc::Status StreamQueries(
       grpc::ServerContext*,
       grpc::ServerReaderWriter<v1::StreamQueriesResponse, v1::StreamQueriesRequest>* stream) override {
     v1::StreamQueriesRequest request;
     std::vector<v1::StreamQueriesResponse> held;
+    int messages = 0;
     while (stream->Read(&request)) {
       v1::StreamQueriesResponse response;
       response.set_sequence(request.sequence());
+      ++messages;
+      if (request.has_update()) {
+        const std::optional<v1::StreamUpdatesResponse> applied = updates_.apply_step(request.update(), messages);
+        if (!applied) return updates_.breaks.status;
+        if (applied->has_error())
+          *response.mutable_error() = applied->error();
+        else
+          *response.mutable_ack() = applied->ack();
+        if (applied->has_ack() && request.batch().max_work() == kRefusedWork)
+          set_refused(*response.mutable_error());
+        else if (applied->has_ack())
+          response.mutable_result()->set_revision(applied->ack().revision());
+        stream->Write(response);
+        continue;
+      }
       {
         std::lock_guard lock(mutex_);
         ++calls;
@@ -212,8 +257,7 @@ class FakeQueries final : public v1::QueryService::Service {
         continue;
       }
       if (request.batch().max_work() == kRefusedWork) {
-        response.mutable_error()->set_code(grpc::StatusCode::INVALID_ARGUMENT);
-        response.mutable_error()->set_reason(v1::REASON_NOT_FINITE);
+        set_refused(*response.mutable_error());
       } else {
         response.mutable_result()->set_revision(request.batch().max_work());
       }
@@ -244,7 +288,13 @@ class FakeQueries final : public v1::QueryService::Service {
   v1::QueryBatch last_batch;
 
  private:
+  static void set_refused(v1::Error& error) {
+    error.set_code(grpc::StatusCode::INVALID_ARGUMENT);
+    error.set_reason(v1::REASON_NOT_FINITE);
+  }
+
   std::mutex mutex_;
+  FakeUpdates& updates_;
 };
 
 // Fake SceneService: stores scenes by name, the hashes of all uploaded meshes, and the arrays of the last mesh.
@@ -485,7 +535,7 @@ class FakeServer {
   void restart() { start(address()); }
 
   FakeUpdates updates;
-  FakeQueries queries;
+  FakeQueries queries{updates};
   FakeScenes scenes;
   FakeServerService servers;
 

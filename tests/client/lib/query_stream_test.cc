@@ -35,6 +35,15 @@ class QueryStreamTest : public ::testing::TestWithParam<testing::Way> {
     return stream_->send(std::move(batch));
   }
 
+  // Sends a step whose update has the tick `tick`; `number` is the max_work of its queries.
+  std::future<absl::StatusOr<StepResult>> step(uint64_t tick, uint64_t number = 1) {
+    v1::UpdateBatch update;
+    update.set_tick(tick);
+    v1::QueryBatch queries;
+    queries.set_max_work(number);
+    return stream_->step(std::move(update), std::move(queries));
+  }
+
   FakeServer server_;
   std::unique_ptr<Client> client_;
   std::unique_ptr<QueryStream> stream_;
@@ -127,6 +136,72 @@ TEST_P(QueryStreamTest, EitherLaneReachesTheServer) {
     open({.lane = lane});
     EXPECT_EQ(ask(1).get()->revision(), 3u);
   }
+}
+
+TEST_P(QueryStreamTest, AStepReturnsTheAckAndTheAnswer) {
+  for (uint64_t tick = 1; tick <= 10; ++tick) {
+    const absl::StatusOr<StepResult> outcome = step(tick).get();
+    ASSERT_TRUE(outcome.ok()) << outcome.status();
+    EXPECT_EQ(outcome->ack.revision(), tick);
+    EXPECT_EQ(outcome->result->revision(), tick);
+  }
+  EXPECT_TRUE(stream_->close().ok());
+}
+
+TEST_P(QueryStreamTest, QueriesThatFailAfterTheirUpdateKeepTheAckAndTheNumber) {
+  const absl::StatusOr<StepResult> failed = step(1, FakeQueries::kRefusedWork).get();
+  ASSERT_TRUE(failed.ok()) << failed.status();
+  EXPECT_EQ(failed->ack.revision(), 1u);
+  EXPECT_TRUE(absl::IsInvalidArgument(failed->result.status()));
+  EXPECT_EQ(error_of(failed->result.status())->reason(), v1::REASON_NOT_FINITE);
+  EXPECT_EQ(step(2).get()->ack.revision(), 2u);
+  EXPECT_EQ(server_.updates.gaps, 0);
+}
+
+// Steps with refused updates, broken streams, and queries between the steps: each step is applied once, in order.
+TEST_P(QueryStreamTest, EachStepIsAppliedOnceDespiteRefusalsAndBreaks) {
+  server_.queries.stream_answer = [](const v1::QueryBatch& batch) {
+    v1::QueryResult result;
+    result.set_revision(batch.max_work());
+    return result;
+  };
+  server_.updates.refused_ticks = {3, 17, 18, 33};
+  server_.updates.breaks = {.after_messages = 5, .times = 12, .apply_last = true};
+  std::vector<std::future<absl::StatusOr<StepResult>>> steps;
+  std::vector<std::future<absl::StatusOr<v1::QueryResult>>> queries;
+  std::vector<uint64_t> expected;
+  for (uint64_t tick = 1; tick <= 60; ++tick) {
+    steps.push_back(step(tick));
+    if (tick % 3 == 0) queries.push_back(ask(1000 + tick));
+    if (!server_.updates.refused_ticks.contains(tick)) expected.push_back(tick);
+  }
+  EXPECT_TRUE(stream_->close().ok());
+  for (uint64_t tick = 1; tick <= 60; ++tick) {
+    const absl::StatusOr<StepResult> outcome = steps[tick - 1].get();
+    if (server_.updates.refused_ticks.contains(tick))
+      EXPECT_TRUE(absl::IsInvalidArgument(outcome.status())) << tick;
+    else
+      EXPECT_TRUE(outcome.ok()) << tick << ": " << outcome.status();
+  }
+  for (size_t i = 0; i < queries.size(); ++i) EXPECT_EQ(queries[i].get()->revision(), 1003 + 3 * i);
+  EXPECT_EQ(server_.updates.applied(), expected);
+}
+
+TEST_P(QueryStreamTest, AServerThatForgotTheWriterEndsTheStream) {
+  ASSERT_TRUE(step(1).get().ok());
+  server_.updates.forget_writers();
+  const absl::Status status = step(2).get().status();
+  EXPECT_EQ(error_of(status)->reason(), v1::REASON_BATCH_GAP);
+  EXPECT_TRUE(absl::IsFailedPrecondition(stream_->close()));
+}
+
+TEST_P(QueryStreamTest, AStreamContinuesTheNumbersOfAnEarlierWriter) {
+  open({.writer = 77});
+  ASSERT_TRUE(step(1).get().ok());
+  open({.writer = 77, .next_batch = 2});
+  ASSERT_TRUE(step(2).get().ok());
+  EXPECT_EQ(server_.updates.last_batch.writer(), 77u);
+  EXPECT_EQ(server_.updates.last_batch.batch(), 2u);
 }
 
 INSTANTIATE_TEST_SUITE_P(Ways, QueryStreamRestartTest, ::testing::Values(testing::Way::kLoopback), testing::way_name);

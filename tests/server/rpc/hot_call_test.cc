@@ -106,6 +106,7 @@ struct Unary {
     service->RequestQuery(context, request, wire, queue, queue, tag);
   }
   Work make_work(CallSlot& slot) const { return Work(slot); }
+  static bool is_change(const Request&, const Response&) { return false; }
   void begin(Work& work, const std::string&, const Request& request, Response& response) const {
     if (request.batch().max_work() == kBulky) fill_up(*response.mutable_result());
     work.begin(request.batch().max_work());
@@ -127,6 +128,7 @@ struct Streamed {
     service->RequestStreamQueries(context, wire, queue, queue, tag);
   }
   Work make_work(CallSlot& slot) const { return Work(slot); }
+  static bool is_change(const Request&, const Response&) { return false; }
   void begin(Work& work, const std::string&, const Request& request, Response& response) const {
     response.mutable_result();
     if (request.batch().max_work() == kBulky) fill_up(*response.mutable_result());
