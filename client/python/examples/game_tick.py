@@ -1,4 +1,4 @@
-"""Loop of a game server: each tick it streams the players' moves and queries what they see, at the new revision.
+"""Loop of a game server: each tick it sends one step, the players' moves with queries of what they see after the moves.
 
     PYTHONPATH=build/release/python /usr/bin/python3 client/python/examples/game_tick.py --address 127.0.0.1:7575
 
@@ -55,36 +55,34 @@ def difference(a: Iterable[float], b: Iterable[float]) -> "array.array[float]":
 
 
 class Game:
-    """Scene of the game, with its update stream and its query stream."""
+    """Scene of the game, with the stream of its steps."""
 
     def __init__(self, client: locus.Client, scene: str, players: int) -> None:
         self.ids = array.array("Q", range(FIRST, FIRST + players))
-        self.updates = client.update_stream(scene)
-        self.queries = client.query_stream(scene)
+        self.stream = client.query_stream(scene)
         start = locus.UpdateBatch(tick=0)
         start.insert_boxes(WALL, [0.0, 0.0, 2.0], [8.0, 0.25, 2.0])
         start.insert_balls(self.ids, positions(players, 0), RADIUS, groups=self.ids)
-        self.updates.send(start).result()
+        self.stream.step(start, locus.QueryBatch()).result()
 
     def step(self, number: int) -> Tick:
-        """Moves all players, then queries at the resulting revision."""
+        """Moves all players and queries at the resulting revision, in one message and one answer."""
         begin = time.perf_counter()
         here = positions(len(self.ids), number)
-        ack = self.updates.send(locus.UpdateBatch(tick=number).move(self.ids, here)).result()
-        batch = locus.QueryBatch(at_least=ack)
+        batch = locus.QueryBatch()
         batch.balls(here, REACH, block=locus.Block(ignore_groups=self.ids, ignore_ids=[WALL]))
         # Each ray goes from a player to the next player, and ignores the group of the player where it starts. So its
         # first hit is the next player, or an obstacle that hides the next player.
         batch.rays(here, difference(shifted(here), here), t_max=1.0, block=locus.Block(ignore_groups=self.ids))
-        near, sight = self.queries.send(batch).result().blocks
+        step = self.stream.step(locus.UpdateBatch(tick=number).move(self.ids, here), batch).result()
+        near, sight = step.result.blocks
         next_ids = self.ids[1:] + self.ids[:1]
         seen = sum(1 for found, wanted in zip(sight.ids.tolist(), next_ids) if found == wanted)
-        return Tick(ack.revision, near.rows, seen, time.perf_counter() - begin)
+        return Tick(step.ack.revision, near.rows, seen, time.perf_counter() - begin)
 
     def close(self) -> None:
-        """Waits for all answers and closes both streams."""
-        self.updates.close()
-        self.queries.close()
+        """Waits for all answers and closes the stream."""
+        self.stream.close()
 
 
 def run(client: locus.Client, scene: str, players: int, ticks: int, rate: float) -> List[Tick]:

@@ -20,7 +20,7 @@ from .errors import LocusError
 from .meshes import InstanceChange, MeshColumns, PlacedInstances
 from .queries import After, Block, QueryBatch
 from .query_stream import QueryStream
-from .results import NO_TRIANGLE, BlockResult, QueryResult
+from .results import NO_TRIANGLE, BlockResult, QueryResult, StepResult
 from .update_stream import UpdateStream
 from .updates import UpdateBatch
 from .values import Ack, ItemError, Limit, Mesh, MeshPart, Quota, Revision, Scene, Server, Work
@@ -31,6 +31,6 @@ __all__ = [
     "InstanceChange", "ItemError", "Limit", "LocusError", "Mesh", "MeshColumns", "MeshPart", "NO_TRIANGLE",
     "OutsideHistory", "OverloadPolicy", "PlacedInstances", "Precision", "QueryBatch", "QueryResult", "QueryStream",
     "Quota", "RayMode", "Reason", "Retry", "Revision", "Scene", "SceneState", "Server", "Source", "StaticDetail",
-    "UpdateBatch", "UpdateStream", "Values", "Winding", "Work", "connect",
-    "connect_from_environment", "embedded",
+    "StepResult", "UpdateBatch", "UpdateStream", "Values", "Winding", "Work", "connect", "connect_from_environment",
+    "embedded",
 ]

@@ -19,7 +19,7 @@ from typing import Any, Dict, Iterator, List, Mapping, Optional, Sequence
 
 import grpc
 
-from . import columns, meshes, schema
+from . import columns, meshes, schema, wire
 from .connection import Connection, Retry
 from .credentials import Credentials
 from .enums import OverloadPolicy, Winding
@@ -27,7 +27,7 @@ from .errors import LocusError, connection_advice, from_call, late_query, parsed
 from .meshes import InstanceChange, MeshColumns, PlacedInstances
 from .queries import QueryBatch
 from .query_stream import QueryStream
-from .results import QueryResult
+from .results import QueryResult, StepResult
 from .update_stream import UpdateStream
 from .updates import UpdateBatch
 from .values import Ack, Mesh, MeshPart, Quota, Scene, Server
@@ -235,6 +235,21 @@ class Client:
             if error.code != grpc.StatusCode.DEADLINE_EXCEEDED or error.refused:
                 raise
             raise late_query(scene, batch.waits_for) from error
+
+    def step(self, scene: str, update: UpdateBatch, queries: QueryBatch) -> StepResult:
+        """Makes a step: applies `update`, then runs `queries` at a revision that contains it, in one call.
+
+        Raises LocusError if the step was refused; if the server refused it, nothing was changed and no query was run.
+        An error of queries whose update was applied is in StepResult.error. For a step every tick use
+        QueryStream.step().
+        """
+        rpc = _rpc("Query", "Step")
+        numbers = schema.numbers("StepRequest")
+        changes, batch = update.message.SerializeToString(), queries.batch_bytes()
+        request = b"".join((rpc.request(scene=scene).SerializeToString(), wire.head(numbers["update"], len(changes)),
+                            changes, wire.head(numbers["queries"], len(batch)), batch))
+        once_only = update.message.writer != 0 and update.message.batch != 0
+        return StepResult.from_bytes(self._connection.unary_bytes(rpc.path, request, scene=scene, repeat=once_only))
 
     def query_bytes(self, scene: str, request: bytes) -> bytes:
         """Runs an encoded batch. `request` are the bytes from QueryBatch.request_bytes(). Returns the bytes of the

@@ -145,6 +145,11 @@ def unreadable(what: str) -> LocusError:
     return LocusError(grpc.StatusCode.DATA_LOSS, f"the server's answer cannot be read: {what}; is this a locus server?")
 
 
+def neither() -> LocusError:
+    """Returns the error for a response with neither a result nor an error."""
+    return LocusError(grpc.StatusCode.DATA_LOSS, "the server answered a batch with neither a result nor an error")
+
+
 def parsed(message_class: Any, raw: bytes) -> Any:
     """Decodes a message. Raises LocusError DATA_LOSS if the bytes are not a valid message."""
     try:

@@ -8,6 +8,7 @@ is set no message is accepted, and `_abandon()` empties `_items`.
 """
 from __future__ import annotations
 
+import secrets
 import threading
 from concurrent.futures import Future
 from typing import Any, Generic, Iterator, List, Optional, Tuple, TypeVar
@@ -15,6 +16,7 @@ from typing import Any, Generic, Iterator, List, Optional, Tuple, TypeVar
 import grpc
 
 from .connection import Connection, Retry
+from .enums import Reason
 from .errors import LocusError, from_call
 
 Result = TypeVar("Result")
@@ -25,10 +27,11 @@ _AGAIN = (grpc.StatusCode.CANCELLED, grpc.StatusCode.INTERNAL)
 class Item(Generic[Result]):
     """Message that was accepted and is not yet answered."""
 
-    def __init__(self, batch: bytes) -> None:
-        self.batch = batch
+    def __init__(self, batch: bytes, is_update: bool) -> None:
+        self.batch = batch  # the encoded message without the numbers
+        self.is_update = is_update
         self.sequence = 0
-        self.number = 0  # batch number of the stream's writer; only in update streams
+        self.number = 0  # batch number of the stream's writer, if the message has an update
         self.future: "Future[Result]" = Future()
         self.written = False  # True if sent on the current call
         self.future.set_running_or_notify_cancel()
@@ -36,6 +39,10 @@ class Item(Generic[Result]):
 
 class PipelinedStream(Generic[Result]):
     """Common part of UpdateStream and QueryStream. Thread-safe.
+
+    Each message with an update carries the stream's random writer id, `writer`, and a batch number that counts up from
+    1 without gaps, so that the server applies it only once. A refused update does not consume its number: the messages
+    after it are numbered and sent again.
 
     Use as a context manager: the end of the `with` block waits for all answers, or cancels the stream after an
     exception.
@@ -52,6 +59,8 @@ class PipelinedStream(Generic[Result]):
         self._changed = threading.Condition()
         self._items: List[Item[Result]] = []
         self._call: Any = None
+        self.writer = secrets.randbelow(2**64 - 1) + 1
+        self._next_batch = 1
         self._last_sequence = 0
         self._failures = 0
         self._handing_over = 0
@@ -65,9 +74,12 @@ class PipelinedStream(Generic[Result]):
     # Methods that a kind of stream overrides; called with the lock held, except _answer_in().
 
     def _number(self, item: Item[Result]) -> None:
-        """Assigns the item its sequence number and, in an update stream, its batch number."""
+        """Assigns the item its sequence number and, if it has an update, its batch number."""
         self._last_sequence += 1
         item.sequence = self._last_sequence
+        if item.is_update:
+            item.number = self._next_batch
+            self._next_batch += 1
 
     def _request_of(self, item: Item[Result]) -> bytes:
         """Returns the encoded request of an item."""
@@ -77,13 +89,26 @@ class PipelinedStream(Generic[Result]):
         """Returns the sequence number of a response, and the result or LocusError that the response contains."""
         raise NotImplementedError
 
-    def _answered(self, outcome: Any, position: int) -> None:
-        """Handles `outcome`, the result or LocusError of an item. Called after the item was removed from index
-        `position` of `_items`.
-        """
+    def _answered(self, result: Any) -> None:
+        """Handles the result of an item."""
 
-    def _send(self, batch: bytes) -> "Future[Result]":
-        item: Item[Result] = Item(batch)
+    def _update_refused(self, error: LocusError, position: int) -> None:
+        """Handles the error of an item with an update. Called after the item was removed from index `position` of
+        `_items`.
+        """
+        if not error.refused or error.reason == Reason.BATCH_GAP:
+            # End the stream, because continuing could lose a batch: either it is unknown whether the server used the
+            # batch number, or the server no longer has a record of the writer.
+            self._fatal = error
+            return
+        later = self._items[position:]
+        self._next_batch -= 1 + sum(item.is_update for item in later)
+        for item in later:
+            item.written = False
+            self._number(item)
+
+    def _send(self, batch: bytes, is_update: bool) -> "Future[Any]":
+        item: Item[Any] = Item(batch, is_update)
         with self._changed:
             self._changed.wait_for(
                 lambda: self._ended or self._closing or len(self._items) < self._max_in_flight)
@@ -223,7 +248,10 @@ class PipelinedStream(Generic[Result]):
                 return
             item = self._items.pop(position)
             self._failures = 0
-            self._answered(outcome, position)
+            if not isinstance(outcome, LocusError):
+                self._answered(outcome)
+            elif item.is_update:
+                self._update_refused(outcome, position)
             self._handing_over += 1
             self._changed.notify_all()
             if self._fatal is not None:
@@ -265,11 +293,6 @@ class PipelinedStream(Generic[Result]):
 
 def _broken_off() -> LocusError:
     return LocusError(grpc.StatusCode.CANCELLED, "the stream was broken off")
-
-
-def neither() -> LocusError:
-    """Returns the error for a response with neither a result nor an error."""
-    return LocusError(grpc.StatusCode.DATA_LOSS, "the server answered a batch with neither a result nor an error")
 
 
 def _resolve(item: Item[Any], outcome: Any) -> None:

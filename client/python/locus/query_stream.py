@@ -1,5 +1,5 @@
-"""Pipelined stream of query batches to one scene, for callers that query every tick. Answers may arrive in any order;
-the stream assigns each answer to its batch by the sequence number.
+"""Pipelined stream of query batches to one scene, and of steps: an update with queries that see it. For callers that
+query every tick. Answers may arrive in any order; the stream assigns each answer to its batch by the sequence number.
 """
 from __future__ import annotations
 
@@ -8,20 +8,22 @@ from typing import Any, Tuple
 
 from . import schema, wire
 from .connection import Connection, Retry
-from .errors import from_error, parsed
-from .pipelined_stream import Item, PipelinedStream, neither
+from .errors import from_error, neither, parsed
+from .pipelined_stream import Item, PipelinedStream
 from .queries import QueryBatch
-from .results import QueryResult
+from .results import QueryResult, StepResult
+from .updates import UpdateBatch
 
 _METHOD = schema.method("locus.v1.QueryService", "StreamQueries")
-_BATCH = _METHOD.request.DESCRIPTOR.fields_by_name["batch"].number
-_SEQUENCE, _RESULT, _ERROR = (_METHOD.response.DESCRIPTOR.fields_by_name[name].number
-                              for name in ("sequence", "result", "error"))
+_BATCH, _UPDATE = (_METHOD.request.DESCRIPTOR.fields_by_name[name].number for name in ("batch", "update"))
+_SEQUENCE, _RESULT, _ERROR, _ACK = (_METHOD.response.DESCRIPTOR.fields_by_name[name].number
+                                    for name in ("sequence", "result", "error", "ack"))
 
 
-class QueryStream(PipelinedStream[QueryResult]):
+class QueryStream(PipelinedStream[Any]):
     """Stream returned by Client.query_stream(). Thread-safe. After a broken connection, unanswered batches are sent
-    again on a new connection, which is safe since queries change nothing.
+    again on a new connection. This is safe, because queries change nothing, and the server applies the update of a step
+    only once. The stream ends in the same cases as an UpdateStream.
     """
 
     def __init__(self, connection: Connection, scene: str, max_in_flight: int, retry: Retry) -> None:
@@ -34,15 +36,33 @@ class QueryStream(PipelinedStream[QueryResult]):
         the caller can use it again. Raises LocusError if the stream has ended. To keep a local server busy, 8 batches
         of 1,024 queries in flight are enough, or 2 batches of 8,192.
         """
-        return self._send(batch.batch_bytes())
+        pieces = batch.batch_bytes()
+        return self._send(wire.head(_BATCH, len(pieces)) + pieces, is_update=False)
 
-    def _request_of(self, item: Item[QueryResult]) -> bytes:
-        numbers = _METHOD.request(scene=self._scene, sequence=item.sequence).SerializeToString()
-        return b"".join((numbers, wire.head(_BATCH, len(item.batch)), item.batch))
+    def step(self, update: UpdateBatch, queries: QueryBatch) -> "Future[StepResult]":
+        """Sends a step: the server applies `update`, then answers `queries` at a revision that contains it. Otherwise
+        like send().
+
+        The future receives the StepResult, or the LocusError with which the step was refused; then nothing was changed
+        and no query was run. Steps are applied in the order sent. The stream replaces the `writer` and `number` of the
+        sent copy of the update.
+        """
+        changes, batch = update.message.SerializeToString(), queries.batch_bytes()
+        return self._send(b"".join((wire.head(_UPDATE, len(changes)), changes, wire.head(_BATCH, len(batch)), batch)),
+                          is_update=True)
+
+    def _request_of(self, item: Item[Any]) -> bytes:
+        numbers = _METHOD.request(scene=self._scene, sequence=item.sequence)
+        if item.is_update:
+            # This is the second occurrence of the field `update`. Protobuf parsers merge the two.
+            numbers.update.writer, numbers.update.batch = self.writer, item.number
+        return b"".join((item.batch, numbers.SerializeToString()))
 
     def _answer_in(self, response: bytes) -> Tuple[int, Any]:
         found = wire.fields(memoryview(response))
         sequence = wire.fixed64(found, _SEQUENCE)
+        if _ACK in found:
+            return sequence, StepResult.of(found, _ACK, _RESULT, _ERROR)
         if _RESULT in found:
             return sequence, QueryResult.of(wire.column(found, _RESULT))
         return sequence, from_error(parsed(_METHOD.response, response).error) if _ERROR in found else neither()

@@ -9,15 +9,18 @@ import grpc
 
 from . import columns, schema, wire
 from .columns import FLOAT32, FLOAT64, UINT8, UINT32, UINT64, Values
-from .errors import LocusError, parsed
-from .values import Revision, Work
+from .errors import LocusError, from_error, neither, parsed
+from .values import Ack, Revision, Work
 
 _Work = schema.message("Work")
+_Ack = schema.message("UpdateAck")
+_Error = schema.message("Error")
 NO_TRIANGLE = 0xFFFFFFFF
 
 _RESULT = schema.numbers("QueryResult")
 _BLOCK = schema.numbers("BlockResult")
 _IN_RESPONSE = schema.numbers("QueryResponse")["result"]
+_STEP = schema.numbers("StepResponse")
 # _ROW_BYTES: columns with one entry per row, and the size of an entry in bytes. The number of rows of a block is
 # computed from the first of these columns that the block contains, so the two most frequent columns come first.
 _COUNTS = _BLOCK["counts"]
@@ -178,6 +181,37 @@ class QueryResult(Revision):
     def from_bytes(cls, response: bytes) -> "QueryResult":
         """Decodes a response of Query."""
         return cls.of(wire.column(wire.fields(memoryview(response)), _IN_RESPONSE))
+
+
+@dataclasses.dataclass(frozen=True)
+class StepResult:
+    """Result of a step: its update was applied, except the refused items in `ack`.
+
+    `error` is the LocusError of the queries, or None. The update stays applied if the queries fail.
+    """
+
+    ack: Ack
+    error: Optional[LocusError]
+    _result: Optional[QueryResult]
+
+    @property
+    def result(self) -> QueryResult:
+        """Result of the queries, at the revision of `ack` or a later one. Raises `error` if the queries failed."""
+        if self._result is None:
+            raise self.error or neither()
+        return self._result
+
+    @classmethod
+    def of(cls, found: wire.Fields, ack: int, result: int, error: int) -> "StepResult":
+        """Decodes a response of Step or StreamQueries from its fields. The other arguments are field numbers."""
+        failed = from_error(parsed(_Error, bytes(wire.column(found, error)))) if error in found else None
+        answer = QueryResult.of(wire.column(found, result)) if result in found else None
+        return cls(Ack.of(parsed(_Ack, bytes(wire.column(found, ack)))), failed, answer)
+
+    @classmethod
+    def from_bytes(cls, response: bytes) -> "StepResult":
+        """Decodes a response of Step."""
+        return cls.of(wire.fields(memoryview(response)), _STEP["ack"], _STEP["result"], _STEP["error"])
 
 
 def _contradiction(what: str) -> LocusError:

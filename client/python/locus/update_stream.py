@@ -3,15 +3,13 @@ exactly once, even if connections break.
 """
 from __future__ import annotations
 
-import secrets
 from concurrent.futures import Future
 from typing import Any, Optional, Tuple
 
 from . import schema, wire
 from .connection import Connection, Retry
-from .enums import Reason
-from .errors import LocusError, from_error, parsed
-from .pipelined_stream import Item, PipelinedStream, neither
+from .errors import from_error, neither, parsed
+from .pipelined_stream import Item, PipelinedStream
 from .updates import UpdateBatch
 from .values import Ack, Revision
 
@@ -33,8 +31,6 @@ class UpdateStream(PipelinedStream[Ack]):
 
     def __init__(self, connection: Connection, scene: str, max_in_flight: int, retry: Retry) -> None:
         super().__init__(connection, _METHOD.path, scene, max_in_flight, retry)
-        self.writer = secrets.randbelow(2**64 - 1) + 1
-        self._next_batch = 1
         self._last_ack: Optional[Ack] = None
 
     def send(self, batch: UpdateBatch) -> "Future[Ack]":
@@ -44,7 +40,7 @@ class UpdateStream(PipelinedStream[Ack]):
         The future receives the Ack, or the LocusError of this batch. The batch is copied, so the caller can use it
         again. The stream replaces the `writer` and `number` of the copy. Raises LocusError if the stream has ended.
         """
-        return self._send(batch.message.SerializeToString())
+        return self._send(batch.message.SerializeToString(), is_update=True)
 
     @property
     def last_ack(self) -> Optional[Revision]:
@@ -53,11 +49,6 @@ class UpdateStream(PipelinedStream[Ack]):
         """
         with self._changed:
             return self._last_ack
-
-    def _number(self, item: Item[Ack]) -> None:
-        super()._number(item)
-        item.number = self._next_batch
-        self._next_batch += 1
 
     def _request_of(self, item: Item[Ack]) -> bytes:
         # Write the field `batch` twice: first with the columns, then with writer and batch number. Protobuf parsers
@@ -73,15 +64,5 @@ class UpdateStream(PipelinedStream[Ack]):
             return message.sequence, Ack.of(message.ack)
         return message.sequence, from_error(message.error) if kind else neither()
 
-    def _answered(self, outcome: Any, position: int) -> None:
-        if not isinstance(outcome, LocusError):
-            self._last_ack = outcome
-        elif not outcome.refused or outcome.reason == Reason.BATCH_GAP:
-            # End the stream, because continuing could lose a batch: either it is unknown whether the server used the
-            # batch number, or the server no longer has a record of the writer.
-            self._fatal = outcome
-        else:
-            self._next_batch -= len(self._items) - position + 1
-            for item in self._items[position:]:
-                item.written = False
-                self._number(item)
+    def _answered(self, result: Any) -> None:
+        self._last_ack = result

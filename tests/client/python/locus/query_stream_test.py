@@ -54,6 +54,62 @@ class QueryStreamTest(DaemonTest):
             error = stream.send(QueryBatch(at_least=future_revision).lookup(1)).exception(WAIT_SECONDS)
         self.assertEqual(error.code, grpc.StatusCode.DEADLINE_EXCEEDED)
 
+    def test_the_queries_of_a_step_see_its_update(self):
+        with self.client.query_stream(self.scene) as stream:
+            for number in range(1, 21):
+                update = UpdateBatch().move(7, [500.0 + number, 0, 0])
+                step = stream.step(update, QueryBatch().lookup(7)).result(WAIT_SECONDS)
+                self.assertEqual(step.ack.applied, 1)
+                self.assertEqual(step.ack.revision, self.built.revision + number)
+                self.assertEqual(step.result.revision, step.ack.revision)
+                self.assertIsNone(step.error)
+                self.assertEqual(listed(step.result.blocks[0].positions), [500.0 + number, 0, 0])
+        self.assertEqual(update.message.batch, 0)
+
+    def test_a_refused_step_does_not_stop_later_ones(self):
+        with self.client.query_stream(self.scene) as stream:
+            futures = []
+            for number in range(40):
+                update = UpdateBatch(all_or_nothing=True).move(99 if number % 4 == 0 else 7, [500.0 + number, 0, 0])
+                futures.append(stream.step(update, QueryBatch().lookup(7)))
+                futures.append(stream.send(self.asking(2)))
+        for number in range(40):
+            step, query = futures[2 * number], futures[2 * number + 1]
+            self.assertEqual(listed(query.result().blocks[0].ids), [2])
+            if number % 4 == 0:
+                self.assertRefused(step.exception(), "INVALID_ARGUMENT", "UNKNOWN_ID", "moves[0].ids")
+            else:
+                self.assertEqual(step.result().ack.applied, 1)
+        self.assertEqual(self.client.scene(self.scene).revision, self.built.revision + 30)
+
+    def test_queries_that_fail_after_their_update_leave_its_ack(self):
+        update = UpdateBatch().move(7, [500, 0, 0])
+        past = QueryBatch().lookup(7, block=locus.Block(as_of_ticks=[5]))
+        with self.client.query_stream(self.scene) as stream:
+            streamed = stream.step(update, past).result(WAIT_SECONDS)
+        for step in (streamed, self.client.step(self.scene, update, past)):
+            self.assertEqual(step.ack.applied, 1)
+            self.assertEqual(step.error.code, grpc.StatusCode.OUT_OF_RANGE)
+            with self.assertRaises(locus.LocusError):
+                step.result
+
+    def test_a_single_step_equals_a_streamed_one(self):
+        update = UpdateBatch(tick=3).move(7, [500, 0, 0])
+        step = self.client.step(self.scene, update, QueryBatch().lookup(7))
+        self.assertEqual((step.ack.applied, step.ack.tick, step.result.tick), (1, 3, 3))
+        self.assertEqual(listed(step.result.blocks[0].positions), [500, 0, 0])
+        with self.assertRaises(locus.LocusError) as refused:
+            self.client.step(self.scene, UpdateBatch(all_or_nothing=True).move(99, [1, 0, 0]), QueryBatch().lookup(7))
+        self.assertRefused(refused.exception, "INVALID_ARGUMENT", "UNKNOWN_ID", "moves[0].ids")
+
+    def test_a_repeated_step_is_applied_once(self):
+        update = UpdateBatch(writer=5, number=1).move(7, [500, 0, 0])
+        first = self.client.step(self.scene, update, QueryBatch().lookup(7))
+        second = self.client.step(self.scene, update, QueryBatch().lookup(7))
+        self.assertEqual((first.ack.duplicate, second.ack.duplicate), (False, True))
+        self.assertEqual(second.ack.revision, first.ack.revision)
+        self.assertEqual(second.result.blocks[0].rows, 1)
+
     def test_waiting_for_answers_is_bounded(self):
         future_revision = locus.Revision(self.built.epoch, self.built.revision + 100)
         with self.client.query_stream(self.scene) as stream:

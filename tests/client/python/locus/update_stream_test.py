@@ -119,6 +119,22 @@ class UpdateStreamTest(DaemonTest):
         self.assertEqual(self.client.scene(self.scene).revision, batches)
         self.assertEqual(self.client.scene(self.scene).objects, batches + 1)
 
+    def test_no_step_is_lost_or_applied_twice_when_connections_break(self):
+        relay = Relay(self.daemon.address)
+        self.addCleanup(relay.close)
+        steps = 120
+        with locus.connect(relay.address) as client:
+            with client.query_stream(self.scene) as stream:
+                futures = []
+                for number in range(1, steps + 1):
+                    futures.append(stream.step(self.moved(number), QueryBatch().lookup(1 + number)))
+                    if number in (20, 50, 51, 90):
+                        relay.cut()
+                stream.sync(WAIT_SECONDS)
+        self.assertEqual(self.client.scene(self.scene).revision, steps)
+        for number, future in enumerate(futures, 1):
+            self.assertEqual(listed(future.result().result.blocks[0].ids), [1 + number])
+
     def test_sending_waits_while_too_many_batches_are_under_way(self):
         relay = Relay(self.daemon.address)
         client = locus.connect(relay.address)
