@@ -120,6 +120,8 @@ TEST(WirePlanTest, EmptySubMessagesAreCountedBeforeTheyExist) {
   const std::string lists = repeat(empty_insert, limits::kMaxUpdateLists + 1);
   expect_limit<v1::ApplyUpdatesRequest>(delimited(2, lists), "update_lists");
   expect_limit<v1::ApplyUpdatesRequest>(delimited(2, repeat(empty_insert, 16'000'000)), "update_lists");
+  expect_limit<v1::StepRequest>(delimited(2, lists), "update_lists");
+  expect_limit<v1::StreamQueriesRequest>(delimited(4, lists), "update_lists");
   // Protobuf merges the copies of a sub-message that occurs more than once, so the counts of all copies add up.
   expect_limit<v1::ApplyUpdatesRequest>(repeat(delimited(2, repeat(empty_insert, 1000)), 100), "update_lists");
   EXPECT_TRUE(scan<v1::ApplyUpdatesRequest>(delimited(2, repeat(empty_insert, limits::kMaxUpdateLists))).ok());
