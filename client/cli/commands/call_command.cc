@@ -123,7 +123,8 @@ Examples:
   locus call GetServer
   locus call GetScene '{"name": "arena"}'
   locus call locus.v1.UpdateService/ApplyUpdates '{"scene": "arena", "batch": {"removeIds": ["7"]}}'
-  locus call Query - < query.json)");
+  locus call Query - < query.json
+  locus call Step '{"scene": "arena", "update": {"removeIds": ["7"]}, "queries": {"blocks": [{"lookup": {"ids": ["7"]}}]}}')");
   command.add_option("METHOD", options->method, "The method, such as GetScene or locus.v1.SceneService/GetScene");
   command.add_option("JSON", options->json, "The request; - is standard input [{}]");
   command.add_flag("--list", options->list, "List the methods");

@@ -159,6 +159,20 @@ int query(lua_State* state) {
   return push_answer(state, value_or_raise(state, client_at(state).query(scene, std::move(batch))));
 }
 
+// Pushes the result and the ack. Raises the error of queries that failed after the update was applied.
+int step(lua_State* state) {
+  const std::string scene = text_argument(state, 2);
+  const client::StepResult step =
+      value_or_raise(state, client_at(state).step(scene, message_argument<v1::UpdateBatch>(state, 3),
+                                                  message_argument<v1::QueryBatch>(state, 4)));
+  server_at(state).remember(scene, {step.ack.epoch(), step.ack.revision()});
+  check_or_raise(state, refused_items(step.ack));
+  check_or_raise(state, step.result.status());
+  push_message(state, *step.result);
+  push_message(state, step.ack);
+  return 2;
+}
+
 int update_stream(lua_State* state) {
   push_stream(state, client_at(state).update_stream(text_argument(state, 2)));
   return 1;
@@ -412,6 +426,7 @@ void create_server_metatable(lua_State* state) {
                               {"change_instances", change_instances},
                               {"apply", apply},
                               {"query", query},
+                              {"step", step},
                               {"update_stream", update_stream},
                               {"query_stream", query_stream},
                               {nullptr, nullptr}};

@@ -189,11 +189,16 @@ end
 -- Sends the batch with `options`, which are fields of the protocol's UpdateBatch, and returns the ack. The builder is
 -- empty afterwards. The server applies removals, then inserts, then moves, then relabels.
 function Updates:commit(options)
+  return self.scene:apply(self:take(options))
+end
+
+-- Returns the batch with `options`, and empties the builder.
+function Updates:take(options)
   local batch = self.batch
   for name, value in pairs(options or {}) do batch[name] = value end
   self.shapes = {}
   self.batch = { inserts = {}, moves = {}, remove_ids = {}, remove_groups = {}, relabels = {} }
-  return self.scene:apply(batch)
+  return batch
 end
 
 -- Queries by row: one batch, answered at one revision. `options` are fields of the protocol's QueryBlock, such as
@@ -340,6 +345,13 @@ end
 -- Sends the batch and returns the answers in the order of the queries, and the protocol's result. `view` asks for a
 -- revision: { at_least = N } or { exactly = N }. The builder is empty afterwards.
 function Queries:run(view)
+  local batch, answers_in = self:take(view)
+  local result = self.scene:query(batch)
+  return answers_in(result), result
+end
+
+-- Returns the batch, and a function that returns the answers in a result; empties the builder.
+function Queries:take(view)
   local entries, places = self.blocks, self.places
   self.blocks, self.places = {}, {}
   local blocks = {}
@@ -350,21 +362,38 @@ function Queries:run(view)
     if entry.finds_first then entry.block.columns = with_id(entry.block.columns) end
     blocks[i] = entry.block
   end
-  local result = self.scene:query{ view = view, blocks = blocks }
-  for _, answer in ipairs(result.blocks) do
-    answer.first_rows, answer.is_truncated = {}, {}
-    local first = 1
-    for n, count in ipairs(answer.counts) do
-      answer.first_rows[n] = first
-      first = first + count
+  local function answers_in(result)
+    for _, answer in ipairs(result.blocks) do
+      answer.first_rows, answer.is_truncated = {}, {}
+      local first = 1
+      for n, count in ipairs(answer.counts) do
+        answer.first_rows[n] = first
+        first = first + count
+      end
+      for _, query in ipairs(answer.truncated) do answer.is_truncated[query + 1] = true end
     end
-    for _, query in ipairs(answer.truncated) do answer.is_truncated[query + 1] = true end
+    local answers = {}
+    for i, place in ipairs(places) do
+      answers[i] = answer_of(result.blocks[place[1]], place[2], blocks[place[1]].count_only)
+    end
+    return answers
   end
-  local answers = {}
-  for i, place in ipairs(places) do
-    answers[i] = answer_of(result.blocks[place[1]], place[2], blocks[place[1]].count_only)
-  end
-  return answers, result
+  return { view = view, blocks = blocks }, answers_in
+end
+
+local step_fields <const> = fields("updates queries tick view")
+-- Makes a step: applies `updates` at `tick`, then answers `queries` at a revision that contains the updates, or at that
+-- of `view`. Both are builders or batches in columns, and may be absent. Returns the answers (nil for a batch in
+-- columns), the result and the ack.
+function Scene:step(step)
+  check_fields("step", step, step_fields)
+  local updates, queries, answers_in = step.updates or {}, step.queries or {}, nil
+  if getmetatable(updates) == Updates then updates = updates:take() end
+  if getmetatable(queries) == Queries then queries, answers_in = queries:take() end
+  if step.tick then updates.tick = step.tick end
+  if step.view then queries.view = step.view end
+  local result, ack = self.server:step(self.name, updates, queries)
+  return answers_in and answers_in(result), result, ack
 end
 
 -- Expectations. An expectation that is not met ends the script, or with --keep-going is counted and written.

@@ -43,6 +43,18 @@ TEST_F(CallTest, IdsOf64BitsSurvive) {
   }
 }
 
+TEST_F(CallTest, AStepIsAppliedAndItsQueriesSeeIt) {
+  const Json reply =
+      reply_of("Step", R"({"scene": "world", "update": {"inserts": [{"ids": ["7"], "positions": [1, 2, 3],
+      "ball": {"radii": [1]}}]}, "queries": {"blocks": [{"lookup": {"ids": ["7", "8"]}}]}})");
+  EXPECT_EQ(reply["ack"]["applied"], 1);
+  EXPECT_EQ(reply["result"]["revision"], reply["ack"]["revision"]);
+  EXPECT_EQ(reply["result"]["blocks"][0]["ids"], Json::array({"7", "0"}));
+  const Outcome refused = run({"call", "Step", R"({"scene": "world", "queries": {"view": {"exactly": "1"}}})"});
+  EXPECT_EQ(refused.code, cli::ExitCode::kFailed) << refused.err;
+  EXPECT_THAT(refused.err, HasSubstr("view.exactly"));
+}
+
 TEST_F(CallTest, WithoutJsonTheRequestIsEmpty) {
   const Outcome outcome = run({"call", "GetServer"});
   ASSERT_EQ(outcome.code, cli::ExitCode::kOk) << outcome.err;

@@ -334,6 +334,49 @@ locus.expect_equal(asks:flush()[1].blocks[1].ids[1], 1)
   EXPECT_EQ(outcome.code, ExitCode::kOk) << outcome.err;
 }
 
+TEST_F(RunCommandTest, AStepTakesBuildersOrColumnsAndItsQueriesSeeItsUpdates) {
+  const Outcome outcome = run_lua(R"(
+local scene = locus.scene("steps")
+scene:delete{if_present = true}
+scene:create()
+local insert = scene:updates():insert{id = 1, at = {0, 0, 0}, ball = 1}
+local look = scene:queries():ray{from = {-9, 0, 0}, dir = {1, 0, 0}}
+local answers, result, ack = scene:step{updates = insert, queries = look, tick = 5}
+locus.expect_equal(answers[1].id, 1)
+locus.expect_equal({ack.applied, ack.tick, ack.revision}, {1, 5, result.revision})
+local none, columns = scene:step{updates = {moves = {{ids = {1}, positions_f64 = {{7, 0, 0}}}}},
+  queries = {blocks = {{columns = {"pose"}, lookup = {ids = {1}}}}}}
+locus.expect_equal(none, nil)
+locus.expect_equal(columns.blocks[1].positions[1], 7)
+locus.expect_equal(select(3, scene:step{}).revision, ack.revision + 1)
+locus.expect_equal(#look:run(), 0)
+local move = scene:updates():move{id = 1, at = {3, 0, 0}}
+locus.expect_error("MALFORMED", scene.step, scene, {updates = move, view = {exactly = 1}})
+locus.expect_equal(scene:describe().revision, ack.revision + 1)
+locus.expect_error("UNKNOWN_ID", scene.step, scene, {updates = scene:updates():move{id = 9, at = {3, 0, 0}}})
+local past = scene:queries():ray({from = {-9, 0, 0}, dir = {1, 0, 0}}, {as_of_ticks = {1}})
+local late = scene:updates():move{id = 1, at = {4, 0, 0}}
+locus.expect_error("OUT_OF_RANGE", scene.step, scene, {updates = late, queries = past})
+locus.expect_equal(scene:describe().revision, ack.revision + 2, "the update stays applied")
+local stream = scene:query_stream()
+stream:step({moves = {{ids = {1}, positions_f64 = {{5, 0, 0}}}}}, {blocks = {{columns = {"pose"}, lookup = {ids = {1}}}}})
+stream:step({all_or_nothing = true, moves = {{ids = {9}, positions_f64 = {{0, 0, 0}}}}}, {})
+locus.expect_equal(stream:send{}, 3)
+stream:step({}, {blocks = {{as_of_ticks = {1}, lookup = {ids = {1}}}}})
+local steps = stream:close()
+locus.expect_equal(steps[1].ack.applied, 1)
+locus.expect_equal(steps[1].result.blocks[1].positions[1], 5)
+locus.expect_equal(steps[2].reason, "UNKNOWN_ID")
+locus.expect_equal(steps[3].revision, steps[1].ack.revision)
+locus.expect_equal(steps[4].result.reason, "OUT_OF_RANGE")
+locus.expect_equal(scene:update_stream().step, nil)
+scene:step{update = move}
+)",
+                                  {"--keep-going"});
+  EXPECT_THAT(outcome.err, HasSubstr("step has no field 'update'; did you mean `updates`?"));
+  EXPECT_THAT(outcome.err, HasSubstr("18 expectations passed")) << outcome.err;
+}
+
 TEST_F(RunCommandTest, MeshesAndInstancesAreMadeFromTables) {
   const Outcome outcome = run_lua(R"(
 local server = locus.connect()
