@@ -35,6 +35,7 @@ KINDS = ("uniform", "clustered", "far", "onecell", "border", "giant", "mixed")
 # Expected cells of the suite serving: (case, peer).
 SERVING = {(f"rays/{cost}/{size}", "in_process") for cost in ("90ns", "270ns") for size in (1024, 8192)}
 SERVING |= {("scan/1024", "whole_query"), ("sight/100x100x3", "any_rays")}
+SERVING |= {(f"step/shooter_{form}", "two_calls") for form in ("unary", "stream")}
 SERVING |= {(f"one_stream/{size}", "two_streams") for size in (1024, 8192)}
 SERVING |= {(f"{case}/{size}", "raw_tcp") for size in (1024, 8192) for case in ("echo", "empty")}
 SERVING |= {(f"{case}/{size}", peer) for size in (256, 4096)

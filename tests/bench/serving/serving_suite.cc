@@ -7,6 +7,7 @@
 #include "tests/bench/serving/redis_cases.h"
 #include "tests/bench/serving/scan_cases.h"
 #include "tests/bench/serving/sight_cases.h"
+#include "tests/bench/serving/step_cases.h"
 #include "tests/bench/serving/tls_cases.h"
 
 namespace locus::bench::serving {
@@ -20,6 +21,7 @@ absl::Status run_serving_suite(const Options& options, const Progress& progress,
   if (status.ok() && *plain != nullptr) status = run_echo_cases(run, **plain);
   if (status.ok()) status = run_scan_cases(run);
   if (status.ok()) status = run_sight_cases(run);
+  if (status.ok()) status = run_step_cases(run);
   if (status.ok()) status = run_redis_cases(run);
   if (status.ok()) status = run_crowd_cases(run);
   if (status.ok()) status = run_durable_cases(run);
