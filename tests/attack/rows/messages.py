@@ -100,7 +100,7 @@ def unfinished_messages(job):
     piece = bytes(MIB)
     with job.connect(timeout=job.seconds + 5) as connection:
         for i in range(96):
-            stream = connection.start(HOT[i % 4])
+            stream = connection.start(HOT[i % len(HOT)])
             if not connection.write(stream, struct.pack(">BI", 0, LARGEST), end=False, until=job.until):
                 break
             for _ in range(31):
