@@ -65,7 +65,10 @@ IoLoop::IoLoop(std::unique_ptr<grpc::ServerCompletionQueue> queue, IoWaker& wake
 
 EventSource::Next IoLoop::next(std::chrono::steady_clock::duration wait, EventTag** tag, bool* ok) {
   void* received = nullptr;
-  switch (queue_->AsyncNext(&received, ok, system_clock::now() + wait)) {
+  // gRPC rounds deadlines up to whole milliseconds. So without a wait, the deadline must be in the past.
+  const gpr_timespec deadline =
+      wait <= wait.zero() ? gpr_inf_past(GPR_CLOCK_REALTIME) : grpc::TimePoint(system_clock::now() + wait).raw_time();
+  switch (queue_->AsyncNext(&received, ok, deadline)) {
     case grpc::CompletionQueue::SHUTDOWN:
       return Next::kEnd;
     case grpc::CompletionQueue::TIMEOUT:
