@@ -88,7 +88,7 @@ SnapshotPtr SceneWriter::trim_history(uint64_t bytes) {
 
 SnapshotPtr SceneWriter::replace_statics(std::shared_ptr<const StaticSet> statics) {
   LOCUS_DCHECK(statics != nullptr);
-  replaced_bytes_ += statics_->bytes();
+  replaced_bytes_ += statics_->unshared_bytes(*statics);
   statics_ = std::move(statics);
   SnapshotPtr snapshot = next_revision();
   LOCUS_DCHECK_CALL(check_invariants());

@@ -40,7 +40,7 @@ struct MissCount {
 // Counts hits of the reference and misses of the query for the rays of `block`; `triangles` are the triangles of the
 // scene's only instance.
 MissCount count_misses(const SceneSnapshot& snapshot, const OwnedBlock& block, const std::vector<Triangle>& triangles) {
-  const Instance& instance = snapshot.statics->tree().values()[0];
+  const Instance& instance = *snapshot.statics->tree().values().begin();
   const Transform& transform = instance.transform;
   const Real extent = magnitude(instance.mesh->bounds());
   const BlockResult result = run_block(snapshot, block);

@@ -199,7 +199,9 @@ class RecoveryLockstep {
 
   Id random_instance() {
     const auto instances = model_->latest()->statics->tree().values();
-    return instances.empty() || random_.chance(0.1) ? random_.below(kIds) : random_.pick(instances).id;
+    return instances.empty() || random_.chance(0.1)
+               ? random_.below(kIds)
+               : std::next(instances.begin(), static_cast<std::ptrdiff_t>(random_.below(instances.size())))->id;
   }
 
   absl::StatusOr<InstanceChange> apply(Scene& scene, const Change& change) const {

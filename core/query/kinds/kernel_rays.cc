@@ -32,7 +32,7 @@ class Rounds {
     LOCUS_DCHECK(task.ray_kernels() != nullptr);
     for (const PendingRay& ray : rays) LOCUS_DCHECK(ray.request.mode == mode());
     const Bvh<Instance>& instances = task.snapshot().statics->tree();
-    if (instances.size() == 1) only_ = instances.values().data();
+    if (instances.size() == 1) only_ = &*instances.values().begin();
     slabs_.reserve(rays.size());
     for (const PendingRay& ray : rays)
       slabs_.emplace_back(Rayd{ray.request.origin, ray.request.direction}, kInstancePad);

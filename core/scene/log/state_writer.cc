@@ -73,6 +73,9 @@ void write_objects(ByteWriter& writer, const std::vector<Object>& objects) {
 
 StateWriter::StateWriter(FrozenScene scene) : scene_(std::move(scene)), writers_(scene_.writers.writers()) {
   LOCUS_DCHECK(scene_.snapshot != nullptr);
+  const Bvh<Instance>::Values instances = scene_.snapshot->statics->tree().values();
+  next_instance_ = instances.begin();
+  last_instance_ = instances.end();
 }
 
 absl::StatusOr<std::optional<std::string>> StateWriter::next() {
@@ -81,7 +84,7 @@ absl::StatusOr<std::optional<std::string>> StateWriter::next() {
     chunk = header();
   } else if (next_writer_ < writers_.size()) {
     chunk = next_writers();
-  } else if (next_instance_ < scene_.snapshot->statics->size()) {
+  } else if (next_instance_ != last_instance_) {
     chunk = next_instances();
   } else if (objects_written_ < scene_.snapshot->objects.size()) {
     chunk = next_objects();
@@ -123,9 +126,10 @@ std::string StateWriter::next_writers() {
 }
 
 std::string StateWriter::next_instances() {
-  const absl::Span<const Instance> all = scene_.snapshot->statics->tree().values();
-  const absl::Span<const Instance> instances = all.subspan(next_instance_, kInstancesPerChunk);
-  next_instance_ += instances.size();
+  std::vector<Instance> chunk_instances;
+  for (; next_instance_ != last_instance_ && chunk_instances.size() < kInstancesPerChunk; ++next_instance_)
+    chunk_instances.push_back(*next_instance_);
+  const absl::Span<const Instance> instances = chunk_instances;
   absl::flat_hash_map<const StaticMesh*, uint32_t> mesh_indices;
   std::vector<Sha256> contents;
   std::vector<absl::string_view> names;

@@ -37,7 +37,7 @@ class StateWriter {
   const std::vector<WriterTable::Writer> writers_;
   bool begun_ = false;
   size_t next_writer_ = 0;
-  size_t next_instance_ = 0;
+  Bvh<Instance>::Values::Iterator next_instance_, last_instance_;
   size_t objects_written_ = 0;
   GridCursor next_object_;
   uint64_t bytes_ = 0;

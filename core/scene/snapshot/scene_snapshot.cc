@@ -41,11 +41,11 @@ uint64_t unshared_history_bytes(const SceneSnapshot& held, const SceneSnapshot& 
 
 uint64_t unshared_bytes(const SceneSnapshot& held, const SceneSnapshot& later) {
   LOCUS_DCHECK_LE(held.revision, later.revision);
-  const uint64_t statics = held.statics == later.statics ? 0 : held.statics->bytes();
   // Among the sets of objects that `later` holds, the first set at or after the tick of `held` shares the most memory
   // with `held`.
   const HistoryRecord* next = first_record(later, held.tick);
-  return statics + held.objects.unshared_bytes(next == nullptr ? later.objects : next->objects) +
+  return held.statics->unshared_bytes(*later.statics) +
+         held.objects.unshared_bytes(next == nullptr ? later.objects : next->objects) +
          unshared_history_bytes(held, later);
 }
 

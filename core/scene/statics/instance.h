@@ -19,6 +19,9 @@ struct Instance {
   std::shared_ptr<const StaticMesh> mesh;
   Transform transform;
   Aabbd bounds;  // world bounds of the whole mesh
+  // Identifies the stay of the instance in the scene, from its placement to its removal or to the next jump. Unique in
+  // the process; 0 before the instance is placed.
+  uint64_t life = 0;
 };
 
 template <>

@@ -1,6 +1,7 @@
 #include "core/scene/statics/static_set.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <utility>
 
@@ -11,6 +12,7 @@
 #include "core/base/limits.h"
 #include "core/base/refusal.h"
 #include "core/base/status_macros.h"
+#include "core/index/bvh/bvh_change.h"
 
 namespace locus {
 namespace {
@@ -90,36 +92,47 @@ uint64_t bytes_of_meshes(const absl::flat_hash_map<const StaticMesh*, uint32_t>&
   return bytes;
 }
 
-// Ids of the instances of a set that is being built. Checks the ids of placements, or chooses ids for them.
+// Returns another number at each call, never 0.
+uint64_t new_life() {
+  static std::atomic<uint64_t> last{0};
+  return last.fetch_add(1, std::memory_order_relaxed) + 1;
+}
+
+// Ids of the instances of a set that is being changed. Checks the ids of placements, or chooses ids for them.
 class InstanceIds {
  public:
-  InstanceIds(const std::function<bool(Id)>& is_object, const std::function<Id()>& next_id)
-      : is_object_(is_object), next_id_(next_id) {}
+  InstanceIds(const StaticSet& old, const std::function<bool(Id)>& is_object, const std::function<Id()>& next_id)
+      : old_(old), is_object_(is_object), next_id_(next_id) {}
 
-  void take(Id id) { taken_.insert(id); }
+  // Frees the id of an instance of the old set.
+  void remove(Id id) { removed_.insert(id); }
+  bool is_removed(Id id) const { return removed_.contains(id); }
 
   // Checks placements and passes each of their instances to `keep`.
   template <class Keep>
   absl::Status place(const PlacementColumns& columns, const std::string& field, const Keep& keep) {
     LOCUS_CHECK(columns.mesh != nullptr);
     RETURN_IF_ERROR(check_columns(columns, field));
-    const size_t n = columns.count();
-    if (taken_.size() + n > limits::kMaxInstances)
-      return refuse_full(field, "instances", limits::kMaxInstances, static_cast<double>(taken_.size() + n), 0);
+    const size_t n = columns.count(), size = old_.size() - removed_.size() + placed_.size();
+    if (size + n > limits::kMaxInstances)
+      return refuse_full(field, "instances", limits::kMaxInstances, static_cast<double>(size + n), 0);
     for (uint32_t i = 0; i < n; ++i) {
       ASSIGN_OR_RETURN(Instance instance, read_instance(columns, i, field));
       instance.id = columns.ids.empty() ? choose_id() : columns.ids[i];
       RETURN_IF_ERROR(check_id(instance.id, i, field));
-      taken_.insert(instance.id);
+      placed_.insert(instance.id);
       keep(std::move(instance));
     }
     return absl::OkStatus();
   }
 
  private:
+  bool is_taken(Id id) const {
+    return placed_.contains(id) || (old_.find(id) != nullptr && !removed_.contains(id)) || is_object_(id);
+  }
   absl::Status check_id(Id id, uint32_t i, const std::string& field) const {
     if (id == kNoId) return refuse_argument(Reason::kOutOfRange, field + ".ids", i, "0 is no id");
-    if (taken_.contains(id) || is_object_(id))
+    if (is_taken(id))
       return refuse_argument(Reason::kDuplicateId, field + ".ids", i,
                              absl::StrCat("the id ", id, " is taken; instances and objects share one id space"));
     return absl::OkStatus();
@@ -129,55 +142,64 @@ class InstanceIds {
     Id id = kNoId;
     do {
       id = next_id_();
-    } while (taken_.contains(id) || is_object_(id));
+    } while (is_taken(id));
     return id;
   }
 
+  const StaticSet& old_;
   const std::function<bool(Id)>& is_object_;
   const std::function<Id()>& next_id_;
-  absl::flat_hash_set<Id> taken_;
+  absl::flat_hash_set<Id> removed_;
+  absl::flat_hash_set<Id> placed_;
 };
 
-// Static change that is being applied. Collects the instances of the new set: first the old instances that are not
-// removed, then the placed instances.
+// Static change that is being applied: collects what changes in the tree over instances.
 class Changing {
  public:
   Changing(const StaticSet& old, const std::function<bool(Id)>& is_object, const std::function<Id()>& next_id)
-      : old_(old), ids_(is_object, next_id) {}
+      : old_(old), ids_(old, is_object, next_id) {}
 
   absl::Status remove(const StaticChange& change) {
-    absl::flat_hash_set<Id> removed;
     for (size_t i = 0; i < change.remove_ids.size(); ++i) {
       const Id id = change.remove_ids[i];
       if (old_.find(id) == nullptr)
         return refuse_argument(Reason::kUnknownId, "remove_ids", static_cast<uint32_t>(i),
                                absl::StrCat("no instance has the id ", id));
-      removed.insert(id);
+      remove(id);
     }
     const absl::flat_hash_set<Group> groups(change.remove_groups.begin(), change.remove_groups.end());
     if (groups.contains(0)) return refuse_group_zero(change);
-    for (const Instance& instance : old_.tree().values()) {
-      if (removed.contains(instance.id) || groups.contains(instance.group)) continue;
-      instances_.push_back(instance);
-      ids_.take(instance.id);
-    }
+    if (groups.empty()) return absl::OkStatus();
+    for (const Instance& instance : old_.tree().values())
+      if (groups.contains(instance.group)) remove(instance.id);
     return absl::OkStatus();
   }
 
   absl::Status place(const PlacementColumns& columns, const std::string& field) {
     return ids_.place(columns, field, [this](Instance instance) {
       placed_.push_back(instance.id);
-      instances_.push_back(std::move(instance));
+      instance.life = new_life();
+      tree_.added.push_back(std::move(instance));
     });
   }
 
-  std::vector<Instance>& instances() { return instances_; }
+  // Ids of the instances that the change removes, and those that it places.
+  const std::vector<Id>& removed() const { return removed_; }
   std::vector<Id>& placed() { return placed_; }
+  BvhChange<Instance>& tree() { return tree_; }
 
  private:
+  void remove(Id id) {
+    if (ids_.is_removed(id)) return;
+    ids_.remove(id);
+    removed_.push_back(id);
+    tree_.removed.push_back(old_.position(id));
+  }
+
   const StaticSet& old_;
   InstanceIds ids_;
-  std::vector<Instance> instances_;
+  BvhChange<Instance> tree_;
+  std::vector<Id> removed_;
   std::vector<Id> placed_;
 };
 
@@ -185,18 +207,36 @@ class Changing {
 
 void StaticSet::check_invariants() const {
   LOCUS_CHECK_EQ(positions_.size(), tree_.size());
-  for (uint32_t i = 0; i < tree_.values().size(); ++i) {
-    const Instance& instance = tree_.values()[i];
+  for (const Instance& instance : tree_.values()) {
     LOCUS_CHECK_NE(instance.id, kNoId);
+    LOCUS_CHECK_NE(instance.life, uint64_t{0});
     LOCUS_CHECK(instance.mesh != nullptr);
-    LOCUS_CHECK_EQ(positions_.at(instance.id), i);
+    LOCUS_CHECK_EQ(find(instance.id), &instance);
   }
   size_t uses = 0;
-  for (const auto& [mesh, count] : uses_) uses += count;
+  for (const auto& [mesh, count] : *uses_) uses += count;
   LOCUS_CHECK_EQ(uses, tree_.size());
 }
 
-std::shared_ptr<const StaticSet> StaticSet::empty() { return std::shared_ptr<const StaticSet>(new StaticSet()); }
+const std::shared_ptr<const StaticSet>& StaticSet::empty() {
+  static const std::shared_ptr<const StaticSet>& set = *new std::shared_ptr<const StaticSet>(new StaticSet());
+  return set;
+}
+
+std::shared_ptr<StaticSet> StaticSet::with_tree(const StaticSet& old, Bvh<Instance>::Changed changed,
+                                                absl::Span<const Id> removed) {
+  std::shared_ptr<StaticSet> set(new StaticSet());
+  set->tree_ = std::move(changed.tree);
+  set->positions_ = old.positions_;
+  for (const Id id : removed) set->positions_.erase(id);
+  set->positions_.fit(set->tree_.size());
+  for (const uint32_t block : changed.blocks) {
+    uint32_t position = block * kBvhBlockValues;
+    for (const Instance& instance : set->tree_.block(block)) set->positions_.set(instance.id, position++);
+  }
+  set->positions_.snapshot();  // so that the table can be copied
+  return set;
+}
 
 absl::StatusOr<StaticSet::Changed> StaticSet::apply(const StaticChange& change,
                                                     const std::function<bool(Id)>& is_object,
@@ -205,24 +245,49 @@ absl::StatusOr<StaticSet::Changed> StaticSet::apply(const StaticChange& change,
   RETURN_IF_ERROR(changing.remove(change));
   for (size_t i = 0; i < change.place.size(); ++i)
     RETURN_IF_ERROR(changing.place(change.place[i], absl::StrCat("place[", i, "]")));
-  ASSIGN_OR_RETURN(Bvh<Instance> tree, Bvh<Instance>::build(std::move(changing.instances()), BvhOptions{}));
-  std::shared_ptr<StaticSet> set(new StaticSet());
-  set->tree_ = std::move(tree);
-  for (uint32_t i = 0; i < set->tree_.values().size(); ++i) {
-    const Instance& instance = set->tree_.values()[i];
-    set->positions_.emplace(instance.id, i);
-    ++set->uses_[instance.mesh.get()];
-    set->triangle_count_ += instance.mesh->triangle_count();
+  Uses uses = *uses_;
+  uint64_t triangle_count = triangle_count_;
+  for (const Id id : changing.removed()) {
+    const StaticMesh* const mesh = find(id)->mesh.get();
+    triangle_count -= mesh->triangle_count();
+    if (--uses[mesh] == 0) uses.erase(mesh);
   }
-  set->mesh_bytes_ = bytes_of_meshes(set->uses_);
+  for (const Instance& instance : changing.tree().added) {
+    triangle_count += instance.mesh->triangle_count();
+    ++uses[instance.mesh.get()];
+  }
+  ASSIGN_OR_RETURN(Bvh<Instance>::Changed tree, tree_.change(std::move(changing.tree())));
+  std::shared_ptr<StaticSet> set = with_tree(*this, std::move(tree), changing.removed());
+  set->triangle_count_ = triangle_count;
+  set->mesh_bytes_ = bytes_of_meshes(uses);
+  set->uses_ = std::make_shared<const Uses>(std::move(uses));
   LOCUS_DCHECK_CALL(set->check_invariants());
   return Changed{std::move(set), std::move(changing.placed())};
+}
+
+std::shared_ptr<const StaticSet> StaticSet::replace(std::vector<Instance> changed) const {
+  BvhChange<Instance> change;
+  change.replaced.reserve(changed.size());
+  for (Instance& instance : changed) {
+    const uint32_t at = position(instance.id);
+    LOCUS_DCHECK(tree_.at(at).mesh == instance.mesh);
+    change.replaced.push_back({at, std::move(instance)});
+  }
+  // Fails only for bounds that are not finite and for too many values, and the instances have passed these checks.
+  absl::StatusOr<Bvh<Instance>::Changed> tree = tree_.change(std::move(change));
+  LOCUS_CHECK(tree.ok());
+  std::shared_ptr<StaticSet> set = with_tree(*this, *std::move(tree), {});
+  set->triangle_count_ = triangle_count_;
+  set->mesh_bytes_ = mesh_bytes_;
+  set->uses_ = uses_;
+  LOCUS_DCHECK_CALL(set->check_invariants());
+  return set;
 }
 
 absl::Status StaticSet::check_placements(absl::Span<const PlacementColumns> place) {
   const std::function<bool(Id)> no_object = [](Id) { return false; };
   const std::function<Id()> next_id = ids_from(kFirstChosenId);
-  InstanceIds ids(no_object, next_id);
+  InstanceIds ids(*empty(), no_object, next_id);
   for (size_t i = 0; i < place.size(); ++i)
     RETURN_IF_ERROR(ids.place(place[i], absl::StrCat("place[", i, "]"), [](const Instance&) {}));
   return absl::OkStatus();
@@ -236,17 +301,26 @@ Id StaticSet::first_id_above() const {
 }
 
 const Instance* StaticSet::find(Id id) const {
-  const auto found = positions_.find(id);
-  if (found == positions_.end()) return nullptr;
-  LOCUS_DCHECK_EQ(tree_.values()[found->second].id, id);
-  return &tree_.values()[found->second];
+  const uint32_t found = positions_.find(id);
+  if (found == PersistentIdTable<>::kNone) return nullptr;
+  LOCUS_DCHECK_EQ(tree_.at(found).id, id);
+  return &tree_.at(found);
+}
+
+uint32_t StaticSet::position(Id id) const {
+  const uint32_t found = positions_.find(id);
+  LOCUS_DCHECK_NE(found, PersistentIdTable<>::kNone);
+  return found;
 }
 
 uint32_t StaticSet::uses(const StaticMesh* mesh) const {
-  const auto found = uses_.find(mesh);
-  return found == uses_.end() ? 0 : found->second;
+  const auto found = uses_->find(mesh);
+  return found == uses_->end() ? 0 : found->second;
 }
 
-uint64_t StaticSet::bytes() const { return tree_.bytes() + positions_.capacity() * (sizeof(Id) + sizeof(uint32_t)); }
+uint64_t StaticSet::unshared_bytes(const StaticSet& other) const {
+  if (this == &other) return 0;
+  return tree_.unshared_bytes(other.tree_) + positions_.unshared_bytes(other.positions_);
+}
 
 }  // namespace locus

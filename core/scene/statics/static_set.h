@@ -1,6 +1,7 @@
 // Static part of a scene: instances of meshes and a tree over these instances. Immutable, shared by snapshots, and safe
-// to read from any thread. A change makes a new set, so that a failed change has no effect. Invariants: ids are
-// distinct and not 0; positions_ has one entry for each instance; the counts of uses_ add up to size().
+// to read from any thread. A change makes a new set, so that a failed change has no effect. The new set shares with the
+// old one the parts of the tree and of the table of ids that the change does not touch. Invariants: ids are distinct
+// and not 0; positions_ has one entry for each instance; the counts of uses_ add up to size().
 #ifndef LOCUS_CORE_SCENE_STATICS_STATIC_SET_H_
 #define LOCUS_CORE_SCENE_STATICS_STATIC_SET_H_
 
@@ -12,6 +13,7 @@
 #include "absl/container/flat_hash_map.h"
 #include "absl/status/statusor.h"
 #include "absl/types/span.h"
+#include "core/base/persistent_id_table.h"
 #include "core/index/bvh/bvh.h"
 #include "core/scene/statics/instance.h"
 
@@ -47,7 +49,7 @@ inline std::function<Id()> ids_from(Id first) {
 class StaticSet {
  public:
   // Returns the set without instances.
-  static std::shared_ptr<const StaticSet> empty();
+  static const std::shared_ptr<const StaticSet>& empty();
 
   struct Changed {
     std::shared_ptr<const StaticSet> set;
@@ -56,9 +58,14 @@ class StaticSet {
   // Returns a new set without the instances that the change removes, and with the instances that the change places.
   // `is_object` returns true for the id of an object; no instance may have the id of an object. `next_id` returns
   // another id at each call; placements without ids get these ids, except ids that are taken. An error refuses the
-  // whole change and names the field and index of the invalid value. O(instances).
+  // whole change and names the field and index of the invalid value. Cost: that of Bvh::change(); with remove_groups,
+  // also O(instances).
   absl::StatusOr<Changed> apply(const StaticChange& change, const std::function<bool(Id)>& is_object,
                                 const std::function<Id()>& next_id) const;
+  // Returns a new set in which the instances with the ids of `changed` are those of `changed`, with the same meshes.
+  // Preconditions: the set has these ids, which are distinct; moved() has made the transforms and bounds. Cost: that of
+  // Bvh::change().
+  std::shared_ptr<const StaticSet> replace(std::vector<Instance> changed) const;
   // Returns the least id from kFirstChosenId on that is above the ids of all instances below kEndOfChosenIds.
   // O(instances).
   Id first_id_above() const;
@@ -69,23 +76,34 @@ class StaticSet {
 
   const Bvh<Instance>& tree() const { return tree_; }
   const Instance* find(Id id) const;
+  // Returns the position of an instance in tree(). Precondition: the set has the id.
+  uint32_t position(Id id) const;
   size_t size() const { return tree_.size(); }
   uint64_t triangle_count() const { return triangle_count_; }
   // Returns the number of instances of `mesh`, not counting instances of meshes with equal content under other names.
   uint32_t uses(const StaticMesh* mesh) const;
   // Returns the size in bytes of the set without the meshes, which are shared by several sets.
-  uint64_t bytes() const;
+  uint64_t bytes() const { return unshared_bytes(*empty()); }
+  // Returns the size in bytes of the parts that this set does not share with `other`, without the meshes. O(instances /
+  // kBvhBlockValues); O(1) if the sets are the same.
+  uint64_t unshared_bytes(const StaticSet& other) const;
   // Returns the size in bytes of the meshes of all instances; a content that several meshes share counts once. O(1).
   uint64_t mesh_bytes() const { return mesh_bytes_; }
 
  private:
+  using Uses = absl::flat_hash_map<const StaticMesh*, uint32_t>;
+
   StaticSet() = default;
-  // Checks the invariants of the class comment. O(instances), like building the set.
+  // Makes a set with the tree of `changed`. Ids of `removed` are no longer in the set.
+  static std::shared_ptr<StaticSet> with_tree(const StaticSet& old, Bvh<Instance>::Changed changed,
+                                              absl::Span<const Id> removed);
+  // Checks the invariants of the class comment. O(instances).
   void check_invariants() const;
 
   Bvh<Instance> tree_;
-  absl::flat_hash_map<Id, uint32_t> positions_;  // index of each instance in tree_.values()
-  absl::flat_hash_map<const StaticMesh*, uint32_t> uses_;
+  PersistentIdTable<> positions_;  // position of each instance in tree_
+  std::shared_ptr<const Uses> uses_ =
+      std::make_shared<const Uses>();  // shared by sets that have the same instances at other places; never null
   uint64_t triangle_count_ = 0;
   uint64_t mesh_bytes_ = 0;
 };

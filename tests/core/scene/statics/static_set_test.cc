@@ -310,6 +310,49 @@ TEST_F(StaticSetTest, UsesCountInstancesOfAMesh) {
   EXPECT_EQ(scene_.latest()->statics->uses(other.get()), 0u);
 }
 
+// Returns the number of instances of `set` that it does not share with `other`.
+size_t instances_apart(const StaticSet& set, const StaticSet& other) {
+  size_t count = 0;
+  set.tree().for_each_apart_from(other.tree(), [&count](const Instance&) { ++count; });
+  return count;
+}
+
+TEST_F(StaticSetTest, AChangeOfOneOfManyInstancesSharesTheOthers) {
+  std::vector<Id> ids;
+  std::vector<double> translations;
+  for (Id id = 1; id <= 5'000; ++id) {
+    ids.push_back(id);
+    for (const Id digit : {id % 10, id / 10 % 10, id / 100}) translations.push_back(10.0 * static_cast<double>(digit));
+  }
+  change(placing(placement(ids, translations)));
+  const std::shared_ptr<const StaticSet> before = scene_.latest()->statics;
+  change(removing_instances({77}));
+  const std::shared_ptr<const StaticSet> removed = scene_.latest()->statics;
+  change(placing(placement({77}, {3, 4, 5})));
+  EXPECT_LE(instances_apart(*removed, *before), kBvhBlockValues);
+  EXPECT_LE(instances_apart(*scene_.latest()->statics, *removed), 2 * kBvhBlockValues);
+  EXPECT_LT(removed->unshared_bytes(*before), before->bytes() / 4);
+  EXPECT_EQ(removed->unshared_bytes(*removed), 0u);
+  EXPECT_NE(before->find(77), nullptr);
+  EXPECT_EQ(removed->find(77), nullptr);
+  EXPECT_EQ(instance(77)->transform.translation, (Vec3d{3, 4, 5}));
+}
+
+TEST_F(StaticSetTest, ReplacedInstancesAreFoundAtTheirNewPlaces) {
+  change(placing(placement({1, 2, 3}, {0, 0, 0, 10, 0, 0, 20, 0, 0})));
+  const std::shared_ptr<const StaticSet> before = scene_.latest()->statics;
+  Instance moved = *before->find(2);
+  moved.transform.translation = {50, 60, 70};
+  moved.bounds = bounds_to_world(moved.transform, moved.mesh->bounds());
+  const std::shared_ptr<const StaticSet> after = before->replace({moved});
+  EXPECT_EQ(after->find(2)->transform.translation, (Vec3d{50, 60, 70}));
+  EXPECT_TRUE(contains(after->tree().bounds(), moved.bounds));
+  EXPECT_EQ(before->find(2)->transform.translation, (Vec3d{10, 0, 0}));
+  EXPECT_EQ(after->size(), 3u);
+  EXPECT_EQ(after->uses(mesh_.get()), 3u);
+  EXPECT_EQ(after->find(1)->life, before->find(1)->life);
+}
+
 TEST_F(StaticSetTest, BoundsContainTheScaledRotatedAndTranslatedMesh) {
   PlacementColumns place = placement({1}, {100, 0, 0});
   place.scales = columns_.floats({10});
