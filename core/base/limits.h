@@ -33,7 +33,7 @@ inline constexpr uint32_t kMaxBvhDepth = 64;  // max levels of nodes; sets the s
 inline constexpr uint32_t kMaxBvhBins = 64;
 
 inline constexpr uint32_t kMaxUpdateItems = 1u << 20;   // items per update batch
-inline constexpr uint32_t kMaxUpdateLists = 65536;      // lists (inserts, moves and relabels together) per request
+inline constexpr uint32_t kMaxUpdateLists = 65536;      // lists (inserts, moves, relabels and so on) per request
 inline constexpr uint32_t kMaxListedItemErrors = 1000;  // max refused items listed in an ack
 inline constexpr uint32_t kMaxWriters = 4096;           // writer ids stored per scene, to detect batches sent twice
 

@@ -283,6 +283,15 @@ absl::StatusOr<InstanceChange> Scene::build_and_publish(const StaticChange& chan
   // Objects inserted while the tree was being built may have taken an id.
   for (size_t i = 0; i < changed.placed.size(); ++i)
     if (writer_.is_object(changed.placed[i])) return taken_meanwhile(change, i, changed.placed[i]);
+  // Update batches that were applied while the tree was being built may have moved and relabelled instances.
+  if (const std::shared_ptr<const StaticSet>& updated = writer_.statics(); updated != statics) {
+    if (!change.remove_groups.empty() && updated->regrouped_since(*statics)) {
+      const auto is_taken = [this](Id id) LOCUS_REQUIRES(writer_mutex_) { return writer_.is_object(id); };
+      ASSIGN_OR_RETURN(changed, updated->apply(change, is_taken, next_id));
+    } else {
+      changed.set = changed.set->with_updates(*statics, *updated);
+    }
+  }
   RETURN_IF_ERROR(journal_.append_change(writer_.epoch(), change, changed.placed));
   SnapshotPtr snapshot = writer_.replace_statics(std::move(changed.set));
   InstanceChange result{std::move(changed.placed), snapshot->revision, snapshot->epoch};

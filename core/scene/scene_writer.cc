@@ -125,10 +125,13 @@ absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_new(const UpdateBatch& b
 }
 
 template <class Applier>
-absl::Status SceneWriter::fill_ack(const UpdateBatch& batch, Applier& applier, Applied& result) {
-  result.ack.applied = applier.applied();
-  result.ack.refused = applier.refused();
+absl::Status SceneWriter::fill_ack(const UpdateBatch& batch, Applier& applier, InstanceApplier& instances,
+                                   Applied& result) {
+  result.ack.applied = applier.applied() + instances.applied();
+  result.ack.refused = applier.refused() + instances.refused();
   result.ack.errors = std::move(applier.errors());
+  for (ItemError& error : instances.errors())
+    if (result.ack.errors.size() < limits::kMaxListedItemErrors) result.ack.errors.push_back(std::move(error));
   if (!batch.all_or_nothing || result.ack.refused == 0) return absl::OkStatus();
   const ItemError& first = result.ack.errors.front();
   return refuse_argument(
@@ -140,8 +143,10 @@ absl::Status SceneWriter::fill_ack(const UpdateBatch& batch, Applier& applier, A
 absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_moves(const UpdateBatch& batch) {
   Applied result;
   moves_.run(objects_, batch);
-  RETURN_IF_ERROR(fill_ack(batch, moves_, result));
-  result.snapshot = publish_moves(batch);
+  InstanceApplier instances(*statics_, batch);
+  instances.run();
+  RETURN_IF_ERROR(fill_ack(batch, moves_, instances, result));
+  result.snapshot = publish_moves(batch, &instances);
   set_revision(result.ack);
   return result;
 }
@@ -154,12 +159,15 @@ absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_changes(const UpdateBatc
   if (applier.object_count() > max_objects_)
     return refuse_full("inserts", "objects", static_cast<double>(max_objects_),
                        static_cast<double>(applier.object_count()), 0);
-  RETURN_IF_ERROR(fill_ack(batch, applier, result));
+  InstanceApplier instances(*statics_, batch);
+  instances.run();
+  RETURN_IF_ERROR(fill_ack(batch, applier, instances, result));
   const BatchApplier::Difference difference = applier.difference();
   const bool dropped_history = drops_history(batch);
   start_tick(batch);
   replaced_bytes_ += objects_.apply(difference.removed, difference.added, difference.replaced);
-  publish_changes(batch, !difference.empty() || dropped_history, result);
+  const bool instances_change = apply_instances(instances);
+  publish_changes(batch, !difference.empty() || instances_change || dropped_history, result);
   return result;
 }
 
@@ -187,7 +195,7 @@ absl::StatusOr<SceneWriter::Joined> SceneWriter::apply_joined(absl::Span<const U
     writers_.record(batch->writer, batch->batch, ack);
   }
   moves_.finish(objects_);
-  if (any_new != nullptr) joined.snapshot = publish_moves(*any_new);
+  if (any_new != nullptr) joined.snapshot = publish_moves(*any_new, nullptr);
   for (size_t i = 0; i < batches.size(); ++i) {
     // The ack of a duplicate has epoch 0 in two cases: the duplicate repeats an earlier element of `batches`, whose
     // revision is known only now, or the writer table has dropped the ack.
@@ -211,10 +219,20 @@ void SceneWriter::flush_coalesced_moves() {
   coalesced_moves_.clear();
 }
 
-SnapshotPtr SceneWriter::publish_moves(const UpdateBatch& batch) {
+bool SceneWriter::apply_instances(InstanceApplier& instances) {
+  std::vector<Instance> changed = instances.changed();
+  if (changed.empty()) return false;
+  std::shared_ptr<const StaticSet> statics = statics_->replace(std::move(changed));
+  replaced_bytes_ += statics_->unshared_bytes(*statics);
+  statics_ = std::move(statics);
+  return true;
+}
+
+SnapshotPtr SceneWriter::publish_moves(const UpdateBatch& batch, InstanceApplier* instances) {
   Applied result;
   start_tick(batch);
-  const bool changes = apply_staged_moves();
+  bool changes = apply_staged_moves();
+  if (instances != nullptr) changes |= apply_instances(*instances);
   publish_changes(batch, changes, result);
   moves_.clear();
   return std::move(result.snapshot);

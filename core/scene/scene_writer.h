@@ -19,6 +19,7 @@
 #include "core/scene/snapshot/scene_snapshot.h"
 #include "core/scene/updates/batch_applier.h"
 #include "core/scene/updates/coalesced_moves.h"
+#include "core/scene/updates/instance_applier.h"
 #include "core/scene/updates/move_applier.h"
 #include "core/scene/updates/update_batch.h"
 #include "core/scene/updates/writer_table.h"
@@ -100,15 +101,17 @@ class SceneWriter {
   SnapshotPtr next_revision();
   // Sets the epoch, revision and tick of `ack` to the current values.
   void set_revision(UpdateAck& ack) const;
-  // Moves the counts and errors of `applier` into the ack of `result`. Returns an error if the batch is all_or_nothing
-  // and an item was refused.
+  // Moves the counts and errors of `applier`, and then those of `instances`, into the ack of `result`. Returns an error
+  // if the batch is all_or_nothing and an item was refused.
   template <class Applier>
-  static absl::Status fill_ack(const UpdateBatch& batch, Applier& applier, Applied& result);
+  static absl::Status fill_ack(const UpdateBatch& batch, Applier& applier, InstanceApplier& instances, Applied& result);
+  // Replaces the changed instances. Returns false if there are none.
+  bool apply_instances(InstanceApplier& instances);
   // Applies a batch for which MoveApplier::serves() returns true.
   absl::StatusOr<Applied> apply_moves(const UpdateBatch& batch);
-  // Applies the moves that moves_ has read, at the tick of `batch`. Returns the new snapshot, or null if nothing
-  // changed or snapshots are deferred.
-  SnapshotPtr publish_moves(const UpdateBatch& batch);
+  // Applies the moves that moves_ has read and those of `instances`, which may be null, at the tick of `batch`. Returns
+  // the new snapshot, or null if nothing changed or snapshots are deferred.
+  SnapshotPtr publish_moves(const UpdateBatch& batch, InstanceApplier* instances);
   // Returns true during a replay that builds no snapshots. A scene with history builds snapshots during replay, too,
   // because history records are made from snapshots.
   bool defer_snapshots() const { return replaying_ && !recorder_.on(); }

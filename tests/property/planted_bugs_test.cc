@@ -136,6 +136,7 @@ constexpr Trial kTrials[] = {
     {"GridWithAGhostAfterAMove", PlantedBug::kGhostAfterMove, compare_moving_grids_with_list},
     {"SceneWithAStaleSnapshot", PlantedBug::kStaleSnapshot, compare_scenes_with_model},
     {"SceneWithAGhostAfterAMove", PlantedBug::kGhostAfterMove, compare_scenes_with_model},
+    {"SceneWhoseInstancesMoveWithoutTheirBounds", PlantedBug::kStalePlacedBounds, compare_scenes_with_model},
     {"RewindThatLooksOnlyWhereObjectsWere", PlantedBug::kRewindReach, compare_rewinds_with_model},
     {"RewindThatForgetsTheWayBack", PlantedBug::kRewindFastBox, compare_rewinds_of_busy_ticks_with_model},
     {"PlacedBoundsAsWideAsFloatRounds", PlantedBug::kWidePlacedBounds, compare_conservative_answers_with_bounds},

@@ -32,6 +32,8 @@ class RandomUpdates {
     for (uint64_t i = random_.below(4); i > 0; --i) batch.inserts.push_back(draw_insert(columns, items));
     for (uint64_t i = random_.below(4); i > 0; --i) batch.moves.push_back(draw_move(columns, items));
     for (uint64_t i = random_.below(2); i > 0; --i) batch.relabels.push_back(draw_relabel(columns, items));
+    for (uint64_t i = random_.below(3); i > 1; --i) batch.instance_moves.push_back(draw_instance_move(columns, items));
+    if (random_.chance(0.1)) batch.instance_relabels.push_back(draw_relabel(columns, items));
     if (random_.chance(0.3)) number(batch);
     return batch;
   }
@@ -122,6 +124,24 @@ class RandomUpdates {
     draw_pose(columns, n, move);
     move.teleport = random_.chance(0.2);
     return move;
+  }
+
+  InstanceMoveColumns draw_instance_move(Columns& columns, size_t items) {
+    const size_t n = 1 + random_.below(items);
+    InstanceMoveColumns move;
+    move.ids = columns.ids(draw_ids(n));
+    draw_pose(columns, n, move);
+    if (random_.chance(0.4)) move.scales = columns.floats(draw_scales(random_.chance(0.3) ? 1 : n));
+    move.teleport = random_.chance(0.2);
+    return move;
+  }
+
+  std::vector<float> draw_scales(size_t count) {
+    constexpr float kBad[] = {std::numeric_limits<float>::quiet_NaN(), 0, -1, 2e12f};
+    std::vector<float> scales;
+    for (size_t i = 0; i < count; ++i)
+      scales.push_back(random_.chance(0.02) ? random_.pick(kBad) : random_.float_between(0.1, 4));
+    return scales;
   }
 
   RelabelColumns draw_relabel(Columns& columns, size_t items) {

@@ -172,6 +172,8 @@ class RecoveryLockstep {
     batch.remove_ids = batch.remove_groups = {};
     batch.inserts.clear();
     batch.relabels.clear();
+    batch.instance_moves.clear();
+    batch.instance_relabels.clear();
     for (MoveColumns& move : batch.moves) move.teleport = false;
     return batch;
   }

@@ -76,6 +76,17 @@ class SceneFixture : public ::testing::Test {
     batch.relabels.push_back(relabel);
     return batch;
   }
+  static UpdateBatch with(InstanceMoveColumns move) {
+    UpdateBatch batch;
+    batch.instance_moves.push_back(move);
+    return batch;
+  }
+  InstanceMoveColumns instances_to(std::vector<Id> ids, std::vector<double> positions) {
+    InstanceMoveColumns move;
+    move.ids = columns_.ids(std::move(ids));
+    move.positions_f64 = columns_.doubles(std::move(positions));
+    return move;
+  }
   UpdateBatch removing(std::vector<Id> ids) {
     UpdateBatch batch;
     batch.remove_ids = columns_.ids(std::move(ids));

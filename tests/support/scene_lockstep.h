@@ -92,6 +92,44 @@ class SceneLockstep {
     return "";
   }
 
+  static SceneModel::Placed state_of(const Instance& instance) {
+    SceneModel::Placed placed;
+    placed.pose.position = instance.transform.translation;
+    placed.pose.rotation = instance.transform.quaternion;
+    placed.scale = instance.transform.scale;
+    placed.layers = instance.layers;
+    placed.group = instance.group;
+    placed.tag = instance.tag;
+    return placed;
+  }
+
+  // Visitor of the tree over instances that counts the instances whose bounds overlap a box.
+  struct BoxCount {
+    Aabbd box;
+    size_t found = 0;
+
+    Aabbd bounds() const { return box; }
+    bool overlaps(const Aabbd& other) const { return locus::overlaps(box, other); }
+    bool visit(const Instance& instance) {
+      found += overlaps(instance.bounds);
+      return true;
+    }
+  };
+
+  // Compares the number of instances that the tree finds in a random box with that of the model.
+  std::string box_difference(const SceneSnapshot& snapshot, const SceneModel& model) {
+    const Vec3d center = random_.whole_vector(3) * 8;
+    BoxCount count{grown(Aabbd{center, center}, random_.between(0, 20))};
+    Work work;
+    snapshot.statics->tree().visit_region(count, work);
+    size_t expected = 0;
+    for (const auto& [id, placed] : model.instances())
+      expected += overlaps(
+          count.box,
+          bounds_to_world(make_transform(placed.pose.position, placed.pose.rotation, placed.scale), mesh_->bounds()));
+    return count.found == expected ? "" : "number of instances in a box";
+  }
+
   std::string difference(const SceneSnapshot& snapshot, const SceneModel& model) {
     std::vector<Object> in_grid;
     snapshot.objects.for_each([&](const Object& object) { in_grid.push_back(object); });
@@ -105,8 +143,11 @@ class SceneLockstep {
       if (!(in_grid[at++] == object)) return "object " + std::to_string(id) + " in the grid";
     }
     if (snapshot.statics->size() != model.instances().size()) return "number of instances";
-    for (const Id id : model.instances())
-      if (snapshot.statics->find(id) == nullptr) return "instance " + std::to_string(id);
+    for (const auto& [id, placed] : model.instances()) {
+      const Instance* const known = snapshot.statics->find(id);
+      if (known == nullptr || !(state_of(*known) == placed)) return "instance " + std::to_string(id);
+    }
+    if (std::string what = box_difference(snapshot, model); !what.empty()) return what;
     return ball_difference(snapshot, model);
   }
 

@@ -8,7 +8,6 @@
 #include <cmath>
 #include <map>
 #include <optional>
-#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -70,14 +69,26 @@ class SceneModel {
     const auto known = objects.find(id);
     return known == objects.end() ? std::nullopt : std::optional<Vec3d>(known->second.shape.position);
   }
-  const std::set<Id>& instances() const { return instances_; }
+  // State of an instance.
+  struct Placed {
+    Shape pose;  // position and rotation
+    float scale = 1;
+    Layers layers = kDefaultLayers;
+    Group group = 0;
+    Tag tag = 0;
 
-  // Removes the instance `removed` (kNoId = removes none) and places an instance with the id `placed`. Returns false
+    friend bool operator==(const Placed&, const Placed&) = default;
+  };
+  using Instances = std::map<Id, Placed>;
+  const Instances& instances() const { return instances_; }
+
+  // Removes the instance `removed` (kNoId = removes none) and places an instance with the id `placed` at the
+  // origin. Returns false
   // and changes nothing if the change is refused.
   bool change_instances(Id removed, Id placed) {
-    std::set<Id> next = instances_;
+    Instances next = instances_;
     if (removed != kNoId && next.erase(removed) == 0) return false;
-    if (placed == kNoId || objects_.contains(placed) || !next.insert(placed).second) return false;
+    if (placed == kNoId || objects_.contains(placed) || !next.try_emplace(placed).second) return false;
     instances_ = std::move(next);
     ++revision_;
     return true;
@@ -94,6 +105,8 @@ class SceneModel {
     ack_ = {};
     next_ = batch.clear ? Objects{} : objects_;
     next_lifetimes_ = lifetimes_;
+    next_instances_ = instances_;
+    next_jumps_ = false;
     apply_items(batch);
     if (batch.all_or_nothing && ack_.refused > 0) return {absl::StatusCode::kInvalidArgument, {}, ack_.errors.front()};
     commit(batch);
@@ -108,7 +121,9 @@ class SceneModel {
     std::erase_if(next_lifetimes_, [this](const auto& life) { return !next_.contains(life.first); });
     const bool forgets = batch.restart_ticks && !past_.empty();
     const bool replaced = history_ticks_ != 0 && next_lifetimes_ != lifetimes_;
-    if (tick != tick_ || next_ != objects_ || forgets || replaced) ++revision_;
+    const bool instances_change = next_instances_ != instances_ || next_jumps_;
+    if (tick != tick_ || next_ != objects_ || instances_change || forgets || replaced) ++revision_;
+    instances_ = std::move(next_instances_);
     if (history_ticks_ != 0) remember(batch, tick);
     tick_ = tick;
     objects_ = std::move(next_);
@@ -156,6 +171,12 @@ class SceneModel {
     for (size_t list = 0; list < batch.relabels.size(); ++list)
       for (size_t i = 0; i < batch.relabels[list].ids.size(); ++i)
         relabel(batch.relabels[list], i, "relabels[" + std::to_string(list) + "]");
+    for (size_t list = 0; list < batch.instance_moves.size(); ++list)
+      for (size_t i = 0; i < batch.instance_moves[list].ids.size(); ++i)
+        move_instance(batch, batch.instance_moves[list], i, "instance_moves[" + std::to_string(list) + "]");
+    for (size_t list = 0; list < batch.instance_relabels.size(); ++list)
+      for (size_t i = 0; i < batch.instance_relabels[list].ids.size(); ++i)
+        relabel_instance(batch.instance_relabels[list], i, "instance_relabels[" + std::to_string(list) + "]");
   }
 
   void count(Reason reason, const std::string& field, size_t index, Id id) {
@@ -222,8 +243,8 @@ class SceneModel {
     return {};
   }
 
-  template <class T>
-  static void read_labels(const T& columns, size_t i, Object& object) {
+  template <class T, class Labelled>
+  static void read_labels(const T& columns, size_t i, Labelled& object) {
     if (!columns.layers.empty()) object.layers = *entry(columns.layers, 1, i);
     if (!columns.groups.empty()) object.group = *entry(columns.groups, 1, i);
     if (!columns.tags.empty()) object.tag = *entry(columns.tags, 1, i);
@@ -258,6 +279,29 @@ class SceneModel {
     count(fault.second, field + fault.first, i, id);
   }
 
+  void move_instance(const UpdateBatch& batch, const InstanceMoveColumns& columns, size_t i, const std::string& field) {
+    const Id id = columns.ids[i];
+    const auto known = next_instances_.find(id);
+    if (known == next_instances_.end()) return count(Reason::kUnknownId, field + ".ids", i, id);
+    Placed placed = known->second;
+    Fault fault = read_pose(batch, columns, i, placed.pose);
+    if (fault.first.empty() && !columns.scales.empty()) {
+      placed.scale = *entry(columns.scales, 1, i);
+      if (!std::isfinite(placed.scale)) fault = {".scales", Reason::kNotFinite};
+      if (placed.scale < 1e-12f || placed.scale > 1e12f) fault = {".scales", Reason::kOutOfRange};
+    }
+    if (fault.first.empty()) known->second = placed;
+    if (fault.first.empty() && columns.teleport) next_jumps_ = true;
+    count(fault.second, field + fault.first, i, id);
+  }
+
+  void relabel_instance(const RelabelColumns& columns, size_t i, const std::string& field) {
+    const auto known = next_instances_.find(columns.ids[i]);
+    if (known == next_instances_.end()) return count(Reason::kUnknownId, field + ".ids", i, columns.ids[i]);
+    read_labels(columns, i, known->second);
+    count(Reason::kUnspecified, field, i, columns.ids[i]);
+  }
+
   void relabel(const RelabelColumns& columns, size_t i, const std::string& field) {
     const auto known = next_.find(columns.ids[i]);
     if (known == next_.end()) return count(Reason::kUnknownId, field + ".ids", i, columns.ids[i]);
@@ -277,7 +321,8 @@ class SceneModel {
   std::map<uint64_t, Then> past_;  // recorded states, by tick
   Lifetimes lifetimes_, next_lifetimes_;
   uint64_t last_life_ = 0;
-  std::set<Id> instances_;
+  Instances instances_, next_instances_;
+  bool next_jumps_ = false;  // an instance teleports
   Objects objects_;
   Objects next_;
   UpdateAck ack_;

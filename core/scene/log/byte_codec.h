@@ -177,6 +177,7 @@ class AlignedBytes {
 // Kind of a record or chunk. Every record and chunk begins with its kind and kBytesVersion.
 enum class BytesKind : uint32_t {
   kBatch = 0x4842'534c,
+  kInstanceBatch = 0x4942'534c,  // a batch that changes instances
   kJoinedBatches = 0x4a42'534c,
   kStaticChange = 0x4353'534c,  // data format 1: identifies meshes by content hash; decoded, but never written
   kNamedChange = 0x434e'534c,

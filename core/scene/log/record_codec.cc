@@ -90,6 +90,14 @@ MoveColumns read_move(ByteReader& reader) {
   return move;
 }
 
+InstanceMoveColumns read_instance_move(ByteReader& reader) {
+  InstanceMoveColumns move;
+  move.teleport = reader.number_upto(1, "whether moves of instances teleport") != 0;
+  read_pose(reader, move);
+  move.scales = reader.column<float>("scales");
+  return move;
+}
+
 RelabelColumns read_relabel(ByteReader& reader) {
   RelabelColumns relabel;
   relabel.ids = reader.column<uint64_t>("ids");
@@ -104,7 +112,27 @@ void read_lists(ByteReader& reader, const char* what, std::vector<Columns>& list
   for (uint64_t i = 0; i < count && reader.good(); ++i) lists.push_back(read(reader));
 }
 
-// Appends `batch` to `writer`. Precondition: `batch` has passed check_form(). O(bytes): copies each column.
+void write_relabels(const std::vector<RelabelColumns>& relabels, ByteWriter& writer) {
+  writer.number(uint64_t{relabels.size()});
+  for (const RelabelColumns& relabel : relabels) {
+    writer.column(relabel.ids);
+    write_labels(relabel, writer);
+  }
+}
+
+// Appends the changes of instances of `batch`, which follow the other changes.
+void write_instance_changes(const UpdateBatch& batch, ByteWriter& writer) {
+  writer.number(uint64_t{batch.instance_moves.size()});
+  for (const InstanceMoveColumns& move : batch.instance_moves) {
+    writer.number(uint64_t{move.teleport});
+    write_pose(move, writer);
+    writer.column(move.scales);
+  }
+  write_relabels(batch.instance_relabels, writer);
+}
+
+// Appends `batch` to `writer`, except its changes of instances. Precondition: `batch` has passed check_form().
+// O(bytes): copies each column.
 void write_batch(const UpdateBatch& batch, ByteWriter& writer) {
   writer.number(uint64_t{flags_of(batch)});
   for (int axis = 0; axis < 3; ++axis) writer.number(batch.frame[axis]);
@@ -120,16 +148,14 @@ void write_batch(const UpdateBatch& batch, ByteWriter& writer) {
     writer.number(uint64_t{move.teleport});
     write_pose(move, writer);
   }
-  writer.number(uint64_t{batch.relabels.size()});
-  for (const RelabelColumns& relabel : batch.relabels) {
-    writer.column(relabel.ids);
-    write_labels(relabel, writer);
-  }
+  write_relabels(batch.relabels, writer);
 }
+
+enum class InstanceChanges { kNone, kFollow };
 
 // Reads a batch whose columns borrow from the bytes of `reader`. If the batch does not pass check_form(), sets the
 // error of `reader`.
-UpdateBatch read_batch(ByteReader& reader) {
+UpdateBatch read_batch(ByteReader& reader, InstanceChanges instances = InstanceChanges::kNone) {
   UpdateBatch batch;
   const auto flags = static_cast<uint32_t>(reader.number_upto(kAllFlags, "the flags of a batch"));
   batch.clear = (flags & kClear) != 0;
@@ -146,6 +172,10 @@ UpdateBatch read_batch(ByteReader& reader) {
   read_lists(reader, "the number of inserts", batch.inserts, read_insert);
   read_lists(reader, "the number of moves", batch.moves, read_move);
   read_lists(reader, "the number of relabels", batch.relabels, read_relabel);
+  if (instances == InstanceChanges::kFollow) {
+    read_lists(reader, "the number of moves of instances", batch.instance_moves, read_instance_move);
+    read_lists(reader, "the number of relabels of instances", batch.instance_relabels, read_relabel);
+  }
   if (!reader.good()) return {};
   if (const absl::Status form = check_form(batch); !form.ok())
     reader.fail("a batch", absl::StrCat("is of wrong form: ", form.message()));
@@ -212,8 +242,9 @@ Record::Change read_change(ByteReader& reader, BytesKind kind) {
 
 void encode_batch(const UpdateBatch& batch, std::string& to) {
   ByteWriter writer(to);
-  write_kind(writer, BytesKind::kBatch);
+  write_kind(writer, has_instances(batch) ? BytesKind::kInstanceBatch : BytesKind::kBatch);
   write_batch(batch, writer);
+  if (has_instances(batch)) write_instance_changes(batch, writer);
 }
 
 void encode_joined(absl::Span<const UpdateBatch* const> batches, std::string& to) {
@@ -244,6 +275,8 @@ absl::StatusOr<Record> Record::decode(absl::string_view bytes) {
   const BytesKind kind = read_kind(reader);
   if (kind == BytesKind::kBatch) {
     record.content_ = read_batch(reader);
+  } else if (kind == BytesKind::kInstanceBatch) {
+    record.content_ = read_batch(reader, InstanceChanges::kFollow);
   } else if (kind == BytesKind::kJoinedBatches) {
     record.content_ = read_joined(reader);
   } else if (kind == BytesKind::kStaticChange || kind == BytesKind::kNamedChange) {

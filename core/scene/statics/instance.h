@@ -2,9 +2,12 @@
 #ifndef LOCUS_CORE_SCENE_STATICS_INSTANCE_H_
 #define LOCUS_CORE_SCENE_STATICS_INSTANCE_H_
 
+#include <atomic>
 #include <memory>
 
 #include "core/base/ids.h"
+#include "core/base/limits.h"
+#include "core/base/planted_bug.h"
 #include "core/geometry/primitive_traits.h"
 #include "core/geometry/transform.h"
 #include "core/scene/statics/static_mesh.h"
@@ -31,6 +34,33 @@ struct PrimitiveTraits<Instance> {
   static Aabbd bounds(const Instance& instance) { return instance.bounds; }
   static Vec3d position(const Instance& instance) { return instance.transform.translation; }
 };
+
+// Maximum absolute coordinate of the bounds of a placed mesh. Higher than the limit of positions, because a mesh may
+// extend beyond the position of its instance.
+inline constexpr double kMaxPlacedBound = 2 * limits::kMaxCoordinate;
+
+// Sets the transform and the bounds of an instance, whose mesh is set. Returns false, and changes nothing, if the
+// bounds would exceed kMaxPlacedBound.
+inline bool place_at(const Transform& transform, Instance& instance) {
+  const Aabbd bounds = bounds_to_world(transform, instance.mesh->bounds());
+  if (magnitude(bounds) > kMaxPlacedBound) return false;
+  instance.transform = transform;
+  if (!planted(PlantedBug::kStalePlacedBounds) || instance.life == 0) instance.bounds = bounds;
+  return true;
+}
+
+// Returns true if two states of an instance are the same, including the life.
+inline bool is_same(const Instance& a, const Instance& b) {
+  return a.life == b.life && a.group == b.group && a.tag == b.tag && a.layers == b.layers &&
+         a.transform.translation == b.transform.translation && a.transform.quaternion == b.transform.quaternion &&
+         a.transform.scale == b.transform.scale;
+}
+
+// Returns another number for Instance::life at each call, never 0.
+inline uint64_t new_life() {
+  static std::atomic<uint64_t> last{0};
+  return last.fetch_add(1, std::memory_order_relaxed) + 1;
+}
 
 }  // namespace locus
 

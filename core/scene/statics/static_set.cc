@@ -1,7 +1,6 @@
 #include "core/scene/statics/static_set.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <utility>
 
@@ -16,10 +15,6 @@
 
 namespace locus {
 namespace {
-
-// Maximum absolute coordinate of the bounds of a placed mesh. Higher than the limit of positions, because a mesh may
-// extend beyond the position of its instance.
-constexpr double kMaxPlacedBound = 2 * limits::kMaxCoordinate;
 
 absl::Status check_columns(const PlacementColumns& place, const std::string& field) {
   const size_t n = place.count();
@@ -68,12 +63,10 @@ absl::StatusOr<Instance> read_instance(const PlacementColumns& place, uint32_t i
   ASSIGN_OR_RETURN(Transform transform, read_transform(place, i, field));
   Instance instance;
   instance.mesh = place.mesh;
-  instance.transform = transform;
-  instance.bounds = bounds_to_world(transform, place.mesh->bounds());
   instance.layers = ColumnReader<uint32_t>(place.layers, 1).value(i, kDefaultLayers);
   instance.group = ColumnReader<uint64_t>(place.groups, 1).value(i, 0);
   instance.tag = ColumnReader<uint64_t>(place.tags, 1).value(i, 0);
-  if (magnitude(instance.bounds) > kMaxPlacedBound)
+  if (!place_at(transform, instance))
     return refuse_argument(Reason::kOutOfRange, field + ".scales", i, "the placed mesh must lie within +-2e9");
   return instance;
 }
@@ -90,12 +83,6 @@ uint64_t bytes_of_meshes(const absl::flat_hash_map<const StaticMesh*, uint32_t>&
   for (const auto& [mesh, count] : uses)
     bytes += mesh->bytes() - (contents.insert(mesh->sha256()).second ? 0 : mesh->shared_bytes());
   return bytes;
-}
-
-// Returns another number at each call, never 0.
-uint64_t new_life() {
-  static std::atomic<uint64_t> last{0};
-  return last.fetch_add(1, std::memory_order_relaxed) + 1;
 }
 
 // Ids of the instances of a set that is being changed. Checks the ids of placements, or chooses ids for them.
@@ -282,6 +269,25 @@ std::shared_ptr<const StaticSet> StaticSet::replace(std::vector<Instance> change
   set->uses_ = uses_;
   LOCUS_DCHECK_CALL(set->check_invariants());
   return set;
+}
+
+bool StaticSet::regrouped_since(const StaticSet& base) const {
+  bool regrouped = false;
+  tree_.for_each_apart_from(base.tree_, [&](const Instance& instance) {
+    regrouped = regrouped || base.find(instance.id)->group != instance.group;
+  });
+  return regrouped;
+}
+
+std::shared_ptr<const StaticSet> StaticSet::with_updates(const StaticSet& base, const StaticSet& updated) const {
+  std::vector<Instance> changed;
+  updated.tree_.for_each_apart_from(base.tree_, [&](const Instance& instance) {
+    const Instance* const before = base.find(instance.id);
+    const Instance* const now = find(instance.id);
+    LOCUS_DCHECK(before != nullptr);
+    if (now != nullptr && now->life == before->life && !is_same(instance, *before)) changed.push_back(instance);
+  });
+  return replace(std::move(changed));
 }
 
 absl::Status StaticSet::check_placements(absl::Span<const PlacementColumns> place) {

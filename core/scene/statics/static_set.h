@@ -66,6 +66,12 @@ class StaticSet {
   // Preconditions: the set has these ids, which are distinct; moved() has made the transforms and bounds. Cost: that of
   // Bvh::change().
   std::shared_ptr<const StaticSet> replace(std::vector<Instance> changed) const;
+  // Returns true if an instance of this set has another group than in `base`. Precondition: update batches alone made
+  // this set from `base`, so that both have the same instances.
+  bool regrouped_since(const StaticSet& base) const;
+  // Returns this set, which a static change made from `base`, with the changes that update batches made meanwhile, from
+  // `base` to `updated`. Changes of instances that this set does not have are dropped.
+  std::shared_ptr<const StaticSet> with_updates(const StaticSet& base, const StaticSet& updated) const;
   // Returns the least id from kFirstChosenId on that is above the ids of all instances below kEndOfChosenIds.
   // O(instances).
   Id first_id_above() const;

@@ -30,6 +30,12 @@ class ElementCheck {
 
   absl::Status run(const RelabelColumns& relabel) const { return check_labels(relabel); }
 
+  absl::Status run(const InstanceMoveColumns& move) const {
+    RETURN_IF_ERROR(check_positions(move.positions, move.positions_f64));
+    RETURN_IF_ERROR(check_length(move.rotations.size(), 4, ColumnNeed::kOptional, "rotations"));
+    return check_length(move.scales.size(), 1, ColumnNeed::kOptional, "scales");
+  }
+
  private:
   absl::Status check_length(size_t values, size_t width, ColumnNeed need, absl::string_view column) const {
     return check_column(values, width, items_, need, {list_, index_, column});
@@ -82,6 +88,8 @@ size_t item_count(const UpdateBatch& batch) {
   for (const InsertColumns& insert : batch.inserts) items += insert.ids.size();
   for (const MoveColumns& move : batch.moves) items += move.ids.size();
   for (const RelabelColumns& relabel : batch.relabels) items += relabel.ids.size();
+  for (const InstanceMoveColumns& move : batch.instance_moves) items += move.ids.size();
+  for (const RelabelColumns& relabel : batch.instance_relabels) items += relabel.ids.size();
   return items;
 }
 
@@ -102,6 +110,7 @@ bool only_moves(const UpdateBatch& batch) {
   if (batch.clear || batch.restart_ticks || batch.all_or_nothing || batch.moves.empty()) return false;
   if (!batch.remove_ids.empty() || !batch.remove_groups.empty() || !batch.inserts.empty() || !batch.relabels.empty())
     return false;
+  if (has_instances(batch)) return false;
   return std::none_of(batch.moves.begin(), batch.moves.end(), [](const MoveColumns& move) { return move.teleport; });
 }
 
@@ -115,7 +124,9 @@ absl::Status check_form(const UpdateBatch& batch) {
   RETURN_IF_ERROR(check_header(batch));
   RETURN_IF_ERROR(check_list("inserts", batch.inserts));
   RETURN_IF_ERROR(check_list("moves", batch.moves));
-  return check_list("relabels", batch.relabels);
+  RETURN_IF_ERROR(check_list("relabels", batch.relabels));
+  RETURN_IF_ERROR(check_list("instance_moves", batch.instance_moves));
+  return check_list("instance_relabels", batch.instance_relabels);
 }
 
 }  // namespace locus

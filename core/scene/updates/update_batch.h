@@ -1,6 +1,6 @@
 // Update batch as borrowed columns, and its acknowledgement. Plain data; the columns outlive the call that applies the
-// batch. A batch is applied in the order clear, removes, inserts, moves, relabels; all these changes become one
-// revision.
+// batch. A batch is applied in the order clear, removes, inserts, moves, relabels, instance moves, instance relabels;
+// all these changes become one revision.
 #ifndef LOCUS_CORE_SCENE_UPDATES_UPDATE_BATCH_H_
 #define LOCUS_CORE_SCENE_UPDATES_UPDATE_BATCH_H_
 
@@ -45,6 +45,16 @@ struct RelabelColumns {
   absl::Span<const uint64_t> tags;
 };
 
+// Columns of instances to move. Like MoveColumns; a position is the translation of the instance.
+struct InstanceMoveColumns {
+  absl::Span<const uint64_t> ids;
+  absl::Span<const float> positions;
+  absl::Span<const double> positions_f64;
+  absl::Span<const float> rotations;  // if empty, the rotations do not change
+  absl::Span<const float> scales;     // > 0; if empty, the scales do not change
+  bool teleport = false;
+};
+
 struct UpdateBatch {
   Vec3d frame;
   std::optional<uint64_t> tick;  // tick of the batch; nullopt: the scene's current tick
@@ -54,6 +64,8 @@ struct UpdateBatch {
   std::vector<InsertColumns> inserts;
   std::vector<MoveColumns> moves;
   std::vector<RelabelColumns> relabels;
+  std::vector<InstanceMoveColumns> instance_moves;
+  std::vector<RelabelColumns> instance_relabels;
   bool upsert = false;
   bool all_or_nothing = false;
   bool restart_ticks = false;
@@ -82,6 +94,11 @@ struct UpdateAck {
 // objects, without teleport, all_or_nothing or restart_ticks. If both batches move an object, the second batch
 // determines the result.
 bool may_join(const UpdateBatch& first, const UpdateBatch& second);
+
+// Returns true if the batch changes instances.
+inline bool has_instances(const UpdateBatch& batch) {
+  return !batch.instance_moves.empty() || !batch.instance_relabels.empty();
+}
 
 // Checks the form of a batch: column lengths, frame, writer and limits. Returns INVALID_ARGUMENT, naming the invalid
 // field, if the form is wrong.

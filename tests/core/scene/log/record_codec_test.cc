@@ -47,6 +47,10 @@ bool same_insert(const InsertColumns& a, const InsertColumns& b) {
 bool same_move(const MoveColumns& a, const MoveColumns& b) { return a.teleport == b.teleport && same_pose(a, b); }
 bool same_relabel(const RelabelColumns& a, const RelabelColumns& b) { return same(a.ids, b.ids) && same_labels(a, b); }
 
+bool same_instance_move(const InstanceMoveColumns& a, const InstanceMoveColumns& b) {
+  return a.teleport == b.teleport && same_pose(a, b) && same(a.scales, b.scales);
+}
+
 template <class List, class Same>
 bool all_same(const List& a, const List& b, const Same& is_same) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), is_same);
@@ -58,8 +62,10 @@ bool same_batch(const UpdateBatch& a, const UpdateBatch& b) {
   return a.frame == b.frame && a.tick == b.tick && a.clear == b.clear && same(a.remove_ids, b.remove_ids) &&
          same(a.remove_groups, b.remove_groups) && all_same(a.inserts, b.inserts, same_insert) &&
          all_same(a.moves, b.moves, same_move) && all_same(a.relabels, b.relabels, same_relabel) &&
-         a.upsert == b.upsert && a.all_or_nothing == b.all_or_nothing && a.restart_ticks == b.restart_ticks &&
-         a.writer == b.writer && a.batch == b.batch;
+         all_same(a.instance_moves, b.instance_moves, same_instance_move) &&
+         all_same(a.instance_relabels, b.instance_relabels, same_relabel) && a.upsert == b.upsert &&
+         a.all_or_nothing == b.all_or_nothing && a.restart_ticks == b.restart_ticks && a.writer == b.writer &&
+         a.batch == b.batch;
 }
 
 class RecordCodecTest : public SceneFixture {};
@@ -76,6 +82,14 @@ TEST_F(RecordCodecTest, RandomBatchesRoundTrip) {
     ASSERT_TRUE(record.ok()) << record.status();
     ASSERT_TRUE(same_batch(batch, std::get<UpdateBatch>(record->content()))) << i;
   }
+}
+
+TEST_F(RecordCodecTest, OnlyABatchThatChangesInstancesHasTheNewKind) {
+  EXPECT_EQ(encoded(with(move_to({1}, {1, 2, 3}))).substr(0, 4), "LSBH");
+  EXPECT_EQ(encoded(with(instances_to({1}, {1, 2, 3}))).substr(0, 4), "LSBI");
+  UpdateBatch hide;
+  hide.instance_relabels.emplace_back().ids = columns_.ids({1});
+  EXPECT_EQ(encoded(hide).substr(0, 4), "LSBI");
 }
 
 TEST_F(RecordCodecTest, ColumnsAreSpansOfTheBytesThemselves) {
