@@ -15,7 +15,8 @@ void append_position(Message& message, const Position& position) {
                 {static_cast<float>(value.x), static_cast<float>(value.y), static_cast<float>(value.z)});
 }
 
-bool continues(const v1::Move& last, bool absolute, bool rotated, MoveKind kind) {
+template <class Move>
+bool continues(const Move& last, bool absolute, bool rotated, MoveKind kind) {
   return (last.positions_f64_size() > 0) == absolute && (last.rotations_size() > 0) == rotated &&
          last.teleport() == (kind == MoveKind::kTeleport);
 }
@@ -23,6 +24,16 @@ bool continues(const v1::Move& last, bool absolute, bool rotated, MoveKind kind)
 bool continues(const v1::Relabel& last, const Relabeling& labels) {
   return (last.layers_size() > 0) == labels.layers.has_value() &&
          (last.groups_size() > 0) == labels.group.has_value() && (last.tags_size() > 0) == labels.tag.has_value();
+}
+
+// Appends a row to the last message of `relabels`, or to a new message if the last one sets other kinds of labels.
+void append_relabel(google::protobuf::RepeatedPtrField<v1::Relabel>& relabels, uint64_t id, const Relabeling& labels) {
+  const bool same = !relabels.empty() && continues(relabels[relabels.size() - 1], labels);
+  v1::Relabel& relabel = same ? relabels[relabels.size() - 1] : *relabels.Add();
+  relabel.add_ids(id);
+  if (labels.layers) relabel.add_layers(*labels.layers);
+  if (labels.group) relabel.add_groups(*labels.group);
+  if (labels.tag) relabel.add_tags(*labels.tag);
 }
 
 }  // namespace
@@ -179,19 +190,50 @@ UpdateBuilder& UpdateBuilder::moves(const MoveColumns& columns, MoveKind kind) {
 }
 
 UpdateBuilder& UpdateBuilder::relabel(uint64_t id, const Relabeling& labels) {
-  const int entries = batch_.relabels_size();
-  const bool same = entries > 0 && continues(batch_.relabels(entries - 1), labels);
-  v1::Relabel& relabel = same ? *batch_.mutable_relabels(entries - 1) : *batch_.add_relabels();
-  relabel.add_ids(id);
-  if (labels.layers) relabel.add_layers(*labels.layers);
-  if (labels.group) relabel.add_groups(*labels.group);
-  if (labels.tag) relabel.add_tags(*labels.tag);
+  append_relabel(*batch_.mutable_relabels(), id, labels);
+  return *this;
+}
+
+UpdateBuilder& UpdateBuilder::move_instance(uint64_t id, const Position& position,
+                                            const std::optional<Rotation>& rotation, std::optional<float> scale,
+                                            MoveKind kind) {
+  const int entries = batch_.instance_moves_size();
+  const auto takes_row = [&](const v1::InstanceMove& last) {
+    return continues(last, position.absolute, rotation.has_value(), kind) &&
+           (last.scales_size() > 0) == scale.has_value();
+  };
+  const bool same = instance_move_takes_rows_ && takes_row(batch_.instance_moves(entries - 1));
+  v1::InstanceMove& move = same ? *batch_.mutable_instance_moves(entries - 1) : *batch_.add_instance_moves();
+  move.add_ids(id);
+  append_position(move, position);
+  if (rotation) append_rotation(*move.mutable_rotations(), *rotation);
+  if (scale) move.add_scales(*scale);
+  move.set_teleport(kind == MoveKind::kTeleport);
+  instance_move_takes_rows_ = true;
+  return *this;
+}
+
+UpdateBuilder& UpdateBuilder::move_instances(const InstanceMoveColumns& columns, MoveKind kind) {
+  v1::InstanceMove& move = *batch_.add_instance_moves();
+  assign(*move.mutable_ids(), columns.ids);
+  assign(*move.mutable_positions(), columns.positions);
+  assign(*move.mutable_positions_f64(), columns.positions_f64);
+  assign(*move.mutable_rotations(), columns.rotations);
+  assign(*move.mutable_scales(), columns.scales);
+  move.set_teleport(kind == MoveKind::kTeleport);
+  instance_move_takes_rows_ = false;
+  return *this;
+}
+
+UpdateBuilder& UpdateBuilder::relabel_instance(uint64_t id, const Relabeling& labels) {
+  append_relabel(*batch_.mutable_instance_relabels(), id, labels);
   return *this;
 }
 
 v1::UpdateBatch UpdateBuilder::build() {
   row_inserts_.fill(-1);
   move_takes_rows_ = false;
+  instance_move_takes_rows_ = false;
   return std::exchange(batch_, v1::UpdateBatch());
 }
 

@@ -6,7 +6,7 @@
 // order in which they were added. Moves always stay in the order in which they were added, since the later of two moves
 // of one object wins. Therefore a move begins a new Move message if its MoveKind or its columns (with or without
 // rotation, relative or absolute position) differ from those of the previous move. A relabel begins a new Relabel
-// message if it sets other kinds of labels than the previous relabel.
+// message if it sets other kinds of labels than the previous relabel. Moves and relabels of instances do the same.
 #ifndef LOCUS_CLIENT_LIB_UPDATE_BUILDER_H_
 #define LOCUS_CLIENT_LIB_UPDATE_BUILDER_H_
 
@@ -39,7 +39,15 @@ struct MoveColumns {
   absl::Span<const float> rotations = {};       // 4N; none = rotations do not change
 };
 
-// New labels of one object. Labels without a value do not change.
+struct InstanceMoveColumns {
+  absl::Span<const uint64_t> ids;
+  absl::Span<const float> positions = {};       // 3N, relative to the frame
+  absl::Span<const double> positions_f64 = {};  // 3N, absolute
+  absl::Span<const float> rotations = {};       // 4N; none = rotations do not change
+  absl::Span<const float> scales = {};          // none = scales do not change
+};
+
+// New labels of one object or instance. Labels without a value do not change.
 struct Relabeling {
   std::optional<uint32_t> layers = std::nullopt;
   std::optional<uint64_t> group = std::nullopt;
@@ -90,6 +98,15 @@ class UpdateBuilder {
 
   UpdateBuilder& relabel(uint64_t id, const Relabeling& labels);
 
+  // Move one instance, or whole columns, which are copied unchanged. A position is that of the origin of the mesh.
+  // Instances without a given rotation or scale keep theirs.
+  UpdateBuilder& move_instance(uint64_t id, const Position& position,
+                               const std::optional<Rotation>& rotation = std::nullopt,
+                               std::optional<float> scale = std::nullopt, MoveKind kind = MoveKind::kContinuous);
+  UpdateBuilder& move_instances(const InstanceMoveColumns& columns, MoveKind kind = MoveKind::kContinuous);
+  // Sets labels of one instance. Layers 0 hide the instance, and other layers show it again.
+  UpdateBuilder& relabel_instance(uint64_t id, const Relabeling& labels);
+
   // Returns the batch, and leaves the builder empty with every setting at its default.
   v1::UpdateBatch build();
 
@@ -100,7 +117,8 @@ class UpdateBuilder {
   v1::Insert& add_columns(const InsertColumns& columns);
 
   v1::UpdateBatch batch_;
-  bool move_takes_rows_ = false;  // move() may append rows to the last entry of batch_.moves
+  bool move_takes_rows_ = false;           // move() may append rows to the last entry of batch_.moves
+  bool instance_move_takes_rows_ = false;  // the same for move_instance() and batch_.instance_moves
   // Two indices into batch_.inserts for each form of an object: the first is the entry that collects rows with relative
   // positions, the second is the entry that collects rows with absolute positions; -1 = no such entry yet.
   std::array<int, 8> row_inserts_ = {-1, -1, -1, -1, -1, -1, -1, -1};

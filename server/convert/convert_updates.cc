@@ -71,6 +71,18 @@ absl::StatusOr<MoveColumns> to_move(const v1::Move& move, const std::string& fie
   return columns;
 }
 
+absl::StatusOr<InstanceMoveColumns> to_instance_move(const v1::InstanceMove& move, const std::string& field) {
+  RETURN_IF_ERROR(check_positions(move, field));
+  InstanceMoveColumns columns;
+  columns.ids = span_of(move.ids());
+  columns.positions = span_of(move.positions());
+  columns.positions_f64 = span_of(move.positions_f64());
+  columns.rotations = span_of(move.rotations());
+  columns.scales = span_of(move.scales());
+  columns.teleport = move.teleport();
+  return columns;
+}
+
 RelabelColumns to_relabel(const v1::Relabel& relabel) {
   RelabelColumns columns;
   columns.ids = span_of(relabel.ids());
@@ -81,7 +93,8 @@ RelabelColumns to_relabel(const v1::Relabel& relabel) {
 }
 
 absl::Status check_batch_form(const v1::UpdateBatch& batch) {
-  const int64_t lists = int64_t{batch.inserts_size()} + batch.moves_size() + batch.relabels_size();
+  const int64_t lists = int64_t{batch.inserts_size()} + batch.moves_size() + batch.relabels_size() +
+                        batch.instance_moves_size() + batch.instance_relabels_size();
   if (lists > limits::kMaxUpdateLists)
     return refuse_limit("", "update_lists", limits::kMaxUpdateLists, static_cast<double>(lists));
   if (batch.writer() == 0 && batch.batch() != 0)
@@ -110,6 +123,12 @@ absl::StatusOr<UpdateBatch> to_updates(const v1::UpdateBatch& batch) {
     out.moves.push_back(move);
   }
   for (const v1::Relabel& relabel : batch.relabels()) out.relabels.push_back(to_relabel(relabel));
+  for (int i = 0; i < batch.instance_moves_size(); ++i) {
+    const std::string field = absl::StrCat("instance_moves[", i, "]");
+    ASSIGN_OR_RETURN(InstanceMoveColumns move, to_instance_move(batch.instance_moves(i), field));
+    out.instance_moves.push_back(move);
+  }
+  for (const v1::Relabel& relabel : batch.instance_relabels()) out.instance_relabels.push_back(to_relabel(relabel));
   out.upsert = batch.upsert();
   out.all_or_nothing = batch.all_or_nothing();
   out.restart_ticks = batch.restart_ticks();

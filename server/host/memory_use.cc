@@ -29,6 +29,8 @@ uint64_t changed_count(const UpdateBatch& batch) {
   uint64_t items = 0;
   for (const MoveColumns& move : batch.moves) items += move.ids.size();
   for (const RelabelColumns& relabel : batch.relabels) items += relabel.ids.size();
+  for (const InstanceMoveColumns& move : batch.instance_moves) items += move.ids.size();
+  for (const RelabelColumns& relabel : batch.instance_relabels) items += relabel.ids.size();
   return items;
 }
 

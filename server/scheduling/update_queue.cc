@@ -32,11 +32,14 @@ uint64_t items_of(const UpdateBatch& batch) {
   for (const InsertColumns& insert : batch.inserts) items += insert.ids.size();
   for (const MoveColumns& move : batch.moves) items += move.ids.size();
   for (const RelabelColumns& relabel : batch.relabels) items += relabel.ids.size();
+  for (const InstanceMoveColumns& move : batch.instance_moves) items += move.ids.size();
+  for (const RelabelColumns& relabel : batch.instance_relabels) items += relabel.ids.size();
   return items;
 }
 
 uint64_t lists_of(const UpdateBatch& batch) {
-  return batch.inserts.size() + batch.moves.size() + batch.relabels.size();
+  return batch.inserts.size() + batch.moves.size() + batch.relabels.size() + batch.instance_moves.size() +
+         batch.instance_relabels.size();
 }
 
 bool coalesces(const Scene& scene) { return scene.spec().overload == OverloadPolicy::kLatestWins; }

@@ -9,8 +9,10 @@
 #include "client/cli/commands/dump_command.h"
 #include "client/cli/default_scene.h"
 #include "client/cli/failure.h"
+#include "client/cli/rows/update_report.h"
 #include "client/lib/client.h"
 #include "client/lib/status.h"
+#include "client/lib/update_builder.h"
 #include "core/base/status_macros.h"
 
 namespace locus::cli {
@@ -37,6 +39,23 @@ struct RemoveOptions {
   std::string scene;
   std::vector<Number64> ids;
   std::vector<Number64> groups;
+};
+
+struct InstanceMoveOptions {
+  std::string scene;
+  std::vector<Number64> ids;
+  std::vector<Triple> to;
+  std::vector<Quaternion> rotations;
+  std::vector<double> scales;
+  std::optional<uint64_t> tick;
+  bool teleport = false;
+};
+
+struct InstanceRelabelOptions {
+  std::string scene;
+  std::vector<Number64> ids;
+  std::optional<Number64> layers, group, tag;
+  std::optional<uint64_t> tick;
 };
 
 template <class Values, class Column>
@@ -102,6 +121,29 @@ absl::Status remove_instances(const RemoveOptions& options, Context& context) {
   return absl::OkStatus();
 }
 
+absl::Status move_instances(const InstanceMoveOptions& options, Context& context) {
+  const std::vector<uint64_t> ids = values_of(options.ids);
+  const std::vector<double> positions = doubles_of(options.to);
+  const std::vector<float> rotations = floats_of(options.rotations), scales = floats_of(options.scales);
+  client::UpdateBuilder builder;
+  if (options.tick) builder.tick(*options.tick);
+  builder.move_instances({.ids = ids, .positions_f64 = positions, .rotations = rotations, .scales = scales},
+                         options.teleport ? client::MoveKind::kTeleport : client::MoveKind::kContinuous);
+  return apply_and_report(options.scene, builder.build(), context);
+}
+
+absl::Status relabel_instances(const InstanceRelabelOptions& options, Context& context) {
+  if (!options.layers && !options.group && !options.tag) return usage_error("give --layers, --group or --tag");
+  client::Relabeling labels;
+  if (options.layers) labels.layers = static_cast<uint32_t>(options.layers->value);
+  if (options.group) labels.group = options.group->value;
+  if (options.tag) labels.tag = options.tag->value;
+  client::UpdateBuilder builder;
+  if (options.tick) builder.tick(*options.tick);
+  for (const uint64_t id : values_of(options.ids)) builder.relabel_instance(id, labels);
+  return apply_and_report(options.scene, builder.build(), context);
+}
+
 void add_place(CLI::App& parent, Context& context) {
   const auto options = std::make_shared<PlaceOptions>();
   CLI::App& command = *parent.add_subcommand("place", "Place an uploaded mesh, once or more, as one change");
@@ -133,6 +175,43 @@ void add_list(CLI::App& parent, Context& context) {
   run_when_chosen(command, options, context, list_instances);
 }
 
+void add_instance_move(CLI::App& parent, Context& context) {
+  const auto options = std::make_shared<InstanceMoveOptions>();
+  CLI::App& command = *parent.add_subcommand("move", "Move instances, such as doors, as one update");
+  command.footer(R"(Examples:
+  locus instance move arena --id 7 --to 10,0,0 --rotation 0,0,0,1
+  locus instance move arena --id 7 --to 1,2,4 --id 8 --to 0,0,1 --tick 120
+
+Except --id, an option given once stands for all instances.)");
+  add_scene_argument(command, options->scene);
+  add_repeatable(command, "--id", options->ids, "ID", "An instance; repeat --id and --to for more")->required();
+  add_repeatable(command, "--to", options->to, "X,Y,Z", "Where its origin goes")->required();
+  add_repeatable(command, "--rotation", options->rotations, "X,Y,Z,W", "Its new rotation [kept]");
+  add_repeatable(command, "--scale", options->scales, "S", "Its new size, as a multiple of the mesh's [kept]");
+  command.add_option("--tick", options->tick, "The time step [the scene's]")->type_name("TICK");
+  command.add_flag("--teleport", options->teleport, "It jumped: queries about the past do not interpolate this move");
+  run_or_check_when_chosen(command, options, context, move_instances);
+}
+
+void add_instance_relabel(CLI::App& parent, Context& context) {
+  const auto options = std::make_shared<InstanceRelabelOptions>();
+  CLI::App& command = *parent.add_subcommand("relabel", "Hide and show instances, or set their group and tag");
+  command.footer(R"(Examples:
+  locus instance relabel arena --id 7 --layers 0
+  locus instance relabel arena --id 7 --id 8 --layers 1 --tag 5
+
+Layers 0 hide an instance from every query but lookups; other layers show it again.)");
+  add_scene_argument(command, options->scene);
+  add_repeatable(command, "--id", options->ids, "ID", "An instance; repeat for more")->required();
+  command.add_option("--layers", options->layers, "Layer bits; 0 hides it [kept]")
+      ->type_name("BITS")
+      ->check(fits_32_bits());
+  command.add_option("--group", options->group, "Its group, 0: none [kept]")->type_name("GROUP");
+  command.add_option("--tag", options->tag, "Any number of your own [kept]")->type_name("TAG");
+  command.add_option("--tick", options->tick, "The time step [the scene's]")->type_name("TICK");
+  run_or_check_when_chosen(command, options, context, relabel_instances);
+}
+
 void add_remove(CLI::App& parent, Context& context) {
   const auto options = std::make_shared<RemoveOptions>();
   CLI::App& command = *parent.add_subcommand("remove", "Remove instances as one change; their meshes stay");
@@ -149,14 +228,17 @@ void add_remove(CLI::App& parent, Context& context) {
 }  // namespace
 
 void add_instance_command(CLI::App& parent, Context& context) {
-  CLI::App& command = *parent.add_subcommand("instance", "Place, list and remove instances of meshes");
+  CLI::App& command = *parent.add_subcommand("instance", "Place, list, move and remove instances of meshes");
   command.footer(R"(Examples:
   locus instance place arena --mesh city-5000-1 --at 0,0,0
   locus instance list arena
+  locus instance move arena --id 7 --to 10,0,0
   locus instance remove arena --id 7)");
   command.require_subcommand(1);
   add_place(command, context);
   add_list(command, context);
+  add_instance_move(command, context);
+  add_instance_relabel(command, context);
   add_remove(command, context);
 }
 

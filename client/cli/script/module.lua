@@ -72,10 +72,11 @@ end
 -- Updates by row: one batch, which changes nothing before commit().
 local Updates = {}
 Updates.__index = Updates
-function Scene:updates()
-  return setmetatable({ scene = self, shapes = {}, batch = { inserts = {}, moves = {}, remove_ids = {},
-    remove_groups = {}, relabels = {} } }, Updates)
+local function empty_batch()
+  return { inserts = {}, moves = {}, remove_ids = {}, remove_groups = {}, relabels = {}, instance_moves = {},
+    instance_relabels = {} }
 end
+function Scene:updates() return setmetatable({ scene = self, shapes = {}, batch = empty_batch() }, Updates) end
 
 local no_rotation <const> = { 0, 0, 0, 1 }
 -- Returns the field `name` of a row, a list of `width` numbers; nil if it is absent and not needed.
@@ -144,30 +145,51 @@ function Updates:insert(row)
   return self
 end
 
-local move_fields <const> = fields("id at rotation teleport")
-function Updates:move(row)
-  check_fields("move", row, move_fields)
-  needed("move", row, "id")
-  local id, at = scalar("move", row, "id"), vector("move", row, "at", 3, true)
-  local rotation, teleport = vector("move", row, "rotation", 4), row.teleport or false
-  local moves = self.batch.moves
+-- Adds a row to `moves`: to the last entry if that has the same columns, otherwise to a new one.
+local function add_move(what, moves, row, scale)
+  needed(what, row, "id")
+  local id, at = scalar(what, row, "id"), vector(what, row, "at", 3, true)
+  local rotation, teleport = vector(what, row, "rotation", 4), row.teleport or false
   local move = moves[#moves]
-  local turns = rotation ~= nil
-  if not move or move.teleport ~= teleport or (move.rotations ~= nil) ~= turns then
-    move = { ids = {}, positions_f64 = {}, rotations = turns and {} or nil, teleport = teleport }
+  local turns, scales = rotation ~= nil, scale ~= nil
+  if not move or move.teleport ~= teleport or (move.rotations ~= nil) ~= turns or (move.scales ~= nil) ~= scales then
+    move = { ids = {}, positions_f64 = {}, rotations = turns and {} or nil, scales = scales and {} or nil,
+      teleport = teleport }
     moves[#moves + 1] = move
   end
   local n = #move.ids + 1
   move.ids[n], move.positions_f64[n] = id, at
   if turns then move.rotations[n] = rotation end
+  if scales then move.scales[n] = scale end
+end
+
+local move_fields <const> = fields("id at rotation teleport")
+function Updates:move(row)
+  check_fields("move", row, move_fields)
+  add_move("move", self.batch.moves, row)
+  return self
+end
+
+local instance_move_fields <const> = fields("id at rotation scale teleport")
+function Updates:move_instance(row)
+  check_fields("move_instance", row, instance_move_fields)
+  add_move("move_instance", self.batch.instance_moves, row, scalar("move_instance", row, "scale"))
   return self
 end
 
 local relabel_fields <const> = fields("id layers group tag")
+local function relabel_of(what, row)
+  check_fields(what, row, relabel_fields)
+  return { ids = { needed(what, row, "id") }, layers = row.layers, groups = row.group, tags = row.tag }
+end
+
 function Updates:relabel(row)
-  check_fields("relabel", row, relabel_fields)
-  table.insert(self.batch.relabels, { ids = { needed("relabel", row, "id") }, layers = row.layers, groups = row.group,
-    tags = row.tag })
+  table.insert(self.batch.relabels, relabel_of("relabel", row))
+  return self
+end
+
+function Updates:relabel_instance(row)
+  table.insert(self.batch.instance_relabels, relabel_of("relabel_instance", row))
   return self
 end
 
@@ -187,7 +209,7 @@ function Updates:remove_group(group)
 end
 
 -- Sends the batch with `options`, which are fields of the protocol's UpdateBatch, and returns the ack. The builder is
--- empty afterwards. The server applies removals, then inserts, then moves, then relabels.
+-- empty afterwards. The server applies removals, then inserts, moves and relabels, and those of instances last.
 function Updates:commit(options)
   return self.scene:apply(self:take(options))
 end
@@ -197,7 +219,7 @@ function Updates:take(options)
   local batch = self.batch
   for name, value in pairs(options or {}) do batch[name] = value end
   self.shapes = {}
-  self.batch = { inserts = {}, moves = {}, remove_ids = {}, remove_groups = {}, relabels = {} }
+  self.batch = empty_batch()
   return batch
 end
 

@@ -1,4 +1,4 @@
-"""Update batches: changes of moving objects in columns, applied as one revision of a scene."""
+"""Update batches: changes of objects and instances in columns, applied as one revision of a scene."""
 from __future__ import annotations
 
 import contextlib
@@ -11,7 +11,8 @@ _Request = schema.message("ApplyUpdatesRequest")
 
 
 class UpdateBatch:
-    """Changes that are applied as one revision, in this order: clear, removes, inserts, moves, relabels.
+    """Changes that are applied as one revision, in this order: clear, removes, inserts, moves, relabels, moves
+    and relabels of instances.
 
     N is the number of ids of a call. Every other column has N entries, one entry for all ids, or no entry, which means
     its default. `positions` are 3N float32 relative to `frame` (three floats, the origin by default); `positions_f64`
@@ -121,6 +122,25 @@ class UpdateBatch:
             entry.labels(layers, groups, tags)
         return self
 
+    def move_instances(self, ids: ColumnLike, positions: ColumnLike = None, *, positions_f64: ColumnLike = None,
+                       rotations: ColumnLike = None, scales: ColumnLike = None,
+                       teleport: bool = False) -> "UpdateBatch":
+        """Moves N placed instances: sets the positions of the origins of their meshes, and their rotations and scales
+        (N float32 or one) if given. `teleport` means the same as in move().
+        """
+        with _new_entry(self.message.instance_moves, "instance_moves", ids) as entry:
+            entry.pose(positions, positions_f64, rotations)
+            entry.message.scales = entry.column("scales", scales, FLOAT32)
+            entry.message.teleport = teleport
+        return self
+
+    def relabel_instances(self, ids: ColumnLike, *, layers: ColumnLike = None, groups: ColumnLike = None,
+                          tags: ColumnLike = None) -> "UpdateBatch":
+        """Sets labels of N placed instances, as relabel() does for objects. Layers 0 hide an instance from queries."""
+        with _new_entry(self.message.instance_relabels, "instance_relabels", ids) as entry:
+            entry.labels(layers, groups, tags)
+        return self
+
     def request_bytes(self, scene: str) -> bytes:
         """Returns the encoded request for ApplyUpdates."""
         self._request.scene = scene
@@ -128,7 +148,7 @@ class UpdateBatch:
 
 
 class _Entry:
-    """New entry of one of the batch's lists (inserts, moves, relabels). Errors name its columns, for example
+    """New entry of one of the batch's lists (inserts, moves and so on). Errors name its columns, for example
     `moves[1].positions`.
     """
 

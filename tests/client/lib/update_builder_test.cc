@@ -116,6 +116,43 @@ TEST(UpdateBuilderTest, RelabelsLeaveAbsentColumnsEmpty) {
   EXPECT_THAT(batch.relabels(1).tags(), ElementsAre(5));
 }
 
+TEST(UpdateBuilderTest, MovesOfInstancesShareAMessageWhileTheirColumnsAreTheSame) {
+  const std::vector<uint64_t> ids = {8, 9};
+  const std::vector<double> positions = {1, 2, 3};
+  const std::vector<float> scales = {2};
+  const v1::UpdateBatch batch = UpdateBuilder()
+                                    .move_instance(1, Double3{1, 2, 3})
+                                    .move_instance(2, Double3{4, 5, 6})
+                                    .move_instance(3, Double3{7, 8, 9}, Rotation{0, 0, 1, 0}, 2.0f)
+                                    .move_instance(4, Float3{1, 1, 1}, std::nullopt, std::nullopt, MoveKind::kTeleport)
+                                    .move_instances({.ids = ids, .positions_f64 = positions, .scales = scales})
+                                    .move_instance(5, Double3{1, 2, 3})
+                                    .build();
+  ASSERT_EQ(batch.instance_moves_size(), 5);
+  EXPECT_THAT(batch.instance_moves(0).ids(), ElementsAre(1, 2));
+  EXPECT_THAT(batch.instance_moves(0).positions_f64(), ElementsAre(1, 2, 3, 4, 5, 6));
+  EXPECT_THAT(batch.instance_moves(0).rotations(), IsEmpty());
+  EXPECT_THAT(batch.instance_moves(1).rotations(), ElementsAre(0, 0, 1, 0));
+  EXPECT_THAT(batch.instance_moves(1).scales(), ElementsAre(2));
+  EXPECT_THAT(batch.instance_moves(2).positions(), ElementsAre(1, 1, 1));
+  EXPECT_TRUE(batch.instance_moves(2).teleport());
+  EXPECT_THAT(batch.instance_moves(3).ids(), ElementsAre(8, 9));
+  EXPECT_THAT(batch.instance_moves(4).ids(), ElementsAre(5));
+  EXPECT_EQ(batch.moves_size(), 0);
+}
+
+TEST(UpdateBuilderTest, RelabelsOfInstancesAreApartFromThoseOfObjects) {
+  const v1::UpdateBatch batch = UpdateBuilder()
+                                    .relabel(1, {.tag = 5u})
+                                    .relabel_instance(2, {.layers = 0u})
+                                    .relabel_instance(3, {.layers = 1u})
+                                    .build();
+  EXPECT_THAT(batch.relabels(0).ids(), ElementsAre(1));
+  ASSERT_EQ(batch.instance_relabels_size(), 1);
+  EXPECT_THAT(batch.instance_relabels(0).ids(), ElementsAre(2, 3));
+  EXPECT_THAT(batch.instance_relabels(0).layers(), ElementsAre(0, 1));
+}
+
 TEST(UpdateBuilderTest, SettingsAndRemovesAreInTheBatchAndBuildResetsTheBuilder) {
   UpdateBuilder builder;
   const std::vector<uint64_t> more = {2, 3};

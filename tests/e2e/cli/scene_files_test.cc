@@ -73,6 +73,13 @@ TEST_F(SceneFilesTest, InstancesArePlacedListedAndRemoved) {
             R"("group":"4","tag":"0"})");
   const Outcome used = run({"mesh", "delete", "city"});
   EXPECT_THAT(used.err, HasSubstr("hint: `locus instance list SCENE`"));
+  text_of({"instance", "move", "world", "--id", "201", "--to", "0,0,95", "--rotation", "0,0,1,0"});
+  text_of({"instance", "relabel", "world", "--id", "201", "--layers", "0", "--tag", "6"});
+  EXPECT_EQ(json_of({"instance", "list", "world"})["instances"][3].dump(),
+            R"({"id":"201","mesh":"city","at":[0.0,0.0,95.0],"rotation":[0.0,0.0,1.0,0.0],"scale":0.5,"layers":0,)"
+            R"("group":"4","tag":"6"})");
+  EXPECT_EQ(run({"instance", "relabel", "world", "--id", "201"}).code, cli::ExitCode::kUsage);
+  EXPECT_EQ(run({"instance", "move", "world", "--id", "999", "--to", "0,0,0"}).code, cli::ExitCode::kNotFound);
   text_of({"instance", "remove", "world", "--id", "100", "--group", "4"});
   EXPECT_EQ(json_of({"instance", "list", "world"})["instances"].size(), 1u);
   text_of({"instance", "remove", "world", "--id", "101"});

@@ -27,6 +27,14 @@ TEST(ConvertUpdatesTest, EveryFieldOfABatchArrives) {
   for (int i = 0; i < 4; ++i) move->add_rotations(0.5f);
   move->set_teleport(true);
   batch.add_relabels()->add_ids(10);
+  v1::InstanceMove* instance_move = batch.add_instance_moves();
+  instance_move->add_ids(20);
+  for (int i = 0; i < 3; ++i) instance_move->add_positions_f64(i);
+  for (int i = 0; i < 4; ++i) instance_move->add_rotations(0.5f);
+  instance_move->add_scales(2);
+  instance_move->set_teleport(true);
+  batch.add_instance_relabels()->add_ids(21);
+  batch.mutable_instance_relabels(0)->add_layers(0);
   batch.set_upsert(true);
   batch.set_all_or_nothing(true);
   batch.set_restart_ticks(true);
@@ -56,6 +64,15 @@ TEST(ConvertUpdatesTest, EveryFieldOfABatchArrives) {
   EXPECT_TRUE(updates->moves[0].teleport);
   ASSERT_EQ(updates->relabels.size(), 1u);
   EXPECT_EQ(updates->relabels[0].ids[0], 10u);
+  ASSERT_EQ(updates->instance_moves.size(), 1u);
+  EXPECT_EQ(updates->instance_moves[0].ids[0], 20u);
+  EXPECT_EQ(updates->instance_moves[0].positions_f64.size(), 3u);
+  EXPECT_EQ(updates->instance_moves[0].rotations.size(), 4u);
+  EXPECT_EQ(updates->instance_moves[0].scales[0], 2);
+  EXPECT_TRUE(updates->instance_moves[0].teleport);
+  ASSERT_EQ(updates->instance_relabels.size(), 1u);
+  EXPECT_EQ(updates->instance_relabels[0].ids[0], 21u);
+  EXPECT_EQ(updates->instance_relabels[0].layers.size(), 1u);
   EXPECT_EQ(updates->writer, 11u);
   EXPECT_EQ(updates->batch, 12u);
 }

@@ -4,7 +4,7 @@ import hashlib
 import struct
 
 import locus
-from locus import InstanceChange, MeshPart, QueryBatch, meshes
+from locus import InstanceChange, MeshPart, QueryBatch, UpdateBatch, meshes
 from support import DaemonTest, listed
 
 SQUARE = ([0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0], [0, 1, 2, 0, 2, 3])
@@ -85,6 +85,20 @@ class MeshesTest(DaemonTest):
         self.assertEqual((listed(block.layers), listed(block.groups), listed(block.tags)), ([1, 2], [9, 9], [50, 60]))
         (block,) = self.ask(QueryBatch().rays([22.9, 0.5, 9], [0, 0, -1]))
         self.assertEqual(listed(block.ids), [6])
+
+    def test_instances_move_and_are_hidden_by_update_batches(self):
+        self.client.upload_mesh("square", *SQUARE)
+        self.client.change_instances(self.scene, InstanceChange().place("square", [[0, 0, 0], [10, 0, 0]], ids=[1, 2]))
+        batch = UpdateBatch().move_instances([1, 2], positions_f64=[[0, 0, 5], [20, 0, 0]], rotations=[0, 0, 1, 0],
+                                             scales=[2]).relabel_instances(2, layers=0, tags=7)
+        self.assertEqual(self.apply(batch).applied, 3)
+        (block,) = self.ask(QueryBatch().lookup([1, 2], block=locus.Block(columns=[
+            locus.Column.ID, locus.Column.POSE, locus.Column.TAG, locus.Column.LAYERS])))
+        self.assertEqual(listed(block.positions), [0, 0, 5, 20, 0, 0])
+        self.assertEqual(listed(block.rotations), [0, 0, 1, 0] * 2)
+        self.assertEqual((listed(block.tags), listed(block.layers)), ([0, 7], [1, 0]))
+        (error,) = self.apply(UpdateBatch().move_instances(3, [0, 0, 0])).errors
+        self.assertEqual((error.field, error.id), ("instance_moves[0].ids", 3))
 
     def test_removing_and_placing_is_one_revision(self):
         self.client.upload_mesh("square", *SQUARE)
