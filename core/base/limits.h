@@ -37,9 +37,11 @@ inline constexpr uint32_t kMaxUpdateLists = 65536;      // lists (inserts, moves
 inline constexpr uint32_t kMaxListedItemErrors = 1000;  // max refused items listed in an ack
 inline constexpr uint32_t kMaxWriters = 4096;           // writer ids stored per scene, to detect batches sent twice
 
-inline constexpr uint32_t kMaxBlocks = 256;           // blocks per query batch
-inline constexpr uint32_t kMaxQueries = 65536;        // queries other than rays per query batch, summed over all blocks
-inline constexpr uint32_t kMaxRays = 262'144;         // rays per query batch, summed over all blocks
+inline constexpr uint32_t kMaxBlocks = 256;     // blocks per query batch
+inline constexpr uint32_t kMaxQueries = 65536;  // queries other than rays per query batch, summed over all blocks
+inline constexpr uint32_t kMaxRays = 262'144;   // rays per query batch, summed over all blocks
+// Memory of the instances that a query batch interpolates between ticks at which they moved.
+inline constexpr uint64_t kMaxInterpolatedBytes = uint64_t{256} << 20;
 inline constexpr uint32_t kMaxIgnoredIds = 64;        // ids that the queries of a block ignore
 inline constexpr uint32_t kMaxOnlyGroups = 16;        // groups to which a query is restricted
 inline constexpr uint32_t kDefaultMaxResults = 1024;  // results per query if the block sets no max_results

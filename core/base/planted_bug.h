@@ -14,6 +14,7 @@ enum class PlantedBug {
   kGhostAfterMove,     // a move across a cell border leaves the object in its old cell
   kUnsignedCellIndex,  // cell indices are truncated towards zero, not rounded down
   kStalePlacedBounds,  // an instance that moves keeps the bounds that it had at its old place
+  kPastInstances,      // queries about the past see the instances of the latest revision
   kRewindReach,        // a query at a time between two ticks searches the grid without the displacement bound
   kRewindFastBox,      // after a far move of an object, its shorter moves later in the same tick are not recorded
   kUnpaddedNear,       // the slab test of tree nodes does not pad the near side

@@ -403,9 +403,20 @@ void Scene::forget_recent() {
 }
 
 void Scene::forget_mesh(const StaticMesh* mesh) {
-  std::deque<SnapshotPtr> forgotten;  // freed after the lock is released, because freeing takes long
+  std::deque<SnapshotPtr> forgotten;  // freed after the locks are released, because freeing takes long
+  const MutexLock writer_lock(writer_mutex_);
+  // The writer's instances are those of the latest revision while the writer's lock is held.
+  if (writer_.statics()->uses(mesh) > 0) return;  // placed again, by a change that began before the deletion
+  const SnapshotPtr trimmed = writer_.forget_mesh(mesh);
   const MutexLock lock(mutex_);
-  if (latest_->statics->uses(mesh) > 0) return;  // placed again meanwhile, by a change that began before the deletion
+  if (trimmed != nullptr) {
+    LOCUS_DCHECK_EQ(trimmed->revision, latest_->revision);
+    forgotten.swap(recent_);
+    latest_ = trimmed;
+    recent_.push_back(trimmed);
+    LOCUS_DCHECK_CALL(check_invariants());
+    return;
+  }
   const auto last = std::find_if(recent_.rbegin(), recent_.rend(),
                                  [mesh](const SnapshotPtr& recent) { return recent->statics->uses(mesh) > 0; });
   std::move(recent_.begin(), last.base(), std::back_inserter(forgotten));

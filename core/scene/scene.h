@@ -207,9 +207,10 @@ class Scene {
   uint64_t revoke_readers(uint64_t bytes) LOCUS_EXCLUDES(mutex_);
   // Drops the revisions that are retained for kExactly views, except the latest one. Called when memory is short.
   void forget_recent() LOCUS_EXCLUDES(mutex_);
-  // Drops the retained revisions that contain instances of `mesh`, and all revisions before them. Called when the mesh
-  // was deleted, so that its memory becomes free. Drops nothing if the latest revision contains an instance.
-  void forget_mesh(const StaticMesh* mesh) LOCUS_EXCLUDES(mutex_);
+  // Drops the retained revisions and the ticks of the history that contain instances of `mesh`, and everything before
+  // them. Called when the mesh was deleted, so that its memory becomes free. Drops nothing if the latest revision
+  // contains an instance. Waits for a batch that is being applied.
+  void forget_mesh(const StaticMesh* mesh) LOCUS_EXCLUDES(writer_mutex_, mutex_);
 
   // Closes the scene after its deletion: wakes all waiters. Later calls of view() and of the members that change the
   // scene return NOT_FOUND.

@@ -67,7 +67,7 @@ void SceneWriter::restart(uint64_t epoch) {
 SnapshotPtr SceneWriter::freeze() {
   const bool stale = planted(PlantedBug::kStaleSnapshot) && published_ != nullptr;
   ObjectSet objects = stale ? published_->objects : objects_.snapshot();
-  recorder_.measure(objects);
+  recorder_.measure(objects, *statics_);
   return std::make_shared<const SceneSnapshot>(SceneSnapshot{
       epoch_, revision_, tick_, winding_, statics_, std::move(objects), recorder_.history(), objects_.displacement(),
       replaced_bytes_ + recorder_.dropped_bytes(), recorder_.limit(), recorder_.forgotten_ticks()});
@@ -81,6 +81,13 @@ SnapshotPtr SceneWriter::next_revision() {
 
 SnapshotPtr SceneWriter::trim_history(uint64_t bytes) {
   if (replaying_ || !recorder_.trim(bytes)) return nullptr;
+  published_ = freeze();
+  LOCUS_DCHECK_CALL(check_invariants());
+  return published_;
+}
+
+SnapshotPtr SceneWriter::forget_mesh(const StaticMesh* mesh) {
+  if (replaying_ || !recorder_.forget_mesh(mesh)) return nullptr;
   published_ = freeze();
   LOCUS_DCHECK_CALL(check_invariants());
   return published_;
@@ -256,7 +263,7 @@ void SceneWriter::start_tick(const UpdateBatch& batch) {
     return objects_.start_tick(tick, std::numeric_limits<uint64_t>::max());
   }
   LOCUS_DCHECK(published_ != nullptr);  // a scene with history never defers snapshots
-  recorder_.close(tick_, published_->objects, objects_.displacement(), tick);
+  recorder_.close(tick_, published_->objects, published_->statics, objects_.displacement(), tick);
   objects_.start_tick(tick, recorder_.oldest_tick(tick));
 }
 

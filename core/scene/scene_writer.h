@@ -69,6 +69,10 @@ class SceneWriter {
   // revision with the shorter history, or null if no record was dropped.
   SnapshotPtr trim_history(uint64_t bytes);
 
+  // Drops the records of the history up to the last one that has instances of `mesh`, which was deleted. Returns a
+  // snapshot as trim_history() does.
+  SnapshotPtr forget_mesh(const StaticMesh* mesh);
+
   // Begins replay, during which published() must not be called. If the scene has no history, no snapshots are built
   // during the replay, so apply(), apply_joined() and replace_statics() return null snapshots.
   void begin_replay() {

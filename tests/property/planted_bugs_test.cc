@@ -11,6 +11,7 @@
 #include "core/index/bvh/kernels/region_kernels.h"
 #include "tests/support/conservative_answers.h"
 #include "tests/support/crossing_trials.h"
+#include "tests/support/door_lockstep.h"
 #include "tests/support/edge_on_cases.h"
 #include "tests/support/grid_comparison.h"
 #include "tests/support/kernel_trials.h"
@@ -48,6 +49,8 @@ std::string compare_moving_grids_with_list() {
 }
 
 std::string compare_scenes_with_model() { return search_scene_lockstep(scaled_count(20), 60); }
+
+std::string compare_doors_with_model() { return search_door_lockstep(scaled_count(10), 30); }
 
 std::string compare_rewinds_with_model() { return search_rewind_lockstep(scaled_count(10), 40); }
 
@@ -137,6 +140,7 @@ constexpr Trial kTrials[] = {
     {"SceneWithAStaleSnapshot", PlantedBug::kStaleSnapshot, compare_scenes_with_model},
     {"SceneWithAGhostAfterAMove", PlantedBug::kGhostAfterMove, compare_scenes_with_model},
     {"SceneWhoseInstancesMoveWithoutTheirBounds", PlantedBug::kStalePlacedBounds, compare_scenes_with_model},
+    {"PastWithTheInstancesOfThePresent", PlantedBug::kPastInstances, compare_doors_with_model},
     {"RewindThatLooksOnlyWhereObjectsWere", PlantedBug::kRewindReach, compare_rewinds_with_model},
     {"RewindThatForgetsTheWayBack", PlantedBug::kRewindFastBox, compare_rewinds_of_busy_ticks_with_model},
     {"PlacedBoundsAsWideAsFloatRounds", PlantedBug::kWidePlacedBounds, compare_conservative_answers_with_bounds},

@@ -36,7 +36,8 @@ class Block(NamedTuple):
     - `self_ids`: N uint64 or one; the query ignores the object or instance with this id, 0 = none.
     - `max_results`: maximum number of rows per query, 0 = 1,024.
     - `after_id`: return only rows with a higher id, to continue after a truncated result.
-    - `as_of_ticks`: N uint64 or one; the query sees objects as they were at the end of this tick. `as_of_fractions`: N
+    - `as_of_ticks`: N uint64 or one; the query sees objects and instances as they were at the end of
+      this tick. `as_of_fractions`: N
       float32 or one, 0 <= f < 1, only with `as_of_ticks`: the query is answered for the time tick + f, f being a
       fraction of the time between that tick and the next. `outside_history`: how times outside the history are handled;
       by default they are refused.

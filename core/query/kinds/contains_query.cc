@@ -91,7 +91,7 @@ OverlapAnswer run_contains(QueryTask& task, const SceneAtTime& moment, Vec3d poi
   LowestRows rows(options.max_results, false, options.count_only);
   if (options.source != Source::kDynamic) {
     InstancesAround visitor(task, point, options, filter, rows);
-    task.visit_region(task.snapshot().statics->tree(), visitor);
+    task.visit_region(moment.statics().tree(), visitor);
   }
   OverlapAnswer answer = rows.finish();
   if (options.source == Source::kStatic || moment.objects().size() == 0 || task.ended()) return answer;

@@ -28,17 +28,21 @@ class Rounds {
   using InstanceWalk = Bvh<Instance>::RayWalk;
 
  public:
-  Rounds(QueryTask& task, std::vector<PendingRay>& rays) : task_(task), rays_(rays) {
+  // statics_of(i) returns the instances at the time of ray i.
+  template <class StaticsOf>
+  Rounds(QueryTask& task, std::vector<PendingRay>& rays, const StaticsOf& statics_of) : task_(task), rays_(rays) {
     LOCUS_DCHECK(task.ray_kernels() != nullptr);
     for (const PendingRay& ray : rays) LOCUS_DCHECK(ray.request.mode == mode());
-    const Bvh<Instance>& instances = task.snapshot().statics->tree();
-    if (instances.size() == 1) only_ = &*instances.values().begin();
+    const Bvh<Instance>& first = statics_of(0).tree();
+    bool is_only = first.size() == 1;
+    for (size_t i = 1; i < rays.size() && is_only; ++i) is_only = &statics_of(i).tree() == &first;
+    if (is_only) only_ = &*first.values().begin();
     slabs_.reserve(rays.size());
     for (const PendingRay& ray : rays)
       slabs_.emplace_back(Rayd{ray.request.origin, ray.request.direction}, kInstancePad);
     walks_.reserve(only_ == nullptr ? rays.size() : 0);
     if (only_ == nullptr)
-      for (const SlabRay<double>& slabs : slabs_) walks_.emplace_back(instances, slabs);
+      for (size_t i = 0; i < rays.size(); ++i) walks_.emplace_back(statics_of(i).tree(), slabs_[i]);
     stops_.reserve(rays.size());
     if (mode() != RayMode::kAll) return;
     // One row more than requested shows that the result is truncated. With count_only, max_results has no effect.
@@ -213,8 +217,11 @@ class Rounds {
 
 }  // namespace
 
-void trace_meshes(QueryTask& task, std::vector<PendingRay>& rays) {
-  if (!rays.empty() && task.snapshot().statics->size() != 0) Rounds(task, rays).run();
+void trace_meshes(QueryTask& task, std::vector<PendingRay>& rays,
+                  absl::FunctionRef<const SceneAtTime&(size_t)> moment_of) {
+  const auto statics_of = [&](size_t ray) -> const StaticSet& { return moment_of(ray).statics(); };
+  for (size_t i = 0; i < rays.size(); ++i)
+    if (statics_of(i).size() != 0) return Rounds(task, rays, statics_of).run();
 }
 
 }  // namespace locus

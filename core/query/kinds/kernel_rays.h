@@ -32,7 +32,9 @@ struct PendingRay {
 
 // Finds the hits of each ray on static instances and offers them to the ray's collector. Preconditions: all rays are
 // EXACT, have the same mode and no position `after`, and task.ray_kernels() is not null.
-void trace_meshes(QueryTask& task, std::vector<PendingRay>& rays);
+// moment_of(i) returns the scene at the time of ray i.
+void trace_meshes(QueryTask& task, std::vector<PendingRay>& rays,
+                  absl::FunctionRef<const SceneAtTime&(size_t)> moment_of);
 
 }  // namespace locus
 

@@ -10,9 +10,9 @@ constexpr size_t kListedCost = 8;
 
 }  // namespace
 
-Hit look_up(const SceneSnapshot& snapshot, const SceneAtTime& moment, Id id) {
+Hit look_up(const SceneAtTime& moment, Id id) {
   if (const GridRef object = moment.objects().find_ref(id)) return hit_on(object, 0, moment);
-  if (const Instance* instance = snapshot.statics->find(id)) return hit_on(*instance, 0);
+  if (const Instance* instance = moment.statics().find(id)) return hit_on(*instance, 0);
   return {};
 }
 
@@ -27,7 +27,7 @@ absl::flat_hash_map<Group, OverlapAnswer> look_up_groups(QueryTask& task, const 
     const auto group_rows = rows.find(labels.group);
     if (group_rows != rows.end()) group_rows->second.offer(make_hit());
   };
-  for (const Instance& instance : task.snapshot().statics->tree().values())
+  for (const Instance& instance : moment.statics().tree().values())
     offer(instance, [&] { return hit_on(instance, 0); });
   const ObjectSet& objects = moment.objects();
   const auto visit = [&](const GridRef& object) {

@@ -8,9 +8,9 @@
 
 namespace locus {
 
-// Returns a hit with t = 0 on the object or instance with this id: an object of `moment`, or else an instance of
-// `snapshot`. Returns a miss if the id is unknown. The hit borrows from `moment` and `snapshot`.
-Hit look_up(const SceneSnapshot& snapshot, const SceneAtTime& moment, Id id);
+// Returns a hit with t = 0 on the object or instance of `moment` with this id. Returns a miss if the id is unknown. The
+// hit borrows from `moment`.
+Hit look_up(const SceneAtTime& moment, Id id);
 
 // Returns, for each group, one row for each object at `moment` and each instance that belongs to the group. The ids
 // of the rows are above options.after_id and ascending; each group has at most options.max_results rows. A group that

@@ -331,7 +331,7 @@ NearestAnswer run_nearest(QueryTask& task, const SceneAtTime& moment, const Near
   }
   if (request.source != Source::kDynamic && !task.ended()) {
     InstancesNear visitor(task, request, filter, rows);
-    task.visit_nearest(task.snapshot().statics->tree(), request.point, visitor);
+    task.visit_nearest(moment.statics().tree(), request.point, visitor);
   }
   return rows.finish();
 }

@@ -485,7 +485,7 @@ OverlapAnswer run_overlap(QueryTask& task, const SceneAtTime& moment, const type
   LowestRows rows(options.max_results, options.detail == StaticDetail::kTrianglesSorted, options.count_only);
   if (options.source != Source::kDynamic) {
     InstanceSearch<Kind> search(task, shape, options, filter, rows);
-    task.visit_region(task.snapshot().statics->tree(), search);
+    task.visit_region(moment.statics().tree(), search);
   }
   OverlapAnswer answer = rows.finish();
   const bool may_find_objects = options.source != Source::kStatic && moment.objects().size() != 0;

@@ -9,11 +9,10 @@
 namespace locus {
 namespace {
 
-// Returns the position of the object `id` at the time `moment`, or of the instance `id`. Returns nullopt if neither
-// exists.
-std::optional<Vec3d> position_of(const SceneSnapshot& snapshot, const SceneAtTime& moment, Id id) {
+// Returns the position of the object or instance `id` at the time `moment`. Returns nullopt if neither exists.
+std::optional<Vec3d> position_of(const SceneAtTime& moment, Id id) {
   if (const GridRef object = moment.objects().find_ref(id)) return moment.shape(object).position;
-  if (const Instance* instance = snapshot.statics->find(id)) return instance->transform.translation;
+  if (const Instance* instance = moment.statics().find(id)) return instance->transform.translation;
   return std::nullopt;
 }
 
@@ -55,8 +54,7 @@ struct WithinWorld {
 
 }  // namespace
 
-QueryOrigins::QueryOrigins(const SceneSnapshot& snapshot, const QueryBlock& block, const QueryTimes& times)
-    : block_(block) {
+QueryOrigins::QueryOrigins(const QueryBlock& block, const QueryTimes& times) : block_(block) {
   if (block.anchor_ids.empty()) return;
   const ColumnReader<uint64_t> anchors(block.anchor_ids, 1);
   const size_t queries = query_count(block);
@@ -65,7 +63,7 @@ QueryOrigins::QueryOrigins(const SceneSnapshot& snapshot, const QueryBlock& bloc
   std::optional<Vec3d> position;
   for (size_t i = 0; i < queries; ++i) {
     if (i == 0 || !is_shared) {
-      position = position_of(snapshot, times.of(i), *anchors.entry(i));
+      position = position_of(times.of(i), *anchors.entry(i));
       positions_.push_back(position.value_or(Vec3d{}));
     }
     if (!position || !std::visit(WithinWorld{*position, i}, block.kind))

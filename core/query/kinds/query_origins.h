@@ -16,7 +16,7 @@ namespace locus {
 class QueryOrigins {
  public:
   // Looks up the anchors of `block`, which has passed check_batch(), at the times of its queries. O(1) for each query.
-  QueryOrigins(const SceneSnapshot& snapshot, const QueryBlock& block, const QueryTimes& times);
+  QueryOrigins(const QueryBlock& block, const QueryTimes& times);
 
   // Returns the point to which the positions of query `i` are relative. The point has no meaning if the query is
   // unanchored.

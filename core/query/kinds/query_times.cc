@@ -1,7 +1,11 @@
 #include "core/query/kinds/query_times.h"
 
+#include <utility>
+
+#include "absl/container/flat_hash_map.h"
 #include "absl/strings/str_cat.h"
 #include "core/base/column.h"
+#include "core/base/limits.h"
 #include "core/base/refusal.h"
 
 namespace locus {
@@ -49,14 +53,29 @@ absl::Status not_kept(const SceneSnapshot& snapshot, const AsOf& time, const std
   return refuse(absl::StatusCode::kOutOfRange, message, refusal);
 }
 
+absl::Status too_many_times(const std::string& field, size_t entry) {
+  Refusal refusal;
+  refusal.reason = Reason::kLimit;
+  refusal.field = field + ".as_of_ticks";
+  refusal.index = static_cast<uint32_t>(entry);
+  refusal.limit = "interpolated_bytes";
+  refusal.limit_value = limits::kMaxInterpolatedBytes;
+  return refuse(absl::StatusCode::kInvalidArgument,
+                "too many different times between ticks at which instances moved. Ask for fewer times in one batch, or "
+                "for whole ticks",
+                refusal);
+}
+
 }  // namespace
 
 absl::StatusOr<QueryTimes> QueryTimes::resolve(const SceneSnapshot& snapshot, const QueryBlock& block,
-                                               const std::string& field) {
+                                               const std::string& field, uint64_t& free_bytes) {
   QueryTimes result;
+  absl::flat_hash_map<std::pair<uint64_t, float>, size_t>
+      moving;  // index in scenes_ of each time with moving instances
   const size_t n = query_count(block);
   if (block.as_of_ticks.empty() || n == 0) {
-    result.scenes_.emplace_back(snapshot.objects);
+    result.scenes_.emplace_back(snapshot.objects, *snapshot.statics);
     LOCUS_DCHECK_CALL(result.check_invariants(n));
     return result;
   }
@@ -69,7 +88,17 @@ absl::StatusOr<QueryTimes> QueryTimes::resolve(const SceneSnapshot& snapshot, co
     const AsOf time = nearest_kept(snapshot, asked);
     if (!(time == asked) && block.outside == OutsideHistory::kReject) return not_kept(snapshot, asked, field, i);
     const bool repeated = i > 0 && time == result.times_.back();
-    result.scenes_.push_back(repeated ? result.scenes_.back() : *find_scene_at(snapshot, time));
+    const auto known = moving.empty() ? moving.end() : moving.find({time.tick, time.fraction});
+    if (repeated || known != moving.end()) {
+      result.scenes_.push_back(result.scenes_[repeated ? i - 1 : known->second]);
+    } else {
+      result.scenes_.push_back(*find_scene_at(snapshot, time));
+      if (const uint64_t bytes = result.scenes_.back().interpolated_bytes(); bytes != 0) {
+        if (bytes > free_bytes) return too_many_times(field, i);
+        free_bytes -= bytes;
+        moving.emplace(std::pair(time.tick, time.fraction), i);
+      }
+    }
     result.times_.push_back(time);
     result.clamped_.push_back(time == asked ? 0 : 1);
   }

@@ -121,12 +121,12 @@ void find_hits(QueryTask& task, std::vector<PendingRay>& rays,
   if (rays.empty()) return;
   const Source source = rays.front().request.source;
   const bool by_kernels = use_kernels(task, rays);
-  if (by_kernels && source != Source::kDynamic) trace_meshes(task, rays);
+  if (by_kernels && source != Source::kDynamic) trace_meshes(task, rays, moment_of);
   for (size_t i = 0; i < rays.size(); ++i) {
     PendingRay& ray = rays[i];
     if (!by_kernels && source != Source::kDynamic && !task.ended()) {
       InstanceVisitor visitor(task, ray.request, ray.filter, ray.collector);
-      task.visit_ray(task.snapshot().statics->tree(), visitor.slabs(), visitor);
+      task.visit_ray(moment_of(i).statics().tree(), visitor.slabs(), visitor);
     }
     if (source != Source::kStatic && !ray.collector.done() && !task.ended()) {
       const SceneAtTime& moment = moment_of(i);

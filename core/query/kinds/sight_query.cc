@@ -107,7 +107,7 @@ class Look {
     eye_ = eye;
     gather(seen);
     if (uses_kernels()) {
-      for (const Instance& instance : task_.snapshot().statics->tree().values()) trace(instance);
+      for (const Instance& instance : moment_.statics().tree().values()) trace(instance);
     } else if (block_.source != Source::kDynamic) {
       search_rays(Source::kStatic);
     }
@@ -131,7 +131,7 @@ class Look {
 
   bool uses_kernels() const {
     return block_.precision == Precision::kExact && block_.source != Source::kDynamic &&
-           task_.ray_kernels() != nullptr && task_.snapshot().statics->size() <= kFewInstances;
+           task_.ray_kernels() != nullptr && moment_.statics().size() <= kFewInstances;
   }
 
   void see(uint32_t target, uint32_t sample, absl::Span<char> seen) {

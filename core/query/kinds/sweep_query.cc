@@ -280,7 +280,7 @@ RayAnswer run_sweep(QueryTask& task, const SceneAtTime& moment, const SweepReque
   HitCollector collector(request.mode, request.max_results, 1, request.count_only, RowPosition());
   if (request.source != Source::kDynamic) {
     SweptInstances visitor(task, request, filter, collector);
-    task.visit_ray(task.snapshot().statics->tree(), visitor.slabs(), visitor);
+    task.visit_ray(moment.statics().tree(), visitor.slabs(), visitor);
   }
   const bool has_objects = request.source != Source::kStatic && moment.objects().grid().size() != 0;
   if (has_objects && !collector.done() && !task.ended()) {

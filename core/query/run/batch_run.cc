@@ -51,9 +51,10 @@ absl::StatusOr<std::unique_ptr<BatchRun>> BatchRun::prepare(const SceneSnapshot&
                                                             RunOptions options, AnswerSink& answer) {
   std::vector<QueryTimes> times;
   times.reserve(batch.blocks.size());
+  uint64_t free_bytes = limits::kMaxInterpolatedBytes;
   for (size_t b = 0; b < batch.blocks.size(); ++b) {
     ASSIGN_OR_RETURN(QueryTimes resolved,
-                     QueryTimes::resolve(snapshot, batch.blocks[b], absl::StrCat("blocks[", b, "]")));
+                     QueryTimes::resolve(snapshot, batch.blocks[b], absl::StrCat("blocks[", b, "]"), free_bytes));
     times.push_back(std::move(resolved));
   }
   std::unique_ptr<BatchRun> run(new BatchRun(snapshot, batch, std::move(options), answer));
@@ -79,7 +80,7 @@ void BatchRun::add_block(QueryTimes times) {
   const size_t index = blocks_.size();
   const QueryBlock& block = batch_.blocks[index];
   const size_t queries = query_count(block);
-  Block& to = blocks_.emplace_back(snapshot_, block, std::move(times), queries, max_chunk_queries(block));
+  Block& to = blocks_.emplace_back(block, std::move(times), queries, max_chunk_queries(block));
   if (row_layout(block) == RowLayout::kDense)
     to.output.rows = answer_.add_rows(index, returned_columns(block), queries);
   if (row_layout(block) == RowLayout::kBytes) to.output.bytes = answer_.add_hits(index, queries);

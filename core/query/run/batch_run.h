@@ -93,8 +93,8 @@ class BatchRun {
 
  private:
   struct Block {
-    Block(const SceneSnapshot& snapshot, const QueryBlock& block, QueryTimes&& resolved, size_t count, size_t max_chunk)
-        : times(std::move(resolved)), origins(snapshot, block, times), queries(count), max_chunk_queries(max_chunk) {}
+    Block(const QueryBlock& block, QueryTimes&& resolved, size_t count, size_t max_chunk)
+        : times(std::move(resolved)), origins(block, times), queries(count), max_chunk_queries(max_chunk) {}
 
     const QueryTimes times;
     const QueryOrigins origins;

@@ -369,7 +369,7 @@ void BlockRunner::look_up_groups_at(const LookupColumns& lookup, size_t i) {
 }
 
 void BlockRunner::run_query(const LookupColumns& lookup, size_t i) {
-  if (lookup.groups.empty()) return write_row(look_up(task_.snapshot(), times_.of(i), lookup.ids[i]), output_.rows, i);
+  if (lookup.groups.empty()) return write_row(look_up(times_.of(i), lookup.ids[i]), output_.rows, i);
   look_up_groups_at(lookup, i);
   const OverlapAnswer& answer = groups_[lookup.groups[i]];
   append_rows(answer, i);

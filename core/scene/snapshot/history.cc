@@ -7,11 +7,13 @@
 namespace locus {
 namespace {
 
-// Returns a copy of `record` in which `bytes` is the memory that the record does not share with `next`. `next` has the
-// objects of the next record or, if `record` is the last record, the current objects.
-std::shared_ptr<const HistoryRecord> with_bytes(const HistoryRecord& record, const ObjectSet& next) {
+// Returns a copy of `record` in which `bytes` is the memory that the record does not share with `objects` and
+// `statics`: those of the next record or, if `record` is the last record, the current ones.
+std::shared_ptr<const HistoryRecord> with_bytes(const HistoryRecord& record, const ObjectSet& objects,
+                                                const StaticSet& statics) {
   HistoryRecord counted = record;
-  counted.bytes = sizeof(HistoryRecord) + record.objects.unshared_bytes(next);
+  counted.bytes =
+      sizeof(HistoryRecord) + record.objects.unshared_bytes(objects) + record.statics->unshared_bytes(statics);
   if (record.to_next.fast != nullptr) counted.bytes += record.to_next.fast->size() * sizeof(FastMover);
   return std::make_shared<const HistoryRecord>(std::move(counted));
 }
@@ -33,8 +35,8 @@ void HistoryRecorder::check_invariants() const {
   LOCUS_CHECK_EQ(bytes, history_->bytes);
 }
 
-void HistoryRecorder::close(uint64_t tick, const ObjectSet& objects, const Displacement& since_last,
-                            uint64_t next_tick) {
+void HistoryRecorder::close(uint64_t tick, const ObjectSet& objects, std::shared_ptr<const StaticSet> statics,
+                            const Displacement& since_last, uint64_t next_tick) {
   LOCUS_DCHECK_LT(tick, next_tick);
   LOCUS_DCHECK(history_ == nullptr || history_->records.back()->tick < tick);
   has_past_ = true;
@@ -43,10 +45,10 @@ void HistoryRecorder::close(uint64_t tick, const ObjectSet& objects, const Displ
     next = *history_;
     HistoryRecord last = *next.records.back();
     last.to_next = since_last;
-    next.records.back() = with_bytes(last, objects);
+    next.records.back() = with_bytes(last, objects, *statics);
   }
-  next.records.push_back(
-      std::make_shared<const HistoryRecord>(HistoryRecord{tick, objects, {}, sizeof(HistoryRecord)}));
+  next.records.push_back(std::make_shared<const HistoryRecord>(
+      HistoryRecord{tick, objects, std::move(statics), {}, sizeof(HistoryRecord)}));
   size_t first = 0;
   while (first + 1 < next.records.size() && next_tick >= options_.ticks &&
          next.records[first + 1]->tick <= next_tick - options_.ticks)
@@ -75,6 +77,17 @@ bool HistoryRecorder::trim(uint64_t bytes) {
   return true;
 }
 
+bool HistoryRecorder::forget_mesh(const StaticMesh* mesh) {
+  if (history_ == nullptr) return false;
+  History next = *history_;
+  size_t count = next.records.size();
+  while (count > 0 && next.records[count - 1]->statics->uses(mesh) == 0) --count;
+  if (count == 0) return false;
+  drop_first(next, count, PastLimit::kMemory);
+  publish(std::move(next), options_.bytes, PastLimit::kBytes);
+  return true;
+}
+
 void HistoryRecorder::drop_first(History& history, size_t count, PastLimit reason) {
   if (count > 0) limit_ = reason;
   if (forgets_early(reason)) forgotten_ticks_ += count;
@@ -83,10 +96,10 @@ void HistoryRecorder::drop_first(History& history, size_t count, PastLimit reaso
   history.records.erase(history.records.begin(), history.records.begin() + static_cast<std::ptrdiff_t>(count));
 }
 
-void HistoryRecorder::measure(const ObjectSet& now) {
+void HistoryRecorder::measure(const ObjectSet& objects, const StaticSet& statics) {
   if (std::exchange(measured_, true) || history_ == nullptr) return;
   History next = *history_;
-  next.records.back() = with_bytes(*next.records.back(), now);
+  next.records.back() = with_bytes(*next.records.back(), objects, statics);
   publish(std::move(next), options_.bytes, PastLimit::kBytes);
 }
 

@@ -1,7 +1,7 @@
-// History of a scene: the objects at the end of each recorded tick. Records share unchanged memory with each other and
-// with the latest revision, so that a record costs only the memory that its tick changed. A History is immutable once
-// published and may be read by any thread. Invariants: records are ascending by tick; History::bytes is the sum of
-// HistoryRecord::bytes and at most HistoryOptions::bytes.
+// History of a scene: the objects and instances at the end of each recorded tick. Records share unchanged memory with
+// each other and with the latest revision, so that a record costs only the memory that its tick changed. A History is
+// immutable once published and may be read by any thread. Invariants: records are ascending by tick; History::bytes is
+// the sum of HistoryRecord::bytes and at most HistoryOptions::bytes.
 #ifndef LOCUS_CORE_SCENE_SNAPSHOT_HISTORY_H_
 #define LOCUS_CORE_SCENE_SNAPSHOT_HISTORY_H_
 
@@ -11,12 +11,14 @@
 
 #include "core/scene/objects/object_set.h"
 #include "core/scene/objects/tick_moves.h"
+#include "core/scene/statics/static_set.h"
 
 namespace locus {
 
 struct HistoryRecord {
   uint64_t tick = 0;
-  ObjectSet objects;  // objects at the end of `tick`
+  ObjectSet objects;                         // objects at the end of `tick`
+  std::shared_ptr<const StaticSet> statics;  // instances at the end of `tick`
   // Displacement up to the next record. Not set in the last record: see SceneSnapshot::since_close.
   Displacement to_next;
   // Memory in bytes that is not shared with the next record. The last record of a history has no next record: its bytes
@@ -61,18 +63,23 @@ class HistoryRecorder {
   // Returns the history, or null if it has no record.
   const HistoryPtr& history() const { return history_; }
 
-  // Appends a record with `objects`, the objects at the end of `tick`, and drops the records that are too old once the
-  // scene is at `next_tick`. `since_last` is the displacement since the last record. Precondition: last record's tick <
-  // `tick` < `next_tick`. O(records + memory that the tick changed).
-  void close(uint64_t tick, const ObjectSet& objects, const Displacement& since_last, uint64_t next_tick);
-  // Measures how much memory of the last record is not shared with `now`, the current objects, and drops the oldest
-  // records if all records together exceed HistoryOptions::bytes. Only the first call after each close() has an effect.
-  void measure(const ObjectSet& now);
+  // Appends a record with `objects` and `statics`, the objects and instances at the end of `tick`, and drops the
+  // records that are too old once the scene is at `next_tick`. `since_last` is the displacement since the last record.
+  // Precondition: last record's tick < `tick` < `next_tick`. O(records + memory that the tick changed).
+  void close(uint64_t tick, const ObjectSet& objects, std::shared_ptr<const StaticSet> statics,
+             const Displacement& since_last, uint64_t next_tick);
+  // Measures how much memory of the last record is not shared with `objects` and `statics`, the current ones, and drops
+  // the oldest records if all records together exceed HistoryOptions::bytes. Only the first call after each close() has
+  // an effect.
+  void measure(const ObjectSet& objects, const StaticSet& statics);
   // Drops all records.
   void drop();
   // Drops the oldest records until the rest takes at most `bytes`. Called when memory is short. Returns true if a
   // record was dropped. Does not change the memory limit for records that are added later.
   bool trim(uint64_t bytes);
+  // Drops the records up to the last one that has instances of `mesh`. Called when the mesh was deleted. Returns true
+  // if a record was dropped.
+  bool forget_mesh(const StaticMesh* mesh);
   // Returns true if close() or restore(true) was called since the last drop(), even if all records were dropped to
   // save memory. The result depends on the batches alone, so that a replay of the same batches produces the same
   // revisions.

@@ -16,12 +16,16 @@ bool before(const AsOf& a, const AsOf& b) { return a.tick < b.tick || (a.tick ==
 
 }  // namespace
 
-SceneAtTime::SceneAtTime(const ObjectSet& at, const ObjectSet& next, double weight, const Displacement& displacement)
+SceneAtTime::SceneAtTime(const ObjectSet& at, const ObjectSet& next, double weight, const Displacement& displacement,
+                         const StaticSet& statics, const StaticSet& next_statics)
     : at_(&at),
       next_(&next),
       weight_(weight),
       displacement_bound_(displacement.bound * weight * kEpsilonFactor + kPositionEpsilon),
-      fast_(displacement.fast.get()) {
+      fast_(displacement.fast.get()),
+      statics_(&statics),
+      next_statics_(&next_statics) {
+  if (&statics != &next_statics) between_ = std::make_shared<const InstancesBetween>(statics, next_statics, weight);
   LOCUS_DCHECK(weight >= 0 && weight <= 1);
   LOCUS_DCHECK_GE(displacement.bound, 0.0);
 }
@@ -45,21 +49,22 @@ Shape SceneAtTime::shape_between(const GridRef& object) const {
 
 std::optional<SceneAtTime> find_scene_at(const SceneSnapshot& snapshot, const AsOf& time) {
   const AsOf now{snapshot.tick, 0};
-  if (time == now) return SceneAtTime(snapshot.objects);
+  if (time == now) return SceneAtTime(snapshot.objects, *snapshot.statics);
   if (before(now, time) || time.tick < snapshot.oldest_tick()) return std::nullopt;
   const auto& records = snapshot.history->records;
   const auto next = std::upper_bound(records.begin(), records.end(), time.tick,
                                      [](uint64_t tick, const auto& record) { return tick < record->tick; });
   LOCUS_DCHECK(next != records.begin());
   const HistoryRecord& at = **(next - 1);
-  if (time == AsOf{at.tick, 0}) return SceneAtTime(at.objects);
+  const StaticSet& statics = planted(PlantedBug::kPastInstances) ? *snapshot.statics : *at.statics;
+  if (time == AsOf{at.tick, 0}) return SceneAtTime(at.objects, statics);
   const bool last = next == records.end();
   const uint64_t next_tick = last ? snapshot.tick : (*next)->tick;
   LOCUS_DCHECK_LT(at.tick, next_tick);
   const double weight =
       (static_cast<double>(time.tick - at.tick) + double{time.fraction}) / static_cast<double>(next_tick - at.tick);
   return SceneAtTime(at.objects, last ? snapshot.objects : (*next)->objects, weight,
-                     last ? snapshot.since_close : at.to_next);
+                     last ? snapshot.since_close : at.to_next, statics, last ? *snapshot.statics : *(*next)->statics);
 }
 
 AsOf nearest_kept(const SceneSnapshot& snapshot, const AsOf& time) {

@@ -1,21 +1,25 @@
-// View of the moving objects of a scene at one time, which may lie between two recorded ticks. Queries search this view
-// for objects. Borrows from a snapshot and is cheap to copy. Any thread may use a view.
+// View of the objects and instances of a scene at one time, which may lie between two recorded ticks. Queries search
+// this view. Borrows from a snapshot and is cheap to copy; the instances of a view live as long as the view or a copy.
+// Any thread may use a view.
 //
 // An object exists at a time if it existed at the end of the last recorded tick that is not after that time. If the
 // same lifetime of the object exists at the next recorded tick, the object moves in a straight line to its position at
 // that tick; otherwise the object stays in place. A search widens its region by the displacement bound, finds objects
-// at their positions at the earlier recorded tick, and interpolates each object found. At a recorded tick, and at the
-// latest revision, nothing is interpolated or widened.
+// at their positions at the earlier recorded tick, and interpolates each object found. Instances follow the same rules;
+// a set of the interpolated instances is made for the view. At a recorded tick, and at the latest revision, nothing is
+// interpolated or widened.
 #ifndef LOCUS_CORE_SCENE_SNAPSHOT_SCENE_AT_TIME_H_
 #define LOCUS_CORE_SCENE_SNAPSHOT_SCENE_AT_TIME_H_
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <optional>
 
 #include "core/base/planted_bug.h"
 #include "core/index/hash_grid/region_walk.h"
+#include "core/scene/snapshot/instances_between.h"
 #include "core/scene/snapshot/scene_snapshot.h"
 
 namespace locus {
@@ -30,16 +34,25 @@ struct AsOf {
 
 class SceneAtTime {
  public:
-  // Creates a view of `objects` at their stored positions.
-  explicit SceneAtTime(const ObjectSet& objects) : at_(&objects) {}
-  // Creates a view of the objects `at`, interpolated towards `next` with 0 <= weight <= 1. `displacement` is the
-  // displacement from `at` to `next`.
-  SceneAtTime(const ObjectSet& at, const ObjectSet& next, double weight, const Displacement& displacement);
+  // Creates a view of `objects` and `statics` at their stored positions.
+  SceneAtTime(const ObjectSet& objects, const StaticSet& statics) : at_(&objects), statics_(&statics) {}
+  // Creates a view of the objects `at`, interpolated towards `next` with 0 <= weight <= 1, and of the instances
+  // `statics`, interpolated towards `next_statics`. `displacement` is the displacement from `at` to `next`.
+  SceneAtTime(const ObjectSet& at, const ObjectSet& next, double weight, const Displacement& displacement,
+              const StaticSet& statics, const StaticSet& next_statics);
 
   // Returns true if the time lies between two records, so that objects may be away from their stored positions.
   bool between() const { return next_ != nullptr; }
   // Returns the objects that exist at this time, at their stored positions.
   const ObjectSet& objects() const { return *at_; }
+  // Returns the instances at this time, at their interpolated positions. Between two ticks at which instances moved,
+  // the first call for a view and its copies makes the set: see InstancesBetween::get().
+  const StaticSet& statics() const { return between_ == nullptr ? *statics_ : between_->get(); }
+  // Returns an upper bound of the memory of the set that statics() makes; 0 if it makes none. O(instances that changed
+  // between the two ticks).
+  uint64_t interpolated_bytes() const {
+    return between_ == nullptr ? 0 : locus::interpolated_bytes(*statics_, *next_statics_);
+  }
   // Returns the shape of an object of objects() at its interpolated position and rotation.
   Shape shape(const GridRef& object) const { return next_ == nullptr ? shape_of(object) : shape_between(object); }
 
@@ -83,6 +96,9 @@ class SceneAtTime {
   double weight_ = 0;
   double displacement_bound_ = 0;                 // maximum distance of an object from its position in at_
   const std::vector<FastMover>* fast_ = nullptr;  // objects exempt from displacement_bound_, ascending by handle
+  const StaticSet* statics_;
+  const StaticSet* next_statics_ = nullptr;
+  std::shared_ptr<const InstancesBetween> between_;  // null if no instance changes up to the next tick
 };
 
 // Returns the view of the scene at `time`, or nullopt if `time` is before the oldest recorded tick or after the

@@ -32,7 +32,8 @@ uint64_t unshared_history_bytes(const SceneSnapshot& held, const SceneSnapshot& 
     // Appending a record replaces the previous record by a copy with the same objects. Therefore compare the objects of
     // two records of the same tick, not the pointers to the records.
     const bool same_tick = kept != nullptr && kept->tick == record->tick;
-    bytes += same_tick ? record->objects.unshared_bytes(kept->objects) : record->bytes;
+    bytes += same_tick ? record->objects.unshared_bytes(kept->objects) + record->statics->unshared_bytes(*kept->statics)
+                       : record->bytes;
   }
   return bytes;
 }
@@ -44,7 +45,7 @@ uint64_t unshared_bytes(const SceneSnapshot& held, const SceneSnapshot& later) {
   // Among the sets of objects that `later` holds, the first set at or after the tick of `held` shares the most memory
   // with `held`.
   const HistoryRecord* next = first_record(later, held.tick);
-  return held.statics->unshared_bytes(*later.statics) +
+  return held.statics->unshared_bytes(next == nullptr ? *later.statics : *next->statics) +
          held.objects.unshared_bytes(next == nullptr ? later.objects : next->objects) +
          unshared_history_bytes(held, later);
 }

@@ -184,10 +184,10 @@ TEST_F(HistoryTest, TheHistoryReportsWhyItBeginsAtItsOldestTick) {
 TEST_F(HistoryTest, ARestoredHistoryReportsTheTickLimitOnceItIsLongEnough) {
   HistoryRecorder recorder({2, uint64_t{1} << 30});
   recorder.restore(true);
-  recorder.close(5, {}, {}, 6);
-  recorder.close(6, {}, {}, 7);
+  recorder.close(5, {}, StaticSet::empty(), {}, 6);
+  recorder.close(6, {}, StaticSet::empty(), {}, 7);
   EXPECT_EQ(recorder.limit(), PastLimit::kRestored);
-  recorder.close(7, {}, {}, 8);
+  recorder.close(7, {}, StaticSet::empty(), {}, 8);
   EXPECT_EQ(recorder.limit(), PastLimit::kTicks);
 }
 
