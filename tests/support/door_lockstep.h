@@ -158,7 +158,7 @@ class DoorLockstep {
   }
 
   Random random_;
-  MeshPtr mesh_;
+  std::shared_ptr<const StaticMesh> mesh_;
   Scene scene_;
   uint64_t tick_ = 0;
   uint64_t lives_ = 0;

@@ -7,6 +7,7 @@
 #include "tests/bench/dynamic/country_cases.h"
 #include "tests/bench/dynamic/growth_case.h"
 #include "tests/bench/dynamic/insert_cases.h"
+#include "tests/bench/dynamic/instance_cases.h"
 #include "tests/bench/dynamic/move_cases.h"
 #include "tests/bench/dynamic/peers.h"
 #include "tests/bench/dynamic/query_cases.h"
@@ -103,6 +104,7 @@ absl::Status run_dynamic_suite(const Options& options, const Progress& progress,
   run_country_cases(options, progress, report);
   run_growth_case(options, progress, report);
   run_rewind_cases(options, progress, report);
+  run_instance_cases(options, progress, report);
   run_concurrent_cases(options, progress, report);
   return absl::OkStatus();
 }
