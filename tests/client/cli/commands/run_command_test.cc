@@ -111,6 +111,27 @@ TEST_F(RunCommandTest, ABrokenCopyFailsWithLineAndValue) {
   EXPECT_THAT(outcome.err, HasSubstr("2 expectations passed, 1 failed\n"));
 }
 
+TEST_F(RunCommandTest, ABatchMovesAndRelabelsInstances) {
+  const Outcome outcome = run_lua(R"(
+    local scene = locus.scene("lua-doors")
+    locus.command("generate city --triangles 500 --seed 1 --create --scene", scene.name)
+    locus.command("wait", scene.name)
+    local before = locus.command("instance list", scene.name)
+    local updates = scene:updates()
+    updates:move_instance{ id = before.instances[1].id, at = { 7, 8, 9 }, scale = 2 }
+    updates:relabel_instance{ id = before.instances[1].id, tag = 5 }
+    locus.expect_equal(updates:commit{ tick = 1 }.applied, 2)
+    local door = locus.command("instance list", scene.name).instances[1]
+    locus.expect_equal(door.at, { 7, 8, 9 })
+    locus.expect_equal(door.scale, 2)
+    locus.expect_equal(door.tag, 5)
+    locus.expect_error("UNKNOWN_ID", function()
+      scene:updates():move_instance{ id = 1, at = { 0, 0, 0 } }:commit()
+    end)
+  )");
+  EXPECT_EQ(outcome.code, ExitCode::kOk) << outcome.err;
+}
+
 TEST_F(RunCommandTest, SettingsReachTheScriptAndTheEndIsJsonWhereTheOutputIs) {
   const Outcome outcome = run({"run", kExamples + "first_steps.lua", "--set", "scene=elsewhere", "-o", "ndjson"});
   EXPECT_EQ(outcome.code, ExitCode::kOk) << outcome.err;
