@@ -53,8 +53,9 @@ void add_queries(const MetricCounts& counts, MetricPage& page) {
 }
 
 void add_updates(const MetricCounts& counts, MetricPage& page) {
-  page.add_one("locus_update_items_total", "Objects inserted, moved, relabelled and removed.", MetricKind::kCounter,
-               static_cast<double>(counts.update_items));
+  page.add_one("locus_update_items_total",
+               "Objects inserted, moved, relabelled and removed, and instances moved and relabelled.",
+               MetricKind::kCounter, static_cast<double>(counts.update_items));
   page.begin("locus_update_lag_seconds",
              "Time from the arrival of a batch of updates to the publication of its revision, in seconds.",
              MetricKind::kHistogram);

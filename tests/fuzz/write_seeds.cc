@@ -214,6 +214,13 @@ void write_updates(const SeedWriter& seeds) {
   v1::Relabel* relabel = batch.add_relabels();
   relabel->add_ids(8);
   relabel->add_groups(4);
+  v1::InstanceMove* instance_move = batch.add_instance_moves();
+  instance_move->add_ids(100);
+  for (float value : {1.f, 2.f, 3.f}) instance_move->add_positions(value);
+  instance_move->add_scales(2);
+  v1::Relabel* hidden = batch.add_instance_relabels();
+  hidden->add_ids(100);
+  hidden->add_layers(0);
   batch.add_remove_ids(1);
   batch.set_tick(9);
   v1::UpdateBatch second;

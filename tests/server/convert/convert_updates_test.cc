@@ -77,6 +77,17 @@ TEST(ConvertUpdatesTest, EveryFieldOfABatchArrives) {
   EXPECT_EQ(updates->batch, 12u);
 }
 
+TEST(ConvertUpdatesTest, AMoveOfInstancesNeedsOneColumnOfPositions) {
+  v1::UpdateBatch batch;
+  v1::InstanceMove* move = batch.add_instance_moves();
+  move->add_ids(20);
+  EXPECT_EQ(refusal_of(to_updates(batch).status())->field, "instance_moves[0].positions");
+  for (int i = 0; i < 3; ++i) move->add_positions(0);
+  EXPECT_TRUE(to_updates(batch).ok());
+  for (int i = 0; i < 3; ++i) move->add_positions_f64(0);
+  EXPECT_EQ(refusal_of(to_updates(batch).status())->field, "instance_moves[0].positions_f64");
+}
+
 TEST(ConvertUpdatesTest, AnEmptyMessageConvertsToTheDefaults) {
   const absl::StatusOr<UpdateBatch> updates = to_updates({});
   ASSERT_TRUE(updates.ok());

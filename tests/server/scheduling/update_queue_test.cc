@@ -145,6 +145,17 @@ TEST_F(UpdateQueueTest, ABatchThatScansEveryObjectIsNotAppliedByItsCaller) {
   EXPECT_EQ(queue.stats().applied, 1u);
 }
 
+TEST_F(UpdateQueueTest, ABatchThatChangesInstancesIsNotAppliedByItsCaller) {
+  UpdateQueue queue({});
+  const std::vector<uint64_t> ids = {50};
+  const auto update = move({1}, 5);
+  update->change().instance_relabels.emplace_back().ids = ids;
+  ASSERT_TRUE(queue.post(scene_, *update, WhenFull::kRefuse).ok());
+  EXPECT_EQ(update->wait()->refused, 1u);
+  EXPECT_EQ(x_of(1), 5);
+  EXPECT_EQ(queue.stats().applied_inline, 0u);
+}
+
 TEST_F(UpdateQueueTest, ACallerNeverWaitsForThePreviousBatch) {
   UpdateQueue queue({});
   const auto held = move({1}, 1);
