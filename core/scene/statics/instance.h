@@ -3,6 +3,7 @@
 #define LOCUS_CORE_SCENE_STATICS_INSTANCE_H_
 
 #include <atomic>
+#include <limits>
 #include <memory>
 
 #include "core/base/ids.h"
@@ -19,12 +20,12 @@ struct Instance {
   Group group = 0;
   Tag tag = 0;
   Layers layers = kDefaultLayers;
+  // Identifies the stay of the instance in the scene, from its placement to its removal or to the next jump; 0 before
+  // the instance is placed. Two stays of one id have different numbers, unless 2^32 stays are between them.
+  uint32_t life = 0;
   std::shared_ptr<const StaticMesh> mesh;
   Transform transform;
   Aabbd bounds;  // world bounds of the whole mesh
-  // Identifies the stay of the instance in the scene, from its placement to its removal or to the next jump. Unique in
-  // the process; 0 before the instance is placed.
-  uint64_t life = 0;
 };
 
 template <>
@@ -57,9 +58,9 @@ inline bool is_same(const Instance& a, const Instance& b) {
 }
 
 // Returns another number for Instance::life at each call, never 0.
-inline uint64_t new_life() {
+inline uint32_t new_life() {
   static std::atomic<uint64_t> last{0};
-  return last.fetch_add(1, std::memory_order_relaxed) + 1;
+  return static_cast<uint32_t>(last.fetch_add(1, std::memory_order_relaxed) % std::numeric_limits<uint32_t>::max()) + 1;
 }
 
 }  // namespace locus

@@ -196,7 +196,7 @@ void StaticSet::check_invariants() const {
   LOCUS_CHECK_EQ(positions_.size(), tree_.size());
   for (const Instance& instance : tree_.values()) {
     LOCUS_CHECK_NE(instance.id, kNoId);
-    LOCUS_CHECK_NE(instance.life, uint64_t{0});
+    LOCUS_CHECK_NE(instance.life, 0u);
     LOCUS_CHECK(instance.mesh != nullptr);
     LOCUS_CHECK_EQ(find(instance.id), &instance);
   }
