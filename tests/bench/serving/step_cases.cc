@@ -105,8 +105,8 @@ class Shooter {
   std::vector<Vec3f> starts_;
 };
 
-// One way to make the ticks of a shooter: each call of tick() makes the next tick, in one or two messages, and waits
-// for the answers.
+// One way to make the ticks of a shooter, in one or two messages each. prepare() makes the messages of the next ticks;
+// run() sends them, one tick after another, and waits for the answers to each.
 class Way {
  public:
   explicit Way(const Shooter& shooter) : shooter_(shooter) {}
@@ -114,11 +114,17 @@ class Way {
   Way(const Way&) = delete;
   Way& operator=(const Way&) = delete;
 
-  void tick(uint64_t number) {
-    if (!failure_.ok()) return;
-    failure_ = run(number);
-    if (failure_.ok() && (ack_.applied() != kPlayers || result_.blocks_size() != 3 || result_.tick() != number))
-      failure_ = absl::DataLossError("a tick was not answered as a whole");
+  void prepare(uint64_t first, size_t ticks) {
+    first_ = first;
+    ticks_ = ticks;
+    for (size_t i = 0; i < ticks; ++i) make(i, first + i);
+  }
+  void run() {
+    for (size_t i = 0; i < ticks_ && failure_.ok(); ++i) {
+      failure_ = send(i);
+      const bool is_whole = ack_.applied() == kPlayers && result_.blocks_size() == 3 && result_.tick() == first_ + i;
+      if (failure_.ok() && !is_whole) failure_ = absl::DataLossError("a tick was not answered as a whole");
+    }
   }
   const absl::Status& failure() const { return failure_; }
   // Returns the answer to the last tick without its revision.
@@ -129,68 +135,82 @@ class Way {
   }
 
  protected:
-  virtual absl::Status run(uint64_t number) = 0;
+  // Makes the messages of the tick `number`, the `i`th of those that are prepared.
+  virtual void make(size_t i, uint64_t number) = 0;
+  virtual absl::Status send(size_t i) = 0;
 
   const Shooter& shooter_;
   v1::UpdateAck ack_;
   v1::QueryResult result_;
 
  private:
+  uint64_t first_ = 0;
+  size_t ticks_ = 0;
   absl::Status failure_;
 };
+
+// Returns entry `i` of a list of messages, which grows as needed.
+template <class Message>
+Message& message_at(std::vector<Message>& messages, size_t i) {
+  if (messages.size() <= i) messages.resize(i + 1);
+  messages[i].set_scene(kScene);
+  return messages[i];
+}
 
 class UnaryStep final : public Way {
  public:
   UnaryStep(const Shooter& shooter, const std::shared_ptr<grpc::Channel>& channel)
-      : Way(shooter), stub_(v1::QueryService::NewStub(channel)) {
-    request_.set_scene(kScene);
-  }
+      : Way(shooter), stub_(v1::QueryService::NewStub(channel)) {}
 
  private:
-  absl::Status run(uint64_t number) override {
-    shooter_.set_moves(number, *request_.mutable_update());
-    shooter_.set_queries(number, *request_.mutable_queries());
+  void make(size_t i, uint64_t number) override {
+    v1::StepRequest& request = message_at(requests_, i);
+    shooter_.set_moves(number, *request.mutable_update());
+    shooter_.set_queries(number, *request.mutable_queries());
+  }
+  absl::Status send(size_t i) override {
     grpc::ClientContext context;
     v1::StepResponse response;
-    if (const grpc::Status status = stub_->Step(&context, request_, &response); !status.ok()) return failed(status);
+    if (const grpc::Status status = stub_->Step(&context, requests_[i], &response); !status.ok()) return failed(status);
     ack_.Swap(response.mutable_ack());
     result_.Swap(response.mutable_result());
     return absl::OkStatus();
   }
 
   const std::unique_ptr<v1::QueryService::Stub> stub_;
-  v1::StepRequest request_;
+  std::vector<v1::StepRequest> requests_;
 };
 
 class TwoCalls final : public Way {
  public:
   TwoCalls(const Shooter& shooter, const std::shared_ptr<grpc::Channel>& channel)
-      : Way(shooter), updates_(v1::UpdateService::NewStub(channel)), queries_(v1::QueryService::NewStub(channel)) {
-    update_.set_scene(kScene);
-    query_.set_scene(kScene);
-  }
+      : Way(shooter),
+        update_stub_(v1::UpdateService::NewStub(channel)),
+        query_stub_(v1::QueryService::NewStub(channel)) {}
 
  private:
-  absl::Status run(uint64_t number) override {
-    shooter_.set_moves(number, *update_.mutable_batch());
+  void make(size_t i, uint64_t number) override {
+    shooter_.set_moves(number, *message_at(updates_, i).mutable_batch());
+    shooter_.set_queries(number, *message_at(queries_, i).mutable_batch());
+  }
+  absl::Status send(size_t i) override {
     grpc::ClientContext update_context, query_context;
     v1::ApplyUpdatesResponse applied;
     v1::QueryResponse answered;
-    if (const grpc::Status status = updates_->ApplyUpdates(&update_context, update_, &applied); !status.ok())
+    if (const grpc::Status status = update_stub_->ApplyUpdates(&update_context, updates_[i], &applied); !status.ok())
       return failed(status);
-    shooter_.set_queries(number, *query_.mutable_batch());
-    query_.mutable_batch()->mutable_view()->set_at_least(applied.ack().revision());
-    if (const grpc::Status status = queries_->Query(&query_context, query_, &answered); !status.ok())
+    queries_[i].mutable_batch()->mutable_view()->set_at_least(applied.ack().revision());
+    if (const grpc::Status status = query_stub_->Query(&query_context, queries_[i], &answered); !status.ok())
       return failed(status);
     ack_.Swap(applied.mutable_ack());
     result_.Swap(answered.mutable_result());
     return absl::OkStatus();
   }
 
-  const std::unique_ptr<v1::UpdateService::Stub> updates_;
-  const std::unique_ptr<v1::QueryService::Stub> queries_;
-  v1::ApplyUpdatesRequest update_;
-  v1::QueryRequest query_;
+  const std::unique_ptr<v1::UpdateService::Stub> update_stub_;
+  const std::unique_ptr<v1::QueryService::Stub> query_stub_;
+  std::vector<v1::ApplyUpdatesRequest> updates_;
+  std::vector<v1::QueryRequest> queries_;
 };
 
 absl::Status broken() { return absl::DataLossError("the server ended a stream"); }
@@ -198,16 +218,17 @@ absl::Status broken() { return absl::DataLossError("the server ended a stream");
 class StreamedStep final : public Way {
  public:
   StreamedStep(const Shooter& shooter, const std::shared_ptr<grpc::Channel>& channel)
-      : Way(shooter), stub_(v1::QueryService::NewStub(channel)), stream_(stub_->StreamQueries(&context_)) {
-    request_.set_scene(kScene);
-  }
+      : Way(shooter), stub_(v1::QueryService::NewStub(channel)), stream_(stub_->StreamQueries(&context_)) {}
   ~StreamedStep() override { context_.TryCancel(); }
 
  private:
-  absl::Status run(uint64_t number) override {
-    shooter_.set_moves(number, *request_.mutable_update());
-    shooter_.set_queries(number, *request_.mutable_batch());
-    if (!stream_->Write(request_) || !stream_->Read(&response_)) return broken();
+  void make(size_t i, uint64_t number) override {
+    v1::StreamQueriesRequest& request = message_at(requests_, i);
+    shooter_.set_moves(number, *request.mutable_update());
+    shooter_.set_queries(number, *request.mutable_batch());
+  }
+  absl::Status send(size_t i) override {
+    if (!stream_->Write(requests_[i]) || !stream_->Read(&response_)) return broken();
     ack_.Swap(response_.mutable_ack());
     result_.Swap(response_.mutable_result());
     return absl::OkStatus();
@@ -216,7 +237,7 @@ class StreamedStep final : public Way {
   grpc::ClientContext context_;
   const std::unique_ptr<v1::QueryService::Stub> stub_;
   const std::unique_ptr<grpc::ClientReaderWriter<v1::StreamQueriesRequest, v1::StreamQueriesResponse>> stream_;
-  v1::StreamQueriesRequest request_;
+  std::vector<v1::StreamQueriesRequest> requests_;
   v1::StreamQueriesResponse response_;
 };
 
@@ -226,24 +247,22 @@ class TwoStreams final : public Way {
       : Way(shooter),
         update_stub_(v1::UpdateService::NewStub(channel)),
         query_stub_(v1::QueryService::NewStub(channel)),
-        updates_(update_stub_->StreamUpdates(&update_context_)),
-        queries_(query_stub_->StreamQueries(&query_context_)) {
-    update_.set_scene(kScene);
-    query_.set_scene(kScene);
-  }
+        update_stream_(update_stub_->StreamUpdates(&update_context_)),
+        query_stream_(query_stub_->StreamQueries(&query_context_)) {}
   ~TwoStreams() override {
     update_context_.TryCancel();
     query_context_.TryCancel();
   }
 
  private:
-  absl::Status run(uint64_t number) override {
-    shooter_.set_moves(number, *update_.mutable_batch());
-    if (!updates_->Write(update_)) return broken();
-    shooter_.set_queries(number, *query_.mutable_batch());  // while the update is on its way
-    if (!updates_->Read(&applied_)) return broken();
-    query_.mutable_batch()->mutable_view()->set_at_least(applied_.ack().revision());
-    if (!queries_->Write(query_) || !queries_->Read(&answered_)) return broken();
+  void make(size_t i, uint64_t number) override {
+    shooter_.set_moves(number, *message_at(updates_, i).mutable_batch());
+    shooter_.set_queries(number, *message_at(queries_, i).mutable_batch());
+  }
+  absl::Status send(size_t i) override {
+    if (!update_stream_->Write(updates_[i]) || !update_stream_->Read(&applied_)) return broken();
+    queries_[i].mutable_batch()->mutable_view()->set_at_least(applied_.ack().revision());
+    if (!query_stream_->Write(queries_[i]) || !query_stream_->Read(&answered_)) return broken();
     ack_.Swap(applied_.mutable_ack());
     result_.Swap(answered_.mutable_result());
     return absl::OkStatus();
@@ -252,11 +271,11 @@ class TwoStreams final : public Way {
   grpc::ClientContext update_context_, query_context_;
   const std::unique_ptr<v1::UpdateService::Stub> update_stub_;
   const std::unique_ptr<v1::QueryService::Stub> query_stub_;
-  const std::unique_ptr<grpc::ClientReaderWriter<v1::StreamUpdatesRequest, v1::StreamUpdatesResponse>> updates_;
-  const std::unique_ptr<grpc::ClientReaderWriter<v1::StreamQueriesRequest, v1::StreamQueriesResponse>> queries_;
-  v1::StreamUpdatesRequest update_;
+  const std::unique_ptr<grpc::ClientReaderWriter<v1::StreamUpdatesRequest, v1::StreamUpdatesResponse>> update_stream_;
+  const std::unique_ptr<grpc::ClientReaderWriter<v1::StreamQueriesRequest, v1::StreamQueriesResponse>> query_stream_;
+  std::vector<v1::StreamUpdatesRequest> updates_;
+  std::vector<v1::StreamQueriesRequest> queries_;
   v1::StreamUpdatesResponse applied_;
-  v1::StreamQueriesRequest query_;
   v1::StreamQueriesResponse answered_;
 };
 
@@ -287,18 +306,22 @@ absl::Status compare(const ServingRun& run, const std::string& name, uint64_t& t
   if (!run.wants(name)) return absl::OkStatus();
   run.progress(name);
   const size_t chunks = run.options.quick ? 2 : 40, ticks = run.options.quick ? 5 : 25;
-  const auto make = [&](Way& way) {
-    for (size_t i = 0; i < ticks; ++i) way.tick(tick++);
+  const auto prepare = [&](Way& way) {
+    way.prepare(tick, ticks);
+    tick += ticks;
   };
   const auto operations = static_cast<double>(chunks * ticks);
-  const std::vector<Contestant> contestants = {{"step", [&](size_t) { make(step); }, operations, {}},
-                                               {"two_calls", [&](size_t) { make(calls); }, operations, {}}};
+  const std::vector<Contestant> contestants = {
+      {"step", [&](size_t) { step.run(); }, operations, [&](size_t) { prepare(step); }},
+      {"two_calls", [&](size_t) { calls.run(); }, operations, [&](size_t) { prepare(calls); }}};
   const auto times = race(contestants, chunks, run.options.rounds, wall_seconds);
-  RETURN_IF_ERROR(step.failure());
-  RETURN_IF_ERROR(calls.failure());
   // A second move to the same positions at the same tick changes neither the scene nor its history.
-  step.tick(tick);
-  calls.tick(tick++);
+  for (Way* const way : {&step, &calls}) {
+    way->prepare(tick, 1);
+    way->run();
+    RETURN_IF_ERROR(way->failure());
+  }
+  ++tick;
   if (step.answer() != calls.answer()) run.disagree(name + ": a step and two calls have different answers");
   add_cells(contestants, times, cell_of(name, "ns/tick", hash_of_number(kPlayers)), run.report);
   note_bar(run.report, kStepBar,
