@@ -64,6 +64,7 @@ enum class PlantedBug {
   // lower triangle number.
   kKernelRowTie,
   kKernelHitAfterGivingUp,  // an undecided ray of a packet still records later hits
+  kKernelBeamMiddle,        // a beam excludes the triangles that its middle ray misses
   // The region kernels:
   kRegionReach,       // boxes of nodes are tested against the ball without a pad
   kRegionInside,      // vertices are tested against the ball in float without an error bound

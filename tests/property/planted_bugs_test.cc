@@ -181,6 +181,7 @@ constexpr Trial kTrials[] = {
     {"KernelThatPrunesEqualHits", PlantedBug::kKernelPruneEqual, compare_kernels_with_list},
     {"KernelThatKeepsTheWrongOfEqualRows", PlantedBug::kKernelRowTie, compare_kernels_with_list},
     {"KernelThatAnswersWhatItGaveUp", PlantedBug::kKernelHitAfterGivingUp, compare_kernels_with_list},
+    {"KernelBeamOfItsMiddle", PlantedBug::kKernelBeamMiddle, compare_kernels_with_list},
     {"RegionKernelWithoutNodePad", PlantedBug::kRegionReach, compare_region_kernels_with_list},
     {"RegionKernelWithoutInnerPad", PlantedBug::kRegionInside, compare_region_kernels_with_list},
     {"RegionKernelWithoutBoundOfPartingPlanes", PlantedBug::kRegionBeyond, compare_region_kernels_with_list},

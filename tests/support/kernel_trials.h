@@ -3,6 +3,7 @@
 #ifndef LOCUS_TESTS_SUPPORT_KERNEL_TRIALS_H_
 #define LOCUS_TESTS_SUPPORT_KERNEL_TRIALS_H_
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -101,6 +102,51 @@ inline KernelTrial beam_trial(std::string name, const std::vector<Triangle>& mes
     }
   }
   return KernelTrial(std::move(name), mesh, questions);
+}
+
+// Makes fans of rays from one point, as wide as the pixels of a near camera or as narrow as rounding. The point may be
+// a vertex of the mesh or lie on an edge, and rays may be aimed exactly at vertices. Some fans lie in a plane of two
+// axes, with components of 0 or -0.
+inline KernelTrial fan_trial(std::string name, const std::vector<Triangle>& mesh, uint64_t seed) {
+  Random random(seed);
+  const Aabbf bounds = internal::bounds_of_all(mesh);
+  const double size = double{max_component(bounds.extent())};
+  std::vector<KernelQuestion> questions;
+  while (questions.size() < scaled_count(4'000)) {
+    const Triangle& start = random.pick(mesh);
+    const Triangle& target = random.pick(mesh);
+    Vec3d origin = to_double(bounds.min + bounds.max) * 0.5 + random.vector(size);
+    if (random.chance(0.2)) origin = to_double(start.a);
+    if (random.chance(0.2)) origin = to_double(start.a) + (to_double(start.b) - to_double(start.a)) * random.unit();
+    const Vec3d ahead = to_double(target.a) - origin;
+    const double width = max_component(abs(ahead)) * random.magnitude(-30, -3);
+    const bool at_vertices = random.chance(0.3);
+    const int flat_axis = random.chance(0.2) ? random.whole(0, 2) : 3;
+    for (int ray = 0; ray < 16; ++ray) {
+      KernelQuestion question;
+      question.origin = origin;
+      question.direction = ahead + random.vector(width);
+      if (at_vertices) question.direction = to_double(random.pick(std::array{target.a, target.b, target.c})) - origin;
+      if (flat_axis < 3) question.direction[flat_axis] = seed % 2 == 0 ? 0.0 : -0.0;
+      if (random.chance(0.1)) question.limit = static_cast<float>(random.between(0.5, 1.5));
+      if (random.chance(0.2)) question.cull = random.chance(0.5) ? Cull::kBack : Cull::kFront;
+      if (max_component(abs(question.direction)) >= size * 0x1p-10) questions.push_back(question);
+    }
+  }
+  return KernelTrial(std::move(name), mesh, questions);
+}
+
+inline std::vector<KernelTrial> fan_trials() {
+  std::vector<KernelTrial> trials;
+  trials.push_back(fan_trial("fans at a sphere", bumpy_sphere(14, 0.1, 1), 20));
+  trials.push_back(fan_trial("fans at a city", box_city(6, 1), 21));
+  trials.push_back(fan_trial("fans at a house", box_city(1, 2), 22));
+  for (const float scale : {0x1p-9f, 0x1p9f})
+    trials.push_back(fan_trial(absl::StrCat("fans at a sphere times ", scale),
+                               internal::scaled_and_moved(bumpy_sphere(10, 0.1, 1), scale, {}), 23));
+  trials.push_back(fan_trial("fans at a far sphere",
+                             internal::scaled_and_moved(bumpy_sphere(10, 0.1, 1), 1, {1e3f, -2e3f, 5e2f}), 24));
+  return trials;
 }
 
 // Makes runs of rays that are nearly parallel to a triangle and close to it. A kernel leaves these rays undecided for
@@ -232,6 +278,7 @@ inline std::vector<KernelTrial> all_kernel_trials() {
   std::vector<KernelTrial> trials = ordinary_trials();
   for (KernelTrial& trial : far_trials()) trials.push_back(std::move(trial));
   for (KernelTrial& trial : beam_trials()) trials.push_back(std::move(trial));
+  for (KernelTrial& trial : fan_trials()) trials.push_back(std::move(trial));
   for (KernelTrial (*const make)() :
        {lattice_trial, near_diagonal_trial, border_trial, surface_trial, sliver_trial, copies_trial})
     trials.push_back(make());

@@ -16,7 +16,7 @@
 namespace locus::bench {
 namespace {
 
-constexpr size_t kBatch = 1024;      // rays per call of the kernels
+constexpr size_t kBatch = 256;       // rays per call of the kernels, as in a chunk of a query
 constexpr size_t kRegionBatch = 16;  // balls or boxes per call of find_triangles()
 constexpr size_t kAllBatch = 256;    // rays per call of the kernel for all hits
 constexpr uint32_t kMaxRows = 128;
@@ -31,12 +31,14 @@ std::shared_ptr<const StaticMesh> static_mesh(const BenchMesh& mesh) {
   return *built;
 }
 
-KernelRay kernel_ray(const RayQuery& ray) {
-  return {{ray.origin.x, ray.origin.y, ray.origin.z},
-          {ray.direction.x, ray.direction.y, ray.direction.z},
-          ray.t_max,
-          true,
-          true};
+// Writes the members in place, because copying a ray right after it was written in parts would stall the processor.
+void set(KernelRay& to, const RayQuery& ray) {
+  for (int axis = 0; axis < 3; ++axis) {
+    to.origin[axis] = ray.origin[axis];
+    to.direction[axis] = ray.direction[axis];
+  }
+  to.limit = ray.t_max;
+  to.accept_front = to.accept_back = true;
 }
 
 // Returns whether the kernels' error bounds hold for a ray. Directions have unit length, so only `reach` must be
@@ -73,7 +75,7 @@ void ask_kernels(const TriangleBvh& tree, AskKernel ask, absl::Span<const RayQue
   const float magnitude = tree.tree().magnitude;
   for (size_t begin = 0; begin < rays.size(); begin += kBatch) {
     const size_t count = std::min(kBatch, rays.size() - begin);
-    for (size_t i = 0; i < count; ++i) batch[i] = kernel_ray(rays[begin + i]);
+    for (size_t i = 0; i < count; ++i) set(batch[i], rays[begin + i]);
     ask(tree.tree(), batch.data(), hits.data(), count);
     for (size_t i = 0; i < count; ++i) {
       if (hits[i].verdict == KernelVerdict::kUndecided || !kernels_hold(rays[begin + i], magnitude))
@@ -99,7 +101,7 @@ void find_all(const TriangleBvh& tree, const RayKernels& kernels, absl::Span<con
               absl::Span<uint32_t> ids, uint32_t* counts, KernelRow* rows) {
   std::array<KernelRay, kAllBatch> batch;
   std::array<KernelHit, kAllBatch> hits;
-  std::transform(rays.begin(), rays.end(), batch.begin(), kernel_ray);
+  for (size_t i = 0; i < rays.size(); ++i) set(batch[i], rays[i]);
   kernels.all(tree.tree(), batch.data(), hits.data(), rays.size(), rows, kMaxRows);
   size_t used = 0;
   for (size_t i = 0; i < rays.size(); ++i, rows += kMaxRows) {

@@ -4,6 +4,7 @@
 
 #include <immintrin.h>
 
+#include <cstddef>
 #include <cstdint>
 
 #include "core/index/bvh/triangle_tree.h"
@@ -41,12 +42,21 @@ static inline Floats8 bits_of(uint32_t bits) {
   return {_mm256_castsi256_ps(_mm256_set1_epi32(static_cast<int>(bits)))};
 }
 static inline Floats8 bit_and(Floats8 a, Floats8 b) { return {_mm256_and_ps(a.v, b.v)}; }
+// Returns the bits of `b` that are not set in `a`.
+static inline Floats8 bit_and_not(Floats8 a, Floats8 b) { return {_mm256_andnot_ps(a.v, b.v)}; }
 static inline Floats8 bit_or(Floats8 a, Floats8 b) { return {_mm256_or_ps(a.v, b.v)}; }
 static inline void store_bits(Floats8 a, uint32_t* to) { a.store(reinterpret_cast<float*>(to)); }
-// Returns a mask for select(): the sign bit of a lane is set if a >= b.
+// Return masks for select(): all bits of a lane are set if a >= b, or if a > b.
 static inline Floats8 greater_equal_mask(Floats8 a, Floats8 b) { return {_mm256_cmp_ps(a.v, b.v, _CMP_GE_OQ)}; }
+static inline Floats8 greater_mask(Floats8 a, Floats8 b) { return {_mm256_cmp_ps(a.v, b.v, _CMP_GT_OQ)}; }
 // Returns the lane of `yes` where the sign bit of the mask's lane is set, else the lane of `no`.
 static inline Floats8 select(Floats8 mask, Floats8 yes, Floats8 no) { return {_mm256_blendv_ps(no.v, yes.v, mask.v)}; }
+// Returns the mask for select() of a mask of bits.
+static inline Floats8 mask_of_eight(uint32_t bits) {
+  const __m256i lanes = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+  const __m256i chosen = _mm256_and_si256(_mm256_set1_epi32(static_cast<int>(bits)), lanes);
+  return {_mm256_castsi256_ps(_mm256_cmpeq_epi32(chosen, lanes))};
+}
 
 // Returns a vector whose lanes all have the value of the largest lane of `a`.
 static inline Floats8 horizontal_max(Floats8 a) {
@@ -66,6 +76,13 @@ static inline uint32_t below(Floats8 a, Floats8 b) {
 
 // Returns a mask with one bit per lane: the sign bit of the lane. Also converts a mask for select() to a mask of bits.
 static inline uint32_t signs_of(Floats8 a) { return static_cast<uint32_t>(_mm256_movemask_ps(a.v)); }
+
+// Returns a mask with one bit per lane, set if a lane of `a` has all the bits that are set in `bits`.
+static inline uint32_t have_bits(Floats8 a, uint32_t bits) {
+  const __m256i wanted = _mm256_set1_epi32(static_cast<int>(bits));
+  return signs_of(
+      {_mm256_castsi256_ps(_mm256_cmpeq_epi32(_mm256_and_si256(_mm256_castps_si256(a.v), wanted), wanted))});
+}
 
 // Table with one row for each bit mask of eight lanes. A row begins with the indices of the lanes in the mask, in
 // increasing order. Computed at compile time.
@@ -201,6 +218,51 @@ typedef double Doubles __attribute__((vector_size(32)));
 
 static inline Doubles widened(float a, float b, float c) {
   return reinterpret_cast<Doubles>(_mm256_cvtps_pd(_mm_setr_ps(a, b, c, c)));
+}
+static inline Doubles widened(float a, float b, float c, float d) {
+  return reinterpret_cast<Doubles>(_mm256_cvtps_pd(_mm_setr_ps(a, b, c, d)));
+}
+
+// Writes four doubles, rounded to float.
+static inline void store_rounded(Doubles a, float* to) {
+  _mm_storeu_ps(to, _mm256_cvtpd_ps(reinterpret_cast<__m256d>(a)));
+}
+
+// Result of a comparison of Doubles: all bits of an element are set if true.
+typedef long long DoubleMask __attribute__((vector_size(32)));
+
+// Returns a mask with one bit per element.
+static inline uint32_t mask_bits(DoubleMask mask) {
+  return static_cast<uint32_t>(_mm256_movemask_pd(reinterpret_cast<__m256d>(mask)));
+}
+
+// Writes four columns as eight rows of four 32-bit values, at `to`, `to` + `stride` bytes and so on.
+static inline void store_rows(const Floats8* columns, char* to, size_t stride) {
+  const __m256 ab_low = _mm256_unpacklo_ps(columns[0].v, columns[1].v),
+               ab_high = _mm256_unpackhi_ps(columns[0].v, columns[1].v),
+               cd_low = _mm256_unpacklo_ps(columns[2].v, columns[3].v),
+               cd_high = _mm256_unpackhi_ps(columns[2].v, columns[3].v);
+  const __m256 rows[4] = {_mm256_shuffle_ps(ab_low, cd_low, _MM_SHUFFLE(1, 0, 1, 0)),
+                          _mm256_shuffle_ps(ab_low, cd_low, _MM_SHUFFLE(3, 2, 3, 2)),
+                          _mm256_shuffle_ps(ab_high, cd_high, _MM_SHUFFLE(1, 0, 1, 0)),
+                          _mm256_shuffle_ps(ab_high, cd_high, _MM_SHUFFLE(3, 2, 3, 2))};
+  for (size_t i = 0; i < 4; ++i) {
+    _mm_storeu_ps(reinterpret_cast<float*>(to + i * stride), _mm256_castps256_ps128(rows[i]));
+    _mm_storeu_ps(reinterpret_cast<float*>(to + (i + 4) * stride), _mm256_extractf128_ps(rows[i], 1));
+  }
+}
+
+// Loads the first two of the four 32-bit values at `from`, `from` + `stride` bytes and so on, eight times, as columns.
+static inline void load_pairs(const char* from, size_t stride, Floats8& first, Floats8& second) {
+  __m256 rows[4];
+  for (size_t i = 0; i < 4; ++i) {
+    const __m128 low = _mm_loadu_ps(reinterpret_cast<const float*>(from + i * stride));
+    rows[i] = _mm256_insertf128_ps(_mm256_castps128_ps256(low),
+                                   _mm_loadu_ps(reinterpret_cast<const float*>(from + (i + 4) * stride)), 1);
+  }
+  const __m256 rows01 = _mm256_unpacklo_ps(rows[0], rows[1]), rows23 = _mm256_unpacklo_ps(rows[2], rows[3]);
+  first.v = _mm256_shuffle_ps(rows01, rows23, _MM_SHUFFLE(1, 0, 1, 0));
+  second.v = _mm256_shuffle_ps(rows01, rows23, _MM_SHUFFLE(3, 2, 3, 2));
 }
 
 // Table like PackTable, but the indices of the lanes are in decreasing order.

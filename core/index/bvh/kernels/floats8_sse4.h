@@ -5,6 +5,7 @@
 
 #include <immintrin.h>
 
+#include <cstddef>
 #include <cstdint>
 
 #include "core/index/bvh/triangle_tree.h"
@@ -50,13 +51,25 @@ static inline Floats8 bits_of(uint32_t bits) {
 }
 static inline Floats8 bit_and(Floats8 a, Floats8 b) { return {_mm_and_ps(a.low, b.low), _mm_and_ps(a.high, b.high)}; }
 static inline Floats8 bit_or(Floats8 a, Floats8 b) { return {_mm_or_ps(a.low, b.low), _mm_or_ps(a.high, b.high)}; }
+static inline Floats8 bit_and_not(Floats8 a, Floats8 b) {
+  return {_mm_andnot_ps(a.low, b.low), _mm_andnot_ps(a.high, b.high)};
+}
 static inline Floats8 absolute(Floats8 a) { return bit_and(a, bits_of(0x7FFFFFFFu)); }
 static inline void store_bits(Floats8 a, uint32_t* to) { a.store(reinterpret_cast<float*>(to)); }
 static inline Floats8 greater_equal_mask(Floats8 a, Floats8 b) {
   return {_mm_cmpge_ps(a.low, b.low), _mm_cmpge_ps(a.high, b.high)};
 }
+static inline Floats8 greater_mask(Floats8 a, Floats8 b) {
+  return {_mm_cmpgt_ps(a.low, b.low), _mm_cmpgt_ps(a.high, b.high)};
+}
 static inline Floats8 select(Floats8 mask, Floats8 yes, Floats8 no) {
   return {_mm_blendv_ps(no.low, yes.low, mask.low), _mm_blendv_ps(no.high, yes.high, mask.high)};
+}
+static inline Floats8 mask_of_eight(uint32_t bits) {
+  const __m128i all_bits = _mm_set1_epi32(static_cast<int>(bits));
+  const __m128i low = _mm_setr_epi32(1, 2, 4, 8), high = _mm_setr_epi32(16, 32, 64, 128);
+  return {_mm_castsi128_ps(_mm_cmpeq_epi32(_mm_and_si128(all_bits, low), low)),
+          _mm_castsi128_ps(_mm_cmpeq_epi32(_mm_and_si128(all_bits, high), high))};
 }
 
 static inline Floats8 horizontal_max(Floats8 a) {
@@ -74,6 +87,14 @@ static inline uint32_t at_most(Floats8 a, Floats8 b) {
 }
 static inline uint32_t below(Floats8 a, Floats8 b) {
   return lanes_of(_mm_cmplt_ps(a.low, b.low), _mm_cmplt_ps(a.high, b.high));
+}
+
+static inline uint32_t have_bits(Floats8 a, uint32_t bits) {
+  const __m128i wanted = _mm_set1_epi32(static_cast<int>(bits));
+  const auto half = [wanted](__m128 lanes) {
+    return _mm_castsi128_ps(_mm_cmpeq_epi32(_mm_and_si128(_mm_castps_si128(lanes), wanted), wanted));
+  };
+  return lanes_of(half(a.low), half(a.high));
 }
 
 static inline uint32_t pack_children(const TriangleNode& node, Floats8 near, Floats8 far, uint32_t* children) {
@@ -170,6 +191,36 @@ static inline void transpose_three(const double* const* rows, Floats8* columns) 
 typedef double Doubles __attribute__((vector_size(32)));
 
 static inline Doubles widened(float a, float b, float c) { return Doubles{a, b, c, c}; }
+
+static inline Doubles widened(float a, float b, float c, float d) { return Doubles{a, b, c, d}; }
+
+typedef long long DoubleMask __attribute__((vector_size(32)));
+
+static inline uint32_t mask_bits(DoubleMask mask) {
+  uint32_t bits = 0;
+  for (uint32_t i = 0; i < 4; ++i) bits |= (mask[i] != 0 ? 1u : 0u) << i;
+  return bits;
+}
+
+static inline void store_rounded(Doubles a, float* to) {
+  for (int i = 0; i < 4; ++i) to[i] = static_cast<float>(a[i]);
+}
+
+static inline void store_rows(const Floats8* columns, char* to, size_t stride) {
+  alignas(16) float values[4][kTreeWidth];
+  for (size_t k = 0; k < 4; ++k) columns[k].store(values[k]);
+  for (size_t i = 0; i < kTreeWidth; ++i)
+    for (size_t k = 0; k < 4; ++k) __builtin_memcpy(to + i * stride + k * sizeof(float), &values[k][i], sizeof(float));
+}
+
+static inline void load_pairs(const char* from, size_t stride, Floats8& first, Floats8& second) {
+  alignas(16) float columns[2][kTreeWidth];
+  for (size_t i = 0; i < kTreeWidth; ++i)
+    for (size_t k = 0; k < 2; ++k)
+      __builtin_memcpy(&columns[k][i], from + i * stride + k * sizeof(float), sizeof(float));
+  first = Floats8::load(columns[0]);
+  second = Floats8::load(columns[1]);
+}
 
 static inline void pack_falling(const TriangleNode& node, uint32_t set, uint32_t flagged, uint32_t flag,
                                 uint32_t* children) {

@@ -161,15 +161,26 @@ struct Verdict {
   float t;
 };
 
+// Constants of a ray for the test in double; the members are columns of PreparedRays.
+struct ExactConstants {
+  uint32_t axis_x, axis_y, axis_z;
+  float edge_scale, edge_floor, start_noise, t_floor;
+
+  static inline ExactConstants of(PreparedRay ray) {
+    return {ray.integer(kAxisX),   ray.integer(kAxisY),    ray.integer(kAxisZ), ray.value(kEdgeScale),
+            ray.value(kEdgeFloor), ray.value(kStartNoise), ray.value(kTFloor)};
+  }
+};
+
 // Returns true if TriangleRay would treat the triangle as nearly edge-on; may also return true for triangles slightly
 // beyond TriangleRay's bound. `size` is |determinant| and `along` is d; R, E and d are defined at the top of this file.
 // Sheared coordinates are at most 2 E + 2^-18 R, so TriangleRay's bound is at most d^2 (2^-12 E^2 + 2^-29 R E + 2^-48
 // R^2). This larger bound is cheaper to compute, so `size` is compared with it first.
-static inline bool may_be_edge_on(const TriangleBlock& block, PreparedRay prepared, Doubles x, Doubles y,
+static inline bool may_be_edge_on(const TriangleBlock& block, const ExactConstants& constants, Doubles x, Doubles y,
                                   Doubles depths, double along, double size) {
-  const double extent = block.extent, edge_scale = prepared.value(kEdgeScale);
-  const double bound = extent * (extent + edge_scale) + prepared.value(kEdgeFloor);
-  if (size > 0x1p-12 * bound * along * along) return false;
+  const double edge_scale = constants.edge_scale;
+  const double extent = block.extent;
+  if (size > 0x1p-12 * (extent * (extent + edge_scale) + constants.edge_floor) * along * along) return false;
   const double reach = 0x1p17 * edge_scale, longest = __builtin_fabs(along);
   double width = 0x1p-39 * reach * longest;
   for (int vertex = 0; vertex < 3; ++vertex)
@@ -194,9 +205,9 @@ static inline bool is_exactly_edge_on(const TriangleBlock& block, int lane, cons
 // Tests in double whether the ray hits the triangle in lane `lane`. Computes TriangleRay::edge_test(), but omits its
 // scaling by powers of two. For the directions and distances that the kernels accept, this scaling would change no bit
 // of the result.
-static inline Verdict decide(const TriangleBlock& block, int lane, const KernelRay& ray, PreparedRay prepared) {
-  const uint32_t axis_x = prepared.integer(kAxisX), axis_y = prepared.integer(kAxisY),
-                 axis_z = prepared.integer(kAxisZ);
+static inline Verdict decide(const TriangleBlock& block, int lane, const KernelRay& ray,
+                             const ExactConstants& constants) {
+  const uint32_t axis_x = constants.axis_x, axis_y = constants.axis_y, axis_z = constants.axis_z;
   const double along = ray.direction[axis_z];
   const Doubles z = coordinates(block, axis_z, lane) - splat(ray.origin[axis_z]);
   const Doubles x =
@@ -207,7 +218,7 @@ static inline Verdict decide(const TriangleBlock& block, int lane, const KernelR
                           __builtin_shufflevector(y, y, 2, 0, 1, 3) * __builtin_shufflevector(x, x, 1, 2, 0, 3);
   const double a = weights[0], b = weights[1], c = weights[2];
   const double determinant = a + b + c, size = __builtin_fabs(determinant);
-  if (may_be_edge_on(block, prepared, x, y, z, along, size))
+  if (may_be_edge_on(block, constants, x, y, z, along, size))
     return {is_exactly_edge_on(block, lane, ray) ? KernelVerdict::kMiss : KernelVerdict::kUndecided, 0};
   if (minimum(a, minimum(b, c)) < 0 && maximum(a, maximum(b, c)) > 0) return {KernelVerdict::kMiss, 0};
   if (!(determinant > 0 || planted(PlantedBug::kKernelCull) ? ray.accept_front : ray.accept_back))
@@ -218,11 +229,73 @@ static inline Verdict decide(const TriangleBlock& block, int lane, const KernelR
     const double unit = along * along;
     // A triangle far behind the origin is not hit. For a triangle slightly behind the origin the result depends on
     // TriangleRay::depth_error(), which is not computed here, so the verdict is kUndecided.
-    const double noise = double{prepared.value(kStartNoise)} * unit / size + double{prepared.value(kTFloor)};
+    const double noise = double{constants.start_noise} * unit / size + double{constants.t_floor};
     return {t < -noise ? KernelVerdict::kMiss : KernelVerdict::kUndecided, 0};
   }
   if ((t > 0 && t < 1e-30) || !(t < 1e30)) return {KernelVerdict::kUndecided, 0};
   return {KernelVerdict::kHit, static_cast<float>(t) + 0.0f};
+}
+
+// Results of decide_four(). A mask has one bit per pair; a pair in neither mask is a miss.
+struct FourVerdicts {
+  uint32_t hits;
+  uint32_t unsure;  // pairs that decide() must decide
+  float t[4];       // valid for hits
+};
+
+// Four pairs of a ray and a triangle. The rays start at the same point. The triangle of pair i is in lane lanes[i] of
+// blocks[i]. Bit i of `front` and `back` is set if ray i accepts a triangle seen from the front or back.
+struct FourPairs {
+  const KernelRay* rays;
+  const TriangleBlock* blocks[4];
+  uint32_t lanes[4];
+  uint32_t front, back;
+};
+
+// Tests four pairs in double, by the arithmetic of decide(). The rays share `constants`, of which start_noise and
+// t_floor are not used. With kSame all pairs have the same triangle.
+template <bool kSame>
+static inline FourVerdicts decide_four(const FourPairs& pairs, const ExactConstants& constants) {
+  const KernelRay* const rays = pairs.rays;
+  const float* lanes[4];
+  for (uint32_t i = 0; i < 4; ++i) lanes[i] = pairs.blocks[i]->vertices[0] + pairs.lanes[i];
+  const auto coordinate = [&](uint32_t row) {
+    const uint32_t at = row * kTreeWidth;
+    if constexpr (kSame) return splat(double{lanes[0][at]});
+    return widened(lanes[0][at], lanes[1][at], lanes[2][at], lanes[3][at]);
+  };
+  const auto direction = [&](uint32_t axis) {
+    return Doubles{rays[0].direction[axis], rays[1].direction[axis], rays[2].direction[axis], rays[3].direction[axis]};
+  };
+  const uint32_t axis_x = constants.axis_x, axis_y = constants.axis_y, axis_z = constants.axis_z;
+  const Doubles along = direction(axis_z), direction_x = direction(axis_x), direction_y = direction(axis_y);
+  const Doubles from_x = splat(rays[0].origin[axis_x]), from_y = splat(rays[0].origin[axis_y]),
+                from_z = splat(rays[0].origin[axis_z]);
+  Doubles x[3], y[3], z[3];
+  for (uint32_t vertex = 0; vertex < 3; ++vertex) {
+    z[vertex] = coordinate(axis_z + 3 * vertex) - from_z;
+    x[vertex] = (coordinate(axis_x + 3 * vertex) - from_x) * along - z[vertex] * direction_x;
+    y[vertex] = (coordinate(axis_y + 3 * vertex) - from_y) * along - z[vertex] * direction_y;
+  }
+  const Doubles a = x[2] * y[1] - y[2] * x[1], b = x[0] * y[2] - y[0] * x[2], c = x[1] * y[0] - y[1] * x[0];
+  const Doubles determinant = a + b + c, zero = splat(0);
+  const Doubles t = (a * z[0] + b * z[1] + c * z[2]) / (determinant * along);
+  const Doubles extent = kSame ? splat(pairs.blocks[0]->extent)
+                               : widened(pairs.blocks[0]->extent, pairs.blocks[1]->extent, pairs.blocks[2]->extent,
+                                         pairs.blocks[3]->extent);
+  // The bound of may_be_edge_on(), which is the same for all four pairs.
+  const Doubles bound =
+      (extent * (extent + splat(constants.edge_scale)) + splat(constants.edge_floor)) * splat(0x1p-12) * along * along;
+  const auto not_edge_on = (determinant > bound) | (determinant < zero - bound);
+  const auto miss = ((a < zero) | (b < zero) | (c < zero)) & ((a > zero) | (b > zero) | (c > zero));
+  const auto ordinary = (t >= splat(1e-30)) & (t < splat(1e30));
+  const auto mask = [](auto comparison) { return mask_bits(reinterpret_cast<DoubleMask>(comparison)); };
+  const uint32_t is_front = planted(PlantedBug::kKernelCull) ? 15u : mask(determinant > zero);
+  FourVerdicts verdicts;
+  verdicts.hits = mask(not_edge_on & ordinary & ~miss) & ((is_front & pairs.front) | (~is_front & pairs.back));
+  verdicts.unsure = ~mask(not_edge_on & (miss | ordinary)) & 15u;
+  store_rounded(t, verdicts.t);
+  return verdicts;
 }
 
 }  // namespace

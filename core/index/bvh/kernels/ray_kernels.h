@@ -3,7 +3,7 @@
 // rounding error proves that the result is right. Otherwise the kernel repeats the test in double by the arithmetic of
 // TriangleRay (core/geometry/ray_triangle.h), so that its answers equal the answers of TriangleRay bit for bit. If
 // double is not precise enough either, the verdict on the ray is kUndecided, and the caller traces the ray again,
-// triangle by triangle with TriangleRay. Plain data; functions without state, safe from any thread; a call uses 220 KB
+// triangle by triangle with TriangleRay. Plain data; functions without state, safe from any thread; a call uses 300 KB
 // of stack.
 #ifndef LOCUS_CORE_INDEX_BVH_KERNELS_RAY_KERNELS_H_
 #define LOCUS_CORE_INDEX_BVH_KERNELS_RAY_KERNELS_H_
@@ -53,8 +53,8 @@ struct KernelHit {
   // triangle that the ray hits.
   uint32_t number;
   KernelVerdict verdict;
-  uint32_t nodes;  // number of nodes opened; of eight rays traced together, all but the first have 0
-  uint32_t tests;  // number of triangles tested
+  // Number of nodes opened, and of triangles tested. What rays traced together share is counted for the first of them.
+  uint32_t nodes, tests;
 };
 
 // One of the hits found by all().

@@ -11,6 +11,7 @@
 #include "core/base/planted_bug.h"
 #include "core/index/bvh/kernels/floats8.h"
 #include "core/index/bvh/kernels/ray_answer_impl.h"
+#include "core/index/bvh/kernels/ray_beam_impl.h"
 #include "core/index/bvh/kernels/ray_block_impl.h"
 #include "core/index/bvh/kernels/ray_kernels.h"
 #include "core/index/bvh/kernels/ray_packet_impl.h"
@@ -207,7 +208,7 @@ class RayStream {
     const TriangleBlock& block = tree_.blocks[opened.index];
     for (uint32_t candidates = opened.results.candidates; candidates != 0; candidates &= candidates - 1u) {
       const int lane = __builtin_ctz(candidates);
-      const Verdict verdict = decide(block, lane, rays_[flight.index], flight.ray);
+      const Verdict verdict = decide(block, lane, rays_[flight.index], ExactConstants::of(flight.ray));
       if (verdict.verdict == KernelVerdict::kUndecided) flight.undecided = true;
       if (verdict.verdict != KernelVerdict::kHit) continue;
       record_hit(flight, {verdict.t, kAny ? opened.index : number_of(tree_, block, lane)});
@@ -278,22 +279,53 @@ class RayStream {
   OpenedBlock opened_[kMaxFlights];
 };
 
-// Divides the rays into groups of eight consecutive rays, and traces each group of coherent rays as one Packet, which
-// writes the answers of these rays to `hits`. Writes the indices of all other rays to `rest` and returns their number.
+// Rays of one trace() call that beams and packets have not answered.
+struct Leftover {
+  uint8_t groups[kPreparedRays / kTreeWidth];  // indices of groups of eight consecutive rays, which are prepared
+  uint8_t rays[kPreparedRays];                 // indices of single rays
+  uint32_t group_count = 0, ray_count = 0;
+};
+
+// Divides the rays into groups of kBeamRays consecutive rays, traces each group that forms a beam, and prepares the
+// rays of all other groups.
 template <bool kAny>
-static uint32_t trace_packets(const TriangleTree& tree, const KernelRay* rays, const PreparedRays* prepared,
-                              KernelHit* hits, uint32_t count, uint8_t* rest) {
-  uint32_t rest_count = 0, first = 0;
+static inline void trace_beams(const TriangleTree& tree, const KernelRay* rays, PreparedRays* prepared, KernelHit* hits,
+                               uint32_t count, Leftover& left) {
+  Beam beams[kMaxBeams];
+  uint32_t firsts[kMaxBeams], beam_count = 0;
+  const auto leave = [&](uint32_t first) {
+    for (uint32_t i = first; i < first + kBeamRays && i < count; i += kTreeWidth) {
+      prepare(rays + i, count - i, tree.magnitude, prepared[i / kTreeWidth]);
+      left.groups[left.group_count++] = static_cast<uint8_t>(i / kTreeWidth);
+    }
+  };
+  for (uint32_t first = 0; first < count; first += kBeamRays) {
+    if (count - first >= kBeamRays && beams[beam_count].aim(tree, rays + first))
+      firsts[beam_count++] = first;
+    else
+      leave(first);
+  }
+  if (beam_count != 0) BeamStream<kAny>::run(beams, beam_count);
+  for (uint32_t i = 0; i < beam_count; ++i)
+    if (!beams[i].template finish<kAny>(hits + firsts[i])) leave(firsts[i]);
+}
+
+// Traces each group of eight coherent rays of left.groups as one Packet, which writes the answers of these rays to
+// `hits`. Appends the indices of all other rays to left.rays.
+template <bool kAny>
+static void trace_packets(const TriangleTree& tree, const KernelRay* rays, const PreparedRays* prepared,
+                          KernelHit* hits, uint32_t count, Leftover& left) {
+  uint32_t next_group = 0;
   // Starts `packet` with the next group of coherent rays. Returns false if no such group remains.
   const auto start_next = [&](Packet<kAny>& packet) {
-    while (first < count) {
-      const uint32_t now = first, size = count - now < kTreeWidth ? count - now : kTreeWidth;
-      first += size;
-      if (size == kTreeWidth && are_coherent(prepared[now / kTreeWidth], tree.magnitude)) {
-        packet.start(tree, rays + now, prepared[now / kTreeWidth], hits + now);
+    while (next_group < left.group_count) {
+      const uint32_t group = left.groups[next_group++], now = group * kTreeWidth;
+      const uint32_t size = count - now < kTreeWidth ? count - now : kTreeWidth;
+      if (size == kTreeWidth && are_coherent(prepared[group], tree.magnitude)) {
+        packet.start(tree, rays + now, prepared[group], hits + now);
         return true;
       }
-      for (uint32_t i = now; i < first; ++i) rest[rest_count++] = static_cast<uint8_t>(i);
+      for (uint32_t i = now; i < now + size; ++i) left.rays[left.ray_count++] = static_cast<uint8_t>(i);
     }
     return false;
   };
@@ -312,7 +344,6 @@ static uint32_t trace_packets(const TriangleTree& tree, const KernelRay* rays, c
         active[i] = active[--packet_count];
     }
   }
-  return rest_count;
 }
 
 // Traces `count` rays, up to kPreparedRays at a time, and writes their answers to `hits` and, if kAll, to `kept`.
@@ -320,18 +351,19 @@ template <Wanted kWanted>
 static inline void trace(const TriangleTree& tree, const KernelRay* rays, KernelHit* hits, size_t count,
                          KeptRows kept) {
   PreparedRays prepared[kPreparedRays / kTreeWidth];
-  uint8_t rest[kPreparedRays];
   InFlightRay flights[kMaxFlights];
   while (count != 0) {
     const auto now = static_cast<uint32_t>(count < kPreparedRays ? count : kPreparedRays);
-    for (uint32_t i = 0; i < now; i += kTreeWidth) prepare(rays + i, now - i, tree.magnitude, prepared[i / kTreeWidth]);
-    uint32_t rest_count = 0;
+    Leftover left;
     if constexpr (kWanted == Wanted::kAll) {
-      for (; rest_count < now; ++rest_count) rest[rest_count] = static_cast<uint8_t>(rest_count);
+      for (uint32_t i = 0; i < now; i += kTreeWidth)
+        prepare(rays + i, now - i, tree.magnitude, prepared[i / kTreeWidth]);
+      for (; left.ray_count < now; ++left.ray_count) left.rays[left.ray_count] = static_cast<uint8_t>(left.ray_count);
     } else {
-      rest_count = trace_packets<kWanted == Wanted::kAny>(tree, rays, prepared, hits, now, rest);
+      trace_beams<kWanted == Wanted::kAny>(tree, rays, prepared, hits, now, left);
+      trace_packets<kWanted == Wanted::kAny>(tree, rays, prepared, hits, now, left);
     }
-    RayStream<kWanted>(tree, rays, prepared, hits, kept, rest, rest_count, flights).run();
+    RayStream<kWanted>(tree, rays, prepared, hits, kept, left.rays, left.ray_count, flights).run();
     rays += now;
     hits += now;
     count -= now;

@@ -46,6 +46,10 @@ TEST_P(RayKernelsTest, AnswerCoherentRaysAsAllTrianglesDo) {
   for (const KernelTrial& trial : beam_trials()) EXPECT_EQ(trial.difference(*kernels_), "");
 }
 
+TEST_P(RayKernelsTest, AnswerFansOfRaysFromOnePointAsAllTrianglesDo) {
+  for (const KernelTrial& trial : fan_trials()) EXPECT_EQ(trial.difference(*kernels_), "");
+}
+
 #ifdef __SSE__
 // Some libraries set the processor flags that treat denormals as zero; the flags apply to all later code of the thread.
 TEST_P(RayKernelsTest, AnswersDoNotChangeIfDenormalsAreTreatedAsZero) {
@@ -83,6 +87,42 @@ TEST_P(RayKernelsTest, CoherentRaysOpenEachNodeOnce) {
     return sum;
   };
   EXPECT_LT(nodes(8) * 4, nodes(1));
+}
+
+// Sixteen rays from one point are tested with few triangles, because one test with a frustum excludes all others.
+TEST_P(RayKernelsTest, RaysFromOnePointOpenEachNodeOnceAndSkipTrianglesBesideThem) {
+  const TriangleBvh tree = *TriangleBvh::build(bumpy_sphere(40, 0.1, 1));
+  std::vector<KernelRay> rays;
+  for (int i = 0; i < 16; ++i) rays.push_back({{0, 0, 0}, {1, 0.2 + 0.001 * i, 0.3}, 10, true, true});
+  std::vector<KernelHit> together(16), alone(16);
+  kernels_->first(tree.tree(), rays.data(), together.data(), 16);
+  uint32_t nodes_together = 0, nodes_alone = 0, tests_together = 0, tests_alone = 0;
+  for (size_t i = 0; i < 16; ++i) {
+    kernels_->first(tree.tree(), &rays[i], &alone[i], 1);
+    EXPECT_EQ(together[i].t, alone[i].t);
+    EXPECT_EQ(together[i].number, alone[i].number);
+    nodes_together += together[i].nodes;
+    nodes_alone += alone[i].nodes;
+    tests_together += together[i].tests;
+    tests_alone += alone[i].tests;
+  }
+  EXPECT_LT(nodes_together * 8, nodes_alone);
+  EXPECT_LT(tests_together * 2, tests_alone);
+}
+
+// Fifteen rays of the fan pass beside all triangles of a pile, within their boxes. So the beam gives up, and its rays
+// are traced alone: one of them hits a triangle, the others stay undecided.
+TEST_P(RayKernelsTest, ABeamThatTestsTooManyTrianglesIsTracedRayByRay) {
+  std::vector<Triangle> pile;
+  for (uint32_t i = 0; i < 3 * kMaxKernelTests; ++i) pile.push_back(wall_at(static_cast<float>(i), i));
+  const absl::StatusOr<TriangleBvh> tree = TriangleBvh::build(pile);
+  ASSERT_TRUE(tree.ok());
+  std::vector<KernelRay> rays(16, kernel_ray({{-1, 0.9, 0.9}, {1, -1e-6, -1e-6}}));
+  rays[3].direction[1] = rays[3].direction[2] = -0.1;
+  std::vector<KernelHit> hits(16);
+  kernels_->first(tree->tree(), rays.data(), hits.data(), 16);
+  for (size_t i = 0; i < 16; ++i)
+    EXPECT_EQ(hits[i].verdict, i == 3 ? KernelVerdict::kHit : KernelVerdict::kUndecided) << i;
 }
 
 TEST_P(RayKernelsTest, AnswerRaysOnALatticeAsAllTrianglesDo) { EXPECT_EQ(lattice_trial().difference(*kernels_), ""); }
