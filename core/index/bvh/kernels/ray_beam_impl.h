@@ -193,7 +193,7 @@ class Beam {
   // triangles.
   inline void finish_block() {
     limit_ = greatest(Floats16::load(limits_));
-    if (tests_ <= kMaxKernelTests) return;
+    if (tests_ <= kMaxKernelTests && ray_tests_ <= kMaxRayTests) return;
     gave_up_ = true;
     limit_ = kNever;
   }
@@ -212,6 +212,8 @@ class Beam {
 
  private:
   static constexpr float kNever = -1;  // limit of a ray that needs no more tests
+  // Greatest number of triangles that are tested with all rays; with more triangles, single rays are faster.
+  static constexpr uint32_t kMaxRayTests = 96;
   // Factor that covers the rounding of a product of t and a component of the direction.
   static constexpr float kUp = 1 + 0x1p-21f;
   // Greatest difference of the shears of a beam's rays from those of its middle. Wider beams test too many triangles

@@ -286,29 +286,71 @@ struct Leftover {
   uint32_t group_count = 0, ray_count = 0;
 };
 
-// Divides the rays into groups of kBeamRays consecutive rays, traces each group that forms a beam, and prepares the
-// rays of all other groups.
+// Tracer of the beams among up to kPreparedRays rays.
 template <bool kAny>
-static inline void trace_beams(const TriangleTree& tree, const KernelRay* rays, PreparedRays* prepared, KernelHit* hits,
-                               uint32_t count, Leftover& left) {
-  Beam beams[kMaxBeams];
-  uint32_t firsts[kMaxBeams], beam_count = 0;
-  const auto leave = [&](uint32_t first) {
-    for (uint32_t i = first; i < first + kBeamRays && i < count; i += kTreeWidth) {
-      prepare(rays + i, count - i, tree.magnitude, prepared[i / kTreeWidth]);
-      left.groups[left.group_count++] = static_cast<uint8_t>(i / kTreeWidth);
+class BeamTracer {
+ public:
+  inline BeamTracer(const TriangleTree& tree, const KernelRay* rays, PreparedRays* prepared, KernelHit* hits,
+                    uint32_t count, Leftover& left)
+      : tree_(tree), rays_(rays), prepared_(prepared), hits_(hits), count_(count), left_(left) {}
+
+  // Divides the rays into groups of kBeamRays consecutive rays, traces each group that forms a beam, and prepares the
+  // rays of all other groups. Traces a few beams first: if most of these are not worth it, there are no other beams.
+  inline void run() {
+    constexpr uint32_t kFirstBeams = 8;
+    while (first_ < count_ && beam_count_ < kFirstBeams) aim_next();
+    const bool worth_it = trace();
+    while (first_ < count_) {
+      if (worth_it) {
+        aim_next();
+      } else {
+        leave(first_);
+        first_ += kBeamRays;
+      }
     }
-  };
-  for (uint32_t first = 0; first < count; first += kBeamRays) {
-    if (count - first >= kBeamRays && beams[beam_count].aim(tree, rays + first))
-      firsts[beam_count++] = first;
-    else
-      leave(first);
+    trace();
   }
-  if (beam_count != 0) BeamStream<kAny>::run(beams, beam_count);
-  for (uint32_t i = 0; i < beam_count; ++i)
-    if (!beams[i].template finish<kAny>(hits + firsts[i])) leave(firsts[i]);
-}
+
+ private:
+  inline void aim_next() {
+    if (count_ - first_ >= kBeamRays && beams_[beam_count_].aim(tree_, rays_ + first_))
+      firsts_[beam_count_++] = first_;
+    else
+      leave(first_);
+    first_ += kBeamRays;
+  }
+
+  // Traces the beams aimed so far. Returns whether at least half of them were worth it.
+  inline bool trace() {
+    if (beam_count_ != 0) BeamStream<kAny>::run(beams_, beam_count_);
+    uint32_t given_up = 0;
+    for (uint32_t i = 0; i < beam_count_; ++i) {
+      if (beams_[i].template finish<kAny>(hits_ + firsts_[i])) continue;
+      leave(firsts_[i]);
+      ++given_up;
+    }
+    const bool worth_it = 2 * given_up <= beam_count_;
+    beam_count_ = 0;
+    return worth_it;
+  }
+
+  inline void leave(uint32_t first) {
+    for (uint32_t i = first; i < first + kBeamRays && i < count_; i += kTreeWidth) {
+      prepare(rays_ + i, count_ - i, tree_.magnitude, prepared_[i / kTreeWidth]);
+      left_.groups[left_.group_count++] = static_cast<uint8_t>(i / kTreeWidth);
+    }
+  }
+
+  const TriangleTree& tree_;
+  const KernelRay* const rays_;
+  PreparedRays* const prepared_;
+  KernelHit* const hits_;
+  const uint32_t count_;
+  Leftover& left_;
+  uint32_t first_ = 0;  // index of the first ray of the next group
+  Beam beams_[kMaxBeams];
+  uint32_t firsts_[kMaxBeams], beam_count_ = 0;
+};
 
 // Traces each group of eight coherent rays of left.groups as one Packet, which writes the answers of these rays to
 // `hits`. Appends the indices of all other rays to left.rays.
@@ -360,7 +402,7 @@ static inline void trace(const TriangleTree& tree, const KernelRay* rays, Kernel
         prepare(rays + i, now - i, tree.magnitude, prepared[i / kTreeWidth]);
       for (; left.ray_count < now; ++left.ray_count) left.rays[left.ray_count] = static_cast<uint8_t>(left.ray_count);
     } else {
-      trace_beams<kWanted == Wanted::kAny>(tree, rays, prepared, hits, now, left);
+      BeamTracer<kWanted == Wanted::kAny>(tree, rays, prepared, hits, now, left).run();
       trace_packets<kWanted == Wanted::kAny>(tree, rays, prepared, hits, now, left);
     }
     RayStream<kWanted>(tree, rays, prepared, hits, kept, left.rays, left.ray_count, flights).run();
