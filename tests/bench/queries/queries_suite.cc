@@ -4,6 +4,7 @@
 #include "tests/bench/frame/peer_library.h"
 #include "tests/bench/queries/cell_cases.h"
 #include "tests/bench/queries/contains_cases.h"
+#include "tests/bench/queries/lidar_cases.h"
 #include "tests/bench/queries/nearest_cases.h"
 #include "tests/bench/queries/object_cases.h"
 #include "tests/bench/queries/overlap_cases.h"
@@ -25,6 +26,7 @@ absl::Status run_queries_suite(const Options& options, const Progress& progress,
     run_contains_cases(options, progress, *mesh, report);
     run_cell_cases(options, progress, *mesh, report);
     run_sight_cases(options, progress, *mesh, report);
+    run_lidar_cases(options, progress, *mesh, report);
     run_nearest_cases(options, progress, *mesh, report);
     run_overlap_cases(options, progress, *mesh, report);
   }
