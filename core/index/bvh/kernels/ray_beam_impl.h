@@ -10,14 +10,13 @@
 //
 //   weight = (cx by - cy bx) + u (cy bz - cz by) + v (cz bx - cx bz)
 //
-// Error bound of this weight, with R as in ray_block_impl.h, s = the largest |u| or |v|, at most kMaxHalfSpread, and M
-// = the largest |sheared coordinate| of the triangle: the error of a coordinate on the middle ray is at most 7 * 2^-24
-// R, that of u times a depth at most 5 * 2^-24 R, so that of a coordinate on the ray of u and v is at most 12 * 2^-24
-// R, where the coordinate itself is at most M + s R. The two products of an edge function differ from their exact
-// values by at most 48 * 2^-24 R (M + s R) + 2^-39.8 R^2; rounding of the three terms and their sums adds at most 12 *
-// 2^-24 R M (1
-// + s). The sum is less than edge = 2^-17 R (M + s R) + 2^-36 R^2. t is an average of depths as before, so its error
-// has the same bound as in ray_block_impl.h.
+// Error bound of this weight, with R as in ray_block_impl.h, e = 2^-24, s = the largest |u| or |v|, at most
+// kMaxHalfSpread, and M = the largest |sheared coordinate| of the triangle: the error of a coordinate on the middle ray
+// is at most 7 e R, that of u times a depth at most 5 e R, so that of a coordinate on the ray of u and v is at most
+// 12 e R, where the coordinate itself is at most M + s R. Two products of an edge function differ from their exact
+// values by at most 48 e R (M + s R); rounding of the three terms and of their sums adds at most 12 e R M (1 + s).
+// Squares of errors are less than 2^-38 R^2. The sum is less than edge = 2^-18 R (M + s R) + 2^-36 R^2. t is an average
+// of depths as before, so its error has the same bound as in ray_block_impl.h.
 //
 // Sources: Reshetov, Soupikov, Hurley, Multi-Level Ray Tracing Algorithm, 2005; Benthin, Wald, Efficient Ray Traced
 // Soft Shadows using Multi-Frusta Tracing, 2009.
@@ -102,7 +101,8 @@ class Beam {
       largest = maximum(largest, maximum(absolute(xs[vertex]), absolute(ys[vertex])));
     }
     const Floats8 spread = Floats8::splat(__builtin_fmaxf(spread_u_, spread_v_) * reach_);
-    Floats8 edge = multiply_add(Floats8::splat(exact_.edge_scale), largest + spread, Floats8::splat(exact_.edge_floor));
+    Floats8 edge =
+        multiply_add(Floats8::splat(0.5f * exact_.edge_scale), largest + spread, Floats8::splat(exact_.edge_floor));
     if (planted(PlantedBug::kKernelEdgeBound)) edge = Floats8::splat(0);
     const Floats8 half_u = Floats8::splat(spread_u_), half_v = Floats8::splat(spread_v_);
     Floats8 greatest_low = Floats8::splat(-__builtin_inff()), least_high = Floats8::splat(__builtin_inff());
