@@ -18,8 +18,9 @@ namespace locus::bench::queries {
 namespace {
 
 constexpr size_t kBoxCounts[] = {0, 500, 5'000};
-constexpr size_t kBeams = 128, kAngles = 1024, kQuickAngles = 32, kRaysAChunk = 8 * kBeams;
-constexpr double kHeightOfView = 45;  // degrees between the highest and the lowest beam
+constexpr size_t kBeams = 128, kAngles = 1024, kQuickAngles = 32;
+constexpr size_t kMaxRaysAChunk = 65'536;  // of one batch: half a turn
+constexpr double kHeightOfView = 45;       // degrees between the highest and the lowest beam
 constexpr float kReach = 1e30f;
 constexpr double kBar = 1;
 constexpr double kMaxAddedBy500 = 80;  // most nanoseconds that 500 boxes may add to a ray
@@ -129,12 +130,12 @@ double run_case(const Options& options, const std::string& name, const BenchMesh
   const std::vector<RayQuery> rays = turn(sensor, up_axis_of(mesh), options.quick ? kQuickAngles : kAngles);
   const std::vector<LidarBox> boxes = boxes_of(mesh, box_count, sensor);
   const OurLidar ours(snapshot_of(mesh, boxes), rays);
-  const size_t chunks = rays.size() / kRaysAChunk;
+  const size_t rays_a_chunk = std::min(kMaxRaysAChunk, rays.size()), chunks = rays.size() / rays_a_chunk;
   std::vector<LidarHit> our_hits(rays.size());
   std::vector<Contestant> contestants = {{"locus",
                                           [&](size_t chunk) {
-                                            ours.first(chunk * kRaysAChunk, (chunk + 1) * kRaysAChunk,
-                                                       &our_hits[chunk * kRaysAChunk]);
+                                            ours.first(chunk * rays_a_chunk, (chunk + 1) * rays_a_chunk,
+                                                       &our_hits[chunk * rays_a_chunk]);
                                           },
                                           static_cast<double>(rays.size()),
                                           {}}};
@@ -144,8 +145,8 @@ double run_case(const Options& options, const std::string& name, const BenchMesh
   their_hits.resize(peers.size(), our_hits);
   for (size_t i = 0; i < peers.size(); ++i) {
     const auto run = [&, i](size_t chunk) {
-      peers[i]->first(absl::MakeConstSpan(rays).subspan(chunk * kRaysAChunk, kRaysAChunk),
-                      &their_hits[i][chunk * kRaysAChunk]);
+      peers[i]->first(absl::MakeConstSpan(rays).subspan(chunk * rays_a_chunk, rays_a_chunk),
+                      &their_hits[i][chunk * rays_a_chunk]);
     };
     contestants.push_back({peers[i]->name(), run, static_cast<double>(rays.size()), {}});
   }
