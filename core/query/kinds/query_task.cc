@@ -1,6 +1,9 @@
 #include "core/query/kinds/query_task.h"
 
+#include <utility>
+
 #include "core/base/planted_bug.h"
+#include "core/query/kinds/object_boxes.h"
 
 namespace locus {
 
@@ -20,6 +23,21 @@ bool Filter::passes_rare_filters(Group group, Tag tag, Id id) const {
   const absl::Span<const uint64_t> wanted(reader.entry(query_), groups);
   if (group != 0 && std::find(wanted.begin(), wanted.end(), group) != wanted.end()) return true;
   return std::all_of(wanted.begin(), wanted.end(), [](uint64_t one) { return one == 0; });
+}
+
+BatchControl::BatchControl(uint64_t max_work, std::function<absl::Status()> stop)
+    : max_work_(max_work), stop_(std::move(stop)) {}
+
+BatchControl::~BatchControl() = default;
+
+const ObjectBoxes* BatchControl::object_boxes(const ObjectSet& objects, size_t rays) {
+  const ObjectBoxes* const boxes = boxes_.load(std::memory_order_acquire);
+  if (boxes != nullptr) return boxes;
+  const uint64_t enough = objects.size() / 2, before = beam_rays_.fetch_add(rays, std::memory_order_relaxed);
+  if (before > enough || before + rays <= enough) return nullptr;  // another thread builds them, or not yet
+  built_boxes_ = std::make_unique<const ObjectBoxes>(objects);
+  boxes_.store(built_boxes_.get(), std::memory_order_release);
+  return built_boxes_.get();
 }
 
 bool BatchControl::report_work(uint64_t work) {

@@ -11,6 +11,7 @@
 #include <array>
 #include <atomic>
 #include <functional>
+#include <memory>
 #include <optional>
 
 #include "absl/status/status.h"
@@ -24,6 +25,8 @@
 #include "core/scene/snapshot/scene_at_time.h"
 
 namespace locus {
+
+class ObjectBoxes;
 
 // Filter of one query by layers, groups, tag and id; the query's anchor is not accepted. Borrows the block. Most
 // queries filter by layers only, or also by one ignored group; the filter contains what these compare. It reads the
@@ -87,7 +90,8 @@ class BatchControl {
  public:
   // `max_work` is the maximum number of nodes, cells and primitive tests; 0: no limit. `stop` may be empty; if it
   // returns a status that is not OK, the batch stops with this status.
-  BatchControl(uint64_t max_work, std::function<absl::Status()> stop) : max_work_(max_work), stop_(std::move(stop)) {}
+  BatchControl(uint64_t max_work, std::function<absl::Status()> stop);
+  ~BatchControl();
 
   // Adds `work` to the work done. Returns false if the batch must end, because the work budget is used up or because
   // `stop`, which this function calls, has returned an error.
@@ -98,6 +102,11 @@ class BatchControl {
   absl::Status status() const { return status_; }
   bool stopped() const { return stopped_.load(std::memory_order_acquire); }
 
+  // Returns the boxes of `objects`, or null if they are not built. Builds them once `rays` of this and earlier calls
+  // sum up to half the number of objects, so that the build never costs much more than the searches of the grid before
+  // it. All calls must have the same `objects`. The result belongs to this object.
+  const ObjectBoxes* object_boxes(const ObjectSet& objects, size_t rays);
+
  private:
   const uint64_t max_work_;
   const std::function<absl::Status()> stop_;
@@ -105,6 +114,9 @@ class BatchControl {
   std::atomic<bool> stopping_ = false;
   std::atomic<bool> stopped_ = false;
   absl::Status status_;  // written once, by the thread that set stopping_, before it sets stopped_
+  std::atomic<uint64_t> beam_rays_ = 0;
+  std::unique_ptr<const ObjectBoxes> built_boxes_;  // written once, by the thread that builds the boxes
+  std::atomic<const ObjectBoxes*> boxes_ = nullptr;
 };
 
 class QueryTask {
@@ -137,6 +149,10 @@ class QueryTask {
   // Returns the vector kernels for EXACT rays in meshes, or null if the active instruction set has none or the task
   // uses brute force.
   const RayKernels* ray_kernels() const { return brute_force_ ? nullptr : active_ray_kernels(); }
+
+  // Returns the boxes of the latest objects for `rays` more rays, or null if the grid should be searched: see
+  // BatchControl::object_boxes().
+  const ObjectBoxes* object_boxes(size_t rays) { return control_.object_boxes(snapshot_.objects, rays); }
 
   // Returns the collector of found objects, which successive overlap and contains queries reuse.
   FoundObjects& found_objects() { return found_objects_; }

@@ -9,6 +9,7 @@
 #include "core/query/kinds/hit_collector.h"
 #include "core/query/kinds/instance_rays.h"
 #include "core/query/kinds/kernel_rays.h"
+#include "core/query/kinds/object_boxes.h"
 
 namespace locus {
 namespace {
@@ -49,6 +50,39 @@ class ObjectVisitor {
   const Filter& filter_;
   HitCollector& collector_;
 };
+
+// Finds the objects that rays [first, first + RayBeam::kRays) hit. Returns false, and finds nothing, if the rays are no
+// beam or the moment of a ray needs a search of the grid.
+bool search_beam(QueryTask& task, std::vector<PendingRay>& all_rays, size_t first,
+                 absl::FunctionRef<const SceneAtTime&(size_t)> moment_of, std::vector<ObjectBoxes::Found>& found) {
+  if (all_rays.size() - first < RayBeam::kRays || task.snapshot().objects.size() == 0) return false;
+  const absl::Span<PendingRay> rays = absl::MakeSpan(all_rays).subspan(first, RayBeam::kRays);
+  const Vec3d& origin = rays[0].request.origin;
+  for (const PendingRay& ray : rays)
+    if (ray.request.origin != origin) return false;
+  for (size_t i = first; i < first + RayBeam::kRays; ++i)
+    if (moment_of(i).between() || &moment_of(i).objects() != &task.snapshot().objects) return false;
+  const std::optional<RayBeam> beam = RayBeam::of(origin, [&](size_t i) { return rays[i].request.direction; });
+  const ObjectBoxes* const boxes = beam ? task.object_boxes(rays.size()) : nullptr;
+  if (boxes == nullptr) return false;
+  float max_depth = 0;
+  for (const PendingRay& ray : rays)
+    max_depth = std::max(max_depth, beam->depth(ray.request.direction, ray.collector.limit()));
+  boxes->find(*beam, max_depth, found, task.work());
+  if (found.empty()) return true;
+  for (PendingRay& ray : rays) {
+    if (ray.collector.done() || task.ended()) continue;
+    ObjectVisitor visitor(task, moment_of(first), ray.request, ray.filter, ray.collector);
+    for (const ObjectBoxes::Found& one : found) {
+      if (one.depth > beam->depth(ray.request.direction, ray.collector.limit())) break;
+      const Interval<double> part = visitor.slabs().interval(boxes->box(one.index));
+      if (!(part.near <= part.far) || part.far < 0 || part.near > visitor.limit()) continue;
+      ++task.work().tests;
+      if (!visitor.visit(boxes->object(one.index))) break;
+    }
+  }
+  return true;
+}
 
 // Visitor of instances for rays that the vector kernels do not trace.
 class InstanceVisitor {
@@ -122,13 +156,18 @@ void find_hits(QueryTask& task, std::vector<PendingRay>& rays,
   const Source source = rays.front().request.source;
   const bool by_kernels = use_kernels(task, rays);
   if (by_kernels && source != Source::kDynamic) trace_meshes(task, rays, moment_of);
+  std::vector<ObjectBoxes::Found> found;
+  size_t beam_end = 0;  // index of the ray after the last beam that search_beam() has searched
   for (size_t i = 0; i < rays.size(); ++i) {
     PendingRay& ray = rays[i];
+    if (i >= beam_end && by_kernels && source != Source::kStatic && !task.ended() &&
+        search_beam(task, rays, i, moment_of, found))
+      beam_end = i + RayBeam::kRays;
     if (!by_kernels && source != Source::kDynamic && !task.ended()) {
       InstanceVisitor visitor(task, ray.request, ray.filter, ray.collector);
       task.visit_ray(moment_of(i).statics().tree(), visitor.slabs(), visitor);
     }
-    if (source != Source::kStatic && !ray.collector.done() && !task.ended()) {
+    if (i >= beam_end && source != Source::kStatic && !ray.collector.done() && !task.ended()) {
       const SceneAtTime& moment = moment_of(i);
       if (moment.objects().grid().size() != 0) {
         ObjectVisitor visitor(task, moment, ray.request, ray.filter, ray.collector);

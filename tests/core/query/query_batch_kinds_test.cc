@@ -15,7 +15,7 @@ namespace {
 
 // Expects that check_batch() refuses the block with an error that names `field` and `index`. If `index` is -1, the
 // error must name no index.
-void expect_refusal(const OwnedBlock& block, Reason reason, const std::string& field, int index) {
+void expect_kind_refusal(const OwnedBlock& block, Reason reason, const std::string& field, int index) {
   QueryBatch batch;
   batch.blocks = {block.view()};
   const absl::Status status = check_batch(batch);
@@ -79,61 +79,61 @@ TEST(CheckKindsTest, ValidBlocksAreAccepted) {
 TEST(CheckKindsTest, Frustums) {
   OwnedBlock block = two_cubes();
   block.points[24 + 3] = kNan;
-  expect_refusal(block, Reason::kNotFinite, "frustums.planes", 1);
+  expect_kind_refusal(block, Reason::kNotFinite, "frustums.planes", 1);
   block = two_cubes();
   block.points.pop_back();
-  expect_refusal(block, Reason::kColumnLength, "frustums.planes", -1);
+  expect_kind_refusal(block, Reason::kColumnLength, "frustums.planes", -1);
   for (const uint32_t each : {3u, 33u, std::numeric_limits<uint32_t>::max()}) {
     block = two_cubes();
     block.settings.kind = FrustumColumns{{}, {}, each};
-    expect_refusal(block, Reason::kLimit, "frustums.planes_each", -1);
+    expect_kind_refusal(block, Reason::kLimit, "frustums.planes_each", -1);
   }
   block = two_cubes();
   block.extras.assign(16, 1);
-  expect_refusal(block, Reason::kMalformed, "frustums", -1);
+  expect_kind_refusal(block, Reason::kMalformed, "frustums", -1);
   block = {};
   block.settings.kind = FrustumColumns{};
   block.extras.assign(32, 1);
   block.extras[20] = kInfinity;
-  expect_refusal(block, Reason::kNotFinite, "frustums.view_projections", 1);
+  expect_kind_refusal(block, Reason::kNotFinite, "frustums.view_projections", 1);
   block.extras.assign(17, 1);
-  expect_refusal(block, Reason::kColumnLength, "frustums.view_projections", -1);
+  expect_kind_refusal(block, Reason::kColumnLength, "frustums.view_projections", -1);
 }
 
 TEST(CheckKindsTest, Sight) {
   OwnedBlock block = two_viewers_three_targets();
   block.points[4] = kNan;
-  expect_refusal(block, Reason::kNotFinite, "sight.viewers", 1);
+  expect_kind_refusal(block, Reason::kNotFinite, "sight.viewers", 1);
   block = two_viewers_three_targets();
   block.sizes[7] = 2e9f;
-  expect_refusal(block, Reason::kOutOfRange, "sight.targets", 2);
+  expect_kind_refusal(block, Reason::kOutOfRange, "sight.targets", 2);
   block = two_viewers_three_targets();
   block.sizes.pop_back();
-  expect_refusal(block, Reason::kColumnLength, "sight.targets", -1);
+  expect_kind_refusal(block, Reason::kColumnLength, "sight.targets", -1);
   block = two_viewers_three_targets();
   block.groups = {1, 2, 3};
-  expect_refusal(block, Reason::kColumnLength, "sight.viewer_groups", -1);
+  expect_kind_refusal(block, Reason::kColumnLength, "sight.viewer_groups", -1);
   block = two_viewers_three_targets();
   block.target_groups = {1, 2};
-  expect_refusal(block, Reason::kColumnLength, "sight.target_groups", -1);
+  expect_kind_refusal(block, Reason::kColumnLength, "sight.target_groups", -1);
   block = two_viewers_three_targets();
   block.extras = {1, -1};
-  expect_refusal(block, Reason::kOutOfRange, "sight.max_distances", 1);
+  expect_kind_refusal(block, Reason::kOutOfRange, "sight.max_distances", 1);
   block.extras = {kNan};
-  expect_refusal(block, Reason::kNotFinite, "sight.max_distances", 0);
+  expect_kind_refusal(block, Reason::kNotFinite, "sight.max_distances", 0);
   SightColumns columns;
   columns.samples = 256;
   block = two_viewers_three_targets();
   block.settings.kind = columns;
-  expect_refusal(block, Reason::kLimit, "sight.samples_per_target", -1);
+  expect_kind_refusal(block, Reason::kLimit, "sight.samples_per_target", -1);
   columns = {};
   columns.eyes = 17;
   block.settings.kind = columns;
-  expect_refusal(block, Reason::kLimit, "sight.eyes_per_viewer", -1);
+  expect_kind_refusal(block, Reason::kLimit, "sight.eyes_per_viewer", -1);
   columns = {};
   columns.pairwise = true;
   block.settings.kind = columns;
-  expect_refusal(block, Reason::kColumnLength, "sight.targets", -1);
+  expect_kind_refusal(block, Reason::kColumnLength, "sight.targets", -1);
 }
 
 TEST(CheckKindsTest, TooManySegmentsAreRefusedBeforeTheyAreLookedAt) {
@@ -150,48 +150,48 @@ TEST(CheckKindsTest, TooManySegmentsAreRefusedBeforeTheyAreLookedAt) {
 TEST(CheckKindsTest, Contains) {
   OwnedBlock block = points(ContainsColumns{});
   block.points[10] = kNan;
-  expect_refusal(block, Reason::kNotFinite, "contains.points", 3);
+  expect_kind_refusal(block, Reason::kNotFinite, "contains.points", 3);
 }
 
 TEST(CheckKindsTest, Pairs) {
-  expect_refusal(pairs({kNan}), Reason::kNotFinite, "pairs.max_distance", -1);
-  expect_refusal(pairs({-1}), Reason::kOutOfRange, "pairs.max_distance", -1);
-  expect_refusal(pairs({kInfinity}), Reason::kOutOfRange, "pairs.max_distance", -1);
-  expect_refusal(pairs({1, 0, 0, 1025}), Reason::kLimit, "pairs.k", -1);
-  expect_refusal(pairs({1, 0, 0, 0, 7}), Reason::kMalformed, "pairs.after_other", -1);
+  expect_kind_refusal(pairs({kNan}), Reason::kNotFinite, "pairs.max_distance", -1);
+  expect_kind_refusal(pairs({-1}), Reason::kOutOfRange, "pairs.max_distance", -1);
+  expect_kind_refusal(pairs({kInfinity}), Reason::kOutOfRange, "pairs.max_distance", -1);
+  expect_kind_refusal(pairs({1, 0, 0, 1025}), Reason::kLimit, "pairs.k", -1);
+  expect_kind_refusal(pairs({1, 0, 0, 0, 7}), Reason::kMalformed, "pairs.after_other", -1);
 }
 
 TEST(CheckKindsTest, Cells) {
   OwnedBlock block = four_cells();
   block.extras = {};
-  expect_refusal(block, Reason::kColumnLength, "cells.max_distances", -1);
+  expect_kind_refusal(block, Reason::kColumnLength, "cells.max_distances", -1);
   block.extras = {1, 1, 0, 1};
-  expect_refusal(block, Reason::kOutOfRange, "cells.max_distances", 2);
+  expect_kind_refusal(block, Reason::kOutOfRange, "cells.max_distances", 2);
   block.extras = {kInfinity};
-  expect_refusal(block, Reason::kNotFinite, "cells.max_distances", 0);
+  expect_kind_refusal(block, Reason::kNotFinite, "cells.max_distances", 0);
   block = four_cells();
   block.settings.kind = CellColumns{{}, {}, 65};
-  expect_refusal(block, Reason::kLimit, "cells.max_planes", -1);
+  expect_kind_refusal(block, Reason::kLimit, "cells.max_planes", -1);
 }
 
 TEST(CheckKindsTest, ColumnsOfOtherKinds) {
   OwnedBlock block = points(ContainsColumns{});
   block.settings.columns = {Column::kT};
-  expect_refusal(block, Reason::kMalformed, "columns", -1);
+  expect_kind_refusal(block, Reason::kMalformed, "columns", -1);
   block = two_viewers_three_targets();
   block.settings.columns = {Column::kId};
-  expect_refusal(block, Reason::kMalformed, "columns", -1);
+  expect_kind_refusal(block, Reason::kMalformed, "columns", -1);
 }
 
 TEST(CheckKindsTest, Anchors) {
   OwnedBlock block = points(ContainsColumns{});
   block.anchor_ids = {1, 2};
-  expect_refusal(block, Reason::kColumnLength, "anchor_ids", -1);
+  expect_kind_refusal(block, Reason::kColumnLength, "anchor_ids", -1);
   block.anchor_ids = {1, 2, 0, 4};
-  expect_refusal(block, Reason::kOutOfRange, "anchor_ids", 2);
+  expect_kind_refusal(block, Reason::kOutOfRange, "anchor_ids", 2);
   block = pairs({});
   block.anchor_ids = {1};
-  expect_refusal(block, Reason::kMalformed, "anchor_ids", -1);
+  expect_kind_refusal(block, Reason::kMalformed, "anchor_ids", -1);
 }
 
 TEST(CheckKindsTest, CountsNeedAKindWithCounts) {
@@ -199,7 +199,7 @@ TEST(CheckKindsTest, CountsNeedAKindWithCounts) {
   rays.sizes = {1, 0, 0};
   for (OwnedBlock block : {rays, two_viewers_three_targets(), four_cells()}) {
     block.settings.count_only = true;
-    expect_refusal(block, Reason::kMalformed, "count_only", -1);
+    expect_kind_refusal(block, Reason::kMalformed, "count_only", -1);
   }
 }
 
@@ -207,16 +207,16 @@ TEST(CheckKindsTest, Pages) {
   OwnedBlock block = points(RayColumns{});
   block.sizes = {1, 0, 0};
   block.after_ts = {0, kNan, 0, 0};
-  expect_refusal(block, Reason::kNotFinite, "rays.after_ts", 1);
+  expect_kind_refusal(block, Reason::kNotFinite, "rays.after_ts", 1);
   block.after_ts = {0, 0};
-  expect_refusal(block, Reason::kColumnLength, "rays.after_ts", -1);
+  expect_kind_refusal(block, Reason::kColumnLength, "rays.after_ts", -1);
   block.after_ts = {};
   block.after_ids = {1};
-  expect_refusal(block, Reason::kMalformed, "rays.after_ids", -1);
+  expect_kind_refusal(block, Reason::kMalformed, "rays.after_ids", -1);
   block.after_ts = {1};
   block.after_ids = {};
   block.after_triangles = {1};
-  expect_refusal(block, Reason::kMalformed, "rays.after_triangles", -1);
+  expect_kind_refusal(block, Reason::kMalformed, "rays.after_triangles", -1);
 }
 
 }  // namespace
