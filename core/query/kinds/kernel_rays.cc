@@ -115,17 +115,14 @@ class Rounds {
   // stop `first`; meshes with equal contents share one tree. Returns the index of the first stop with another tree.
   size_t trace_tree(size_t first) {
     const TriangleBvh& tree = current_[first].instance->mesh->tree();
-    kernel_rays_.clear();
+    if (kernel_rays_.size() < current_.size()) kernel_rays_.resize(current_.size());
     kernel_stops_.clear();
     size_t last = first;
     for (; last < current_.size() && &current_[last].instance->mesh->tree() == &tree; ++last) {
-      const std::optional<KernelRay> ray = kernel_ray(current_[last]);
-      if (!ray) {
+      if (set_kernel_ray(current_[last], kernel_rays_[kernel_stops_.size()]))
+        kernel_stops_.push_back(last);
+      else
         trace_triangles(current_[last]);
-        continue;
-      }
-      kernel_rays_.push_back(*ray);
-      kernel_stops_.push_back(last);
     }
     run_kernels(tree.tree());
     return last;
@@ -139,7 +136,7 @@ class Rounds {
       kernels.all(tree, kernel_rays_.data(), hits_.data(), hits_.size(), rows_.get(), max_rows_);
     else
       (mode() == RayMode::kAny ? kernels.any : kernels.first)(tree, kernel_rays_.data(), hits_.data(), hits_.size());
-    LOCUS_DCHECK_EQ(kernel_rays_.size(), kernel_stops_.size());
+    LOCUS_DCHECK_LE(kernel_stops_.size(), kernel_rays_.size());
     uint64_t tests = 0;
     for (size_t i = 0; i < kernel_stops_.size(); ++i) {
       task_.work().nodes += hits_[i].nodes;
@@ -186,20 +183,27 @@ class Rounds {
     trace_instance(task_, ray.request, slabs_[stop.ray], *stop.instance, stop.nearest, ray.collector);
   }
 
-  // Returns the ray of `stop` in mesh axes, or nullopt if the direction or the coordinates lie outside the range that
-  // the kernels support.
-  std::optional<KernelRay> kernel_ray(const Stop& stop) const {
+  // Sets `to` to the ray of `stop` in mesh axes. Returns false if the direction or the coordinates lie outside the
+  // range that the kernels support. Writes the members in place, because copying a ray right after it was written in
+  // parts would stall the processor.
+  bool set_kernel_ray(const Stop& stop, KernelRay& to) const {
     const PendingRay& ray = rays_[stop.ray];
     const Transform& transform = stop.instance->transform;
     const Vec3d origin = transform.point_to_mesh(ray.request.origin);
     const Vec3d direction = transform.direction_to_mesh(ray.request.direction);
     const double max_direction = max_component(abs(direction));
     const double extent = max_component(abs(origin)) + double{stop.instance->mesh->tree().tree().magnitude};
-    if (!(max_direction >= kMinKernelDirection && max_direction <= kMaxKernelDirection)) return std::nullopt;
-    if (!(extent >= kMinKernelReach && extent <= kMaxKernelReach)) return std::nullopt;
-    return KernelRay{{origin.x, origin.y, origin.z},  {direction.x, direction.y, direction.z},
-                     ray.collector.limit(),           ray.request.cull != Cull::kFront,
-                     ray.request.cull != Cull::kBack, transform.quaternion.is_identity()};
+    if (!(max_direction >= kMinKernelDirection && max_direction <= kMaxKernelDirection)) return false;
+    if (!(extent >= kMinKernelReach && extent <= kMaxKernelReach)) return false;
+    for (int axis = 0; axis < 3; ++axis) {
+      to.origin[axis] = origin[axis];
+      to.direction[axis] = direction[axis];
+    }
+    to.limit = ray.collector.limit();
+    to.accept_front = ray.request.cull != Cull::kFront;
+    to.accept_back = ray.request.cull != Cull::kBack;
+    to.unrotated = transform.quaternion.is_identity();
+    return true;
   }
 
   QueryTask& task_;
