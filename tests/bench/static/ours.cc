@@ -75,10 +75,15 @@ void ask_kernels(const TriangleBvh& tree, AskKernel ask, absl::Span<const RayQue
   const float magnitude = tree.tree().magnitude;
   for (size_t begin = 0; begin < rays.size(); begin += kBatch) {
     const size_t count = std::min(kBatch, rays.size() - begin);
-    for (size_t i = 0; i < count; ++i) set(batch[i], rays[begin + i]);
-    ask(tree.tree(), batch.data(), hits.data(), count);
+    float largest = 0;
     for (size_t i = 0; i < count; ++i) {
-      if (hits[i].verdict == KernelVerdict::kUndecided || !kernels_hold(rays[begin + i], magnitude))
+      set(batch[i], rays[begin + i]);
+      largest = std::max(largest, max_component(abs(rays[begin + i].origin)));
+    }
+    ask(tree.tree(), batch.data(), hits.data(), count);
+    const bool all_hold = magnitude >= kMinKernelReach && double{largest} + magnitude <= kMaxKernelReach;
+    for (size_t i = 0; i < count; ++i) {
+      if (hits[i].verdict == KernelVerdict::kUndecided || !(all_hold || kernels_hold(rays[begin + i], magnitude)))
         unsettled(begin + i);
       else
         settled(begin + i, hits[i]);

@@ -247,15 +247,19 @@ class Beam {
     return {a, b, c, minimum(a, minimum(b, c)), maximum(a, maximum(b, c))};
   }
   static inline bool same_origins(const KernelRay* rays) {
-    uint64_t first[3], differences = 0;
-    __builtin_memcpy(first, rays[0].origin, sizeof(first));
-    for (uint32_t i = 1; i < kBeamRays; ++i) {
-      uint64_t other[3];
-      __builtin_memcpy(other, rays[i].origin, sizeof(other));
-      differences |= (first[0] ^ other[0]) | (first[1] ^ other[1]) | (first[2] ^ other[2]);
-      if (i == 1 && differences != 0) return false;
+    static_assert(offsetof(KernelRay, direction) == 3 * sizeof(double));
+    // Each row has the three components of an origin and one of the direction.
+    DoubleMask first, second, differences;
+    __builtin_memcpy(&first, rays[0].origin, sizeof(first));
+    __builtin_memcpy(&second, rays[1].origin, sizeof(second));
+    differences = first ^ second;
+    if ((differences[0] | differences[1] | differences[2]) != 0) return false;
+    for (uint32_t i = 2; i < kBeamRays; ++i) {
+      DoubleMask other;
+      __builtin_memcpy(&other, rays[i].origin, sizeof(other));
+      differences |= first ^ other;
     }
-    return differences == 0;
+    return (differences[0] | differences[1] | differences[2]) == 0;
   }
 
   inline void load_directions(Floats16* direction) const {
