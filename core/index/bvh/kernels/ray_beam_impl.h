@@ -206,7 +206,7 @@ class Beam {
     if constexpr (!kAny) resolve_nearest();
     write_hits(hits);
     hits[0].nodes = nodes_;
-    hits[0].tests += tests_;
+    hits[0].tests = tests_ + ray_tests_;
     return true;
   }
 
@@ -450,7 +450,7 @@ class Beam {
                   high[4] = {t.high, numbers.high, verdicts.high, zero.high};
     store_rows(low, reinterpret_cast<char*>(hits), sizeof(KernelHit));
     store_rows(high, reinterpret_cast<char*>(hits + kTreeWidth), sizeof(KernelHit));
-    for (uint32_t i = 0; i < kBeamRays; ++i) hits[i].tests = ray_tests_;
+    for (uint32_t i = 0; i < kBeamRays; ++i) hits[i].tests = 0;
   }
 
   const TriangleTree* tree_;
