@@ -16,7 +16,7 @@
 namespace locus::bench {
 namespace {
 
-constexpr size_t kBatch = 256;       // rays per call of the kernels, as in a chunk of a query
+constexpr size_t kBatch = 1024;      // rays per call of the kernels
 constexpr size_t kRegionBatch = 16;  // balls or boxes per call of find_triangles()
 constexpr size_t kAllBatch = 256;    // rays per call of the kernel for all hits
 constexpr uint32_t kMaxRows = 128;

@@ -32,6 +32,20 @@
 namespace locus {
 namespace {
 
+// Constants of a ray of a beam for the test in double, with the meaning of PreparedConstants.
+struct BeamConstants {
+  uint32_t axes[3];
+  float scale, floor, noise, least_t;
+
+  inline uint32_t axis_x() const { return axes[0]; }
+  inline uint32_t axis_y() const { return axes[1]; }
+  inline uint32_t axis_z() const { return axes[2]; }
+  inline float edge_scale() const { return scale; }
+  inline float edge_floor() const { return floor; }
+  inline float start_noise() const { return noise; }
+  inline float t_floor() const { return least_t; }
+};
+
 constexpr uint32_t kBeamRays = 16;
 constexpr uint32_t kAllBeamRays = (1u << kBeamRays) - 1u;
 constexpr uint32_t kMaxBeams = 16;  // maximum number of beams traced interleaved
@@ -89,7 +103,7 @@ class Beam {
   // may hit.
   inline uint32_t project_block() {
     const TriangleBlock& block = tree_->blocks[now & ~kBlockBit];
-    const uint32_t x = exact_.axis_x, y = exact_.axis_y, z = exact_.axis_z;
+    const uint32_t x = exact_.axes[0], y = exact_.axes[1], z = exact_.axes[2];
     const Floats8 from_x = Floats8::splat(origin_[x]), from_y = Floats8::splat(origin_[y]),
                   from_z = Floats8::splat(origin_[z]);
     const Floats8 shear_x = Floats8::splat(shear_x_), shear_y = Floats8::splat(shear_y_);
@@ -101,8 +115,7 @@ class Beam {
       largest = maximum(largest, maximum(absolute(xs[vertex]), absolute(ys[vertex])));
     }
     const Floats8 spread = Floats8::splat(__builtin_fmaxf(spread_u_, spread_v_) * reach_);
-    Floats8 edge =
-        multiply_add(Floats8::splat(0.5f * exact_.edge_scale), largest + spread, Floats8::splat(exact_.edge_floor));
+    Floats8 edge = multiply_add(Floats8::splat(0.5f * exact_.scale), largest + spread, Floats8::splat(exact_.floor));
     if (planted(PlantedBug::kKernelEdgeBound)) edge = Floats8::splat(0);
     const Floats8 half_u = Floats8::splat(spread_u_), half_v = Floats8::splat(spread_v_);
     Floats8 greatest_low = Floats8::splat(-__builtin_inff()), least_high = Floats8::splat(__builtin_inff());
@@ -282,23 +295,23 @@ class Beam {
     }
     const Floats16 lengths[3] = {absolute(direction[0]), absolute(direction[1]), absolute(direction[2])};
     const Floats16 longest = maximum(maximum(lengths[0], lengths[1]), lengths[2]);
-    uint32_t& z = exact_.axis_z;
+    uint32_t& z = exact_.axes[2];
     for (z = 0; z < 3; ++z)
       if (at_most(longest, lengths[z]) == kAllBeamRays) break;
     if (z == 3) return false;
     const bool backwards = (octant_ >> z & 1u) != 0;
-    exact_.axis_x = (z + (backwards ? 2u : 1u)) % 3;
-    exact_.axis_y = (z + (backwards ? 1u : 2u)) % 3;
-    return (at_most(longest, lengths[exact_.axis_x]) | at_most(longest, lengths[exact_.axis_y])) == 0;
+    exact_.axes[0] = (z + (backwards ? 2u : 1u)) % 3;
+    exact_.axes[1] = (z + (backwards ? 1u : 2u)) % 3;
+    return (at_most(longest, lengths[exact_.axes[0]]) | at_most(longest, lengths[exact_.axes[1]])) == 0;
   }
 
   // Sets the middle ray, the differences of the rays from it, and the slopes of the frustum. Returns false if the
   // differences are too large.
   inline bool set_shears(const Floats16* direction) {
-    const Floats16 along = direction[exact_.axis_z], reciprocal = Floats16::splat(1) / along;
+    const Floats16 along = direction[exact_.axes[2]], reciprocal = Floats16::splat(1) / along;
     absolute(along).store(lengths_);
-    sign_ = sign_of(exact_.axis_z);
-    slope(exact_.axis_z, 1, 1);
+    sign_ = sign_of(exact_.axes[2]);
+    slope(exact_.axes[2], 1, 1);
     const auto spread = [&](uint32_t axis, float& middle, float* differences) {
       const Floats16 shear = direction[axis] * reciprocal;
       const float low = least(shear), high = greatest(shear);
@@ -307,8 +320,8 @@ class Beam {
       slope(axis, __builtin_fabsf(low), __builtin_fabsf(high));
       return __builtin_fmaxf(high - middle, middle - low);
     };
-    spread_u_ = spread(exact_.axis_x, shear_x_, us_);
-    spread_v_ = spread(exact_.axis_y, shear_y_, vs_);
+    spread_u_ = spread(exact_.axes[0], shear_x_, us_);
+    spread_v_ = spread(exact_.axes[1], shear_y_, vs_);
     if (planted(PlantedBug::kKernelBeamMiddle)) spread_u_ = spread_v_ = 0;
     return spread_u_ <= kMaxHalfSpread && spread_v_ <= kMaxHalfSpread;
   }
@@ -334,8 +347,8 @@ class Beam {
     for (uint32_t k = 0; k < 3; ++k)
       pads_[k] = planted(PlantedBug::kKernelTreePad) ? 0 : 2 * kTreePad * reach * __builtin_fabsf(steep_[k]);
     reach_ = reach;
-    exact_.edge_scale = reach * 0x1p-17f;
-    exact_.edge_floor = reach * reach * 0x1p-36f;
+    exact_.scale = reach * 0x1p-17f;
+    exact_.floor = reach * reach * 0x1p-36f;
     start_noise_ = reach * reach * reach * 0x1p-42f;
     depth_floor_ = reach * 0x1p-20f;
   }
@@ -373,9 +386,9 @@ class Beam {
   template <bool kAny>
   inline void resolve(const TriangleBlock& block, uint32_t lane, uint32_t i) {
     if (limits_[i] < 0) return;
-    ExactConstants constants = exact_;
-    constants.start_noise = start_noise_ / lengths_[i];
-    constants.t_floor = depth_floor_ / lengths_[i];
+    BeamConstants constants = exact_;
+    constants.noise = start_noise_ / lengths_[i];
+    constants.least_t = depth_floor_ / lengths_[i];
     const Verdict verdict = decide(block, static_cast<int>(lane), rays_[i], constants);
     if (verdict.verdict == KernelVerdict::kUndecided) {
       undecided_ |= 1u << i;
@@ -456,7 +469,7 @@ class Beam {
   const TriangleTree* tree_;
   const KernelRay* rays_;
   uint32_t octant_;
-  ExactConstants exact_;                            // the constants that all rays share
+  BeamConstants exact_;                             // the constants that all rays share
   float start_noise_, depth_floor_;                 // those of exact_ for a ray whose largest component is 1
   float reach_;                                     // R
   float origin_[3], steep_[3], flat_[3], pads_[3];  // the frustum, by mesh axis

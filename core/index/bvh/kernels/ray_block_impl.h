@@ -161,26 +161,29 @@ struct Verdict {
   float t;
 };
 
-// Constants of a ray for the test in double; the members are columns of PreparedRays.
-struct ExactConstants {
-  uint32_t axis_x, axis_y, axis_z;
-  float edge_scale, edge_floor, start_noise, t_floor;
+// Constants of a ray for the test in double: columns of PreparedRays, which are loaded only when they are used.
+struct PreparedConstants {
+  PreparedRay ray;
 
-  static inline ExactConstants of(PreparedRay ray) {
-    return {ray.integer(kAxisX),   ray.integer(kAxisY),    ray.integer(kAxisZ), ray.value(kEdgeScale),
-            ray.value(kEdgeFloor), ray.value(kStartNoise), ray.value(kTFloor)};
-  }
+  inline uint32_t axis_x() const { return ray.integer(kAxisX); }
+  inline uint32_t axis_y() const { return ray.integer(kAxisY); }
+  inline uint32_t axis_z() const { return ray.integer(kAxisZ); }
+  inline float edge_scale() const { return ray.value(kEdgeScale); }
+  inline float edge_floor() const { return ray.value(kEdgeFloor); }
+  inline float start_noise() const { return ray.value(kStartNoise); }
+  inline float t_floor() const { return ray.value(kTFloor); }
 };
 
 // Returns true if TriangleRay would treat the triangle as nearly edge-on; may also return true for triangles slightly
 // beyond TriangleRay's bound. `size` is |determinant| and `along` is d; R, E and d are defined at the top of this file.
 // Sheared coordinates are at most 2 E + 2^-18 R, so TriangleRay's bound is at most d^2 (2^-12 E^2 + 2^-29 R E + 2^-48
 // R^2). This larger bound is cheaper to compute, so `size` is compared with it first.
-static inline bool may_be_edge_on(const TriangleBlock& block, const ExactConstants& constants, Doubles x, Doubles y,
+template <class Constants>
+static inline bool may_be_edge_on(const TriangleBlock& block, const Constants& constants, Doubles x, Doubles y,
                                   Doubles depths, double along, double size) {
-  const double edge_scale = constants.edge_scale;
+  const double edge_scale = constants.edge_scale();
   const double extent = block.extent;
-  if (size > 0x1p-12 * (extent * (extent + edge_scale) + constants.edge_floor) * along * along) return false;
+  if (size > 0x1p-12 * (extent * (extent + edge_scale) + constants.edge_floor()) * along * along) return false;
   const double reach = 0x1p17 * edge_scale, longest = __builtin_fabs(along);
   double width = 0x1p-39 * reach * longest;
   for (int vertex = 0; vertex < 3; ++vertex)
@@ -205,9 +208,9 @@ static inline bool is_exactly_edge_on(const TriangleBlock& block, int lane, cons
 // Tests in double whether the ray hits the triangle in lane `lane`. Computes TriangleRay::edge_test(), but omits its
 // scaling by powers of two. For the directions and distances that the kernels accept, this scaling would change no bit
 // of the result.
-static inline Verdict decide(const TriangleBlock& block, int lane, const KernelRay& ray,
-                             const ExactConstants& constants) {
-  const uint32_t axis_x = constants.axis_x, axis_y = constants.axis_y, axis_z = constants.axis_z;
+template <class Constants>
+static inline Verdict decide(const TriangleBlock& block, int lane, const KernelRay& ray, const Constants& constants) {
+  const uint32_t axis_x = constants.axis_x(), axis_y = constants.axis_y(), axis_z = constants.axis_z();
   const double along = ray.direction[axis_z];
   const Doubles z = coordinates(block, axis_z, lane) - splat(ray.origin[axis_z]);
   const Doubles x =
@@ -229,7 +232,7 @@ static inline Verdict decide(const TriangleBlock& block, int lane, const KernelR
     const double unit = along * along;
     // A triangle far behind the origin is not hit. For a triangle slightly behind the origin the result depends on
     // TriangleRay::depth_error(), which is not computed here, so the verdict is kUndecided.
-    const double noise = double{constants.start_noise} * unit / size + double{constants.t_floor};
+    const double noise = double{constants.start_noise()} * unit / size + double{constants.t_floor()};
     return {t < -noise ? KernelVerdict::kMiss : KernelVerdict::kUndecided, 0};
   }
   if ((t > 0 && t < 1e-30) || !(t < 1e30)) return {KernelVerdict::kUndecided, 0};
@@ -254,8 +257,8 @@ struct FourPairs {
 
 // Tests four pairs in double, by the arithmetic of decide(). The rays share `constants`, of which start_noise and
 // t_floor are not used. With kSame all pairs have the same triangle.
-template <bool kSame>
-static inline FourVerdicts decide_four(const FourPairs& pairs, const ExactConstants& constants) {
+template <bool kSame, class Constants>
+static inline FourVerdicts decide_four(const FourPairs& pairs, const Constants& constants) {
   const KernelRay* const rays = pairs.rays;
   const float* lanes[4];
   for (uint32_t i = 0; i < 4; ++i) lanes[i] = pairs.blocks[i]->vertices[0] + pairs.lanes[i];
@@ -267,7 +270,7 @@ static inline FourVerdicts decide_four(const FourPairs& pairs, const ExactConsta
   const auto direction = [&](uint32_t axis) {
     return Doubles{rays[0].direction[axis], rays[1].direction[axis], rays[2].direction[axis], rays[3].direction[axis]};
   };
-  const uint32_t axis_x = constants.axis_x, axis_y = constants.axis_y, axis_z = constants.axis_z;
+  const uint32_t axis_x = constants.axis_x(), axis_y = constants.axis_y(), axis_z = constants.axis_z();
   const Doubles along = direction(axis_z), direction_x = direction(axis_x), direction_y = direction(axis_y);
   const Doubles from_x = splat(rays[0].origin[axis_x]), from_y = splat(rays[0].origin[axis_y]),
                 from_z = splat(rays[0].origin[axis_z]);
@@ -284,8 +287,8 @@ static inline FourVerdicts decide_four(const FourPairs& pairs, const ExactConsta
                                : widened(pairs.blocks[0]->extent, pairs.blocks[1]->extent, pairs.blocks[2]->extent,
                                          pairs.blocks[3]->extent);
   // The bound of may_be_edge_on(), which is the same for all four pairs.
-  const Doubles bound =
-      (extent * (extent + splat(constants.edge_scale)) + splat(constants.edge_floor)) * splat(0x1p-12) * along * along;
+  const Doubles bound = (extent * (extent + splat(constants.edge_scale())) + splat(constants.edge_floor())) *
+                        splat(0x1p-12) * along * along;
   const auto not_edge_on = (determinant > bound) | (determinant < zero - bound);
   const auto miss = ((a < zero) | (b < zero) | (c < zero)) & ((a > zero) | (b > zero) | (c > zero));
   const auto ordinary = (t >= splat(1e-30)) & (t < splat(1e30));

@@ -208,7 +208,7 @@ class RayStream {
     const TriangleBlock& block = tree_.blocks[opened.index];
     for (uint32_t candidates = opened.results.candidates; candidates != 0; candidates &= candidates - 1u) {
       const int lane = __builtin_ctz(candidates);
-      const Verdict verdict = decide(block, lane, rays_[flight.index], ExactConstants::of(flight.ray));
+      const Verdict verdict = decide(block, lane, rays_[flight.index], PreparedConstants{flight.ray});
       if (verdict.verdict == KernelVerdict::kUndecided) flight.undecided = true;
       if (verdict.verdict != KernelVerdict::kHit) continue;
       record_hit(flight, {verdict.t, kAny ? opened.index : number_of(tree_, block, lane)});

@@ -299,7 +299,7 @@ class Packet {
   // needs no more tests: after give_up() a ray stays undecided, even if it hits another triangle of the same block.
   inline void resolve(const TriangleBlock& block, int lane, uint32_t i) {
     if (limits_[i] < 0 && !planted(PlantedBug::kKernelHitAfterGivingUp)) return;
-    const Verdict verdict = decide(block, lane, rays_[i], ExactConstants::of(PreparedRay(*prepared_, i)));
+    const Verdict verdict = decide(block, lane, rays_[i], PreparedConstants{PreparedRay(*prepared_, i)});
     if (verdict.verdict == KernelVerdict::kUndecided) give_up(i);
     if (verdict.verdict != KernelVerdict::kHit) return;
     record_hit(i, verdict.t, kAny ? index_of(block) : number_of(*tree_, block, lane));
