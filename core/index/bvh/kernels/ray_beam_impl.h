@@ -50,6 +50,9 @@ constexpr uint32_t kBeamRays = 16;
 constexpr uint32_t kAllBeamRays = (1u << kBeamRays) - 1u;
 constexpr uint32_t kMaxBeams = 16;  // maximum number of beams traced interleaved
 
+// Returns the larger of two numbers. std::max() would be a function with external linkage, fmax() a call.
+static inline float larger(float a, float b) { return a < b ? b : a; }
+
 class Beam {
  public:
   uint32_t now;  // current node or block, or kNoChild at the end
@@ -114,7 +117,7 @@ class Beam {
       ys[vertex] = subtract_product(from_y - Floats8::load(block.vertices[y + 3 * vertex]), shear_y, zs[vertex]);
       largest = maximum(largest, maximum(absolute(xs[vertex]), absolute(ys[vertex])));
     }
-    const Floats8 spread = Floats8::splat(__builtin_fmaxf(spread_u_, spread_v_) * reach_);
+    const Floats8 spread = Floats8::splat(larger(spread_u_, spread_v_) * reach_);
     Floats8 edge = multiply_add(Floats8::splat(0.5f * exact_.scale), largest + spread, Floats8::splat(exact_.floor));
     if (planted(PlantedBug::kKernelEdgeBound)) edge = Floats8::splat(0);
     const Floats8 half_u = Floats8::splat(spread_u_), half_v = Floats8::splat(spread_v_);
@@ -318,7 +321,7 @@ class Beam {
       middle = 0.5f * (low + high);
       (shear - Floats16::splat(middle)).store(differences);
       slope(axis, __builtin_fabsf(low), __builtin_fabsf(high));
-      return __builtin_fmaxf(high - middle, middle - low);
+      return larger(high - middle, middle - low);
     };
     spread_u_ = spread(exact_.axes[0], shear_x_, us_);
     spread_v_ = spread(exact_.axes[1], shear_y_, vs_);
@@ -331,8 +334,8 @@ class Beam {
   // Sets the reciprocals of the least and the greatest slope of the rays along a mesh axis. A slope of less than 1e-18
   // is replaced by 1e-18, as in SlabRay.
   inline void slope(uint32_t axis, float one, float other) {
-    steep_[axis] = sign_of(axis) / __builtin_fmaxf(one < other ? one : other, 1e-18f);
-    flat_[axis] = sign_of(axis) / __builtin_fmaxf(one < other ? other : one, 1e-18f);
+    steep_[axis] = sign_of(axis) / larger(one < other ? one : other, 1e-18f);
+    flat_[axis] = sign_of(axis) / larger(one < other ? other : one, 1e-18f);
   }
 
   // Sets the rest of the frustum and the error bounds. The frustum enters a slab no later, and leaves it no earlier,
@@ -341,7 +344,7 @@ class Beam {
     float reach = 0;
     for (uint32_t k = 0; k < 3; ++k) {
       origin_[k] = static_cast<float>(rays_[0].origin[k]);
-      reach = __builtin_fmaxf(reach, __builtin_fabsf(origin_[k]));
+      reach = larger(reach, __builtin_fabsf(origin_[k]));
     }
     reach += tree_->magnitude;
     for (uint32_t k = 0; k < 3; ++k)
