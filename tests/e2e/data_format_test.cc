@@ -113,7 +113,10 @@ class DataFormatTest : public ::testing::Test {
                       relabels { ids: 2 tags: 99 groups: 4 layers: 8 }
                       inserts { ids: [6] positions: [8, 8, 8] capsule { radii: 0.25 half_axes: [0, 1, 0] } })");
     apply("arena", R"(writer: 7 batch: 3 tick: 5 frame { x: 1000 }
-                      moves { ids: 4 positions: [0.5, 0, 0] teleport: true } remove_ids: [5])");
+                      moves { ids: 4 positions: [0.5, 0, 0] teleport: true } remove_ids: [5]
+                      instance_moves { ids: 9223372036938661889 positions_f64: [0, 7, 2] rotations: [0, 0, 0, 1]
+                                       scales: 2 }
+                      instance_relabels { ids: 9223372036938661890 layers: 0 tags: 8 })");
     apply("twin", R"(inserts { ids: [1] positions: [1, 2, 3] ball { radii: 2 } })");
     apply("quick", R"(inserts { ids: [1, 2] positions: [1, 2, 3, 4, 5, 6] point {} })");
   }
@@ -206,7 +209,7 @@ TEST_F(DataFormatTest, TheSampleOfThisFormatHoldsWhatIsWrittenIntoANewDirectory)
     copy_sample(daemon_.directory(), std::filesystem::path(folder) / "data");
     std::ofstream(std::filesystem::path(folder) / "holds.txt") << holds;
   } else {
-    EXPECT_EQ(without_epochs(holds), without_epochs(text_of((samples() / "format-3" / "holds.txt").string())));
+    EXPECT_EQ(without_epochs(holds), without_epochs(text_of((samples() / "format-4" / "holds.txt").string())));
   }
 }
 

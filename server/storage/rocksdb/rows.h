@@ -33,7 +33,7 @@
 
 namespace locus::server {
 
-inline constexpr uint32_t kFormat = 3;
+inline constexpr uint32_t kFormat = 4;
 inline constexpr uint32_t kOldestFormat = 1;
 inline constexpr absl::string_view kFormatKey = "format";
 inline constexpr absl::string_view kCatalogueKey = "catalogue";
