@@ -1,13 +1,14 @@
-// Format 3 of the keys and values in RocksDB; FORMAT.md in this folder describes every byte. Each value ends with a
+// Format 4 of the keys and values in RocksDB; FORMAT.md in this folder describes every byte. Each value ends with a
 // checksum over key and value, which reveals a value under a wrong key. Free functions on plain data; any thread.
 //
 // A mesh has a content (vertices and triangles), stored once for all names of equal content, and parts (named ranges of
 // triangles), stored for each name. Snapshots, contents and parts are stored as chunks; a random content id in their
 // keys identifies each list of chunks.
 //
-// Formats 1 and 2 can be read, too. The mesh rows of format 1 have no `parts`: the chunks of the content include the
-// parts. In formats 1 and 2 no scene and no mesh has a creator. Opening a directory of an older format sets its format
-// number to 3 and leaves all rows unchanged.
+// Formats 1 to 3 can be read, too. The mesh rows of format 1 have no `parts`: the chunks of the content include the
+// parts. In formats 1 and 2 no scene and no mesh has a creator. Up to format 3, no record moves instances (LSBI, see
+// core/scene/log/FORMAT.md). Opening a directory of an older format sets its format number to 4 and leaves all rows
+// unchanged.
 //
 // Column families, the fields of their keys, and the value under each key (`scene` is a SceneKey, `id` a content id):
 // meta      "format"; "catalogue"; 's' scene: a scene; 'm' name: a mesh; 'c' sha256: a mesh's content; 'p' scene id:

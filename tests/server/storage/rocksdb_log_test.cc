@@ -290,7 +290,7 @@ TEST_F(RocksdbLogTest, ADirectoryOfFormat1BecomesOneOfFormat3AndItsMeshesKeepThe
   ASSERT_EQ(log_->add_mesh("another", stored.sha256, content, parts), absl::OkStatus());
   ASSERT_EQ(log_->delete_mesh(stored.name), absl::OkStatus());
   log_ = nullptr;
-  EXPECT_EQ(format_of(options_.path), 3u);
+  EXPECT_EQ(format_of(options_.path), 4u);
   open();
   ASSERT_EQ(log_->stored_meshes().size(), 1u);
   EXPECT_FALSE(log_->stored_meshes()[0].parts_in_content);
