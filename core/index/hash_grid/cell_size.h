@@ -9,7 +9,7 @@
 
 #include "absl/types/span.h"
 #include "core/base/check.h"
-#include "core/geometry/vec3.h"
+#include "core/geometry/aabb.h"
 
 namespace locus::internal {
 
@@ -43,16 +43,21 @@ int choose_cell_exponent(absl::Span<const SampledValue> sample, size_t populatio
 bool cell_exponent_fits(absl::Span<const SampledValue> sample, size_t population, int exponent);
 
 // Evenly spaced sample of `population` values, which are offered one by one. Selects all values if `population` is less
-// than `min_sample`, else `min_sample` to 2 * `min_sample` values.
+// than kCellSizeSample, else kCellSizeSample to 2 * kCellSizeSample values.
 class EvenSample {
  public:
-  EvenSample(size_t population, size_t min_sample) : stride_(std::max<size_t>(1, population / min_sample)) {}
+  explicit EvenSample(size_t population) : stride_(std::max<size_t>(1, population / kCellSizeSample)) {}
   void offer(Vec3d position, double diameter) {
     if (offered_++ % stride_ == 0) values_.push_back({position, diameter});
+    LOCUS_DCHECK_LE(values_.size(), 2 * kCellSizeSample);
   }
   absl::Span<const SampledValue> values() const { return values_; }
-  // Returns the number of offered values for each selected value.
-  size_t stride() const { return stride_; }
+  // Returns the bounds of the selected positions.
+  Aabbd bounds() const {
+    Aabbd bounds;
+    for (const SampledValue& value : values_) bounds = merge(bounds, Aabbd{value.position, value.position});
+    return bounds;
+  }
 
  private:
   size_t stride_;

@@ -1,6 +1,9 @@
 #include "core/index/hash_grid/density_map.h"
 
+#include <algorithm>
+#include <array>
 #include <bit>
+#include <utility>
 
 #include "core/base/check.h"
 
@@ -46,7 +49,19 @@ bool DensityMap::differs(const DensityMap& before, const GridKey& key, int expon
   return is_dense(key, exponent) && !before.is_dense(key, exponent);
 }
 
-DensityCount::DensityCount(int base_exponent, const Aabbd& bounds) : base_(base_exponent), top_(base_exponent) {
+void DensityCount::Node::add_child(const GridKey& key, double child_values) {
+  values += child_values;
+  max_of_child = std::max(max_of_child, child_values);
+  children |= uint64_t{1} << index_in_brick(key);
+}
+
+bool DensityCount::Node::is_dense(double min_brick_values) const {
+  return has_dense_child || values >= min_brick_values * std::popcount(children) ||
+         max_of_child >= kCrowd * min_brick_values;
+}
+
+DensityCount::DensityCount(int base_exponent, const Aabbd& bounds)
+    : base_(base_exponent), top_(base_exponent), counts_(1) {
   const double width = bounds.empty() ? 0 : max_component(bounds.max - bounds.min);
   while (top_ + kStep <= kMaxBaseExponent && std::ldexp(1.0, top_ + kBrickBits) < width) {
     top_ += kStep;
@@ -57,33 +72,33 @@ DensityCount::DensityCount(int base_exponent, const Aabbd& bounds) : base_(base_
 void DensityCount::add(const Brick& brick) {
   const BrickGeometry& geometry = brick.geometry;
   LOCUS_DCHECK_GE(geometry.exponent, base_);
-  const int levels =
-      std::max((geometry.exponent - base_ + kStep - 1) / kStep, 1);  // of the node that counts the values
+  const int levels = (geometry.exponent - base_ + kStep - 1) / kStep;  // of the node that counts the values
   const int exponent = base_ + levels * kStep;
   if (exponent > top_) return;
-  const int finer = exponent - geometry.exponent;  // 0 to kStep: the brick is so much finer than the node
-  LOCUS_DCHECK(0 <= finer && finer <= kStep);
-  Node& node = counts_[static_cast<size_t>(levels - 1)][ancestor(geometry.key, finer)];
+  const int finer = exponent - geometry.exponent;  // 0 or 1: the brick is so much finer than the node
+  LOCUS_DCHECK(0 <= finer && finer < kStep);
+  Node& node = counts_[static_cast<size_t>(levels)][ancestor(geometry.key, finer)];
   node.values += brick.size();
-  const auto add_child = [&](int64_t cell) {
-    GridKey child;  // in units of the children, which are as wide as the cells of the node
+  if (levels == 0) return;
+  std::array<uint32_t, kBrickCells> values{};  // of each child of the node, which is as wide as a cell of the node
+  const auto child_of = [&](int cell) {
+    GridKey child;
     for (int axis = 0; axis < 3; ++axis)
       child[axis] = ((geometry.key[axis] << kBrickBits) + (cell >> (axis * kBrickBits) & 3)) >> finer;
-    node.children |= uint64_t{1} << index_in_brick(child);
+    return static_cast<size_t>(index_in_brick(child));
   };
   const std::array<uint32_t, kBrickCells + 1>& offsets = brick.sorted->offsets();
   for (int cell = 0; cell < kBrickCells; ++cell)
-    if (offsets[static_cast<size_t>(cell)] != offsets[static_cast<size_t>(cell) + 1]) add_child(cell);
+    values[child_of(cell)] += offsets[static_cast<size_t>(cell) + 1] - offsets[static_cast<size_t>(cell)];
   for (uint32_t slot = 0; slot < brick.recent_count; ++slot)
-    if (!brick.is_recent_dead(slot)) add_child(geometry.cell_of(brick.recent->entry(slot).position));
+    if (!brick.is_recent_dead(slot)) ++values[child_of(geometry.cell_of(brick.recent->entry(slot).position))];
+  for (size_t child = 0; child < values.size(); ++child)
+    if (values[child] != 0) node.children |= uint64_t{1} << child;
+  node.max_of_child = std::max(node.max_of_child, static_cast<double>(*std::max_element(values.begin(), values.end())));
 }
 
 void DensityCount::add(Vec3d position, double values) {
-  if (counts_.empty()) return;
-  const GridKey child = brick_of(internal::cell_of(position, cells_per_unit(base_)));
-  Node& node = counts_[0][ancestor(child, kStep)];
-  node.values += values;
-  node.children |= uint64_t{1} << index_in_brick(child);
+  counts_[0][brick_of(internal::cell_of(position, cells_per_unit(base_)))].values += values;
 }
 
 DensityMap DensityCount::map(double min_brick_values, const DensityMap* before) {
@@ -91,35 +106,25 @@ DensityMap DensityCount::map(double min_brick_values, const DensityMap* before) 
   const bool was_sparse = before != nullptr && before->has_sparse_regions();
   size_t sparse_nodes = 0;
   for (size_t level = 0; level < counts_.size(); ++level) {
-    DensityMap::Nodes& dense = result.dense_.emplace_back();
-    const int exponent = base_ + kStep * static_cast<int>(level + 1);
+    const int exponent = base_ + kStep * static_cast<int>(level);
+    DensityMap::Nodes dense;
     for (const auto& [key, node] : counts_[level]) {
-      const bool was_dense = was_sparse && before->is_dense(key, exponent);
-      const bool fills_bricks = node.values >= min_brick_values * (was_dense ? 0.5 : 1) * std::popcount(node.children);
-      const bool is_dense = node.has_dense_child || fills_bricks;
+      const bool was_dense = level != 0 && was_sparse && before->is_dense(key, exponent);
+      const bool is_dense = level != 0 && node.is_dense(was_dense ? min_brick_values / 2 : min_brick_values);
       if (is_dense) dense.insert(key);
-      if (!is_dense && level == 0) ++sparse_nodes;
+      if (!is_dense && level == 1) ++sparse_nodes;
       if (level + 1 == counts_.size()) continue;
       Node& parent = counts_[level + 1][ancestor(key, kStep)];
-      parent.values += node.values;
-      parent.children |= uint64_t{1} << index_in_brick(key);
+      parent.add_child(key, node.values);
       parent.has_dense_child |= is_dense;
     }
+    if (level != 0) result.dense_.push_back(std::move(dense));
   }
   const double share = kMinSparseShare * (was_sparse ? 0.5 : 1);
-  if (counts_.empty() || static_cast<double>(sparse_nodes) <= share * static_cast<double>(counts_[0].size()))
+  if (counts_.size() < 2 || static_cast<double>(sparse_nodes) <= share * static_cast<double>(counts_[1].size()))
     return DensityMap(base_);
   result.top_ = top_;
   return result;
-}
-
-DensityMap density_of(const EvenSample& sample, int base_exponent, double min_brick_values) {
-  LOCUS_CHECK(!sample.values().empty());
-  Aabbd bounds;
-  for (const SampledValue& value : sample.values()) bounds = merge(bounds, Aabbd{value.position, value.position});
-  DensityCount count(base_exponent, bounds);
-  for (const SampledValue& value : sample.values()) count.add(value.position, static_cast<double>(sample.stride()));
-  return count.map(min_brick_values, nullptr);
 }
 
 }  // namespace locus::internal

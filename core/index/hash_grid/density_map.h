@@ -6,10 +6,10 @@
 // are base, base + 2, base + 4, ... up to the one whose bricks are as wide as all values together. So a cell of one
 // density level is a brick of the next finer one, and a node has 64 children. A node is dense if its values, those of
 // all levels together, would fill the bricks of its children: if the children that have values have at least
-// `min_brick_values` on average, or if a child is dense. A dense node remains dense until they have fewer than half of
-// that, so that values do not move back and forth. A value is stored on the finest density level whose next coarser
-// node, at the position of the value, is dense. Source of the structure: Gargantini, An Effective Way to Represent
-// Quadtrees, 1982 (nodes in a table).
+// `min_brick_values` on average, or one has kCrowd times as many, or if a child is dense. Half of these numbers suffice
+// for a node that is already dense, so that values do not move back and forth. A value is stored on the finest density
+// level whose next coarser node, at the position of the value, is dense. Source of the structure: Gargantini, An
+// Effective Way to Represent Quadtrees, 1982 (nodes in a table).
 //
 // Threads: as for a standard container. Invariant: the parent of a dense node is dense.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_DENSITY_MAP_H_
@@ -22,7 +22,6 @@
 #include "absl/container/flat_hash_map.h"
 #include "absl/container/flat_hash_set.h"
 #include "core/index/hash_grid/brick.h"
-#include "core/index/hash_grid/cell_size.h"
 
 namespace locus::internal {
 
@@ -30,6 +29,8 @@ namespace locus::internal {
 // nodes at the edge of a uniform world are sparse, wider cells would save less than a further level costs. The share is
 // half as large for a grid that already has sparse regions.
 inline constexpr double kMinSparseShare = 1.0 / 4;
+
+inline constexpr double kCrowd = 8;
 
 class DensityMap {
  public:
@@ -61,7 +62,7 @@ class DensityMap {
 // Counts the values of each node, and makes a map of the counts.
 class DensityCount {
  public:
-  // `bounds` are the bounds of all positions; `base_exponent` is that of the grid.
+  // `bounds` are the bounds of the positions of most values; `base_exponent` is that of the grid.
   DensityCount(int base_exponent, const Aabbd& bounds);
 
   // Adds the values of a brick on any level from the base level on. Values of a brick that is wider than the coarsest
@@ -76,18 +77,19 @@ class DensityCount {
  private:
   struct Node {
     double values = 0;
-    uint64_t children = 0;  // one bit for each child that has values, numbered as by index_in_brick()
+    double max_of_child = 0;  // largest number of values of one child
+    uint64_t children = 0;    // one bit for each child that has values, numbered as by index_in_brick()
     bool has_dense_child = false;
+
+    void add_child(const GridKey& key, double child_values);
+    bool is_dense(double min_brick_values) const;
   };
   using Counts = absl::flat_hash_map<GridKey, Node, GridKeyHash>;
 
   int base_, top_;
-  // Nodes of the levels base_ + 2, base_ + 4, ..., top_ with the values added; map() adds those of their children.
+  // Nodes of the levels base_, base_ + 2, ..., top_ with the values added; map() adds those of their children.
   std::vector<Counts> counts_;
 };
-
-// Returns the density map of the values of which `sample` selects some. Precondition: the sample is not empty.
-DensityMap density_of(const EvenSample& sample, int base_exponent, double min_brick_values);
 
 }  // namespace locus::internal
 

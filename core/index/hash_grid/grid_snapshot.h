@@ -2,8 +2,8 @@
 // only culls: it passes each value that may satisfy a query to the caller once, and the caller applies the exact
 // predicate of the value in double.
 //
-// A value is stored in the one cell that contains its position, on the finest level whose cells are at least as wide as
-// the value. A query therefore widens its range on each level by the largest extent of that level, so that the query
+// A value is stored in the one cell that contains its position, on a level whose cells are at least as wide as the
+// value. A query therefore widens its range on each level by the largest extent of that level, so that the query
 // misses no value. This extent is at most half a cell, unless a value is wider than the cells of the coarsest possible
 // level. A large value does not widen the range on other levels. Levels are visited from coarse to fine, so that a hit
 // on a large near value shortens a ray before the many small values are tested. Source: Ericson, Real-Time Collision
@@ -45,7 +45,7 @@ using BrickIndices = PersistentArray<uint32_t, 1024>;
 
 struct GridLevel {
   int exponent = 0;        // cell edge = 2^exponent
-  LevelGeometry geometry;  // its bounds contain all values and do not shrink until the level is empty
+  LevelGeometry geometry;  // its bounds contain all values, and may be larger
   size_t size = 0;         // number of values
   std::shared_ptr<const BrickTable> table;
 };
@@ -103,9 +103,9 @@ class GridSnapshot {
                  double displacement_bound = 0) const;
 
   // Calls visit(GridRef) for every value whose bounds have a squared_distance() of at most limit() from `point`, and
-  // for some other values near the point. The order on each level is roughly from near to far; the level with the most
-  // values at the point is visited first. limit() may decrease during the visit. Ends if visit() returns false. The
-  // cost on each level is proportional to the number of cells within the final limit() plus the number of values in
+  // for some other values near the point. The order on each level is roughly from near to far; the finest level
+  // with a brick at the point is visited first. limit() may decrease during the visit. Ends if visit() returns false.
+  // The cost on each level is proportional to the number of cells within the final limit() plus the number of values in
   // these cells. If the range of these cells has more than 1024 brick keys, and more than the level has bricks, each
   // brick of the level is tested once instead.
   template <class Limit, class Visit>

@@ -17,27 +17,15 @@ constexpr size_t kChangesPerCheck = 64;    // changes per value, on average, bef
 constexpr size_t kRefiledPerBatch = 8192;  // min number of values that a batch moves to other levels
 constexpr size_t kArrivalShare = 8;        // the density is counted again after size() / kArrivalShare arrivals,
 constexpr double kMinArrivals = 32;        // but not before this many times HashGridOptions::min_brick_values
-constexpr size_t kValuesPerSample = 4;     // values for each value of a sample from which the density is estimated
 
-using internal::DensityMap;
-using internal::SampledValue;
-
-// Sample of the values of a grid: a few for the choice of the cell size, and more for the density map.
-struct GridSample {
-  explicit GridSample(size_t population)
-      : few(population, internal::kCellSizeSample),
-        many(population, std::max(internal::kCellSizeSample, population / kValuesPerSample)) {}
-  void offer(Vec3d position, float extent) {
-    few.offer(position, 2.0 * double{extent});
-    many.offer(position, 2.0 * double{extent});
-  }
-  internal::EvenSample few, many;
-};
+// Returns the number of values for each one from which the density of `values` values is estimated.
+size_t values_per_sample(size_t values) { return values < 8192 ? 1 : 4; }
 
 }  // namespace
 
 using internal::BrickChange;
 using internal::BrickGeometry;
+using internal::DensityMap;
 using internal::GridKey;
 using internal::GridSlot;
 
@@ -364,14 +352,15 @@ size_t HashGrid::apply(const GridBatch& batch) {
   replaced_bytes_ = 0;
   // Choose the cell size before a bulk load, so that the load stores each value only once.
   if (size_ == 0 && batch.inserted.size() >= first_choice_) {
-    GridSample sample(batch.inserted.size());
-    for (const GridItem& item : batch.inserted) sample.offer(item.entry.position, item.reach);
-    density_ = internal::density_of(
-        sample.many, internal::choose_cell_exponent(sample.few.values(), batch.inserted.size()), min_brick_values_);
+    internal::EvenSample sample(batch.inserted.size());
+    for (const GridItem& item : batch.inserted) sample.offer(item.entry.position, 2.0 * double{item.reach});
+    const int base = internal::choose_cell_exponent(sample.values(), batch.inserted.size());
+    estimate_density(batch.inserted, base, sample.bounds());
     size_at_choice_ = batch.inserted.size();
     changes_since_choice_ = 0;
   }
   apply_to_bricks(batch);
+  arrivals_since_count_ += batch.removed.size();
   const size_t changes = batch.removed.size() + batch.moves.moves.size() + batch.inserted.size();
   changes_since_choice_ += changes;
   if (stale_bricks_.empty() && choice_is_stale()) choose_cell_size();
@@ -386,12 +375,21 @@ void HashGrid::fill(absl::Span<const GridItem> items, double cell_size) {
   density_ = DensityMap(base);
   if (items.size() >= first_choice_) {
     size_at_choice_ = items.size();
-    GridSample sample(items.size());
-    for (const GridItem& item : items) sample.offer(item.entry.position, item.reach);
-    density_ = internal::density_of(sample.many, base, min_brick_values_);
+    internal::EvenSample sample(items.size());
+    for (const GridItem& item : items) sample.offer(item.entry.position, 2.0 * double{item.reach});
+    estimate_density(items, base, sample.bounds());
   }
   changes_since_choice_ = 0;
   apply_to_bricks({{}, {}, items});
+}
+
+// Makes the density map of an empty grid from a sample of the values that it will have.
+void HashGrid::estimate_density(absl::Span<const GridItem> items, int base_exponent, const Aabbd& bounds) {
+  internal::DensityCount count(base_exponent, bounds);
+  const size_t stride = values_per_sample(items.size());
+  for (size_t i = 0; i < items.size(); i += stride) count.add(items[i].entry.position, static_cast<double>(stride));
+  density_ = count.map(min_brick_values_, nullptr);
+  density_is_estimated_ = true;
 }
 
 bool HashGrid::choice_is_stale() const {
@@ -401,24 +399,36 @@ bool HashGrid::choice_is_stale() const {
 
 void HashGrid::choose_cell_size() {
   const bool similar_size = size_ < 2 * size_at_choice_ && size_ > size_at_choice_ / 8;
-  GridSample sample(size_);
+  internal::EvenSample sample(size_);
   for_each([&sample](const GridRef& value) {
-    sample.offer(value.entry().position, value.reach());
+    sample.offer(value.entry().position, 2.0 * double{value.reach()});
     return true;
   });
   changes_since_choice_ = 0;
   const int base = density_.base_exponent();
-  if (similar_size && internal::cell_exponent_fits(sample.few.values(), size_, base)) return;
+  if (similar_size && internal::cell_exponent_fits(sample.values(), size_, base)) return;
   size_at_choice_ = size_;
-  const int exponent = internal::choose_cell_exponent(sample.few.values(), size_);
-  if (exponent != base) start_refiling(internal::density_of(sample.many, exponent, min_brick_values_));
+  const int exponent = internal::choose_cell_exponent(sample.values(), size_);
+  if (exponent == base) return;
+  internal::DensityCount count(exponent, sample.bounds());
+  const size_t stride = values_per_sample(size_);
+  size_t index = 0;
+  for_each([&](const GridRef& value) {
+    if (index++ % stride == 0) count.add(value.entry().position, static_cast<double>(stride));
+    return true;
+  });
+  density_is_estimated_ = true;
+  start_refiling(count.map(min_brick_values_, nullptr));
 }
 
 bool HashGrid::density_is_stale() const {
-  return size_at_choice_ != 0 && size_ >= first_choice_ && arrivals_since_count_ >= size_ / kArrivalShare;
+  const auto min_arrivals = static_cast<size_t>(kMinArrivals * min_brick_values_);
+  return size_at_choice_ != 0 && size_ >= first_choice_ &&
+         arrivals_since_count_ >= std::max(min_arrivals, size_ / kArrivalShare);
 }
 
-// Makes a density map of the present values. O(bricks).
+// Makes a density map of the present values. O(bricks). A node that was dense by an estimate alone needs as many values
+// as any other to remain dense.
 void HashGrid::count_density() {
   measure_levels();
   arrivals_since_count_ = 0;
@@ -427,7 +437,7 @@ void HashGrid::count_density() {
   internal::DensityCount count(density_.base_exponent(), bounds);
   for (uint32_t brick = 0; brick < brick_info_.size(); ++brick)
     if (bricks_[brick] != nullptr) count.add(*bricks_[brick]);
-  start_refiling(count.map(min_brick_values_, &density_));
+  start_refiling(count.map(min_brick_values_, std::exchange(density_is_estimated_, false) ? nullptr : &density_));
 }
 
 // Computes the bounds and the extents of all levels again. They grow with each value that arrives, so they are too

@@ -14,9 +14,9 @@
 // levels of the old and the new size exist side by side.
 //
 // The base cell fits the places where most values are. Where values are much sparser, they are stored on a coarser
-// level (density_map.h). The grid counts the values of all bricks again after one value in eight has been inserted,
-// removed or moved to another brick, and moves the values of regions whose density has changed, in the same small
-// steps.
+// level (density_map.h). The grid counts the values of all bricks again, in one step of O(bricks), after one value in
+// eight has been inserted, removed or moved to another brick, and moves the values of regions whose density has
+// changed, in the same small steps.
 //
 // Invariants: every value is stored in the brick that contains its position, on a level whose cells are at least as
 // wide as the value; no brick is empty; slots_ holds the location of each value. |position| <= limits::kMaxCoordinate
@@ -138,6 +138,7 @@ class HashGrid {
   bool choice_is_stale() const;
   void choose_cell_size();
   void start_refiling(internal::DensityMap density);
+  void estimate_density(absl::Span<const GridItem> items, int base_exponent, const Aabbd& bounds);
   bool density_is_stale() const;
   void count_density();
   void refile(size_t max_values);
@@ -147,7 +148,8 @@ class HashGrid {
   void check_brick(uint32_t brick) const;
   void check_locations(const GridBatch& batch) const;
 
-  internal::DensityMap density_;  // has the exponent of the base level
+  internal::DensityMap density_;       // has the exponent of the base level
+  bool density_is_estimated_ = false;  // true if density_ was made from a sample
   size_t first_choice_;
   double min_brick_values_;
   size_t size_at_choice_ = 0;

@@ -84,6 +84,17 @@ TEST(DensityMapTest, OccupiedCellsOfABrickCountAsTheBricksThatItsValuesWouldFill
   }
 }
 
+TEST(DensityMapTest, ACrowdInOneOfManyBricksMakesTheirNodeDense) {
+  const auto level_of = [](int crowd) {
+    DensityCount count(0, {{0, 0, 0}, {1000, 1000, 1000}});
+    for (int i = 0; i < 64; ++i) count.add({4.0 * (i % 4), 4.0 * (i / 4 % 4), 4.0 * (i / 16)}, i == 5 ? crowd : 1);
+    for (int i = 2; i < 60; ++i) count.add({17.0 * i, 17.0 * i, 17.0 * i}, 1);
+    return count.map(kFull, nullptr).exponent_at({1, 1, 1});
+  };
+  EXPECT_EQ(level_of(8 * 64), 0);
+  EXPECT_GT(level_of(7 * 64), 0);
+}
+
 TEST(DensityMapTest, ANodeWithADenseChildIsDense) {
   DensityCount count(0, {{0, 0, 0}, {1000, 1000, 1000}});
   count.add({1, 1, 1}, 100);
