@@ -34,15 +34,17 @@ absl::Status named(absl::string_view what, const absl::Status& status) {
 
 // Lookup of the meshes that a snapshot and its later records use. Returns a placeholder for a missing mesh, because the
 // mesh may have been deleted after a later record removed its instances. check() reports a placeholder that is still in
-// use after the replay.
+// use after the replay. A placeholder has the bounds of the missing mesh, on which it depends which moves of instances
+// are refused.
 class Meshes {
  public:
   explicit Meshes(const FindMesh& find) : find_(find) {}
 
-  MeshPtr operator()(const MeshKey& key) {
+  // Returns the mesh of a key. `bounds` are stored with the use of the mesh, except in data formats 1 to 3.
+  MeshPtr operator()(const MeshKey& key, const Aabbf* bounds) {
     MeshPtr& mesh = known_[key];
     if (mesh == nullptr) mesh = find_(key);
-    if (mesh == nullptr) mesh = placeholder(key);
+    if (mesh == nullptr) mesh = placeholder(key, bounds == nullptr ? Aabbf{{0, 0, 0}, {0, 0, 0}} : *bounds);
     return mesh;
   }
 
@@ -56,12 +58,21 @@ class Meshes {
     return absl::OkStatus();
   }
 
+  // Drops the ticks of the history that have instances of a missing mesh, as Scene::forget_mesh() did when the mesh was
+  // deleted. Their answers would be wrong, because a placeholder is not the mesh.
+  void forget_missing(SceneWriter& writer) const {
+    for (const MeshPtr& mesh : placeholders_) writer.forget_mesh(mesh.get());
+  }
+
  private:
-  MeshPtr placeholder(const MeshKey& key) {
-    absl::StatusOr<TriangleMesh> triangle = TriangleMesh::create({0, 0, 0, 0, 0, 0, 0, 0, 0}, {0, 1, 2}, {});
+  MeshPtr placeholder(const MeshKey& key, const Aabbf& bounds) {
+    const Vec3f &min = bounds.min, &max = bounds.max;
+    absl::StatusOr<TriangleMesh> triangle =
+        TriangleMesh::create({min.x, min.y, min.z, max.x, max.y, max.z}, {0, 1, 0}, {});
     LOCUS_CHECK(triangle.ok());
     absl::StatusOr<MeshPtr> mesh = StaticMesh::build(key.name, key.sha256, *std::move(triangle));
     LOCUS_CHECK(mesh.ok());
+    LOCUS_CHECK((*mesh)->bounds() == bounds);
     placeholders_.push_back(*mesh);
     return *mesh;
   }
@@ -130,7 +141,8 @@ class Replay {
   }
 
   absl::Status apply(Record::Change& change) {
-    for (size_t i = 0; i < change.meshes.size(); ++i) change.change.place[i].mesh = meshes_(change.meshes[i]);
+    for (size_t i = 0; i < change.meshes.size(); ++i)
+      change.change.place[i].mesh = meshes_(change.meshes[i], change.bounds.empty() ? nullptr : &change.bounds[i]);
     const auto is_object = [this](Id id) { return writer_.is_object(id); };
     absl::StatusOr<StaticSet::Changed> changed =
         writer_.statics()->apply(change.change, is_object, ids_from(kFirstChosenId));
@@ -152,7 +164,11 @@ absl::StatusOr<SceneWriter> read_snapshot(const UpdateLog& log, SceneKey key, co
   StateReader reader;
   absl::Status status = log.read_snapshot(key, [&reader](absl::string_view chunk) { return reader.add(chunk); });
   if (!status.ok()) return named("snapshot", status);
-  absl::StatusOr<SceneState> state = std::move(reader).finish([&meshes](const MeshKey& mesh) { return meshes(mesh); });
+  const std::map<MeshKey, Aabbf> mesh_bounds = reader.mesh_bounds();
+  absl::StatusOr<SceneState> state = std::move(reader).finish([&meshes, &mesh_bounds](const MeshKey& mesh) {
+    const auto bounds = mesh_bounds.find(mesh);
+    return meshes(mesh, bounds == mesh_bounds.end() ? nullptr : &bounds->second);
+  });
   if (!state.ok()) return named("snapshot", state.status());
   absl::StatusOr<SceneWriter> writer = SceneWriter::restore(*std::move(state), spec.winding, spec.history);
   if (!writer.ok()) return named("snapshot", writer.status());
@@ -173,6 +189,7 @@ absl::StatusOr<ScenePtr> recover(UpdateLog& log, const StoredScene& stored, cons
   RETURN_IF_ERROR(replay.finish());
   RETURN_IF_ERROR(meshes.check(*writer.statics()));
   writer.end_replay();
+  meshes.forget_missing(writer);
   const AckLevel level = ack_level(spec->durability);
   const SceneLog on{&log, stored.key, level, {stored.last_sequence, stored.snapshot_sequence, stored.log_bytes}};
   return std::make_shared<Scene>(stored.name, *std::move(spec), std::move(writer), on);

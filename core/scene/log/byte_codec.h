@@ -180,13 +180,15 @@ enum class BytesKind : uint32_t {
   kInstanceBatch = 0x4942'534c,  // a batch that changes instances
   kJoinedBatches = 0x4a42'534c,
   kStaticChange = 0x4353'534c,  // data format 1: identifies meshes by content hash; decoded, but never written
-  kNamedChange = 0x434e'534c,
+  kNamedChange = 0x434e'534c,   // data formats 2 and 3: without the bounds of meshes; decoded, but never written
+  kBoundedChange = 0x4345'534c,
   kSceneSpec = 0x5053'534c,
   kOwnedSpec = 0x534f'534c,
   kStateHeader = 0x4854'534c,
   kStateWriters = 0x5754'534c,
   kStateInstances = 0x4954'534c,  // data format 1: identifies meshes by content hash; decoded, but never written
-  kNamedInstances = 0x494e'534c,
+  kNamedInstances = 0x494e'534c,  // data formats 2 and 3: without the bounds of meshes; decoded, but never written
+  kBoundedInstances = 0x4945'534c,
   kStateObjects = 0x4f54'534c,
   kMeshHeader = 0x484d'534c,
   kMeshVertices = 0x564d'534c,

@@ -30,6 +30,17 @@ void read_parts(ByteReader& reader, std::vector<MeshPart>& parts) {
 
 }  // namespace
 
+std::array<float, 6> encode_bounds(const Aabbf& bounds) {
+  return {bounds.min.x, bounds.min.y, bounds.min.z, bounds.max.x, bounds.max.y, bounds.max.z};
+}
+
+Aabbf decode_bounds(const float* numbers, ByteReader& reader) {
+  const Aabbf bounds{{numbers[0], numbers[1], numbers[2]}, {numbers[3], numbers[4], numbers[5]}};
+  if (!bounds.empty() && magnitude(bounds) <= limits::kMaxCoordinate) return bounds;
+  reader.fail("the bounds of a mesh", "are out of range");
+  return {};
+}
+
 MeshWriter::MeshWriter(std::shared_ptr<const StaticMesh> mesh)
     : mesh_(std::move(mesh)), vertices_(mesh_->vertices()), indices_(mesh_->indices()) {
   LOCUS_DCHECK_EQ(vertices_.size(), size_t{3} * mesh_->vertex_count());

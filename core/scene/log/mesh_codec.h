@@ -4,6 +4,7 @@
 #ifndef LOCUS_CORE_SCENE_LOG_MESH_CODEC_H_
 #define LOCUS_CORE_SCENE_LOG_MESH_CODEC_H_
 
+#include <array>
 #include <memory>
 #include <optional>
 #include <string>
@@ -11,11 +12,19 @@
 
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
+#include "core/geometry/aabb.h"
 #include "core/mesh/triangle_mesh.h"
 #include "core/scene/log/byte_codec.h"
 #include "core/scene/statics/static_mesh.h"
 
 namespace locus {
+
+// Returns the numbers by which records and snapshots store the bounds of a mesh: minimum x y z, then maximum x y z. The
+// bounds are stored with each placement, because a replay needs them to refuse the same moves of instances as before,
+// and the mesh may be deleted by then.
+std::array<float, 6> encode_bounds(const Aabbf& bounds);
+// Returns the bounds that the 6 numbers at `numbers` encode. If no mesh has such bounds, sets the error of `reader`.
+Aabbf decode_bounds(const float* numbers, ByteReader& reader);
 
 // Encoder of the vertices and indices of a mesh.
 class MeshWriter {

@@ -6,6 +6,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/check.h"
 #include "core/base/limits.h"
+#include "core/scene/log/mesh_codec.h"
 
 namespace locus {
 namespace {
@@ -198,6 +199,7 @@ Record::Joined read_joined(ByteReader& reader) {
 void write_placement(const PlacementColumns& place, absl::Span<const Id> ids, ByteWriter& writer) {
   writer.column(absl::MakeConstSpan(place.mesh->sha256()));
   writer.text(place.mesh->name());
+  writer.column(absl::MakeConstSpan(encode_bounds(place.mesh->bounds())));
   writer.column(ids);
   writer.column(place.translations);
   writer.column(place.rotations);
@@ -207,14 +209,24 @@ void write_placement(const PlacementColumns& place, absl::Span<const Id> ids, By
   writer.column(place.tags);
 }
 
-PlacementColumns read_placement(ByteReader& reader, BytesKind kind, MeshKey& mesh) {
+Aabbf read_bounds(ByteReader& reader) {
+  const auto numbers = reader.column<float>("the bounds of a mesh");
+  if (numbers.size() == 6) return decode_bounds(numbers.data(), reader);
+  reader.fail("the bounds of a mesh", "have a wrong length");
+  return {};
+}
+
+// Reads a placement, without its mesh, whose key and bounds are appended to those of `change`.
+PlacementColumns read_placement(ByteReader& reader, BytesKind kind, Record::Change& change) {
+  MeshKey& mesh = change.meshes.emplace_back();
   const auto sha256 = reader.column<uint8_t>("the hash of a mesh's content");
   if (sha256.size() == mesh.sha256.size())
     std::copy(sha256.begin(), sha256.end(), mesh.sha256.begin());
   else
     reader.fail("the hash of a mesh's content", "has a wrong length");
-  if (kind == BytesKind::kNamedChange)
+  if (kind != BytesKind::kStaticChange)
     mesh.name = std::string(reader.text(limits::kMaxNameLength, "the name of a mesh"));
+  if (kind == BytesKind::kBoundedChange) change.bounds.push_back(read_bounds(reader));
   PlacementColumns place;
   place.ids = reader.column<uint64_t>("ids");
   place.translations = reader.column<double>("translations");
@@ -227,14 +239,17 @@ PlacementColumns read_placement(ByteReader& reader, BytesKind kind, MeshKey& mes
   return place;
 }
 
+bool is_change(BytesKind kind) {
+  return kind == BytesKind::kStaticChange || kind == BytesKind::kNamedChange || kind == BytesKind::kBoundedChange;
+}
+
 Record::Change read_change(ByteReader& reader, BytesKind kind) {
   Record::Change read;
   read.change.remove_ids = reader.column<uint64_t>("remove_ids");
   read.change.remove_groups = reader.column<uint64_t>("remove_groups");
   const uint64_t count = reader.count(kMinPlacementBytes, "the number of placements");
   read.change.place.reserve(count);
-  for (uint64_t i = 0; i < count && reader.good(); ++i)
-    read.change.place.push_back(read_placement(reader, kind, read.meshes.emplace_back()));
+  for (uint64_t i = 0; i < count && reader.good(); ++i) read.change.place.push_back(read_placement(reader, kind, read));
   return read;
 }
 
@@ -256,7 +271,7 @@ void encode_joined(absl::Span<const UpdateBatch* const> batches, std::string& to
 
 void encode_change(const StaticChange& change, absl::Span<const Id> placed, std::string& to) {
   ByteWriter writer(to);
-  write_kind(writer, BytesKind::kNamedChange);
+  write_kind(writer, BytesKind::kBoundedChange);
   writer.column(change.remove_ids);
   writer.column(change.remove_groups);
   writer.number(uint64_t{change.place.size()});
@@ -279,7 +294,7 @@ absl::StatusOr<Record> Record::decode(absl::string_view bytes) {
     record.content_ = read_batch(reader, InstanceChanges::kFollow);
   } else if (kind == BytesKind::kJoinedBatches) {
     record.content_ = read_joined(reader);
-  } else if (kind == BytesKind::kStaticChange || kind == BytesKind::kNamedChange) {
+  } else if (is_change(kind)) {
     record.content_ = read_change(reader, kind);
   } else {
     reader.fail("the kind of a record", "is not known");

@@ -40,6 +40,7 @@ class Record {
   struct Change {
     StaticChange change;          // all placements have ids; all mesh pointers are null
     std::vector<MeshKey> meshes;  // key of each placement's mesh; without a name in data format 1
+    std::vector<Aabbf> bounds;    // bounds of each placement's mesh; no entries in data formats 1 to 3
   };
   using Content = std::variant<UpdateBatch, Joined, Change>;  // all batches have passed check_form()
   Content& content() { return content_; }

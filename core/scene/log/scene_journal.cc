@@ -10,11 +10,11 @@ namespace locus {
 namespace {
 
 // The largest batch and the largest static change fit into a record. The values of one item take at most 128 bytes in
-// all columns together, and the column lengths of one list take at most 256 bytes. One instance takes at most 256
-// bytes, including the hash and the name of its mesh.
+// all columns together, and the column lengths of one list take at most 256 bytes. One instance takes at most 320
+// bytes, including the hash, the name and the bounds of its mesh.
 static_assert(uint64_t{limits::kMaxUpdateItems} * 128 + uint64_t{limits::kMaxUpdateLists} * 256 <=
               UpdateLog::kMaxRecordBytes);
-static_assert(uint64_t{limits::kMaxInstances} * 256 <= UpdateLog::kMaxRecordBytes);
+static_assert(uint64_t{limits::kMaxInstances} * 320 <= UpdateLog::kMaxRecordBytes);
 
 }  // namespace
 

@@ -45,9 +45,10 @@ inline constexpr size_t kObjectsPerChunk = 8192;
 // Maximum encoded size of an object in bytes: id, group, tag, layers, kind, position, rotation, size and radius.
 inline constexpr size_t kMaxBytesOfObject = 8 + 8 + 8 + 4 + 1 + 24 + 16 + 12 + 4;
 inline constexpr size_t kInstancesPerChunk = 4096;
-// Maximum encoded size of an instance in bytes. Includes the content hash and the name, with length and padding, of the
-// instance's mesh, as if no other instance in the chunk used that mesh.
-inline constexpr size_t kMaxBytesOfInstance = 32 + 8 + limits::kMaxNameLength + 1 + 8 + 8 + 8 + 4 + 4 + 24 + 16 + 4;
+// Maximum encoded size of an instance in bytes. Includes the content hash, the bounds and the name, with length and
+// padding, of the instance's mesh, as if no other instance in the chunk used that mesh.
+inline constexpr size_t kMaxBytesOfInstance =
+    32 + 24 + 8 + limits::kMaxNameLength + 1 + 8 + 8 + 8 + 4 + 4 + 24 + 16 + 4;
 // Maximum length in bytes of ItemError::field. The longest field that is written, inserts[65535].capsule.half_axes, has
 // 32 bytes; the other bytes are a reserve.
 inline constexpr size_t kMaxErrorField = 128;

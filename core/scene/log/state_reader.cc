@@ -9,6 +9,7 @@
 #include "core/base/limits.h"
 #include "core/base/refusal.h"
 #include "core/base/status_macros.h"
+#include "core/scene/log/mesh_codec.h"
 
 namespace locus {
 namespace {
@@ -106,7 +107,8 @@ absl::Status StateReader::add(absl::string_view chunk) {
     read_header(reader);
   } else if (kind == BytesKind::kStateWriters) {
     read_writers(reader);
-  } else if (kind == BytesKind::kStateInstances || kind == BytesKind::kNamedInstances) {
+  } else if (kind == BytesKind::kStateInstances || kind == BytesKind::kNamedInstances ||
+             kind == BytesKind::kBoundedInstances) {
     read_instances(reader, kind);
   } else if (kind == BytesKind::kStateObjects) {
     read_objects(reader);
@@ -145,8 +147,9 @@ void StateReader::read_writers(ByteReader& reader) {
 void StateReader::read_instances(ByteReader& reader, BytesKind kind) {
   std::vector<MeshKey> meshes;
   for (const Sha256& sha256 : reader.column<Sha256>("the contents of meshes")) meshes.push_back({sha256, ""});
-  if (kind == BytesKind::kNamedInstances)
+  if (kind != BytesKind::kStateInstances)
     for (MeshKey& mesh : meshes) mesh.name = std::string(reader.text(limits::kMaxNameLength, "the name of a mesh"));
+  if (kind == BytesKind::kBoundedInstances) read_bounds(reader, meshes);
   const LabelColumns labels(reader, kInstancesPerChunk);
   const size_t n = labels.ids.size();
   const auto mesh_indices = reader.shared_column<uint32_t>(n, 1, "the meshes of instances");
@@ -167,6 +170,13 @@ void StateReader::read_instances(ByteReader& reader, BytesKind kind) {
     append(placed.scales, ColumnReader<float>(scales, 1), i, 1);
   }
   instances_read_ += n;
+}
+
+void StateReader::read_bounds(ByteReader& reader, absl::Span<const MeshKey> meshes) {
+  const auto bounds = reader.column<std::array<float, 6>>("the bounds of meshes");
+  if (bounds.size() != meshes.size()) reader.fail("the bounds of meshes", "have a wrong length");
+  for (size_t i = 0; i < meshes.size() && reader.good(); ++i)
+    mesh_bounds_[meshes[i]] = decode_bounds(bounds[i].data(), reader);
 }
 
 void StateReader::read_objects(ByteReader& reader) {

@@ -23,6 +23,8 @@ class StateReader {
  public:
   // Decodes the next chunk. The chunks must be added in the order in which they were written.
   absl::Status add(absl::string_view chunk);
+  // Returns the bounds of the meshes of the instances decoded so far, without meshes of data formats 1 to 3.
+  const std::map<MeshKey, Aabbf>& mesh_bounds() const { return mesh_bounds_; }
   // Returns the state once all chunks were added, and builds the tree of instances. Returns DATA_LOSS if chunks are
   // missing or `find_mesh` returns null.
   absl::StatusOr<SceneState> finish(const FindMesh& find_mesh) &&;
@@ -38,6 +40,8 @@ class StateReader {
   void read_header(ByteReader& reader);
   void read_writers(ByteReader& reader);
   void read_instances(ByteReader& reader, BytesKind kind);
+  // Reads the bounds of `meshes`.
+  void read_bounds(ByteReader& reader, absl::Span<const MeshKey> meshes);
   void read_objects(ByteReader& reader);
   absl::Status place(const FindMesh& find_mesh);
 
@@ -49,6 +53,7 @@ class StateReader {
   uint64_t instances_read_ = 0;
   uint64_t objects_read_ = 0;
   std::map<MeshKey, Placed> placed_;
+  std::map<MeshKey, Aabbf> mesh_bounds_;
 };
 
 }  // namespace locus

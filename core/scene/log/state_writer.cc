@@ -7,6 +7,7 @@
 #include "absl/container/flat_hash_map.h"
 #include "core/base/check.h"
 #include "core/scene/log/byte_codec.h"
+#include "core/scene/log/mesh_codec.h"
 
 namespace locus {
 namespace {
@@ -133,16 +134,19 @@ std::string StateWriter::next_instances() {
   absl::flat_hash_map<const StaticMesh*, uint32_t> mesh_indices;
   std::vector<Sha256> contents;
   std::vector<absl::string_view> names;
+  std::vector<std::array<float, 6>> bounds;
   for (const Instance& instance : instances) {
     if (!mesh_indices.emplace(instance.mesh.get(), static_cast<uint32_t>(contents.size())).second) continue;
     contents.push_back(instance.mesh->sha256());
     names.emplace_back(instance.mesh->name());
+    bounds.push_back(encode_bounds(instance.mesh->bounds()));
   }
   std::string chunk;
   ByteWriter writer(chunk);
-  write_kind(writer, BytesKind::kNamedInstances);
+  write_kind(writer, BytesKind::kBoundedInstances);
   writer.column(absl::MakeConstSpan(contents));
   for (const absl::string_view name : names) writer.text(name);
+  writer.column(absl::MakeConstSpan(bounds));
   write_labels(writer, instances);
   write_each(writer, instances,
              [&](const Instance& one) { return Values<uint32_t, 1>{mesh_indices.at(one.mesh.get())}; });

@@ -202,6 +202,65 @@ TEST_F(RecoverTest, TheHistoryBeginsAtTheSnapshot) {
   EXPECT_EQ(find_scene_at(*(*scene)->latest(), {7, 0})->objects().find(1)->shape.position.x, 7);
 }
 
+// Deletes the mesh of instances of the ticks 1 to 3. The live scene and the recovered one keep the later ticks only, so
+// that a query of an earlier tick is refused and does not miss the mesh.
+TEST_F(RecoverTest, TicksOfADeletedMeshAreForgottenAsTheLiveSceneForgotThem) {
+  SceneSpec spec;
+  spec.history = {50, uint64_t{1} << 30};
+  const ScenePtr live = registry_.create_scene("remembering", spec, kEpoch, "", false)->scene;
+  const auto go_to = [&](uint64_t tick) {
+    UpdateBatch batch = with(points({1}, {static_cast<float>(tick), 0, 0}));
+    batch.upsert = true;
+    batch.tick = tick;
+    ASSERT_TRUE(live->apply(batch).ok());
+  };
+  ASSERT_TRUE(live->change_instances(placing(placement({5}, {1, 2, 3}))).ok());
+  for (uint64_t tick = 1; tick <= 4; ++tick) go_to(tick);
+  StaticChange removal;
+  removal.remove_ids = columns_.ids({5});
+  ASSERT_TRUE(live->change_instances(removal).ok());
+  for (uint64_t tick = 5; tick <= 7; ++tick) go_to(tick);
+  live->forget_mesh(mesh_.get());
+  ASSERT_EQ(live->latest()->oldest_tick(), 4u);
+  find_ = [](const MeshKey&) { return nullptr; };
+  MemoryLog again(log_.crash());
+  const auto scene = recover_scene(again, again.stored_scenes()[1], find_);
+  ASSERT_TRUE(scene.ok()) << scene.status();
+  EXPECT_EQ((*scene)->latest()->oldest_tick(), 4u);
+  EXPECT_EQ((*scene)->latest()->past_limit, live->latest()->past_limit);
+  EXPECT_EQ((*scene)->latest()->forgotten_ticks, live->latest()->forgotten_ticks);
+  EXPECT_EQ(find_scene_at(*(*scene)->latest(), {3, 0}), std::nullopt);
+  EXPECT_EQ(find_scene_at(*(*scene)->latest(), {4, 0})->statics().size(), 0u);
+}
+
+// Refused batches are in the log as well. Whether a move of an instance is refused depends on the bounds of its mesh,
+// which a replay must know although the mesh is deleted. The mesh is used first by a record, then by the snapshot.
+TEST_F(RecoverTest, AReplayRefusesTheSameMovesOfInstancesOfADeletedMesh) {
+  for (const bool in_snapshot : {false, true}) {
+    SCOPED_TRACE(in_snapshot);
+    const Id door = in_snapshot ? 6 : 5, object = in_snapshot ? 2 : 1;
+    ASSERT_TRUE(logged_->change_instances(placing(placement({door}, {1, 2, 3}))).ok());
+    if (in_snapshot) {
+      const FrozenScene frozen = logged_->freeze();
+      StateWriter state(frozen);
+      ASSERT_TRUE(log_.write_snapshot(logged_->log_key(), frozen.sequence, [&state] { return state.next(); }).ok());
+    }
+    UpdateBatch batch = with(points({object}, {0, 0, 0}));
+    batch.all_or_nothing = true;
+    batch.instance_moves.push_back(instances_to({door}, {0, 0, 0}));
+    batch.instance_moves[0].scales = columns_.floats({1e11f});  // the mesh would not lie within the limits
+    ASSERT_EQ(logged_->apply(batch).status().code(), absl::StatusCode::kInvalidArgument);
+    StaticChange removal;
+    removal.remove_ids = columns_.ids({door});
+    ASSERT_TRUE(logged_->change_instances(removal).ok());
+    find_ = [](const MeshKey&) { return nullptr; };
+    const absl::StatusOr<ScenePtr> scene = recover(log_.crash());
+    ASSERT_TRUE(scene.ok()) << scene.status();
+    EXPECT_EQ((*scene)->latest()->objects.find(object), std::nullopt);
+    EXPECT_EQ((*scene)->latest()->revision, logged_->latest()->revision);
+  }
+}
+
 TEST_F(RecoverTest, ProgressIsReported) {
   for (Id id = 1; id <= 100; ++id) apply(with(points({id}, {0, 0, 0})));
   std::vector<std::pair<uint64_t, uint64_t>> reports;

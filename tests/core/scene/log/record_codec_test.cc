@@ -151,6 +151,7 @@ TEST_F(RecordCodecTest, AStaticChangeHasTheIdsThatWereChosenAndTheMeshesNamesAnd
   EXPECT_THAT(read.change.remove_ids, ElementsAre(3));
   EXPECT_THAT(read.change.remove_groups, ElementsAre(4, 4));
   EXPECT_THAT(read.meshes, ElementsAre(mesh_->key(), mesh_->key()));
+  EXPECT_THAT(read.bounds, ElementsAre(mesh_->bounds(), mesh_->bounds()));
   ASSERT_EQ(read.change.place.size(), 2u);
   EXPECT_THAT(read.change.place[0].ids, ElementsAre(5));
   EXPECT_THAT(read.change.place[1].ids, ElementsAre(kFirstChosenId | 1, kFirstChosenId | 2));
@@ -160,24 +161,54 @@ TEST_F(RecordCodecTest, AStaticChangeHasTheIdsThatWereChosenAndTheMeshesNamesAnd
   EXPECT_TRUE(read.change.place[1].rotations.empty());
 }
 
-TEST_F(RecordCodecTest, AStaticChangeOfFormat1NamesContentsOnly) {
+// Returns a static change of the given kind that places instance 5. Without `name` and `bounds`, their columns are left
+// out, as in older data formats.
+std::string old_change(BytesKind kind, const StaticMesh& mesh, const std::optional<std::string>& name,
+                       const std::vector<float>& bounds) {
   std::string bytes;
   ByteWriter writer(bytes);
-  write_kind(writer, BytesKind::kStaticChange);
+  write_kind(writer, kind);
   for (int column = 0; column < 2; ++column)
     writer.column(absl::Span<const uint64_t>());  // removed ids, removed groups
   writer.number(uint64_t{1});
-  writer.column(absl::MakeConstSpan(mesh_->sha256()));
+  writer.column(absl::MakeConstSpan(mesh.sha256()));
+  if (name) writer.text(*name);
+  if (!bounds.empty()) writer.column(absl::MakeConstSpan(bounds));
   const uint64_t ids[] = {5};
   const double translations[] = {1, 2, 3};
   writer.column(absl::MakeConstSpan(ids));
   writer.column(absl::MakeConstSpan(translations));
   for (int column = 0; column < 5; ++column) writer.column(absl::Span<const uint64_t>());
-  absl::StatusOr<Record> record = Record::decode(bytes);
+  return bytes;
+}
+
+TEST_F(RecordCodecTest, AStaticChangeOfFormat1NamesContentsOnly) {
+  absl::StatusOr<Record> record = Record::decode(old_change(BytesKind::kStaticChange, *mesh_, std::nullopt, {}));
   ASSERT_TRUE(record.ok()) << record.status();
   const auto& read = std::get<Record::Change>(record->content());
   EXPECT_THAT(read.meshes, ElementsAre(MeshKey{mesh_->sha256(), ""}));
   EXPECT_THAT(read.change.place.at(0).ids, ElementsAre(5));
+}
+
+TEST_F(RecordCodecTest, AStaticChangeOfFormats2And3HasNoBounds) {
+  absl::StatusOr<Record> record = Record::decode(old_change(BytesKind::kNamedChange, *mesh_, "m", {}));
+  ASSERT_TRUE(record.ok()) << record.status();
+  const auto& read = std::get<Record::Change>(record->content());
+  EXPECT_THAT(read.meshes, ElementsAre(mesh_->key()));
+  EXPECT_TRUE(read.bounds.empty());
+  EXPECT_THAT(read.change.place.at(0).ids, ElementsAre(5));
+}
+
+TEST_F(RecordCodecTest, BoundsThatNoMeshHasAreDamage) {
+  const auto read = [this](const std::vector<float>& bounds) {
+    return Record::decode(old_change(BytesKind::kBoundedChange, *mesh_, "m", bounds)).status();
+  };
+  EXPECT_TRUE(read({0, 0, 0, 1, 1, 0}).ok());
+  EXPECT_EQ(read({0, 0, 0, 1, 1}), absl::DataLossError("the bounds of a mesh have a wrong length"));
+  const absl::Status out_of_range = absl::DataLossError("the bounds of a mesh are out of range");
+  EXPECT_EQ(read({0, 0, 0, 1, -1, 0}), out_of_range);
+  EXPECT_EQ(read({0, 0, 0, 1, NAN, 0}), out_of_range);
+  EXPECT_EQ(read({0, 0, 0, 1, 2e9f, 0}), out_of_range);
 }
 
 TEST_F(RecordCodecTest, ErrorsNameTheInvalidValue) {
