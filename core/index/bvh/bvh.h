@@ -6,7 +6,7 @@
 // tree in which some values are replaced, removed or added: it shares all blocks without these values with the old
 // tree, and copies the nodes above the blocks. A tree degrades when its values move, which is measured by the sum of
 // the areas of its boxes: a block is built again when its sum has grown by half, and the whole tree when the sum of the
-// tree has grown by half.
+// tree has grown by half. The whole tree is also built again when its blocks have too few values.
 //
 // Threads: immutable after build() and change(); every member may run concurrently. Invariants: a node's box contains
 // the bounds of every value below it. The slab test is monotone: a ray that hits a box also hits every box that
@@ -161,7 +161,8 @@ class Bvh {
   template <RayVisitor<V> Visitor>
   void visit_ray(const SlabRay<S>& slabs, Visitor& visitor, Work& work) const;
 
-  // Passes to `visitor` the values whose own bounds visitor.overlaps() accepts, in storage order. Allocates no memory.
+  // Passes to `visitor` the values whose own bounds visitor.overlaps() accepts, in the order of the nodes, which is
+  // that of values() until the first change(). Allocates no memory.
   template <RegionVisitor<V> Visitor>
   void visit_region(Visitor& visitor, Work& work) const;
 
@@ -213,6 +214,7 @@ class Bvh {
   explicit Bvh(BvhCut<V> cut) : nodes_(std::move(cut.nodes)), blocks_(std::move(cut.blocks)) {
     measure();
     built_area_ = area_;
+    if (!blocks_.empty()) built_fill_ = static_cast<double>(size_) / static_cast<double>(blocks_.size());
     LOCUS_DCHECK_CALL(check_invariants());
   }
 
@@ -244,9 +246,10 @@ class Bvh {
   BvhChild root_ = {0, 0};
   size_t size_ = 0;
   Aabb<S> bounds_;
-  S magnitude_ = 0;        // largest |coordinate| of the bounds; the slab tests of all nodes use it
-  double area_ = 0;        // half areas of the boxes of all nodes
-  double built_area_ = 0;  // least area_ since the whole tree was built
+  S magnitude_ = 0;                      // largest |coordinate| of the bounds; the slab tests of all nodes use it
+  double area_ = 0;                      // half areas of the boxes of all nodes
+  double built_area_ = 0;                // least area_ since the whole tree was built
+  double built_fill_ = kBvhBlockValues;  // values for each block when the whole tree was built
 };
 
 template <Bounded V>

@@ -4,7 +4,8 @@
 // boxes of the block grow too much, the block is built again, without the values that have left its bounds; these are
 // added like new values. A value is added to the block whose boxes it enlarges least, and the block is built again; a
 // block that becomes too large is divided. The nodes above the blocks are built again only if the number of blocks
-// changes.
+// changes. Blocks are not merged; if too many have few values, because of removals or divisions, the whole tree is
+// built again.
 #ifndef LOCUS_CORE_INDEX_BVH_BVH_CHANGE_H_
 #define LOCUS_CORE_INDEX_BVH_BVH_CHANGE_H_
 
@@ -42,7 +43,7 @@ class BvhChanging {
     if (tree_.blocks_.size() != old_.blocks_.size() || !added_blocks_.empty()) RETURN_IF_ERROR(link_blocks());
     tree_.measure();
     tree_.built_area_ = std::min(tree_.built_area_, tree_.area_);
-    if (tree_.area_ > kGrowth * tree_.built_area_) {
+    if (tree_.area_ > kGrowth * tree_.built_area_ || is_sparse()) {
       drafts_.clear();
       change_.added.clear();
       return rebuild();
@@ -60,6 +61,15 @@ class BvhChanging {
   static constexpr size_t kRebuiltShare = 4;
   // A block, or the whole tree, is built again when the areas of its boxes have grown by this factor.
   static constexpr double kGrowth = 1.5;
+  // The whole tree is built again if it has more blocks than this number, and than its values would need if the blocks
+  // had this share of the values that blocks had when the whole tree was built.
+  static constexpr double kFewBlocks = 16;
+  static constexpr double kSparseShare = 0.25;
+
+  bool is_sparse() const {
+    const double needed = static_cast<double>(tree_.size_) / (kSparseShare * tree_.built_fill_);
+    return static_cast<double>(tree_.blocks_.size()) > kFewBlocks + needed;
+  }
 
   static uint32_t block_of(uint32_t position) { return position / kBvhBlockValues; }
 

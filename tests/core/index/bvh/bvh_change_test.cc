@@ -157,6 +157,25 @@ TEST(BvhChangeTest, AChangeOfOneValueSharesAllButOneBlock) {
   EXPECT_LT(moved.tree().unshared_bytes(before.tree()), before.tree().bytes() / 4);
 }
 
+TEST(BvhChangeTest, ATreeOfWhichFewValuesAreLeftHasFewBlocks) {
+  Random random(6);
+  Pair pair(random_triangles(20'000, 100, random));
+  while (pair.values().size() > 300) {
+    std::vector<uint32_t> numbers;
+    for (const auto& [number, triangle] : pair.values()) numbers.push_back(number);
+    BvhChange<Triangle> change;
+    for (size_t i = 0; i < numbers.size() / 20; ++i) {
+      std::swap(numbers[i], numbers[i + random.below(numbers.size() - i)]);
+      change.removed.push_back(pair.position(numbers[i]));
+    }
+    ASSERT_NO_FATAL_FAILURE(pair.change(std::move(change)));
+    std::vector<Triangle> values;
+    for (const auto& [number, triangle] : pair.values()) values.push_back(triangle);
+    ASSERT_LE(pair.tree().block_count(), 16 + 8 * Bvh<Triangle>::build(std::move(values))->block_count());
+  }
+  EXPECT_EQ(pair.difference(random, 100), "");
+}
+
 TEST(BvhChangeTest, ATreeWhoseValuesWanderIsBuiltAgainBeforeItDegrades) {
   Random random(5);
   Pair pair(random_triangles(2'000, 100, random));
