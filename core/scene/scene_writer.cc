@@ -150,7 +150,7 @@ absl::Status SceneWriter::fill_ack(const UpdateBatch& batch, Applier& applier, I
 absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_moves(const UpdateBatch& batch) {
   Applied result;
   moves_.run(objects_, batch);
-  InstanceApplier instances(*statics_, batch);
+  InstanceApplier instances(*statics_, batch, track_lifetimes());
   instances.run();
   RETURN_IF_ERROR(fill_ack(batch, moves_, instances, result));
   result.snapshot = publish_moves(batch, &instances);
@@ -161,12 +161,12 @@ absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_moves(const UpdateBatch&
 absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_changes(const UpdateBatch& batch) {
   Applied result;
   flush_coalesced_moves();
-  BatchApplier applier(objects_, *statics_, batch, recorder_.on() ? TrackLifetimes::kYes : TrackLifetimes::kNo);
+  BatchApplier applier(objects_, *statics_, batch, track_lifetimes());
   applier.run();
   if (applier.object_count() > max_objects_)
     return refuse_full("inserts", "objects", static_cast<double>(max_objects_),
                        static_cast<double>(applier.object_count()), 0);
-  InstanceApplier instances(*statics_, batch);
+  InstanceApplier instances(*statics_, batch, track_lifetimes());
   instances.run();
   RETURN_IF_ERROR(fill_ack(batch, applier, instances, result));
   const BatchApplier::Difference difference = applier.difference();

@@ -119,6 +119,7 @@ class SceneWriter {
   // Returns true during a replay that builds no snapshots. A scene with history builds snapshots during replay, too,
   // because history records are made from snapshots.
   bool defer_snapshots() const { return replaying_ && !recorder_.on(); }
+  TrackLifetimes track_lifetimes() const { return recorder_.on() ? TrackLifetimes::kYes : TrackLifetimes::kNo; }
   // Applies the moves in moves_ to objects_, or adds them to coalesced_moves_ if snapshots are deferred. Returns true
   // if the moves change an object.
   bool apply_staged_moves();

@@ -132,6 +132,9 @@ class RandomUpdates {
     move.ids = columns.ids(draw_ids(n));
     draw_pose(columns, n, move);
     if (random_.chance(0.4)) move.scales = columns.floats(draw_scales(random_.chance(0.3) ? 1 : n));
+    if (random_.chance(0.2)) {  // to the origin, where an instance may be already
+      move = {move.ids, {}, columns.doubles({0, 0, 0}), {}, {}, false};
+    }
     move.teleport = random_.chance(0.2);
     return move;
   }

@@ -82,9 +82,8 @@ class SceneModel {
   using Instances = std::map<Id, Placed>;
   const Instances& instances() const { return instances_; }
 
-  // Removes the instance `removed` (kNoId = removes none) and places an instance with the id `placed` at the
-  // origin. Returns false
-  // and changes nothing if the change is refused.
+  // Removes the instance `removed` (kNoId = removes none) and places an instance with the id `placed` at the origin.
+  // Returns false and changes nothing if the change is refused.
   bool change_instances(Id removed, Id placed) {
     Instances next = instances_;
     if (removed != kNoId && next.erase(removed) == 0) return false;
@@ -291,7 +290,7 @@ class SceneModel {
       if (placed.scale < 1e-12f || placed.scale > 1e12f) fault = {".scales", Reason::kOutOfRange};
     }
     if (fault.first.empty()) known->second = placed;
-    if (fault.first.empty() && columns.teleport) next_jumps_ = true;
+    if (fault.first.empty() && columns.teleport && history_ticks_ != 0) next_jumps_ = true;
     count(fault.second, field + fault.first, i, id);
   }
 
@@ -322,7 +321,7 @@ class SceneModel {
   Lifetimes lifetimes_, next_lifetimes_;
   uint64_t last_life_ = 0;
   Instances instances_, next_instances_;
-  bool next_jumps_ = false;  // an instance teleports
+  bool next_jumps_ = false;  // an instance teleports, and the scene has a history
   Objects objects_;
   Objects next_;
   UpdateAck ack_;

@@ -20,8 +20,9 @@ struct Instance {
   Group group = 0;
   Tag tag = 0;
   Layers layers = kDefaultLayers;
-  // Identifies the stay of the instance in the scene, from its placement to its removal or to the next jump; 0 before
-  // the instance is placed. Two stays of one id have different numbers, unless 2^32 stays are between them.
+  // Identifies the stay of the instance in the scene, from its placement to its removal or, in a scene with history, to
+  // its next jump; 0 before the instance is placed. Two stays of one id have different numbers, unless 2^32 stays are
+  // between them.
   uint32_t life = 0;
   std::shared_ptr<const StaticMesh> mesh;
   Transform transform;

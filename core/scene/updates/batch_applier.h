@@ -17,8 +17,8 @@
 
 namespace locus {
 
-// Controls whether difference() reports the objects that begin a new lifetime (Difference::replaced). Only scenes with
-// history need these reports.
+// Controls whether BatchApplier::difference() reports the objects that begin a new lifetime (Difference::replaced), and
+// whether InstanceApplier gives instances that teleport a new life. Only scenes with history need this.
 enum class TrackLifetimes : uint8_t { kNo, kYes };
 
 class BatchApplier {

@@ -75,7 +75,7 @@ void InstanceApplier::move(const InstanceMoveColumns& columns, const std::string
       refuse(absl::StrCat(field, ".", column), i, id, reason);
       continue;
     }
-    if (columns.teleport) instance->life = new_life();
+    if (columns.teleport && track_lifetimes_ == TrackLifetimes::kYes) instance->life = new_life();
     ++applied_;
   }
 }

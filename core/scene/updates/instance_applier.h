@@ -9,6 +9,7 @@
 
 #include "absl/container/flat_hash_map.h"
 #include "core/scene/statics/static_set.h"
+#include "core/scene/updates/batch_applier.h"
 #include "core/scene/updates/pose_reader.h"
 #include "core/scene/updates/update_batch.h"
 
@@ -17,7 +18,9 @@ namespace locus {
 class InstanceApplier {
  public:
   // Borrows `statics` and `batch` for the lifetime of this object. Precondition: `batch` has passed check_form().
-  InstanceApplier(const StaticSet& statics, const UpdateBatch& batch) : statics_(statics), batch_(batch) {}
+  // Without `track_lifetimes`, a teleport to the place where the instance is changes nothing.
+  InstanceApplier(const StaticSet& statics, const UpdateBatch& batch, TrackLifetimes track_lifetimes)
+      : statics_(statics), batch_(batch), track_lifetimes_(track_lifetimes) {}
 
   // Applies instance moves, then instance relabels. Call once.
   void run();
@@ -40,6 +43,7 @@ class InstanceApplier {
 
   const StaticSet& statics_;
   const UpdateBatch& batch_;
+  const TrackLifetimes track_lifetimes_;
   std::vector<Instance> instances_;
   absl::flat_hash_map<Id, size_t> indices_;  // index in instances_ of each collected instance
   uint32_t applied_ = 0;

@@ -3,7 +3,9 @@
 
 #include <gmock/gmock.h>
 
+#include <atomic>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <thread>
 
@@ -159,6 +161,18 @@ TEST_F(InstanceApplierTest, ColumnsOfOtherLengthsRefuseTheBatch) {
 TEST_F(InstanceApplierTest, ABatchThatChangesNothingMakesNoRevision) {
   EXPECT_EQ(apply(with(instances_to({6}, {10, 0, 0}))).revision, 1u);
   EXPECT_EQ(revision(), 1u);
+}
+
+// Only queries of the past see that an instance jumped to the place where it was.
+TEST_F(InstanceApplierTest, AJumpToTheSamePlaceMakesARevisionOnlyInASceneWithHistory) {
+  InstanceMoveColumns jump = instances_to({6}, {10, 0, 0});
+  jump.teleport = true;
+  EXPECT_EQ(apply(with(jump)).applied, 1u);
+  EXPECT_EQ(revision(), 1u);
+  SceneSpec spec;
+  spec.history = {10, 1 << 20};
+  Scene remembering("remembering", spec, kEpoch, scene_.latest()->statics);
+  EXPECT_EQ(remembering.apply(with(jump))->revision, 1u);
 }
 
 TEST_F(InstanceApplierTest, ARepeatedBatchMovesNothing) {
