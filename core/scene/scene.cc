@@ -15,6 +15,10 @@
 namespace locus {
 namespace {
 
+// Maximum number of times that a static change is built while update batches may be applied. If batches change the
+// groups that it removes during each of these builds, it is built once more while they wait.
+constexpr int kMaxBuilds = 3;
+
 absl::Status restarted(uint64_t now, uint64_t asked) {
   Refusal refusal;
   refusal.reason = Reason::kSceneRestarted;
@@ -275,23 +279,35 @@ absl::StatusOr<InstanceChange> Scene::build_and_publish(const StaticChange& chan
   // Building the tree takes long. During this time, hold only the instances of the current revision, not its objects;
   // is_object() therefore searches the objects of the revision that is the latest at each call.
   const auto is_object = [this](Id id) { return static_cast<bool>(latest()->objects.find_ref(id)); };
-  const std::shared_ptr<const StaticSet> statics = latest()->statics;
-  const auto next_id = [this] { return next_chosen_id(); };
-  ASSIGN_OR_RETURN(StaticSet::Changed changed, statics->apply(change, is_object, next_id));
+  for (int build = 1;; ++build) {
+    const std::shared_ptr<const StaticSet> statics = latest()->statics;
+    ASSIGN_OR_RETURN(StaticSet::Changed changed,
+                     statics->apply(change, is_object, [this] { return next_chosen_id(); }));
+    const WhenRegrouped again = build < kMaxBuilds ? WhenRegrouped::kReturn : WhenRegrouped::kBuildHere;
+    ASSIGN_OR_RETURN(std::optional<InstanceChange> result, publish_change(change, *statics, changed, again));
+    if (result) return *std::move(result);
+  }
+}
+
+absl::StatusOr<std::optional<InstanceChange>> Scene::publish_change(const StaticChange& change,
+                                                                    const StaticSet& statics,
+                                                                    StaticSet::Changed& changed, WhenRegrouped again) {
   const MutexLock lock(writer_mutex_);
   RETURN_IF_ERROR(check_open());
+  // Update batches that were applied while the tree was being built may have moved and relabelled instances.
+  if (const std::shared_ptr<const StaticSet>& updated = writer_.statics(); updated.get() != &statics) {
+    if (!updated->regrouped_since(statics, change.remove_groups)) {
+      changed.set = changed.set->with_updates(statics, *updated);
+    } else if (again == WhenRegrouped::kReturn) {
+      return std::nullopt;
+    } else {
+      const auto is_taken = [this](Id id) LOCUS_REQUIRES(writer_mutex_) { return writer_.is_object(id); };
+      ASSIGN_OR_RETURN(changed, updated->apply(change, is_taken, [this] { return next_chosen_id(); }));
+    }
+  }
   // Objects inserted while the tree was being built may have taken an id.
   for (size_t i = 0; i < changed.placed.size(); ++i)
     if (writer_.is_object(changed.placed[i])) return taken_meanwhile(change, i, changed.placed[i]);
-  // Update batches that were applied while the tree was being built may have moved and relabelled instances.
-  if (const std::shared_ptr<const StaticSet>& updated = writer_.statics(); updated != statics) {
-    if (!change.remove_groups.empty() && updated->regrouped_since(*statics)) {
-      const auto is_taken = [this](Id id) LOCUS_REQUIRES(writer_mutex_) { return writer_.is_object(id); };
-      ASSIGN_OR_RETURN(changed, updated->apply(change, is_taken, next_id));
-    } else {
-      changed.set = changed.set->with_updates(*statics, *updated);
-    }
-  }
   RETURN_IF_ERROR(journal_.append_change(writer_.epoch(), change, changed.placed));
   SnapshotPtr snapshot = writer_.replace_statics(std::move(changed.set));
   InstanceChange result{std::move(changed.placed), snapshot->revision, snapshot->epoch};

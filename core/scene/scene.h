@@ -258,6 +258,14 @@ class Scene {
   void count_joined(const Acks& acks) LOCUS_EXCLUDES(mutex_);
   absl::StatusOr<InstanceChange> build_and_publish(const StaticChange& change) LOCUS_REQUIRES(change_mutex_)
       LOCUS_EXCLUDES(writer_mutex_, mutex_);
+  // Logs `change` and publishes its result `changed`, unless update batches have meanwhile put instances into groups
+  // that the change removes, or taken them out. Then the change must be built again: this function builds it again if
+  // `again` is kBuildHere, and returns nullopt if it is kReturn. `statics` are the instances from which `changed` was
+  // made.
+  enum class WhenRegrouped : uint8_t { kReturn, kBuildHere };
+  absl::StatusOr<std::optional<InstanceChange>> publish_change(const StaticChange& change, const StaticSet& statics,
+                                                               StaticSet::Changed& changed, WhenRegrouped again)
+      LOCUS_REQUIRES(change_mutex_) LOCUS_EXCLUDES(writer_mutex_, mutex_);
   Id next_chosen_id() LOCUS_EXCLUDES(mutex_);
   absl::StatusOr<SnapshotPtr> recent(uint64_t revision) const LOCUS_REQUIRES(mutex_);
 

@@ -271,10 +271,13 @@ std::shared_ptr<const StaticSet> StaticSet::replace(std::vector<Instance> change
   return set;
 }
 
-bool StaticSet::regrouped_since(const StaticSet& base) const {
+bool StaticSet::regrouped_since(const StaticSet& base, absl::Span<const Group> groups) const {
+  if (groups.empty()) return false;
+  const absl::flat_hash_set<Group> looked_for(groups.begin(), groups.end());
   bool regrouped = false;
   tree_.for_each_apart_from(base.tree_, [&](const Instance& instance) {
-    regrouped = regrouped || base.find(instance.id)->group != instance.group;
+    const Group before = base.find(instance.id)->group;
+    regrouped |= before != instance.group && looked_for.contains(before) != looked_for.contains(instance.group);
   });
   return regrouped;
 }
@@ -326,7 +329,8 @@ uint32_t StaticSet::uses(const StaticMesh* mesh) const {
 
 uint64_t StaticSet::unshared_bytes(const StaticSet& other) const {
   if (this == &other) return 0;
-  return tree_.unshared_bytes(other.tree_) + positions_.unshared_bytes(other.positions_);
+  const uint64_t uses = uses_ == other.uses_ ? 0 : uses_->capacity() * (sizeof(Uses::value_type) + 1);
+  return tree_.unshared_bytes(other.tree_) + positions_.unshared_bytes(other.positions_) + uses;
 }
 
 }  // namespace locus

@@ -63,12 +63,12 @@ class StaticSet {
   absl::StatusOr<Changed> apply(const StaticChange& change, const std::function<bool(Id)>& is_object,
                                 const std::function<Id()>& next_id) const;
   // Returns a new set in which the instances with the ids of `changed` are those of `changed`, with the same meshes.
-  // Preconditions: the set has these ids, which are distinct; moved() has made the transforms and bounds. Cost: that of
-  // Bvh::change().
+  // Preconditions: the set has these ids, which are distinct; place_at() has made the transforms and bounds. Cost: that
+  // of Bvh::change().
   std::shared_ptr<const StaticSet> replace(std::vector<Instance> changed) const;
-  // Returns true if an instance of this set has another group than in `base`. Precondition: update batches alone made
-  // this set from `base`, so that both have the same instances.
-  bool regrouped_since(const StaticSet& base) const;
+  // Returns true if an instance has one of `groups` in this set and not in `base`, or the other way round.
+  // Precondition: update batches alone made this set from `base`, so that both have the same instances.
+  bool regrouped_since(const StaticSet& base, absl::Span<const Group> groups) const;
   // Returns this set, which a static change made from `base`, with the changes that update batches made meanwhile, from
   // `base` to `updated`. Changes of instances that this set does not have are dropped.
   std::shared_ptr<const StaticSet> with_updates(const StaticSet& base, const StaticSet& updated) const;

@@ -189,37 +189,6 @@ TEST_F(InstanceApplierTest, OlderSnapshotsKeepTheirInstances) {
   EXPECT_EQ(before->statics->find(6)->transform.translation, (Vec3d{10, 0, 0}));
 }
 
-// A static change is built while update batches move the same instances. Neither may undo the other.
-TEST_F(InstanceApplierTest, MovesDuringAStaticChangeAreNotLost) {
-  std::vector<Id> many;
-  for (Id id = 100; id < 3'000; ++id) many.push_back(id);
-  change(placing(placement(many, {0, 50, 0})));
-  constexpr int kMoves = 300;
-  std::thread changes([this] {
-    for (Id id = 100; id < 140; ++id) {
-      StaticChange what = placing(placement({id + 10'000}, {0, 60, 0}));
-      what.remove_ids = {&id, 1};
-      what.remove_groups = columns_.ids({77});
-      change(what);
-    }
-  });
-  std::vector<double> to(3);
-  const std::vector<Id> door = {6};
-  for (int i = 1; i <= kMoves; ++i) {
-    to[0] = i;
-    UpdateBatch batch;
-    batch.instance_moves.emplace_back().ids = door;
-    batch.instance_moves[0].positions_f64 = to;
-    apply(batch);
-    ASSERT_EQ(instance(6).transform.translation.x, i);
-  }
-  changes.join();
-  EXPECT_EQ(instance(6).transform.translation.x, kMoves);
-  EXPECT_EQ(scene_.latest()->statics->size(), many.size() + 3);
-  EXPECT_EQ(scene_.latest()->statics->find(100), nullptr);
-  EXPECT_NE(scene_.latest()->statics->find(10'100), nullptr);
-}
-
 TEST_F(InstanceApplierTest, AChangeKeepsUpdatesThatWereAppliedMeanwhile) {
   const std::shared_ptr<const StaticSet> base = scene_.latest()->statics;
   StaticChange what = placing(placement({8}, {30, 0, 0}));
@@ -232,13 +201,146 @@ TEST_F(InstanceApplierTest, AChangeKeepsUpdatesThatWereAppliedMeanwhile) {
   batch.instance_relabels[0].groups = columns_.ids({4});
   apply(batch);
   const std::shared_ptr<const StaticSet> updated = scene_.latest()->statics;
-  EXPECT_TRUE(updated->regrouped_since(*base));
+  EXPECT_TRUE(updated->regrouped_since(*base, {4}));
+  EXPECT_TRUE(updated->regrouped_since(*base, {9, 4}));
+  EXPECT_FALSE(updated->regrouped_since(*base, {9}));
+  EXPECT_FALSE(updated->regrouped_since(*base, {}));
   const auto both = changed->set->with_updates(*base, *updated);
   EXPECT_EQ(both->size(), 3u);
   EXPECT_EQ(both->find(5), nullptr);
   EXPECT_EQ(both->find(6)->transform.translation, (Vec3d{7, 7, 7}));
   EXPECT_EQ(both->find(7)->group, 4u);
   EXPECT_EQ(both->find(8)->transform.translation, (Vec3d{30, 0, 0}));
+}
+
+// Fixture with many more instances, the crowd, whose replacement by a static change takes so long that update batches
+// are applied meanwhile. The scene chooses the ids of the crowd. It chooses them again when it builds a change again,
+// so that a gap in the ids tells that it has.
+class DuringAChangeTest : public InstanceApplierTest {
+ protected:
+  static constexpr size_t kCrowd = 3'000;
+  static constexpr int kMaxRounds = 500;
+  static constexpr int kOverlaps = 20;  // number of rounds with an overlap after which a test ends
+
+  DuringAChangeTest() {
+    for (size_t i = 0; i < 3 * kCrowd; ++i) places_.push_back(50 + static_cast<double>(i * i % 101));
+    replace_crowd({});
+  }
+
+  InstanceChange replace_crowd(std::vector<Group> remove_groups) {
+    StaticChange what;
+    what.place.emplace_back().mesh = mesh_;
+    what.place[0].translations = places_;
+    what.remove_ids = crowd_;
+    what.remove_groups = remove_groups;
+    absl::StatusOr<InstanceChange> changed = scene_.change_instances(what);
+    EXPECT_TRUE(changed.ok()) << changed.status();
+    if (!changed.ok()) return {};
+    is_rebuilt_ = !crowd_.empty() && changed->placed.front() != crowd_.back() + 1;
+    crowd_ = changed->placed;
+    return *std::move(changed);
+  }
+  // Returns true if the last call of replace_crowd() built its change several times.
+  bool is_rebuilt() const { return is_rebuilt_; }
+
+  // Calls update(n) in another thread, for n = 1, 2, 3 and so on, while this object lives.
+  class Meanwhile {
+   public:
+    explicit Meanwhile(std::function<void(int)> update)
+        : thread_([this, update = std::move(update)] {
+            while (!ended_) {
+              update(calls_ + 1);
+              ++calls_;
+            }
+          }) {}
+    ~Meanwhile() {
+      ended_ = true;
+      thread_.join();
+    }
+    // Returns the number of calls that have returned.
+    int calls() const { return calls_; }
+
+   private:
+    std::atomic<bool> ended_ = false;
+    std::atomic<int> calls_ = 0;
+    std::thread thread_;
+  };
+
+  // Gives one of the instances 5, 6 and 7 the group `group`, and the others group 0.
+  void regroup(int which, Group group) {
+    const Id ids[] = {5, 6, 7};
+    Group groups[] = {0, 0, 0};
+    groups[which] = group;
+    UpdateBatch batch;
+    batch.instance_relabels.emplace_back().ids = ids;
+    batch.instance_relabels[0].groups = groups;
+    apply(batch);
+  }
+
+ private:
+  std::vector<double> places_;
+  std::vector<Id> crowd_;
+  bool is_rebuilt_ = false;
+};
+
+// A static change is built while update batches move another instance. Neither may undo the other.
+TEST_F(DuringAChangeTest, MovesAreNotLost) {
+  int overlaps = 0, moves = 0;
+  {
+    const Meanwhile other([this](int n) {
+      const Id door = 6;
+      const double to[] = {static_cast<double>(n), 0, 0};
+      UpdateBatch batch;
+      batch.instance_moves.emplace_back().ids = {&door, 1};
+      batch.instance_moves[0].positions_f64 = to;
+      apply(batch);
+      const SnapshotPtr snapshot = scene_.latest();
+      EXPECT_EQ(snapshot->statics->find(door)->transform.translation.x, n);
+    });
+    for (int round = 0; round < kMaxRounds && overlaps < kOverlaps; ++round) {
+      const int before = other.calls();
+      replace_crowd({77});
+      moves = other.calls();
+      overlaps += moves - before >= 3 ? 1 : 0;  // at least one move began and ended during the change
+    }
+  }
+  EXPECT_EQ(overlaps, kOverlaps);
+  EXPECT_GE(instance(6).transform.translation.x, moves);
+  EXPECT_EQ(scene_.latest()->statics->size(), kCrowd + 3);
+}
+
+// Exactly the instances that have a removed group just before the change is published are removed.
+TEST_F(DuringAChangeTest, AChangeRemovesTheInstancesThatHaveTheGroupWhenItIsPublished) {
+  int checked = 0;
+  const Meanwhile other([this](int n) { regroup(n % 2, 77); });
+  for (int round = 0; round < kMaxRounds && checked < kOverlaps; ++round) {
+    const InstanceChange changed = replace_crowd({77});
+    const auto before = scene_.view({View::Kind::kExactly, changed.revision - 1, 0}, {});
+    const auto after = scene_.view({View::Kind::kExactly, changed.revision, 0}, {});
+    std::vector<Id> missing;
+    for (const Id id : {5, 6, 7}) {
+      if (scene_.latest()->statics->find(id) == nullptr) missing.push_back(id);
+      if (!before.ok() || !after.ok()) continue;  // too many revisions were made since
+      const Instance* const was = (*before)->statics->find(id);
+      ASSERT_NE(was, nullptr);
+      EXPECT_EQ((*after)->statics->find(id) != nullptr, was->group != 77) << id;
+    }
+    if (is_rebuilt() && before.ok() && after.ok()) ++checked;
+    if (!missing.empty()) change(placing(placement(missing, {0, 0, 0})));
+  }
+  EXPECT_EQ(checked, kOverlaps);
+}
+
+TEST_F(DuringAChangeTest, RegroupingAmongOtherGroupsDoesNotBuildTheChangeAgain) {
+  int overlaps = 0;
+  const Meanwhile other([this](int n) { regroup(n % 3, 76); });
+  for (int round = 0; round < kMaxRounds && overlaps < kOverlaps; ++round) {
+    const int before = other.calls();
+    replace_crowd({77});
+    ASSERT_FALSE(is_rebuilt());
+    overlaps += other.calls() - before >= 3 ? 1 : 0;
+  }
+  EXPECT_EQ(overlaps, kOverlaps);
 }
 
 }  // namespace
