@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -145,6 +146,32 @@ class DoorLockstep {
       if (std::abs(found->transform.scale - expected.scale) > 1e-5f) return "scale" + which;
       if (found->layers != door.layers) return "layers" + which;
       if (found->bounds != bounds_to_world(found->transform, mesh_->bounds())) return "bounds" + which;
+    }
+    const std::string searched = search_difference(moment->statics());
+    return searched.empty() ? "" : searched + when;
+  }
+
+  // Collects the instances whose bounds overlap a box.
+  struct BoxSearch {
+    Aabbd box;
+    std::set<Id> found = {};
+    Aabbd bounds() const { return box; }
+    bool overlaps(const Aabbd& other) const { return locus::overlaps(box, other); }
+    bool visit(const Instance& instance) { return found.insert(instance.id).second; }
+  };
+
+  // Searches the tree for the instances in random boxes, and compares them with those that find() returns.
+  std::string search_difference(const StaticSet& statics) {
+    for (int i = 0; i < 4; ++i) {
+      const Vec3d corner = random_.vector(60);
+      BoxSearch search{{corner, corner + Vec3d{1, 1, 1} * random_.between(0, 60)}};
+      Work work;
+      statics.tree().visit_region(search, work);
+      for (Id id = 1; id <= kIds; ++id) {
+        const Instance* const instance = statics.find(id);
+        const bool expected = instance != nullptr && overlaps(search.box, instance->bounds);
+        if (search.found.contains(id) != expected) return "search for " + std::to_string(id);
+      }
     }
     return "";
   }
