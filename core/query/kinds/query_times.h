@@ -25,7 +25,7 @@ class QueryTimes {
   static absl::StatusOr<QueryTimes> resolve(const SceneSnapshot& snapshot, const QueryBlock& block,
                                             const std::string& field, uint64_t& free_bytes);
 
-  // Returns the moving objects at the effective time of a query.
+  // Returns the objects and instances at the effective time of a query.
   const SceneAtTime& of(size_t query) const { return scenes_[entry_of(query)]; }
   // Returns the effective time of a query. Precondition: asks_past().
   const AsOf& time(size_t query) const {

@@ -39,7 +39,7 @@ using SnapshotPtr = std::shared_ptr<const SceneSnapshot>;
 // and history, but not meshes, which scenes share. The result is exact except for the bytes of the history. These
 // bytes may be overestimated if ticks were restarted between the two revisions. They may be underestimated if `later`
 // has dropped the last history record of `held`, and `held` is not the first revision after the tick of this record.
-// O(size of the difference).
+// O(size of the difference + instances / kBvhBlockValues).
 uint64_t unshared_bytes(const SceneSnapshot& held, const SceneSnapshot& later);
 
 // Returns the bytes of the snapshot without its history and meshes. O(objects).
