@@ -29,6 +29,11 @@ uint64_t changed_count(const UpdateBatch& batch) {
   uint64_t items = 0;
   for (const MoveColumns& move : batch.moves) items += move.ids.size();
   for (const RelabelColumns& relabel : batch.relabels) items += relabel.ids.size();
+  return items;
+}
+
+uint64_t changed_instances(const UpdateBatch& batch) {
+  uint64_t items = 0;
   for (const InstanceMoveColumns& move : batch.instance_moves) items += move.ids.size();
   for (const RelabelColumns& relabel : batch.instance_relabels) items += relabel.ids.size();
   return items;
@@ -37,16 +42,16 @@ uint64_t changed_count(const UpdateBatch& batch) {
 }  // namespace
 
 uint64_t item_count(const UpdateBatch& batch) {
-  return inserted_count(batch) + changed_count(batch) + batch.remove_ids.size();
+  return inserted_count(batch) + changed_count(batch) + changed_instances(batch) + batch.remove_ids.size();
 }
 
 UpdateCost cost_of(const UpdateBatch& batch) {
   UpdateCost cost;
-  const uint64_t inserts = inserted_count(batch), changes = changed_count(batch);
-  cost.kind = inserts > 0   ? UpdateCost::Kind::kInserts
-              : changes > 0 ? UpdateCost::Kind::kMoves
-                            : UpdateCost::Kind::kRemoves;
-  cost.bytes = kBytesABatch + (inserts + changes) * kBytesAnItem;
+  const uint64_t inserts = inserted_count(batch), changes = changed_count(batch), instances = changed_instances(batch);
+  cost.kind = inserts > 0               ? UpdateCost::Kind::kInserts
+              : changes + instances > 0 ? UpdateCost::Kind::kMoves
+                                        : UpdateCost::Kind::kRemoves;
+  cost.bytes = kBytesABatch + (inserts + changes) * kBytesAnItem + instances * kBytesAnInstance;
   return cost;
 }
 

@@ -182,6 +182,11 @@ UpdateQueue::SceneQueue* UpdateQueue::next() {
   }
 }
 
+bool UpdateQueue::changes_instances(const Group& group) {
+  return std::any_of(group.begin(), group.end(),
+                     [](const PendingUpdate* update) { return has_instances(update->batch()); });
+}
+
 void UpdateQueue::work_on(SceneQueue& scene_queue) {
   Group group;
   uint64_t items = 0;
@@ -191,9 +196,10 @@ void UpdateQueue::work_on(SceneQueue& scene_queue) {
     group = take_group(scene_queue);
     items = before - scene_queue.items;
   }
+  const bool is_typical = !waits_for_disk(*scene_queue.scene) && !changes_instances(group);
   const SteadyTime start = steady_clock::now();
   if (!apply(scene_queue, group)) return stall(scene_queue, group);
-  if (!waits_for_disk(*scene_queue.scene)) learn(items, start);
+  if (is_typical) learn(items, start);
   std::unique_ptr<SceneQueue> empty;
   const MutexLock lock(mutex_);
   empty = finish(scene_queue);

@@ -122,6 +122,9 @@ class UpdateQueue {
   // Ends this thread's work on the SceneQueue. Returns the SceneQueue if it is empty; the caller frees it without the
   // lock, because freeing it may destroy a deleted scene.
   std::unique_ptr<SceneQueue> finish(SceneQueue& scene_queue) LOCUS_REQUIRES(mutex_);
+  // Returns whether a batch of the group changes instances. The time of such a batch depends on the number of all
+  // instances, so it is not used as the cost of an item.
+  static bool changes_instances(const Group& group);
   void learn(uint64_t items, SteadyTime start);
   void check_invariants(const SceneQueue& scene_queue) const LOCUS_REQUIRES(mutex_);
 

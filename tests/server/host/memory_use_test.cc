@@ -39,6 +39,15 @@ TEST(MemoryUseTest, EveryItemOfABatchCostsTheSame) {
   EXPECT_GT(eight, four);
 }
 
+TEST(MemoryUseTest, AChangedInstanceCostsAsMuchAsAPlacedOne) {
+  UpdateBatch batch = moving();
+  const uint64_t before = cost_of(batch).bytes;
+  batch.instance_moves.emplace_back().ids = kIds;
+  batch.instance_relabels.emplace_back().ids = kIds;
+  EXPECT_EQ(cost_of(batch).bytes - before, change_cost(0, 2 * kIds.size()));
+  EXPECT_EQ(item_count(batch), 3 * kIds.size());
+}
+
 TEST(MemoryUseTest, AnUploadAndItsTreeCostMoreThanTheyKeepAndTheLargestDoNotOverflow) {
   EXPECT_GT(upload_cost(100, 200), uint64_t{100 * 12 + 200 * 12});
   EXPECT_GT(tree_cost(200), uint64_t{200 * 72});

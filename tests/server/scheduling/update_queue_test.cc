@@ -12,6 +12,7 @@
 #include "core/base/refusal.h"
 #include "core/scene/registry.h"
 #include "tests/support/memory_log.h"
+#include "tests/support/scene_fixture.h"
 
 namespace locus::server {
 namespace {
@@ -154,6 +155,37 @@ TEST_F(UpdateQueueTest, ABatchThatChangesInstancesIsNotAppliedByItsCaller) {
   EXPECT_EQ(update->wait()->refused, 1u);
   EXPECT_EQ(x_of(1), 5);
   EXPECT_EQ(queue.stats().applied_inline, 0u);
+}
+
+// The time of a batch that changes instances depends on how many there are, and tells nothing about other batches.
+TEST_F(UpdateQueueTest, BatchesThatChangeInstancesDoNotRaiseTheEstimateForOtherBatches) {
+  std::vector<double> translations(3 * 50'000);
+  for (size_t i = 0; i < translations.size(); ++i) translations[i] = static_cast<double>(i * i % 10'007);
+  StaticChange change;
+  change.place.emplace_back().mesh = test::make_mesh("m", 1);
+  change.place[0].translations = translations;
+  const std::vector<Id> placed = scene_->change_instances(change)->placed;
+  UpdateQueue queue({});
+  for (double x = 0; x < 30; ++x) {
+    std::vector<Id> ids;
+    for (size_t i = 0; i < 64; ++i) ids.push_back(placed[i * 700]);
+    const std::vector<double> to = {x, x, x};
+    const auto update = move({1}, 5);
+    update->change().instance_moves.emplace_back().ids = ids;
+    update->change().instance_moves[0].positions_f64 = to;
+    ASSERT_TRUE(queue.post(scene_, *update, WhenFull::kRefuse).ok());
+    EXPECT_EQ(update->wait()->applied, 65u);
+  }
+  std::vector<uint64_t> many;  // too few for the estimate to learn from
+  for (uint64_t id = 1000; id < 1060; ++id) many.push_back(id);
+  // The queue may not have marked the scene as idle again when the last batch is done.
+  const auto inlined = [&queue] { return queue.stats().applied_inline; };
+  for (int tries = 0; tries < 1000 && inlined() == 0; ++tries) {
+    const auto update = move(many, 1);
+    ASSERT_TRUE(queue.post(scene_, *update, WhenFull::kRefuse).ok());
+    EXPECT_TRUE(update->wait().ok());
+  }
+  EXPECT_NE(inlined(), 0u);
 }
 
 TEST_F(UpdateQueueTest, ACallerNeverWaitsForThePreviousBatch) {
