@@ -12,6 +12,7 @@
 #include "client/lib/retry.h"
 #include "client/lib/status.h"
 #include "client/lib/transfers.h"
+#include "client/lib/writer.h"
 #include "core/base/status_macros.h"
 #include "grpc/health/v1/health.grpc.pb.h"
 #include "grpcpp/channel.h"
@@ -36,6 +37,8 @@ struct CallPlan {
   RetryPolicy retry;
   Repeat repeat = Repeat::kNever;
   absl::string_view scene = {};
+  // True if the call is an update with a writer and a batch number: see outcome_unknown().
+  bool numbered_update = false;
 };
 
 template <class Stub, class Request, class Response>
@@ -44,13 +47,19 @@ absl::StatusOr<Response> call(Stub& stub, const CallPlan& plan, const Request& r
   const absl::Time deadline = absl::Now() + plan.deadline;
   Response response;
   uint64_t token = 0;
-  const auto attempt = [&]() -> absl::Status {
+  bool lost = false;  // whether the outcome of an attempt is unknown
+  const auto once = [&]() -> absl::Status {
     ASSIGN_OR_RETURN(const CallGate::Permit permit, CallGate::enter(plan.link.gate));
     continue_connecting(plan.link, deadline);
     CancellableContext context(&plan.running);
     token = prepare(context, {plan.authorization, deadline, plan.scene});
     response.Clear();
     return to_absl_status((stub.*method)(&context, request, &response));
+  };
+  const auto attempt = [&]() -> absl::Status {
+    absl::Status status = once();
+    lost = lost || (!status.ok() && !changed_nothing(status) && !absl::IsUnauthenticated(status));
+    return status;
   };
   const auto wait = [&](absl::Duration duration) { wait_connecting(plan.link, duration); };
   const auto attempts = [&] {
@@ -59,6 +68,7 @@ absl::StatusOr<Response> call(Stub& stub, const CallPlan& plan, const Request& r
   absl::Status status = attempts();
   // Repeat even a call that is not safe to repeat: a server that refuses the token has changed nothing.
   if (absl::IsUnauthenticated(status) && plan.authorization.has_newer(token)) status = attempts();
+  if (lost && plan.numbered_update && changed_nothing(status)) return outcome_unknown(status);
   RETURN_IF_ERROR(status);
   return response;
 }
@@ -132,6 +142,13 @@ struct Client::Connection {
   }
   CallPlan repeatable(absl::string_view scene = {}) const {
     return {latency, *authorization, *running, options.deadline, options.retry, Repeat::kWhenUnavailable, scene};
+  }
+  // Returns the plan of a call that applies `batch`, which is repeatable if the batch has a writer and a number.
+  CallPlan update(absl::string_view scene, const v1::UpdateBatch& batch) const {
+    if (batch.writer() == 0 || batch.batch() == 0) return once(scene);
+    CallPlan plan = repeatable(scene);
+    plan.numbered_update = true;
+    return plan;
   }
   // Prepares a call on `bulk`, whose deadline is `timeout` from now, and returns its header.
   CallHeader bulk_header(absl::Duration timeout, absl::string_view scene = {}) const {
@@ -351,13 +368,12 @@ absl::StatusOr<std::string> Client::call_by_path(const std::string& path, absl::
 }
 
 absl::StatusOr<v1::UpdateAck> Client::apply(absl::string_view scene, v1::UpdateBatch batch) const {
-  const bool once_only = batch.writer() != 0 && batch.batch() != 0;
+  const CallPlan plan = connection_->update(scene, batch);
   v1::ApplyUpdatesRequest request;
   request.set_scene(std::string(scene));
   *request.mutable_batch() = std::move(batch);
   ASSIGN_OR_RETURN(v1::ApplyUpdatesResponse response,
-                   call(*connection_->updates, once_only ? connection_->repeatable(scene) : connection_->once(scene),
-                        request, &v1::UpdateService::StubInterface::ApplyUpdates));
+                   call(*connection_->updates, plan, request, &v1::UpdateService::StubInterface::ApplyUpdates));
   return std::move(*response.mutable_ack());
 }
 
@@ -372,14 +388,13 @@ absl::StatusOr<v1::QueryResult> Client::query(absl::string_view scene, v1::Query
 }
 
 absl::StatusOr<StepResult> Client::step(absl::string_view scene, v1::UpdateBatch update, v1::QueryBatch queries) const {
-  const bool once_only = update.writer() != 0 && update.batch() != 0;
+  const CallPlan plan = connection_->update(scene, update);
   v1::StepRequest request;
   request.set_scene(std::string(scene));
   *request.mutable_update() = std::move(update);
   *request.mutable_queries() = std::move(queries);
   ASSIGN_OR_RETURN(v1::StepResponse response,
-                   call(*connection_->queries, once_only ? connection_->repeatable(scene) : connection_->once(scene),
-                        request, &v1::QueryService::StubInterface::Step));
+                   call(*connection_->queries, plan, request, &v1::QueryService::StubInterface::Step));
   if (response.has_error()) return StepResult{std::move(*response.mutable_ack()), to_absl_status(response.error())};
   return StepResult{std::move(*response.mutable_ack()), std::move(*response.mutable_result())};
 }

@@ -128,15 +128,15 @@ class Client {
   absl::Status dump(const v1::DumpSceneRequest& request,
                     const std::function<absl::Status(const v1::DumpSceneResponse&)>& on_message) const;
 
-  // Applies one batch. Retried only if the batch carries `writer` and `batch`. For regular batches use update_stream().
+  // Applies one batch. Retried only if the batch carries `writer` and `batch`. If a retry is refused, the error has no
+  // reason, because an earlier attempt may have applied the batch. For regular batches use update_stream().
   absl::StatusOr<v1::UpdateAck> apply(absl::string_view scene, v1::UpdateBatch batch) const;
   // Sends one batch of queries and returns the answers, all at one revision. Retried. For regular batches use
   // query_stream().
   absl::StatusOr<v1::QueryResult> query(absl::string_view scene, v1::QueryBatch batch) const;
   // Makes a step: applies `update`, then answers `queries` at a revision that contains it, in one call. An error means
   // that the step was refused; if the server sent it, nothing was changed. An error of queries whose update was applied
-  // is in StepResult::result. Retried only if the update carries `writer` and `batch`. For a step every tick use
-  // QueryStream::step().
+  // is in StepResult::result. Retried like apply(). For a step every tick use QueryStream::step().
   absl::StatusOr<StepResult> step(absl::string_view scene, v1::UpdateBatch update, v1::QueryBatch queries) const;
 
   // Cancels the calls in progress, which then return CANCELLED; whether a change was made is unknown. Does not end

@@ -57,7 +57,8 @@ class PipelinedStream {
     // Renumbering replaces this request and does not modify it, because a write in progress may still read it.
     std::shared_ptr<Request> request;
     Callback done;
-    bool written = false;  // whether the request's write on the current call has begun
+    bool written = false;      // whether the request's write on the current call has begun
+    bool sent_before = false;  // whether the write of this request on an earlier call has begun
   };
   using Items = std::deque<Item>;
 
@@ -70,10 +71,13 @@ class PipelinedStream {
     virtual void number(Request& request) = 0;
     // Converts a response into the outcome of its request.
     virtual absl::StatusOr<Result> outcome_of(Response& response) = 0;
-    // Handles the outcome of the item with `request`, which was at index `position` of `items` and has been removed.
-    // May renumber the later items by number_again(). If an error is returned, the stream ends with this error.
-    virtual absl::Status answered(const Request& request, const absl::StatusOr<Result>& outcome, Items& items,
-                                  size_t position) = 0;
+    // Returns whether `item` must be numbered and sent again instead of completing with `outcome`, as must all later
+    // items.
+    virtual bool goes_again(const Item& item, const absl::StatusOr<Result>& outcome) = 0;
+    // Handles the outcome of `item`, which was at index `position` of `items` and has been removed. May change the
+    // outcome, and renumber the later items by number_again(). If an error is returned, the stream ends with this
+    // error.
+    virtual absl::Status answered(const Item& item, absl::StatusOr<Result>& outcome, Items& items, size_t position) = 0;
   };
 
   struct Options {
@@ -123,7 +127,7 @@ class PipelinedStream {
   void number_again(Items& items, size_t position) {
     for (size_t i = position; i < items.size(); ++i) {
       items[i].request = std::make_shared<Request>(*items[i].request);
-      items[i].written = false;
+      items[i].written = items[i].sent_before = false;
       kind_.number(*items[i].request);
     }
   }
@@ -249,19 +253,22 @@ class PipelinedStream {
     });
     if (item == items_.end()) return;
     const size_t position = static_cast<size_t>(item - items_.begin());
-    Callback done = std::move(item->done);
-    const std::shared_ptr<Request> request = std::move(item->request);
-    items_.erase(item);
     backoff_.reset();
     last_response_ = Clock::now();
     absl::StatusOr<Result> outcome = kind_.outcome_of(response);
-    fatal_.Update(kind_.answered(*request, outcome, items_, position));
+    if (kind_.goes_again(*item, outcome)) {
+      number_again(items_, position);
+      return pump();
+    }
+    Item answered = std::move(*item);
+    items_.erase(item);
+    fatal_.Update(kind_.answered(answered, outcome, items_, position));
     if (fatal_.ok()) {
       pump();
     } else {
       attempt_->cancel();
     }
-    complete(lock, done, std::move(outcome));
+    complete(lock, answered.done, std::move(outcome));
   }
 
   void complete(std::unique_lock<std::mutex>& lock, Callback& done, absl::StatusOr<Result> outcome) {
@@ -296,7 +303,7 @@ class PipelinedStream {
   }
 
   absl::Status run_attempt(std::unique_lock<std::mutex>& lock) {
-    for (Item& item : items_) item.written = false;
+    for (Item& item : items_) item.sent_before |= std::exchange(item.written, false);
     {
       ASSIGN_OR_RETURN(const CallGate::Permit permit, CallGate::enter(link_.gate));
       attempt_ = std::make_unique<Attempt>(*this);

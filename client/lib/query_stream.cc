@@ -26,8 +26,7 @@ class QueryStream::Impl final : public Stream::Kind {
   Impl(const Link& link, std::shared_ptr<Authorization> authorization, std::string scene,
        const QueryStreamOptions& options)
       : stub_(v1::QueryService::NewStub(link.channel)),
-        writer_(options.writer != 0 ? options.writer : random_writer()),
-        next_batch_(options.next_batch),
+        numbers_(options.writer, options.next_batch),
         stream_(*this, std::move(scene),
                 {link, options.max_in_flight, options.reconnect, options.patience, std::move(authorization)}) {}
 
@@ -38,9 +37,7 @@ class QueryStream::Impl final : public Stream::Kind {
   }
   void number(v1::StreamQueriesRequest& request) override {
     request.set_sequence(++sequence_);
-    if (!request.has_update()) return;
-    request.mutable_update()->set_writer(writer_);
-    request.mutable_update()->set_batch(next_batch_++);
+    if (request.has_update()) numbers_.number(*request.mutable_update());
   }
   // Returns the error of a batch without an update, and of a step that was refused as a whole.
   absl::StatusOr<StepResult> outcome_of(v1::StreamQueriesResponse& response) override {
@@ -48,21 +45,35 @@ class QueryStream::Impl final : public Stream::Kind {
     if (!result.ok() && !response.has_ack()) return result.status();
     return StepResult{std::move(*response.mutable_ack()), std::move(result)};
   }
-  absl::Status answered(const v1::StreamQueriesRequest& request, const absl::StatusOr<StepResult>& outcome,
-                        Stream::Items& items, size_t position) override {
-    if (outcome.ok() || !request.has_update()) return absl::OkStatus();
-    if (!batch_number_is_unused(outcome.status())) return outcome.status();
-    --next_batch_;
-    for (size_t behind = position; behind < items.size(); ++behind)
-      if (items[behind].request->has_update()) --next_batch_;
-    stream_.number_again(items, position);
+  bool goes_again(const Stream::Item& item, const absl::StatusOr<StepResult>& outcome) override {
+    return !outcome.ok() && item.request->has_update() &&
+           numbers_.closes_gap(item.request->update().batch(), outcome.status());
+  }
+  absl::Status answered(const Stream::Item& item, absl::StatusOr<StepResult>& outcome, Stream::Items& items,
+                        size_t position) override {
+    if (!item.request->has_update()) return absl::OkStatus();
+    const uint64_t batch = item.request->update().batch();
+    if (outcome.ok()) {
+      const absl::Status acked = numbers_.acked(batch, outcome->ack.duplicate(), item.sent_before);
+      if (!acked.ok()) outcome = acked;
+      return acked;
+    }
+    switch (numbers_.failed(batch, item.sent_before, outcome.status())) {
+      case BatchNumbers::AfterFailure::kEndStream:
+        return outcome.status();
+      case BatchNumbers::AfterFailure::kKeepNumbers:
+        outcome = outcome_unknown(outcome.status());
+        break;
+      case BatchNumbers::AfterFailure::kNumberLaterAgain:
+        stream_.number_again(items, position);
+        break;
+    }
     return absl::OkStatus();
   }
 
  private:
   const std::unique_ptr<v1::QueryService::StubInterface> stub_;
-  const uint64_t writer_;
-  uint64_t next_batch_;    // guarded by the stream's lock
+  BatchNumbers numbers_;   // guarded by the stream's lock
   uint64_t sequence_ = 0;  // guarded by the stream's lock
   Stream stream_;          // declared last: its thread uses all members above
 };

@@ -4,7 +4,8 @@
 // carries the stream's random writer id and a consecutive batch number, by which the server applies it only once.
 //
 // As in an UpdateStream, a refused update does not use up its number: the stream renumbers the later steps and sends
-// everything after the refused step again. The stream ends permanently in the cases in which an UpdateStream ends.
+// everything after the refused step again. A step that is refused when it is sent again may have been applied: its
+// error then has no reason and says so. The stream ends permanently in the cases in which an UpdateStream ends.
 #ifndef LOCUS_CLIENT_LIB_QUERY_STREAM_H_
 #define LOCUS_CLIENT_LIB_QUERY_STREAM_H_
 
@@ -73,8 +74,8 @@ class QueryStream {
   std::future<absl::StatusOr<v1::QueryResult>> send(v1::QueryBatch batch);
 
   // Sends a step: the server applies `update`, then answers `queries` at a revision that contains it. Otherwise like
-  // send(). An error means that the step was refused: nothing was changed and no query was run. Steps are applied in
-  // the order sent. Overwrites `writer` and `batch` of the update.
+  // send(). An error with a reason means that the step was refused: nothing was changed and no query was run. Steps are
+  // applied in the order sent. Overwrites `writer` and `batch` of the update.
   absl::Status step(v1::UpdateBatch update, v1::QueryBatch queries, StepCallback on_result);
   std::future<absl::StatusOr<StepResult>> step(v1::UpdateBatch update, v1::QueryBatch queries);
 

@@ -20,13 +20,12 @@ class UpdateStream::Impl final : public UpdatePipeline::Kind {
   Impl(const Link& link, std::shared_ptr<Authorization> authorization, std::string scene,
        const UpdateStreamOptions& options)
       : stub_(v1::UpdateService::NewStub(link.channel)),
-        writer_(options.writer != 0 ? options.writer : random_writer()),
-        next_batch_(options.next_batch),
+        numbers_(options.writer, options.next_batch),
         stream_(*this, std::move(scene),
                 {link, options.max_in_flight, options.reconnect, options.patience, std::move(authorization)}) {}
 
   UpdatePipeline& stream() { return stream_; }
-  uint64_t writer() const { return writer_; }
+  uint64_t writer() const { return numbers_.writer(); }
   std::optional<Revision> last_ack() const {
     std::lock_guard lock(ack_mutex_);
     return last_ack_;
@@ -38,8 +37,7 @@ class UpdateStream::Impl final : public UpdatePipeline::Kind {
 
   void number(v1::StreamUpdatesRequest& request) override {
     request.set_sequence(++sequence_);
-    request.mutable_batch()->set_writer(writer_);
-    request.mutable_batch()->set_batch(next_batch_++);
+    numbers_.number(*request.mutable_batch());
   }
 
   absl::StatusOr<v1::UpdateAck> outcome_of(v1::StreamUpdatesResponse& response) override {
@@ -48,23 +46,38 @@ class UpdateStream::Impl final : public UpdatePipeline::Kind {
     return absl::DataLossError("the server answered a batch with neither an ack nor an error");
   }
 
-  absl::Status answered(const v1::StreamUpdatesRequest&, const absl::StatusOr<v1::UpdateAck>& outcome,
+  bool goes_again(const UpdatePipeline::Item& item, const absl::StatusOr<v1::UpdateAck>& outcome) override {
+    return !outcome.ok() && numbers_.closes_gap(item.request->batch().batch(), outcome.status());
+  }
+
+  absl::Status answered(const UpdatePipeline::Item& item, absl::StatusOr<v1::UpdateAck>& outcome,
                         UpdatePipeline::Items& items, size_t position) override {
+    const uint64_t batch = item.request->batch().batch();
     if (outcome.ok()) {
+      if (absl::Status status = numbers_.acked(batch, outcome->duplicate(), item.sent_before); !status.ok()) {
+        outcome = status;
+        return status;
+      }
       std::lock_guard lock(ack_mutex_);
       last_ack_ = Revision{outcome->epoch(), outcome->revision()};
       return absl::OkStatus();
     }
-    if (!batch_number_is_unused(outcome.status())) return outcome.status();
-    next_batch_ -= items.size() - position + 1;
-    stream_.number_again(items, position);
+    switch (numbers_.failed(batch, item.sent_before, outcome.status())) {
+      case BatchNumbers::AfterFailure::kEndStream:
+        return outcome.status();
+      case BatchNumbers::AfterFailure::kKeepNumbers:
+        outcome = outcome_unknown(outcome.status());
+        break;
+      case BatchNumbers::AfterFailure::kNumberLaterAgain:
+        stream_.number_again(items, position);
+        break;
+    }
     return absl::OkStatus();
   }
 
  private:
   const std::unique_ptr<v1::UpdateService::StubInterface> stub_;
-  const uint64_t writer_;
-  uint64_t next_batch_;    // guarded by the stream's lock
+  BatchNumbers numbers_;   // guarded by the stream's lock
   uint64_t sequence_ = 0;  // guarded by the stream's lock
   mutable std::mutex ack_mutex_;
   std::optional<Revision> last_ack_;  // guarded by ack_mutex_

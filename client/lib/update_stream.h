@@ -4,7 +4,9 @@
 // Each batch carries the stream's random writer id (`writer`) and a consecutive batch number (`batch`). After a broken
 // connection, every batch without an ack is sent again, in order, on a new connection; the server answers batches that
 // it had already applied with `duplicate`. A batch that the server refuses does not use up its number, so the stream
-// renumbers the later batches and sends them again: the caller gets one outcome for each batch, in the order sent.
+// renumbers the later batches and sends them again: the caller gets one outcome for each batch, in the order sent. If a
+// batch is refused when it is sent again after a broken connection, the server may have applied it before: its error
+// then has no reason and says so, and the stream continues as the server's next answer requires.
 //
 // The stream ends permanently in these cases: the server refuses the stream itself (for example because of the scene
 // name or of missing rights); the server has lost the state of the writer (because the scene was restarted without its

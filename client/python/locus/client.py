@@ -221,10 +221,13 @@ class Client:
         return PlacedInstances.of(response)
 
     def apply(self, scene: str, batch: UpdateBatch) -> Ack:
-        """Applies one batch. For a sequence of batches use update_stream()."""
+        """Applies one batch. If a retry is refused, the LocusError has no reason, because an earlier attempt may have
+        applied the batch. For a sequence of batches use update_stream().
+        """
         rpc = _rpc("Update", "ApplyUpdates")
         once_only = batch.message.writer != 0 and batch.message.batch != 0
-        raw = self._connection.unary_bytes(rpc.path, batch.request_bytes(scene), scene=scene, repeat=once_only)
+        raw = self._connection.unary_bytes(rpc.path, batch.request_bytes(scene), scene=scene, repeat=once_only,
+                                           is_update=True)
         return Ack.of(parsed(rpc.response, raw).ack)
 
     def query(self, scene: str, batch: QueryBatch) -> QueryResult:
@@ -249,7 +252,8 @@ class Client:
         request = b"".join((rpc.request(scene=scene).SerializeToString(), wire.head(numbers["update"], len(changes)),
                             changes, wire.head(numbers["queries"], len(batch)), batch))
         once_only = update.message.writer != 0 and update.message.batch != 0
-        return StepResult.from_bytes(self._connection.unary_bytes(rpc.path, request, scene=scene, repeat=once_only))
+        return StepResult.from_bytes(
+            self._connection.unary_bytes(rpc.path, request, scene=scene, repeat=once_only, is_update=True))
 
     def query_bytes(self, scene: str, request: bytes) -> bytes:
         """Runs an encoded batch. `request` are the bytes from QueryBatch.request_bytes(). Returns the bytes of the

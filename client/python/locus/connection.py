@@ -11,7 +11,7 @@ import grpc
 
 from . import schema
 from .credentials import Credentials, Metadata, Token, stays_on_this_machine
-from .errors import LocusError, from_call, parsed
+from .errors import LocusError, from_call, outcome_unknown, parsed
 
 DEFAULT_PORT = 7575
 _MAX_CONNECTING_SECONDS = 0.1
@@ -126,28 +126,42 @@ class Connection:
         return parsed(rpc.response, raw)
 
     def unary_bytes(self, path: str, request: bytes, *, scene: str = "", repeat: bool = False,
-                    timeout: Optional[float] = None) -> bytes:
-        """Calls a unary rpc with an encoded request and returns the encoded response. The other arguments are those of
-        unary().
+                    timeout: Optional[float] = None, is_update: bool = False) -> bytes:
+        """Calls a unary rpc with an encoded request and returns the encoded response. `is_update`: the request applies
+        an update; if a retry is refused, the outcome is unknown. The other arguments are those of unary().
         """
         call = self.channel.unary_unary(path)
         deadline = time.monotonic() + (self.timeout if timeout is None else timeout)
 
         used = 0
+        lost = False  # True if the outcome of an attempt is unknown
 
         def attempt() -> bytes:
-            nonlocal used
+            nonlocal used, lost
             self.continue_connecting(deadline - time.monotonic())
             used, metadata = self.metadata(scene)
-            return bytes(call(request, timeout=max(0.0, deadline - time.monotonic()), metadata=metadata))
+            try:
+                return bytes(call(request, timeout=max(0.0, deadline - time.monotonic()), metadata=metadata))
+            except grpc.RpcError as failure:
+                error = from_call(failure)
+                lost = lost or not (error.changed_nothing or error.code == grpc.StatusCode.UNAUTHENTICATED)
+                raise
+
+        def attempts() -> bytes:
+            try:
+                return self._attempts(attempt, deadline if repeat else None)
+            except LocusError as error:
+                if is_update and lost and error.changed_nothing:
+                    raise outcome_unknown(error) from None
+                raise
 
         try:
-            return self._attempts(attempt, deadline if repeat else None)
+            return attempts()
         except LocusError as error:
             # A server that refuses the token has done nothing, so every call may be repeated.
             if error.code != grpc.StatusCode.UNAUTHENTICATED or not self.token.has_newer(used):
                 raise
-        return self._attempts(attempt, deadline if repeat else None)
+        return attempts()
 
     def _attempts(self, attempt: Callable[[], _Answer], deadline: Optional[float]) -> _Answer:
         failures = 0

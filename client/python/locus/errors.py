@@ -91,6 +91,13 @@ class LocusError(Exception):
         return self.reason != Reason.UNSPECIFIED
 
     @property
+    def changed_nothing(self) -> bool:
+        """True if the server refused this message of an update, so that the message did not use its batch number. False
+        for BATCH_GAP, which is about the numbers before the batch.
+        """
+        return (self.refused and self.reason != Reason.BATCH_GAP) or self.code == grpc.StatusCode.PERMISSION_DENIED
+
+    @property
     def worth_repeating(self) -> bool:
         """True if an idempotent call that failed with this error may succeed when it is retried unchanged."""
         return self.code == grpc.StatusCode.UNAVAILABLE or (
@@ -129,6 +136,14 @@ def from_call(call: Any) -> LocusError:
             if error is not None:
                 return from_error(error)
     return LocusError(call.code(), call.details() or "")
+
+
+def outcome_unknown(refusal: LocusError) -> LocusError:
+    """Returns the error for an update that the server refused when it was sent again, although an earlier message of
+    the same update may have been applied. It keeps the code, but has no reason.
+    """
+    return LocusError(refusal.code, "the update may have been applied: it was sent before the connection broke, and was "
+                                    f"refused when it was sent again: {refusal.message}")
 
 
 def late_query(scene: str, waits_for: Optional[int]) -> LocusError:

@@ -17,7 +17,7 @@ import grpc
 
 from .connection import Connection, Retry
 from .enums import Reason
-from .errors import LocusError, from_call
+from .errors import LocusError, from_call, outcome_unknown
 
 Result = TypeVar("Result")
 # Status codes after which a new call may succeed, in addition to the codes that worth_repeating covers.
@@ -34,6 +34,7 @@ class Item(Generic[Result]):
         self.number = 0  # batch number of the stream's writer, if the message has an update
         self.future: "Future[Result]" = Future()
         self.written = False  # True if sent on the current call
+        self.sent_before = False  # True if sent on an earlier call with the same number
         self.future.set_running_or_notify_cancel()
 
 
@@ -42,7 +43,9 @@ class PipelinedStream(Generic[Result]):
 
     Each message with an update carries the stream's random writer id, `writer`, and a batch number that counts up from
     1 without gaps, so that the server applies it only once. A refused update does not consume its number: the messages
-    after it are numbered and sent again.
+    after it are numbered and sent again. If an update is refused when it is sent again after a broken connection, it may
+    have been applied before: its number is uncertain, its error has no reason, and the later updates keep their numbers
+    until the server answers one of them with BATCH_GAP, which shows that the uncertain number was not used.
 
     Use as a context manager: the end of the `with` block waits for all answers, or cancels the stream after an
     exception.
@@ -61,6 +64,8 @@ class PipelinedStream(Generic[Result]):
         self._call: Any = None
         self.writer = secrets.randbelow(2**64 - 1) + 1
         self._next_batch = 1
+        self._uncertain = 0  # lowest uncertain batch number; 0 = none
+        self._reused_end = 0  # end of the uncertain numbers that were used again
         self._last_sequence = 0
         self._failures = 0
         self._handing_over = 0
@@ -89,23 +94,59 @@ class PipelinedStream(Generic[Result]):
         """Returns the sequence number of a response, and the result or LocusError that the response contains."""
         raise NotImplementedError
 
+    def _is_duplicate(self, result: Any) -> bool:
+        """Returns whether the ack in the result of an item with an update is marked as duplicate."""
+        return bool(result.duplicate)
+
     def _answered(self, result: Any) -> None:
         """Handles the result of an item."""
 
-    def _update_refused(self, error: LocusError, position: int) -> None:
-        """Handles the error of an item with an update. Called after the item was removed from index `position` of
-        `_items`.
+    def _closes_gap(self, item: Item[Result], error: LocusError) -> bool:
+        """Returns True if the error of an item shows that uncertain numbers before it were not used. Such numbers are
+        then used again, from the item on.
         """
-        if not error.refused or error.reason == Reason.BATCH_GAP:
+        if not item.is_update or error.reason != Reason.BATCH_GAP or self._uncertain == 0:
+            return False
+        if not self._uncertain <= error.limit_value < item.number:
+            return False
+        self._reused_end = item.number
+        self._next_batch = int(error.limit_value)
+        self._uncertain = 0
+        return True
+
+    def _number_again(self, position: int) -> None:
+        """Numbers the items from index `position` on, and sends them again."""
+        for item in self._items[position:]:
+            item.written = item.sent_before = False
+            self._number(item)
+
+    def _update_refused(self, item: Item[Result], error: LocusError, position: int) -> LocusError:
+        """Handles the error of an item with an update, and returns the error for its future. Called after the item was
+        removed from index `position` of `_items`.
+        """
+        if not error.changed_nothing:
             # End the stream, because continuing could lose a batch: either it is unknown whether the server used the
             # batch number, or the server no longer has a record of the writer.
             self._fatal = error
-            return
-        later = self._items[position:]
-        self._next_batch -= 1 + sum(item.is_update for item in later)
-        for item in later:
-            item.written = False
-            self._number(item)
+            return error
+        if item.sent_before:
+            self._uncertain = min(self._uncertain or item.number, item.number)
+            return outcome_unknown(error)
+        self._next_batch = item.number
+        self._number_again(position)
+        return error
+
+    def _update_applied(self, item: Item[Result], duplicate: bool) -> Optional[LocusError]:
+        """Handles the ack of an item with an update. Returns an error if another batch took a number that seemed unused,
+        so that the update of this item was not applied.
+        """
+        if duplicate and not item.sent_before and item.number < self._reused_end:
+            self._fatal = LocusError(grpc.StatusCode.DATA_LOSS, "the batch was not applied: a batch that was sent before "
+                                                                "took its number")
+            return self._fatal
+        if item.number > self._uncertain:
+            self._uncertain = 0
+        return None
 
     def _send(self, batch: bytes, is_update: bool) -> "Future[Any]":
         item: Item[Any] = Item(batch, is_update)
@@ -194,6 +235,7 @@ class PipelinedStream(Generic[Result]):
         try:
             with self._changed:
                 for item in self._items:
+                    item.sent_before = item.sent_before or item.written
                     item.written = False
                 used, metadata = self._connection.metadata(self._scene)
                 self._call = call = method(self._requests(over), metadata=metadata)
@@ -246,12 +288,21 @@ class PipelinedStream(Generic[Result]):
             position = next((index for index, item in enumerate(self._items) if item.sequence == sequence), None)
             if position is None:
                 return
-            item = self._items.pop(position)
+            item = self._items[position]
             self._failures = 0
-            if not isinstance(outcome, LocusError):
-                self._answered(outcome)
-            elif item.is_update:
-                self._update_refused(outcome, position)
+            if isinstance(outcome, LocusError) and self._closes_gap(item, outcome):
+                self._number_again(position)
+                self._changed.notify_all()
+                return
+            del self._items[position]
+            if isinstance(outcome, LocusError):
+                if item.is_update:
+                    outcome = self._update_refused(item, outcome, position)
+            else:
+                if item.is_update:
+                    outcome = self._update_applied(item, self._is_duplicate(outcome)) or outcome
+                if not isinstance(outcome, LocusError):
+                    self._answered(outcome)
             self._handing_over += 1
             self._changed.notify_all()
             if self._fatal is not None:

@@ -43,8 +43,8 @@ class QueryStream(PipelinedStream[Any]):
         """Sends a step: the server applies `update`, then answers `queries` at a revision that contains it. Otherwise
         like send().
 
-        The future receives the StepResult, or the LocusError with which the step was refused; then nothing was changed
-        and no query was run. Steps are applied in the order sent. The stream replaces the `writer` and `number` of the
+        The future receives the StepResult, or the LocusError with which the step was refused; if the error has a reason,
+        nothing was changed and no query was run. Steps are applied in the order sent. The stream replaces the `writer` and `number` of the
         sent copy of the update.
         """
         changes, batch = update.message.SerializeToString(), queries.batch_bytes()
@@ -57,6 +57,9 @@ class QueryStream(PipelinedStream[Any]):
             # This is the second occurrence of the field `update`. Protobuf parsers merge the two.
             numbers.update.writer, numbers.update.batch = self.writer, item.number
         return b"".join((item.batch, numbers.SerializeToString()))
+
+    def _is_duplicate(self, result: Any) -> bool:
+        return isinstance(result, StepResult) and result.ack.duplicate
 
     def _answer_in(self, response: bytes) -> Tuple[int, Any]:
         found = wire.fields(memoryview(response))

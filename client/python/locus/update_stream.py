@@ -23,7 +23,8 @@ class UpdateStream(PipelinedStream[Ack]):
     Each batch carries the stream's random writer id, `writer`, and a batch number that counts up from 1 without gaps.
     After a broken connection every batch without an ack is sent again, in order; the ack of a batch that the server had
     already applied has `duplicate` set. A refused batch does not consume its number: the batches after it are
-    renumbered and sent again. The stream ends if the server refuses the whole stream, if the server no longer knows
+    renumbered and sent again. If a batch is refused when it is sent again, it may have been applied before: its error
+    then has no reason and says so. The stream ends if the server refuses the whole stream, if the server no longer knows
     the writer (the scene has a new epoch), if a batch fails with an error without a reason, or if reconnecting fails as
     often as `reconnect` allows. The future of every unanswered batch then raises the LocusError with which the stream
     ended; the outcome of these batches is unknown.

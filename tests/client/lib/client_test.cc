@@ -133,6 +133,23 @@ TEST_P(ClientTest, AnUpdateWithWriterAndBatchIsRetried) {
   EXPECT_THAT(server_.updates.applied(), ElementsAre(5));
 }
 
+TEST_P(ClientTest, ARefusalDoesNotHideThatAnEarlierAttemptMayHaveAppliedTheUpdate) {
+  for (const bool is_step : {false, true}) {
+    server_.updates.failing_calls = 1;
+    server_.updates.refused_repeats = {5};
+    v1::UpdateBatch batch;
+    batch.set_writer(is_step ? 78 : 77);
+    batch.set_batch(1);
+    batch.set_tick(5);
+    const absl::Status status =
+        is_step ? client_->step("arena", batch, {}).status() : client_->apply("arena", batch).status();
+    EXPECT_TRUE(absl::IsFailedPrecondition(status)) << status;
+    EXPECT_FALSE(refused_by_server(status)) << status;
+    EXPECT_NE(status.message().find("may have been applied"), absl::string_view::npos) << status;
+    EXPECT_TRUE(refused_by_server(client_->apply("arena", batch).status())) << "refused at the first attempt";
+  }
+}
+
 TEST_P(ClientTest, AStepReturnsTheAckAndTheAnswerOrTheErrorOfItsQueries) {
   v1::QueryBatch queries;
   const absl::StatusOr<StepResult> step = client_->step("arena", {}, queries);

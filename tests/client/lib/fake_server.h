@@ -66,6 +66,7 @@ class FakeUpdates final : public v1::UpdateService::Service {
     scenes.push_back(metadata_of(*context, "x-scene"));
     if (failing_calls > 0) {
       --failing_calls;
+      break_at(request->batch());
       return {grpc::StatusCode::UNAVAILABLE, "planned"};
     }
     v1::StreamUpdatesResponse answer = apply(request->batch());
@@ -90,7 +91,7 @@ class FakeUpdates final : public v1::UpdateService::Service {
       std::unique_lock lock(mutex_);
       if (breaks.times > 0 && ++messages == breaks.after_messages) {
         --breaks.times;
-        if (breaks.apply_last) apply(request.batch());
+        break_at(request.batch());
         return breaks.status;
       }
       v1::StreamUpdatesResponse answer = apply(request.batch());
@@ -107,7 +108,7 @@ class FakeUpdates final : public v1::UpdateService::Service {
     std::lock_guard lock(mutex_);
     if (breaks.times > 0 && messages == breaks.after_messages) {
       --breaks.times;
-      if (breaks.apply_last) apply(batch);
+      break_at(batch);
       return std::nullopt;
     }
     return apply(batch);
@@ -127,6 +128,9 @@ class FakeUpdates final : public v1::UpdateService::Service {
 
   Breaks breaks;
   std::set<uint64_t> refused_ticks;  // ticks whose batches are refused
+  std::set<uint64_t> denied_ticks;   // ticks whose batches the caller has no right to send
+  // Ticks whose batches are refused, before their number is checked, once they were applied or their message was lost.
+  std::set<uint64_t> refused_repeats;
   int failing_calls = 0;
   int calls = 0;
   int streams = 0;
@@ -138,8 +142,22 @@ class FakeUpdates final : public v1::UpdateService::Service {
   v1::UpdateBatch last_batch;
 
  private:
+  // Handles the last message before a break.
+  void break_at(const v1::UpdateBatch& batch) {
+    if (breaks.apply_last) apply(batch);
+    seen_.insert(batch.tick());
+  }
+
   v1::StreamUpdatesResponse apply(const v1::UpdateBatch& batch) {
     v1::StreamUpdatesResponse response;
+    if (denied_ticks.count(batch.tick()) > 0) {
+      set_error(response, grpc::StatusCode::PERMISSION_DENIED, v1::REASON_UNSPECIFIED);
+      return response;
+    }
+    if (seen_.count(batch.tick()) > 0 && refused_repeats.count(batch.tick()) > 0) {
+      set_error(response, grpc::StatusCode::FAILED_PRECONDITION, v1::REASON_SCENE_RESTARTED);
+      return response;
+    }
     uint64_t& next = next_.try_emplace(batch.writer(), 1).first->second;
     if (batch.writer() != 0 && batch.batch() > next) {
       ++gaps;
@@ -176,6 +194,7 @@ class FakeUpdates final : public v1::UpdateService::Service {
 
   mutable std::mutex mutex_;
   std::map<uint64_t, uint64_t> next_;
+  std::set<uint64_t> seen_;  // ticks of the last messages before breaks
   std::vector<uint64_t> applied_;
 };
 

@@ -187,6 +187,47 @@ TEST_P(QueryStreamTest, EachStepIsAppliedOnceDespiteRefusalsAndBreaks) {
   EXPECT_EQ(server_.updates.applied(), expected);
 }
 
+// A step that was applied, and is refused when it is sent again, keeps its number. Otherwise the next step would get
+// the number, and the server would take it for a repetition.
+TEST_P(QueryStreamTest, ARepeatedStepThatIsRefusedKeepsTheNumberIfItWasApplied) {
+  server_.updates.breaks = {.after_messages = 2, .times = 1, .apply_last = true};
+  server_.updates.refused_repeats = {2};
+  std::vector<std::future<absl::StatusOr<StepResult>>> steps;
+  for (uint64_t tick = 1; tick <= 6; ++tick) steps.push_back(step(tick));
+  EXPECT_TRUE(stream_->close().ok());
+  for (uint64_t tick = 1; tick <= 6; ++tick) {
+    const absl::StatusOr<StepResult> outcome = steps[tick - 1].get();
+    EXPECT_EQ(outcome.ok(), tick != 2) << tick << ": " << outcome.status();
+    if (outcome.ok()) {
+      EXPECT_FALSE(outcome->ack.duplicate()) << tick;
+      continue;
+    }
+    EXPECT_NE(outcome.status().message().find("may have been applied"), absl::string_view::npos) << outcome.status();
+    EXPECT_FALSE(refused_by_server(outcome.status()));
+  }
+  EXPECT_EQ(server_.updates.applied(), (std::vector<uint64_t>{1, 2, 3, 4, 5, 6}));
+}
+
+TEST_P(QueryStreamTest, TheNumberOfARepeatedStepIsUsedAgainIfItWasNotApplied) {
+  server_.updates.breaks = {.after_messages = 2, .times = 1, .apply_last = false};
+  server_.updates.refused_repeats = {2};
+  std::vector<std::future<absl::StatusOr<StepResult>>> steps;
+  for (uint64_t tick = 1; tick <= 6; ++tick) steps.push_back(step(tick));
+  EXPECT_TRUE(stream_->close().ok());
+  for (uint64_t tick = 1; tick <= 6; ++tick) EXPECT_EQ(steps[tick - 1].get().ok(), tick != 2) << tick;
+  EXPECT_EQ(server_.updates.applied(), (std::vector<uint64_t>{1, 3, 4, 5, 6}));
+  EXPECT_EQ(server_.updates.duplicates, 0);
+}
+
+TEST_P(QueryStreamTest, AStepWithoutTheRightToUpdateDoesNotEndTheStream) {
+  server_.updates.denied_ticks = {2};
+  std::vector<std::future<absl::StatusOr<StepResult>>> steps;
+  for (uint64_t tick = 1; tick <= 4; ++tick) steps.push_back(step(tick));
+  EXPECT_TRUE(stream_->close().ok());
+  EXPECT_TRUE(absl::IsPermissionDenied(steps[1].get().status()));
+  EXPECT_EQ(server_.updates.applied(), (std::vector<uint64_t>{1, 3, 4}));
+}
+
 TEST_P(QueryStreamTest, AServerThatForgotTheWriterEndsTheStream) {
   ASSERT_TRUE(step(1).get().ok());
   server_.updates.forget_writers();

@@ -155,6 +155,30 @@ TEST_P(UpdateStreamTest, EachBatchIsAppliedOnceDespiteRefusalsAndBreaks) {
   EXPECT_EQ(outcomes.ticks, one_to(60));
 }
 
+// A batch that was applied, and is refused when it is sent again, keeps its number. Otherwise the next batch would get
+// the number, and the server would take it for a repetition.
+TEST_P(UpdateStreamTest, ARepeatedBatchThatIsRefusedFreesItsNumberOnlyIfItWasNotApplied) {
+  for (const bool applied : {true, false}) {
+    const uint64_t first = applied ? 1 : 11;
+    server_.updates.breaks = {.after_messages = 2, .times = 1, .apply_last = applied};
+    server_.updates.refused_repeats = {2, 12};
+    const auto stream = open();
+    std::vector<std::future<absl::StatusOr<v1::UpdateAck>>> acks;
+    for (uint64_t i = 0; i < 6; ++i) acks.push_back(stream->send(batch_of_tick(first + i)));
+    EXPECT_TRUE(stream->close().ok());
+    for (uint64_t i = 0; i < 6; ++i) {
+      const absl::StatusOr<v1::UpdateAck> ack = acks[i].get();
+      EXPECT_EQ(ack.ok(), i != 1) << i << ": " << ack.status();
+      if (ack.ok()) {
+        EXPECT_FALSE(ack->duplicate()) << i;
+      } else {
+        EXPECT_FALSE(refused_by_server(ack.status())) << ack.status();
+      }
+    }
+  }
+  EXPECT_THAT(server_.updates.applied(), ElementsAre(1, 2, 3, 4, 5, 6, 11, 13, 14, 15, 16));
+}
+
 TEST_P(UpdateStreamTest, AServerThatForgotTheWriterEndsTheStreamInsteadOfLosingBatches) {
   const auto stream = open();
   ASSERT_TRUE(stream->send(batch_of_tick(1)).get().ok());

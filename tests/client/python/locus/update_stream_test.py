@@ -1,12 +1,16 @@
 """Tests that update streams apply batches in order and exactly once, across refusals and broken connections."""
 import socket
 import threading
+import unittest
+from concurrent import futures
 
 import grpc
 import locus
-from locus import QueryBatch, UpdateBatch
+from locus import QueryBatch, UpdateBatch, schema
 from support import WAIT_SECONDS, Daemon, DaemonTest, listed
 
+UPDATES, STEPS = schema.method("locus.v1.UpdateService", "StreamUpdates"), schema.method("locus.v1.QueryService",
+                                                                                         "StreamQueries")
 
 
 class Relay:
@@ -61,6 +65,122 @@ class Relay:
         self.listener.shutdown(socket.SHUT_RDWR)  # wakes accept(); close() alone does not
         self.listener.close()
         self.cut()
+
+
+class FakeServer:
+    """Server of updates and steps that loses the first answer to tick 2 and breaks the call then. When tick 2 is sent
+    again, it is refused before its number is checked, as the server refuses a step whose view names an old epoch.
+    """
+
+    def __init__(self, applies_lost):
+        self.applies_lost = applies_lost
+        self.applied, self.lost = [], False
+        self.pool = futures.ThreadPoolExecutor(8)
+        self.server = grpc.server(self.pool)
+        stream, unary = grpc.stream_stream_rpc_method_handler, grpc.unary_unary_rpc_method_handler
+        handlers = {"UpdateService": {"StreamUpdates": stream(self.updates), "ApplyUpdates": unary(self.update)},
+                    "QueryService": {"StreamQueries": stream(self.steps), "Step": unary(self.step)},
+                    "ServerService": {"GetServer": unary(lambda request, context: b"")}}
+        self.server.add_generic_rpc_handlers([
+            grpc.method_handlers_generic_handler("locus.v1." + name, methods) for name, methods in handlers.items()])
+        self.address = "127.0.0.1:%d" % self.server.add_insecure_port("127.0.0.1:0")
+        self.server.start()
+
+    def stop(self):
+        self.server.stop(None).wait()
+        self.pool.shutdown()
+
+    def apply(self, batch, response):
+        """Fills in the ack or the error of a batch. Returns False if the call must break."""
+        if batch.tick == 2:
+            if not self.lost:
+                self.lost = True
+                if self.applies_lost:
+                    self.applied.append(batch.tick)
+                return False
+            response.error.code, response.error.reason = 9, locus.Reason.SCENE_RESTARTED.value
+            response.error.message = "planned"
+            return True
+        if batch.batch > len(self.applied) + 1:
+            response.error.code, response.error.reason = 9, locus.Reason.BATCH_GAP.value
+            response.error.limit_value = len(self.applied) + 1
+            return True
+        response.ack.duplicate = batch.batch <= len(self.applied)
+        if not response.ack.duplicate:
+            self.applied.append(batch.tick)
+        response.ack.revision = len(self.applied)
+        return True
+
+    def answers(self, method, requests, context, update_of):
+        for raw in requests:
+            request = method.request.FromString(raw)
+            response = method.response(sequence=request.sequence)
+            if not self.apply(update_of(request), response):
+                context.abort(grpc.StatusCode.UNAVAILABLE, "planned")
+            if method is STEPS and response.HasField("ack"):
+                response.result.revision = response.ack.revision
+            yield response.SerializeToString()
+
+    def updates(self, requests, context):
+        return self.answers(UPDATES, requests, context, lambda request: request.batch)
+
+    def steps(self, requests, context):
+        return self.answers(STEPS, requests, context, lambda request: request.update)
+
+    def answer(self, batch, context):
+        response = UPDATES.response()
+        if not self.apply(batch, response):
+            context.abort(grpc.StatusCode.UNAVAILABLE, "planned")
+        status = schema.message("Status")(code=response.error.code, message=response.error.message)
+        status.details.add(type_url="type.googleapis.com/locus.v1.Error", value=response.error.SerializeToString())
+        context.set_trailing_metadata((("grpc-status-details-bin", status.SerializeToString()),))
+        context.abort(grpc.StatusCode.FAILED_PRECONDITION, response.error.message)
+
+    def update(self, raw, context):
+        return self.answer(schema.method("locus.v1.UpdateService", "ApplyUpdates").request.FromString(raw).batch, context)
+
+    def step(self, raw, context):
+        return self.answer(schema.method("locus.v1.QueryService", "Step").request.FromString(raw).update, context)
+
+
+class RepeatedUpdateTest(unittest.TestCase):
+    """Tests of updates that are refused when they are sent again after their first answer was lost."""
+
+    def started(self, applies_lost):
+        server = FakeServer(applies_lost)
+        self.addCleanup(server.stop)
+        client = locus.connect(server.address, retry=locus.Retry(attempts=20, first_wait=0.01))
+        self.addCleanup(client.close)
+        return server, client
+
+    def check(self, error):
+        self.assertEqual((error.code, error.refused), (grpc.StatusCode.FAILED_PRECONDITION, False))
+        self.assertIn("may have been applied", str(error))
+
+    def test_a_stream_frees_the_number_only_if_the_update_was_not_applied(self):
+        for applies_lost in (True, False):
+            for steps in (True, False):
+                with self.subTest(applies_lost=applies_lost, steps=steps):
+                    server, client = self.started(applies_lost)
+                    quick = locus.Retry(attempts=20, first_wait=0.01)
+                    with (client.query_stream if steps else client.update_stream)("arena", reconnect=quick) as stream:
+                        sent = [stream.step(UpdateBatch(tick=tick), QueryBatch().lookup(1)) if steps else
+                                stream.send(UpdateBatch(tick=tick)) for tick in range(1, 7)]
+                    self.check(sent.pop(1).exception(WAIT_SECONDS))
+                    acks = [future.result(WAIT_SECONDS) for future in sent]
+                    self.assertFalse(any((ack.ack if steps else ack).duplicate for ack in acks))
+                    self.assertEqual(server.applied, [1, 2, 3, 4, 5, 6] if applies_lost else [1, 3, 4, 5, 6])
+
+    def test_a_refused_retry_of_a_call_has_an_unknown_outcome(self):
+        for step in (True, False):
+            _, client = self.started(True)
+            update = UpdateBatch(tick=2, writer=5, number=1)
+            with self.assertRaises(locus.LocusError) as failed:
+                client.step("arena", update, QueryBatch().lookup(1)) if step else client.apply("arena", update)
+            self.check(failed.exception)
+            with self.assertRaises(locus.LocusError) as refused:
+                client.apply("arena", update)
+            self.assertTrue(refused.exception.refused, "refused at the first attempt")
 
 
 class UpdateStreamTest(DaemonTest):
