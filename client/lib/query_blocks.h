@@ -11,6 +11,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <optional>
 
 #include "absl/types/span.h"
 #include "client/lib/columns.h"
@@ -27,8 +28,9 @@ struct Filter {
   uint64_t ignore_group = 0;   // group that the query does not find; 0 = no group is ignored
   uint64_t only_group = 0;     // only group that the query finds; 0 = every group
   uint64_t self_id = 0;        // id that the query does not find; 0 = no id
-  uint64_t tag = 0;            // finds only objects and instances with (their tag & tag_mask) == (tag & tag_mask)
-  uint64_t tag_mask = 0;       // 0 = every tag
+  // Finds only objects and instances with (their tag & tag_mask) == (tag & tag_mask); none = every tag.
+  std::optional<uint64_t> tag = std::nullopt;
+  uint64_t tag_mask = ~uint64_t{0};
 };
 
 // Settings that every kind of block has. Each function returns the builder of the block, so that calls can be chained.
@@ -134,10 +136,10 @@ class BlockBuilder {
     append_row<uint64_t>(*block_->mutable_only_groups(), rows_before, filter.only_group, 0);
     append_row<uint64_t>(*block_->mutable_self_ids(), rows_before, filter.self_id, 0);
     // The server takes masks only together with tags, so both columns are filled once a row has a mask.
-    append_row<uint64_t>(*block_->mutable_tag_masks(), rows_before, filter.tag_mask, 0);
+    append_row<uint64_t>(*block_->mutable_tag_masks(), rows_before, filter.tag ? filter.tag_mask : 0, 0);
     if (!block_->tag_masks().empty()) {
       block_->mutable_tags()->Resize(rows_before, 0);
-      block_->add_tags(filter.tag);
+      block_->add_tags(filter.tag.value_or(0));
     }
   }
 

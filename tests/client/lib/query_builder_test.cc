@@ -38,12 +38,13 @@ TEST(QueryBuilderTest, FiltersOfARowFillTheirColumns) {
   builder.rays()
       .ray({0, 1, 0}, {0, 0, -1})
       .ray({1, 1, 0}, {0, 0, -2}, 50, {.only_group = 4, .self_id = 7, .tag = 0, .tag_mask = 0xFF})
-      .ray({2, 1, 0}, {0, 0, -3}, 50, {.tag = 5, .tag_mask = 6});
+      .ray({2, 1, 0}, {0, 0, -3}, 50, {.tag = 5, .tag_mask = 6})
+      .ray({3, 1, 0}, {0, 0, -3}, 50, {.tag = 7});
   const v1::QueryBlock block = builder.build().blocks(0);
-  EXPECT_THAT(block.only_groups(), ElementsAre(0, 4, 0));
-  EXPECT_THAT(block.self_ids(), ElementsAre(0, 7, 0));
-  EXPECT_THAT(block.tags(), ElementsAre(0, 0, 5));
-  EXPECT_THAT(block.tag_masks(), ElementsAre(0, 0xFF, 6));
+  EXPECT_THAT(block.only_groups(), ElementsAre(0, 4, 0, 0));
+  EXPECT_THAT(block.self_ids(), ElementsAre(0, 7, 0, 0));
+  EXPECT_THAT(block.tags(), ElementsAre(0, 0, 5, 7));
+  EXPECT_THAT(block.tag_masks(), ElementsAre(0, 0xFF, 6, ~uint64_t{0})) << "a tag without a mask compares all bits";
 }
 
 TEST(QueryBuilderTest, FiltersOfABlockAreWholeColumns) {
