@@ -222,7 +222,9 @@ void add_filter_fields(const QueryOptions& options, RowSchema& schema) {
   schema.push_back(
       column_or_option({.name = "only_group", .kind = FieldKind::kId}, options.only_groups, "--only-group"));
   schema.push_back(column_or_option({.name = "tag", .kind = FieldKind::kId}, options.tags, "--tag"));
-  schema.push_back(column_or_option({.name = "tag_mask", .kind = FieldKind::kId}, options.tag_masks, "--tag-mask"));
+  Field mask = column_or_option({.name = "tag_mask", .kind = FieldKind::kId}, options.tag_masks, "--tag-mask");
+  if (options.tags.empty()) mask.needs = "tag";
+  schema.push_back(std::move(mask));
 }
 
 TagColumns tag_columns(const QueryOptions& options, const BlockRows& rows, size_t tag_field) {

@@ -63,7 +63,7 @@ std::vector<float> offsets_of(const RowColumn& positions, RowSpan rows, const cl
 Field at_field();
 
 // Appends the fields that every kind of query has to the schema: mask, ignore_group, self_id, only_group, tag and
-// tag_mask.
+// tag_mask. A row with a tag_mask and without a tag is malformed.
 void add_filter_fields(const QueryOptions& options, RowSchema& schema);
 
 // Columns tags and tag_masks of a block. Both are empty if no tag is given.

@@ -134,6 +134,10 @@ absl::Status RowBuilder::finish(uint64_t line, RowBatch& batch) {
   for (size_t i = 0; i < schema_.size(); ++i) {
     const uint32_t given = values_[i].parts_given;
     if (given == 0 && schema_[i].required) return wrong({i}, "is missing");
+    if (given != 0 && !schema_[i].needs.empty())
+      if (const std::optional<Slot> other = find_slot(schema_, schema_[i].needs);
+          other && values_[other->field].parts_given == 0)
+        return wrong({i}, absl::StrCat("needs a value of ", schema_[i].needs, " in the same row"));
     if (given == 0 || schema_[i].parts.empty()) continue;
     for (size_t part = 0; part < schema_[i].size(); ++part) {
       if ((given & (1u << part)) == 0) return wrong({i, part}, "is missing, but other parts are given");

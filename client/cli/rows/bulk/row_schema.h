@@ -36,6 +36,8 @@ struct Field {
   // Option that sets this field for all rows, so that the input must not have the column; empty = none.
   std::string option = {};
   std::vector<std::string> words = {};
+  // Name of a field that a row must have if it has this field; empty = none.
+  std::string needs = {};
 
   size_t size() const { return parts.empty() ? 1 : parts.size(); }
 };

@@ -140,6 +140,9 @@ TEST_F(BulkQueryTest, RowsFilterByGroupTagAndId) {
   EXPECT_EQ(
       out_of({"-o", "csv", "query", "ball", "world", "--from-csv", plain.path(), "--tag", "12345", "--tag-mask", "0"}),
       "ball,id\n0,1\n");
+  const TestFile masks("at.x,at.y,at.z,radius,tag,tag_mask\n0,0,0,1,5,7\n0,0,0,1,,7\n", "masks.csv");
+  EXPECT_THAT(run({"query", "ball", "world", "--from-csv", masks.path()}).err,
+              HasSubstr(masks.path() + ":3: tag_mask: needs a value of tag in the same row"));
 }
 
 TEST_F(BulkQueryTest, AJsonAnswerIsTheSameDocumentAsFromOptions) {
