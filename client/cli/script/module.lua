@@ -403,6 +403,14 @@ function Queries:take(view)
   return { view = view, blocks = blocks }, answers_in
 end
 
+-- Returns a copy of a table of the caller with one more field.
+local function with_field(batch, name, value)
+  local copy = {}
+  for key, field in pairs(batch) do copy[key] = field end
+  copy[name] = value
+  return copy
+end
+
 local step_fields <const> = fields("updates queries tick view")
 -- Makes a step: applies `updates` at `tick`, then answers `queries` at a revision that contains the updates, or at that
 -- of `view`. Both are builders or batches in columns, and may be absent. Returns the answers (nil for a batch in
@@ -412,8 +420,8 @@ function Scene:step(step)
   local updates, queries, answers_in = step.updates or {}, step.queries or {}, nil
   if getmetatable(updates) == Updates then updates = updates:take() end
   if getmetatable(queries) == Queries then queries, answers_in = queries:take() end
-  if step.tick then updates.tick = step.tick end
-  if step.view then queries.view = step.view end
+  if step.tick then updates = with_field(updates, "tick", step.tick) end
+  if step.view then queries = with_field(queries, "view", step.view) end
   local result, ack = self.server:step(self.name, updates, queries)
   return answers_in and answers_in(result), result, ack
 end

@@ -391,11 +391,15 @@ locus.expect_equal(steps[2].reason, "UNKNOWN_ID")
 locus.expect_equal(steps[3].revision, steps[1].ack.revision)
 locus.expect_equal(steps[4].result.reason, "OUT_OF_RANGE")
 locus.expect_equal(scene:update_stream().step, nil)
+local shared, none_asked = {moves = {{ids = {1}, positions_f64 = {{6, 0, 0}}}}}, {blocks = {}}
+scene:step{updates = shared, queries = none_asked, tick = 9, view = {at_least = 1}}
+locus.expect_equal(shared.tick, nil, "a step leaves the caller's tables unchanged")
+locus.expect_equal(none_asked.view, nil, "a step leaves the caller's tables unchanged")
 scene:step{update = move}
 )",
                                   {"--keep-going"});
   EXPECT_THAT(outcome.err, HasSubstr("step has no field 'update'; did you mean `updates`?"));
-  EXPECT_THAT(outcome.err, HasSubstr("18 expectations passed")) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("20 expectations passed")) << outcome.err;
 }
 
 TEST_F(RunCommandTest, MeshesAndInstancesAreMadeFromTables) {
