@@ -1,5 +1,6 @@
 #include "core/query/kinds/query_times.h"
 
+#include <optional>
 #include <utility>
 
 #include "absl/container/flat_hash_map.h"
@@ -69,7 +70,7 @@ absl::Status too_many_times(const std::string& field, size_t entry) {
 }  // namespace
 
 absl::StatusOr<QueryTimes> QueryTimes::resolve(const SceneSnapshot& snapshot, const QueryBlock& block,
-                                               const std::string& field, uint64_t& free_bytes) {
+                                               const std::string& field, InterpolationBudget& budget) {
   QueryTimes result;
   absl::flat_hash_map<std::pair<uint64_t, float>, size_t>
       moving;  // index in scenes_ of each time with moving instances
@@ -93,11 +94,9 @@ absl::StatusOr<QueryTimes> QueryTimes::resolve(const SceneSnapshot& snapshot, co
       result.scenes_.push_back(result.scenes_[repeated ? i - 1 : known->second]);
     } else {
       result.scenes_.push_back(*find_scene_at(snapshot, time));
-      if (const uint64_t bytes = result.scenes_.back().interpolated_bytes(); bytes != 0) {
-        if (bytes > free_bytes) return too_many_times(field, i);
-        free_bytes -= bytes;
-        moving.emplace(std::pair(time.tick, time.fraction), i);
-      }
+      const std::optional<uint64_t> bytes = result.scenes_.back().take_interpolated_bytes(budget);
+      if (!bytes) return too_many_times(field, i);
+      if (*bytes != 0) moving.emplace(std::pair(time.tick, time.fraction), i);
     }
     result.times_.push_back(time);
     result.clamped_.push_back(time == asked ? 0 : 1);

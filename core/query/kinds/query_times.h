@@ -20,10 +20,10 @@ class QueryTimes {
  public:
   // Resolves the times of `block`, which has passed check_batch(). `field` is the block's name in errors. Returns
   // OUT_OF_RANGE for a time outside the history unless the block has OutsideHistory::kClamp; the error names
-  // `field`.as_of_ticks, the index of the entry and the retained ticks. Subtracts from `free_bytes` the memory of the
+  // `field`.as_of_ticks, the index of the entry and the retained ticks. Takes from `budget` the memory of the
   // sets of interpolated instances that the queries may make; returns INVALID_ARGUMENT if it is not enough.
   static absl::StatusOr<QueryTimes> resolve(const SceneSnapshot& snapshot, const QueryBlock& block,
-                                            const std::string& field, uint64_t& free_bytes);
+                                            const std::string& field, InterpolationBudget& budget);
 
   // Returns the objects and instances at the effective time of a query.
   const SceneAtTime& of(size_t query) const { return scenes_[entry_of(query)]; }

@@ -51,13 +51,14 @@ absl::StatusOr<std::unique_ptr<BatchRun>> BatchRun::prepare(const SceneSnapshot&
                                                             RunOptions options, AnswerSink& answer) {
   std::vector<QueryTimes> times;
   times.reserve(batch.blocks.size());
-  uint64_t free_bytes = limits::kMaxInterpolatedBytes;
+  InterpolationBudget budget(limits::kMaxInterpolatedBytes);
   for (size_t b = 0; b < batch.blocks.size(); ++b) {
     ASSIGN_OR_RETURN(QueryTimes resolved,
-                     QueryTimes::resolve(snapshot, batch.blocks[b], absl::StrCat("blocks[", b, "]"), free_bytes));
+                     QueryTimes::resolve(snapshot, batch.blocks[b], absl::StrCat("blocks[", b, "]"), budget));
     times.push_back(std::move(resolved));
   }
   std::unique_ptr<BatchRun> run(new BatchRun(snapshot, batch, std::move(options), answer));
+  run->interpolated_bytes_ = budget.taken();
   for (QueryTimes& block_times : times) run->add_block(std::move(block_times));
   const MutexLock lock(run->mutex_);
   LOCUS_DCHECK_EQ(run->blocks_.size(), batch.blocks.size());

@@ -73,6 +73,10 @@ class BatchRun {
   static absl::StatusOr<std::unique_ptr<BatchRun>> prepare(const SceneSnapshot& snapshot, const QueryBatch& batch,
                                                            RunOptions options, AnswerSink& answer);
 
+  // Returns an upper bound of the memory of the instances that the queries interpolate between ticks. None of it is
+  // allocated before work().
+  uint64_t interpolated_bytes() const { return interpolated_bytes_; }
+
   // Runs chunks until about `nanoseconds` have passed or no chunk may be started. Writes finished chunks to the
   // AnswerSink in batch order, up to the first chunk that is not finished.
   Progress work(uint64_t nanoseconds) LOCUS_EXCLUDES(mutex_);
@@ -168,6 +172,7 @@ class BatchRun {
   BatchControl control_;
   std::deque<Block> blocks_;
   std::atomic<uint64_t> work_done_{0};
+  uint64_t interpolated_bytes_ = 0;
   std::atomic<uint64_t> free_bytes_;  // reply bytes left for counted rows; set by write_out()
 
   Mutex mutex_;

@@ -48,11 +48,16 @@ class SceneAtTime {
   // Returns the instances at this time, at their interpolated positions. Between two ticks at which instances moved,
   // the first call for a view and its copies makes the set: see InstancesBetween::get().
   const StaticSet& statics() const { return between_ == nullptr ? *statics_ : between_->get(); }
-  // Returns an upper bound of the memory of the set that statics() makes; 0 if it makes none. O(instances that changed
-  // between the two ticks).
-  uint64_t interpolated_bytes() const {
-    return between_ == nullptr ? 0 : locus::interpolated_bytes(*statics_, *next_statics_);
+  // Takes the memory of the set that statics() makes from `budget`, before the first call of statics(). If no instance
+  // moves up to the next tick, the view uses the instances of its tick from then on, and takes nothing. Returns the
+  // bytes taken, or nullopt if the budget does not suffice.
+  std::optional<uint64_t> take_interpolated_bytes(InterpolationBudget& budget) {
+    const uint64_t bytes = between_ == nullptr ? 0 : budget.cost(*statics_, *next_statics_);
+    if (bytes == 0) between_ = nullptr;
+    return budget.take(bytes) ? std::optional(bytes) : std::nullopt;
   }
+  // Returns whether statics() interpolates instances.
+  bool interpolates_statics() const { return between_ != nullptr; }
   // Returns the shape of an object of objects() at its interpolated position and rotation.
   Shape shape(const GridRef& object) const { return next_ == nullptr ? shape_of(object) : shape_between(object); }
 
@@ -98,7 +103,7 @@ class SceneAtTime {
   const std::vector<FastMover>* fast_ = nullptr;  // objects exempt from displacement_bound_, ascending by handle
   const StaticSet* statics_;
   const StaticSet* next_statics_ = nullptr;
-  std::shared_ptr<const InstancesBetween> between_;  // null if no instance changes up to the next tick
+  std::shared_ptr<const InstancesBetween> between_;  // null if no instance is known to change up to the next tick
 };
 
 // Returns the view of the scene at `time`, or nullopt if `time` is before the oldest recorded tick or after the

@@ -415,6 +415,30 @@ TEST_F(PastInstancesTest, TooManyTimesOfMovingInstancesAreRefused) {
   EXPECT_TRUE(run_batch(*scene_.latest(), batch, {}).ok());
 }
 
+// Between the ticks 2 and 3 an instance was hidden, but none has moved; between 6 and 7 one has moved.
+TEST_F(PastInstancesTest, InstancesOfTwoTicksAreComparedOncePerBatch) {
+  tick(6, {});
+  tick(7, with(instances_to({9}, {5, 3, 8})));
+  for (const uint64_t begin : {2, 6}) {
+    OwnedBlock block = up(0, begin);
+    block.points.clear();
+    block.sizes = {0, 0, 1};
+    block.as_of_fractions.clear();
+    for (int i = 0; i < 16; ++i) {
+      block.points.insert(block.points.end(), {0.2f, 0.2f, 0});
+      block.as_of_fractions.push_back(static_cast<float>(i) / 16);
+    }
+    InterpolationBudget budget(uint64_t{1} << 20);
+    const auto scene = scene_.latest();
+    const absl::StatusOr<QueryTimes> times = QueryTimes::resolve(*scene, block.view(), "blocks[0]", budget);
+    ASSERT_TRUE(times.ok()) << times.status();
+    EXPECT_EQ(budget.pairs(), 1u);
+    EXPECT_EQ(budget.taken() != 0, begin == 6);
+    for (size_t i = 1; i < 16; ++i) EXPECT_EQ(times->of(i).interpolates_statics(), begin == 6) << i;
+    EXPECT_EQ(&times->of(3).statics() == &times->of(1).statics(), begin == 2);
+  }
+}
+
 TEST_F(PastInstancesTest, TheHistoryCountsTheInstancesThatMoved) {
   std::vector<Id> many;
   for (Id id = 100; id < 2'100; ++id) many.push_back(id);
