@@ -95,6 +95,7 @@ void QueryWork::drop() {
   ticket_.reset();
   if (run_ != nullptr) slot_.caller().charge_quota(QuotaKind::kWork, static_cast<double>(run_->work_done()));
   run_.reset();
+  instances_claim_.release();
   pin_.reset();
   scene_.reset();
   change({State::kReading, State::kParked, State::kDeferred, State::kQueued}, State::kIdle);
@@ -177,10 +178,18 @@ void QueryWork::run() {
   absl::StatusOr<std::unique_ptr<BatchRun>> run = BatchRun::prepare(**pin_, batch_, std::move(options), *columns_);
   if (!run.ok()) return answer(run.status());
   run_ = *std::move(run);
+  if (absl::Status status = claim_instances(); !status.ok()) return answer(std::move(status));
   const uint64_t cost = host_.costs.nanoseconds((*pin_)->epoch, batch_);
   if (!host_.scheduler.runs_inline(cost)) return submit(cost);
   change({State::kReading}, State::kDeferred);
   slot_.io().defer(*this, cost < kShortNanoseconds ? TaskLength::kShort : TaskLength::kLong);
+}
+
+absl::Status QueryWork::claim_instances() {
+  const uint64_t bytes = run_->interpolated_bytes();
+  if (bytes == 0) return absl::OkStatus();
+  ASSIGN_OR_RETURN(instances_claim_, slot_.caller().claim(MemoryLine::kReplies, "blocks", bytes));
+  return absl::OkStatus();
 }
 
 void QueryWork::run_deferred() { progress_ = host_.scheduler.run_inline(*this); }

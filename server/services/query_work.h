@@ -54,6 +54,7 @@
 #include "locus/v1/query_service.pb.h"
 #include "server/convert/result_columns.h"
 #include "server/host/host.h"
+#include "server/rpc/call.h"
 #include "server/rpc/call_slot.h"
 #include "server/rpc/io_threads.h"
 #include "server/scheduling/query_scheduler.h"
@@ -108,6 +109,8 @@ class QueryWork final : private QueryJob, private DeferredTask {
   absl::Status no_longer() const;
 
   void run();
+  // Claims memory for the instances that the queries interpolate between ticks.
+  absl::Status claim_instances();
   // Works on the batch for about SchedulerOptions::inline_nanoseconds, without the loop's lock.
   void run_deferred() override;
   void on_deferred_done() override;
@@ -142,6 +145,7 @@ class QueryWork final : private QueryJob, private DeferredTask {
 
   std::optional<SnapshotPin> pin_;
   std::optional<ResultColumns> columns_;
+  CallMemory instances_claim_;  // memory of the instances that the queries interpolate between ticks
   std::unique_ptr<BatchRun> run_;
   Progress progress_ = Progress::kMore;  // result of run_deferred()
   QueryScheduler::TicketPtr ticket_;

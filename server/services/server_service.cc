@@ -95,6 +95,7 @@ std::vector<NamedLimit> limits_of(const Host& host) {
       {"http_request_bytes", kMaxHttpRequestBytes},
       {"ignored_ids", limits::kMaxIgnoredIds},
       {"instances", limits::kMaxInstances},
+      {"interpolated_bytes", static_cast<double>(limits::kMaxInterpolatedBytes)},
       {"label_length", limits::kMaxLabelLength},
       {"labelled_scenes", kMaxLabelledScenes},
       {"labels", limits::kMaxLabels},

@@ -66,6 +66,7 @@ TEST_F(ServerRpcTest, LimitsAreListedInOrderWithTheirUse) {
   EXPECT_EQ(limit_of(server, "calls").used(), 1);
   EXPECT_EQ(limit_of(server, "queries").value(), limits::kMaxQueries);
   EXPECT_EQ(limit_of(server, "rays").value(), limits::kMaxRays);
+  EXPECT_EQ(limit_of(server, "interpolated_bytes").value(), static_cast<double>(limits::kMaxInterpolatedBytes));
   EXPECT_EQ(limit_of(server, "receive_bytes").value(), limits::kReceiveBytes);
 }
 
