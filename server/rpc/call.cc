@@ -93,7 +93,9 @@ absl::Status check_serving(const RpcState& state) {
 
 bool ends_stream(const Caller& caller, const absl::Status& status) {
   if (status.code() == absl::StatusCode::kCancelled || status.code() == absl::StatusCode::kUnavailable) return true;
-  return status.code() == absl::StatusCode::kDeadlineExceeded && !caller.stop().ok();
+  if (status.code() != absl::StatusCode::kDeadlineExceeded) return false;
+  const absl::Status stop = caller.stop();
+  return !stop.ok() && !absl::IsUnavailable(stop);  // UNAVAILABLE: the server drains, and the caller waits for answers
 }
 
 void record_answer(CallMetrics& metrics, const Caller& caller, Rpc rpc, const absl::Status& status, SteadyTime arrived,

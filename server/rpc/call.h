@@ -164,7 +164,8 @@ inline constexpr const char* kRequestIdMetadata = "x-request-id";
 absl::Status check_serving(const RpcState& state);
 
 // Returns whether `status`, the error of one message, must end the whole stream. This is the case if the caller ended
-// the call, if the call's deadline passed, or if the error is UNAVAILABLE (the server drains or its disk fails).
+// the call, if the call's deadline passed, or if the error is UNAVAILABLE (the server drains or its disk fails). It is
+// not the case if the error is DEADLINE_EXCEEDED because the server drains: then the messages are still answered.
 bool ends_stream(const Caller& caller, const absl::Status& status);
 
 // Counts a call, or one message of a stream, that was answered with `status`. If `status` is not OK, logs a line at

@@ -64,6 +64,8 @@ void QueryWork::start(uint64_t revision, uint64_t ack_bytes) {
   ack_bytes_ = ack_bytes;
   view_.revision = view_.kind == View::Kind::kAtLeast ? std::max(view_.revision, revision) : revision;
   view_.kind = View::Kind::kAtLeast;
+  // give_up() had no effect while the update was applied.
+  if (absl::Status status = slot_.caller().stop(); !status.ok()) return answer(std::move(status));
   until_ = slot_.caller().wait_until(slot_.stream());
   look();
 }
@@ -85,8 +87,13 @@ absl::Status QueryWork::take_quotas() const {
   return slot_.caller().take_quota(QuotaKind::kWork, 0);  // with amount 0, fails only while the quota is overdrawn
 }
 
+// The end of a drain is no UNAVAILABLE error for a step, whose ack must be sent: that error means that nothing was
+// changed.
 void QueryWork::answer(absl::Status status) {
   drop();
+  if (is_step_ && absl::IsUnavailable(status))
+    status = absl::DeadlineExceededError(
+        "the server is shutting down before it answered the queries of the step; the update was applied");
   slot_.answered(std::move(status));
 }
 

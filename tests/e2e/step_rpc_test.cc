@@ -73,6 +73,13 @@ class StepRpcTest : public RpcTest {
     EXPECT_EQ(dump(), before);
   }
 
+  void create_scene(RunningServer& server) {
+    v1::CreateSceneRequest create;
+    create.set_name("world");
+    v1::CreateSceneResponse created;
+    ASSERT_TRUE(call(*server.stubs().scenes, &v1::SceneService::Stub::CreateScene, create, &created).ok());
+  }
+
   static v1::StreamQueriesRequest message(uint64_t sequence, const v1::QueryBatch& queries,
                                           const std::optional<v1::UpdateBatch>& update = std::nullopt) {
     v1::StreamQueriesRequest request;
@@ -360,6 +367,36 @@ TEST_F(StepRpcTest, ADrainEndsTheWaitForALaterRevisionWithTheAck) {
   caller.join();
   EXPECT_EQ(response.ack().revision(), 2u);
   EXPECT_EQ(response.error().code(), grpc::StatusCode::DEADLINE_EXCEEDED);
+}
+
+// A drain without a grace period ends the step while its queries wait. If the call is answered, the answer has the ack;
+// otherwise its outcome is unknown. It is never REASON_DRAINING, which would mean that nothing was changed.
+TEST_F(StepRpcTest, TheEndOfADrainDoesNotHideAnAppliedUpdate) {
+  for (int times = 0; times < 5; ++times) {
+    RunningServer server(test_config());
+    create_scene(server);
+    std::thread caller([&] {
+      v1::StepRequest request;
+      request.set_scene("world");
+      *request.mutable_update() = insert_balls(1, 1);
+      request.mutable_queries()->mutable_view()->set_at_least(99);
+      v1::StepResponse response;
+      const grpc::Status status = call(*server.stubs().queries, &v1::QueryService::Stub::Step, request, &response);
+      if (status.ok()) {
+        EXPECT_EQ(response.ack().revision(), 1u);
+        EXPECT_EQ(response.error().code(), grpc::StatusCode::DEADLINE_EXCEEDED);
+      } else {
+        EXPECT_EQ(error_of(status).reason(), v1::REASON_UNSPECIFIED) << status.error_message();
+      }
+    });
+    v1::GetSceneRequest get;
+    get.set_name("world");
+    v1::GetSceneResponse scene;
+    while (scene.scene().revision() < 1)
+      ASSERT_TRUE(call(*server.stubs().scenes, &v1::SceneService::Stub::GetScene, get, &scene).ok());
+    server.server().drain(std::chrono::milliseconds(0));
+    caller.join();
+  }
 }
 
 // The updates wait for the log, or for a thread of the update queue because they scan all objects.
