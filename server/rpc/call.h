@@ -86,6 +86,8 @@ class Caller {
   // Takes `amount` from the quotas `kind` of the caller's identity and the caller's connection, even if they do not
   // suffice, because the work is already done.
   void charge_quota(QuotaKind kind, double amount) const;
+  // Gives back `amount` that take_quota() took from rates, because the work was not done.
+  void give_back_quota(QuotaKind kind, double amount) const;
   // Takes `amount` from the same quotas as take_quota(), but only until the result is destroyed.
   absl::StatusOr<QuotaHold> hold_quota(QuotaKind kind, double amount) const;
 

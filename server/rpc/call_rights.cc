@@ -190,6 +190,11 @@ void Caller::charge_quota(QuotaKind kind, double amount) const {
   for (const std::string& subject : quota_subjects_) state_.quotas.charge(subject, kind, amount, now);
 }
 
+void Caller::give_back_quota(QuotaKind kind, double amount) const {
+  if (!has_quotas()) return;
+  for (const std::string& subject : quota_subjects_) state_.quotas.give_back(subject, kind, amount);
+}
+
 absl::StatusOr<QuotaHold> Caller::hold_quota(QuotaKind kind, double amount) const {
   if (!has_quotas()) return QuotaHold();
   return state_.quotas.hold(quota_subjects_, kind, amount, steady_nanoseconds());

@@ -168,6 +168,12 @@ QuotaHold Quotas::hold_anyway(absl::Span<const std::string> subjects, QuotaKind 
   return QuotaHold(*this, subjects, kind, amount);
 }
 
+void Quotas::give_back(absl::string_view subject, QuotaKind kind, double amount) {
+  LOCUS_DCHECK(is_rate(kind));
+  MutexLock lock(mutex_);
+  put_back_locked(subject, kind, amount);
+}
+
 void Quotas::release(absl::string_view subject, QuotaKind kind, double amount) {
   LOCUS_DCHECK(!is_rate(kind));
   MutexLock lock(mutex_);

@@ -76,6 +76,8 @@ class Quotas {
   // calls of take() are refused until the rate has recovered, or enough of the amount in use was released. Counts
   // nothing if the subject is new and the table full.
   void charge(absl::string_view subject, QuotaKind kind, double amount, uint64_t now) LOCUS_EXCLUDES(mutex_);
+  // Gives back `amount` of a rate that take() took, because the work was not done.
+  void give_back(absl::string_view subject, QuotaKind kind, double amount) LOCUS_EXCLUDES(mutex_);
   // Releases an amount in use, so that it can be taken again. Not for rates.
   void release(absl::string_view subject, QuotaKind kind, double amount) LOCUS_EXCLUDES(mutex_);
   // Forgets a subject, for example a closed connection.

@@ -46,8 +46,12 @@ void QueryWork::begin_reading(const v1::QueryBatch& batch, v1::QueryResult& resu
 absl::Status QueryWork::prepare(const std::string& scene, const v1::QueryBatch& batch, v1::QueryResult& result) {
   begin_reading(batch, result);
   absl::Status status = read(scene, batch);
-  if (status.ok()) status = check_step_view();
-  if (!status.ok()) drop();
+  if (!status.ok()) {
+    drop();
+    return status;
+  }
+  status = check_step_view();
+  if (!status.ok()) cancel();
   return status;
 }
 
@@ -80,10 +84,19 @@ absl::Status QueryWork::read(const std::string& scene, const v1::QueryBatch& bat
   return take_quotas();
 }
 
-absl::Status QueryWork::take_quotas() const {
+double QueryWork::queries() const {
   double queries = 0;
   for (const QueryBlock& block : batch_.blocks) queries += static_cast<double>(query_count(block));
-  RETURN_IF_ERROR(slot_.caller().take_quota(QuotaKind::kQueries, queries));
+  return queries;
+}
+
+void QueryWork::cancel() {
+  slot_.caller().give_back_quota(QuotaKind::kQueries, queries());
+  drop();
+}
+
+absl::Status QueryWork::take_quotas() const {
+  RETURN_IF_ERROR(slot_.caller().take_quota(QuotaKind::kQueries, queries()));
   return slot_.caller().take_quota(QuotaKind::kWork, 0);  // with amount 0, fails only while the quota is overdrawn
 }
 

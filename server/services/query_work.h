@@ -71,13 +71,14 @@ class QueryWork final : private QueryJob, private DeferredTask {
 
   // Checks the batch of a step, before its update is applied. Returns every error that the batch's form and values
   // have, and FAILED_PRECONDITION if its view names another epoch; the work has then ended and the slot is not
-  // answered. Otherwise start() or drop() must follow. `batch` and `result` are borrowed until then.
+  // answered. Otherwise start() or cancel() must follow. `batch` and `result` are borrowed until then.
   absl::Status prepare(const std::string& scene, const v1::QueryBatch& batch, v1::QueryResult& result);
   // Answers the prepared batch at `revision`, at which the step's update is visible, or a later revision. `ack_bytes`
   // is the size of the step's ack, which is part of the same answer.
   void start(uint64_t revision, uint64_t ack_bytes);
-  // Ends the work without answering the slot, and frees its data. Call it only after prepare(), instead of start().
-  void drop();
+  // Ends the work without answering the slot, frees its data, and gives back the quota of the queries, which do not
+  // run. Call it only after prepare(), instead of start().
+  void cancel();
   // Makes the work answer soon: ends the wait for a revision, and withdraws a queued run if the caller has given up. A
   // run in progress is not interrupted here, because it polls Caller::stop() itself.
   void give_up();
@@ -91,11 +92,15 @@ class QueryWork final : private QueryJob, private DeferredTask {
     state_ = to;
   }
   absl::Status take_quotas() const;
+  // Returns the number of queries of the batch, as an amount of a quota.
+  double queries() const;
   // Refuses a view that could not contain the update of a step.
   absl::Status check_step_view() const;
   void begin_reading(const v1::QueryBatch& batch, v1::QueryResult& result);
   absl::Status read(const std::string& scene, const v1::QueryBatch& batch);
   void answer(absl::Status status);
+  // Ends the work and frees its data.
+  void drop();
 
   // Pins the revision named by the view, then calls run(), or parks the batch until that revision is published.
   void look();

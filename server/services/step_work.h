@@ -86,7 +86,7 @@ class StepWork final {
   void updated(absl::Status status) {
     if (status.ok()) return query_.start(response_->ack().revision(), ack_bytes_);
     response_->clear_ack();
-    query_.drop();
+    query_.cancel();
     slot_.answered(std::move(status));
   }
 

@@ -114,6 +114,17 @@ class QuotaRpcTest : public ::testing::Test {
     return running_->stubs().queries->Query(&context, request, &response);
   }
 
+  grpc::Status step(const v1::UpdateBatch& update, const v1::QueryBatch& queries) {
+    grpc::ClientContext context;
+    as(context, "maker");
+    v1::StepRequest request;
+    request.set_scene("a");
+    *request.mutable_update() = update;
+    *request.mutable_queries() = queries;
+    v1::StepResponse response;
+    return running_->stubs().queries->Step(&context, request, &response);
+  }
+
   // Expects a refusal of the quota `name` whose text contains `text`.
   static void expect_quota(const grpc::Status& status, const std::string& name, const std::string& text) {
     ASSERT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED) << status.error_message();
@@ -155,6 +166,21 @@ TEST_F(QuotaRpcTest, ScenesCountForTheirCreatorAlsoAfterARestart) {
   EXPECT_TRUE(create("c", {}, "other").ok());
   remove_scene("a");
   EXPECT_TRUE(create("d").ok());
+}
+
+TEST_F(QuotaRpcTest, TheQueriesOfARefusedStepUseNoQuota) {
+  ASSERT_TRUE(create("a").ok());
+  ASSERT_TRUE(apply(insert_balls(1, 5)).ok());
+  set_quotas("quota token:maker queries_per_s=1\n");
+  v1::UpdateBatch refused;
+  refused.set_all_or_nothing(true);
+  refused.add_remove_ids(99);
+  for (int times = 0; times < 50; ++times)
+    EXPECT_EQ(error_of(step(refused, ray_along_x())).reason(), v1::REASON_UNKNOWN_ID) << times;
+  EXPECT_TRUE(step({}, ray_along_x()).ok());
+  grpc::Status status;
+  for (int times = 0; times < 50 && status.ok(); ++times) status = step({}, ray_along_x());
+  EXPECT_EQ(error_of(status).limit(), "queries_per_s") << "the queries of other steps use the quota";
 }
 
 TEST_F(QuotaRpcTest, ObjectsCountForTheCreatorOfTheirSceneWhoeverInsertsThem) {
