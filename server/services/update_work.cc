@@ -17,6 +17,9 @@ namespace {
 // Maximum bytes of one listed item error in an ack, including its text.
 constexpr uint64_t kBytesAnItemError = 192;
 constexpr uint64_t kBytesAnAck = 256;
+// The bound that the protocol states, and the space that a step with the default max_reply_bytes leaves for the ack.
+static_assert(kBytesAnAck + kBytesAnItemError * limits::kMaxListedItemErrors == 192'256);
+static_assert(limits::kDefaultReplyBytes + 192'256 + 1024 <= 4u << 20, "clients refuse larger messages by default");
 
 // Claims the memory that the batch needs while it is applied. A batch that only removes objects is never refused,
 // because it frees memory.
