@@ -44,8 +44,8 @@ class QueryStream(PipelinedStream[Any]):
         like send().
 
         The future receives the StepResult, or the LocusError with which the step was refused; if the error has a reason,
-        nothing was changed and no query was run. Steps are applied in the order sent. The stream replaces the `writer` and `number` of the
-        sent copy of the update.
+        nothing was changed and no query was run. Steps are applied in the order sent. The stream replaces the `writer`
+        and `number` of the sent copy of the update.
         """
         changes, batch = update.message.SerializeToString(), queries.batch_bytes()
         return self._send(b"".join((wire.head(_UPDATE, len(changes)), changes, wire.head(_BATCH, len(batch)), batch)),
