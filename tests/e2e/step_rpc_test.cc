@@ -399,6 +399,46 @@ TEST_F(StepRpcTest, TheEndOfADrainDoesNotHideAnAppliedUpdate) {
   }
 }
 
+// The caller gives up while the update waits for the log. Then nothing waits for the later revision.
+TEST_F(StepRpcTest, AStepWhoseCallerGaveUpDuringItsUpdateDoesNotWaitForARevision) {
+  MemoryLog log;
+  RunningServer durable(test_config(), &log);
+  v1::CreateSceneRequest create;
+  create.set_name("world");
+  create.mutable_spec()->set_durability(v1::DURABILITY_LOCAL);
+  v1::CreateSceneResponse created;
+  ASSERT_TRUE(call(*durable.stubs().scenes, &v1::SceneService::Stub::CreateScene, create, &created).ok());
+  const auto calls = [&] {
+    v1::GetServerResponse server;
+    EXPECT_TRUE(
+        call(*durable.stubs().server, &v1::ServerService::Stub::GetServer, v1::GetServerRequest(), &server).ok());
+    for (const v1::Limit& limit : server.limits())
+      if (limit.name() == "calls") return limit.used();
+    return -1.0;
+  };
+  log.hold();
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + std::chrono::minutes(5));
+  std::thread caller([&] {
+    v1::StepRequest request;
+    request.set_scene("world");
+    *request.mutable_update() = insert_balls(1, 1);
+    request.mutable_queries()->mutable_view()->set_at_least(99);
+    v1::StepResponse response;
+    EXPECT_EQ(durable.stubs().queries->Step(&context, request, &response).error_code(), grpc::StatusCode::CANCELLED);
+  });
+  log.wait_for_writer();
+  EXPECT_EQ(calls(), 2) << "the step, and the call that asks";
+  context.TryCancel();
+  caller.join();
+  calls();  // follows the cancellation on the same connection
+  log.release();
+  const auto end = std::chrono::steady_clock::now() + std::chrono::minutes(1);
+  while (calls() != 1 && std::chrono::steady_clock::now() < end) {
+  }
+  EXPECT_EQ(calls(), 1) << "the step still waits";
+}
+
 // The updates wait for the log, or for a thread of the update queue because they scan all objects.
 TEST_F(StepRpcTest, QueriesSeeAnUpdateThatTheUpdateQueueApplies) {
   MemoryLog log;
