@@ -103,14 +103,15 @@ TEST(WirePlanTest, ShortColumnsNeedNoMoreMemoryThanTheScanSays) {
 }
 
 TEST(WirePlanTest, UnknownFieldsNeedNoMoreMemoryThanTheScanSays) {
-  const uint64_t empty = v1::QueryBlock().SpaceUsedLong();
+  const uint64_t empty = v1::ApplyUpdatesRequest().SpaceUsedLong();
   for (int fields = 1; fields <= 40; ++fields) {
     for (size_t length = 0; length <= 64; ++length) {
       const std::string bytes = repeat(delimited(15, std::string(length, 'x')), static_cast<size_t>(fields));
-      v1::QueryBlock block;
-      ASSERT_TRUE(block.ParseFromString(bytes));
-      ASSERT_EQ(block.GetReflection()->GetUnknownFields(block).field_count(), fields);
-      EXPECT_LE(block.SpaceUsedLong() - empty, *scan<v1::QueryBlock>(bytes)) << fields << " of " << length << " bytes";
+      v1::ApplyUpdatesRequest request;
+      ASSERT_TRUE(request.ParseFromString(bytes));
+      ASSERT_EQ(request.GetReflection()->GetUnknownFields(request).field_count(), fields);
+      EXPECT_LE(request.SpaceUsedLong() - empty, *scan<v1::ApplyUpdatesRequest>(bytes))
+          << fields << " of " << length << " bytes";
     }
   }
 }
