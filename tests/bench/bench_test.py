@@ -30,7 +30,8 @@ DYNAMIC_PEERS = {"bullet": {"bullet"}, "boost": {"boost_rtree"}, "nanoflann": {"
 ONE_SIZE_ONLY = {"boost_rtree", "nanoflann", "flat_hash_map"}
 NOT_ASKED = {"box": {"nanoflann"}, "ray": {"nanoflann", "boost_rtree"}, "nearest": {"bullet", "flat_hash_map"},
              "reinsert": {"nanoflann", "sorted_rebuild"}}
-KINDS = ("uniform", "clustered", "far", "onecell", "border", "giant", "mixed")
+HUBS = ("hub20", "hub60", "hub200")
+KINDS = ("uniform", "clustered", "far", "onecell", "border", "giant", "mixed", *HUBS)
 
 # Expected cells of the suite serving: (case, peer).
 SERVING = {(f"rays/{cost}/{size}", "in_process") for cost in ("90ns", "270ns") for size in (1024, 8192)}
@@ -73,6 +74,11 @@ def expected_dynamic_cells():
               for peer in ("no_writer", "spinning")}
     cells |= {("unpaced/1reader/10k" + batch, "no_reader") for batch in ("", "/batch100", "/batch10000")}
     cells |= {(f"rewind/{age}/10k", "now") for age in ("1tick", "10ticks", "30ticks")}
+    cells |= {(f"country/{case}/{hub}/10k", "uniform") for case in ("ball", "box", "ray", "nearest", "memory")
+              for hub in HUBS}
+    cells |= {(f"instances/{change}_{share}/10k", "place_all") for change in ("move", "place", "remove")
+              for share in ("one", "1%")}
+    cells |= {("doors/1reader", "required")}
     for kind in KINDS:
         for case in ("move", "ball", "ball_batch", "box", "box_batch", "ray", "ray_batch", "nearest", "nearest_batch",
                      "insert", "reinsert", "memory"):
