@@ -183,7 +183,8 @@ std::string old_change(BytesKind kind, const StaticMesh& mesh, const std::option
 }
 
 TEST_F(RecordCodecTest, AStaticChangeOfFormat1NamesContentsOnly) {
-  absl::StatusOr<Record> record = Record::decode(old_change(BytesKind::kStaticChange, *mesh_, std::nullopt, {}));
+  const std::string bytes = old_change(BytesKind::kStaticChange, *mesh_, std::nullopt, {});
+  absl::StatusOr<Record> record = Record::decode(bytes);
   ASSERT_TRUE(record.ok()) << record.status();
   const auto& read = std::get<Record::Change>(record->content());
   EXPECT_THAT(read.meshes, ElementsAre(MeshKey{mesh_->sha256(), ""}));
@@ -191,7 +192,8 @@ TEST_F(RecordCodecTest, AStaticChangeOfFormat1NamesContentsOnly) {
 }
 
 TEST_F(RecordCodecTest, AStaticChangeOfFormats2And3HasNoBounds) {
-  absl::StatusOr<Record> record = Record::decode(old_change(BytesKind::kNamedChange, *mesh_, "m", {}));
+  const std::string bytes = old_change(BytesKind::kNamedChange, *mesh_, "m", {});
+  absl::StatusOr<Record> record = Record::decode(bytes);
   ASSERT_TRUE(record.ok()) << record.status();
   const auto& read = std::get<Record::Change>(record->content());
   EXPECT_THAT(read.meshes, ElementsAre(mesh_->key()));
