@@ -185,8 +185,10 @@ void Quotas::put_back_locked(absl::string_view subject, QuotaKind kind, double a
   const auto found = slots_.find(subject);
   if (found == slots_.end()) return;
   if (is_rate(kind)) {
-    Bucket& bucket = accounts_[found->second].buckets[static_cast<size_t>(kind)];
-    bucket.level += amount;
+    Account& account = accounts_[found->second];
+    Bucket& bucket = account.buckets[static_cast<size_t>(kind)];
+    // The bucket may have filled up since the amount was taken, or the quota may have become lower.
+    bucket.level = std::min(capacity_of(account.quota, kind), bucket.level + amount);
     bucket.window_used = std::max(bucket.window_used - amount, 0.0);
   } else {
     double& used = accounts_[found->second].in_use[static_cast<size_t>(kind)];

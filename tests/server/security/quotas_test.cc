@@ -51,6 +51,17 @@ TEST_F(QuotasTest, ARateAllowsTwoSecondsAtOnceAndThenItsRate) {
   EXPECT_FALSE(quotas.take("token:ci", QuotaKind::kQueries, 1, kStart + 60 * kSecond).ok());
 }
 
+TEST_F(QuotasTest, ARateThatIsGivenBackLaterDoesNotExceedTheBurst) {
+  quota_ = quota(QuotaKind::kQueries, 1000);
+  Quotas quotas(source());
+  ASSERT_TRUE(quotas.take("token:ci", QuotaKind::kQueries, 1500, kStart).ok());
+  ASSERT_TRUE(quotas.take("token:ci", QuotaKind::kQueries, 0, kStart + 60 * kSecond).ok());
+  quotas.give_back("token:ci", QuotaKind::kQueries, 1500);
+  EXPECT_FALSE(quotas.take("token:ci", QuotaKind::kQueries, 2001, kStart + 60 * kSecond).ok());
+  EXPECT_TRUE(quotas.take("token:ci", QuotaKind::kQueries, 2000, kStart + 60 * kSecond).ok());
+  EXPECT_FALSE(quotas.take("token:ci", QuotaKind::kQueries, 1, kStart + 60 * kSecond).ok());
+}
+
 TEST_F(QuotasTest, ARefusedRateSaysWhenToTryAgainAndIsThenAllowed) {
   quota_ = quota(QuotaKind::kQueries, 1000);
   Quotas quotas(source());
