@@ -58,17 +58,7 @@ class QueryStream::Impl final : public Stream::Kind {
       if (!acked.ok()) outcome = acked;
       return acked;
     }
-    switch (numbers_.failed(batch, item.sent_before, outcome.status())) {
-      case BatchNumbers::AfterFailure::kEndStream:
-        return outcome.status();
-      case BatchNumbers::AfterFailure::kKeepNumbers:
-        outcome = outcome_unknown(outcome.status());
-        break;
-      case BatchNumbers::AfterFailure::kNumberLaterAgain:
-        stream_.number_again(items, position);
-        break;
-    }
-    return absl::OkStatus();
+    return handle_refusal(numbers_, batch, item.sent_before, outcome, [&] { stream_.number_again(items, position); });
   }
 
  private:

@@ -3,7 +3,7 @@
 // unanswered batches are sent again on a new connection, which is safe: queries change nothing, and each step's update
 // carries the stream's random writer id and a consecutive batch number, by which the server applies it only once.
 //
-// As in an UpdateStream, a refused update does not use up its number: the stream renumbers the later steps and sends
+// A refused update does not use up its number, as in an UpdateStream: the stream renumbers the later steps and sends
 // everything after the refused step again. A step that is refused when it is sent again may have been applied: its
 // error then has no reason and says so. The stream ends permanently in the cases in which an UpdateStream ends.
 #ifndef LOCUS_CLIENT_LIB_QUERY_STREAM_H_

@@ -62,17 +62,7 @@ class UpdateStream::Impl final : public UpdatePipeline::Kind {
       last_ack_ = Revision{outcome->epoch(), outcome->revision()};
       return absl::OkStatus();
     }
-    switch (numbers_.failed(batch, item.sent_before, outcome.status())) {
-      case BatchNumbers::AfterFailure::kEndStream:
-        return outcome.status();
-      case BatchNumbers::AfterFailure::kKeepNumbers:
-        outcome = outcome_unknown(outcome.status());
-        break;
-      case BatchNumbers::AfterFailure::kNumberLaterAgain:
-        stream_.number_again(items, position);
-        break;
-    }
-    return absl::OkStatus();
+    return handle_refusal(numbers_, batch, item.sent_before, outcome, [&] { stream_.number_again(items, position); });
   }
 
  private:

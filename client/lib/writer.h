@@ -100,6 +100,25 @@ class BatchNumbers {
   uint64_t reused_end_ = 0;  // end of the uncertain numbers that closes_gap() has used again
 };
 
+// Handles the error `outcome` of batch `number` for a stream. Calls number_later_again() if the later batches must be
+// numbered again. If the batch may have been applied, `outcome` becomes an error that says so. Returns an error if the
+// stream must end.
+template <class Outcome, class NumberLaterAgain>
+absl::Status handle_refusal(BatchNumbers& numbers, uint64_t number, bool sent_before, Outcome& outcome,
+                            const NumberLaterAgain& number_later_again) {
+  switch (numbers.failed(number, sent_before, outcome.status())) {
+    case BatchNumbers::AfterFailure::kEndStream:
+      return outcome.status();
+    case BatchNumbers::AfterFailure::kKeepNumbers:
+      outcome = outcome_unknown(outcome.status());
+      break;
+    case BatchNumbers::AfterFailure::kNumberLaterAgain:
+      number_later_again();
+      break;
+  }
+  return absl::OkStatus();
+}
+
 }  // namespace locus::client
 
 #endif  // LOCUS_CLIENT_LIB_WRITER_H_
