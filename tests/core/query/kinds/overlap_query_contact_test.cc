@@ -117,18 +117,24 @@ TEST(OverlapContactTest, AConservativeBoxReportsAPointOfTheBounds) {
   EXPECT_THAT(result.points, ElementsAre(FloatNear(1, 1e-6f), 0, 0));
 }
 
+// Returns an object of a random shape near the origin.
+Object object_of_random_shape(Random& random) {
+  Object object;
+  object.id = 1;
+  object.shape = random_shape(random, random.pick(kShapeKinds), 1);
+  for (int axis = 0; axis < 3; ++axis) object.shape.size[axis] = random.float_between(0.1, 2);
+  object.shape.radius = random.float_between(0.1, 2);
+  return object;
+}
+
 // A box that is moved out along the normal by its depth just touches the object or triangle, and a box that is moved
 // out a little less still overlaps it. The point belongs to both.
 TEST(OverlapContactTest, TheBoxMovedOutByItsDepthTouches) {
   size_t checked = 0;
   for (uint64_t seed = 0; seed < scaled_count(3'000); ++seed) {
     Random random(seed);
+    const Object object = object_of_random_shape(random);
     QueryWorld world;
-    Object object;
-    object.id = 1;
-    object.shape = random_shape(random, random.pick(kShapeKinds), 1);
-    for (int axis = 0; axis < 3; ++axis) object.shape.size[axis] = random.float_between(0.1, 2);
-    object.shape.radius = random.float_between(0.1, 2);
     world.objects = {object};
     const Vec3f center = to_float(random.vector(2)), half = to_float(random.positive_vector(2));
     const Quaternion q = random.rotation();
@@ -170,12 +176,8 @@ TEST(OverlapContactTest, TheBallMovedOutByItsDepthTouches) {
   size_t checked = 0;
   for (uint64_t seed = 0; seed < scaled_count(3'000); ++seed) {
     Random random(seed);
+    const Object object = object_of_random_shape(random);
     QueryWorld world;
-    Object object;
-    object.id = 1;
-    object.shape = random_shape(random, random.pick(kShapeKinds), 1);
-    for (int axis = 0; axis < 3; ++axis) object.shape.size[axis] = random.float_between(0.1, 2);
-    object.shape.radius = random.float_between(0.1, 2);
     world.objects = {object};
     const Vec3f center = to_float(random.vector(3));
     const float radius = random.float_between(0.1, 2);
