@@ -42,6 +42,7 @@ v1::HistoryLimit to_proto(PastLimit limit) {
 
 absl::Status check_served(const v1::SceneSpec& spec) {
   if (spec.idle_ttl_s() != 0) return not_served("spec.idle_ttl_s");
+  if (spec.mesh_grace_s() != 0) return not_served("spec.mesh_grace_s");
   if (!v1::Durability_IsValid(spec.durability())) return unknown_enum("spec.durability", spec.durability());
   if (!v1::Winding_IsValid(spec.winding())) return unknown_enum("spec.winding", spec.winding());
   if (!v1::OverloadPolicy_IsValid(spec.overload())) return unknown_enum("spec.overload", spec.overload());

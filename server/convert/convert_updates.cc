@@ -40,6 +40,8 @@ absl::Status read_shape(const v1::Insert& insert, const std::string& field, Inse
       out->radii = span_of(insert.capsule().radii());
       out->extents = span_of(insert.capsule().half_axes());
       return absl::OkStatus();
+    case v1::Insert::kCompound:
+      return not_served(field + ".compound");
     case v1::Insert::SHAPE_NOT_SET:
       break;
   }
@@ -57,11 +59,13 @@ absl::StatusOr<InsertColumns> to_insert(const v1::Insert& insert, const std::str
   columns.layers = span_of(insert.layers());
   columns.groups = span_of(insert.groups());
   columns.tags = span_of(insert.tags());
+  if (!insert.expire_ticks().empty()) return not_served(field + ".expire_ticks");
   return columns;
 }
 
 absl::StatusOr<MoveColumns> to_move(const v1::Move& move, const std::string& field) {
   RETURN_IF_ERROR(check_positions(move, field));
+  if (move.parts_each() != 0) return not_served(field + ".parts_each");
   MoveColumns columns;
   columns.ids = span_of(move.ids());
   columns.positions = span_of(move.positions());
@@ -108,6 +112,8 @@ absl::Status check_batch_form(const v1::UpdateBatch& batch) {
 
 absl::StatusOr<UpdateBatch> to_updates(const v1::UpdateBatch& batch) {
   RETURN_IF_ERROR(check_batch_form(batch));
+  if (batch.lease_ms() != 0) return not_served("lease_ms");
+  if (batch.continues()) return not_served("continues");
   UpdateBatch out;
   out.frame = to_vec(batch.frame());
   if (batch.has_tick()) out.tick = batch.tick();
