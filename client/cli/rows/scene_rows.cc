@@ -46,6 +46,7 @@ bool has_shape_columns(const v1::Insert& run) {
       return run.box().half_extents_size() == 3 * rows;
     case v1::Insert::kCapsule:
       return run.capsule().radii_size() == rows && run.capsule().half_axes_size() == 3 * rows;
+    case v1::Insert::kCompound:
     case v1::Insert::SHAPE_NOT_SET:
       return false;
   }
