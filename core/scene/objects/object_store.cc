@@ -49,6 +49,7 @@ uint32_t ObjectStore::new_handle() {
 
 void ObjectStore::free_handle(uint32_t handle) {
   LOCUS_DCHECK_LT(handle, next_handle_);
+  ++ended_lives_;
   if (moves_ == nullptr) {
     free_handles_.push_back(handle);
   } else {

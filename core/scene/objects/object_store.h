@@ -54,6 +54,9 @@ class ObjectStore {
     LOCUS_DCHECK_EQ(ids.size(), handles.size());
     handles_.find(ids, handles);
   }
+  // Returns the number of lifetimes that have ended. While it stays the same, the handle of every known id stays the
+  // same.
+  uint64_t ended_lives() const { return ended_lives_; }
   // Returns one more than the highest handle that was ever used.
   size_t handle_count() const { return next_handle_; }
   GridRef at(uint32_t handle) const {
@@ -123,6 +126,7 @@ class ObjectStore {
   std::shared_ptr<const GroupLists> groups_snapshot_;
   std::vector<uint32_t> free_handles_;
   uint32_t next_handle_ = 0;
+  uint64_t ended_lives_ = 0;
   struct QuarantinedHandle {
     uint32_t handle;
     uint64_t tick;  // tick in which the object was removed

@@ -1,6 +1,7 @@
 #include "core/scene/updates/move_applier.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "core/base/check.h"
@@ -12,6 +13,8 @@ namespace {
 // Number of items that are read together. Before the first of them is read, the handles of all these items are looked
 // up and the memory to which the handles refer is prefetched.
 constexpr size_t kItemsAtOnce = 64;
+// Number of items whose handles are remembered: their ids take kKeptScratch bytes.
+constexpr size_t kRememberedItems = kKeptScratch / sizeof(Id);
 
 }  // namespace
 
@@ -32,6 +35,12 @@ void MoveApplier::begin(const ObjectStore& objects) {
   moves_.clear();
   rotations_.clear();
   last_move_.resize(std::max(last_move_.size(), objects.handle_count()));
+  if (lives_ended_ != objects.ended_lives()) {
+    remembered_ids_.clear();
+    remembered_handles_.clear();
+    lives_ended_ = objects.ended_lives();
+  }
+  items_read_ = 0;
 }
 
 void MoveApplier::add(const ObjectStore& objects, const UpdateBatch& batch) {
@@ -85,19 +94,35 @@ inline void MoveApplier::move(const PoseReader& poses, uint32_t handle, const It
   ++applied_;
 }
 
+absl::Span<const uint32_t> MoveApplier::handles_of(const ObjectStore& objects, absl::Span<const Id> ids) {
+  const size_t first = std::exchange(items_read_, items_read_ + ids.size());
+  if (first + ids.size() <= remembered_ids_.size() &&
+      std::equal(ids.begin(), ids.end(), remembered_ids_.begin() + static_cast<ptrdiff_t>(first)))
+    return absl::MakeConstSpan(remembered_handles_).subspan(first, ids.size());
+  handles_.resize(ids.size());
+  objects.find_handles(ids, absl::MakeSpan(handles_));
+  const bool all_known = std::find(handles_.begin(), handles_.end(), ObjectStore::kNoHandle) == handles_.end();
+  if (!all_known || first > remembered_ids_.size() || first + ids.size() > kRememberedItems) return handles_;
+  const size_t size = std::max(remembered_ids_.size(), first + ids.size());
+  remembered_ids_.resize(size);
+  remembered_handles_.resize(size);
+  std::copy(ids.begin(), ids.end(), remembered_ids_.begin() + static_cast<ptrdiff_t>(first));
+  std::copy(handles_.begin(), handles_.end(), remembered_handles_.begin() + static_cast<ptrdiff_t>(first));
+  return handles_;
+}
+
 void MoveApplier::run(const ObjectStore& objects, Vec3d frame, const MoveColumns& columns, size_t list) {
   const PoseReader poses(frame, columns.positions, columns.positions_f64, columns.rotations);
   moves_.reserve(moves_.size() + columns.ids.size());
   for (size_t begin = 0; begin < columns.ids.size(); begin += kItemsAtOnce) {
     const absl::Span<const uint64_t> ids = columns.ids.subspan(begin, kItemsAtOnce);
-    handles_.resize(ids.size());
-    objects.find_handles(ids, absl::MakeSpan(handles_));
-    for (const uint32_t handle : handles_) {
+    const absl::Span<const uint32_t> handles = handles_of(objects, ids);
+    for (const uint32_t handle : handles) {
       if (handle == ObjectStore::kNoHandle) continue;
       objects.prefetch_slot(handle);
       __builtin_prefetch(&last_move_[handle]);
     }
-    for (size_t i = 0; i < ids.size(); ++i) move(poses, handles_[i], {list, static_cast<uint32_t>(begin + i), ids[i]});
+    for (size_t i = 0; i < ids.size(); ++i) move(poses, handles[i], {list, static_cast<uint32_t>(begin + i), ids[i]});
   }
 }
 

@@ -51,6 +51,8 @@ class MoveApplier {
   // Checks that each handle has one move. O(moves).
   void check_invariants() const;
   void run(const ObjectStore& objects, Vec3d frame, const MoveColumns& columns, size_t list);
+  // Returns the handles of `ids`, the next items of the batch, until the next call.
+  absl::Span<const uint32_t> handles_of(const ObjectStore& objects, absl::Span<const Id> ids);
   struct Item {
     size_t list;
     uint32_t index;
@@ -65,6 +67,13 @@ class MoveApplier {
   // For each handle, the index of its move in moves_. An entry is stale unless the move at this index has the same
   // handle.
   std::vector<uint32_t> last_move_;
+  // Ids and handles of the first items of an earlier batch, in order; all of them are known ids. Most senders move the
+  // same objects in the same order at every tick, so that comparing ids replaces looking them up. Valid while
+  // ObjectStore::ended_lives() is lives_ended_.
+  std::vector<Id> remembered_ids_;
+  std::vector<uint32_t> remembered_handles_;
+  uint64_t lives_ended_ = 0;
+  size_t items_read_ = 0;          // number of items of the batch that were read
   std::vector<uint32_t> handles_;  // handles of the items being read
   bool changes_ = false;
   uint32_t applied_ = 0;

@@ -94,5 +94,34 @@ TEST_F(MoveApplierTest, GivesTheSameResultAsBatchApplier) {
   }
 }
 
+TEST_F(MoveApplierTest, MovesTheObjectThatHasTheIdNowWhenABatchIsRepeated) {
+  const auto put_back = [&](Id id, float at) {
+    UpdateBatch batch = with(points({id}, {at, at, at}));
+    batch.remove_ids = columns_.ids({id});
+    return batch;
+  };
+  for (int round = 0; round < 3; ++round) {
+    const auto at = static_cast<float>(10 * round);
+    apply(with(move_to({1, 2, 3}, {at, 0, 0, at + 1, 0, 0, at + 2, 0, 0})));
+    for (const Id id : {1, 2, 3}) EXPECT_EQ(object(id)->shape.position.x, at + static_cast<float>(id - 1));
+    // Objects 1 and 3 get each other's place in memory, and another object gets that of 2.
+    UpdateBatch leave;
+    leave.remove_ids = columns_.ids({3, 2, 1});
+    apply(leave);
+    const UpdateAck gone = apply(with(move_to({1, 2, 3}, {5, 5, 5, 5, 5, 5, 5, 5, 5})));
+    EXPECT_EQ(gone.refused, 3u);
+    apply(with(points({3, 77, 1}, {0, 0, 0, 0, 0, 0, 0, 0, 0})));
+    const UpdateAck one_gone = apply(with(move_to({1, 2, 3}, {7, 0, 0, 8, 0, 0, 9, 0, 0})));
+    EXPECT_EQ(one_gone.refused, 1u);
+    EXPECT_EQ(object(1)->shape.position.x, 7);
+    EXPECT_EQ(object(3)->shape.position.x, 9);
+    EXPECT_EQ(object(77)->shape.position.x, 0);
+    apply(put_back(1, 1));
+    UpdateBatch again = with(points({2}, {2, 2, 2}));
+    again.remove_ids = columns_.ids({77});
+    apply(again);
+  }
+}
+
 }  // namespace
 }  // namespace locus::test
