@@ -32,10 +32,14 @@ inline constexpr uint32_t kMaxBvhValues = kMaxMeshTriangles;
 inline constexpr uint32_t kMaxBvhDepth = 64;  // max levels of nodes; sets the size of the traversal stack
 inline constexpr uint32_t kMaxBvhBins = 64;
 
-inline constexpr uint32_t kMaxUpdateItems = 1u << 20;   // items per update batch
-inline constexpr uint32_t kMaxUpdateLists = 65536;      // lists (inserts, moves, relabels and so on) per request
-inline constexpr uint32_t kMaxListedItemErrors = 1000;  // max refused items listed in an ack
-inline constexpr uint32_t kMaxWriters = 4096;           // writer ids stored per scene, to detect batches sent twice
+inline constexpr uint32_t kMaxUpdateItems = 1u << 20;  // items per update batch
+inline constexpr uint32_t kMaxUpdateLists = 65536;     // lists (inserts, moves, relabels and so on) per request
+inline constexpr uint32_t kMaxUpdateMessages = 4096;   // messages that together are one update batch
+inline constexpr uint64_t kMaxExpireTicks = uint64_t{1} << 48;  // longest existence of an object that expires
+inline constexpr uint32_t kMaxLeaseMs = 86'400'000;             // longest lease of a writer
+inline constexpr uint32_t kMaxLeases = 4096;                    // leases of writers per scene
+inline constexpr uint32_t kMaxListedItemErrors = 1000;          // max refused items listed in an ack
+inline constexpr uint32_t kMaxWriters = 4096;  // writer ids stored per scene, to detect batches sent twice
 
 inline constexpr uint32_t kMaxBlocks = 256;     // blocks per query batch
 inline constexpr uint32_t kMaxQueries = 65536;  // queries other than rays per query batch, summed over all blocks

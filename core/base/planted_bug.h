@@ -12,6 +12,10 @@ enum class PlantedBug {
   kStrictTie,          // tests that include equality (touching, equal distances) compare with < instead of <=
   kStaleSnapshot,      // a published snapshot has the objects of the previous revision
   kGhostAfterMove,     // a move across a cell border leaves the object in its old cell
+  kHalfGroup,          // the first message of a batch of several messages is published as a revision of its own
+  kExpiryLate,         // an object expires one tick too late
+  kExpiryUnmoved,      // a batch that only moves objects removes no expired objects
+  kLeaseOfFirst,       // an object that another writer inserts again still belongs to the lease of the first writer
   kUnsignedCellIndex,  // cell indices are truncated towards zero, not rounded down
   kStalePlacedBounds,  // an instance that moves keeps the bounds that it had at its old place
   kPastInstances,      // queries about the past see the instances of the latest revision

@@ -110,6 +110,8 @@ Scene::Scene(std::string name, SceneSpec spec, SceneWriter writer, const SceneLo
   LOCUS_CHECK_NE(writer_.epoch(), uint64_t{0});
   latest_ = writer_.published();  // NOLINT(cppcoreguidelines-prefer-member-initializer): writer_ must have an epoch
   recent_.push_back(latest_);
+  leases_ = std::make_shared<const std::vector<Lease>>(writer_.leases());
+  lease_changes_ = writer_.lease_changes();
   // NOLINTNEXTLINE(cppcoreguidelines-prefer-member-initializer): needs latest_
   next_chosen_id_ = std::max(latest_->statics->first_id_above(), kFirstChosenId + latest_->revision);
 }
@@ -169,8 +171,38 @@ absl::StatusOr<UpdateAck> Scene::answer(const UpdateBatch& batch, absl::StatusOr
   RETURN_IF_ERROR(admission.status());
   if (*admission) return **std::move(admission);
   ASSIGN_OR_RETURN(SceneWriter::Applied applied, writer_.apply_new(batch));
+  publish_leases();
   if (applied.snapshot != nullptr) publish(applied.snapshot);
   return std::move(applied.ack);
+}
+
+void Scene::publish_leases() {
+  if (lease_changes_ == writer_.lease_changes()) return;
+  lease_changes_ = writer_.lease_changes();
+  LeaseList leases = std::make_shared<const std::vector<Lease>>(writer_.leases());
+  const MutexLock lock(mutex_);
+  leases_ = std::move(leases);
+}
+
+Scene::LeaseList Scene::leases() const {
+  const MutexLock lock(mutex_);
+  return leases_;
+}
+
+absl::StatusOr<bool> Scene::end_lease(uint64_t writer, absl::FunctionRef<bool()> is_due, Deadline until) {
+  UpdateBatch end;
+  end.end_lease = writer;
+  const UpdateBatch* const batches = &end;
+  while (true) {
+    RETURN_IF_ERROR(wait_for_readers(until));
+    const MutexLock lock(writer_mutex_);
+    RETURN_IF_ERROR(check_open());
+    if (pins_->over_budget()) continue;
+    if (!writer_.has_lease(writer) || !is_due()) return false;
+    RETURN_IF_ERROR(journal_.append_each(writer_.epoch(), {&batches, 1}));
+    RETURN_IF_ERROR(answer(end, SceneWriter::Admission()).status());
+    return true;
+  }
 }
 
 absl::StatusOr<Scene::Acks> Scene::apply_joined(absl::Span<const UpdateBatch* const> batches, Deadline until) {
@@ -481,8 +513,8 @@ absl::Status Scene::remove() {
 
 FrozenScene Scene::freeze() {
   const MutexLock lock(writer_mutex_);
-  return {writer_.published(), writer_.writers(), writer_.has_past(), journal_.position().sequence,
-          journal_.total_bytes()};
+  return {writer_.published(),          writer_.writers(),      writer_.has_past(),
+          journal_.position().sequence, journal_.total_bytes(), writer_.lease_table()};
 }
 
 SceneStatus Scene::status() const {

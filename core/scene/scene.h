@@ -23,6 +23,7 @@
 #include <optional>
 #include <string>
 
+#include "absl/functional/function_ref.h"
 #include "core/base/mutex.h"
 #include "core/scene/log/scene_journal.h"
 #include "core/scene/log/scene_state.h"
@@ -126,6 +127,17 @@ class Scene {
   // was applied.
   absl::StatusOr<Acks> apply_joined(absl::Span<const UpdateBatch* const> batches,
                                     Deadline until = ReaderTracker::kNever) LOCUS_EXCLUDES(writer_mutex_, mutex_);
+
+  // Ends the lease of a writer: removes the objects that belong to it, as one revision, which is logged like a batch.
+  // Does nothing if the writer has no lease, or if `is_due` returns false. `is_due` is called when no batch is being
+  // applied, right before the lease ends, so that a batch of the writer that arrived meanwhile keeps the lease; it must
+  // be quick and must not call the scene. Returns true if the lease ended; the errors are those of apply().
+  absl::StatusOr<bool> end_lease(uint64_t writer, absl::FunctionRef<bool()> is_due,
+                                 Deadline until = ReaderTracker::kNever) LOCUS_EXCLUDES(writer_mutex_, mutex_);
+  // Returns the leases of writers after the last applied batch, ascending by writer. O(1); does not wait for a batch
+  // that is being applied. A batch that begins or changes a lease is in the list before it is acknowledged.
+  using LeaseList = std::shared_ptr<const std::vector<Lease>>;
+  LeaseList leases() const LOCUS_EXCLUDES(mutex_);
 
   // Removes instances and places new instances, as one revision. Changes of one scene run one at a time. Update batches
   // are not blocked while a change builds the new tree of instances. Waits like apply() while readers exceed their
@@ -255,6 +267,8 @@ class Scene {
   // new, applies the batch and publishes the new revision.
   absl::StatusOr<UpdateAck> answer(const UpdateBatch& batch, absl::StatusOr<SceneWriter::Admission> admission)
       LOCUS_REQUIRES(writer_mutex_);
+  // Makes the list of leases() current after a batch was applied.
+  void publish_leases() LOCUS_REQUIRES(writer_mutex_) LOCUS_EXCLUDES(mutex_);
   void count_joined(const Acks& acks) LOCUS_EXCLUDES(mutex_);
   absl::StatusOr<InstanceChange> build_and_publish(const StaticChange& change) LOCUS_REQUIRES(change_mutex_)
       LOCUS_EXCLUDES(writer_mutex_, mutex_);
@@ -290,6 +304,8 @@ class Scene {
   std::vector<const StaticMesh*> meshes_to_place_ LOCUS_GUARDED_BY(mutex_);  // meshes of pending changes
   std::string last_build_error_ LOCUS_GUARDED_BY(mutex_);
   uint64_t joined_updates_ LOCUS_GUARDED_BY(mutex_) = 0;
+  LeaseList leases_ LOCUS_GUARDED_BY(mutex_);                   // never null
+  uint64_t lease_changes_ LOCUS_GUARDED_BY(writer_mutex_) = 0;  // SceneWriter::lease_changes() of leases_
   Id next_chosen_id_ LOCUS_GUARDED_BY(mutex_);
   bool closed_ LOCUS_GUARDED_BY(mutex_) = false;
   const std::shared_ptr<ReaderTracker> pins_;  // shared, because pins may outlive the scene

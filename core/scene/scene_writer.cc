@@ -42,6 +42,20 @@ absl::StatusOr<SceneWriter> SceneWriter::restore(SceneState state, Winding windi
       return absl::DataLossError(absl::StrCat("the id ", instance.id, " belongs to an object and to an instance"));
   writer.revision_ = state.revision;
   writer.tick_ = state.tick;
+  for (const auto& [id, remaining] : state.expiries) {
+    const uint32_t handle = writer.objects_.handle(id);
+    if (handle == ObjectStore::kNoHandle || !writer.expiries_.set(handle, state.tick, remaining))
+      return absl::DataLossError(absl::StrCat("the object ", id, " expires twice, or does not exist"));
+  }
+  for (const SceneState::StoredLease& lease : state.leases) {
+    writer.leases_.begin(lease.writer, lease.lease_ms);
+    for (const Id id : lease.ids) {
+      const uint32_t handle = writer.objects_.handle(id);
+      if (handle == ObjectStore::kNoHandle || writer.leases_.owner(handle) != 0)
+        return absl::DataLossError(absl::StrCat("the object ", id, " belongs to two leases, or does not exist"));
+      writer.leases_.give(handle, lease.writer);
+    }
+  }
   writer.writers_ = std::move(state.writers);
   writer.recorder_.restore(state.has_past);
   writer.published_ = writer.freeze();
@@ -70,7 +84,7 @@ SnapshotPtr SceneWriter::freeze() {
   recorder_.measure(objects, *statics_);
   return std::make_shared<const SceneSnapshot>(SceneSnapshot{
       epoch_, revision_, tick_, winding_, statics_, std::move(objects), recorder_.history(), objects_.displacement(),
-      replaced_bytes_ + recorder_.dropped_bytes(), recorder_.limit(), recorder_.forgotten_ticks()});
+      replaced_bytes_ + recorder_.dropped_bytes(), recorder_.limit(), recorder_.forgotten_ticks(), expiries_.table()});
 }
 
 SnapshotPtr SceneWriter::next_revision() {
@@ -125,8 +139,16 @@ absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_new(const UpdateBatch& b
   LOCUS_DCHECK(writers_.admit(batch.writer, batch.batch).ok() && !*writers_.admit(batch.writer, batch.batch));
   const bool teleports = recorder_.on() && std::any_of(batch.moves.begin(), batch.moves.end(),
                                                        [](const MoveColumns& move) { return move.teleport; });
-  absl::StatusOr<Applied> result = MoveApplier::serves(batch) && !teleports ? apply_moves(batch) : apply_changes(batch);
-  if (result.ok()) writers_.record(batch.writer, batch.batch, result->ack);
+  if (batch.lease_ms != 0 && !leases_.has(batch.writer) && leases_.size() >= limits::kMaxLeases)
+    return refuse_full("lease_ms", "leases", limits::kMaxLeases, static_cast<double>(leases_.size() + 1), 0);
+  const bool expires = !planted(PlantedBug::kExpiryUnmoved) && expiries_.due(tick_of(batch));
+  const bool moves = MoveApplier::serves(batch) && !teleports && !expires;
+  if (planted(PlantedBug::kHalfGroup) && !batch.earlier.empty())
+    if (absl::StatusOr<Applied> half = apply_changes(batch.earlier.front()); half.ok()) return half;
+  ASSIGN_OR_RETURN(Applied result, moves ? apply_moves(batch) : apply_changes(batch));
+  if (batch.lease_ms != 0) leases_.begin(batch.writer, batch.lease_ms);
+  if (batch.end_lease != 0) leases_.end(batch.end_lease);
+  writers_.record(batch.writer, batch.batch, result.ack);
   LOCUS_DCHECK_CALL(check_invariants());
   return result;
 }
@@ -138,7 +160,14 @@ absl::Status SceneWriter::fill_ack(const UpdateBatch& batch, Applier& applier, I
   result.ack.refused = applier.refused() + instances.refused();
   result.ack.errors = std::move(applier.errors());
   for (ItemError& error : instances.errors())
-    if (result.ack.errors.size() < limits::kMaxListedItemErrors) result.ack.errors.push_back(std::move(error));
+    if (!batch.earlier.empty() || result.ack.errors.size() < limits::kMaxListedItemErrors)
+      result.ack.errors.push_back(std::move(error));
+  if (!batch.earlier.empty()) {
+    // Each applier lists its errors in order of application, so the first errors of both are among them.
+    std::stable_sort(result.ack.errors.begin(), result.ack.errors.end(),
+                     [](const ItemError& a, const ItemError& b) { return a.message < b.message; });
+    result.ack.errors.resize(std::min<size_t>(result.ack.errors.size(), limits::kMaxListedItemErrors));
+  }
   if (!batch.all_or_nothing || result.ack.refused == 0) return absl::OkStatus();
   const ItemError& first = result.ack.errors.front();
   return refuse_argument(
@@ -153,7 +182,8 @@ absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_moves(const UpdateBatch&
   InstanceApplier instances(*statics_, batch, track_lifetimes());
   instances.run();
   RETURN_IF_ERROR(fill_ack(batch, moves_, instances, result));
-  result.snapshot = publish_moves(batch, &instances);
+  start_tick(batch);
+  result.snapshot = publish_moves(batch, &instances, false);
   set_revision(result.ack);
   return result;
 }
@@ -162,6 +192,8 @@ absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_changes(const UpdateBatc
   Applied result;
   flush_coalesced_moves();
   BatchApplier applier(objects_, *statics_, batch, track_lifetimes());
+  if (changes_lifetimes(batch)) applier.record_inserted();
+  remove_ended(batch, applier);
   applier.run();
   if (applier.object_count() > max_objects_)
     return refuse_full("inserts", "objects", static_cast<double>(max_objects_),
@@ -169,13 +201,78 @@ absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_changes(const UpdateBatc
   InstanceApplier instances(*statics_, batch, track_lifetimes());
   instances.run();
   RETURN_IF_ERROR(fill_ack(batch, applier, instances, result));
-  const BatchApplier::Difference difference = applier.difference();
   const bool dropped_history = drops_history(batch);
   start_tick(batch);
-  replaced_bytes_ += objects_.apply(difference.removed, difference.added, difference.replaced);
+  const bool objects_change = apply_objects(batch, applier);
   const bool instances_change = apply_instances(instances);
-  publish_changes(batch, !difference.empty() || instances_change || dropped_history, result);
+  publish_changes(batch, objects_change || instances_change || dropped_history, result);
   return result;
+}
+
+bool SceneWriter::changes_lifetimes(const UpdateBatch& batch) const {
+  const auto expires = [](const UpdateBatch& message) {
+    return std::any_of(message.inserts.begin(), message.inserts.end(),
+                       [](const InsertColumns& insert) { return !insert.expire_ticks.empty(); });
+  };
+  return !expiries_.empty() || !leases_.empty() || batch.lease_ms != 0 || expires(batch) ||
+         std::any_of(batch.earlier.begin(), batch.earlier.end(), expires);
+}
+
+void SceneWriter::remove_ended(const UpdateBatch& batch, BatchApplier& applier) const {
+  const uint64_t tick = tick_of(batch);
+  if (!batch.restart_ticks && expiries_.due(tick))
+    for (const uint32_t handle : expiries_.due_handles(tick)) applier.remove_first(objects_.at(handle).entry().id);
+  if (batch.end_lease != 0)
+    leases_.for_each(batch.end_lease, [&](uint32_t handle) { applier.remove_first(objects_.at(handle).entry().id); });
+}
+
+bool SceneWriter::apply_objects(const UpdateBatch& batch, BatchApplier& applier) {
+  const BatchApplier::Difference difference = applier.difference();
+  if (!changes_lifetimes(batch)) {
+    replaced_bytes_ += objects_.apply(difference.removed, difference.added, difference.replaced);
+    return !difference.empty();
+  }
+  std::vector<uint32_t> handles;
+  handles.reserve(difference.removed.size());
+  for (const Object& object : difference.removed) handles.push_back(objects_.handle(object.id));
+  replaced_bytes_ += objects_.apply(difference.removed, difference.added, difference.replaced);
+  follow_handles(difference.removed, handles, applier.inserted());
+  const uint64_t tick = tick_of(batch);
+  const uint64_t owner = batch.lease_ms != 0 || leases_.has(batch.writer) ? batch.writer : 0;
+  bool expiries_change = false;
+  for (const auto& [id, expire_ticks] : applier.inserted()) {
+    const uint32_t handle = objects_.handle(id);
+    LOCUS_DCHECK_NE(handle, ObjectStore::kNoHandle);
+    expiries_change |= expiries_.set(handle, tick, expire_ticks);
+    if (!planted(PlantedBug::kLeaseOfFirst) || leases_.owner(handle) == 0) leases_.give(handle, owner);
+  }
+  return !difference.empty() || expiries_change;
+}
+
+void SceneWriter::follow_handles(absl::Span<const Object> removed, absl::Span<const uint32_t> handles,
+                                 const absl::flat_hash_map<Id, uint64_t>& inserted) {
+  for (size_t i = 0; i < removed.size(); ++i) {
+    const uint32_t now = objects_.handle(removed[i].id);
+    if (now == handles[i]) continue;
+    if (now != ObjectStore::kNoHandle && !inserted.contains(removed[i].id)) {
+      expiries_.transfer(handles[i], now);
+      leases_.give(now, leases_.owner(handles[i]));
+    }
+    expiries_.erase(handles[i]);
+    leases_.give(handles[i], 0);
+  }
+}
+
+bool SceneWriter::expire(const UpdateBatch& batch) {
+  if (!expiries_.due(tick_of(batch))) return false;
+  flush_coalesced_moves();
+  const std::vector<uint32_t> handles = expiries_.due_handles(tick_of(batch));
+  std::vector<Object> removed;
+  removed.reserve(handles.size());
+  for (const uint32_t handle : handles) removed.push_back(object_of(objects_.at(handle)));
+  replaced_bytes_ += objects_.apply(removed, {});
+  follow_handles(removed, handles, {});
+  return true;
 }
 
 absl::StatusOr<SceneWriter::Joined> SceneWriter::apply_joined(absl::Span<const UpdateBatch* const> batches,
@@ -183,6 +280,7 @@ absl::StatusOr<SceneWriter::Joined> SceneWriter::apply_joined(absl::Span<const U
   Joined joined;
   std::vector<bool> is_new;
   const UpdateBatch* any_new = nullptr;
+  bool expired = false;
   moves_.begin(objects_);
   for (const UpdateBatch* batch : batches) {
     LOCUS_DCHECK(check_form(*batch).ok() && may_join(*batches.front(), *batch));
@@ -190,7 +288,11 @@ absl::StatusOr<SceneWriter::Joined> SceneWriter::apply_joined(absl::Span<const U
     is_new.push_back(known.ok() && !*known);
     joined.acks.push_back(known.ok() ? absl::StatusOr<UpdateAck>(known->value_or(UpdateAck())) : known.status());
     if (!is_new.back()) continue;
-    if (any_new == nullptr) RETURN_IF_ERROR(log());
+    if (any_new == nullptr) {
+      RETURN_IF_ERROR(log());
+      start_tick(*batch);
+      expired = expire(*batch);
+    }
     any_new = batch;
     moves_.add(objects_, *batch);
     UpdateAck& ack = *joined.acks.back();
@@ -202,7 +304,7 @@ absl::StatusOr<SceneWriter::Joined> SceneWriter::apply_joined(absl::Span<const U
     writers_.record(batch->writer, batch->batch, ack);
   }
   moves_.finish(objects_);
-  if (any_new != nullptr) joined.snapshot = publish_moves(*any_new, nullptr);
+  if (any_new != nullptr) joined.snapshot = publish_moves(*any_new, nullptr, expired);
   for (size_t i = 0; i < batches.size(); ++i) {
     // The ack of a duplicate has epoch 0 in two cases: the duplicate repeats an earlier element of `batches`, whose
     // revision is known only now, or the writer table has dropped the ack.
@@ -235,10 +337,9 @@ bool SceneWriter::apply_instances(InstanceApplier& instances) {
   return true;
 }
 
-SnapshotPtr SceneWriter::publish_moves(const UpdateBatch& batch, InstanceApplier* instances) {
+SnapshotPtr SceneWriter::publish_moves(const UpdateBatch& batch, InstanceApplier* instances, bool changed) {
   Applied result;
-  start_tick(batch);
-  bool changes = apply_staged_moves();
+  bool changes = apply_staged_moves() || changed;
   if (instances != nullptr) changes |= apply_instances(*instances);
   publish_changes(batch, changes, result);
   moves_.clear();
@@ -257,6 +358,7 @@ uint64_t SceneWriter::tick_of(const UpdateBatch& batch) const {
 
 void SceneWriter::start_tick(const UpdateBatch& batch) {
   const uint64_t tick = tick_of(batch);
+  if (batch.restart_ticks) expiries_.restart(tick_, tick);
   if (!recorder_.on() || (tick == tick_ && !batch.restart_ticks)) return;
   if (batch.restart_ticks) {
     recorder_.drop();

@@ -15,6 +15,8 @@
 #include "core/base/check.h"
 #include "core/base/limits.h"
 #include "core/scene/log/scene_state.h"
+#include "core/scene/objects/expiries.h"
+#include "core/scene/objects/leases.h"
 #include "core/scene/objects/object_store.h"
 #include "core/scene/snapshot/scene_snapshot.h"
 #include "core/scene/updates/batch_applier.h"
@@ -31,7 +33,8 @@ class SceneWriter {
   SceneWriter(uint64_t epoch, Winding winding, std::shared_ptr<const StaticSet> statics,
               size_t max_objects = limits::kMaxObjects, const HistoryOptions& history = {});
 
-  // Returns a writer that continues from `state`. Returns DATA_LOSS if an id occurs twice in `state`.
+  // Returns a writer that continues from `state`. Returns DATA_LOSS if an id occurs twice in `state`, or if an expiry
+  // or a lease names an object that `state` does not have.
   static absl::StatusOr<SceneWriter> restore(SceneState state, Winding winding, const HistoryOptions& history);
 
   // The ack of a batch that was applied before, or nullopt if the batch is new.
@@ -47,7 +50,7 @@ class SceneWriter {
   };
   // Applies one batch. Precondition: admit() has returned nullopt for the batch. The ack lists refused items; with
   // all_or_nothing, one refused item refuses the whole batch. Returns RESOURCE_EXHAUSTED if the scene would have too
-  // many objects.
+  // many objects or leases. A batch with end_lease for a writer without a lease changes nothing.
   absl::StatusOr<Applied> apply_new(const UpdateBatch& batch);
   // Calls admit(), and then apply_new() if the batch is new. Returns the errors of both functions.
   absl::StatusOr<Applied> apply(const UpdateBatch& batch);
@@ -95,6 +98,13 @@ class SceneWriter {
   // batch makes a revision even if it changes nothing else.
   bool has_past() const { return recorder_.has_past(); }
 
+  // Leases of writers, ascending by writer, and the number of changes of this list so far.
+  std::vector<Lease> leases() const { return leases_.list(); }
+  uint64_t lease_changes() const { return leases_.changes(); }
+  bool has_lease(uint64_t writer) const { return leases_.has(writer); }
+  // Returns the leases and their objects at the current revision.
+  LeaseTable lease_table() { return leases_.table(); }
+
   bool is_object(Id id) const { return objects_.handle(id) != ObjectStore::kNoHandle; }
   const std::shared_ptr<const StaticSet>& statics() const { return statics_; }
 
@@ -113,9 +123,10 @@ class SceneWriter {
   bool apply_instances(InstanceApplier& instances);
   // Applies a batch for which MoveApplier::serves() returns true.
   absl::StatusOr<Applied> apply_moves(const UpdateBatch& batch);
-  // Applies the moves that moves_ has read and those of `instances`, which may be null, at the tick of `batch`. Returns
-  // the new snapshot, or null if nothing changed or snapshots are deferred.
-  SnapshotPtr publish_moves(const UpdateBatch& batch, InstanceApplier* instances);
+  // Applies the moves that moves_ has read and those of `instances`, which may be null, at the tick of `batch`, after
+  // start_tick(). `changed` is true if the revision has other changes. Returns the new snapshot, or null if nothing
+  // changed or snapshots are deferred.
+  SnapshotPtr publish_moves(const UpdateBatch& batch, InstanceApplier* instances, bool changed);
   // Returns true during a replay that builds no snapshots. A scene with history builds snapshots during replay, too,
   // because history records are made from snapshots.
   bool defer_snapshots() const { return replaying_ && !recorder_.on(); }
@@ -130,12 +141,25 @@ class SceneWriter {
   void record_ack(const UpdateBatch& batch, UpdateAck& ack);
   // Applies a batch of any kind with BatchApplier.
   absl::StatusOr<Applied> apply_changes(const UpdateBatch& batch);
+  // Returns true if the batch may change expiries or leases of objects.
+  bool changes_lifetimes(const UpdateBatch& batch) const;
+  // Removes from `applier` the objects that expire with the batch, or whose lease the batch ends.
+  void remove_ended(const UpdateBatch& batch, BatchApplier& applier) const;
+  // Applies the changes of `applier` to objects_, and their effect on expiries and leases. Returns true if an object or
+  // an expiry changed.
+  bool apply_objects(const UpdateBatch& batch, BatchApplier& applier);
+  // Removes the objects that expire at the tick of `batch`. Returns true if there are any. Call after start_tick().
+  bool expire(const UpdateBatch& batch);
+  // Removes the expiries and the owners of objects that were removed, and gives those of objects that began a new
+  // lifetime with a teleport to their new handles. `handles` are those of `removed` before the changes.
+  void follow_handles(absl::Span<const Object> removed, absl::Span<const uint32_t> handles,
+                      const absl::flat_hash_map<Id, uint64_t>& inserted);
   // Returns true if the batch drops history.
   bool drops_history(const UpdateBatch& batch) const { return batch.restart_ticks && has_past(); }
   // Returns the tick that the scene will have after the batch.
   uint64_t tick_of(const UpdateBatch& batch) const;
-  // Drops the history if the batch restarts ticks. Otherwise, if the batch begins another tick, adds the state at the
-  // end of the current tick to the history. Does nothing for a scene without history. Call before the batch is applied.
+  // Drops the history and shifts the expiries if the batch restarts ticks. Otherwise, if the batch begins another tick,
+  // adds the state at the end of the current tick to the history. Call once, before the batch is applied.
   void start_tick(const UpdateBatch& batch);
   // Makes the next revision if `changes` is true or the batch begins a new tick. Then sets the epoch, revision and tick
   // of the ack in `result`.
@@ -148,6 +172,8 @@ class SceneWriter {
   Winding winding_;
   std::shared_ptr<const StaticSet> statics_;
   ObjectStore objects_;
+  Expiries expiries_;
+  Leases leases_;
   MoveApplier moves_;
   CoalescedMoves coalesced_moves_;  // not yet applied to objects_; empty unless defer_snapshots()
   WriterTable writers_;

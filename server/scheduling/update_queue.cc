@@ -27,21 +27,6 @@ constexpr uint64_t kMaxItemsPerSync = uint64_t{1} << 15;
 constexpr milliseconds kReaderPollInterval{2};
 constexpr milliseconds kReaderGrace{1000};
 
-uint64_t items_of(const UpdateBatch& batch) {
-  uint64_t items = batch.remove_ids.size() + batch.remove_groups.size();
-  for (const InsertColumns& insert : batch.inserts) items += insert.ids.size();
-  for (const MoveColumns& move : batch.moves) items += move.ids.size();
-  for (const RelabelColumns& relabel : batch.relabels) items += relabel.ids.size();
-  for (const InstanceMoveColumns& move : batch.instance_moves) items += move.ids.size();
-  for (const RelabelColumns& relabel : batch.instance_relabels) items += relabel.ids.size();
-  return items;
-}
-
-uint64_t lists_of(const UpdateBatch& batch) {
-  return batch.inserts.size() + batch.moves.size() + batch.relabels.size() + batch.instance_moves.size() +
-         batch.instance_relabels.size();
-}
-
 bool coalesces(const Scene& scene) { return scene.spec().overload == OverloadPolicy::kLatestWins; }
 
 // Returns whether the scene's acks wait for the disk. The queue logs the waiting batches of such a scene together,
@@ -109,7 +94,7 @@ bool UpdateQueue::fits_inline(const Scene& scene, const UpdateBatch& batch, uint
 }
 
 absl::StatusOr<Posted> UpdateQueue::post(const ScenePtr& scene, PendingUpdate& update, WhenFull when_full) {
-  const uint64_t items = items_of(update.batch());
+  const uint64_t items = count_items(update.batch());
   SceneQueue* idle = nullptr;
   {
     const MutexLock lock(mutex_);
@@ -217,8 +202,8 @@ UpdateQueue::Group UpdateQueue::take_group(SceneQueue& scene_queue) {
   uint64_t lists = 0;
   while (!scene_queue.waiting.empty()) {
     PendingUpdate* const update = scene_queue.waiting.front();
-    const uint64_t more = items_of(update->batch());
-    const uint64_t more_lists = lists_of(update->batch());
+    const uint64_t more = count_items(update->batch());
+    const uint64_t more_lists = count_lists(update->batch());
     const bool fits = group.empty() || (items + lists + more + more_lists <= max_items &&
                                         (!coalescing || may_join(group.front()->batch(), update->batch())));
     if (!fits) break;
@@ -300,7 +285,7 @@ void UpdateQueue::stall(SceneQueue& scene_queue, const Group& group) {
 void UpdateQueue::requeue(SceneQueue& scene_queue, const Group& group) {
   // NOLINTNEXTLINE(modernize-loop-convert): a range in reverse order would need std::views
   for (auto update = group.rbegin(); update != group.rend(); ++update) {
-    const uint64_t items = items_of((*update)->batch());
+    const uint64_t items = count_items((*update)->batch());
     scene_queue.waiting.push_front(*update);
     scene_queue.items += items;
     stats_.items += items;

@@ -7,6 +7,7 @@
 #include <map>
 #include <vector>
 
+#include "core/base/limits.h"
 #include "core/scene/updates/update_batch.h"
 #include "tests/support/columns.h"
 #include "tests/support/random.h"
@@ -18,15 +19,32 @@ class RandomUpdates {
   // Makes a generator whose ids are below `ids`.
   RandomUpdates(Random& random, uint64_t ids) : random_(random), ids_(ids) {}
 
-  // Generates a batch with lists of at most `items` entries. The batch borrows its columns from `columns`.
+  // Generates a batch with lists of at most `items` entries, sometimes as several messages. The batch borrows its
+  // columns from `columns`.
   UpdateBatch draw(Columns& columns, size_t items) {
+    UpdateBatch batch = draw_message(columns, items);
+    batch.all_or_nothing = random_.chance(0.15);
+    batch.restart_ticks = random_.chance(0.05);
+    if (random_.chance(0.4)) batch.tick = random_.below(50);
+    if (random_.chance(0.3)) number(batch);
+    if (batch.writer != 0 && random_.chance(0.3)) batch.lease_ms = static_cast<uint32_t>(1 + random_.below(3));
+    if (random_.chance(0.15))
+      for (uint64_t i = 1 + random_.below(3); i > 0; --i) batch.earlier.push_back(draw_message(columns, items));
+    return batch;
+  }
+
+  // Generates a writer id, often one whose lease a batch has begun.
+  uint64_t draw_writer() { return 1 + random_.below(3) + 3 * (drawn_ / 100); }
+
+ private:
+  static constexpr Vec3d kFrames[] = {{}, {}, {1e6, -3, 0.1}, {-5e8, 5e8, 1e9}};
+
+  // Generates the columns of a batch, and the settings that each message has.
+  UpdateBatch draw_message(Columns& columns, size_t items) {
     UpdateBatch batch;
     batch.frame = random_.pick(kFrames);
     batch.clear = random_.chance(0.03);
     batch.upsert = random_.chance(0.3);
-    batch.all_or_nothing = random_.chance(0.15);
-    batch.restart_ticks = random_.chance(0.05);
-    if (random_.chance(0.4)) batch.tick = random_.below(50);
     if (random_.chance(0.3)) batch.remove_ids = columns.ids(draw_ids(1 + random_.below(items)));
     if (random_.chance(0.1)) batch.remove_groups = columns.ids(draw_labels<uint64_t>(2));
     for (uint64_t i = random_.below(4); i > 0; --i) batch.inserts.push_back(draw_insert(columns, items));
@@ -34,12 +52,8 @@ class RandomUpdates {
     for (uint64_t i = random_.below(2); i > 0; --i) batch.relabels.push_back(draw_relabel(columns, items));
     for (uint64_t i = random_.below(3); i > 1; --i) batch.instance_moves.push_back(draw_instance_move(columns, items));
     if (random_.chance(0.1)) batch.instance_relabels.push_back(draw_relabel(columns, items));
-    if (random_.chance(0.3)) number(batch);
     return batch;
   }
-
- private:
-  static constexpr Vec3d kFrames[] = {{}, {}, {1e6, -3, 0.1}, {-5e8, 5e8, 1e9}};
 
   std::vector<uint64_t> draw_ids(size_t count) {
     std::vector<uint64_t> ids(count);
@@ -114,7 +128,15 @@ class RandomUpdates {
     insert.extents = columns.floats(draw_column<float>(n, [this] { return draw_size(); }));
     insert.radii = columns.floats(draw_column<float>(n, [this] { return std::vector<double>{draw_size()[0]}; }));
     draw_label_columns(columns, n, insert);
+    if (random_.chance(0.4)) insert.expire_ticks = columns.ids(draw_expire_ticks(random_.chance(0.3) ? 1 : n));
     return insert;
+  }
+
+  std::vector<uint64_t> draw_expire_ticks(size_t count) {
+    std::vector<uint64_t> ticks(count);
+    for (uint64_t& entry : ticks)
+      entry = random_.chance(0.02) ? limits::kMaxExpireTicks + random_.below(2) : random_.below(25);
+    return ticks;
   }
 
   MoveColumns draw_move(Columns& columns, size_t items) {

@@ -63,6 +63,7 @@ class RecoveryLockstep {
     std::vector<UpdateBatch> batches;  // one batch; several if joined; none for a change of instances
     bool joined = false;
     std::optional<Change> change;
+    uint64_t end_lease = 0;  // writer whose lease ends; the deed has no batches then
   };
 
   static MeshPtr one_triangle(uint8_t content) {
@@ -90,6 +91,7 @@ class RecoveryLockstep {
     const uint64_t kind = random_.below(10);
     if (kind == 0) return change_instances();
     if (kind < 3) return apply_joined();
+    if (kind == 9 && random_.chance(0.5)) return end_lease();
     if (kind < 5) return apply_each();
     return apply_one();
   }
@@ -119,6 +121,15 @@ class RecoveryLockstep {
     std::string what;
     if (!logged(ack.status(), {{{batch}, false, {}}}, before, what)) return what;
     return ack_difference(ack, model_->apply(batch));
+  }
+
+  std::string end_lease() {
+    const uint64_t writer = updates_.draw_writer();
+    const uint64_t before = scene_->log_position().sequence;
+    const absl::StatusOr<bool> ended = scene_->end_lease(writer, [] { return true; });
+    std::string what;
+    if (!logged(ended.status(), {{{}, false, {}, writer}}, before, what)) return what;
+    return *ended == *model_->end_lease(writer, [] { return true; }) ? "" : "whether the lease of a writer ends";
   }
 
   std::string apply_each() {
@@ -169,6 +180,8 @@ class RecoveryLockstep {
     while (batch.moves.empty()) batch = updates_.draw(columns_, 6);
     batch.clear = batch.all_or_nothing = batch.restart_ticks = false;
     batch.tick = tick;
+    batch.lease_ms = 0;
+    batch.earlier.clear();
     batch.remove_ids = batch.remove_groups = {};
     batch.inserts.clear();
     batch.relabels.clear();
@@ -263,7 +276,9 @@ class RecoveryLockstep {
     model_ = new_model();
     for (const Deed& deed : deeds_) {
       if (deed.change && !apply(*model_, *deed.change).ok()) return "a static change that was logged is refused";
-      if (deed.joined)
+      if (deed.end_lease != 0)
+        model_->end_lease(deed.end_lease, [] { return true; }).IgnoreError();
+      else if (deed.joined)
         joined(*model_, deed.batches).IgnoreError();
       else if (!deed.change)
         model_->apply(deed.batches.front()).IgnoreError();

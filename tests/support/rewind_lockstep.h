@@ -139,6 +139,9 @@ class RewindLockstep {
     insert.ids = columns_.ids(ids);
     insert.positions_f64 = columns_.doubles(std::move(positions));
     insert.groups = columns_.ids(std::move(groups));
+    std::vector<uint64_t> expire_ticks;
+    for (size_t i = 0; i < ids.size(); ++i) expire_ticks.push_back(random_.chance(0.7) ? 0 : random_.below(8));
+    if (random_.chance(0.5)) insert.expire_ticks = columns_.ids(std::move(expire_ticks));
     insert.kind = static_cast<ShapeKind>(random_.below(4));
     insert.radii = columns_.floats({random_.float_between(0, 2)});
     insert.extents = columns_.floats({random_.float_between(0, 2), random_.float_between(0, 1), 0.5f});

@@ -20,7 +20,8 @@ inline std::string ack_difference(const UpdateAck& a, const UpdateAck& b) {
   if (a.applied != b.applied || a.refused != b.refused) return "counts of the ack";
   if (a.duplicate != b.duplicate) return "duplicate";
   const auto same = [](const ItemError& one, const ItemError& other) {
-    return one.field == other.field && one.index == other.index && one.id == other.id && one.reason == other.reason;
+    return one.field == other.field && one.index == other.index && one.id == other.id && one.reason == other.reason &&
+           one.message == other.message;
   };
   return std::equal(a.errors.begin(), a.errors.end(), b.errors.begin(), b.errors.end(), same) ? ""
                                                                                               : "errors of the ack";
@@ -111,13 +112,36 @@ inline std::string snapshot_difference(const SceneSnapshot& a, const SceneSnapsh
   if (a.winding != b.winding) return "winding";
   if (std::string what = statics_difference(*a.statics, *b.statics); !what.empty()) return what;
   if (std::string what = objects_difference(a.objects, b.objects, random); !what.empty()) return what;
+  for (const Object& object : sorted_objects(a.objects))
+    if (a.remaining_ticks(a.objects.find_ref(object.id).handle()) !=
+        b.remaining_ticks(b.objects.find_ref(object.id).handle()))
+      return "expiry of object " + std::to_string(object.id);
   return past_difference(a, b, random);
+}
+
+// Compares the leases and the ids of their objects.
+inline std::string lease_difference(const FrozenScene& a, const FrozenScene& b) {
+  if (a.leases.leases != b.leases.leases) return "leases";
+  for (const Lease& lease : a.leases.leases) {
+    const auto ids_in = [&lease](const FrozenScene& scene) {
+      std::vector<Id> ids;
+      scene.leases.objects.for_each(lease.writer, [&](uint32_t handle) {
+        ids.push_back(scene.snapshot->objects.grid().at(handle).entry().id);
+        return true;
+      });
+      std::sort(ids.begin(), ids.end());
+      return ids;
+    };
+    if (ids_in(a) != ids_in(b)) return "objects of the lease of writer " + std::to_string(lease.writer);
+  }
+  return "";
 }
 
 inline std::string scene_difference(Scene& a, Scene& b, Random& random) {
   const FrozenScene one = a.freeze(), other = b.freeze();
   if (std::string what = snapshot_difference(*one.snapshot, *other.snapshot, random); !what.empty()) return what;
   if (one.has_past != other.has_past) return "whether there is a past";
+  if (std::string what = lease_difference(one, other); !what.empty()) return what;
   return writers_difference(one.writers, other.writers);
 }
 

@@ -5,6 +5,7 @@
 #define LOCUS_TESTS_SUPPORT_SCENE_LOCKSTEP_H_
 
 #include <algorithm>
+#include <map>
 #include <string>
 #include <utility>
 #include <vector>
@@ -36,7 +37,8 @@ class SceneLockstep {
   // Returns the first difference; empty if there is none.
   std::string run(int batches) {
     for (int batch = 0; batch < batches; ++batch) {
-      std::string what = random_.chance(0.1) ? change_instances() : apply_batch();
+      std::string what = random_.chance(0.1) ? change_instances() : random_.chance(0.1) ? end_lease() : apply_batch();
+      if (what.empty()) what = lease_difference();
       if (what.empty()) what = difference(*scene_.latest(), model_);
       if (!what.empty()) return "batch " + std::to_string(batch) + ": " + what;
       if (random_.chance(0.02)) kept_.emplace_back(scene_.latest(), model_);
@@ -53,7 +55,7 @@ class SceneLockstep {
 
   static std::string difference(const ItemError& actual, const ItemError& expected) {
     if (actual.field == expected.field && actual.index == expected.index && actual.id == expected.id &&
-        actual.reason == expected.reason)
+        actual.reason == expected.reason && actual.message == expected.message)
       return "";
     return "error " + actual.field + " " + std::to_string(actual.index) + " for " + expected.field + " " +
            std::to_string(expected.index);
@@ -141,6 +143,8 @@ class SceneLockstep {
       const std::optional<Object> known = snapshot.objects.find(id);
       if (!known || !(*known == object)) return "object " + std::to_string(id);
       if (!(in_grid[at++] == object)) return "object " + std::to_string(id) + " in the grid";
+      const uint64_t remaining = snapshot.remaining_ticks(snapshot.objects.find_ref(id).handle());
+      if (remaining != model.ends().at(id).remaining) return "expiry of object " + std::to_string(id);
     }
     if (snapshot.statics->size() != model.instances().size()) return "number of instances";
     for (const auto& [id, placed] : model.instances()) {
@@ -149,6 +153,31 @@ class SceneLockstep {
     }
     if (std::string what = box_difference(snapshot, model); !what.empty()) return what;
     return ball_difference(snapshot, model);
+  }
+
+  // Compares the leases and their objects.
+  std::string lease_difference() {
+    const FrozenScene frozen = scene_.freeze();
+    if (frozen.leases.leases != *scene_.leases()) return "list of leases";
+    std::map<uint64_t, uint32_t> leases;
+    std::map<Id, uint64_t> owners;
+    for (const Lease& lease : frozen.leases.leases) {
+      leases[lease.writer] = lease.lease_ms;
+      frozen.leases.objects.for_each(lease.writer, [&](uint32_t handle) {
+        owners[frozen.snapshot->objects.grid().at(handle).entry().id] = lease.writer;
+        return true;
+      });
+    }
+    if (leases != model_.leases()) return "leases";
+    for (const auto& [id, end] : model_.ends())
+      if (end.owner != (owners.contains(id) ? owners.at(id) : 0)) return "owner of object " + std::to_string(id);
+    return "";
+  }
+
+  std::string end_lease() {
+    const uint64_t writer = updates_.draw_writer();
+    const absl::StatusOr<bool> ended = scene_.end_lease(writer, [] { return true; });
+    return ended.ok() && *ended == model_.end_lease(writer) ? "" : "whether the lease of a writer ends";
   }
 
   std::string apply_batch() {

@@ -102,31 +102,83 @@ class SceneModel {
       if (batch.batch <= number) return {absl::StatusCode::kOk, duplicate(batch.batch == number ? last : now()), {}};
     }
     ack_ = {};
-    next_ = batch.clear ? Objects{} : objects_;
+    message_ = 0;
+    next_ = objects_;
     next_lifetimes_ = lifetimes_;
     next_instances_ = instances_;
     next_jumps_ = false;
+    next_ends_ = ends_;
+    owner_ = batch.lease_ms != 0 || leases_.contains(batch.writer) ? batch.writer : 0;
+    if (!batch.restart_ticks && batch.tick.value_or(0) > tick_) expire(*batch.tick - tick_);
+    const Ends aged = next_ends_;
+    for (const UpdateBatch& message : batch.earlier) {
+      apply_items(message);
+      ++message_;
+    }
     apply_items(batch);
+    ends_change_ = std::any_of(next_ends_.begin(), next_ends_.end(), [&aged](const auto& entry) {
+      const auto before = aged.find(entry.first);
+      return before != aged.end() && before->second.remaining != entry.second.remaining;
+    });
     if (batch.all_or_nothing && ack_.refused > 0) return {absl::StatusCode::kInvalidArgument, {}, ack_.errors.front()};
     commit(batch);
+    if (batch.lease_ms != 0) leases_[batch.writer] = batch.lease_ms;
     if (batch.writer != 0) writers_[batch.writer] = {batch.batch, ack_};
     return {absl::StatusCode::kOk, ack_, {}};
   }
 
+  // Number of ticks until an object expires, or 0, and the writer to whose lease the object belongs, or 0.
+  struct End {
+    uint64_t remaining = 0;
+    uint64_t owner = 0;
+
+    friend bool operator==(const End&, const End&) = default;
+  };
+  using Ends = std::map<Id, End>;
+  const Ends& ends() const { return ends_; }
+  // Lengths of the leases, by writer.
+  const std::map<uint64_t, uint32_t>& leases() const { return leases_; }
+
+  // Ends the lease of a writer. Returns false if it has none.
+  bool end_lease(uint64_t writer) {
+    if (leases_.erase(writer) == 0) return false;
+    const size_t before = objects_.size();
+    std::erase_if(objects_, [&](const auto& entry) { return ends_.at(entry.first).owner == writer; });
+    std::erase_if(ends_, [&](const auto& entry) { return !objects_.contains(entry.first); });
+    std::erase_if(lifetimes_, [&](const auto& entry) { return !objects_.contains(entry.first); });
+    if (objects_.size() != before) ++revision_;
+    return true;
+  }
+
  private:
+  // Removes the objects that expire within `ticks` ticks.
+  void expire(uint64_t ticks) {
+    for (auto& [id, end] : next_ends_) {
+      if (end.remaining == 0) continue;
+      if (end.remaining <= ticks) next_.erase(id);
+      end.remaining -= std::min(ticks, end.remaining);
+    }
+    forget_removed();
+  }
+  void forget_removed() {
+    std::erase_if(next_lifetimes_, [this](const auto& life) { return !next_.contains(life.first); });
+    std::erase_if(next_ends_, [this](const auto& end) { return !next_.contains(end.first); });
+  }
+
   void commit(const UpdateBatch& batch) {
     uint64_t tick = batch.tick.value_or(tick_);
     if (!batch.restart_ticks) tick = std::max(tick, tick_);
-    std::erase_if(next_lifetimes_, [this](const auto& life) { return !next_.contains(life.first); });
+    forget_removed();
     const bool forgets = batch.restart_ticks && !past_.empty();
     const bool replaced = history_ticks_ != 0 && next_lifetimes_ != lifetimes_;
     const bool instances_change = next_instances_ != instances_ || next_jumps_;
-    if (tick != tick_ || next_ != objects_ || instances_change || forgets || replaced) ++revision_;
+    if (tick != tick_ || next_ != objects_ || instances_change || forgets || replaced || ends_change_) ++revision_;
     instances_ = std::move(next_instances_);
     if (history_ticks_ != 0) remember(batch, tick);
     tick_ = tick;
     objects_ = std::move(next_);
     lifetimes_ = std::move(next_lifetimes_);
+    ends_ = std::move(next_ends_);
     ack_.revision = revision_;
     ack_.tick = tick_;
   }
@@ -151,6 +203,7 @@ class SceneModel {
   }
 
   void apply_items(const UpdateBatch& batch) {
+    if (batch.clear) next_.clear();
     for (size_t i = 0; i < batch.remove_ids.size(); ++i) {
       const Id id = batch.remove_ids[i];
       count(next_.erase(id) == 1 ? Reason::kUnspecified : Reason::kUnknownId, "remove_ids", i, id);
@@ -160,7 +213,7 @@ class SceneModel {
       if (group != 0) std::erase_if(next_, [group](const auto& entry) { return entry.second.group == group; });
       count(group == 0 ? Reason::kOutOfRange : Reason::kUnspecified, "remove_groups", i, kNoId);
     }
-    std::erase_if(next_lifetimes_, [this](const auto& life) { return !next_.contains(life.first); });
+    forget_removed();
     for (size_t list = 0; list < batch.inserts.size(); ++list)
       for (size_t i = 0; i < batch.inserts[list].ids.size(); ++i)
         insert(batch, batch.inserts[list], i, "inserts[" + std::to_string(list) + "]");
@@ -184,7 +237,7 @@ class SceneModel {
       return;
     }
     ++ack_.refused;
-    if (ack_.errors.size() < 1000) ack_.errors.push_back({field, static_cast<uint32_t>(index), id, reason});
+    if (ack_.errors.size() < 1000) ack_.errors.push_back({field, static_cast<uint32_t>(index), id, reason, message_});
   }
 
   template <class T>
@@ -261,6 +314,9 @@ class SceneModel {
       fault = read_pose(batch, columns, i, object.shape);
       if (fault.first.empty()) fault = read_shape(columns, i, object.shape);
     }
+    const uint64_t expire_ticks = columns.expire_ticks.empty() ? 0 : *entry(columns.expire_ticks, 1, i);
+    if (fault.first.empty() && expire_ticks > uint64_t{1} << 48) fault = {".expire_ticks", Reason::kOutOfRange};
+    if (fault.first.empty()) next_ends_[object.id] = {expire_ticks, owner_};
     read_labels(columns, i, object);
     if (fault.first.empty() && !next_.contains(object.id)) next_lifetimes_[object.id] = ++last_life_;
     if (fault.first.empty()) next_[object.id] = object;
@@ -324,6 +380,11 @@ class SceneModel {
   bool next_jumps_ = false;  // an instance teleports, and the scene has a history
   Objects objects_;
   Objects next_;
+  Ends ends_, next_ends_;
+  bool ends_change_ = false;  // the batch changes the expiry of an object that it does not otherwise change
+  std::map<uint64_t, uint32_t> leases_;
+  uint64_t owner_ = 0;    // owner of the objects that the batch inserts
+  uint32_t message_ = 0;  // index of the message that is being applied
   UpdateAck ack_;
   uint64_t revision_ = 0;
   uint64_t tick_ = 0;

@@ -178,6 +178,8 @@ class AlignedBytes {
 enum class BytesKind : uint32_t {
   kBatch = 0x4842'534c,
   kInstanceBatch = 0x4942'534c,  // a batch that changes instances
+  kExtendedBatch = 0x5842'534c,  // a batch with expiry ticks or a lease
+  kGroupedBatch = 0x4742'534c,   // a batch that was sent as several messages
   kJoinedBatches = 0x4a42'534c,
   kStaticChange = 0x4353'534c,  // data format 1: identifies meshes by content hash; decoded, but never written
   kNamedChange = 0x434e'534c,   // data formats 2 and 3: without the bounds of meshes; decoded, but never written
@@ -186,10 +188,13 @@ enum class BytesKind : uint32_t {
   kOwnedSpec = 0x534f'534c,
   kStateHeader = 0x4854'534c,
   kStateWriters = 0x5754'534c,
+  kMessageWriters = 0x4d57'534c,  // like kStateWriters; the errors of the acks also have the index of a message
   kStateInstances = 0x4954'534c,  // data format 1: identifies meshes by content hash; decoded, but never written
   kNamedInstances = 0x494e'534c,  // data formats 2 and 3: without the bounds of meshes; decoded, but never written
   kBoundedInstances = 0x4945'534c,
   kStateObjects = 0x4f54'534c,
+  kStateExpiries = 0x4554'534c,
+  kStateLeases = 0x4c54'534c,
   kMeshHeader = 0x484d'534c,
   kMeshVertices = 0x564d'534c,
   kMeshIndices = 0x494d'534c,

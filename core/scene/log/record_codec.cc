@@ -63,16 +63,30 @@ void read_labels(ByteReader& reader, Columns& columns) {
   columns.tags = reader.column<uint64_t>("tags");
 }
 
-void write_insert(const InsertColumns& insert, ByteWriter& writer) {
+// Parts of a batch that a kind of record stores after the parts that every kind stores.
+enum class BatchParts {
+  kBase,
+  kInstances,  // also the changes of instances
+  kExtended,   // also the changes of instances, expiry ticks and leases
+};
+
+bool is_extended(const UpdateBatch& batch) {
+  return batch.lease_ms != 0 || batch.end_lease != 0 ||
+         std::any_of(batch.inserts.begin(), batch.inserts.end(),
+                     [](const InsertColumns& insert) { return !insert.expire_ticks.empty(); });
+}
+
+void write_insert(const InsertColumns& insert, BatchParts parts, ByteWriter& writer) {
   const bool capsule = insert.kind == ShapeKind::kCapsule;
   writer.number(static_cast<uint64_t>(insert.kind));
   write_pose(insert, writer);
   if (insert.kind == ShapeKind::kBall || capsule) writer.column(insert.radii);
   if (insert.kind == ShapeKind::kBox || capsule) writer.column(insert.extents);
   write_labels(insert, writer);
+  if (parts == BatchParts::kExtended) writer.column(insert.expire_ticks);
 }
 
-InsertColumns read_insert(ByteReader& reader) {
+InsertColumns read_insert(ByteReader& reader, BatchParts parts) {
   InsertColumns insert;
   insert.kind =
       static_cast<ShapeKind>(reader.number_upto(static_cast<uint64_t>(ShapeKind::kCapsule), "the kind of a shape"));
@@ -81,6 +95,7 @@ InsertColumns read_insert(ByteReader& reader) {
   if (insert.kind == ShapeKind::kBall || capsule) insert.radii = reader.column<float>("radii");
   if (insert.kind == ShapeKind::kBox || capsule) insert.extents = reader.column<float>("extents");
   read_labels(reader, insert);
+  if (parts == BatchParts::kExtended) insert.expire_ticks = reader.column<uint64_t>("expire_ticks");
   return insert;
 }
 
@@ -132,9 +147,9 @@ void write_instance_changes(const UpdateBatch& batch, ByteWriter& writer) {
   write_relabels(batch.instance_relabels, writer);
 }
 
-// Appends `batch` to `writer`, except its changes of instances. Precondition: `batch` has passed check_form().
+// Appends `parts` of `batch` to `writer`, without earlier messages. Precondition: `batch` has passed check_form().
 // O(bytes): copies each column.
-void write_batch(const UpdateBatch& batch, ByteWriter& writer) {
+void write_batch(const UpdateBatch& batch, BatchParts parts, ByteWriter& writer) {
   writer.number(uint64_t{flags_of(batch)});
   for (int axis = 0; axis < 3; ++axis) writer.number(batch.frame[axis]);
   writer.number(batch.tick.value_or(0));
@@ -143,20 +158,29 @@ void write_batch(const UpdateBatch& batch, ByteWriter& writer) {
   writer.column(batch.remove_ids);
   writer.column(batch.remove_groups);
   writer.number(uint64_t{batch.inserts.size()});
-  for (const InsertColumns& insert : batch.inserts) write_insert(insert, writer);
+  for (const InsertColumns& insert : batch.inserts) write_insert(insert, parts, writer);
   writer.number(uint64_t{batch.moves.size()});
   for (const MoveColumns& move : batch.moves) {
     writer.number(uint64_t{move.teleport});
     write_pose(move, writer);
   }
   write_relabels(batch.relabels, writer);
+  if (parts != BatchParts::kBase) write_instance_changes(batch, writer);
+  if (parts != BatchParts::kExtended) return;
+  writer.number(uint64_t{batch.lease_ms});
+  writer.number(batch.end_lease);
 }
 
-enum class InstanceChanges { kNone, kFollow };
+// Sets the error of `reader` if `batch` does not pass check_form().
+UpdateBatch checked(UpdateBatch batch, ByteReader& reader) {
+  if (!reader.good()) return {};
+  if (const absl::Status form = check_form(batch); !form.ok())
+    reader.fail("a batch", absl::StrCat("is of wrong form: ", form.message()));
+  return batch;
+}
 
-// Reads a batch whose columns borrow from the bytes of `reader`. If the batch does not pass check_form(), sets the
-// error of `reader`.
-UpdateBatch read_batch(ByteReader& reader, InstanceChanges instances = InstanceChanges::kNone) {
+// Reads a batch whose columns borrow from the bytes of `reader`.
+UpdateBatch read_unchecked(ByteReader& reader, BatchParts parts) {
   UpdateBatch batch;
   const auto flags = static_cast<uint32_t>(reader.number_upto(kAllFlags, "the flags of a batch"));
   batch.clear = (flags & kClear) != 0;
@@ -170,17 +194,37 @@ UpdateBatch read_batch(ByteReader& reader, InstanceChanges instances = InstanceC
   batch.batch = reader.number("the number of a batch");
   batch.remove_ids = reader.column<uint64_t>("remove_ids");
   batch.remove_groups = reader.column<uint64_t>("remove_groups");
-  read_lists(reader, "the number of inserts", batch.inserts, read_insert);
+  read_lists(reader, "the number of inserts", batch.inserts,
+             [parts](ByteReader& from) { return read_insert(from, parts); });
   read_lists(reader, "the number of moves", batch.moves, read_move);
   read_lists(reader, "the number of relabels", batch.relabels, read_relabel);
-  if (instances == InstanceChanges::kFollow) {
+  if (parts != BatchParts::kBase) {
     read_lists(reader, "the number of moves of instances", batch.instance_moves, read_instance_move);
     read_lists(reader, "the number of relabels of instances", batch.instance_relabels, read_relabel);
   }
-  if (!reader.good()) return {};
-  if (const absl::Status form = check_form(batch); !form.ok())
-    reader.fail("a batch", absl::StrCat("is of wrong form: ", form.message()));
+  if (parts == BatchParts::kExtended) {
+    batch.lease_ms = static_cast<uint32_t>(reader.number_upto(limits::kMaxLeaseMs, "the lease"));
+    batch.end_lease = reader.number("the writer whose lease ends");
+  }
   return batch;
+}
+
+// Reads a batch that was not sent as several messages. If it does not pass check_form(), sets the error of `reader`.
+UpdateBatch read_batch(ByteReader& reader, BatchParts parts) { return checked(read_unchecked(reader, parts), reader); }
+
+// Reads a batch that was sent as several messages.
+UpdateBatch read_grouped(ByteReader& reader) {
+  const uint64_t count = reader.count(kMinBatchBytes, "the number of messages");
+  if (reader.good() && count == 0) reader.fail("the number of messages", "is 0");
+  std::vector<UpdateBatch> messages;
+  messages.reserve(count);
+  for (uint64_t i = 0; i < count && reader.good(); ++i)
+    messages.push_back(read_unchecked(reader, BatchParts::kExtended));
+  if (!reader.good()) return {};
+  UpdateBatch batch = std::move(messages.back());
+  messages.pop_back();
+  batch.earlier = std::move(messages);
+  return checked(std::move(batch), reader);
 }
 
 Record::Joined read_joined(ByteReader& reader) {
@@ -188,7 +232,7 @@ Record::Joined read_joined(ByteReader& reader) {
   const uint64_t count = reader.count(kMinBatchBytes, "the number of batches");
   joined.batches.reserve(count);
   for (uint64_t i = 0; i < count && reader.good(); ++i) {
-    joined.batches.push_back(read_batch(reader));
+    joined.batches.push_back(read_batch(reader, BatchParts::kBase));
     if (reader.good() && !may_join(joined.batches.front(), joined.batches.back()))
       reader.fail(absl::StrCat("batch ", i), "cannot have been joined");
   }
@@ -257,16 +301,26 @@ Record::Change read_change(ByteReader& reader, BytesKind kind) {
 
 void encode_batch(const UpdateBatch& batch, std::string& to) {
   ByteWriter writer(to);
-  write_kind(writer, has_instances(batch) ? BytesKind::kInstanceBatch : BytesKind::kBatch);
-  write_batch(batch, writer);
-  if (has_instances(batch)) write_instance_changes(batch, writer);
+  if (!batch.earlier.empty()) {
+    write_kind(writer, BytesKind::kGroupedBatch);
+    writer.number(uint64_t{batch.earlier.size() + 1});
+    for (const UpdateBatch& message : batch.earlier) write_batch(message, BatchParts::kExtended, writer);
+    write_batch(batch, BatchParts::kExtended, writer);
+  } else if (is_extended(batch)) {
+    write_kind(writer, BytesKind::kExtendedBatch);
+    write_batch(batch, BatchParts::kExtended, writer);
+  } else {
+    const bool instances = has_instances(batch);
+    write_kind(writer, instances ? BytesKind::kInstanceBatch : BytesKind::kBatch);
+    write_batch(batch, instances ? BatchParts::kInstances : BatchParts::kBase, writer);
+  }
 }
 
 void encode_joined(absl::Span<const UpdateBatch* const> batches, std::string& to) {
   ByteWriter writer(to);
   write_kind(writer, BytesKind::kJoinedBatches);
   writer.number(uint64_t{batches.size()});
-  for (const UpdateBatch* batch : batches) write_batch(*batch, writer);
+  for (const UpdateBatch* batch : batches) write_batch(*batch, BatchParts::kBase, writer);
 }
 
 void encode_change(const StaticChange& change, absl::Span<const Id> placed, std::string& to) {
@@ -289,9 +343,13 @@ absl::StatusOr<Record> Record::decode(absl::string_view bytes) {
   ByteReader reader(record.bytes_.bytes());
   const BytesKind kind = read_kind(reader);
   if (kind == BytesKind::kBatch) {
-    record.content_ = read_batch(reader);
+    record.content_ = read_batch(reader, BatchParts::kBase);
   } else if (kind == BytesKind::kInstanceBatch) {
-    record.content_ = read_batch(reader, InstanceChanges::kFollow);
+    record.content_ = read_batch(reader, BatchParts::kInstances);
+  } else if (kind == BytesKind::kExtendedBatch) {
+    record.content_ = read_batch(reader, BatchParts::kExtended);
+  } else if (kind == BytesKind::kGroupedBatch) {
+    record.content_ = read_grouped(reader);
   } else if (kind == BytesKind::kJoinedBatches) {
     record.content_ = read_joined(reader);
   } else if (is_change(kind)) {

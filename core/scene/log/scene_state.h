@@ -7,9 +7,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "core/base/limits.h"
+#include "core/scene/objects/leases.h"
 #include "core/scene/objects/object.h"
 #include "core/scene/snapshot/scene_snapshot.h"
 #include "core/scene/statics/static_set.h"
@@ -25,6 +27,7 @@ struct FrozenScene {
   bool has_past = false;   // SceneWriter::has_past()
   uint64_t sequence = 0;   // sequence number of the last record whose effect is included
   uint64_t log_bytes = 0;  // value of SceneJournal::total_bytes() after that record
+  LeaseTable leases;
 };
 
 // Decoded scene snapshot, the input of SceneWriter::restore().
@@ -35,8 +38,15 @@ struct SceneState {
   bool has_past = false;
   WriterTable writers;
   std::shared_ptr<const StaticSet> statics;
-  double cell_size = 0;                      // cell size of the grid
-  std::vector<std::vector<Object>> objects;  // one vector for each chunk read
+  double cell_size = 0;                           // cell size of the grid
+  std::vector<std::vector<Object>> objects;       // one vector for each chunk read
+  std::vector<std::pair<Id, uint64_t>> expiries;  // objects that expire, and the ticks that they have left
+  struct StoredLease {
+    uint64_t writer = 0;
+    uint32_t lease_ms = 0;
+    std::vector<Id> ids;
+  };
+  std::vector<StoredLease> leases;
 };
 
 // Maximum numbers of objects and instances in one chunk of a snapshot, for StateWriter and StateReader. The limits are
@@ -44,6 +54,8 @@ struct SceneState {
 inline constexpr size_t kObjectsPerChunk = 8192;
 // Maximum encoded size of an object in bytes: id, group, tag, layers, kind, position, rotation, size and radius.
 inline constexpr size_t kMaxBytesOfObject = 8 + 8 + 8 + 4 + 1 + 24 + 16 + 12 + 4;
+// Maximum number of expiries, or of objects of leases, in one chunk.
+inline constexpr size_t kLifetimesPerChunk = 32768;
 inline constexpr size_t kInstancesPerChunk = 4096;
 // Maximum encoded size of an instance in bytes. Includes the content hash, the bounds and the name, with length and
 // padding, of the instance's mesh, as if no other instance in the chunk used that mesh.

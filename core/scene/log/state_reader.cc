@@ -17,7 +17,7 @@ namespace {
 constexpr size_t kMinWriterBytes = size_t{8} * 8;
 constexpr size_t kMinErrorBytes = size_t{3} * 8;
 
-UpdateAck read_ack(ByteReader& reader) {
+UpdateAck read_ack(ByteReader& reader, BytesKind kind) {
   UpdateAck ack;
   ack.epoch = reader.number("the epoch of an ack");
   ack.revision = reader.number("the revision of an ack");
@@ -34,6 +34,9 @@ UpdateAck read_ack(ByteReader& reader) {
     if (pair.second > static_cast<uint32_t>(kLastReason)) reader.fail("the reason of an error", "is unknown");
     error.reason = static_cast<Reason>(pair.second);
     error.id = reader.number("the id of an error");
+    if (kind == BytesKind::kMessageWriters)
+      error.message =
+          static_cast<uint32_t>(reader.number_upto(limits::kMaxUpdateMessages - 1, "the message of an error"));
     error.field = std::string(reader.text(kMaxErrorField, "the field of an error"));
   }
   return ack;
@@ -105,13 +108,17 @@ absl::Status StateReader::add(absl::string_view chunk) {
   if (reader.good() && (kind == BytesKind::kStateHeader) == begun_) reader.fail("the header", "is not first");
   if (kind == BytesKind::kStateHeader) {
     read_header(reader);
-  } else if (kind == BytesKind::kStateWriters) {
-    read_writers(reader);
+  } else if (kind == BytesKind::kStateWriters || kind == BytesKind::kMessageWriters) {
+    read_writers(reader, kind);
   } else if (kind == BytesKind::kStateInstances || kind == BytesKind::kNamedInstances ||
              kind == BytesKind::kBoundedInstances) {
     read_instances(reader, kind);
   } else if (kind == BytesKind::kStateObjects) {
     read_objects(reader);
+  } else if (kind == BytesKind::kStateExpiries) {
+    read_expiries(reader);
+  } else if (kind == BytesKind::kStateLeases) {
+    read_leases(reader);
   } else {
     reader.fail("the kind of a chunk", "is not known");
   }
@@ -133,13 +140,13 @@ void StateReader::read_header(ByteReader& reader) {
   if (!(state_.cell_size >= 0x1p-40 && state_.cell_size <= 0x1p40)) reader.fail("the size of cells", "is out of range");
 }
 
-void StateReader::read_writers(ByteReader& reader) {
+void StateReader::read_writers(ByteReader& reader, BytesKind kind) {
   while (reader.good() && reader.left() >= kMinWriterBytes) {
     WriterTable::Writer writer;
     writer.number = reader.number("a writer");
     writer.batch = reader.number("the last batch of a writer");
     writer.heard = reader.number("the activity count of a writer");
-    writer.ack = read_ack(reader);
+    writer.ack = read_ack(reader, kind);
     if (reader.good() && !state_.writers.restore(std::move(writer))) reader.fail("a writer", "occurs twice, or is 0");
   }
 }
@@ -227,12 +234,57 @@ absl::Status StateReader::place(const FindMesh& find_mesh) {
   return absl::OkStatus();
 }
 
-absl::StatusOr<SceneState> StateReader::finish(const FindMesh& find_mesh) && {
-  if (!begun_) return data_loss("the header is missing");
+void StateReader::read_expiries(ByteReader& reader) {
+  expiries_ = reader.number_upto(objects_, "the number of expiries");
+  const auto ids = reader.column<uint64_t>("ids");
+  const auto remaining = reader.shared_column<uint64_t>(ids.size(), 1, "the ticks until objects expire");
+  if (ids.empty() || ids.size() > kLifetimesPerChunk) reader.fail("ids", "are missing or too many");
+  if (std::any_of(remaining.begin(), remaining.end(),
+                  [](uint64_t ticks) { return ticks == 0 || ticks > limits::kMaxExpireTicks; }))
+    reader.fail("the ticks until an object expires", "are out of range");
+  if (!reader.good()) return;
+  const ColumnReader<uint64_t> ticks(remaining, 1);
+  for (size_t i = 0; i < ids.size(); ++i) state_.expiries.emplace_back(ids[i], *ticks.entry(i));
+}
+
+void StateReader::read_leases(ByteReader& reader) {
+  constexpr size_t kMinLeaseBytes = size_t{4} * 8;
+  leases_ = reader.number_upto(limits::kMaxLeases, "the number of leases");
+  while (reader.good() && reader.left() >= kMinLeaseBytes) {
+    const uint64_t writer = reader.number("the writer of a lease");
+    const uint64_t lease_ms = reader.number_upto(limits::kMaxLeaseMs, "a lease");
+    const uint64_t later = reader.number_upto(objects_, "the number of objects of a lease");
+    const auto ids = reader.column<uint64_t>("ids");
+    if (writer == 0 || lease_ms == 0) reader.fail("a lease or its writer", "is 0");
+    const bool continued = leased_objects_ != 0;
+    const bool follows = continued ? state_.leases.back().writer == writer && leased_objects_ == later + ids.size()
+                                   : state_.leases.empty() || state_.leases.back().writer < writer;
+    if (!follows) reader.fail("a lease", "is not in order");
+    if (!reader.good()) return;
+    if (!continued) state_.leases.emplace_back();
+    SceneState::StoredLease& lease = state_.leases.back();
+    lease.writer = writer;
+    lease.lease_ms = static_cast<uint32_t>(lease_ms);
+    lease.ids.insert(lease.ids.end(), ids.begin(), ids.end());
+    leased_objects_ = later;
+  }
+}
+
+absl::Status StateReader::check_counts() const {
   if (state_.writers.size() != writers_ || instances_read_ != instances_ || objects_read_ != objects_)
     return data_loss(absl::StrCat("the header counts ", writers_, " writers, ", instances_, " instances and ", objects_,
                                   " objects, the chunks contain ", state_.writers.size(), ", ", instances_read_,
                                   " and ", objects_read_));
+  if (state_.expiries.size() != expiries_ || state_.leases.size() != leases_ || leased_objects_ != 0)
+    return data_loss(absl::StrCat("the chunks count ", expiries_, " expiries and ", leases_, " leases, and contain ",
+                                  state_.expiries.size(), " and ", state_.leases.size(), "; ", leased_objects_,
+                                  " objects of the last lease are missing"));
+  return absl::OkStatus();
+}
+
+absl::StatusOr<SceneState> StateReader::finish(const FindMesh& find_mesh) && {
+  if (!begun_) return data_loss("the header is missing");
+  RETURN_IF_ERROR(check_counts());
   RETURN_IF_ERROR(place(find_mesh));
   return std::move(state_);
 }

@@ -17,9 +17,10 @@ constexpr size_t kWritersChunk = UpdateLog::kMaxChunkBytes / 2;
 static_assert(kWritersChunk + size_t{limits::kMaxListedItemErrors} * kMaxBytesOfError + 1024 <=
               UpdateLog::kMaxChunkBytes);
 static_assert(kObjectsPerChunk * kMaxBytesOfObject + 1024 <= UpdateLog::kMaxChunkBytes);
+static_assert(kLifetimesPerChunk * 16 + limits::kMaxLeases * 32 + 1024 <= UpdateLog::kMaxChunkBytes);
 static_assert(kInstancesPerChunk * kMaxBytesOfInstance + 1024 <= UpdateLog::kMaxChunkBytes);
 
-void write_ack(const UpdateAck& ack, ByteWriter& writer) {
+void write_ack(const UpdateAck& ack, bool names_messages, ByteWriter& writer) {
   writer.number(ack.epoch);
   writer.number(ack.revision);
   writer.number(ack.tick);
@@ -28,6 +29,7 @@ void write_ack(const UpdateAck& ack, ByteWriter& writer) {
   for (const ItemError& error : ack.errors) {
     writer.pair(error.index, static_cast<uint32_t>(error.reason));
     writer.number(error.id);
+    if (names_messages) writer.number(uint64_t{error.message});
     writer.text(error.field);
   }
 }
@@ -77,6 +79,8 @@ StateWriter::StateWriter(FrozenScene scene) : scene_(std::move(scene)), writers_
   const Bvh<Instance>::Values instances = scene_.snapshot->statics->tree().values();
   next_instance_ = instances.begin();
   last_instance_ = instances.end();
+  for (const WriterTable::Writer& writer : writers_)
+    for (const ItemError& error : writer.ack.errors) names_messages_ |= error.message != 0;
 }
 
 absl::StatusOr<std::optional<std::string>> StateWriter::next() {
@@ -89,6 +93,10 @@ absl::StatusOr<std::optional<std::string>> StateWriter::next() {
     chunk = next_instances();
   } else if (objects_written_ < scene_.snapshot->objects.size()) {
     chunk = next_objects();
+  } else if (scene_.snapshot->expiries != nullptr && expiries_written_ < scene_.snapshot->expiries->count()) {
+    chunk = next_expiries();
+  } else if (next_lease_ < scene_.leases.leases.size()) {
+    chunk = next_leases();
   } else {
     return std::optional<std::string>();
   }
@@ -115,13 +123,13 @@ std::string StateWriter::header() const {
 std::string StateWriter::next_writers() {
   std::string chunk;
   ByteWriter writer(chunk);
-  write_kind(writer, BytesKind::kStateWriters);
+  write_kind(writer, names_messages_ ? BytesKind::kMessageWriters : BytesKind::kStateWriters);
   for (; next_writer_ < writers_.size() && chunk.size() < kWritersChunk; ++next_writer_) {
     const WriterTable::Writer& entry = writers_[next_writer_];
     writer.number(entry.number);
     writer.number(entry.batch);
     writer.number(entry.heard);
-    write_ack(entry.ack, writer);
+    write_ack(entry.ack, names_messages_, writer);
   }
   return chunk;
 }
@@ -170,6 +178,53 @@ std::string StateWriter::next_objects() {
   ByteWriter writer(chunk);
   write_kind(writer, BytesKind::kStateObjects);
   write_objects(writer, objects);
+  return chunk;
+}
+
+std::string StateWriter::next_expiries() {
+  std::vector<Id> ids;
+  std::vector<uint64_t> remaining;
+  scene_.snapshot->objects.grid().for_each_from(next_expiry_, [&](const GridRef& object) {
+    const uint64_t ticks = scene_.snapshot->remaining_ticks(object.handle());
+    if (ticks == 0) return true;
+    ids.push_back(object.entry().id);
+    remaining.push_back(ticks);
+    return ids.size() < kLifetimesPerChunk;
+  });
+  LOCUS_CHECK(!ids.empty());
+  expiries_written_ += ids.size();
+  LOCUS_DCHECK_LE(expiries_written_, scene_.snapshot->expiries->count());
+  std::string chunk;
+  ByteWriter writer(chunk);
+  write_kind(writer, BytesKind::kStateExpiries);
+  writer.number(uint64_t{scene_.snapshot->expiries->count()});
+  writer.column(absl::MakeConstSpan(ids));
+  writer.shared_column(absl::MakeConstSpan(remaining), 1);
+  return chunk;
+}
+
+std::string StateWriter::next_leases() {
+  std::string chunk;
+  ByteWriter writer(chunk);
+  write_kind(writer, BytesKind::kStateLeases);
+  writer.number(uint64_t{scene_.leases.leases.size()});
+  size_t room = kLifetimesPerChunk;
+  while (room > 0 && next_lease_ < scene_.leases.leases.size()) {
+    const Lease& lease = scene_.leases.leases[next_lease_];
+    if (leased_.empty())
+      scene_.leases.objects.for_each(lease.writer, [this](uint32_t handle) {
+        leased_.push_back(scene_.snapshot->objects.grid().at(handle).entry().id);
+        return true;
+      });
+    const size_t count = std::min(room, leased_.size());
+    writer.number(lease.writer);
+    writer.number(uint64_t{lease.lease_ms});
+    writer.number(uint64_t{leased_.size() - count});  // number of objects of the lease in later chunks
+    writer.column(absl::MakeConstSpan(leased_).last(count));
+    leased_.resize(leased_.size() - count);
+    room -= count;
+    if (leased_.empty()) ++next_lease_;
+  }
   return chunk;
 }
 

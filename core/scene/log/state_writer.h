@@ -2,7 +2,7 @@
 // are encoded one at a time, so only one chunk is in memory. One thread at a time.
 //
 // The first chunk is a header with the numbers of writers, instances and objects. The chunks of writers follow, then
-// the chunks of instances, then the chunks of objects. The objects are in the order of the grid. StateReader
+// the chunks of instances, of objects, of expiries and of leases. The objects are in the order of the grid. StateReader
 // (core/scene/log/state_reader.h) decodes the chunks; FORMAT.md describes the bytes.
 #ifndef LOCUS_CORE_SCENE_LOG_STATE_WRITER_H_
 #define LOCUS_CORE_SCENE_LOG_STATE_WRITER_H_
@@ -32,6 +32,8 @@ class StateWriter {
   std::string next_writers();
   std::string next_instances();
   std::string next_objects();
+  std::string next_expiries();
+  std::string next_leases();
 
   const FrozenScene scene_;
   const std::vector<WriterTable::Writer> writers_;
@@ -40,6 +42,11 @@ class StateWriter {
   Bvh<Instance>::Values::Iterator next_instance_, last_instance_;
   size_t objects_written_ = 0;
   GridCursor next_object_;
+  bool names_messages_ = false;  // an ack has an error of a message other than the first
+  size_t expiries_written_ = 0;
+  GridCursor next_expiry_;  // next object whose expiry is written, if it expires
+  size_t next_lease_ = 0;
+  std::vector<Id> leased_;  // ids of the objects of the lease next_lease_ that are not written yet
   uint64_t bytes_ = 0;
 };
 

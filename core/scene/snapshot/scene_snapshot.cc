@@ -38,6 +38,12 @@ uint64_t unshared_history_bytes(const SceneSnapshot& held, const SceneSnapshot& 
   return bytes;
 }
 
+// Returns the bytes of the expiries of `held` that `later`, which may be null, does not hold.
+uint64_t unshared_expiry_bytes(const SceneSnapshot& held, const SceneSnapshot* later) {
+  return held.expiries == nullptr ? 0
+                                  : held.expiries->unshared_bytes(later == nullptr ? nullptr : later->expiries.get());
+}
+
 }  // namespace
 
 uint64_t unshared_bytes(const SceneSnapshot& held, const SceneSnapshot& later) {
@@ -47,9 +53,11 @@ uint64_t unshared_bytes(const SceneSnapshot& held, const SceneSnapshot& later) {
   const HistoryRecord* next = first_record(later, held.tick);
   return held.statics->unshared_bytes(next == nullptr ? *later.statics : *next->statics) +
          held.objects.unshared_bytes(next == nullptr ? later.objects : next->objects) +
-         unshared_history_bytes(held, later);
+         unshared_history_bytes(held, later) + unshared_expiry_bytes(held, &later);
 }
 
-uint64_t bytes_of(const SceneSnapshot& snapshot) { return snapshot.statics->bytes() + snapshot.objects.bytes(); }
+uint64_t bytes_of(const SceneSnapshot& snapshot) {
+  return snapshot.statics->bytes() + snapshot.objects.bytes() + unshared_expiry_bytes(snapshot, nullptr);
+}
 
 }  // namespace locus

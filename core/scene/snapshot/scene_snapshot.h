@@ -5,6 +5,7 @@
 
 #include <memory>
 
+#include "core/scene/objects/expiries.h"
 #include "core/scene/objects/object_set.h"
 #include "core/scene/snapshot/history.h"
 #include "core/scene/statics/static_set.h"
@@ -26,9 +27,14 @@ struct SceneSnapshot {
   // Includes memory that was allocated and replaced between two revisions, and memory that the history still holds.
   // Never decreases.
   uint64_t replaced_bytes = 0;
-  PastLimit past_limit = PastLimit::kOff;  // reason why the history has no ticks before oldest_tick()
-  uint64_t forgotten_ticks = 0;            // see HistoryRecorder::forgotten_ticks()
+  PastLimit past_limit = PastLimit::kOff;       // reason why the history has no ticks before oldest_tick()
+  uint64_t forgotten_ticks = 0;                 // see HistoryRecorder::forgotten_ticks()
+  std::shared_ptr<const ExpiryTable> expiries;  // null if no object expires
 
+  // Returns the number of ticks until an object of `objects` expires; 0 if it does not expire. O(1).
+  uint64_t remaining_ticks(uint32_t handle) const {
+    return expiries == nullptr ? 0 : expiries->remaining(handle, tick);
+  }
   // Returns the oldest tick at which queries may be evaluated.
   uint64_t oldest_tick() const { return history == nullptr ? tick : history->records.front()->tick; }
 };

@@ -36,62 +36,97 @@ BatchApplier::BatchApplier(const ObjectStore& objects, const StaticSet& statics,
       statics_(statics),
       batch_(batch),
       track_lifetimes_(track_lifetimes),
-      count_(batch.clear ? 0 : objects.size()) {
+      message_(&batch),
+      count_(objects.size()) {
   LOCUS_DCHECK(check_form(batch).ok());
 }
 
+void BatchApplier::remove_first(Id id) {
+  LOCUS_DCHECK(current(id).has_value());
+  remove(id);
+}
+
 void BatchApplier::run() {
-  LOCUS_DCHECK(changed_.empty() && applied_ == 0 && refused_ == 0);  // called once
+  LOCUS_DCHECK(applied_ == 0 && refused_ == 0 && message_index_ == 0);  // called once
+  for (const UpdateBatch& message : batch_.earlier) {
+    apply(message);
+    ++message_index_;
+  }
+  apply(batch_);
+  LOCUS_DCHECK_LE(errors_.size(), size_t{refused_});
+}
+
+void BatchApplier::apply(const UpdateBatch& message) {
+  message_ = &message;
+  if (message.clear) clear();
   remove_ids();
   remove_groups();
-  for (size_t i = 0; i < batch_.inserts.size(); ++i) insert(batch_.inserts[i], absl::StrCat("inserts[", i, "]"));
-  for (size_t i = 0; i < batch_.moves.size(); ++i) move(batch_.moves[i], absl::StrCat("moves[", i, "]"));
-  for (size_t i = 0; i < batch_.relabels.size(); ++i) relabel(batch_.relabels[i], absl::StrCat("relabels[", i, "]"));
-  LOCUS_DCHECK_LE(errors_.size(), size_t{refused_});
+  for (size_t i = 0; i < message.inserts.size(); ++i) insert(message.inserts[i], absl::StrCat("inserts[", i, "]"));
+  for (size_t i = 0; i < message.moves.size(); ++i) move(message.moves[i], absl::StrCat("moves[", i, "]"));
+  for (size_t i = 0; i < message.relabels.size(); ++i) relabel(message.relabels[i], absl::StrCat("relabels[", i, "]"));
+}
+
+void BatchApplier::clear() {
+  cleared_ = true;
+  count_ = 0;
+  changed_.clear();
+  inserted_.clear();
+  grouped_.clear();
 }
 
 std::optional<Object> BatchApplier::current(Id id) const {
   const auto changed = changed_.find(id);
   if (changed != changed_.end()) return changed->second;
-  return batch_.clear ? std::nullopt : objects_.find(id);
+  return cleared_ ? std::nullopt : objects_.find(id);
+}
+
+void BatchApplier::put(const Object& object) {
+  changed_[object.id] = object;
+  if (object.group != 0 && !batch_.earlier.empty()) grouped_[object.group].push_back(object.id);
+}
+
+void BatchApplier::remove(Id id) {
+  changed_[id] = std::nullopt;
+  inserted_.erase(id);
+  --count_;
 }
 
 void BatchApplier::refuse(std::string field, size_t index, Id id, Reason reason) {
   ++refused_;
   if (errors_.size() < limits::kMaxListedItemErrors)
-    errors_.push_back({std::move(field), static_cast<uint32_t>(index), id, reason});
+    errors_.push_back({std::move(field), static_cast<uint32_t>(index), id, reason, message_index_});
 }
 
 void BatchApplier::remove_ids() {
-  for (size_t i = 0; i < batch_.remove_ids.size(); ++i) {
-    const Id id = batch_.remove_ids[i];
+  for (size_t i = 0; i < message_->remove_ids.size(); ++i) {
+    const Id id = message_->remove_ids[i];
     if (!current(id)) {
       refuse("remove_ids", i, id, Reason::kUnknownId);
       continue;
     }
-    changed_[id] = std::nullopt;
-    --count_;
+    remove(id);
     ++applied_;
   }
 }
 
 void BatchApplier::remove_groups() {
   absl::flat_hash_set<Group> groups;
-  for (size_t i = 0; i < batch_.remove_groups.size(); ++i) {
-    if (batch_.remove_groups[i] == 0) {
+  for (size_t i = 0; i < message_->remove_groups.size(); ++i) {
+    if (message_->remove_groups[i] == 0) {
       refuse("remove_groups", i, kNoId, Reason::kOutOfRange);
       continue;
     }
-    groups.insert(batch_.remove_groups[i]);
+    groups.insert(message_->remove_groups[i]);
     ++applied_;
   }
-  if (batch_.clear) return;
   for (const Group group : groups) {
-    objects_.for_each_in(group, [&](const Object& object) {
-      if (!current(object.id)) return;
-      changed_[object.id] = std::nullopt;
-      --count_;
-    });
+    const auto remove_member = [this, group](Id id) {
+      const std::optional<Object> now = current(id);
+      if (now && now->group == group) remove(id);
+    };
+    if (const auto grouped = grouped_.extract(group); !grouped.empty())
+      for (const Id id : grouped.mapped()) remove_member(id);
+    if (!cleared_) objects_.for_each_in(group, [&](const Object& object) { remove_member(object.id); });
   }
 }
 
@@ -134,31 +169,37 @@ bool BatchApplier::may_insert(Id id, uint32_t index, const std::string& field) {
   Reason reason = Reason::kUnspecified;
   const bool known = current(id).has_value();
   if (id == kNoId) reason = Reason::kOutOfRange;
-  if (statics_.find(id) != nullptr || (known && !batch_.upsert)) reason = Reason::kDuplicateId;
+  if (statics_.find(id) != nullptr || (known && !message_->upsert)) reason = Reason::kDuplicateId;
   if (reason != Reason::kUnspecified) refuse(field + ".ids", index, id, reason);
   return reason == Reason::kUnspecified;
 }
 
 void BatchApplier::insert(const InsertColumns& columns, const std::string& field) {
-  const PoseReader poses(batch_.frame, columns.positions, columns.positions_f64, columns.rotations);
+  const PoseReader poses(message_->frame, columns.positions, columns.positions_f64, columns.rotations);
   for (uint32_t i = 0; i < columns.ids.size(); ++i) {
     Object object;
     object.id = columns.ids[i];
     if (!may_insert(object.id, i, field)) continue;
     if (!read_pose(poses, i, object.id, field, object.shape)) continue;
     if (!read_shape(columns, i, object.id, field, object.shape)) continue;
+    const uint64_t expire_ticks = ColumnReader<uint64_t>(columns.expire_ticks, 1).value(i, 0);
+    if (expire_ticks > limits::kMaxExpireTicks) {
+      refuse(field + ".expire_ticks", i, object.id, Reason::kOutOfRange);
+      continue;
+    }
     read_labels(columns, i, object);
     if (!current(object.id)) {
       ++count_;
       begin_life(object.id);
     }
     put(object);
+    if (records_inserted_) inserted_[object.id] = expire_ticks;
     ++applied_;
   }
 }
 
 void BatchApplier::move(const MoveColumns& columns, const std::string& field) {
-  const PoseReader poses(batch_.frame, columns.positions, columns.positions_f64, columns.rotations);
+  const PoseReader poses(message_->frame, columns.positions, columns.positions_f64, columns.rotations);
   for (uint32_t i = 0; i < columns.ids.size(); ++i) {
     const Id id = columns.ids[i];
     const std::optional<Object> known = current(id);
@@ -194,7 +235,7 @@ BatchApplier::Difference BatchApplier::difference() {
   const auto lives_on = [&difference](const Object& before, const std::optional<Object>& now) {
     return now && *now == before && !difference.replaced.contains(before.id);
   };
-  if (batch_.clear)
+  if (cleared_)
     objects_.for_each([&](const Object& object) {
       const auto changed = changed_.find(object.id);
       if (changed == changed_.end() || !lives_on(object, changed->second)) difference.removed.push_back(object);
@@ -202,7 +243,7 @@ BatchApplier::Difference BatchApplier::difference() {
   for (const auto& [id, object] : changed_) {
     const std::optional<Object> before = objects_.find(id);
     if (before && lives_on(*before, object)) continue;
-    if (before && !batch_.clear) difference.removed.push_back(*before);
+    if (before && !cleared_) difference.removed.push_back(*before);
     if (object) difference.added.push_back(*object);
   }
   LOCUS_DCHECK_EQ(count_ + difference.removed.size(), objects_.size() + difference.added.size());

@@ -1,6 +1,6 @@
-// Application of one update batch. Does not change the store: collects the changed objects in a table of its own and
-// computes their difference from the store at the end. So a refused batch changes nothing, and the grid is updated only
-// once for each object. One thread at a time.
+// Application of one update batch with its earlier messages. Does not change the store: collects the changed objects in
+// a table of its own and computes their difference from the store at the end. So a refused batch changes nothing, and
+// the grid is updated only once for each object. One thread at a time.
 #ifndef LOCUS_CORE_SCENE_UPDATES_BATCH_APPLIER_H_
 #define LOCUS_CORE_SCENE_UPDATES_BATCH_APPLIER_H_
 
@@ -28,7 +28,11 @@ class BatchApplier {
   BatchApplier(const ObjectStore& objects, const StaticSet& statics, const UpdateBatch& batch,
                TrackLifetimes track_lifetimes = TrackLifetimes::kNo);
 
-  // Applies clear, removes, inserts, moves and relabels, in this order. Call once.
+  // Makes run() fill inserted(). Call before run().
+  void record_inserted() { records_inserted_ = true; }
+  // Removes a present object before run(): it expires or its lease ends. Not counted as an applied item.
+  void remove_first(Id id);
+  // Applies clear, removes, inserts, moves and relabels, in this order: those of the earlier messages first. Call once.
   void run();
 
   // Returns the number of objects after the batch. A batch removes objects only before its inserts, so no insert makes
@@ -50,9 +54,16 @@ class BatchApplier {
   };
   Difference difference();
 
+  // Returns the ids of the objects that the batch inserted and that still exist after it, each with the ticks until it
+  // expires; 0: it does not expire. Empty unless record_inserted() was called.
+  const absl::flat_hash_map<Id, uint64_t>& inserted() const { return inserted_; }
+
  private:
   std::optional<Object> current(Id id) const;
-  void put(const Object& object) { changed_[object.id] = object; }
+  void put(const Object& object);
+  void remove(Id id);
+  void apply(const UpdateBatch& message);
+  void clear();
   void begin_life(Id id) {
     if (track_lifetimes_ == TrackLifetimes::kYes) replaced_.insert(id);
   }
@@ -70,7 +81,15 @@ class BatchApplier {
   const StaticSet& statics_;
   const UpdateBatch& batch_;
   const TrackLifetimes track_lifetimes_;
+  const UpdateBatch* message_;  // message that is being applied
+  uint32_t message_index_ = 0;
+  bool records_inserted_ = false;
+  bool cleared_ = false;  // a message had `clear`: the objects of objects_ are removed
   absl::flat_hash_set<Id> replaced_;
+  absl::flat_hash_map<Id, uint64_t> inserted_;
+  // Ids that earlier messages put into a group. Some may have left the group or were removed. Empty for a batch of one
+  // message.
+  absl::flat_hash_map<Group, std::vector<Id>> grouped_;
   size_t count_;                                            // number of objects after the items applied so far
   absl::flat_hash_map<Id, std::optional<Object>> changed_;  // new state by id; nullopt: removed
   uint32_t applied_ = 0;

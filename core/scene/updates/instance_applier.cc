@@ -12,13 +12,22 @@ namespace locus {
 
 void InstanceApplier::run() {
   LOCUS_DCHECK(check_form(batch_).ok() && instances_.empty());
+  for (const UpdateBatch& message : batch_.earlier) {
+    apply(message);
+    ++message_index_;
+  }
+  apply(batch_);
+}
+
+void InstanceApplier::apply(const UpdateBatch& message) {
+  message_ = &message;
   size_t items = 0;
-  for (const InstanceMoveColumns& move : batch_.instance_moves) items += move.ids.size();
-  instances_.reserve(std::min(items, statics_.size()));
-  for (size_t i = 0; i < batch_.instance_moves.size(); ++i)
-    move(batch_.instance_moves[i], absl::StrCat("instance_moves[", i, "]"));
-  for (size_t i = 0; i < batch_.instance_relabels.size(); ++i)
-    relabel(batch_.instance_relabels[i], absl::StrCat("instance_relabels[", i, "]"));
+  for (const InstanceMoveColumns& move : message.instance_moves) items += move.ids.size();
+  instances_.reserve(std::min(std::max(items, instances_.capacity()), statics_.size()));
+  for (size_t i = 0; i < message.instance_moves.size(); ++i)
+    move(message.instance_moves[i], absl::StrCat("instance_moves[", i, "]"));
+  for (size_t i = 0; i < message.instance_relabels.size(); ++i)
+    relabel(message.instance_relabels[i], absl::StrCat("instance_relabels[", i, "]"));
 }
 
 std::vector<Instance> InstanceApplier::changed() {
@@ -39,7 +48,7 @@ Instance* InstanceApplier::find(Id id) {
 void InstanceApplier::refuse(std::string field, size_t index, Id id, Reason reason) {
   ++refused_;
   if (errors_.size() < limits::kMaxListedItemErrors)
-    errors_.push_back({std::move(field), static_cast<uint32_t>(index), id, reason});
+    errors_.push_back({std::move(field), static_cast<uint32_t>(index), id, reason, message_index_});
 }
 
 Reason InstanceApplier::read_transform(const InstanceMoveColumns& columns, const PoseReader& poses, size_t i,
@@ -62,7 +71,7 @@ Reason InstanceApplier::read_transform(const InstanceMoveColumns& columns, const
 }
 
 void InstanceApplier::move(const InstanceMoveColumns& columns, const std::string& field) {
-  const PoseReader poses(batch_.frame, columns.positions, columns.positions_f64, columns.rotations);
+  const PoseReader poses(message_->frame, columns.positions, columns.positions_f64, columns.rotations);
   for (size_t i = 0; i < columns.ids.size(); ++i) {
     const Id id = columns.ids[i];
     Instance* const instance = find(id);

@@ -1,6 +1,6 @@
-// Application of the moves and relabels of instances of one update batch. Does not change the set of instances:
-// collects the changed instances, which StaticSet::replace() puts into a new set. One thread at a time. Invariant: each
-// changed instance is collected once.
+// Application of the moves and relabels of instances of one update batch with its earlier messages. Does not change the
+// set of instances: collects the changed instances, which StaticSet::replace() puts into a new set. One thread at a
+// time. Invariant: each changed instance is collected once.
 #ifndef LOCUS_CORE_SCENE_UPDATES_INSTANCE_APPLIER_H_
 #define LOCUS_CORE_SCENE_UPDATES_INSTANCE_APPLIER_H_
 
@@ -20,9 +20,9 @@ class InstanceApplier {
   // Borrows `statics` and `batch` for the lifetime of this object. Precondition: `batch` has passed check_form().
   // Without `track_lifetimes`, a teleport to the place where the instance is changes nothing.
   InstanceApplier(const StaticSet& statics, const UpdateBatch& batch, TrackLifetimes track_lifetimes)
-      : statics_(statics), batch_(batch), track_lifetimes_(track_lifetimes) {}
+      : statics_(statics), batch_(batch), message_(&batch), track_lifetimes_(track_lifetimes) {}
 
-  // Applies instance moves, then instance relabels. Call once.
+  // Applies instance moves, then instance relabels, those of the earlier messages first. Call once.
   void run();
 
   uint32_t applied() const { return applied_; }
@@ -32,6 +32,7 @@ class InstanceApplier {
   std::vector<Instance> changed();
 
  private:
+  void apply(const UpdateBatch& message);
   void move(const InstanceMoveColumns& columns, const std::string& field);
   void relabel(const RelabelColumns& columns, const std::string& field);
   // Reads item `i` of a move. Returns the reason why it is refused, with the name of the column in `column`.
@@ -43,6 +44,8 @@ class InstanceApplier {
 
   const StaticSet& statics_;
   const UpdateBatch& batch_;
+  const UpdateBatch* message_;  // message that is being applied
+  uint32_t message_index_ = 0;
   const TrackLifetimes track_lifetimes_;
   std::vector<Instance> instances_;
   absl::flat_hash_map<Id, size_t> indices_;  // index in instances_ of each collected instance

@@ -28,7 +28,7 @@ void MoveApplier::check_invariants() const {
 
 bool MoveApplier::serves(const UpdateBatch& batch) {
   return !batch.clear && !batch.restart_ticks && batch.remove_ids.empty() && batch.remove_groups.empty() &&
-         batch.inserts.empty() && batch.relabels.empty() && !batch.moves.empty();
+         batch.inserts.empty() && batch.relabels.empty() && !batch.moves.empty() && batch.earlier.empty();
 }
 
 void MoveApplier::begin(const ObjectStore& objects) {

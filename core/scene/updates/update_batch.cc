@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/check.h"
 #include "core/base/column.h"
 #include "core/base/limits.h"
 #include "core/base/status_macros.h"
@@ -20,7 +21,8 @@ class ElementCheck {
     RETURN_IF_ERROR(check_positions(insert.positions, insert.positions_f64));
     RETURN_IF_ERROR(check_length(insert.rotations.size(), 4, ColumnNeed::kOptional, "rotations"));
     RETURN_IF_ERROR(check_shape(insert));
-    return check_labels(insert);
+    RETURN_IF_ERROR(check_labels(insert));
+    return check_length(insert.expire_ticks.size(), 1, ColumnNeed::kOptional, "expire_ticks");
   }
 
   absl::Status run(const MoveColumns& move) const {
@@ -83,16 +85,6 @@ absl::Status check_list(absl::string_view list, const std::vector<Columns>& elem
   return absl::OkStatus();
 }
 
-size_t item_count(const UpdateBatch& batch) {
-  size_t items = batch.remove_ids.size() + batch.remove_groups.size();
-  for (const InsertColumns& insert : batch.inserts) items += insert.ids.size();
-  for (const MoveColumns& move : batch.moves) items += move.ids.size();
-  for (const RelabelColumns& relabel : batch.relabels) items += relabel.ids.size();
-  for (const InstanceMoveColumns& move : batch.instance_moves) items += move.ids.size();
-  for (const RelabelColumns& relabel : batch.instance_relabels) items += relabel.ids.size();
-  return items;
-}
-
 absl::Status check_header(const UpdateBatch& batch) {
   if (!is_finite(batch.frame)) return refuse_argument(Reason::kNotFinite, "frame", {}, "a frame needs finite numbers");
   if (max_component(abs(batch.frame)) > limits::kMaxCoordinate)
@@ -100,14 +92,30 @@ absl::Status check_header(const UpdateBatch& batch) {
   if ((batch.writer == 0) != (batch.batch == 0))
     return refuse_argument(Reason::kMalformed, batch.writer == 0 ? "writer" : "batch", {},
                            "writer and batch go together: a random number that is not 0, and 1, 2, 3, ...");
-  const size_t items = item_count(batch);
+  if (batch.lease_ms != 0 && batch.writer == 0)
+    return refuse_argument(Reason::kMalformed, "lease_ms", {}, "a lease belongs to a writer: give writer and batch");
+  if (batch.lease_ms > limits::kMaxLeaseMs)
+    return refuse_limit("lease_ms", "lease_ms", limits::kMaxLeaseMs, batch.lease_ms);
+  const uint64_t items = count_items(batch);
   if (items > limits::kMaxUpdateItems)
     return refuse_limit("batch", "update_items", limits::kMaxUpdateItems, static_cast<double>(items));
+  if (batch.earlier.size() >= limits::kMaxUpdateMessages)
+    return refuse_limit("continues", "update_messages", limits::kMaxUpdateMessages,
+                        static_cast<double>(batch.earlier.size()) + 1);
   return absl::OkStatus();
+}
+
+absl::Status check_lists(const UpdateBatch& batch) {
+  RETURN_IF_ERROR(check_list("inserts", batch.inserts));
+  RETURN_IF_ERROR(check_list("moves", batch.moves));
+  RETURN_IF_ERROR(check_list("relabels", batch.relabels));
+  RETURN_IF_ERROR(check_list("instance_moves", batch.instance_moves));
+  return check_list("instance_relabels", batch.instance_relabels);
 }
 
 bool only_moves(const UpdateBatch& batch) {
   if (batch.clear || batch.restart_ticks || batch.all_or_nothing || batch.moves.empty()) return false;
+  if (batch.lease_ms != 0 || batch.end_lease != 0 || !batch.earlier.empty()) return false;
   if (!batch.remove_ids.empty() || !batch.remove_groups.empty() || !batch.inserts.empty() || !batch.relabels.empty())
     return false;
   if (has_instances(batch)) return false;
@@ -120,13 +128,55 @@ bool may_join(const UpdateBatch& first, const UpdateBatch& second) {
   return first.tick == second.tick && only_moves(first) && only_moves(second);
 }
 
+bool has_instances(const UpdateBatch& batch) {
+  return !batch.instance_moves.empty() || !batch.instance_relabels.empty() ||
+         std::any_of(batch.earlier.begin(), batch.earlier.end(), has_instances);
+}
+
+uint64_t count_items(const UpdateBatch& batch) {
+  uint64_t items = batch.remove_ids.size() + batch.remove_groups.size();
+  for (const InsertColumns& insert : batch.inserts) items += insert.ids.size();
+  for (const MoveColumns& move : batch.moves) items += move.ids.size();
+  for (const RelabelColumns& relabel : batch.relabels) items += relabel.ids.size();
+  for (const InstanceMoveColumns& move : batch.instance_moves) items += move.ids.size();
+  for (const RelabelColumns& relabel : batch.instance_relabels) items += relabel.ids.size();
+  for (const UpdateBatch& message : batch.earlier) items += count_items(message);
+  return items;
+}
+
+uint64_t count_lists(const UpdateBatch& batch) {
+  uint64_t lists = batch.inserts.size() + batch.moves.size() + batch.relabels.size() + batch.instance_moves.size() +
+                   batch.instance_relabels.size();
+  for (const UpdateBatch& message : batch.earlier) lists += count_lists(message);
+  return lists;
+}
+
 absl::Status check_form(const UpdateBatch& batch) {
   RETURN_IF_ERROR(check_header(batch));
-  RETURN_IF_ERROR(check_list("inserts", batch.inserts));
-  RETURN_IF_ERROR(check_list("moves", batch.moves));
-  RETURN_IF_ERROR(check_list("relabels", batch.relabels));
-  RETURN_IF_ERROR(check_list("instance_moves", batch.instance_moves));
-  return check_list("instance_relabels", batch.instance_relabels);
+  RETURN_IF_ERROR(check_lists(batch));
+  for (const UpdateBatch& message : batch.earlier) {
+    RETURN_IF_ERROR(check_earlier(message));
+    RETURN_IF_ERROR(check_header(message));
+    RETURN_IF_ERROR(check_lists(message));
+  }
+  if (batch.earlier.empty()) return absl::OkStatus();
+  if (const uint64_t lists = count_lists(batch); lists > limits::kMaxUpdateLists)
+    return refuse_limit("batch", "update_lists", limits::kMaxUpdateLists, static_cast<double>(lists));
+  return absl::OkStatus();
+}
+
+absl::Status check_earlier(const UpdateBatch& batch) {
+  LOCUS_DCHECK(batch.earlier.empty());  // the messages of a revision are one list
+  const char* const field = batch.tick             ? "tick"
+                            : batch.restart_ticks  ? "restart_ticks"
+                            : batch.writer != 0    ? "writer"
+                            : batch.batch != 0     ? "batch"
+                            : batch.all_or_nothing ? "all_or_nothing"
+                            : batch.lease_ms != 0  ? "lease_ms"
+                            : batch.end_lease != 0 ? "end_lease"
+                                                   : nullptr;
+  if (field == nullptr) return absl::OkStatus();
+  return refuse_argument(Reason::kMalformed, field, {}, "only the last message of a revision may have this field");
 }
 
 }  // namespace locus

@@ -1,6 +1,7 @@
 // Update batch as borrowed columns, and its acknowledgement. Plain data; the columns outlive the call that applies the
 // batch. A batch is applied in the order clear, removes, inserts, moves, relabels, instance moves, instance relabels;
-// all these changes become one revision.
+// all these changes become one revision. A batch
+// that was sent as several messages has the earlier messages in `earlier`; they are applied first, in order.
 #ifndef LOCUS_CORE_SCENE_UPDATES_UPDATE_BATCH_H_
 #define LOCUS_CORE_SCENE_UPDATES_UPDATE_BATCH_H_
 
@@ -23,11 +24,12 @@ struct InsertColumns {
   absl::Span<const double> positions_f64;  // entries x y z, absolute; empty if positions is used
   absl::Span<const float> rotations;       // quaternions x y z w; default: no rotation
   ShapeKind kind = ShapeKind::kPoint;
-  absl::Span<const float> radii;      // balls and capsules only, >= 0
-  absl::Span<const float> extents;    // entries x y z: half extents of boxes, >= 0, or half axes of capsules
-  absl::Span<const uint32_t> layers;  // default: bit 0
-  absl::Span<const uint64_t> groups;  // default: 0, no group
-  absl::Span<const uint64_t> tags;    // default: 0
+  absl::Span<const float> radii;            // balls and capsules only, >= 0
+  absl::Span<const float> extents;          // entries x y z: half extents of boxes, >= 0, or half axes of capsules
+  absl::Span<const uint32_t> layers;        // default: bit 0
+  absl::Span<const uint64_t> groups;        // default: 0, no group
+  absl::Span<const uint64_t> tags;          // default: 0
+  absl::Span<const uint64_t> expire_ticks;  // ticks until the object expires; default and 0: it does not expire
 };
 
 struct MoveColumns {
@@ -71,6 +73,15 @@ struct UpdateBatch {
   bool restart_ticks = false;
   uint64_t writer = 0;  // writer id; 0: no id; batches with equal (writer, batch) are applied only once
   uint64_t batch = 0;   // number of the batch in the sequence of its writer, from 1 without gaps; 0: no number
+  // Lease of the writer in milliseconds, from this batch on: see core/scene/objects/leases.h. 0: the batch begins no
+  // lease and changes none.
+  uint32_t lease_ms = 0;
+  // Writer whose lease ends: the objects of the lease are removed. Only Scene::end_lease() makes such batches, which
+  // have no other content; a batch for a writer without a lease has no effect. 0: no lease ends.
+  uint64_t end_lease = 0;
+  // Earlier messages of the same revision, in order; each satisfies check_earlier(). The tick, the writer and the
+  // settings of the revision are those of this batch. Frame and upsert of a message apply to this message only.
+  std::vector<UpdateBatch> earlier;
 };
 
 struct ItemError {
@@ -78,6 +89,7 @@ struct ItemError {
   uint32_t index = 0;
   Id id = kNoId;
   Reason reason = Reason::kUnspecified;
+  uint32_t message = 0;  // index of the message, if the batch was sent as several messages
 };
 
 struct UpdateAck {
@@ -91,18 +103,24 @@ struct UpdateAck {
 };
 
 // Returns true if the two batches may be applied as one revision: both batches have the same tick and only move
-// objects, without teleport, all_or_nothing or restart_ticks. If both batches move an object, the second batch
-// determines the result.
+// objects, without teleport, all_or_nothing, restart_ticks, lease_ms or earlier messages. If both batches move an
+// object, the second batch determines the result.
 bool may_join(const UpdateBatch& first, const UpdateBatch& second);
 
-// Returns true if the batch changes instances.
-inline bool has_instances(const UpdateBatch& batch) {
-  return !batch.instance_moves.empty() || !batch.instance_relabels.empty();
-}
+// Returns true if the batch or one of its earlier messages changes instances.
+bool has_instances(const UpdateBatch& batch);
 
-// Checks the form of a batch: column lengths, frame, writer and limits. Returns INVALID_ARGUMENT, naming the invalid
-// field, if the form is wrong.
+// Returns the number of items of the batch and its earlier messages, and the number of their lists.
+uint64_t count_items(const UpdateBatch& batch);
+uint64_t count_lists(const UpdateBatch& batch);
+
+// Checks the form of a batch: column lengths, frame, writer, earlier messages and limits. Returns INVALID_ARGUMENT,
+// naming the invalid field, if the form is wrong.
 absl::Status check_form(const UpdateBatch& batch);
+
+// Checks that a batch has no setting that only the last message of a revision may have: tick, restart_ticks, writer,
+// batch, all_or_nothing and lease_ms. Returns INVALID_ARGUMENT, naming the field, if it has one.
+absl::Status check_earlier(const UpdateBatch& batch);
 
 }  // namespace locus
 

@@ -42,7 +42,7 @@ bool same_insert(const InsertColumns& a, const InsertColumns& b) {
   const bool long_one = a.kind == ShapeKind::kBox || a.kind == ShapeKind::kCapsule;
   return a.kind == b.kind && same_pose(a, b) && same_labels(a, b) &&
          same(round ? a.radii : absl::Span<const float>(), b.radii) &&
-         same(long_one ? a.extents : absl::Span<const float>(), b.extents);
+         same(long_one ? a.extents : absl::Span<const float>(), b.extents) && same(a.expire_ticks, b.expire_ticks);
 }
 bool same_move(const MoveColumns& a, const MoveColumns& b) { return a.teleport == b.teleport && same_pose(a, b); }
 bool same_relabel(const RelabelColumns& a, const RelabelColumns& b) { return same(a.ids, b.ids) && same_labels(a, b); }
@@ -65,7 +65,8 @@ bool same_batch(const UpdateBatch& a, const UpdateBatch& b) {
          all_same(a.instance_moves, b.instance_moves, same_instance_move) &&
          all_same(a.instance_relabels, b.instance_relabels, same_relabel) && a.upsert == b.upsert &&
          a.all_or_nothing == b.all_or_nothing && a.restart_ticks == b.restart_ticks && a.writer == b.writer &&
-         a.batch == b.batch;
+         a.batch == b.batch && a.lease_ms == b.lease_ms && a.end_lease == b.end_lease &&
+         all_same(a.earlier, b.earlier, same_batch);
 }
 
 class RecordCodecTest : public SceneFixture {};
@@ -90,6 +91,48 @@ TEST_F(RecordCodecTest, OnlyABatchThatChangesInstancesHasTheNewKind) {
   UpdateBatch hide;
   hide.instance_relabels.emplace_back().ids = columns_.ids({1});
   EXPECT_EQ(encoded(hide).substr(0, 4), "LSBI");
+}
+
+TEST_F(RecordCodecTest, ExpiryTicksAndLeasesHaveAKindOfTheirOwn) {
+  UpdateBatch expiring = with(points({1, 2}, {0, 0, 0, 1, 1, 1}));
+  EXPECT_EQ(encoded(expiring).substr(0, 4), "LSBH");
+  expiring.inserts[0].expire_ticks = columns_.ids({5, 0});
+  expiring.instance_moves.emplace_back().ids = columns_.ids({7});
+  expiring.instance_moves[0].positions = columns_.floats({1, 2, 3});
+  UpdateBatch leased = numbered(with(points({1}, {0, 0, 0})), 9, 1);
+  leased.lease_ms = 1500;
+  UpdateBatch ended;
+  ended.end_lease = 9;
+  for (const UpdateBatch& batch : {expiring, leased, ended}) {
+    const std::string bytes = encoded(batch);
+    EXPECT_EQ(bytes.substr(0, 4), "LSBX");
+    const absl::StatusOr<Record> record = Record::decode(bytes);
+    ASSERT_TRUE(record.ok()) << record.status();
+    EXPECT_TRUE(same_batch(batch, std::get<UpdateBatch>(record->content())));
+  }
+}
+
+TEST_F(RecordCodecTest, ABatchOfSeveralMessagesIsOneRecord) {
+  UpdateBatch batch = numbered(with(move_to({1}, {2, 2, 2})), 9, 1);
+  batch.tick = 4;
+  batch.lease_ms = 10;
+  batch.earlier = {with(points({1}, {0, 0, 0})), UpdateBatch()};
+  batch.earlier[0].inserts[0].expire_ticks = columns_.ids({3});
+  batch.earlier[0].frame = {1, 2, 3};
+  batch.earlier[1].upsert = true;
+  const std::string bytes = encoded(batch);
+  EXPECT_EQ(bytes.substr(0, 4), "LSBG");
+  const absl::StatusOr<Record> record = Record::decode(bytes);
+  ASSERT_TRUE(record.ok()) << record.status();
+  EXPECT_TRUE(same_batch(batch, std::get<UpdateBatch>(record->content())));
+}
+
+TEST_F(RecordCodecTest, ASettingOfAnEarlierMessageIsDamage) {
+  UpdateBatch batch;
+  batch.earlier.emplace_back().tick = 3;
+  EXPECT_THAT(std::string(Record::decode(encoded(batch)).status().message()), HasSubstr("only the last message"));
+  std::string none = encoded(batch).substr(0, 8) + std::string(8, '\0');
+  EXPECT_THAT(std::string(Record::decode(none).status().message()), HasSubstr("the number of messages is 0"));
 }
 
 TEST_F(RecordCodecTest, ColumnsAreSpansOfTheBytesThemselves) {

@@ -174,5 +174,55 @@ TEST_F(UpdateFormTest, TooManyItemsNameTheLimit) {
   EXPECT_EQ(refusal.asked, limits::kMaxUpdateItems + 1.0);
 }
 
+TEST_F(UpdateFormTest, ExpireTicksHaveOneEntryEachOrOneForAll) {
+  EXPECT_EQ(accepted(insert().expire_ticks, 1, "inserts[0].expire_ticks"), (std::vector<size_t>{0, 1, 3}));
+}
+
+TEST_F(UpdateFormTest, ALeaseBelongsToAWriterAndLastsAtMostADay) {
+  batch_.lease_ms = 1;
+  EXPECT_EQ(refused_field(Reason::kMalformed), "lease_ms");
+  batch_.writer = batch_.batch = 1;
+  batch_.lease_ms = limits::kMaxLeaseMs;
+  EXPECT_EQ(refused_field(), "");
+  batch_.lease_ms = limits::kMaxLeaseMs + 1;
+  EXPECT_EQ(refused_field(Reason::kLimit), "lease_ms");
+}
+
+TEST_F(UpdateFormTest, OnlyTheLastMessageHasSettings) {
+  const auto refused = [this](auto UpdateBatch::*field, auto value) {
+    batch_.earlier.assign(2, UpdateBatch());
+    batch_.earlier[1].*field = value;
+    return refused_field(Reason::kMalformed);
+  };
+  EXPECT_EQ(refused(&UpdateBatch::tick, 3), "tick");
+  EXPECT_EQ(refused(&UpdateBatch::restart_ticks, true), "restart_ticks");
+  EXPECT_EQ(refused(&UpdateBatch::writer, 3), "writer");
+  EXPECT_EQ(refused(&UpdateBatch::batch, 3), "batch");
+  EXPECT_EQ(refused(&UpdateBatch::all_or_nothing, true), "all_or_nothing");
+  EXPECT_EQ(refused(&UpdateBatch::lease_ms, 3), "lease_ms");
+  EXPECT_EQ(refused(&UpdateBatch::end_lease, 3), "end_lease");
+  EXPECT_EQ(refused(&UpdateBatch::upsert, true), "");
+  EXPECT_EQ(refused(&UpdateBatch::clear, true), "");
+}
+
+TEST_F(UpdateFormTest, EarlierMessagesAreCheckedAndCountTowardsTheLimits) {
+  batch_.earlier.emplace_back(batch_).inserts[0].ids = {};
+  EXPECT_EQ(refused_field(), "inserts[0].positions");
+  batch_.earlier.assign(limits::kMaxUpdateMessages - 1, UpdateBatch());
+  EXPECT_EQ(refused_field(), "");
+  batch_.earlier.emplace_back();
+  EXPECT_EQ(refused_field(Reason::kLimit), "continues");
+  batch_.earlier.assign(1, UpdateBatch());
+  batch_.earlier[0].remove_ids = columns_.ids(std::vector<uint64_t>(limits::kMaxUpdateItems - 9));
+  EXPECT_EQ(refused_field(), "");
+  batch_.earlier[0].remove_groups = columns_.ids({1});
+  EXPECT_EQ(refused_field(Reason::kLimit), "batch");
+  batch_.earlier[0] = UpdateBatch();
+  batch_.earlier[0].moves.resize(limits::kMaxUpdateLists - 3);
+  EXPECT_EQ(refused_field(), "");
+  batch_.earlier[0].relabels.resize(1);
+  EXPECT_EQ(refused_field(Reason::kLimit), "batch");
+}
+
 }  // namespace
 }  // namespace locus::test
