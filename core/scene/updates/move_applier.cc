@@ -35,11 +35,6 @@ void MoveApplier::begin(const ObjectStore& objects) {
   moves_.clear();
   rotations_.clear();
   last_move_.resize(std::max(last_move_.size(), objects.handle_count()));
-  if (lives_ended_ != objects.ended_lives()) {
-    remembered_ids_.clear();
-    remembered_handles_.clear();
-    lives_ended_ = objects.ended_lives();
-  }
   items_read_ = 0;
 }
 
@@ -48,6 +43,11 @@ void MoveApplier::add(const ObjectStore& objects, const UpdateBatch& batch) {
   LOCUS_DCHECK_GE(last_move_.size(), objects.handle_count());  // begin() was called for this store
   applied_ = refused_ = 0;
   errors_.clear();
+  if (lives_ended_ != objects.ended_lives()) {
+    remembered_ids_.clear();
+    remembered_handles_.clear();
+    lives_ended_ = objects.ended_lives();
+  }
   for (size_t list = 0; list < batch.moves.size(); ++list) run(objects, batch.frame, batch.moves[list], list);
 }
 

@@ -1,7 +1,7 @@
 // Update batch as borrowed columns, and its acknowledgement. Plain data; the columns outlive the call that applies the
 // batch. A batch is applied in the order clear, removes, inserts, moves, relabels, instance moves, instance relabels;
-// all these changes become one revision. A batch
-// that was sent as several messages has the earlier messages in `earlier`; they are applied first, in order.
+// all these changes become one revision. A batch that was sent as several messages has the earlier messages in
+// `earlier`; they are applied first, in order.
 #ifndef LOCUS_CORE_SCENE_UPDATES_UPDATE_BATCH_H_
 #define LOCUS_CORE_SCENE_UPDATES_UPDATE_BATCH_H_
 

@@ -113,6 +113,22 @@ TEST_F(SceneLifetimesTest, JoinedMovesExpireObjects) {
   EXPECT_EQ(object(2)->shape.position, (Vec3d{2, 2, 2}));
 }
 
+TEST_F(SceneLifetimesTest, JoinedMovesDoNotMoveTheObjectThatExpiresAlthoughItWasMovedBefore) {
+  apply(at(1, inserting({1, 2}, {4, 0})));
+  apply(at(2, with(move_to({1, 2}, {1, 1, 1, 2, 2, 2}))));
+  const UpdateBatch first = at(5, with(move_to({1, 2}, {3, 3, 3, 4, 4, 4}))), second = first;
+  const UpdateBatch* const batches[] = {&first, &second};
+  const auto acks = scene_.apply_joined(batches);
+  ASSERT_TRUE(acks.ok());
+  for (const absl::StatusOr<UpdateAck>& ack : *acks) {
+    ASSERT_TRUE(ack.ok());
+    EXPECT_EQ(ack->applied, 1u);
+    EXPECT_EQ(ack->refused, 1u);
+  }
+  EXPECT_FALSE(object(1).has_value());
+  EXPECT_EQ(object(2)->shape.position, (Vec3d{4, 4, 4}));
+}
+
 TEST_F(SceneLifetimesTest, ARefusedBatchExpiresNothing) {
   apply(at(1, inserting({1}, {1})));
   UpdateBatch batch = at(9, removing({77}));
