@@ -96,6 +96,7 @@ const std::vector<WireLimit> kRequestLimits = {
     {"locus.v1.UpdateBatch.relabels", "relabels", "update_lists", limits::kMaxUpdateLists},
     {"locus.v1.UpdateBatch.instance_moves", "instance_moves", "update_lists", limits::kMaxUpdateLists},
     {"locus.v1.UpdateBatch.instance_relabels", "instance_relabels", "update_lists", limits::kMaxUpdateLists},
+    {"locus.v1.Compound.parts", "compound.parts", "update_lists", limits::kMaxUpdateLists},
     {"locus.v1.ChangeInstancesRequest.place", "place", "update_lists", limits::kMaxUpdateLists},
     {"locus.v1.UploadMeshRequest.parts", "parts", "mesh_parts", limits::kMaxMeshParts},
     {"locus.v1.SceneSpec.labels", "spec.labels", "labels", limits::kMaxLabels},
