@@ -96,8 +96,9 @@ void QueryWork::cancel() {
 }
 
 absl::Status QueryWork::take_quotas() const {
-  RETURN_IF_ERROR(slot_.caller().take_quota(QuotaKind::kQueries, queries()));
-  return slot_.caller().take_quota(QuotaKind::kWork, 0);  // with amount 0, fails only while the quota is overdrawn
+  // With amount 0, this fails only while the quota is overdrawn. It comes first, because a refused batch takes nothing.
+  RETURN_IF_ERROR(slot_.caller().take_quota(QuotaKind::kWork, 0));
+  return slot_.caller().take_quota(QuotaKind::kQueries, queries());
 }
 
 // The end of a drain is no UNAVAILABLE error for a step, whose ack must be sent: that error means that nothing was

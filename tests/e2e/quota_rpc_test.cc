@@ -183,6 +183,20 @@ TEST_F(QuotaRpcTest, TheQueriesOfARefusedStepUseNoQuota) {
   EXPECT_EQ(error_of(status).limit(), "queries_per_s") << "the queries of other steps use the quota";
 }
 
+TEST_F(QuotaRpcTest, QueriesRefusedForTheirWorkUseNoQuotaOfQueries) {
+  constexpr const char* kQueries = "quota token:maker queries_per_s=1\n";
+  ASSERT_TRUE(create("a").ok());
+  ASSERT_TRUE(apply(insert_balls(1, 5)).ok());
+  ASSERT_TRUE(ask(ray_along_x()).ok());  // while no quota limits it
+  set_quotas(absl::StrCat(kQueries, "quota token:maker work_per_s=1\n"));
+  grpc::Status status = ask(ray_along_x());
+  ASSERT_TRUE(status.ok()) << status.error_message();
+  for (int times = 0; times < 50; ++times) EXPECT_EQ(error_of(ask(ray_along_x())).limit(), "work_per_s") << times;
+  set_quotas(kQueries);
+  status = ask(ray_along_x());
+  EXPECT_TRUE(status.ok()) << status.error_message();
+}
+
 TEST_F(QuotaRpcTest, ObjectsCountForTheCreatorOfTheirSceneWhoeverInsertsThem) {
   set_quotas("quota token:maker objects=10\n");
   ASSERT_TRUE(create("a").ok());
