@@ -276,7 +276,7 @@ uint32_t format_of(const std::string& path) {
   return bytes ? static_cast<uint32_t>(static_cast<unsigned char>(bytes->front())) : 0;
 }
 
-TEST_F(RocksdbLogTest, ADirectoryOfFormat1BecomesOneOfFormat3AndItsMeshesKeepTheirPartsInTheContent) {
+TEST_F(RocksdbLogTest, ADirectoryOfFormat1GetsTheLatestFormatAndItsMeshesKeepTheirPartsInTheContent) {
   options_.path = folder_.file("sample");
   std::filesystem::copy(LOCUS_SOURCE_DIR "/tests/golden/data/format-1/data", options_.path,
                         std::filesystem::copy_options::recursive);
@@ -290,7 +290,7 @@ TEST_F(RocksdbLogTest, ADirectoryOfFormat1BecomesOneOfFormat3AndItsMeshesKeepThe
   ASSERT_EQ(log_->add_mesh("another", stored.sha256, content, parts), absl::OkStatus());
   ASSERT_EQ(log_->delete_mesh(stored.name), absl::OkStatus());
   log_ = nullptr;
-  EXPECT_EQ(format_of(options_.path), 4u);
+  EXPECT_EQ(format_of(options_.path), kFormat);
   open();
   ASSERT_EQ(log_->stored_meshes().size(), 1u);
   EXPECT_FALSE(log_->stored_meshes()[0].parts_in_content);
