@@ -20,6 +20,7 @@ inline constexpr uint32_t kMaxMeshes = 65536;
 inline constexpr uint32_t kMaxNameLength = 63;  // names of scenes and of meshes
 inline constexpr uint32_t kMaxLabels = 16;
 inline constexpr uint32_t kMaxLabelLength = 256;
+inline constexpr uint32_t kMaxLifetimeSeconds = 31'536'000;  // a year: of an idle scene, and of an unused mesh
 inline constexpr uint32_t kMaxCreatorLength = 256;  // length in bytes of the name of a scene's or mesh's creator
 inline constexpr uint32_t kMaxMeshParts = 65536;
 inline constexpr uint32_t kMaxMeshVertices = 1u << 28;

@@ -184,10 +184,23 @@ absl::Status Registry::delete_scene(const std::string& name) {
                        absl::StrCat("no scene is called '", name, "'"));
   // remove() closes the scene once the deletion is logged. Until then the scene can be found.
   RETURN_IF_ERROR((*scene)->remove());
-  const MutexLock lock(mutex_);
-  scenes_.erase(name);
-  take_from_creator(**scene);
+  unregister(**scene);
   return absl::OkStatus();
+}
+
+absl::StatusOr<bool> Registry::delete_scene_if(const ScenePtr& scene, absl::FunctionRef<bool()> condition) {
+  const MutexLock change(changes_mutex_);
+  const absl::StatusOr<ScenePtr> known = find_scene(scene->name());
+  if (!known.ok() || *known != scene) return false;
+  ASSIGN_OR_RETURN(const bool removed, scene->remove_if(condition));
+  if (removed) unregister(*scene);
+  return removed;
+}
+
+void Registry::unregister(const Scene& scene) {
+  const MutexLock lock(mutex_);
+  take_from_creator(scene);
+  scenes_.erase(scene.name());
 }
 
 std::vector<ScenePtr> Registry::list_scenes(const std::string& after, size_t limit) const {
@@ -287,6 +300,10 @@ uint32_t Registry::count_uses(const StaticMesh* mesh) const {
   return uses;
 }
 
+bool Registry::in_use(const StaticMesh* mesh) const {
+  return std::any_of(scenes_.begin(), scenes_.end(), [mesh](const auto& entry) { return entry.second->in_use(mesh); });
+}
+
 absl::StatusOr<MeshPtr> Registry::take_mesh(const std::string& name) {
   const MutexLock lock(mutex_);
   if (damaged_meshes_.contains(name)) return MeshPtr();
@@ -295,9 +312,7 @@ absl::StatusOr<MeshPtr> Registry::take_mesh(const std::string& name) {
     return refuse_name(absl::StatusCode::kNotFound, Reason::kNotFound, "mesh",
                        absl::StrCat("no mesh is called '", name, "'"));
   const StaticMesh* mesh = known->second.get();
-  const bool in_use =
-      std::any_of(scenes_.begin(), scenes_.end(), [mesh](const auto& entry) { return entry.second->in_use(mesh); });
-  if (in_use) {
+  if (in_use(mesh)) {
     const uint32_t uses = count_uses(mesh);
     Refusal refusal;
     refusal.reason = Reason::kInUse;
@@ -320,15 +335,68 @@ absl::Status Registry::delete_mesh(const std::string& name) {
   const MutexLock mesh_change(mesh_changes_mutex_);
   const MutexLock change(changes_mutex_);
   ASSIGN_OR_RETURN(MeshPtr taken, take_mesh(name));
+  return delete_taken(name, std::move(taken));
+}
+
+absl::StatusOr<bool> Registry::delete_mesh_if(const MeshPtr& mesh, absl::FunctionRef<bool()> condition) {
+  const MutexLock mesh_change(mesh_changes_mutex_);
+  const MutexLock change(changes_mutex_);
+  MeshPtr taken;
+  {
+    const MutexLock lock(mutex_);
+    const auto known = meshes_.find(mesh->name());
+    if (known == meshes_.end() || known->second != mesh || in_use(mesh.get()) || !condition()) return false;
+    taken = std::move(known->second);
+    meshes_.erase(known);
+    take_from_creator(*taken);
+  }
+  RETURN_IF_ERROR(delete_taken(mesh->name(), std::move(taken)));
+  return true;
+}
+
+absl::Status Registry::delete_taken(const std::string& name, MeshPtr taken) {
   const absl::Status status = log_ == nullptr ? absl::OkStatus() : log_->delete_mesh(name);
   if (taken != nullptr && status.ok())
     for (const ScenePtr& scene : list_scenes("", std::numeric_limits<size_t>::max())) scene->forget_mesh(taken.get());
   const MutexLock lock(mutex_);
+  if (status.ok()) mesh_graces_.erase(name);
   if (taken == nullptr && status.ok()) damaged_meshes_.erase(name);
   if (taken == nullptr || status.ok()) return status;
   add_to_creator(*taken);
   meshes_.emplace(name, std::move(taken));
   return status;
+}
+
+absl::Status Registry::make_collectable(const StaticMesh* mesh, uint32_t grace_s) {
+  const auto is_recorded = [&]() LOCUS_EXCLUDES(mutex_) {
+    const MutexLock lock(mutex_);
+    const auto known = meshes_.find(mesh->name());
+    if (known == meshes_.end() || known->second.get() != mesh) return true;
+    const auto grace = mesh_graces_.find(mesh->name());
+    return grace != mesh_graces_.end() && grace->second >= grace_s;
+  };
+  // Most calls find the record; these calls do not wait for a mesh that is being written.
+  if (is_recorded()) return absl::OkStatus();
+  const MutexLock change(mesh_changes_mutex_);
+  if (is_recorded()) return absl::OkStatus();
+  if (log_ != nullptr) RETURN_IF_ERROR(log_->set_mesh_grace(mesh->name(), grace_s));
+  const MutexLock lock(mutex_);
+  mesh_graces_[mesh->name()] = grace_s;
+  return absl::OkStatus();
+}
+
+std::vector<Registry::CollectableMesh> Registry::collectable_meshes() const {
+  const MutexLock lock(mutex_);
+  std::vector<CollectableMesh> meshes;
+  for (const auto& [name, grace_s] : mesh_graces_)
+    if (const auto known = meshes_.find(name); known != meshes_.end()) meshes.push_back({known->second, grace_s});
+  return meshes;
+}
+
+absl::flat_hash_set<const StaticMesh*> Registry::used_meshes() const {
+  absl::flat_hash_set<const StaticMesh*> meshes;
+  for (const ScenePtr& scene : list_scenes("", std::numeric_limits<size_t>::max())) scene->add_used_meshes(meshes);
+  return meshes;
 }
 
 bool Registry::is_kept(const StaticMesh* mesh) const {
@@ -339,10 +407,11 @@ bool Registry::is_kept(const StaticMesh* mesh) const {
 
 void Registry::restore_scene(const ScenePtr& scene) { put_in(scene); }
 
-void Registry::restore_mesh(const std::string& name, MeshPtr mesh) {
+void Registry::restore_mesh(const std::string& name, MeshPtr mesh, uint32_t grace_s) {
   const MutexLock lock(mutex_);
   mesh = to_keep(name, std::move(mesh));
   if (meshes_.emplace(name, mesh).second) add_to_creator(*mesh);
+  if (grace_s != 0) mesh_graces_[name] = grace_s;
 }
 
 void Registry::restore_damaged_scene(const std::string& name, SceneKey key, const absl::Status& damage) {

@@ -18,6 +18,8 @@
 #include <string>
 #include <vector>
 
+#include "absl/container/flat_hash_set.h"
+#include "absl/functional/function_ref.h"
 #include "core/scene/log/update_log.h"
 #include "core/scene/scene.h"
 
@@ -60,6 +62,10 @@ class Registry {
   // Deletes a scene, damaged or not, and closes it: callers that wait for the scene get NOT_FOUND. If the log fails,
   // returns the log's error, and the scene stays open.
   absl::Status delete_scene(const std::string& name) LOCUS_EXCLUDES(changes_mutex_, mutex_);
+  // Deletes `scene` like delete_scene() if it is still registered and `condition` returns true. `condition` is called
+  // while no change of the scene is being applied. Returns whether the scene was deleted, or the log's error.
+  absl::StatusOr<bool> delete_scene_if(const ScenePtr& scene, absl::FunctionRef<bool()> condition)
+      LOCUS_EXCLUDES(changes_mutex_, mutex_);
   // Returns at most `limit` scenes in name order, beginning after the name `after`.
   std::vector<ScenePtr> list_scenes(const std::string& after, size_t limit) const LOCUS_EXCLUDES(mutex_);
   struct Damaged {
@@ -89,6 +95,24 @@ class Registry {
   // Deletes a mesh, damaged or not. Returns FAILED_PRECONDITION IN_USE, naming the number of its instances, if a scene
   // has instances that were placed under this name, or if a pending change places such instances.
   absl::Status delete_mesh(const std::string& name) LOCUS_EXCLUDES(mesh_changes_mutex_, changes_mutex_, mutex_);
+  // Records that `mesh` may be deleted when no scene has used it for `grace_s` seconds. If this was recorded before,
+  // the longer time applies. With a log, the record survives a restart. Does nothing if the mesh is not registered any
+  // more. Returns the log's error if the log fails; then nothing has changed.
+  absl::Status make_collectable(const StaticMesh* mesh, uint32_t grace_s) LOCUS_EXCLUDES(mesh_changes_mutex_, mutex_);
+  struct CollectableMesh {
+    MeshPtr mesh;
+    uint32_t grace_s = 0;
+  };
+  // Returns the meshes for which make_collectable() was called, in name order.
+  std::vector<CollectableMesh> collectable_meshes() const LOCUS_EXCLUDES(mutex_);
+  // Returns the meshes that the latest revision, the history or a pending change of a scene uses.
+  absl::flat_hash_set<const StaticMesh*> used_meshes() const LOCUS_EXCLUDES(mutex_);
+  // Deletes `mesh` like delete_mesh() if it is still registered, no latest revision and no pending change uses it, and
+  // `condition` returns true. From the call of `condition` on, no other call finds the mesh. `condition` is called
+  // under a lock of the registry: it must be quick and must not call the registry. Returns whether the mesh was
+  // deleted, or the log's error.
+  absl::StatusOr<bool> delete_mesh_if(const MeshPtr& mesh, absl::FunctionRef<bool()> condition)
+      LOCUS_EXCLUDES(mesh_changes_mutex_, changes_mutex_, mutex_);
   struct NamedMesh {
     std::string name;
     MeshPtr mesh;
@@ -112,7 +136,8 @@ class Registry {
   // meshes before scenes are recovered, because recover_scene() looks meshes up with find_stored(). Meshes of equal
   // content share one content.
   void restore_scene(const ScenePtr& scene) LOCUS_EXCLUDES(mutex_);
-  void restore_mesh(const std::string& name, MeshPtr mesh) LOCUS_EXCLUDES(mutex_);
+  // `grace_s` is the stored result of make_collectable(), or 0.
+  void restore_mesh(const std::string& name, MeshPtr mesh, uint32_t grace_s = 0) LOCUS_EXCLUDES(mutex_);
   // Add a damaged scene or mesh: lookups of its name return `damage` (DATA_LOSS) until the scene or mesh is deleted.
   void restore_damaged_scene(const std::string& name, SceneKey key, const absl::Status& damage) LOCUS_EXCLUDES(mutex_);
   void restore_damaged_mesh(const std::string& name, const absl::Status& damage) LOCUS_EXCLUDES(mutex_);
@@ -151,6 +176,13 @@ class Registry {
   // Removes the mesh `name` from meshes_ and returns it. Returns FAILED_PRECONDITION IN_USE if the mesh is in use. For
   // a damaged mesh, returns null and removes nothing.
   absl::StatusOr<MeshPtr> take_mesh(const std::string& name) LOCUS_EXCLUDES(mutex_);
+  // Deletes the mesh `name` from the log. `taken` is the mesh, which was removed from meshes_, or null if the mesh is
+  // damaged. If the log fails, restores the name.
+  absl::Status delete_taken(const std::string& name, MeshPtr taken) LOCUS_REQUIRES(mesh_changes_mutex_, changes_mutex_)
+      LOCUS_EXCLUDES(mutex_);
+  bool in_use(const StaticMesh* mesh) const LOCUS_REQUIRES(mutex_);
+  // Removes a scene that was deleted from its log.
+  void unregister(const Scene& scene) LOCUS_EXCLUDES(mutex_);
   // Returns true if `mesh` is the mesh that is registered under its name.
   bool is_kept(const StaticMesh* mesh) const LOCUS_EXCLUDES(mutex_);
   uint32_t count_uses(const StaticMesh* mesh) const LOCUS_REQUIRES(mutex_);
@@ -172,6 +204,7 @@ class Registry {
   std::map<std::string, DamagedScene> damaged_scenes_ LOCUS_GUARDED_BY(mutex_);
   std::map<std::string, MeshPtr> meshes_ LOCUS_GUARDED_BY(mutex_);
   std::map<std::string, absl::Status> damaged_meshes_ LOCUS_GUARDED_BY(mutex_);
+  std::map<std::string, uint32_t> mesh_graces_ LOCUS_GUARDED_BY(mutex_);  // see make_collectable(); by name
   std::map<std::string, Creator> creators_ LOCUS_GUARDED_BY(mutex_);
 };
 

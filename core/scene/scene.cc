@@ -271,6 +271,25 @@ bool Scene::in_use(const StaticMesh* mesh) const {
          std::find(meshes_to_place_.begin(), meshes_to_place_.end(), mesh) != meshes_to_place_.end();
 }
 
+void Scene::add_used_meshes(absl::flat_hash_set<const StaticMesh*>& meshes) const {
+  SnapshotPtr snapshot;
+  {
+    const MutexLock lock(mutex_);
+    meshes.insert(meshes_to_place_.begin(), meshes_to_place_.end());
+    snapshot = latest_;
+  }
+  const StaticSet* last = nullptr;
+  const auto add = [&](const StaticSet& statics) {
+    if (&statics == last) return;
+    last = &statics;
+    const std::vector<const StaticMesh*> used = statics.meshes();
+    meshes.insert(used.begin(), used.end());
+  };
+  if (snapshot->history != nullptr)
+    for (const std::shared_ptr<const HistoryRecord>& record : snapshot->history->records) add(*record->statics);
+  add(*snapshot->statics);
+}
+
 absl::Status Scene::check_kept(const StaticChange& change) const {
   for (size_t i = 0; is_kept_ != nullptr && i < change.place.size(); ++i)
     if (!is_kept_(change.place[i].mesh.get())) return mesh_is_gone(change, i);
@@ -504,11 +523,16 @@ void Scene::close() {
 }
 
 absl::Status Scene::remove() {
+  return remove_if([] { return true; }).status();
+}
+
+absl::StatusOr<bool> Scene::remove_if(absl::FunctionRef<bool()> condition) {
   const MutexLock lock(writer_mutex_);  // held so that nothing is logged or acknowledged after the deletion
   RETURN_IF_ERROR(check_open());
+  if (!condition()) return false;
   RETURN_IF_ERROR(journal_.remove());
   close();
-  return absl::OkStatus();
+  return true;
 }
 
 FrozenScene Scene::freeze() {

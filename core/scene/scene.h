@@ -23,11 +23,13 @@
 #include <optional>
 #include <string>
 
+#include "absl/container/flat_hash_set.h"
 #include "absl/functional/function_ref.h"
 #include "core/base/mutex.h"
 #include "core/scene/log/scene_journal.h"
 #include "core/scene/log/scene_state.h"
 #include "core/scene/readers/reader_tracker.h"
+#include "core/scene/scene_uses.h"
 #include "core/scene/scene_writer.h"
 #include "core/scene/snapshot/scene_snapshot.h"
 #include "core/scene/snapshot/scene_summary.h"
@@ -59,6 +61,11 @@ struct SceneSpec {
   OverloadPolicy overload = OverloadPolicy::kEveryBatch;
   Durability durability = Durability::kLocal;
   std::string creator;  // caller who created the scene and whose quota it uses; empty: no creator
+  // Seconds without use after which the scene is deleted; 0: never. See SceneUses.
+  uint32_t idle_ttl_s = 0;
+  // Seconds after which a mesh that the scene has used is deleted if no scene uses it any more; 0: never. See
+  // Registry::make_collectable().
+  uint32_t mesh_grace_s = 0;
 };
 
 // Revision that a caller requests. kLatest requests the latest revision and ignores `revision`. kAtLeast requests
@@ -168,6 +175,13 @@ class Scene {
   // Returns true if the scene contains instances of the mesh, or if a pending change places instances of the mesh.
   bool in_use(const StaticMesh* mesh) const LOCUS_EXCLUDES(mutex_);
 
+  // Adds to `meshes` every mesh that the latest revision, the history or a pending change uses. O(ticks of the
+  // history).
+  void add_used_meshes(absl::flat_hash_set<const StaticMesh*>& meshes) const LOCUS_EXCLUDES(mutex_);
+
+  // Returns the record of the calls that use the scene.
+  SceneUses& uses() { return uses_; }
+
   SnapshotPtr latest() const LOCUS_EXCLUDES(mutex_);
 
   // Returns the snapshot of the revision that `view` requests. kAtLeast waits for the revision until `deadline`, then
@@ -229,6 +243,9 @@ class Scene {
   void close() LOCUS_EXCLUDES(mutex_);
   // Deletes the scene from its log and closes it. If the log fails, returns the log's error, and the scene stays open.
   absl::Status remove() LOCUS_EXCLUDES(writer_mutex_, mutex_);
+  // Does the same as remove() if `condition` returns true, and nothing otherwise. `condition` is called while no change
+  // of the scene is being applied. Returns whether the scene was removed.
+  absl::StatusOr<bool> remove_if(absl::FunctionRef<bool()> condition) LOCUS_EXCLUDES(writer_mutex_, mutex_);
 
   // Returns the state to be written as the log's next snapshot: the latest revision and the sequence number of the last
   // record. Waits for a batch that is being applied. The returned state does not block later batches.
@@ -288,9 +305,10 @@ class Scene {
   Mutex change_mutex_;  // held during a static change; locked before writer_mutex_
   Mutex writer_mutex_;  // locked before mutex_
   SceneWriter writer_ LOCUS_GUARDED_BY(writer_mutex_);
-  SceneJournal journal_;             // records are appended only under writer_mutex_
-  IsKept is_kept_;                   // null: every mesh may be placed
-  ObjectCount object_count_;         // may be null
+  SceneJournal journal_;      // records are appended only under writer_mutex_
+  IsKept is_kept_;            // null: every mesh may be placed
+  ObjectCount object_count_;  // may be null
+  SceneUses uses_;
   mutable Mutex summarizing_mutex_;  // held while summary() computes; locked before mutex_
   mutable Mutex mutex_;
   mutable ConditionVariable published_;

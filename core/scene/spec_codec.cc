@@ -1,5 +1,6 @@
 #include "core/scene/spec_codec.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "core/base/limits.h"
@@ -22,12 +23,27 @@ void read_labels(ByteReader& reader, SceneSpec& spec) {
   }
 }
 
+// Returns the kind of the encoded specification: the oldest kind that contains all of its values.
+BytesKind kind_of(const SceneSpec& spec) {
+  if (spec.idle_ttl_s != 0 || spec.mesh_grace_s != 0) return BytesKind::kLimitedSpec;
+  return spec.creator.empty() ? BytesKind::kSceneSpec : BytesKind::kOwnedSpec;
+}
+
+void read_lifetimes(ByteReader& reader, SceneSpec& spec) {
+  const ByteReader::Pair lifetimes = reader.pair("the lifetimes");
+  if (std::max(lifetimes.first, lifetimes.second) > limits::kMaxLifetimeSeconds)
+    reader.fail("a lifetime", "is out of range");
+  spec.idle_ttl_s = lifetimes.first;
+  spec.mesh_grace_s = lifetimes.second;
+}
+
 }  // namespace
 
 std::string encode_spec(const SceneSpec& spec) {
   std::string bytes;
   ByteWriter writer(bytes);
-  write_kind(writer, spec.creator.empty() ? BytesKind::kSceneSpec : BytesKind::kOwnedSpec);
+  const BytesKind kind = kind_of(spec);
+  write_kind(writer, kind);
   writer.number(static_cast<uint64_t>(spec.winding));
   writer.number(uint64_t{spec.history.ticks});
   writer.number(spec.history.bytes);
@@ -39,7 +55,8 @@ std::string encode_spec(const SceneSpec& spec) {
     writer.text(key);
     writer.text(value);
   }
-  if (!spec.creator.empty()) writer.text(spec.creator);
+  if (kind != BytesKind::kSceneSpec) writer.text(spec.creator);
+  if (kind == BytesKind::kLimitedSpec) writer.pair(spec.idle_ttl_s, spec.mesh_grace_s);
   return bytes;
 }
 
@@ -48,7 +65,7 @@ absl::StatusOr<SceneSpec> decode_spec(absl::string_view bytes) {
   ByteReader reader(aligned.bytes());
   SceneSpec spec;
   const BytesKind kind = read_kind(reader);
-  if (kind != BytesKind::kSceneSpec && kind != BytesKind::kOwnedSpec)
+  if (kind != BytesKind::kSceneSpec && kind != BytesKind::kOwnedSpec && kind != BytesKind::kLimitedSpec)
     reader.fail("the kind of a specification", "is not known");
   spec.winding = read_enum(reader, Winding::kClockwise, "the winding");
   spec.history.ticks = static_cast<uint32_t>(reader.number_upto(limits::kMaxHistoryTicks, "the ticks of the history"));
@@ -57,7 +74,8 @@ absl::StatusOr<SceneSpec> decode_spec(absl::string_view bytes) {
   spec.overload = read_enum(reader, OverloadPolicy::kLatestWins, "the overload policy");
   spec.durability = read_enum(reader, Durability::kMemory, "the durability");
   read_labels(reader, spec);
-  if (kind == BytesKind::kOwnedSpec) spec.creator = std::string(reader.text(limits::kMaxCreatorLength, "the creator"));
+  if (kind != BytesKind::kSceneSpec) spec.creator = std::string(reader.text(limits::kMaxCreatorLength, "the creator"));
+  if (kind == BytesKind::kLimitedSpec) read_lifetimes(reader, spec);
   reader.end("a specification");
   if (!reader.good()) return reader.status();
   return spec;

@@ -96,6 +96,7 @@ void RocksdbLog::list_stored() {
     StoredMesh& stored = stored_meshes_.emplace_back();
     stored.name = found.name;
     stored.sha256 = found.sha256;
+    stored.grace_s = found.grace_s;
     stored.parts_in_content = !found.parts.has_value();
     if (!found.damage.empty())
       stored.damage = absl::DataLossError(

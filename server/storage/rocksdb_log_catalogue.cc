@@ -368,6 +368,19 @@ absl::Status RocksdbLog::delete_mesh(absl::string_view name) {
   return absl::OkStatus();
 }
 
+absl::Status RocksdbLog::set_mesh_grace(absl::string_view name, uint32_t grace_s) {
+  MutexLock adding(adding_mesh_);
+  MutexLock lock(catalogue_mutex_);
+  std::optional<MeshRow> row = mesh_row(name);
+  if (!row) return not_stored(absl::StrCat("the log has no mesh '", name, "'"));
+  row->grace_s = grace_s;
+  rocksdb::WriteBatch batch;
+  RETURN_IF_ERROR(commit({{{mesh_key(name), encode(*row)}}, 0}, batch));
+  scenes_.set_catalogue(catalogue_.totals());
+  write_durable_marker(false);
+  return absl::OkStatus();
+}
+
 absl::Status RocksdbLog::read_mesh(const Sha256& sha256, ChunkSink sink) const {
   std::optional<ContentRow> row;
   {

@@ -40,6 +40,7 @@ class MemoryLog : public UpdateLog {
   struct Kept {
     std::map<SceneKey, KeptScene> scenes;
     std::map<std::string, std::array<uint8_t, 32>> meshes;
+    std::map<std::string, uint32_t> mesh_graces;
     std::map<std::array<uint8_t, 32>, std::vector<Bytes>> contents;
     std::map<std::string, std::vector<Bytes>> parts;  // parts of each mesh, by name; no entry for a mesh of format 1
     std::map<std::array<uint8_t, 32>, std::string> topologies;
@@ -223,10 +224,19 @@ class MemoryLog : public UpdateLog {
     const std::array<uint8_t, 32> sha256 = found->second;
     kept_.meshes.erase(found);
     kept_.parts.erase(std::string(name));
+    kept_.mesh_graces.erase(std::string(name));
     const bool used = std::any_of(kept_.meshes.begin(), kept_.meshes.end(),
                                   [&sha256](const auto& mesh) { return mesh.second == sha256; });
     if (!used) kept_.contents.erase(sha256);
     if (!used) kept_.topologies.erase(sha256);
+    return absl::OkStatus();
+  }
+
+  absl::Status set_mesh_grace(absl::string_view name, uint32_t grace_s) override {
+    const MutexLock lock(mutex_);
+    if (!failure_.ok()) return failure_;
+    if (!kept_.meshes.contains(std::string(name))) return absl::NotFoundError("no such mesh");
+    kept_.mesh_graces[std::string(name)] = grace_s;
     return absl::OkStatus();
   }
 
@@ -294,6 +304,11 @@ class MemoryLog : public UpdateLog {
     return kept_.contents.contains(sha256);
   }
 
+  static uint32_t grace_of(const Kept& kept, const std::string& name) {
+    const auto grace = kept.mesh_graces.find(name);
+    return grace == kept.mesh_graces.end() ? 0 : grace->second;
+  }
+
   void list_stored(const Kept& kept) {
     for (const auto& [key, scene] : kept.scenes) {
       uint64_t bytes = 0;
@@ -302,7 +317,7 @@ class MemoryLog : public UpdateLog {
           {key, scene.name, scene.spec, scene.epoch, scene.snapshot_sequence, scene.last(), bytes, false, {}});
     }
     for (const auto& [name, sha256] : kept.meshes)
-      stored_meshes_.push_back({name, sha256, {}, !kept.parts.contains(name)});
+      stored_meshes_.push_back({name, sha256, {}, grace_of(kept, name), !kept.parts.contains(name)});
   }
 
   mutable Mutex mutex_;

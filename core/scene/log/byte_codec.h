@@ -186,6 +186,7 @@ enum class BytesKind : uint32_t {
   kBoundedChange = 0x4345'534c,
   kSceneSpec = 0x5053'534c,
   kOwnedSpec = 0x534f'534c,
+  kLimitedSpec = 0x534c'534c,  // a specification with lifetimes
   kStateHeader = 0x4854'534c,
   kStateWriters = 0x5754'534c,
   kMessageWriters = 0x4d57'534c,  // like kStateWriters; the errors of the acks also have the index of a message

@@ -327,6 +327,13 @@ uint32_t StaticSet::uses(const StaticMesh* mesh) const {
   return found == uses_->end() ? 0 : found->second;
 }
 
+std::vector<const StaticMesh*> StaticSet::meshes() const {
+  std::vector<const StaticMesh*> meshes;
+  meshes.reserve(uses_->size());
+  for (const auto& [mesh, uses] : *uses_) meshes.push_back(mesh);
+  return meshes;
+}
+
 uint64_t StaticSet::unshared_bytes(const StaticSet& other) const {
   if (this == &other) return 0;
   const uint64_t uses = uses_ == other.uses_ ? 0 : uses_->capacity() * (sizeof(Uses::value_type) + 1);

@@ -88,6 +88,8 @@ class StaticSet {
   uint64_t triangle_count() const { return triangle_count_; }
   // Returns the number of instances of `mesh`, not counting instances of meshes with equal content under other names.
   uint32_t uses(const StaticMesh* mesh) const;
+  // Returns the meshes of the instances, each once, in any order.
+  std::vector<const StaticMesh*> meshes() const;
   // Returns the size in bytes of the set without the meshes, which are shared by several sets.
   uint64_t bytes() const { return unshared_bytes(*empty()); }
   // Returns the size in bytes of the parts that this set does not share with `other`, without the meshes. O(instances /

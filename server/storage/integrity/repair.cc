@@ -158,7 +158,7 @@ absl::Status copy_mesh(const Database& source, const MeshHealth& found, Copier& 
   if (!status.ok() && !absl::IsDataLoss(status)) return status;
   MeshRepair repaired{found.name, found.damage, !status.ok(), false};
   if (status.ok()) {
-    MeshRow row{found.sha256, found.parts};
+    MeshRow row{found.sha256, found.parts, found.grace_s};
     absl::Status parts = row.parts ? copy_mesh_chunks(source, row.sha256, *row.parts, copier) : absl::OkStatus();
     if (!parts.ok() && !absl::IsDataLoss(parts)) return parts;
     repaired.parts_dropped = !parts.ok();

@@ -213,6 +213,7 @@ absl::Status find_meshes(const Database& database, Depth depth, ReadCounter& cou
     if (const std::optional<MeshRow> name = decode_mesh(*verified(row->first, row->second))) {
       mesh.sha256 = name->sha256;
       mesh.parts = name->parts;
+      mesh.grace_s = name->grace_s;
     }
     const auto content = found.rows.find(content_key(mesh.sha256));
     const std::optional<ContentRow> list =

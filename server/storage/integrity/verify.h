@@ -36,6 +36,7 @@ struct MeshHealth {
   Sha256 sha256 = {};
   ContentRow content;
   std::optional<ContentRow> parts;  // no value in format 1, where the content's chunks include the parts
+  uint32_t grace_s = 0;             // see MeshRow
   std::string damage;
 };
 

@@ -12,6 +12,7 @@ namespace {
 
 constexpr uint8_t kRecordFormat = 1;
 constexpr size_t kChecksumBytes = 8;
+constexpr size_t kContentRowBytes = 4 * 8;
 
 std::string tagged(char tag, absl::string_view rest) { return std::string(1, tag).append(rest.data(), rest.size()); }
 
@@ -86,6 +87,7 @@ std::string encode(const MeshRow& row) {
   RowWriter out;
   out.bytes(view_of(row.sha256));
   if (row.parts) out.bytes(encode(*row.parts));
+  if (row.grace_s != 0) out.u32(row.grace_s);
   return out.take();
 }
 
@@ -120,9 +122,10 @@ std::optional<MeshRow> decode_mesh(absl::string_view bytes) {
   const absl::string_view sha256 = in.bytes(row.sha256.size());
   if (!in.ok()) return std::nullopt;
   std::copy(sha256.begin(), sha256.end(), row.sha256.begin());
+  if (in.rest().size() >= kContentRowBytes) row.parts = decode_content(in.bytes(kContentRowBytes));
   if (in.ended()) return row;
-  row.parts = decode_content(in.rest());
-  return row.parts ? std::optional(row) : std::nullopt;
+  row.grace_s = in.u32();
+  return in.ended() && row.grace_s != 0 ? std::optional(row) : std::nullopt;
 }
 
 std::optional<SceneRow> decode_scene(absl::string_view bytes) {

@@ -42,7 +42,7 @@ class RegistryLogTest : public SceneFixture {
       EXPECT_FALSE(mesh->built) << "the topology was stored with the mesh";
       const absl::StatusOr<MeshPtr> named = recover_name(*log_, stored, mesh->mesh);
       ASSERT_TRUE(named.ok()) << named.status();
-      registry_->restore_mesh(stored.name, *named);
+      registry_->restore_mesh(stored.name, *named, stored.grace_s);
     }
     for (const StoredScene& stored : log_->stored_scenes()) {
       const absl::StatusOr<ScenePtr> scene = recover_scene(*log_, stored, find_restored_meshes(*log_, *registry_));
@@ -74,6 +74,41 @@ TEST_F(RegistryLogTest, ScenesMeshesAndInstancesSurviveARestart) {
   EXPECT_EQ(&(*registry_->find_mesh("alias", "mesh"))->tree(), &mesh->tree());
   EXPECT_EQ(registry_->mesh_uses(mesh.get()), 2u);
   EXPECT_EQ(registry_->delete_mesh("m").code(), absl::StatusCode::kFailedPrecondition);
+}
+
+TEST_F(RegistryLogTest, CollectableMeshesSurviveARestart) {
+  const MeshPtr mesh = *registry_->add_mesh("m", mesh_);
+  ASSERT_TRUE(registry_->add_mesh("alias", mesh_).ok());
+  log_->fail_with(kFull);
+  EXPECT_EQ(registry_->make_collectable(mesh.get(), 60), kFull);
+  EXPECT_THAT(registry_->collectable_meshes(), IsEmpty());
+  log_->fail_with(absl::OkStatus());
+  ASSERT_TRUE(registry_->make_collectable(mesh.get(), 60).ok());
+  restart();
+  ASSERT_EQ(registry_->collectable_meshes().size(), 1u);
+  EXPECT_EQ(registry_->collectable_meshes()[0].mesh, *registry_->find_mesh("m", "mesh"));
+  EXPECT_EQ(registry_->collectable_meshes()[0].grace_s, 60u);
+  const MeshPtr restored = registry_->collectable_meshes()[0].mesh;
+  log_->fail_with(kFull);
+  EXPECT_EQ(registry_->delete_mesh_if(restored, [] { return true; }).status(), kFull);
+  EXPECT_EQ(registry_->collectable_meshes().size(), 1u) << "the deletion failed";
+  log_->fail_with(absl::OkStatus());
+  EXPECT_TRUE(*registry_->delete_mesh_if(restored, [] { return true; }));
+  restart();
+  EXPECT_THAT(registry_->collectable_meshes(), IsEmpty());
+  EXPECT_FALSE(registry_->find_mesh("m", "mesh").ok());
+  EXPECT_TRUE(registry_->find_mesh("alias", "mesh").ok());
+}
+
+TEST_F(RegistryLogTest, AConditionalDeletionThatTheLogRefusesLeavesTheScene) {
+  const ScenePtr scene = create("arena")->scene;
+  log_->fail_with(kFull);
+  EXPECT_EQ(registry_->delete_scene_if(scene, [] { return true; }).status(), kFull);
+  EXPECT_THAT(scene_names(), ElementsAre("arena"));
+  log_->fail_with(absl::OkStatus());
+  EXPECT_TRUE(*registry_->delete_scene_if(scene, [] { return true; }));
+  restart();
+  EXPECT_THAT(scene_names(), IsEmpty());
 }
 
 TEST_F(RegistryLogTest, CreatorsSurviveARestartAndAFailedDeletion) {

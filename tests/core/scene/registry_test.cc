@@ -78,6 +78,23 @@ TEST_F(RegistryTest, ADeletedSceneIsClosedAndForgotten) {
   expect_refusal(registry_.delete_scene("arena"), absl::StatusCode::kNotFound, Reason::kNotFound, "name");
 }
 
+TEST_F(RegistryTest, ASceneIsDeletedOnlyIfTheConditionHolds) {
+  const ScenePtr scene = created("arena");
+  EXPECT_FALSE(*registry_.delete_scene_if(scene, [] { return false; }));
+  EXPECT_EQ(*registry_.find_scene("arena"), scene);
+  EXPECT_TRUE(*registry_.delete_scene_if(scene, [] { return true; }));
+  EXPECT_EQ(registry_.find_scene("arena").status().code(), absl::StatusCode::kNotFound);
+  EXPECT_EQ(scene->apply({}).status().code(), absl::StatusCode::kNotFound);
+}
+
+TEST_F(RegistryTest, AConditionalDeletionSparesALaterSceneOfTheSameName) {
+  const ScenePtr first = created("arena");
+  ASSERT_TRUE(registry_.delete_scene("arena").ok());
+  const ScenePtr second = created("arena");
+  EXPECT_FALSE(*registry_.delete_scene_if(first, [] { return true; }));
+  EXPECT_EQ(*registry_.find_scene("arena"), second);
+}
+
 TEST_F(RegistryTest, ScenesAreListedByNamePageByPage) {
   for (const char* name : {"d", "b", "a", "c"}) created(name);
   EXPECT_EQ(names(registry_.list_scenes("", 3)), (Names{"a", "b", "c"}));
@@ -263,6 +280,62 @@ TEST_F(RegistryTest, AUsedMeshIsNotDeletedAndItsUsesOfAllScenesAreCounted) {
   EXPECT_EQ(registry_.mesh_uses(mesh_.get()), 2u);
   EXPECT_TRUE(registry_.delete_scene("b").ok());
   EXPECT_TRUE(registry_.delete_mesh("m").ok());
+}
+
+TEST_F(RegistryTest, TheLongestGraceOfACollectableMeshApplies) {
+  const MeshPtr mesh = *registry_.add_mesh("m", mesh_);
+  EXPECT_TRUE(registry_.collectable_meshes().empty());
+  for (const uint32_t grace_s : {10, 60, 20}) ASSERT_TRUE(registry_.make_collectable(mesh.get(), grace_s).ok());
+  const std::vector<Registry::CollectableMesh> meshes = registry_.collectable_meshes();
+  ASSERT_EQ(meshes.size(), 1u);
+  EXPECT_EQ(meshes[0].mesh, mesh);
+  EXPECT_EQ(meshes[0].grace_s, 60u);
+  ASSERT_TRUE(registry_.delete_mesh("m").ok());
+  ASSERT_TRUE(registry_.make_collectable(mesh.get(), 10).ok());
+  EXPECT_TRUE(registry_.collectable_meshes().empty());
+  ASSERT_TRUE(registry_.add_mesh("m", mesh_).ok());
+  EXPECT_TRUE(registry_.collectable_meshes().empty()) << "this is another mesh";
+}
+
+TEST_F(RegistryTest, AMeshIsDeletedConditionallyOnlyIfItIsUnusedAndTheConditionHolds) {
+  mesh_ = *registry_.add_mesh("m", mesh_);
+  const ScenePtr scene = created("arena");
+  ASSERT_TRUE(scene->change_instances(placing(placement({1}, {0, 0, 0}))).ok());
+  EXPECT_FALSE(*registry_.delete_mesh_if(mesh_, [] { return true; })) << "an instance uses it";
+  StaticChange removal;
+  removal.remove_ids = columns_.ids({1});
+  ASSERT_TRUE(scene->change_instances(removal).ok());
+  EXPECT_FALSE(*registry_.delete_mesh_if(mesh_, [] { return false; }));
+  EXPECT_TRUE(registry_.find_mesh("m", "mesh").ok());
+  EXPECT_TRUE(*registry_.delete_mesh_if(mesh_, [] { return true; }));
+  EXPECT_EQ(registry_.find_mesh("m", "mesh").status().code(), absl::StatusCode::kNotFound);
+  const MeshPtr again = *registry_.add_mesh("m", make_mesh("m", 1));
+  EXPECT_FALSE(*registry_.delete_mesh_if(mesh_, [] { return true; })) << "this is another mesh";
+  EXPECT_EQ(*registry_.find_mesh("m", "mesh"), again);
+}
+
+TEST_F(RegistryTest, TheHistoryUsesItsMeshesUntilItsTicksAreDropped) {
+  mesh_ = *registry_.add_mesh("m", mesh_);
+  SceneSpec spec;
+  spec.history = {2, 1u << 20};
+  const ScenePtr scene = registry_.create_scene("arena", spec, 1, "", false)->scene;
+  EXPECT_TRUE(registry_.used_meshes().empty());
+  ASSERT_TRUE(scene->change_instances(placing(placement({1}, {0, 0, 0}))).ok());
+  EXPECT_TRUE(registry_.used_meshes().contains(mesh_.get()));
+  const auto begin_tick = [&](uint64_t tick) {
+    UpdateBatch batch;
+    batch.tick = tick;
+    EXPECT_TRUE(scene->apply(batch).ok());
+  };
+  begin_tick(1);
+  StaticChange removal;
+  removal.remove_ids = columns_.ids({1});
+  ASSERT_TRUE(scene->change_instances(removal).ok());
+  EXPECT_TRUE(registry_.used_meshes().contains(mesh_.get())) << "tick 0 has the instance";
+  begin_tick(2);
+  EXPECT_TRUE(registry_.used_meshes().contains(mesh_.get()));
+  begin_tick(4);
+  EXPECT_FALSE(registry_.used_meshes().contains(mesh_.get()));
 }
 
 TEST_F(RegistryTest, MeshesAreListedByNamePageByPageWithTheirUses) {

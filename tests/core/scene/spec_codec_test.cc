@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/base/limits.h"
 #include "tests/support/damaged_bytes.h"
 #include "tests/support/test_scale.h"
 
@@ -46,9 +47,48 @@ TEST(SpecCodecTest, ASpecificationWithoutACreatorIsWrittenAsInFormat2) {
   EXPECT_EQ(decode_spec(bytes)->creator, "");
 }
 
+TEST(SpecCodecTest, LifetimesRoundTripWithAndWithoutACreator) {
+  for (const char* const creator : {"token:ci", ""}) {
+    SceneSpec spec = full_spec();
+    spec.creator = creator;
+    spec.idle_ttl_s = 90;
+    const std::string bytes = encode_spec(spec);
+    EXPECT_EQ(bytes.substr(0, 4), "LSLS");
+    absl::StatusOr<SceneSpec> decoded = decode_spec(bytes);
+    ASSERT_TRUE(decoded.ok()) << decoded.status();
+    EXPECT_EQ(decoded->idle_ttl_s, 90u);
+    EXPECT_EQ(decoded->mesh_grace_s, 0u);
+    EXPECT_EQ(decoded->creator, creator);
+    EXPECT_EQ(decoded->labels, spec.labels);
+    spec.idle_ttl_s = 0;
+    spec.mesh_grace_s = limits::kMaxLifetimeSeconds;
+    decoded = decode_spec(encode_spec(spec));
+    ASSERT_TRUE(decoded.ok()) << decoded.status();
+    EXPECT_EQ(decoded->idle_ttl_s, 0u);
+    EXPECT_EQ(decoded->mesh_grace_s, limits::kMaxLifetimeSeconds);
+  }
+}
+
+TEST(SpecCodecTest, ALifetimeBeyondTheLimitIsDamage) {
+  SceneSpec spec = full_spec();
+  spec.idle_ttl_s = limits::kMaxLifetimeSeconds + 1;
+  EXPECT_EQ(decode_spec(encode_spec(spec)).status().code(), absl::StatusCode::kDataLoss);
+}
+
+// Scene specifications of the data formats 3 and 4 have no lifetimes. They must stay readable.
+TEST(SpecCodecTest, ASpecificationWithoutLifetimesIsWrittenAsInFormat4) {
+  SceneSpec spec = full_spec();
+  const std::string bytes = encode_spec(spec);
+  EXPECT_EQ(bytes.substr(0, 4), "LSOS");
+  spec.mesh_grace_s = 1;
+  EXPECT_EQ(encode_spec(spec).substr(4, bytes.size() - 4), bytes.substr(4));
+}
+
 TEST(SpecCodecTest, DamagedBytesNeverHarm) {
   Random random(1);
-  const std::string bytes = encode_spec(full_spec());
+  SceneSpec limited = full_spec();
+  limited.idle_ttl_s = 3600;
+  const std::string bytes = encode_spec(limited);
   uint64_t refused = 0;
   for (uint64_t i = 0; i < scaled_count(20000); ++i) {
     const absl::Status status = decode_spec(damaged(bytes, random)).status();

@@ -244,6 +244,25 @@ TEST_F(RocksdbLogTest, PartsAreKeptForEachNameAndGoWithIt) {
   EXPECT_EQ(read_mesh(*log_, hash_of(1)).status().code(), absl::StatusCode::kNotFound);
 }
 
+TEST_F(RocksdbLogTest, TheGraceOfAMeshIsKeptForItsNameAndGoesWithIt) {
+  for (const char* const name : {"a", "b"}) ASSERT_EQ(add_mesh(name, 1, {"content"}), absl::OkStatus());
+  ASSERT_EQ(log_->set_mesh_grace("a", 7), absl::OkStatus());
+  ASSERT_EQ(log_->set_mesh_grace("a", 60), absl::OkStatus());
+  EXPECT_EQ(log_->set_mesh_grace("c", 60).code(), absl::StatusCode::kNotFound);
+  for (int times = 0; times < 2; ++times) {
+    open();
+    ASSERT_EQ(log_->stored_meshes().size(), 2u);
+    EXPECT_EQ(log_->stored_meshes()[0].grace_s, 60u);
+    EXPECT_EQ(log_->stored_meshes()[1].grace_s, 0u);
+    EXPECT_FALSE(log_->stored_meshes()[0].parts_in_content);
+    EXPECT_EQ(test::read_parts(*log_, "a").value(), (std::vector<std::string>{"parts of", "a"}));
+  }
+  ASSERT_EQ(log_->delete_mesh("a"), absl::OkStatus());
+  ASSERT_EQ(add_mesh("a", 1, {"content"}), absl::OkStatus());
+  open();
+  EXPECT_EQ(log_->stored_meshes()[0].grace_s, 0u) << "this is another mesh";
+}
+
 TEST_F(RocksdbLogTest, DamagedContentIsStoredAgainWhenItIsUploadedAgain) {
   // The content is larger than a block of a table, so that damage to it does not make other values unreadable.
   const std::vector<std::string> content = {"the bytes of a mesh" + std::string(200'000, '.')};

@@ -77,6 +77,7 @@ class RepairTest : public ::testing::Test {
 TEST_F(RepairTest, AMeshWhosePartsAreDamagedIsKeptWithoutThem) {
   store_two_meshes();
   EXPECT_EQ(stored_chunks(), 4u);
+  for (const char* const name : {"a", "b"}) ASSERT_EQ(open()->set_mesh_grace(name, 60), absl::OkStatus());
   const absl::StatusOr<RepairReport> report = damage_and_repair(kParts + "a");
   ASSERT_TRUE(report.ok()) << report.status();
   ASSERT_EQ(report->meshes.size(), 1u);
@@ -87,6 +88,7 @@ TEST_F(RepairTest, AMeshWhosePartsAreDamagedIsKeptWithoutThem) {
   const std::unique_ptr<RocksdbLog> log = open();
   ASSERT_EQ(log->stored_meshes().size(), 2u);
   EXPECT_EQ(test::read_mesh(*log, hash_of(1)).value(), (std::vector<std::string>{kFirst, kContent}));
+  for (const StoredMesh& mesh : log->stored_meshes()) EXPECT_EQ(mesh.grace_s, 60u) << mesh.name;
   EXPECT_TRUE(test::read_parts(*log, "a")->empty());
   EXPECT_EQ(test::read_parts(*log, "b").value(), std::vector<std::string>{kParts + "b"});
 }
