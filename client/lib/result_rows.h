@@ -91,7 +91,8 @@ class RayHits {
   // Returns whether the ray has a hit.
   bool hit(size_t ray) const;
   // Return the columns of the ray's nearest hit; +infinity, 0 and kNoTriangle for a miss. triangle() also returns
-  // kNoTriangle for a hit on an object, and if the column of triangles was not requested.
+  // kNoTriangle for a hit on an object, and if the column of triangles was not requested; for a hit on a compound, it
+  // returns the number of the part.
   float t(size_t ray) const;
   uint64_t id(size_t ray) const;
   uint32_t triangle(size_t ray) const;
@@ -127,7 +128,8 @@ class Overlaps {
   // Returns the ids that the query found, in ascending order. If the block requested one row per triangle, the id of an
   // instance is repeated for each triangle found.
   absl::Span<const uint64_t> ids(size_t query) const;
-  // Returns the triangle of each entry of ids(query); empty if the column was not requested.
+  // Returns the triangle, or the part of a compound, of each entry of ids(query); empty if the column was not
+  // requested.
   absl::Span<const uint32_t> triangles(size_t query) const;
 
  private:

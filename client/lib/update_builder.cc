@@ -3,9 +3,12 @@
 #include <utility>
 
 #include "client/lib/columns.h"
+#include "google/protobuf/util/message_differencer.h"
 
 namespace locus::client {
 namespace {
+
+constexpr uint32_t kDefaultLayers = 1;
 
 template <class Message>
 void append_position(Message& message, const Position& position) {
@@ -19,6 +22,13 @@ template <class Move>
 bool continues(const Move& last, bool absolute, bool rotated, MoveKind kind) {
   return (last.positions_f64_size() > 0) == absolute && (last.rotations_size() > 0) == rotated &&
          last.teleport() == (kind == MoveKind::kTeleport);
+}
+
+// Returns whether a row may be added to the last entry of compounds: all objects of an entry have the same parts, and
+// either all or none of them have layers.
+bool continues(const v1::Insert& last, const Compound& compound, const Labels& labels) {
+  return (last.layers_size() > 0) == labels.layers.has_value() &&
+         google::protobuf::util::MessageDifferencer::Equals(last.compound(), compound.message());
 }
 
 bool continues(const v1::Relabel& last, const Relabeling& labels) {
@@ -86,9 +96,13 @@ UpdateBuilder& UpdateBuilder::remove_group(uint64_t group) {
   return *this;
 }
 
+size_t UpdateBuilder::slot_of(Form form, const Position& position) {
+  return static_cast<size_t>(form) * 2 + (position.absolute ? 1 : 0);
+}
+
 v1::Insert& UpdateBuilder::add_row(Form form, uint64_t id, const Position& position, const Rotation& rotation,
                                    const Labels& labels) {
-  const size_t slot = static_cast<size_t>(form) * 2 + (position.absolute ? 1 : 0);
+  const size_t slot = slot_of(form, position);
   if (row_inserts_[slot] < 0) {
     row_inserts_[slot] = batch_.inserts_size();
     batch_.add_inserts();
@@ -98,9 +112,14 @@ v1::Insert& UpdateBuilder::add_row(Form form, uint64_t id, const Position& posit
   insert.add_ids(id);
   append_position(insert, position);
   append_rotation_row(*insert.mutable_rotations(), rows_before, rotation);
-  append_row<uint32_t>(*insert.mutable_layers(), rows_before, labels.layers, Labels{}.layers);
+  if (form == Form::kCompound) {
+    if (labels.layers) insert.add_layers(*labels.layers);
+  } else {
+    append_row<uint32_t>(*insert.mutable_layers(), rows_before, labels.layers.value_or(kDefaultLayers), kDefaultLayers);
+  }
   append_row<uint64_t>(*insert.mutable_groups(), rows_before, labels.group, 0);
   append_row<uint64_t>(*insert.mutable_tags(), rows_before, labels.tag, 0);
+  append_row<uint64_t>(*insert.mutable_expire_ticks(), rows_before, labels.expire_ticks, 0);
   return insert;
 }
 
@@ -129,6 +148,15 @@ UpdateBuilder& UpdateBuilder::insert_capsule(uint64_t id, const Position& positi
   return *this;
 }
 
+UpdateBuilder& UpdateBuilder::insert_compound(uint64_t id, const Position& position, const Compound& compound,
+                                              const Rotation& rotation, const Labels& labels) {
+  int& entry = row_inserts_[slot_of(Form::kCompound, position)];
+  if (entry >= 0 && !continues(batch_.inserts(entry), compound, labels)) entry = -1;
+  v1::Insert& insert = add_row(Form::kCompound, id, position, rotation, labels);
+  if (!insert.has_compound()) *insert.mutable_compound() = compound.message();
+  return *this;
+}
+
 v1::Insert& UpdateBuilder::add_columns(const InsertColumns& columns) {
   v1::Insert& insert = *batch_.add_inserts();
   assign(*insert.mutable_ids(), columns.ids);
@@ -138,6 +166,7 @@ v1::Insert& UpdateBuilder::add_columns(const InsertColumns& columns) {
   assign(*insert.mutable_layers(), columns.layers);
   assign(*insert.mutable_groups(), columns.groups);
   assign(*insert.mutable_tags(), columns.tags);
+  assign(*insert.mutable_expire_ticks(), columns.expire_ticks);
   return insert;
 }
 
@@ -164,17 +193,39 @@ UpdateBuilder& UpdateBuilder::insert_capsules(const InsertColumns& columns, absl
   return *this;
 }
 
-UpdateBuilder& UpdateBuilder::move(uint64_t id, const Position& position, const std::optional<Rotation>& rotation,
-                                   MoveKind kind) {
+UpdateBuilder& UpdateBuilder::insert_compounds(const InsertColumns& columns, const Compound& compound) {
+  *add_columns(columns).mutable_compound() = compound.message();
+  return *this;
+}
+
+v1::Move& UpdateBuilder::add_move(uint64_t id, const Position& position, const std::optional<Rotation>& rotation,
+                                  size_t parts, MoveKind kind) {
   const int entries = batch_.moves_size();
-  const bool same =
-      move_takes_rows_ && continues(batch_.moves(entries - 1), position.absolute, rotation.has_value(), kind);
+  const bool same = move_takes_rows_ && batch_.moves(entries - 1).parts_each() == parts &&
+                    continues(batch_.moves(entries - 1), position.absolute, rotation.has_value(), kind);
   v1::Move& move = same ? *batch_.mutable_moves(entries - 1) : *batch_.add_moves();
   move.add_ids(id);
   append_position(move, position);
   if (rotation) append_rotation(*move.mutable_rotations(), *rotation);
+  move.set_parts_each(static_cast<uint32_t>(parts));
   move.set_teleport(kind == MoveKind::kTeleport);
   move_takes_rows_ = true;
+  return move;
+}
+
+UpdateBuilder& UpdateBuilder::move(uint64_t id, const Position& position, const std::optional<Rotation>& rotation,
+                                   MoveKind kind) {
+  add_move(id, position, rotation, 0, kind);
+  return *this;
+}
+
+UpdateBuilder& UpdateBuilder::move_compound(uint64_t id, const Position& position, absl::Span<const PartPose> parts,
+                                            const std::optional<Rotation>& rotation, MoveKind kind) {
+  v1::Move& move = add_move(id, position, rotation, parts.size(), kind);
+  for (const PartPose& part : parts) {
+    append_triple(*move.mutable_part_positions(), part.position);
+    append_rotation(*move.mutable_part_rotations(), part.rotation);
+  }
   return *this;
 }
 
@@ -184,6 +235,9 @@ UpdateBuilder& UpdateBuilder::moves(const MoveColumns& columns, MoveKind kind) {
   assign(*move.mutable_positions(), columns.positions);
   assign(*move.mutable_positions_f64(), columns.positions_f64);
   assign(*move.mutable_rotations(), columns.rotations);
+  move.set_parts_each(columns.parts_each);
+  assign(*move.mutable_part_positions(), columns.part_positions);
+  assign(*move.mutable_part_rotations(), columns.part_rotations);
   move.set_teleport(kind == MoveKind::kTeleport);
   move_takes_rows_ = false;
   return *this;

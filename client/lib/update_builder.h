@@ -3,10 +3,11 @@
 // builder.
 //
 // Inserted rows with the same shape and kind of position (relative or absolute) share one Insert message and keep the
-// order in which they were added. Moves always stay in the order in which they were added, since the later of two moves
-// of one object wins. Therefore a move begins a new Move message if its MoveKind or its columns (with or without
-// rotation, relative or absolute position) differ from those of the previous move. A relabel begins a new Relabel
-// message if it sets other kinds of labels than the previous relabel. Moves and relabels of instances do the same.
+// order in which they were added. A compound shares the Insert message of the compound before it if their parts are
+// equal. Moves always stay in the order in which they were added, since the later of two moves of one object wins.
+// Therefore a move begins a new Move message if its MoveKind or its columns (with or without rotation, number of parts,
+// relative or absolute position) differ from those of the previous move. A relabel begins a new Relabel message if it
+// sets other kinds of labels than the previous relabel. Moves and relabels of instances do the same.
 #ifndef LOCUS_CLIENT_LIB_UPDATE_BUILDER_H_
 #define LOCUS_CLIENT_LIB_UPDATE_BUILDER_H_
 
@@ -15,6 +16,7 @@
 #include <optional>
 
 #include "absl/types/span.h"
+#include "client/lib/compound.h"
 #include "client/lib/values.h"
 #include "locus/v1/update_service.pb.h"
 
@@ -24,19 +26,24 @@ namespace locus::client {
 // objects, or none. Exactly one of the two position columns must be given.
 struct InsertColumns {
   absl::Span<const uint64_t> ids;
-  absl::Span<const float> positions = {};       // 3N, relative to the frame
-  absl::Span<const double> positions_f64 = {};  // 3N, absolute
-  absl::Span<const float> rotations = {};       // 4N; none = identity
-  absl::Span<const uint32_t> layers = {};       // none = 1
-  absl::Span<const uint64_t> groups = {};       // none = 0
-  absl::Span<const uint64_t> tags = {};         // none = 0
+  absl::Span<const float> positions = {};        // 3N, relative to the frame
+  absl::Span<const double> positions_f64 = {};   // 3N, absolute
+  absl::Span<const float> rotations = {};        // 4N; none = identity
+  absl::Span<const uint32_t> layers = {};        // none = 1, or all layers of a compound's parts
+  absl::Span<const uint64_t> groups = {};        // none = 0
+  absl::Span<const uint64_t> tags = {};          // none = 0
+  absl::Span<const uint64_t> expire_ticks = {};  // none or 0 = until the object is removed
 };
 
+// With poses of parts, all objects are compounds of `parts_each` = P parts.
 struct MoveColumns {
   absl::Span<const uint64_t> ids;
   absl::Span<const float> positions = {};       // 3N, relative to the frame
   absl::Span<const double> positions_f64 = {};  // 3N, absolute
   absl::Span<const float> rotations = {};       // 4N; none = rotations do not change
+  uint32_t parts_each = 0;
+  absl::Span<const float> part_positions = {};  // 3NP, or 3P for all objects; none = parts keep their positions
+  absl::Span<const float> part_rotations = {};  // 4NP, or 4P for all objects; none = parts keep their rotations
 };
 
 struct InstanceMoveColumns {
@@ -84,6 +91,8 @@ class UpdateBuilder {
   // own axes.
   UpdateBuilder& insert_capsule(uint64_t id, const Position& position, const Float3& half_axis, float radius,
                                 const Rotation& rotation = {}, const Labels& labels = {});
+  UpdateBuilder& insert_compound(uint64_t id, const Position& position, const Compound& compound,
+                                 const Rotation& rotation = {}, const Labels& labels = {});
 
   // Insert whole columns, which are copied unchanged. Each call adds an Insert message of its own.
   UpdateBuilder& insert_points(const InsertColumns& columns);
@@ -91,9 +100,16 @@ class UpdateBuilder {
   UpdateBuilder& insert_boxes(const InsertColumns& columns, absl::Span<const float> half_extents);
   UpdateBuilder& insert_capsules(const InsertColumns& columns, absl::Span<const float> half_axes,
                                  absl::Span<const float> radii);
+  // Inserts compounds that all have the parts of `compound`.
+  UpdateBuilder& insert_compounds(const InsertColumns& columns, const Compound& compound);
 
   UpdateBuilder& move(uint64_t id, const Position& position, const std::optional<Rotation>& rotation = std::nullopt,
                       MoveKind kind = MoveKind::kContinuous);
+  // Moves one compound and sets the poses of all its parts, in order. The server refuses the row if the compound has
+  // another number of parts.
+  UpdateBuilder& move_compound(uint64_t id, const Position& position, absl::Span<const PartPose> parts,
+                               const std::optional<Rotation>& rotation = std::nullopt,
+                               MoveKind kind = MoveKind::kContinuous);
   UpdateBuilder& moves(const MoveColumns& columns, MoveKind kind = MoveKind::kContinuous);
 
   UpdateBuilder& relabel(uint64_t id, const Relabeling& labels);
@@ -111,17 +127,21 @@ class UpdateBuilder {
   v1::UpdateBatch build();
 
  private:
-  enum class Form { kPoint, kBall, kBox, kCapsule };
+  enum class Form { kPoint, kBall, kBox, kCapsule, kCompound };
 
+  // Returns the index into row_inserts_ for rows of this form and kind of position.
+  static size_t slot_of(Form form, const Position& position);
   v1::Insert& add_row(Form form, uint64_t id, const Position& position, const Rotation& rotation, const Labels& labels);
   v1::Insert& add_columns(const InsertColumns& columns);
+  v1::Move& add_move(uint64_t id, const Position& position, const std::optional<Rotation>& rotation, size_t parts,
+                     MoveKind kind);
 
   v1::UpdateBatch batch_;
   bool move_takes_rows_ = false;           // move() may append rows to the last entry of batch_.moves
   bool instance_move_takes_rows_ = false;  // the same for move_instance() and batch_.instance_moves
   // Two indices into batch_.inserts for each form of an object: the first is the entry that collects rows with relative
   // positions, the second is the entry that collects rows with absolute positions; -1 = no such entry yet.
-  std::array<int, 8> row_inserts_ = {-1, -1, -1, -1, -1, -1, -1, -1};
+  std::array<int, 10> row_inserts_ = {-1, -1, -1, -1, -1, -1, -1, -1, -1, -1};
 };
 
 }  // namespace locus::client

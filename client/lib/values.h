@@ -4,6 +4,7 @@
 #define LOCUS_CLIENT_LIB_VALUES_H_
 
 #include <cstdint>
+#include <optional>
 
 namespace locus::client {
 
@@ -33,11 +34,14 @@ struct Rotation {
   friend constexpr bool operator==(const Rotation&, const Rotation&) = default;
 };
 
-// Labels by which queries filter and report an object. The defaults equal the protocol's defaults.
+// Labels by which queries filter and report a new object, and its lifetime. The defaults equal the protocol's defaults.
 struct Labels {
-  uint32_t layers = 1;  // a query finds the object iff (layers & mask of the query) != 0; 0 = hidden
-  uint64_t group = 0;   // 0 = no group
+  // A query finds the object iff (layers & mask of the query) != 0; 0 = hidden. None = bit 0 (the value 1) or, for a
+  // compound whose parts have layers, all layers of the parts.
+  std::optional<uint32_t> layers = std::nullopt;
+  uint64_t group = 0;  // 0 = no group
   uint64_t tag = 0;
+  uint64_t expire_ticks = 0;  // number of ticks that the object exists, at most 2^48; 0 = until it is removed
 };
 
 // Identifier of one state of a scene. Revisions are counted within an epoch; a scene that was restarted without its

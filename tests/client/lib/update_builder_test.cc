@@ -60,6 +60,100 @@ TEST(UpdateBuilderTest, CapsulesHaveAxisAndRadius) {
   EXPECT_THAT(batch.inserts(0).capsule().radii(), ElementsAre(0.25f));
 }
 
+TEST(UpdateBuilderTest, LifetimesAreAColumnOfTheirOwn) {
+  const std::vector<uint64_t> ids = {3, 4}, expire = {9};
+  const std::vector<float> positions = {1, 2, 3};
+  const v1::UpdateBatch batch = UpdateBuilder()
+                                    .insert_point(1, Float3{})
+                                    .insert_point(2, Float3{}, {.expire_ticks = 30})
+                                    .insert_points({.ids = ids, .positions = positions, .expire_ticks = expire})
+                                    .build();
+  EXPECT_THAT(batch.inserts(0).expire_ticks(), ElementsAre(0, 30));
+  EXPECT_THAT(batch.inserts(1).expire_ticks(), ElementsAre(9));
+}
+
+TEST(UpdateBuilderTest, PartsOfACompoundAreNumberedInTheOrderAdded) {
+  const Compound rig = Compound()
+                           .ball({0, 0, 2}, 0.5f)
+                           .ball({0, 0, 3}, 0.25f, {.layers = 4})
+                           .capsule({1, 0, 0}, {0, 0, 1}, 0.125f)
+                           .box({0, 0, 1}, {1, 2, 3}, {.rotation = {0, 0, 1, 0}})
+                           .ball({0, 0, 4}, 1);
+  EXPECT_EQ(rig.size(), 5u);
+  const v1::Compound& message = rig.message();
+  ASSERT_EQ(message.parts_size(), 4) << "parts of one shape share an entry only if no other part is between them";
+  EXPECT_THAT(message.parts(0).positions(), ElementsAre(0, 0, 2, 0, 0, 3));
+  EXPECT_THAT(message.parts(0).ball().radii(), ElementsAre(0.5f, 0.25f));
+  EXPECT_THAT(message.parts(0).layers(), ElementsAre(kAllLayers, 4));
+  EXPECT_THAT(message.parts(0).rotations(), IsEmpty());
+  EXPECT_THAT(message.parts(1).capsule().half_axes(), ElementsAre(0, 0, 1));
+  EXPECT_THAT(message.parts(1).capsule().radii(), ElementsAre(0.125f));
+  EXPECT_THAT(message.parts(2).box().half_extents(), ElementsAre(1, 2, 3));
+  EXPECT_THAT(message.parts(2).rotations(), ElementsAre(0, 0, 1, 0));
+  EXPECT_THAT(message.parts(2).layers(), IsEmpty());
+  EXPECT_THAT(message.parts(3).ball().radii(), ElementsAre(1));
+}
+
+TEST(UpdateBuilderTest, CompoundsWithEqualPartsShareOneInsert) {
+  const Compound rig = Compound().ball({0, 0, 1}, 1, {.layers = 2});
+  const Compound car = Compound().box({0, 0, 1}, {2, 1, 1});
+  const v1::UpdateBatch batch = UpdateBuilder()
+                                    .insert_compound(1, Float3{1, 0, 0}, rig)
+                                    .insert_compound(2, Float3{2, 0, 0}, Compound(rig), {0, 0, 1, 0}, {.group = 7})
+                                    .insert_compound(3, Float3{3, 0, 0}, car, {}, {.layers = 1})
+                                    .insert_compound(4, Float3{4, 0, 0}, car, {}, {.layers = 8, .expire_ticks = 5})
+                                    .insert_compound(5, Float3{5, 0, 0}, car)
+                                    .insert_compound(6, Double3{6, 0, 0}, rig)
+                                    .build();
+  ASSERT_EQ(batch.inserts_size(), 4);
+  EXPECT_THAT(batch.inserts(0).ids(), ElementsAre(1, 2));
+  EXPECT_THAT(batch.inserts(0).rotations(), ElementsAre(0, 0, 0, 1, 0, 0, 1, 0));
+  EXPECT_THAT(batch.inserts(0).groups(), ElementsAre(0, 7));
+  EXPECT_THAT(batch.inserts(0).layers(), IsEmpty()) << "none = all layers of the parts";
+  EXPECT_THAT(batch.inserts(0).compound().parts(0).layers(), ElementsAre(2));
+  EXPECT_THAT(batch.inserts(1).ids(), ElementsAre(3, 4));
+  EXPECT_THAT(batch.inserts(1).layers(), ElementsAre(1, 8)) << "a given value is sent, even if it is 1";
+  EXPECT_THAT(batch.inserts(1).expire_ticks(), ElementsAre(0, 5));
+  EXPECT_THAT(batch.inserts(2).ids(), ElementsAre(5));
+  EXPECT_THAT(batch.inserts(2).layers(), IsEmpty());
+  EXPECT_THAT(batch.inserts(3).positions_f64(), ElementsAre(6, 0, 0));
+}
+
+TEST(UpdateBuilderTest, CompoundsInColumnsHaveTheSameParts) {
+  const std::vector<uint64_t> ids = {1, 2};
+  const std::vector<float> positions = {1, 2, 3, 4, 5, 6};
+  const Compound rig = Compound().ball({}, 1).capsule({}, {0, 0, 1}, 1);
+  const v1::UpdateBatch batch = UpdateBuilder().insert_compounds({.ids = ids, .positions = positions}, rig).build();
+  EXPECT_THAT(batch.inserts(0).ids(), ElementsAre(1, 2));
+  EXPECT_EQ(batch.inserts(0).compound().parts_size(), 2);
+}
+
+TEST(UpdateBuilderTest, MovesOfCompoundsCarryThePosesOfTheirParts) {
+  const std::vector<PartPose> bent = {{{0, 0, 1}}, {{0, 0, 2}, {0, 0, 1, 0}}};
+  const std::vector<PartPose> single = {{{1, 2, 3}}};
+  const std::vector<uint64_t> ids = {6, 7};
+  const std::vector<float> positions = {1, 2, 3}, part_positions = {0, 0, 1, 0, 0, 2};
+  const v1::UpdateBatch batch =
+      UpdateBuilder()
+          .move_compound(1, Float3{1, 0, 0}, bent)
+          .move_compound(2, Float3{2, 0, 0}, bent)
+          .move_compound(3, Float3{3, 0, 0}, single)
+          .move(4, Float3{4, 0, 0})
+          .moves({.ids = ids, .positions = positions, .parts_each = 2, .part_positions = part_positions})
+          .build();
+  ASSERT_EQ(batch.moves_size(), 4);
+  EXPECT_THAT(batch.moves(0).ids(), ElementsAre(1, 2));
+  EXPECT_EQ(batch.moves(0).parts_each(), 2u);
+  EXPECT_THAT(batch.moves(0).part_positions(), ElementsAre(0, 0, 1, 0, 0, 2, 0, 0, 1, 0, 0, 2));
+  EXPECT_THAT(batch.moves(0).part_rotations(), ElementsAre(0, 0, 0, 1, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 1, 0));
+  EXPECT_EQ(batch.moves(1).parts_each(), 1u);
+  EXPECT_EQ(batch.moves(2).parts_each(), 0u);
+  EXPECT_THAT(batch.moves(2).part_positions(), IsEmpty());
+  EXPECT_EQ(batch.moves(3).parts_each(), 2u);
+  EXPECT_THAT(batch.moves(3).part_positions(), ElementsAre(0, 0, 1, 0, 0, 2));
+  EXPECT_THAT(batch.moves(3).part_rotations(), IsEmpty()) << "absent keeps the rotations of the parts";
+}
+
 TEST(UpdateBuilderTest, WholeColumnsAreCopiedUnchanged) {
   const std::vector<uint64_t> ids = {1, 2};
   const std::vector<float> positions = {1, 2, 3, 4, 5, 6};
