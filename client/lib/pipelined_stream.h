@@ -3,12 +3,20 @@
 // request. After a broken connection the stream reconnects and sends the unanswered requests again. A connection counts
 // as broken if no response arrives for Options::patience while requests are unanswered.
 //
+// An item may consist of several messages that the server applies as one (UpdateBatch.continues). The server answers
+// each of them. The outcome of the item is the answer to the last message, or the error of the first refused message.
+// After a broken connection all messages of the item are sent again, since the server has applied none of them.
+//
+// With Options::renewal, the stream sends a request of its own (Kind::renewal()) when no request that renews the lease
+// was sent for that long. Renewals begin with the first such request and end when the stream is closed.
+//
 // Threads: each stream owns one thread, the supervisor, which starts one call after another and waits for the end of
 // each call. Messages are read and written on gRPC's callback threads. send(), flush() and close() may be called from
 // any thread. Callbacks run one at a time, without the lock held.
 //
 // Invariants: `items_` contains the requests that were accepted and not answered, in the order of sending. Within a
-// call, an item is written only after all items before it. After `ended_` is set, `items_` is and stays empty.
+// call, an item is written only after all items before it, and no other message is written between the messages of one
+// item. At most one renewal is unanswered. After `ended_` is set, `items_` is and stays empty.
 #ifndef LOCUS_CLIENT_LIB_PIPELINED_STREAM_H_
 #define LOCUS_CLIENT_LIB_PIPELINED_STREAM_H_
 
@@ -25,6 +33,7 @@
 #include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -56,9 +65,13 @@ class PipelinedStream {
   struct Item {
     // Renumbering replaces this request and does not modify it, because a write in progress may still read it.
     std::shared_ptr<Request> request;
-    Callback done;
+    Callback done;             // empty for a renewal
     bool written = false;      // whether the request's write on the current call has begun
     bool sent_before = false;  // whether the write of this request on an earlier call has begun
+    // Messages that are written before `request`, and the number of them whose write on the current call has begun.
+    std::vector<std::shared_ptr<Request>> held = {};
+    size_t held_written = 0;
+    absl::Status refusal = {};  // the first error among the answers to `held` on the current call
   };
   using Items = std::deque<Item>;
 
@@ -67,8 +80,14 @@ class PipelinedStream {
    public:
     virtual ~Kind() = default;
     virtual void start_call(grpc::ClientContext* context, Reactor* reactor) = 0;
-    // Assigns the sequence number of a new request, and, for updates, the writer and batch number of its batch.
+    // Assigns, for updates, the writer and batch number of a new request's batch.
     virtual void number(Request& request) = 0;
+    // Returns the request that renews the writer's lease.
+    virtual Request renewal() { return Request(); }
+    // Returns whether a request renews the writer's lease.
+    virtual bool renews(const Request&) const { return true; }
+    // Returns an error if the response to a message of Item::held shows that the server does not hold the message.
+    virtual absl::Status held(Response&) { return absl::OkStatus(); }
     // Converts a response into the outcome of its request.
     virtual absl::StatusOr<Result> outcome_of(Response& response) = 0;
     // Returns whether `item` must be numbered and sent again instead of completing with `outcome`, as must all later
@@ -86,6 +105,7 @@ class PipelinedStream {
     RetryPolicy reconnect;
     absl::Duration patience;  // maximum time without any response while requests are unanswered
     std::shared_ptr<Authorization> authorization;
+    absl::Duration renewal = absl::InfiniteDuration();  // maximum time without a request that renews the lease
   };
 
   // Starts the supervisor thread. `kind` must outlive the stream.
@@ -97,38 +117,46 @@ class PipelinedStream {
         backoff_(options.reconnect),
         link_(options.link),
         authorization_(options.authorization),
+        renewal_(absl::ToChronoNanoseconds(options.renewal)),
         supervisor_([this] { supervise(); }) {}
 
   ~PipelinedStream() {
     {
       std::lock_guard lock(mutex_);
       broken_off_ = true;
+      renew_at_ = Clock::time_point::max();
       if (attempt_) attempt_->cancel();
       changed_.notify_all();
     }
     supervisor_.join();
   }
 
-  absl::Status send(Request request, Callback done) {
-    auto shared = std::make_shared<Request>(std::move(request));
+  // Sends the messages of `held`, if any, and then `request`, as one item.
+  absl::Status send(Request request, Callback done, std::vector<Request> held = {}) {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [this] { return ended_ || closing_ || items_.size() < max_in_flight_; });
     if (ended_ || closing_) return why_ended();
-    shared->set_scene(scene_);
-    kind_.number(*shared);
-    if (items_.empty()) last_response_ = Clock::now();
-    items_.push_back({std::move(shared), std::move(done)});
-    pump();
-    changed_.notify_all();
+    append(std::move(request), std::move(done), std::move(held));
     return absl::OkStatus();
   }
 
   // Numbers the items from `position` on again, and sends them again. For Kind::answered().
   void number_again(Items& items, size_t position) {
     for (size_t i = position; i < items.size(); ++i) {
-      items[i].request = std::make_shared<Request>(*items[i].request);
-      items[i].written = items[i].sent_before = false;
-      kind_.number(*items[i].request);
+      Item& item = items[i];
+      // End the messages that the server holds, before others are sent. The server refuses this request, because its
+      // number is higher than the number of an item that is sent again.
+      if (item.held_written > 0 && !item.written) group_end_ = item.request;
+      for (std::shared_ptr<Request>& message : item.held) {
+        message = std::make_shared<Request>(*message);
+        message->set_sequence(++sequence_);
+      }
+      item.request = std::make_shared<Request>(*item.request);
+      item.request->set_sequence(++sequence_);
+      kind_.number(*item.request);
+      item.written = item.sent_before = false;
+      item.held_written = 0;
+      item.refusal = absl::OkStatus();
     }
   }
 
@@ -141,6 +169,7 @@ class PipelinedStream {
   absl::Status close() {
     std::unique_lock lock(mutex_);
     closing_ = true;
+    renew_at_ = Clock::time_point::max();
     pump();
     changed_.notify_all();
     changed_.wait(lock, [this] { return items_.empty() && running_callbacks_ == 0; });
@@ -156,8 +185,8 @@ class PipelinedStream {
 
   // Maximum time for which close() waits until the server ends the call. After this time close() cancels the call.
   static constexpr std::chrono::seconds kCloseTimeout{5};
-  // Maximum duration of one wait on the condition variable for a response; wait_for_end() then waits again. The maximum
-  // is needed because the end of the wait would overflow if the patience is unlimited.
+  // Maximum duration of one wait on the condition variable; the caller then waits again. The maximum is needed because
+  // the end of the wait would overflow if the patience is unlimited.
   static constexpr std::chrono::hours kLongestWait{1};
 
   // One gRPC call. A hold (AddHold) prevents gRPC from finishing the call while other threads may still start writes.
@@ -224,12 +253,48 @@ class PipelinedStream {
     std::optional<absl::Status> end_;
   };
 
-  // Starts writing the next unwritten request. If the stream is closing and all requests are answered, ends the writes
+  // Appends an item and starts to write it. Precondition: the caller holds the lock.
+  void append(Request request, Callback done, std::vector<Request> held) {
+    if (kind_.renews(request)) renew_at_ = time_after(renewal_);
+    Item item = {std::make_shared<Request>(std::move(request)), std::move(done)};
+    for (Request& message : held) {
+      item.held.push_back(std::make_shared<Request>(std::move(message)));
+      item.held.back()->set_scene(scene_);
+      item.held.back()->set_sequence(++sequence_);
+    }
+    item.request->set_scene(scene_);
+    item.request->set_sequence(++sequence_);
+    kind_.number(*item.request);
+    if (items_.empty()) last_response_ = Clock::now();
+    items_.push_back(std::move(item));
+    pump();
+    changed_.notify_all();
+  }
+
+  // Returns the time after `wait`, or the maximum if it would overflow.
+  static Clock::time_point time_after(Clock::duration wait) {
+    const Clock::time_point now = Clock::now();
+    return wait < Clock::time_point::max() - now ? now + wait : Clock::time_point::max();
+  }
+
+  // Sends a renewal if it is due and no renewal is unanswered. Precondition: the caller holds the lock.
+  void renew_if_due() {
+    if (Clock::now() < renew_at_) return;
+    renew_at_ = time_after(renewal_);
+    const auto is_renewal = [](const Item& item) { return !item.done; };
+    if (fatal_.ok() && std::none_of(items_.begin(), items_.end(), is_renewal)) append(kind_.renewal(), {}, {});
+  }
+
+  // Starts writing the next unwritten message. If the stream is closing and all requests are answered, ends the writes
   // of the call instead. Does nothing while a write is in progress. Precondition: the caller holds the lock.
   void pump() {
     if (!attempt_ || !attempt_->writable()) return;
     const auto next = std::find_if(items_.begin(), items_.end(), [](const Item& item) { return !item.written; });
-    if (next != items_.end()) {
+    if (group_end_) {
+      attempt_->write(std::exchange(group_end_, nullptr));
+    } else if (next != items_.end() && next->held_written < next->held.size()) {
+      attempt_->write(next->held[next->held_written++]);
+    } else if (next != items_.end()) {
       next->written = true;
       attempt_->write(next->request);
     } else if (closing_ && items_.empty()) {
@@ -240,22 +305,35 @@ class PipelinedStream {
 
   // Returns whether the invariants in the file comment hold. O(items). Precondition: the caller holds the lock.
   bool check_invariants() const {
-    return items_.size() <= max_in_flight_ && (!ended_ || items_.empty()) &&
+    const auto renewals = std::count_if(items_.begin(), items_.end(), [](const Item& item) { return !item.done; });
+    return renewals <= 1 && items_.size() <= max_in_flight_ + static_cast<size_t>(renewals) &&
+           (!ended_ || items_.empty()) &&
            std::is_partitioned(items_.begin(), items_.end(), [](const Item& item) { return item.written; });
+  }
+
+  // Handles the answer to a message of `item.held`. Precondition: the caller holds the lock.
+  void receive_held(Item& item, Response& response) {
+    last_response_ = Clock::now();
+    item.refusal.Update(kind_.held(response));
   }
 
   // Completes the request that `response` answers. Ignores a response whose sequence number matches no item: its
   // request was renumbered in the meantime and is sent again.
   void receive(Response& response) {
     std::unique_lock lock(mutex_);
+    const auto answers = [&](const std::shared_ptr<Request>& request) {
+      return request->sequence() == response.sequence();
+    };
     const auto item = std::find_if(items_.begin(), items_.end(), [&](const Item& candidate) {
-      return candidate.request->sequence() == response.sequence();
+      return answers(candidate.request) || std::any_of(candidate.held.begin(), candidate.held.end(), answers);
     });
     if (item == items_.end()) return;
+    if (!answers(item->request)) return receive_held(*item, response);
     const size_t position = static_cast<size_t>(item - items_.begin());
     backoff_.reset();
     last_response_ = Clock::now();
     absl::StatusOr<Result> outcome = kind_.outcome_of(response);
+    if (!item->refusal.ok()) outcome = item->refusal;
     if (kind_.goes_again(*item, outcome)) {
       number_again(items_, position);
       return pump();
@@ -272,6 +350,7 @@ class PipelinedStream {
   }
 
   void complete(std::unique_lock<std::mutex>& lock, Callback& done, absl::StatusOr<Result> outcome) {
+    if (!done) return changed_.notify_all();
     ++running_callbacks_;
     changed_.notify_all();
     lock.unlock();
@@ -284,7 +363,8 @@ class PipelinedStream {
   void supervise() {
     std::unique_lock lock(mutex_);
     while (!ended_) {
-      changed_.wait(lock, [this] { return broken_off_ || closing_ || !items_.empty(); });
+      const auto has_work = [this] { return broken_off_ || closing_ || !items_.empty(); };
+      while (!has_work()) wait_or_renew(lock, kLongestWait, has_work);
       if (!broken_off_ && !items_.empty()) {
         const absl::Status end = run_attempt(lock);
         if (const std::optional<absl::Duration> wait = wait_before_next(end)) {
@@ -303,7 +383,12 @@ class PipelinedStream {
   }
 
   absl::Status run_attempt(std::unique_lock<std::mutex>& lock) {
-    for (Item& item : items_) item.sent_before |= std::exchange(item.written, false);
+    for (Item& item : items_) {
+      item.sent_before |= std::exchange(item.written, false);
+      item.held_written = 0;
+      item.refusal = absl::OkStatus();
+    }
+    group_end_.reset();
     {
       ASSIGN_OR_RETURN(const CallGate::Permit permit, CallGate::enter(link_.gate));
       attempt_ = std::make_unique<Attempt>(*this);
@@ -337,9 +422,17 @@ class PipelinedStream {
         changed_.wait(lock, ended);
         return false;
       }
-      changed_.wait_for(lock, std::min<Clock::duration>(patience_ - quiet, kLongestWait), ended);
+      wait_or_renew(lock, std::min<Clock::duration>(patience_ - quiet, kLongestWait), ended);
     }
     return true;
+  }
+
+  // Waits until `done` is true, a renewal is due, or `wait` has passed. Sends the renewal if it is due.
+  template <class Done>
+  void wait_or_renew(std::unique_lock<std::mutex>& lock, Clock::duration wait, const Done& done) {
+    const Clock::time_point until = std::min(renew_at_, Clock::now() + wait);
+    changed_.wait_until(lock, until, [&] { return done() || renew_at_ < until; });
+    renew_if_due();
   }
 
   // Returns the wait before the next call. Returns nothing if the stream must end with `end` instead of opening another
@@ -373,6 +466,11 @@ class PipelinedStream {
   Backoff backoff_;
   const Link link_;
   const std::shared_ptr<Authorization> authorization_;
+  const Clock::duration renewal_;
+  Clock::time_point renew_at_ = Clock::time_point::max();  // time of the next renewal
+  uint64_t sequence_ = 0;                                  // of the latest message
+  // Message that ends an item of which some messages were written when it was numbered again; null = none.
+  std::shared_ptr<Request> group_end_;
   Items items_;
   // Start of the current wait for a response: the time of the last response, of the start of the call, or of the first
   // request after all earlier requests were answered, whichever is latest.

@@ -26,9 +26,10 @@ class QueryStream::Impl final : public Stream::Kind {
   Impl(const Link& link, std::shared_ptr<Authorization> authorization, std::string scene,
        const QueryStreamOptions& options)
       : stub_(v1::QueryService::NewStub(link.channel)),
-        numbers_(options.writer, options.next_batch),
+        numbers_(options.writer, options.next_batch, lease_ms_of(options.lease)),
         stream_(*this, std::move(scene),
-                {link, options.max_in_flight, options.reconnect, options.patience, std::move(authorization)}) {}
+                {link, options.max_in_flight, options.reconnect, options.patience, std::move(authorization),
+                 renewal_of(options.lease)}) {}
 
   Stream& stream() { return stream_; }
 
@@ -36,9 +37,14 @@ class QueryStream::Impl final : public Stream::Kind {
     stub_->async()->StreamQueries(context, reactor);
   }
   void number(v1::StreamQueriesRequest& request) override {
-    request.set_sequence(++sequence_);
     if (request.has_update()) numbers_.number(*request.mutable_update());
   }
+  v1::StreamQueriesRequest renewal() override {
+    v1::StreamQueriesRequest request;
+    request.mutable_update();
+    return request;
+  }
+  bool renews(const v1::StreamQueriesRequest& request) const override { return request.has_update(); }
   // Returns the error of a batch without an update, and of a step that was refused as a whole.
   absl::StatusOr<StepResult> outcome_of(v1::StreamQueriesResponse& response) override {
     absl::StatusOr<v1::QueryResult> result = result_of(response);
@@ -63,9 +69,8 @@ class QueryStream::Impl final : public Stream::Kind {
 
  private:
   const std::unique_ptr<v1::QueryService::StubInterface> stub_;
-  BatchNumbers numbers_;   // guarded by the stream's lock
-  uint64_t sequence_ = 0;  // guarded by the stream's lock
-  Stream stream_;          // declared last: its thread uses all members above
+  BatchNumbers numbers_;  // guarded by the stream's lock
+  Stream stream_;         // declared last: its thread uses all members above
 };
 
 QueryStream::QueryStream(const Link& link, std::shared_ptr<Authorization> authorization, std::string scene,

@@ -49,6 +49,8 @@ struct QueryStreamOptions {
   // these two options only to continue the batch numbers of an earlier stream's writer.
   uint64_t writer = 0;
   uint64_t next_batch = 1;
+  // Lease of the steps, as UpdateStreamOptions::lease; it begins with the first step.
+  absl::Duration lease = absl::ZeroDuration();
 };
 
 // Thread-safe: every method may be called from any thread. Callbacks run one at a time, in the order of the answers, on

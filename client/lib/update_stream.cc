@@ -20,9 +20,10 @@ class UpdateStream::Impl final : public UpdatePipeline::Kind {
   Impl(const Link& link, std::shared_ptr<Authorization> authorization, std::string scene,
        const UpdateStreamOptions& options)
       : stub_(v1::UpdateService::NewStub(link.channel)),
-        numbers_(options.writer, options.next_batch),
+        numbers_(options.writer, options.next_batch, lease_ms_of(options.lease)),
         stream_(*this, std::move(scene),
-                {link, options.max_in_flight, options.reconnect, options.patience, std::move(authorization)}) {}
+                {link, options.max_in_flight, options.reconnect, options.patience, std::move(authorization),
+                 renewal_of(options.lease)}) {}
 
   UpdatePipeline& stream() { return stream_; }
   uint64_t writer() const { return numbers_.writer(); }
@@ -35,9 +36,15 @@ class UpdateStream::Impl final : public UpdatePipeline::Kind {
     stub_->async()->StreamUpdates(context, reactor);
   }
 
-  void number(v1::StreamUpdatesRequest& request) override {
-    request.set_sequence(++sequence_);
-    numbers_.number(*request.mutable_batch());
+  void number(v1::StreamUpdatesRequest& request) override { numbers_.number(*request.mutable_batch()); }
+
+  absl::Status held(v1::StreamUpdatesResponse& response) override {
+    const absl::StatusOr<v1::UpdateAck> ack = outcome_of(response);
+    if (ack.ok() && !ack->pending()) {
+      return absl::UnimplementedError(
+          "the server does not hold messages (`continues`): it applied one that is a part of a batch");
+    }
+    return ack.status();
   }
 
   absl::StatusOr<v1::UpdateAck> outcome_of(v1::StreamUpdatesResponse& response) override {
@@ -67,8 +74,7 @@ class UpdateStream::Impl final : public UpdatePipeline::Kind {
 
  private:
   const std::unique_ptr<v1::UpdateService::StubInterface> stub_;
-  BatchNumbers numbers_;   // guarded by the stream's lock
-  uint64_t sequence_ = 0;  // guarded by the stream's lock
+  BatchNumbers numbers_;  // guarded by the stream's lock
   mutable std::mutex ack_mutex_;
   std::optional<Revision> last_ack_;  // guarded by ack_mutex_
   UpdatePipeline stream_;             // declared last: its thread uses all members above
@@ -88,6 +94,24 @@ absl::Status UpdateStream::send(v1::UpdateBatch batch, AckCallback on_ack) {
 
 std::future<absl::StatusOr<v1::UpdateAck>> UpdateStream::send(v1::UpdateBatch batch) {
   return send_for_future<v1::UpdateAck>([&](AckCallback done) { return send(std::move(batch), std::move(done)); });
+}
+
+absl::Status UpdateStream::send_together(std::vector<v1::UpdateBatch> batches, AckCallback on_ack) {
+  if (batches.empty()) return absl::InvalidArgumentError("there are no batches to send together");
+  v1::StreamUpdatesRequest last;
+  *last.mutable_batch() = std::move(batches.back());
+  batches.pop_back();
+  std::vector<v1::StreamUpdatesRequest> held(batches.size());
+  for (size_t i = 0; i < held.size(); ++i) {
+    *held[i].mutable_batch() = std::move(batches[i]);
+    held[i].mutable_batch()->set_continues(true);
+  }
+  return impl_->stream().send(std::move(last), std::move(on_ack), std::move(held));
+}
+
+std::future<absl::StatusOr<v1::UpdateAck>> UpdateStream::send_together(std::vector<v1::UpdateBatch> batches) {
+  return send_for_future<v1::UpdateAck>(
+      [&](AckCallback done) { return send_together(std::move(batches), std::move(done)); });
 }
 
 absl::Status UpdateStream::flush() { return impl_->stream().flush(); }

@@ -8,6 +8,12 @@
 // batch is refused when it is sent again after a broken connection, the server may have applied it before: its error
 // then has no reason and says so, and the stream continues as the server's next answer requires.
 //
+// A stream with a lease (UpdateStreamOptions::lease) is for objects that must not outlive their writer: when the
+// process ends or is cut off, the server removes the objects that the stream inserted. The lease begins with the first
+// batch. The stream renews it by empty batches while the caller sends nothing, so a lease lasts as long as the stream
+// object is open, however silent the caller is. It runs out after close() or the destructor, after the stream has ended
+// with an error, and while the server cannot be reached.
+//
 // The stream ends permanently in these cases: the server refuses the stream itself (for example because of the scene
 // name or of missing rights); the server has lost the state of the writer (because the scene was restarted without its
 // state); the server answers a batch with an error that has no reason; as many consecutive calls as the policy allows
@@ -22,9 +28,11 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/time/time.h"
 #include "client/lib/options.h"
 #include "client/lib/values.h"
 #include "locus/v1/update_service.pb.h"
@@ -48,6 +56,10 @@ struct UpdateStreamOptions {
   absl::Duration patience = absl::Seconds(10);
   // Connection of the stream. Use kLatency for small batches whose acks are needed quickly.
   Lane lane = Lane::kBulk;
+  // Lease of the stream's writer, at most one day, in whole milliseconds (rounded up); 0 = none. When no batch of the
+  // stream has arrived for that long, the server removes all objects that the stream inserted. The stream sends an
+  // empty batch when a third of the lease has passed without another batch.
+  absl::Duration lease = absl::ZeroDuration();
 };
 
 // Thread-safe: every method may be called from any thread; batches of several threads are numbered in the order in
@@ -71,6 +83,14 @@ class UpdateStream {
   absl::Status send(v1::UpdateBatch batch, AckCallback on_ack);
   // Sends a batch and returns a future for its ack. If the stream has ended, the future receives the stream's error.
   std::future<absl::StatusOr<v1::UpdateAck>> send(v1::UpdateBatch batch);
+
+  // Sends several batches that become one revision: nothing of them is visible before the last is applied, and none is
+  // applied if one is refused. For changes that are too large for one message. The batches are applied in the order
+  // given. Only the last may have a tick, `all_or_nothing` or `lease_ms`, which then hold for all. Counts as one batch:
+  // there is one ack, whose ItemError.message is an index into `batches`, and after a broken connection all are sent
+  // again. Otherwise like send(); returns INVALID_ARGUMENT if `batches` is empty.
+  absl::Status send_together(std::vector<v1::UpdateBatch> batches, AckCallback on_ack);
+  std::future<absl::StatusOr<v1::UpdateAck>> send_together(std::vector<v1::UpdateBatch> batches);
 
   // Blocks until all sent batches are answered and their callbacks have returned. If the stream has ended, returns the
   // stream's error.

@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <random>
 
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
+#include "absl/time/time.h"
 #include "client/lib/status.h"
 #include "locus/v1/errors.pb.h"
 #include "locus/v1/update_service.pb.h"
@@ -41,6 +43,19 @@ inline absl::Status outcome_unknown(const absl::Status& refusal) {
                                    refusal.message()));
 }
 
+// Returns the value of UpdateBatch.lease_ms for a lease; a positive duration is at least 1 ms.
+inline uint32_t lease_ms_of(absl::Duration lease) {
+  if (lease <= absl::ZeroDuration()) return 0;
+  const int64_t rounded_up = absl::ToInt64Milliseconds(absl::Ceil(lease, absl::Milliseconds(1)));
+  return static_cast<uint32_t>(std::min<int64_t>(rounded_up, std::numeric_limits<uint32_t>::max()));
+}
+
+// Returns the maximum time that a stream with a lease lets pass without a batch: a third of the lease, so that a
+// renewal may be late or lost.
+inline absl::Duration renewal_of(absl::Duration lease) {
+  return lease > absl::ZeroDuration() ? lease / 3 : absl::InfiniteDuration();
+}
+
 // Batch numbers of the writer of a stream. Not thread-safe.
 //
 // The server applies batches densely from number 1 and answers REASON_BATCH_GAP with the number that it expects. The
@@ -52,12 +67,15 @@ class BatchNumbers {
  public:
   enum class AfterFailure { kEndStream, kKeepNumbers, kNumberLaterAgain };
 
-  BatchNumbers(uint64_t writer, uint64_t next) : writer_(writer != 0 ? writer : random_writer()), next_(next) {}
+  // `lease_ms` is the lease of the writer, which every batch carries; 0 = none.
+  BatchNumbers(uint64_t writer, uint64_t next, uint32_t lease_ms)
+      : writer_(writer != 0 ? writer : random_writer()), lease_ms_(lease_ms), next_(next) {}
 
   uint64_t writer() const { return writer_; }
   void number(v1::UpdateBatch& batch) {
     batch.set_writer(writer_);
     batch.set_batch(next_++);
+    if (lease_ms_ != 0 && batch.lease_ms() == 0) batch.set_lease_ms(lease_ms_);
   }
 
   // Handles the ack of batch `number`. `sent_before`: an earlier call sent the batch with this number. Returns an error
@@ -95,6 +113,7 @@ class BatchNumbers {
 
  private:
   const uint64_t writer_;
+  const uint32_t lease_ms_;
   uint64_t next_;
   uint64_t uncertain_ = 0;   // lowest uncertain number; 0 = none
   uint64_t reused_end_ = 0;  // end of the uncertain numbers that closes_gap() has used again

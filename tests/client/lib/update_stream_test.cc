@@ -6,6 +6,7 @@
 #include <numeric>
 #include <thread>
 
+#include "absl/time/clock.h"
 #include "client/lib/client.h"
 #include "client/lib/status.h"
 #include "tests/client/lib/fake_server.h"
@@ -16,6 +17,7 @@ namespace {
 using ::testing::Each;
 using ::testing::ElementsAre;
 using testing::FakeServer;
+using ::testing::IsEmpty;
 
 constexpr RetryPolicy kQuickReconnect = {
     .max_attempts = 20, .first_backoff = absl::Milliseconds(1), .max_backoff = absl::Milliseconds(20)};
@@ -24,6 +26,13 @@ v1::UpdateBatch batch_of_tick(uint64_t tick) {
   v1::UpdateBatch batch;
   batch.set_tick(tick);
   return batch;
+}
+
+// Returns `messages` batches, of which the last has the tick.
+std::vector<v1::UpdateBatch> group_of_tick(uint64_t tick, size_t messages) {
+  std::vector<v1::UpdateBatch> batches(messages);
+  batches.back() = batch_of_tick(tick);
+  return batches;
 }
 
 std::vector<uint64_t> one_to(uint64_t last) {
@@ -254,6 +263,122 @@ TEST_P(UpdateStreamTest, SeveralThreadsShareOneStream) {
   ASSERT_TRUE(stream->flush().ok());
   EXPECT_EQ(server_.updates.applied().size(), 200u);
   EXPECT_EQ(outcomes.ticks, server_.updates.applied());
+}
+
+TEST_P(UpdateStreamTest, BatchesSentTogetherAreAppliedAsOneWithOneAck) {
+  const auto stream = open(/*max_in_flight=*/2);
+  Outcomes outcomes;
+  for (uint64_t tick = 1; tick <= 20; ++tick) {
+    ASSERT_TRUE(stream->send_together(group_of_tick(tick, 1 + tick % 4), outcomes.of(tick)).ok());
+  }
+  ASSERT_TRUE(stream->flush().ok());
+  EXPECT_EQ(server_.updates.applied(), one_to(20));
+  for (uint64_t tick = 1; tick <= 20; ++tick) EXPECT_EQ(server_.updates.applied_messages()[tick - 1], 1 + tick % 4);
+  EXPECT_EQ(outcomes.ticks, one_to(20));
+  EXPECT_THAT(outcomes.codes, Each(absl::StatusCode::kOk));
+  EXPECT_EQ(server_.updates.gaps, 0);
+  EXPECT_TRUE(absl::IsInvalidArgument(stream->send_together({}).get().status()));
+}
+
+TEST_P(UpdateStreamTest, BatchesSentTogetherAreAllSentAgainAfterABreak) {
+  // 25 batches of 3 messages each. Streams break at the first, second or third message of a batch. Half of the breaks
+  // lose the message, the others lose its answer.
+  size_t batches = 0;
+  for (const int after_messages : {7, 8, 9}) {
+    for (const bool apply_last : {false, true}) {
+      const auto stream = open();
+      server_.updates.breaks = {.after_messages = after_messages, .times = 5, .apply_last = apply_last};
+      Outcomes outcomes;
+      for (uint64_t tick = 1; tick <= 25; ++tick) {
+        ASSERT_TRUE(stream->send_together(group_of_tick(tick, 3), outcomes.of(tick)).ok());
+      }
+      ASSERT_TRUE(stream->flush().ok());
+      EXPECT_EQ(outcomes.ticks, one_to(25));
+      EXPECT_THAT(outcomes.codes, Each(absl::StatusCode::kOk));
+      batches += 25;
+      EXPECT_EQ(server_.updates.applied().size(), batches) << after_messages << apply_last;
+    }
+  }
+  EXPECT_THAT(server_.updates.applied_messages(), Each(3u));
+}
+
+TEST_P(UpdateStreamTest, ARefusedMessageRefusesAllThatWereSentTogetherAndNothingElse) {
+  const auto stream = open();
+  std::vector<std::future<absl::StatusOr<v1::UpdateAck>>> acks;
+  for (uint64_t tick = 1; tick <= 6; ++tick) {
+    std::vector<v1::UpdateBatch> batches = group_of_tick(tick, 3);
+    if (tick == 3) batches[1].set_tick(3);
+    acks.push_back(stream->send_together(std::move(batches)));
+  }
+  ASSERT_TRUE(stream->flush().ok());
+  for (uint64_t tick = 1; tick <= 6; ++tick) {
+    const absl::Status status = acks[tick - 1].get().status();
+    if (tick != 3) {
+      EXPECT_TRUE(status.ok()) << tick << ": " << status;
+    } else {
+      EXPECT_EQ(error_of(status)->reason(), v1::REASON_OUT_OF_RANGE) << "the error of the first refused message";
+    }
+  }
+  EXPECT_THAT(server_.updates.applied(), ElementsAre(1, 2, 4, 5, 6));
+  EXPECT_THAT(server_.updates.applied_messages(), Each(3u));
+}
+
+TEST_P(UpdateStreamTest, RenumberedMessagesNeverJoinThoseThatTheServerHolds) {
+  server_.updates.refused_ticks = {1, 2, 9, 15, 16};
+  const auto stream = open(/*max_in_flight=*/4);
+  Outcomes outcomes;
+  for (uint64_t tick = 1; tick <= 40; ++tick) {
+    ASSERT_TRUE(stream->send_together(group_of_tick(tick, 1 + tick % 6), outcomes.of(tick)).ok());
+  }
+  ASSERT_TRUE(stream->flush().ok());
+  std::vector<uint64_t> expected = one_to(40);
+  std::erase_if(expected, [&](uint64_t tick) { return server_.updates.refused_ticks.count(tick) > 0; });
+  EXPECT_EQ(server_.updates.applied(), expected);
+  for (size_t i = 0; i < expected.size(); ++i) {
+    EXPECT_EQ(server_.updates.applied_messages()[i], 1 + expected[i] % 6) << expected[i];
+  }
+  EXPECT_EQ(outcomes.ticks, one_to(40));
+}
+
+TEST_P(UpdateStreamTest, AServerThatAppliesMessagesOneByOneEndsTheStream) {
+  server_.updates.forgets_continues = true;
+  const auto stream = open();
+  const absl::Status status = stream->send_together(group_of_tick(1, 2)).get().status();
+  EXPECT_TRUE(absl::IsUnimplemented(status)) << status;
+  EXPECT_TRUE(absl::IsUnimplemented(stream->flush()));
+}
+
+TEST_P(UpdateStreamTest, EveryBatchCarriesTheLease) {
+  const auto stream = client_->update_stream("arena", {.lease = absl::Microseconds(59'999'001)});
+  v1::UpdateBatch own = batch_of_tick(2);
+  own.set_lease_ms(5);
+  ASSERT_TRUE(stream->send(batch_of_tick(1)).get().ok());
+  ASSERT_TRUE(stream->send(own).get().ok());
+  ASSERT_TRUE(stream->send_together(group_of_tick(3, 2)).get().ok());
+  EXPECT_THAT(server_.updates.leases(), ElementsAre(60'000, 5, 60'000));
+}
+
+TEST_P(UpdateStreamTest, ASilentStreamRenewsItsLeaseAlsoOnANewConnection) {
+  const auto stream = client_->update_stream("arena", {.reconnect = kQuickReconnect, .lease = absl::Milliseconds(30)});
+  EXPECT_THAT(server_.updates.applied(), IsEmpty()) << "the lease begins with the first batch";
+  ASSERT_TRUE(stream->send(batch_of_tick(1)).get().ok());
+  const auto wait_for = [&](size_t batches) {
+    const absl::Time end = absl::Now() + absl::Seconds(30);
+    while (server_.updates.applied().size() < batches && absl::Now() < end) absl::SleepFor(absl::Milliseconds(1));
+    return server_.updates.applied().size() >= batches;
+  };
+  EXPECT_TRUE(wait_for(4));
+  server_.updates.break_next_message();
+  EXPECT_TRUE(wait_for(10));
+  EXPECT_THAT(server_.updates.leases(), Each(30u));
+  EXPECT_EQ(server_.updates.last_batch.ByteSizeLong(), [&] {
+    v1::UpdateBatch numbers;
+    numbers.set_writer(stream->writer());
+    numbers.set_batch(1);
+    numbers.set_lease_ms(30);
+    return numbers.ByteSizeLong();
+  }()) << "a renewal changes nothing";
+  ASSERT_TRUE(stream->close().ok());
 }
 
 INSTANTIATE_TEST_SUITE_P(Ways, UpdateStreamRestartTest, ::testing::Values(testing::Way::kLoopback), testing::way_name);
