@@ -172,8 +172,9 @@ absl::Status SceneWriter::fill_ack(const UpdateBatch& batch, Applier& applier, I
   const ItemError& first = result.ack.errors.front();
   return refuse_argument(
       first.reason, first.field, first.index,
-      absl::StrCat(reason_name(first.reason), ", id ", first.id, "; all_or_nothing refuses the batch because of ",
-                   result.ack.refused, " refused items"));
+      absl::StrCat(reason_name(first.reason), ", id ", first.id,
+                   batch.earlier.empty() ? "" : absl::StrCat(" in message ", first.message),
+                   "; all_or_nothing refuses the batch because of ", result.ack.refused, " refused items"));
 }
 
 absl::StatusOr<SceneWriter::Applied> SceneWriter::apply_moves(const UpdateBatch& batch) {

@@ -75,7 +75,8 @@ class SceneLockstep {
     if (actual.status().code() != expected.code) return "status " + actual.status().ToString();
     if (actual.ok()) return difference(*actual, expected.ack);
     const Refusal refusal = refusal_of(actual.status()).value_or(Refusal{});
-    ItemError error{refusal.field, refusal.index.value_or(0), expected.error.id, refusal.reason};
+    ItemError error{refusal.field, refusal.index.value_or(0), expected.error.id, refusal.reason,
+                    expected.error.message};
     return difference(error, expected.error);
   }
 

@@ -188,6 +188,7 @@ enum class BytesKind : uint32_t {
   kOwnedSpec = 0x534f'534c,
   kLimitedSpec = 0x534c'534c,  // a specification with lifetimes
   kStateHeader = 0x4854'534c,
+  kExtendedHeader = 0x4858'534c,  // like kStateHeader; also counts expiries and leases
   kStateWriters = 0x5754'534c,
   kMessageWriters = 0x4d57'534c,  // like kStateWriters; the errors of the acks also have the index of a message
   kStateInstances = 0x4954'534c,  // data format 1: identifies meshes by content hash; decoded, but never written

@@ -105,9 +105,10 @@ absl::Status StateReader::add(absl::string_view chunk) {
   const AlignedBytes aligned(chunk);
   ByteReader reader(aligned.bytes());
   const BytesKind kind = read_kind(reader);
-  if (reader.good() && (kind == BytesKind::kStateHeader) == begun_) reader.fail("the header", "is not first");
-  if (kind == BytesKind::kStateHeader) {
-    read_header(reader);
+  const bool is_header = kind == BytesKind::kStateHeader || kind == BytesKind::kExtendedHeader;
+  if (reader.good() && is_header == begun_) reader.fail("the header", "is not first");
+  if (is_header) {
+    read_header(reader, kind);
   } else if (kind == BytesKind::kStateWriters || kind == BytesKind::kMessageWriters) {
     read_writers(reader, kind);
   } else if (kind == BytesKind::kStateInstances || kind == BytesKind::kNamedInstances ||
@@ -126,7 +127,7 @@ absl::Status StateReader::add(absl::string_view chunk) {
   return reader.status();
 }
 
-void StateReader::read_header(ByteReader& reader) {
+void StateReader::read_header(ByteReader& reader, BytesKind kind) {
   begun_ = true;
   state_.epoch = reader.number("the epoch");
   if (reader.good() && state_.epoch == 0) reader.fail("the epoch", "is 0");
@@ -138,6 +139,9 @@ void StateReader::read_header(ByteReader& reader) {
   objects_ = reader.number_upto(limits::kMaxObjects, "the number of objects");
   state_.cell_size = reader.real("the size of cells");
   if (!(state_.cell_size >= 0x1p-40 && state_.cell_size <= 0x1p40)) reader.fail("the size of cells", "is out of range");
+  if (kind != BytesKind::kExtendedHeader) return;
+  expiries_ = reader.number_upto(objects_, "the number of expiries");
+  leases_ = reader.number_upto(limits::kMaxLeases, "the number of leases");
 }
 
 void StateReader::read_writers(ByteReader& reader, BytesKind kind) {
@@ -235,7 +239,6 @@ absl::Status StateReader::place(const FindMesh& find_mesh) {
 }
 
 void StateReader::read_expiries(ByteReader& reader) {
-  expiries_ = reader.number_upto(objects_, "the number of expiries");
   const auto ids = reader.column<uint64_t>("ids");
   const auto remaining = reader.shared_column<uint64_t>(ids.size(), 1, "the ticks until objects expire");
   if (ids.empty() || ids.size() > kLifetimesPerChunk) reader.fail("ids", "are missing or too many");
@@ -249,7 +252,6 @@ void StateReader::read_expiries(ByteReader& reader) {
 
 void StateReader::read_leases(ByteReader& reader) {
   constexpr size_t kMinLeaseBytes = size_t{4} * 8;
-  leases_ = reader.number_upto(limits::kMaxLeases, "the number of leases");
   while (reader.good() && reader.left() >= kMinLeaseBytes) {
     const uint64_t writer = reader.number("the writer of a lease");
     const uint64_t lease_ms = reader.number_upto(limits::kMaxLeaseMs, "a lease");
@@ -276,9 +278,9 @@ absl::Status StateReader::check_counts() const {
                                   " objects, the chunks contain ", state_.writers.size(), ", ", instances_read_,
                                   " and ", objects_read_));
   if (state_.expiries.size() != expiries_ || state_.leases.size() != leases_ || leased_objects_ != 0)
-    return data_loss(absl::StrCat("the chunks count ", expiries_, " expiries and ", leases_, " leases, and contain ",
-                                  state_.expiries.size(), " and ", state_.leases.size(), "; ", leased_objects_,
-                                  " objects of the last lease are missing"));
+    return data_loss(absl::StrCat("the header counts ", expiries_, " expiries and ", leases_,
+                                  " leases, the chunks contain ", state_.expiries.size(), " and ", state_.leases.size(),
+                                  "; ", leased_objects_, " objects of the last lease are missing"));
   return absl::OkStatus();
 }
 

@@ -37,7 +37,7 @@ class StateReader {
     std::vector<double> translations;
     std::vector<float> rotations, scales;
   };
-  void read_header(ByteReader& reader);
+  void read_header(ByteReader& reader, BytesKind kind);
   void read_writers(ByteReader& reader, BytesKind kind);
   void read_instances(ByteReader& reader, BytesKind kind);
   // Reads the bounds of `meshes`.
@@ -45,7 +45,7 @@ class StateReader {
   void read_objects(ByteReader& reader);
   void read_expiries(ByteReader& reader);
   void read_leases(ByteReader& reader);
-  // Returns DATA_LOSS if the chunks do not have everything that the header and the chunks themselves count.
+  // Returns DATA_LOSS if the chunks do not have exactly what the header counts.
   absl::Status check_counts() const;
   absl::Status place(const FindMesh& find_mesh);
 
@@ -56,8 +56,8 @@ class StateReader {
   uint64_t objects_ = 0;    // expected number of objects, from the header
   uint64_t instances_read_ = 0;
   uint64_t objects_read_ = 0;
-  uint64_t expiries_ = 0;        // expected number of expiries, from their chunks
-  uint64_t leases_ = 0;          // expected number of leases, from their chunks
+  uint64_t expiries_ = 0;        // expected number of expiries, from the header
+  uint64_t leases_ = 0;          // expected number of leases, from the header
   uint64_t leased_objects_ = 0;  // number of objects of the last lease that later chunks have
   std::map<MeshKey, Placed> placed_;
   std::map<MeshKey, Aabbf> mesh_bounds_;

@@ -108,7 +108,9 @@ absl::StatusOr<std::optional<std::string>> StateWriter::next() {
 std::string StateWriter::header() const {
   std::string chunk;
   ByteWriter writer(chunk);
-  write_kind(writer, BytesKind::kStateHeader);
+  const size_t expiries = scene_.snapshot->expiries == nullptr ? 0 : scene_.snapshot->expiries->count();
+  const bool extended = expiries != 0 || !scene_.leases.leases.empty();
+  write_kind(writer, extended ? BytesKind::kExtendedHeader : BytesKind::kStateHeader);
   writer.number(scene_.snapshot->epoch);
   writer.number(scene_.snapshot->revision);
   writer.number(scene_.snapshot->tick);
@@ -117,6 +119,9 @@ std::string StateWriter::header() const {
   writer.number(uint64_t{scene_.snapshot->statics->size()});
   writer.number(uint64_t{scene_.snapshot->objects.size()});
   writer.number(scene_.snapshot->objects.grid().cell_size());
+  if (!extended) return chunk;
+  writer.number(uint64_t{expiries});
+  writer.number(uint64_t{scene_.leases.leases.size()});
   return chunk;
 }
 
@@ -197,7 +202,6 @@ std::string StateWriter::next_expiries() {
   std::string chunk;
   ByteWriter writer(chunk);
   write_kind(writer, BytesKind::kStateExpiries);
-  writer.number(uint64_t{scene_.snapshot->expiries->count()});
   writer.column(absl::MakeConstSpan(ids));
   writer.shared_column(absl::MakeConstSpan(remaining), 1);
   return chunk;
@@ -207,7 +211,6 @@ std::string StateWriter::next_leases() {
   std::string chunk;
   ByteWriter writer(chunk);
   write_kind(writer, BytesKind::kStateLeases);
-  writer.number(uint64_t{scene_.leases.leases.size()});
   size_t room = kLifetimesPerChunk;
   while (room > 0 && next_lease_ < scene_.leases.leases.size()) {
     const Lease& lease = scene_.leases.leases[next_lease_];

@@ -359,7 +359,9 @@ TEST_F(SceneLifetimesTest, ErrorsOfMessagesAreInOrderOfApplication) {
 TEST_F(SceneLifetimesTest, ARefusedItemOfAnyMessageRefusesAllIfTheLastSaysSo) {
   UpdateBatch batch = group({inserting({1}), removing({9})}, inserting({2}));
   batch.all_or_nothing = true;
-  expect_refusal(scene_.apply(batch).status(), absl::StatusCode::kInvalidArgument, Reason::kUnknownId, "remove_ids", 0);
+  const absl::Status status = scene_.apply(batch).status();
+  expect_refusal(status, absl::StatusCode::kInvalidArgument, Reason::kUnknownId, "remove_ids", 0);
+  EXPECT_THAT(std::string(status.message()), testing::HasSubstr("id 9 in message 1"));
   EXPECT_EQ(revision(), 0u);
   EXPECT_THAT(ids(), IsEmpty());
 }

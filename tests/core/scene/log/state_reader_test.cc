@@ -163,13 +163,50 @@ TEST_F(StateReaderTest, TheSceneMayChangeWhileItsStateIsWritten) {
 TEST_F(StateReaderTest, AMissingOrRepeatedChunkIsDetected) {
   live(1, 60);
   const Chunks chunks = written();
-  ASSERT_EQ(chunks.size(), 4u);
+  ASSERT_EQ(chunks.size(), 6u);  // header, writers, instances, objects, expiries, leases
   for (size_t i = 0; i < chunks.size(); ++i) {
     Chunks fewer = chunks, more = chunks;
     fewer.erase(fewer.begin() + static_cast<std::ptrdiff_t>(i));
     more.insert(more.begin() + static_cast<std::ptrdiff_t>(i), chunks[i]);
     EXPECT_EQ(read(fewer).status().code(), absl::StatusCode::kDataLoss) << i;
     EXPECT_EQ(read(more).status().code(), absl::StatusCode::kDataLoss) << i;
+  }
+}
+
+TEST_F(StateReaderTest, ManyExpiriesAndLeasesTakeManyChunks) {
+  std::vector<Id> ids(100'000);
+  for (size_t i = 0; i < ids.size(); ++i) ids[i] = i + 1;
+  std::vector<uint64_t> expire_ticks(ids.size());
+  for (uint64_t& ticks : expire_ticks) ticks = random_.below(3) * 100;
+  UpdateBatch batch = numbered(with(points(ids, {1, 2, 3})), 7, 1);
+  batch.inserts[0].expire_ticks = columns_.ids(expire_ticks);
+  batch.lease_ms = 20;
+  apply(batch);
+  for (uint64_t writer = 10; writer < 200; ++writer) {
+    UpdateBatch lease = numbered(with(points({1'000'000 + writer}, {1, 2, 3})), writer, 1);
+    if (writer % 2 == 0) lease.inserts.clear();
+    lease.lease_ms = static_cast<uint32_t>(writer);
+    apply(lease);
+  }
+  const Chunks chunks = written();
+  EXPECT_EQ(chunks.size(), 1u + 1 + 13 + 3 + 4);
+  const auto again = read(chunks);
+  ASSERT_TRUE(again.ok()) << again.status();
+  EXPECT_EQ(scene_difference(**again, scene_, random_), "");
+}
+
+TEST_F(StateReaderTest, AnExpiryOrALeaseOfNoObjectIsDamage) {
+  UpdateBatch batch = numbered(with(points({1, 2}, {0, 0, 0})), 7, 1);
+  batch.inserts[0].expire_ticks = columns_.ids({5});
+  batch.lease_ms = 20;
+  apply(batch);
+  for (const char* const kind : {"LSTE", "LSTL"}) {
+    Chunks wrong = written();
+    const auto chunk =
+        std::find_if(wrong.begin(), wrong.end(), [kind](const std::string& one) { return one.substr(0, 4) == kind; });
+    ASSERT_NE(chunk, wrong.end());
+    (*chunk)[chunk->rfind('\2')] = 9;  // the id 2 becomes 9
+    EXPECT_THAT(read(wrong).status().message(), HasSubstr("9")) << kind;
   }
 }
 
