@@ -2,6 +2,7 @@
 #include "core/base/limits.h"
 #include "core/base/status_macros.h"
 #include "server/convert/convert.h"
+#include "server/convert/status.h"
 
 namespace locus::server {
 namespace {
@@ -59,7 +60,7 @@ absl::StatusOr<InsertColumns> to_insert(const v1::Insert& insert, const std::str
   columns.layers = span_of(insert.layers());
   columns.groups = span_of(insert.groups());
   columns.tags = span_of(insert.tags());
-  if (!insert.expire_ticks().empty()) return not_served(field + ".expire_ticks");
+  columns.expire_ticks = span_of(insert.expire_ticks());
   return columns;
 }
 
@@ -113,7 +114,6 @@ absl::Status check_batch_form(const v1::UpdateBatch& batch) {
 absl::StatusOr<UpdateBatch> to_updates(const v1::UpdateBatch& batch) {
   RETURN_IF_ERROR(check_batch_form(batch));
   if (batch.lease_ms() != 0) return not_served("lease_ms");
-  if (batch.continues()) return not_served("continues");
   UpdateBatch out;
   out.frame = to_vec(batch.frame());
   if (batch.has_tick()) out.tick = batch.tick();
@@ -140,6 +140,7 @@ absl::StatusOr<UpdateBatch> to_updates(const v1::UpdateBatch& batch) {
   out.restart_ticks = batch.restart_ticks();
   out.writer = batch.writer();
   out.batch = batch.batch();
+  out.lease_ms = batch.lease_ms();
   return out;
 }
 
@@ -157,6 +158,7 @@ v1::UpdateAck to_proto(const UpdateAck& ack) {
     item->set_index(error.index);
     item->set_id(error.id);
     item->set_reason(static_cast<v1::Reason>(error.reason));
+    item->set_message(error.message);
   }
   return out;
 }

@@ -31,6 +31,9 @@ class CallSlot {
   // before the answer is built. Returns RESOURCE_EXHAUSTED if there is not enough memory.
   virtual absl::Status claim_answer(uint64_t bytes) = 0;
 
+  // Gives away the claim for the memory of the request, which the caller of this function keeps beyond the answer.
+  virtual CallMemory take_request_claim() = 0;
+
   // Stops the call from reading further messages until this message is answered. Call it on the IO loop.
   virtual void hold() = 0;
 

@@ -52,7 +52,11 @@ class HotCall;  // NOLINT(cppcoreguidelines-virtual-class-destructor): a call de
 // are listen(), which requests the next call from gRPC; make_work(), which returns the Work of a CallSlot; begin(),
 // which begins the work on a message; and is_change(), which returns whether a message changes its scene. The Method of
 // a unary call may have put_error(), which puts an error into the response and returns true, or returns false if the
-// error is to be the call's status. Work::give_up() asks the work to answer soon if it has not answered yet.
+// error is to be the call's status. The Method of a stream may have a type StreamState: each call has one, which is
+// passed to begin(). Such a Method also has continues(), which returns whether the next message belongs to a message,
+// and read_continues(), which reads this from the bytes of a message that was not parsed; it returns false if it
+// cannot. StreamState::refuse_rest() receives continues() of each message that is refused before begin().
+// Work::give_up() asks the work to answer soon if it has not answered yet.
 template <class Method>
 class Listener {
  public:
@@ -108,6 +112,7 @@ class HotCall final : private IoLoop::ActiveCall {
       ASSIGN_OR_RETURN(answer_claim_, call_->caller_->claim(MemoryLine::kReplies, "", bytes * kAnswerCopies));
       return absl::OkStatus();
     }
+    CallMemory take_request_claim() override { return std::move(request_claim_); }
     void hold() override { holds_ = true; }
     void answered(absl::Status status) override { call_->answered(*this, std::move(status)); }
 
@@ -155,6 +160,17 @@ class HotCall final : private IoLoop::ActiveCall {
                                   grpc::ServerAsyncResponseWriter<Bytes>>;
   using Tag = MemberTag<HotCall>;
   using Slots = std::vector<std::unique_ptr<Slot>>;
+  static constexpr bool kHasState = requires { typename Method::StreamState; };
+  struct NoState {};
+  template <class M>
+  struct StateOf {
+    using Type = NoState;
+  };
+  template <class M>
+  requires requires { typename M::StreamState; }
+  struct StateOf<M> {
+    using Type = typename M::StreamState;
+  };
 
   static constexpr size_t kSlots = 8;
   static constexpr uint32_t kRetryAfterMs = Method::kStream ? 1000 : 100;
@@ -271,7 +287,10 @@ class HotCall final : private IoLoop::ActiveCall {
   // into `request`.
   static bool can_answer(const absl::Status& refused, const Bytes& bytes, Request& request) {
     const std::optional<Refusal> refusal = refusal_of(refused);
-    return Method::kStream && refusal && refusal->reason != Reason::kMalformed && parse_envelope(bytes, request);
+    if (!Method::kStream || !refusal || refusal->reason == Reason::kMalformed) return false;
+    if (!parse_envelope(bytes, request)) return false;
+    if constexpr (kHasState) return Method::read_continues(bytes, request);
+    return true;
   }
 
   // Begins the work on a message. If `status` is an error, the message was refused already and is answered with it.
@@ -283,9 +302,13 @@ class HotCall final : private IoLoop::ActiveCall {
       if (!status.ok()) {
         slot.response_.Clear();  // removes the answer of the slot's previous message
         slot.response_.set_sequence(slot.request_.sequence());
+        if constexpr (kHasState) state_.refuse_rest(Method::continues(slot.request_));
         return slot.answered(std::move(status));
       }
-      listener_.rpc_.begin(slot.work_, scene_.scene(), slot.request_, slot.response_);
+      if constexpr (kHasState)
+        listener_.rpc_.begin(slot.work_, scene_.scene(), slot.request_, slot.response_, state_);
+      else
+        listener_.rpc_.begin(slot.work_, scene_.scene(), slot.request_, slot.response_);
     } else {
       listener_.rpc_.begin(slot.work_, slot.request_.scene(), slot.request_, slot.response_);
     }
@@ -478,6 +501,7 @@ class HotCall final : private IoLoop::ActiveCall {
   std::optional<Caller> caller_;
   AdmissionLimiter::Permit permit_;
   SceneBinding scene_;
+  [[no_unique_address]] typename StateOf<Method>::Type state_;
   Slots slots_;               // in the order of arrival
   Slot* writing_ = nullptr;   // slot whose answer is being written
   SteadyTime writing_since_;  // start of the last write, or of sending the status

@@ -89,6 +89,32 @@ bool parse_envelope(const grpc::ByteBuffer& bytes, google::protobuf::Message& re
   return in.ConsumedEntireMessage() && request.ParseFromString(fields);
 }
 
+std::optional<bool> read_flag(const grpc::ByteBuffer& bytes, int parent, int number) {
+  grpc::ByteBuffer borrowed(bytes);  // shares the slices; the reader needs a pointer to a non-const buffer
+  grpc::ProtoBufferReader reader(&borrowed);
+  if (!reader.status().ok()) return std::nullopt;
+  CodedInputStream in(&reader);
+  bool flag = false;
+  while (const uint32_t tag = in.ReadTag()) {
+    uint32_t length = 0;
+    if (tag != WireFormatLite::MakeTag(parent, WireFormatLite::WIRETYPE_LENGTH_DELIMITED)) {
+      if (!WireFormatLite::SkipField(&in, tag)) return std::nullopt;
+      continue;
+    }
+    if (!in.ReadVarint32(&length) || length > INT32_MAX) return std::nullopt;
+    const CodedInputStream::Limit limit = in.PushLimit(static_cast<int>(length));
+    while (const uint32_t inner = in.ReadTag()) {
+      uint64_t value = 0;
+      const bool is_flag = inner == WireFormatLite::MakeTag(number, WireFormatLite::WIRETYPE_VARINT);
+      if (is_flag ? !in.ReadVarint64(&value) : !WireFormatLite::SkipField(&in, inner)) return std::nullopt;
+      if (is_flag) flag = value != 0;
+    }
+    if (!in.ConsumedEntireMessage() || in.BytesUntilLimit() != 0) return std::nullopt;
+    in.PopLimit(limit);
+  }
+  return in.ConsumedEntireMessage() ? std::optional<bool>(flag) : std::nullopt;
+}
+
 grpc::ByteBuffer to_bytes(const google::protobuf::Message& response) {
   grpc::ByteBuffer bytes;
   const size_t size = response.ByteSizeLong();

@@ -6,6 +6,8 @@
 #include <google/protobuf/message.h>
 #include <grpcpp/support/byte_buffer.h>
 
+#include <optional>
+
 #include "absl/status/statusor.h"
 #include "server/rpc/call.h"
 #include "server/rpc/wire_plan.h"
@@ -24,6 +26,10 @@ absl::StatusOr<CallMemory> parse_request(const Caller& caller, const WirePlan& p
 // because an envelope has at most 2048 bytes. Returns false if the bytes are not a message of this type, or if the
 // envelope is too large. Does not change `bytes`.
 bool parse_envelope(const grpc::ByteBuffer& bytes, google::protobuf::Message& request);
+
+// Reads the field `number`, a bool, of the sub-message in the field `parent` of a message that was not parsed. Returns
+// nullopt if the bytes are not a message, for example because they are compressed. Claims no memory.
+std::optional<bool> read_flag(const grpc::ByteBuffer& bytes, int parent, int number);
 
 // Returns the bytes of a response.
 grpc::ByteBuffer to_bytes(const google::protobuf::Message& response);

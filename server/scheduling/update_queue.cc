@@ -88,7 +88,7 @@ absl::Status UpdateQueue::refuse(const SceneQueue& scene_queue, uint64_t items) 
 // instances, whose tree may have to be built again, or whose ack waits for the disk, are always queued.
 bool UpdateQueue::fits_inline(const Scene& scene, const UpdateBatch& batch, uint64_t items) const {
   if (waits_for_disk(scene) || batch.clear || batch.restart_ticks || !batch.remove_groups.empty()) return false;
-  if (has_instances(batch)) return false;
+  if (has_instances(batch) || !batch.earlier.empty()) return false;
   const double nanoseconds = static_cast<double>(items) * nanoseconds_per_item_.load(std::memory_order_relaxed);
   return nanoseconds + kBatchNanoseconds < static_cast<double>(options_.inline_nanoseconds);
 }

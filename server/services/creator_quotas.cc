@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "absl/container/flat_hash_set.h"
+#include "absl/container/flat_hash_map.h"
 #include "core/base/limits.h"
 #include "core/base/status_macros.h"
 #include "server/scheduling/clocks.h"
@@ -27,22 +27,53 @@ absl::StatusOr<QuotaHold> hold_created(Host& host, const std::string& creator, Q
 uint64_t inserted(const UpdateBatch& batch) {
   uint64_t items = 0;
   for (const InsertColumns& insert : batch.inserts) items += insert.ids.size();
+  for (const UpdateBatch& message : batch.earlier) items += inserted(message);
   return items;
 }
 
+// Count of the objects by which a batch makes a scene larger, message by message. An upper bound: inserts that will be
+// refused are counted, and removals by group are not.
+class Growth {
+ public:
+  explicit Growth(const Scene& scene) : snapshot_(scene.latest()) {}
+
+  void add(const UpdateBatch& message) {
+    if (message.clear) clear();
+    for (const Id id : message.remove_ids)
+      if (is_there(id)) set(id, false);
+    for (const InsertColumns& insert : message.inserts)
+      for (const Id id : insert.ids)
+        if (!is_there(id)) set(id, true);
+  }
+  uint64_t growth() const { return growth_ > 0 ? static_cast<uint64_t>(growth_) : 0; }
+
+ private:
+  bool is_there(Id id) const {
+    const auto changed = changed_.find(id);
+    return changed != changed_.end() ? changed->second : !cleared_ && snapshot_->objects.find_ref(id);
+  }
+  void set(Id id, bool there) {
+    changed_[id] = there;
+    growth_ += there ? 1 : -1;
+  }
+  void clear() {
+    cleared_ = true;
+    changed_.clear();
+    growth_ = -static_cast<int64_t>(snapshot_->objects.size());
+  }
+
+  const SnapshotPtr snapshot_;
+  bool cleared_ = false;
+  absl::flat_hash_map<Id, bool> changed_;  // whether an object exists after the messages so far
+  int64_t growth_ = 0;
+};
+
 // Returns an upper bound of the number of objects by which the batch makes the scene larger. O(ids).
 uint64_t growth_of(const Scene& scene, const UpdateBatch& batch) {
-  const SnapshotPtr snapshot = scene.latest();
-  absl::flat_hash_set<Id> removed;
-  for (const Id id : batch.remove_ids)
-    if (!batch.clear && snapshot->objects.find_ref(id)) removed.insert(id);
-  uint64_t added = 0;
-  for (const InsertColumns& insert : batch.inserts)
-    added += static_cast<uint64_t>(std::count_if(insert.ids.begin(), insert.ids.end(), [&](Id id) {
-      return batch.clear || removed.contains(id) || !snapshot->objects.find_ref(id);
-    }));
-  const uint64_t gone = batch.clear ? snapshot->objects.size() : removed.size();
-  return added - std::min(added, gone);
+  Growth growth(scene);
+  for (const UpdateBatch& message : batch.earlier) growth.add(message);
+  growth.add(batch);
+  return growth.growth();
 }
 
 }  // namespace

@@ -17,7 +17,7 @@ namespace {
 // the thing's entries in the columns, the protobuf tags and lengths of a new message Insert or Placement, and a mesh's
 // name.
 constexpr size_t kThingsPerPiece = 16384;
-constexpr size_t kMaxBytesPerThing = 8 + 24 + 16 + 16 + 4 + 8 + 8 + 64 + limits::kMaxNameLength;
+constexpr size_t kMaxBytesPerThing = 8 + 24 + 16 + 16 + 4 + 8 + 8 + 8 + 64 + limits::kMaxNameLength;
 static_assert(kThingsPerPiece * kMaxBytesPerThing <= limits::kDefaultReplyBytes);
 
 template <class Message>
@@ -70,21 +70,25 @@ void add_shape(const Shape& shape, v1::Insert* to) {
 using TakeDumpPiece = std::function<bool(const v1::DumpSceneResponse&)>;
 
 // Builder of the pieces of a dump. Passes each piece to `take` when the piece is full. Consecutive objects with the
-// same kind of shape, or instances of the same mesh, share a run of columns.
+// same kind of shape of which all or none expire, or instances of the same mesh, share a run of columns.
 class Dump {
  public:
   Dump(const SceneSnapshot& snapshot, const TakeDumpPiece& take) : snapshot_(snapshot), take_(take) { start_piece(); }
 
-  void add(const Object& object) {
+  // `expire_ticks` is the number of ticks until the object expires; 0: it does not expire.
+  void add(const Object& object, uint64_t expire_ticks) {
     if (!make_room()) return;
-    if (piece_.objects().empty() || object.shape.kind != last_kind_) piece_.add_objects();
+    const bool expires = expire_ticks != 0;
+    if (piece_.objects().empty() || object.shape.kind != last_kind_ || expires != last_expires_) piece_.add_objects();
     last_kind_ = object.shape.kind;
+    last_expires_ = expires;
     v1::Insert* run = piece_.mutable_objects(piece_.objects_size() - 1);
     run->add_ids(object.id);
     add_position(object.shape.position, run->mutable_positions_f64());
     add_rotation(object.shape.rotation, run);
     add_shape(object.shape, run);
     add_labels(object, run);
+    if (expires) run->add_expire_ticks(expire_ticks);
   }
 
   void add(const Instance& instance) {
@@ -132,6 +136,7 @@ class Dump {
   size_t pieces_ = 0;
   bool taken_ = true;
   ShapeKind last_kind_ = ShapeKind::kPoint;
+  bool last_expires_ = false;
   const StaticMesh* last_mesh_ = nullptr;
 };
 
@@ -161,7 +166,7 @@ DumpOrder order_of(const SceneSnapshot& snapshot) {
 // Sends objects, then instances, in one or more pieces. Returns false if `take` ended the dump.
 bool dump_snapshot(const SceneSnapshot& snapshot, const DumpOrder& order, const TakeDumpPiece& take) {
   Dump dump(snapshot, take);
-  for (const GridRef& object : order.objects) dump.add(object_of(object));
+  for (const GridRef& object : order.objects) dump.add(object_of(object), snapshot.remaining_ticks(object.handle()));
   for (const Instance* instance : order.instances) dump.add(*instance);
   return dump.finish();
 }

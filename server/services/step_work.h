@@ -67,6 +67,7 @@ class StepWork final {
       step_.ack_bytes_ = bytes;
       return step_.slot_.claim_answer(bytes);
     }
+    CallMemory take_request_claim() override { return step_.slot_.take_request_claim(); }
     void hold() override { step_.slot_.hold(); }
     void answered(absl::Status status) override { step_.updated(std::move(status)); }
 

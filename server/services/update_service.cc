@@ -4,6 +4,8 @@
 #include <string>
 
 #include "server/rpc/hot_call.h"
+#include "server/rpc/receive.h"
+#include "server/services/held_updates.h"
 #include "server/services/update_work.h"
 
 namespace locus::server {
@@ -39,6 +41,7 @@ struct StreamUpdatesMethod {
   using Request = v1::StreamUpdatesRequest;
   using Response = v1::StreamUpdatesResponse;
   using Work = UpdateWork;
+  using StreamState = HeldUpdates;
   static constexpr Rpc kRpc = Rpc::kStreamUpdates;
   static constexpr const char* kPath = "/locus.v1.UpdateService/StreamUpdates";
   static constexpr bool kStream = true;
@@ -50,8 +53,15 @@ struct StreamUpdatesMethod {
   }
   Work make_work(CallSlot& slot) const { return Work(*host, slot); }
   static bool is_change(const Request&, const Response&) { return true; }
-  void begin(Work& work, const std::string& scene, const Request& request, Response& response) const {
-    work.begin(scene, request.batch(), *response.mutable_ack());
+  static bool continues(const Request& request) { return request.batch().continues(); }
+  static bool read_continues(const grpc::ByteBuffer& bytes, Request& request) {
+    const std::optional<bool> flag =
+        read_flag(bytes, Request::kBatchFieldNumber, v1::UpdateBatch::kContinuesFieldNumber);
+    if (flag) request.mutable_batch()->set_continues(*flag);
+    return flag.has_value();
+  }
+  void begin(Work& work, const std::string& scene, Request& request, Response& response, HeldUpdates& held) const {
+    work.begin(scene, *request.mutable_batch(), *response.mutable_ack(), held);
   }
 
   UpdateService* service;

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <chrono>
+#include <memory>
 #include <utility>
+#include <vector>
 
 #include "core/base/limits.h"
 #include "core/base/status_macros.h"
@@ -38,7 +40,12 @@ absl::StatusOr<CallMemory> make_room(const Caller& caller, const UpdateBatch& ba
 
 // Returns an upper bound of the size of the batch's ack, in bytes.
 uint64_t ack_bytes(const UpdateBatch& batch) {
-  return kBytesAnAck + kBytesAnItemError * std::min<uint64_t>(item_count(batch), limits::kMaxListedItemErrors);
+  return kBytesAnAck + kBytesAnItemError * std::min<uint64_t>(count_items(batch), limits::kMaxListedItemErrors);
+}
+
+absl::Status only_on_streams() {
+  return refuse_argument(Reason::kMalformed, "continues", {},
+                         "several messages are one revision in StreamUpdates only");
 }
 
 }  // namespace
@@ -46,18 +53,64 @@ uint64_t ack_bytes(const UpdateBatch& batch) {
 void UpdateWork::begin(const std::string& scene, const v1::UpdateBatch& batch, v1::UpdateAck& ack) {
   arrived_ = std::chrono::steady_clock::now();
   ack_ = &ack;
-  if (absl::Status status = post(scene, batch); !status.ok()) {
-    release();
-    scene_.reset();
-    slot_.answered(std::move(status));
+  absl::Status status = batch.continues() ? only_on_streams() : post(scene, batch);
+  if (!status.ok()) refuse(std::move(status));
+}
+
+void UpdateWork::begin(const std::string& scene, v1::UpdateBatch& batch, v1::UpdateAck& ack, HeldUpdates& held) {
+  arrived_ = std::chrono::steady_clock::now();
+  ack_ = &ack;
+  const bool continues = batch.continues();
+  absl::Status status = held.check_not_refused();
+  if (status.ok()) status = continues ? hold(scene, batch, held) : post_all(scene, batch, held);
+  if (!status.ok()) {
+    held.refuse_rest(continues);
+    refuse(std::move(status));
+  } else if (continues) {
+    ack_->Clear();
+    ack_->set_pending(true);
+    slot_.answered(absl::OkStatus());
   }
 }
 
-absl::Status UpdateWork::post(const std::string& scene_name, const v1::UpdateBatch& batch) {
+void UpdateWork::refuse(absl::Status status) {
+  release();
+  scene_.reset();
+  slot_.answered(std::move(status));
+}
+
+absl::Status UpdateWork::hold(const std::string& scene_name, v1::UpdateBatch& batch, HeldUpdates& held) {
+  ASSIGN_OR_RETURN(const ScenePtr scene, find_scene(host_, slot_.caller(), scene_name, "scene"));
+  RETURN_IF_ERROR(held.check_scene(scene));
+  auto owner = std::make_unique<v1::UpdateBatch>();
+  owner->Swap(&batch);
+  ASSIGN_OR_RETURN(UpdateBatch message, to_updates(*owner));
+  RETURN_IF_ERROR(check_form(message));
+  RETURN_IF_ERROR(check_earlier(message));
+  RETURN_IF_ERROR(held.check_limits(message));
+  RETURN_IF_ERROR(slot_.caller().take_quota(QuotaKind::kUpdateItems, static_cast<double>(item_count(message))));
+  RETURN_IF_ERROR(slot_.claim_answer(kBytesAnAck));
+  std::vector<CallMemory> claims(2);
+  ASSIGN_OR_RETURN(claims[0], make_room(slot_.caller(), message));
+  claims[1] = slot_.take_request_claim();
+  held.hold(scene, std::move(message), std::move(owner), std::move(claims));
+  return absl::OkStatus();
+}
+
+absl::Status UpdateWork::post_all(const std::string& scene_name, const v1::UpdateBatch& batch, HeldUpdates& held) {
   ASSIGN_OR_RETURN(scene_, find_scene(host_, slot_.caller(), scene_name, "scene"));
-  ASSIGN_OR_RETURN(UpdateBatch updates, to_updates(batch));
-  batch_ = std::move(updates);
+  RETURN_IF_ERROR(held.check_scene(scene_));
+  messages_ = held.take();
+  return post(scene_name, batch);
+}
+
+absl::Status UpdateWork::post(const std::string& scene_name, const v1::UpdateBatch& batch) {
+  if (scene_ == nullptr) {
+    ASSIGN_OR_RETURN(scene_, find_scene(host_, slot_.caller(), scene_name, "scene"));
+  }
+  ASSIGN_OR_RETURN(batch_, to_updates(batch));
   RETURN_IF_ERROR(slot_.caller().take_quota(QuotaKind::kUpdateItems, static_cast<double>(item_count(batch_))));
+  batch_.earlier = std::move(messages_.batches);
   RETURN_IF_ERROR(slot_.claim_answer(ack_bytes(batch_)));
   ASSIGN_OR_RETURN(objects_, hold_objects(host_, *scene_, batch_));
   ASSIGN_OR_RETURN(claim_, make_room(slot_.caller(), batch_));
@@ -77,6 +130,8 @@ void UpdateWork::done(absl::StatusOr<UpdateAck> ack) {
 void UpdateWork::release() {
   claim_.release();
   objects_.shrink(0);
+  batch_.earlier.clear();
+  messages_ = {};
 }
 
 void UpdateWork::applied(bool) {

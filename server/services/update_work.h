@@ -1,5 +1,6 @@
 // Work on one update batch, from its message to its ack: converts the batch, claims memory from the budget, and posts
-// the batch to the update queue.
+// the batch to the update queue. A message with `continues` is held instead, until the last message of its revision
+// posts all of them as one batch.
 //
 // Threads: members run on the call's IO loop, except batch(), stop() and done(), which the update queue calls on any
 // thread.
@@ -14,6 +15,7 @@
 #include "server/rpc/call_slot.h"
 #include "server/rpc/io_threads.h"
 #include "server/scheduling/update_queue.h"
+#include "server/services/held_updates.h"
 
 namespace locus::server {
 
@@ -23,23 +25,32 @@ class UpdateWork final : private PendingUpdate {
 
   // Begins the work. `batch` and `ack` are borrowed until the slot is answered.
   void begin(const std::string& scene, const v1::UpdateBatch& batch, v1::UpdateAck& ack);
+  // Begins the work on a message of a stream, which holds `held`. Empties `batch` if the message is held.
+  void begin(const std::string& scene, v1::UpdateBatch& batch, v1::UpdateAck& ack, HeldUpdates& held);
   // Does nothing: the update queue calls stop() before it applies a batch, and answers at once if stop() returns an
   // error.
   void give_up() {}
 
  private:
+  // Posts a batch, which is applied after the messages in messages_.
   absl::Status post(const std::string& scene, const v1::UpdateBatch& batch);
+  absl::Status hold(const std::string& scene, v1::UpdateBatch& batch, HeldUpdates& held);
+  // Takes over the held messages, and posts them with the last message of their revision.
+  absl::Status post_all(const std::string& scene, const v1::UpdateBatch& batch, HeldUpdates& held);
 
   const UpdateBatch& batch() const override { return batch_; }
   absl::Status stop() const override { return slot_.caller().stop(); }
   void done(absl::StatusOr<UpdateAck> ack) override;
   void applied(bool);
+  // Releases everything that the work holds, and answers with an error.
+  void refuse(absl::Status status);
   void release();
 
   Host& host_;
   CallSlot& slot_;
   UpdateBatch batch_;
-  ScenePtr scene_;  // null until the scene is found
+  HeldUpdates::Messages messages_;  // earlier messages of the batch, from which it borrows columns
+  ScenePtr scene_;                  // null until the scene is found
   SteadyTime arrived_;
   v1::UpdateAck* ack_ = nullptr;
   CallMemory claim_;

@@ -25,7 +25,7 @@ struct StepOutcome {
   }
 };
 
-std::string text_of(const v1::Error& error) { return error.DebugString(); }
+std::string debug_text(const v1::Error& error) { return error.DebugString(); }
 
 class StepPropertyTest : public RpcTest {
  protected:
@@ -49,10 +49,10 @@ class StepPropertyTest : public RpcTest {
     v1::StepResponse response;
     const grpc::Status status = call(*stubs().queries, &v1::QueryService::Stub::Step, request, &response);
     StepOutcome outcome;
-    if (!status.ok()) outcome.error = text_of(error_of(status));
+    if (!status.ok()) outcome.error = debug_text(error_of(status));
     outcome.ack = response.ack();
     outcome.result = response.result();
-    if (response.has_error()) outcome.query_error = text_of(response.error());
+    if (response.has_error()) outcome.query_error = debug_text(response.error());
     return outcome;
   }
 
@@ -67,7 +67,7 @@ class StepPropertyTest : public RpcTest {
     StepOutcome outcome;
     outcome.ack = response.ack();
     outcome.result = response.result();
-    if (response.has_error()) (response.has_ack() ? outcome.query_error : outcome.error) = text_of(response.error());
+    if (response.has_error()) (response.has_ack() ? outcome.query_error : outcome.error) = debug_text(response.error());
     return outcome;
   }
 
@@ -78,16 +78,16 @@ class StepPropertyTest : public RpcTest {
     v1::QueryBatch form = queries;
     for (v1::QueryBlock& block : *form.mutable_blocks()) block.clear_as_of_ticks();
     if (const grpc::Status status = query(form, nullptr, scene); !status.ok()) {
-      outcome.error = text_of(error_of(status));
+      outcome.error = debug_text(error_of(status));
       return outcome;
     }
     if (const grpc::Status status = apply(update, &outcome.ack, scene); !status.ok()) {
-      outcome.error = text_of(error_of(status));
+      outcome.error = debug_text(error_of(status));
       outcome.ack.Clear();
       return outcome;
     }
     if (const grpc::Status status = query(queries, &outcome.result, scene); !status.ok()) {
-      outcome.query_error = text_of(error_of(status));
+      outcome.query_error = debug_text(error_of(status));
       outcome.result.Clear();
     }
     return outcome;

@@ -21,6 +21,7 @@ TEST(ConvertUpdatesTest, EveryFieldOfABatchArrives) {
   insert->add_layers(6);
   insert->add_groups(7);
   insert->add_tags(8);
+  insert->add_expire_ticks(30);
   v1::Move* move = batch.add_moves();
   move->add_ids(9);
   for (int i = 0; i < 3; ++i) move->add_positions(static_cast<float>(i));
@@ -56,6 +57,7 @@ TEST(ConvertUpdatesTest, EveryFieldOfABatchArrives) {
   EXPECT_EQ(inserted.radii[0], 0.5f);
   EXPECT_EQ(inserted.extents[2], 2.f);
   EXPECT_EQ(inserted.layers[0], 6u);
+  EXPECT_EQ(inserted.expire_ticks[0], 30u);
   EXPECT_EQ(inserted.groups[0], 7u);
   EXPECT_EQ(inserted.tags[0], 8u);
   ASSERT_EQ(updates->moves.size(), 1u);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "locus/v1/query_service.pb.h"
+#include "locus/v1/update_service.pb.h"
 #include "tests/support/random.h"
 
 namespace locus::server {
@@ -64,6 +65,29 @@ TEST(ReceiveTest, DamagedBytesHaveNoEnvelopeOrAnotherOne) {
     damaged[random.below(damaged.size())] = static_cast<char>(random.next());
     parse_envelope(in_slices(damaged), envelope);
   }
+}
+
+TEST(ReceiveTest, AFlagOfASubMessageIsReadWithoutTheRest) {
+  const auto flag_of = [](const std::string& bytes, size_t slice_bytes = 1 << 20) {
+    return read_flag(in_slices(bytes, slice_bytes), v1::StreamUpdatesRequest::kBatchFieldNumber,
+                     v1::UpdateBatch::kContinuesFieldNumber);
+  };
+  v1::StreamUpdatesRequest request;
+  request.set_scene("world");
+  request.set_sequence(3);
+  EXPECT_EQ(flag_of(request.SerializeAsString()), std::optional<bool>(false));
+  request.mutable_batch()->mutable_remove_ids()->Resize(3000, 17);
+  EXPECT_EQ(flag_of(request.SerializeAsString()), std::optional<bool>(false));
+  request.mutable_batch()->set_continues(true);
+  for (const size_t slice_bytes : {1u, 7u, 1u << 20})
+    EXPECT_EQ(flag_of(request.SerializeAsString(), slice_bytes), std::optional<bool>(true));
+  // Several sub-messages are merged, like Protobuf does it.
+  v1::StreamUpdatesRequest other;
+  other.mutable_batch()->add_remove_ids(1);
+  EXPECT_EQ(flag_of(request.SerializeAsString() + other.SerializeAsString()), std::optional<bool>(true));
+  const std::string bytes = request.SerializeAsString();
+  EXPECT_EQ(flag_of(bytes.substr(0, bytes.size() - 1)), std::nullopt);
+  EXPECT_EQ(flag_of("\x1f\x8b\x08 compressed"), std::nullopt);
 }
 
 }  // namespace
