@@ -27,6 +27,7 @@ inline constexpr uint32_t kMaxMeshVertices = 1u << 28;
 inline constexpr uint32_t kMaxMeshTriangles = 1u << 27;
 inline constexpr uint32_t kMaxInstances = 1u << 20;  // instances per scene
 inline constexpr uint32_t kMaxObjects = 1u << 24;    // objects per scene
+inline constexpr uint32_t kMaxParts = 64;            // parts of a compound
 inline constexpr uint32_t kMaxPendingChanges = 64;   // queued static changes (of instances) per scene
 
 inline constexpr uint32_t kMaxBvhValues = kMaxMeshTriangles;

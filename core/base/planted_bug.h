@@ -53,6 +53,7 @@ enum class PlantedBug {
   kWayShort,           // a search along a half line ends in the cell of its start, not in the cell where it should end
   kHalfLineRounding,   // boxes are compared with the point rounded to the nearest float
   kHalfLineStart,      // a half line misses a box that ends exactly at the start of the half line
+  kPartMask,           // the layers of a compound's part are ignored
   // The ray kernels:
   kKernelEdgeBound,   // the signs of edge functions are computed in float without an error bound
   kKernelTBound,      // t is compared with the limit in float without an error bound

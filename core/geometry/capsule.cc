@@ -50,6 +50,8 @@ double squared_distance_to_core(const Capsule& capsule, const Shape& shape) {
     }
     case ShapeKind::kCapsule:
       return squared_distance_segments(offset, half_axis, rotation_of(shape.rotation).to_world(size));
+    case ShapeKind::kCompound:
+      break;
   }
   return std::numeric_limits<double>::infinity();
 }

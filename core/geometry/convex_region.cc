@@ -334,6 +334,8 @@ bool region_overlaps(const ConvexRegion& region, const Shape& shape) {
     case ShapeKind::kCapsule:
       return capsule_overlaps(region, center, rotation_of(shape.rotation).to_world(to_double(shape.size)),
                               double{shape.radius});
+    case ShapeKind::kCompound:
+      break;
   }
   return false;
 }

@@ -1,5 +1,8 @@
 #include "core/geometry/shape.h"
 
+#include <cmath>
+#include <limits>
+
 #include "core/base/check.h"
 #include "core/base/planted_bug.h"
 #include "core/geometry/ray_convex.h"
@@ -15,6 +18,11 @@ Aabbd capsule_bounds(const Shape& shape) {
   const Vec3d axis = abs(rotation_of(shape.rotation).to_world(to_double(shape.size)));
   const double epsilon = kEpsilon * (max_component(abs(shape.position)) + max_component(axis) + shape.radius);
   return grown(Aabbd{shape.position - axis, shape.position + axis}, shape.radius + epsilon);
+}
+
+// Returns a float that is at least `length`.
+float at_least(double length) {
+  return std::nextafter(static_cast<float>(length), std::numeric_limits<float>::infinity());
 }
 
 // Line of a ray in a solid's own axes.
@@ -38,6 +46,7 @@ LocalRay local_ray(const Rayd& ray, const Shape& shape) {
 bool contains(const Shape& shape, Vec3d local) {
   switch (shape.kind) {
     case ShapeKind::kPoint:
+    case ShapeKind::kCompound:
       return false;
     case ShapeKind::kBall:
       return ball_contains(shape.radius, local);
@@ -52,6 +61,7 @@ bool contains(const Shape& shape, Vec3d local) {
 std::optional<Chord> chord_of(const Shape& shape, const Line& line) {
   switch (shape.kind) {
     case ShapeKind::kPoint:
+    case ShapeKind::kCompound:
       return std::nullopt;
     case ShapeKind::kBall:
       return chord_of_ball(line, shape.radius);
@@ -101,6 +111,8 @@ double squared_distance_to_core(Vec3d point, const Shape& shape) {
       return squared_distance(rotation_of(shape.rotation).to_local(offset), Aabbd{-size, size});
     case ShapeKind::kCapsule:
       return squared_distance_to_segment(rotation_of(shape.rotation).to_local(offset), size);
+    case ShapeKind::kCompound:
+      break;
   }
   return std::numeric_limits<double>::infinity();
 }
@@ -116,6 +128,8 @@ Vec3d nearest_in_core(Vec3d local, const Shape& shape) {
       return nearest_in(local, Aabbd{-size, size});
     case ShapeKind::kCapsule:
       return nearest_on_segment(local, size);
+    case ShapeKind::kCompound:
+      break;
   }
   return {};
 }
@@ -124,6 +138,21 @@ Vec3d nearest_in_core(Vec3d local, const Shape& shape) {
 double max_with_root(double a, double b) { return a > 0 && a * a > b * (1 + 0x1p-50) ? a : std::max(a, std::sqrt(b)); }
 
 }  // namespace
+
+float extent_of(const Shape& shape) {
+  switch (shape.kind) {
+    case ShapeKind::kPoint:
+    case ShapeKind::kCompound:
+      return 0;
+    case ShapeKind::kBall:
+      return shape.radius;
+    case ShapeKind::kBox:
+      return at_least(std::sqrt(squared_length(to_double(shape.size))));
+    case ShapeKind::kCapsule:
+      return at_least(std::sqrt(squared_length(to_double(shape.size))) + shape.radius);
+  }
+  return 0;
+}
 
 Aabbd bounds_of(const Shape& shape) {
   switch (shape.kind) {
@@ -135,6 +164,8 @@ Aabbd bounds_of(const Shape& shape) {
       return bounds_of(box_of(shape));
     case ShapeKind::kCapsule:
       return capsule_bounds(shape);
+    case ShapeKind::kCompound:
+      LOCUS_DCHECK(shape.kind != ShapeKind::kCompound);
   }
   return {};
 }
@@ -176,6 +207,8 @@ bool box_overlaps(const Obbd& box, const Shape& shape) {
       const Vec3d half_axis = rotation_of(shape.rotation).to_world(to_double(shape.size));
       return squared_distance_segment_box(offset, box.rotation.to_local(half_axis), box.half) <= rr;
     }
+    case ShapeKind::kCompound:
+      break;
   }
   return false;
 }

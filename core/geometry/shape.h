@@ -11,7 +11,9 @@
 
 namespace locus {
 
-enum class ShapeKind : uint8_t { kPoint, kBall, kBox, kCapsule };
+// Kind of a shape. Only objects are of kind kCompound: their shape has a position and a rotation, and the shapes of
+// their parts are computed from these (compound.h). The functions of this file do not take shapes of this kind.
+enum class ShapeKind : uint8_t { kPoint, kBall, kBox, kCapsule, kCompound };
 
 // Shape and its position. kPoint uses neither `size` nor `radius`. kBall uses `radius`. kBox uses `size` as its half
 // extents, in local axes. kCapsule uses `radius`, and `size` as its half axis, in local axes: the vector from the
@@ -49,6 +51,10 @@ struct ShapeHit {
   double t;      // in units of the ray's direction, >= 0
   Vec3d normal;  // unit, outward, world axes; minus the ray's unit direction if the ray starts inside (kSolid)
 };
+
+// Returns the extent of the shape: an upper bound of the distance from its position to any of its points, under any
+// rotation. The extent does not depend on the current rotation. The extent of a ball is exactly its radius.
+float extent_of(const Shape& shape);
 
 // Returns axis-aligned bounds in world axes. If rounding could exclude a part of the shape, the bounds are grown by
 // 2^-40 of the sum of the magnitudes of position, size and radius.

@@ -23,6 +23,7 @@ RoundedCore core_of(const Shape& shape) {
   RoundedCore core;
   switch (shape.kind) {
     case ShapeKind::kPoint:
+    case ShapeKind::kCompound:
       break;
     case ShapeKind::kBall:
       core.radius = double{shape.radius};

@@ -13,9 +13,9 @@
 namespace locus::server {
 namespace {
 
-// Maximum number of things (objects and instances) in a piece, and maximum size in bytes of a thing. The size includes
-// the thing's entries in the columns, the protobuf tags and lengths of a new message Insert or Placement, and a mesh's
-// name.
+// Maximum number of things (objects, parts of compounds, and instances) in a piece, and maximum size in bytes of a
+// thing. The size includes the thing's entries in the columns, the protobuf tags and lengths of a new message Insert or
+// Placement, and a mesh's name.
 constexpr size_t kThingsPerPiece = 16384;
 constexpr size_t kMaxBytesPerThing = 8 + 24 + 16 + 16 + 4 + 8 + 8 + 8 + 64 + limits::kMaxNameLength;
 static_assert(kThingsPerPiece * kMaxBytesPerThing <= limits::kDefaultReplyBytes);
@@ -48,8 +48,34 @@ void add_size(const Vec3f& size, google::protobuf::RepeatedField<float>* to) {
   to->Add(size.z);
 }
 
+// Adds one part, to the last entry of parts if they have the same kind of shape.
+void add_part(const Part& part, v1::Compound* to) {
+  const auto kind_of = [](ShapeKind kind) {
+    return kind == ShapeKind::kBall  ? v1::Parts::kBall
+           : kind == ShapeKind::kBox ? v1::Parts::kBox
+                                     : v1::Parts::kCapsule;
+  };
+  const int last = to->parts_size() - 1;
+  v1::Parts* const entry =
+      last >= 0 && to->parts(last).shape_case() == kind_of(part.kind) ? to->mutable_parts(last) : to->add_parts();
+  add_size(part.position, entry->mutable_positions());
+  add_rotation(part.rotation, entry);
+  entry->add_layers(part.layers);
+  if (part.kind == ShapeKind::kBall) {
+    entry->mutable_ball()->add_radii(part.radius);
+  } else if (part.kind == ShapeKind::kBox) {
+    add_size(part.size, entry->mutable_box()->mutable_half_extents());
+  } else {
+    entry->mutable_capsule()->add_radii(part.radius);
+    add_size(part.size, entry->mutable_capsule()->mutable_half_axes());
+  }
+}
+
+// Adds the shape of an object, except a compound, which all objects of an entry share.
 void add_shape(const Shape& shape, v1::Insert* to) {
   switch (shape.kind) {
+    case ShapeKind::kCompound:
+      return;
     case ShapeKind::kPoint:
       to->mutable_point();
       return;
@@ -70,17 +96,26 @@ void add_shape(const Shape& shape, v1::Insert* to) {
 using TakeDumpPiece = std::function<bool(const v1::DumpSceneResponse&)>;
 
 // Builder of the pieces of a dump. Passes each piece to `take` when the piece is full. Consecutive objects with the
-// same kind of shape of which all or none expire, or instances of the same mesh, share a run of columns.
+// same kind of shape of which all or none expire, compounds with the same parts of which all or none expire, or instances
+// of the same mesh, share a run of columns.
 class Dump {
  public:
   Dump(const SceneSnapshot& snapshot, const TakeDumpPiece& take) : snapshot_(snapshot), take_(take) { start_piece(); }
 
   // `expire_ticks` is the number of ticks until the object expires; 0: it does not expire.
   void add(const Object& object, uint64_t expire_ticks) {
-    if (!make_room()) return;
+    if (!make_room(1 + (object.compound == nullptr ? 0 : object.compound->parts().size()))) return;
     const bool expires = expire_ticks != 0;
-    if (piece_.objects().empty() || object.shape.kind != last_kind_ || expires != last_expires_) piece_.add_objects();
+    if (piece_.objects().empty() || object.shape.kind != last_kind_ || object.compound != last_compound_ ||
+        expires != last_expires_) {
+      v1::Insert* const added = piece_.add_objects();
+      if (object.compound != nullptr)
+        for (const Part& part : object.compound->parts()) add_part(part, added->mutable_compound());
+    } else if (object.compound != nullptr) {
+      things_ -= object.compound->parts().size();  // the run has the parts already
+    }
     last_kind_ = object.shape.kind;
+    last_compound_ = object.compound;
     last_expires_ = expires;
     v1::Insert* run = piece_.mutable_objects(piece_.objects_size() - 1);
     run->add_ids(object.id);
@@ -92,7 +127,7 @@ class Dump {
   }
 
   void add(const Instance& instance) {
-    if (!make_room()) return;
+    if (!make_room(1)) return;
     if (piece_.instances().empty() || instance.mesh.get() != last_mesh_)
       piece_.add_instances()->set_mesh(instance.mesh->name());
     last_mesh_ = instance.mesh.get();
@@ -110,15 +145,15 @@ class Dump {
   }
 
  private:
-  // Counts one more object or instance of the piece. If the piece is full, first passes it to `take` and begins a new
-  // piece. Returns false once `take` has ended the dump.
-  bool make_room() {
-    if (taken_ && things_ == kThingsPerPiece) {
+  // Counts more things of the piece. If they do not fit, first passes the piece to `take` and begins a new piece.
+  // Returns false once `take` has ended the dump.
+  bool make_room(size_t things) {
+    if (taken_ && things_ + things > kThingsPerPiece) {
       taken_ = take_(piece_);
       ++pieces_;
       start_piece();
     }
-    ++things_;
+    things_ += things;
     return taken_;
   }
 
@@ -137,6 +172,7 @@ class Dump {
   bool taken_ = true;
   ShapeKind last_kind_ = ShapeKind::kPoint;
   bool last_expires_ = false;
+  const Compound* last_compound_ = nullptr;
   const StaticMesh* last_mesh_ = nullptr;
 };
 
@@ -176,7 +212,8 @@ bool dump_snapshot(const SceneSnapshot& snapshot, const DumpOrder& order, const 
 // bytes.
 uint64_t dump_cost(const SceneSnapshot& snapshot) {
   const uint64_t things = snapshot.objects.size() + snapshot.statics->size();
-  return things * sizeof(GridRef) + 3 * std::min<uint64_t>(things, kThingsPerPiece) * kMaxBytesPerThing;
+  const uint64_t parts = snapshot.objects.compounds() == nullptr ? 0 : snapshot.objects.size() * limits::kMaxParts;
+  return things * sizeof(GridRef) + 3 * std::min<uint64_t>(things + parts, kThingsPerPiece) * kMaxBytesPerThing;
 }
 
 }  // namespace

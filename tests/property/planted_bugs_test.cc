@@ -17,6 +17,7 @@
 #include "tests/support/kernel_trials.h"
 #include "tests/support/kind_trials.h"
 #include "tests/support/nearest_trials.h"
+#include "tests/support/part_scenes.h"
 #include "tests/support/placed_scenes.h"
 #include "tests/support/region_trials.h"
 #include "tests/support/rewind_lockstep.h"
@@ -49,6 +50,8 @@ std::string compare_moving_grids_with_list() {
 }
 
 std::string compare_scenes_with_model() { return search_scene_lockstep(scaled_count(20), 60); }
+
+std::string compare_compounds_with_parts() { return search_part_scenes(scaled_count(300)); }
 
 std::string compare_doors_with_model() { return search_door_lockstep(scaled_count(10), 30); }
 
@@ -172,6 +175,7 @@ constexpr Trial kTrials[] = {
     {"FilterByTheFirstOfSeveralGroups", PlantedBug::kFilterFirstGroup, filter_difference},
     {"FilterByAllBitsOfATag", PlantedBug::kFilterTagMask, filter_difference},
     {"FilterThatForgetsGroupsTagsAndIds", PlantedBug::kFilterLabels, filter_difference},
+    {"CompoundsWhosePartsHaveNoLayers", PlantedBug::kPartMask, compare_compounds_with_parts},
 #ifdef LOCUS_X86_KERNELS
     {"KernelWithoutEdgeBound", PlantedBug::kKernelEdgeBound, compare_kernels_with_list},
     {"KernelWithoutTBound", PlantedBug::kKernelTBound, compare_kernels_with_list},

@@ -151,8 +151,12 @@ TEST(QueryDeterminismTest, ADistantFrameGivesTheHitsOfTheSceneAtTheOrigin) {
           std::holds_alternative<SightColumns>(block.settings.kind))
         for (float& x : block.sizes) x = std::round(x * 16) / 16;
     }
-    for (Object& object : scene.world.objects)
+    for (Object& object : scene.world.objects) {
       for (int axis = 0; axis < 3; ++axis) object.shape.position[axis] = std::round(object.shape.position[axis]);
+      // The positions of parts have no whole coordinates, and are rounded when they are far.
+      if (object.compound != nullptr) object.shape.kind = ShapeKind::kBall, object.shape.radius = 1;
+      object.compound = nullptr;
+    }
     const BatchResult near = answer(*snapshot_of(scene.world), scene.blocks, {});
     for (const double shift : {1e6, -1048576.0, 1e8, -9e8}) {
       QueryScene far = scene;

@@ -59,6 +59,12 @@ inline std::vector<Found> found_by(const SceneSnapshot& snapshot, OwnedBlock blo
     block.settings.columns.add(Column::kT);
     block.settings.columns.add(Column::kPoint);
   }
+  const bool one_row = std::visit(
+      [](const auto& kind) {
+        if constexpr (requires { kind.detail; }) return kind.detail == StaticDetail::kInstances;
+        return false;
+      },
+      block.settings.kind);
   const BlockResult result = run_block(snapshot, block);
   LOCUS_CHECK(result.truncated.empty());
   std::vector<Found> found;
@@ -66,7 +72,8 @@ inline std::vector<Found> found_by(const SceneSnapshot& snapshot, OwnedBlock blo
   for (const uint32_t rows : result.counts) {
     found.emplace_back();
     for (const size_t end = row + rows; row < end; ++row) {
-      FoundRow& one = found.back()[{result.ids[row], result.triangles[row]}];
+      // With one row for each object, the row of a compound names its nearest part, which depends on the precision.
+      FoundRow& one = found.back()[{result.ids[row], one_row ? kNoTriangle : result.triangles[row]}];
       if (!result.t.empty()) one.t = result.t[row];
       if (!result.points.empty())
         one.point = {result.points[3 * row], result.points[3 * row + 1], result.points[3 * row + 2]};

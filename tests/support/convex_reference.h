@@ -63,6 +63,7 @@ class SolidReference {
     const Vec3r size = to_real(shape_.size);
     switch (shape_.kind) {
       case ShapeKind::kPoint:
+      case ShapeKind::kCompound:
         return length(p);
       case ShapeKind::kBall:
         return length(p) - shape_.radius;

@@ -36,11 +36,12 @@ inline void answer_block(const OracleScene& scene, const QueryBlock& block, cons
       if (exactly && !winds_around(*instance, point)) continue;
       rows.push_back({0, instance->id, kNoTriangle, 0, nullptr, instance, 0, 0, {}, {}});
     }
-    for (const Object& object : scene.objects_) {
+    for (const OracleScene::OracleObject& object : scene.objects_) {
       if (block.source == Source::kStatic || object.id <= block.after_id || !scene.wanted(block, i, object)) continue;
       if (squared_distance(point, bounds_of(object.shape)) > 0) continue;
       if (exactly && !ball_overlaps(Balld{point, 0}, object.shape)) continue;
-      rows.push_back({0, object.id, kNoTriangle, 0, &object, nullptr, 0, 0, {}, {}});
+      const bool is_known = !rows.empty() && rows.back().id == object.id;  // by another part
+      if (!is_known) rows.push_back({0, object.id, kNoTriangle, 0, scene.whole_of(object.id), nullptr, 0, 0, {}, {}});
     }
     std::sort(rows.begin(), rows.end(), [](const auto& a, const auto& b) { return a.id < b.id; });
     OracleScene::count(block, rows, i, result);

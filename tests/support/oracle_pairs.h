@@ -25,26 +25,35 @@ inline void answer_block(const OracleScene& scene, const QueryBlock& block, cons
                                      : distance_between(low, high));
   };
   std::vector<Found> found;
-  for (const Object& a : scene.objects_) {
+  for (const OracleScene::OracleObject& whole : scene.wholes_) {
+    const Id a_id = whole.id;
     std::vector<Found> own;
-    for (const Object& b : scene.objects_) {
-      if (block.source == Source::kStatic || a.id == b.id || (a.group != 0 && a.group == b.group)) continue;
-      if (!scene.wanted(block, 0, a) || !scene.wanted(block, 0, b)) continue;
+    const auto measure = [&](const Object& a, const Object& b) {
+      if (block.source == Source::kStatic || a.id == b.id || (a.group != 0 && a.group == b.group)) return;
+      if (!scene.wanted(block, 0, a) || !scene.wanted(block, 0, b)) return;
       const bool forwards = has(a, pairs.first_mask) && has(b, pairs.second_mask);
       const bool backwards = has(b, pairs.first_mask) && has(a, pairs.second_mask);
-      if (pairs.count == 0 ? a.id > b.id || (!forwards && !backwards) : !forwards) continue;
+      if (pairs.count == 0 ? a.id > b.id || (!forwards && !backwards) : !forwards) return;
       const float t = distance(a, b);
-      if (t <= pairs.max_distance) own.push_back({{t, a.id, kNoTriangle, 0, &a, nullptr, 0, 0, {}, {}}, b.id});
-    }
+      if (t > pairs.max_distance) return;
+      const auto known = std::find_if(own.begin(), own.end(), [&](const Found& x) { return x.other == b.id; });
+      if (known == own.end())
+        own.push_back({{t, a.id, kNoTriangle, 0, &whole, nullptr, 0, 0, {}, {}}, b.id});
+      else
+        known->row.t = std::min(known->row.t, t);
+    };
+    for (const Object& a : scene.objects_)
+      for (const Object& b : scene.objects_)
+        if (a.id == a_id) measure(a, b);
     std::sort(own.begin(), own.end(), [&](const Found& x, const Found& y) {
       return pairs.count == 0 ? x.other < y.other : std::tie(x.row.t, x.other) < std::tie(y.row.t, y.other);
     });
     if (pairs.count != 0 && own.size() > pairs.count) own.resize(pairs.count);
     // Keep only the pairs that come after the page position (after_id, after_other).
-    if (a.id < block.after_id || (a.id == block.after_id && pairs.after_other == 0)) continue;
-    if (a.id == block.after_id && pairs.count == 0) {
+    if (a_id < block.after_id || (a_id == block.after_id && pairs.after_other == 0)) continue;
+    if (a_id == block.after_id && pairs.count == 0) {
       std::erase_if(own, [&](const Found& x) { return x.other <= pairs.after_other; });
-    } else if (a.id == block.after_id) {
+    } else if (a_id == block.after_id) {
       const auto last =
           std::find_if(own.begin(), own.end(), [&](const Found& x) { return x.other == pairs.after_other; });
       if (last != own.end()) own.erase(own.begin(), last + 1);

@@ -64,9 +64,9 @@ class RayOracle : public OracleScene {
     return entry_of(slabs, PlacedTriangles(instance).bounds_of_triangle(triangle)).value_or(kInfinity);
   }
 
-  void hit_on(const Object& object, const Question& question, Rows& rows) const {
+  void hit_on(const OracleObject& object, const Question& question, Rows& rows) const {
     const ObjectRay ray(Rayd{question.origin, question.direction}, question.inside);
-    Row row{0, object.id, kNoTriangle, 0, &object, nullptr, 0, 0, {}, {}};
+    Row row{0, object.id, object.part, 0, &object, nullptr, 0, 0, {}, {}};
     if (question.conservative) {
       const std::optional<float> t = entry_of(ray.slabs(), bounds_of(object.shape));
       if (!t) return;
@@ -102,7 +102,7 @@ class RayOracle : public OracleScene {
       for (const Instance* instance : instances_)
         if (wanted(block, i, *instance)) hits_on(*instance, question, rows);
     if (block.source != Source::kStatic)
-      for (const Object& object : objects_)
+      for (const OracleObject& object : objects_)
         if (wanted(block, i, object)) hit_on(object, question, rows);
     std::erase_if(rows, [&](const Row& row) { return row.t > question.t_max; });
     keep_behind(std::get<RayColumns>(block.kind).after, i, rows);
@@ -186,11 +186,11 @@ class RayOracle : public OracleScene {
     }
   }
 
-  void swept(const QueryBlock& block, const SweepColumns& sweeps, const Mover& mover, const Object& object,
+  void swept(const QueryBlock& block, const SweepColumns& sweeps, const Mover& mover, const OracleObject& object,
              Rows& rows) const {
     const std::optional<double> entered = SweptBounds(mover, kObjectPad).entry(bounds_of(object.shape));
     if (!entered) return;
-    Row row{entry_of(*entered), object.id, kNoTriangle, 0, &object, nullptr, 0, 0, {}, {}};
+    Row row{entry_of(*entered), object.id, object.part, 0, &object, nullptr, 0, 0, {}, {}};
     if (block.precision == Precision::kExact) {
       const std::optional<double> t = first_contact(mover, object.shape, sweeps.at_start);
       if (!t) return;
@@ -209,7 +209,7 @@ class RayOracle : public OracleScene {
       for (const Instance* instance : instances_)
         if (block.source != Source::kDynamic && wanted(block, i, *instance))
           swept(block, sweeps, mover, *instance, rows);
-      for (const Object& object : objects_)
+      for (const OracleObject& object : objects_)
         if (block.source != Source::kStatic && wanted(block, i, object)) swept(block, sweeps, mover, object, rows);
       std::erase_if(rows, [](const Row& row) { return row.t > 1; });
       std::sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) {
@@ -248,7 +248,7 @@ class RayOracle : public OracleScene {
     Rows rows;
     for (const Instance* instance : instances_)
       if (block.source != Source::kDynamic && blocks(*instance)) hits_on(*instance, segment, rows);
-    for (const Object& object : objects_)
+    for (const OracleObject& object : objects_)
       if (block.source != Source::kStatic && blocks(object)) hit_on(object, segment, rows);
     return std::any_of(rows.begin(), rows.end(), [](const Row& row) { return row.t <= 1; });
   }

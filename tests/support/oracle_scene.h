@@ -8,6 +8,7 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -27,12 +28,22 @@ class OracleScene {
       uint32_t position = 0;
       instance.mesh->tree().for_each([&](const Triangle& triangle) { storage[triangle.number] = position++; });
     }
-    snapshot.objects.for_each([this](const Object& object) { objects_.push_back(object); });
+    std::vector<Object> objects;
+    snapshot.objects.for_each([&objects](const Object& object) { objects.push_back(object); });
+    add_objects(objects);
   }
   // Makes an oracle that uses `objects`, the objects of another time, instead of the objects of the snapshot.
-  OracleScene(const SceneSnapshot& snapshot, std::vector<Object> objects) : OracleScene(snapshot) {
-    objects_ = std::move(objects);
+  OracleScene(const SceneSnapshot& snapshot, const std::vector<Object>& objects) : OracleScene(snapshot) {
+    objects_.clear();
+    wholes_.clear();
+    add_objects(objects);
   }
+
+  // Object without parts, or one part of a compound as an object of its own, with the id of the compound.
+  struct OracleObject : Object {
+    uint32_t part = kNoTriangle;  // number of the part, or kNoTriangle for an object without parts
+    Shape whole;                  // shape of the whole object, which gives the pose
+  };
 
   static constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
@@ -41,13 +52,61 @@ class OracleScene {
     Id id = 0;
     uint32_t triangle = kNoTriangle;
     uint32_t storage = 0;
-    const Object* object = nullptr;
+    const OracleObject* object = nullptr;
     const Instance* instance = nullptr;
     float u = 0, v = 0;
     Vec3d normal;  // surface normal; nearest queries and cells: vector to the nearest point
     Vec3d place;   // sweeps only: point of contact, relative to the start
   };
   using Rows = std::vector<Row>;
+
+  // Adds objects, and the parts of compounds: a part has the layers that both it and its compound have, the rotation of
+  // the compound after its own, and its position in the axes of the compound.
+  void add_objects(const std::vector<Object>& objects) {
+    for (const Object& object : objects) {
+      wholes_.push_back({object, kNoTriangle, object.shape});
+      if (object.compound == nullptr) {
+        objects_.push_back(wholes_.back());
+        continue;
+      }
+      for (uint32_t number = 0; number < object.compound->parts().size(); ++number) {
+        const Part& part = object.compound->parts()[number];
+        OracleObject one = {object, number, object.shape};
+        one.layers = object.layers & part.layers;
+        one.compound = nullptr;
+        one.shape.kind = part.kind;
+        one.shape.size = part.size;
+        one.shape.radius = part.radius;
+        one.shape.position =
+            object.shape.position + rotation_of(object.shape.rotation).to_world(to_double(part.position));
+        one.shape.rotation = after(object.shape.rotation, part.rotation);
+        objects_.push_back(one);
+      }
+    }
+  }
+  // Returns the rotation by `first`, then by `second`.
+  static Quaternion after(const Quaternion& second, const Quaternion& first) {
+    const Vec3d a = {second.x, second.y, second.z}, b = {first.x, first.y, first.z};
+    const double aw = second.w, bw = first.w;
+    const double x = aw * b.x + a.x * bw + a.y * b.z - a.z * b.y, y = aw * b.y - a.x * b.z + a.y * bw + a.z * b.x,
+                 z = aw * b.z + a.x * b.y - a.y * b.x + a.z * bw, w = aw * bw - a.x * b.x - a.y * b.y - a.z * b.z;
+    const double n = std::sqrt(x * x + y * y + z * z + w * w);
+    return {static_cast<float>(x / n), static_cast<float>(y / n), static_cast<float>(z / n), static_cast<float>(w / n)};
+  }
+  const OracleObject* whole_of(Id id) const {
+    for (const OracleObject& object : wholes_)
+      if (object.id == id) return &object;
+    return nullptr;
+  }
+  // Keeps, of the rows of each compound, only the nearest; of equally near rows, that of the lowest part.
+  static void keep_nearest_parts(Rows& rows) {
+    const auto is_beaten = [rows](const Row& row) {
+      return row.object != nullptr && std::any_of(rows.begin(), rows.end(), [&row](const Row& other) {
+               return other.id == row.id && std::tie(other.t, other.triangle) < std::tie(row.t, row.triangle);
+             });
+    };
+    std::erase_if(rows, is_beaten);
+  }
 
   static float entry_of(double near) {
     return near <= 0 ? 0.0f
@@ -63,7 +122,7 @@ class OracleScene {
   // Returns the position of the anchor of query `i`; nullopt if the scene does not contain the anchor.
   std::optional<Vec3d> anchor(const QueryBlock& block, size_t i) const {
     const uint64_t id = entry_for(block.anchor_ids, i, uint64_t{0});
-    for (const Object& object : objects_)
+    for (const OracleObject& object : wholes_)
       if (object.id == id) return object.shape.position;
     for (const Instance* instance : instances_)
       if (instance->id == id) return instance->transform.translation;
@@ -192,8 +251,8 @@ class OracleScene {
     Quaternion rotation{0, 0, 0, 0};
     if (row.object != nullptr) {
       write_labels(*row.object, columns, result);
-      position = row.object->shape.position;
-      rotation = row.object->shape.rotation;
+      position = row.object->whole.position;
+      rotation = row.object->whole.rotation;
     } else if (row.instance != nullptr) {
       write_labels(*row.instance, columns, result);
       position = row.instance->transform.translation;
@@ -223,7 +282,8 @@ class OracleScene {
 
   const bool clockwise_;
   std::vector<const Instance*> instances_;
-  std::vector<Object> objects_;
+  std::vector<OracleObject> objects_;  // objects without parts, and the parts of compounds
+  std::vector<OracleObject> wholes_;   // all objects
   std::map<const StaticMesh*, std::vector<uint32_t>> storage_;
 };
 

@@ -67,7 +67,7 @@ class QueryOracle : public RayOracle {
       for (const Instance* instance : instances_)
         if (block.source != Source::kDynamic && wanted(block, i, *instance))
           near_rows(from, *instance, true, conservative, rows);
-      for (const Object& object : objects_)
+      for (const OracleObject& object : objects_)
         if (block.source != Source::kStatic && wanted(block, i, object)) near_row(from, object, conservative, rows);
       const float farthest = entry_for(cells.max_distances, i, 0.0f);
       std::erase_if(rows, [&](const Row& row) { return row.t > farthest; });
@@ -206,11 +206,19 @@ class QueryOracle : public RayOracle {
     for (const Instance* instance : instances_)
       if (block.source != Source::kDynamic && instance->id > block.after_id && wanted(block, i, *instance))
         overlap_rows(block, detail, solid, *instance, rows);
-    for (const Object& object : objects_) {
+    Rows of_objects;
+    for (const OracleObject& object : objects_) {
       if (block.source == Source::kStatic || object.id <= block.after_id || !wanted(block, i, object)) continue;
       if (!meets(solid, bounds_of(object.shape))) continue;
       if (block.precision == Precision::kExact && !meets(solid, object.shape)) continue;
-      rows.push_back({0, object.id, kNoTriangle, 0, &object, nullptr, 0, 0, {}, {}});
+      of_objects.push_back({0, object.id, object.part, 0, &object, nullptr, 0, 0, {}, {}});
+      if constexpr (!std::is_same_v<Solid, ConvexRegion>)
+        of_objects.back().t = static_cast<float>(contact_of(of_objects.back(), block, solid).distance) + 0.0f;
+    }
+    if (detail == StaticDetail::kInstances) keep_nearest_parts(of_objects);
+    for (Row& row : of_objects) {
+      row.t = 0;
+      rows.push_back(row);
     }
     std::sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) {
       return std::tie(a.id, a.storage, a.triangle) < std::tie(b.id, b.storage, b.triangle);
@@ -222,13 +230,10 @@ class QueryOracle : public RayOracle {
     }
   }
 
-  // Writes the contact of a ball, capsule or box with the row's object or triangle. If the row is a whole instance,
-  // writes the contact with the nearest triangle that the solid overlaps. Conservative answers use bounds.
+  // Returns the contact of a ball, capsule or box with the row's object or triangle. If the row is a whole instance,
+  // returns the contact with the nearest triangle that the solid overlaps. Conservative answers use bounds.
   template <class Solid>
-  static void write_contact(const Row& row, const QueryBlock& block, const Solid& solid, BlockResult& result) {
-    const ColumnSet columns = columns_of(block);
-    if (!columns.has(Column::kT) && !columns.has(Column::kNormal) && !columns.has(Column::kPoint)) return;
-    Hit hit;
+  static Contact contact_of(const Row& row, const QueryBlock& block, const Solid& solid) {
     const Mover mover = resting(solid);
     Contact contact;
     const bool exactly = block.precision == Precision::kExact;
@@ -260,6 +265,15 @@ class QueryOracle : public RayOracle {
                                               (bounds.max - bounds.min) * 0.5);
       contact = {std::is_same_v<Solid, Obbd> ? 0 : std::sqrt(pair.squared_distance), pair.on_primitive, {}};
     }
+    return contact;
+  }
+
+  template <class Solid>
+  static void write_contact(const Row& row, const QueryBlock& block, const Solid& solid, BlockResult& result) {
+    const ColumnSet columns = columns_of(block);
+    if (!columns.has(Column::kT) && !columns.has(Column::kNormal) && !columns.has(Column::kPoint)) return;
+    const Mover mover = resting(solid);
+    const Contact contact = contact_of(row, block, solid);
     if (columns.has(Column::kT)) result.t.back() = static_cast<float>(contact.distance) + 0.0f;
     if (columns.has(Column::kNormal)) write_vector(to_float(contact.normal + Vec3d{}), result.normals);
     if (columns.has(Column::kPoint))
@@ -309,7 +323,7 @@ class QueryOracle : public RayOracle {
       Rows rows;
       for (const Instance* instance : instances_)
         if (wants(*instance)) rows.push_back({0, instance->id, kNoTriangle, 0, nullptr, instance, 0, 0, {}, {}});
-      for (const Object& object : objects_)
+      for (const OracleObject& object : wholes_)
         if (wants(object)) rows.push_back({0, object.id, kNoTriangle, 0, &object, nullptr, 0, 0, {}, {}});
       std::sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.id < b.id; });
       return rows;
@@ -383,13 +397,13 @@ class QueryOracle : public RayOracle {
     result.uvs.insert(result.uvs.end(), {u, v});
   }
 
-  static void near_row(Vec3d point, const Object& object, bool conservative, Rows& rows) {
+  static void near_row(Vec3d point, const OracleObject& object, bool conservative, Rows& rows) {
     const Aabbd bounds = bounds_of(object.shape);
     const double away = conservative ? std::sqrt(squared_distance(point, bounds)) : distance(point, object.shape);
     Shape around = object.shape;
     around.position = around.position - point;
     const Vec3d way = conservative ? nearest_in(point, bounds) - point : nearest_on_shape({}, around);
-    rows.push_back({entry_of(away), object.id, kNoTriangle, 0, &object, nullptr, 0, 0, way, {}});
+    rows.push_back({entry_of(away), object.id, object.part, 0, &object, nullptr, 0, 0, way, {}});
   }
 
   void answer_kind(const QueryBlock& block, const NearestColumns& nearest, BlockResult& result) const {
@@ -401,8 +415,11 @@ class QueryOracle : public RayOracle {
       for (const Instance* instance : instances_)
         if (block.source != Source::kDynamic && wanted(block, i, *instance))
           near_rows(from, *instance, every_triangle, conservative, rows);
-      for (const Object& object : objects_)
-        if (block.source != Source::kStatic && wanted(block, i, object)) near_row(from, object, conservative, rows);
+      Rows near;
+      for (const OracleObject& object : objects_)
+        if (block.source != Source::kStatic && wanted(block, i, object)) near_row(from, object, conservative, near);
+      if (!every_triangle) keep_nearest_parts(near);
+      rows.insert(rows.end(), near.begin(), near.end());
       const float farthest = entry_for(nearest.max_distances, i, std::numeric_limits<float>::infinity());
       std::erase_if(rows, [&](const Row& row) { return row.t > farthest; });
       keep_behind(nearest.after, i, rows);

@@ -32,6 +32,7 @@ struct QueryWorld {
   Winding winding = Winding::kCounterClockwise;
   std::vector<PlacedMesh> instances;
   std::vector<Object> objects;
+  std::vector<CompoundPtr> compounds;  // owns the compounds of `objects`
 };
 
 // Makes a mesh in which the number of a triangle is its index in `triangles`.
@@ -70,6 +71,14 @@ inline InsertColumns columns_of(const Object& object) {
   columns.layers = {&object.layers, 1};
   columns.groups = {&object.group, 1};
   columns.tags = {&object.tag, 1};
+  if (object.compound == nullptr) return columns;
+  for (const Part& part : object.compound->parts())
+    columns.parts.push_back({part.kind,
+                             {&part.position.x, 3},
+                             {&part.rotation.x, 4},
+                             {&part.radius, 1},
+                             {&part.size.x, 3},
+                             {&part.layers, 1}});
   return columns;
 }
 

@@ -4,6 +4,7 @@
 #ifndef LOCUS_TESTS_SUPPORT_RANDOM_QUERY_H_
 #define LOCUS_TESTS_SUPPORT_RANDOM_QUERY_H_
 
+#include <algorithm>
 #include <limits>
 #include <string>
 #include <utility>
@@ -13,6 +14,7 @@
 #include "tests/support/grid_scenes.h"
 #include "tests/support/owned_block.h"
 #include "tests/support/query_world.h"
+#include "tests/support/random_compound.h"
 #include "tests/support/scene_sketch.h"
 #include "tests/support/small_world.h"
 
@@ -543,6 +545,18 @@ inline OwnedBlock lookup_block(const QueryScene& scene, Random& random) {
   return block;
 }
 
+// Turns some objects of some scenes into compounds of which the object's own shape is a part.
+inline void add_compounds(Random& random, QueryWorld& world) {
+  if (random.chance(0.6)) return;
+  const double share = random.chance(0.3) ? 1 : 0.3;
+  for (Object& object : world.objects) {
+    if (object.shape.kind == ShapeKind::kPoint || !random.chance(share)) continue;
+    world.compounds.push_back(compound_around(random, object.shape));
+    object.compound = world.compounds.back().get();
+    object.shape = {ShapeKind::kCompound, object.shape.position, object.shape.rotation, {}, 0};
+  }
+}
+
 }  // namespace internal
 
 inline QueryScene query_scene(const SceneSketch& sketch, Random& random) {
@@ -567,6 +581,7 @@ inline QueryScene query_scene(const SceneSketch& sketch, Random& random) {
   scene.blocks.push_back(internal::sight_block(scene, sketch, random));
   scene.blocks.push_back(internal::pair_block(scene, random));
   if (!sketch.balls.empty()) scene.blocks.push_back(internal::cell_block(scene, sketch, random));
+  internal::add_compounds(random, scene.world);
   return scene;
 }
 

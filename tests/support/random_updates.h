@@ -37,6 +37,7 @@ class RandomUpdates {
   uint64_t draw_writer() { return 1 + random_.below(3) + 3 * (drawn_ / 100); }
 
  private:
+  static constexpr size_t kParts = 3;  // usual number of parts of a compound
   static constexpr Vec3d kFrames[] = {{}, {}, {1e6, -3, 0.1}, {-5e8, 5e8, 1e9}};
 
   // Generates the columns of a batch, and the settings that each message has.
@@ -123,7 +124,8 @@ class RandomUpdates {
     const size_t n = 1 + random_.below(items);
     InsertColumns insert;
     insert.ids = columns.ids(draw_ids(n));
-    insert.kind = static_cast<ShapeKind>(random_.below(4));
+    insert.kind = static_cast<ShapeKind>(random_.below(5));
+    if (insert.kind == ShapeKind::kCompound) draw_parts(columns, insert);
     draw_pose(columns, n, insert);
     insert.extents = columns.floats(draw_column<float>(n, [this] { return draw_size(); }));
     insert.radii = columns.floats(draw_column<float>(n, [this] { return std::vector<double>{draw_size()[0]}; }));
@@ -145,7 +147,42 @@ class RandomUpdates {
     move.ids = columns.ids(draw_ids(n));
     draw_pose(columns, n, move);
     move.teleport = random_.chance(0.2);
+    if (random_.chance(0.2)) draw_part_poses(columns, n, move);
     return move;
+  }
+
+  // Generates the parts of compounds: usually kParts parts, so that moves with new poses of parts often fit.
+  void draw_parts(Columns& columns, InsertColumns& insert) {
+    for (size_t left = random_.chance(0.8) ? kParts : 1 + random_.below(limits::kMaxParts); left > 0;) {
+      const size_t n = 1 + random_.below(left);
+      PartColumns parts;
+      parts.kind = static_cast<ShapeKind>(1 + random_.below(3));
+      std::vector<float> positions;
+      for (size_t i = 0; i < n; ++i)
+        for (const double value : draw_position())
+          positions.push_back(static_cast<float>(random_.chance(0.003) ? bad_number() : value));
+      parts.positions = columns.floats(std::move(positions));
+      if (random_.chance(0.5))
+        parts.rotations = columns.floats(draw_column<float>(n, [this] { return draw_rotation(); }));
+      parts.extents = columns.floats(draw_column<float>(n, [this] { return draw_size(); }));
+      parts.radii = columns.floats(draw_column<float>(n, [this] { return std::vector<double>{draw_size()[0]}; }));
+      if (random_.chance(0.3)) parts.layers = columns.words(draw_labels<uint32_t>(random_.chance(0.5) ? 1 : n));
+      insert.parts.push_back(parts);
+      left -= n;
+    }
+  }
+  void draw_part_poses(Columns& columns, size_t n, MoveColumns& move) {
+    move.parts_each = static_cast<uint32_t>(random_.chance(0.9) ? kParts : 1 + random_.below(limits::kMaxParts));
+    const size_t entries = move.parts_each * (random_.chance(0.5) ? n : 1);
+    std::vector<float> positions, rotations;
+    for (size_t i = 0; i < entries; ++i) {
+      for (const double value : draw_position())
+        positions.push_back(static_cast<float>(random_.chance(0.002) ? bad_number() : value));
+      for (const double value : draw_rotation()) rotations.push_back(static_cast<float>(value));
+    }
+    const bool both = random_.chance(0.3), first = random_.chance(0.5);
+    if (both || first) move.part_positions = columns.floats(std::move(positions));
+    if (both || !first) move.part_rotations = columns.floats(std::move(rotations));
   }
 
   InstanceMoveColumns draw_instance_move(Columns& columns, size_t items) {

@@ -24,6 +24,7 @@
 #include "tests/support/owned_block.h"
 #include "tests/support/query_oracle.h"
 #include "tests/support/random.h"
+#include "tests/support/random_compound.h"
 #include "tests/support/scene_model.h"
 #include "tests/support/threads.h"
 
@@ -81,6 +82,7 @@ class RewindLockstep {
 
  private:
   static constexpr uint64_t kIds = 400;
+  static constexpr uint32_t kParts = 3;  // parts of each compound
 
   SceneSpec spec() const {
     SceneSpec spec;
@@ -123,6 +125,14 @@ class RewindLockstep {
     move.positions_f64 = columns_.doubles(std::move(positions));
     if (random_.chance(0.3)) move.rotations = columns_.floats(std::move(rotations));
     move.teleport = teleport;
+    if (random_.chance(0.2)) {  // new poses of parts, for all objects or for each
+      move.parts_each = kParts;
+      std::vector<float> places;
+      for (size_t i = (random_.chance(0.5) ? 1 : ids.size()) * kParts; i > 0; --i)
+        append(places, random_.float_vector(random_.chance(0.1) ? 30 : 2));
+      move.part_positions = columns_.floats(std::move(places));
+      if (ids.empty()) move.parts_each = 0, move.part_positions = {};
+    }
     return move;
   }
 
@@ -142,10 +152,24 @@ class RewindLockstep {
     std::vector<uint64_t> expire_ticks;
     for (size_t i = 0; i < ids.size(); ++i) expire_ticks.push_back(random_.chance(0.7) ? 0 : random_.below(8));
     if (random_.chance(0.5)) insert.expire_ticks = columns_.ids(std::move(expire_ticks));
-    insert.kind = static_cast<ShapeKind>(random_.below(4));
+    insert.kind = static_cast<ShapeKind>(random_.below(5));
+    if (insert.kind == ShapeKind::kCompound) add_parts(insert);
     insert.radii = columns_.floats({random_.float_between(0, 2)});
     insert.extents = columns_.floats({random_.float_between(0, 2), random_.float_between(0, 1), 0.5f});
     return insert;
+  }
+
+  void add_parts(InsertColumns& insert) {
+    for (uint32_t i = 0; i < kParts; ++i) {
+      const Part part = random_part(random_, 1);
+      PartColumns columns;
+      columns.kind = part.kind;
+      columns.positions = columns_.floats({part.position.x, part.position.y, part.position.z});
+      columns.rotations = columns_.floats({part.rotation.x, part.rotation.y, part.rotation.z, part.rotation.w});
+      columns.radii = columns_.floats({part.radius});
+      columns.extents = columns_.floats({part.size.x, part.size.y, part.size.z});
+      insert.parts.push_back(columns);
+    }
   }
 
   // Generates a batch. Most batches contain only moves, and most of these batches move every object.
@@ -240,6 +264,7 @@ class RewindLockstep {
     if (!any)
       for (const Column column : {Column::kId, Column::kTag, Column::kPose}) block.settings.columns.add(column);
     if (kind == 2 && !any) block.settings.columns.add(Column::kNormal);
+    if ((kind < 3 || kind == 5) && !any) block.settings.columns.add(Column::kTriangle);
     if ((kind == 2 && !any) || kind == 5) block.settings.columns.add(Column::kT);
     if (kind == 5) block.settings.columns.add(Column::kPoint);
   }

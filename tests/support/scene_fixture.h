@@ -61,6 +61,16 @@ class SceneFixture : public ::testing::Test {
     return insert;
   }
 
+  // Returns compounds at the origin whose parts are balls.
+  InsertColumns compounds(std::vector<Id> ids, std::vector<float> part_positions, std::vector<float> radii) {
+    InsertColumns insert = points(std::move(ids), {0, 0, 0});
+    insert.kind = ShapeKind::kCompound;
+    PartColumns& parts = insert.parts.emplace_back();
+    parts.positions = columns_.floats(std::move(part_positions));
+    parts.radii = columns_.floats(std::move(radii));
+    return insert;
+  }
+
   static UpdateBatch with(InsertColumns insert) {
     UpdateBatch batch;
     batch.inserts.push_back(insert);

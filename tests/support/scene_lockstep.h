@@ -86,7 +86,7 @@ class SceneLockstep {
     std::vector<Object> found;
     ball_overlap(snapshot.objects, ball, found);
     size_t expected = 0;
-    for (const auto& [id, object] : model.objects()) expected += ball_overlaps(ball, object.shape);
+    for (const auto& [id, object] : model.objects()) expected += PrimitiveTraits<Object>::ball(object, ball);
     if (found.size() != expected) return "objects that a ball finds";
     for (const Object& object : found) {
       const auto known = model.objects().find(object.id);

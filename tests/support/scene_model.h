@@ -302,6 +302,74 @@ class SceneModel {
     if (!columns.tags.empty()) object.tag = *entry(columns.tags, 1, i);
   }
 
+  // Reads the parts of a compound one after the other.
+  Fault read_parts(const InsertColumns& columns, Object& object) {
+    std::vector<Part> parts;
+    bool have_layers = false;
+    for (size_t list = 0; list < columns.parts.size(); ++list) {
+      const PartColumns& one = columns.parts[list];
+      have_layers = have_layers || !one.layers.empty();
+      for (size_t k = 0; k < one.positions.size() / 3; ++k) {
+        InsertColumns shapes;
+        shapes.kind = one.kind;
+        shapes.radii = one.radii;
+        shapes.extents = one.extents;
+        Shape shape;
+        Fault fault = read_shape(shapes, k, shape);
+        Part part{one.kind, {}, {}, shape.size, shape.radius, kAllLayers};
+        if (fault.first.empty()) fault = read_part_pose(&one.positions[3 * k], nullptr, ".positions", "", part);
+        if (fault.first.empty() && !one.rotations.empty())
+          fault = read_part_pose(nullptr, entry(one.rotations, 4, k), "", ".rotations", part);
+        if (!fault.first.empty()) return {".compound.parts[" + std::to_string(list) + "]" + fault.first, fault.second};
+        if (!one.layers.empty()) part.layers = *entry(one.layers, 1, k);
+        parts.push_back(part);
+      }
+    }
+    Layers all = 0;
+    for (const Part& part : parts) all |= part.layers;
+    if (have_layers) object.layers = all;
+    keep_parts(std::move(parts), object);
+    return {};
+  }
+  // Reads the position or the rotation of a part; null keeps it.
+  static Fault read_part_pose(const float* position, const float* q, const char* positions, const char* rotations,
+                              Part& part) {
+    if (position != nullptr) {
+      if (const Reason reason = judge(position, 3, -1e9); reason != Reason::kUnspecified) return {positions, reason};
+      part.position = {position[0], position[1], position[2]};
+    }
+    if (q == nullptr) return {};
+    const double length =
+        std::sqrt(double{q[0]} * q[0] + double{q[1]} * q[1] + double{q[2]} * q[2] + double{q[3]} * q[3]);
+    if (!std::isfinite(length)) return {rotations, Reason::kNotFinite};
+    if (std::abs(length - 1) > 1e-3) return {rotations, Reason::kOutOfRange};
+    part.rotation = normalized({q[0], q[1], q[2], q[3]});
+    return {};
+  }
+  void keep_parts(std::vector<Part> parts, Object& object) {
+    compounds_.push_back(Compound::make(std::move(parts)));
+    object.compound = compounds_.back().get();
+  }
+  // Gives the parts of a compound the poses of item `i`.
+  Fault move_parts(const MoveColumns& columns, size_t i, Object& object) {
+    const size_t count = columns.parts_each;
+    if (object.compound == nullptr || object.compound->parts().size() != count)
+      return {".parts_each", Reason::kOutOfRange};
+    std::vector<Part> parts = object.compound->parts();
+    for (size_t k = 0; k < count && !columns.part_positions.empty(); ++k) {
+      const Fault fault =
+          read_part_pose(entry(columns.part_positions, 3 * count, i) + 3 * k, nullptr, ".part_positions", "", parts[k]);
+      if (!fault.first.empty()) return fault;
+    }
+    for (size_t k = 0; k < count && !columns.part_rotations.empty(); ++k) {
+      const Fault fault =
+          read_part_pose(nullptr, entry(columns.part_rotations, 4 * count, i) + 4 * k, "", ".part_rotations", parts[k]);
+      if (!fault.first.empty()) return fault;
+    }
+    keep_parts(std::move(parts), object);
+    return {};
+  }
+
   void insert(const UpdateBatch& batch, const InsertColumns& columns, size_t i, const std::string& field) {
     Object object;
     object.id = columns.ids[i];
@@ -313,6 +381,7 @@ class SceneModel {
     } else {
       fault = read_pose(batch, columns, i, object.shape);
       if (fault.first.empty()) fault = read_shape(columns, i, object.shape);
+      if (fault.first.empty() && columns.kind == ShapeKind::kCompound) fault = read_parts(columns, object);
     }
     const uint64_t expire_ticks = columns.expire_ticks.empty() ? 0 : *entry(columns.expire_ticks, 1, i);
     if (fault.first.empty() && expire_ticks > uint64_t{1} << 48) fault = {".expire_ticks", Reason::kOutOfRange};
@@ -327,9 +396,10 @@ class SceneModel {
     const Id id = columns.ids[i];
     const auto known = next_.find(id);
     if (known == next_.end()) return count(Reason::kUnknownId, field + ".ids", i, id);
-    Shape shape = known->second.shape;
-    const Fault fault = read_pose(batch, columns, i, shape);
-    if (fault.first.empty()) known->second.shape = shape;
+    Object object = known->second;
+    Fault fault = read_pose(batch, columns, i, object.shape);
+    if (fault.first.empty() && columns.parts_each != 0) fault = move_parts(columns, i, object);
+    if (fault.first.empty()) known->second = object;
     if (fault.first.empty() && columns.teleport) next_lifetimes_[id] = ++last_life_;
     count(fault.second, field + fault.first, i, id);
   }
@@ -383,8 +453,9 @@ class SceneModel {
   Ends ends_, next_ends_;
   bool ends_change_ = false;  // the batch changes the expiry of an object that it does not otherwise change
   std::map<uint64_t, uint32_t> leases_;
-  uint64_t owner_ = 0;    // owner of the objects that the batch inserts
-  uint32_t message_ = 0;  // index of the message that is being applied
+  uint64_t owner_ = 0;                  // owner of the objects that the batch inserts
+  uint32_t message_ = 0;                // index of the message that is being applied
+  std::vector<CompoundPtr> compounds_;  // owns the compounds of all states
   UpdateAck ack_;
   uint64_t revision_ = 0;
   uint64_t tick_ = 0;

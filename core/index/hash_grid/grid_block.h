@@ -12,6 +12,7 @@
 #define LOCUS_CORE_INDEX_HASH_GRID_GRID_BLOCK_H_
 
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -33,12 +34,22 @@ struct GridEntry {
 };
 static_assert(sizeof(GridEntry) == 56);
 
+class Compound;
+
 // Rotation, size and radius of a shape, as in Shape. Most values have the default form, so a block may omit the forms
 // if all its values have the default form.
 struct GridForm {
   Quaternion rotation;
   Vec3f size;
   float radius = 0;  // 0 for balls, whose radius is their extent
+
+  // Return the form of a compound, which stores the address of the compound in place of a size, and this address. So
+  // the form of every shape has 32 bytes. A form does not own its compound.
+  static GridForm of_compound(const Quaternion& rotation, const Compound* compound) {
+    const auto halves = std::bit_cast<std::array<float, 2>>(compound);
+    return {rotation, {1, halves[0], halves[1]}, 0};  // the 1 distinguishes the form from the default form
+  }
+  const Compound* compound() const { return std::bit_cast<const Compound*>(std::array<float, 2>{size.y, size.z}); }
 
   friend constexpr bool operator==(const GridForm&, const GridForm&) = default;
 };

@@ -93,12 +93,10 @@ OverlapAnswer run_contains(QueryTask& task, const SceneAtTime& moment, Vec3d poi
     InstancesAround visitor(task, point, options, filter, rows);
     task.visit_region(moment.statics().tree(), visitor);
   }
+  const bool may_find_objects = options.source != Source::kStatic && moment.objects().size() != 0 && !task.ended();
+  if (may_find_objects) find_objects_around(task, moment, Balld{point, 0}, options, filter, rows);
   OverlapAnswer answer = rows.finish();
-  if (options.source == Source::kStatic || moment.objects().size() == 0 || task.ended()) return answer;
-  OverlapOptions of_objects = options;
-  of_objects.source = Source::kDynamic;
-  run_ball(task, moment, Balld{point, 0}, of_objects, filter);
-  add_objects(answer, task.found_objects(), moment, options);
+  if (may_find_objects) add_objects(answer, task.found_objects(), moment, options);
   return answer;
 }
 

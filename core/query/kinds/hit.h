@@ -21,23 +21,35 @@ struct Hit {
   // Miss: infinity.
   float t = std::numeric_limits<float>::infinity();
   Id id = kNoId;                        // id of the object or instance; 0: the hit is a miss
-  uint32_t triangle = kNoTriangle;      // index of the triangle in the uploaded mesh
+  uint32_t triangle = kNoTriangle;      // index of the triangle in the uploaded mesh, or number of a compound's part
   GridRef object;                       // null for an instance and for a miss
   const Instance* instance = nullptr;   // null for an object and for a miss
   const SceneAtTime* moment = nullptr;  // time at which the object was found; null: the snapshot's latest state
 
-  // Returns the object's shape at the time at which the object was found. Precondition: the hit is on an object.
+  // Returns the object's shape at the time at which the object was found. For a hit on a part of a compound, returns
+  // the shape of the part. Precondition: the hit is on an object.
   Shape object_shape() const {
+    const Shape shape = whole_shape();
+    if (shape.kind != ShapeKind::kCompound || triangle == kNoTriangle) return shape;
+    return PlacedCompound(*compound_of(object), shape.position, shape.rotation).shape(triangle);
+  }
+  // Returns the object's shape like object_shape(), but for a hit on a part the shape of the whole compound, which has
+  // only a position and a rotation.
+  Shape whole_shape() const {
     LOCUS_DCHECK(static_cast<bool>(object));
     return moment == nullptr ? shape_of(object) : moment->shape(object);
   }
 };
 
 // Return a hit at `t`. The first function returns a hit on an object in the snapshot's latest state. The second returns
-// a hit on an object at the time `moment`, which the hit borrows. The third returns a hit on an instance.
+// a hit on an object at the time `moment`, which the hit borrows. hit_on_part() returns a hit on a part of a compound.
+// The last returns a hit on an instance.
 inline Hit hit_on(const GridRef& object, float t) { return {t, object.entry().id, kNoTriangle, object}; }
 inline Hit hit_on(const GridRef& object, float t, const SceneAtTime& moment) {
   return {t, object.entry().id, kNoTriangle, object, nullptr, &moment};
+}
+inline Hit hit_on_part(const GridRef& object, uint32_t part, float t, const SceneAtTime& moment) {
+  return {t, object.entry().id, part, object, nullptr, &moment};
 }
 inline Hit hit_on(const Instance& instance, float t) { return {t, instance.id, kNoTriangle, GridRef(), &instance}; }
 

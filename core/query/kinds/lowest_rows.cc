@@ -93,4 +93,27 @@ OverlapAnswer LowestRows::finish() {
   return {std::move(runs_), std::move(triangles_), {}, count_, truncated_};
 }
 
+void add_objects(OverlapAnswer& answer, FoundObjects& found, const SceneAtTime& moment, const OverlapOptions& options) {
+  const absl::Span<const FoundObject> objects = found.finish();
+  answer.count += found.count();
+  if (options.count_only == CountOnly::kYes) return;
+  if (answer.runs.empty()) {
+    answer.objects = objects;
+    answer.truncated |= found.truncated();
+    return;
+  }
+  if (objects.empty()) return;
+  LowestRows rows(options.max_results, options.detail == StaticDetail::kTrianglesSorted);
+  for (const RowRun& run : answer.runs) {
+    if (run.triangle_count == 0)
+      rows.offer(run.row);
+    else
+      rows.offer(run.row, answer.triangles_of(run));
+  }
+  for (const FoundObject& found_object : objects) rows.offer(hit_on(found_object.object, 0, moment));
+  const bool truncated = answer.truncated || found.truncated();
+  answer = rows.finish();
+  answer.truncated |= truncated;
+}
+
 }  // namespace locus

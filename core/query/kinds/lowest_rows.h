@@ -9,10 +9,11 @@
 #include "absl/types/span.h"
 #include "core/query/kinds/found_objects.h"
 #include "core/query/kinds/hit.h"
+#include "core/query/kinds/overlap_columns.h"
 
 namespace locus {
 
-// Single row, or consecutive rows of one instance that differ only in the triangle.
+// Single row, or consecutive rows of one instance or compound that differ only in the triangle or part.
 struct RowRun {
   Hit row;                    // t is 0; triangle is not set
   size_t first_triangle = 0;  // index of the run's first triangle in OverlapAnswer::triangles
@@ -48,8 +49,8 @@ class LowestRows {
 
   // Adds a row without a triangle.
   void offer(const Hit& row);
-  // Adds one row for each entry of `triangles`, which are triangles of the instance of `row`. Several calls for one
-  // instance must pass its triangles in storage order.
+  // Adds one row for each entry of `triangles`, which are triangles of the instance, or parts of the compound, of
+  // `row`. Several calls for one instance must pass its triangles in storage order.
   void offer(const Hit& row, absl::Span<const uint32_t> triangles);
   // Returns the retained rows, ascending by id, and empties the collector. Call it once.
   OverlapAnswer finish();
@@ -72,6 +73,10 @@ class LowestRows {
   std::vector<RowRun> runs_;
   std::vector<uint32_t> triangles_;
 };
+
+// Adds the objects in `found` to `answer`, which has the rows of instances: retains at most options.max_results rows,
+// ascending by id. With count_only, only adds to the number of rows.
+void add_objects(OverlapAnswer& answer, FoundObjects& found, const SceneAtTime& moment, const OverlapOptions& options);
 
 }  // namespace locus
 

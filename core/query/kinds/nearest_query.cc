@@ -9,6 +9,7 @@
 #include "core/geometry/point_triangle.h"
 #include "core/query/kinds/hit_collector.h"
 #include "core/query/kinds/nearest_triangles.h"
+#include "core/query/kinds/object_parts.h"
 #include "core/query/kinds/placed_triangle.h"
 
 namespace locus {
@@ -109,15 +110,35 @@ class ObjectsNear {
   bool visit(const GridRef& object) {
     if (!task_.count_test()) return false;
     if (!filter_.accepts(object.entry())) return true;
-    const Shape shape = moment_.shape(object);
-    const double distance_to_object = request_.precision == Precision::kConservative
-                                          ? std::sqrt(squared_distance(request_.point, bounds_of(shape)))
-                                          : distance(request_.point, shape);
-    rows_.offer(hit_on(object, rounded_distance(distance_to_object), moment_));
+    if (has_parts(object)) return visit_parts(object);
+    rows_.offer(hit_on(object, distance_to(moment_.shape(object)), moment_));
     return true;
   }
 
  private:
+  float distance_to(const Shape& shape) const {
+    return rounded_distance(request_.precision == Precision::kConservative
+                                ? std::sqrt(squared_distance(request_.point, bounds_of(shape)))
+                                : distance(request_.point, shape));
+  }
+  // Offers a row for each part of a compound, or one row for its nearest part.
+  bool visit_parts(const GridRef& object) {
+    Hit nearest;
+    for_each_part(moment_, object, filter_.layers(), [&](const PlacedCompound::PlacedPart& part) {
+      if (squared_distance(request_.point, part.loose_bounds()) > rows_.limit()) return true;
+      ++task_.work().tests;
+      if (!task_.count_test()) return false;
+      const Hit row = hit_on_part(object, part.number(), distance_to(part.shape()), moment_);
+      if (request_.every_triangle)
+        rows_.offer(row);
+      else if (nearest.id == kNoId || nearer(row, nearest))
+        nearest = row;
+      return true;
+    });
+    if (nearest.id != kNoId) rows_.offer(nearest);
+    return !task_.ended();
+  }
+
   QueryTask& task_;
   const SceneAtTime& moment_;
   const NearestRequest& request_;

@@ -65,7 +65,7 @@ ObjectBoxes::ObjectBoxes(const ObjectSet& objects) {
   placed.reserve(objects.size());
   Aabbf bounds;
   objects.grid().for_each([&](const GridRef& object) {
-    placed.push_back({0, rounded_out(bounds_of(shape_of(object))), object});
+    placed.push_back({0, rounded_out(bounds_of(object, shape_of(object))), object});
     bounds = placed.size() == 1 ? placed[0].box : merge(bounds, placed.back().box);
     return true;
   });

@@ -1,14 +1,18 @@
 #include "core/query/kinds/overlap_contact.h"
 
 #include <cmath>
+#include <limits>
 
+#include "core/base/check.h"
 #include "core/geometry/nearest_pair.h"
 #include "core/geometry/sweep.h"
 #include "core/query/kinds/placed_triangle.h"
 
 namespace locus {
 
-Contact overlap_contact(const Mover& solid, Precision precision, const Hit& hit, uint32_t triangle) {
+Contact overlap_contact(const Mover& solid, Precision precision, const Hit& row, uint32_t triangle) {
+  Hit hit = row;
+  if (hit.object) hit.triangle = triangle;
   if (precision == Precision::kConservative) {
     Aabbd bounds;
     if (hit.object)
@@ -31,6 +35,19 @@ Contact overlap_contact(const Mover& solid, Precision precision, const Hit& hit,
   contact.point = transform.rotation.to_world(contact.point) * double{transform.scale};
   contact.normal = normalized(transform.rotation.to_world(contact.normal));
   return contact;
+}
+
+uint32_t nearest_part(const Mover& solid, Precision precision, const Hit& row, absl::Span<const uint32_t> parts) {
+  LOCUS_DCHECK(!parts.empty());
+  uint32_t nearest = parts[0];
+  float least = std::numeric_limits<float>::infinity();
+  for (const uint32_t part : parts) {
+    const auto distance = static_cast<float>(overlap_contact(solid, precision, row, part).distance);
+    if (!(distance < least)) continue;
+    least = distance;
+    nearest = part;
+  }
+  return nearest;
 }
 
 }  // namespace locus

@@ -9,6 +9,8 @@
 #include "core/geometry/segment.h"
 #include "core/geometry/sweep.h"
 #include "core/index/regions.h"
+#include "core/query/kinds/object_parts.h"
+#include "core/query/kinds/overlap_contact.h"
 #include "core/query/kinds/placed_triangle.h"
 #include "core/query/kinds/triangle_search.h"
 
@@ -202,13 +204,24 @@ GridRegion search_region(const SceneAtTime& moment, const typename Kind::World& 
   return moment.region(region.bounds(), options.precision == Precision::kExact ? Kind::as_ball(shape) : std::nullopt);
 }
 
-// Visitor of the moving objects that one ball, box, capsule or convex region may overlap.
+// Selects whether the rows of compounds name a part.
+enum class NameParts : uint8_t { kNo, kYes };
+
+// Visitor of the moving objects that one ball, box, capsule or convex region may overlap. Adds the rows of compounds to
+// a LowestRows, because they name parts, and the other objects to QueryTask::found_objects().
 template <class Kind>
 class ObjectRows {
  public:
   ObjectRows(QueryTask& task, const SceneAtTime& moment, const typename Kind::World& shape,
-             const OverlapOptions& options, const Filter& filter)
-      : task_(task), moment_(moment), shape_(shape), options_(options), filter_(filter), found_(task.found_objects()) {
+             const OverlapOptions& options, const Filter& filter, NameParts name_parts, LowestRows& rows)
+      : task_(task),
+        moment_(moment),
+        shape_(shape),
+        options_(options),
+        filter_(filter),
+        name_parts_(name_parts),
+        rows_(rows),
+        found_(task.found_objects()) {
     found_.restart(options.max_results, options.count_only);
   }
 
@@ -217,11 +230,41 @@ class ObjectRows {
   bool visit(const GridRef& object) {
     if (!task_.count_test()) return false;
     if (object.entry().id <= options_.after_id || !filter_.accepts(object.entry())) return true;
+    if (has_parts(object)) return visit_parts(object);
     if (overlaps(object)) found_.offer(object);
     return true;
   }
 
  private:
+  // Adds the rows of a compound: one for each part that the query overlaps, or one for the nearest of these parts.
+  bool visit_parts(const GridRef& object) {
+    const bool exact = options_.precision == Precision::kExact;
+    if (exact && verdict_by_bounds(object) == Verdict::kDisjoint) return true;
+    const bool one_row = options_.detail == StaticDetail::kInstances;
+    // The order of the parts needs no distance if all rows are returned, and regions have no distances.
+    const bool first_only = one_row && (name_parts_ == NameParts::kNo || options_.count_only == CountOnly::kYes ||
+                                        std::is_same_v<Kind, RegionShape>);
+    absl::InlinedVector<uint32_t, limits::kMaxParts> parts;
+    for_each_part(moment_, object, filter_.layers(), [&](const PlacedCompound::PlacedPart& part) {
+      if (!Kind::overlaps_bounds(shape_, part.loose_bounds())) return true;
+      ++task_.work().tests;
+      if (!task_.count_test()) return false;
+      const Shape shape = part.shape();
+      const bool found = exact ? Kind::overlaps_object(shape_, shape) : Kind::overlaps_bounds(shape_, bounds_of(shape));
+      if (found) parts.push_back(part.number());
+      return !(found && first_only);
+    });
+    if (parts.empty()) return !task_.ended();
+    if constexpr (!std::is_same_v<Kind, RegionShape>) {
+      if (one_row && parts.size() > 1)
+        parts = {nearest_part(resting(shape_), options_.precision, hit_on(object, 0, moment_), parts)};
+    }
+    if (name_parts_ == NameParts::kYes)
+      rows_.offer(hit_on(object, 0, moment_), parts);
+    else
+      rows_.offer(hit_on(object, 0, moment_));
+    return !task_.ended();
+  }
   // Returns the verdict for an object by its stored position and bounds. A convex region may contain many bricks, so
   // the planes near a brick are determined first, once for consecutive objects of the brick. Between two ticks, objects
   // may lie outside of their brick. A search by brute force must not depend on bricks.
@@ -253,6 +296,8 @@ class ObjectRows {
   const typename Kind::World& shape_;
   const OverlapOptions& options_;
   const Filter& filter_;
+  const NameParts name_parts_;
+  LowestRows& rows_;
   FoundObjects& found_;
   // Brick of the last object, and the planes near it. Only used for convex regions.
   uint32_t brick_ = std::numeric_limits<uint32_t>::max();
@@ -487,17 +532,23 @@ OverlapAnswer run_overlap(QueryTask& task, const SceneAtTime& moment, const type
     InstanceSearch<Kind> search(task, shape, options, filter, rows);
     task.visit_region(moment.statics().tree(), search);
   }
-  OverlapAnswer answer = rows.finish();
-  const bool may_find_objects = options.source != Source::kStatic && moment.objects().size() != 0;
-  if (may_find_objects && !task.ended()) {
-    ObjectRows<Kind> search(task, moment, shape, options, filter);
+  const bool may_find_objects = options.source != Source::kStatic && moment.objects().size() != 0 && !task.ended();
+  if (may_find_objects) {
+    ObjectRows<Kind> search(task, moment, shape, options, filter, NameParts::kYes, rows);
     task.visit_objects_in_region(moment, search);
-    add_objects(answer, task.found_objects(), moment, options);
   }
+  OverlapAnswer answer = rows.finish();
+  if (may_find_objects) add_objects(answer, task.found_objects(), moment, options);
   return answer;
 }
 
 }  // namespace
+
+void find_objects_around(QueryTask& task, const SceneAtTime& moment, const Balld& point, const OverlapOptions& options,
+                         const Filter& filter, LowestRows& rows) {
+  ObjectRows<BallShape> search(task, moment, point, options, filter, NameParts::kNo, rows);
+  task.visit_objects_in_region(moment, search);
+}
 
 uint32_t nearest_overlapping(QueryTask& task, const Balld& solid, const Instance& instance) {
   return search_nearest<BallShape>(task, solid, instance);
@@ -509,35 +560,6 @@ uint32_t nearest_overlapping(QueryTask& task, const Capsule& solid, const Instan
 
 uint32_t nearest_overlapping(QueryTask& task, const Obbd& solid, const Instance& instance) {
   return search_nearest<BoxShape>(task, solid, instance);
-}
-
-void add_objects(OverlapAnswer& answer, FoundObjects& found, const SceneAtTime& moment, const OverlapOptions& options) {
-  const absl::Span<const FoundObject> objects = found.finish();
-  answer.count += found.count();
-  if (options.count_only == CountOnly::kYes) return;
-  if (answer.runs.empty()) {
-    answer.objects = objects;
-    answer.truncated |= found.truncated();
-    return;
-  }
-  if (objects.empty()) return;
-  LowestRows rows(options.max_results, options.detail == StaticDetail::kTrianglesSorted);
-  for (const RowRun& run : answer.runs) {
-    if (run.triangle_count == 0)
-      rows.offer(run.row);
-    else
-      rows.offer(run.row, answer.triangles_of(run));
-  }
-  for (const FoundObject& found_object : objects) rows.offer(hit_on(found_object.object, 0, moment));
-  const bool truncated = answer.truncated || found.truncated();
-  answer = rows.finish();
-  answer.truncated |= truncated;
-}
-
-OverlapOptions overlap_options(const QueryBlock& block, StaticDetail detail) {
-  const uint32_t max_results = block.max_results == 0 ? limits::kDefaultMaxResults : block.max_results;
-  return {block.source, block.precision, detail,
-          max_results,  block.after_id,  block.count_only ? CountOnly::kYes : CountOnly::kNo};
 }
 
 OverlapAnswer run_ball(QueryTask& task, const SceneAtTime& moment, const Balld& ball, const OverlapOptions& options,
@@ -570,25 +592,6 @@ GridRegion box_region(const SceneAtTime& moment, const Obbd& box, const OverlapO
 
 GridRegion capsule_region(const SceneAtTime& moment, const Capsule& capsule, const OverlapOptions& options) {
   return search_region<CapsuleShape>(moment, capsule, options);
-}
-
-Balld ball_of(Vec3d origin, const BallColumns& balls, size_t i) {
-  LOCUS_DCHECK_LT(3 * i, balls.centers.size());
-  return {origin + read_vec3d(ColumnReader<float>(balls.centers, 3).entry(i)),
-          ColumnReader<float>(balls.radii, 1).value(i, 0)};
-}
-
-Obbd box_of(Vec3d origin, const BoxColumns& boxes, size_t i) {
-  LOCUS_DCHECK_LT(3 * i, boxes.centers.size());
-  return {origin + read_vec3d(ColumnReader<float>(boxes.centers, 3).entry(i)),
-          read_vec3d(ColumnReader<float>(boxes.half_extents, 3).entry(i)), rotation_entry(boxes.rotations, i)};
-}
-
-Capsule capsule_of(Vec3d origin, const CapsuleColumns& capsules, size_t i) {
-  LOCUS_DCHECK_LT(3 * i, capsules.starts.size());
-  const Vec3d start = origin + read_vec3d(ColumnReader<float>(capsules.starts, 3).entry(i));
-  const Vec3d end = origin + read_vec3d(ColumnReader<float>(capsules.ends, 3).entry(i));
-  return {(start + end) * 0.5, (end - start) * 0.5, ColumnReader<float>(capsules.radii, 1).value(i, 0)};
 }
 
 }  // namespace locus

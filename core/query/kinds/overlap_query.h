@@ -8,22 +8,10 @@
 #include "core/geometry/convex_region.h"
 #include "core/geometry/obb.h"
 #include "core/query/kinds/lowest_rows.h"
+#include "core/query/kinds/overlap_columns.h"
 #include "core/query/kinds/query_task.h"
 
 namespace locus {
-
-// Settings of a block that apply to each of its overlap queries.
-struct OverlapOptions {
-  Source source;
-  Precision precision;
-  StaticDetail detail;
-  uint32_t max_results;
-  Id after_id;
-  CountOnly count_only;
-};
-
-// Returns the options of a block. A max_results of 0 becomes limits::kDefaultMaxResults.
-OverlapOptions overlap_options(const QueryBlock& block, StaticDetail detail);
 
 // Answer one ball, box, capsule or region query, given in world axes. Objects are searched as of `moment`, which the
 // answer borrows. The memory of OverlapAnswer::objects belongs to `task` and is valid until the next query of the task.
@@ -38,6 +26,11 @@ OverlapAnswer run_capsule(QueryTask& task, const SceneAtTime& moment, const Caps
 OverlapAnswer run_region(QueryTask& task, const SceneAtTime& moment, const ConvexRegion& region,
                          const OverlapOptions& options, const Filter& filter);
 
+// Searches the objects that contain a point: `point` is a ball of radius 0. Adds a row for each compound to `rows`, and
+// all other objects to task.found_objects().
+void find_objects_around(QueryTask& task, const SceneAtTime& moment, const Balld& point, const OverlapOptions& options,
+                         const Filter& filter, LowestRows& rows);
+
 // Return the number of the triangle that is nearest to the ball's centre or to the capsule's inner segment, or into
 // which the box reaches most deeply, among the triangles of the instance that the solid overlaps. Return the lowest
 // number if several triangles are equally near, and kNoTriangle if the solid overlaps no triangle. `solid` is in world
@@ -46,21 +39,11 @@ uint32_t nearest_overlapping(QueryTask& task, const Balld& solid, const Instance
 uint32_t nearest_overlapping(QueryTask& task, const Capsule& solid, const Instance& instance);
 uint32_t nearest_overlapping(QueryTask& task, const Obbd& solid, const Instance& instance);
 
-// Adds the objects in `found` to `answer`, which has the rows of instances: retains at most options.max_results rows,
-// ascending by id. With count_only, only adds to the number of rows.
-void add_objects(OverlapAnswer& answer, FoundObjects& found, const SceneAtTime& moment, const OverlapOptions& options);
-
 // Return the region that run_ball(), run_box() or run_capsule() searches in the grid of objects.
 // QueryTask::walk_regions() uses these regions.
 GridRegion ball_region(const SceneAtTime& moment, const Balld& ball, const OverlapOptions& options);
 GridRegion box_region(const SceneAtTime& moment, const Obbd& box, const OverlapOptions& options);
 GridRegion capsule_region(const SceneAtTime& moment, const Capsule& capsule, const OverlapOptions& options);
-
-// Return the ball, box or capsule of query `i` of a block, in world axes. The positions of the query are relative to
-// `origin`.
-Balld ball_of(Vec3d origin, const BallColumns& balls, size_t i);
-Obbd box_of(Vec3d origin, const BoxColumns& boxes, size_t i);
-Capsule capsule_of(Vec3d origin, const CapsuleColumns& capsules, size_t i);
 
 }  // namespace locus
 

@@ -12,6 +12,7 @@
 #include "core/geometry/shape_distance.h"
 #include "core/index/hash_grid/kernels/grid_dispatch.h"
 #include "core/query/kinds/hit_collector.h"
+#include "core/query/kinds/object_parts.h"
 
 namespace locus {
 namespace {
@@ -125,6 +126,7 @@ struct PairSearch {
   const bool conservative;
   const bool by_balls;  // two balls are compared by their stored positions and extents
   const Id after_id, after_other;
+  const bool is_directed;  // PairColumns::count is not 0: only the first object of a row needs first_mask
 
   bool may_be_first(const GridEntry& entry) const { return (entry.layers & first_mask) != 0; }
   bool may_be_second(const GridEntry& entry) const { return (entry.layers & second_mask) != 0; }
@@ -139,8 +141,8 @@ struct PairSearch {
     return are_apart(a, b) && ((may_be_first(a) && may_be_second(b)) || (may_be_first(b) && may_be_second(a)));
   }
   // Returns a box that overlaps the bounds of every object within max_distance of an object with this shape.
-  Aabbd reach_of(const Shape& shape) const {
-    const Aabbd own = bounds_of(shape);
+  Aabbd reach_of(const GridRef& object, const Shape& shape) const {
+    const Aabbd own = bounds_of(object, shape);
     const double reach = raised(max_distance);
     return grown(own, reach + 0x1p-40 * (magnitude(own) + reach));
   }
@@ -149,6 +151,56 @@ struct PairSearch {
   float distance(Id a_id, const Shape& a, Id b_id, const Shape& b) const {
     if (conservative) return rounded_distance(distance_between(bounds_of(a), bounds_of(b)));
     return rounded_distance(a_id < b_id ? distance_between(a, b) : distance_between(b, a));
+  }
+  // Returns the rounded distance between two objects with these shapes at the time of the query. For compounds, returns
+  // the least distance between parts that may form a pair, or NaN if there are none or it is more than `farthest`.
+  float distance(const GridRef& a, const Shape& a_shape, const GridRef& b, const Shape& b_shape, float farthest) const {
+    if (!has_parts(a) && !has_parts(b)) return distance(a.entry().id, a_shape, b.entry().id, b_shape);
+    return distance_of_parts(a, a_shape, b, b_shape, farthest);
+  }
+
+ private:
+  // Object without parts, or one part of a compound.
+  struct Solid {
+    Shape shape;
+    Aabbd bounds;  // contains the bounds of the shape
+    Layers layers;
+  };
+  using Solids = absl::InlinedVector<Solid, 1>;
+
+  // Returns the solids of an object that the filter accepts.
+  Solids solids_of(const GridRef& object, const Shape& shape) const {
+    if (!has_parts(object)) return {{shape, bounds_of(shape), object.entry().layers}};
+    Solids solids;
+    const PlacedCompound placed(*compound_of(object), shape.position, shape.rotation);
+    placed.for_each(object.entry().layers & filter.layers(), [&](const PlacedCompound::PlacedPart& part) {
+      solids.push_back({part.shape(), part.loose_bounds(), object.entry().layers & part.part().layers});
+      return true;
+    });
+    return solids;
+  }
+  // Returns whether two solids may form a pair, by the masks for first and second objects.
+  bool may_pair(Layers a, Layers b) const {
+    if ((a & first_mask) != 0 && (b & second_mask) != 0) return true;
+    return !is_directed && (b & first_mask) != 0 && (a & second_mask) != 0;
+  }
+  float distance_of_parts(const GridRef& a, const Shape& a_shape, const GridRef& b, const Shape& b_shape,
+                          float farthest) const {
+    const Solids of_a = solids_of(a, a_shape), of_b = solids_of(b, b_shape);
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
+    constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+    float least = kInfinity;
+    for (const Solid& one : of_a) {
+      for (const Solid& other : of_b) {
+        if (!may_pair(one.layers, other.layers)) continue;
+        // Rounding may make the distance of two shapes less than that of their bounds, but not of their loose bounds.
+        if (distance_between(one.bounds, other.bounds) > raised(std::min(least, farthest))) continue;
+        ++task.work().tests;
+        if (!task.count_test()) return kNone;
+        least = std::min(least, distance(a.entry().id, one.shape, b.entry().id, other.shape));
+      }
+    }
+    return least == kInfinity ? kNone : least;
   }
 };
 
@@ -159,13 +211,13 @@ class Partners {
   Partners(const PairSearch& search, const GridRef& object, std::vector<Partner>& rows)
       : search_(search), object_(object), shape_(search.moment.shape(object)), rows_(rows) {}
 
-  Aabbd bounds() const { return search_.reach_of(shape_); }
+  Aabbd bounds() const { return search_.reach_of(object_, shape_); }
   GridRegion region() const { return search_.moment.region(bounds(), std::nullopt); }
   bool visit(const GridRef& other) {
     if (!search_.task.count_test()) return false;
     const GridEntry &a = object_.entry(), &b = other.entry();
     if (!search_.may_be_row(a, b) || !search_.filter.accepts(b)) return true;
-    const float distance = search_.distance(a.id, shape_, b.id, search_.moment.shape(other));
+    const float distance = search_.distance(object_, shape_, other, search_.moment.shape(other), search_.max_distance);
     if (distance <= search_.max_distance) rows_.push_back({b.id, distance});
     return true;
   }
@@ -190,7 +242,7 @@ class PairGroup {
   bool add(const GridRef& object) {
     if (size_ == kMembers || (!empty() && members_.front().object.brick() != object.brick())) return false;
     const Shape shape = search_.moment.shape(object);
-    const Aabbd reach = search_.reach_of(shape);
+    const Aabbd reach = search_.reach_of(object, shape);
     const Aabbd bounds = empty() ? reach : merge(bounds_, reach);
     // The search visits all objects in `bounds`, so a group of objects far apart would visit too many objects.
     if (!empty() && volume(bounds) > kMaxWaste * (volumes_ + volume(reach))) return false;
@@ -291,7 +343,7 @@ class PairGroup {
     const GridEntry &a = member.object.entry(), &b = other.entry();
     if (search_.by_balls && a.kind == ShapeKind::kBall && b.kind == ShapeKind::kBall)
       return rounded_distance(distance_between(Balld{a.position, member.object.reach()}, {b.position, other.reach()}));
-    return search_.distance(a.id, member.shape, b.id, search_.moment.shape(other));
+    return search_.distance(member.object, member.shape, other, search_.moment.shape(other), search_.max_distance);
   }
 
   const PairSearch& search_;
@@ -317,7 +369,7 @@ class NearestPartners {
       : search_(search),
         object_(object),
         shape_(search.moment.shape(object)),
-        extent_(extent_of(shape_, bounds_of(shape_), object, search.conservative)),
+        extent_(extent_of(shape_, bounds_of(object, shape_), object, search.conservative)),
         count_(count),
         farthest_(search.max_distance) {}
 
@@ -331,7 +383,7 @@ class NearestPartners {
     if (!search_.task.count_test()) return false;
     const GridEntry &a = object_.entry(), &b = other.entry();
     if (!PairSearch::are_apart(a, b) || !search_.filter.accepts(b) || !search_.may_be_second(b)) return true;
-    const float distance = search_.distance(a.id, shape_, b.id, search_.moment.shape(other));
+    const float distance = search_.distance(object_, shape_, other, search_.moment.shape(other), farthest_);
     if (!(distance <= farthest_)) return true;
     rows_.push_back({b.id, distance});
     std::push_heap(rows_.begin(), rows_.end(), nearer_partner);
@@ -403,7 +455,8 @@ PairAnswer run_pairs(QueryTask& task, const SceneAtTime& moment, const QueryBloc
                           block.precision == Precision::kConservative,
                           block.precision != Precision::kConservative && !moment.between(),
                           block.after_id,
-                          pairs.after_other};
+                          pairs.after_other,
+                          pairs.count != 0};
   FirstPairs rows(block.max_results == 0 ? limits::kDefaultMaxResults : block.max_results, block.count_only);
   PairGroup group(search);
   const bool by_groups = pairs.count == 0 && task.uses_kernels();

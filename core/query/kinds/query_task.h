@@ -50,6 +50,9 @@ class Filter {
     ignored_groups_[2] = second;
     if (first != 0 || second != 0) layers_only_ = false;
   }
+  // Returns the layers that the filter accepts. A part of a compound is found if the filter accepts the object, and one
+  // of these layers is a layer of both the object and the part.
+  Layers layers() const { return mask_; }
   // Makes the filter accept nothing, for a query that has no answer.
   void accept_nothing() { mask_ = 0; }
   template <class Item>

@@ -10,6 +10,7 @@
 #include "core/query/kinds/instance_rays.h"
 #include "core/query/kinds/kernel_rays.h"
 #include "core/query/kinds/object_boxes.h"
+#include "core/query/kinds/object_parts.h"
 
 namespace locus {
 namespace {
@@ -31,11 +32,22 @@ class ObjectVisitor {
   bool visit(const GridRef& object) {
     if (!task_.count_test()) return false;
     if (!filter_.accepts(object.entry())) return true;
+    if (has_parts(object)) return visit_parts(object);
     const std::optional<float> t = test(moment_.shape(object));
     return !t || collector_.offer(hit_on(object, *t, moment_));
   }
 
  private:
+  bool visit_parts(const GridRef& object) {
+    return for_each_part(moment_, object, filter_.layers(), [&](const PlacedCompound::PlacedPart& part) {
+      const Interval<double> near = ray_.slabs().interval(part.loose_bounds());
+      if (!(near.near <= near.far) || near.far < 0 || near.near > limit()) return true;
+      ++task_.work().tests;
+      if (!task_.count_test()) return false;
+      const std::optional<float> t = test(part.shape());
+      return !t || collector_.offer(hit_on_part(object, part.number(), *t, moment_));
+    });
+  }
   std::optional<float> test(const Shape& shape) const {
     if (precision_ == Precision::kConservative) return entry(ray_.slabs(), bounds_of(shape));
     const std::optional<ShapeHit> hit = ray_hit(ray_, shape);

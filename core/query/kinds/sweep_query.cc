@@ -9,6 +9,7 @@
 #include "core/geometry/sweep.h"
 #include "core/geometry/swept_bounds.h"
 #include "core/query/kinds/hit_collector.h"
+#include "core/query/kinds/object_parts.h"
 #include "core/query/kinds/placed_triangle.h"
 
 namespace locus {
@@ -220,11 +221,22 @@ class SweptObjects {
   bool visit(const GridRef& object) {
     if (!task_.count_test()) return false;
     if (!filter_.accepts(object.entry())) return true;
+    if (has_parts(object)) return visit_parts(object);
     const std::optional<float> t = test(moment_.shape(object));
     return !t || collector_.offer(hit_on(object, *t, moment_));
   }
 
  private:
+  bool visit_parts(const GridRef& object) {
+    return for_each_part(moment_, object, filter_.layers(), [&](const PlacedCompound::PlacedPart& part) {
+      const std::optional<double> near = path_.entry(part.loose_bounds());
+      if (!near || *near > raised(collector_.limit())) return true;
+      ++task_.work().tests;
+      if (!task_.count_test()) return false;
+      const std::optional<float> t = test(part.shape());
+      return !t || collector_.offer(hit_on_part(object, part.number(), *t, moment_));
+    });
+  }
   std::optional<float> test(const Shape& shape) const {
     const std::optional<double> entered = path_.entry(bounds_of(shape));
     if (!entered) return std::nullopt;

@@ -21,8 +21,11 @@ struct Labels {
 Labels labels_of(const Hit& hit) {
   if (hit.object) {
     const GridEntry& entry = hit.object.entry();
-    const Shape shape = hit.object_shape();
-    return {entry.group, entry.tag, entry.layers, shape.position, shape.rotation};
+    const Shape shape = hit.whole_shape();
+    Layers layers = entry.layers;
+    if (shape.kind == ShapeKind::kCompound && hit.triangle != kNoTriangle)
+      layers &= compound_of(hit.object)->parts()[hit.triangle].layers;
+    return {entry.group, entry.tag, layers, shape.position, shape.rotation};
   }
   if (hit.instance != nullptr)
     return {hit.instance->group, hit.instance->tag, hit.instance->layers, hit.instance->transform.translation,
@@ -40,13 +43,18 @@ void write_point(T* column, size_t row, V x, V y, V z) {
 
 // Writes the columns SHAPE. The numbers of the shapes are those of the protocol's BlockResult.shapes.
 void write_shape(const Hit& hit, const RowSpans& to, size_t row) {
-  constexpr uint32_t kInstanceShape = 5;
+  constexpr uint32_t kInstanceShape = 5, kCompoundShape = 6;
   uint32_t kind = 0;
   std::array<float, 4> sizes = {};
   if (hit.object) {
-    const Shape shape = hit.object_shape();
-    kind = static_cast<uint32_t>(shape.kind) + 1;
-    sizes = {shape.radius, shape.size.x, shape.size.y, shape.size.z};
+    const Shape shape = hit.whole_shape();
+    if (const Compound* const compound = compound_of(hit.object)) {
+      kind = kCompoundShape;
+      sizes = {compound->extent(), static_cast<float>(compound->parts().size())};
+    } else {
+      kind = static_cast<uint32_t>(shape.kind) + 1;
+      sizes = {shape.radius, shape.size.x, shape.size.y, shape.size.z};
+    }
   } else if (hit.instance != nullptr) {
     kind = kInstanceShape;
     sizes[0] = hit.instance->transform.scale;
@@ -96,7 +104,11 @@ void write_triangle_rows(const Hit& hit, absl::Span<const uint32_t> triangles, c
   if (to.ids != nullptr) std::fill_n(to.ids + row, triangles.size(), hit.id);
   if (to.triangles != nullptr) std::copy(triangles.begin(), triangles.end(), to.triangles + row);
   if (!has_labels(to)) return;
-  for (size_t i = 0; i < triangles.size(); ++i) write_labels(hit, to, row + i);
+  Hit one = hit;
+  for (size_t i = 0; i < triangles.size(); ++i) {
+    one.triangle = triangles[i];  // the layers of a compound's row depend on the part
+    write_labels(one, to, row + i);
+  }
 }
 
 void write_object_rows(absl::Span<const FoundObject> objects, const SceneAtTime& moment, const RowSpans& to) {

@@ -178,7 +178,7 @@ class AlignedBytes {
 enum class BytesKind : uint32_t {
   kBatch = 0x4842'534c,
   kInstanceBatch = 0x4942'534c,  // a batch that changes instances
-  kExtendedBatch = 0x5842'534c,  // a batch with expiry ticks or a lease
+  kExtendedBatch = 0x5842'534c,  // a batch with compounds, new poses of parts, expiry ticks or a lease
   kGroupedBatch = 0x4742'534c,   // a batch that was sent as several messages
   kJoinedBatches = 0x4a42'534c,
   kStaticChange = 0x4353'534c,  // data format 1: identifies meshes by content hash; decoded, but never written
@@ -197,6 +197,8 @@ enum class BytesKind : uint32_t {
   kStateObjects = 0x4f54'534c,
   kStateExpiries = 0x4554'534c,
   kStateLeases = 0x4c54'534c,
+  kStateCompounds = 0x4354'534c,
+  kCompoundObjects = 0x4b54'534c,  // objects of which some are compounds
   kMeshHeader = 0x484d'534c,
   kMeshVertices = 0x564d'534c,
   kMeshIndices = 0x494d'534c,

@@ -67,42 +67,102 @@ void read_labels(ByteReader& reader, Columns& columns) {
 enum class BatchParts {
   kBase,
   kInstances,  // also the changes of instances
-  kExtended,   // also the changes of instances, expiry ticks and leases
+  kExtended,   // also the changes of instances, compounds, new poses of parts, expiry ticks and leases
 };
 
 bool is_extended(const UpdateBatch& batch) {
   return batch.lease_ms != 0 || batch.end_lease != 0 ||
          std::any_of(batch.inserts.begin(), batch.inserts.end(),
-                     [](const InsertColumns& insert) { return !insert.expire_ticks.empty(); });
+                     [](const InsertColumns& insert) {
+                       return !insert.expire_ticks.empty() || insert.kind == ShapeKind::kCompound;
+                     }) ||
+         std::any_of(batch.moves.begin(), batch.moves.end(),
+                     [](const MoveColumns& move) { return move.parts_each != 0; });
+}
+
+// Write and read the columns of radii and extents that the kind of the shapes has.
+template <class Columns>
+void write_size(const Columns& columns, ByteWriter& writer) {
+  const bool capsule = columns.kind == ShapeKind::kCapsule;
+  if (columns.kind == ShapeKind::kBall || capsule) writer.column(columns.radii);
+  if (columns.kind == ShapeKind::kBox || capsule) writer.column(columns.extents);
+}
+
+template <class Columns>
+void read_size(ByteReader& reader, Columns& columns) {
+  const bool capsule = columns.kind == ShapeKind::kCapsule;
+  if (columns.kind == ShapeKind::kBall || capsule) columns.radii = reader.column<float>("radii");
+  if (columns.kind == ShapeKind::kBox || capsule) columns.extents = reader.column<float>("extents");
+}
+
+ShapeKind read_shape_kind(ByteReader& reader, ShapeKind max) {
+  return static_cast<ShapeKind>(reader.number_upto(static_cast<uint64_t>(max), "the kind of a shape"));
+}
+
+void write_compound(const std::vector<PartColumns>& parts, ByteWriter& writer) {
+  writer.number(uint64_t{parts.size()});
+  for (const PartColumns& columns : parts) {
+    writer.number(static_cast<uint64_t>(columns.kind));
+    writer.column(columns.positions);
+    writer.column(columns.rotations);
+    write_size(columns, writer);
+    writer.column(columns.layers);
+  }
+}
+
+std::vector<PartColumns> read_compound(ByteReader& reader) {
+  std::vector<PartColumns> parts(reader.count(kMinListBytes, "the number of lists of parts"));
+  for (PartColumns& columns : parts) {
+    columns.kind = read_shape_kind(reader, ShapeKind::kCapsule);
+    if (columns.kind == ShapeKind::kPoint) reader.fail("the kind of a part", "is out of range");
+    columns.positions = reader.column<float>("the positions of parts");
+    columns.rotations = reader.column<float>("the rotations of parts");
+    read_size(reader, columns);
+    columns.layers = reader.column<uint32_t>("the layers of parts");
+    if (!reader.good()) return {};
+  }
+  return parts;
 }
 
 void write_insert(const InsertColumns& insert, BatchParts parts, ByteWriter& writer) {
-  const bool capsule = insert.kind == ShapeKind::kCapsule;
+  LOCUS_DCHECK(insert.kind != ShapeKind::kCompound || parts == BatchParts::kExtended);
   writer.number(static_cast<uint64_t>(insert.kind));
   write_pose(insert, writer);
-  if (insert.kind == ShapeKind::kBall || capsule) writer.column(insert.radii);
-  if (insert.kind == ShapeKind::kBox || capsule) writer.column(insert.extents);
+  write_size(insert, writer);
+  if (insert.kind == ShapeKind::kCompound) write_compound(insert.parts, writer);
   write_labels(insert, writer);
   if (parts == BatchParts::kExtended) writer.column(insert.expire_ticks);
 }
 
 InsertColumns read_insert(ByteReader& reader, BatchParts parts) {
   InsertColumns insert;
-  insert.kind =
-      static_cast<ShapeKind>(reader.number_upto(static_cast<uint64_t>(ShapeKind::kCapsule), "the kind of a shape"));
-  const bool capsule = insert.kind == ShapeKind::kCapsule;
+  insert.kind = read_shape_kind(reader, parts == BatchParts::kExtended ? ShapeKind::kCompound : ShapeKind::kCapsule);
   read_pose(reader, insert);
-  if (insert.kind == ShapeKind::kBall || capsule) insert.radii = reader.column<float>("radii");
-  if (insert.kind == ShapeKind::kBox || capsule) insert.extents = reader.column<float>("extents");
+  read_size(reader, insert);
+  if (insert.kind == ShapeKind::kCompound) insert.parts = read_compound(reader);
   read_labels(reader, insert);
   if (parts == BatchParts::kExtended) insert.expire_ticks = reader.column<uint64_t>("expire_ticks");
   return insert;
 }
 
-MoveColumns read_move(ByteReader& reader) {
+void write_move(const MoveColumns& move, BatchParts parts, ByteWriter& writer) {
+  LOCUS_DCHECK(move.parts_each == 0 || parts == BatchParts::kExtended);
+  writer.number(uint64_t{move.teleport});
+  write_pose(move, writer);
+  if (parts != BatchParts::kExtended) return;
+  writer.number(uint64_t{move.parts_each});
+  writer.column(move.part_positions);
+  writer.column(move.part_rotations);
+}
+
+MoveColumns read_move(ByteReader& reader, BatchParts parts) {
   MoveColumns move;
   move.teleport = reader.number_upto(1, "whether moves teleport") != 0;
   read_pose(reader, move);
+  if (parts != BatchParts::kExtended) return move;
+  move.parts_each = static_cast<uint32_t>(reader.number_upto(limits::kMaxParts, "the number of parts"));
+  move.part_positions = reader.column<float>("part_positions");
+  move.part_rotations = reader.column<float>("part_rotations");
   return move;
 }
 
@@ -160,10 +220,7 @@ void write_batch(const UpdateBatch& batch, BatchParts parts, ByteWriter& writer)
   writer.number(uint64_t{batch.inserts.size()});
   for (const InsertColumns& insert : batch.inserts) write_insert(insert, parts, writer);
   writer.number(uint64_t{batch.moves.size()});
-  for (const MoveColumns& move : batch.moves) {
-    writer.number(uint64_t{move.teleport});
-    write_pose(move, writer);
-  }
+  for (const MoveColumns& move : batch.moves) write_move(move, parts, writer);
   write_relabels(batch.relabels, writer);
   if (parts != BatchParts::kBase) write_instance_changes(batch, writer);
   if (parts != BatchParts::kExtended) return;
@@ -196,7 +253,7 @@ UpdateBatch read_unchecked(ByteReader& reader, BatchParts parts) {
   batch.remove_groups = reader.column<uint64_t>("remove_groups");
   read_lists(reader, "the number of inserts", batch.inserts,
              [parts](ByteReader& from) { return read_insert(from, parts); });
-  read_lists(reader, "the number of moves", batch.moves, read_move);
+  read_lists(reader, "the number of moves", batch.moves, [parts](ByteReader& from) { return read_move(from, parts); });
   read_lists(reader, "the number of relabels", batch.relabels, read_relabel);
   if (parts != BatchParts::kBase) {
     read_lists(reader, "the number of moves of instances", batch.instance_moves, read_instance_move);

@@ -39,6 +39,7 @@ struct SceneState {
   WriterTable writers;
   std::shared_ptr<const StaticSet> statics;
   double cell_size = 0;                           // cell size of the grid
+  std::vector<CompoundPtr> compounds;             // owns the compounds of `objects`
   std::vector<std::vector<Object>> objects;       // one vector for each chunk read
   std::vector<std::pair<Id, uint64_t>> expiries;  // objects that expire, and the ticks that they have left
   struct StoredLease {
@@ -52,8 +53,13 @@ struct SceneState {
 // Maximum numbers of objects and instances in one chunk of a snapshot, for StateWriter and StateReader. The limits are
 // part of the format: a later version may write smaller chunks, but must still read chunks of these sizes.
 inline constexpr size_t kObjectsPerChunk = 8192;
-// Maximum encoded size of an object in bytes: id, group, tag, layers, kind, position, rotation, size and radius.
-inline constexpr size_t kMaxBytesOfObject = 8 + 8 + 8 + 4 + 1 + 24 + 16 + 12 + 4;
+// Maximum encoded size of an object in bytes: id, group, tag, layers, kind, position, rotation, size, radius, compound.
+inline constexpr size_t kMaxBytesOfObject = 8 + 8 + 8 + 4 + 1 + 24 + 16 + 12 + 4 + 4;
+// Maximum number of parts of all compounds in one chunk, and maximum encoded size of a part in bytes: the number of
+// parts of its compound, kind, position, rotation, size, radius and layers.
+inline constexpr size_t kPartsPerChunk = 16384;
+inline constexpr size_t kMaxBytesOfPart = 1 + 1 + 12 + 16 + 12 + 4 + 4;
+inline constexpr uint32_t kNoCompound = 0xFFFFFFFFu;  // number of the compound of an object of another kind
 // Maximum number of expiries, or of objects of leases, in one chunk.
 inline constexpr size_t kLifetimesPerChunk = 32768;
 inline constexpr size_t kInstancesPerChunk = 4096;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -78,15 +79,14 @@ struct ShapeColumns {
   absl::Span<const double> positions;
   absl::Span<const float> rotations, sizes, radii;
 
-  ShapeColumns(ByteReader& reader, size_t n) {
+  ShapeColumns(ByteReader& reader, size_t n, ShapeKind max_kind) {
     kinds = reader.shared_column<uint8_t>(n, 1, "kinds");
     positions = reader.shared_column<double>(n, 3, "positions");
     rotations = reader.shared_column<float>(n, 4, "rotations");
     sizes = reader.shared_column<float>(n, 3, "sizes");
     radii = reader.shared_column<float>(n, 1, "radii");
     constexpr double kMax = limits::kMaxCoordinate;
-    if (!all_within(kinds, 0, static_cast<double>(ShapeKind::kCapsule)))
-      reader.fail("the kind of a shape", "is unknown");
+    if (!all_within(kinds, 0, static_cast<double>(max_kind))) reader.fail("the kind of a shape", "is unknown");
     if (!all_within(positions, -kMax, kMax)) reader.fail("a position", "is out of range");
     if (!all_unit(rotations)) reader.fail("a rotation", "is not of unit length");
     if (!all_within(sizes, -kMax, kMax)) reader.fail("a size", "is out of range");
@@ -114,8 +114,10 @@ absl::Status StateReader::add(absl::string_view chunk) {
   } else if (kind == BytesKind::kStateInstances || kind == BytesKind::kNamedInstances ||
              kind == BytesKind::kBoundedInstances) {
     read_instances(reader, kind);
-  } else if (kind == BytesKind::kStateObjects) {
-    read_objects(reader);
+  } else if (kind == BytesKind::kStateCompounds) {
+    read_compounds(reader);
+  } else if (kind == BytesKind::kStateObjects || kind == BytesKind::kCompoundObjects) {
+    read_objects(reader, kind);
   } else if (kind == BytesKind::kStateExpiries) {
     read_expiries(reader);
   } else if (kind == BytesKind::kStateLeases) {
@@ -190,10 +192,56 @@ void StateReader::read_bounds(ByteReader& reader, absl::Span<const MeshKey> mesh
     mesh_bounds_[meshes[i]] = decode_bounds(bounds[i].data(), reader);
 }
 
-void StateReader::read_objects(ByteReader& reader) {
+void StateReader::read_compounds(ByteReader& reader) {
+  const uint64_t all = reader.number_upto(limits::kMaxObjects, "the number of compounds");
+  if (compounds_ != 0 && all != compounds_) reader.fail("the number of compounds", "differs from an earlier chunk");
+  compounds_ = all;
+  const auto counts = reader.column<uint8_t>("the numbers of parts");
+  const size_t n = std::accumulate(counts.begin(), counts.end(), size_t{0});
+  if (n > kPartsPerChunk || !all_within(counts, 1, limits::kMaxParts))
+    reader.fail("the number of parts of a compound", "is out of range");
+  const auto kinds = reader.shared_column<uint8_t>(n, 1, "the kinds of parts");
+  const auto positions = reader.shared_column<float>(n, 3, "the positions of parts");
+  const auto rotations = reader.shared_column<float>(n, 4, "the rotations of parts");
+  const auto sizes = reader.shared_column<float>(n, 3, "the sizes of parts");
+  const auto radii = reader.shared_column<float>(n, 1, "the radii of parts");
+  const auto layers = reader.shared_column<uint32_t>(n, 1, "the layers of parts");
+  constexpr double kMax = limits::kMaxCoordinate;
+  if (!all_within(kinds, static_cast<double>(ShapeKind::kBall), static_cast<double>(ShapeKind::kCapsule)))
+    reader.fail("the kind of a part", "is unknown");
+  if (!all_within(positions, -kMax, kMax)) reader.fail("the position of a part", "is out of range");
+  if (!all_unit(rotations)) reader.fail("the rotation of a part", "is not of unit length");
+  if (!all_within(sizes, -kMax, kMax)) reader.fail("the size of a part", "is out of range");
+  if (!all_within(radii, 0, kMax)) reader.fail("the radius of a part", "is out of range");
+  if (!reader.good()) return;
+  size_t i = 0;
+  for (const uint8_t count : counts) {
+    std::vector<Part> parts(count);
+    for (Part& part : parts) {
+      const float* const p = ColumnReader<float>(positions, 3).entry(i);
+      const float* const q = ColumnReader<float>(rotations, 4).entry(i);
+      const float* const s = ColumnReader<float>(sizes, 3).entry(i);
+      part = {static_cast<ShapeKind>(*ColumnReader<uint8_t>(kinds, 1).entry(i)),
+              {p[0], p[1], p[2]},
+              {q[0], q[1], q[2], q[3]},
+              {s[0], s[1], s[2]},
+              *ColumnReader<float>(radii, 1).entry(i),
+              *ColumnReader<uint32_t>(layers, 1).entry(i)};
+      if (part.kind == ShapeKind::kBox && !(s[0] >= 0 && s[1] >= 0 && s[2] >= 0))
+        return reader.fail("the extent of a box", "is negative");
+      ++i;
+    }
+    state_.compounds.push_back(Compound::make(std::move(parts)));
+  }
+}
+
+void StateReader::read_objects(ByteReader& reader, BytesKind kind) {
+  const bool has_compounds = kind == BytesKind::kCompoundObjects;
   const LabelColumns labels(reader, kObjectsPerChunk);
   const size_t n = labels.ids.size();
-  const ShapeColumns shapes(reader, n);
+  const ShapeColumns shapes(reader, n, has_compounds ? ShapeKind::kCompound : ShapeKind::kCapsule);
+  absl::Span<const uint32_t> compounds;
+  if (has_compounds) compounds = reader.shared_column<uint32_t>(n, 1, "the compounds of objects");
   if (!reader.good()) return;
   const ColumnReader<uint64_t> groups(labels.groups, 1), tags(labels.tags, 1);
   const ColumnReader<uint32_t> layers(labels.layers, 1);
@@ -215,6 +263,11 @@ void StateReader::read_objects(ByteReader& reader) {
                     {q[0], q[1], q[2], q[3]},
                     {s[0], s[1], s[2]},
                     *radii.entry(i)};
+    if (object.shape.kind == ShapeKind::kCompound) {
+      const uint32_t number = *ColumnReader<uint32_t>(compounds, 1).entry(i);
+      if (number >= state_.compounds.size()) return reader.fail("the compound of an object", "is unknown");
+      object.compound = state_.compounds[number].get();
+    }
     const bool box = object.shape.kind == ShapeKind::kBox;
     if (box && !(s[0] >= 0 && s[1] >= 0 && s[2] >= 0)) reader.fail("the extent of a box", "is negative");
   }
@@ -277,6 +330,9 @@ absl::Status StateReader::check_counts() const {
     return data_loss(absl::StrCat("the header counts ", writers_, " writers, ", instances_, " instances and ", objects_,
                                   " objects, the chunks contain ", state_.writers.size(), ", ", instances_read_,
                                   " and ", objects_read_));
+  if (state_.compounds.size() != compounds_)
+    return data_loss(
+        absl::StrCat("the chunks count ", compounds_, " compounds, and contain ", state_.compounds.size()));
   if (state_.expiries.size() != expiries_ || state_.leases.size() != leases_ || leased_objects_ != 0)
     return data_loss(absl::StrCat("the header counts ", expiries_, " expiries and ", leases_,
                                   " leases, the chunks contain ", state_.expiries.size(), " and ", state_.leases.size(),

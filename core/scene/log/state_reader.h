@@ -42,7 +42,8 @@ class StateReader {
   void read_instances(ByteReader& reader, BytesKind kind);
   // Reads the bounds of `meshes`.
   void read_bounds(ByteReader& reader, absl::Span<const MeshKey> meshes);
-  void read_objects(ByteReader& reader);
+  void read_compounds(ByteReader& reader);
+  void read_objects(ByteReader& reader, BytesKind kind);
   void read_expiries(ByteReader& reader);
   void read_leases(ByteReader& reader);
   // Returns DATA_LOSS if the chunks do not have exactly what the header counts.
@@ -56,6 +57,7 @@ class StateReader {
   uint64_t objects_ = 0;    // expected number of objects, from the header
   uint64_t instances_read_ = 0;
   uint64_t objects_read_ = 0;
+  uint64_t compounds_ = 0;       // expected number of compounds, from their chunks
   uint64_t expiries_ = 0;        // expected number of expiries, from the header
   uint64_t leases_ = 0;          // expected number of leases, from the header
   uint64_t leased_objects_ = 0;  // number of objects of the last lease that later chunks have

@@ -18,6 +18,7 @@ static_assert(kWritersChunk + size_t{limits::kMaxListedItemErrors} * kMaxBytesOf
               UpdateLog::kMaxChunkBytes);
 static_assert(kObjectsPerChunk * kMaxBytesOfObject + 1024 <= UpdateLog::kMaxChunkBytes);
 static_assert(kLifetimesPerChunk * 16 + limits::kMaxLeases * 32 + 1024 <= UpdateLog::kMaxChunkBytes);
+static_assert(kPartsPerChunk * kMaxBytesOfPart + 1024 <= UpdateLog::kMaxChunkBytes);
 static_assert(kInstancesPerChunk * kMaxBytesOfInstance + 1024 <= UpdateLog::kMaxChunkBytes);
 
 void write_ack(const UpdateAck& ack, bool names_messages, ByteWriter& writer) {
@@ -79,6 +80,8 @@ StateWriter::StateWriter(FrozenScene scene) : scene_(std::move(scene)), writers_
   const Bvh<Instance>::Values instances = scene_.snapshot->statics->tree().values();
   next_instance_ = instances.begin();
   last_instance_ = instances.end();
+  for (size_t i = 0; compounds() != nullptr && i < compounds()->size(); ++i)
+    compound_count_ += (*compounds())[i] != nullptr ? 1 : 0;
   for (const WriterTable::Writer& writer : writers_)
     for (const ItemError& error : writer.ack.errors) names_messages_ |= error.message != 0;
 }
@@ -91,6 +94,8 @@ absl::StatusOr<std::optional<std::string>> StateWriter::next() {
     chunk = next_writers();
   } else if (next_instance_ != last_instance_) {
     chunk = next_instances();
+  } else if (compound_numbers_.size() < compound_count_) {
+    chunk = next_compounds();
   } else if (objects_written_ < scene_.snapshot->objects.size()) {
     chunk = next_objects();
   } else if (scene_.snapshot->expiries != nullptr && expiries_written_ < scene_.snapshot->expiries->count()) {
@@ -169,6 +174,30 @@ std::string StateWriter::next_instances() {
   return chunk;
 }
 
+std::string StateWriter::next_compounds() {
+  std::vector<uint8_t> counts;
+  std::vector<Part> parts;
+  for (; next_compound_ < compounds()->size() && parts.size() + limits::kMaxParts <= kPartsPerChunk; ++next_compound_) {
+    const Compound* const compound = (*compounds())[next_compound_].get();
+    if (compound == nullptr) continue;
+    compound_numbers_.emplace(compound, static_cast<uint32_t>(compound_numbers_.size()));
+    counts.push_back(static_cast<uint8_t>(compound->parts().size()));
+    parts.insert(parts.end(), compound->parts().begin(), compound->parts().end());
+  }
+  std::string chunk;
+  ByteWriter writer(chunk);
+  write_kind(writer, BytesKind::kStateCompounds);
+  writer.number(compound_count_);
+  writer.column(absl::MakeConstSpan(counts));
+  write_each(writer, parts, [](const Part& part) { return Values<uint8_t, 1>{static_cast<uint8_t>(part.kind)}; });
+  write_each(writer, parts, [](const Part& part) { return components(part.position); });
+  write_each(writer, parts, [](const Part& part) { return components(part.rotation); });
+  write_each(writer, parts, [](const Part& part) { return components(part.size); });
+  write_each(writer, parts, [](const Part& part) { return Values<float, 1>{part.radius}; });
+  write_each(writer, parts, [](const Part& part) { return Values<uint32_t, 1>{part.layers}; });
+  return chunk;
+}
+
 std::string StateWriter::next_objects() {
   std::vector<Object> objects;
   objects.reserve(kObjectsPerChunk);
@@ -181,8 +210,14 @@ std::string StateWriter::next_objects() {
   LOCUS_DCHECK_LE(objects_written_, scene_.snapshot->objects.size());
   std::string chunk;
   ByteWriter writer(chunk);
-  write_kind(writer, BytesKind::kStateObjects);
+  const bool has_compounds =
+      std::any_of(objects.begin(), objects.end(), [](const Object& object) { return object.compound != nullptr; });
+  write_kind(writer, has_compounds ? BytesKind::kCompoundObjects : BytesKind::kStateObjects);
   write_objects(writer, objects);
+  if (has_compounds)
+    write_each(writer, objects, [this](const Object& object) {
+      return Values<uint32_t, 1>{object.compound == nullptr ? kNoCompound : compound_numbers_.at(object.compound)};
+    });
   return chunk;
 }
 

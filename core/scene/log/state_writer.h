@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "absl/container/flat_hash_map.h"
 #include "absl/status/statusor.h"
 #include "core/scene/log/scene_state.h"
 #include "core/scene/log/update_log.h"
@@ -28,9 +29,11 @@ class StateWriter {
   uint64_t bytes() const { return bytes_; }
 
  private:
+  const CompoundArray* compounds() const { return scene_.snapshot->objects.compounds(); }
   std::string header() const;
   std::string next_writers();
   std::string next_instances();
+  std::string next_compounds();
   std::string next_objects();
   std::string next_expiries();
   std::string next_leases();
@@ -40,6 +43,10 @@ class StateWriter {
   bool begun_ = false;
   size_t next_writer_ = 0;
   Bvh<Instance>::Values::Iterator next_instance_, last_instance_;
+  uint64_t compound_count_ = 0;
+  size_t next_compound_ = 0;  // index in ObjectSet::compounds()
+  // Number of each compound that was written, in the order of writing.
+  absl::flat_hash_map<const Compound*, uint32_t> compound_numbers_;
   size_t objects_written_ = 0;
   GridCursor next_object_;
   bool names_messages_ = false;  // an ack has an error of a message other than the first

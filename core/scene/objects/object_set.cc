@@ -1,46 +1,28 @@
 #include "core/scene/objects/object_set.h"
 
-#include <cmath>
-#include <limits>
-
 #include "core/base/check.h"
 
 namespace locus {
-namespace {
-
-// Returns a float that is at least `length`.
-float at_least(double length) {
-  return std::nextafter(static_cast<float>(length), std::numeric_limits<float>::infinity());
-}
-
-// Returns the extent of the shape: an upper bound of the distance from its position to any of its points, under any
-// rotation. The extent does not depend on the current rotation, so a rotation never moves an object to another cell.
-float extent_of(const Shape& shape) {
-  switch (shape.kind) {
-    case ShapeKind::kPoint:
-      return 0;
-    case ShapeKind::kBall:
-      return shape.radius;
-    case ShapeKind::kBox:
-      return at_least(std::sqrt(squared_length(to_double(shape.size))));
-    case ShapeKind::kCapsule:
-      return at_least(std::sqrt(squared_length(to_double(shape.size))) + shape.radius);
-  }
-  return 0;
-}
-
-}  // namespace
-
 Shape shape_of(const GridRef& value) {
   const GridForm form = value.form();
   const ShapeKind kind = value.entry().kind;
+  if (kind == ShapeKind::kCompound) return {kind, value.entry().position, form.rotation, {}, 0};
   const float radius = kind == ShapeKind::kBall ? value.reach() : form.radius;
   return {kind, value.entry().position, form.rotation, form.size, radius};
 }
 
 Object object_of(const GridRef& value) {
   const GridEntry& entry = value.entry();
-  return {entry.id, entry.group, entry.tag, entry.layers, shape_of(value)};
+  return {entry.id, entry.group, entry.tag, entry.layers, shape_of(value), compound_of(value)};
+}
+
+const Compound* compound_of(const GridRef& value) {
+  return value.entry().kind == ShapeKind::kCompound ? value.form().compound() : nullptr;
+}
+
+Aabbd bounds_of(const GridRef& value, const Shape& shape) {
+  if (shape.kind != ShapeKind::kCompound) return bounds_of(shape);
+  return PlacedCompound(*compound_of(value), shape.position, shape.rotation).bounds();
 }
 
 GridItem grid_item_of(const Object& object, uint32_t handle) {
@@ -49,6 +31,11 @@ GridItem grid_item_of(const Object& object, uint32_t handle) {
   GridItem item;
   item.entry = {shape.position, object.id, object.group, object.tag, object.layers, shape.kind};
   item.handle = handle;
+  if (object.compound != nullptr) {
+    item.reach = object.compound->extent();
+    item.form = GridForm::of_compound(shape.rotation, object.compound);
+    return item;
+  }
   item.reach = extent_of(shape);
   item.form = {shape.rotation, shape.size, shape.kind == ShapeKind::kBall ? 0 : shape.radius};
   return item;

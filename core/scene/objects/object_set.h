@@ -11,6 +11,7 @@
 #include "core/base/persistent_id_table.h"
 #include "core/index/hash_grid/grid_snapshot.h"
 #include "core/index/spatial_index.h"
+#include "core/scene/objects/compound_table.h"
 #include "core/scene/objects/group_lists.h"
 #include "core/scene/objects/object.h"
 
@@ -19,6 +20,11 @@ namespace locus {
 // Return the shape, or the complete object, to which a reference into the grid points.
 Shape shape_of(const GridRef& value);
 Object object_of(const GridRef& value);
+// Returns the compound of an object, or null if the object is of another kind. The object's set or store owns it.
+const Compound* compound_of(const GridRef& value);
+// Returns the bounds of an object whose shape, at the time in question, is `shape`: of a compound, the union of the
+// bounds of its parts.
+Aabbd bounds_of(const GridRef& value, const Shape& shape);
 // Returns the grid item that stores `object` under `handle`.
 GridItem grid_item_of(const Object& object, uint32_t handle);
 
@@ -27,9 +33,13 @@ class ObjectSet {
   using Value = Object;
 
   ObjectSet() = default;
-  // `groups` may be null if no object belongs to a group.
-  ObjectSet(GridSnapshot grid, PersistentIdTable<> handles, std::shared_ptr<const GroupLists> groups)
-      : grid_(std::move(grid)), handles_(std::move(handles)), groups_(std::move(groups)) {}
+  // `groups` may be null if no object belongs to a group, and `compounds` if no object is a compound.
+  ObjectSet(GridSnapshot grid, PersistentIdTable<> handles, std::shared_ptr<const GroupLists> groups,
+            std::shared_ptr<const CompoundArray> compounds)
+      : grid_(std::move(grid)),
+        handles_(std::move(handles)),
+        groups_(std::move(groups)),
+        compounds_(std::move(compounds)) {}
 
   size_t size() const { return grid_.size(); }
   const GridSnapshot& grid() const { return grid_; }
@@ -89,20 +99,25 @@ class ObjectSet {
   }
 
   GridStatistics statistics() const { return grid_.statistics(); }
-  // Returns the size in bytes of the objects, the bricks, the lookup tables and the lists of groups. O(bricks).
+  // Returns the compounds that the set owns, some of which may be null; null if no object is a compound.
+  const CompoundArray* compounds() const { return compounds_.get(); }
+  // Returns the size in bytes of the objects, the bricks, the lookup tables, the lists of groups and the compounds.
+  // O(bricks + compounds).
   size_t bytes() const { return unshared_bytes(ObjectSet()); }
   // Returns the bytes of this set that `other`, a set of the same scene, does not share. O(size of the difference).
   size_t unshared_bytes(const ObjectSet& other) const {
     const size_t groups = groups_ == nullptr || groups_ == other.groups_ ? 0
                           : other.groups_ == nullptr                     ? groups_->unshared_bytes(GroupLists())
                                                                          : groups_->unshared_bytes(*other.groups_);
-    return grid_.unshared_bytes(other.grid_) + handles_.unshared_bytes(other.handles_) + groups;
+    return grid_.unshared_bytes(other.grid_) + handles_.unshared_bytes(other.handles_) + groups +
+           locus::unshared_bytes(compounds_, other.compounds_);
   }
 
  private:
   GridSnapshot grid_;
   PersistentIdTable<> handles_;
-  std::shared_ptr<const GroupLists> groups_;  // null if no object belongs to a group
+  std::shared_ptr<const GroupLists> groups_;        // null if no object belongs to a group
+  std::shared_ptr<const CompoundArray> compounds_;  // keeps the compounds of all objects; null if there are none
 };
 
 }  // namespace locus

@@ -137,7 +137,9 @@ size_t ObjectStore::apply(absl::Span<const Object> removed, absl::Span<const Obj
   }
   for (size_t i = 0; i < removed.size(); ++i)
     if (ends[i] != 0) free_handle(leaving[i]);
-  const size_t replaced_bytes = grid_.apply({leaving, {}, items}) + handles_.take_replaced_bytes();
+  size_t replaced_bytes = grid_.apply({leaving, {}, items}) + handles_.take_replaced_bytes();
+  for (const Object& object : inserted) compounds_.add(object.compound);
+  for (const Object& object : removed) replaced_bytes += compounds_.remove(object.compound);
   LOCUS_DCHECK_CALL(check_invariants());
   return replaced_bytes;
 }
@@ -156,6 +158,7 @@ bool ObjectStore::fill(std::vector<std::vector<Object>> chunks, double cell_size
       if (!handles_.set(chunk[i].id, handle)) return false;
       change_group(handle, 0, chunk[i].group);
       if (moves_ != nullptr) moves_->born(handle);
+      compounds_.add(chunk[i].compound);
       items.push_back(grid_item_of(chunk[i], handle));
     }
     std::vector<Object>().swap(chunk);

@@ -69,8 +69,9 @@ class ObjectStore {
   // Replaces the objects `removed` by `inserted`. An id in both lists is an update of one object, unless the id is in
   // `replaced`: then the lifetime of the old object ends, and a new lifetime begins. Preconditions: every removed
   // object is present; after the removals, no object with an inserted id is present. O(removed + inserted), plus the
-  // size of the changed bricks. Returns the number of replaced bytes: the bytes that existing object sets hold and
-  // later sets will not share.
+  // size of the changed bricks. The compounds of inserted objects must be owned by shared pointers; the compounds of
+  // removed objects may be destroyed. Returns the number of replaced bytes: the bytes that existing object sets hold
+  // and later sets will not share.
   size_t apply(absl::Span<const Object> removed, absl::Span<const Object> inserted,
                const absl::flat_hash_set<Id>& replaced = {});
   // Moves objects. Precondition: the handles belong to objects and are distinct. Returns the number of replaced bytes,
@@ -105,7 +106,7 @@ class ObjectStore {
   ObjectSet snapshot() {
     if (groups_changed_) groups_snapshot_ = std::make_shared<const GroupLists>(groups_.snapshot());
     groups_changed_ = false;
-    return {grid_.snapshot(), handles_.snapshot(), groups_snapshot_};
+    return {grid_.snapshot(), handles_.snapshot(), groups_snapshot_, compounds_.snapshot()};
   }
 
  private:
@@ -124,6 +125,7 @@ class ObjectStore {
   GroupLists groups_;
   bool groups_changed_ = false;  // since groups_snapshot_ was made
   std::shared_ptr<const GroupLists> groups_snapshot_;
+  CompoundTable compounds_;  // owns the compounds of all objects
   std::vector<uint32_t> free_handles_;
   uint32_t next_handle_ = 0;
   uint64_t ended_lives_ = 0;

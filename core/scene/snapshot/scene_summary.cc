@@ -13,7 +13,7 @@ SceneSummary summarize(const SceneSnapshot& snapshot) {
   summary.triangles = snapshot.statics->triangle_count();
   summary.bounds = snapshot.statics->tree().bounds();
   Work work;
-  const auto object_bounds = [](const GridRef& object) { return bounds_of(shape_of(object)); };
+  const auto object_bounds = [](const GridRef& object) { return bounds_of(object, shape_of(object)); };
   summary.bounds = merge(summary.bounds, snapshot.objects.grid().bounds(object_bounds, work));
   return summary;
 }

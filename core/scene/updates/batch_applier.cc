@@ -1,6 +1,8 @@
 #include "core/scene/updates/batch_applier.h"
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "core/base/check.h"
@@ -20,6 +22,12 @@ Reason check_values(const float* values, size_t count, float min) {
 }
 
 Vec3f point(const float* p) { return {p[0], p[1], p[2]}; }
+
+Reason read_part_position(const float* position, Part& part) {
+  const Reason reason = check_values(position, 3, -static_cast<float>(limits::kMaxCoordinate));
+  if (reason == Reason::kUnspecified) part.position = point(position);
+  return reason;
+}
 
 template <class Columns>
 void read_labels(const Columns& columns, size_t i, Object& object) {
@@ -143,26 +151,81 @@ bool BatchApplier::read_pose(const PoseReader& poses, uint32_t index, Id id, con
   return true;
 }
 
-bool BatchApplier::read_shape(const InsertColumns& columns, uint32_t index, Id id, const std::string& field,
-                              Shape& shape) {
+bool BatchApplier::refuse_fault(const Fault& fault, uint32_t index, Id id, const std::string& field) {
+  if (fault.reason == Reason::kUnspecified) return false;
+  refuse(absl::StrCat(field, ".", fault.column), index, id, fault.reason);
+  return true;
+}
+
+template <class Columns>
+BatchApplier::Fault BatchApplier::read_size(const Columns& columns, size_t index, Shape& shape) {
   shape.kind = columns.kind;
   const bool capsule = columns.kind == ShapeKind::kCapsule;
   if (columns.kind == ShapeKind::kBall || capsule) {
     shape.radius = ColumnReader<float>(columns.radii, 1).value(index, 0);
-    if (const Reason reason = check_values(&shape.radius, 1, 0); reason != Reason::kUnspecified) {
-      refuse(field + (capsule ? ".capsule.radii" : ".ball.radii"), index, id, reason);
-      return false;
-    }
+    if (const Reason reason = check_values(&shape.radius, 1, 0); reason != Reason::kUnspecified)
+      return {capsule ? "capsule.radii" : "ball.radii", reason};
   }
-  if (columns.kind != ShapeKind::kBox && !capsule) return true;
+  if (columns.kind != ShapeKind::kBox && !capsule) return {};
   const float* extents = ColumnReader<float>(columns.extents, 3).entry(index);
   const float min = capsule ? -static_cast<float>(limits::kMaxCoordinate) : 0;
-  if (const Reason reason = check_values(extents, 3, min); reason != Reason::kUnspecified) {
-    refuse(field + (capsule ? ".capsule.half_axes" : ".box.half_extents"), index, id, reason);
-    return false;
-  }
+  if (const Reason reason = check_values(extents, 3, min); reason != Reason::kUnspecified)
+    return {capsule ? "capsule.half_axes" : "box.half_extents", reason};
   shape.size = point(extents);
-  return true;
+  return {};
+}
+
+BatchApplier::Fault BatchApplier::read_part(const PartColumns& columns, size_t index, Part& part) {
+  Shape shape;
+  if (Fault fault = read_size(columns, index, shape); fault.reason != Reason::kUnspecified) return fault;
+  part = {shape.kind, {},           {},
+          shape.size, shape.radius, ColumnReader<uint32_t>(columns.layers, 1).value(index, kAllLayers)};
+  if (const Reason reason = read_part_position(&columns.positions[3 * index], part); reason != Reason::kUnspecified)
+    return {"positions", reason};
+  if (columns.rotations.empty()) return {};
+  const float* const rotation = ColumnReader<float>(columns.rotations, 4).entry(index);
+  if (const Reason reason = read_quaternion(rotation, part.rotation); reason != Reason::kUnspecified)
+    return {PoseReader::kRotationColumn, reason};
+  return {};
+}
+
+const Compound* BatchApplier::keep(std::vector<Part> parts) {
+  compounds_.push_back(Compound::make(std::move(parts)));
+  return compounds_.back().get();
+}
+
+const Compound* BatchApplier::read_compound(const InsertColumns& columns, Fault& fault) {
+  std::vector<Part> parts;
+  for (size_t i = 0; i < columns.parts.size(); ++i) {
+    for (size_t k = 0; k < columns.parts[i].count(); ++k) {
+      fault = read_part(columns.parts[i], k, parts.emplace_back());
+      if (fault.reason == Reason::kUnspecified) continue;
+      fault.column = absl::StrCat("compound.parts[", i, "].", fault.column);
+      return nullptr;
+    }
+  }
+  return keep(std::move(parts));
+}
+
+BatchApplier::Fault BatchApplier::read_part_poses(const MoveColumns& columns, size_t index, Object& object) {
+  const size_t count = columns.parts_each;
+  if (object.compound == nullptr || object.compound->parts().size() != count)
+    return {"parts_each", Reason::kOutOfRange};
+  std::vector<Part> parts = object.compound->parts();
+  if (!columns.part_positions.empty()) {
+    const float* const positions = ColumnReader<float>(columns.part_positions, 3 * count).entry(index);
+    for (size_t k = 0; k < count; ++k)
+      if (const Reason reason = read_part_position(positions + 3 * k, parts[k]); reason != Reason::kUnspecified)
+        return {"part_positions", reason};
+  }
+  if (!columns.part_rotations.empty()) {
+    const float* const rotations = ColumnReader<float>(columns.part_rotations, 4 * count).entry(index);
+    for (size_t k = 0; k < count; ++k)
+      if (const Reason reason = read_quaternion(rotations + 4 * k, parts[k].rotation); reason != Reason::kUnspecified)
+        return {"part_rotations", reason};
+  }
+  if (parts != object.compound->parts()) object.compound = keep(std::move(parts));
+  return {};
 }
 
 bool BatchApplier::may_insert(Id id, uint32_t index, const std::string& field) {
@@ -176,12 +239,24 @@ bool BatchApplier::may_insert(Id id, uint32_t index, const std::string& field) {
 
 void BatchApplier::insert(const InsertColumns& columns, const std::string& field) {
   const PoseReader poses(message_->frame, columns.positions, columns.positions_f64, columns.rotations);
+  const Compound* compound = nullptr;
+  Fault parts_fault;
+  Layers layers = kDefaultLayers;
+  if (columns.kind == ShapeKind::kCompound && !columns.ids.empty()) {
+    compound = read_compound(columns, parts_fault);
+    const bool parts_have_layers = std::any_of(columns.parts.begin(), columns.parts.end(),
+                                               [](const PartColumns& parts) { return !parts.layers.empty(); });
+    if (compound != nullptr && parts_have_layers) layers = compound->layers();
+  }
   for (uint32_t i = 0; i < columns.ids.size(); ++i) {
     Object object;
     object.id = columns.ids[i];
+    object.layers = layers;
+    object.compound = compound;
     if (!may_insert(object.id, i, field)) continue;
     if (!read_pose(poses, i, object.id, field, object.shape)) continue;
-    if (!read_shape(columns, i, object.id, field, object.shape)) continue;
+    if (refuse_fault(parts_fault, i, object.id, field)) continue;
+    if (refuse_fault(read_size(columns, i, object.shape), i, object.id, field)) continue;
     const uint64_t expire_ticks = ColumnReader<uint64_t>(columns.expire_ticks, 1).value(i, 0);
     if (expire_ticks > limits::kMaxExpireTicks) {
       refuse(field + ".expire_ticks", i, object.id, Reason::kOutOfRange);
@@ -209,6 +284,7 @@ void BatchApplier::move(const MoveColumns& columns, const std::string& field) {
     }
     Object object = *known;
     if (!read_pose(poses, i, id, field, object.shape)) continue;
+    if (columns.parts_each != 0 && refuse_fault(read_part_poses(columns, i, object), i, id, field)) continue;
     if (columns.teleport) begin_life(id);
     put(object);
     ++applied_;

@@ -75,7 +75,21 @@ class BatchApplier {
   void move(const MoveColumns& columns, const std::string& field);
   void relabel(const RelabelColumns& columns, const std::string& field);
   bool read_pose(const PoseReader& poses, uint32_t index, Id id, const std::string& field, Shape& shape);
-  bool read_shape(const InsertColumns& columns, uint32_t index, Id id, const std::string& field, Shape& shape);
+  // Wrong value of a column: the column's name after the field, and the reason. Unspecified: there is none.
+  struct Fault {
+    std::string column;
+    Reason reason = Reason::kUnspecified;
+  };
+  bool refuse_fault(const Fault& fault, uint32_t index, Id id, const std::string& field);
+  // Read values of one item or part. The columns of PartColumns and of InsertColumns have the same names.
+  template <class Columns>
+  static Fault read_size(const Columns& columns, size_t index, Shape& shape);
+  static Fault read_part(const PartColumns& columns, size_t index, Part& part);
+  // Returns the compound of an element, or null and the first wrong value in `fault`.
+  const Compound* read_compound(const InsertColumns& columns, Fault& fault);
+  // Gives the object the compound with the part poses of item `index`.
+  Fault read_part_poses(const MoveColumns& columns, size_t index, Object& object);
+  const Compound* keep(std::vector<Part> parts);
 
   const ObjectStore& objects_;
   const StaticSet& statics_;
@@ -95,6 +109,7 @@ class BatchApplier {
   uint32_t applied_ = 0;
   uint32_t refused_ = 0;
   std::vector<ItemError> errors_;
+  std::vector<CompoundPtr> compounds_;  // owns the compounds of changed_ that the batch made
 };
 
 }  // namespace locus

@@ -28,7 +28,9 @@ void MoveApplier::check_invariants() const {
 
 bool MoveApplier::serves(const UpdateBatch& batch) {
   return !batch.clear && !batch.restart_ticks && batch.remove_ids.empty() && batch.remove_groups.empty() &&
-         batch.inserts.empty() && batch.relabels.empty() && !batch.moves.empty() && batch.earlier.empty();
+         batch.inserts.empty() && batch.relabels.empty() && !batch.moves.empty() && batch.earlier.empty() &&
+         std::none_of(batch.moves.begin(), batch.moves.end(),
+                      [](const MoveColumns& move) { return move.parts_each != 0; });
 }
 
 void MoveApplier::begin(const ObjectStore& objects) {

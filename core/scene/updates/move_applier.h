@@ -17,7 +17,7 @@ namespace locus {
 
 class MoveApplier {
  public:
-  // Returns true if the batch only moves objects and does not restart ticks.
+  // Returns true if the batch only moves objects, without new poses of parts, and does not restart ticks.
   static bool serves(const UpdateBatch& batch);
 
   // Reads one batch. Preconditions: the batch has passed check_form(), and serves(batch) is true. O(items).

@@ -6,10 +6,8 @@
 
 namespace locus {
 
-Reason PoseReader::read_rotation(size_t i, Quaternion& rotation) const {
-  LOCUS_DCHECK(has_rotations());
-  const float* q = rotations_.entry(i);
-  const Quaternion given{q[0], q[1], q[2], q[3]};
+Reason read_quaternion(const float* values, Quaternion& rotation) {
+  const Quaternion given{values[0], values[1], values[2], values[3]};
   const double deviation = unit_deviation(given);
   if (!std::isfinite(deviation)) return Reason::kNotFinite;
   if (deviation > limits::kMaxQuaternionDeviation) return Reason::kOutOfRange;

@@ -14,6 +14,10 @@
 
 namespace locus {
 
+// Reads a quaternion x, y, z, w and normalizes it. Returns Reason::kUnspecified, or the reason why the values are
+// refused.
+Reason read_quaternion(const float* values, Quaternion& rotation);
+
 class PoseReader {
  public:
   // Precondition: the columns have passed check_form(), and one of the two position columns has entries unless there
@@ -44,7 +48,10 @@ class PoseReader {
                        (distance.z <= limits::kMaxCoordinate);
     return valid ? Reason::kUnspecified : is_finite(position) ? Reason::kOutOfRange : Reason::kNotFinite;
   }
-  Reason read_rotation(size_t i, Quaternion& rotation) const;
+  Reason read_rotation(size_t i, Quaternion& rotation) const {
+    LOCUS_DCHECK(has_rotations());
+    return read_quaternion(rotations_.entry(i), rotation);
+  }
 
  private:
   Vec3d frame_;

@@ -27,7 +27,8 @@ class ElementCheck {
 
   absl::Status run(const MoveColumns& move) const {
     RETURN_IF_ERROR(check_positions(move.positions, move.positions_f64));
-    return check_length(move.rotations.size(), 4, ColumnNeed::kOptional, "rotations");
+    RETURN_IF_ERROR(check_length(move.rotations.size(), 4, ColumnNeed::kOptional, "rotations"));
+    return check_new_poses(move);
   }
 
   absl::Status run(const RelabelColumns& relabel) const { return check_labels(relabel); }
@@ -51,9 +52,54 @@ class ElementCheck {
     return check_length(absolute.size(), 3, ColumnNeed::kEachOrOne, "positions_f64");
   }
 
+  absl::Status malformed(absl::string_view column, absl::string_view message) const {
+    return refuse_argument(Reason::kMalformed, ColumnName{list_, index_, column}.text(), {}, message);
+  }
+
+  absl::Status check_new_poses(const MoveColumns& move) const {
+    const bool given = !move.part_positions.empty() || !move.part_rotations.empty();
+    if (given && move.parts_each == 0)
+      return malformed("parts_each", "give the number of parts of each object with part_positions or part_rotations");
+    if (move.parts_each > limits::kMaxParts)
+      return refuse_limit(ColumnName{list_, index_, "parts_each"}.text(), "parts", limits::kMaxParts, move.parts_each);
+    if (move.parts_each == 0) return absl::OkStatus();
+    if (!given && items_ != 0) return malformed("parts_each", "give part_positions or part_rotations, too");
+    const size_t parts = move.parts_each;
+    RETURN_IF_ERROR(check_length(move.part_positions.size(), 3 * parts, ColumnNeed::kOptional, "part_positions"));
+    return check_length(move.part_rotations.size(), 4 * parts, ColumnNeed::kOptional, "part_rotations");
+  }
+
+  absl::Status check_compound(const InsertColumns& insert) const {
+    const std::string list = ColumnName{list_, index_, "compound.parts"}.text();
+    for (size_t i = 0; i < insert.parts.size(); ++i) {
+      const PartColumns& parts = insert.parts[i];
+      const ElementCheck check(list, i, parts.count());
+      const bool whole = parts.count() != 0 && parts.positions.size() % 3 == 0;
+      if (!whole)
+        return refuse_argument(Reason::kColumnLength, ColumnName{list, i, "positions"}.text(), {},
+                               absl::StrCat("holds ", parts.positions.size(), " numbers; give three for each part"));
+      RETURN_IF_ERROR(check.check_length(parts.rotations.size(), 4, ColumnNeed::kOptional, "rotations"));
+      RETURN_IF_ERROR(check.check_size(parts));
+      RETURN_IF_ERROR(check.check_length(parts.layers.size(), 1, ColumnNeed::kOptional, "layers"));
+    }
+    const size_t parts = part_count(insert);
+    if (parts == 0) return refuse_argument(Reason::kMalformed, list, {}, "a compound needs at least one part");
+    if (parts > limits::kMaxParts) return refuse_limit(list, "parts", limits::kMaxParts, static_cast<double>(parts));
+    return absl::OkStatus();
+  }
+
   absl::Status check_shape(const InsertColumns& insert) const {
+    if (insert.kind == ShapeKind::kCompound) return check_compound(insert);
+    LOCUS_DCHECK(insert.parts.empty());
+    return insert.kind == ShapeKind::kPoint ? absl::OkStatus() : check_size(insert);
+  }
+
+  // Checks the columns of radii and extents that the kind of the shapes needs.
+  template <class Columns>
+  absl::Status check_size(const Columns& insert) const {
     switch (insert.kind) {
       case ShapeKind::kPoint:
+      case ShapeKind::kCompound:
         return absl::OkStatus();
       case ShapeKind::kBall:
         return check_length(insert.radii.size(), 1, ColumnNeed::kEachOrOne, "ball.radii");
@@ -119,10 +165,17 @@ bool only_moves(const UpdateBatch& batch) {
   if (!batch.remove_ids.empty() || !batch.remove_groups.empty() || !batch.inserts.empty() || !batch.relabels.empty())
     return false;
   if (has_instances(batch)) return false;
-  return std::none_of(batch.moves.begin(), batch.moves.end(), [](const MoveColumns& move) { return move.teleport; });
+  return std::none_of(batch.moves.begin(), batch.moves.end(),
+                      [](const MoveColumns& move) { return move.teleport || move.parts_each != 0; });
 }
 
 }  // namespace
+
+size_t part_count(const InsertColumns& insert) {
+  size_t parts = 0;
+  for (const PartColumns& columns : insert.parts) parts += columns.count();
+  return parts;
+}
 
 bool may_join(const UpdateBatch& first, const UpdateBatch& second) {
   return first.tick == second.tick && only_moves(first) && only_moves(second);
@@ -135,8 +188,8 @@ bool has_instances(const UpdateBatch& batch) {
 
 uint64_t count_items(const UpdateBatch& batch) {
   uint64_t items = batch.remove_ids.size() + batch.remove_groups.size();
-  for (const InsertColumns& insert : batch.inserts) items += insert.ids.size();
-  for (const MoveColumns& move : batch.moves) items += move.ids.size();
+  for (const InsertColumns& insert : batch.inserts) items += insert.ids.size() + part_count(insert);
+  for (const MoveColumns& move : batch.moves) items += move.ids.size() + part_count(move);
   for (const RelabelColumns& relabel : batch.relabels) items += relabel.ids.size();
   for (const InstanceMoveColumns& move : batch.instance_moves) items += move.ids.size();
   for (const RelabelColumns& relabel : batch.instance_relabels) items += relabel.ids.size();

@@ -16,6 +16,19 @@
 
 namespace locus {
 
+// Columns of parts of compounds that have the same kind of shape. Let P be the number of positions. Each other column
+// has P entries, or one entry for all parts; a column with a default may also have no entries.
+struct PartColumns {
+  ShapeKind kind = ShapeKind::kBall;  // ball, box or capsule
+  absl::Span<const float> positions;  // entries x y z, in the object's own axes
+  absl::Span<const float> rotations;  // quaternions x y z w; default: no rotation
+  absl::Span<const float> radii;      // as in InsertColumns
+  absl::Span<const float> extents;    // as in InsertColumns
+  absl::Span<const uint32_t> layers;  // default: all layers
+
+  size_t count() const { return positions.size() / 3; }
+};
+
 // Columns of objects to insert. Let N be the number of ids. Each other column has N entries, or one entry for all
 // items. A column with a default may also have no entries; then the default applies.
 struct InsertColumns {
@@ -30,6 +43,9 @@ struct InsertColumns {
   absl::Span<const uint64_t> groups;        // default: 0, no group
   absl::Span<const uint64_t> tags;          // default: 0
   absl::Span<const uint64_t> expire_ticks;  // ticks until the object expires; default and 0: it does not expire
+  // Parts of each object, compounds only: 1 .. limits::kMaxParts parts. If `layers` has no entries and parts have
+  // layers, the objects are in all layers of the parts.
+  std::vector<PartColumns> parts;
 };
 
 struct MoveColumns {
@@ -38,6 +54,11 @@ struct MoveColumns {
   absl::Span<const double> positions_f64;
   absl::Span<const float> rotations;  // if empty, the rotations do not change
   bool teleport = false;
+  // Number P of parts of each object if the moves give parts new poses, else 0. The columns have P entries for each
+  // item, or P entries for all items; no entries: the parts keep their positions or rotations.
+  uint32_t parts_each = 0;
+  absl::Span<const float> part_positions = {};
+  absl::Span<const float> part_rotations = {};
 };
 
 struct RelabelColumns {
@@ -85,7 +106,9 @@ struct UpdateBatch {
 };
 
 struct ItemError {
-  std::string field;  // column of the refused value, for example inserts[0].positions
+  // Column of the refused value, for example inserts[0].positions. A wrong value of a compound's part, for example of
+  // inserts[0].compound.parts[1].ball.radii, refuses each item of the element.
+  std::string field;
   uint32_t index = 0;
   Id id = kNoId;
   Reason reason = Reason::kUnspecified;
@@ -102,15 +125,20 @@ struct UpdateAck {
   bool duplicate = false;
 };
 
+// Return the number of parts of compounds that an element of a batch has.
+size_t part_count(const InsertColumns& insert);
+inline size_t part_count(const MoveColumns& move) { return move.ids.size() * size_t{move.parts_each}; }
+
 // Returns true if the two batches may be applied as one revision: both batches have the same tick and only move
-// objects, without teleport, all_or_nothing, restart_ticks, lease_ms or earlier messages. If both batches move an
-// object, the second batch determines the result.
+// objects, without new poses of parts, teleport, all_or_nothing, restart_ticks, lease_ms or earlier messages. If both
+// batches move an object, the second batch determines the result.
 bool may_join(const UpdateBatch& first, const UpdateBatch& second);
 
 // Returns true if the batch or one of its earlier messages changes instances.
 bool has_instances(const UpdateBatch& batch);
 
-// Returns the number of items of the batch and its earlier messages, and the number of their lists.
+// Returns the number of items of the batch and its earlier messages, and the number of their lists. Parts of compounds
+// count as items, because they take memory like objects.
 uint64_t count_items(const UpdateBatch& batch);
 uint64_t count_lists(const UpdateBatch& batch);
 

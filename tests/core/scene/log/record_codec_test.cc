@@ -37,14 +37,25 @@ template <class Columns>
 bool same_labels(const Columns& a, const Columns& b) {
   return same(a.layers, b.layers) && same(a.groups, b.groups) && same(a.tags, b.tags);
 }
-bool same_insert(const InsertColumns& a, const InsertColumns& b) {
+template <class Columns>
+bool same_size(const Columns& a, const Columns& b) {
   const bool round = a.kind == ShapeKind::kBall || a.kind == ShapeKind::kCapsule;
   const bool long_one = a.kind == ShapeKind::kBox || a.kind == ShapeKind::kCapsule;
-  return a.kind == b.kind && same_pose(a, b) && same_labels(a, b) &&
-         same(round ? a.radii : absl::Span<const float>(), b.radii) &&
-         same(long_one ? a.extents : absl::Span<const float>(), b.extents) && same(a.expire_ticks, b.expire_ticks);
+  return a.kind == b.kind && same(round ? a.radii : absl::Span<const float>(), b.radii) &&
+         same(long_one ? a.extents : absl::Span<const float>(), b.extents);
 }
-bool same_move(const MoveColumns& a, const MoveColumns& b) { return a.teleport == b.teleport && same_pose(a, b); }
+bool same_parts(const PartColumns& a, const PartColumns& b) {
+  return same_size(a, b) && same(a.positions, b.positions) && same(a.rotations, b.rotations) &&
+         same(a.layers, b.layers);
+}
+bool same_insert(const InsertColumns& a, const InsertColumns& b) {
+  return same_size(a, b) && same_pose(a, b) && same_labels(a, b) && same(a.expire_ticks, b.expire_ticks) &&
+         std::equal(a.parts.begin(), a.parts.end(), b.parts.begin(), b.parts.end(), same_parts);
+}
+bool same_move(const MoveColumns& a, const MoveColumns& b) {
+  return a.teleport == b.teleport && same_pose(a, b) && a.parts_each == b.parts_each &&
+         same(a.part_positions, b.part_positions) && same(a.part_rotations, b.part_rotations);
+}
 bool same_relabel(const RelabelColumns& a, const RelabelColumns& b) { return same(a.ids, b.ids) && same_labels(a, b); }
 
 bool same_instance_move(const InstanceMoveColumns& a, const InstanceMoveColumns& b) {
@@ -91,6 +102,14 @@ TEST_F(RecordCodecTest, OnlyABatchThatChangesInstancesHasTheNewKind) {
   UpdateBatch hide;
   hide.instance_relabels.emplace_back().ids = columns_.ids({1});
   EXPECT_EQ(encoded(hide).substr(0, 4), "LSBI");
+}
+
+TEST_F(RecordCodecTest, CompoundsAndNewPosesOfPartsHaveTheKindOfExtendedBatches) {
+  EXPECT_EQ(encoded(with(compounds({1}, {0, 0, 1}, {2}))).substr(0, 4), "LSBX");
+  MoveColumns move = move_to({1}, {1, 2, 3});
+  move.parts_each = 1;
+  move.part_positions = columns_.floats({4, 5, 6});
+  EXPECT_EQ(encoded(with(move)).substr(0, 4), "LSBX");
 }
 
 TEST_F(RecordCodecTest, ExpiryTicksAndLeasesHaveAKindOfTheirOwn) {

@@ -2,6 +2,8 @@
 // batch omits, and rounding.
 #include "core/scene/updates/batch_applier.h"
 
+#include <limits>
+
 #include "core/base/limits.h"
 #include "core/scene/scene_writer.h"
 #include "tests/support/random.h"
@@ -45,6 +47,97 @@ TEST_F(BatchApplierTest, InsertsTakeOneEntryForAllOrOneEach) {
   EXPECT_EQ(object(2)->shape.radius, 4);
   EXPECT_EQ(object(1)->tag, 9u);
   EXPECT_EQ(object(2)->tag, 9u);
+}
+
+TEST_F(BatchApplierTest, AllCompoundsOfAnInsertShareTheirParts) {
+  EXPECT_EQ(apply(with(compounds({1, 2}, {0, 0, 1, 0, 0, 2}, {0.5f}))).applied, 2u);
+  ASSERT_NE(object(1)->compound, nullptr);
+  EXPECT_EQ(object(1)->compound, object(2)->compound);
+  EXPECT_EQ(object(1)->compound->parts().size(), 2u);
+  EXPECT_EQ(object(1)->compound->parts()[1].position, (Vec3f{0, 0, 2}));
+  EXPECT_EQ(object(1)->shape.kind, ShapeKind::kCompound);
+}
+
+TEST_F(BatchApplierTest, CompoundsWithoutLayersHaveAllLayersOfTheirParts) {
+  InsertColumns insert = compounds({1}, {0, 0, 1, 0, 0, 2}, {0.5f});
+  apply(with(insert));
+  EXPECT_EQ(object(1)->layers, kDefaultLayers);
+  insert.ids = columns_.ids({2});
+  insert.parts[0].layers = columns_.words({2, 8});
+  apply(with(insert));
+  EXPECT_EQ(object(2)->layers, 10u);
+  insert.ids = columns_.ids({3});
+  insert.layers = columns_.words({16});
+  apply(with(insert));
+  EXPECT_EQ(object(3)->layers, 16u);
+}
+
+TEST_F(BatchApplierTest, AWrongValueOfAPartRefusesEachCompoundOfTheInsert) {
+  InsertColumns insert = compounds({1, 2}, {0, 0, 1}, {1});
+  insert.parts.push_back({ShapeKind::kBall, columns_.floats({1, 1, 1, 2, 2, 2}), {}, columns_.floats({1, -1}), {}, {}});
+  const UpdateAck ack = apply(with(insert));
+  EXPECT_EQ(ack.refused, 2u);
+  ASSERT_EQ(ack.errors.size(), 2u);
+  EXPECT_EQ(ack.errors[1].field, "inserts[0].compound.parts[1].ball.radii");
+  EXPECT_EQ(ack.errors[1].index, 1u);
+  EXPECT_EQ(ack.errors[1].id, 2u);
+  EXPECT_EQ(ack.errors[1].reason, Reason::kOutOfRange);
+  insert = compounds({1}, {0, 2e9f, 1}, {1});
+  expect_error(with(insert), "inserts[0].compound.parts[0].positions", 0, 1, Reason::kOutOfRange);
+  insert = compounds({1}, {0, 0, 1}, {std::numeric_limits<float>::quiet_NaN()});
+  expect_error(with(insert), "inserts[0].compound.parts[0].ball.radii", 0, 1, Reason::kNotFinite);
+  insert = compounds({1}, {0, 0, 1}, {1});
+  insert.parts[0].rotations = columns_.floats({0, 0, 0, 2});
+  expect_error(with(insert), "inserts[0].compound.parts[0].rotations", 0, 1, Reason::kOutOfRange);
+  EXPECT_FALSE(object(1));
+}
+
+TEST_F(BatchApplierTest, MovesGivePartsNewPoses) {
+  apply(with(compounds({1, 2}, {0, 0, 1, 0, 0, 2}, {0.5f})));
+  MoveColumns move = move_to({1}, {5, 5, 5});
+  move.parts_each = 2;
+  move.part_positions = columns_.floats({7, 0, 0, 8, 0, 0});
+  EXPECT_EQ(apply(with(move)).applied, 1u);
+  EXPECT_EQ(object(1)->shape.position, (Vec3d{5, 5, 5}));
+  EXPECT_EQ(object(1)->compound->parts()[1].position, (Vec3f{8, 0, 0}));
+  EXPECT_EQ(object(1)->compound->parts()[1].radius, 0.5f);
+  EXPECT_EQ(object(2)->compound->parts()[1].position, (Vec3f{0, 0, 2}));
+  const uint64_t before = revision();
+  apply(with(move));
+  EXPECT_EQ(revision(), before);  // equal poses change nothing
+}
+
+TEST_F(BatchApplierTest, NewPosesOfPartsThatDoNotFitAreRefused) {
+  apply(with(compounds({1}, {0, 0, 1, 0, 0, 2}, {0.5f})));
+  apply(with(balls({2}, {1})));
+  MoveColumns move = move_to({1}, {5, 5, 5});
+  move.parts_each = 1;
+  move.part_positions = columns_.floats({7, 0, 0});
+  expect_error(with(move), "moves[0].parts_each", 0, 1, Reason::kOutOfRange);
+  move.ids = columns_.ids({2});
+  expect_error(with(move), "moves[0].parts_each", 0, 2, Reason::kOutOfRange);
+  move.ids = columns_.ids({1});
+  move.parts_each = 2;
+  move.part_positions = columns_.floats({7, 0, 0, 8, 0, std::numeric_limits<float>::infinity()});
+  expect_error(with(move), "moves[0].part_positions", 0, 1, Reason::kNotFinite);
+  move.part_positions = {};
+  move.part_rotations = columns_.floats({0, 0, 0, 1, 0, 0, 0, 1.1f});
+  expect_error(with(move), "moves[0].part_rotations", 0, 1, Reason::kOutOfRange);
+  EXPECT_EQ(object(1)->shape.position, Vec3d{});
+}
+
+TEST_F(BatchApplierTest, UpsertsReplaceCompoundsByOtherShapesAndBack) {
+  apply(with(compounds({1}, {0, 0, 1}, {0.5f})));
+  UpdateBatch ball = with(balls({1}, {3}));
+  ball.upsert = true;
+  apply(ball);
+  EXPECT_EQ(object(1)->compound, nullptr);
+  EXPECT_EQ(object(1)->shape.radius, 3);
+  UpdateBatch compound = with(compounds({1}, {0, 0, 4}, {0.5f}));
+  compound.upsert = true;
+  apply(compound);
+  ASSERT_NE(object(1)->compound, nullptr);
+  EXPECT_EQ(object(1)->compound->parts()[0].position, (Vec3f{0, 0, 4}));
 }
 
 TEST_F(BatchApplierTest, AbsentColumnsOfInsertsAreTheDefaults) {

@@ -224,5 +224,62 @@ TEST_F(UpdateFormTest, EarlierMessagesAreCheckedAndCountTowardsTheLimits) {
   EXPECT_EQ(refused_field(Reason::kLimit), "batch");
 }
 
+TEST_F(UpdateFormTest, PartsOfCompoundsTakeOneEntryForEachOrForAll) {
+  insert().kind = ShapeKind::kCompound;
+  EXPECT_EQ(refused_field(Reason::kMalformed), "inserts[0].compound.parts");
+  insert().parts.resize(2);
+  PartColumns& parts = insert().parts[1];
+  for (PartColumns& one : insert().parts) {
+    one.positions = columns_.floats(std::vector<float>(9));
+    one.radii = columns_.floats({1});
+  }
+  EXPECT_EQ(refused_field(), "");
+  EXPECT_EQ(accepted(parts.radii, 1, "inserts[0].compound.parts[1].ball.radii"), (std::vector<size_t>{1, 3}));
+  EXPECT_EQ(accepted(parts.rotations, 4, "inserts[0].compound.parts[1].rotations"), (std::vector<size_t>{0, 1, 3}));
+  EXPECT_EQ(accepted(parts.layers, 1, "inserts[0].compound.parts[1].layers"), (std::vector<size_t>{0, 1, 3}));
+  parts.kind = ShapeKind::kBox;
+  EXPECT_EQ(accepted(parts.extents, 3, "inserts[0].compound.parts[1].box.half_extents"), (std::vector<size_t>{1, 3}));
+  parts.extents = columns_.floats({1, 1, 1});
+  parts.positions = columns_.floats(std::vector<float>(8));
+  EXPECT_EQ(refused_field(), "inserts[0].compound.parts[1].positions");
+  parts.positions = {};
+  EXPECT_EQ(refused_field(), "inserts[0].compound.parts[1].positions");
+}
+
+TEST_F(UpdateFormTest, CompoundsHaveAtMost64Parts) {
+  insert().kind = ShapeKind::kCompound;
+  insert().parts.resize(2);
+  for (PartColumns& one : insert().parts) {
+    one.positions = columns_.floats(std::vector<float>(size_t{3} * 32));
+    one.radii = columns_.floats({1});
+  }
+  EXPECT_EQ(refused_field(), "");
+  insert().parts[1].positions = columns_.floats(std::vector<float>(size_t{3} * 33));
+  EXPECT_EQ(refused_field(Reason::kLimit), "inserts[0].compound.parts");
+}
+
+TEST_F(UpdateFormTest, NewPosesOfPartsComeWithTheNumberOfParts) {
+  MoveColumns& move = batch_.moves[0];
+  move.parts_each = 2;
+  EXPECT_EQ(refused_field(Reason::kMalformed), "moves[0].parts_each");
+  move.part_rotations = columns_.floats(std::vector<float>(8));
+  EXPECT_EQ(refused_field(), "");
+  EXPECT_EQ(accepted(move.part_positions, 6, "moves[0].part_positions"), (std::vector<size_t>{0, 1, 3}));
+  move.parts_each = 0;
+  EXPECT_EQ(refused_field(Reason::kMalformed), "moves[0].parts_each");
+  move.parts_each = 65;
+  EXPECT_EQ(refused_field(Reason::kLimit), "moves[0].parts_each");
+}
+
+TEST_F(UpdateFormTest, PartsCountAsItems) {
+  insert().kind = ShapeKind::kCompound;
+  PartColumns& parts = insert().parts.emplace_back();
+  parts.positions = columns_.floats(std::vector<float>(size_t{3} * 5));
+  parts.radii = columns_.floats({1});
+  batch_.moves[0].parts_each = 2;
+  batch_.moves[0].part_positions = columns_.floats(std::vector<float>(6));
+  EXPECT_EQ(count_items(batch_), 3u + 5u + 3u + 6u + 3u);
+}
+
 }  // namespace
 }  // namespace locus::test
