@@ -1,3 +1,5 @@
+#include <utility>
+
 #include "absl/strings/str_cat.h"
 #include "core/base/limits.h"
 #include "core/base/status_macros.h"
@@ -23,6 +25,39 @@ absl::Status check_positions(const Message& message, const std::string& field) {
   return absl::OkStatus();
 }
 
+// Each entry has at least one part, so that limits::kMaxParts entries are the most that a compound can have.
+absl::Status read_parts(const v1::Compound& compound, const std::string& field, InsertColumns* out) {
+  if (compound.parts_size() > static_cast<int>(limits::kMaxParts))
+    return refuse_limit(field + ".parts", "parts", limits::kMaxParts, compound.parts_size());
+  out->parts.reserve(static_cast<size_t>(compound.parts_size()));
+  for (int i = 0; i < compound.parts_size(); ++i) {
+    const v1::Parts& parts = compound.parts(i);
+    PartColumns& columns = out->parts.emplace_back();
+    columns.positions = span_of(parts.positions());
+    columns.rotations = span_of(parts.rotations());
+    columns.layers = span_of(parts.layers());
+    switch (parts.shape_case()) {
+      case v1::Parts::kBall:
+        columns.kind = ShapeKind::kBall;
+        columns.radii = span_of(parts.ball().radii());
+        break;
+      case v1::Parts::kBox:
+        columns.kind = ShapeKind::kBox;
+        columns.extents = span_of(parts.box().half_extents());
+        break;
+      case v1::Parts::kCapsule:
+        columns.kind = ShapeKind::kCapsule;
+        columns.radii = span_of(parts.capsule().radii());
+        columns.extents = span_of(parts.capsule().half_axes());
+        break;
+      case v1::Parts::SHAPE_NOT_SET:
+        return malformed_update(absl::StrCat(field, ".parts[", i, "].shape"),
+                                "say what the parts are: ball, box or capsule");
+    }
+  }
+  return absl::OkStatus();
+}
+
 absl::Status read_shape(const v1::Insert& insert, const std::string& field, InsertColumns* out) {
   switch (insert.shape_case()) {
     case v1::Insert::kPoint:
@@ -42,11 +77,12 @@ absl::Status read_shape(const v1::Insert& insert, const std::string& field, Inse
       out->extents = span_of(insert.capsule().half_axes());
       return absl::OkStatus();
     case v1::Insert::kCompound:
-      return not_served(field + ".compound");
+      out->kind = ShapeKind::kCompound;
+      return read_parts(insert.compound(), field + ".compound", out);
     case v1::Insert::SHAPE_NOT_SET:
       break;
   }
-  return malformed_update(field + ".shape", "say what the objects are: point, ball, box or capsule");
+  return malformed_update(field + ".shape", "say what the objects are: point, ball, box, capsule or compound");
 }
 
 absl::StatusOr<InsertColumns> to_insert(const v1::Insert& insert, const std::string& field) {
@@ -66,13 +102,18 @@ absl::StatusOr<InsertColumns> to_insert(const v1::Insert& insert, const std::str
 
 absl::StatusOr<MoveColumns> to_move(const v1::Move& move, const std::string& field) {
   RETURN_IF_ERROR(check_positions(move, field));
-  if (move.parts_each() != 0) return not_served(field + ".parts_each");
+  // Checked here already, because the memory of the batch is estimated before check_form() is called.
+  if (move.parts_each() > limits::kMaxParts)
+    return refuse_limit(field + ".parts_each", "parts", limits::kMaxParts, move.parts_each());
   MoveColumns columns;
   columns.ids = span_of(move.ids());
   columns.positions = span_of(move.positions());
   columns.positions_f64 = span_of(move.positions_f64());
   columns.rotations = span_of(move.rotations());
   columns.teleport = move.teleport();
+  columns.parts_each = move.parts_each();
+  columns.part_positions = span_of(move.part_positions());
+  columns.part_rotations = span_of(move.part_rotations());
   return columns;
 }
 
@@ -97,9 +138,17 @@ RelabelColumns to_relabel(const v1::Relabel& relabel) {
   return columns;
 }
 
+// Returns the number of lists of parts of all compounds.
+int64_t part_lists(const v1::UpdateBatch& batch) {
+  int64_t lists = 0;
+  for (const v1::Insert& insert : batch.inserts())
+    if (insert.has_compound()) lists += insert.compound().parts_size();
+  return lists;
+}
+
 absl::Status check_batch_form(const v1::UpdateBatch& batch) {
   const int64_t lists = int64_t{batch.inserts_size()} + batch.moves_size() + batch.relabels_size() +
-                        batch.instance_moves_size() + batch.instance_relabels_size();
+                        batch.instance_moves_size() + batch.instance_relabels_size() + part_lists(batch);
   if (lists > limits::kMaxUpdateLists)
     return refuse_limit("", "update_lists", limits::kMaxUpdateLists, static_cast<double>(lists));
   if (batch.writer() == 0 && batch.batch() != 0)
@@ -122,7 +171,7 @@ absl::StatusOr<UpdateBatch> to_updates(const v1::UpdateBatch& batch) {
   out.remove_groups = span_of(batch.remove_groups());
   for (int i = 0; i < batch.inserts_size(); ++i) {
     ASSIGN_OR_RETURN(InsertColumns insert, to_insert(batch.inserts(i), absl::StrCat("inserts[", i, "]")));
-    out.inserts.push_back(insert);
+    out.inserts.push_back(std::move(insert));
   }
   for (int i = 0; i < batch.moves_size(); ++i) {
     ASSIGN_OR_RETURN(MoveColumns move, to_move(batch.moves(i), absl::StrCat("moves[", i, "]")));

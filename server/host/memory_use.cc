@@ -8,6 +8,7 @@ namespace {
 
 // Peak bytes for each item of a batch: inserting or moving an object copies its cell and its path in the tree of ids.
 constexpr uint64_t kBytesAnItem = 700;
+constexpr uint64_t kBytesACompoundPart = 160;  // peak bytes for each part of a new compound
 constexpr uint64_t kBytesABatch = 16384;
 // Peak memory of an upload's columns, as a multiple of their final size: the vectors of the columns double their
 // capacity as they grow.
@@ -32,6 +33,15 @@ uint64_t changed_count(const UpdateBatch& batch) {
   return items;
 }
 
+// Returns the number of parts of the compounds that the batch makes: one compound for each insertion of compounds, and
+// one for each object whose parts get new poses.
+uint64_t made_parts(const UpdateBatch& batch) {
+  uint64_t parts = 0;
+  for (const InsertColumns& insert : batch.inserts) parts += part_count(insert);
+  for (const MoveColumns& move : batch.moves) parts += part_count(move);
+  return parts;
+}
+
 uint64_t changed_instances(const UpdateBatch& batch) {
   uint64_t items = 0;
   for (const InstanceMoveColumns& move : batch.instance_moves) items += move.ids.size();
@@ -42,7 +52,8 @@ uint64_t changed_instances(const UpdateBatch& batch) {
 }  // namespace
 
 uint64_t item_count(const UpdateBatch& batch) {
-  return inserted_count(batch) + changed_count(batch) + changed_instances(batch) + batch.remove_ids.size();
+  return inserted_count(batch) + changed_count(batch) + changed_instances(batch) + batch.remove_ids.size() +
+         made_parts(batch);
 }
 
 UpdateCost cost_of(const UpdateBatch& batch) {
@@ -51,7 +62,8 @@ UpdateCost cost_of(const UpdateBatch& batch) {
   cost.kind = inserts > 0               ? UpdateCost::Kind::kInserts
               : changes + instances > 0 ? UpdateCost::Kind::kMoves
                                         : UpdateCost::Kind::kRemoves;
-  cost.bytes = kBytesABatch + (inserts + changes) * kBytesAnItem + instances * kBytesAnInstance;
+  cost.bytes = kBytesABatch + (inserts + changes) * kBytesAnItem + made_parts(batch) * kBytesACompoundPart +
+               instances * kBytesAnInstance;
   return cost;
 }
 

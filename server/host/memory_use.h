@@ -23,8 +23,9 @@ struct UpdateCost {
   uint64_t bytes = 0;
   Kind kind = Kind::kRemoves;
 };
-// Returns the number of the batch's items that insert, move or relabel an object, or remove one by its id. The earlier
-// messages of the batch are not counted, here and in cost_of(): they are counted when they arrive.
+// Returns the number of the batch's items that insert, move or relabel an object, or remove one by its id, plus the
+// number of parts of compounds that it inserts or gives new poses. The earlier messages of the batch are not counted,
+// here and in cost_of(): they are counted when they arrive.
 uint64_t item_count(const UpdateBatch& batch);
 // Returns the cost of a batch whose form is not checked yet: its lists may have any length.
 UpdateCost cost_of(const UpdateBatch& batch);

@@ -30,9 +30,9 @@ TEST_F(ServerRpcTest, TheServerReportsItsVersionAndFeatures) {
   EXPECT_EQ(server.version(), LOCUS_VERSION);
   EXPECT_EQ(server.instruction_set(), instruction_set());
   EXPECT_THAT(server.features(),
-              ::testing::ElementsAre("after_t", "anchors", "as_of", "balls", "boxes", "capsules", "cells", "contains",
-                                     "count_only", "download_mesh", "frustums", "history", "latest_wins", "lookup",
-                                     "nearest", "pairs", "rays", "sight", "static_from", "step", "sweeps"));
+              ::testing::ElementsAre("after_t", "anchors", "as_of", "balls", "boxes", "capsules", "cells", "compounds",
+                                     "contains", "count_only", "download_mesh", "frustums", "history", "latest_wins",
+                                     "lookup", "nearest", "pairs", "rays", "sight", "static_from", "step", "sweeps"));
 }
 
 TEST_F(ServerRpcTest, AServerThatWasStartedInsecureSaysSo) {

@@ -79,6 +79,47 @@ TEST(ConvertUpdatesTest, EveryFieldOfABatchArrives) {
   EXPECT_EQ(updates->batch, 12u);
 }
 
+TEST(ConvertUpdatesTest, CompoundsAndNewPosesOfPartsArrive) {
+  v1::UpdateBatch batch;
+  v1::Insert* insert = batch.add_inserts();
+  v1::Parts* balls = insert->mutable_compound()->add_parts();
+  for (const float x : {1.f, 2.f, 3.f}) balls->add_positions(x);
+  for (const float x : {0.f, 0.f, 0.f, 1.f}) balls->add_rotations(x);
+  balls->mutable_ball()->add_radii(4);
+  balls->add_layers(5);
+  v1::Parts* boxes = insert->mutable_compound()->add_parts();
+  boxes->mutable_box()->add_half_extents(6);
+  v1::Parts* capsules = insert->mutable_compound()->add_parts();
+  capsules->mutable_capsule()->add_radii(7);
+  capsules->mutable_capsule()->add_half_axes(8);
+  v1::Move* move = batch.add_moves();
+  move->set_parts_each(2);
+  move->add_part_positions(9);
+  move->add_part_rotations(10);
+  const absl::StatusOr<UpdateBatch> updates = to_updates(batch);
+  ASSERT_TRUE(updates.ok()) << updates.status();
+  const std::vector<PartColumns>& parts = updates->inserts[0].parts;
+  ASSERT_EQ(parts.size(), 3u);
+  EXPECT_EQ(updates->inserts[0].kind, ShapeKind::kCompound);
+  EXPECT_EQ(parts[0].kind, ShapeKind::kBall);
+  EXPECT_EQ(parts[0].positions.at(2), 3);
+  EXPECT_EQ(parts[0].rotations.at(3), 1);
+  EXPECT_EQ(parts[0].radii.at(0), 4);
+  EXPECT_EQ(parts[0].layers.at(0), 5u);
+  EXPECT_EQ(parts[1].kind, ShapeKind::kBox);
+  EXPECT_EQ(parts[1].extents.at(0), 6);
+  EXPECT_EQ(parts[2].kind, ShapeKind::kCapsule);
+  EXPECT_EQ(parts[2].radii.at(0), 7);
+  EXPECT_EQ(parts[2].extents.at(0), 8);
+  EXPECT_EQ(updates->moves[0].parts_each, 2u);
+  EXPECT_EQ(updates->moves[0].part_positions.at(0), 9);
+  EXPECT_EQ(updates->moves[0].part_rotations.at(0), 10);
+  move->set_parts_each(65);
+  EXPECT_EQ(refusal_of(to_updates(batch).status())->field, "moves[0].parts_each");
+  boxes->clear_shape();
+  EXPECT_EQ(refusal_of(to_updates(batch).status())->field, "inserts[0].compound.parts[1].shape");
+}
+
 TEST(ConvertUpdatesTest, AMoveOfInstancesNeedsOneColumnOfPositions) {
   v1::UpdateBatch batch;
   v1::InstanceMove* move = batch.add_instance_moves();

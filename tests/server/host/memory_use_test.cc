@@ -39,6 +39,18 @@ TEST(MemoryUseTest, EveryItemOfABatchCostsTheSame) {
   EXPECT_GT(eight, four);
 }
 
+TEST(MemoryUseTest, PartsOfCompoundsCost) {
+  UpdateBatch batch = moving();
+  const uint64_t before = cost_of(batch).bytes;
+  batch.moves[0].parts_each = 16;
+  const uint64_t parts = cost_of(batch).bytes - before;
+  EXPECT_GT(parts, 16 * kIds.size() * 50);
+  EXPECT_EQ(item_count(batch), 17 * kIds.size());
+  const std::vector<float> positions(size_t{3} * 16);
+  batch.inserts.emplace_back().parts.emplace_back().positions = positions;
+  EXPECT_EQ(cost_of(batch).bytes - before - parts, parts / kIds.size());
+}
+
 TEST(MemoryUseTest, AChangedInstanceCostsAsMuchAsAPlacedOne) {
   UpdateBatch batch = moving();
   const uint64_t before = cost_of(batch).bytes;

@@ -128,6 +128,13 @@ TEST(WirePlanTest, EmptySubMessagesAreCountedBeforeTheyExist) {
   EXPECT_TRUE(scan<v1::ApplyUpdatesRequest>(delimited(2, repeat(empty_insert, limits::kMaxUpdateLists))).ok());
 }
 
+TEST(WirePlanTest, ListsOfPartsAreCountedOverAllCompounds) {
+  const std::string empty_parts(std::string("\x0a\x00", 2));
+  const std::string insert = delimited(6, delimited(12, repeat(empty_parts, 1000)));
+  EXPECT_TRUE(scan<v1::ApplyUpdatesRequest>(delimited(2, repeat(insert, 65))).ok());
+  expect_limit<v1::ApplyUpdatesRequest>(delimited(2, repeat(insert, 66)), "update_lists");
+}
+
 TEST(WirePlanTest, FieldsAreCounted) {
   const std::string flag("\x18\x01");
   expect_limit<v1::ApplyUpdatesRequest>(delimited(2, repeat(flag, kMaxWireFields)), "wire_fields");
