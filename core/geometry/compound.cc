@@ -11,6 +11,7 @@ namespace locus {
 
 Compound::Compound(std::vector<Part> parts) : parts_(std::move(parts)) {
   LOCUS_CHECK(!parts_.empty() && parts_.size() <= limits::kMaxParts);
+  parts_.shrink_to_fit();  // so that bytes() is right
   extents_.reserve(parts_.size());
   double extent = 0;
   for (const Part& part : parts_) {

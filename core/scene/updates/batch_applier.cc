@@ -196,6 +196,7 @@ const Compound* BatchApplier::keep(std::vector<Part> parts) {
 
 const Compound* BatchApplier::read_compound(const InsertColumns& columns, Fault& fault) {
   std::vector<Part> parts;
+  parts.reserve(part_count(columns));
   for (size_t i = 0; i < columns.parts.size(); ++i) {
     for (size_t k = 0; k < columns.parts[i].count(); ++k) {
       fault = read_part(columns.parts[i], k, parts.emplace_back());
