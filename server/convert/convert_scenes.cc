@@ -16,6 +16,8 @@ v1::SceneSpec spec_to_proto(const SceneSpec& spec) {
   for (const auto& [key, value] : spec.labels) (*out.mutable_labels())[key] = value;
   out.set_history_ticks(spec.history.ticks);
   out.set_history_bytes(spec.history.bytes);
+  out.set_idle_ttl_s(spec.idle_ttl_s);
+  out.set_mesh_grace_s(spec.mesh_grace_s);
   out.set_winding(spec.winding == Winding::kClockwise ? v1::WINDING_CLOCKWISE : v1::WINDING_COUNTER_CLOCKWISE);
   out.set_overload(spec.overload == OverloadPolicy::kLatestWins ? v1::OVERLOAD_POLICY_LATEST_WINS
                                                                 : v1::OVERLOAD_POLICY_EVERY_BATCH);
@@ -41,12 +43,15 @@ v1::HistoryLimit to_proto(PastLimit limit) {
 }
 
 absl::Status check_served(const v1::SceneSpec& spec) {
-  if (spec.idle_ttl_s() != 0) return not_served("spec.idle_ttl_s");
-  if (spec.mesh_grace_s() != 0) return not_served("spec.mesh_grace_s");
   if (!v1::Durability_IsValid(spec.durability())) return unknown_enum("spec.durability", spec.durability());
   if (!v1::Winding_IsValid(spec.winding())) return unknown_enum("spec.winding", spec.winding());
   if (!v1::OverloadPolicy_IsValid(spec.overload())) return unknown_enum("spec.overload", spec.overload());
   return absl::OkStatus();
+}
+
+absl::Status check_lifetime(uint32_t seconds, absl::string_view field, absl::string_view limit) {
+  if (seconds <= limits::kMaxLifetimeSeconds) return absl::OkStatus();
+  return refuse_limit(field, limit, limits::kMaxLifetimeSeconds, seconds);
 }
 
 absl::StatusOr<HistoryOptions> to_history(const v1::SceneSpec& spec) {
@@ -132,8 +137,12 @@ absl::StatusOr<SceneSpec> to_spec(const v1::SceneSpec& spec) {
   RETURN_IF_ERROR(check_served(spec));
   RETURN_IF_ERROR(check_labels(spec.labels(), "spec.labels"));
   ASSIGN_OR_RETURN(const HistoryOptions history, to_history(spec));
+  RETURN_IF_ERROR(check_lifetime(spec.idle_ttl_s(), "spec.idle_ttl_s", "idle_ttl_s"));
+  RETURN_IF_ERROR(check_lifetime(spec.mesh_grace_s(), "spec.mesh_grace_s", "mesh_grace_s"));
   SceneSpec out;
   out.history = history;
+  out.idle_ttl_s = spec.idle_ttl_s();
+  out.mesh_grace_s = spec.mesh_grace_s();
   out.labels.insert(spec.labels().begin(), spec.labels().end());
   out.winding = spec.winding() == v1::WINDING_CLOCKWISE ? Winding::kClockwise : Winding::kCounterClockwise;
   if (spec.overload() == v1::OVERLOAD_POLICY_LATEST_WINS) out.overload = OverloadPolicy::kLatestWins;

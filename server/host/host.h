@@ -21,6 +21,9 @@
 #include "server/scheduling/change_queue.h"
 #include "server/scheduling/clocks.h"
 #include "server/scheduling/cost_estimates.h"
+#include "server/scheduling/idle_scenes.h"
+#include "server/scheduling/lifetime_keeper.h"
+#include "server/scheduling/mesh_collector.h"
 #include "server/scheduling/query_scheduler.h"
 #include "server/scheduling/snapshotter.h"
 #include "server/scheduling/turns.h"
@@ -39,7 +42,9 @@ struct Host : RpcState {
         registry(with_log),
         pool(with.threads),
         scheduler(scheduler_options(with)),
-        updates(queue_options(with, with_log)) {}
+        updates(queue_options(with, with_log)) {
+    RpcState::idle_scenes = &idle_scenes;
+  }
 
   static constexpr uint32_t kChangeThreads = 2;
   // Minimum weight in bytes of the connections that are closed when memory is nearly full; see
@@ -73,6 +78,10 @@ struct Host : RpcState {
     return std::max(share, limits::kMinPinnedBytes);
   }
 
+  // Begins to delete idle scenes and unused meshes. Call once, when all scenes are recovered: the times of all scenes
+  // and meshes begin.
+  void start_lifetimes();
+
   const ServerConfig config;
   // Host and port of the HTTP pages; the port is 0 if there are none. Set before the first call is served.
   std::string http_host;
@@ -90,6 +99,12 @@ struct Host : RpcState {
   MemoryKeeper memory_keeper{
       memory, registry,
       [this](bool close) { return connections.shed_heaviest(close, kMinShedBytes, "memory is nearly full"); }, log};
+  IdleScenes idle_scenes{lifetimes, registry, [this](const ScenePtr& scene, const absl::Status& status) {
+                           report_idle_scene(scene, status);
+                         }};
+  MeshCollector mesh_collector{lifetimes, registry, [this](const std::string& mesh, const absl::Status& status) {
+                                 report_unused_mesh(mesh, status);
+                               }};
   // Limits the calls that visit all objects of a scene, to describe or dump it: at the same time, at most half as many
   // as `config.threads` work, but at least one.
   Turns scene_visits{std::max(1u, config.threads / 2)};
@@ -97,6 +112,12 @@ struct Host : RpcState {
   AdmissionLimiter health_checks{kMaxHealthChecks, Sharing::kFair};
   AdmissionLimiter reflections{kMaxReflections, Sharing::kFair};
   AdmissionLimiter backups{limits::kMaxBackups};
+  LifetimeKeeper lifetimes;  // the last member: its thread ends first, because its tasks use the other members
+
+ private:
+  // Log and audit that a scene or mesh was deleted because it was not used, or could not be deleted.
+  void report_idle_scene(const ScenePtr& scene, const absl::Status& status);
+  void report_unused_mesh(const std::string& mesh, const absl::Status& status);
 };
 
 }  // namespace locus::server

@@ -13,6 +13,7 @@
 #include "server/scheduling/admission_limiter.h"
 #include "server/scheduling/client_shares.h"
 #include "server/scheduling/drain.h"
+#include "server/scheduling/idle_scenes.h"
 #include "server/scheduling/memory_budget.h"
 #include "server/security/access_control.h"
 #include "server/security/file_loads.h"
@@ -35,6 +36,8 @@ struct RpcState {
   uint64_t max_inflated_bytes = 0;  // maximum size of an inflated message; 0 = gRPC refuses compressed messages
   // Identities and rights of callers. Set before the first call; null in servers without access control.
   AccessControl* access = nullptr;
+  // Counts the open streams of each scene. Set before the first call; null in tests that serve no scenes.
+  IdleScenes* idle_scenes = nullptr;
   FileLoads access_loads;  // loads of the access file, the token file and the JWKS file
   FileLoads tls_loads;     // loads of the certificate, its key and the client CA
   Quotas quotas{

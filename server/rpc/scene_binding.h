@@ -1,5 +1,6 @@
 // The scene that a stream serves. The first message of the stream must name the scene; later messages may leave the
-// name out. Threads: the stream's IO loop only.
+// name out. While the stream is open, the scene is in use, so that it is not deleted as idle, if the caller has the
+// right to it. Threads: the stream's IO loop only.
 #ifndef LOCUS_SERVER_RPC_SCENE_BINDING_H_
 #define LOCUS_SERVER_RPC_SCENE_BINDING_H_
 
@@ -15,6 +16,13 @@ namespace locus::server {
 // Invariant: the scene never changes once it is set.
 class SceneBinding {
  public:
+  SceneBinding() = default;
+  ~SceneBinding() {
+    if (uses_ != nullptr) uses_->stream_closed(scene_);
+  }
+  SceneBinding(const SceneBinding&) = delete;
+  SceneBinding& operator=(const SceneBinding&) = delete;
+
   // Sets the scene to `scene`, the name in the first message. Call bind() for every message; for later messages it does
   // nothing. After an error the stream must end.
   absl::Status bind(const Caller& caller, const std::string& scene) {
@@ -22,6 +30,9 @@ class SceneBinding {
     RETURN_IF_ERROR(check_scene_name(scene, "scene"));
     RETURN_IF_ERROR(caller.check_scene(scene));
     scene_ = scene;
+    if (caller.state().idle_scenes == nullptr || !caller.check_right(scene).ok()) return absl::OkStatus();
+    uses_ = caller.state().idle_scenes;
+    uses_->stream_opened(scene);
     return absl::OkStatus();
   }
   // Refuses a message that names another scene. Call it for every message, after bind(). An error is the answer to that
@@ -35,6 +46,7 @@ class SceneBinding {
 
  private:
   std::string scene_;
+  IdleScenes* uses_ = nullptr;  // counts this stream; null if it does not
 };
 
 }  // namespace locus::server

@@ -14,6 +14,11 @@ inline uint64_t steady_nanoseconds() {
   return static_cast<uint64_t>(std::chrono::duration_cast<std::chrono::nanoseconds>(since).count());
 }
 
+// Returns `time` as steady_nanoseconds() would have returned it.
+inline uint64_t nanoseconds_of(std::chrono::steady_clock::time_point time) {
+  return static_cast<uint64_t>(std::chrono::nanoseconds(time.time_since_epoch()).count());
+}
+
 // Returns the processor time of the calling thread since it started, which excludes time spent waiting for a core. A
 // call takes 0.2 to 1 us, because it is a system call.
 inline uint64_t thread_nanoseconds() {

@@ -84,6 +84,8 @@ absl::StatusOr<std::shared_ptr<OwnedChange>> read_change(Scene& scene, const Reg
 }
 
 using SharedClaim = std::shared_ptr<const CallMemory>;
+// The use of the scene by a call and by the change that it queues.
+using SharedUse = std::shared_ptr<const UsedScene>;
 
 // Claims memory for the change before any memory is allocated for it: for the queued copy of the change, for its check,
 // and for building the new set of instances. A small change that only removes instances is never refused.
@@ -105,7 +107,7 @@ void log_failure(const Scene& scene, uint64_t number, const absl::StatusOr<Insta
 }
 
 // Queues the change together with the claim of its memory. Returns the change's number.
-absl::StatusOr<uint64_t> submit(Host& host, const ScenePtr& scene, uint64_t epoch, std::shared_ptr<OwnedChange> owned,
+absl::StatusOr<uint64_t> submit(Host& host, const SharedUse& scene, uint64_t epoch, std::shared_ptr<OwnedChange> owned,
                                 SharedClaim room, std::shared_ptr<Outcome> outcome) {
   return host.changes.submit(
       epoch, [&host, arrived = SteadyTime::clock::now(), scene, owned = std::move(owned), room = std::move(room),
@@ -113,10 +115,13 @@ absl::StatusOr<uint64_t> submit(Host& host, const ScenePtr& scene, uint64_t epoc
         const LogScope scope(trace);
         // Wait without a deadline: the change runs even if its caller has given up, and revoked readers release their
         // snapshots in any case.
-        (void)wait_for_readers(*scene, [] { return absl::OkStatus(); });
-        absl::StatusOr<InstanceChange> change = scene->change_instances(owned->change);
-        if (change.ok()) host.metrics.record_instance_change(nanoseconds_since(arrived));
-        log_failure(*scene, number, change);
+        (void)wait_for_readers(**scene, [] { return absl::OkStatus(); });
+        absl::StatusOr<InstanceChange> change = (*scene)->change_instances(owned->change);
+        if (change.ok()) {
+          host.metrics.record_instance_change(nanoseconds_since(arrived));
+          host.mesh_collector.instances_changed(**scene);
+        }
+        log_failure(**scene, number, change);
         outcome->set(std::move(change));
       });
 }
@@ -126,16 +131,18 @@ absl::StatusOr<uint64_t> submit(Host& host, const ScenePtr& scene, uint64_t epoc
 absl::Status change_instances(Host& host, const Caller& caller, const v1::ChangeInstancesRequest& request,
                               MessageStream& stream) {
   caller.set_subject(request.scene());
-  ASSIGN_OR_RETURN(const ScenePtr scene, find_scene(host, caller, request.scene(), "scene"));
-  ASSIGN_OR_RETURN(SharedClaim room, make_room(caller, *scene, request));
+  ASSIGN_OR_RETURN(UsedScene found, use_scene(host, caller, request.scene(), "scene"));
+  const auto scene = std::make_shared<const UsedScene>(std::move(found));
+  ASSIGN_OR_RETURN(SharedClaim room, make_room(caller, **scene, request));
   // Held until the response is written.
   ASSIGN_OR_RETURN(const CallMemory reply, claim_copy(caller, placed_count(request) * kReplyBytesAPlacement));
-  ASSIGN_OR_RETURN(const std::shared_ptr<OwnedChange> owned, read_change(*scene, host.registry, request));
+  for (const v1::Placement& placement : request.place()) host.mesh_collector.renew(placement.mesh());
+  ASSIGN_OR_RETURN(const std::shared_ptr<OwnedChange> owned, read_change(**scene, host.registry, request));
   // Check the placements without the scene's instances, because changes that were queued earlier may still alter those
   // instances.
   if (request.no_wait()) RETURN_IF_ERROR(StaticSet::check_placements(owned->change.place));
   const auto outcome = std::make_shared<Outcome>();
-  const uint64_t epoch = scene->latest()->epoch;
+  const uint64_t epoch = (*scene)->latest()->epoch;
   ASSIGN_OR_RETURN(const uint64_t number, submit(host, scene, epoch, owned, std::move(room), outcome));
   v1::ChangeInstancesResponse response;
   response.set_change(number);

@@ -174,6 +174,8 @@ absl::Status reuse(Host& host, const Caller& caller, const std::string& name, co
     ASSIGN_OR_RETURN(quota, hold_mesh_bytes(host, shared->creator(), shared->bytes()));
     ASSIGN_OR_RETURN(room, caller.claim(MemoryLine::kUploads, "parts", parts_cost(parts)));
   }
+  host.mesh_collector.renew(name);
+  host.mesh_collector.renew(known.name());
   ASSIGN_OR_RETURN(MeshPtr mesh, host.registry.add_mesh(name, shared));
   response.set_already_known(true);
   *response.mutable_mesh() = describe_mesh(host.registry, name, std::move(mesh));
@@ -225,6 +227,7 @@ absl::Status add_mesh(Host& host, const Caller& caller, MeshUpload& upload, v1::
   ASSIGN_OR_RETURN(MeshPtr built, build(host, upload.name(), std::move(complete)));
   built = StaticMesh::share(upload.name(), built->parts(), *built, creator_name(caller));
   ASSIGN_OR_RETURN(const QuotaHold quota, hold_mesh_bytes(host, built->creator(), built->bytes()));
+  host.mesh_collector.renew(upload.name());
   ASSIGN_OR_RETURN(MeshPtr added, host.registry.add_mesh(upload.name(), std::move(built)));
   log(LogLevel::kInfo, "mesh uploaded", {{"mesh", upload.name()}});
   *response.mutable_mesh() = describe_mesh(host.registry, upload.name(), std::move(added));

@@ -12,7 +12,6 @@
 #include "server/convert/status.h"
 #include "server/observability/log.h"
 #include "server/scheduling/clocks.h"
-#include "server/services/scene_access.h"
 
 namespace locus::server {
 
@@ -75,8 +74,7 @@ void QueryWork::start(uint64_t revision, uint64_t ack_bytes) {
 }
 
 absl::Status QueryWork::read(const std::string& scene, const v1::QueryBatch& batch) {
-  ASSIGN_OR_RETURN(ScenePtr found, find_scene(host_, slot_.caller(), scene, "scene"));
-  scene_ = std::move(found);
+  ASSIGN_OR_RETURN(scene_, use_scene(host_, slot_.caller(), scene, "scene"));
   ASSIGN_OR_RETURN(QueryBatch queries, to_queries(batch));
   batch_ = std::move(queries);
   view_ = to_view(batch.view());

@@ -58,6 +58,7 @@
 #include "server/rpc/call_slot.h"
 #include "server/rpc/io_threads.h"
 #include "server/scheduling/query_scheduler.h"
+#include "server/services/scene_access.h"
 
 namespace locus::server {
 
@@ -134,7 +135,7 @@ class QueryWork final : private QueryJob, private DeferredTask {
   State state_ = State::kIdle;
   const v1::QueryBatch* message_ = nullptr;
   v1::QueryResult* result_ = nullptr;
-  ScenePtr scene_;
+  UsedScene scene_;
   View view_;
   QueryBatch batch_;
   bool is_step_ = false;    // the answer contains the ack of an applied update

@@ -86,7 +86,7 @@ class Recovery {
     for (const StoredMesh* name : names) {
       const absl::StatusOr<MeshPtr> named = mesh.ok() ? recover_name(log_, *name, mesh->mesh) : mesh.status();
       if (named.ok()) {
-        host_.registry.restore_mesh(name->name, *named);
+        host_.registry.restore_mesh(name->name, *named, name->grace_s);
       } else if (take_damage("mesh", name->name, named.status())) {
         host_.registry.restore_damaged_mesh(name->name, damaged("mesh", named.status()));
       }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <utility>
 
 #include "core/base/names.h"
 #include "core/base/status_macros.h"
@@ -29,6 +30,12 @@ absl::StatusOr<ScenePtr> find_scene(const Host& host, const Caller& caller, cons
     return status;
   }
   return host.registry.find_scene(name);
+}
+
+absl::StatusOr<UsedScene> use_scene(const Host& host, const Caller& caller, const std::string& name,
+                                    absl::string_view field) {
+  ASSIGN_OR_RETURN(ScenePtr scene, find_scene(host, caller, name, field));
+  return UsedScene(std::move(scene));
 }
 
 absl::StatusOr<CallMemory> claim_copy(const Caller& caller, uint64_t bytes, MemoryLine line) {

@@ -1,21 +1,59 @@
-// Functions that find the scene of a call, wait for a revision of the scene, and wait for the scene's readers. No
-// state; any thread.
+// Functions that find the scene of a call, count its use, wait for a revision of the scene, and wait for the scene's
+// readers. No state; any thread.
 #ifndef LOCUS_SERVER_SERVICES_SCENE_ACCESS_H_
 #define LOCUS_SERVER_SERVICES_SCENE_ACCESS_H_
 
 #include <functional>
 #include <string>
+#include <utility>
 
 #include "absl/status/statusor.h"
 #include "core/scene/scene.h"
 #include "server/host/host.h"
 #include "server/rpc/call.h"
+#include "server/scheduling/clocks.h"
 
 namespace locus::server {
 
 // Checks the scene's name, the metadata x-scene and the caller's right to the scene, then returns the scene. `field` is
 // the field of the request that contains the name; the error for a malformed name repeats `field`.
 absl::StatusOr<ScenePtr> find_scene(const Host& host, const Caller& caller, const std::string& name,
+                                    absl::string_view field);
+
+// Scene that a call uses. The use of a scene with idle_ttl_s is counted until reset() or the destructor, so that the
+// scene is not deleted as idle meanwhile. One thread at a time.
+class UsedScene {
+ public:
+  UsedScene() = default;
+  explicit UsedScene(ScenePtr scene) : scene_(std::move(scene)) {
+    if (is_counted()) scene_->uses().begin();
+  }
+  UsedScene(UsedScene&& other) noexcept : scene_(std::move(other.scene_)) {}
+  UsedScene& operator=(UsedScene&& other) noexcept {
+    std::swap(scene_, other.scene_);
+    return *this;
+  }
+  ~UsedScene() { reset(); }
+  UsedScene(const UsedScene&) = delete;
+  UsedScene& operator=(const UsedScene&) = delete;
+
+  // Ends the use and releases the scene.
+  void reset() {
+    if (is_counted()) scene_->uses().end(steady_nanoseconds());
+    scene_.reset();
+  }
+  const ScenePtr& pointer() const { return scene_; }
+  Scene& operator*() const { return *scene_; }
+  Scene* operator->() const { return scene_.get(); }
+
+ private:
+  bool is_counted() const { return scene_ != nullptr && scene_->spec().idle_ttl_s != 0; }
+
+  ScenePtr scene_;
+};
+
+// Returns the scene that find_scene() returns, for a call that uses it.
+absl::StatusOr<UsedScene> use_scene(const Host& host, const Caller& caller, const std::string& name,
                                     absl::string_view field);
 
 // Claims `bytes` for responses that copy parts of scenes or meshes. A claim of up to 64 KiB uses MemoryLine::kReplies,

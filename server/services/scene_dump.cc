@@ -219,7 +219,7 @@ uint64_t dump_cost(const SceneSnapshot& snapshot) {
 }  // namespace
 
 absl::Status dump_scene(Host& host, const Caller& caller, const v1::DumpSceneRequest& request, MessageStream& stream) {
-  ASSIGN_OR_RETURN(const ScenePtr scene, find_scene(host, caller, request.scene(), "scene"));
+  ASSIGN_OR_RETURN(const UsedScene scene, use_scene(host, caller, request.scene(), "scene"));
   RETURN_IF_ERROR(check_work(caller));
   ASSIGN_OR_RETURN(SnapshotPin snapshot, wait_for(*scene, to_view(request.view()), caller.wait_until(false), caller));
   ASSIGN_OR_RETURN(const CallMemory claim, claim_copy(caller, dump_cost(*snapshot)));

@@ -148,7 +148,10 @@ absl::Status delete_scene(const Caller& caller, Host& host, const v1::DeleteScen
   if (status.ok() || absl::IsDataLoss(status)) status = host.registry.delete_scene(request.name());
   if (status.code() == absl::StatusCode::kNotFound && request.if_present()) return absl::OkStatus();
   RETURN_IF_ERROR(status);
-  if (scene.ok()) host.changes.forget((*scene)->latest()->epoch);
+  if (scene.ok()) {
+    host.changes.forget((*scene)->latest()->epoch);
+    host.idle_scenes.forget(**scene);
+  }
   log(LogLevel::kInfo, "scene deleted", {{"scene", request.name()}});
   return absl::OkStatus();
 }
@@ -187,9 +190,19 @@ absl::Status create_scene(const Caller& caller, Host& host, const v1::CreateScen
   spec.pinned_bytes = host.pinned_limit();
   spec.creator = creator_name(caller);
   const std::string& static_from = request.spec().static_from();
-  if (!static_from.empty()) RETURN_IF_ERROR(check_source(host, caller, static_from));
+  UsedScene source;
+  if (!static_from.empty()) {
+    RETURN_IF_ERROR(check_source(host, caller, static_from));
+    if (const absl::StatusOr<ScenePtr> found = host.registry.find_scene(static_from); found.ok())
+      source = UsedScene(*found);
+  }
   ASSIGN_OR_RETURN(const Registry::CreatedScene created, add_scene(host, request, spec));
-  if (!created.existed) log(LogLevel::kInfo, "scene created", {{"scene", request.name()}});
+  const UsedScene use(created.scene);
+  if (!created.existed) {
+    host.idle_scenes.watch(created.scene);
+    host.mesh_collector.instances_changed(*created.scene);
+    log(LogLevel::kInfo, "scene created", {{"scene", request.name()}});
+  }
   *response.mutable_scene() = describe(host, caller, *created.scene);
   return absl::OkStatus();
 }

@@ -135,6 +135,10 @@ void add_storage(const Host& host, MetricPage& page) {
                static_cast<double>(snapshots.written));
   page.add_one("locus_snapshot_failures_total", "Snapshots that could not be written.", MetricKind::kCounter,
                static_cast<double>(snapshots.failed));
+  page.add_one("locus_scenes_expired_total", "Scenes that were deleted because no call used them.",
+               MetricKind::kCounter, static_cast<double>(host.idle_scenes.deleted()));
+  page.add_one("locus_meshes_collected_total", "Meshes that were deleted because no scene used them.",
+               MetricKind::kCounter, static_cast<double>(host.mesh_collector.deleted()));
   page.add_one("locus_scenes_damaged", "Scenes that are not served because their stored data is damaged.",
                MetricKind::kGauge, static_cast<double>(host.registry.damaged_scenes().size()));
 }

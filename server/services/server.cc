@@ -175,6 +175,7 @@ absl::StatusOr<std::unique_ptr<Server>> Server::start(const ServerConfig& config
   std::unique_ptr<Server> server(new Server(std::move(parts)));
   Host& host = server->parts_->host;
   if (log != nullptr) RETURN_IF_ERROR(recover_all(host, stop));
+  host.start_lifetimes();
   host.recovering = false;
   server->parts_->health_service.serving();
   server->parts_->scrape.serving(server->addresses());
@@ -205,6 +206,7 @@ void Server::drain(milliseconds grace, const std::function<void()>& before_closi
   // Accept new connections until all calls have ended or `deadline` has passed, so that probes get NOT_SERVING.
   parts_->health_service.not_serving();
   host.drain.begin();
+  host.lifetimes.stop();
   parts_->access->stop();
   parts_->io->drain();
   const bool idle = host.streams.wait_until_empty(deadline) && host.calls.wait_until_empty(deadline);

@@ -43,4 +43,15 @@ void report_connections(const RpcState& state, uint64_t count, absl::string_view
   audit(state, std::move(entry));
 }
 
+void report_deletion(const RpcState& state, absl::string_view rpc, absl::string_view subject,
+                     const absl::Status& status, absl::string_view why) {
+  AuditEntry entry;
+  entry.principal = "locusd";
+  entry.rpc = std::string(rpc);
+  entry.subject = std::string(subject);
+  entry.code = status.code();
+  entry.text = std::string(status.ok() ? why : status.message());
+  audit(state, std::move(entry));
+}
+
 }  // namespace locus::server

@@ -1,7 +1,7 @@
-// Reports two kinds of events that no call causes. The first kind: changed files of TLS or access control were put into
-// use, or could not be used. Such an event is counted for /metrics and written to the audit log. The second kind:
-// connections were refused or closed. Such an event is only written to the audit log. Other code writes lines about
-// these events to the normal log.
+// Reports three kinds of events that no call causes. The first kind: changed files of TLS or access control were put
+// into use, or could not be used. Such an event is counted for /metrics and written to the audit log. The second kind:
+// connections were refused or closed. The third kind: a scene or mesh that was not used was deleted. Such events are
+// only written to the audit log. Other code writes lines about these events to the normal log.
 #ifndef LOCUS_SERVER_SERVICES_SERVER_EVENTS_H_
 #define LOCUS_SERVER_SERVICES_SERVER_EVENTS_H_
 
@@ -22,6 +22,11 @@ void report_reload(const RpcState& state, FileLoads& loads, absl::string_view fi
 // The caller limits how often it reports; the audit log then limits the lines of each address. Any thread.
 void report_connections(const RpcState& state, uint64_t count, absl::string_view peer, absl::string_view address,
                         const absl::Status& status);
+
+// Reports that the server deleted `subject`, a scene or mesh, by itself, as the method `rpc` does, or could not delete
+// it. `why` is the reason of the deletion. Any thread.
+void report_deletion(const RpcState& state, absl::string_view rpc, absl::string_view subject,
+                     const absl::Status& status, absl::string_view why);
 
 }  // namespace locus::server
 

@@ -11,7 +11,6 @@
 #include "server/convert/convert.h"
 #include "server/host/memory_use.h"
 #include "server/services/creator_quotas.h"
-#include "server/services/scene_access.h"
 
 namespace locus::server {
 namespace {
@@ -98,15 +97,15 @@ absl::Status UpdateWork::hold(const std::string& scene_name, v1::UpdateBatch& ba
 }
 
 absl::Status UpdateWork::post_all(const std::string& scene_name, const v1::UpdateBatch& batch, HeldUpdates& held) {
-  ASSIGN_OR_RETURN(scene_, find_scene(host_, slot_.caller(), scene_name, "scene"));
-  RETURN_IF_ERROR(held.check_scene(scene_));
+  ASSIGN_OR_RETURN(scene_, use_scene(host_, slot_.caller(), scene_name, "scene"));
+  RETURN_IF_ERROR(held.check_scene(scene_.pointer()));
   messages_ = held.take();
   return post(scene_name, batch);
 }
 
 absl::Status UpdateWork::post(const std::string& scene_name, const v1::UpdateBatch& batch) {
-  if (scene_ == nullptr) {
-    ASSIGN_OR_RETURN(scene_, find_scene(host_, slot_.caller(), scene_name, "scene"));
+  if (scene_.pointer() == nullptr) {
+    ASSIGN_OR_RETURN(scene_, use_scene(host_, slot_.caller(), scene_name, "scene"));
   }
   ASSIGN_OR_RETURN(batch_, to_updates(batch));
   RETURN_IF_ERROR(slot_.caller().take_quota(QuotaKind::kUpdateItems, static_cast<double>(item_count(batch_))));
@@ -115,7 +114,7 @@ absl::Status UpdateWork::post(const std::string& scene_name, const v1::UpdateBat
   ASSIGN_OR_RETURN(objects_, hold_objects(host_, *scene_, batch_));
   ASSIGN_OR_RETURN(claim_, make_room(slot_.caller(), batch_));
   const WhenFull when_full = slot_.stream() ? WhenFull::kHold : WhenFull::kRefuse;
-  const absl::StatusOr<Posted> posted = host_.updates.post(scene_, *this, when_full);
+  const absl::StatusOr<Posted> posted = host_.updates.post(scene_.pointer(), *this, when_full);
   if (posted.ok() && *posted == Posted::kFull) slot_.hold();
   return posted.status();
 }
@@ -136,7 +135,7 @@ void UpdateWork::release() {
 
 void UpdateWork::applied(bool) {
   release();
-  const ScenePtr scene = std::exchange(scene_, nullptr);
+  const UsedScene scene = std::move(scene_);
   if (outcome_.ok()) {
     slot_.caller().audit_update(scene->name(), outcome_->applied);
     host_.metrics.record_update(outcome_->applied, nanoseconds_since(arrived_));

@@ -16,6 +16,7 @@
 #include "server/rpc/io_threads.h"
 #include "server/scheduling/update_queue.h"
 #include "server/services/held_updates.h"
+#include "server/services/scene_access.h"
 
 namespace locus::server {
 
@@ -50,7 +51,7 @@ class UpdateWork final : private PendingUpdate {
   CallSlot& slot_;
   UpdateBatch batch_;
   HeldUpdates::Messages messages_;  // earlier messages of the batch, from which it borrows columns
-  ScenePtr scene_;                  // null until the scene is found
+  UsedScene scene_;                 // null until the scene is found
   SteadyTime arrived_;
   v1::UpdateAck* ack_ = nullptr;
   CallMemory claim_;

@@ -99,9 +99,6 @@ TEST_F(SceneRpcTest, FieldsOfTheSpecThatAreNotServedAreNamed) {
     expect_refused(create("arena", spec), {grpc::StatusCode::UNIMPLEMENTED, v1::REASON_NOT_SERVED, field});
   };
   v1::SceneSpec spec;
-  spec.set_idle_ttl_s(1);
-  refused("spec.idle_ttl_s", spec);
-  spec.Clear();
   spec.set_durability(v1::DURABILITY_LOCAL);
   refused("spec.durability", spec);
 }
