@@ -16,6 +16,7 @@ enum class PlantedBug {
   kExpiryLate,         // an object expires one tick too late
   kExpiryUnmoved,      // a batch that only moves objects removes no expired objects
   kLeaseOfFirst,       // an object that another writer inserts again still belongs to the lease of the first writer
+  kLeaseTwice,         // a lease that was renewed, or ended and begun again, still ends at its old time
   kUnsignedCellIndex,  // cell indices are truncated towards zero, not rounded down
   kStalePlacedBounds,  // an instance that moves keeps the bounds that it had at its old place
   kPastInstances,      // queries about the past see the instances of the latest revision

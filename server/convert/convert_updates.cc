@@ -162,7 +162,6 @@ absl::Status check_batch_form(const v1::UpdateBatch& batch) {
 
 absl::StatusOr<UpdateBatch> to_updates(const v1::UpdateBatch& batch) {
   RETURN_IF_ERROR(check_batch_form(batch));
-  if (batch.lease_ms() != 0) return not_served("lease_ms");
   UpdateBatch out;
   out.frame = to_vec(batch.frame());
   if (batch.has_tick()) out.tick = batch.tick();

@@ -22,6 +22,7 @@
 #include "server/scheduling/clocks.h"
 #include "server/scheduling/cost_estimates.h"
 #include "server/scheduling/idle_scenes.h"
+#include "server/scheduling/lease_keeper.h"
 #include "server/scheduling/lifetime_keeper.h"
 #include "server/scheduling/mesh_collector.h"
 #include "server/scheduling/query_scheduler.h"
@@ -78,8 +79,8 @@ struct Host : RpcState {
     return std::max(share, limits::kMinPinnedBytes);
   }
 
-  // Begins to delete idle scenes and unused meshes. Call once, when all scenes are recovered: the times of all scenes
-  // and meshes begin.
+  // Begins to delete idle scenes and unused meshes and to end leases. Call once, when all scenes are recovered: the
+  // times of all scenes, meshes and leases begin.
   void start_lifetimes();
 
   const ServerConfig config;
@@ -105,6 +106,9 @@ struct Host : RpcState {
   MeshCollector mesh_collector{lifetimes, registry, [this](const std::string& mesh, const absl::Status& status) {
                                  report_unused_mesh(mesh, status);
                                }};
+  LeaseKeeper leases{lease_ends, [this](const Scene& scene, uint64_t writer, const absl::Status& status) {
+                       report_lease(scene, writer, status);
+                     }};
   // Limits the calls that visit all objects of a scene, to describe or dump it: at the same time, at most half as many
   // as `config.threads` work, but at least one.
   Turns scene_visits{std::max(1u, config.threads / 2)};
@@ -112,12 +116,17 @@ struct Host : RpcState {
   AdmissionLimiter health_checks{kMaxHealthChecks, Sharing::kFair};
   AdmissionLimiter reflections{kMaxReflections, Sharing::kFair};
   AdmissionLimiter backups{limits::kMaxBackups};
-  LifetimeKeeper lifetimes;  // the last member: its thread ends first, because its tasks use the other members
+  // The last members: their threads end first, because their tasks use the other members. The ends of leases have a
+  // thread of their own, so that they do not wait for the deletion of a scene or mesh.
+  LifetimeKeeper lifetimes;
+  LifetimeKeeper lease_ends;
 
  private:
   // Log and audit that a scene or mesh was deleted because it was not used, or could not be deleted.
   void report_idle_scene(const ScenePtr& scene, const absl::Status& status);
   void report_unused_mesh(const std::string& mesh, const absl::Status& status);
+  // Logs that the objects of a silent writer were removed, or could not be removed.
+  void report_lease(const Scene& scene, uint64_t writer, const absl::Status& status);
 };
 
 }  // namespace locus::server

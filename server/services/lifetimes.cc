@@ -1,8 +1,9 @@
-// Members of Host (server/host/host.h) for the lifetimes of scenes and meshes: their start, and the reports of
-// deletions that no call has made.
+// Members of Host (server/host/host.h) for the lifetimes of scenes, meshes and leases: their start, and the reports of
+// what no call has deleted.
 #include <limits>
 #include <string>
 
+#include "absl/strings/str_cat.h"
 #include "server/host/host.h"
 #include "server/observability/log.h"
 #include "server/services/server_events.h"
@@ -10,9 +11,13 @@
 namespace locus::server {
 
 void Host::start_lifetimes() {
-  for (const ScenePtr& scene : registry.list_scenes("", std::numeric_limits<size_t>::max())) idle_scenes.watch(scene);
+  for (const ScenePtr& scene : registry.list_scenes("", std::numeric_limits<size_t>::max())) {
+    idle_scenes.watch(scene);
+    leases.watch(scene);
+  }
   mesh_collector.start();
   lifetimes.start();
+  lease_ends.start();
 }
 
 void Host::report_idle_scene(const ScenePtr& scene, const absl::Status& status) {
@@ -22,7 +27,16 @@ void Host::report_idle_scene(const ScenePtr& scene, const absl::Status& status) 
     return server::log(LogLevel::kWarning, "an idle scene could not be deleted; this is tried again",
                        {{"scene", name}, {"why", std::string(status.message())}});
   changes.forget(scene->latest()->epoch);
+  leases.forget(*scene);
   server::log(LogLevel::kInfo, "idle scene deleted", {{"scene", name}});
+}
+
+void Host::report_lease(const Scene& scene, uint64_t writer, const absl::Status& status) {
+  const std::string id = absl::StrCat(writer);
+  if (!status.ok())
+    return server::log(LogLevel::kWarning, "the lease of a silent writer could not be ended; this is tried again",
+                       {{"scene", scene.name()}, {"writer", id}, {"why", std::string(status.message())}});
+  server::log(LogLevel::kInfo, "lease of a silent writer ended", {{"scene", scene.name()}, {"writer", id}});
 }
 
 void Host::report_unused_mesh(const std::string& mesh, const absl::Status& status) {

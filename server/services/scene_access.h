@@ -3,6 +3,7 @@
 #ifndef LOCUS_SERVER_SERVICES_SCENE_ACCESS_H_
 #define LOCUS_SERVER_SERVICES_SCENE_ACCESS_H_
 
+#include <cstddef>
 #include <functional>
 #include <string>
 #include <utility>
@@ -42,7 +43,9 @@ class UsedScene {
     if (is_counted()) scene_->uses().end(steady_nanoseconds());
     scene_.reset();
   }
-  const ScenePtr& pointer() const { return scene_; }
+  // NOLINTNEXTLINE(google-explicit-constructor): a UsedScene is used in place of a ScenePtr
+  operator const ScenePtr&() const { return scene_; }
+  friend bool operator==(const UsedScene& scene, std::nullptr_t) { return scene.scene_ == nullptr; }
   Scene& operator*() const { return *scene_; }
   Scene* operator->() const { return scene_.get(); }
 

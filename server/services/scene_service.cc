@@ -151,6 +151,7 @@ absl::Status delete_scene(const Caller& caller, Host& host, const v1::DeleteScen
   if (scene.ok()) {
     host.changes.forget((*scene)->latest()->epoch);
     host.idle_scenes.forget(**scene);
+    host.leases.forget(**scene);
   }
   log(LogLevel::kInfo, "scene deleted", {{"scene", request.name()}});
   return absl::OkStatus();

@@ -139,6 +139,8 @@ void add_storage(const Host& host, MetricPage& page) {
                MetricKind::kCounter, static_cast<double>(host.idle_scenes.deleted()));
   page.add_one("locus_meshes_collected_total", "Meshes that were deleted because no scene used them.",
                MetricKind::kCounter, static_cast<double>(host.mesh_collector.deleted()));
+  page.add_one("locus_leases_ended_total", "Leases that ended because their writers were silent.", MetricKind::kCounter,
+               static_cast<double>(host.leases.ended()));
   page.add_one("locus_scenes_damaged", "Scenes that are not served because their stored data is damaged.",
                MetricKind::kGauge, static_cast<double>(host.registry.damaged_scenes().size()));
 }

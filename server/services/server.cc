@@ -207,6 +207,7 @@ void Server::drain(milliseconds grace, const std::function<void()>& before_closi
   parts_->health_service.not_serving();
   host.drain.begin();
   host.lifetimes.stop();
+  host.lease_ends.stop();
   parts_->access->stop();
   parts_->io->drain();
   const bool idle = host.streams.wait_until_empty(deadline) && host.calls.wait_until_empty(deadline);

@@ -178,6 +178,7 @@ void get_server(Host& host, const Caller& caller, v1::GetServerResponse& respons
                                           "history",
                                           "idle_ttl",
                                           "latest_wins",
+                                          "leases",
                                           "lookup",
                                           "mesh_grace",
                                           "nearest",

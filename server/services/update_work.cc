@@ -108,13 +108,14 @@ absl::Status UpdateWork::post(const std::string& scene_name, const v1::UpdateBat
     ASSIGN_OR_RETURN(scene_, use_scene(host_, slot_.caller(), scene_name, "scene"));
   }
   ASSIGN_OR_RETURN(batch_, to_updates(batch));
+  lease_ = host_.leases.batch_arrived(scene_, batch_.writer, batch_.lease_ms);
   RETURN_IF_ERROR(slot_.caller().take_quota(QuotaKind::kUpdateItems, static_cast<double>(item_count(batch_))));
   batch_.earlier = std::move(messages_.batches);
   RETURN_IF_ERROR(slot_.claim_answer(ack_bytes(batch_)));
   ASSIGN_OR_RETURN(objects_, hold_objects(host_, *scene_, batch_));
   ASSIGN_OR_RETURN(claim_, make_room(slot_.caller(), batch_));
   const WhenFull when_full = slot_.stream() ? WhenFull::kHold : WhenFull::kRefuse;
-  const absl::StatusOr<Posted> posted = host_.updates.post(scene_.pointer(), *this, when_full);
+  const absl::StatusOr<Posted> posted = host_.updates.post(scene_, *this, when_full);
   if (posted.ok() && *posted == Posted::kFull) slot_.hold();
   return posted.status();
 }
@@ -127,6 +128,7 @@ void UpdateWork::done(absl::StatusOr<UpdateAck> ack) {
 }
 
 void UpdateWork::release() {
+  host_.leases.batch_done(std::exchange(lease_, nullptr), batch_.lease_ms);
   claim_.release();
   objects_.shrink(0);
   batch_.earlier.clear();

@@ -52,6 +52,7 @@ class UpdateWork final : private PendingUpdate {
   UpdateBatch batch_;
   HeldUpdates::Messages messages_;  // earlier messages of the batch, from which it borrows columns
   UsedScene scene_;                 // null until the scene is found
+  LeaseKeeper::Batch lease_;        // renews the lease of the batch's writer; null if there is none
   SteadyTime arrived_;
   v1::UpdateAck* ack_ = nullptr;
   CallMemory claim_;

@@ -1,12 +1,16 @@
-// Scenes with idle_ttl_s and meshes of scenes with mesh_grace_s: what keeps them, when they go, and restarts. Tests
-// wait until a control scene of the same time is gone, so that they depend on no time of their own.
+// Scenes with idle_ttl_s, meshes of scenes with mesh_grace_s, and leases of writers: what keeps them, when they go, and
+// restarts. Tests wait until a control scene of the same time is gone, so that they depend on no time of their own.
 #include <algorithm>
 #include <functional>
+#include <map>
+#include <random>
+#include <set>
 #include <thread>
 
 #include "core/base/limits.h"
 #include "tests/support/kept_daemon.h"
 #include "tests/support/rpc_test.h"
+#include "tests/support/test_scale.h"
 
 namespace locus::test {
 namespace {
@@ -178,6 +182,63 @@ TEST_F(LifetimesRpcTest, LifetimesBeyondTheLimitAreRefused) {
   EXPECT_TRUE(create("arena", longest).ok());
 }
 
+v1::UpdateBatch leased(v1::UpdateBatch batch, uint64_t writer, uint64_t number, uint32_t lease_ms) {
+  batch.set_writer(writer);
+  batch.set_batch(number);
+  batch.set_lease_ms(lease_ms);
+  return batch;
+}
+
+TEST_F(LifetimesRpcTest, TheObjectsOfASilentWriterGoAsOneRevision) {
+  ASSERT_TRUE(apply(insert_balls(100, 101)).ok());
+  v1::UpdateAck ack;
+  ASSERT_TRUE(apply(leased(insert_balls(1, 20), 7, 1, 50), &ack).ok());
+  v1::Scene scene = get("world");
+  while (scene.objects() == 22) scene = get("world");
+  EXPECT_EQ(scene.objects(), 2u) << "all go together";
+  EXPECT_EQ(scene.revision(), ack.revision() + 1);
+  EXPECT_TRUE(apply(leased({}, 7, 1, 50), &ack).ok());
+  EXPECT_TRUE(ack.duplicate());
+  EXPECT_EQ(get("world").objects(), 2u) << "a repeated batch is not applied again";
+}
+
+// The lease of writer 7 is renewed until that of writer 8, which is as long and began later, has ended.
+TEST_F(LifetimesRpcTest, BatchesOnAStreamRenewALease) {
+  constexpr uint32_t kLength = 2000;
+  grpc::ClientContext context;
+  set_timeout(context);
+  const auto stream = stubs().updates->StreamUpdates(&context);
+  v1::StreamUpdatesRequest request;
+  request.set_scene("world");
+  *request.mutable_batch() = leased(insert_balls(1, 1), 7, 1, kLength);
+  v1::StreamUpdatesResponse response;
+  ASSERT_TRUE(stream->Write(request));
+  ASSERT_TRUE(stream->Read(&response));
+  ASSERT_TRUE(apply(leased(insert_balls(2, 3), 8, 1, kLength)).ok());
+  for (uint64_t number = 2; get("world").objects() == 3; ++number) {
+    *request.mutable_batch() = leased({}, 7, number, 0);
+    ASSERT_TRUE(stream->Write(request));
+    ASSERT_TRUE(stream->Read(&response));
+    ASSERT_FALSE(response.has_error()) << response.ShortDebugString();
+  }
+  EXPECT_EQ(get("world").objects(), 1u) << "the objects of writer 8 are gone";
+  stream->WritesDone();
+  EXPECT_TRUE(stream->Finish().ok());
+  while (get("world").objects() > 0) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+}
+
+TEST_F(LifetimesRpcTest, WrongLeasesAreRefused) {
+  v1::UpdateBatch no_writer = insert_balls(1, 1);
+  no_writer.set_lease_ms(1);
+  expect_refused(apply(no_writer), {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_MALFORMED, "lease_ms"});
+  const v1::Error error = error_of(apply(leased(insert_balls(1, 1), 7, 1, limits::kMaxLeaseMs + 1)));
+  expect_error(error, {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_LIMIT, "lease_ms"});
+  EXPECT_EQ(error.limit(), "lease_ms");
+  EXPECT_EQ(error.limit_value(), limits::kMaxLeaseMs);
+  EXPECT_EQ(get("world").objects(), 0u);
+  EXPECT_TRUE(apply(leased(insert_balls(1, 1), 7, 1, limits::kMaxLeaseMs)).ok());
+}
+
 class LifetimesKillTest : public ::testing::Test {
  protected:
   void upload_and_place(const std::string& mesh, const std::string& scene) {
@@ -230,6 +291,61 @@ TEST_F(LifetimesKillTest, LifetimesSurviveAKill) {
   restart();
   EXPECT_THAT(scene_names(daemon_.stubs()), ElementsAre("lasting"));
   EXPECT_THAT(mesh_names(daemon_.stubs()), ElementsAre("kept"));
+  EXPECT_EQ(daemon_.stop(), 0) << daemon_.log();
+  EXPECT_EQ(daemon_.maintain("check"), 0) << daemon_.printed();
+}
+
+// Writers with short leases insert groups of objects and fall silent, and the daemon is killed again and again, often
+// while leases end. After each start, every group is there as a whole or not at all, a group that was seen to be gone
+// stays gone, and the groups that are there go after the time of their leases.
+TEST_F(LifetimesKillTest, NoKillLeavesHalfALease) {
+  constexpr uint64_t kWriters = 6, kGroup = 50;
+  std::mt19937 random(20261128);
+  daemon_.start();
+  create_scene(daemon_.stubs(), "world");
+  const auto groups = [&] {
+    std::map<uint64_t, uint64_t> sizes;
+    for (const auto& [id, point] : points_of(daemon_.stubs(), "world")) ++sizes[id / kGroup];
+    return sizes;
+  };
+  uint64_t group = 0;
+  for (int kill = 0; kill < static_cast<int>(scaled_count(6)); ++kill) {
+    SCOPED_TRACE("kill " + std::to_string(kill));
+    std::set<uint64_t> sent;
+    for (uint64_t writer = 1; writer <= kWriters; ++writer) {
+      v1::ApplyUpdatesRequest request;
+      request.set_scene("world");
+      v1::UpdateBatch& batch = *request.mutable_batch();
+      batch = leased({}, ++group, 1, static_cast<uint32_t>(10 + 20 * writer));
+      sent.insert(group);
+      v1::Insert& insert = *batch.add_inserts();
+      insert.mutable_point();
+      for (uint64_t i = 0; i < kGroup; ++i) {
+        insert.add_ids(group * kGroup + i);
+        for (int axis = 0; axis < 3; ++axis) insert.add_positions(static_cast<float>(i));
+      }
+      grpc::ClientContext context;
+      set_timeout(context);
+      v1::ApplyUpdatesResponse response;
+      ASSERT_TRUE(daemon_.stubs().updates->ApplyUpdates(&context, request, &response).ok());
+      EXPECT_EQ(response.ack().refused(), 0u);
+    }
+    std::map<uint64_t, uint64_t> before = groups();
+    const uint64_t wanted = random() % kWriters;
+    while (before.size() > wanted) before = groups();
+    daemon_.kill();
+    daemon_.start();
+    for (const auto& [number, size] : groups()) {
+      EXPECT_EQ(size, kGroup) << "half of group " << number;
+      EXPECT_TRUE(before.contains(number)) << "group " << number << " has come back";
+      EXPECT_TRUE(sent.contains(number));
+    }
+    while (!groups().empty()) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    EXPECT_THAT(daemon_.log(), HasSubstr("lease of a silent writer ended"));
+  }
+  EXPECT_EQ(daemon_.stop(), 0) << daemon_.log();
+  daemon_.start();
+  EXPECT_EQ(get_scene(daemon_.stubs(), "world").objects(), 0u);
   EXPECT_EQ(daemon_.stop(), 0) << daemon_.log();
   EXPECT_EQ(daemon_.maintain("check"), 0) << daemon_.printed();
 }

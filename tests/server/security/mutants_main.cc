@@ -1,22 +1,8 @@
-// Main function of the security tests that are linked with planted bugs. Runs all tests once without a bug: all must
-// pass. Then runs all tests once with each bug: at least one must fail. Each run is a process of its own. Exits 0 if
-// every bug is caught.
-#include <gtest/gtest.h>
-#include <sys/wait.h>
-#include <unistd.h>
+// Main function of the security tests that are linked with planted bugs: see tests/support/mutants.h.
+#include "tests/support/mutants.h"
 
-#include <cstdio>
-#include <iterator>
-
-#include "core/base/planted_bug.h"
-
-namespace locus::server {
+namespace locus::test {
 namespace {
-
-struct Mutant {
-  const char* name;
-  PlantedBug bug;
-};
 
 constexpr Mutant kMutants[] = {
     {"RightLeftOut", PlantedBug::kRightLeftOut},
@@ -35,41 +21,10 @@ constexpr Mutant kMutants[] = {
     {"UserFromAfar", PlantedBug::kUserFromAfar},
 };
 
-// Runs all tests with the bug `bug` and returns the exit code: 0 if all tests pass, 1 if one fails, any other code if
-// the run did not reach its end. If a failure is expected, the output of the tests goes to /dev/null.
-int result_with(PlantedBug bug) {
-  std::fflush(stdout);
-  const pid_t child = fork();
-  if (child == 0) {
-    planted_bug = bug;
-    GTEST_FLAG_SET(fail_fast, bug != PlantedBug::kNone);  // one failure is enough to catch a bug
-    if (bug != PlantedBug::kNone && std::freopen("/dev/null", "w", stdout) == nullptr) std::_Exit(2);
-    std::_Exit(RUN_ALL_TESTS());
-  }
-  int status = 0;
-  if (child < 0 || waitpid(child, &status, 0) != child || !WIFEXITED(status)) return -1;
-  return WEXITSTATUS(status);
-}
-
-int run() {
-  if (result_with(PlantedBug::kNone) != 0) {
-    std::puts("the tests fail without a planted bug");
-    return 1;
-  }
-  int missed = 0;
-  for (const Mutant& mutant : kMutants) {
-    const bool caught = result_with(mutant.bug) == 1;
-    std::printf("%s: %s\n", mutant.name, caught ? "caught" : "MISSED");
-    missed += caught ? 0 : 1;
-  }
-  std::printf("mutants of access control: %zu, missed: %d\n", std::size(kMutants), missed);
-  return missed == 0 ? 0 : 1;
-}
-
 }  // namespace
-}  // namespace locus::server
+}  // namespace locus::test
 
 int main(int argc, char** argv) {
   ::testing::InitGoogleTest(&argc, argv);
-  return locus::server::run();
+  return locus::test::run_mutants("access control", locus::test::kMutants);
 }
