@@ -11,6 +11,7 @@ __path__ = pkgutil.extend_path(__path__, __name__)
 
 from .client import DEFAULT_ADDRESS, Client, connect
 from .columns import ColumnLike, Values
+from .compounds import Compound
 from .connection import Retry
 from .embedded import EmbeddedClient, embedded
 from .enums import (AtStart, ClipDepth, Column, Cull, Inside, OutsideHistory, OverloadPolicy, Precision, RayMode, Reason,
@@ -26,8 +27,8 @@ from .updates import UpdateBatch
 from .values import Ack, ItemError, Limit, Mesh, MeshPart, Quota, Revision, Scene, Server, Work
 
 __all__ = [
-    "Ack", "After", "AtStart", "Block", "BlockResult", "Client", "ClipDepth", "Column", "ColumnLike", "Cull",
-    "DEFAULT_ADDRESS", "EmbeddedClient", "Inside",
+    "Ack", "After", "AtStart", "Block", "BlockResult", "Client", "ClipDepth", "Column", "ColumnLike",
+    "Compound", "Cull", "DEFAULT_ADDRESS", "EmbeddedClient", "Inside",
     "InstanceChange", "ItemError", "Limit", "LocusError", "Mesh", "MeshColumns", "MeshPart", "NO_TRIANGLE",
     "OutsideHistory", "OverloadPolicy", "PlacedInstances", "Precision", "QueryBatch", "QueryResult", "QueryStream",
     "Quota", "RayMode", "Reason", "Retry", "Revision", "Scene", "SceneState", "Server", "Source", "StaticDetail",

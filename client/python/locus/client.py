@@ -118,13 +118,17 @@ class Client:
 
     def create_scene(self, name: str, *, if_absent: bool = False, labels: Optional[Mapping[str, str]] = None,
                      winding: Winding = Winding.UNSPECIFIED, static_from: str = "", history_ticks: int = 0,
-                     history_bytes: int = 0, overload: OverloadPolicy = OverloadPolicy.UNSPECIFIED) -> Scene:
+                     history_bytes: int = 0, overload: OverloadPolicy = OverloadPolicy.UNSPECIFIED,
+                     idle_ttl_s: int = 0, mesh_grace_s: int = 0) -> Scene:
         """Creates an empty scene, or one that starts with the instances of `static_from`.
 
         `history_ticks`: number of past ticks that can be queried; `history_bytes`: maximum memory of the history, 0 =
         256 MiB. After a restart of the server, the history holds only the ticks after the scene's last snapshot on
         disk.
         `overload`: handling of moves that arrive faster than they can be applied.
+        `idle_ttl_s`: the scene is deleted after this number of seconds without a query, an update, a change of
+        instances or an open stream; 0 = never. `mesh_grace_s`: a mesh that the scene used is deleted this number of
+        seconds after no scene uses it any more; 0 = never.
         `if_absent`: returns an existing scene of this name unchanged instead of failing with ALREADY_EXISTS.
         """
         rpc = _rpc("Scene", "CreateScene")
@@ -135,6 +139,8 @@ class Client:
         request.spec.history_ticks = history_ticks
         request.spec.history_bytes = history_bytes
         request.spec.overload = overload
+        request.spec.idle_ttl_s = idle_ttl_s
+        request.spec.mesh_grace_s = mesh_grace_s
         return Scene.of(self._unary(rpc, request, scene=name).scene)
 
     def scene(self, name: str) -> Scene:
@@ -263,16 +269,23 @@ class Client:
         """
         return self._connection.unary_bytes(_rpc("Query", "Query").path, request, scene=scene, repeat=True)
 
-    def update_stream(self, scene: str, *, max_in_flight: int = 8, reconnect: Retry = Retry(attempts=10)) -> UpdateStream:
+    def update_stream(self, scene: str, *, max_in_flight: int = 8, reconnect: Retry = Retry(attempts=10),
+                      lease_ms: int = 0) -> UpdateStream:
         """Returns a pipelined stream of update batches to one scene, each applied exactly once. The stream connects
         when the first batch is sent.
-        """
-        return UpdateStream(self._connection, scene, max_in_flight, reconnect)
 
-    def query_stream(self, scene: str, *, max_in_flight: int = 8, reconnect: Retry = Retry()) -> QueryStream:
-        """Returns a pipelined stream of query batches to one scene. The stream connects when the first batch is sent.
+        `lease_ms`: lease of the stream's writer in milliseconds, at most one day; 0 = none. When no batch of the stream
+        has arrived for that long, the server removes all objects that the stream inserted. See UpdateStream.
         """
-        return QueryStream(self._connection, scene, max_in_flight, reconnect)
+        return UpdateStream(self._connection, scene, max_in_flight, reconnect, lease_ms)
+
+    def query_stream(self, scene: str, *, max_in_flight: int = 8, reconnect: Retry = Retry(),
+                     lease_ms: int = 0) -> QueryStream:
+        """Returns a pipelined stream of query batches to one scene. The stream connects when the first batch is sent.
+
+        `lease_ms`: lease of the writer of the stream's steps, as for update_stream(); it begins with the first step.
+        """
+        return QueryStream(self._connection, scene, max_in_flight, reconnect, lease_ms)
 
     def _pages(self, rpc: schema.Method, **fields: Any) -> Iterator[Any]:
         request = rpc.request(**fields)

@@ -4,14 +4,16 @@ the unanswered messages again. Internal to the package.
 
 One thread per stream opens the calls, one after another, and reads the responses; gRPC's thread writes the messages.
 Invariants: `_items` contains the messages that were accepted and not answered, in the order of sending. After `_ended`
-is set no message is accepted, and `_abandon()` empties `_items`.
+is set no message is accepted, and `_abandon()` empties `_items`. No other message is sent between the messages of one
+item. At most one renewal is unanswered.
 """
 from __future__ import annotations
 
 import secrets
 import threading
+import time
 from concurrent.futures import Future
-from typing import Any, Generic, Iterator, List, Optional, Tuple, TypeVar
+from typing import Any, Callable, Generic, Iterator, List, Optional, Sequence, Tuple, TypeVar
 
 import grpc
 
@@ -27,8 +29,13 @@ _AGAIN = (grpc.StatusCode.CANCELLED, grpc.StatusCode.INTERNAL)
 class Item(Generic[Result]):
     """Message that was accepted and is not yet answered."""
 
-    def __init__(self, batch: bytes, is_update: bool) -> None:
+    def __init__(self, batch: bytes, is_update: bool, held: Sequence[bytes] = (), is_renewal: bool = False) -> None:
         self.batch = batch  # the encoded message without the numbers
+        self.held = held  # encoded messages that are sent before `batch` and are applied with it
+        self.held_sequences = range(0)
+        self.held_written = 0  # number of messages of `held` that were sent on the current call
+        self.refusal: Optional[LocusError] = None  # first error among the answers to `held` on the current call
+        self.is_renewal = is_renewal
         self.is_update = is_update
         self.sequence = 0
         self.number = 0  # batch number of the stream's writer, if the message has an update
@@ -36,6 +43,12 @@ class Item(Generic[Result]):
         self.written = False  # True if sent on the current call
         self.sent_before = False  # True if sent on an earlier call with the same number
         self.future.set_running_or_notify_cancel()
+
+    def begin_again(self) -> None:
+        """Marks every message as not written."""
+        self.written = False
+        self.held_written = 0
+        self.refusal = None
 
 
 class PipelinedStream(Generic[Result]):
@@ -47,11 +60,18 @@ class PipelinedStream(Generic[Result]):
     have been applied before: its number is uncertain, its error has no reason, and the later updates keep their numbers
     until the server answers one of them with BATCH_GAP, which shows that the uncertain number was not used.
 
+    An item may have several messages, which the server applies as one. Its outcome is the answer to the last message, or
+    the error of the first refused message. After a broken connection all of them are sent again, since the server has
+    applied none.
+
     Use as a context manager: the end of the `with` block waits for all answers, or cancels the stream after an
     exception.
     """
 
-    def __init__(self, connection: Connection, path: str, scene: str, max_in_flight: int, retry: Retry) -> None:
+    def __init__(self, connection: Connection, path: str, scene: str, max_in_flight: int, retry: Retry,
+                 lease_ms: int) -> None:
+        if not 0 <= lease_ms < 2**32:
+            raise ValueError(f"lease_ms is {lease_ms}: give milliseconds, at most one day, or 0 for no lease")
         if max_in_flight < 1:
             raise ValueError(f"max_in_flight is {max_in_flight}: give 1 or more")
         self._connection = connection
@@ -59,6 +79,10 @@ class PipelinedStream(Generic[Result]):
         self._scene = scene
         self._max_in_flight = max_in_flight
         self._retry = retry
+        self._lease_ms = lease_ms
+        self._renew_at: Optional[float] = None  # time.monotonic() at which the lease must be renewed; None = never
+        # Message that ends an item of which some messages were sent when it was numbered again.
+        self._group_end: Optional[bytes] = None
         self._changed = threading.Condition()
         self._items: List[Item[Result]] = []
         self._call: Any = None
@@ -76,11 +100,15 @@ class PipelinedStream(Generic[Result]):
         self._end: Optional[LocusError] = None
         self._thread: Optional[threading.Thread] = None
 
+    _renewal = b""  # encoded message without numbers that renews the lease
+
     # Methods that a kind of stream overrides; called with the lock held, except _answer_in().
 
     def _number(self, item: Item[Result]) -> None:
-        """Assigns the item its sequence number and, if it has an update, its batch number."""
-        self._last_sequence += 1
+        """Assigns the item its sequence numbers and, if it has an update, its batch number."""
+        first = self._last_sequence + 1
+        self._last_sequence += len(item.held) + 1
+        item.held_sequences = range(first, self._last_sequence)
         item.sequence = self._last_sequence
         if item.is_update:
             item.number = self._next_batch
@@ -89,6 +117,20 @@ class PipelinedStream(Generic[Result]):
     def _request_of(self, item: Item[Result]) -> bytes:
         """Returns the encoded request of an item."""
         raise NotImplementedError
+
+    def _held_request(self, batch: bytes, sequence: int) -> bytes:
+        """Returns the encoded request of a message of Item.held."""
+        raise NotImplementedError
+
+    def _held_answer(self, outcome: Any) -> Optional[LocusError]:
+        """Returns the error if the answer to a message of Item.held shows that the server does not hold the message."""
+        raise NotImplementedError
+
+    def _set_numbers(self, batch: Any, item: Item[Result]) -> None:
+        """Sets the numbers of an item with an update, and the lease, in the protocol's UpdateBatch."""
+        batch.writer, batch.batch = self.writer, item.number
+        if self._lease_ms:
+            batch.lease_ms = self._lease_ms
 
     def _answer_in(self, response: bytes) -> Tuple[int, Any]:
         """Returns the sequence number of a response, and the result or LocusError that the response contains."""
@@ -117,7 +159,12 @@ class PipelinedStream(Generic[Result]):
     def _number_again(self, position: int) -> None:
         """Numbers the items from index `position` on, and sends them again."""
         for item in self._items[position:]:
-            item.written = item.sent_before = False
+            if item.held_written and not item.written:
+                # End the messages that the server holds, before others are sent. The server refuses this request,
+                # because its number is higher than the number of an item that is sent again.
+                self._group_end = self._request_of(item)
+            item.begin_again()
+            item.sent_before = False
             self._number(item)
 
     def _update_refused(self, item: Item[Result], error: LocusError, position: int) -> LocusError:
@@ -148,21 +195,45 @@ class PipelinedStream(Generic[Result]):
             self._uncertain = 0
         return None
 
-    def _send(self, batch: bytes, is_update: bool) -> "Future[Any]":
-        item: Item[Any] = Item(batch, is_update)
+    def _send(self, batch: bytes, is_update: bool, held: Sequence[bytes] = ()) -> "Future[Any]":
+        item: Item[Any] = Item(batch, is_update, held)
         with self._changed:
             self._changed.wait_for(
                 lambda: self._ended or self._closing or len(self._items) < self._max_in_flight)
             if self._ended or self._closing:
                 raise self._end or (_broken_off() if self._broken_off else LocusError(
                     grpc.StatusCode.FAILED_PRECONDITION, "the stream was closed: open a new one"))
-            self._number(item)
-            self._items.append(item)
+            self._append(item)
             if self._thread is None:
                 self._thread = threading.Thread(target=self._supervise, name="locus stream", daemon=True)
                 self._thread.start()
-            self._changed.notify_all()
         return item.future
+
+    def _append(self, item: Item[Any]) -> None:
+        self._number(item)
+        self._items.append(item)
+        if item.is_update:
+            self._plan_renewal()
+        self._changed.notify_all()
+
+    def _plan_renewal(self) -> None:
+        """Plans the next renewal of the lease, a third of the lease from now, so that it may be late or lost."""
+        if self._lease_ms:
+            self._renew_at = time.monotonic() + self._lease_ms / 3000
+
+    def _wait_or_renew(self, done: Callable[[], Any]) -> None:
+        """Waits until done() is true. Meanwhile renews the lease when it is due, unless the stream is closing. Called
+        with the lock held.
+        """
+        while not done():
+            planned = None if self._closing or self._ended else self._renew_at
+            wait = None if planned is None else planned - time.monotonic()
+            if wait is None or wait > 0:
+                self._changed.wait(wait)
+            else:
+                self._plan_renewal()
+                if self._fatal is None and not any(item.is_renewal for item in self._items):
+                    self._append(Item(self._renewal, is_update=True, is_renewal=True))
 
     def sync(self, timeout: Optional[float] = None) -> None:
         """Blocks until every sent batch has been answered. Raises LocusError if the stream ended with an error, and
@@ -218,7 +289,7 @@ class PipelinedStream(Generic[Result]):
             wait = self._wait_before_next(end) if end is not None else 0.0
             if wait is not None:
                 self._changed.wait_for(lambda: self._broken_off, wait)
-                self._changed.wait_for(lambda: self._items or self._closing)
+                self._wait_or_renew(lambda: self._items or self._closing)
             if self._broken_off:
                 end = _broken_off()
             elif wait is not None and self._items:
@@ -236,7 +307,8 @@ class PipelinedStream(Generic[Result]):
             with self._changed:
                 for item in self._items:
                     item.sent_before = item.sent_before or item.written
-                    item.written = False
+                    item.begin_again()
+                self._group_end = None
                 used, metadata = self._connection.metadata(self._scene)
                 self._call = call = method(self._requests(over), metadata=metadata)
                 if self._broken_off:
@@ -267,14 +339,27 @@ class PipelinedStream(Generic[Result]):
         """
         while True:
             with self._changed:
-                self._changed.wait_for(lambda: over.is_set() or self._unwritten() is not None
-                                       or (self._closing and not self._items))
-                item = self._unwritten()
-                if over.is_set() or item is None:
-                    return
-                item.written = True
-                message = self._request_of(item)
+                self._wait_or_renew(lambda: over.is_set() or self._group_end is not None
+                                    or self._unwritten() is not None or (self._closing and not self._items))
+                message = None if over.is_set() else self._next_message()
+            if message is None:
+                return
             yield message
+
+    def _next_message(self) -> Optional[bytes]:
+        """Returns the next message to send on the current call, and marks it as written."""
+        if self._group_end is not None:
+            message, self._group_end = self._group_end, None
+            return message
+        item = self._unwritten()
+        if item is None:
+            return None
+        if item.held_written < len(item.held):
+            index = item.held_written
+            item.held_written += 1
+            return self._held_request(item.held[index], item.held_sequences[index])
+        item.written = True
+        return self._request_of(item)
 
     def _unwritten(self) -> Optional[Item[Result]]:
         return next((item for item in self._items if not item.written), None)
@@ -285,11 +370,16 @@ class PipelinedStream(Generic[Result]):
         """
         sequence, outcome = self._answer_in(response)
         with self._changed:
-            position = next((index for index, item in enumerate(self._items) if item.sequence == sequence), None)
+            position = next((index for index, item in enumerate(self._items)
+                             if item.sequence == sequence or sequence in item.held_sequences), None)
             if position is None:
                 return
             item = self._items[position]
+            if item.sequence != sequence:
+                item.refusal = item.refusal or self._held_answer(outcome)
+                return
             self._failures = 0
+            outcome = item.refusal or outcome
             if isinstance(outcome, LocusError) and self._closes_gap(item, outcome):
                 self._number_again(position)
                 self._changed.notify_all()

@@ -23,11 +23,11 @@ _SEQUENCE, _RESULT, _ERROR, _ACK = (_METHOD.response.DESCRIPTOR.fields_by_name[n
 class QueryStream(PipelinedStream[Any]):
     """Stream returned by Client.query_stream(). Thread-safe. After a broken connection, unanswered batches are sent
     again on a new connection. This is safe, because queries change nothing, and the server applies the update of a step
-    only once. The stream ends in the same cases as an UpdateStream.
+    only once. The stream ends in the same cases as an UpdateStream, and renews its lease like one.
     """
 
-    def __init__(self, connection: Connection, scene: str, max_in_flight: int, retry: Retry) -> None:
-        super().__init__(connection, _METHOD.path, scene, max_in_flight, retry)
+    def __init__(self, connection: Connection, scene: str, max_in_flight: int, retry: Retry, lease_ms: int) -> None:
+        super().__init__(connection, _METHOD.path, scene, max_in_flight, retry, lease_ms)
 
     def send(self, batch: QueryBatch) -> "Future[QueryResult]":
         """Sends a batch. Blocks while `max_in_flight` batches are unanswered.
@@ -55,7 +55,7 @@ class QueryStream(PipelinedStream[Any]):
         numbers = _METHOD.request(scene=self._scene, sequence=item.sequence)
         if item.is_update:
             # This is the second occurrence of the field `update`. Protobuf parsers merge the two.
-            numbers.update.writer, numbers.update.batch = self.writer, item.number
+            self._set_numbers(numbers.update, item)
         return b"".join((item.batch, numbers.SerializeToString()))
 
     def _is_duplicate(self, result: Any) -> bool:

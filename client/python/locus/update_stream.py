@@ -4,11 +4,13 @@ exactly once, even if connections break.
 from __future__ import annotations
 
 from concurrent.futures import Future
-from typing import Any, Optional, Tuple
+from typing import Any, Optional, Sequence, Tuple
+
+import grpc
 
 from . import schema, wire
 from .connection import Connection, Retry
-from .errors import from_error, neither, parsed
+from .errors import LocusError, from_error, neither, parsed
 from .pipelined_stream import Item, PipelinedStream
 from .updates import UpdateBatch
 from .values import Ack, Revision
@@ -28,10 +30,15 @@ class UpdateStream(PipelinedStream[Ack]):
     the writer (the scene has a new epoch), if a batch fails with an error without a reason, or if reconnecting fails as
     often as `reconnect` allows. The future of every unanswered batch then raises the LocusError with which the stream
     ended; the outcome of these batches is unknown.
+
+    With `lease_ms`, the server removes the objects that the stream inserted when no batch of the stream has arrived for
+    that long. The lease begins with the first batch. While the caller sends nothing, the stream renews the lease by empty
+    batches, a third of the lease apart, so the objects stay as long as the stream is open, however silent the caller is.
+    The lease runs out after the stream or its process has ended, and while the server cannot be reached.
     """
 
-    def __init__(self, connection: Connection, scene: str, max_in_flight: int, retry: Retry) -> None:
-        super().__init__(connection, _METHOD.path, scene, max_in_flight, retry)
+    def __init__(self, connection: Connection, scene: str, max_in_flight: int, retry: Retry, lease_ms: int) -> None:
+        super().__init__(connection, _METHOD.path, scene, max_in_flight, retry, lease_ms)
         self._last_ack: Optional[Ack] = None
 
     def send(self, batch: UpdateBatch) -> "Future[Ack]":
@@ -42,6 +49,20 @@ class UpdateStream(PipelinedStream[Ack]):
         again. The stream replaces the `writer` and `number` of the copy. Raises LocusError if the stream has ended.
         """
         return self._send(batch.message.SerializeToString(), is_update=True)
+
+    def send_together(self, batches: Sequence[UpdateBatch]) -> "Future[Ack]":
+        """Sends several batches that become one revision: nothing of them is visible before the last is applied, and
+        none is applied if one is refused. For changes that are too large for one message.
+
+        The batches are applied in the order given. Only the last may have a `tick`, `all_or_nothing` or `lease_ms`,
+        which then hold for all. Counts as one batch: there is one Ack, whose ItemError.message is an index into
+        `batches`, and after a broken connection all are sent again. Otherwise like send(). Raises ValueError if
+        `batches` is empty.
+        """
+        if not batches:
+            raise ValueError("send_together: give at least one batch")
+        *held, last = [batch.message.SerializeToString() for batch in batches]
+        return self._send(last, is_update=True, held=held)
 
     @property
     def last_ack(self) -> Optional[Revision]:
@@ -55,8 +76,20 @@ class UpdateStream(PipelinedStream[Ack]):
         # Write the field `batch` twice: first with the columns, then with writer and batch number. Protobuf parsers
         # merge two occurrences of a field that is a message.
         numbers = _METHOD.request(scene=self._scene, sequence=item.sequence)
-        numbers.batch.writer, numbers.batch.batch = self.writer, item.number
+        self._set_numbers(numbers.batch, item)
         return b"".join((wire.head(_BATCH, len(item.batch)), item.batch, numbers.SerializeToString()))
+
+    def _held_request(self, batch: bytes, sequence: int) -> bytes:
+        settings = _METHOD.request(scene=self._scene, sequence=sequence)
+        settings.batch.continues = True
+        return b"".join((wire.head(_BATCH, len(batch)), batch, settings.SerializeToString()))
+
+    def _held_answer(self, outcome: Any) -> Optional[LocusError]:
+        if isinstance(outcome, LocusError):
+            return outcome
+        return None if outcome.pending else LocusError(
+            grpc.StatusCode.UNIMPLEMENTED, "the server does not hold messages (`continues`): it applied one that is a "
+                                           "part of a batch")
 
     def _answer_in(self, response: bytes) -> Tuple[int, Any]:
         message = parsed(_METHOD.response, response)

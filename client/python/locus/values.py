@@ -20,13 +20,15 @@ class Revision:
 @dataclasses.dataclass(frozen=True)
 class ItemError:
     """Item that was refused while the rest of its batch was applied. `field` is the path of the column at fault,
-    `index` the index of the item within its list.
+    `index` the index of the item within its list. `message` is the index of the batch within UpdateStream.send_together();
+    0 for a single batch.
     """
 
     field: str
     index: int
     id: int
     reason: Reason
+    message: int = 0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -35,6 +37,8 @@ class Ack(Revision):
 
     `applied` and `refused` count items; `errors` lists the first 1,000 refused items. `tick` is the scene's tick when
     the batch was applied. `duplicate` is True if the server had already applied this batch and did not apply it again.
+    `pending` is True if the server holds the batch until the rest of UpdateStream.send_together(); the stream handles
+    such acks itself.
     """
 
     tick: int
@@ -42,13 +46,15 @@ class Ack(Revision):
     refused: int
     errors: Tuple[ItemError, ...]
     duplicate: bool
+    pending: bool = False
 
     @classmethod
     def of(cls, message: Any) -> "Ack":
         """Converts the protocol's UpdateAck."""
-        errors = tuple(ItemError(error.field, error.index, error.id, reason_of(error.reason)) for error in message.errors)
+        errors = tuple(ItemError(error.field, error.index, error.id, reason_of(error.reason), error.message)
+                       for error in message.errors)
         return cls(message.epoch, message.revision, message.tick, message.applied, message.refused, errors,
-                   message.duplicate)
+                   message.duplicate, message.pending)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,7 +66,8 @@ class Scene(Revision):
     None in an empty scene. The box may be somewhat too large. `history_ticks` is the maximum number of ticks in the
     history. At present the history contains `recorded_ticks` ticks, the first of which is `oldest_tick`, and takes
     `history_bytes` bytes. `forgotten_ticks` ticks were dropped early for lack of memory. `mesh_bytes` is the memory of
-    the placed meshes, which scenes share, and `recent_bytes` at most that of recent revisions.
+    the placed meshes, which scenes share, and `recent_bytes` at most that of recent revisions. `idle_ttl_s` and
+    `mesh_grace_s` are those of Client.create_scene(); 0 = never.
     """
 
     name: str
@@ -83,6 +90,8 @@ class Scene(Revision):
     mesh_bytes: int = 0
     recent_bytes: int = 0
     forgotten_ticks: int = 0
+    idle_ttl_s: int = 0
+    mesh_grace_s: int = 0
 
     @classmethod
     def of(cls, message: Any) -> "Scene":
@@ -95,7 +104,7 @@ class Scene(Revision):
                    message.last_build_error, dict(message.spec.labels), Winding(message.spec.winding), bounds,
                    message.spec.history_ticks, message.oldest_tick, message.recorded_ticks, message.history_bytes,
                    OverloadPolicy(message.spec.overload), message.mesh_bytes, message.recent_bytes,
-                   message.forgotten_ticks)
+                   message.forgotten_ticks, message.spec.idle_ttl_s, message.spec.mesh_grace_s)
 
 
 @dataclasses.dataclass(frozen=True)

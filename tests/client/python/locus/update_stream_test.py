@@ -1,6 +1,7 @@
 """Tests that update streams apply batches in order and exactly once, across refusals and broken connections."""
 import socket
 import threading
+import time
 import unittest
 from concurrent import futures
 
@@ -181,6 +182,131 @@ class RepeatedUpdateTest(unittest.TestCase):
             with self.assertRaises(locus.LocusError) as refused:
                 client.apply("arena", update)
             self.assertTrue(refused.exception.refused, "refused at the first attempt")
+
+
+class HoldingServer(FakeServer):
+    """Server of updates that holds messages with `continues`, and breaks the first `breaks` calls at their message number
+    `after`, which is lost. Refuses the updates whose ticks are in `refused`. `applied` lists the tick and the number of
+    messages of each applied update, `leases` their leases.
+    """
+
+    def __init__(self, breaks=0, after=0, refused=()):
+        self.breaks, self.after, self.refused, self.leases, self.knows_continues = breaks, after, refused, [], True
+        super().__init__(False)
+
+    def updates(self, requests, context):
+        held, is_refused = 0, False
+        for number, raw in enumerate(requests, 1):
+            request = UPDATES.request.FromString(raw)
+            batch, response = request.batch, UPDATES.response(sequence=request.sequence)
+            if self.breaks and number >= self.after:
+                self.breaks -= 1
+                context.abort(grpc.StatusCode.UNAVAILABLE, "planned")
+            if batch.continues and self.knows_continues:
+                is_refused = is_refused or batch.HasField("tick") or batch.writer != 0
+                held += 1
+                if is_refused:
+                    self.refuse(response, locus.Reason.MALFORMED)
+                else:
+                    response.ack.pending = True
+            else:
+                if is_refused:
+                    self.refuse(response, locus.Reason.COLUMN_LENGTH)
+                else:
+                    self.apply_held(batch, held, response)
+                held, is_refused = 0, False
+            yield response.SerializeToString()
+
+    def refuse(self, response, reason):
+        response.error.code, response.error.reason = 3, reason.value
+
+    def apply_held(self, batch, held, response):
+        if batch.batch > len(self.applied) + 1:
+            self.refuse(response, locus.Reason.BATCH_GAP)
+        elif batch.batch == len(self.applied) + 1 and batch.tick in self.refused:
+            self.refuse(response, locus.Reason.OUT_OF_RANGE)
+        else:
+            response.ack.duplicate = batch.batch <= len(self.applied)
+            if not response.ack.duplicate:
+                self.applied.append((batch.tick, held + 1))
+                self.leases.append(batch.lease_ms)
+            response.ack.revision = len(self.applied)
+
+
+class SeveralMessagesTest(unittest.TestCase):
+    """Tests of batches that are sent together, and of leases."""
+
+    def stream(self, server, **options):
+        self.addCleanup(server.stop)
+        client = locus.connect(server.address)
+        self.addCleanup(client.close)
+        return client.update_stream("arena", reconnect=locus.Retry(attempts=20, first_wait=0.01), **options)
+
+    def group(self, tick, messages):
+        return [UpdateBatch() for _ in range(messages - 1)] + [UpdateBatch(tick=tick)]
+
+    def test_batches_sent_together_are_applied_as_one(self):
+        server = HoldingServer()
+        with self.stream(server, max_in_flight=2) as stream:
+            sent = [stream.send_together(self.group(tick, 1 + tick % 4)) for tick in range(1, 21)]
+            with self.assertRaisesRegex(ValueError, "at least one batch"):
+                stream.send_together([])
+        self.assertEqual([future.result().revision for future in sent], list(range(1, 21)))
+        self.assertEqual(server.applied, [(tick, 1 + tick % 4) for tick in range(1, 21)])
+
+    def test_all_are_sent_again_after_a_break(self):
+        for after in (7, 8, 9):  # the first, second and third message of an update
+            server = HoldingServer(breaks=5, after=after)
+            with self.stream(server) as stream:
+                sent = [stream.send_together(self.group(tick, 3)) for tick in range(1, 26)]
+            self.assertEqual([future.exception() for future in sent], [None] * 25)
+            self.assertEqual(server.applied, [(tick, 3) for tick in range(1, 26)])
+
+    def test_renumbered_messages_never_join_those_that_the_server_holds(self):
+        refused = (1, 2, 9, 15, 16)
+        server = HoldingServer(refused=refused)
+        with self.stream(server, max_in_flight=4) as stream:
+            sent = [stream.send_together(self.group(tick, 1 + tick % 6)) for tick in range(1, 41)]
+        self.assertEqual([tick for tick, future in enumerate(sent, 1) if future.exception()], list(refused))
+        self.assertEqual(server.applied, [(tick, 1 + tick % 6) for tick in range(1, 41) if tick not in refused])
+
+    def test_a_refused_message_refuses_its_update_only(self):
+        server = HoldingServer()
+        with self.stream(server) as stream:
+            sent = [stream.send_together([UpdateBatch(tick=5 if tick == 2 else None), UpdateBatch(tick=tick)])
+                    for tick in (1, 2, 3)]
+        self.assertEqual(sent[1].exception().reason, locus.Reason.MALFORMED)
+        self.assertEqual(server.applied, [(1, 2), (3, 2)])
+
+    def test_a_server_that_applies_messages_one_by_one_ends_the_stream(self):
+        server = HoldingServer()
+        server.knows_continues = False
+        stream = self.stream(server)
+        error = stream.send_together(self.group(1, 2)).exception(WAIT_SECONDS)
+        self.assertEqual(error.code, grpc.StatusCode.UNIMPLEMENTED)
+        with self.assertRaises(locus.LocusError):
+            stream.close(WAIT_SECONDS)
+
+    def wait_for(self, condition):
+        deadline = time.monotonic() + WAIT_SECONDS
+        while not condition():
+            self.assertLess(time.monotonic(), deadline)
+            time.sleep(0.001)
+
+    def test_a_silent_stream_renews_its_lease_also_on_a_new_connection(self):
+        server = HoldingServer()
+        with self.stream(server, lease_ms=30) as stream:
+            stream.send(UpdateBatch(tick=1)).result(WAIT_SECONDS)
+            self.wait_for(lambda: len(server.applied) >= 4)
+            server.after = 1
+            server.breaks = 1
+            before = len(server.applied)
+            self.wait_for(lambda: len(server.applied) >= before + 4)
+        self.assertEqual(set(server.leases), {30})
+        self.assertEqual(server.applied[1:], [(0, 1)] * (len(server.applied) - 1))
+        for wrong in (-1, 2**32):
+            with self.assertRaisesRegex(ValueError, "lease_ms is"):
+                self.stream(HoldingServer(), lease_ms=wrong)
 
 
 class UpdateStreamTest(DaemonTest):
