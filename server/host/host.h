@@ -14,6 +14,7 @@
 #include "server/config/server_config.h"
 #include "server/host/memory_keeper.h"
 #include "server/host/memory_use.h"
+#include "server/observability/line_limit.h"
 #include "server/observability/process_figures.h"
 #include "server/observability/slow_queries.h"
 #include "server/rpc/rpc_state.h"
@@ -52,6 +53,8 @@ struct Host : RpcState {
   // ConnectionTable::shed_heaviest().
   static constexpr uint64_t kMinShedBytes = 128u << 10;
   static constexpr uint32_t kLoggingThreads = 8;
+  // Maximum number of log lines a second about leases that ended.
+  static constexpr uint32_t kMaxLeaseLines = 16;
 
   static SchedulerOptions scheduler_options(const ServerConfig& config) {
     SchedulerOptions options;
@@ -106,6 +109,7 @@ struct Host : RpcState {
   MeshCollector mesh_collector{lifetimes, registry, [this](const std::string& mesh, const absl::Status& status) {
                                  report_unused_mesh(mesh, status);
                                }};
+  LineLimit lease_lines{kMaxLeaseLines};
   LeaseKeeper leases{lease_ends, [this](const Scene& scene, uint64_t writer, const absl::Status& status) {
                        report_lease(scene, writer, status);
                      }};

@@ -1,6 +1,7 @@
 // Members of Host (server/host/host.h) for the lifetimes of scenes, meshes and leases: their start, and the reports of
 // what no call has deleted.
 #include <limits>
+#include <optional>
 #include <string>
 
 #include "absl/strings/str_cat.h"
@@ -32,11 +33,15 @@ void Host::report_idle_scene(const ScenePtr& scene, const absl::Status& status) 
 }
 
 void Host::report_lease(const Scene& scene, uint64_t writer, const absl::Status& status) {
-  const std::string id = absl::StrCat(writer);
+  const std::optional<uint64_t> left_out = lease_lines.admit(lease_ends.now());
+  if (!left_out) return;
+  const std::string id = absl::StrCat(writer), others = absl::StrCat(*left_out);
   if (!status.ok())
-    return server::log(LogLevel::kWarning, "the lease of a silent writer could not be ended; this is tried again",
-                       {{"scene", scene.name()}, {"writer", id}, {"why", std::string(status.message())}});
-  server::log(LogLevel::kInfo, "lease of a silent writer ended", {{"scene", scene.name()}, {"writer", id}});
+    return server::log(
+        LogLevel::kWarning, "the lease of a silent writer could not be ended; this is tried again",
+        {{"scene", scene.name()}, {"writer", id}, {"left_out", others}, {"why", std::string(status.message())}});
+  server::log(LogLevel::kInfo, "lease of a silent writer ended",
+              {{"scene", scene.name()}, {"writer", id}, {"left_out", others}});
 }
 
 void Host::report_unused_mesh(const std::string& mesh, const absl::Status& status) {

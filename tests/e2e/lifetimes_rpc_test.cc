@@ -93,6 +93,7 @@ TEST_F(LifetimesRpcTest, AnOpenStreamKeepsItsSceneUntilItEnds) {
   const auto stream = stubs().updates->StreamUpdates(&context);
   v1::StreamUpdatesRequest request;
   request.set_scene("streamed");
+  request.mutable_batch();
   v1::StreamUpdatesResponse response;
   ASSERT_TRUE(stream->Write(request));
   ASSERT_TRUE(stream->Read(&response));
@@ -269,7 +270,6 @@ TEST_F(LifetimesKillTest, LifetimesSurviveAKill) {
   v1::SceneSpec lasting = idle_spec(limits::kMaxLifetimeSeconds);
   lasting.set_mesh_grace_s(1);
   create_scene(daemon_.stubs(), "lasting", lasting);
-  create_scene(daemon_.stubs(), "idle", idle_spec());
   upload_and_place("kept", "lasting");
   create_scene(daemon_.stubs(), "short", grace_spec());
   upload_and_place("unused", "short");
@@ -281,6 +281,7 @@ TEST_F(LifetimesKillTest, LifetimesSurviveAKill) {
     v1::DeleteSceneResponse deleted;
     ASSERT_TRUE(daemon_.stubs().scenes->DeleteScene(&context, request, &deleted).ok());
   }
+  create_scene(daemon_.stubs(), "idle", idle_spec());
   restart();
   EXPECT_EQ(get_scene(daemon_.stubs(), "lasting").spec().idle_ttl_s(), limits::kMaxLifetimeSeconds);
   EXPECT_EQ(get_scene(daemon_.stubs(), "lasting").spec().mesh_grace_s(), 1u);
