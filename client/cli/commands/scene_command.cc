@@ -26,6 +26,8 @@ struct CreateOptions {
   uint32_t history_ticks = 0;
   uint64_t history_bytes = 0;
   v1::OverloadPolicy overload = v1::OVERLOAD_POLICY_UNSPECIFIED;
+  uint32_t idle_ttl_s = 0;
+  uint32_t mesh_grace_s = 0;
   bool if_absent = false;
 };
 
@@ -98,6 +100,8 @@ Report description_of(const v1::Scene& scene) {
     report.head["overload"] = "latest-wins";
     report.head["joined_updates"] = scene.joined_updates();
   }
+  if (scene.spec().idle_ttl_s() != 0) report.head["idle_ttl_s"] = scene.spec().idle_ttl_s();
+  if (scene.spec().mesh_grace_s() != 0) report.head["mesh_grace_s"] = scene.spec().mesh_grace_s();
   report.head["recent_bytes"] = scene.recent_bytes();
   report.head["pinned_bytes"] = scene.pinned_bytes();
   report.head["pending_changes"] = scene.pending_changes();
@@ -119,6 +123,8 @@ absl::Status create(const CreateOptions& options, Context& context) {
   request.mutable_spec()->set_history_ticks(options.history_ticks);
   request.mutable_spec()->set_history_bytes(options.history_bytes);
   request.mutable_spec()->set_overload(options.overload);
+  request.mutable_spec()->set_idle_ttl_s(options.idle_ttl_s);
+  request.mutable_spec()->set_mesh_grace_s(options.mesh_grace_s);
   request.mutable_spec()->mutable_labels()->insert(labels.begin(), labels.end());
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());
   ASSIGN_OR_RETURN(const v1::Scene scene, client->create_scene(request));
@@ -169,6 +175,7 @@ void add_create(CLI::App& parent, Context& context) {
   locus scene create arena
   locus scene create arena --if-absent --label map=delta --label mode=ctf
   locus scene create arena --history-ticks 64 --overload latest-wins
+  locus scene create match-17 --idle-ttl-s 600 --mesh-grace-s 60
   locus scene create arena-copy --static-from arena)");
   command.add_option("NAME", options->name, "Lower case letters, digits, - _ and ., at most 63")->required();
   command.add_flag("--if-absent", options->if_absent, "Accept a scene of that name as it is");
@@ -190,6 +197,13 @@ void add_create(CLI::App& parent, Context& context) {
                   "Batches that arrive too fast: one revision each (every-batch) or joined (latest-wins) [every-batch]")
       ->type_name("POLICY")
       ->transform(choices(policies));
+  command
+      .add_option("--idle-ttl-s", options->idle_ttl_s, "Delete the scene after so many seconds without use [0: never]")
+      ->type_name("SECONDS");
+  command
+      .add_option("--mesh-grace-s", options->mesh_grace_s,
+                  "Delete a mesh of the scene so many seconds after its last use in any scene [0: never]")
+      ->type_name("SECONDS");
   run_when_chosen(command, options, context, create);
 }
 

@@ -24,17 +24,18 @@ Json triangle_json(uint32_t triangle) { return triangle == client::kNoTriangle ?
 
 // Sets the keys of COLUMN_SHAPE: the kind of shape, and those of its sizes that the kind has; the others are null.
 void add_shape(const ResultRows& rows, size_t row, Json& json) {
-  enum Kind : uint32_t { kPoint = 1, kBall = 2, kBox = 3, kCapsule = 4, kInstance = 5 };
-  constexpr std::array<const char*, 6> kNames = {nullptr, "point", "ball", "box", "capsule", "instance"};
+  enum Kind : uint32_t { kPoint = 1, kBall = 2, kBox = 3, kCapsule = 4, kInstance = 5, kCompound = 6 };
+  constexpr std::array<const char*, 7> kNames = {nullptr, "point", "ball", "box", "capsule", "instance", "compound"};
   const uint32_t kind = rows.shapes().empty() ? 0 : rows.shapes()[row];
-  for (const char* key : {"shape", "radius", "half", "axis", "scale"}) json[key] = Json();
+  for (const char* key : {"shape", "radius", "half", "axis", "scale", "parts"}) json[key] = Json();
   if (kind == 0 || kind >= kNames.size()) return;
   const absl::Span<const float> sizes = rows.sizes().subspan(row * 4, 4);
   json["shape"] = kNames[kind];
-  if (kind == kBall || kind == kCapsule) json["radius"] = float_json(sizes[0]);
+  if (kind == kBall || kind == kCapsule || kind == kCompound) json["radius"] = float_json(sizes[0]);
   if (kind == kBox) json["half"] = floats_json(sizes.subspan(1));
   if (kind == kCapsule) json["axis"] = floats_json(sizes.subspan(1));
   if (kind == kInstance) json["scale"] = float_json(sizes[0]);
+  if (kind == kCompound) json["parts"] = static_cast<uint32_t>(sizes[1]);
 }
 
 // Sets the key or keys of `column` in `json`. `json` becomes the row of the report that shows row `row` of the answer.
@@ -93,7 +94,7 @@ const std::vector<std::string>& keys_of(v1::Column column) {
       {v1::COLUMN_OTHER, {"other"}},
       {v1::COLUMN_UNSPECIFIED, {}},
       {v1::COLUMN_POSE, {"position", "rotation"}},
-      {v1::COLUMN_SHAPE, {"shape", "radius", "half", "axis", "scale"}}};
+      {v1::COLUMN_SHAPE, {"shape", "radius", "half", "axis", "scale", "parts"}}};
   const auto found = keys.find(column);
   return found == keys.end() ? keys.at(v1::COLUMN_UNSPECIFIED) : found->second;
 }

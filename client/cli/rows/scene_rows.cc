@@ -1,5 +1,6 @@
 #include "client/cli/rows/scene_rows.h"
 
+#include "client/cli/rows/part_list.h"
 #include "core/base/status_macros.h"
 
 namespace locus::cli {
@@ -47,6 +48,7 @@ bool has_shape_columns(const v1::Insert& run) {
     case v1::Insert::kCapsule:
       return run.capsule().radii_size() == rows && run.capsule().half_axes_size() == 3 * rows;
     case v1::Insert::kCompound:
+      return for_each_part(run.compound(), [](const PartRow&) {});
     case v1::Insert::SHAPE_NOT_SET:
       return false;
   }
@@ -64,6 +66,9 @@ void read_shape(const v1::Insert& run, int row, SceneThing* thing) {
     thing->kind = ThingKind::kCapsule;
     thing->radius = run.capsule().radii(row);
     read(run.capsule().half_axes(), row, &thing->size);
+  } else if (run.has_compound()) {
+    thing->kind = ThingKind::kCompound;
+    thing->compound = &run.compound();
   }
 }
 
@@ -79,6 +84,8 @@ std::string shape_name(ThingKind kind) {
       return "box";
     case ThingKind::kCapsule:
       return "capsule";
+    case ThingKind::kCompound:
+      return "compound";
     case ThingKind::kInstance:
       return "";
   }
@@ -114,10 +121,10 @@ bool is_among(Things things, ThingKind kind) {
 
 const std::vector<std::string>& thing_keys(Things things) {
   using Keys = std::vector<std::string>;
-  static const auto& all = *new Keys{"kind",   "id",   "shape", "mesh",   "at",    "rotation", "scale",
-                                     "radius", "half", "axis",  "layers", "group", "tag"};
+  static const auto& all = *new Keys{"kind",   "id",   "shape", "mesh",  "at",     "rotation", "scale",
+                                     "radius", "half", "axis",  "parts", "layers", "group",    "tag"};
   static const auto& objects =
-      *new Keys{"id", "shape", "at", "rotation", "radius", "half", "axis", "layers", "group", "tag"};
+      *new Keys{"id", "shape", "at", "rotation", "radius", "half", "axis", "parts", "layers", "group", "tag"};
   static const auto& instances = *new Keys{"id", "mesh", "at", "rotation", "scale", "layers", "group", "tag"};
   switch (things) {
     case Things::kAll:
@@ -146,6 +153,7 @@ Json thing_row(const SceneThing& thing, Things things) {
   if (thing.kind == ThingKind::kBall || thing.kind == ThingKind::kCapsule) row["radius"] = float_json(thing.radius);
   if (thing.kind == ThingKind::kBox) row["half"] = floats_json(thing.size);
   if (thing.kind == ThingKind::kCapsule) row["axis"] = floats_json(thing.size);
+  if (thing.compound != nullptr) row["parts"] = parts_json(*thing.compound);
   row["layers"] = thing.layers;
   row["group"] = id_json(thing.group);
   row["tag"] = id_json(thing.tag);

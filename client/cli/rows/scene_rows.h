@@ -15,7 +15,7 @@
 
 namespace locus::cli {
 
-enum class ThingKind { kPoint, kBall, kBox, kCapsule, kInstance };
+enum class ThingKind { kPoint, kBall, kBox, kCapsule, kCompound, kInstance };
 
 // Object or instance of a scene. Fields that do not apply to its kind have their defaults.
 struct SceneThing {
@@ -27,12 +27,14 @@ struct SceneThing {
   std::array<float, 3> size{};                // box: half extents; capsule: half axis
   std::string mesh;                           // instance
   float scale = 1;                            // instance
+  const v1::Compound* compound = nullptr;     // compound: its parts, in the message of the dump
   uint32_t layers = 1;
   uint64_t group = 0;
   uint64_t tag = 0;
 };
 
-// Returns the name of an object's shape: "point", "ball", "box" or "capsule". Returns an empty string for an instance.
+// Returns the name of an object's shape: "point", "ball", "box", "capsule" or "compound". Returns an empty string for
+// an instance.
 std::string shape_name(ThingKind kind);
 
 // Calls `take` for each thing in one message of a dump, objects before instances. Stops at the first error of `take`
@@ -44,9 +46,9 @@ absl::Status for_each_thing(const v1::DumpSceneResponse& message,
 enum class Things { kAll, kObjects, kInstances };
 bool is_among(Things things, ThingKind kind);
 
-// Returns the keys of thing_row(), in order: id, shape or mesh, at, rotation, scale, radius, half, axis, layers, group,
-// tag. The keys equal the names of the options of the insert command, so that dumped rows of objects can be inserted
-// again. With Things::kAll, these keys are preceded by kind, whose value is "object" or "instance".
+// Returns the keys of thing_row(), in order: id, shape or mesh, at, rotation, scale, radius, half, axis, parts,
+// layers, group, tag. The keys equal the names of the options of the insert command, so that dumped rows of objects can
+// be inserted again. With Things::kAll, these keys are preceded by kind, whose value is "object" or "instance".
 const std::vector<std::string>& thing_keys(Things things);
 
 // Returns `thing` as a row of a report. `things` is the choice for the whole report; with kAll the row begins with the

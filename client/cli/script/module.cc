@@ -173,13 +173,31 @@ int step(lua_State* state) {
   return 2;
 }
 
+// Returns the lease in the table of options at index 3, {lease_ms = N}; 0 if there is none.
+absl::Duration lease_argument(lua_State* state) {
+  if (lua_isnoneornil(state, 3)) return absl::ZeroDuration();
+  luaL_checktype(state, 3, LUA_TTABLE);
+  lua_pushnil(state);
+  while (lua_next(state, 3) != 0) {
+    lua_pop(state, 1);
+    if (lua_type(state, -1) != LUA_TSTRING || absl::string_view(lua_tostring(state, -1)) != "lease_ms")
+      raise(state, absl::InvalidArgumentError("a stream has no option but lease_ms"));
+  }
+  lua_getfield(state, 3, "lease_ms");
+  const lua_Integer milliseconds = luaL_checkinteger(state, -1);
+  if (milliseconds < 0 || milliseconds > std::numeric_limits<uint32_t>::max())
+    raise(state, absl::InvalidArgumentError("lease_ms is a number of milliseconds, at most one day"));
+  lua_pop(state, 1);
+  return absl::Milliseconds(milliseconds);
+}
+
 int update_stream(lua_State* state) {
-  push_stream(state, client_at(state).update_stream(text_argument(state, 2)));
+  push_stream(state, client_at(state).update_stream(text_argument(state, 2), {.lease = lease_argument(state)}));
   return 1;
 }
 
 int query_stream(lua_State* state) {
-  push_stream(state, client_at(state).query_stream(text_argument(state, 2)));
+  push_stream(state, client_at(state).query_stream(text_argument(state, 2), {.lease = lease_argument(state)}));
   return 1;
 }
 

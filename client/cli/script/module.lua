@@ -40,8 +40,8 @@ end
 function Scene:describe() return self.server:get_scene(self.name) end
 function Scene:apply(batch) return self.server:apply(self.name, batch) end
 function Scene:query(batch) return self.server:query(self.name, batch) end
-function Scene:update_stream() return self.server:update_stream(self.name) end
-function Scene:query_stream() return self.server:query_stream(self.name) end
+function Scene:update_stream(options) return self.server:update_stream(self.name, options) end
+function Scene:query_stream(options) return self.server:query_stream(self.name, options) end
 function Scene:change_instances(change)
   change.scene = self.name
   return self.server:change_instances(change)
@@ -76,7 +76,7 @@ local function empty_batch()
   return { inserts = {}, moves = {}, remove_ids = {}, remove_groups = {}, relabels = {}, instance_moves = {},
     instance_relabels = {} }
 end
-function Scene:updates() return setmetatable({ scene = self, shapes = {}, batch = empty_batch() }, Updates) end
+function Scene:updates() return setmetatable({ scene = self, shapes = {}, compounds = {}, batch = empty_batch() }, Updates) end
 
 local no_rotation <const> = { 0, 0, 0, 1 }
 -- Returns the field `name` of a row, a list of `width` numbers; nil if it is absent and not needed.
@@ -97,41 +97,92 @@ local function scalar(what, row, name, default)
   return value
 end
 
-local insert_fields <const> = fields("id at rotation layers group tag point ball box capsule")
+-- Sets entry `n` of a column that may be absent. It stays absent until a row has a value; then earlier rows get
+-- `default`.
+local function set_optional(columns, name, n, value, default)
+  if columns[name] == nil then
+    if value == nil then return end
+    columns[name] = {}
+    for i = 1, n - 1 do columns[name][i] = default end
+  end
+  if value == nil then value = default end
+  columns[name][n] = value
+end
+
+local insert_fields <const> = fields("id at rotation layers group tag expire_ticks point ball box capsule compound")
 local capsule_fields <const> = fields("axis radius")
-function Updates:insert(row)
-  check_fields("insert", row, insert_fields)
+local part_fields <const> = fields("at rotation layers ball box capsule")
+
+-- Returns the radius and the size of the ball, box or capsule in a row or a part.
+local function measures_of(what, row, shape)
+  if shape == "ball" then return scalar(what, row, "ball") end
+  if shape == "box" then return nil, vector(what, row, "box", 3, true) end
+  if shape ~= "capsule" then return end
+  check_fields("capsule", row.capsule, capsule_fields)
+  return needed("capsule", row.capsule, "radius") and scalar("capsule", row.capsule, "radius"),
+    vector("capsule", row.capsule, "axis", 3, true)
+end
+
+-- Returns the one field of `row` that is among the names of shapes; nil if there is none.
+local function shape_in(what, row, names)
   local shapes = {}
-  for _, name in ipairs{ "point", "ball", "box", "capsule" } do
+  for _, name in ipairs(names) do
     if row[name] then shapes[#shapes + 1] = name end
   end
-  if #shapes > 1 then locus.fail("insert: an object has one shape, not " .. table.concat(shapes, " and ")) end
-  local shape = shapes[1] or "point"
+  if #shapes > 1 then locus.fail(what .. " has one shape, not " .. table.concat(shapes, " and ")) end
+  return shapes[1]
+end
+
+-- Returns the protocol's Compound of a list of parts. Part 0 is the first.
+local function compound_of(list)
+  if type(list) ~= "table" or #list == 0 then locus.fail("insert: compound is a list of parts") end
+  local parts = {}
+  for i, part in ipairs(list) do
+    check_fields("part", part, part_fields)
+    local shape = shape_in("part: a part", part, { "ball", "box", "capsule" })
+    if not shape then locus.fail("part needs ball, box or capsule") end
+    local radius, size = measures_of("part", part, shape)
+    parts[i] = { positions = { vector("part", part, "at", 3, true) },
+      rotations = part.rotation and { vector("part", part, "rotation", 4) } or nil,
+      layers = part.layers and { scalar("part", part, "layers") } or nil,
+      [shape] = { radii = radius and { radius } or nil, [shape == "box" and "half_extents" or "half_axes"] = size and { size } or nil } }
+  end
+  return { parts = parts }
+end
+
+function Updates:insert(row)
+  check_fields("insert", row, insert_fields)
+  local shape = shape_in("insert: an object", row, { "point", "ball", "box", "capsule", "compound" }) or "point"
   local id, at = scalar("insert", row, "id"), vector("insert", row, "at", 3, true)
   needed("insert", row, "id")
   local rotation = vector("insert", row, "rotation", 4) or no_rotation
-  local layers, group, tag = scalar("insert", row, "layers", 1), scalar("insert", row, "group", 0),
-    scalar("insert", row, "tag", 0)
-  local radius, size
-  if shape == "ball" then
-    radius = scalar("insert", row, "ball")
-  elseif shape == "box" then
-    size = vector("insert", row, "box", 3, true)
-  elseif shape == "capsule" then
-    check_fields("capsule", row.capsule, capsule_fields)
-    radius, size = scalar("capsule", row.capsule, "radius"), vector("capsule", row.capsule, "axis", 3, true)
-    needed("capsule", row.capsule, "radius")
+  -- Without layers, a compound is in all layers of its parts.
+  local layers = scalar("insert", row, "layers", shape ~= "compound" and 1 or nil)
+  local group, tag = scalar("insert", row, "group", 0), scalar("insert", row, "tag", 0)
+  local expire_ticks = scalar("insert", row, "expire_ticks")
+  local radius, size = measures_of("insert", row, shape)
+  -- Compounds of one list of parts share an entry if all or none of them have layers.
+  local key = shape
+  if shape == "compound" then
+    self.compounds[row.compound] = self.compounds[row.compound] or {}
+    key = self.compounds[row.compound]
+    key[1], key[2] = key[1] or {}, key[2] or {}
+    key = key[layers and 1 or 2]
   end
+  local insert = self.shapes[key]
+  local compound = not insert and shape == "compound" and compound_of(row.compound)
   -- Everything is checked: a refused row adds nothing.
-  local insert = self.shapes[shape]
   if not insert then
-    insert = { ids = {}, positions_f64 = {}, rotations = {}, layers = {}, groups = {}, tags = {}, [shape] = {} }
-    self.shapes[shape] = insert
+    insert = { ids = {}, positions_f64 = {}, rotations = {}, layers = layers and {}, groups = {}, tags = {},
+      [shape] = compound or {} }
+    self.shapes[key] = insert
     table.insert(self.batch.inserts, insert)
   end
   local n = #insert.ids + 1
   insert.ids[n], insert.positions_f64[n], insert.rotations[n] = id, at, rotation
-  insert.layers[n], insert.groups[n], insert.tags[n] = layers, group, tag
+  insert.groups[n], insert.tags[n] = group, tag
+  if layers then insert.layers[n] = layers end
+  set_optional(insert, "expire_ticks", n, expire_ticks, 0)
   local columns = insert[shape]
   local size_column = shape == "box" and "half_extents" or "half_axes"
   if radius then
@@ -145,25 +196,49 @@ function Updates:insert(row)
   return self
 end
 
+local pose_fields <const> = fields("at rotation")
+-- Returns the positions and the rotations of the poses of a compound's parts, each nil if no part has one.
+local function poses_of(what, parts)
+  if parts == nil then return end
+  if type(parts) ~= "table" or #parts == 0 then locus.fail(what .. ": parts is a list of poses") end
+  local positions, rotations = {}, {}
+  for _, part in ipairs(parts) do
+    check_fields("part", part, pose_fields)
+    positions[#positions + 1] = vector("part", part, "at", 3)
+    rotations[#rotations + 1] = vector("part", part, "rotation", 4)
+  end
+  if (#positions ~= #parts and #positions > 0) or (#rotations ~= #parts and #rotations > 0) or #positions + #rotations == 0 then
+    locus.fail(what .. ": either all parts or none have at, and the same for rotation; one of them is needed")
+  end
+  return #positions > 0 and positions or nil, #rotations > 0 and rotations or nil
+end
+
 -- Adds a row to `moves`: to the last entry if that has the same columns, otherwise to a new one.
 local function add_move(what, moves, row, scale)
   needed(what, row, "id")
   local id, at = scalar(what, row, "id"), vector(what, row, "at", 3, true)
   local rotation, teleport = vector(what, row, "rotation", 4), row.teleport or false
+  local part_positions, part_rotations = poses_of(what, row.parts)
+  local parts_each = row.parts and #row.parts
   local move = moves[#moves]
   local turns, scales = rotation ~= nil, scale ~= nil
-  if not move or move.teleport ~= teleport or (move.rotations ~= nil) ~= turns or (move.scales ~= nil) ~= scales then
+  if not move or move.teleport ~= teleport or (move.rotations ~= nil) ~= turns or (move.scales ~= nil) ~= scales
+    or move.parts_each ~= parts_each or (move.part_positions ~= nil) ~= (part_positions ~= nil)
+    or (move.part_rotations ~= nil) ~= (part_rotations ~= nil) then
     move = { ids = {}, positions_f64 = {}, rotations = turns and {} or nil, scales = scales and {} or nil,
-      teleport = teleport }
+      teleport = teleport, parts_each = parts_each, part_positions = part_positions and {},
+      part_rotations = part_rotations and {} }
     moves[#moves + 1] = move
   end
   local n = #move.ids + 1
   move.ids[n], move.positions_f64[n] = id, at
   if turns then move.rotations[n] = rotation end
   if scales then move.scales[n] = scale end
+  for _, at in ipairs(part_positions or {}) do table.insert(move.part_positions, at) end
+  for _, turn in ipairs(part_rotations or {}) do table.insert(move.part_rotations, turn) end
 end
 
-local move_fields <const> = fields("id at rotation teleport")
+local move_fields <const> = fields("id at rotation teleport parts")
 function Updates:move(row)
   check_fields("move", row, move_fields)
   add_move("move", self.batch.moves, row)
@@ -218,7 +293,7 @@ end
 function Updates:take(options)
   local batch = self.batch
   for name, value in pairs(options or {}) do batch[name] = value end
-  self.shapes = {}
+  self.shapes, self.compounds = {}, {}
   self.batch = empty_batch()
   return batch
 end
@@ -229,18 +304,6 @@ local Queries = {}
 Queries.__index = Queries
 function Scene:queries(options)
   return setmetatable({ scene = self, options = options or {}, blocks = {}, places = {} }, Queries)
-end
-
--- Sets entry `n` of a column that may be absent. It stays absent until a row has a value; then earlier rows get
--- `default`.
-local function set_optional(columns, name, n, value, default)
-  if columns[name] == nil then
-    if value == nil then return end
-    columns[name] = {}
-    for i = 1, n - 1 do columns[name][i] = default end
-  end
-  if value == nil then value = default end
-  columns[name][n] = value
 end
 
 -- Kinds of queries: the kind's field in a block, the columns of needed fields, and the columns and defaults of others.

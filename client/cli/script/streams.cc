@@ -47,6 +47,25 @@ struct StreamObject {
     return object.add(state, object.stream->send(std::move(batch)));
   }
 
+  // Sends a list of batches that become one revision. Only streams of updates have this method.
+  static int send_together(lua_State* state) {
+    StreamObject& object = self(state);
+    luaL_checktype(state, 2, LUA_TTABLE);
+    std::vector<v1::UpdateBatch> batches(lua_rawlen(state, 2));
+    for (size_t i = 0; i < batches.size(); ++i) {
+      lua_rawgeti(state, 2, static_cast<lua_Integer>(i + 1));
+      if (absl::Status status = read_message(state, lua_gettop(state), batches[i]); !status.ok()) {
+        std::vector<v1::UpdateBatch>().swap(batches);  // raise() does not return and runs no destructors
+        raise(state, std::move(status));
+      }
+      lua_pop(state, 1);
+    }
+    object.check_unread(state);
+    if constexpr (std::is_same_v<Stream, client::UpdateStream>)
+      return object.add(state, object.stream->send_together(std::move(batches)));
+    return 0;
+  }
+
   // Sends a step. Only streams of queries have this method.
   static int step(lua_State* state) {
     StreamObject& object = self(state);
@@ -111,8 +130,8 @@ struct StreamObject {
     new (lua_newuserdatauv(state, sizeof(StreamObject), 0)) StreamObject{std::move(stream), {}, 0};
     if (luaL_newmetatable(state, kName) != 0) {
       const bool has_steps = std::is_same_v<Stream, client::QueryStream>;
-      const luaL_Reg methods[] = {
-          {"send", send}, {"flush", flush}, {"close", close}, {has_steps ? "step" : nullptr, step}, {nullptr, nullptr}};
+      const luaL_Reg own = has_steps ? luaL_Reg{"step", step} : luaL_Reg{"send_together", send_together};
+      const luaL_Reg methods[] = {{"send", send}, {"flush", flush}, {"close", close}, own, {nullptr, nullptr}};
       luaL_newlib(state, methods);
       lua_setfield(state, -2, "__index");
       lua_pushcfunction(state, free);

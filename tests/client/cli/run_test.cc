@@ -222,6 +222,71 @@ TEST_F(RunTest, EveryShapeIsSentInItsOwnColumns) {
   EXPECT_EQ(server_.updates.last_batch.tick(), 5u);
 }
 
+TEST_F(RunTest, CompoundsAreSentWithTheirPartsAndPoses) {
+  const std::string parts = R"([{"ball":0.5,"at":[0,0,2],"layers":2},{"box":[1,2,3],"at":[0,0,1]}])";
+  ASSERT_EQ(run_here({"insert", "arena", "compound", "--id", "1", "--at", "0,0,0", "--id", "2", "--at", "9,0,0",
+                      "--parts", parts, "--expire-ticks", "30"})
+                .code,
+            ExitCode::kOk);
+  const v1::Insert& insert = server_.updates.last_batch.inserts(0);
+  EXPECT_THAT(insert.ids(), ElementsAre(1, 2));
+  ASSERT_EQ(insert.compound().parts_size(), 2);
+  EXPECT_THAT(insert.compound().parts(0).layers(), ElementsAre(2));
+  EXPECT_THAT(insert.expire_ticks(), ElementsAre(30));
+  EXPECT_EQ(insert.layers_size(), 0);
+  ASSERT_EQ(
+      run_here({"move", "arena", "--id", "1", "--to", "1,0,0", "--parts", R"([{"at":[0,0,3]},{"at":[0,0,1]}])"}).code,
+      ExitCode::kOk);
+  EXPECT_EQ(server_.updates.last_batch.moves(0).parts_each(), 2u);
+  EXPECT_THAT(server_.updates.last_batch.moves(0).part_positions(), ElementsAre(0, 0, 3, 0, 0, 1));
+  EXPECT_EQ(run_here({"insert", "arena", "compound", "--id", "1", "--at", "0,0,0"}).code, ExitCode::kUsage);
+  EXPECT_EQ(run_here({"insert", "arena", "ball", "--id", "1", "--at", "0,0,0", "--radius", "1", "--parts", parts}).code,
+            ExitCode::kUsage);
+  EXPECT_THAT(run_here({"insert", "arena", "compound", "--id", "1", "--at", "0,0,0", "--parts", "[{}]"}).err,
+              HasSubstr("part 0: needs one of ball, box and capsule"));
+}
+
+TEST_F(RunTest, ScenesAreCreatedWithLifetimes) {
+  const Json made = json_of({"scene", "create", "match", "--idle-ttl-s", "600", "--mesh-grace-s", "60"});
+  EXPECT_EQ(made["idle_ttl_s"], 600);
+  EXPECT_EQ(made["mesh_grace_s"], 60);
+  EXPECT_EQ(server_.scenes.scenes["match"].spec().idle_ttl_s(), 600u);
+  EXPECT_FALSE(json_of({"scene", "create", "other"}).contains("idle_ttl_s"));
+}
+
+TEST_F(RunTest, RowsOfCompoundsCarryTheirOwnParts) {
+  const std::string path = ::testing::TempDir() + "/compounds.ndjson";
+  std::ofstream(path)
+      << R"({"id":1,"shape":"compound","at":[0,0,0],"parts":[{"ball":1,"at":[0,0,1]}]})"
+      << "\n"
+      << R"({"id":2,"shape":"compound","at":[1,0,0],"parts":[{"ball":1,"at":[0,0,1]}],"layers":4})"
+      << "\n"
+      << R"({"id":3,"shape":"compound","at":[2,0,0],"expire_ticks":7,"layers":4,)"
+      << R"("parts":[{"capsule":{"axis":[0,0,1],"radius":2},"at":[0,0,1e0],"layers":8},{"box":[1,1,1],"at":[0,-1,0]}]})"
+      << "\n";
+  ASSERT_EQ(run_here({"insert", "arena", "mixed", "--from-ndjson", path}).code, ExitCode::kOk);
+  const v1::UpdateBatch inserted = server_.updates.last_batch;
+  ASSERT_EQ(inserted.inserts_size(), 3);
+  EXPECT_EQ(inserted.inserts(0).layers_size(), 0);
+  EXPECT_THAT(inserted.inserts(1).layers(), ElementsAre(4));
+  EXPECT_THAT(inserted.inserts(2).expire_ticks(), ElementsAre(7));
+  ASSERT_EQ(inserted.inserts(2).compound().parts_size(), 2);
+  EXPECT_THAT(inserted.inserts(2).compound().parts(0).capsule().radii(), ElementsAre(2));
+  EXPECT_THAT(inserted.inserts(2).compound().parts(1).positions(), ElementsAre(0, -1, 0));
+  std::ofstream(path) << R"({"id":1,"to":[0,0,0],"parts":[{"at":[0,0,2]}]})"
+                      << "\n"
+                      << R"({"id":2,"to":[0,0,0]})"
+                      << "\n";
+  ASSERT_EQ(run_here({"move", "arena", "--from-ndjson", path}).code, ExitCode::kOk);
+  ASSERT_EQ(server_.updates.last_batch.moves_size(), 2);
+  EXPECT_THAT(server_.updates.last_batch.moves(0).part_positions(), ElementsAre(0, 0, 2));
+  EXPECT_EQ(server_.updates.last_batch.moves(1).parts_each(), 0u);
+  std::ofstream(path) << R"({"id":1,"shape":"compound","at":[0,0,0],"parts":[{"cone":1}]})"
+                      << "\n";
+  EXPECT_THAT(run_here({"insert", "arena", "mixed", "--from-ndjson", path}).err,
+              HasSubstr("compounds.ndjson:1: parts: part 0: unknown key 'cone'"));
+}
+
 TEST_F(RunTest, MovesAndRemovesReachTheServer) {
   ASSERT_EQ(run_here({"move", "arena", "--id", "7", "--to", "1,2,4", "--teleport"}).code, ExitCode::kOk);
   EXPECT_THAT(server_.updates.last_batch.moves(0).positions_f64(), ElementsAre(1, 2, 4));

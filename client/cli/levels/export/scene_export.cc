@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/cli/levels/export/unit_shapes.h"
+#include "client/cli/rows/part_list.h"
 #include "core/base/status_macros.h"
 
 namespace locus::cli {
@@ -19,6 +20,18 @@ Json facts_of(const SceneThing& thing) {
   if (thing.tag != 0) facts["tag"] = id_json(thing.tag);
   facts["layers"] = thing.layers;
   return facts;
+}
+
+// Returns the product of two quaternions: the rotation by `b` and then by `a`.
+std::array<float, 4> product(const std::array<float, 4>& a, const std::array<float, 4>& b) {
+  return {a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1], a[3] * b[1] - a[0] * b[2] + a[1] * b[3] + a[2] * b[0],
+          a[3] * b[2] + a[0] * b[1] - a[1] * b[0] + a[2] * b[3], a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2]};
+}
+
+std::array<float, 3> rotated(const std::array<float, 4>& rotation, const std::array<float, 3>& vector) {
+  const std::array<float, 4> back = {-rotation[0], -rotation[1], -rotation[2], rotation[3]};
+  const std::array<float, 4> result = product(product(rotation, {vector[0], vector[1], vector[2], 0}), back);
+  return {result[0], result[1], result[2]};
 }
 
 std::string object_name(const SceneThing& thing) { return absl::StrCat("object ", thing.id); }
@@ -123,8 +136,30 @@ absl::Status SceneExport::add_instance(const SceneThing& thing) {
                           facts_of(thing));
 }
 
+// Adds each part of a compound like an object of its shape.
+absl::Status SceneExport::add_parts(const SceneThing& thing) {
+  absl::Status added;
+  for_each_part(*thing.compound, [&](const PartRow& row) {
+    SceneThing part = thing;
+    part.kind = row.shape == v1::Parts::kBall  ? ThingKind::kBall
+                : row.shape == v1::Parts::kBox ? ThingKind::kBox
+                                               : ThingKind::kCapsule;
+    const std::array<float, 3> offset = rotated(thing.rotation, row.at);
+    for (size_t axis = 0; axis < 3; ++axis) part.at[axis] += offset[axis];
+    part.rotation = product(thing.rotation, row.rotation);
+    part.radius = row.radius;
+    part.size = row.size;
+    if (added.ok()) added = add_drawn(part);
+  });
+  return added;
+}
+
 absl::Status SceneExport::add(const SceneThing& thing) {
   ++things_;
+  return add_drawn(thing);
+}
+
+absl::Status SceneExport::add_drawn(const SceneThing& thing) {
   const float radius = drawn(thing.radius);
   switch (thing.kind) {
     case ThingKind::kPoint:
@@ -135,6 +170,8 @@ absl::Status SceneExport::add(const SceneThing& thing) {
       return add_shape(thing, Part::kBox, {drawn(thing.size[0]), drawn(thing.size[1]), drawn(thing.size[2])});
     case ThingKind::kCapsule:
       return add_capsule(thing);
+    case ThingKind::kCompound:
+      return add_parts(thing);
     case ThingKind::kInstance:
       return add_instance(thing);
   }

@@ -51,6 +51,8 @@ class SceneExport {
 
   absl::StatusOr<size_t> shape_mesh(Part part);
   absl::Status add_shape(const SceneThing& thing, Part part, const std::array<float, 3>& scale);
+  absl::Status add_parts(const SceneThing& thing);
+  absl::Status add_drawn(const SceneThing& thing);
   absl::Status add_capsule(const SceneThing& thing);
   absl::Status add_instance(const SceneThing& thing);
   GlbPlace place_of(const SceneThing& thing) const;

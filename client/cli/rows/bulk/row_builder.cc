@@ -78,6 +78,7 @@ void RowBuilder::start() {
   for (Value& value : values_) {
     std::fill(value.numbers.begin(), value.numbers.end(), 0);
     value.integer = 0;
+    value.text.clear();
     value.parts_given = 0;
   }
 }
@@ -98,6 +99,10 @@ absl::Status RowBuilder::store(const Slot& slot, double number, uint64_t integer
 
 absl::Status RowBuilder::put_text(const Slot& slot, absl::string_view text) {
   const Field& field = schema_[slot.field];
+  if (field.kind == FieldKind::kJson) {
+    values_[slot.field].text = std::string(text);
+    return store(slot, 0, 0);
+  }
   if (field.kind == FieldKind::kWord) {
     const auto word = std::find(field.words.begin(), field.words.end(), text);
     if (word != field.words.end()) return store(slot, 0, static_cast<uint64_t>(word - field.words.begin()));
@@ -114,6 +119,7 @@ absl::Status RowBuilder::put_text(const Slot& slot, absl::string_view text) {
 
 absl::Status RowBuilder::put_number(const Slot& slot, double value) {
   const FieldKind kind = schema_[slot.field].kind;
+  if (kind == FieldKind::kJson) return wrong(slot, absl::StrCat(value, " is no list"));
   if (holds_integer(kind))
     return wrong(slot, absl::StrCat(value, " is no whole number from 0 to 18446744073709551615"));
   const std::string fault = fault_of(kind, value);
@@ -149,6 +155,8 @@ absl::Status RowBuilder::finish(uint64_t line, RowBatch& batch) {
     column.given.push_back(value.parts_given != 0 ? 1 : 0);
     if (holds_integer(schema_[i].kind)) {
       column.integers.push_back(value.integer);
+    } else if (schema_[i].kind == FieldKind::kJson) {
+      column.texts.push_back(value.text);
     } else {
       column.numbers.insert(column.numbers.end(), value.numbers.begin(), value.numbers.end());
     }

@@ -6,6 +6,7 @@
 #define LOCUS_CLIENT_CLI_ROWS_BULK_ROW_BUILDER_H_
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -37,6 +38,7 @@ class RowBuilder {
   struct Value {
     std::vector<double> numbers;  // one for each part
     uint64_t integer = 0;
+    std::string text = {};
     uint32_t parts_given = 0;  // bit i: part i has a value
   };
 

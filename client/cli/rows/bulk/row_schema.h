@@ -25,6 +25,7 @@ enum class FieldKind {
   kId,          // unsigned, 64 bits
   kBits,        // unsigned, 32 bits
   kWord,        // one of Field::words, stored as its index in that list
+  kJson,        // a JSON list, stored as its text, which the command reads
 };
 
 struct Field {
@@ -61,11 +62,13 @@ std::string slot_name(const RowSchema& schema, const Slot& slot);
 std::string known_columns(const RowSchema& schema);
 
 // Values of one field for all rows of a batch. Depending on the field's kind, either `numbers` (Field::size() entries
-// per row) or `integers` (one entry per row) is filled. `given` has one entry per row: 1 if the row has a value,
-// otherwise 0. If a row has no value, its entries in `numbers` or `integers` are 0.
+// per row), `integers` (one entry per row) or `texts` (one entry per row) is filled. `given` has one entry per row: 1
+// if the row has a value, otherwise 0. If a row has no value, its entries in `numbers` or `integers` are 0, and in
+// `texts` empty.
 struct RowColumn {
   std::vector<double> numbers;
   std::vector<uint64_t> integers;
+  std::vector<std::string> texts;
   std::vector<uint8_t> given;
 
   bool any() const;

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "client/cli/rows/part_list.h"
+
 namespace locus::cli {
 namespace {
 
@@ -61,6 +63,32 @@ TEST(SceneRowsTest, ThingsComeInOrderWithTheirValues) {
   EXPECT_EQ(things[2].radius, 0.25f);
   EXPECT_EQ(things[4].mesh, "crate");
   EXPECT_EQ(things[4].scale, 2);
+}
+
+TEST(SceneRowsTest, CompoundsHaveTheirPartsInARow) {
+  v1::DumpSceneResponse message;
+  v1::Insert& run = *message.add_objects();
+  fill_shared(run, 9);
+  for (const double part : {1.0, 2.0, 3.0}) run.add_positions_f64(part);
+  *run.mutable_compound() = client::Compound()
+                                .ball({0, 0, 2}, 0.5f, {.layers = 2})
+                                .capsule({0, 0, 1}, {0, 0, 0.5f}, 0.25f, {.rotation = {0, 0, 1, 0}})
+                                .message();
+  Json row;
+  ASSERT_TRUE(for_each_thing(message, [&](const SceneThing& thing) {
+                row = thing_row(thing, Things::kObjects);
+                return absl::OkStatus();
+              }).ok());
+  EXPECT_EQ(row["shape"], "compound");
+  EXPECT_EQ(row["parts"].dump(),
+            R"([{"ball":0.5,"at":[0.0,0.0,2.0],"rotation":[0.0,0.0,0.0,1.0],"layers":2},)"
+            R"({"capsule":{"axis":[0.0,0.0,0.5],"radius":0.25},"at":[0.0,0.0,1.0],"rotation":[0.0,0.0,1.0,0.0],)"
+            R"("layers":4294967295}])");
+  const absl::StatusOr<client::Compound> again = read_parts(row["parts"].dump());
+  ASSERT_TRUE(again.ok()) << again.status();
+  EXPECT_EQ(parts_json(again->message()), row["parts"]);
+  run.mutable_compound()->mutable_parts(1)->mutable_capsule()->clear_radii();
+  EXPECT_TRUE(absl::IsDataLoss(read(message)));
 }
 
 TEST(SceneRowsTest, ReadingEndsAtTheFirstError) {
