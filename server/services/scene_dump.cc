@@ -96,8 +96,8 @@ void add_shape(const Shape& shape, v1::Insert* to) {
 using TakeDumpPiece = std::function<bool(const v1::DumpSceneResponse&)>;
 
 // Builder of the pieces of a dump. Passes each piece to `take` when the piece is full. Consecutive objects with the
-// same kind of shape of which all or none expire, compounds with the same parts of which all or none expire, or instances
-// of the same mesh, share a run of columns.
+// same kind of shape of which all or none expire, compounds with the same parts of which all or none expire, or
+// instances of the same mesh, share a run of columns.
 class Dump {
  public:
   Dump(const SceneSnapshot& snapshot, const TakeDumpPiece& take) : snapshot_(snapshot), take_(take) { start_piece(); }
