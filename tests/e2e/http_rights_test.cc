@@ -171,6 +171,24 @@ TEST_F(HttpRightsTest, AnAccessFileThatCannotBeUsedIsCountedUntilItIsMendedAndTh
   EXPECT_THAT(read("audit.refused"), HasSubstr(R"("rpc":"reload","subject":"access files","code":"INVALID_ARGUMENT")"));
 }
 
+TEST_F(HttpRightsTest, TheDeletionOfAnIdleSceneIsCountedAndAudited) {
+  start(config());
+  EXPECT_EQ(metric("locus_scenes_expired_total", {}), 0);
+  EXPECT_EQ(metric("locus_meshes_collected_total", {}), 0);
+  EXPECT_EQ(metric("locus_leases_ended_total", {}), 0);
+  grpc::ClientContext context;
+  set_timeout(context);
+  context.AddMetadata("authorization", "Bearer " + tokens_["reader"]);
+  v1::CreateSceneRequest request;
+  request.set_name("arena");
+  request.mutable_spec()->set_idle_ttl_s(1);
+  v1::CreateSceneResponse created;
+  ASSERT_TRUE(running_->stubs().scenes->CreateScene(&context, request, &created).ok());
+  EXPECT_TRUE(wait_until([&] { return metric("locus_scenes_expired_total", {}) == 1; }));
+  running_.reset();  // writes the queued lines
+  EXPECT_THAT(read("audit"), HasSubstr(R"("rpc":"DeleteScene","subject":"arena","code":"OK")"));
+}
+
 TEST_F(HttpRightsTest, ACertificateThatCannotBeUsedIsCountedUntilItIsMendedAndTheOldOneStays) {
   start(tls_config());
   const HttpReader reader = trusting(authority_);
