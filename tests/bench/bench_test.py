@@ -79,6 +79,8 @@ def expected_dynamic_cells():
     cells |= {(f"instances/{change}_{share}/10k", "place_all") for change in ("move", "place", "remove")
               for share in ("one", "1%")}
     cells |= {("doors/1reader", "required")}
+    cells |= {(f"compounds/{case}/10k", "balls") for case in ("move", "turn", "pose")}
+    cells |= {(f"compounds/{case}/10k", "parts") for case in ("ray", "ball")}
     for kind in KINDS:
         for case in ("move", "ball", "ball_batch", "box", "box_batch", "ray", "ray_batch", "nearest", "nearest_batch",
                      "insert", "reinsert", "memory"):

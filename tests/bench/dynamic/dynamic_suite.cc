@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "tests/bench/dynamic/check_values.h"
+#include "tests/bench/dynamic/compound_cases.h"
 #include "tests/bench/dynamic/concurrent_cases.h"
 #include "tests/bench/dynamic/country_cases.h"
 #include "tests/bench/dynamic/growth_case.h"
@@ -105,6 +106,7 @@ absl::Status run_dynamic_suite(const Options& options, const Progress& progress,
   run_growth_case(options, progress, report);
   run_rewind_cases(options, progress, report);
   run_instance_cases(options, progress, report);
+  run_compound_cases(options, progress, report);
   run_concurrent_cases(options, progress, report);
   return absl::OkStatus();
 }
