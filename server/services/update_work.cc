@@ -98,13 +98,13 @@ absl::Status UpdateWork::hold(const std::string& scene_name, v1::UpdateBatch& ba
 
 absl::Status UpdateWork::post_all(const std::string& scene_name, const v1::UpdateBatch& batch, HeldUpdates& held) {
   ASSIGN_OR_RETURN(scene_, use_scene(host_, slot_.caller(), scene_name, "scene"));
-  RETURN_IF_ERROR(held.check_scene(scene_.pointer()));
+  RETURN_IF_ERROR(held.check_scene(scene_));
   messages_ = held.take();
   return post(scene_name, batch);
 }
 
 absl::Status UpdateWork::post(const std::string& scene_name, const v1::UpdateBatch& batch) {
-  if (scene_.pointer() == nullptr) {
+  if (scene_ == nullptr) {
     ASSIGN_OR_RETURN(scene_, use_scene(host_, slot_.caller(), scene_name, "scene"));
   }
   ASSIGN_OR_RETURN(batch_, to_updates(batch));
