@@ -464,3 +464,97 @@ class UpdateStreamTest(DaemonTest):
     def test_a_max_in_flight_of_zero_is_refused(self):
         with self.assertRaisesRegex(ValueError, "max_in_flight is 0: give 1 or more"):
             self.client.update_stream(self.scene, max_in_flight=0)
+
+
+class WaitingTest(DaemonTest):
+    def wait_for(self, condition):
+        deadline = time.monotonic() + WAIT_SECONDS
+        while not condition():
+            self.assertLess(time.monotonic(), deadline)
+            time.sleep(0.01)
+
+    def found(self, *ids):
+        return listed(self.ask(QueryBatch().lookup(list(ids)))[0].ids)
+
+    def refused(self, batch, code, reason, field):
+        with self.assertRaises(locus.LocusError) as raised:
+            self.apply(batch)
+        self.assertRefused(raised.exception, code, reason, field)
+
+    def item_errors(self, batch):
+        return [(error.field, error.index, error.reason.name) for error in self.apply(batch).errors]
+
+
+class LifetimesTest(WaitingTest):
+    def test_objects_expire_with_the_first_batch_of_their_last_tick(self):
+        self.apply(UpdateBatch(tick=10).insert_points([1, 2, 3], [0, 0, 0], expire_ticks=[5, 6, 0]))
+        self.apply(UpdateBatch(tick=14))
+        self.assertEqual(self.found(1, 2, 3), [1, 2, 3])
+        self.apply(UpdateBatch(tick=15).insert_points(1, [0, 0, 0]))
+        self.assertEqual(self.found(1, 2, 3), [1, 2, 3], "1 has expired before it was inserted again")
+        self.apply(UpdateBatch(tick=100))
+        self.assertEqual(self.found(1, 2, 3), [1, 0, 3])
+
+    def test_too_long_a_lifetime_is_refused(self):
+        batch = UpdateBatch().insert_points([1, 2], [0, 0, 0], expire_ticks=[2**48, 2**48 + 1])
+        self.assertEqual(self.item_errors(batch), [("inserts[0].expire_ticks", 1, "OUT_OF_RANGE")])
+
+    def test_objects_of_a_silent_writer_go_in_one_revision(self):
+        self.apply(UpdateBatch().insert_points(9, [0, 0, 0]))
+        before = self.apply(UpdateBatch(writer=5, number=1, lease_ms=1).insert_points([1, 2], [0, 0, 0])).revision
+        self.wait_for(lambda: self.found(1, 2, 9) == [0, 0, 9])
+        self.assertEqual(self.client.scene(self.scene).revision, before + 1)
+
+    def test_an_open_stream_keeps_its_objects_and_a_closed_one_does_not(self):
+        with self.client.update_stream(self.scene, lease_ms=1500) as stream:
+            stream.send(UpdateBatch().insert_points(1, [0, 0, 0])).result(WAIT_SECONDS)
+            end = time.monotonic() + 4  # longer than the lease
+            while time.monotonic() < end:
+                self.assertEqual(self.found(1), [1])
+                time.sleep(0.05)
+        self.wait_for(lambda: self.found(1) == [0])
+
+    def test_wrong_leases_are_refused(self):
+        self.refused(UpdateBatch(lease_ms=1000), "INVALID_ARGUMENT", "MALFORMED", "lease_ms")
+        self.refused(UpdateBatch(writer=6, number=1, lease_ms=86_400_001), "INVALID_ARGUMENT", "LIMIT", "lease_ms")
+
+
+class SeveralMessagesInScenesTest(WaitingTest):
+    def test_batches_sent_together_are_one_revision(self):
+        with self.client.update_stream(self.scene) as stream:
+            first = stream.send_together([UpdateBatch().insert_points([1, 2], [0, 0, 0]),
+                                          UpdateBatch().insert_points([2, 3], [0, 0, 0]),
+                                          UpdateBatch(tick=7).move(1, [1, 0, 0])])
+            second = stream.send(UpdateBatch().remove(1))
+        ack = first.result()
+        self.assertEqual((ack.revision, ack.tick, ack.applied, ack.refused), (1, 7, 4, 1))
+        self.assertEqual([(error.message, error.field, error.index) for error in ack.errors], [(1, "inserts[0].ids", 0)])
+        self.assertEqual(second.result().revision, 2)
+
+    def test_a_refused_message_refuses_all(self):
+        wrong = {"tick": UpdateBatch(tick=4), "all_or_nothing": UpdateBatch(all_or_nothing=True),
+                 "lease_ms": UpdateBatch(lease_ms=5), "positions": UpdateBatch().insert_balls(5, radii=1)}
+        with self.client.update_stream(self.scene) as stream:
+            for field, batch in wrong.items():
+                error = stream.send_together([UpdateBatch().insert_points(1, [0, 0, 0]), batch,
+                                              UpdateBatch().insert_points(2, [0, 0, 0])]).exception(WAIT_SECONDS)
+                self.assertEqual(error.code.name, "INVALID_ARGUMENT", error)
+                self.assertIn(field, error.field)
+                self.assertEqual(self.found(1, 2, 5), [0, 0, 0])
+            self.assertEqual(stream.send(UpdateBatch().insert_points(1, [0, 0, 0])).result(WAIT_SECONDS).revision, 1)
+
+    def test_a_single_call_has_no_rest(self):
+        batch = UpdateBatch()
+        batch.message.continues = True
+        self.refused(batch, "INVALID_ARGUMENT", "MALFORMED", "continues")
+
+
+class ScenesTest(WaitingTest):
+    def test_an_unused_scene_goes_with_its_meshes(self):
+        name = "idle-scene"
+        self.client.upload_mesh("idle-mesh", [0, 0, 0, 1, 0, 0, 0, 1, 0], [0, 1, 2])
+        made = self.client.create_scene(name, idle_ttl_s=1, mesh_grace_s=1)
+        self.assertEqual((made.idle_ttl_s, made.mesh_grace_s), (1, 1))
+        self.client.change_instances(name, locus.InstanceChange().place("idle-mesh", [0.0, 0.0, 0.0], ids=1))
+        self.wait_for(lambda: name not in [scene.name for scene in self.client.scenes()])
+        self.wait_for(lambda: "idle-mesh" not in [mesh.name for mesh in self.client.meshes()])
