@@ -2,10 +2,9 @@
 import array
 import unittest
 
-from locus import Compound, UpdateBatch, columns
-from support import floats
-
-MAX_PARTS = 64
+import locus
+from locus import Block, Column, Compound, QueryBatch, UpdateBatch, columns
+from support import DaemonTest, floats, listed
 
 
 def rig():
@@ -97,3 +96,41 @@ class PartPosesTest(unittest.TestCase):
             with self.assertRaisesRegex(ValueError, pattern):
                 batch.move([1, 2], [0] * 3, **poses)
         self.assertEqual(len(batch.message.moves), 0)
+
+
+class CompoundsInScenesTest(DaemonTest):
+    PARTS = Compound().balls([0, 0, 2], 0.5, layers=2).boxes([[0, 0, 0], [0, 5, 0]], [1, 1, 1], layers=1)
+
+    def shoot(self, origin, **block):
+        columns = [Column.ID, Column.TRIANGLE, Column.SHAPE]
+        (hits,) = self.ask(QueryBatch().rays(origin, [0, 0, -1], block=Block(columns=columns, **block)))
+        return listed(hits.ids)[0], listed(hits.triangles)[0]
+
+    def test_answers_name_the_part(self):
+        self.apply(UpdateBatch().insert_compounds([7, 8], [[0, 0, 0], [100, 0, 0]], self.PARTS))
+        self.assertEqual(self.shoot([0, 0, 9]), (7, 0))
+        self.assertEqual(self.shoot([0, 0, 9], masks=[1]), (7, 1))
+        self.assertEqual(self.shoot([100, 5, 9]), (8, 2))
+
+    def test_moves_set_the_poses_of_parts(self):
+        self.apply(UpdateBatch().insert_compounds(7, [0, 0, 0], self.PARTS))
+        poses = [[50, 0, 0], [0, 0, 0], [0, 0, 0]]
+        self.assertEqual(self.apply(UpdateBatch().move(7, [0, 0, 0], parts_each=3, part_positions=poses)).refused, 0)
+        self.assertEqual(self.shoot([50, 0, 9]), (7, 0))
+        self.assertEqual(self.shoot([0, 5, 9])[0], 0)
+        (error,) = self.apply(UpdateBatch().move(7, [0, 0, 0], parts_each=2, part_positions=poses[:2])).errors
+        self.assertEqual((error.index, error.reason), (0, locus.Reason.OUT_OF_RANGE))
+
+    def test_wrong_compounds_are_refused(self):
+        for compound in (Compound(), Compound().balls([[0, 0, 0]] * 65, 1)):
+            with self.assertRaises(locus.LocusError) as raised:
+                self.apply(UpdateBatch().insert_compounds(1, [0, 0, 0], compound))
+            self.assertEqual(raised.exception.code.name, "INVALID_ARGUMENT", raised.exception)
+            self.assertIn("compound.parts", raised.exception.field)
+        shapeless = UpdateBatch().insert_compounds(1, [0, 0, 0], Compound().balls([0, 0, 0], 1))
+        shapeless.message.inserts[0].compound.parts[0].ClearField("ball")
+        with self.assertRaises(locus.LocusError) as raised:
+            self.apply(shapeless)
+        self.assertEqual(raised.exception.code.name, "INVALID_ARGUMENT", raised.exception)
+        self.assertEqual(self.apply(UpdateBatch().insert_compounds(1, [0, 0, 0], Compound().balls([0, 0, 0], -1))).refused, 1)
+        self.assertEqual(listed(self.ask(QueryBatch().lookup(1))[0].ids), [0])
