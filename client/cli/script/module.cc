@@ -1,5 +1,6 @@
 #include "client/cli/script/module.h"
 
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>

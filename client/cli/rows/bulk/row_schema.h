@@ -68,7 +68,7 @@ std::string known_columns(const RowSchema& schema);
 struct RowColumn {
   std::vector<double> numbers;
   std::vector<uint64_t> integers;
-  std::vector<std::string> texts;
+  std::vector<std::string> texts = {};
   std::vector<uint8_t> given;
 
   bool any() const;
