@@ -182,7 +182,12 @@ void add_rows(const InsertOptions& options, const RowBatch& batch, RowSpan rows,
   const std::vector<double> positions = positions_of(columns[kAt], rows);
   const std::vector<float> rotations =
       float_column(columns[kRotation], rows, {0, 0, 0, 1}, floats_of(options.rotations));
-  const std::vector<uint32_t> layers = bits_column(columns[kLayers], rows, 1, values32_of(options.layers));
+  std::vector<uint32_t> layers = bits_column(columns[kLayers], rows, 1, values32_of(options.layers));
+  // Without layers, a compound is in all layers of its parts.
+  if (shape_of(options, batch, rows.begin) == "compound" && options.layers.empty() &&
+      columns[kLayers].given[rows.begin] == 0) {
+    layers.clear();
+  }
   const std::vector<uint64_t> groups = id_column(columns[kGroup], rows, 0, values_of(options.groups));
   const std::vector<uint64_t> tags = id_column(columns[kTag], rows, 0, values_of(options.tags));
   const std::vector<uint64_t> expire_ticks = id_column(columns[kExpire], rows, 0, values_of(options.expire_ticks));
