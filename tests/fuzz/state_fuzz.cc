@@ -25,8 +25,8 @@ absl::StatusOr<SceneWriter> read_state(const Chunks& chunks) {
   return SceneWriter::restore(*std::move(state), {}, {});
 }
 
-Chunks write_state(const SceneWriter& writer) {
-  FrozenScene frozen{writer.published(), writer.writers(), writer.has_past()};
+Chunks write_state(SceneWriter& writer) {
+  FrozenScene frozen{writer.published(), writer.writers(), writer.has_past(), 0, 0, writer.lease_table()};
   StateWriter state(std::move(frozen));
   Chunks chunks;
   while (std::optional<std::string> chunk = *state.next()) chunks.push_back(*std::move(chunk));
@@ -36,16 +36,16 @@ Chunks write_state(const SceneWriter& writer) {
 LOCUS_FUZZ_TARGET(state) {
   Chunks chunks;
   while (!input.empty()) chunks.emplace_back(next_piece(input));
-  const absl::StatusOr<SceneWriter> first = read_state(chunks);
+  absl::StatusOr<SceneWriter> first = read_state(chunks);
   if (!first.ok()) return check_error(first.status());
   const Chunks written = write_state(*first);
-  const absl::StatusOr<SceneWriter> second = read_state(written);
+  absl::StatusOr<SceneWriter> second = read_state(written);
   LOCUS_CHECK(second.ok());
   LOCUS_CHECK_EQ(second->published()->objects.size(), first->published()->objects.size());
   LOCUS_CHECK_EQ(second->statics()->size(), first->statics()->size());
   // Objects are stored in the order of the grid, which depends on the order in which they were inserted. So only the
   // third writing must equal the second.
-  const absl::StatusOr<SceneWriter> third = read_state(write_state(*second));
+  absl::StatusOr<SceneWriter> third = read_state(write_state(*second));
   LOCUS_CHECK(third.ok());
   LOCUS_CHECK(write_state(*third) == write_state(*second));
 }
