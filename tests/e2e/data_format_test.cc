@@ -130,6 +130,16 @@ class DataFormatTest : public ::testing::Test {
     make_a_snapshot_due("brief");
     apply_together("brief", {"inserts { ids: [4, 5] positions: [7, 8, 9] point {} expire_ticks: [2, 9] }",
                              "writer: 8 batch: 2 tick: 13 moves { ids: 2 positions: [2, 2, 2] } remove_ids: 78"});
+    create("rigs", "idle_ttl_s: 31536000 mesh_grace_s: 31536000");
+    apply("rigs", R"(writer: 9 batch: 1 lease_ms: 86400000 tick: 1
+                     inserts { ids: [1, 2] positions: [1, 2, 3, 4, 5, 6] compound {
+                       parts { positions: [0, 0, 0, 0, 1, 0] ball { radii: [0.5, 0.25] } layers: [1, 2] }
+                       parts { positions: [0, 2, 0] rotations: [0, 0.6, 0, 0.8] box { half_extents: [1, 2, 3] } } } })");
+    make_a_snapshot_due("rigs");
+    apply("rigs", R"(writer: 9 batch: 2 tick: 2
+                     moves { ids: 2 positions: [7, 8, 9] parts_each: 3 part_positions: [1, 0, 0, 1, 1, 0, 1, 2, 0] }
+                     inserts { ids: 3 positions: [3, 3, 3] rotations: [0, 0.6, 0, 0.8] compound {
+                       parts { positions: [0, 0, 0] capsule { radii: 0.5 half_axes: [0, 1, 0] } } } })");
     create("quick", R"(durability: DURABILITY_MEMORY)");
     create("gone", "");
     v1::DeleteSceneRequest gone;
