@@ -24,7 +24,7 @@ class ScheduleReader {
     const SnapshotPtr snapshot = scene_.latest();
     if (snapshot->revision < last_) return "revision " + std::to_string(snapshot->revision) + " after a later one";
     last_ = snapshot->revision;
-    const uint64_t now = snapshot->revision - 1;  // revision of the schedule
+    const uint64_t now = snapshot->revision - SceneSchedule::kFirstRevision;  // revision of the schedule
     ++looks_;
     if (std::string what = compare(*snapshot, now, {}); !what.empty()) return what;
     const uint64_t tick = SceneSchedule::tick_of(now);
@@ -49,11 +49,8 @@ class ScheduleReader {
     const Vec3d center = SceneSchedule::position(1 + random_.below(schedule_.objects()), random_.below(1'000));
     const auto radius = static_cast<float>(random_.below(12));
     std::vector<Id> expected;
-    for (Id id = 1; id <= schedule_.objects(); ++id) {
-      const std::optional<Vec3d> at = SceneSchedule::at(id, revision);
-      const Shape shape{ShapeKind::kBall, at.value_or(Vec3d{}), {}, {}, SceneSchedule::kRadius};
-      if (at && ball_overlaps({center, radius}, shape)) expected.push_back(id);
-    }
+    for (Id id = 1; id <= schedule_.last_door(); ++id)
+      if (schedule_.meets({center, radius}, id, revision)) expected.push_back(id);
     if (ids_in_ball(snapshot, center, radius, ticks) != expected) return "a ball finds others" + where;
     for (int i = 0; i < 20; ++i)
       if (std::string what = compare_lookup(snapshot, revision, ticks); !what.empty()) return what + where;
@@ -72,13 +69,15 @@ class ScheduleReader {
   }
 
   std::string compare_lookup(const SceneSnapshot& snapshot, uint64_t revision, const std::vector<uint64_t>& ticks) {
-    const Id id = 1 + random_.below(schedule_.objects());
+    const Id id = 1 + random_.below(schedule_.last_door());
     QueryBlock block;
     const uint64_t ids[] = {id};
     block.kind = LookupColumns{ids, {}};
     block.as_of_ticks = ticks;
     const BlockResult result = run(snapshot, block);
-    const std::optional<Vec3d> at = SceneSchedule::at(id, revision);
+    const std::optional<Vec3d> at = schedule_.is_door(id)
+                                        ? SceneSchedule::position(id, SceneSchedule::turn_of(id, revision))
+                                        : SceneSchedule::at(id, revision);
     if ((result.ids[0] == id) != at.has_value()) return "object " + std::to_string(id) + " is or is not there";
     const Vec3d found{result.positions[0], result.positions[1], result.positions[2]};
     return !at || found == *at ? "" : "object " + std::to_string(id) + " is elsewhere";
