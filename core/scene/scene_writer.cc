@@ -241,12 +241,20 @@ bool SceneWriter::apply_objects(const UpdateBatch& batch, BatchApplier& applier)
   const uint64_t tick = tick_of(batch);
   const uint64_t owner = batch.lease_ms != 0 || leases_.has(batch.writer) ? batch.writer : 0;
   bool expiries_change = false;
+  // Objects that expired and were inserted again by this batch may have kept their handles.
+  if (!batch.restart_ticks) {
+    for (const uint32_t handle : expiries_.due_handles(tick)) {
+      expiries_.erase(handle);
+      expiries_change = true;
+    }
+  }
   for (const auto& [id, expire_ticks] : applier.inserted()) {
     const uint32_t handle = objects_.handle(id);
     LOCUS_DCHECK_NE(handle, ObjectStore::kNoHandle);
     expiries_change |= expiries_.set(handle, tick, expire_ticks);
     if (!planted(PlantedBug::kLeaseOfFirst) || leases_.owner(handle) == 0) leases_.give(handle, owner);
   }
+  replaced_bytes_ += expiries_.take_replaced_bytes();
   return !difference.empty() || expiries_change;
 }
 

@@ -47,6 +47,10 @@ struct Host : RpcState {
         updates(queue_options(with, with_log)) {
     RpcState::idle_scenes = &idle_scenes;
   }
+  ~Host() {
+    lifetimes.stop();
+    lease_ends.stop();
+  }
 
   static constexpr uint32_t kChangeThreads = 2;
   // Minimum weight in bytes of the connections that are closed when memory is nearly full; see
@@ -99,10 +103,10 @@ struct Host : RpcState {
   QueryScheduler scheduler;
   UpdateQueue updates;
   Snapshotter snapshots{registry, log, snapshotter_options(config)};
-  ChangeQueue changes{kChangeThreads, limits::kMaxPendingChanges};
-  MemoryKeeper memory_keeper{
-      memory, registry,
-      [this](bool close) { return connections.shed_heaviest(close, kMinShedBytes, "memory is nearly full"); }, log};
+  // Before `changes`, whose jobs use them. The ends of leases have a thread of their own, so that they do not wait for
+  // the deletion of a scene or mesh. ~Host() ends both threads first, because their tasks use the other members.
+  LifetimeKeeper lifetimes;
+  LifetimeKeeper lease_ends;
   IdleScenes idle_scenes{lifetimes, registry, [this](const ScenePtr& scene, const absl::Status& status) {
                            report_idle_scene(scene, status);
                          }};
@@ -113,6 +117,10 @@ struct Host : RpcState {
   LeaseKeeper leases{lease_ends, [this](const Scene& scene, uint64_t writer, const absl::Status& status) {
                        report_lease(scene, writer, status);
                      }};
+  ChangeQueue changes{kChangeThreads, limits::kMaxPendingChanges};
+  MemoryKeeper memory_keeper{
+      memory, registry,
+      [this](bool close) { return connections.shed_heaviest(close, kMinShedBytes, "memory is nearly full"); }, log};
   // Limits the calls that visit all objects of a scene, to describe or dump it: at the same time, at most half as many
   // as `config.threads` work, but at least one.
   Turns scene_visits{std::max(1u, config.threads / 2)};
@@ -120,10 +128,6 @@ struct Host : RpcState {
   AdmissionLimiter health_checks{kMaxHealthChecks, Sharing::kFair};
   AdmissionLimiter reflections{kMaxReflections, Sharing::kFair};
   AdmissionLimiter backups{limits::kMaxBackups};
-  // The last members: their threads end first, because their tasks use the other members. The ends of leases have a
-  // thread of their own, so that they do not wait for the deletion of a scene or mesh.
-  LifetimeKeeper lifetimes;
-  LifetimeKeeper lease_ends;
 
  private:
   // Log and audit that a scene or mesh was deleted because it was not used, or could not be deleted.

@@ -67,8 +67,8 @@ LeaseKeeper::Batch LeaseKeeper::find_or_add_locked(const ScenePtr& scene, uint64
   const Time now = keeper_.now();
   auto lease = std::make_shared<Lease>();
   lease->scene = scene;
+  lease->address = scene.get();
   lease->writer = writer;
-  lease->length_ms = lease_ms;
   lease->batches.touch(nanoseconds_of(now));
   lease->task = keeper_.add(now + milliseconds(lease_ms), [this, weak = std::weak_ptr<Lease>(lease)](Time time) {
     const std::shared_ptr<Lease> watched = weak.lock();
@@ -90,23 +90,28 @@ void LeaseKeeper::batch_done(const Batch& batch, uint32_t lease_ms) {
   if (!batch->has_begun.load()) {
     const ScenePtr scene = batch->scene.lock();
     if (scene == nullptr || !length_of(*scene, batch->writer)) {
-      forget(batch);
-      return;
+      if (forget(batch)) return;
+    } else {
+      batch->has_begun.store(true);
     }
-    batch->has_begun.store(true);
   }
   // The lease may be shorter from this batch on.
-  if (lease_ms != 0 && batch->length_ms.exchange(lease_ms) != lease_ms)
-    keeper_.expedite(batch->task, now + milliseconds(lease_ms));
+  if (lease_ms != 0) keeper_.expedite(batch->task, now + milliseconds(lease_ms));
 }
 
-bool LeaseKeeper::forget(const std::shared_ptr<Lease>& lease) {
+bool LeaseKeeper::forget(const std::shared_ptr<Lease>& lease, SceneState state) {
   const ScenePtr scene = lease->scene.lock();  // released after the lock
   const MutexLock lock(mutex_);
-  lease->has_begun.store(false);
-  if (!lease->batches.idle_since()) return false;
+  if (!lease->batches.idle_since()) {
+    lease->has_begun.store(false);
+    return false;
+  }
+  // A batch that arrived after the end of the lease may have begun another one, and be done already.
+  const bool has_begun = state == SceneState::kOpen && scene != nullptr && length_of(*scene, lease->writer);
+  lease->has_begun.store(has_begun);
+  if (has_begun) return false;
   keeper_.remove(lease->task);
-  const auto writers = scenes_.find(scene.get());
+  const auto writers = scenes_.find(lease->address);
   if (writers == scenes_.end()) return true;
   const auto found = writers->second.find(lease->writer);
   if (found == writers->second.end() || found->second != lease) return true;
@@ -118,7 +123,10 @@ bool LeaseKeeper::forget(const std::shared_ptr<Lease>& lease) {
 
 std::optional<LeaseKeeper::Time> LeaseKeeper::check(const std::shared_ptr<Lease>& lease, Time now) {
   const ScenePtr scene = lease->scene.lock();
-  if (scene == nullptr) return std::nullopt;
+  if (scene == nullptr) {
+    forget(lease);
+    return std::nullopt;
+  }
   const std::optional<milliseconds> length = length_of(*scene, lease->writer);
   if (!length) return forget(lease) ? std::nullopt : std::optional(now + kRetrySoon);
   const Time due = due_time(*lease, *length, now);
@@ -144,7 +152,8 @@ std::optional<LeaseKeeper::Time> LeaseKeeper::end(const std::shared_ptr<Lease>& 
   }
   // The lease has ended, or the scene was deleted. A batch that arrived meanwhile may begin another lease.
   if (planted(PlantedBug::kLeaseTwice)) return now + length;
-  return forget(lease) ? std::nullopt : std::optional(now + length);
+  const SceneState state = ended.ok() ? SceneState::kOpen : SceneState::kClosed;
+  return forget(lease, state) ? std::nullopt : std::optional(now + length);
 }
 
 }  // namespace locus::server

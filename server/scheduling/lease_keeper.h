@@ -40,11 +40,11 @@ class LeaseKeeper {
   // The lease of one writer. It is added when the batch arrives that begins it.
   struct Lease {
     std::weak_ptr<Scene> scene;
+    const Scene* address = nullptr;  // of the scene, which may have been destroyed
     uint64_t writer = 0;
     LifetimeKeeper::TaskId task = 0;
     SceneUses batches;                   // batches of the writer that have arrived
     std::atomic<bool> has_begun{false};  // Scene::leases() contained the lease
-    std::atomic<uint32_t> length_ms{0};  // the last length that a batch asked for
   };
   // A batch of a writer with a lease, from its arrival until it is done. Null for other batches.
   using Batch = std::shared_ptr<Lease>;
@@ -82,9 +82,10 @@ class LeaseKeeper {
   // check.
   std::optional<Time> end(const std::shared_ptr<Lease>& lease, Scene& scene, std::chrono::milliseconds length, Time now)
       LOCUS_EXCLUDES(mutex_);
-  // Forgets a lease that the scene does not have. If a batch of its writer has arrived and is not done, does nothing
-  // and returns false: the end of that batch decides.
-  bool forget(const std::shared_ptr<Lease>& lease) LOCUS_EXCLUDES(mutex_);
+  enum class SceneState : uint8_t { kOpen, kClosed };
+  // Forgets a lease that the scene does not have. If an open scene has it, or if a batch of its writer has arrived and
+  // is not done, whose end then decides, does nothing and returns false.
+  bool forget(const std::shared_ptr<Lease>& lease, SceneState state = SceneState::kOpen) LOCUS_EXCLUDES(mutex_);
 
   LifetimeKeeper& keeper_;
   const Report report_;

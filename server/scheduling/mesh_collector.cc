@@ -59,6 +59,8 @@ std::optional<MeshCollector::Time> MeshCollector::check(Time now) {
 }
 
 MeshCollector::Time MeshCollector::compare(Time now, std::vector<Registry::CollectableMesh>& due) {
+  // The meshes of a damaged scene are not known. The scene needs them after a repair.
+  if (!registry_.damaged_scenes().empty()) return now + kMaxCheck;
   {
     const MutexLock lock(mutex_);
     comparing_ = true;

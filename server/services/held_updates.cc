@@ -27,7 +27,7 @@ absl::Status HeldUpdates::check_scene(const ScenePtr& scene) const {
 }
 
 absl::Status HeldUpdates::check_limits(const UpdateBatch& batch) const {
-  const uint64_t messages = messages_.batches.size() + 1;
+  const uint64_t messages = messages_.batches.size() + 2;  // with this message and the last
   if (messages > limits::kMaxUpdateMessages)
     return refuse_limit("continues", "update_messages", limits::kMaxUpdateMessages, static_cast<double>(messages));
   if (const uint64_t items = items_ + count_items(batch); items > limits::kMaxUpdateItems)

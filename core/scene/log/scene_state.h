@@ -70,7 +70,7 @@ inline constexpr size_t kMaxBytesOfInstance =
 // Maximum length in bytes of ItemError::field. The longest field that is written, inserts[65535].capsule.half_axes, has
 // 32 bytes; the other bytes are a reserve.
 inline constexpr size_t kMaxErrorField = 128;
-inline constexpr size_t kMaxBytesOfError = 24 + kMaxErrorField;
+inline constexpr size_t kMaxBytesOfError = 32 + kMaxErrorField;
 
 }  // namespace locus
 

@@ -2,8 +2,8 @@
 // are encoded one at a time, so only one chunk is in memory. One thread at a time.
 //
 // The first chunk is a header with the numbers of writers, instances, objects, expiries and leases. The chunks of
-// writers follow, then the chunks of instances, of objects, of expiries and of leases. The objects are in the order of
-// the grid. StateReader (core/scene/log/state_reader.h) decodes the chunks; FORMAT.md describes the bytes.
+// writers follow, then the chunks of instances, of compounds, of objects, of expiries and of leases. The objects are in
+// the order of the grid. StateReader (core/scene/log/state_reader.h) decodes the chunks; FORMAT.md describes the bytes.
 #ifndef LOCUS_CORE_SCENE_LOG_STATE_WRITER_H_
 #define LOCUS_CORE_SCENE_LOG_STATE_WRITER_H_
 

@@ -26,14 +26,20 @@ std::vector<uint32_t> Expiries::due_handles(uint64_t tick) const {
   return handles;
 }
 
+void Expiries::put(uint32_t handle, uint64_t key) {
+  keys_.set(handle, key);
+  changed_ = true;
+  const size_t leaves = keys_.size() / ExpiryTable::kKeysPerLeaf + 1;
+  if (table_ == nullptr || !changed_leaves_.insert(handle / ExpiryTable::kKeysPerLeaf).second) return;
+  replaced_bytes_ += ExpiryTable::kKeysPerLeaf * sizeof(uint64_t);
+  if (changed_leaves_.size() == 1) replaced_bytes_ += leaves * sizeof(std::shared_ptr<void>);
+}
+
 void Expiries::store(uint32_t handle, uint64_t key) {
   const uint64_t before = this->key(handle);
   if (before != 0) queue_.erase({before, handle});
   if (key != 0) queue_.insert({key, handle});
-  if (before != key) {
-    keys_.set(handle, key);
-    changed_ = true;
-  }
+  if (before != key) put(handle, key);
   first_ = queue_.empty() ? std::numeric_limits<uint64_t>::max() : queue_.begin()->first;
   LOCUS_DCHECK_CALL(check_invariants());
 }
@@ -74,11 +80,10 @@ void Expiries::rebase(uint64_t tick) {
   for (const auto& [key, handle] : queue_) {
     LOCUS_DCHECK_LT(passed, key);
     queue.insert(queue.end(), {key - passed, handle});
-    keys_.set(handle, key - passed);
+    put(handle, key - passed);
   }
   queue_ = std::move(queue);
   base_ = tick;
-  changed_ = true;
   first_ = queue_.empty() ? std::numeric_limits<uint64_t>::max() : queue_.begin()->first;
   LOCUS_DCHECK_CALL(check_invariants());
 }
@@ -87,6 +92,7 @@ std::shared_ptr<const ExpiryTable> Expiries::table() {
   if (changed_)
     table_ = queue_.empty() ? nullptr : std::make_shared<const ExpiryTable>(keys_.snapshot(), base_, queue_.size());
   changed_ = false;
+  changed_leaves_.clear();
   return table_;
 }
 

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "absl/container/btree_set.h"
+#include "absl/container/flat_hash_set.h"
 #include "core/base/persistent_array.h"
 #include "core/base/planted_bug.h"
 
@@ -23,7 +24,8 @@ namespace locus {
 // Expiries of the objects of one revision. Immutable.
 class ExpiryTable {
  public:
-  using Keys = PersistentArray<uint64_t, 512>;  // indexed by handle; 0: the object does not expire
+  static constexpr uint32_t kKeysPerLeaf = 512;
+  using Keys = PersistentArray<uint64_t, kKeysPerLeaf>;  // indexed by handle; 0: the object does not expire
 
   ExpiryTable(Keys keys, uint64_t base, size_t count) : keys_(std::move(keys)), base_(base), count_(count) {}
 
@@ -65,6 +67,8 @@ class Expiries {
 
   // Returns the table for readers; null if no object expires. O(1).
   std::shared_ptr<const ExpiryTable> table();
+  // Returns an upper bound of the bytes of earlier tables that were replaced since the last call of this function.
+  size_t take_replaced_bytes() { return std::exchange(replaced_bytes_, 0); }
 
  private:
   // Checks the invariants of the class comment, except the order of the queue. O(1).
@@ -75,6 +79,8 @@ class Expiries {
   }
   uint64_t key(uint32_t handle) const { return handle < keys_.size() ? keys_[handle] : 0; }
   void store(uint32_t handle, uint64_t key);
+  // Writes a key, and counts the leaf that a table may share.
+  void put(uint32_t handle, uint64_t key);
   // Makes `tick` the base. O(size * log(size)).
   void rebase(uint64_t tick);
 
@@ -84,6 +90,8 @@ class Expiries {
   uint64_t base_ = 0;
   bool changed_ = false;  // since table_ was made
   std::shared_ptr<const ExpiryTable> table_;
+  absl::flat_hash_set<uint32_t> changed_leaves_;  // leaves of keys_ that were changed since table_ was made
+  size_t replaced_bytes_ = 0;
 };
 
 }  // namespace locus

@@ -7,9 +7,10 @@
 //
 // Formats 1 to 4 can be read, too. The mesh rows of format 1 have no `parts`: the chunks of the content include the
 // parts. In formats 1 and 2 no scene and no mesh has a creator. Up to format 3, no record moves instances (LSBI, see
-// core/scene/log/FORMAT.md), and no record and no snapshot has the bounds of meshes (LSEC, LSEI). Up to format 4, no
-// specification has lifetimes (LSLS), and no mesh row has `grace_s`. Opening a directory of an older format sets its
-// format number to 5 and leaves all rows unchanged.
+// core/scene/log/FORMAT.md), and no record and no snapshot has the bounds of meshes (LSEC, LSEI). Up to format 4,
+// no record and no snapshot has compounds, expiries, leases or batches of several messages (LSBX, LSBG, LSXH, LSWM,
+// LSTC, LSTK, LSTE, LSTL), no specification has lifetimes (LSLS), and no mesh row has `grace_s`. Opening a directory of
+// an older format sets its format number to 5 and leaves all rows unchanged.
 //
 // Column families, the fields of their keys, and the value under each key (`scene` is a SceneKey, `id` a content id):
 // meta      "format"; "catalogue"; 's' scene: a scene; 'm' name: a mesh; 'c' sha256: a mesh's content; 'p' scene id:

@@ -92,6 +92,24 @@ TEST_F(SceneLifetimesTest, AnExpiredObjectIsGoneBeforeTheItemsOfTheBatch) {
   EXPECT_EQ(remaining(1), 0u);
 }
 
+TEST_F(SceneLifetimesTest, AnObjectMayBeInsertedAgainByTheBatchWithWhichItExpiresAtAnyTick) {
+  constexpr uint64_t kFar = uint64_t{1} << 62;
+  apply(at(0, inserting({1}, {10})));
+  for (const uint64_t tick : {kFar - 10, kFar, kFar + 10, 2 * kFar}) {
+    apply(at(tick, inserting({1}, {10})));
+    EXPECT_THAT(ids(), ElementsAre(1));
+    EXPECT_EQ(remaining(1), 10u);
+    apply(at(tick + 9, {}));
+    EXPECT_EQ(remaining(1), 1u);
+  }
+  const uint64_t before = revision();
+  apply(at(2 * kFar + 10, inserting({1})));
+  EXPECT_EQ(revision(), before + 1);
+  EXPECT_EQ(remaining(1), 0u);
+  apply(at(3 * kFar, {}));
+  EXPECT_THAT(ids(), ElementsAre(1));
+}
+
 TEST_F(SceneLifetimesTest, ABatchOfMovesExpiresObjects) {
   apply(at(1, inserting({1, 2}, {4, 0})));
   const UpdateAck ack = apply(at(5, with(move_to({1, 2}, {1, 1, 1, 2, 2, 2}))));

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <functional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -72,7 +73,9 @@ class LeaseKeeperTest : public ::testing::Test {
   std::vector<std::string> reports_;
   LeaseKeeper leases_{keeper_, [this](const Scene&, uint64_t writer, const absl::Status& status) {
                         reports_.push_back(std::to_string(writer) + (status.ok() ? "" : " failed"));
+                        if (on_report_) on_report_();
                       }};
+  std::function<void()> on_report_;
   test::Columns columns_;
   uint64_t epoch_ = 0;
   ScenePtr scene_;
@@ -102,6 +105,37 @@ TEST_F(LeaseKeeperTest, EveryBatchOfTheWriterRenewsItsLease) {
   EXPECT_FALSE(send(7, 9, 0).ok());  // a refused batch
   EXPECT_THAT(objects_at(369), ElementsAre(1u));
   EXPECT_THAT(objects_at(370), IsEmpty());
+}
+
+TEST_F(LeaseKeeperTest, ALeaseIsShortenedThoughABatchThatAskedForItWasRefused) {
+  ASSERT_TRUE(send(7, 1, 10'000, 1).ok());
+  EXPECT_FALSE(send(7, 9, 100).ok());
+  EXPECT_THAT(objects_at(150), ElementsAre(1u)) << "a refused batch changes no lease";
+  ASSERT_TRUE(send(7, 2, 100).ok());
+  EXPECT_THAT(objects_at(249), ElementsAre(1u));
+  EXPECT_THAT(objects_at(250), IsEmpty());
+}
+
+TEST_F(LeaseKeeperTest, ALeaseThatBeginsRightAfterAnotherEndedIsKept) {
+  ASSERT_TRUE(send(7, 1, 100, 1).ok());
+  on_report_ = [this] { ASSERT_TRUE(send(7, 2, 100, 2).ok()); };  // the lease has ended, and is not forgotten yet
+  EXPECT_THAT(objects_at(100), ElementsAre(2u));
+  on_report_ = nullptr;
+  EXPECT_EQ(leases_.leases(), 1u);
+  EXPECT_THAT(objects_at(199), ElementsAre(2u));
+  ASSERT_TRUE(send(7, 3, 0).ok());
+  EXPECT_THAT(objects_at(298), ElementsAre(2u));
+  EXPECT_THAT(objects_at(299), IsEmpty());
+  EXPECT_EQ(leases_.leases(), 0u);
+}
+
+TEST_F(LeaseKeeperTest, ALeaseOfADeletedSceneIsForgotten) {
+  const LeaseKeeper::Batch batch = leases_.batch_arrived(scene_, 7, 100);  // after the deletion was announced
+  ASSERT_TRUE(registry_.delete_scene("arena").ok());
+  scene_.reset();
+  leases_.batch_done(batch, 100);
+  EXPECT_EQ(leases_.leases(), 0u);
+  EXPECT_EQ(keeper_.size(), 0u);
 }
 
 TEST_F(LeaseKeeperTest, BatchesOfOtherWritersDoNotRenewALease) {

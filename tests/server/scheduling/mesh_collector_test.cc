@@ -101,6 +101,15 @@ TEST_F(MeshCollectorTest, AMeshIsDeletedItsGraceAfterItsLastInstanceWasRemoved) 
   EXPECT_THAT(log_.crash().meshes, IsEmpty()) << "the deletion is durable";
 }
 
+TEST_F(MeshCollectorTest, NoMeshIsDeletedWhileASceneIsDamaged) {
+  const ScenePtr scene = created("arena");
+  place(*scene, upload("m", 1), 1);
+  remove(*scene, 1);
+  registry_.restore_damaged_scene("broken", 77, absl::DataLossError("damaged"));
+  EXPECT_THAT(meshes_at(200'000), ElementsAre("m")) << "the damaged scene may use it";
+  EXPECT_EQ(collector_.deleted(), 0u);
+}
+
 TEST_F(MeshCollectorTest, AMeshThatNoAskingSceneUsedIsNotDeleted) {
   upload("never-placed", 1);
   const ScenePtr scene = created("arena", 0);
