@@ -250,8 +250,12 @@ TEST_F(ContinuesRpcTest, AllMessagesTogetherKeepToTheLimits) {
   expect_error(send(removing({1})).error(), {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_LIMIT, "batch"});
   for (uint32_t i = 1; i < limits::kMaxUpdateMessages; ++i) hold({});
   EXPECT_EQ(applied(insert_balls(1, 1)).applied(), 1u);
-  for (uint32_t i = 1; i <= limits::kMaxUpdateMessages; ++i) hold({});
-  expect_error(send(insert_balls(2, 2)).error(), {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_LIMIT, "continues"});
+  for (uint32_t i = 1; i < limits::kMaxUpdateMessages; ++i) hold({});
+  v1::UpdateBatch one_too_many;
+  one_too_many.set_continues(true);
+  expect_error(send(one_too_many).error(), {grpc::StatusCode::INVALID_ARGUMENT, v1::REASON_LIMIT, "continues"});
+  expect_error(send(insert_balls(2, 2)).error(),
+               {grpc::StatusCode::FAILED_PRECONDITION, v1::REASON_MALFORMED, "continues"});
   EXPECT_EQ(get("world").objects(), 1u);
 }
 
