@@ -187,7 +187,11 @@ class RecoveryLockstep {
     batch.relabels.clear();
     batch.instance_moves.clear();
     batch.instance_relabels.clear();
-    for (MoveColumns& move : batch.moves) move.teleport = false;
+    for (MoveColumns& move : batch.moves) {
+      move.teleport = false;
+      move.parts_each = 0;
+      move.part_positions = move.part_rotations = {};
+    }
     return batch;
   }
 
