@@ -1,6 +1,7 @@
 """Support of the Python tests: a locusd process, the command line, and the modules that protoc generates."""
 import glob
 import importlib
+import importlib.util
 import json
 import os
 import subprocess
@@ -88,6 +89,19 @@ class DaemonTest(unittest.TestCase):
         self.assertEqual((error.code.name, error.reason.name), (code, reason), str(error))
         if field is not None:
             self.assertEqual(error.field, field)
+
+
+def example_path(name):
+    """Returns the path of the example program `name`."""
+    return os.path.join(os.path.dirname(os.path.abspath(__file__)), "../../../client/python/examples", name + ".py")
+
+
+def load_example(path):
+    """Returns the example program at `path` as a module, without running it."""
+    spec = importlib.util.spec_from_file_location(os.path.basename(path)[:-len(".py")], path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 def listed(values):

@@ -1,24 +1,16 @@
 """Tests of the wallhack filter: a player behind a wall is not sent."""
-import importlib.util
 import os
 import subprocess
 import sys
 
-from support import WAIT_SECONDS, DaemonTest
+from support import WAIT_SECONDS, DaemonTest, example_path, load_example
 
-EXAMPLE = os.path.join(os.path.dirname(os.path.abspath(__file__)), "../../../../client/python/examples/anti_wallhack.py")
-
-
-def loaded():
-    spec = importlib.util.spec_from_file_location("anti_wallhack", EXAMPLE)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+EXAMPLE = example_path("anti_wallhack")
 
 
 class AntiWallhackTest(DaemonTest):
     def test_a_player_behind_a_wall_is_not_sent(self):
-        example = loaded()
+        example = load_example(EXAMPLE)
         positions = [[0.0, 0.0, 10.0], [2.0, 0.0, 11.0], [0.0, 0.0, -10.0]] + [[40.0 + 9 * i, 0.0, 40.0] for i in range(5)]
         known = example.visible(self.client, example.make_scene(self.client, positions), positions)
         self.client.delete_scene(example.SCENE)

@@ -1,26 +1,18 @@
 """Tests of areas of interest: anchored queries find the objects near each player."""
-import importlib.util
 import math
 import os
 import random
 import subprocess
 import sys
 
-from support import WAIT_SECONDS, DaemonTest
+from support import WAIT_SECONDS, DaemonTest, example_path, load_example
 
-EXAMPLE = os.path.join(os.path.dirname(os.path.abspath(__file__)), "../../../../client/python/examples/areas_of_interest.py")
-
-
-def loaded():
-    spec = importlib.util.spec_from_file_location("areas_of_interest", EXAMPLE)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+EXAMPLE = example_path("areas_of_interest")
 
 
 class AreasOfInterestTest(DaemonTest):
     def test_areas_of_interest_equal_those_computed_directly(self):
-        example = loaded()
+        example = load_example(EXAMPLE)
         around, _ = example.interests(self.client, example.make_scene(self.client))
         numbers = random.Random(11)
         places = [[numbers.uniform(-100, 100) for _ in range(3)] for _ in range(example.PLAYERS + example.THINGS)]

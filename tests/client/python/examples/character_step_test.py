@@ -1,25 +1,17 @@
 """Tests of a character's step: it slides along walls and stays above the floor."""
-import importlib.util
 import math
 import os
 import subprocess
 import sys
 
-from support import WAIT_SECONDS, DaemonTest
+from support import WAIT_SECONDS, DaemonTest, example_path, load_example
 
-EXAMPLE = os.path.join(os.path.dirname(os.path.abspath(__file__)), "../../../../client/python/examples/character_step.py")
-
-
-def loaded():
-    spec = importlib.util.spec_from_file_location("character_step", EXAMPLE)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+EXAMPLE = example_path("character_step")
 
 
 class CharacterStepTest(DaemonTest):
     def test_a_character_slides_along_the_wall_and_stays_above_the_floor(self):
-        example = loaded()
+        example = load_example(EXAMPLE)
         example.make_scene(self.client)
         center = [0.0, example.RADIUS + example.HALF, 0.0]
         for _ in range(8):

@@ -1,24 +1,16 @@
 """Tests of the doors: a rewound shot is stopped by the door that was closed at its time."""
-import importlib.util
 import os
 import subprocess
 import sys
 
-from support import WAIT_SECONDS, DaemonTest
+from support import WAIT_SECONDS, DaemonTest, example_path, load_example
 
-EXAMPLE = os.path.join(os.path.dirname(os.path.abspath(__file__)), "../../../../client/python/examples/doors.py")
-
-
-def loaded():
-    spec = importlib.util.spec_from_file_location("doors", EXAMPLE)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+EXAMPLE = example_path("doors")
 
 
 class DoorsTest(DaemonTest):
     def test_a_rewound_shot_is_stopped_by_the_door_that_was_closed_then(self):
-        example = loaded()
+        example = load_example(EXAMPLE)
         example.make_scene(self.client)
         ack = example.play(self.client)
         # The door covers x = 1 until it is open by half, in the middle of its way.

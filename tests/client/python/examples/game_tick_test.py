@@ -1,29 +1,21 @@
 """Tests of the game example: every tick makes one revision, which that tick's queries see."""
-import importlib.util
 import math
 import os
 import subprocess
 import sys
 
 import locus
-from support import WAIT_SECONDS, DaemonTest, listed
+from support import WAIT_SECONDS, DaemonTest, example_path, listed, load_example
 
-EXAMPLE = os.path.join(os.path.dirname(os.path.abspath(__file__)), "../../../../client/python/examples/game_tick.py")
+EXAMPLE = example_path("game_tick")
 PLAYERS, TICKS, RATE = 12, 10, 200.0
-
-
-def loaded():
-    spec = importlib.util.spec_from_file_location("game_tick", EXAMPLE)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 class GameTickTest(DaemonTest):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        cls.example = loaded()
+        cls.example = load_example(EXAMPLE)
 
     def test_every_tick_makes_one_revision(self):
         ticks = self.example.run(self.client, self.scene, PLAYERS, TICKS, RATE)

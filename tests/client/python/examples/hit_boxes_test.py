@@ -1,24 +1,16 @@
 """Tests of the hit boxes: a rewound shot names the part that it hits, in the pose of its tick."""
-import importlib.util
 import os
 import subprocess
 import sys
 
-from support import WAIT_SECONDS, DaemonTest
+from support import WAIT_SECONDS, DaemonTest, example_path, load_example
 
-EXAMPLE = os.path.join(os.path.dirname(os.path.abspath(__file__)), "../../../../client/python/examples/hit_boxes.py")
-
-
-def loaded():
-    spec = importlib.util.spec_from_file_location("hit_boxes", EXAMPLE)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+EXAMPLE = example_path("hit_boxes")
 
 
 class HitBoxesTest(DaemonTest):
     def test_a_rewound_shot_hits_the_part_that_was_there_then(self):
-        example = loaded()
+        example = load_example(EXAMPLE)
         self.assertEqual(len(example.PARTS), 16)
         everything = example.BODY | example.HEAD
         seen = example.play(self.client)

@@ -1,23 +1,15 @@
 """Tests of the lidar example: its answers equal those of the command line, and the program runs."""
 import array
-import importlib.util
 import math
 import os
 import subprocess
 import sys
 
 import locus
-from support import WAIT_SECONDS, DaemonTest, listed, number
+from support import WAIT_SECONDS, DaemonTest, example_path, listed, load_example, number
 
-EXAMPLE = os.path.join(os.path.dirname(os.path.abspath(__file__)), "../../../../client/python/examples/lidar_sweep.py")
+EXAMPLE = example_path("lidar_sweep")
 RAYS = 8192
-
-
-def loaded():
-    spec = importlib.util.spec_from_file_location("lidar_sweep", EXAMPLE)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def text(vector):
@@ -28,7 +20,7 @@ class LidarSweepTest(DaemonTest):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        cls.example = loaded()
+        cls.example = load_example(EXAMPLE)
 
     def test_directions_are_unit_vectors_all_around(self):
         column = self.example.directions(RAYS)
