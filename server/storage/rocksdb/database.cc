@@ -85,18 +85,30 @@ rocksdb::ColumnFamilyOptions family_options(uint64_t buffer_bytes, OpenMode mode
 class Database::ErrorWatch final : public rocksdb::EventListener {
  public:
   std::atomic<bool> seen = false;
-  std::atomic<const Database*> database = nullptr;  // null until the database is open and during recover()
+
+  // Sets the database whose flushes the first error waits for; null until the database is open, during recover(), and
+  // once it closes. Returns when no thread of RocksDB uses the earlier database any more.
+  void watch(const Database* database) LOCUS_EXCLUDES(mutex_) {
+    MutexLock lock(mutex_);
+    database_ = database;
+  }
 
   // RocksDB calls this function before it stops background work because of the error, without holding its mutex.
-  void OnBackgroundError(rocksdb::BackgroundErrorReason, rocksdb::Status* error) override {
-    const Database* const opened = database;
-    if (!seen.exchange(true) && opened != nullptr) opened->wait_for_flush_start();
+  void OnBackgroundError(rocksdb::BackgroundErrorReason, rocksdb::Status* error) override LOCUS_EXCLUDES(mutex_) {
+    if (!seen.exchange(true)) {
+      MutexLock lock(mutex_);
+      if (database_ != nullptr) database_->wait_for_flush_start();
+    }
     if (error->IsIOError() && !error->IsIOFenced() && error->severity() > rocksdb::Status::Severity::kHardError)
       *error = rocksdb::Status(*error, rocksdb::Status::Severity::kHardError);
   }
   void OnErrorRecoveryBegin(rocksdb::BackgroundErrorReason, rocksdb::Status, bool* automatically) override {
     *automatically = false;
   }
+
+ private:
+  Mutex mutex_;  // held while a thread of RocksDB uses the database
+  const Database* database_ LOCUS_GUARDED_BY(mutex_) = nullptr;
 };
 
 rocksdb::DBOptions database_options(const DatabaseOptions& options, OpenMode mode) {
@@ -155,7 +167,7 @@ rocksdb::Status Database::open(const DatabaseOptions& options, OpenMode mode, st
           : rocksdb::DB::Open(wanted, options.folder, families(options, mode), &database->families_, &db);
   if (!status.ok()) return status;
   database->db_.reset(db);
-  database->errors_->database = database.get();
+  database->errors_->watch(database.get());
   result = std::move(database);
   if (mode == OpenMode::kCreate) status = result->flush_to_new_log();
   return status;
@@ -163,7 +175,7 @@ rocksdb::Status Database::open(const DatabaseOptions& options, OpenMode mode, st
 
 Database::~Database() {
   LOCUS_DCHECK_EQ(writers_.load(), 0);
-  errors_->database = nullptr;
+  errors_->watch(nullptr);
   if (db_ == nullptr) return;
   for (rocksdb::ColumnFamilyHandle* family : families_) db_->DestroyColumnFamilyHandle(family).PermitUncheckedError();
   db_->Close().PermitUncheckedError();
@@ -219,13 +231,13 @@ absl::Status Database::recover(uint64_t free_bytes) {
   // again before flush_to_new_log() has replaced this log file. Therefore wait until no call of write_now() is in
   // progress.
   while (writers_ > 0) std::this_thread::sleep_for(kBufferPoll);
-  errors_->database = nullptr;
+  errors_->watch(nullptr);
   errors_->seen = false;
   rocksdb::Status status = db_->Resume();
   // If the memory tables are empty, Resume() flushes nothing and keeps the log file in which a write failed. Then
   // flush_to_new_log() fails too, but leaves a row in the memory tables, so that the next call of recover() succeeds.
   if (status.ok()) status = flush_to_new_log();
-  errors_->database = this;
+  errors_->watch(this);
   if (!status.ok()) {
     errors_->seen = true;
     MutexLock lock(mutex_);
