@@ -11,7 +11,7 @@
 //              index finds the value to remove by this id
 //   bounds     axis-aligned bounds; every test below also requires that the query overlaps these bounds, so culling by
 //              any superset of them loses no result
-//   position   reference point, always the same for one value; may lie outside the bounds; no structure reads it
+//   position   reference point, always the same for one value; may lie outside the bounds
 //   ray        distance >= 0 of the first hit on the value, even if it exceeds the ray's t_max
 //   ball, box  whether the value shares a point with the closed ball or box
 //   distance   distance from a point to the value, in double; 0 inside the value; needed for nearest queries only
@@ -37,32 +37,32 @@ struct PrimitiveTraits;
 template <class Value>
 using ScalarOf = typename PrimitiveTraits<Value>::Scalar;
 
-// Values that an index can store and cull.
-template <class Value>
+// Values that an index can store and cull. A type may have other traits than PrimitiveTraits: an index takes them as
+// its second template argument, so that one type lies at its centroid in one index and at its lowest corner in another.
+template <class Value, class Traits = PrimitiveTraits<Value>>
 concept Bounded = requires(const Value& value) {
-  requires std::floating_point<ScalarOf<Value>>;
-  { PrimitiveTraits<Value>::id(value) } -> std::same_as<uint64_t>;
-  { PrimitiveTraits<Value>::bounds(value) } -> std::same_as<Aabb<ScalarOf<Value>>>;
-  { PrimitiveTraits<Value>::position(value) } -> std::same_as<Vec3<ScalarOf<Value>>>;
+  requires std::floating_point<typename Traits::Scalar>;
+  { Traits::id(value) } -> std::same_as<uint64_t>;
+  { Traits::bounds(value) } -> std::same_as<Aabb<typename Traits::Scalar>>;
+  { Traits::position(value) } -> std::same_as<Vec3<typename Traits::Scalar>>;
 };
 
 // Values that an index can test against rays, balls and boxes.
-template <class Value>
-concept Primitive = Bounded<Value> &&
-    requires(const Value& value, const typename PrimitiveTraits<Value>::RayQuery& ray,
-             const typename PrimitiveTraits<Value>::BallQuery& ball,
-             const typename PrimitiveTraits<Value>::BoxQuery& box, ScalarOf<Value> distance) {
-  { ray.slabs() } -> std::same_as<const SlabRay<ScalarOf<Value>>&>;
-  { ray.to_scaled(distance) } -> std::same_as<ScalarOf<Value>>;
-  { PrimitiveTraits<Value>::ray(value, ray) } -> std::same_as<std::optional<ScalarOf<Value>>>;
-  { PrimitiveTraits<Value>::ball(value, ball) } -> std::same_as<bool>;
-  { PrimitiveTraits<Value>::box(value, box) } -> std::same_as<bool>;
+template <class Value, class Traits = PrimitiveTraits<Value>>
+concept Primitive = Bounded<Value, Traits> &&
+    requires(const Value& value, const typename Traits::RayQuery& ray, const typename Traits::BallQuery& ball,
+             const typename Traits::BoxQuery& box, typename Traits::Scalar distance) {
+  { ray.slabs() } -> std::same_as<const SlabRay<typename Traits::Scalar>&>;
+  { ray.to_scaled(distance) } -> std::same_as<typename Traits::Scalar>;
+  { Traits::ray(value, ray) } -> std::same_as<std::optional<typename Traits::Scalar>>;
+  { Traits::ball(value, ball) } -> std::same_as<bool>;
+  { Traits::box(value, box) } -> std::same_as<bool>;
 };
 
 // Values that support nearest queries.
-template <class Value>
-concept Measurable = Bounded<Value> && requires(const Value& value, const Vec3d& point) {
-  { PrimitiveTraits<Value>::distance(value, point) } -> std::same_as<double>;
+template <class Value, class Traits = PrimitiveTraits<Value>>
+concept Measurable = Bounded<Value, Traits> && requires(const Value& value, const Vec3d& point) {
+  { Traits::distance(value, point) } -> std::same_as<double>;
 };
 
 template <>

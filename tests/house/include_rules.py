@@ -4,7 +4,7 @@ import re
 
 from source_tree import includes, quoted_includes
 
-INDEX_STRUCTURES = ("list", "bvh", "hash_grid", "kd_tree", "octree", "bsp_tree", "sphere_tree", "grid")
+INDEX_STRUCTURES = ("list", "bvh", "hash_grid", "kd_tree", "octree", "bsp_tree", "sphere_tree", "grid", "kd_points")
 
 # Folders that the sources of a folder may include, in addition to their own folder. A name that ends with "/*" stands
 # for the folder and all folders below it, another name only for the folder itself. "proto" is the code generated from
@@ -75,6 +75,7 @@ ALLOWED = {
 ALLOWED["core/index/bvh/kernels"] = ["core/index/bvh", "core/base"]
 ALLOWED["core/index/hash_grid/kernels"] = ["core/base"]
 ALLOWED.update({"core/index/" + name: ["core/index", "core/geometry", "core/base"] for name in INDEX_STRUCTURES})
+ALLOWED["core/index/queries"] = ["core/index", "core/geometry", "core/base"]
 ALLOWED["core/index/hash_grid"].append("core/index/hash_grid/kernels")
 
 # Prefixes of third-party headers, each with the folders that may include headers with this prefix. A folder stands also

@@ -12,8 +12,8 @@
 #include <string>
 #include <vector>
 
-#include "tests/support/list_index.h"
-#include "tests/support/nearest_values.h"
+#include "core/index/list/list_index.h"
+#include "core/index/queries/nearest_values.h"
 #include "tests/support/scene_sketch.h"
 
 namespace locus::test {

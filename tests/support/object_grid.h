@@ -10,6 +10,7 @@ namespace locus::test {
 class ObjectGrid {
  public:
   using Value = Object;
+  using Traits = PrimitiveTraits<Object>;
 
   ObjectGrid() : ObjectGrid(HashGridOptions()) {}
   explicit ObjectGrid(const HashGridOptions& options) : store_(options), set_(store_.snapshot()) {}

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "core/index/queries/index_queries.h"
 #include "core/scene/scene.h"
 #include "core/scene/snapshot/scene_at_time.h"
-#include "tests/support/index_queries.h"
 #include "tests/support/random.h"
 
 namespace locus::test {

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "core/base/check.h"
+#include "core/index/queries/index_queries.h"
 #include "core/scene/scene.h"
-#include "tests/support/index_queries.h"
 #include "tests/support/random_updates.h"
 #include "tests/support/scene_model.h"
 

@@ -54,11 +54,11 @@ struct BvhChange {
 
 template <Bounded V>
 class Bvh {
-  using Traits = PrimitiveTraits<V>;
   using S = ScalarOf<V>;
 
  public:
   using Value = V;
+  using Traits = PrimitiveTraits<V>;
 
   // Makes an empty tree.
   Bvh() = default;

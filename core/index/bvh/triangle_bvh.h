@@ -31,6 +31,7 @@ namespace locus {
 class TriangleBvh {
  public:
   using Value = Triangle;
+  using Traits = PrimitiveTraits<Triangle>;
 
   // Makes an empty tree.
   TriangleBvh() = default;

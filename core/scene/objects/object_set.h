@@ -31,6 +31,7 @@ GridItem grid_item_of(const Object& object, uint32_t handle);
 class ObjectSet {
  public:
   using Value = Object;
+  using Traits = PrimitiveTraits<Object>;
 
   ObjectSet() = default;
   // `groups` may be null if no object belongs to a group, and `compounds` if no object is a compound.

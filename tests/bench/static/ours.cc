@@ -9,9 +9,9 @@
 
 #include "core/base/check.h"
 #include "core/index/bvh/kernels/dispatch.h"
+#include "core/index/queries/index_queries.h"
 #include "core/query/kinds/triangle_search.h"
 #include "tests/bench/frame/results_hash.h"
-#include "tests/support/index_queries.h"
 
 namespace locus::bench {
 namespace {

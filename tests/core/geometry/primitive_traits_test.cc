@@ -10,9 +10,9 @@
 #include <fstream>
 #include <string>
 
+#include "core/index/list/list_index.h"
+#include "core/index/queries/index_queries.h"
 #include "gtest/gtest.h"
-#include "tests/support/index_queries.h"
-#include "tests/support/list_index.h"
 
 // Type of another library, in its own namespace.
 namespace game {
@@ -154,8 +154,8 @@ size_t count(const std::string& text, const std::string& part) {
 
 TEST(PrimitiveTraitsTest, AMissingMemberIsOneErrorThatNamesIt) {
   const std::string output = compiler_output();
-  EXPECT_NE(output.find("PrimitiveTraits<Value>::position(value)"), std::string::npos) << output;
-  EXPECT_EQ(output.find("PrimitiveTraits<Value>::bounds(value)' "), std::string::npos) << output;
+  EXPECT_NE(output.find("Traits::position(value)"), std::string::npos) << output;
+  EXPECT_EQ(output.find("Traits::bounds(value)' "), std::string::npos) << output;
   EXPECT_LE(count(output, "\n"), 30u) << output;
   EXPECT_EQ(count(output, "error:"), 1u) << output;
 }

@@ -3,9 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/index/queries/index_queries.h"
 #include "tests/support/generated_meshes.h"
 #include "tests/support/index_judge.h"
-#include "tests/support/index_queries.h"
 #include "tests/support/test_scale.h"
 
 namespace locus::test {

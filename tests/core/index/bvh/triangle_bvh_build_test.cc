@@ -9,9 +9,9 @@
 #include "core/base/refusal.h"
 #include "core/geometry/ray_triangle.h"
 #include "core/index/bvh/triangle_bvh.h"
+#include "core/index/queries/index_queries.h"
 #include "tests/support/equal_trees.h"
 #include "tests/support/generated_meshes.h"
-#include "tests/support/index_queries.h"
 #include "tests/support/test_scale.h"
 #include "tests/support/threads.h"
 

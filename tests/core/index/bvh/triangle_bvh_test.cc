@@ -4,8 +4,8 @@
 #include <gtest/gtest.h>
 
 #include "core/index/bvh/bvh.h"
+#include "core/index/queries/index_queries.h"
 #include "tests/support/generated_meshes.h"
-#include "tests/support/index_queries.h"
 #include "tests/support/scene_search.h"
 
 namespace locus::test {

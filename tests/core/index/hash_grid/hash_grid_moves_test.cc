@@ -7,8 +7,8 @@
 
 #include "core/base/mutex.h"
 #include "core/index/hash_grid/hash_grid.h"
+#include "core/index/queries/index_queries.h"
 #include "core/scene/objects/object_store.h"
-#include "tests/support/index_queries.h"
 #include "tests/support/random.h"
 #include "tests/support/test_scale.h"
 

@@ -2,8 +2,8 @@
 // hit of a ray, any hit, the nearest few hits, or all values whose bounds overlap a ray or a region. Collectors are
 // separate from traversal, so that every structure supports every kind of query. One object per query and thread; each
 // object borrows its query.
-#ifndef LOCUS_TESTS_SUPPORT_COLLECTORS_H_
-#define LOCUS_TESTS_SUPPORT_COLLECTORS_H_
+#ifndef LOCUS_CORE_INDEX_QUERIES_COLLECTORS_H_
+#define LOCUS_CORE_INDEX_QUERIES_COLLECTORS_H_
 
 #include <algorithm>
 #include <cstddef>
@@ -18,10 +18,10 @@ namespace locus {
 
 // Collector of the nearest hit at a distance strictly less than `distance`; among hits at equal distance the lower id
 // wins.
-template <Primitive V>
+template <class V, class Traits = PrimitiveTraits<V>>
+requires Primitive<V, Traits>
 class NearestVisitor {
-  using Traits = PrimitiveTraits<V>;
-  using S = ScalarOf<V>;
+  using S = typename Traits::Scalar;
 
  public:
   NearestVisitor(const typename Traits::RayQuery& ray, S distance)
@@ -54,10 +54,10 @@ class NearestVisitor {
 };
 
 // Collector that checks for any hit at a distance strictly less than `distance`. Ends the visit at the first hit found.
-template <Primitive V>
+template <class V, class Traits = PrimitiveTraits<V>>
+requires Primitive<V, Traits>
 class AnyHitVisitor {
-  using Traits = PrimitiveTraits<V>;
-  using S = ScalarOf<V>;
+  using S = typename Traits::Scalar;
 
  public:
   AnyHitVisitor(const typename Traits::RayQuery& ray, S distance)
@@ -79,30 +79,31 @@ class AnyHitVisitor {
 };
 
 // Hit of a ray: the value and its distance, in units of the ray's direction.
-template <Bounded V>
+template <class V, class Traits = PrimitiveTraits<V>>
 struct RayHit {
-  ScalarOf<V> distance;
+  typename Traits::Scalar distance;
   V value;
 
   friend bool operator==(const RayHit&, const RayHit&) = default;
 };
 
 // Returns true if hit `a` precedes hit `b` in the order by distance, then by id.
-template <Bounded V>
-bool comes_before(const RayHit<V>& a, const RayHit<V>& b) {
+template <class V, class Traits>
+bool comes_before(const RayHit<V, Traits>& a, const RayHit<V, Traits>& b) {
   if (a.distance != b.distance) return a.distance < b.distance;
-  return PrimitiveTraits<V>::id(a.value) < PrimitiveTraits<V>::id(b.value);
+  return Traits::id(a.value) < Traits::id(b.value);
 }
 
 // Collector of the nearest `max_hits` hits at distances strictly less than `distance`. Appends the hits to `result`.
 // Until finish() the appended part is a heap whose top is its farthest hit; a nearer hit replaces the top.
-template <Primitive V>
+template <class V, class Traits = PrimitiveTraits<V>>
+requires Primitive<V, Traits>
 class NearestFewVisitor {
-  using Traits = PrimitiveTraits<V>;
-  using S = ScalarOf<V>;
+  using S = typename Traits::Scalar;
 
  public:
-  NearestFewVisitor(const typename Traits::RayQuery& ray, S distance, size_t max_hits, std::vector<RayHit<V>>& result)
+  NearestFewVisitor(const typename Traits::RayQuery& ray, S distance, size_t max_hits,
+                    std::vector<RayHit<V, Traits>>& result)
       : ray_(ray),
         distance_(distance),
         limit_(ray.to_scaled(distance)),
@@ -120,22 +121,22 @@ class NearestFewVisitor {
 
   // Sorts the appended hits. The collector must not be used afterwards.
   void finish() {
-    LOCUS_DCHECK(std::is_heap(result_.begin() + begin_, result_.end(), comes_before<V>));
-    std::sort_heap(result_.begin() + begin_, result_.end(), comes_before<V>);
+    LOCUS_DCHECK(std::is_heap(result_.begin() + begin_, result_.end(), comes_before<V, Traits>));
+    std::sort_heap(result_.begin() + begin_, result_.end(), comes_before<V, Traits>);
   }
 
  private:
   bool full() const { return result_.size() - static_cast<size_t>(begin_) == max_hits_; }
-  void add(const RayHit<V>& hit) {
+  void add(const RayHit<V, Traits>& hit) {
     const auto first = result_.begin() + begin_;
     if (full()) {
       if (!comes_before(hit, *first)) return;
-      std::pop_heap(first, result_.end(), comes_before<V>);
+      std::pop_heap(first, result_.end(), comes_before<V, Traits>);
       result_.back() = hit;
     } else {
       result_.push_back(hit);
     }
-    std::push_heap(result_.begin() + begin_, result_.end(), comes_before<V>);
+    std::push_heap(result_.begin() + begin_, result_.end(), comes_before<V, Traits>);
     LOCUS_DCHECK_LE(result_.size() - static_cast<size_t>(begin_), max_hits_);
     if (full()) limit_ = ray_.to_scaled(result_[static_cast<size_t>(begin_)].distance);
   }
@@ -145,15 +146,15 @@ class NearestFewVisitor {
   S limit_;
   size_t max_hits_;
   ptrdiff_t begin_;
-  std::vector<RayHit<V>>& result_;
+  std::vector<RayHit<V, Traits>>& result_;
 };
 
 // Collector of the values whose bounds the ray enters at a distance of at most `distance`, by the slab test alone.
 // Appends these values to `result`.
-template <Primitive V>
+template <class V, class Traits = PrimitiveTraits<V>>
+requires Primitive<V, Traits>
 class BoundsOnRayVisitor {
-  using Traits = PrimitiveTraits<V>;
-  using S = ScalarOf<V>;
+  using S = typename Traits::Scalar;
 
  public:
   BoundsOnRayVisitor(const typename Traits::RayQuery& ray, S distance, std::vector<V>& result)
@@ -175,10 +176,10 @@ class BoundsOnRayVisitor {
 // Collector of the values whose bounds overlap `region` and for which test(value) returns true. Appends these values to
 // `result`. An exact query passes the exact predicate as `test`; a conservative query passes a test that is always
 // true. So exact results are a subset of conservative results, and both are the same for every structure.
-template <Bounded V, class Region, class Test>
+template <class V, class Region, class Test, class Traits = PrimitiveTraits<V>>
+requires Bounded<V, Traits>
 class RegionCollector {
-  using Traits = PrimitiveTraits<V>;
-  using S = ScalarOf<V>;
+  using S = typename Traits::Scalar;
 
  public:
   RegionCollector(const Region& region, Test test, std::vector<V>& result)
@@ -199,4 +200,4 @@ class RegionCollector {
 
 }  // namespace locus
 
-#endif  // LOCUS_TESTS_SUPPORT_COLLECTORS_H_
+#endif  // LOCUS_CORE_INDEX_QUERIES_COLLECTORS_H_

@@ -1,11 +1,11 @@
-#include "tests/support/index_queries.h"
+#include "core/index/queries/index_queries.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "core/index/bvh/bvh.h"
+#include "core/index/list/list_index.h"
 #include "core/scene/objects/object.h"
-#include "tests/support/list_index.h"
 #include "tests/support/random.h"
 #include "tests/support/small_world.h"
 

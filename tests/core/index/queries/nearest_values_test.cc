@@ -1,10 +1,10 @@
-#include "tests/support/nearest_values.h"
+#include "core/index/queries/nearest_values.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "core/index/bvh/bvh.h"
-#include "tests/support/list_index.h"
+#include "core/index/list/list_index.h"
 #include "tests/support/object_grid.h"
 #include "tests/support/small_world.h"
 

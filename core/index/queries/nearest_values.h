@@ -1,19 +1,20 @@
 // Query for the values nearest to a point; one template serves every structure. The query is exact: it compares the
 // distances that PrimitiveTraits computes in double. All structures return the same results.
-#ifndef LOCUS_TESTS_SUPPORT_NEAREST_VALUES_H_
-#define LOCUS_TESTS_SUPPORT_NEAREST_VALUES_H_
+#ifndef LOCUS_CORE_INDEX_QUERIES_NEAREST_VALUES_H_
+#define LOCUS_CORE_INDEX_QUERIES_NEAREST_VALUES_H_
 
 #include <algorithm>
 #include <cstddef>
 #include <vector>
 
 #include "core/base/check.h"
-#include "tests/support/index_queries.h"
+#include "core/index/queries/index_queries.h"
 
 namespace locus {
 
 // Value and its distance from the point of a query.
-template <Measurable V>
+template <class V, class Traits = PrimitiveTraits<V>>
+requires Measurable<V, Traits>
 struct ValueAt {
   double distance;
   V value;
@@ -21,16 +22,18 @@ struct ValueAt {
   // Orders by distance, then by id.
   friend bool operator<(const ValueAt& a, const ValueAt& b) {
     if (a.distance != b.distance) return a.distance < b.distance;
-    return PrimitiveTraits<V>::id(a.value) < PrimitiveTraits<V>::id(b.value);
+    return Traits::id(a.value) < Traits::id(b.value);
   }
 };
 
 // Collector of nearest_values(). Until finish() is called, the appended values are a heap whose top is the farthest
 // value. If the heap is full, a nearer value replaces the top. One object per query and thread.
-template <Measurable V>
+template <class V, class Traits = PrimitiveTraits<V>>
+requires Measurable<V, Traits>
 class NearestValuesVisitor {
  public:
-  NearestValuesVisitor(const Vec3d& point, double max_distance, size_t max_values, std::vector<ValueAt<V>>& result)
+  NearestValuesVisitor(const Vec3d& point, double max_distance, size_t max_values,
+                       std::vector<ValueAt<V, Traits>>& result)
       : point_(point),
         max_distance_(max_distance),
         limit_(squared_limit(max_distance)),
@@ -41,7 +44,7 @@ class NearestValuesVisitor {
   double limit() const { return limit_; }
   bool visit(const V& value) {
     if (max_values_ == 0) return false;
-    const ValueAt<V> found = {PrimitiveTraits<V>::distance(value, point_), value};
+    const ValueAt<V, Traits> found = {Traits::distance(value, point_), value};
     if (found.distance <= max_distance_) add(found);
     return true;
   }
@@ -54,7 +57,7 @@ class NearestValuesVisitor {
 
  private:
   bool full() const { return result_.size() - static_cast<size_t>(begin_) == max_values_; }
-  void add(const ValueAt<V>& found) {
+  void add(const ValueAt<V, Traits>& found) {
     const auto first = result_.begin() + begin_;
     if (full()) {
       if (!(found < *first)) return;
@@ -73,7 +76,7 @@ class NearestValuesVisitor {
   double limit_;
   const size_t max_values_;
   const ptrdiff_t begin_;
-  std::vector<ValueAt<V>>& result_;
+  std::vector<ValueAt<V, Traits>>& result_;
 };
 
 // Appends the `max_values` values nearest to `point` at distances <= max_distance, sorted by distance, then by id. If
@@ -81,13 +84,13 @@ class NearestValuesVisitor {
 // max_values) for each value that enters the heap of results.
 template <SpatialIndex Index>
 void nearest_values(const Index& index, const Vec3d& point, double max_distance, size_t max_values,
-                    std::vector<ValueAt<typename Index::Value>>& result, Work* work = nullptr) {
+                    std::vector<ValueAt<typename Index::Value, typename Index::Traits>>& result, Work* work = nullptr) {
   internal::CostCounter counter(work);
-  NearestValuesVisitor<typename Index::Value> visitor(point, max_distance, max_values, result);
+  NearestValuesVisitor<typename Index::Value, typename Index::Traits> visitor(point, max_distance, max_values, result);
   index.visit_nearest(point, visitor, counter.get());
   visitor.finish();
 }
 
 }  // namespace locus
 
-#endif  // LOCUS_TESTS_SUPPORT_NEAREST_VALUES_H_
+#endif  // LOCUS_CORE_INDEX_QUERIES_NEAREST_VALUES_H_

@@ -4,8 +4,8 @@
 // Threads: const members may run concurrently; insert and remove need exclusive use.
 // Invariant: slots_ maps the id of each value in the list to its slot in values_, and has no other entries.
 // Source: Hughes et al., Computer Graphics: Principles and Practice, 3rd ed., 2013, ch. 37 (List).
-#ifndef LOCUS_TESTS_SUPPORT_LIST_INDEX_H_
-#define LOCUS_TESTS_SUPPORT_LIST_INDEX_H_
+#ifndef LOCUS_CORE_INDEX_LIST_LIST_INDEX_H_
+#define LOCUS_CORE_INDEX_LIST_LIST_INDEX_H_
 
 #include <cstdint>
 #include <utility>
@@ -18,13 +18,14 @@
 
 namespace locus {
 
-template <Bounded V>
+template <class V, class T = PrimitiveTraits<V>>
+requires Bounded<V, T>
 class ListIndex {
-  using Traits = PrimitiveTraits<V>;
-  using S = ScalarOf<V>;
+  using S = typename T::Scalar;
 
  public:
   using Value = V;
+  using Traits = T;
 
   // Appends a value. Precondition: its id is not in the list. Amortised O(1).
   void insert(const V& value) {
@@ -54,17 +55,17 @@ class ListIndex {
   size_t size() const { return values_.size(); }
   absl::Span<const V> values() const { return values_; }
 
-  template <RayVisitor<V> Visitor>
+  template <RayVisitor<V, T> Visitor>
   void visit_ray(const SlabRay<S>&, Visitor& visitor, Work& work) const {
     visit_all(visitor, work);
   }
 
-  template <RegionVisitor<V> Visitor>
+  template <RegionVisitor<V, T> Visitor>
   void visit_region(Visitor& visitor, Work& work) const {
     visit_all(visitor, work);
   }
 
-  template <PointVisitor<V> Visitor>
+  template <PointVisitor<V, T> Visitor>
   void visit_nearest(const Vec3d&, Visitor& visitor, Work& work) const {
     visit_all(visitor, work);
   }
@@ -94,4 +95,4 @@ class ListIndex {
 
 }  // namespace locus
 
-#endif  // LOCUS_TESTS_SUPPORT_LIST_INDEX_H_
+#endif  // LOCUS_CORE_INDEX_LIST_LIST_INDEX_H_

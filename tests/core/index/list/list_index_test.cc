@@ -1,4 +1,4 @@
-#include "tests/support/list_index.h"
+#include "core/index/list/list_index.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -7,22 +7,26 @@
 // direction. If `work` is not null, the query adds its cost to `*work`. The cost of a query is the cost of the
 // structure's visit. Threads: queries only read the index, so any number of them may run concurrently. Source: Hughes
 // et al., Computer Graphics: Principles and Practice, 3rd ed., 2013, ch. 37 (the query interface).
-#ifndef LOCUS_TESTS_SUPPORT_INDEX_QUERIES_H_
-#define LOCUS_TESTS_SUPPORT_INDEX_QUERIES_H_
+#ifndef LOCUS_CORE_INDEX_QUERIES_INDEX_QUERIES_H_
+#define LOCUS_CORE_INDEX_QUERIES_INDEX_QUERIES_H_
 
 #include <cstddef>
 #include <vector>
 
-#include "tests/support/collectors.h"
+#include "core/index/queries/collectors.h"
 
 namespace locus {
 
 template <class Index>
-using RayQueryOf = typename PrimitiveTraits<typename Index::Value>::RayQuery;
+using RayQueryOf = typename Index::Traits::RayQuery;
 template <class Index>
-using BallQueryOf = typename PrimitiveTraits<typename Index::Value>::BallQuery;
+using BallQueryOf = typename Index::Traits::BallQuery;
 template <class Index>
-using BoxQueryOf = typename PrimitiveTraits<typename Index::Value>::BoxQuery;
+using BoxQueryOf = typename Index::Traits::BoxQuery;
+template <class Index>
+using DistanceOf = typename Index::Traits::Scalar;
+template <class Index>
+using RayHitOf = RayHit<typename Index::Value, typename Index::Traits>;
 
 namespace internal {
 // Reference to the counter of a query's cost: the caller's counter `work` or, if `work` is null, an internal counter.
@@ -36,10 +40,11 @@ class CostCounter {
   Work& work_;
 };
 
-template <class Value, class Index, class Region, class Test>
-void collect_region(const Index& index, const Region& region, Test test, std::vector<Value>& result, Work* work) {
+template <class Index, class Region, class Test>
+void collect_region(const Index& index, const Region& region, Test test, std::vector<typename Index::Value>& result,
+                    Work* work) {
   CostCounter counter(work);
-  RegionCollector<Value, Region, Test> collector(region, test, result);
+  RegionCollector<typename Index::Value, Region, Test, typename Index::Traits> collector(region, test, result);
   index.visit_region(collector, counter.get());
 }
 
@@ -51,12 +56,13 @@ inline constexpr auto kBoundsDecide = [](const auto&) { return true; };
 // leaves both unchanged and returns false. The limit for each index is the nearest distance found in the indices before
 // it. Among hits at equal distance the lower id wins, even if the hits are in different indices. Do not join calls of
 // first_ray() by || instead: a hit in the first index would skip the second index, which may hold a nearer hit.
-template <class V, SpatialIndex... Indices>
-bool first_ray_of(const typename PrimitiveTraits<V>::RayQuery& ray, V& value, ScalarOf<V>& distance, Work* work,
-                  const Indices&... indices) {
+template <SpatialIndex Index, SpatialIndex... Others>
+bool first_ray_of(const RayQueryOf<Index>& ray, typename Index::Value& value, DistanceOf<Index>& distance, Work* work,
+                  const Index& index, const Others&... others) {
   internal::CostCounter counter(work);
-  NearestVisitor<V> nearest(ray, distance);
-  (indices.visit_ray(ray.slabs(), nearest, counter.get()), ...);
+  NearestVisitor<typename Index::Value, typename Index::Traits> nearest(ray, distance);
+  index.visit_ray(ray.slabs(), nearest, counter.get());
+  (others.visit_ray(ray.slabs(), nearest, counter.get()), ...);
   if (!nearest.best()) return false;
   value = *nearest.best();
   distance = nearest.distance();
@@ -66,26 +72,25 @@ bool first_ray_of(const typename PrimitiveTraits<V>::RayQuery& ray, V& value, Sc
 // Finds the first hit in one index, as first_ray_of() does.
 template <SpatialIndex Index>
 bool first_ray(const Index& index, const RayQueryOf<Index>& ray, typename Index::Value& value,
-               ScalarOf<typename Index::Value>& distance, Work* work = nullptr) {
+               DistanceOf<Index>& distance, Work* work = nullptr) {
   return first_ray_of(ray, value, distance, work, index);
 }
 
 // Returns true if the ray hits any value at a distance strictly less than `distance`.
 template <SpatialIndex Index>
-bool any_ray(const Index& index, const RayQueryOf<Index>& ray, ScalarOf<typename Index::Value> distance,
-             Work* work = nullptr) {
+bool any_ray(const Index& index, const RayQueryOf<Index>& ray, DistanceOf<Index> distance, Work* work = nullptr) {
   internal::CostCounter counter(work);
-  AnyHitVisitor<typename Index::Value> any(ray, distance);
+  AnyHitVisitor<typename Index::Value, typename Index::Traits> any(ray, distance);
   index.visit_ray(ray.slabs(), any, counter.get());
   return any.found();
 }
 
 // Appends the nearest `max_hits` hits at distances strictly less than `distance`, sorted by distance, then by id.
 template <SpatialIndex Index>
-void all_rays(const Index& index, const RayQueryOf<Index>& ray, ScalarOf<typename Index::Value> distance,
-              size_t max_hits, std::vector<RayHit<typename Index::Value>>& result, Work* work = nullptr) {
+void all_rays(const Index& index, const RayQueryOf<Index>& ray, DistanceOf<Index> distance, size_t max_hits,
+              std::vector<RayHitOf<Index>>& result, Work* work = nullptr) {
   internal::CostCounter counter(work);
-  NearestFewVisitor<typename Index::Value> few(ray, distance, max_hits, result);
+  NearestFewVisitor<typename Index::Value, typename Index::Traits> few(ray, distance, max_hits, result);
   index.visit_ray(ray.slabs(), few, counter.get());
   few.finish();
 }
@@ -93,10 +98,10 @@ void all_rays(const Index& index, const RayQueryOf<Index>& ray, ScalarOf<typenam
 // Appends the values whose bounds the ray enters at a distance of at most `distance`: a superset of the values that
 // all_rays() finds.
 template <SpatialIndex Index>
-void conservative_ray(const Index& index, const RayQueryOf<Index>& ray, ScalarOf<typename Index::Value> distance,
+void conservative_ray(const Index& index, const RayQueryOf<Index>& ray, DistanceOf<Index> distance,
                       std::vector<typename Index::Value>& result, Work* work = nullptr) {
   internal::CostCounter counter(work);
-  BoundsOnRayVisitor<typename Index::Value> on_ray(ray, distance, result);
+  BoundsOnRayVisitor<typename Index::Value, typename Index::Traits> on_ray(ray, distance, result);
   index.visit_ray(ray.slabs(), on_ray, counter.get());
 }
 
@@ -104,8 +109,7 @@ void conservative_ray(const Index& index, const RayQueryOf<Index>& ray, ScalarOf
 template <SpatialIndex Index>
 void ball_overlap(const Index& index, const BallQueryOf<Index>& ball, std::vector<typename Index::Value>& result,
                   Work* work = nullptr) {
-  using Value = typename Index::Value;
-  const auto exact = [&ball](const Value& value) { return PrimitiveTraits<Value>::ball(value, ball); };
+  const auto exact = [&ball](const auto& value) { return Index::Traits::ball(value, ball); };
   internal::collect_region(index, BallRegion(ball), exact, result, work);
 }
 
@@ -120,8 +124,7 @@ void conservative_ball(const Index& index, const BallQueryOf<Index>& ball, std::
 template <SpatialIndex Index>
 void box_overlap(const Index& index, const BoxQueryOf<Index>& box, std::vector<typename Index::Value>& result,
                  Work* work = nullptr) {
-  using Value = typename Index::Value;
-  const auto exact = [&box](const Value& value) { return PrimitiveTraits<Value>::box(value, box); };
+  const auto exact = [&box](const auto& value) { return Index::Traits::box(value, box); };
   internal::collect_region(index, BoxRegion(box), exact, result, work);
 }
 
@@ -134,4 +137,4 @@ void conservative_box(const Index& index, const BoxQueryOf<Index>& box, std::vec
 
 }  // namespace locus
 
-#endif  // LOCUS_TESTS_SUPPORT_INDEX_QUERIES_H_
+#endif  // LOCUS_CORE_INDEX_QUERIES_INDEX_QUERIES_H_
