@@ -6,9 +6,11 @@
 #include "absl/strings/str_cat.h"
 #include "client/cli/failure.h"
 #include "client/lib/status.h"
+#include "core/base/limits.h"
 #include "core/base/status_macros.h"
 
 namespace locus::cli {
+namespace {
 
 void add_bulk_options(CLI::App& command, BulkOptions& options) {
   command.add_option("--from-csv", options.csv, "Rows from a csv file with a header line; - is standard input")
@@ -24,6 +26,15 @@ void add_bulk_options(CLI::App& command, BulkOptions& options) {
       ->check(CLI::Range(uint32_t{1}, kMaxBulkBatch).description(""));
 }
 
+}  // namespace
+
+void add_bulk_update_options(CLI::App& command, BulkOptions& options) {
+  add_bulk_options(command, options);
+  command.add_flag(
+      "--one-revision", options.one_revision,
+      absl::StrCat("With an input of up to ", limits::kMaxUpdateItems, " rows: apply all rows as one revision"));
+}
+
 void add_bulk_query_options(CLI::App& command, BulkOptions& options) {
   add_bulk_options(command, options);
   command.add_flag("--follow", options.follow,
@@ -33,6 +44,8 @@ void add_bulk_query_options(CLI::App& command, BulkOptions& options) {
 absl::Status check(const BulkOptions& options) {
   if (options.csv && options.ndjson) return usage_error("give --from-csv or --from-ndjson, not both");
   if (options.batch && !options.given()) return usage_error("--batch needs --from-csv or --from-ndjson");
+  if (options.one_revision && !options.given()) return usage_error("--one-revision needs --from-csv or --from-ndjson");
+  if (options.lease_seconds && !options.given()) return usage_error("--lease needs --from-csv or --from-ndjson");
   if (options.follow && !options.given()) return usage_error("--follow needs --from-csv or --from-ndjson");
   return absl::OkStatus();
 }

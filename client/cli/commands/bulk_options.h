@@ -32,16 +32,20 @@ struct BulkOptions {
   std::optional<std::string> csv;  // path of the input; "-" = standard input
   std::optional<std::string> ndjson;
   std::optional<uint32_t> batch;
-  bool follow = false;  // queries only: each batch is answered at the newest revision
+  bool follow = false;                  // queries only: each batch is answered at the newest revision
+  bool one_revision = false;            // updates only: all rows become one revision
+  std::optional<double> lease_seconds;  // inserts only: lease of the objects
 
   bool given() const { return csv || ndjson; }
 };
 
-// Add the options --from-csv, --from-ndjson, --batch; the function for queries also adds --follow.
-void add_bulk_options(CLI::App& command, BulkOptions& options);
+// Add the options --from-csv, --from-ndjson, --batch; the function for updates also adds --one-revision, the function
+// for queries --follow.
+void add_bulk_update_options(CLI::App& command, BulkOptions& options);
 void add_bulk_query_options(CLI::App& command, BulkOptions& options);
 
-// Returns a usage error if bulk options exclude each other, or if --batch or --follow is given without an input.
+// Returns a usage error if bulk options exclude each other, or if another bulk option is given without an
+// input.
 absl::Status check(const BulkOptions& options);
 
 // Returns `field` for use in a schema. `values` are the values of the command-line option `option`. If `values` is not

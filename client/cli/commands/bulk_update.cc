@@ -1,11 +1,13 @@
 #include "client/cli/commands/bulk_update.h"
 
+#include <algorithm>
 #include <chrono>
 #include <deque>
 #include <future>
 #include <memory>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/strip.h"
@@ -15,6 +17,7 @@
 #include "client/cli/rows/update_report.h"
 #include "client/lib/status.h"
 #include "core/base/check.h"
+#include "core/base/limits.h"
 #include "core/base/status_macros.h"
 
 namespace locus::cli {
@@ -33,6 +36,29 @@ std::vector<size_t> list_starts_of(const v1::UpdateBatch& batch) {
   return starts;
 }
 
+// Rows of the messages that are answered by one ack.
+struct AnsweredRows {
+  std::vector<SentRows> messages;
+
+  size_t rows() const {
+    size_t rows = 0;
+    for (const SentRows& message : messages) rows += message.rows();
+    return rows;
+  }
+  // Returns the rows of the message of a refused item.
+  const SentRows& message_of(const v1::ItemError& item) const {
+    return messages[std::min<size_t>(item.message(), messages.size() - 1)];
+  }
+  // Returns the rows for an error that names no message: of several messages, all lines without their lists.
+  SentRows whole() const {
+    if (messages.size() == 1) return messages.front();
+    SentRows all;
+    for (const SentRows& message : messages)
+      all.lines.insert(all.lines.end(), message.lines.begin(), message.lines.end());
+    return all;
+  }
+};
+
 class BulkUpdateRun {
  public:
   BulkUpdateRun(const BulkUpdate& update, const std::string& scene, const BulkOptions& bulk, Context& context)
@@ -47,6 +73,7 @@ class BulkUpdateRun {
     reader_ = reader.get();
     client::UpdateStreamOptions options;
     options.max_in_flight = static_cast<int>(kBulkWindow);
+    if (bulk_.lease_seconds) options.lease = absl::Seconds(*bulk_.lease_seconds);
     stream_ = client->update_stream(scene_, options);
     progress_.begin({.action = "sending", .subject = reader_->name(), .unit = "rows"});
     absl::Status status = send_all();
@@ -60,7 +87,7 @@ class BulkUpdateRun {
 
  private:
   struct InFlight {
-    SentRows sent;
+    AnsweredRows sent;
     std::future<absl::StatusOr<v1::UpdateAck>> ack;
   };
 
@@ -71,9 +98,10 @@ class BulkUpdateRun {
       ASSIGN_OR_RETURN(const BatchEnd end, reader_->next(bulk_.batch.value_or(kDefaultBulkBatch), patience, batch));
       // If the input has no rows, send one empty batch: the server checks that the scene exists, and returns its
       // revision.
-      if (batch.rows() > 0 || (end == BatchEnd::kEnd && batches_ == 0 && in_flight_.empty())) {
-        RETURN_IF_ERROR(send(batch));
+      if (batch.rows() > 0 || (end == BatchEnd::kEnd && batches_ == 0 && in_flight_.empty() && held_.empty())) {
+        RETURN_IF_ERROR(bulk_.one_revision ? hold(batch) : send(batch));
       }
+      if (end == BatchEnd::kEnd && bulk_.one_revision) send_held();
       while (!in_flight_.empty() && (end != BatchEnd::kFull || is_there(in_flight_.front()))) {
         RETURN_IF_ERROR(take_front());
       }
@@ -81,22 +109,52 @@ class BulkUpdateRun {
     }
   }
 
-  absl::Status send(const RowBatch& batch) {
+  absl::Status check_rows(const RowBatch& batch) const {
     for (size_t row = 0; update_.check_row && row < batch.rows(); ++row) {
       const absl::Status checked = update_.check_row(batch, row);
       if (!checked.ok()) {
         return in_words(checked, absl::StrCat(reader_->name(), ":", batch.lines[row], ": ", checked.message()));
       }
     }
+    return absl::OkStatus();
+  }
+
+  absl::Status send(const RowBatch& batch) {
+    RETURN_IF_ERROR(check_rows(batch));
     while (in_flight_.size() >= kBulkWindow) {
       RETURN_IF_ERROR(take_front());
     }
     v1::UpdateBatch message = update_.batch_of(batch);
     InFlight& next = in_flight_.emplace_back();
     LOCUS_CHECK_LE(in_flight_.size(), kBulkWindow);
-    next.sent = {.first_row = batch.first_row, .lines = batch.lines, .list_starts = list_starts_of(message)};
+    next.sent.messages = {sent_rows(batch, message)};
     next.ack = stream_->send(std::move(message));
     return absl::OkStatus();
+  }
+
+  // Keeps the batch until send_held() sends all batches as one revision.
+  absl::Status hold(const RowBatch& batch) {
+    RETURN_IF_ERROR(check_rows(batch));
+    if (batch.first_row + batch.rows() > limits::kMaxUpdateItems) {
+      return absl::InvalidArgumentError(
+          absl::StrCat(reader_->name(), ": has more than ", limits::kMaxUpdateItems,
+                       " rows, the most that one revision can have; leave --one-revision out or divide the input"));
+    }
+    v1::UpdateBatch& message = held_.emplace_back(update_.batch_of(batch));
+    held_rows_.messages.push_back(sent_rows(batch, message));
+    return absl::OkStatus();
+  }
+
+  // Sends the held batches together. Only the last of them may have the tick.
+  void send_held() {
+    for (size_t i = 0; i + 1 < held_.size(); ++i) held_[i].clear_tick();
+    InFlight& next = in_flight_.emplace_back();
+    next.sent = std::move(held_rows_);
+    next.ack = stream_->send_together(std::move(held_));
+  }
+
+  static SentRows sent_rows(const RowBatch& batch, const v1::UpdateBatch& message) {
+    return {.first_row = batch.first_row, .lines = batch.lines, .list_starts = list_starts_of(message)};
   }
 
   std::string what_was_done() const {
@@ -120,17 +178,17 @@ class BulkUpdateRun {
       unknown_ += front.sent.rows();
       for (const InFlight& message : in_flight_) unknown_ += message.sent.rows();
       return absl::DeadlineExceededError(
-          absl::StrCat(reader_->name(), ":", front.sent.line_range(), ": no answer within ", seconds, " s"));
+          absl::StrCat(reader_->name(), ":", front.sent.whole().line_range(), ": no answer within ", seconds, " s"));
     }
     const absl::StatusOr<v1::UpdateAck> ack = front.ack.get();
     if (!ack.ok()) {
       if (!client::refused_by_server(ack.status())) unknown_ += front.sent.rows();
-      return refused_rows(ack.status(), reader_->name(), front.sent);
+      return refused_rows(ack.status(), reader_->name(), front.sent.whole());
     }
     count(*ack);
     if (ack->errors_size() > 0) {
       progress_.hide();
-      for (const v1::ItemError& item : ack->errors()) write_refused(item, front.sent);
+      for (const v1::ItemError& item : ack->errors()) write_refused(item, front.sent.message_of(item));
       context_.out().flush();
       progress_.show();
     }
@@ -189,6 +247,8 @@ class BulkUpdateRun {
   RowReader* reader_ = nullptr;
   std::unique_ptr<client::UpdateStream> stream_;
   std::deque<InFlight> in_flight_;
+  std::vector<v1::UpdateBatch> held_;  // with --one-revision: the batches read so far
+  AnsweredRows held_rows_;
   bool timed_out_ = false;  // an ack did not arrive in time; the run does not wait for other acks
   std::optional<ReportStream> errors_;
   std::string first_refused_;

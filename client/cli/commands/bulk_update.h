@@ -1,11 +1,14 @@
 // Runner of updates whose rows are read from a file or a pipe: sends them in batches, which are applied in the order of
-// the input. For insert, move and remove. Holds at most kBulkWindow batches in memory, however long the input is.
+// the input. For insert, move and remove. Holds at most kBulkWindow batches in memory, however long the input is, or,
+// with
+// --one-revision, the kMaxUpdateItems rows that can become one revision.
 //
 // Each batch becomes one revision. A batch ends after --batch rows, or when the input has no data ready (see
 // kRowPause). Therefore, if a process writes the moves of one time step to a pipe and then waits, these moves become
 // one revision. A row that the server refuses is listed in the report, and the rest of its batch is applied. A
 // malformed row (text instead of a number, a missing column) ends the run: no row of its batch is sent, and the message
-// contains the number of rows applied before that batch.
+// contains the number of rows applied before that batch. With --one-revision, nothing is sent before the input has
+// ended.
 #ifndef LOCUS_CLIENT_CLI_COMMANDS_BULK_UPDATE_H_
 #define LOCUS_CLIENT_CLI_COMMANDS_BULK_UPDATE_H_
 

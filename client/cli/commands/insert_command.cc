@@ -13,6 +13,7 @@
 #include "client/cli/rows/part_list.h"
 #include "client/cli/rows/update_report.h"
 #include "client/lib/update_builder.h"
+#include "core/base/limits.h"
 #include "core/base/status_macros.h"
 
 namespace locus::cli {
@@ -279,6 +280,8 @@ void add_insert_command(CLI::App& parent, Context& context) {
   locus insert arena compound --id 11 --at 0,6,0 --parts '[{"ball":0.12,"at":[0,0,1.7],"layers":2},
     {"capsule":{"axis":[0,0,0.3],"radius":0.25},"at":[0,0,1.1]},{"box":[0.3,0.2,0.4],"at":[0,0,0.4]}]'
   generator | locus insert arena mixed --from-ndjson - --upsert
+  locus insert arena mixed --from-csv level.csv --one-revision
+  tracker | locus insert arena ball --from-ndjson - --radius 0.5 --upsert --lease 5
 
 Rows: id,at.x,at.y,at.z[,radius,half.x ..,axis.x ..,rotation.x ..,layers,group,tag,expire_ticks,parts] or
 {"id": "7", "at": [1,2,3]}; parts is a list in JSON; mixed rows have a column shape; an option given once stands for a column. Each batch is one revision.)");
@@ -303,7 +306,13 @@ Rows: id,at.x,at.y,at.z[,radius,half.x ..,axis.x ..,rotation.x ..,layers,group,t
   add_repeatable(command, "--tag", options->tags, "TAG", "A number of your own [0]");
   add_repeatable(command, "--expire-ticks", options->expire_ticks, "TICKS",
                  "Number of ticks after which it is removed [0: never]");
-  add_bulk_options(command, options->bulk);
+  add_bulk_update_options(command, options->bulk);
+  command
+      .add_option(
+          "--lease", options->bulk.lease_seconds,
+          "With an input: remove the objects when it has ended, or this command is cut off, for so long [never]")
+      ->type_name("SECONDS")
+      ->check(CLI::Range(0.001, limits::kMaxLeaseMs / 1000.0).description(""));
   command.add_option("--tick", options->tick, "The time step [the scene's]")->type_name("TICK");
   command.add_flag("--upsert", options->upsert, "Replace an object that has the id");
   run_or_check_when_chosen(command, options, context, insert);

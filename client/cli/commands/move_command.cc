@@ -137,7 +137,7 @@ list in JSON. Each batch is one revision, and ends when it is full or the input 
   add_repeatable(command, "--rotation", options->rotations, "X,Y,Z,W", "Its new rotation [kept]");
   add_repeatable(command, "--parts", options->parts, "JSON",
                  "Compound: new poses of all its parts, a list of at, rotation or both [kept]");
-  add_bulk_options(command, options->bulk);
+  add_bulk_update_options(command, options->bulk);
   command.add_option("--tick", options->tick, "The time step [the scene's]")->type_name("TICK");
   command.add_flag("--teleport", options->teleport, "It jumped: queries about the past do not interpolate this move");
   run_or_check_when_chosen(command, options, context, move);

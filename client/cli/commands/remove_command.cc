@@ -67,7 +67,7 @@ Rows: a column id, or {"id": "7"} a line. Each batch is one revision.)");
   add_repeatable(command, "--id", options->ids, "ID", "An object");
   add_repeatable(command, "--group", options->groups, "GROUP", "All objects of a group");
   command.add_flag("--all", options->all, "Every object");
-  add_bulk_options(command, options->bulk);
+  add_bulk_update_options(command, options->bulk);
   run_or_check_when_chosen(command, options, context, remove);
 }
 

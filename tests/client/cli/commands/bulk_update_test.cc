@@ -168,6 +168,70 @@ TEST_F(BulkUpdateTest, AnInputWithoutRowsReportsTheRevision) {
   EXPECT_EQ(answer["revision"], 0);
 }
 
+TEST_F(BulkUpdateTest, AllRowsBecomeOneRevision) {
+  std::string rows = "id,at.x,at.y,at.z\n";
+  for (int i = 1; i <= 20000; ++i) absl::StrAppend(&rows, i, ",", i, ",0,0\n");
+  const TestFile file(rows, "rows.csv");
+  const Json inserted =
+      json_of({"insert", "world", "point", "--from-csv", file.path(), "--one-revision", "--tick", "7"});
+  EXPECT_EQ(inserted["applied"], 20000);
+  EXPECT_EQ(inserted["revision"], 1);
+  EXPECT_EQ(inserted["tick"], 7);
+  EXPECT_EQ(json_of({"scene", "describe", "world"})["objects"], 20000);
+}
+
+TEST_F(BulkUpdateTest, RefusedItemsOfOneRevisionAreListedByTheirLine) {
+  out_of({"insert", "world", "point", "--id", "1", "--at", "0,0,0"});
+  const TestFile file("id,to.x,to.y,to.z\n1,1,0,0\n1,2,0,0\n1,3,0,0\n8,1,0,0\n1,4,0,0\n");
+  const BulkOutcome outcome =
+      run({"-o", "csv", "move", "world", "--from-csv", file.path(), "--batch", "2", "--one-revision"});
+  EXPECT_EQ(outcome.code, ExitCode::kNotFound);
+  EXPECT_EQ(outcome.out, "line,id,reason\n5,8,UNKNOWN_ID\n");
+  EXPECT_EQ(position_of("1"), "[4.0,0.0,0.0]");
+  EXPECT_EQ(json_of({"scene", "describe", "world"})["revision"], 2);
+}
+
+TEST_F(BulkUpdateTest, NoRowOfOneRevisionIsAppliedIfOneIsMalformed) {
+  const TestFile file("id,at.x,at.y,at.z\n1,0,0,0\n2,0,0,0\n3,zero,0,0\n", "rows.csv");
+  const BulkOutcome outcome =
+      run({"insert", "world", "point", "--from-csv", file.path(), "--batch", "1", "--one-revision"});
+  EXPECT_EQ(outcome.code, ExitCode::kFailed);
+  EXPECT_THAT(outcome.err, AllOf(HasSubstr(absl::StrCat(file.path(), ":4: ")), HasSubstr("nothing was applied")));
+  EXPECT_EQ(json_of({"scene", "describe", "world"})["objects"], 0);
+}
+
+TEST_F(BulkUpdateTest, ARevisionOfTooManyRowsIsRefusedByName) {
+  std::string rows = "id,at.x,at.y,at.z\n";
+  for (int i = 1; i <= (1 << 20) + 1; ++i) absl::StrAppend(&rows, i, ",0,0,0\n");
+  const TestFile file(rows, "rows.csv");
+  const BulkOutcome outcome =
+      run({"insert", "world", "point", "--from-csv", file.path(), "--batch", "65536", "--one-revision"});
+  EXPECT_EQ(outcome.code, ExitCode::kFailed);
+  EXPECT_THAT(outcome.err, HasSubstr("has more than 1048576 rows, the most that one revision can have"));
+  EXPECT_EQ(json_of({"scene", "describe", "world"})["objects"], 0);
+}
+
+TEST_F(BulkUpdateTest, ObjectsWithALeaseGoWhenTheInputHasEnded) {
+  NamedPipe pipe;
+  std::ostringstream out;
+  std::ostringstream err;
+  std::thread command([&] {
+    EXPECT_EQ(run_into({"insert", "world", "point", "--from-ndjson", pipe.path(), "--lease", "0.2"}, out, err),
+              ExitCode::kOk)
+        << err.str();
+  });
+  pipe.write("{\"id\":1,\"at\":[1,2,3]}\n");
+  const auto wait_for_objects = [&](int count) {
+    for (int i = 0; i < 3000 && json_of({"scene", "describe", "world"})["objects"] != count; ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    EXPECT_EQ(json_of({"scene", "describe", "world"})["objects"], count);
+  };
+  wait_for_objects(1);
+  pipe.close();
+  command.join();
+  wait_for_objects(0);
+}
+
 TEST_F(BulkUpdateTest, OptionsThatExcludeEachOtherAreUsageErrors) {
   const TestFile file("id,to.x,to.y,to.z\n");
   const std::string& path = file.path();
@@ -178,6 +242,9 @@ TEST_F(BulkUpdateTest, OptionsThatExcludeEachOtherAreUsageErrors) {
            {"move", "world", "--id", "1", "--to", "0,0,0", "--batch", "9"},
            {"insert", "world", "ball", "--from-csv", path, "--at", "0,0,0"},
            {"insert", "world", "mixed", "--id", "1", "--at", "0,0,0"},
+           {"insert", "world", "point", "--id", "1", "--at", "0,0,0", "--one-revision"},
+           {"insert", "world", "point", "--id", "1", "--at", "0,0,0", "--lease", "5"},
+           {"insert", "world", "point", "--from-csv", path, "--lease", "0"},
            {"insert", "world", "ball", "--radius", "1"},
            {"remove", "world", "--from-csv", path, "--all"},
            {"remove", "world", "--from-csv", path, "--from-ndjson", path}}) {
