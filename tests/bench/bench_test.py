@@ -51,6 +51,10 @@ LOG |= {(f"writers/8/{size}", "one_writer") for size in (16, 256, 4096)}
 LOG |= {("mesh/2M", "built")}
 REDIS = {("moves/10k", "redis"), ("ball/10k", "redis")}
 HAS_REDIS = any(shutil.which(name) for name in ("redis-server", "redis-check-rdb"))
+STRUCTURES = {"bvh", "hash_grid"}
+CHANGEABLE_STRUCTURES = {"hash_grid"}
+STRUCTURE_QUERIES = ("ray", "ray_short", "any", "ball", "box", "nearest")
+STRUCTURE_SCENES = {"uniform": ("1e3", "1e4"), **{name: ("1e3",) for name in ("hub", "city1", "city100", "giant")}}
 
 
 def run(*arguments):
@@ -88,6 +92,18 @@ def expected_dynamic_cells():
                 ONE_SIZE_ONLY if kind in ("giant", "mixed") else set())
             cells |= {(f"{case}/{kind}/10k", peer) for peer in peers - left_out}
     return cells
+
+
+def expected_structure_cells():
+    cells = set()
+    for structure in STRUCTURES:
+        changes = ("insert", "remove") if structure in CHANGEABLE_STRUCTURES else ()
+        figures = (*STRUCTURE_QUERIES, *("work/" + query for query in STRUCTURE_QUERIES), "build", "memory", *changes)
+        cells |= {(f"{figure}/{structure}/{scene}/{count}", "list") for figure in figures
+                  for scene, counts in STRUCTURE_SCENES.items() for count in counts}
+        cells |= {(f"exponent/{query}/{structure}/uniform", "list") for query in STRUCTURE_QUERIES}
+        cells.add((f"exponent/memory/{structure}/uniform", "linear"))
+    return cells | {(f"exponent/{query}/list/uniform", "linear") for query in STRUCTURE_QUERIES}
 
 
 class BenchTest(unittest.TestCase):
@@ -220,6 +236,25 @@ class LogTest(SuiteRun, unittest.TestCase):
 
     def test_the_required_ratio_is_noted_beside_the_measured_one(self):
         self.assertRegex(self.answer.stdout, r"note: commit/256 beside append: .* required 0\.800")
+
+
+class StructuresTest(SuiteRun, unittest.TestCase):
+    SUITE = "structures"
+
+    def expected(self):
+        return expected_structure_cells()
+
+    def test_cells_have_every_field_and_figures_above_zero(self):
+        # An exponent may be zero or less: the work of a grid does not grow.
+        for cell in self.cells:
+            self.assertEqual({name: type(value) for name, value in cell.items()}, FIELDS)
+            for field in ("peer", "ratio") if cell["metric"] == "exponent" else ("ours", "peer", "ratio"):
+                self.assertTrue(math.isfinite(cell[field]) and cell[field] > 0, cell)
+
+    def test_the_work_of_a_list_is_linear(self):
+        for cell in self.cells:
+            if cell["case"].startswith("exponent/ball/list/"):
+                self.assertAlmostEqual(cell["ours"], 1, places=6)
 
 
 if __name__ == "__main__":

@@ -21,6 +21,7 @@
 #include "tests/bench/queries/queries_suite.h"
 #include "tests/bench/serving/serving_suite.h"
 #include "tests/bench/static/static_suite.h"
+#include "tests/bench/structures/structures_suite.h"
 
 namespace locus::bench {
 namespace {
@@ -37,6 +38,8 @@ std::vector<Suite> suites() {
        queries::run_queries_suite},
       {"serving", "a server and its client on the loopback, compared with work in process, plain sockets and Redis",
        serving::run_serving_suite},
+      {"structures", "every structure of the index on the same boxes, compared with a list",
+       structures::run_structures_suite},
       {"log", "update batches on their way to the disk, compared with appending to a file", log::run_log_suite},
   };
 }

@@ -1,0 +1,57 @@
+#include "tests/bench/structures/structures_suite.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/bench/structures/structure.h"
+
+namespace locus::bench::structures {
+namespace {
+
+TEST(StructuresSuiteTest, TheExponentIsThatOfAPowerLaw) {
+  EXPECT_NEAR(exponent_of({1e3, 1e4, 1e5}, {7, 7, 7}), 0, 1e-12);
+  EXPECT_NEAR(exponent_of({1e3, 1e4, 1e5}, {5e3, 5e4, 5e5}), 1, 1e-12);
+  EXPECT_NEAR(exponent_of({1e3, 1e4, 1e5, 1e6}, {30, 300, 3000, 30'000}), 1, 1e-12);
+  EXPECT_NEAR(exponent_of({1, 100}, {1, 10}), 0.5, 1e-12);
+}
+
+TEST(StructuresSuiteTest, AllStructuresAnswerAlike) {
+  for (const SceneKind kind : kScenes) {
+    const Scene scene = scene_of(kind, 500);
+    const SceneQueries queries = queries_of(scene, 20);
+    const auto list = structures().front().make();
+    list->build(scene.boxes);
+    for (const NamedStructure& named : structures()) {
+      const auto structure = named.make();
+      structure->build(scene.boxes);
+      for (const QueryName query : kQueryNames) {
+        for (size_t i = 0; i < 20; ++i) {
+          Work work, list_work;
+          EXPECT_EQ(structure->answer(query, queries, i, work), list->answer(query, queries, i, list_work))
+              << named.name << " " << name_of(kind) << " " << name_of(query) << " " << i;
+          EXPECT_GT(list_work.tests, 0u);
+        }
+      }
+    }
+  }
+}
+
+TEST(StructuresSuiteTest, ABoxLessChangesAnAnswer) {
+  Scene scene = scene_of(SceneKind::kUniform, 500);
+  const SceneQueries queries = queries_of(scene, 20);
+  const auto list = structures().front().make();
+  list->build(scene.boxes);
+  Work work;
+  size_t changed = 0;
+  for (size_t i = 0; i < 20; ++i) {
+    const uint64_t before = list->answer(QueryName::kNearest, queries, i, work);
+    for (const Object& box : scene.boxes) {
+      list->remove(box);
+      changed += list->answer(QueryName::kNearest, queries, i, work) != before;
+      list->insert(box);
+    }
+  }
+  EXPECT_EQ(changed, 20 * kNearestCount);
+}
+
+}  // namespace
+}  // namespace locus::bench::structures
