@@ -81,6 +81,7 @@ class Changes {
       : options_(options), report_(report), mesh_(tetrahedron()), all_(Placed::random(1, count(), random_)) {}
 
   void run() {
+    if (!wanted()) return;
     const double all = seconds([this] {
       scene_ = std::make_unique<Scene>("changes", SceneSpec(), 1, StaticSet::empty());
       change(placing(mesh_, all_));
@@ -116,6 +117,16 @@ class Changes {
 
  private:
   uint32_t count() const { return options_.quick ? 10'000 : 100'000; }
+  std::string case_name(const std::string& what) const {
+    return absl::StrCat("instances/", what, "/", name_of_count(count()));
+  }
+  // Returns whether any case is wanted. The scene is not made for nothing.
+  bool wanted() const {
+    for (const char* what : {"move_one", "move_1%", "remove_one", "remove_1%", "place_one", "place_1%"}) {
+      if (options_.filter.wants(case_name(what))) return true;
+    }
+    return false;
+  }
   static StaticChange removing(const Placed& placed) {
     StaticChange change;
     change.remove_ids = placed.ids;
@@ -144,7 +155,7 @@ class Changes {
   // Adds a cell for the work that prepare() returns. Only the work is timed.
   template <class Prepare>
   void add(const std::string& what, double all, double required, const Prepare& prepare) {
-    const std::string name = absl::StrCat("instances/", what, "/", name_of_count(count()));
+    const std::string name = case_name(what);
     if (!options_.filter.wants(name)) return;
     std::vector<double> times;
     for (int round = 0; round < options_.rounds; ++round) {
