@@ -4,7 +4,7 @@ import shutil
 import subprocess
 
 FORMATTED_ENDINGS = (".h", ".cc")
-PURE_LIBRARIES = ("core/liblocus_core.a", "server/liblocus_server_core.a", "server/liblocus_security.a")
+PURE_LIBRARIES = ("core/liblocus_index.a", "core/liblocus_core.a", "server/liblocus_server_core.a", "server/liblocus_security.a")
 FILES_A_CALL = 50
 KERNEL_NAMES = ("ray_kernels_", "region_kernels_", "nearest_kernels_", "crossing_kernels_",
                 "grid_kernels_")

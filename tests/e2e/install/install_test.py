@@ -20,6 +20,8 @@ START_SECONDS = 30
 HERE = os.path.dirname(os.path.abspath(__file__))
 PROGRAM = os.path.join(HERE, "program.cc")
 EMBEDDED_PROGRAM = os.path.join(HERE, "embedded_program.cc")
+INDEX_PROGRAM = os.path.join(HERE, "index_program.cc")
+INDEX_OUTPUT = "the shot hits monster 7 at 9.5\nnear the explosion: 7 9\nnearest to the door: 9\n"
 WANTED = "hit 8 at t = 59.5\n"
 
 
@@ -91,8 +93,8 @@ class InstallTest(unittest.TestCase):
         unbuilt = [path for path in installed if not re.search(rf"\b{re.escape(path)}(\s|$)", commands)]
         self.assertEqual(unbuilt, [])
 
-    def flags(self, *what):
-        return run("pkg-config", *what, "locus-client", **self.pkgconfig).split()
+    def flags(self, *what, package="locus-client"):
+        return run("pkg-config", *what, package, **self.pkgconfig).split()
 
     def test_every_file_belongs_to_exactly_one_component(self):
         self.assertEqual(sorted(path for paths in self.components.values() for path in paths), sorted(self.files))
@@ -105,7 +107,8 @@ class InstallTest(unittest.TestCase):
                      "share/bash-completion/completions/locus", "share/zsh/site-functions/_locus",
                      "share/fish/vendor_completions.d/locus.fish", "share/doc/locus/locusd.conf.example",
                      "share/locus/proto/locus/v1/query_service.proto",
-                     "include/locus/client/lib/client.h", "include/locus/client/embedded/embedded_server.h",
+                     "include/locus/client/lib/client.h", "include/locus/core/index/bvh/bvh.h",
+                     "include/locus/client/embedded/embedded_server.h",
                      "include/locus/locus/v1/query_service.grpc.pb.h"):
             self.assertIn(path, self.files)
 
@@ -133,9 +136,10 @@ class InstallTest(unittest.TestCase):
 
     def test_every_header_can_be_included_alone(self):
         include = os.path.join(self.tree, "include/locus")
-        headers = sorted(glob.glob(os.path.join(include, "client/**/*.h"), recursive=True))
+        headers = sorted(path for room in ("client", "core") for path in
+                         glob.glob(os.path.join(include, room, "**/*.h"), recursive=True))
         generated = sorted(glob.glob(os.path.join(include, "locus/v1/*.pb.h")))
-        self.assertGreaterEqual(len(headers), 12)
+        self.assertGreaterEqual(len(headers), 80)
         self.assertGreaterEqual(len(generated), 16)
         flags = ["-std=c++20", "-fsyntax-only", *self.flags("--cflags")]
         calls = [[OPTIONS.compiler, *flags, "-x", "c++", header] for header in headers]
@@ -169,6 +173,18 @@ class InstallTest(unittest.TestCase):
         program = os.path.join(OPTIONS.folder, "program")
         run(OPTIONS.compiler, "-std=c++20", PROGRAM, "-o", program, *self.flags("--cflags", "--libs"))
         self.assertEqual(run(program, self.address, "through-pkg-config"), WANTED)
+
+    def test_a_program_with_its_own_values_is_built_through_find_package_without_grpc(self):
+        build = self.build_project("index", INDEX_PROGRAM)
+        self.assertEqual(run(os.path.join(build, "program")), INDEX_OUTPUT)
+        with open(os.path.join(build, "CMakeCache.txt"), encoding="utf-8") as file:
+            self.assertNotIn("gRPC_DIR", file.read())
+
+    def test_a_program_with_its_own_values_is_built_through_pkg_config(self):
+        program = os.path.join(OPTIONS.folder, "index-program")
+        flags = self.flags("--cflags", "--libs", package="locus-index")
+        run(OPTIONS.compiler, "-std=c++20", INDEX_PROGRAM, "-o", program, *flags)
+        self.assertEqual(run(program), INDEX_OUTPUT)
 
     def test_the_python_package_works_where_it_is_installed(self):
         folders = glob.glob(os.path.join(self.tree, "lib/python3*/dist-packages"))
