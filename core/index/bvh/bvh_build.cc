@@ -7,9 +7,8 @@
 
 #include "core/base/check.h"
 #include "core/base/limits.h"
-#include "core/base/refusal.h"
 #include "core/base/status_macros.h"
-#include "core/index/bvh/binary_tree.h"
+#include "core/index/binary_tree.h"
 #include "core/index/bvh/wide_children.h"
 
 namespace locus {
@@ -81,20 +80,6 @@ void check_layout(const BvhLayout<S>& layout, absl::Span<const Aabb<S>> boxes) {
 }
 
 }  // namespace
-
-absl::Status check_build(size_t values, const BvhOptions& options) {
-  if (options.bins < 2 || options.bins > static_cast<int>(limits::kMaxBvhBins))
-    return refuse_argument(Reason::kOutOfRange, "bins", std::nullopt, "must be 2 to 64");
-  if (values > limits::kMaxBvhValues)
-    return refuse_limit("values", "max_bvh_values", limits::kMaxBvhValues, static_cast<double>(values));
-  return absl::OkStatus();
-}
-
-absl::Status cancelled_build() { return absl::CancelledError("the build of the tree was cancelled"); }
-
-absl::Status refuse_bounds(size_t index) {
-  return refuse_argument(Reason::kNotFinite, "values", static_cast<uint32_t>(index), "its bounds must be finite");
-}
 
 template <class S>
 absl::StatusOr<BvhLayout<S>> build_bvh_layout(absl::Span<const Aabb<S>> boxes, const BvhOptions& options) {

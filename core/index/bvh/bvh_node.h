@@ -8,11 +8,9 @@
 #include <vector>
 
 #include "core/geometry/aabb.h"
+#include "core/index/tree_build.h"
 
 namespace locus {
-
-inline constexpr uint32_t kBvhWidth = 8;     // maximum number of children of a node
-inline constexpr uint32_t kBvhLeafSize = 8;  // maximum number of values in a leaf
 
 // Content of a child slot. A leaf (count > 0) holds the values at positions first .. first + count - 1; an inner child
 // (count == 0) is the node at index `first`. No default member initializers, so that a visit need not initialize its

@@ -8,7 +8,7 @@
 #include "core/base/check.h"
 #include "core/base/limits.h"
 #include "core/base/status_macros.h"
-#include "core/index/bvh/binary_tree.h"
+#include "core/index/binary_tree.h"
 
 namespace locus {
 

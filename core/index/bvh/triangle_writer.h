@@ -11,7 +11,7 @@
 
 #include "core/base/large_array.h"
 #include "core/geometry/triangle.h"
-#include "core/index/bvh/binary_tree.h"
+#include "core/index/binary_tree.h"
 #include "core/index/bvh/triangle_tree.h"
 #include "core/index/bvh/wide_children.h"
 

@@ -7,7 +7,7 @@
 #include <array>
 
 #include "core/base/check.h"
-#include "core/index/bvh/binary_tree.h"
+#include "core/index/binary_tree.h"
 
 namespace locus {
 

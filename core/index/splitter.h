@@ -1,18 +1,18 @@
 // Splits a range of boxes into two parts by the surface area heuristic. A large range is distributed to bins and split
 // between two bins; a small range is sorted by centre and split at the best of all cuts. If the heuristic finds no cut,
 // the range is halved at the median centre. The cost of a part is its surface area times (the minimum number of leaves
-// for its boxes + a small term for each box). Internal to this folder. Pure functions. Source: Wald, On fast
+// for its boxes + a small term for each box). Internal to core/index. Pure functions. Source: Wald, On fast
 // Construction of SAH-based Bounding Volume Hierarchies, 2007.
-#ifndef LOCUS_CORE_INDEX_BVH_SPLITTER_H_
-#define LOCUS_CORE_INDEX_BVH_SPLITTER_H_
+#ifndef LOCUS_CORE_INDEX_SPLITTER_H_
+#define LOCUS_CORE_INDEX_SPLITTER_H_
 
 #include <array>
 #include <bit>
 #include <cstdint>
 
 #include "core/base/limits.h"
-#include "core/index/bvh/box_reference.h"
-#include "core/index/bvh/bvh_build.h"
+#include "core/index/box_reference.h"
+#include "core/index/tree_build.h"
 
 namespace locus {
 
@@ -69,4 +69,4 @@ class Splitter {
 
 }  // namespace locus
 
-#endif  // LOCUS_CORE_INDEX_BVH_SPLITTER_H_
+#endif  // LOCUS_CORE_INDEX_SPLITTER_H_

@@ -6,14 +6,14 @@
 // Immutable. Invariants: the cost never increases with the number of slots; each child of an opened node gets at least
 // one slot. Source: Ylitie, Karras, Laine, Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs,
 // 2017.
-#ifndef LOCUS_CORE_INDEX_BVH_WIDE_CHOICE_H_
-#define LOCUS_CORE_INDEX_BVH_WIDE_CHOICE_H_
+#ifndef LOCUS_CORE_INDEX_WIDE_CHOICE_H_
+#define LOCUS_CORE_INDEX_WIDE_CHOICE_H_
 
 #include <array>
 #include <cstdint>
 
 #include "core/base/check.h"
-#include "core/index/bvh/bvh_node.h"
+#include "core/index/tree_build.h"
 
 namespace locus {
 
@@ -74,4 +74,4 @@ class WideChoice {
 
 }  // namespace locus
 
-#endif  // LOCUS_CORE_INDEX_BVH_WIDE_CHOICE_H_
+#endif  // LOCUS_CORE_INDEX_WIDE_CHOICE_H_

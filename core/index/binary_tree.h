@@ -1,10 +1,10 @@
-// Binary tree over boxes with leaves of up to kBvhLeafSize boxes: the intermediate result of a build, before the tree
-// is collapsed to nodes of up to eight children. Equal references and options result in an equal tree; the threads and
-// the order in which BvhOptions::parallel_for runs the tasks have no effect. Immutable after build(). Invariants: the
-// two children of a node partition its references (BoxReference); a node's bounds are exactly the box around its
-// references. Internal to this folder.
-#ifndef LOCUS_CORE_INDEX_BVH_BINARY_TREE_H_
-#define LOCUS_CORE_INDEX_BVH_BINARY_TREE_H_
+// Binary tree over boxes with leaves of up to kBvhLeafSize boxes: the intermediate result of a build. A bvh collapses
+// the tree to nodes of up to eight children; a sphere tree replaces its boxes by balls. Equal references and options
+// result in an equal tree; the threads and the order in which BvhOptions::parallel_for runs the tasks have no effect.
+// Immutable after build(). Invariants: the two children of a node partition its references (BoxReference); a node's
+// bounds are exactly the box around its references. Internal to core/index.
+#ifndef LOCUS_CORE_INDEX_BINARY_TREE_H_
+#define LOCUS_CORE_INDEX_BINARY_TREE_H_
 
 #include <array>
 #include <deque>
@@ -12,9 +12,9 @@
 
 #include "absl/status/statusor.h"
 #include "absl/types/span.h"
-#include "core/index/bvh/box_reference.h"
-#include "core/index/bvh/bvh_build.h"
-#include "core/index/bvh/wide_choice.h"
+#include "core/index/box_reference.h"
+#include "core/index/tree_build.h"
+#include "core/index/wide_choice.h"
 
 namespace locus {
 
@@ -56,4 +56,4 @@ class BinaryTree {
 
 }  // namespace locus
 
-#endif  // LOCUS_CORE_INDEX_BVH_BINARY_TREE_H_
+#endif  // LOCUS_CORE_INDEX_BINARY_TREE_H_

@@ -1,4 +1,4 @@
-#include "core/index/bvh/binary_tree.h"
+#include "core/index/binary_tree.h"
 
 #include <cmath>
 #include <utility>
@@ -6,7 +6,7 @@
 
 #include "core/base/check.h"
 #include "core/base/limits.h"
-#include "core/index/bvh/splitter.h"
+#include "core/index/splitter.h"
 
 namespace locus {
 namespace {

@@ -1,4 +1,4 @@
-#include "core/index/bvh/splitter.h"
+#include "core/index/splitter.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
 // Element that the builder sorts instead of the value itself: the value's box and index, with no more padding than
 // vector instructions require. Plain data.
-#ifndef LOCUS_CORE_INDEX_BVH_BOX_REFERENCE_H_
-#define LOCUS_CORE_INDEX_BVH_BOX_REFERENCE_H_
+#ifndef LOCUS_CORE_INDEX_BOX_REFERENCE_H_
+#define LOCUS_CORE_INDEX_BOX_REFERENCE_H_
 
 #include <bit>
 #include <cstdint>
@@ -9,7 +9,7 @@
 #include "absl/types/span.h"
 #include "core/base/check.h"
 #include "core/base/limits.h"
-#include "core/index/bvh/quad.h"
+#include "core/index/quad.h"
 
 namespace locus {
 
@@ -59,4 +59,4 @@ static_assert(limits::kMaxBvhValues <= 0x3FFFFFFFu);
 
 }  // namespace locus
 
-#endif  // LOCUS_CORE_INDEX_BVH_BOX_REFERENCE_H_
+#endif  // LOCUS_CORE_INDEX_BOX_REFERENCE_H_

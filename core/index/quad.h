@@ -1,8 +1,8 @@
 // Vector of four lanes: the coordinates x, y, z and a spare value. The builder processes all axes of a float box with
 // one vector instruction. Lanes are read by subscript or copied out, never by casting pointers: GCC 12 miscompiles such
 // casts. Plain data.
-#ifndef LOCUS_CORE_INDEX_BVH_QUAD_H_
-#define LOCUS_CORE_INDEX_BVH_QUAD_H_
+#ifndef LOCUS_CORE_INDEX_QUAD_H_
+#define LOCUS_CORE_INDEX_QUAD_H_
 
 #include <array>
 #include <cstdint>
@@ -111,4 +111,4 @@ S half_area(const QuadBox<S>& box) {
 
 }  // namespace locus
 
-#endif  // LOCUS_CORE_INDEX_BVH_QUAD_H_
+#endif  // LOCUS_CORE_INDEX_QUAD_H_
