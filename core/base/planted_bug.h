@@ -85,6 +85,17 @@ enum class PlantedBug {
   kRegionEdgeScale,   // edges are not scaled up, so that products of their components may underflow
   kRegionRange,       // boxes and blocks so small that products of coordinates underflow are tested in float
   kRegionTurnedNode,  // boxes of nodes are tested against a rotated box without a pad
+  // The kd tree:
+  kKdLowerStrict,    // a region that begins exactly at a dividing plane is not searched below the plane
+  kKdAxisByTurns,    // a node divides values on any axis, but keeps the axis of its level
+  kKdPassedTwice,    // a value that lies in several leaves is passed from each of them
+  kKdReferenceLeft,  // a removed value stays in one of its several leaves
+  kKdFixedBounds,    // a value that is inserted outside the bounds of the tree does not widen them
+  kKdRayFromInside,  // a ray that starts outside the bounds of the tree finds nothing
+  kKdRayUnpadded,    // regions are not padded for their own coordinates when they are tested with rays
+  kKdRayToBorder,    // a ray is followed beyond its limit
+  kKdNearestStrict,  // a nearest query does not search regions exactly as far as its limit
+  kKdPointsStrict,   // boxes and balls of points do not search the side of a plane that they just touch
   // Access control:
   kRightLeftOut,         // a grant of any right to a scene grants every right to it
   kSceneLeftOut,         // a grant for some scenes grants its rights to every scene

@@ -23,6 +23,7 @@
 #include "tests/support/rewind_lockstep.h"
 #include "tests/support/scene_lockstep.h"
 #include "tests/support/scene_search.h"
+#include "tests/support/structure_comparison.h"
 #include "tests/support/sweep_trials.h"
 
 namespace locus::test {
@@ -43,6 +44,12 @@ std::string compare_grids_with_list() {
 
 std::string compare_balls_of_grids_with_list() {
   return search_grid_scenes(scaled_count(400), any_adversarial_scene, grid_ball_difference);
+}
+
+std::string compare_kd_trees_with_list() {
+  using KdTrees = StructureList<KdTreeInLeaves<Object, KdSplit::kMiddle>, KdTreeInLeaves<Triangle, KdSplit::kSah>,
+                                KdTreeByTurns<Triangle, KdSplit::kMedian>>;
+  return search_structures(KdTrees(), 60, 180);
 }
 
 std::string compare_moving_grids_with_list() {
@@ -176,6 +183,16 @@ constexpr Trial kTrials[] = {
     {"FilterByAllBitsOfATag", PlantedBug::kFilterTagMask, filter_difference},
     {"FilterThatForgetsGroupsTagsAndIds", PlantedBug::kFilterLabels, filter_difference},
     {"CompoundsWhosePartsHaveNoLayers", PlantedBug::kPartMask, compare_compounds_with_parts},
+    {"KdTreeWithStrictTie", PlantedBug::kStrictTie, compare_kd_trees_with_list},
+    {"KdTreeThatFindsAValueOnAPlaneFromOneSide", PlantedBug::kKdLowerStrict, compare_kd_trees_with_list},
+    {"KdTreeWhoseNodesForgetTheirAxis", PlantedBug::kKdAxisByTurns, compare_kd_trees_with_list},
+    {"KdTreeThatPassesAValueTwice", PlantedBug::kKdPassedTwice, compare_kd_trees_with_list},
+    {"KdTreeThatKeepsAReferenceToARemovedValue", PlantedBug::kKdReferenceLeft, compare_kd_trees_with_list},
+    {"KdTreeThatLosesValuesOutsideItsFirstBounds", PlantedBug::kKdFixedBounds, compare_kd_trees_with_list},
+    {"KdTreeMissedByRaysFromOutside", PlantedBug::kKdRayFromInside, compare_kd_trees_with_list},
+    {"KdTreeWithUnpaddedRegions", PlantedBug::kKdRayUnpadded, compare_kd_trees_with_list},
+    {"KdTreeWhoseRaysWalkToTheBorder", PlantedBug::kKdRayToBorder, short_ray_fault},
+    {"KdTreeThatLosesWhatIsAsFarAsTheLimit", PlantedBug::kKdNearestStrict, compare_kd_trees_with_list},
 #ifdef LOCUS_X86_KERNELS
     {"KernelWithoutEdgeBound", PlantedBug::kKernelEdgeBound, compare_kernels_with_list},
     {"KernelWithoutTBound", PlantedBug::kKernelTBound, compare_kernels_with_list},

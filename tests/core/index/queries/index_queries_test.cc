@@ -3,9 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/index/bvh/bvh.h"
-#include "core/index/list/list_index.h"
-#include "core/scene/objects/object.h"
+#include "tests/support/index_structures.h"
 #include "tests/support/random.h"
 #include "tests/support/small_world.h"
 
@@ -19,23 +17,13 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 ObjectRay along_x() { return ObjectRay(Rayd{{0, 0, 0}, {1, 0, 0}}); }
 
-// Fixture that runs each test for a list and for a tree.
-template <class Index>
+// Fixture that runs each test for every structure.
+template <class Structure>
 class IndexQueriesTest : public ::testing::Test {
  protected:
-  static Index make(const std::vector<Object>& objects) {
-    if constexpr (MutableSpatialIndex<Index>) {
-      Index index;
-      for (const Object& object : objects) index.insert(object);
-      return index;
-    } else {
-      return *Index::build(objects);
-    }
-  }
+  static typename Structure::Index make(const std::vector<Object>& objects) { return Structure::make(objects); }
 };
-
-using Structures = ::testing::Types<ListIndex<Object>, Bvh<Object>>;
-TYPED_TEST_SUITE(IndexQueriesTest, Structures);
+TYPED_TEST_SUITE(IndexQueriesTest, TypesOf<ObjectStructures>);
 
 std::vector<Id> ids_of(const std::vector<Object>& objects) {
   std::vector<Id> ids;
@@ -184,9 +172,8 @@ TYPED_TEST(IndexQueriesTest, WorkIsAddedToTheCallersCounter) {
   const auto index = this->make({ball_object(1, {10, 0, 0}), ball_object(2, {20, 0, 0})});
   Work work;
   work.tests = 100;
-  Object value;
-  double distance = kInfinity;
-  first_ray(index, along_x(), value, distance, &work);
+  std::vector<RayHit<Object>> hits;
+  all_rays(index, along_x(), kInfinity, 9, hits, &work);
   EXPECT_EQ(work.tests, 102u);
   std::vector<Object> values;
   ball_overlap(index, {{0, 0, 0}, 100}, values, &work);
