@@ -19,6 +19,7 @@
 #include "tests/support/nearest_trials.h"
 #include "tests/support/part_scenes.h"
 #include "tests/support/placed_scenes.h"
+#include "tests/support/point_comparison.h"
 #include "tests/support/region_trials.h"
 #include "tests/support/rewind_lockstep.h"
 #include "tests/support/scene_lockstep.h"
@@ -51,6 +52,8 @@ std::string compare_kd_trees_with_list() {
                                 KdTreeByTurns<Triangle, KdSplit::kMedian>>;
   return search_structures(KdTrees(), 60, 180);
 }
+
+std::string compare_points_with_all() { return points_difference<double, 2>(scaled_count(50)); }
 
 std::string compare_moving_grids_with_list() {
   return search_grid_scenes(scaled_count(40), any_adversarial_scene, moving_grid_difference);
@@ -193,6 +196,7 @@ constexpr Trial kTrials[] = {
     {"KdTreeWithUnpaddedRegions", PlantedBug::kKdRayUnpadded, compare_kd_trees_with_list},
     {"KdTreeWhoseRaysWalkToTheBorder", PlantedBug::kKdRayToBorder, short_ray_fault},
     {"KdTreeThatLosesWhatIsAsFarAsTheLimit", PlantedBug::kKdNearestStrict, compare_kd_trees_with_list},
+    {"PointsThatLoseTheBorderOfARegion", PlantedBug::kKdPointsStrict, compare_points_with_all},
 #ifdef LOCUS_X86_KERNELS
     {"KernelWithoutEdgeBound", PlantedBug::kKernelEdgeBound, compare_kernels_with_list},
     {"KernelWithoutTBound", PlantedBug::kKernelTBound, compare_kernels_with_list},
