@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "absl/container/flat_hash_map.h"
 #include "core/base/check.h"
 #include "core/index/hash_grid/cell_key.h"
 
@@ -36,15 +37,11 @@ int exponent_of_all(absl::Span<const SampledValue> sample) {
 // pairs of values that share a cell is the same in the sample and in all values, so the sample size causes no bias.
 double mean_others_per_cell(absl::Span<const SampledValue> sample, size_t population, int exponent) {
   if (sample.size() < 2) return 0;
-  std::vector<GridKey> cells;
-  cells.reserve(sample.size());
-  for (const SampledValue& value : sample) cells.push_back(cell_of(value.position, cells_per_unit(exponent)));
-  std::sort(cells.begin(), cells.end());
-  double pairs = 0;
-  for (size_t begin = 0, end = 0; begin < cells.size(); begin = end) {
-    while (end < cells.size() && cells[end] == cells[begin]) ++end;
-    pairs += static_cast<double>(end - begin) * static_cast<double>(end - begin - 1);
-  }
+  absl::flat_hash_map<GridKey, uint32_t, GridKeyHash> counts;
+  counts.reserve(sample.size());
+  const double per_unit = cells_per_unit(exponent);
+  double pairs = 0;  // ordered pairs of values that share a cell
+  for (const SampledValue& value : sample) pairs += 2.0 * counts[cell_of(value.position, per_unit)]++;
   const double share = pairs / (static_cast<double>(sample.size()) * static_cast<double>(sample.size() - 1));
   return share * static_cast<double>(population - 1);
 }
@@ -53,11 +50,19 @@ double mean_others_per_cell(absl::Span<const SampledValue> sample, size_t popula
 
 int choose_cell_exponent(absl::Span<const SampledValue> sample, size_t population) {
   LOCUS_CHECK(!sample.empty() && population >= sample.size());
-  int exponent = exponent_covering(median_diameter(sample), kMinCellExponent, kMaxBaseExponent);
+  int exponent = exponent_covering(median_diameter(sample), kMinCellExponent, kMaxBaseExponent);  // always suitable
   const double allowed =
       std::max(kMaxMeanPerCell, mean_others_per_cell(sample, population, exponent) + kMaxAddedPerCell);
-  const int max_exponent = exponent_of_all(sample);
-  while (exponent < max_exponent && mean_others_per_cell(sample, population, exponent + 1) <= allowed) ++exponent;
+  // Two values that share a cell share each wider cell, too, so the mean never falls with the exponent.
+  int max_exponent = exponent_of_all(sample);
+  while (exponent < max_exponent) {
+    const int middle = exponent + (max_exponent - exponent + 1) / 2;
+    if (mean_others_per_cell(sample, population, middle) <= allowed) {
+      exponent = middle;
+    } else {
+      max_exponent = middle - 1;
+    }
+  }
   LOCUS_DCHECK_GE(exponent, kMinCellExponent);
   LOCUS_DCHECK_LE(exponent, kMaxBaseExponent);
   return exponent;

@@ -34,11 +34,11 @@ struct SampledValue {
 // much larger than the bounds of all values, unless the median diameter requires a larger edge. The mean is estimated
 // for `population` values, of which `sample` is an evenly spaced selection. Values that share a cell at every cell size
 // raise the limit (see kMaxAddedPerCell), so they do not prevent larger cells. Preconditions: `sample` is not empty,
-// population >= sample.size(). Cost: at most about fifty sorts of the sample.
+// population >= sample.size(). Cost: at most seven counts of the sample's cells.
 int choose_cell_exponent(absl::Span<const SampledValue> sample, size_t population);
 
 // Returns true if cells with an edge of 2^exponent are still suitable: a random value shares its cell with
-// kMinOthersPerCell to kMaxOthersPerCell other values on average. Costs one sort of the sample, much less than
+// kMinOthersPerCell to kMaxOthersPerCell other values on average. Costs one count of the sample's cells, less than
 // choose_cell_exponent().
 bool cell_exponent_fits(absl::Span<const SampledValue> sample, size_t population, int exponent);
 
