@@ -68,16 +68,21 @@ void MoveApplier::refuse(const char* column, const Item& item, Reason reason) {
     errors_.push_back({absl::StrCat("moves[", item.list, "].", column), item.index, item.id, reason});
 }
 
-inline GridMove& MoveApplier::move_of(uint32_t handle) {
+// Moves the object of `handle` to `position`. Returns the index of its move.
+inline uint32_t MoveApplier::add_move(uint32_t handle, Vec3d position) {
   const uint32_t last = last_move_[handle];
-  if (last < moves_.size() && moves_[last].handle == handle) return moves_[last];
-  last_move_[handle] = static_cast<uint32_t>(moves_.size());
-  GridMove& move = moves_.emplace_back();
-  move.handle = handle;
-  return move;
+  if (last < moves_.size() && moves_[last].handle == handle) {
+    moves_[last].position = position;
+    return last;
+  }
+  const auto index = static_cast<uint32_t>(moves_.size());
+  last_move_[handle] = index;
+  moves_.push_back({position, handle});
+  return index;
 }
 
-inline void MoveApplier::move(const PoseReader& poses, uint32_t handle, const Item& item) {
+// Reads one item, with its rotation if the columns have rotations.
+void MoveApplier::move(const PoseReader& poses, uint32_t handle, const Item& item) {
   if (handle == ObjectStore::kNoHandle) return refuse("ids", item, Reason::kUnknownId);
   Vec3d position;
   Quaternion rotation;
@@ -87,13 +92,10 @@ inline void MoveApplier::move(const PoseReader& poses, uint32_t handle, const It
     if (const Reason reason = poses.read_rotation(item.index, rotation); reason != Reason::kUnspecified)
       return refuse(PoseReader::kRotationColumn, item, reason);
   }
-  GridMove& move = move_of(handle);
-  move.position = position;
-  if (poses.has_rotations()) {
-    move.rotation = static_cast<uint32_t>(rotations_.size());
-    rotations_.push_back(rotation);
-  }
-  ++applied_;
+  const uint32_t index = add_move(handle, position);
+  if (!poses.has_rotations()) return;
+  moves_[index].rotation = static_cast<uint32_t>(rotations_.size());
+  rotations_.push_back(rotation);
 }
 
 absl::Span<const uint32_t> MoveApplier::handles_of(const ObjectStore& objects, absl::Span<const Id> ids) {
@@ -115,17 +117,30 @@ absl::Span<const uint32_t> MoveApplier::handles_of(const ObjectStore& objects, a
 
 void MoveApplier::run(const ObjectStore& objects, Vec3d frame, const MoveColumns& columns, size_t list) {
   const PoseReader poses(frame, columns.positions, columns.positions_f64, columns.rotations);
+  const bool has_rotations = poses.has_rotations();
+  const bool few = columns.ids.size() < objects.size() / 2;  // else the grid visits bricks instead of objects
+  const uint32_t refused_before = refused_;
   moves_.reserve(moves_.size() + columns.ids.size());
   for (size_t begin = 0; begin < columns.ids.size(); begin += kItemsAtOnce) {
     const absl::Span<const uint64_t> ids = columns.ids.subspan(begin, kItemsAtOnce);
     const absl::Span<const uint32_t> handles = handles_of(objects, ids);
     for (const uint32_t handle : handles) {
       if (handle == ObjectStore::kNoHandle) continue;
-      objects.prefetch_slot(handle);
+      if (few) objects.prefetch_slot(handle);
       __builtin_prefetch(&last_move_[handle]);
     }
-    for (size_t i = 0; i < ids.size(); ++i) move(poses, handles[i], {list, static_cast<uint32_t>(begin + i), ids[i]});
+    for (size_t i = 0; i < ids.size(); ++i) {
+      Vec3d position;
+      // The common case is read here, without the call and without the fields of an item that may be refused.
+      if (!has_rotations && handles[i] != ObjectStore::kNoHandle &&
+          poses.read_position(begin + i, position) == Reason::kUnspecified) {
+        add_move(handles[i], position);
+      } else {
+        move(poses, handles[i], {list, static_cast<uint32_t>(begin + i), ids[i]});
+      }
+    }
   }
+  applied_ += static_cast<uint32_t>(columns.ids.size()) - (refused_ - refused_before);
 }
 
 }  // namespace locus

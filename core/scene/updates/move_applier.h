@@ -60,7 +60,7 @@ class MoveApplier {
   };
   void move(const PoseReader& poses, uint32_t handle, const Item& item);
   void refuse(const char* column, const Item& item, Reason reason);
-  GridMove& move_of(uint32_t handle);
+  uint32_t add_move(uint32_t handle, Vec3d position);
 
   std::vector<GridMove> moves_;
   std::vector<Quaternion> rotations_;
