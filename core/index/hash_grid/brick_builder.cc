@@ -1,6 +1,7 @@
 #include "core/index/hash_grid/brick_builder.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "core/base/check.h"
 #include "core/base/planted_bug.h"
@@ -252,13 +253,116 @@ BrickPtr BrickBuilder::sorted_by_cell(const Brick* old, absl::Span<const BrickSo
   for (size_t cell = 0; cell < kBrickCells; ++cell) offsets[cell + 1] += offsets[cell];
   std::array<uint32_t, kBrickCells + 1> next = offsets;
   write(*block, 0, old, sources, [&next](const BrickSource& source) { return next[source.cell]++; });
+  return new_brick(block);
+}
+
+// Returns a version with the block `sorted`, which is complete, and without a log.
+BrickPtr BrickBuilder::new_brick(std::shared_ptr<const GridBlock> sorted) const {
   auto brick = std::make_shared<Brick>();
   brick->geometry = *geometry_;
   brick->index = index_;
-  brick->sorted = block;
+  brick->sorted = std::move(sorted);
   brick->max_extent = max_extent_;
   LOCUS_DCHECK_CALL(check_sorted(*brick));
   return brick;
+}
+
+BrickPtr BrickBuilder::rebuild(const Brick& old, const BrickGeometry& geometry, uint32_t index,
+                               const BlockMoves& block_moves, absl::Span<const BrickChange> changes) {
+  LOCUS_DCHECK(slots_ != nullptr && parts_.moves.rotations.empty());
+  LOCUS_DCHECK(old.dead_count == 0 && old.recent_count == 0);
+  LOCUS_DCHECK_EQ(block_moves.moves.size(), size_t{old.sorted->count()});
+  LOCUS_DCHECK(std::all_of(changes.begin(), changes.end(), arrives));
+  LOCUS_DCHECK_CALL(check_changes(&old, changes));
+  geometry_ = &geometry;
+  index_ = index;
+  max_extent_ = old.max_extent;
+  const GridBlock& from = *old.sorted;
+  sources_.clear();
+  add_arrivals(changes);
+  std::array<uint32_t, kBrickCells + 1> offsets{};
+  for (size_t cell = 0; cell < kBrickCells; ++cell) offsets[cell + 1] = from.offsets()[cell + 1] - from.offsets()[cell];
+  for (const CellChange& change : block_moves.cell_changes) {
+    --offsets[change.from + 1];
+    if (change.to != CellChange::kLeaves) ++offsets[change.to + 1];
+  }
+  for (const BrickSource& source : sources_) ++offsets[source.cell + 1];
+  for (size_t cell = 0; cell < kBrickCells; ++cell) offsets[cell + 1] += offsets[cell];
+  if (offsets[kBrickCells] == 0) return nullptr;
+  const auto block = std::make_shared<GridBlock>(offsets[kBrickCells], from.has_forms() || any_form_arrives(changes));
+  block->offsets() = offsets;
+  runs_.clear();
+  find_runs(from, block_moves.cell_changes, offsets);
+  for (const Run& run : runs_) copy_run(from, run, block_moves.moves, *block);
+  write(*block, 0, &old, sources_, [&offsets](const BrickSource& source) { return offsets[source.cell]++; });
+  return new_brick(block);
+}
+
+// Appends a run to runs_, or extends the last run.
+inline void BrickBuilder::add_run(const Run& run) {
+  if (!runs_.empty()) {
+    Run& last = runs_.back();
+    if (last.begin + last.count == run.begin && last.to + last.count == run.to) {
+      last.count += run.count;
+      return;
+    }
+  }
+  runs_.push_back(run);
+}
+
+// Fills runs_ with the values of `from` that remain in the brick, in the order of a counting sort by cell. On input,
+// next[cell] is the first slot of the cell in the new block; on output, it is the slot after the values of `from`.
+void BrickBuilder::find_runs(const GridBlock& from, absl::Span<const CellChange> cell_changes,
+                             std::array<uint32_t, kBrickCells + 1>& next) {
+  if (cell_changes.empty() && next == from.offsets()) {
+    runs_.push_back({0, 0, from.count()});
+    return;
+  }
+  auto change = cell_changes.begin();
+  uint32_t slot = 0;
+  for (size_t cell = 0; cell < kBrickCells; ++cell) {
+    const uint32_t end = from.offsets()[cell + 1];
+    while (slot < end) {
+      const bool stops = change != cell_changes.end() && change->slot < end;
+      const uint32_t count = (stops ? change->slot : end) - slot;
+      if (count != 0) add_run({slot, next[cell], count});
+      next[cell] += count;
+      slot += count;
+      if (!stops) continue;
+      LOCUS_DCHECK_EQ(size_t{change->from}, cell);
+      if (change->to != CellChange::kLeaves) add_run({slot, next[change->to]++, 1});
+      ++slot;
+      ++change;
+    }
+  }
+  LOCUS_DCHECK(change == cell_changes.end());
+}
+
+// Copies a run of values to `block`, with their new positions. `moves` are the moves of the slots of `from`.
+inline void BrickBuilder::copy_run(const GridBlock& from, const Run& run, absl::Span<const uint32_t> moves,
+                                   GridBlock& block) {
+  block.copy_values(from, run.begin, run.to, run.count);
+  const GridBlock::Places places(block, geometry_->center);
+  const GridBlock::Values old_values(from);
+  const GridMove* const all_moves = parts_.moves.moves.data();
+  GridSlot* const slots = slots_->data();
+  const uint32_t index = index_;
+  const bool shifts = run.begin != run.to;
+  for (uint32_t i = 0; i < run.count; ++i) {
+    const uint32_t before = run.begin + i, slot = run.to + i;
+    // The runs are almost in the order of the old slots, so the values that follow are in this run or in the next ones.
+    if (before + kPrefetchValues < moves.size()) {
+      const uint32_t next = moves[before + kPrefetchValues];
+      if (next != BrickSource::kNoMove) __builtin_prefetch(&all_moves[next]);
+      __builtin_prefetch(&old_values.entries[before + kPrefetchValues]);
+      if (shifts) __builtin_prefetch(&slots[old_values.handles[before + kPrefetchValues]], 1);
+    }
+    const uint32_t move = moves[before];
+    const GridEntry& entry = old_values.entries[before];
+    const Vec3d& position = move == BrickSource::kNoMove ? entry.position : all_moves[move].position;
+    places.put_entry(slot, entry, position);
+    if (shifts) slots[old_values.handles[before]] = {index, slot};
+  }
 }
 
 // Returns a version that shares both blocks of `old`: changed values are appended to the log after the slots of

@@ -4,6 +4,8 @@
 #define LOCUS_CORE_INDEX_HASH_GRID_BRICK_SOURCES_H_
 
 #include <algorithm>
+#include <cstring>
+#include <vector>
 
 #include "absl/types/span.h"
 #include "core/index/hash_grid/brick.h"
@@ -47,6 +49,21 @@ struct BrickSource {
   uint32_t origin;  // index of an arrival with bit kArrival set, or present slot, encoded as in GridSlot::slot
   uint32_t move;    // index in GridMoves::moves; kNoMove if the value is unchanged or arrives
   uint32_t cell;    // new cell; unused if the value is appended to the log
+};
+
+// Value of a sorted block that moves to another cell of the brick or leaves the brick.
+struct CellChange {
+  static constexpr uint32_t kLeaves = kBrickCells;
+
+  uint32_t slot;
+  uint16_t from;  // present cell
+  uint16_t to;    // new cell, or kLeaves
+};
+
+// Moves of the values of a sorted block.
+struct BlockMoves {
+  absl::Span<const uint32_t> moves;           // for each slot, the index of its move, or BrickSource::kNoMove
+  absl::Span<const CellChange> cell_changes;  // ascending by slot
 };
 
 // Lookup of moves by handle. Precondition: the batch has moves, and GridMoves::by_handle is given.
@@ -121,6 +138,53 @@ BrickSource* gather_brick(const Brick& brick, const MoveFinder& moves, BrickSour
   if (brick.recent_count == 0) return out;
   return gather_block(geometry, *brick.recent, brick.recent_count, GridSlot::kRecent, moves, out, moved, is_recent_dead,
                       leave);
+}
+
+// Writes the present cell of each slot of the sorted block to `cells`, and more cells than that: `cells` has room for
+// kCellsPerStore more elements than the block has slots.
+inline constexpr uint32_t kCellsPerStore = 32;
+inline void write_cells(const GridBlock& sorted, uint8_t* cells) {
+  for (size_t cell = 0; cell < kBrickCells; ++cell) {
+    const uint32_t begin = sorted.offsets()[cell], end = sorted.offsets()[cell + 1];
+    // Most cells have fewer values than one store writes; the next cells overwrite the rest.
+    std::memset(cells + begin, static_cast<int>(cell), kCellsPerStore);
+    for (uint32_t slot = begin + kCellsPerStore; slot < end; slot += kCellsPerStore)
+      std::memset(cells + slot, static_cast<int>(cell), kCellsPerStore);
+  }
+}
+
+// Finds the moves of the values of a brick that has no log and no dead values. Writes the index of the move of each
+// slot to `out`, or BrickSource::kNoMove. Appends to `cell_changes` the values that move to another cell, and calls
+// leave(block, slot, move) for those that move out of the brick. Returns the number of values that move. `cells` are
+// the present cells of the slots, as from write_cells().
+template <class Leave>
+size_t find_moves(const Brick& brick, const uint8_t* cells, const MoveFinder& moves, uint32_t* out,
+                  std::vector<CellChange>& cell_changes, const Leave& leave) {
+  constexpr uint32_t kGroup = 16;                 // values whose moves are prefetched together
+  const BrickGeometry geometry = brick.geometry;  // a copy, so that the compiler knows that no store changes it
+  const GridBlock& block = *brick.sorted;
+  const uint32_t* const handles = GridBlock::Values(block).handles;
+  size_t moved = 0;
+  for (uint32_t begin = 0; begin < block.count(); begin += kGroup) {
+    const uint32_t end = std::min(block.count(), begin + kGroup);
+    for (uint32_t slot = begin; slot < end; ++slot) {
+      out[slot] = moves.index_of(handles[slot]);
+      __builtin_prefetch(&moves[out[slot]]);
+    }
+    for (uint32_t slot = begin; slot < end; ++slot) {
+      const GridMove& move = moves[out[slot]];
+      if (move.handle != handles[slot]) {
+        out[slot] = BrickSource::kNoMove;
+        continue;
+      }
+      ++moved;
+      const int cell = geometry.cell_if_here(move.position);
+      if (cell == cells[slot]) continue;
+      if (cell < 0) leave(block, slot, move);
+      cell_changes.push_back({slot, cells[slot], static_cast<uint16_t>(cell < 0 ? CellChange::kLeaves : cell)});
+    }
+  }
+  return moved;
 }
 
 }  // namespace internal

@@ -1,6 +1,7 @@
 #include "core/index/hash_grid/grid_block.h"
 
 #include <algorithm>
+#include <cstring>
 
 namespace locus::internal {
 
@@ -19,6 +20,21 @@ GridBlock::GridBlock(uint32_t count, bool has_forms) : count_(count), stride_((c
   for (size_t column = 0; column < 4; ++column)
     std::fill(floats_ + column * stride_ + count, floats_ + (column + 1) * stride_, 0.0f);
   std::fill(handles_ + count, handles_ + stride_, ~0u);  // not a valid handle
+}
+
+void GridBlock::copy_values(const GridBlock& from, uint32_t begin, uint32_t to, uint32_t count) {
+  LOCUS_DCHECK(begin <= from.count_ && count <= from.count_ - begin);
+  LOCUS_DCHECK(to <= count_ && count <= count_ - to);
+  LOCUS_DCHECK(has_forms() || !from.has_forms());
+  std::memcpy(floats_ + size_t{3} * stride_ + to, from.floats_ + size_t{3} * from.stride_ + begin,
+              count * sizeof(float));
+  std::memcpy(handles_ + to, from.handles_ + begin, count * sizeof(uint32_t));
+  if (!has_forms()) return;
+  if (from.has_forms()) {
+    std::memcpy(forms_ + to, from.forms_ + begin, count * sizeof(GridForm));
+  } else {
+    std::fill_n(forms_ + to, count, GridForm());
+  }
 }
 
 void GridBlock::check_invariants() const {

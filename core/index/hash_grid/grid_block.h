@@ -154,11 +154,16 @@ class GridBlock {
 
     // Writes one slot: all members of `entry` except its position, and the given position, handle and extent.
     void put(uint32_t slot, const GridEntry& entry, Vec3d position, uint32_t handle, float extent) const {
+      extent_[slot] = extent;
+      handles_[slot] = handle;
+      put_entry(slot, entry, position);
+    }
+    // Writes the entry and the float columns of the position of a slot: all members of `entry` except its position, and
+    // the given position.
+    void put_entry(uint32_t slot, const GridEntry& entry, Vec3d position) const {
       x_[slot] = static_cast<float>(position.x - center_.x);
       y_[slot] = static_cast<float>(position.y - center_.y);
       z_[slot] = static_cast<float>(position.z - center_.z);
-      extent_[slot] = extent;
-      handles_[slot] = handle;
       entries_[slot] = entry;
       entries_[slot].position = position;
     }
@@ -175,6 +180,10 @@ class GridBlock {
     LOCUS_DCHECK_LT(slot, count_);
     forms_[slot] = form;
   }
+
+  // Copies `count` values of `from`, which has the same brick, to the slots from `to` on: all members except those
+  // that Places::put_entry() writes.
+  void copy_values(const GridBlock& from, uint32_t begin, uint32_t to, uint32_t count);
 
   // Checks the cell offsets and the padding of the float columns. Precondition: the block is a sorted block, not a log,
   // and all its slots have been written. O(cells).

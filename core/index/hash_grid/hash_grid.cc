@@ -233,15 +233,30 @@ void HashGrid::rebuild_bricks(const GridMoves& moves) {
   builder_.begin({moves, arrivals_}, slots_);
   for (size_t i = 0; i < touched_.size(); ++i) {
     prefetch_changes(i);
-    const uint32_t brick = touched_[i];
-    const internal::Brick* const old = bricks_[brick].get();
-    const BrickGeometry& geometry = brick_info_[brick].geometry;
-    if (i < gathered_.size() && gathered_[i].is_gathered) {
-      replace_brick(brick, builder_.build(old, geometry, brick, gathered_[i].sources, changes_of(i)));
-    } else {
-      replace_brick(brick, builder_.apply(old, geometry, brick, changes_of(i)));
-    }
+    replace_brick(touched_[i], next_version(i));
   }
+}
+
+// Returns the next version of the brick touched_[touched], or null if no value remains in it.
+internal::BrickPtr HashGrid::next_version(size_t touched) {
+  const uint32_t brick = touched_[touched];
+  const internal::Brick* const old = bricks_[brick].get();
+  const BrickGeometry& geometry = brick_info_[brick].geometry;
+  const GatheredBrick gathered = touched < gathered_.size() ? gathered_[touched] : GatheredBrick();
+  const size_t count = gathered.end - gathered.begin;
+  switch (gathered.how) {
+    case GatheredBrick::How::kSources:
+      return builder_.build(old, geometry, brick, absl::MakeConstSpan(sources_).subspan(gathered.begin, count),
+                            changes_of(touched));
+    case GatheredBrick::How::kMoves: {
+      const auto moves = absl::MakeConstSpan(moves_by_slot_).subspan(gathered.first_move, old->sorted->count());
+      const auto cell_changes = absl::MakeConstSpan(cell_changes_).subspan(gathered.begin, count);
+      return builder_.rebuild(*old, geometry, brick, {moves, cell_changes}, changes_of(touched));
+    }
+    case GatheredBrick::How::kChanges:
+      break;
+  }
+  return builder_.apply(old, geometry, brick, changes_of(touched));
 }
 
 void HashGrid::replace_brick(uint32_t brick, internal::BrickPtr next) {
@@ -309,6 +324,9 @@ void HashGrid::clear_batch() {
   clear_scratch(arrivals_);
   clear_scratch(gathered_);
   clear_scratch(sources_);
+  clear_scratch(moves_by_slot_);
+  clear_scratch(cell_changes_);
+  clear_scratch(cells_);
   builder_.end();
 }
 
@@ -323,10 +341,9 @@ bool HashGrid::moves_at_least_half(const GridBatch& batch) const {
 // are adjacent in memory, so the moves need not be grouped by brick.
 void HashGrid::gather_all(const GridMoves& moves) {
   const internal::MoveFinder finder(moves);
+  moves_by_slot_.reserve(size_);
   const auto bricks =
       static_cast<uint32_t>(brick_info_.size());  // bricks that insert_moved() creates later hold arrivals only
-  sources_.resize(size_);
-  internal::BrickSource* next = sources_.data();
   for (uint32_t index = 0; index < bricks; ++index) {
     const internal::Brick* const brick = bricks_[index].get();
     if (brick == nullptr) continue;
@@ -336,16 +353,40 @@ void HashGrid::gather_all(const GridMoves& moves) {
       --size_;
       insert_moved(block.item(slot), move, moves);
     };
-    size_t moved = 0;
-    internal::BrickSource* const end = internal::gather_brick(*brick, finder, next, moved, leave);
-    LOCUS_DCHECK_LE(end, sources_.data() + sources_.size());
-    if (moved == 0) continue;
+    GatheredBrick gathered;
+    if (gather(*brick, finder, moves.rotations.empty(), gathered, leave) == 0) continue;
     const uint32_t touched = touch(index);
     if (gathered_.size() <= touched) gathered_.resize(touched + 1);
-    gathered_[touched] = {true, absl::MakeConstSpan(next, static_cast<size_t>(end - next))};
-    next = end;
+    gathered_[touched] = gathered;
   }
   gathered_.resize(touched_.size());
+}
+
+// Finds the moves of the values of one brick. Calls leave(block, slot, move) for each value that moves out of the
+// brick. Returns the number of values that move. `keeps_rotations` is true if the batch sets no rotation.
+template <class Leave>
+size_t HashGrid::gather(const internal::Brick& brick, const internal::MoveFinder& finder, bool keeps_rotations,
+                        GatheredBrick& gathered, const Leave& leave) {
+  if (keeps_rotations && brick.dead_count == 0 && brick.recent_count == 0) {
+    gathered = {GatheredBrick::How::kMoves, cell_changes_.size(), 0, moves_by_slot_.size()};
+    const uint32_t count = brick.sorted->count();
+    cells_.resize(std::max(cells_.size(), size_t{count} + internal::kCellsPerStore));
+    internal::write_cells(*brick.sorted, cells_.data());
+    moves_by_slot_.resize(gathered.first_move + count);
+    const size_t moved = internal::find_moves(brick, cells_.data(), finder, moves_by_slot_.data() + gathered.first_move,
+                                              cell_changes_, leave);
+    if (moved == 0) moves_by_slot_.resize(gathered.first_move);
+    gathered.end = cell_changes_.size();
+    return moved;
+  }
+  gathered = {GatheredBrick::How::kSources, sources_.size(), 0, 0};
+  sources_.resize(gathered.begin + brick.size());
+  size_t moved = 0;
+  const internal::BrickSource* const end =
+      internal::gather_brick(brick, finder, sources_.data() + gathered.begin, moved, leave);
+  gathered.end = moved == 0 ? gathered.begin : static_cast<size_t>(end - sources_.data());
+  sources_.resize(gathered.end);
+  return moved;
 }
 
 size_t HashGrid::apply(const GridBatch& batch) {

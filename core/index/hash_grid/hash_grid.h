@@ -109,6 +109,16 @@ class HashGrid {
     Level* level = nullptr;
   };
 
+  // Result of gather_all() for one brick: the values that stay in the brick. Values that the current batch moves to
+  // another brick are not included.
+  struct GatheredBrick {
+    enum class How : uint8_t { kChanges, kSources, kMoves };
+
+    How how = How::kChanges;    // what the next version is made from; the other members are unused if kChanges
+    size_t begin = 0, end = 0;  // range of the values that stay in sources_ or, if kMoves, of cell_changes_
+    size_t first_move = 0;      // if kMoves: index in moves_by_slot_ of the move of slot 0
+  };
+
   void remove(uint32_t handle);
   void move_to_other_brick(const GridMove& move, const GridMoves& moves);
   void insert_moved(const GridItem& before, const GridMove& move, const GridMoves& moves);
@@ -135,6 +145,10 @@ class HashGrid {
   void apply_to_bricks(const GridBatch& batch);
   bool moves_at_least_half(const GridBatch& batch) const;
   void gather_all(const GridMoves& moves);
+  template <class Leave>
+  size_t gather(const internal::Brick& brick, const internal::MoveFinder& finder, bool keeps_rotations,
+                GatheredBrick& gathered, const Leave& leave);
+  internal::BrickPtr next_version(size_t touched);
   bool choice_is_stale() const;
   void choose_cell_size();
   void start_refiling(internal::DensityMap density);
@@ -180,14 +194,11 @@ class HashGrid {
   std::vector<internal::BrickChange> grouped_;  // changes, grouped by brick in the order of touched_
   std::vector<GridItem> arrivals_;
   internal::BrickBuilder builder_;
-  // Result of gather_all() for one brick: the values that stay in the brick. Values that the current batch moves to
-  // another brick are not included.
-  struct GatheredBrick {
-    bool is_gathered = false;  // false: `sources` is unused, and the next version is made from the changes
-    absl::Span<const internal::BrickSource> sources;
-  };
   std::vector<GatheredBrick> gathered_;  // for each brick in touched_, at the same index
   std::vector<internal::BrickSource> sources_;
+  std::vector<uint32_t> moves_by_slot_;  // BlockMoves::moves of all bricks
+  std::vector<internal::CellChange> cell_changes_;
+  std::vector<uint8_t> cells_;  // present cells of the slots of one brick
 };
 
 }  // namespace locus

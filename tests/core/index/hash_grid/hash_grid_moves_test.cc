@@ -26,11 +26,17 @@ std::vector<Object> crowd(size_t count, double half, Random& random, bool with_f
   return objects;
 }
 
+// Forms of a crowd's objects: only balls, which have the default form; also boxes; also boxes whose moves set
+// rotations.
+enum class Forms { kBalls, kBoxes, kTurningBoxes };
+
 // ObjectStore and a list of the objects that the store must contain.
 class Crowd {
  public:
-  Crowd(size_t count, bool with_forms, uint64_t seed)
-      : random_(seed), objects_(crowd(count, kHalf, random_, with_forms)), rotates_(with_forms) {
+  Crowd(size_t count, Forms forms, uint64_t seed)
+      : random_(seed),
+        objects_(crowd(count, kHalf, random_, forms != Forms::kBalls)),
+        rotates_(forms == Forms::kTurningBoxes) {
     store_.apply({}, objects_);
   }
 
@@ -105,7 +111,7 @@ void expect_finds(const ObjectSet& set, const std::vector<Object>& objects, Rand
   }
 }
 
-class HashGridMovesTest : public ::testing::TestWithParam<bool> {};
+class HashGridMovesTest : public ::testing::TestWithParam<Forms> {};
 
 TEST_P(HashGridMovesTest, QueriesEqualTheModelAfterMovesOfAnyShareAndSnapshotsStayUnchanged) {
   Crowd crowd(4'000, GetParam(), 3);
@@ -125,8 +131,12 @@ TEST_P(HashGridMovesTest, QueriesEqualTheModelAfterMovesOfAnyShareAndSnapshotsSt
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Forms, HashGridMovesTest, ::testing::Bool(),
-                         [](const auto& test) { return test.param ? "Any" : "BallsOnly"; });
+INSTANTIATE_TEST_SUITE_P(Forms, HashGridMovesTest,
+                         ::testing::Values(Forms::kBalls, Forms::kBoxes, Forms::kTurningBoxes), [](const auto& test) {
+                           return test.param == Forms::kBalls   ? "BallsOnly"
+                                  : test.param == Forms::kBoxes ? "Boxes"
+                                                                : "TurningBoxes";
+                         });
 
 // A batch of few moves appends to a log that several versions of a brick share: the writer appends while readers read
 // earlier versions.
@@ -135,7 +145,7 @@ TEST(HashGridMovesThreadsTest, ReadersSeeTheirVersionWhileTheWriterAppendsToTheS
     ObjectSet set;
     std::vector<Object> objects;
   };
-  Crowd crowd(2'000, false, 4);
+  Crowd crowd(2'000, Forms::kBalls, 4);
   Mutex mutex;
   auto published = std::make_shared<const Version>(Version{crowd.snapshot(), crowd.objects()});
   const auto latest = [&] {
