@@ -98,6 +98,18 @@ def message(body, compressed=False):
     return struct.pack(">BI", compressed, len(body)) + body
 
 
+def messages(body):
+    """Returns the complete messages among the bytes of a reply."""
+    found, at = [], 0
+    while len(body) - at >= 5:
+        end = at + 5 + int.from_bytes(body[at + 1:at + 5], "big")
+        if end > len(body):
+            break
+        found.append(bytes(body[at + 5:end]))
+        at = end
+    return found
+
+
 def on_streams(template, offsets, first, count):
     """Returns `count` copies of `template`. In copy i, the stream id first + 2 i is written at each of `offsets`."""
     block, size = bytearray(template * count), len(template)

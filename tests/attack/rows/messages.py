@@ -1,19 +1,22 @@
-"""Attacks by messages: small messages that become large when they are inflated or parsed, and many messages that are
-never completed.
+"""Attacks by messages: small messages that become large when they are inflated or parsed, and many messages or
+revisions that are never completed.
 """
 import functools
 import struct
+import time
 import zlib
 
 import protobuf
 import wire
-from job import Attack, one
+from job import STRANGER, Attack, one
 
 MIB = 1 << 20
 LARGEST = 32 * MIB - 64
 REFUSED = ("UNIMPLEMENTED", "RESOURCE_EXHAUSTED", "INVALID_ARGUMENT")
 HOT = ("/locus.v1.UpdateService/ApplyUpdates", "/locus.v1.UpdateService/StreamUpdates", "/locus.v1.QueryService/Query",
        "/locus.v1.QueryService/StreamQueries", "/locus.v1.QueryService/Step")
+PENDING, CONTINUES, REMOVE_IDS = 8, 17, 4  # fields of UpdateAck and UpdateBatch
+HELD_STREAMS, STREAMS_A_HOLDER, HELD_TOGETHER = 256, 32, 256
 GZIPPED = (HOT[0], HOT[3], "/locus.v1.SceneService/CreateScene")
 
 
@@ -110,6 +113,52 @@ def unfinished_messages(job):
             connection.step(job.until)
 
 
+def is_pending(answer):
+    """Returns whether an answer of StreamUpdates is the ack of a held message."""
+    return answer[9:] == protobuf.delimited(2, protobuf.number(PENDING, 1))  # after the sequence number
+
+
+def held_updates(job, batch, count):
+    """Sends `count` messages with `continues` on each of many streams and never the last message of their revisions,
+    while another client makes honest calls. Messages beyond a limit must be refused, and queries must be answered.
+    """
+    holders, query = [], protobuf.query(b"world", protobuf.rays(16))
+    pieces = [b"".join(wire.message(protobuf.stream_message(b"world", sequence, batch))
+                       for sequence in range(first, min(first + HELD_TOGETHER, count + 1)))
+              for first in range(1, count + 1, HELD_TOGETHER)]
+    try:
+        with job.connect() as other:
+            for i in range(HELD_STREAMS):
+                if job.over():
+                    break
+                if i % STREAMS_A_HOLDER == 0:
+                    holders.append(job.connect())
+                stream = holders[-1].start(HOT[1])
+                for piece in pieces:
+                    holders[-1].write(stream, piece, end=False, until=job.until)
+                job.check(other.call(HOT[2], query), "a query beside held messages", ("OK",))
+            while not job.over():
+                for holder in holders:
+                    holder.step(min(job.until, time.monotonic() + 0.01))
+                job.check(other.call(HOT[2], query), "a query beside held messages", ("OK",))
+        answers = [answer for holder in holders for body in holder.bodies.values() for answer in wire.messages(body)]
+        held = sum(is_pending(answer) for answer in answers)
+        job.count("HELD", held)
+        job.count("REFUSED", len(answers) - held)
+        if not held and job.front != STRANGER:
+            job.wrong("no message was held")
+    finally:
+        for holder in holders:
+            holder.close()
+
+
+def held_steps(job):
+    continues = protobuf.number(CONTINUES, 1)
+    cases = (("inserts", protobuf.insert_balls(1, 20_000), 12),
+             ("removes", protobuf.fixed64s(REMOVE_IDS, range(1, 80_001)), 13), ("empty messages", b"", 4095))
+    return [(name, functools.partial(held_updates, batch=batch + continues, count=count)) for name, batch, count in cases]
+
+
 ROWS = [
     Attack("gzip", "messages", gzip_steps, "compressed messages of 2 MB that inflate to 2 GB and less", "13 messages"),
     # With --accept-compression, parsing a message takes up to 0.1 s on an IO loop, so a larger `slower` is allowed.
@@ -120,4 +169,6 @@ ROWS = [
            "32 MiB a message, one at a time"),
     Attack("unfinished", "messages", one(unfinished_messages), "messages of 32 MiB whose last MiB never comes",
            "96 streams, 3 GiB"),
+    Attack("held-updates", "messages", held_steps, "messages of revisions whose last message never comes",
+           "256 streams, 2 GB"),
 ]
