@@ -26,6 +26,11 @@ QueryBuilder& QueryBuilder::explain() {
   return *this;
 }
 
+QueryBuilder& QueryBuilder::by_list() {
+  batch_.set_by_list(true);
+  return *this;
+}
+
 QueryBuilder& QueryBuilder::max_reply_bytes(uint32_t bytes) {
   batch_.set_max_reply_bytes(bytes);
   return *this;

@@ -25,6 +25,9 @@ class QueryBuilder {
   QueryBuilder& max_work(uint64_t work);
   // Requests a report of the work done for the batch.
   QueryBuilder& explain();
+  // Tests every triangle and object instead of searching the structures of the scene. The result blocks have the same
+  // bytes, so that a caller can verify the server's answers, but cost far more time and work.
+  QueryBuilder& by_list();
   // Sets the maximum size of the reply in bytes; 0 = the default of 4,000,000.
   QueryBuilder& max_reply_bytes(uint32_t bytes);
 

@@ -16,7 +16,10 @@ constexpr double kBlockNanoseconds = 500;
 constexpr std::array<double, 15> kFirstGuess = {300,  200,  1000, 1000, 1000, 2000,       100,   20'000,
                                                 5000, 2000, 5000, 200,  1000, 50'000'000, 20'000};
 static_assert(kFirstGuess.size() == static_cast<size_t>(CostKind::kCell) + 1);
+// Estimated nanoseconds of one test of a query by list before the first measurement.
+constexpr double kFirstGuessOfTest = 5;
 constexpr double kMin = 1, kMax = 1e12;
+constexpr double kMinOfTest = 1e-3;
 constexpr size_t kProbes = 8;
 // A measurement of n queries has the weight n / kForgetQueries in the new estimate, clamped to kMinWeight ..
 // kMaxWeight.
@@ -49,6 +52,12 @@ struct KindOf {
   }
 };
 
+// Returns the number of tests of one query by list. A query of pairs tests all values for each value.
+double tests_of(const QueryBlock& block, CostEstimates::ListValues values) {
+  const auto tests = static_cast<double>(values);
+  return std::holds_alternative<PairColumns>(block.kind) ? tests * tests : tests;
+}
+
 // Returns the number of units of the block's cost: its queries or, for sight, its segments.
 double units_of(const QueryBlock& block) {
   const auto* const sight = std::get_if<SightColumns>(&block.kind);
@@ -68,8 +77,9 @@ double nanoseconds_of(uint64_t entry) { return std::bit_cast<float>(static_cast<
 
 CostKind cost_kind(const QueryBlock& block) { return std::visit(KindOf(), block.kind); }
 
-CostEstimates::Slot CostEstimates::slot_of(uint64_t scene, const QueryBlock& block) {
-  const uint64_t kind = static_cast<uint64_t>(cost_kind(block)) * 4 + static_cast<uint64_t>(block.source);
+CostEstimates::Slot CostEstimates::slot_of(uint64_t scene, const QueryBlock& block, bool by_list) {
+  const uint64_t kind =
+      static_cast<uint64_t>(cost_kind(block)) * 8 + static_cast<uint64_t>(block.source) * 2 + (by_list ? 1 : 0);
   const uint64_t hash = mix(mix(scene) + kind);
   return {hash % kEntries, static_cast<uint32_t>(hash >> 32) | 1u};
 }
@@ -87,30 +97,34 @@ size_t CostEstimates::find(const Slot& slot) const {
   return empty;
 }
 
-double CostEstimates::nanoseconds_a_query(uint64_t scene, const QueryBlock& block) const {
-  const Slot slot = slot_of(scene, block);
+double CostEstimates::nanoseconds_a_query(uint64_t scene, const QueryBlock& block, ListValues values) const {
+  const Slot slot = slot_of(scene, block, values != 0);
   const uint64_t entry = entries_[find(slot)].load(std::memory_order_relaxed);
-  return tag_of(entry) == slot.tag ? nanoseconds_of(entry) : kFirstGuess[static_cast<size_t>(cost_kind(block))];
+  const bool known = tag_of(entry) == slot.tag;
+  if (values != 0) return tests_of(block, values) * (known ? nanoseconds_of(entry) : kFirstGuessOfTest);
+  return known ? nanoseconds_of(entry) : kFirstGuess[static_cast<size_t>(cost_kind(block))];
 }
 
-uint64_t CostEstimates::nanoseconds(uint64_t scene, const QueryBatch& batch) const {
+uint64_t CostEstimates::nanoseconds(uint64_t scene, const QueryBatch& batch, ListValues values) const {
   double sum = 0;
   for (const QueryBlock& block : batch.blocks)
-    sum += kBlockNanoseconds + units_of(block) * nanoseconds_a_query(scene, block);
+    sum += kBlockNanoseconds + units_of(block) * nanoseconds_a_query(scene, block, values);
   return static_cast<uint64_t>(std::min(sum, kMax));
 }
 
-void CostEstimates::learn(uint64_t scene, const QueryBlock& block, uint64_t nanoseconds) {
+void CostEstimates::learn(uint64_t scene, const QueryBlock& block, uint64_t nanoseconds, ListValues values) {
   const double queries = units_of(block);
   if (queries == 0) return;
-  const double seen = std::clamp(static_cast<double>(nanoseconds) / queries, kMin, kMax);
-  const Slot slot = slot_of(scene, block);
+  const double a_query = static_cast<double>(nanoseconds) / queries;
+  const double seen =
+      values == 0 ? std::clamp(a_query, kMin, kMax) : std::clamp(a_query / tests_of(block, values), kMinOfTest, kMax);
+  const Slot slot = slot_of(scene, block, values != 0);
   std::atomic<uint64_t>& at = entries_[find(slot)];
   uint64_t before = at.load(std::memory_order_relaxed);
   const double weight = std::clamp(queries / kForgetQueries, kMinWeight, kMaxWeight);
   const double known = nanoseconds_of(before);
   const double now = tag_of(before) == slot.tag ? known + (seen - known) * weight : seen;
-  LOCUS_DCHECK(kMin / 2 <= now && now <= 2 * kMax);
+  LOCUS_DCHECK(kMinOfTest / 2 <= now && now <= 2 * kMax);
   at.compare_exchange_strong(before, packed(slot.tag, now), std::memory_order_relaxed);
 }
 

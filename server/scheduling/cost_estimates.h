@@ -1,6 +1,9 @@
 // Estimated cost of a query by scene, kind and QueryBlock::source, in nanoseconds of one thread, learned from finished
 // work. Estimates decide where and when a batch runs and whether it is admitted; they never change an answer.
 //
+// Queries by list, which test every value of the scene, have estimates of their own: nanoseconds of one test. So an
+// estimate still holds after the scene has grown.
+//
 // Threads: every member may be called from any thread, and no member takes a lock. If two threads call learn() at the
 // same time, one of their measurements may be lost. Memory is fixed: a new estimate may overwrite the entry of another
 // estimate, which then has its default value until learn() is called for it again.
@@ -39,16 +42,19 @@ class CostEstimates {
  public:
   static constexpr size_t kEntries = 16384;
 
+  // Number of values that each query tests; 0: the query searches the structures.
+  using ListValues = uint64_t;
+
   // Returns the estimate for one query of the block; for sight, for one segment from an eye to a sample. `scene` is any
   // number that identifies the scene, such as its epoch.
-  double nanoseconds_a_query(uint64_t scene, const QueryBlock& block) const;
+  double nanoseconds_a_query(uint64_t scene, const QueryBlock& block, ListValues values = 0) const;
 
   // Returns the estimate for a whole batch.
-  uint64_t nanoseconds(uint64_t scene, const QueryBatch& batch) const;
+  uint64_t nanoseconds(uint64_t scene, const QueryBatch& batch, ListValues values = 0) const;
 
   // Updates the estimate from a measurement: all queries of the block took `nanoseconds` together. The weight of the
   // measurement grows with the number of queries.
-  void learn(uint64_t scene, const QueryBlock& block, uint64_t nanoseconds);
+  void learn(uint64_t scene, const QueryBlock& block, uint64_t nanoseconds, ListValues values = 0);
 
  private:
   // Position of an estimate in the hash table: the first entry to search, and the tag that marks the estimate.
@@ -56,7 +62,7 @@ class CostEstimates {
     size_t first;
     uint32_t tag;
   };
-  static Slot slot_of(uint64_t scene, const QueryBlock& block);
+  static Slot slot_of(uint64_t scene, const QueryBlock& block, bool by_list);
   // Returns the index of the slot's entry. If the slot has no entry, returns the index of the entry that learn() may
   // replace; the caller recognizes this case because the entry has another tag than the slot.
   size_t find(const Slot& slot) const;

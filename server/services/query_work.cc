@@ -88,6 +88,12 @@ double QueryWork::queries() const {
   return queries;
 }
 
+CostEstimates::ListValues QueryWork::list_values() const {
+  if (!message_->by_list()) return 0;
+  const SceneSnapshot& snapshot = **pin_;
+  return 1 + snapshot.statics->triangle_count() + snapshot.objects.size();
+}
+
 void QueryWork::cancel() {
   slot_.caller().give_back_quota(QuotaKind::kQueries, queries());
   drop();
@@ -193,12 +199,13 @@ void QueryWork::run() {
   // estimates of work, and later batches would be queued needlessly.
   options.work_clock = &thread_nanoseconds;
   options.clock = &steady_nanoseconds;
+  options.brute_force = message_->by_list();
   columns_.emplace(*result_, batch_.blocks.size());
   absl::StatusOr<std::unique_ptr<BatchRun>> run = BatchRun::prepare(**pin_, batch_, std::move(options), *columns_);
   if (!run.ok()) return answer(run.status());
   run_ = *std::move(run);
   if (absl::Status status = claim_instances(); !status.ok()) return answer(std::move(status));
-  const uint64_t cost = host_.costs.nanoseconds((*pin_)->epoch, batch_);
+  const uint64_t cost = host_.costs.nanoseconds((*pin_)->epoch, batch_, list_values());
   if (!host_.scheduler.runs_inline(cost)) return submit(cost);
   change({State::kReading}, State::kDeferred);
   slot_.io().defer(*this, cost < kShortNanoseconds ? TaskLength::kShort : TaskLength::kLong);
@@ -241,7 +248,7 @@ void QueryWork::finished(bool) {
 }
 
 void QueryWork::learn(const QueryBlock& block, const QueryCost& cost) {
-  host_.costs.learn((*pin_)->epoch, block, cost.nanoseconds);
+  host_.costs.learn((*pin_)->epoch, block, cost.nanoseconds, list_values());
   host_.metrics.record_block(block_kind(block), query_count(block), cost.nanoseconds, cost.work);
 }
 

@@ -95,6 +95,8 @@ class QueryWork final : private QueryJob, private DeferredTask {
   absl::Status take_quotas() const;
   // Returns the number of queries of the batch, as an amount of a quota.
   double queries() const;
+  // Returns the number of values that each query of a batch by_list tests; 0 for other batches. Precondition: pinned.
+  CostEstimates::ListValues list_values() const;
   // Refuses a view that could not contain the update of a step.
   absl::Status check_step_view() const;
   void begin_reading(const v1::QueryBatch& batch, v1::QueryResult& result);

@@ -57,6 +57,7 @@ void add_view_options(CLI::App& command, QueryOptions& options) {
   command.add_option("--epoch", options.epoch, "Epoch of the revision")->type_name("EPOCH");
   command.add_option("--max-work", options.max_work, "Budget in nodes, cells and tests [none]")->type_name("WORK");
   command.add_flag("--explain", options.explain, "Report the work done");
+  command.add_flag("--by-list", options.by_list, "Test every value, without the scene's structures: same rows, slower");
 }
 
 }  // namespace
@@ -121,6 +122,7 @@ void apply_to_batch(const QueryOptions& options, const Context& context, client:
   if (options.exactly) builder.exactly({options.epoch.value, *options.exactly});
   builder.max_work(options.max_work);
   if (options.explain) builder.explain();
+  if (options.by_list) builder.by_list();
 }
 
 FramedPositions framed(const std::vector<Triple>& positions) {

@@ -37,6 +37,7 @@ struct QueryOptions {
   Number64 epoch;
   uint64_t max_work = 0;
   bool explain = false;
+  bool by_list = false;
 };
 
 // Adds the argument SCENE and the options shared by all queries.
@@ -64,7 +65,7 @@ absl::Status check(const QueryOptions& options);
 // revision of the last acknowledged change. Does nothing if no change was acknowledged.
 void see_own(const std::string& scene, const Context& context, client::QueryBuilder& builder);
 
-// Sets the batch's revision, work budget and explain flag from the options. Without --at-least and --exactly, calls
+// Sets the batch's revision, work budget and flags from the options. Without --at-least and --exactly, calls
 // see_own().
 void apply_to_batch(const QueryOptions& options, const Context& context, client::QueryBuilder& builder);
 

@@ -428,9 +428,14 @@ local function with_id(columns)
 end
 
 -- Sends the batch and returns the answers in the order of the queries, and the protocol's result. `view` asks for a
--- revision: { at_least = N } or { exactly = N }. The builder is empty afterwards.
-function Queries:run(view)
+-- revision: { at_least = N } or { exactly = N }. `options` are further fields of the protocol's QueryBatch, such as
+-- { by_list = true } or { explain = true }. The builder is empty afterwards.
+function Queries:run(view, options)
   local batch, answers_in = self:take(view)
+  for name, value in pairs(options or {}) do
+    if batch[name] ~= nil then locus.fail("run: the option " .. name .. " is part of the batch") end
+    batch[name] = value
+  end
   local result = self.scene:query(batch)
   return answers_in(result), result
 end

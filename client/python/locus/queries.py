@@ -137,6 +137,8 @@ class QueryBatch:
     the server still retains it. By default the batch is answered at the latest revision. If the epoch of the given
     revision differs from the scene's epoch, the query raises LocusError with Reason.SCENE_RESTARTED. `max_work`:
     maximum total number of visited nodes and cells and of tests for the batch; `explain`: report the work done;
+    `by_list`: test every triangle and object instead of searching the scene's structures, which gives the same result
+    blocks, byte for byte, at a far higher cost, to verify the answers of a server;
     `max_reply_bytes`: the maximum size of the answer, 0 = 4,000,000. The attribute `waits_for` is the number of the
     minimum revision; None if the batch waits for none.
 
@@ -146,7 +148,7 @@ class QueryBatch:
     """
 
     def __init__(self, *, at_least: Optional[Revision] = None, exactly: Optional[Revision] = None, max_work: int = 0,
-                 explain: bool = False, max_reply_bytes: int = 0) -> None:
+                 explain: bool = False, max_reply_bytes: int = 0, by_list: bool = False) -> None:
         if at_least is not None and exactly is not None:
             raise ValueError("give at_least or exactly, not both")
         self._parts = wire.Parts()
@@ -163,6 +165,8 @@ class QueryBatch:
             self._parts.add_varint(_BATCH["explain"], 1)
         if max_reply_bytes:
             self._parts.add_fixed32(_BATCH["max_reply_bytes"], max_reply_bytes)
+        if by_list:
+            self._parts.add_varint(_BATCH["by_list"], 1)
         self._blocks = 0
 
     def rays(self, origins: ColumnLike, directions: ColumnLike, *, t_max: ColumnLike = None,

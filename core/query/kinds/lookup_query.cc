@@ -8,9 +8,31 @@ namespace {
 // Cost of finding an object through the list of its group, in visits of a scan of all objects.
 constexpr size_t kListedCost = 8;
 
+// Looks up an id by a scan of all objects and instances.
+Hit scan_for(QueryTask& task, const SceneAtTime& moment, Id id) {
+  Hit found;
+  const auto is_last = [&](Id tested) {
+    ++task.work().tests;
+    return tested == id || !task.count_test();
+  };
+  moment.objects().grid().for_each([&](const GridRef& object) {
+    const bool last = is_last(object.entry().id);
+    if (object.entry().id == id) found = hit_on(object, 0, moment);
+    return !last;
+  });
+  if (found.id == id) return found;
+  for (const Instance& instance : moment.statics().tree().values()) {
+    const bool last = is_last(instance.id);
+    if (instance.id == id) return hit_on(instance, 0);
+    if (last) break;
+  }
+  return {};
+}
+
 }  // namespace
 
-Hit look_up(const SceneAtTime& moment, Id id) {
+Hit look_up(QueryTask& task, const SceneAtTime& moment, Id id) {
+  if (task.brute_force()) return scan_for(task, moment, id);
   if (const GridRef object = moment.objects().find_ref(id)) return hit_on(object, 0, moment);
   if (const Instance* instance = moment.statics().find(id)) return hit_on(*instance, 0);
   return {};
@@ -36,7 +58,7 @@ absl::flat_hash_map<Group, OverlapAnswer> look_up_groups(QueryTask& task, const 
   };
   size_t members = 0;
   for (const auto& [group, lowest] : rows) members += objects.count_in(group);
-  if (members * kListedCost >= objects.size()) {
+  if (task.brute_force() || members * kListedCost >= objects.size()) {
     objects.grid().for_each(visit);
   } else {
     for (const auto& [group, lowest] : rows)

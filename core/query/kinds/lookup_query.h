@@ -8,14 +8,14 @@
 
 namespace locus {
 
-// Returns a hit with t = 0 on the object or instance of `moment` with this id. Returns a miss if the id is unknown. The
-// hit borrows from `moment`.
-Hit look_up(const SceneAtTime& moment, Id id);
+// Returns a hit with t = 0 on the object or instance of `moment` with this id. Returns a miss if the id is unknown, or
+// if a task with brute force ends before it has found the value. The hit borrows from `moment`.
+Hit look_up(QueryTask& task, const SceneAtTime& moment, Id id);
 
 // Returns, for each group, one row for each object at `moment` and each instance that belongs to the group. The ids
 // of the rows are above options.after_id and ascending; each group has at most options.max_results rows. A group that
 // occurs several times in `groups` has one entry in the result. Cost: O(instances), plus O(objects of the groups) or,
-// if that is less, O(all objects).
+// if that is less or the task uses brute force, O(all objects).
 absl::flat_hash_map<Group, OverlapAnswer> look_up_groups(QueryTask& task, const SceneAtTime& moment,
                                                          absl::Span<const uint64_t> groups,
                                                          const OverlapOptions& options);

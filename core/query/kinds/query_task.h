@@ -162,6 +162,8 @@ class QueryTask {
 
   // Returns whether ball, box, contains, nearest and pair queries may use the vector kernels.
   bool uses_kernels() const { return !brute_force_; }
+  // Returns whether lookups test all values instead of using the tables of ids and groups.
+  bool brute_force() const { return brute_force_; }
 
   // Call the visitor for every value of `index` that may match the query: the values that the index structure finds,
   // or, with brute force, all values.
@@ -206,7 +208,7 @@ class QueryTask {
   void visit_objects_on_ray(const SceneAtTime& moment, const SlabRay<double>& slabs, Visitor& visitor) {
     const auto visit = [&visitor](const GridRef& object) { return visitor.visit(object); };
     if (brute_force_)
-      moment.objects().grid().for_each(visit);
+      visit_all_objects(moment, visit);
     else
       moment.visit_ray(
           slabs, [&visitor] { return std::as_const(visitor).limit(); }, work_, visit);
@@ -215,7 +217,7 @@ class QueryTask {
   void visit_objects_near(const SceneAtTime& moment, const Vec3d& point, Visitor& visitor) {
     const auto visit = [&visitor](const GridRef& object) { return visitor.visit(object); };
     if (brute_force_)
-      moment.objects().grid().for_each(visit);
+      visit_all_objects(moment, visit);
     else
       moment.visit_nearest(
           point, [&visitor] { return std::as_const(visitor).limit(); }, work_, visit);
@@ -223,10 +225,7 @@ class QueryTask {
   template <class Visitor>
   void visit_objects_in_region(const SceneAtTime& moment, Visitor& visitor) {
     const auto visit = [&visitor](const GridRef& object) { return visitor.visit(object); };
-    if (brute_force_) {
-      moment.objects().grid().for_each(visit);
-      return;
-    }
+    if (brute_force_) return visit_all_objects(moment, visit);
     const Aabbd bounds = std::as_const(visitor).bounds();
     const auto search = [&](const auto& visit_one) {
       if (walk_) return walk_->visit(work_, visit_one);
@@ -244,15 +243,29 @@ class QueryTask {
   }
 
  private:
+  // Call the visitor for every value, and count a test of each, as the index structures do.
   template <class Value, class Visitor>
-  static void visit_all(const Bvh<Value>& index, Visitor& visitor) {
-    for (const Value& value : index.values())
+  void visit_all(const Bvh<Value>& index, Visitor& visitor) {
+    for (const Value& value : index.values()) {
+      ++work_.tests;
       if (!visitor.visit(value)) return;
+    }
   }
   template <class Index, class Visitor>
-  static void visit_all(const Index& index, Visitor& visitor) {
+  void visit_all(const Index& index, Visitor& visitor) {
     bool more = true;
-    index.for_each([&](const auto& value) { more = more && visitor.visit(value); });
+    index.for_each([&](const auto& value) {
+      if (!more) return;
+      ++work_.tests;
+      more = visitor.visit(value);
+    });
+  }
+  template <class Visit>
+  void visit_all_objects(const SceneAtTime& moment, const Visit& visit) {
+    moment.objects().grid().for_each([&](const GridRef& object) {
+      ++work_.tests;
+      return visit(object);
+    });
   }
 
   const SceneSnapshot& snapshot_;

@@ -48,8 +48,8 @@ struct RunOptions {
   // only about twice for each block on which the call works. If `work_clock` is empty, `clock` is used instead; if
   // both clocks are empty, all times are 0.
   std::function<uint64_t()> work_clock;
-  // Makes queries test every value instead of searching the index structures. Used to verify the index structures: the
-  // results must be the same, and only the cost may differ.
+  // Makes queries test every value instead of searching the index structures, vector kernels and tables. Used to verify
+  // them: the results must be the same, and only the cost may differ.
   bool brute_force = false;
 };
 

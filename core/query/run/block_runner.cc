@@ -100,8 +100,8 @@ size_t BlockRunner::run_queries(const Columns& columns, size_t begin, size_t end
   for (size_t i = begin; i < end; ++i) {
     if (i != begin && should_split()) return i;
     // After the end of the batch no search begins, but lookups are still answered: they need no search, except the one
-    // that look_up_groups_at() may already have done for all groups of the block.
-    const bool searches = !std::is_same_v<Columns, LookupColumns>;
+    // that look_up_groups_at() may already have done for all groups of the block. With brute force they do search.
+    const bool searches = !std::is_same_v<Columns, LookupColumns> || task_.brute_force();
     if (origins_.is_unanchored(i) || (searches && task_.ended()))
       write_nothing(i);
     else
@@ -369,7 +369,7 @@ void BlockRunner::look_up_groups_at(const LookupColumns& lookup, size_t i) {
 }
 
 void BlockRunner::run_query(const LookupColumns& lookup, size_t i) {
-  if (lookup.groups.empty()) return write_row(look_up(times_.of(i), lookup.ids[i]), output_.rows, i);
+  if (lookup.groups.empty()) return write_row(look_up(task_, times_.of(i), lookup.ids[i]), output_.rows, i);
   look_up_groups_at(lookup, i);
   const OverlapAnswer& answer = groups_[lookup.groups[i]];
   append_rows(answer, i);

@@ -263,11 +263,12 @@ TEST(QueryBuilderTest, PairsCellsAndPointsToContain) {
 
 TEST(QueryBuilderTest, ViewsNameEpochAndRevision) {
   QueryBuilder builder;
-  const v1::QueryBatch later = builder.at_least({4, 12}).max_work(3).explain().max_reply_bytes(5).build();
+  const v1::QueryBatch later = builder.at_least({4, 12}).max_work(3).explain().by_list().max_reply_bytes(5).build();
   EXPECT_EQ(later.view().at_least(), 12u);
   EXPECT_EQ(later.view().epoch(), 4u);
   EXPECT_EQ(later.max_work(), 3u);
   EXPECT_TRUE(later.explain());
+  EXPECT_TRUE(later.by_list());
   EXPECT_EQ(later.max_reply_bytes(), 5u);
   EXPECT_EQ(builder.exactly({4, 13}).build().view().exactly(), 13u);
   EXPECT_FALSE(builder.build().has_view());

@@ -81,6 +81,25 @@ TEST_F(CostEstimatesTest, TheEstimateOfABatchIsTheSumOfItsBlocks) {
   EXPECT_NEAR(static_cast<double>(costs_->nanoseconds(1, batch)), 100 * 100 + 10 * 900, 2000);
 }
 
+TEST_F(CostEstimatesTest, QueriesByListCostEveryValue) {
+  const double searched = costs_->nanoseconds_a_query(1, rays(1));
+  EXPECT_GE(costs_->nanoseconds_a_query(1, rays(1), 1'000'000), 1'000'000) << "the first guess";
+  costs_->learn(1, rays(10), 10 * 3'000, 1'000);
+  EXPECT_NEAR(costs_->nanoseconds_a_query(1, rays(1), 1'000), 3'000, 1);
+  EXPECT_NEAR(costs_->nanoseconds_a_query(1, rays(1), 50'000), 150'000, 50) << "the scene has grown";
+  EXPECT_EQ(costs_->nanoseconds_a_query(1, rays(1)), searched) << "searches have estimates of their own";
+  QueryBatch batch;
+  batch.blocks = {rays(100)};
+  EXPECT_NEAR(static_cast<double>(costs_->nanoseconds(1, batch, 1'000)), 300'000, 1'000);
+}
+
+TEST_F(CostEstimatesTest, PairsByListTestEachValueForEachValue) {
+  const QueryBlock pairs = block_of(PairColumns());
+  costs_->learn(1, pairs, 2'000'000, 1'000);
+  EXPECT_NEAR(costs_->nanoseconds_a_query(1, pairs, 1'000), 2'000'000, 1'000);
+  EXPECT_NEAR(costs_->nanoseconds_a_query(1, pairs, 2'000), 8'000'000, 4'000);
+}
+
 TEST_F(CostEstimatesTest, ABlockWithoutQueriesChangesNoEstimate) {
   const double before = costs_->nanoseconds_a_query(1, rays(1));
   costs_->learn(1, rays(0), 1'000'000);

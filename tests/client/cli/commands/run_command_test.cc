@@ -532,6 +532,27 @@ locus.expect_equal(answers[2].truncated, nil)
   EXPECT_EQ(outcome.code, ExitCode::kOk) << outcome.err;
 }
 
+TEST_F(RunCommandTest, QueriesByListFindTheSameAndDoMoreWork) {
+  const Outcome outcome = run_lua(R"(
+local list = locus.scene("by-list")
+list:create()
+local updates = list:updates()
+for id = 1, 200 do updates:insert{ id = id, at = { 3 * id, 0, 0 }, ball = 1 } end
+updates:commit()
+local function ask(options)
+  return list:queries():ball{ at = { 9, 0, 0 }, radius = 4 }:run(nil, options)
+end
+local found, searched = ask{ explain = true }
+local listed, tested = ask{ explain = true, by_list = true }
+locus.expect_equal(listed, found)
+locus.expect_equal(#found[1], 3)
+locus.expect(tested.work.tests >= 200 and searched.work.tests < 200, "by list every object is tested")
+locus.expect(not pcall(ask, { blocks = {} }), "blocks are no option")
+list:delete()
+)");
+  EXPECT_EQ(outcome.code, ExitCode::kOk) << outcome.err;
+}
+
 TEST_F(RunCommandTest, ScriptsMayBeginAsPrograms) {
   EXPECT_EQ(run_lua("#!/usr/bin/env -S locus run\nprint(1)").out, "1\n");
   EXPECT_EQ(run_lua("\xEF\xBB\xBFprint(1)").out, "1\n");

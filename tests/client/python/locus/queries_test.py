@@ -282,6 +282,19 @@ class AnswersEqualTheCommandLineTest(DaemonTest):
         self.assertGreater(result.blocks[1].work.tests, 0)
 
 
+    def test_answers_by_list_have_the_same_bytes(self):
+        def ask(**options):
+            batch = QueryBatch(at_least=self.built, **options)
+            batch.lookup([1]).rays([0, 0, 9], [0, 0, -1]).balls([0, 0, 5], 2).nearest([0, 0, 5], k=3)
+            return self.client.query(self.scene, batch)
+        searched, result = ask(), ask(by_list=True)
+        for found, wanted in zip(result.blocks, searched.blocks):
+            self.assertEqual(bytes(found.ids), bytes(wanted.ids))
+            self.assertEqual(bytes(found.t), bytes(wanted.t))
+        work = ask(by_list=True, explain=True).blocks[2].work
+        self.assertEqual((work.nodes, work.cells), (0, 0))
+
+
 class ViewTest(DaemonTest):
     def test_a_batch_sees_the_revision_it_names(self):
         first = self.apply(locus.UpdateBatch().insert_balls(1, [0, 0, 0], 1))
@@ -336,7 +349,7 @@ class RequestBytesTest(unittest.TestCase):
                          after_id=2**63, as_of_ticks=[11, 12], as_of_fractions=0.5,
                          outside_history=locus.OutsideHistory.CLAMP, only_groups=[1, 2, 3, 4], only_groups_each=2, tags=5,
                          tag_masks=[6, 7], self_ids=8, rotation=[0, 0, 0, 1])
-        batch = QueryBatch(at_least=locus.Revision(7, 8), max_work=9, explain=True, max_reply_bytes=10)
+        batch = QueryBatch(at_least=locus.Revision(7, 8), max_work=9, explain=True, max_reply_bytes=10, by_list=True)
         batch.rays([0] * 6, [1, 0, 0], t_max=[5, 6], mode=RayMode.ALL, cull=locus.Cull.BACK, inside=locus.Inside.SKIP,
                    block=settings)
         batch.balls([1, 2, 3], 4, detail=StaticDetail.TRIANGLES)
@@ -347,6 +360,7 @@ class RequestBytesTest(unittest.TestCase):
         view, blocks = wanted.batch.view, wanted.batch.blocks
         view.epoch, view.at_least = 7, 8
         wanted.batch.max_work, wanted.batch.explain, wanted.batch.max_reply_bytes = 9, True, 10
+        wanted.batch.by_list = True
         first = blocks.add(source=2, precision=2, columns=[2, 9], masks=struct.pack("<2I", 1, 2), max_results=600,
                            ignore_groups=struct.pack("<Q", 3), ignore_ids=struct.pack("<2Q", 4, 5), after_id=2**63,
                            as_of_ticks=struct.pack("<2Q", 11, 12), as_of_fractions=struct.pack("<f", 0.5),

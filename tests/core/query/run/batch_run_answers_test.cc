@@ -221,6 +221,23 @@ TEST(RunBatchTest, LookupsOfAnEndedBatchAreStillAnswered) {
   EXPECT_EQ(result.blocks[1].ids, (std::vector<uint64_t>{1, 2, 3}));
 }
 
+TEST(RunBatchTest, BruteForceCountsATestOfEachValueAndEndsAtMaxWork) {
+  const SnapshotPtr snapshot = snapshot_of(crowd(5'000));
+  const std::vector<OwnedBlock> blocks = {rays_along_x(RayMode::kFirst, std::vector<float>(3 * 4, 0)),
+                                          one_ball({1e6, 0, 0}, 1), lookup_of_ids({1, 5'001}), lookup_of_groups({9})};
+  RunOptions brute_force;
+  brute_force.brute_force = true;
+  QueryBatch batch = batch_of(blocks);
+  const BatchResult whole = run(*snapshot, batch, brute_force);
+  EXPECT_EQ(difference(whole, run(*snapshot, batch)), "");
+  EXPECT_GE(whole.blocks[0].work.tests, 4 * 5'000u);
+  for (const size_t block : {1u, 2u, 3u}) EXPECT_GE(whole.blocks[block].work.tests, 5'000u) << block;
+  batch.max_work = 10'000;
+  const BatchResult cut = run(*snapshot, batch, brute_force);
+  EXPECT_LT(cut.work.tests, 20'000u);
+  for (const BlockResult& block : cut.blocks) EXPECT_FALSE(block.truncated.empty());
+}
+
 TEST(RunBatchTest, EnoughMaxWorkTruncatesNothing) {
   const SnapshotPtr snapshot = snapshot_of(crowd(4));
   const OwnedBlock block = rays_along_x(RayMode::kFirst, std::vector<float>(3 * 1'000, 0));
