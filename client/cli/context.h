@@ -4,6 +4,7 @@
 #define LOCUS_CLIENT_CLI_CONTEXT_H_
 
 #include <atomic>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -30,6 +31,9 @@ struct GlobalOptions {
 };
 
 using Progress = ProgressStyle;
+
+// Receives a batch of queries that a line would send, and the lines of the input from which it was made.
+using BatchSink = std::function<absl::Status(v1::QueryBatch batch, const std::string& input_lines)>;
 
 // Source of lines. The lines that run through a context come from the program's own command line, from a script, or
 // from the check of a script before the script runs. During the check every line is parsed, but nothing is sent. A
@@ -93,6 +97,10 @@ class Context {
   void set_connection_mistake(absl::Status mistake) { connection_mistake_ = std::move(mistake); }
   const absl::Status& connection_mistake() const { return connection_mistake_; }
 
+  // Returns the receiver of the batches of bulk queries, or null if they are sent to the server.
+  const BatchSink& batch_sink() const { return batch_sink_; }
+  void set_batch_sink(BatchSink sink) { batch_sink_ = std::move(sink); }
+
   Lines lines() const { return lines_; }
   void set_lines(Lines lines) { lines_ = lines; }
 
@@ -111,6 +119,7 @@ class Context {
   std::atomic<client::Client*> connected_ = nullptr;  // client_, for cancel_calls()
   absl::Status outcome_;
   std::string default_scene_;
+  BatchSink batch_sink_;
   std::map<std::string, client::Revision> own_;
   Lines lines_ = Lines::kProgram;
 };

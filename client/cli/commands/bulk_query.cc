@@ -49,8 +49,9 @@ class BulkQueryRun {
     // pipe can be read only once.
     if (context_.lines() == Lines::kScriptCheck) return absl::OkStatus();
     ASSIGN_OR_RETURN(const std::unique_ptr<RowReader> reader, open_rows(bulk_, query_.schema));
-    ASSIGN_OR_RETURN(client::Client* const client, context_.connect());
     reader_ = reader.get();
+    if (context_.batch_sink()) return pass_all();
+    ASSIGN_OR_RETURN(client::Client* const client, context_.connect());
     stream_ = client->query_stream(options_.scene, {.max_in_flight = static_cast<int>(kBulkWindow), .reconnect = {}});
     progress_.begin({.action = "querying", .subject = reader_->name(), .unit = "rows"});
     absl::Status status = ask_all();
@@ -70,6 +71,23 @@ class BulkQueryRun {
     std::future<absl::StatusOr<v1::QueryResult>> answer;
     std::vector<client::Double3> frames;  // one per block
   };
+
+  // Passes all batches to the context's batch sink.
+  absl::Status pass_all() {
+    RowBatch batch;
+    while (true) {
+      ASSIGN_OR_RETURN(const BatchEnd end,
+                       reader_->next(bulk_.batch.value_or(kDefaultBulkBatch), Patience::kWait, batch));
+      for (size_t begin = 0; begin < batch.rows();) {
+        InFlight message;
+        client::QueryBuilder builder;
+        begin = add_blocks(batch, begin, message, builder);
+        RETURN_IF_ERROR(
+            context_.batch_sink()(builder.build(), absl::StrCat(reader_->name(), ":", message.sent.line_range())));
+      }
+      if (end == BatchEnd::kEnd) return absl::OkStatus();
+    }
+  }
 
   absl::Status ask_all() {
     RowBatch batch;

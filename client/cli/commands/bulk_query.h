@@ -91,9 +91,10 @@ void apply_filter_columns(const QueryOptions& options, const BlockRows& rows, si
 // Returns a usage error for query options that cannot be combined with rows from an input.
 absl::Status check(const QueryOptions& options, const BulkOptions& bulk);
 
-// Reads rows, sends queries and writes answers until the input ends. If a row is invalid, the error's message names the
-// line of the input. If rows were answered before an error, their answers are written, and the error's message contains
-// the number of these rows.
+// Reads rows, sends queries and writes answers until the input ends. If the context has a batch sink, passes each batch
+// to it instead of sending it, without a view, and writes no answers. If a row is invalid, the error's message names
+// the line of the input. If rows were answered before an error, their answers are written, and the error's message
+// contains the number of these rows.
 absl::Status run_bulk_query(const BulkQuery& query, const QueryOptions& options, const BulkOptions& bulk,
                             Context& context);
 

@@ -14,9 +14,9 @@
 namespace locus::cli {
 namespace {
 
-void push_answer(lua_State* state, const google::protobuf::Message& answer) { push_message(state, answer); }
+void push_received(lua_State* state, const google::protobuf::Message& answer) { push_message(state, answer); }
 
-void push_answer(lua_State* state, const client::StepResult& step) {
+void push_received(lua_State* state, const client::StepResult& step) {
   lua_createtable(state, 0, 2);
   push_message(state, step.ack);
   lua_setfield(state, -2, "ack");
@@ -112,7 +112,7 @@ struct StreamObject {
       sandbox.check(state);
     }
     const absl::StatusOr<Pushed> got = answer.get();
-    got.ok() ? push_answer(state, *got) : push_error(state, got.status());
+    got.ok() ? push_received(state, *got) : push_error(state, got.status());
   }
 
   static int close(lua_State* state) {
