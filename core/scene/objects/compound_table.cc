@@ -16,6 +16,17 @@ size_t unshared_bytes(const std::shared_ptr<const CompoundArray>& compounds,
   return bytes;
 }
 
+void CompoundTable::set_owner(uint32_t index, CompoundPtr owner) {
+  const size_t leaves = (owners_.size() + kOwnersPerLeaf - 1) / kOwnersPerLeaf;
+  const size_t leaf = index / kOwnersPerLeaf;
+  // The last snapshot shares no leaf that is new, and nothing if it has no compounds.
+  const bool is_shared = snapshot_ != nullptr && leaf < leaves;
+  owners_.set(index, std::move(owner));
+  if (snapshot_ == nullptr || !changed_leaves_.insert(leaf).second) return;
+  if (is_shared) replaced_bytes_ += kOwnersPerLeaf * sizeof(CompoundPtr) + sizeof(uint64_t);
+  if (changed_leaves_.size() == 1) replaced_bytes_ += leaves * sizeof(std::shared_ptr<void>);
+}
+
 void CompoundTable::add(const Compound* compound) {
   if (compound == nullptr) return;
   const auto [at, is_new] = uses_.try_emplace(compound);
@@ -26,26 +37,26 @@ void CompoundTable::add(const Compound* compound) {
       use.index = free_indices_.back();
       free_indices_.pop_back();
     }
-    owners_.set(use.index, compound->shared_from_this());
+    set_owner(use.index, compound->shared_from_this());
     changed_ = true;
   }
   ++use.objects;
 }
 
-size_t CompoundTable::remove(const Compound* compound) {
-  if (compound == nullptr) return 0;
+void CompoundTable::remove(const Compound* compound) {
+  if (compound == nullptr) return;
   const auto at = uses_.find(compound);
   LOCUS_CHECK(at != uses_.end());
-  if (--at->second.objects != 0) return 0;
-  const size_t bytes = compound->bytes();
+  if (--at->second.objects != 0) return;
+  replaced_bytes_ += compound->bytes();
   free_indices_.push_back(at->second.index);
-  owners_.set(at->second.index, nullptr);  // may destroy the compound
+  set_owner(at->second.index, nullptr);  // may destroy the compound
   uses_.erase(at);
   changed_ = true;
-  return bytes;
 }
 
 std::shared_ptr<const CompoundArray> CompoundTable::snapshot() {
+  if (changed_) changed_leaves_.clear();
   if (changed_) snapshot_ = uses_.empty() ? nullptr : std::make_shared<const CompoundArray>(owners_.snapshot());
   changed_ = false;
   return snapshot_;

@@ -137,11 +137,11 @@ size_t ObjectStore::apply(absl::Span<const Object> removed, absl::Span<const Obj
   }
   for (size_t i = 0; i < removed.size(); ++i)
     if (ends[i] != 0) free_handle(leaving[i]);
-  size_t replaced_bytes = grid_.apply({leaving, {}, items}) + handles_.take_replaced_bytes();
+  const size_t replaced_bytes = grid_.apply({leaving, {}, items}) + handles_.take_replaced_bytes();
   for (const Object& object : inserted) compounds_.add(object.compound);
-  for (const Object& object : removed) replaced_bytes += compounds_.remove(object.compound);
+  for (const Object& object : removed) compounds_.remove(object.compound);
   LOCUS_DCHECK_CALL(check_invariants());
-  return replaced_bytes;
+  return replaced_bytes + compounds_.take_replaced_bytes();
 }
 
 bool ObjectStore::fill(std::vector<std::vector<Object>> chunks, double cell_size) {

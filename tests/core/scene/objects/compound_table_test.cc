@@ -28,9 +28,11 @@ TEST(CompoundTableTest, ACompoundLivesAsLongAsAnObjectHasIt) {
   table.add(address);
   compound.reset();
   EXPECT_EQ(table.size(), 1u);
-  EXPECT_EQ(table.remove(address), 0u);
+  table.remove(address);
+  EXPECT_EQ(table.take_replaced_bytes(), 0u);
   EXPECT_FALSE(watched.expired());
-  EXPECT_GT(table.remove(address), 0u);
+  table.remove(address);
+  EXPECT_GT(table.take_replaced_bytes(), 0u);
   EXPECT_TRUE(watched.expired());
   EXPECT_EQ(table.snapshot(), nullptr);
 }
@@ -55,8 +57,36 @@ TEST(CompoundTableTest, ASnapshotKeepsItsCompounds) {
 TEST(CompoundTableTest, ObjectsWithoutCompoundsCostNothing) {
   CompoundTable table;
   table.add(nullptr);
-  EXPECT_EQ(table.remove(nullptr), 0u);
+  table.remove(nullptr);
+  EXPECT_EQ(table.take_replaced_bytes(), 0u);
   EXPECT_EQ(table.snapshot(), nullptr);
+}
+
+// Compounds that come and go between snapshots: the replaced bytes are at least the bytes that only an earlier snapshot
+// keeps, and not more than that and the pointers of one leaf for each change.
+TEST(CompoundTableTest, ReplacedBytesAreThoseThatOnlyEarlierSnapshotsKeep) {
+  constexpr size_t kCompounds = 1000;
+  CompoundTable table;
+  std::vector<CompoundPtr> compounds;
+  for (size_t i = 0; i < kCompounds; ++i) compounds.push_back(compound_of(2));
+  for (const CompoundPtr& compound : compounds) table.add(compound.get());
+  EXPECT_EQ(table.take_replaced_bytes(), 0u) << "there is no snapshot";
+  const std::shared_ptr<const CompoundArray> before = table.snapshot();
+  std::shared_ptr<const CompoundArray> last = before;
+  size_t replaced = 0;
+  for (size_t round = 0; round < 10; ++round) {
+    for (size_t i = 0; i < 5; ++i) table.remove(compounds[200 * i + round].get());
+    for (size_t i = 0; i < 5; ++i) table.add(compounds[200 * i + round].get());
+    table.add(compounds.emplace_back(compound_of(3)).get());
+    const size_t more = table.take_replaced_bytes();
+    const std::shared_ptr<const CompoundArray> next = table.snapshot();
+    const size_t removed = 5 * compounds[0]->bytes();  // they are added again
+    EXPECT_GE(more, unshared_bytes(last, next)) << round;
+    EXPECT_LE(more, unshared_bytes(last, next) + removed) << round;
+    replaced += more;
+    last = next;
+  }
+  EXPECT_GE(replaced, unshared_bytes(before, last));
 }
 
 TEST(CompoundTableTest, SetsOfObjectsKeepAndCountTheirCompounds) {
