@@ -138,11 +138,12 @@ RelabelColumns to_relabel(const v1::Relabel& relabel) {
   return columns;
 }
 
-// Returns the number of lists of parts of all compounds.
+// Returns the number of lists of parts, of inserted and of moved compounds.
 int64_t part_lists(const v1::UpdateBatch& batch) {
   int64_t lists = 0;
   for (const v1::Insert& insert : batch.inserts())
     if (insert.has_compound()) lists += insert.compound().parts_size();
+  for (const v1::Move& move : batch.moves()) lists += move.parts_each() == 0 ? 0 : 1;
   return lists;
 }
 

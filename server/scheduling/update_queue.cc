@@ -94,7 +94,8 @@ bool UpdateQueue::fits_inline(const Scene& scene, const UpdateBatch& batch, uint
 }
 
 absl::StatusOr<Posted> UpdateQueue::post(const ScenePtr& scene, PendingUpdate& update, WhenFull when_full) {
-  const uint64_t items = count_items(update.batch());
+  const Waiting waiting{&update, count_items(update.batch()), count_lists(update.batch())};
+  const uint64_t items = waiting.items;
   SceneQueue* idle = nullptr;
   {
     const MutexLock lock(mutex_);
@@ -112,7 +113,7 @@ absl::StatusOr<Posted> UpdateQueue::post(const ScenePtr& scene, PendingUpdate& u
         ready_.push_back(&scene_queue);
         work_.notify_one();
       }
-      scene_queue.waiting.push_back(&update);
+      scene_queue.waiting.push_back(waiting);
       scene_queue.items += items;
       ++stats_.updates;
       stats_.items += items;
@@ -121,15 +122,15 @@ absl::StatusOr<Posted> UpdateQueue::post(const ScenePtr& scene, PendingUpdate& u
       return is_full ? Posted::kFull : Posted::kTaken;
     }
   }
-  apply_inline(*idle, update, items);
+  apply_inline(*idle, waiting);
   return Posted::kTaken;
 }
 
-void UpdateQueue::apply_inline(SceneQueue& scene_queue, PendingUpdate& update, uint64_t items) {
-  Group group = {&update};
+void UpdateQueue::apply_inline(SceneQueue& scene_queue, const Waiting& update) {
+  Group group = {update};
   const SteadyTime start = steady_clock::now();
   if (!apply(scene_queue, group)) return stall(scene_queue, group);
-  if (!group.empty()) learn(items, start);
+  if (!group.empty()) learn(update.items, start);
   std::unique_ptr<SceneQueue> empty;
   const MutexLock lock(mutex_);
   stats_.applied_inline += group.size();  // 0 if apply() dropped the update, because stop() returned an error
@@ -169,7 +170,7 @@ UpdateQueue::SceneQueue* UpdateQueue::next() {
 
 bool UpdateQueue::changes_instances(const Group& group) {
   return std::any_of(group.begin(), group.end(),
-                     [](const PendingUpdate* update) { return has_instances(update->batch()); });
+                     [](const Waiting& waiting) { return has_instances(waiting.update->batch()); });
 }
 
 void UpdateQueue::work_on(SceneQueue& scene_queue) {
@@ -201,15 +202,13 @@ UpdateQueue::Group UpdateQueue::take_group(SceneQueue& scene_queue) {
   uint64_t items = 0;
   uint64_t lists = 0;
   while (!scene_queue.waiting.empty()) {
-    PendingUpdate* const update = scene_queue.waiting.front();
-    const uint64_t more = count_items(update->batch());
-    const uint64_t more_lists = count_lists(update->batch());
-    const bool fits = group.empty() || (items + lists + more + more_lists <= max_items &&
-                                        (!coalescing || may_join(group.front()->batch(), update->batch())));
+    const Waiting& next = scene_queue.waiting.front();
+    const bool fits = group.empty() || (items + lists + next.items + next.lists <= max_items &&
+                                        (!coalescing || may_join(group.front().update->batch(), next.update->batch())));
     if (!fits) break;
-    group.push_back(update);
-    items += more;
-    lists += more_lists;
+    group.push_back(next);
+    items += next.items;
+    lists += next.lists;
     scene_queue.waiting.pop_front();
   }
   LOCUS_DCHECK(scene_queue.busy && !group.empty());
@@ -223,11 +222,11 @@ UpdateQueue::Group UpdateQueue::take_group(SceneQueue& scene_queue) {
 // Completes and removes the batches of the group that were cancelled or whose deadline has passed. If a deadline passed
 // during a stall, done() receives the error of the stall, which names the limit that the readers exceed.
 void UpdateQueue::drop_stopped(const SceneQueue& scene_queue, Group& group) {
-  const auto stopped = [&scene_queue](PendingUpdate* update) {
-    absl::Status status = update->stop();
+  const auto stopped = [&scene_queue](const Waiting& waiting) {
+    absl::Status status = waiting.update->stop();
     if (status.ok()) return false;
     if (status.code() == scene_queue.late.code()) status = scene_queue.late;
-    update->done(std::move(status));
+    waiting.update->done(std::move(status));
     return true;
   };
   group.erase(std::remove_if(group.begin(), group.end(), stopped), group.end());
@@ -238,7 +237,7 @@ bool UpdateQueue::apply(SceneQueue& scene_queue, Group& group) {
   scene_queue.late = absl::OkStatus();
   if (group.empty()) return true;
   std::vector<const UpdateBatch*> batches;
-  for (const PendingUpdate* update : group) batches.push_back(&update->batch());
+  for (const Waiting& waiting : group) batches.push_back(&waiting.update->batch());
   // apply_all() returns DEADLINE_EXCEEDED instead of waiting for readers, because readers may hold their snapshots for
   // a long time.
   absl::StatusOr<Scene::Acks> acks = apply_all(*scene_queue.scene, batches);
@@ -248,7 +247,7 @@ bool UpdateQueue::apply(SceneQueue& scene_queue, Group& group) {
   }
   LOCUS_DCHECK(!acks.ok() || acks->size() == group.size());
   if (acks.ok()) count(*scene_queue.scene, group.size());
-  for (size_t i = 0; i < group.size(); ++i) group[i]->done(acks.ok() ? std::move((*acks)[i]) : acks.status());
+  for (size_t i = 0; i < group.size(); ++i) group[i].update->done(acks.ok() ? std::move((*acks)[i]) : acks.status());
   return true;
 }
 
@@ -285,10 +284,9 @@ void UpdateQueue::stall(SceneQueue& scene_queue, const Group& group) {
 void UpdateQueue::requeue(SceneQueue& scene_queue, const Group& group) {
   // NOLINTNEXTLINE(modernize-loop-convert): a range in reverse order would need std::views
   for (auto update = group.rbegin(); update != group.rend(); ++update) {
-    const uint64_t items = count_items((*update)->batch());
     scene_queue.waiting.push_front(*update);
-    scene_queue.items += items;
-    stats_.items += items;
+    scene_queue.items += update->items;
+    stats_.items += update->items;
     ++stats_.updates;
   }
   LOCUS_DCHECK_CALL(check_invariants(scene_queue));

@@ -90,23 +90,31 @@ class UpdateQueue {
  private:
   using SteadyTime = std::chrono::steady_clock::time_point;
 
+  // A batch and the numbers of its items and lists, which are counted once, without the lock: a batch may consist of
+  // thousands of messages.
+  struct Waiting {
+    PendingUpdate* update = nullptr;
+    uint64_t items = 0;
+    uint64_t lists = 0;
+  };
+
   // Batches that wait for one scene. A scene is stalled while its readers hold more memory than their budget.
   struct SceneQueue {
     ScenePtr scene;
-    std::deque<PendingUpdate*> waiting;
+    std::deque<Waiting> waiting;
     uint64_t items = 0;
     bool busy = false;           // a thread is applying batches
     SteadyTime retry_at = {};    // time of the next attempt, while readers stall the scene
     SteadyTime stalled_at = {};  // start of the stall
     absl::Status late;           // error of the last attempt if readers stalled it, else OK; for the busy thread only
   };
-  using Group = std::vector<PendingUpdate*>;
+  using Group = std::vector<Waiting>;
 
   SceneQueue& queue_of(const ScenePtr& scene) LOCUS_REQUIRES(mutex_);
   bool full(const SceneQueue& scene_queue, uint64_t items) const;
   absl::Status refuse(const SceneQueue& scene_queue, uint64_t items) const;
   bool fits_inline(const Scene& scene, const UpdateBatch& batch, uint64_t items) const;
-  void apply_inline(SceneQueue& scene_queue, PendingUpdate& update, uint64_t items) LOCUS_EXCLUDES(mutex_);
+  void apply_inline(SceneQueue& scene_queue, const Waiting& update) LOCUS_EXCLUDES(mutex_);
 
   void run() LOCUS_EXCLUDES(mutex_);
   SceneQueue* next() LOCUS_EXCLUDES(mutex_);

@@ -200,6 +200,8 @@ uint64_t count_items(const UpdateBatch& batch) {
 uint64_t count_lists(const UpdateBatch& batch) {
   uint64_t lists = batch.inserts.size() + batch.moves.size() + batch.relabels.size() + batch.instance_moves.size() +
                    batch.instance_relabels.size();
+  for (const InsertColumns& insert : batch.inserts) lists += insert.parts.size();
+  for (const MoveColumns& move : batch.moves) lists += move.parts_each == 0 ? 0 : 1;
   for (const UpdateBatch& message : batch.earlier) lists += count_lists(message);
   return lists;
 }

@@ -137,8 +137,8 @@ bool may_join(const UpdateBatch& first, const UpdateBatch& second);
 // Returns true if the batch or one of its earlier messages changes instances.
 bool has_instances(const UpdateBatch& batch);
 
-// Returns the number of items of the batch and its earlier messages, and the number of their lists. Parts of compounds
-// count as items, because they take memory like objects.
+// Return the number of items of the batch and its earlier messages, and the number of their lists. Parts of compounds
+// count as items, because they take memory like objects, and their lists as lists.
 uint64_t count_items(const UpdateBatch& batch);
 uint64_t count_lists(const UpdateBatch& batch);
 

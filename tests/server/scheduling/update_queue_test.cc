@@ -188,6 +188,21 @@ TEST_F(UpdateQueueTest, BatchesThatChangeInstancesDoNotRaiseTheEstimateForOtherB
   EXPECT_NE(inlined(), 0u);
 }
 
+TEST_F(UpdateQueueTest, TheItemsOfABatchAreCountedOnceWhenItIsPosted) {
+  UpdateQueue queue(without_inline());
+  const auto held = occupy(queue);
+  const auto update = move({1, 2}, 5);
+  ASSERT_TRUE(queue.post(scene_, *update, WhenFull::kRefuse).ok());
+  EXPECT_EQ(queue.stats().items, 2u);
+  UpdateBatch message;
+  const std::vector<uint64_t> ids = {7, 8, 9};
+  message.remove_ids = ids;
+  update->change().earlier.assign(2, message);  // another count would see these messages
+  held->release();
+  EXPECT_EQ(update->wait()->refused, 6u);
+  EXPECT_EQ(queue.stats().items, 0u);
+}
+
 TEST_F(UpdateQueueTest, ACallerNeverWaitsForThePreviousBatch) {
   UpdateQueue queue({});
   const auto held = move({1}, 1);

@@ -281,5 +281,16 @@ TEST_F(UpdateFormTest, PartsCountAsItems) {
   EXPECT_EQ(count_items(batch_), 3u + 5u + 3u + 6u + 3u);
 }
 
+TEST_F(UpdateFormTest, ListsOfPartsCountAsLists) {
+  const uint64_t lists = count_lists(batch_);
+  insert().kind = ShapeKind::kCompound;
+  insert().parts.resize(3);
+  batch_.moves[0].parts_each = 2;
+  EXPECT_EQ(count_lists(batch_), lists + 4);
+  UpdateBatch last;
+  last.earlier = {batch_, batch_};
+  EXPECT_EQ(count_lists(last), 2 * lists + 8);
+}
+
 }  // namespace
 }  // namespace locus::test
