@@ -240,7 +240,7 @@ absl::Status Scene::admit_change(const StaticChange& change) {
   if (pending_changes_ >= limits::kMaxPendingChanges)
     return refuse_full("scene", "pending_changes", limits::kMaxPendingChanges, pending_changes_ + 1.0, 100);
   ++pending_changes_;
-  for (const PlacementColumns& place : change.place) meshes_to_place_.push_back(place.mesh.get());
+  for (const PlacementColumns& place : change.place) add_mesh_to_place(place.mesh.get());
   LOCUS_DCHECK_CALL(check_invariants());
   return absl::OkStatus();
 }
@@ -249,11 +249,7 @@ void Scene::leave_change(const StaticChange& change, const absl::Status& result)
   const MutexLock lock(mutex_);
   LOCUS_DCHECK_GT(pending_changes_, 0u);
   --pending_changes_;
-  for (const PlacementColumns& place : change.place) {
-    const auto found = std::find(meshes_to_place_.begin(), meshes_to_place_.end(), place.mesh.get());
-    LOCUS_DCHECK(found != meshes_to_place_.end());
-    meshes_to_place_.erase(found);
-  }
+  for (const PlacementColumns& place : change.place) remove_mesh_to_place(place.mesh.get());
   if (!result.ok()) last_build_error_ = std::string(result.message());
   LOCUS_DCHECK_CALL(check_invariants());
 }
@@ -267,15 +263,14 @@ void Scene::count_objects_in(ObjectCount count) {
 
 bool Scene::in_use(const StaticMesh* mesh) const {
   const MutexLock lock(mutex_);
-  return latest_->statics->uses(mesh) > 0 ||
-         std::find(meshes_to_place_.begin(), meshes_to_place_.end(), mesh) != meshes_to_place_.end();
+  return latest_->statics->uses(mesh) > 0 || meshes_to_place_.contains(mesh);
 }
 
 void Scene::add_used_meshes(absl::flat_hash_set<const StaticMesh*>& meshes) const {
   SnapshotPtr snapshot;
   {
     const MutexLock lock(mutex_);
-    meshes.insert(meshes_to_place_.begin(), meshes_to_place_.end());
+    for (const auto& [mesh, placements] : meshes_to_place_) meshes.insert(mesh);
     snapshot = latest_;
   }
   const StaticSet* last = nullptr;
@@ -373,7 +368,6 @@ void Scene::check_invariants() const {
   LOCUS_CHECK_LE(recent_.size(), size_t{limits::kRecentRevisions});
   LOCUS_CHECK_EQ(recent_.front()->revision + recent_.size() - 1, latest_->revision);
   LOCUS_CHECK(watches_.empty() || (!closed_ && watches_.begin()->first > latest_->revision));
-  LOCUS_CHECK(pending_changes_ > 0 || meshes_to_place_.empty());
 }
 
 void Scene::publish(const SnapshotPtr& snapshot) {

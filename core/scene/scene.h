@@ -22,7 +22,9 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
+#include "absl/container/flat_hash_map.h"
 #include "absl/container/flat_hash_set.h"
 #include "absl/functional/function_ref.h"
 #include "core/base/mutex.h"
@@ -172,7 +174,22 @@ class Scene {
   // Returns the value of the count that was passed to count_objects_in(); 0 if count_objects_in() was not called.
   uint64_t counted_objects() const { return object_count_ == nullptr ? 0 : object_count_->load(); }
 
-  // Returns true if the scene contains instances of the mesh, or if a pending change places instances of the mesh.
+  // Meshes of a change that waits to be passed to change_instances(). As long as the object exists, they count as
+  // meshes of a pending change, so that nobody deletes them. Keeps the scene and the meshes alive.
+  class ExpectedMeshes {
+   public:
+    ExpectedMeshes(std::shared_ptr<Scene> scene, const StaticChange& change);
+    ~ExpectedMeshes();
+    ExpectedMeshes(const ExpectedMeshes&) = delete;
+    ExpectedMeshes& operator=(const ExpectedMeshes&) = delete;
+
+   private:
+    const std::shared_ptr<Scene> scene_;
+    std::vector<std::shared_ptr<const StaticMesh>> meshes_;
+  };
+
+  // Returns true if the scene contains instances of the mesh, or if a pending change places instances of the mesh. A
+  // pending change runs, or has ExpectedMeshes.
   bool in_use(const StaticMesh* mesh) const LOCUS_EXCLUDES(mutex_);
 
   // Adds to `meshes` every mesh that the latest revision, the history or a pending change uses. O(ticks of the
@@ -279,6 +296,9 @@ class Scene {
   absl::Status check_open() const LOCUS_EXCLUDES(mutex_);
   absl::Status admit_change(const StaticChange& change) LOCUS_EXCLUDES(mutex_);
   void leave_change(const StaticChange& change, const absl::Status& result) LOCUS_EXCLUDES(mutex_);
+  // Count one placement more, or less, of a mesh by a pending change.
+  void add_mesh_to_place(const StaticMesh* mesh) LOCUS_REQUIRES(mutex_) { ++meshes_to_place_[mesh]; }
+  void remove_mesh_to_place(const StaticMesh* mesh) LOCUS_REQUIRES(mutex_);
   absl::Status check_kept(const StaticChange& change) const;
   // Returns the ack or the error of `batch`, for which SceneWriter::admit() has returned `admission`. If the batch is
   // new, applies the batch and publishes the new revision.
@@ -319,7 +339,8 @@ class Scene {
   // Watches that are not notified yet. The key is the awaited revision.
   mutable std::multimap<uint64_t, Watch*> watches_ LOCUS_GUARDED_BY(mutex_);
   uint32_t pending_changes_ LOCUS_GUARDED_BY(mutex_) = 0;
-  std::vector<const StaticMesh*> meshes_to_place_ LOCUS_GUARDED_BY(mutex_);  // meshes of pending changes
+  // Meshes of pending changes and of ExpectedMeshes, with the number of their placements, which is not 0.
+  absl::flat_hash_map<const StaticMesh*, uint64_t> meshes_to_place_ LOCUS_GUARDED_BY(mutex_);
   std::string last_build_error_ LOCUS_GUARDED_BY(mutex_);
   uint64_t joined_updates_ LOCUS_GUARDED_BY(mutex_) = 0;
   LeaseList leases_ LOCUS_GUARDED_BY(mutex_);                   // never null
@@ -328,6 +349,24 @@ class Scene {
   bool closed_ LOCUS_GUARDED_BY(mutex_) = false;
   const std::shared_ptr<ReaderTracker> pins_;  // shared, because pins may outlive the scene
 };
+
+inline void Scene::remove_mesh_to_place(const StaticMesh* mesh) {
+  const auto found = meshes_to_place_.find(mesh);
+  LOCUS_DCHECK(found != meshes_to_place_.end() && found->second > 0);
+  if (--found->second == 0) meshes_to_place_.erase(found);
+}
+
+inline Scene::ExpectedMeshes::ExpectedMeshes(std::shared_ptr<Scene> scene, const StaticChange& change)
+    : scene_(std::move(scene)) {
+  for (const PlacementColumns& place : change.place) meshes_.push_back(place.mesh);
+  const MutexLock lock(scene_->mutex_);
+  for (const auto& mesh : meshes_) scene_->add_mesh_to_place(mesh.get());
+}
+
+inline Scene::ExpectedMeshes::~ExpectedMeshes() {
+  const MutexLock lock(scene_->mutex_);
+  for (const auto& mesh : meshes_) scene_->remove_mesh_to_place(mesh.get());
+}
 
 }  // namespace locus
 

@@ -48,10 +48,11 @@ class Outcome {
   std::optional<absl::StatusOr<InstanceChange>> change_ LOCUS_GUARDED_BY(mutex_);
 };
 
-// A change together with the message that its columns point into.
+// A change together with the message that its columns point into. Its meshes are not deleted as long as it exists.
 struct OwnedChange {
   v1::ChangeInstancesRequest request;
   StaticChange change;
+  std::optional<Scene::ExpectedMeshes> meshes;
 };
 
 size_t placement_count(const v1::Placement& placement) {
@@ -74,12 +75,13 @@ void choose_ids(Scene& scene, v1::ChangeInstancesRequest& request) {
   }
 }
 
-absl::StatusOr<std::shared_ptr<OwnedChange>> read_change(Scene& scene, const Registry& registry,
+absl::StatusOr<std::shared_ptr<OwnedChange>> read_change(const ScenePtr& scene, const Registry& registry,
                                                          const v1::ChangeInstancesRequest& request) {
   auto owned = std::make_shared<OwnedChange>();
   owned->request = request;
-  if (request.no_wait()) choose_ids(scene, owned->request);
+  if (request.no_wait()) choose_ids(*scene, owned->request);
   ASSIGN_OR_RETURN(owned->change, to_change(owned->request, registry));
+  owned->meshes.emplace(scene, owned->change);
   return owned;
 }
 
@@ -117,6 +119,7 @@ absl::StatusOr<uint64_t> submit(Host& host, const SharedUse& scene, uint64_t epo
         // snapshots in any case.
         (void)wait_for_readers(**scene, [] { return absl::OkStatus(); });
         absl::StatusOr<InstanceChange> change = (*scene)->change_instances(owned->change);
+        owned->meshes.reset();  // before the caller knows the outcome, and may delete a mesh
         if (change.ok()) {
           host.metrics.record_instance_change(nanoseconds_since(arrived));
           host.mesh_collector.instances_changed(**scene);
@@ -137,7 +140,7 @@ absl::Status change_instances(Host& host, const Caller& caller, const v1::Change
   // Held until the response is written.
   ASSIGN_OR_RETURN(const CallMemory reply, claim_copy(caller, placed_count(request) * kReplyBytesAPlacement));
   for (const v1::Placement& placement : request.place()) host.mesh_collector.renew(placement.mesh());
-  ASSIGN_OR_RETURN(const std::shared_ptr<OwnedChange> owned, read_change(**scene, host.registry, request));
+  ASSIGN_OR_RETURN(const std::shared_ptr<OwnedChange> owned, read_change(*scene, host.registry, request));
   // Check the placements without the scene's instances, because changes that were queued earlier may still alter those
   // instances.
   if (request.no_wait()) RETURN_IF_ERROR(StaticSet::check_placements(owned->change.place));

@@ -3,6 +3,8 @@
 #include <thread>
 
 #include "core/base/ids.h"
+#include "tests/support/kept_daemon.h"
+#include "tests/support/memory_log.h"
 #include "tests/support/rpc_test.h"
 
 namespace locus::test {
@@ -115,6 +117,49 @@ TEST_F(InstanceRpcTest, WithNoWaitTheReplyHasANumberAndTheChangeIsPublishedLater
   EXPECT_EQ(scene.state(), v1::SCENE_STATE_READY);
   EXPECT_EQ(scene.instances(), 1u);
   EXPECT_EQ(scene.last_build_error(), "");
+}
+
+// The first change waits for the log, and the second one waits for the first.
+TEST_F(InstanceRpcTest, AMeshOfAChangeThatWaitsForAnotherIsInUse) {
+  MemoryLog log;
+  RunningServer durable(test_config(), &log);
+  v1::SceneSpec spec;
+  spec.set_durability(v1::DURABILITY_LOCAL);
+  create_scene(durable.stubs(), "world", spec);
+  for (const char* const mesh : {"first", "second"}) {
+    grpc::ClientContext context;
+    set_timeout(context);
+    v1::UploadMeshResponse uploaded;
+    const auto upload = durable.stubs().scenes->UploadMesh(&context, &uploaded);
+    upload->Write(whole_mesh(mesh));
+    upload->WritesDone();
+    ASSERT_TRUE(upload->Finish().ok());
+  }
+  const auto place = [&](const std::string& mesh, uint64_t id) {
+    v1::ChangeInstancesRequest request = place_one(mesh, id);
+    request.set_no_wait(true);
+    v1::ChangeInstancesResponse response;
+    return call(*durable.stubs().scenes, &v1::SceneService::Stub::ChangeInstances, request, &response);
+  };
+  const auto delete_mesh = [&](const std::string& mesh) {
+    v1::DeleteMeshRequest request;
+    request.set_mesh(mesh);
+    v1::DeleteMeshResponse response;
+    return call(*durable.stubs().scenes, &v1::SceneService::Stub::DeleteMesh, request, &response);
+  };
+  log.hold();
+  ASSERT_TRUE(place("first", 1).ok());
+  log.wait_for_writer();
+  ASSERT_TRUE(place("second", 2).ok());
+  expect_refused(delete_mesh("second"), {grpc::StatusCode::FAILED_PRECONDITION, v1::REASON_IN_USE, "mesh"});
+  log.release();
+  while (get_scene(durable.stubs(), "world").instances() < 2) std::this_thread::yield();
+  v1::ChangeInstancesRequest removal;
+  removal.set_scene("world");
+  removal.add_remove_ids(2);
+  v1::ChangeInstancesResponse removed;
+  ASSERT_TRUE(call(*durable.stubs().scenes, &v1::SceneService::Stub::ChangeInstances, removal, &removed).ok());
+  EXPECT_TRUE(delete_mesh("second").ok()) << "nothing waits any more";
 }
 
 TEST_F(InstanceRpcTest, AFailedBackgroundChangeIsReportedByTheScene) {

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <atomic>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -150,6 +151,32 @@ TEST_F(MeshCollectorTest, TheHistoryUsesAMesh) {
   begin_tick(*scene, 4);
   EXPECT_THAT(meshes_at(57'900), ElementsAre("m"));
   EXPECT_THAT(meshes_at(59'000), IsEmpty());
+}
+
+TEST_F(MeshCollectorTest, AMeshOfAChangeThatWaitsLongerThanTheGraceIsNotDeleted) {
+  const ScenePtr scene = created("arena");
+  const MeshPtr mesh = upload("m", 1);
+  place(*scene, mesh, 1);
+  remove(*scene, 1);
+  test::Columns columns;
+  StaticChange waiting;
+  waiting.place.resize(2);
+  for (PlacementColumns& place : waiting.place) {
+    place.mesh = mesh;
+    place.translations = columns.doubles({0, 0, 0});
+  }
+  std::optional<Scene::ExpectedMeshes> expected(std::in_place, scene, waiting);
+  EXPECT_THAT(meshes_at(50'000), ElementsAre("m"));
+  EXPECT_EQ(registry_.delete_mesh("m").code(), absl::StatusCode::kFailedPrecondition);
+  const absl::StatusOr<InstanceChange> placed = scene->change_instances(waiting);
+  ASSERT_TRUE(placed.ok()) << placed.status();
+  StaticChange removal;
+  removal.remove_ids = placed->placed;
+  ASSERT_TRUE(scene->change_instances(removal).ok());
+  EXPECT_THAT(meshes_at(70'000), ElementsAre("m")) << "the waiting change has not been released";
+  expected.reset();
+  EXPECT_THAT(meshes_at(77'900), ElementsAre("m"));
+  EXPECT_THAT(meshes_at(80'000), IsEmpty());
 }
 
 TEST_F(MeshCollectorTest, PlacingOrUploadingAMeshBeginsItsTimeAgain) {
