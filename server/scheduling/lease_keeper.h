@@ -2,9 +2,10 @@
 // the lease's time, its objects are removed by Scene::end_lease(). Which writers have a lease, and of what time, is
 // known from Scene::leases(); this class knows when their batches arrived.
 //
-// A batch counts from its arrival until it is done, so that a lease does not end while a batch of its writer waits. The
-// decision is made again under the lock of the scene's writer, right before the lease ends: a batch that has arrived by
-// then keeps the lease. So a lease ends at most once for each silence of its writer.
+// A batch counts from its arrival until it is done, so that a lease does not end while a batch of its writer waits. If
+// it is sent as several messages, each message counts when it arrives: see renew(). The decision is made again under
+// the lock of the scene's writer, right before the lease ends: a batch that has arrived by then keeps the lease. So a
+// lease ends at most once for each silence of its writer.
 //
 // Threads: every member may be called from any thread. A batch of a writer without a number, and any batch while there
 // are no leases, takes no lock. The lock of this class is held only briefly, and no other lock but the keeper's is
@@ -64,6 +65,10 @@ class LeaseKeeper {
   }
   // Records that a batch is done: applied, or refused. `lease_ms` is that of the batch.
   void batch_done(const Batch& batch, uint32_t lease_ms) LOCUS_EXCLUDES(mutex_);
+  // Renews the lease of a writer that has sent a part of a batch. Does nothing if it has no lease, or `writer` is 0.
+  void renew(const ScenePtr& scene, uint64_t writer) LOCUS_EXCLUDES(mutex_) {
+    batch_done(batch_arrived(scene, writer, 0), 0);
+  }
 
   // Returns the number of leases, and the number of leases ended so far.
   size_t leases() const { return leases_.load(); }

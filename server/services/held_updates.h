@@ -42,6 +42,10 @@ class HeldUpdates {
             std::vector<CallMemory> claims);
   // Returns the number of items of the held messages.
   uint64_t items() const { return items_; }
+  // The writer of the last batch of the stream, 0 if it has none. A message that is held does not name its writer; it
+  // is taken to be the writer of the batch before.
+  uint64_t writer() const { return writer_; }
+  void set_writer(uint64_t writer) { writer_ = writer; }
   // Gives away the held messages; then none is held.
   Messages take();
   // Drops the held messages, because a message was refused. `continues` is whether that message continues: then the
@@ -52,6 +56,7 @@ class HeldUpdates {
   Messages messages_;
   uint64_t items_ = 0;
   uint64_t lists_ = 0;
+  uint64_t writer_ = 0;
   bool refused_ = false;  // a message of the revision to which the next message belongs was refused
 };
 

@@ -81,6 +81,7 @@ void UpdateWork::refuse(absl::Status status) {
 absl::Status UpdateWork::hold(const std::string& scene_name, v1::UpdateBatch& batch, HeldUpdates& held) {
   ASSIGN_OR_RETURN(const ScenePtr scene, find_scene(host_, slot_.caller(), scene_name, "scene"));
   RETURN_IF_ERROR(held.check_scene(scene));
+  host_.leases.renew(scene, held.writer());
   auto owner = std::make_unique<v1::UpdateBatch>();
   owner->Swap(&batch);
   ASSIGN_OR_RETURN(UpdateBatch message, to_updates(*owner));
@@ -100,6 +101,7 @@ absl::Status UpdateWork::post_all(const std::string& scene_name, const v1::Updat
   ASSIGN_OR_RETURN(scene_, use_scene(host_, slot_.caller(), scene_name, "scene"));
   RETURN_IF_ERROR(held.check_scene(scene_));
   messages_ = held.take();
+  held.set_writer(batch.writer());
   return post(scene_name, batch);
 }
 

@@ -228,6 +228,37 @@ TEST_F(LifetimesRpcTest, BatchesOnAStreamRenewALease) {
   while (get("world").objects() > 0) std::this_thread::sleep_for(std::chrono::milliseconds(10));
 }
 
+// A writer that sends one revision as many messages is not silent. The lease of writer 8 is as long and began later.
+TEST_F(LifetimesRpcTest, HeldMessagesOnAStreamRenewTheLeaseOfItsWriter) {
+  constexpr uint32_t kLength = 2000;
+  grpc::ClientContext context;
+  set_timeout(context);
+  const auto stream = stubs().updates->StreamUpdates(&context);
+  v1::StreamUpdatesRequest request;
+  request.set_scene("world");
+  *request.mutable_batch() = leased(insert_balls(1, 1), 7, 1, kLength);
+  v1::StreamUpdatesResponse response;
+  ASSERT_TRUE(stream->Write(request));
+  ASSERT_TRUE(stream->Read(&response));
+  ASSERT_TRUE(apply(leased(insert_balls(2, 3), 8, 1, kLength)).ok());
+  while (get("world").objects() == 3) {
+    request.mutable_batch()->Clear();
+    request.mutable_batch()->set_continues(true);
+    ASSERT_TRUE(stream->Write(request));
+    ASSERT_TRUE(stream->Read(&response));
+    ASSERT_TRUE(response.ack().pending()) << response.ShortDebugString();
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));  // at most 4,095 messages may be held
+  }
+  EXPECT_EQ(get("world").objects(), 1u) << "the objects of writer 8 are gone";
+  *request.mutable_batch() = leased(insert_balls(4, 5), 7, 2, 0);
+  ASSERT_TRUE(stream->Write(request));
+  ASSERT_TRUE(stream->Read(&response));
+  EXPECT_EQ(response.ack().applied(), 2u) << response.ShortDebugString();
+  EXPECT_EQ(get("world").objects(), 3u);
+  stream->WritesDone();
+  EXPECT_TRUE(stream->Finish().ok());
+}
+
 TEST_F(LifetimesRpcTest, WrongLeasesAreRefused) {
   v1::UpdateBatch no_writer = insert_balls(1, 1);
   no_writer.set_lease_ms(1);

@@ -107,6 +107,18 @@ TEST_F(LeaseKeeperTest, EveryBatchOfTheWriterRenewsItsLease) {
   EXPECT_THAT(objects_at(370), IsEmpty());
 }
 
+TEST_F(LeaseKeeperTest, APartOfABatchRenewsTheLease) {
+  ASSERT_TRUE(send(7, 1, 100, 1).ok());
+  ASSERT_TRUE(send(8, 1, 100, 2).ok());
+  EXPECT_THAT(objects_at(90), ElementsAre(1u, 2u));
+  leases_.renew(scene_, 7);
+  leases_.renew(scene_, 9);
+  leases_.renew(scene_, 0);
+  EXPECT_EQ(leases_.leases(), 2u) << "it begins no lease";
+  EXPECT_THAT(objects_at(189), ElementsAre(1u));
+  EXPECT_THAT(objects_at(190), IsEmpty());
+}
+
 TEST_F(LeaseKeeperTest, ALeaseIsShortenedThoughABatchThatAskedForItWasRefused) {
   ASSERT_TRUE(send(7, 1, 10'000, 1).ok());
   EXPECT_FALSE(send(7, 9, 100).ok());
