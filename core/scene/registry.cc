@@ -367,21 +367,27 @@ absl::Status Registry::delete_taken(const std::string& name, MeshPtr taken) {
   return status;
 }
 
-absl::Status Registry::make_collectable(const StaticMesh* mesh, uint32_t grace_s) {
-  const auto is_recorded = [&]() LOCUS_EXCLUDES(mutex_) {
-    const MutexLock lock(mutex_);
-    const auto known = meshes_.find(mesh->name());
-    if (known == meshes_.end() || known->second.get() != mesh) return true;
-    const auto grace = mesh_graces_.find(mesh->name());
-    return grace != mesh_graces_.end() && grace->second >= grace_s;
-  };
-  // Most calls find the record; these calls do not wait for a mesh that is being written.
-  if (is_recorded()) return absl::OkStatus();
-  const MutexLock change(mesh_changes_mutex_);
-  if (is_recorded()) return absl::OkStatus();
-  if (log_ != nullptr) RETURN_IF_ERROR(log_->set_mesh_grace(mesh->name(), grace_s));
+std::vector<std::string> Registry::names_to_mark(absl::Span<const StaticMesh* const> meshes, uint32_t grace_s) const {
+  std::vector<std::string> names;
   const MutexLock lock(mutex_);
-  mesh_graces_[mesh->name()] = grace_s;
+  for (const StaticMesh* const mesh : meshes) {
+    const auto known = meshes_.find(mesh->name());
+    if (known == meshes_.end() || known->second.get() != mesh) continue;
+    const auto grace = mesh_graces_.find(mesh->name());
+    if (grace == mesh_graces_.end() || grace->second < grace_s) names.push_back(mesh->name());
+  }
+  return names;
+}
+
+absl::Status Registry::make_collectable(absl::Span<const StaticMesh* const> meshes, uint32_t grace_s) {
+  // Most calls find the records; these calls do not wait for a mesh that is being written.
+  if (names_to_mark(meshes, grace_s).empty()) return absl::OkStatus();
+  const MutexLock change(mesh_changes_mutex_);
+  const std::vector<std::string> names = names_to_mark(meshes, grace_s);
+  if (names.empty()) return absl::OkStatus();
+  if (log_ != nullptr) RETURN_IF_ERROR(log_->set_mesh_graces(names, grace_s));
+  const MutexLock lock(mutex_);
+  for (const std::string& name : names) mesh_graces_[name] = grace_s;
   return absl::OkStatus();
 }
 

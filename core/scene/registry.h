@@ -20,6 +20,7 @@
 
 #include "absl/container/flat_hash_set.h"
 #include "absl/functional/function_ref.h"
+#include "absl/types/span.h"
 #include "core/scene/log/update_log.h"
 #include "core/scene/scene.h"
 
@@ -95,10 +96,11 @@ class Registry {
   // Deletes a mesh, damaged or not. Returns FAILED_PRECONDITION IN_USE, naming the number of its instances, if a scene
   // has instances that were placed under this name, or if a pending change places such instances.
   absl::Status delete_mesh(const std::string& name) LOCUS_EXCLUDES(mesh_changes_mutex_, changes_mutex_, mutex_);
-  // Records that `mesh` may be deleted when no scene has used it for `grace_s` seconds. If this was recorded before,
-  // the longer time applies. With a log, the record survives a restart. Does nothing if the mesh is not registered any
-  // more. Returns the log's error if the log fails; then nothing has changed.
-  absl::Status make_collectable(const StaticMesh* mesh, uint32_t grace_s) LOCUS_EXCLUDES(mesh_changes_mutex_, mutex_);
+  // Records that each of `meshes` may be deleted when no scene has used it for `grace_s` seconds. If this was recorded
+  // before, the longer time applies. With a log, the records survive a restart, and are written at once. Ignores meshes
+  // that are not registered any more. Returns the log's error if the log fails; then nothing has changed.
+  absl::Status make_collectable(absl::Span<const StaticMesh* const> meshes, uint32_t grace_s)
+      LOCUS_EXCLUDES(mesh_changes_mutex_, mutex_);
   struct CollectableMesh {
     MeshPtr mesh;
     uint32_t grace_s = 0;
@@ -179,6 +181,10 @@ class Registry {
   // Deletes the mesh `name` from the log. `taken` is the mesh, which was removed from meshes_, or null if the mesh is
   // damaged. If the log fails, restores the name.
   absl::Status delete_taken(const std::string& name, MeshPtr taken) LOCUS_REQUIRES(mesh_changes_mutex_, changes_mutex_)
+      LOCUS_EXCLUDES(mutex_);
+  // Returns the names of those of `meshes` that are registered and for which no grace of at least `grace_s` seconds is
+  // recorded.
+  std::vector<std::string> names_to_mark(absl::Span<const StaticMesh* const> meshes, uint32_t grace_s) const
       LOCUS_EXCLUDES(mutex_);
   bool in_use(const StaticMesh* mesh) const LOCUS_REQUIRES(mutex_);
   // Removes a scene that was deleted from its log.

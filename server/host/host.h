@@ -110,9 +110,11 @@ struct Host : RpcState {
   IdleScenes idle_scenes{lifetimes, registry, [this](const ScenePtr& scene, const absl::Status& status) {
                            report_idle_scene(scene, status);
                          }};
-  MeshCollector mesh_collector{lifetimes, registry, [this](const std::string& mesh, const absl::Status& status) {
-                                 report_unused_mesh(mesh, status);
-                               }};
+  MeshCollector mesh_collector{lifetimes, registry,
+                               MeshCollector::Reports{[this](const std::string& mesh, const absl::Status& status) {
+                                                        report_unused_mesh(mesh, status);
+                                                      },
+                                                      &Host::report_unmarked_meshes}};
   LineLimit lease_lines{kMaxLeaseLines};
   LeaseKeeper leases{lease_ends, [this](const Scene& scene, uint64_t writer, const absl::Status& status) {
                        report_lease(scene, writer, status);
@@ -133,6 +135,8 @@ struct Host : RpcState {
   // Log and audit that a scene or mesh was deleted because it was not used, or could not be deleted.
   void report_idle_scene(const ScenePtr& scene, const absl::Status& status);
   void report_unused_mesh(const std::string& mesh, const absl::Status& status);
+  // Logs that meshes of a scene could not be recorded as meshes that may be deleted.
+  static void report_unmarked_meshes(const Scene& scene, const absl::Status& status);
   // Logs that the objects of a silent writer were removed, or could not be removed.
   void report_lease(const Scene& scene, uint64_t writer, const absl::Status& status);
 };

@@ -27,14 +27,13 @@ void MeshCollector::start() {
 void MeshCollector::instances_changed(const Scene& scene) {
   const uint32_t grace_s = scene.spec().mesh_grace_s;
   const SnapshotPtr snapshot = scene.latest();  // keeps the meshes alive
-  for (const StaticMesh* mesh : snapshot->statics->meshes()) {
-    renew(mesh->name());
-    if (grace_s == 0) continue;
-    if (const absl::Status status = registry_.make_collectable(mesh, grace_s); !status.ok())
-      report_(mesh->name(), status);
-    const MutexLock lock(mutex_);
-    check_soon(grace_s);
-  }
+  const std::vector<const StaticMesh*> meshes = snapshot->statics->meshes();
+  for (const StaticMesh* mesh : meshes) renew(mesh->name());
+  if (grace_s == 0 || meshes.empty()) return;
+  if (const absl::Status status = registry_.make_collectable(meshes, grace_s); !status.ok())
+    reports_.not_marked(scene, status);
+  const MutexLock lock(mutex_);
+  check_soon(grace_s);
 }
 
 void MeshCollector::renew(const std::string& mesh) {
@@ -104,7 +103,7 @@ bool MeshCollector::collect(const Registry::CollectableMesh& mesh, Time now) {
     return is_due(mesh, now);
   });
   if (deleted.ok() && *deleted) ++deleted_;
-  if (!deleted.ok() || *deleted) report_(mesh.mesh->name(), deleted.status());
+  if (!deleted.ok() || *deleted) reports_.deleted(mesh.mesh->name(), deleted.status());
   return deleted.ok();
 }
 

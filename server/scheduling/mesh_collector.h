@@ -30,24 +30,29 @@ namespace locus::server {
 
 class MeshCollector {
  public:
-  // Function that is called on the keeper's thread after a mesh was deleted, or with the log's error if it could not be
-  // deleted; then the deletion is tried again after kRetryAfter.
-  using Report = std::function<void(const std::string& mesh, const absl::Status& status)>;
+  struct Reports {
+    // Called on the keeper's thread after a mesh was deleted, or with the log's error if it could not be deleted; then
+    // the deletion is tried again after kRetryAfter.
+    std::function<void(const std::string& mesh, const absl::Status& status)> deleted;
+    // Called by start() and instances_changed() with the log's error if meshes of a scene could not be recorded as
+    // meshes that may be deleted. They are recorded at the next change of the scene's instances, or after a restart.
+    std::function<void(const Scene& scene, const absl::Status& status)> not_marked;
+  };
   static constexpr std::chrono::seconds kRetryAfter{5};
   // Minimum and maximum interval between two checks of a mesh that is in use.
   static constexpr std::chrono::milliseconds kMinCheck{100};
   static constexpr std::chrono::seconds kMaxCheck{60};
 
   // `keeper` and `registry` must outlive the calls of this object's task, which end with the keeper's thread.
-  MeshCollector(LifetimeKeeper& keeper, Registry& registry, Report report)
-      : keeper_(keeper), registry_(registry), report_(std::move(report)) {}
+  MeshCollector(LifetimeKeeper& keeper, Registry& registry, Reports reports)
+      : keeper_(keeper), registry_(registry), reports_(std::move(reports)) {}
 
   // Begins to collect. Records the meshes of all scenes with mesh_grace_s, because a crash may have lost a record. Call
   // once, when the scenes are restored.
   void start() LOCUS_EXCLUDES(mutex_);
 
   // Call after a scene was created, and after its instances were changed. If the scene has mesh_grace_s, records that
-  // its meshes may be deleted, and calls the report with the log's error if that fails. Renews the meshes.
+  // its meshes may be deleted, with one write to the log. Renews the meshes.
   void instances_changed(const Scene& scene) LOCUS_EXCLUDES(mutex_);
   // Begins the time of a mesh again. Call before a mesh of this name is looked up to be placed, or to answer its
   // upload. From then on the mesh, if it is found, is not deleted for its whole time.
@@ -77,7 +82,7 @@ class MeshCollector {
 
   LifetimeKeeper& keeper_;
   Registry& registry_;
-  const Report report_;
+  const Reports reports_;
   std::atomic<uint64_t> deleted_{0};
   mutable Mutex mutex_;
   LifetimeKeeper::TaskId task_ LOCUS_GUARDED_BY(mutex_) = 0;                  // 0: start() was not called

@@ -47,9 +47,16 @@ void Host::report_lease(const Scene& scene, uint64_t writer, const absl::Status&
 void Host::report_unused_mesh(const std::string& mesh, const absl::Status& status) {
   report_deletion(*this, "DeleteMesh", mesh, status, "no scene has used the mesh for its mesh_grace_s");
   if (!status.ok())
-    return server::log(LogLevel::kWarning, "an unused mesh could not be deleted or marked; this is tried again",
+    return server::log(LogLevel::kWarning, "an unused mesh could not be deleted; this is tried again",
                        {{"mesh", mesh}, {"why", std::string(status.message())}});
   server::log(LogLevel::kInfo, "unused mesh deleted", {{"mesh", mesh}});
+}
+
+void Host::report_unmarked_meshes(const Scene& scene, const absl::Status& status) {
+  server::log(LogLevel::kWarning,
+              "meshes of a scene could not be marked for deletion after its mesh_grace_s; this is tried again at the "
+              "next change of its instances",
+              {{"scene", scene.name()}, {"why", std::string(status.message())}});
 }
 
 }  // namespace locus::server

@@ -62,7 +62,7 @@ class RocksdbLog final : public UpdateLog {
   absl::Status add_mesh(absl::string_view name, const std::array<uint8_t, 32>& sha256, ChunkSource content,
                         ChunkSource parts) override LOCUS_EXCLUDES(catalogue_mutex_, adding_mesh_);
   absl::Status delete_mesh(absl::string_view name) override LOCUS_EXCLUDES(catalogue_mutex_, adding_mesh_);
-  absl::Status set_mesh_grace(absl::string_view name, uint32_t grace_s) override
+  absl::Status set_mesh_graces(absl::Span<const std::string> names, uint32_t grace_s) override
       LOCUS_EXCLUDES(catalogue_mutex_, adding_mesh_);
   absl::Status read_mesh(const std::array<uint8_t, 32>& sha256, ChunkSink sink) const override
       LOCUS_EXCLUDES(catalogue_mutex_);

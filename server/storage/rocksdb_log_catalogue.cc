@@ -368,14 +368,18 @@ absl::Status RocksdbLog::delete_mesh(absl::string_view name) {
   return absl::OkStatus();
 }
 
-absl::Status RocksdbLog::set_mesh_grace(absl::string_view name, uint32_t grace_s) {
+absl::Status RocksdbLog::set_mesh_graces(absl::Span<const std::string> names, uint32_t grace_s) {
   MutexLock adding(adding_mesh_);
   MutexLock lock(catalogue_mutex_);
-  std::optional<MeshRow> row = mesh_row(name);
-  if (!row) return not_stored(absl::StrCat("the log has no mesh '", name, "'"));
-  row->grace_s = grace_s;
+  CatalogueChange change;
+  for (const std::string& name : names) {
+    std::optional<MeshRow> row = mesh_row(name);
+    if (!row) return not_stored(absl::StrCat("the log has no mesh '", name, "'"));
+    row->grace_s = grace_s;
+    change.rows.push_back({mesh_key(name), encode(*row)});
+  }
   rocksdb::WriteBatch batch;
-  RETURN_IF_ERROR(commit({{{mesh_key(name), encode(*row)}}, 0}, batch));
+  RETURN_IF_ERROR(commit(change, batch));
   scenes_.set_catalogue(catalogue_.totals());
   write_durable_marker(false);
   return absl::OkStatus();

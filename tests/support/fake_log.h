@@ -39,7 +39,7 @@ class FakeLog final : public UpdateLog {
     return refusal();
   }
   absl::Status delete_mesh(absl::string_view) override { return refusal(); }
-  absl::Status set_mesh_grace(absl::string_view, uint32_t) override { return refusal(); }
+  absl::Status set_mesh_graces(absl::Span<const std::string>, uint32_t) override { return refusal(); }
   absl::Status read_mesh(const std::array<uint8_t, 32>&, ChunkSink) const override { return refusal(); }
   absl::Status read_parts(absl::string_view, ChunkSink) const override { return refusal(); }
   void store_topology(const std::array<uint8_t, 32>&, absl::string_view) override {}

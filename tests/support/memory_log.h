@@ -71,6 +71,11 @@ class MemoryLog : public UpdateLog {
     const MutexLock lock(mutex_);
     failure_ = status;
   }
+  // Like fail_with(), but only set_mesh_graces() fails.
+  void fail_marks_with(const absl::Status& status) {
+    const MutexLock lock(mutex_);
+    mark_failure_ = status;
+  }
   // Makes create_scene(), delete_scene(), append() and delete_mesh() wait until release().
   void hold() {
     const MutexLock lock(mutex_);
@@ -232,12 +237,20 @@ class MemoryLog : public UpdateLog {
     return absl::OkStatus();
   }
 
-  absl::Status set_mesh_grace(absl::string_view name, uint32_t grace_s) override {
+  absl::Status set_mesh_graces(absl::Span<const std::string> names, uint32_t grace_s) override {
     const MutexLock lock(mutex_);
     if (!failure_.ok()) return failure_;
-    if (!kept_.meshes.contains(std::string(name))) return absl::NotFoundError("no such mesh");
-    kept_.mesh_graces[std::string(name)] = grace_s;
+    if (!mark_failure_.ok()) return mark_failure_;
+    for (const std::string& name : names)
+      if (!kept_.meshes.contains(name)) return absl::NotFoundError("no such mesh");
+    ++grace_writes_;
+    for (const std::string& name : names) kept_.mesh_graces[name] = grace_s;
     return absl::OkStatus();
+  }
+  // Returns the number of successful calls of set_mesh_graces().
+  uint64_t grace_writes() const {
+    const MutexLock lock(mutex_);
+    return grace_writes_;
   }
 
   absl::Status read_mesh(const std::array<uint8_t, 32>& sha256, ChunkSink sink) const override {
@@ -323,6 +336,8 @@ class MemoryLog : public UpdateLog {
   mutable Mutex mutex_;
   Kept kept_ LOCUS_GUARDED_BY(mutex_);
   absl::Status failure_ LOCUS_GUARDED_BY(mutex_);
+  absl::Status mark_failure_ LOCUS_GUARDED_BY(mutex_);
+  uint64_t grace_writes_ LOCUS_GUARDED_BY(mutex_) = 0;
   ConditionVariable released_;
   bool held_ LOCUS_GUARDED_BY(mutex_) = false;
   int waiting_ LOCUS_GUARDED_BY(mutex_) = 0;

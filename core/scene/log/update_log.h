@@ -66,7 +66,7 @@ struct StoredMesh {
   std::string name;
   std::array<uint8_t, 32> sha256 = {};  // hash of the content
   absl::Status damage;                  // not OK (DATA_LOSS): the mesh must not be used
-  uint32_t grace_s = 0;                 // last value of set_mesh_grace(), or 0
+  uint32_t grace_s = 0;                 // last value of set_mesh_graces(), or 0
   bool parts_in_content = false;  // true (data format 1): the content includes the parts; read_parts() returns none
 };
 
@@ -123,9 +123,9 @@ class UpdateLog {
   virtual absl::Status add_mesh(absl::string_view name, const std::array<uint8_t, 32>& sha256, ChunkSource content,
                                 ChunkSource parts) = 0;
   virtual absl::Status delete_mesh(absl::string_view name) = 0;
-  // Stores a number of seconds for a mesh name: see Registry::make_collectable(). At most limits::kMaxLifetimeSeconds.
-  // Returns NOT_FOUND if the mesh is not stored.
-  virtual absl::Status set_mesh_grace(absl::string_view name, uint32_t grace_s) = 0;
+  // Stores a number of seconds for each of the mesh names, with one write: see Registry::make_collectable(). At most
+  // limits::kMaxLifetimeSeconds. Returns NOT_FOUND, and stores nothing, if one of the meshes is not stored.
+  virtual absl::Status set_mesh_graces(absl::Span<const std::string> names, uint32_t grace_s) = 0;
   virtual absl::Status read_mesh(const std::array<uint8_t, 32>& sha256, ChunkSink sink) const = 0;
   virtual absl::Status read_parts(absl::string_view name, ChunkSink sink) const = 0;
 

@@ -73,7 +73,7 @@ struct ContentRow {
 struct MeshRow {
   Sha256 sha256 = {};
   std::optional<ContentRow> parts;  // no value in rows of format 1: the content's chunks include the parts
-  uint32_t grace_s = 0;             // see UpdateLog::set_mesh_grace(); 0: not set
+  uint32_t grace_s = 0;             // see UpdateLog::set_mesh_graces(); 0: not set
 };
 
 struct SceneRow {

@@ -80,10 +80,10 @@ TEST_F(RegistryLogTest, CollectableMeshesSurviveARestart) {
   const MeshPtr mesh = *registry_->add_mesh("m", mesh_);
   ASSERT_TRUE(registry_->add_mesh("alias", mesh_).ok());
   log_->fail_with(kFull);
-  EXPECT_EQ(registry_->make_collectable(mesh.get(), 60), kFull);
+  EXPECT_EQ(registry_->make_collectable({mesh.get()}, 60), kFull);
   EXPECT_THAT(registry_->collectable_meshes(), IsEmpty());
   log_->fail_with(absl::OkStatus());
-  ASSERT_TRUE(registry_->make_collectable(mesh.get(), 60).ok());
+  ASSERT_TRUE(registry_->make_collectable({mesh.get()}, 60).ok());
   restart();
   ASSERT_EQ(registry_->collectable_meshes().size(), 1u);
   EXPECT_EQ(registry_->collectable_meshes()[0].mesh, *registry_->find_mesh("m", "mesh"));

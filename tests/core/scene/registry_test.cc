@@ -285,13 +285,13 @@ TEST_F(RegistryTest, AUsedMeshIsNotDeletedAndItsUsesOfAllScenesAreCounted) {
 TEST_F(RegistryTest, TheLongestGraceOfACollectableMeshApplies) {
   const MeshPtr mesh = *registry_.add_mesh("m", mesh_);
   EXPECT_TRUE(registry_.collectable_meshes().empty());
-  for (const uint32_t grace_s : {10, 60, 20}) ASSERT_TRUE(registry_.make_collectable(mesh.get(), grace_s).ok());
+  for (const uint32_t grace_s : {10, 60, 20}) ASSERT_TRUE(registry_.make_collectable({mesh.get()}, grace_s).ok());
   const std::vector<Registry::CollectableMesh> meshes = registry_.collectable_meshes();
   ASSERT_EQ(meshes.size(), 1u);
   EXPECT_EQ(meshes[0].mesh, mesh);
   EXPECT_EQ(meshes[0].grace_s, 60u);
   ASSERT_TRUE(registry_.delete_mesh("m").ok());
-  ASSERT_TRUE(registry_.make_collectable(mesh.get(), 10).ok());
+  ASSERT_TRUE(registry_.make_collectable({mesh.get()}, 10).ok());
   EXPECT_TRUE(registry_.collectable_meshes().empty());
   ASSERT_TRUE(registry_.add_mesh("m", mesh_).ok());
   EXPECT_TRUE(registry_.collectable_meshes().empty()) << "this is another mesh";

@@ -24,6 +24,9 @@ using Time = LifetimeKeeper::Time;
 // A grace of 8 s, so that meshes in use are checked every second.
 constexpr uint32_t kGrace = 8;
 
+const MeshCollector::Reports kNoReports = {[](const std::string&, const absl::Status&) {},
+                                           [](const Scene&, const absl::Status&) {}};
+
 class MeshCollectorTest : public ::testing::Test {
  protected:
   MeshCollectorTest() { collector_.start(); }
@@ -84,9 +87,13 @@ class MeshCollectorTest : public ::testing::Test {
   Registry registry_{&log_};
   LifetimeKeeper keeper_{[this] { return now_; }};
   std::vector<std::string> reports_;
-  MeshCollector collector_{keeper_, registry_, [this](const std::string& mesh, const absl::Status& status) {
-                             reports_.push_back(mesh + (status.ok() ? "" : " failed"));
-                           }};
+  MeshCollector collector_{keeper_, registry_,
+                           MeshCollector::Reports{[this](const std::string& mesh, const absl::Status& status) {
+                                                    reports_.push_back(mesh + (status.ok() ? "" : " failed"));
+                                                  },
+                                                  [this](const Scene& scene, const absl::Status&) {
+                                                    reports_.push_back(scene.name() + " not marked");
+                                                  }}};
   uint64_t epoch_ = 0;
 };
 
@@ -230,6 +237,37 @@ TEST_F(MeshCollectorTest, AFailedDeletionIsTriedAgain) {
   EXPECT_THAT(meshes_at(16'000), IsEmpty());
 }
 
+TEST_F(MeshCollectorTest, AllMeshesOfASceneAreMarkedWithOneWrite) {
+  const ScenePtr scene = created("arena");
+  test::Columns columns;
+  StaticChange placing;
+  for (uint8_t i = 0; i < 5; ++i) {
+    PlacementColumns& place = placing.place.emplace_back();
+    place.mesh = upload("m" + std::to_string(i), i);
+    place.translations = columns.doubles({0, 0, 0});
+  }
+  ASSERT_TRUE(change(*scene, collector_, placing).ok());
+  EXPECT_EQ(log_.crash().mesh_graces.size(), 5u);
+  EXPECT_EQ(log_.grace_writes(), 1u);
+  ASSERT_TRUE(change(*scene, collector_, placing).ok());
+  EXPECT_EQ(log_.grace_writes(), 1u) << "they are marked already";
+}
+
+TEST_F(MeshCollectorTest, MarksThatFailAreReportedAsMarksAndMadeAtTheNextChange) {
+  const ScenePtr scene = created("arena");
+  const MeshPtr mesh = upload("m", 1);
+  place(*scene, mesh, 1);
+  const MeshPtr other = upload("other", 2);
+  log_.fail_marks_with(absl::ResourceExhaustedError("the disk is full"));
+  place(*scene, other, 2);
+  EXPECT_THAT(reports_, ElementsAre("arena not marked"));
+  EXPECT_EQ(log_.crash().mesh_graces.count("other"), 0u);
+  log_.fail_marks_with(absl::OkStatus());
+  remove(*scene, 1);
+  EXPECT_EQ(log_.crash().mesh_graces.count("other"), 1u);
+  EXPECT_THAT(reports_, ElementsAre("arena not marked"));
+}
+
 TEST_F(MeshCollectorTest, ARestartedCollectorKnowsTheMeshesAndBeginsTheirTimeAgain) {
   const ScenePtr scene = created("arena");
   place(*scene, upload("m", 1), 1);
@@ -240,7 +278,7 @@ TEST_F(MeshCollectorTest, ARestartedCollectorKnowsTheMeshesAndBeginsTheirTimeAga
   Registry registry(&log);
   registry.restore_mesh("m", test::make_mesh("m", 1), log.stored_meshes()[0].grace_s);
   LifetimeKeeper keeper([this] { return now_; });
-  MeshCollector collector(keeper, registry, [](const std::string&, const absl::Status&) {});
+  MeshCollector collector(keeper, registry, kNoReports);
   collector.start();
   keeper.run_due();
   now_ += milliseconds(7'900);
@@ -264,7 +302,7 @@ TEST_F(MeshCollectorTest, TheStartMarksTheMeshesOfAskingScenes) {
   ASSERT_TRUE(scene->change_instances(placing).ok());
   EXPECT_THAT(registry_.collectable_meshes(), IsEmpty());
   LifetimeKeeper keeper([this] { return now_; });
-  MeshCollector collector(keeper, registry_, [](const std::string&, const absl::Status&) {});
+  MeshCollector collector(keeper, registry_, kNoReports);
   collector.start();
   EXPECT_EQ(registry_.collectable_meshes().size(), 1u);
   EXPECT_EQ(log_.crash().mesh_graces.at("m"), kGrace);
@@ -278,7 +316,7 @@ TEST(MeshCollectorThreadTest, AMeshThatIsPlacedIsNeverDeleted) {
   test::MemoryLog log;
   Registry registry(&log);
   LifetimeKeeper keeper([&] { return Time(seconds(now_s.load())); });
-  MeshCollector collector(keeper, registry, [](const std::string&, const absl::Status&) {});
+  MeshCollector collector(keeper, registry, kNoReports);
   collector.start();
   SceneSpec spec;
   spec.mesh_grace_s = 1;

@@ -246,9 +246,9 @@ TEST_F(RocksdbLogTest, PartsAreKeptForEachNameAndGoWithIt) {
 
 TEST_F(RocksdbLogTest, TheGraceOfAMeshIsKeptForItsNameAndGoesWithIt) {
   for (const char* const name : {"a", "b"}) ASSERT_EQ(add_mesh(name, 1, {"content"}), absl::OkStatus());
-  ASSERT_EQ(log_->set_mesh_grace("a", 7), absl::OkStatus());
-  ASSERT_EQ(log_->set_mesh_grace("a", 60), absl::OkStatus());
-  EXPECT_EQ(log_->set_mesh_grace("c", 60).code(), absl::StatusCode::kNotFound);
+  ASSERT_EQ(log_->set_mesh_graces({"a"}, 7), absl::OkStatus());
+  ASSERT_EQ(log_->set_mesh_graces({"a"}, 60), absl::OkStatus());
+  EXPECT_EQ(log_->set_mesh_graces({"b", "c"}, 60).code(), absl::StatusCode::kNotFound);
   for (int times = 0; times < 2; ++times) {
     open();
     ASSERT_EQ(log_->stored_meshes().size(), 2u);

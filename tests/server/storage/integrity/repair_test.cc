@@ -77,7 +77,7 @@ class RepairTest : public ::testing::Test {
 TEST_F(RepairTest, AMeshWhosePartsAreDamagedIsKeptWithoutThem) {
   store_two_meshes();
   EXPECT_EQ(stored_chunks(), 4u);
-  for (const char* const name : {"a", "b"}) ASSERT_EQ(open()->set_mesh_grace(name, 60), absl::OkStatus());
+  ASSERT_EQ(open()->set_mesh_graces({"a", "b"}, 60), absl::OkStatus());
   const absl::StatusOr<RepairReport> report = damage_and_repair(kParts + "a");
   ASSERT_TRUE(report.ok()) << report.status();
   ASSERT_EQ(report->meshes.size(), 1u);
