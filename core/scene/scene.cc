@@ -189,7 +189,8 @@ Scene::LeaseList Scene::leases() const {
   return leases_;
 }
 
-absl::StatusOr<bool> Scene::end_lease(uint64_t writer, absl::FunctionRef<bool()> is_due, Deadline until) {
+absl::StatusOr<std::optional<uint64_t>> Scene::end_lease(uint64_t writer, absl::FunctionRef<bool()> is_due,
+                                                         Deadline until) {
   UpdateBatch end;
   end.end_lease = writer;
   const UpdateBatch* const batches = &end;
@@ -198,10 +199,11 @@ absl::StatusOr<bool> Scene::end_lease(uint64_t writer, absl::FunctionRef<bool()>
     const MutexLock lock(writer_mutex_);
     RETURN_IF_ERROR(check_open());
     if (pins_->over_budget()) continue;
-    if (!writer_.has_lease(writer) || !is_due()) return false;
+    if (!writer_.has_lease(writer) || !is_due()) return std::optional<uint64_t>();
     RETURN_IF_ERROR(journal_.append_each(writer_.epoch(), {&batches, 1}));
+    const uint64_t before = latest()->objects.size();
     RETURN_IF_ERROR(answer(end, SceneWriter::Admission()).status());
-    return true;
+    return before - latest()->objects.size();
   }
 }
 

@@ -140,9 +140,11 @@ class Scene {
   // Ends the lease of a writer: removes the objects that belong to it, as one revision, which is logged like a batch.
   // Does nothing if the writer has no lease, or if `is_due` returns false. `is_due` is called when no batch is being
   // applied, right before the lease ends, so that a batch of the writer that arrived meanwhile keeps the lease; it must
-  // be quick and must not call the scene. Returns true if the lease ended; the errors are those of apply().
-  absl::StatusOr<bool> end_lease(uint64_t writer, absl::FunctionRef<bool()> is_due,
-                                 Deadline until = ReaderTracker::kNever) LOCUS_EXCLUDES(writer_mutex_, mutex_);
+  // be quick and must not call the scene. Returns the number of removed objects if the lease ended, else nullopt; the
+  // errors are those of apply().
+  absl::StatusOr<std::optional<uint64_t>> end_lease(uint64_t writer, absl::FunctionRef<bool()> is_due,
+                                                    Deadline until = ReaderTracker::kNever)
+      LOCUS_EXCLUDES(writer_mutex_, mutex_);
   // Returns the leases of writers after the last applied batch, ascending by writer. O(1); does not wait for a batch
   // that is being applied. A batch that begins or changes a lease is in the list before it is acknowledged.
   using LeaseList = std::shared_ptr<const std::vector<Lease>>;

@@ -116,8 +116,8 @@ struct Host : RpcState {
                                                       },
                                                       &Host::report_unmarked_meshes}};
   LineLimit lease_lines{kMaxLeaseLines};
-  LeaseKeeper leases{lease_ends, [this](const Scene& scene, uint64_t writer, const absl::Status& status) {
-                       report_lease(scene, writer, status);
+  LeaseKeeper leases{lease_ends, [this](const Scene& scene, uint64_t writer, const absl::StatusOr<uint64_t>& removed) {
+                       report_lease(scene, writer, removed);
                      }};
   ChangeQueue changes{kChangeThreads, limits::kMaxPendingChanges};
   MemoryKeeper memory_keeper{
@@ -137,8 +137,8 @@ struct Host : RpcState {
   void report_unused_mesh(const std::string& mesh, const absl::Status& status);
   // Logs that meshes of a scene could not be recorded as meshes that may be deleted.
   static void report_unmarked_meshes(const Scene& scene, const absl::Status& status);
-  // Logs that the objects of a silent writer were removed, or could not be removed.
-  void report_lease(const Scene& scene, uint64_t writer, const absl::Status& status);
+  // Logs and audits that the objects of a silent writer were removed, or could not be removed.
+  void report_lease(const Scene& scene, uint64_t writer, const absl::StatusOr<uint64_t>& removed);
 };
 
 }  // namespace locus::server

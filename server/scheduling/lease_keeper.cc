@@ -137,12 +137,12 @@ std::optional<LeaseKeeper::Time> LeaseKeeper::check(const std::shared_ptr<Lease>
 std::optional<LeaseKeeper::Time> LeaseKeeper::end(const std::shared_ptr<Lease>& lease, Scene& scene,
                                                   milliseconds length, Time now) {
   const auto is_due = [&] { return planted(PlantedBug::kLeaseTwice) || due_time(*lease, length, now) <= now; };
-  const absl::StatusOr<bool> ended =
+  const absl::StatusOr<std::optional<uint64_t>> ended =
       scene.end_lease(lease->writer, is_due, std::chrono::steady_clock::time_point::min());
-  if (ended.ok() && !*ended) return due_time(*lease, length, now);
+  if (ended.ok() && !ended->has_value()) return due_time(*lease, length, now);
   if (ended.ok()) {
     ended_.fetch_add(1);
-    report_(scene, lease->writer, absl::OkStatus());
+    report_(scene, lease->writer, **ended);
   } else if (absl::IsDeadlineExceeded(ended.status())) {
     scene.revoke_overdue_readers();
     return now + kRetrySoon;

@@ -31,9 +31,9 @@ namespace locus::server {
 
 class LeaseKeeper {
  public:
-  // Function that is called on the keeper's thread after a lease ended, or with the error if it could not be ended;
-  // then this is tried again after kRetryAfter.
-  using Report = std::function<void(const Scene& scene, uint64_t writer, const absl::Status& status)>;
+  // Function that is called on the keeper's thread after a lease ended, with the number of removed objects, or with the
+  // error if it could not be ended; then this is tried again after kRetryAfter.
+  using Report = std::function<void(const Scene& scene, uint64_t writer, const absl::StatusOr<uint64_t>& removed)>;
   static constexpr std::chrono::seconds kRetryAfter{1};
   // Time until the next attempt if the readers of the scene hold too much memory.
   static constexpr std::chrono::milliseconds kRetrySoon{20};

@@ -18,7 +18,7 @@ struct AuditEntry {
   // Peer::limit_key of the connection. Refusals are counted by principal and `address`. A line that reports counted
   // refusals has `address` as its peer; other lines do not use `address`.
   std::string address;
-  std::string rpc;      // full method path, HTTP page, or event of the server: connect, reload
+  std::string rpc;      // full method path, HTTP page, or event of the server: connect, reload, end_lease
   std::string subject;  // scene or mesh; empty = none
   absl::StatusCode code = absl::StatusCode::kOk;
   std::string request_id;  // request id of the call; empty = none

@@ -32,14 +32,17 @@ void Host::report_idle_scene(const ScenePtr& scene, const absl::Status& status) 
   server::log(LogLevel::kInfo, "idle scene deleted", {{"scene", name}});
 }
 
-void Host::report_lease(const Scene& scene, uint64_t writer, const absl::Status& status) {
+void Host::report_lease(const Scene& scene, uint64_t writer, const absl::StatusOr<uint64_t>& removed) {
+  if (removed.ok()) report_lease_end(*this, scene.name(), *removed);
   const std::optional<uint64_t> left_out = lease_lines.admit(lease_ends.now());
   if (!left_out) return;
   const std::string id = absl::StrCat(writer), others = absl::StrCat(*left_out);
-  if (!status.ok())
-    return server::log(
-        LogLevel::kWarning, "the lease of a silent writer could not be ended; this is tried again",
-        {{"scene", scene.name()}, {"writer", id}, {"left_out", others}, {"why", std::string(status.message())}});
+  if (!removed.ok())
+    return server::log(LogLevel::kWarning, "the lease of a silent writer could not be ended; this is tried again",
+                       {{"scene", scene.name()},
+                        {"writer", id},
+                        {"left_out", others},
+                        {"why", std::string(removed.status().message())}});
   server::log(LogLevel::kInfo, "lease of a silent writer ended",
               {{"scene", scene.name()}, {"writer", id}, {"left_out", others}});
 }

@@ -54,4 +54,9 @@ void report_deletion(const RpcState& state, absl::string_view rpc, absl::string_
   audit(state, std::move(entry));
 }
 
+void report_lease_end(const RpcState& state, const std::string& scene, uint64_t objects) {
+  AuditUpdates* const updates = state.access == nullptr ? nullptr : state.access->audit_updates();
+  if (updates != nullptr) updates->count({"locusd", "", "end_lease", scene, objects}, unix_milliseconds());
+}
+
 }  // namespace locus::server

@@ -126,7 +126,7 @@ class RecoveryLockstep {
   std::string end_lease() {
     const uint64_t writer = updates_.draw_writer();
     const uint64_t before = scene_->log_position().sequence;
-    const absl::StatusOr<bool> ended = scene_->end_lease(writer, [] { return true; });
+    const absl::StatusOr<std::optional<uint64_t>> ended = scene_->end_lease(writer, [] { return true; });
     std::string what;
     if (!logged(ended.status(), {{{}, false, {}, writer}}, before, what)) return what;
     return *ended == *model_->end_lease(writer, [] { return true; }) ? "" : "whether the lease of a writer ends";

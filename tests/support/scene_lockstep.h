@@ -177,8 +177,8 @@ class SceneLockstep {
 
   std::string end_lease() {
     const uint64_t writer = updates_.draw_writer();
-    const absl::StatusOr<bool> ended = scene_.end_lease(writer, [] { return true; });
-    return ended.ok() && *ended == model_.end_lease(writer) ? "" : "whether the lease of a writer ends";
+    const absl::StatusOr<std::optional<uint64_t>> ended = scene_.end_lease(writer, [] { return true; });
+    return ended.ok() && ended->has_value() == model_.end_lease(writer) ? "" : "whether the lease of a writer ends";
   }
 
   std::string apply_batch() {

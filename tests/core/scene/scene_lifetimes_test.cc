@@ -49,7 +49,7 @@ class SceneLifetimesTest : public SceneFixture {
     return snapshot->remaining_ticks(snapshot->objects.find_ref(id).handle());
   }
   bool end_lease(uint64_t writer) {
-    return *scene_.end_lease(writer, [] { return true; });
+    return scene_.end_lease(writer, [] { return true; })->has_value();
   }
 };
 
@@ -302,7 +302,7 @@ TEST_F(SceneLifetimesTest, ALeaseEndsOnlyOnce) {
 
 TEST_F(SceneLifetimesTest, ALeaseThatIsNotDueStays) {
   apply(numbered(leased(100, inserting({1})), 7, 1));
-  EXPECT_FALSE(*scene_.end_lease(7, [] { return false; }));
+  EXPECT_EQ(*scene_.end_lease(7, [] { return false; }), std::nullopt);
   EXPECT_THAT(ids(), ElementsAre(1));
   EXPECT_THAT(*scene_.leases(), ElementsAre(Lease{7, 100}));
 }

@@ -71,7 +71,7 @@ class LeaseKeeperTest : public ::testing::Test {
   Registry registry_{&log_};
   LifetimeKeeper keeper_{[this] { return now_; }};
   std::vector<std::string> reports_;
-  LeaseKeeper leases_{keeper_, [this](const Scene&, uint64_t writer, const absl::Status& status) {
+  LeaseKeeper leases_{keeper_, [this](const Scene&, uint64_t writer, const absl::StatusOr<uint64_t>& status) {
                         reports_.push_back(std::to_string(writer) + (status.ok() ? "" : " failed"));
                         if (on_report_) on_report_();
                       }};
@@ -267,7 +267,7 @@ TEST_F(LeaseKeeperTest, ARestoredSceneHasItsLeasesWithTheirWholeTime) {
       recover_scene(log, log.stored_scenes().front(), [](const MeshKey&) { return MeshPtr(); });
   ASSERT_TRUE(restored.ok()) << restored.status();
   LifetimeKeeper keeper([this] { return now_; });
-  LeaseKeeper leases(keeper, [](const Scene&, uint64_t, const absl::Status&) {});
+  LeaseKeeper leases(keeper, [](const Scene&, uint64_t, const absl::StatusOr<uint64_t>&) {});
   leases.watch(*restored);
   EXPECT_EQ(leases.leases(), 1u);
   now_ += milliseconds(499);
@@ -288,7 +288,7 @@ TEST(LeaseKeeperThreadTest, NoLeaseEndsWhileItsWriterIsHeard) {
   Registry registry(&log);
   const ScenePtr scene = registry.create_scene("arena", {}, 1, "", false)->scene;
   LifetimeKeeper keeper([&] { return Time(milliseconds(now_ms.load())); });
-  LeaseKeeper leases(keeper, [](const Scene&, uint64_t, const absl::Status&) {});
+  LeaseKeeper leases(keeper, [](const Scene&, uint64_t, const absl::StatusOr<uint64_t>&) {});
   std::atomic<uint64_t> wrong{0};
   std::atomic<int> left{kWriters};
   std::vector<std::thread> threads;
