@@ -256,5 +256,38 @@ TEST(KdTreeTest, AVisitEndsWhenTheVisitorHasEnough) {
   EXPECT_EQ(work.tests, 1u);
 }
 
+struct CentroidTraits : PrimitiveTraits<Triangle> {
+  static Vec3f position(const Triangle& triangle) { return (triangle.a + triangle.b + triangle.c) * (1.0f / 3); }
+};
+struct LowestCornerTraits : PrimitiveTraits<Triangle> {
+  static Vec3f position(const Triangle& triangle) { return bounds_of(triangle).min; }
+};
+static_assert(MutableSpatialIndex<KdTree<Triangle, CentroidTraits>>);
+
+TEST(KdTreeTest, OneTypeLiesAtItsCentroidInOneTreeAndAtItsLowestCornerInAnother) {
+  Random random(3);
+  std::vector<Triangle> triangles;
+  for (uint32_t i = 0; i < 300; ++i) {
+    const Vec3f corner = random.float_vector(10);
+    const Vec3f u = random.float_vector(1), v = random.float_vector(1);
+    triangles.push_back({corner, corner + u, corner + v, i});
+  }
+  const auto at_centroid = KdTree<Triangle, CentroidTraits>::build(triangles, options_of(KdSplit::kMedian));
+  const auto at_corner = KdTree<Triangle, LowestCornerTraits>::build(triangles, options_of(KdSplit::kMedian));
+  EXPECT_NE(at_centroid.shape().references, at_corner.shape().references) << "the trees do not differ";
+  for (int i = 0; i < 100; ++i) {
+    const Ballf ball = {random.float_vector(10), 2};
+    std::vector<Triangle> first, second;
+    ball_overlap(at_centroid, ball, first);
+    ball_overlap(at_corner, ball, second);
+    EXPECT_THAT(first, ::testing::UnorderedElementsAreArray(second));
+    const TriangleRay ray(random.vector(10), random.unit_vector());
+    Triangle hit, other_hit;
+    float t = 100, other_t = 100;
+    EXPECT_EQ(first_ray(at_centroid, ray, hit, t), first_ray(at_corner, ray, other_hit, other_t));
+    EXPECT_EQ(t, other_t);
+  }
+}
+
 }  // namespace
 }  // namespace locus::test
