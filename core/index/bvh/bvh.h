@@ -35,11 +35,12 @@
 
 namespace locus {
 
-template <Bounded V>
+template <class V, class T>
+requires Bounded<V, T>
 class BvhChanging;
 
 // Values that a tree has and another tree does not have. A position is one that Bvh::at() takes.
-template <Bounded V>
+template <class V>
 struct BvhChange {
   struct Replacement {
     uint32_t position;
@@ -52,13 +53,14 @@ struct BvhChange {
   bool empty() const { return replaced.empty() && removed.empty() && added.empty(); }
 };
 
-template <Bounded V>
+template <class V, class T = PrimitiveTraits<V>>
+requires Bounded<V, T>
 class Bvh {
-  using S = ScalarOf<V>;
+  using S = typename T::Scalar;
 
  public:
   using Value = V;
-  using Traits = PrimitiveTraits<V>;
+  using Traits = T;
 
   // Makes an empty tree.
   Bvh() = default;
@@ -70,7 +72,7 @@ class Bvh {
     boxes.reserve(values.size());
     for (const V& value : values) boxes.push_back(Traits::bounds(value));
     ASSIGN_OR_RETURN(BvhLayout<S> layout, build_bvh_layout<S>(boxes, options));
-    return Bvh(BvhCutter<V>(layout, values).run());
+    return Bvh(BvhCutter<V, T>(layout, values).run());
   }
 
   struct Changed;
@@ -112,8 +114,8 @@ class Bvh {
 
      private:
       friend class Values;
-      explicit Iterator(const BvhBlockSlot<V>* block) : block_(block) {}
-      const BvhBlockSlot<V>* block_ = nullptr;
+      explicit Iterator(const BvhBlockSlot<V, T>* block) : block_(block) {}
+      const BvhBlockSlot<V, T>* block_ = nullptr;
       size_t slot_ = 0;
     };
     using const_iterator = Iterator;
@@ -158,17 +160,17 @@ class Bvh {
 
   // Passes candidates to `visitor` roughly in the order in which the ray enters their leaves: the children of each node
   // are visited in order of entry. Allocates memory only if more than 16 nodes and leaves are pending.
-  template <RayVisitor<V> Visitor>
+  template <RayVisitor<V, T> Visitor>
   void visit_ray(const SlabRay<S>& slabs, Visitor& visitor, Work& work) const;
 
   // Passes to `visitor` the values whose own bounds visitor.overlaps() accepts, in the order of the nodes, which is
   // that of values() until the first change(). Allocates no memory.
-  template <RegionVisitor<V> Visitor>
+  template <RegionVisitor<V, T> Visitor>
   void visit_region(Visitor& visitor, Work& work) const;
 
   // Passes to `visitor` the values whose own bounds have a squared distance of at most visitor.limit() from `point`,
   // roughly nearest first. Allocates memory only if more than 16 nodes and leaves are pending.
-  template <PointVisitor<V> Visitor>
+  template <PointVisitor<V, T> Visitor>
   void visit_nearest(const Vec3d& point, Visitor& visitor, Work& work) const;
 
   // Resumable traversal of a tree along a ray: each call of next() returns one candidate, so that the caller can
@@ -187,14 +189,14 @@ class Bvh {
 
    private:
     struct Pending {
-      const BvhBlockSlot<V>* block;  // block of the child; null for a child of a node above the blocks
+      const BvhBlockSlot<V, T>* block;  // block of the child; null for a child of a node above the blocks
       BvhChild child;
       S near;
     };
 
     // Pushes the children of `node`, a node of `block`, that the ray may hit at t <= `limit`. The nearest child is
     // pushed last, so that it is popped first.
-    void push_hit(const BvhBlockSlot<V>* block, const BvhNode<S>& node, S limit);
+    void push_hit(const BvhBlockSlot<V, T>* block, const BvhNode<S>& node, S limit);
 
     const Bvh* tree_;
     SlabRay<S> slabs_;
@@ -204,14 +206,14 @@ class Bvh {
   };
 
  private:
-  friend class BvhChanging<V>;
+  friend class BvhChanging<V, T>;
 
   // Maximum number of pending children in the nodes above the blocks, and in one block: on each level one child is
   // being visited and kBvhWidth - 1 are pending; on the last level all kBvhWidth are pending. The nodes above the
   // blocks have one level more than a build makes.
   static constexpr size_t kStackSize = size_t{limits::kMaxBvhDepth + 1} * (kBvhWidth - 1) + 1;
 
-  explicit Bvh(BvhCut<V> cut) : nodes_(std::move(cut.nodes)), blocks_(std::move(cut.blocks)) {
+  explicit Bvh(BvhCut<V, T> cut) : nodes_(std::move(cut.nodes)), blocks_(std::move(cut.blocks)) {
     measure();
     built_area_ = area_;
     if (!blocks_.empty()) built_fill_ = static_cast<double>(size_) / static_cast<double>(blocks_.size());
@@ -223,12 +225,12 @@ class Bvh {
   void measure();
   // Verifies, in debug builds, the bounds and ranges of all leaves, the order of nodes, and the number of values. O(n).
   void check_invariants() const;
-  void check_block(const BvhBlock<V>& block) const;
+  void check_block(const BvhBlock<V, T>& block) const;
 
   // Returns where a visit enters the block that `child`, a child of a node above the blocks, stands for.
   static BvhChild entry(BvhChild child) { return {0, child.count == kBvhBlockRoot ? 0 : child.count}; }
-  template <RegionVisitor<V> Visitor>
-  static bool visit_block(const BvhBlockSlot<V>& block, BvhChild entry, Visitor& visitor, Work& work);
+  template <RegionVisitor<V, T> Visitor>
+  static bool visit_block(const BvhBlockSlot<V, T>& block, BvhChild entry, Visitor& visitor, Work& work);
 
   // Returns whether a box that the ray enters at `near` can be skipped. A box with `near` equal to `limit` cannot be
   // skipped: it may hold a hit at the same t with a lower id, which is preferred.
@@ -241,8 +243,8 @@ class Bvh {
     return result;
   }
 
-  std::vector<BvhNode<S>> nodes_;        // nodes above the blocks; children follow their parents
-  std::vector<BvhBlockSlot<V>> blocks_;  // in any order
+  std::vector<BvhNode<S>> nodes_;           // nodes above the blocks; children follow their parents
+  std::vector<BvhBlockSlot<V, T>> blocks_;  // in any order
   BvhChild root_ = {0, 0};
   size_t size_ = 0;
   Aabb<S> bounds_;
@@ -252,19 +254,21 @@ class Bvh {
   double built_fill_ = kBvhBlockValues;  // values for each block when the whole tree was built
 };
 
-template <Bounded V>
-struct Bvh<V>::Changed {
+template <class V, class T>
+requires Bounded<V, T>
+struct Bvh<V, T>::Changed {
   Bvh tree;
   // Blocks of `tree` that have values at other positions than in the old tree, ascending. Positions of other blocks are
   // the same in both trees.
   std::vector<uint32_t> blocks;
 };
 
-template <Bounded V>
-void Bvh<V>::measure() {
+template <class V, class T>
+requires Bounded<V, T>
+void Bvh<V, T>::measure() {
   area_ = 0;
   size_ = 0;
-  for (const BvhBlockSlot<V>& slot : blocks_) {
+  for (const BvhBlockSlot<V, T>& slot : blocks_) {
     area_ += slot.block->area;
     size_ += slot.block->values.size();
   }
@@ -286,36 +290,40 @@ void Bvh<V>::measure() {
   magnitude_ = blocks_.empty() ? S{0} : magnitude(bounds_);
 }
 
-template <Bounded V>
-size_t Bvh<V>::node_count() const {
+template <class V, class T>
+requires Bounded<V, T> size_t Bvh<V, T>::node_count()
+const {
   size_t count = nodes_.size();
-  for (const BvhBlockSlot<V>& slot : blocks_) count += slot.block->nodes.size();
+  for (const BvhBlockSlot<V, T>& slot : blocks_) count += slot.block->nodes.size();
   return count;
 }
 
-template <Bounded V>
-size_t Bvh<V>::unshared_bytes(const Bvh& other) const {
+template <class V, class T>
+requires Bounded<V, T> size_t Bvh<V, T>::unshared_bytes(const Bvh& other)
+const {
   if (blocks_.empty()) return 0;
-  size_t bytes = nodes_.size() * sizeof(BvhNode<S>) + blocks_.size() * sizeof(BvhBlockSlot<V>);
+  size_t bytes = nodes_.size() * sizeof(BvhNode<S>) + blocks_.size() * sizeof(BvhBlockSlot<V, T>);
   for (size_t i = 0; i < blocks_.size(); ++i) {
-    const BvhBlock<V>& block = *blocks_[i].block;
+    const BvhBlock<V, T>& block = *blocks_[i].block;
     if (i < other.blocks_.size() && other.blocks_[i].block.get() == &block) continue;
     bytes += sizeof(block) + block.nodes.size() * sizeof(BvhNode<S>) + block.values.size() * sizeof(V);
   }
   return bytes;
 }
 
-template <Bounded V>
+template <class V, class T>
+requires Bounded<V, T>
 template <class Fn>
-void Bvh<V>::for_each_apart_from(const Bvh& other, const Fn& fn) const {
+void Bvh<V, T>::for_each_apart_from(const Bvh& other, const Fn& fn) const {
   for (size_t i = 0; i < blocks_.size(); ++i) {
     if (i < other.blocks_.size() && other.blocks_[i].block == blocks_[i].block) continue;
     for (const V& value : blocks_[i].block->values) fn(value);
   }
 }
 
-template <Bounded V>
-double Bvh<V>::sah_cost() const {
+template <class V, class T>
+requires Bounded<V, T>
+double Bvh<V, T>::sah_cost() const {
   if (blocks_.empty()) return 0;
   const double root_area = double{half_area(bounds_)};
   double sum = 1;
@@ -325,16 +333,17 @@ double Bvh<V>::sah_cost() const {
         sum += root_area > 0 ? double{half_area(node.bounds[slot])} / root_area : 1;
   };
   add(nodes_);
-  for (const BvhBlockSlot<V>& slot : blocks_) add(slot.block->nodes);
+  for (const BvhBlockSlot<V, T>& slot : blocks_) add(slot.block->nodes);
   return sum;
 }
 
-template <Bounded V>
-void Bvh<V>::check_invariants() const {
+template <class V, class T>
+requires Bounded<V, T>
+void Bvh<V, T>::check_invariants() const {
   size_t values = 0;
   size_t linked = nodes_.empty() ? blocks_.size() : 0;
   LOCUS_DCHECK(!nodes_.empty() || blocks_.size() <= 1);
-  for (const BvhBlockSlot<V>& slot : blocks_) {
+  for (const BvhBlockSlot<V, T>& slot : blocks_) {
     values += slot.block->values.size();
     LOCUS_DCHECK_CALL(check_block(*slot.block));
   }
@@ -359,8 +368,9 @@ void Bvh<V>::check_invariants() const {
   LOCUS_DCHECK_EQ(linked, blocks_.size());
 }
 
-template <Bounded V>
-void Bvh<V>::check_block(const BvhBlock<V>& block) const {
+template <class V, class T>
+requires Bounded<V, T>
+void Bvh<V, T>::check_block(const BvhBlock<V, T>& block) const {
   LOCUS_DCHECK(!block.values.empty() && block.values.size() <= kBvhBlockValues);
   size_t leaf_values = 0;
   for (uint32_t index = 0; index < block.nodes.size(); ++index) {
@@ -375,16 +385,18 @@ void Bvh<V>::check_block(const BvhBlock<V>& block) const {
         continue;
       }
       LOCUS_DCHECK_LE(size_t{child.first} + child.count, block.values.size());
-      LOCUS_DCHECK(contains(node.bounds[slot],
-                            bounds_of_values<V>(absl::MakeConstSpan(block.values).subspan(child.first, child.count))));
+      LOCUS_DCHECK(
+          contains(node.bounds[slot],
+                   bounds_of_values<V, T>(absl::MakeConstSpan(block.values).subspan(child.first, child.count))));
       leaf_values += child.count;
     }
   }
   LOCUS_DCHECK(block.nodes.empty() || leaf_values == block.values.size());
 }
 
-template <Bounded V>
-const V* Bvh<V>::RayWalk::next(S limit, Work& work) {
+template <class V, class T>
+requires Bounded<V, T>
+const V* Bvh<V, T>::RayWalk::next(S limit, Work& work) {
   while (value_ == end_) {
     if (pending_.empty()) return nullptr;
     Pending now = pending_.back();
@@ -407,8 +419,9 @@ const V* Bvh<V>::RayWalk::next(S limit, Work& work) {
   return value_++;
 }
 
-template <Bounded V>
-void Bvh<V>::RayWalk::push_hit(const BvhBlockSlot<V>* block, const BvhNode<S>& node, S limit) {
+template <class V, class T>
+requires Bounded<V, T>
+void Bvh<V, T>::RayWalk::push_hit(const BvhBlockSlot<V, T>* block, const BvhNode<S>& node, S limit) {
   const size_t base = pending_.size();
   for (uint32_t slot = 0; slot < node.child_count; ++slot) {
     const Interval<S> interval = tree_->node_interval(slabs_, node.bounds[slot]);
@@ -422,17 +435,19 @@ void Bvh<V>::RayWalk::push_hit(const BvhBlockSlot<V>* block, const BvhNode<S>& n
   LOCUS_DCHECK_LE(pending_.size(), 2 * kStackSize);
 }
 
-template <Bounded V>
-template <RayVisitor<V> Visitor>
-void Bvh<V>::visit_ray(const SlabRay<S>& slabs, Visitor& visitor, Work& work) const {
+template <class V, class T>
+requires Bounded<V, T>
+template <RayVisitor<V, T> Visitor>
+void Bvh<V, T>::visit_ray(const SlabRay<S>& slabs, Visitor& visitor, Work& work) const {
   RayWalk walk(*this, slabs);
   while (const V* const value = walk.next(visitor.limit(), work))
     if (!visitor.visit(*value)) return;
 }
 
-template <Bounded V>
-template <RegionVisitor<V> Visitor>
-void Bvh<V>::visit_region(Visitor& visitor, Work& work) const {
+template <class V, class T>
+requires Bounded<V, T>
+template <RegionVisitor<V, T> Visitor>
+void Bvh<V, T>::visit_region(Visitor& visitor, Work& work) const {
   if (blocks_.empty()) return;
   BvhChild stack[kStackSize];
   BvhChild* top = stack;
@@ -452,9 +467,10 @@ void Bvh<V>::visit_region(Visitor& visitor, Work& work) const {
   }
 }
 
-template <Bounded V>
-template <RegionVisitor<V> Visitor>
-bool Bvh<V>::visit_block(const BvhBlockSlot<V>& block, BvhChild entry, Visitor& visitor, Work& work) {
+template <class V, class T>
+requires Bounded<V, T>
+template <RegionVisitor<V, T> Visitor>
+bool Bvh<V, T>::visit_block(const BvhBlockSlot<V, T>& block, BvhChild entry, Visitor& visitor, Work& work) {
   BvhChild stack[kStackSize];
   BvhChild* top = stack;
   *top++ = entry;
@@ -478,11 +494,12 @@ bool Bvh<V>::visit_block(const BvhBlockSlot<V>& block, BvhChild entry, Visitor& 
   return true;
 }
 
-template <Bounded V>
-template <PointVisitor<V> Visitor>
-void Bvh<V>::visit_nearest(const Vec3d& point, Visitor& visitor, Work& work) const {
+template <class V, class T>
+requires Bounded<V, T>
+template <PointVisitor<V, T> Visitor>
+void Bvh<V, T>::visit_nearest(const Vec3d& point, Visitor& visitor, Work& work) const {
   struct Pending {
-    const BvhBlockSlot<V>* block;  // as in RayWalk
+    const BvhBlockSlot<V, T>* block;  // as in RayWalk
     BvhChild child;
     double distance;
   };

@@ -25,32 +25,36 @@ inline constexpr uint32_t kBvhBlockValues = 64;
 inline constexpr uint32_t kBvhBlockRoot = ~0u;
 
 // Immutable once a tree stores it. Children of `nodes` are nodes of the same block, or ranges of `values`.
-template <Bounded V>
+template <class V, class T = PrimitiveTraits<V>>
+requires Bounded<V, T>
 struct BvhBlock {
-  std::vector<BvhNode<ScalarOf<V>>> nodes;  // children follow their parents; no nodes: the block is a single leaf
-  std::vector<V> values;                    // 1 to kBvhBlockValues values in depth-first order
-  Aabb<ScalarOf<V>> bounds;
+  std::vector<BvhNode<typename T::Scalar>>
+      nodes;              // children follow their parents; no nodes: the block is a single leaf
+  std::vector<V> values;  // 1 to kBvhBlockValues values in depth-first order
+  Aabb<typename T::Scalar> bounds;
   double area = 0;        // half areas of `bounds` and of the boxes of all nodes
   double built_area = 0;  // `area` at the time when the nodes were built
 };
 
 // A block and the addresses of its data, so that a visit reads the data without a look at the block itself.
-template <Bounded V>
+template <class V, class T = PrimitiveTraits<V>>
+requires Bounded<V, T>
 struct BvhBlockSlot {
-  const BvhNode<ScalarOf<V>>* nodes;
+  const BvhNode<typename T::Scalar>* nodes;
   const V* values;
-  std::shared_ptr<const BvhBlock<V>> block;  // never null
+  std::shared_ptr<const BvhBlock<V, T>> block;  // never null
 
-  explicit BvhBlockSlot(BvhBlock<V>&& source) : BvhBlockSlot(std::make_shared<const BvhBlock<V>>(std::move(source))) {}
-  explicit BvhBlockSlot(std::shared_ptr<const BvhBlock<V>> owner)
+  explicit BvhBlockSlot(BvhBlock<V, T>&& source)
+      : BvhBlockSlot(std::make_shared<const BvhBlock<V, T>>(std::move(source))) {}
+  explicit BvhBlockSlot(std::shared_ptr<const BvhBlock<V, T>> owner)
       : nodes(owner->nodes.data()), values(owner->values.data()), block(std::move(owner)) {
     LOCUS_DCHECK(!block->values.empty() && block->values.size() <= kBvhBlockValues);
   }
 };
 
 // Returns the child that stands for the block at index `number` in a node above the blocks.
-template <Bounded V>
-BvhChild child_of(uint32_t number, const BvhBlockSlot<V>& slot) {
+template <class V, class T = PrimitiveTraits<V>>
+requires Bounded<V, T> BvhChild child_of(uint32_t number, const BvhBlockSlot<V, T>& slot) {
   return {number, slot.block->nodes.empty() ? static_cast<uint32_t>(slot.block->values.size()) : kBvhBlockRoot};
 }
 
@@ -76,35 +80,37 @@ uint32_t child_growing_least(const BvhNode<S>& node, const Aabb<S>& bounds) {
   return best;
 }
 
-template <Bounded V>
-Aabb<ScalarOf<V>> bounds_of_values(absl::Span<const V> values) {
-  Aabb<ScalarOf<V>> bounds;
-  for (const V& value : values) bounds = merge(bounds, PrimitiveTraits<V>::bounds(value));
+template <class V, class T = PrimitiveTraits<V>>
+requires Bounded<V, T> Aabb<typename T::Scalar> bounds_of_values(absl::Span<const V> values) {
+  Aabb<typename T::Scalar> bounds;
+  for (const V& value : values) bounds = merge(bounds, T::bounds(value));
   return bounds;
 }
 
 // Computes all boxes of the block from its values, and BvhBlock::area.
-template <Bounded V>
-void refit(BvhBlock<V>& block) {
+template <class V, class T = PrimitiveTraits<V>>
+requires Bounded<V, T>
+void refit(BvhBlock<V, T>& block) {
   double area = 0;
   for (size_t index = block.nodes.size(); index-- > 0;) {
     auto& node = block.nodes[index];
     for (uint32_t slot = 0; slot < node.child_count; ++slot) {
       const BvhChild child = node.children[slot];
-      node.bounds[slot] = child.is_leaf()
-                              ? bounds_of_values<V>(absl::MakeConstSpan(block.values).subspan(child.first, child.count))
-                              : bounds_of_node(block.nodes[child.first]);
+      node.bounds[slot] =
+          child.is_leaf() ? bounds_of_values<V, T>(absl::MakeConstSpan(block.values).subspan(child.first, child.count))
+                          : bounds_of_node(block.nodes[child.first]);
       area += double{half_area(node.bounds[slot])};
     }
   }
-  block.bounds = block.nodes.empty() ? bounds_of_values<V>(block.values) : bounds_of_node(block.nodes[0]);
+  block.bounds = block.nodes.empty() ? bounds_of_values<V, T>(block.values) : bounds_of_node(block.nodes[0]);
   block.area = area + double{half_area(block.bounds)};
 }
 
 // Removes the values at `slots`, which ascend, from the values and nodes of the block; the boxes do not change. Returns
 // false if a node, or the block, would have no values left. The block is then in an unspecified state.
-template <Bounded V>
-bool remove_values(BvhBlock<V>& block, absl::Span<const uint32_t> slots) {
+template <class V, class T = PrimitiveTraits<V>>
+requires Bounded<V, T>
+bool remove_values(BvhBlock<V, T>& block, absl::Span<const uint32_t> slots) {
   std::array<uint32_t, kBvhBlockValues + 1> moved_to;
   size_t kept = 0, next = 0;
   for (uint32_t slot = 0; slot < block.values.size(); ++slot) {
@@ -138,16 +144,17 @@ bool remove_values(BvhBlock<V>& block, absl::Span<const uint32_t> slots) {
 
 // Adds a value to the leaf whose box grows least, or as a further leaf beside it; the boxes do not change. Returns
 // false and changes nothing if there is no room.
-template <Bounded V>
-bool add_value(BvhBlock<V>& block, const V& value) {
+template <class V, class T = PrimitiveTraits<V>>
+requires Bounded<V, T>
+bool add_value(BvhBlock<V, T>& block, const V& value) {
   if (block.values.size() == kBvhBlockValues) return false;
   if (block.nodes.empty()) {
     if (block.values.size() == kBvhLeafSize) return false;
     block.values.push_back(value);
     return true;
   }
-  const auto bounds = PrimitiveTraits<V>::bounds(value);
-  BvhNode<ScalarOf<V>>* node = block.nodes.data();
+  const auto bounds = T::bounds(value);
+  BvhNode<typename T::Scalar>* node = block.nodes.data();
   uint32_t slot = child_growing_least(*node, bounds);
   while (!node->children[slot].is_leaf()) {
     node = &block.nodes[node->children[slot].first];
@@ -169,17 +176,19 @@ bool add_value(BvhBlock<V>& block, const V& value) {
 
 // A layout that is cut into blocks: the nodes above the blocks, and the blocks in depth-first order. A tree that fits
 // into one block has no nodes above it.
-template <Bounded V>
+template <class V, class T = PrimitiveTraits<V>>
+requires Bounded<V, T>
 struct BvhCut {
-  std::vector<BvhNode<ScalarOf<V>>> nodes;
-  std::vector<BvhBlockSlot<V>> blocks;
+  std::vector<BvhNode<typename T::Scalar>> nodes;
+  std::vector<BvhBlockSlot<V, T>> blocks;
 };
 
 // Cuts a layout into the largest subtrees that are blocks. The nodes keep their boxes and their order, so that the
 // visits of the tree open the same nodes in the same order as those of the layout.
-template <Bounded V>
+template <class V, class T = PrimitiveTraits<V>>
+requires Bounded<V, T>
 class BvhCutter {
-  using S = ScalarOf<V>;
+  using S = typename T::Scalar;
 
  public:
   // Moves the values from `values`, which are in the order of the input of the build.
@@ -197,7 +206,7 @@ class BvhCutter {
     }
   }
 
-  BvhCut<V> run() {
+  BvhCut<V, T> run() {
     if (layout_.nodes.empty()) return {};
     if (is_block(0)) {
       cut_.blocks.emplace_back(block_of(0));
@@ -235,22 +244,22 @@ class BvhCutter {
   uint32_t first_of(BvhChild child) const { return child.is_leaf() ? child.first : ranges_[child.first].begin; }
   bool is_block(uint32_t node) const { return ranges_[node].end - ranges_[node].begin <= kBvhBlockValues; }
 
-  BvhBlock<V> block_with(uint32_t begin, uint32_t end) {
-    BvhBlock<V> block;
+  BvhBlock<V, T> block_with(uint32_t begin, uint32_t end) {
+    BvhBlock<V, T> block;
     block.values.reserve(end - begin);
     for (uint32_t position = begin; position < end; ++position)
       block.values.push_back(std::move(values_[layout_.order[position]]));
     return block;
   }
-  static BvhBlock<V> measured(BvhBlock<V> block) {
+  static BvhBlock<V, T> measured(BvhBlock<V, T> block) {
     refit(block);
     block.built_area = block.area;
     return block;
   }
-  BvhBlock<V> leaf_of(BvhChild leaf) { return measured(block_with(leaf.first, leaf.first + leaf.count)); }
-  BvhBlock<V> block_of(uint32_t root) {
+  BvhBlock<V, T> leaf_of(BvhChild leaf) { return measured(block_with(leaf.first, leaf.first + leaf.count)); }
+  BvhBlock<V, T> block_of(uint32_t root) {
     const Range range = ranges_[root];
-    BvhBlock<V> block = block_with(range.begin, range.end);
+    BvhBlock<V, T> block = block_with(range.begin, range.end);
     block.nodes.assign(layout_.nodes.begin() + root, layout_.nodes.begin() + range.node_end);
     for (BvhNode<S>& node : block.nodes)
       for (uint32_t slot = 0; slot < node.child_count; ++slot)
@@ -261,7 +270,7 @@ class BvhCutter {
   const BvhLayout<S>& layout_;
   std::vector<V>& values_;
   std::vector<Range> ranges_;  // of each node of the layout
-  BvhCut<V> cut_;
+  BvhCut<V, T> cut_;
 };
 
 }  // namespace locus

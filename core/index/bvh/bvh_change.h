@@ -21,16 +21,18 @@
 namespace locus {
 
 // One call of Bvh::change().
-template <Bounded V>
+template <class V, class T>
+requires Bounded<V, T>
 class BvhChanging {
-  using Traits = PrimitiveTraits<V>;
-  using S = ScalarOf<V>;
+  using Traits = T;
+  using Tree = Bvh<V, T>;
+  using S = typename T::Scalar;
   using Replacement = typename BvhChange<V>::Replacement;
 
  public:
-  BvhChanging(const Bvh<V>& old, BvhChange<V> change) : old_(old), change_(std::move(change)) {}
+  BvhChanging(const Tree& old, BvhChange<V> change) : old_(old), change_(std::move(change)) {}
 
-  absl::StatusOr<typename Bvh<V>::Changed> run() {
+  absl::StatusOr<typename Tree::Changed> run() {
     std::sort(change_.replaced.begin(), change_.replaced.end(),
               [](const Replacement& a, const Replacement& b) { return a.position < b.position; });
     std::sort(change_.removed.begin(), change_.removed.end());
@@ -53,7 +55,7 @@ class BvhChanging {
     moved_.erase(std::unique(moved_.begin(), moved_.end()), moved_.end());
     const auto gone = std::lower_bound(moved_.begin(), moved_.end(), tree_.block_count());
     moved_.erase(gone, moved_.end());
-    return typename Bvh<V>::Changed{std::move(tree_), std::move(moved_)};
+    return typename Tree::Changed{std::move(tree_), std::move(moved_)};
   }
 
  private:
@@ -75,7 +77,7 @@ class BvhChanging {
 
   // Builds the whole tree from the values of all blocks, which are those of the draft if a block has one, and from the
   // added values.
-  absl::StatusOr<typename Bvh<V>::Changed> rebuild() {
+  absl::StatusOr<typename Tree::Changed> rebuild() {
     std::vector<V> values;
     values.reserve(old_.size() + change_.added.size());
     for (uint32_t block = 0; block < tree_.block_count(); ++block) {
@@ -85,10 +87,10 @@ class BvhChanging {
         values.insert(values.end(), tree_.block(block).begin(), tree_.block(block).end());
     }
     std::move(change_.added.begin(), change_.added.end(), std::back_inserter(values));
-    ASSIGN_OR_RETURN(Bvh<V> tree, Bvh<V>::build(std::move(values)));
+    ASSIGN_OR_RETURN(Tree tree, Tree::build(std::move(values)));
     std::vector<uint32_t> all(tree.block_count());
     std::iota(all.begin(), all.end(), 0);
-    return typename Bvh<V>::Changed{std::move(tree), std::move(all)};
+    return typename Tree::Changed{std::move(tree), std::move(all)};
   }
 
   // Applies the replacements and removals, block by block. Blocks that need new nodes become drafts.
@@ -109,8 +111,8 @@ class BvhChanging {
   }
 
   void change_block(uint32_t number, absl::Span<Replacement> replaced, absl::Span<const uint32_t> removed) {
-    const BvhBlock<V>& old = *old_.blocks_[number].block;
-    BvhBlock<V> block = old;
+    const BvhBlock<V, T>& old = *old_.blocks_[number].block;
+    BvhBlock<V, T> block = old;
     for (Replacement& one : replaced) {
       V& value = block.values[one.position % kBvhBlockValues];
       LOCUS_DCHECK_EQ(Traits::id(value), Traits::id(one.value));
@@ -121,7 +123,7 @@ class BvhChanging {
     } else {
       std::vector<uint32_t> slots;
       for (const uint32_t position : removed) slots.push_back(position % kBvhBlockValues);
-      if (BvhBlock<V> rest = block; remove_values(rest, slots) && keep(number, rest)) {
+      if (BvhBlock<V, T> rest = block; remove_values(rest, slots) && keep(number, rest)) {
         moved_.push_back(number);
         return;
       }
@@ -165,7 +167,7 @@ class BvhChanging {
     for (V& value : change_.added) added[block_for(value)].push_back(std::move(value));
     for (auto& [number, values] : added) {
       if (drafts_.find(number) == drafts_.end() && values.size() <= kBvhLeafSize) {
-        BvhBlock<V> block = *tree_.blocks_[number].block;
+        BvhBlock<V, T> block = *tree_.blocks_[number].block;
         const auto add = [&block](const V& value) { return add_value(block, value); };
         if (std::all_of(values.begin(), values.end(), add) && keep(number, block)) {
           moved_.push_back(number);
@@ -179,11 +181,11 @@ class BvhChanging {
 
   // Computes the boxes of a block whose values have changed, and moves the block into the tree. Returns false, and does
   // not move the block, if the boxes have grown too much.
-  bool keep(uint32_t number, BvhBlock<V>& block) {
+  bool keep(uint32_t number, BvhBlock<V, T>& block) {
     refit(block);
     if (block.area > kGrowth * block.built_area) return false;
     block.built_area = std::min(block.built_area, block.area);
-    tree_.blocks_[number] = BvhBlockSlot<V>(std::move(block));
+    tree_.blocks_[number] = BvhBlockSlot<V, T>(std::move(block));
     return true;
   }
 
@@ -194,7 +196,7 @@ class BvhChanging {
       empty_.push_back(number);
       return absl::OkStatus();
     }
-    ASSIGN_OR_RETURN(Bvh<V> built, Bvh<V>::build(std::move(values)));
+    ASSIGN_OR_RETURN(Tree built, Tree::build(std::move(values)));
     tree_.blocks_[number] = std::move(built.blocks_[0]);
     for (size_t i = 1; i < built.blocks_.size(); ++i) added_blocks_.push_back(std::move(built.blocks_[i]));
     return absl::OkStatus();
@@ -202,7 +204,7 @@ class BvhChanging {
 
   // Puts new blocks, and then the last blocks of the tree, in the places of empty ones.
   void drop_empty_blocks() {
-    for (BvhBlockSlot<V>& block : added_blocks_) {
+    for (BvhBlockSlot<V, T>& block : added_blocks_) {
       if (empty_.empty()) {
         moved_.push_back(tree_.block_count());
         tree_.blocks_.push_back(std::move(block));
@@ -224,7 +226,7 @@ class BvhChanging {
   absl::Status link_blocks() {
     std::vector<Aabb<S>> boxes;
     boxes.reserve(tree_.blocks_.size());
-    for (const BvhBlockSlot<V>& slot : tree_.blocks_) boxes.push_back(slot.block->bounds);
+    for (const BvhBlockSlot<V, T>& slot : tree_.blocks_) boxes.push_back(slot.block->bounds);
     tree_.nodes_.clear();
     if (boxes.size() < 2) return absl::OkStatus();
     ASSIGN_OR_RETURN(BvhLayout<S> layout, build_bvh_layout<S>(boxes, BvhOptions{}));
@@ -259,19 +261,20 @@ class BvhChanging {
     return absl::OkStatus();
   }
 
-  const Bvh<V>& old_;
+  const Tree& old_;
   BvhChange<V> change_;
-  Bvh<V> tree_;
+  Tree tree_;
   std::map<uint32_t, std::vector<V>> drafts_;  // values of the blocks that are built again
-  std::vector<BvhBlockSlot<V>> added_blocks_;
+  std::vector<BvhBlockSlot<V, T>> added_blocks_;
   std::vector<uint32_t> empty_;  // blocks without values, ascending
   std::vector<uint32_t> moved_;  // see Bvh::Changed::blocks
 };
 
-template <Bounded V>
-absl::StatusOr<typename Bvh<V>::Changed> Bvh<V>::change(BvhChange<V> change) const {
+template <class V, class T>
+requires Bounded<V, T> absl::StatusOr<typename Bvh<V, T>::Changed> Bvh<V, T>::change(BvhChange<V> change)
+const {
   if (change.empty()) return Changed{*this, {}};
-  return BvhChanging<V>(*this, std::move(change)).run();
+  return BvhChanging<V, T>(*this, std::move(change)).run();
 }
 
 }  // namespace locus

@@ -14,6 +14,18 @@ namespace {
 static_assert(SpatialIndex<Bvh<Triangle>>);
 static_assert(SpatialIndex<Bvh<Object>>);
 
+// Traits by which triangles lie in a mirrored world.
+struct MirroredTraits : PrimitiveTraits<Triangle> {
+  static Aabbf bounds(const Triangle& triangle) {
+    const Aabbf box = bounds_of(triangle);
+    return {-box.max, -box.min};
+  }
+  static bool ball(const Triangle& triangle, const Ballf& ball) {
+    return ball_overlaps({-ball.center, ball.radius}, triangle);
+  }
+};
+static_assert(SpatialIndex<Bvh<Triangle, MirroredTraits>>);
+
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 Bvh<Triangle> build(std::vector<Triangle> triangles) {
@@ -235,6 +247,18 @@ TEST(BvhTest, SahCostAndVisitsOfACityStayUnderTheirCeilings) {
   EXPECT_LT(tree.sah_cost(), 11.6);
   EXPECT_LT(work.nodes, 4.6);
   EXPECT_LT(work.tests, 8.6);
+}
+
+TEST(BvhTest, TheSecondArgumentReplacesTheTraitsOfTheValues) {
+  const std::vector<Triangle> triangles = rows_across_x_axis(8);
+  const auto tree = *Bvh<Triangle, MirroredTraits>::build(triangles);
+  std::vector<Triangle> found;
+  ball_overlap(tree, {{-20, 0, 0}, 1}, found);
+  EXPECT_EQ(found.size(), 8u);
+  for (const Triangle& triangle : found) EXPECT_EQ(triangle.number / 8, 2u);
+  found.clear();
+  ball_overlap(tree, {{20, 0, 0}, 1}, found);
+  EXPECT_TRUE(found.empty());
 }
 
 TEST(BvhTest, ErrorsOfTheBuildArePassedOn) {
