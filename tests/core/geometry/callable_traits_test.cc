@@ -50,7 +50,7 @@ std::vector<Called<Parcel>> shelf(const ValueCallables<Parcel>& callables) {
 }
 
 using Ids = std::vector<uint64_t>;
-Ids ids_of(const std::vector<Called<Parcel>>& parcels) {
+Ids numbers_of(const std::vector<Called<Parcel>>& parcels) {
   Ids ids;
   for (const Called<Parcel>& parcel : parcels) ids.push_back(parcel.value.number);
   std::sort(ids.begin(), ids.end());
@@ -59,7 +59,7 @@ Ids ids_of(const std::vector<Called<Parcel>>& parcels) {
 
 // Returns the answers of an index to several queries around a point.
 template <class Index>
-std::vector<Ids> answers(const Index& index, Vec3d point, Vec3d direction) {
+std::vector<Ids> answers_around(const Index& index, Vec3d point, Vec3d direction) {
   std::vector<Called<Parcel>> ball, box;
   ball_overlap(index, {point, 1.5}, ball);
   box_overlap(index, {point, {1, 1, 1}, {}}, box);
@@ -67,7 +67,7 @@ std::vector<Ids> answers(const Index& index, Vec3d point, Vec3d direction) {
   all_rays(index, ObjectRay(Rayd{point, direction}), 10, 5, hits);
   std::vector<ValueAt<Called<Parcel>>> nearest;
   nearest_values(index, point, 10, 5, nearest);
-  std::vector<Ids> result = {ids_of(ball), ids_of(box), {}, {}};
+  std::vector<Ids> result = {numbers_of(ball), numbers_of(box), {}, {}};
   for (const auto& hit : hits) result[2].push_back(hit.value.value.number);
   for (const auto& value : nearest) result[3].push_back(value.value.value.number);
   return result;
@@ -83,9 +83,9 @@ TEST(CallableTraitsTest, EveryStructureStoresATypeByCallables) {
   Random random(5);
   for (int i = 0; i < 100; ++i) {
     const Vec3d point = random.vector(10), direction = random.unit_vector();
-    const std::vector<Ids> expected = answers(list, point, direction);
-    EXPECT_EQ(answers(tree, point, direction), expected) << i;
-    EXPECT_EQ(answers(bvh, point, direction), expected) << i;
+    const std::vector<Ids> expected = answers_around(list, point, direction);
+    EXPECT_EQ(answers_around(tree, point, direction), expected) << i;
+    EXPECT_EQ(answers_around(bvh, point, direction), expected) << i;
     EXPECT_EQ(expected[3].size(), 5u);
   }
 }

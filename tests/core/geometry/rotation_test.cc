@@ -48,7 +48,7 @@ TEST(RotationTest, HalfTurnsAreExact) {
 
 TEST(RotationTest, QuarterTurnAroundZTakesXToY) {
   const float s = std::sqrt(0.5f);
-  EXPECT_LT(distance(rotation_of({0, 0, s, s}).to_world({1, 0, 0}), {0, 1, 0}), 1e-15);
+  EXPECT_LT(distance(rotation_of({0, 0, s, s}).to_world({1, 0, 0}), Vec3d{0, 1, 0}), 1e-15);
 }
 
 TEST(RotationTest, ComposeRotatesByTheFirstThenTheSecond) {

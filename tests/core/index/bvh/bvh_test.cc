@@ -15,7 +15,7 @@ static_assert(SpatialIndex<Bvh<Triangle>>);
 static_assert(SpatialIndex<Bvh<Object>>);
 
 // Traits by which triangles lie in a mirrored world.
-struct MirroredTraits : PrimitiveTraits<Triangle> {
+struct MirroredTriangleTraits : PrimitiveTraits<Triangle> {
   static Aabbf bounds(const Triangle& triangle) {
     const Aabbf box = bounds_of(triangle);
     return {-box.max, -box.min};
@@ -24,7 +24,7 @@ struct MirroredTraits : PrimitiveTraits<Triangle> {
     return ball_overlaps({-ball.center, ball.radius}, triangle);
   }
 };
-static_assert(SpatialIndex<Bvh<Triangle, MirroredTraits>>);
+static_assert(SpatialIndex<Bvh<Triangle, MirroredTriangleTraits>>);
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
@@ -251,7 +251,7 @@ TEST(BvhTest, SahCostAndVisitsOfACityStayUnderTheirCeilings) {
 
 TEST(BvhTest, TheSecondArgumentReplacesTheTraitsOfTheValues) {
   const std::vector<Triangle> triangles = rows_across_x_axis(8);
-  const auto tree = *Bvh<Triangle, MirroredTraits>::build(triangles);
+  const auto tree = *Bvh<Triangle, MirroredTriangleTraits>::build(triangles);
   std::vector<Triangle> found;
   ball_overlap(tree, {{-20, 0, 0}, 1}, found);
   EXPECT_EQ(found.size(), 8u);

@@ -13,9 +13,10 @@ using ::testing::ElementsAre;
 
 template <class Kind>
 class KdPointsTest : public ::testing::Test {};
-using Kinds = ::testing::Types<PointKind<float, 1>, PointKind<float, 2>, PointKind<float, 3>, PointKind<float, 4>,
-                               PointKind<double, 1>, PointKind<double, 2>, PointKind<double, 3>, PointKind<double, 4>>;
-TYPED_TEST_SUITE(KdPointsTest, Kinds);
+using PointKinds =
+    ::testing::Types<PointKind<float, 1>, PointKind<float, 2>, PointKind<float, 3>, PointKind<float, 4>,
+                     PointKind<double, 1>, PointKind<double, 2>, PointKind<double, 3>, PointKind<double, 4>>;
+TYPED_TEST_SUITE(KdPointsTest, PointKinds);
 
 TYPED_TEST(KdPointsTest, EveryQueryEqualsASearchOfAllPoints) {
   EXPECT_EQ((points_difference<typename TypeParam::Scalar, TypeParam::kDimensions>(scaled_count(200))), "");
@@ -32,14 +33,14 @@ TYPED_TEST(KdPointsTest, NoPointsAnswerNothing) {
   EXPECT_EQ(work.tests, 0u);
 }
 
-std::vector<KdPoint<double, 1>> times(uint64_t count) {
+std::vector<KdPoint<double, 1>> points_of_time(uint64_t count) {
   std::vector<KdPoint<double, 1>> points;
   for (uint64_t i = 0; i < count; ++i) points.push_back({{static_cast<double>(i)}, i});
   return points;
 }
 
 TEST(KdPointsOfTimeTest, APointOnTheBorderOfABoxOrBallIsFound) {
-  const auto points = KdPoints<double, 1>::build(times(100));
+  const auto points = KdPoints<double, 1>::build(points_of_time(100));
   std::vector<uint64_t> ids;
   const auto add = [&ids](const auto& point) {
     ids.push_back(point.id);
@@ -56,7 +57,7 @@ TEST(KdPointsOfTimeTest, APointOnTheBorderOfABoxOrBallIsFound) {
 }
 
 TEST(KdPointsOfTimeTest, AVisitEndsWhenTheFunctionReturnsFalse) {
-  const auto points = KdPoints<double, 1>::build(times(100));
+  const auto points = KdPoints<double, 1>::build(points_of_time(100));
   Work work;
   points.visit_box(
       {0}, {99}, [](const auto&) { return false; }, work);
@@ -78,7 +79,7 @@ TEST(KdPointsOfTimeTest, NearestPointsTieByIdAndAreAppended) {
 }
 
 TEST(KdPointsOfTimeTest, SmallQueriesCompareFewOfManyPoints) {
-  const auto points = KdPoints<double, 1>::build(times(100'000));
+  const auto points = KdPoints<double, 1>::build(points_of_time(100'000));
   Work work;
   std::vector<KdPointAt<double, 1>> nearest;
   points.nearest({500.3}, 1e9, 1, nearest, work);
