@@ -15,6 +15,8 @@
 //   ray        distance >= 0 of the first hit on the value, even if it exceeds the ray's t_max
 //   ball, box  whether the value shares a point with the closed ball or box
 //   distance   distance from a point to the value, in double; 0 inside the value; needed for nearest queries only
+//   plane      plane in which the value lies, or nullopt if there is none; may be missing; indexes that divide space by
+//              planes use it
 //
 // Source: Hughes et al., Computer Graphics: Principles and Practice, 3rd ed., 2013, ch. 37 (PrimitiveKeyTrait and
 // related traits).
@@ -25,6 +27,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "core/geometry/convex_region.h"
 #include "core/geometry/ray_triangle.h"
 #include "core/geometry/shape.h"
 #include "core/geometry/triangle_overlap.h"
@@ -65,6 +68,12 @@ concept Measurable = Bounded<Value, Traits> && requires(const Value& value, cons
   { Traits::distance(value, point) } -> std::same_as<double>;
 };
 
+// Flat values, whose planes can divide space.
+template <class Value, class Traits = PrimitiveTraits<Value>>
+concept Planar = Bounded<Value, Traits> && requires(const Value& value) {
+  { Traits::plane(value) } -> std::same_as<std::optional<Plane>>;
+};
+
 template <>
 struct PrimitiveTraits<Triangle> {
   using Scalar = float;
@@ -82,6 +91,13 @@ struct PrimitiveTraits<Triangle> {
   static bool ball(const Triangle& triangle, const Ballf& ball) { return ball_overlaps(ball, triangle); }
   static bool box(const Triangle& triangle, const Obbf& box) { return box_overlaps(box, triangle); }
   static double distance(const Triangle& triangle, const Vec3d& point) { return locus::distance(point, triangle); }
+  // Returns nullopt for a triangle without area.
+  static std::optional<Plane> plane(const Triangle& triangle) {
+    const Vec3d normal = area_normal(triangle);
+    if (normal == Vec3d{} || !is_finite(normal)) return std::nullopt;
+    const Vec3d unit = normalized(normal);
+    return Plane{unit, -dot(unit, to_double(triangle.a))};
+  }
 };
 
 }  // namespace locus

@@ -105,6 +105,19 @@ TEST(PrimitiveTraitsTest, AStructOfAnotherNamespaceCanBeStoredAndQueried) {
   EXPECT_EQ(result[0].serial, 7u);
 }
 
+TEST(PrimitiveTraitsTest, TheVerticesOfATriangleLieInItsPlane) {
+  const Triangle triangle = {{1, 2, 3}, {4, -1, 0}, {2, 2, -5}, 0};
+  const std::optional<Plane> plane = PrimitiveTraits<Triangle>::plane(triangle);
+  ASSERT_TRUE(plane);
+  EXPECT_NEAR(squared_length(plane->normal), 1, 1e-15);
+  for (const Vec3d& corner : corners_of(triangle)) EXPECT_NEAR(dot(plane->normal, corner) + plane->offset, 0, 1e-14);
+  EXPECT_GT(dot(plane->normal, area_normal(triangle)), 0);
+}
+
+TEST(PrimitiveTraitsTest, ATriangleWithoutAreaHasNoPlane) {
+  EXPECT_FALSE(PrimitiveTraits<Triangle>::plane({{1, 2, 3}, {2, 4, 6}, {3, 6, 9}, 0}));
+}
+
 // Tests the case of Figure 37.15 of Hughes et al. (the source named in primitive_traits.h): if two primitives overlap,
 // the ray may enter the primitive that is tested second before it enters the primitive that is tested first.
 TEST(PrimitiveTraitsTest, TheNearerOfTwoOverlappingPrimitivesWinsInEitherOrder) {
