@@ -96,6 +96,12 @@ enum class PlantedBug {
   kKdRayToBorder,    // a ray is followed beyond its limit
   kKdNearestStrict,  // a nearest query does not search regions exactly as far as its limit
   kKdPointsStrict,   // boxes and balls of points do not search the side of a plane that they just touch
+  // Indexes that divide space by planes:
+  kPaddedRayThin,   // rays are compared with planes without the pad of the slab test
+  kBspPassedTwice,  // a value that lies in several leaves is passed in each of them
+  kBspOnPlane,      // a value or region that only touches a plane is on one side of it
+  kBspRemoveOnce,   // remove() removes a value from one of its leaves only
+  kBspEyeBehind,    // the order from front to back is that of an eye in front of every plane
   // Access control:
   kRightLeftOut,         // a grant of any right to a scene grants every right to it
   kSceneLeftOut,         // a grant for some scenes grants its rights to every scene

@@ -9,6 +9,7 @@
 #include "core/index/bvh/kernels/nearest_kernels.h"
 #include "core/index/bvh/kernels/ray_kernels.h"
 #include "core/index/bvh/kernels/region_kernels.h"
+#include "tests/support/bsp_trials.h"
 #include "tests/support/conservative_answers.h"
 #include "tests/support/crossing_trials.h"
 #include "tests/support/door_lockstep.h"
@@ -37,6 +38,15 @@ std::string compare_trees_with_list() { return search_all_scenes<Triangle>(200, 
 
 std::string compare_triangle_trees_with_list() {
   return search_all_scenes<Triangle>(200, 200, triangle_tree_difference);
+}
+
+std::string compare_bsp_trees_with_list() {
+  std::string what = search_all_scenes<Triangle>(50, 100, bsp_difference<Triangle>);
+  return what.empty() ? search_all_scenes<Object>(50, 100, bsp_difference<Object>) : what;
+}
+
+std::string compare_changed_bsp_trees_with_list() {
+  return search_all_scenes<Object>(50, 100, changed_bsp_difference<Object>);
 }
 
 std::string compare_grids_with_list() {
@@ -145,6 +155,11 @@ constexpr Trial kTrials[] = {
     {"TrianglesEdgeOnDecidedInDouble", PlantedBug::kEdgeOnInDouble, edge_on_difference},
     {"TreeThatLeavesOutWhatIsAsFar", PlantedBug::kNearestLimit, compare_trees_with_list},
     {"TreeWithUnpaddedDistances", PlantedBug::kNearestTreePad, compare_triangle_trees_with_list},
+    {"BspTreeWhoseRaysHaveNoPad", PlantedBug::kPaddedRayThin, compare_bsp_trees_with_list},
+    {"BspTreeThatPassesValuesOfSeveralLeavesTwice", PlantedBug::kBspPassedTwice, compare_bsp_trees_with_list},
+    {"BspTreeWithOneSideForWhatIsOnAPlane", PlantedBug::kBspOnPlane, compare_bsp_trees_with_list},
+    {"BspTreeThatRemovesAValueFromOneLeaf", PlantedBug::kBspRemoveOnce, compare_changed_bsp_trees_with_list},
+    {"BspTreeThatIgnoresTheSideOfTheEye", PlantedBug::kBspEyeBehind, bsp_order_difference},
     {"GridThatDropsACell", PlantedBug::kDropCell, compare_grids_with_list},
     {"GridWithForgottenSparseBricks", PlantedBug::kSparseBrickBounds, compare_moving_grids_with_list},
     {"GridThatTrustsFloatWithBalls", PlantedBug::kGridBallMargin, compare_balls_of_grids_with_list},
