@@ -98,10 +98,13 @@ enum class PlantedBug {
   kKdPointsStrict,   // boxes and balls of points do not search the side of a plane that they just touch
   // Indexes that divide space by planes:
   kPaddedRayThin,   // rays are compared with planes without the pad of the slab test
+  // Indexes that divide space by planes, and trees of balls:
+  kPaddedRayThin,   // rays are compared with planes and balls without the pad of the slab test
   kBspPassedTwice,  // a value that lies in several leaves is passed in each of them
   kBspOnPlane,      // a value or region that only touches a plane is on one side of it
   kBspRemoveOnce,   // remove() removes a value from one of its leaves only
   kBspEyeBehind,    // the order from front to back is that of an eye in front of every plane
+  kSphereCenters,   // a ball contains the centres of the values' bounds, but not the bounds
   // Access control:
   kRightLeftOut,         // a grant of any right to a scene grants every right to it
   kSceneLeftOut,         // a grant for some scenes grants its rights to every scene

@@ -26,6 +26,7 @@
 #include "tests/support/scene_lockstep.h"
 #include "tests/support/scene_search.h"
 #include "tests/support/structure_comparison.h"
+#include "tests/support/sphere_tree_trials.h"
 #include "tests/support/sweep_trials.h"
 
 namespace locus::test {
@@ -47,6 +48,11 @@ std::string compare_bsp_trees_with_list() {
 
 std::string compare_changed_bsp_trees_with_list() {
   return search_all_scenes<Object>(50, 100, changed_bsp_difference<Object>);
+}
+
+std::string compare_sphere_trees_with_list() {
+  std::string what = search_all_scenes<Triangle>(200, 200, sphere_tree_difference<Triangle>);
+  return what.empty() ? search_all_scenes<Object>(200, 200, sphere_tree_difference<Object>) : what;
 }
 
 std::string compare_grids_with_list() {
@@ -160,6 +166,8 @@ constexpr Trial kTrials[] = {
     {"BspTreeWithOneSideForWhatIsOnAPlane", PlantedBug::kBspOnPlane, compare_bsp_trees_with_list},
     {"BspTreeThatRemovesAValueFromOneLeaf", PlantedBug::kBspRemoveOnce, compare_changed_bsp_trees_with_list},
     {"BspTreeThatIgnoresTheSideOfTheEye", PlantedBug::kBspEyeBehind, bsp_order_difference},
+    {"SphereTreeWhoseRaysHaveNoPad", PlantedBug::kPaddedRayThin, compare_sphere_trees_with_list},
+    {"SphereTreeThatContainsOnlyCentres", PlantedBug::kSphereCenters, compare_sphere_trees_with_list},
     {"GridThatDropsACell", PlantedBug::kDropCell, compare_grids_with_list},
     {"GridWithForgottenSparseBricks", PlantedBug::kSparseBrickBounds, compare_moving_grids_with_list},
     {"GridThatTrustsFloatWithBalls", PlantedBug::kGridBallMargin, compare_balls_of_grids_with_list},
