@@ -105,6 +105,15 @@ enum class PlantedBug {
   kBspRemoveOnce,   // remove() removes a value from one of its leaves only
   kBspEyeBehind,    // the order from front to back is that of an eye in front of every plane
   kSphereCenters,   // a ball contains the centres of the values' bounds, but not the bounds
+  // The octree:
+  kOctreeLowerStrict,    // a region that begins exactly at a dividing plane is not searched below the plane
+  kOctreePassedTwice,    // a value that lies in several leaves is passed from each of them
+  kOctreeReferenceLeft,  // a removed value stays in all of its leaves but one
+  kOctreeFixedBounds,    // a value that is inserted outside the bounds of the tree does not widen them
+  kOctreeRayFromInside,  // a ray that starts outside the bounds of the tree finds nothing
+  kOctreeRayUnpadded,    // planes are not padded for the coordinates of the tree when they are tested with rays
+  kOctreeRayToBorder,    // a ray is followed beyond its limit
+  kOctreeNearestStrict,  // a nearest query does not search parts exactly as far as its limit
   // Access control:
   kRightLeftOut,         // a grant of any right to a scene grants every right to it
   kSceneLeftOut,         // a grant for some scenes grants its rights to every scene

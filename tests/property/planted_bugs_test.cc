@@ -18,6 +18,7 @@
 #include "tests/support/kernel_trials.h"
 #include "tests/support/kind_trials.h"
 #include "tests/support/nearest_trials.h"
+#include "tests/support/octree_comparison.h"
 #include "tests/support/part_scenes.h"
 #include "tests/support/placed_scenes.h"
 #include "tests/support/point_comparison.h"
@@ -74,6 +75,8 @@ std::string compare_points_with_all() { return points_difference<double, 2>(scal
 std::string compare_moving_grids_with_list() {
   return search_grid_scenes(scaled_count(40), any_adversarial_scene, moving_grid_difference);
 }
+
+std::string compare_octrees_with_list() { return search_octrees(scaled_count(100), scaled_count(200)); }
 
 std::string compare_scenes_with_model() { return search_scene_lockstep(scaled_count(20), 60); }
 
@@ -173,6 +176,14 @@ constexpr Trial kTrials[] = {
     {"GridThatTrustsFloatWithBalls", PlantedBug::kGridBallMargin, compare_balls_of_grids_with_list},
     {"GridWithTruncatedCellIndices", PlantedBug::kUnsignedCellIndex, compare_grids_with_list},
     {"GridWithAGhostAfterAMove", PlantedBug::kGhostAfterMove, compare_moving_grids_with_list},
+    {"OctreeThatForgetsValuesOnItsPlanes", PlantedBug::kOctreeLowerStrict, compare_octrees_with_list},
+    {"OctreeThatPassesCutValuesTwice", PlantedBug::kOctreePassedTwice, compare_octrees_with_list},
+    {"OctreeThatRemovesFromOneLeaf", PlantedBug::kOctreeReferenceLeft, compare_octrees_with_list},
+    {"OctreeWithTheBoundsOfItsBuild", PlantedBug::kOctreeFixedBounds, compare_octrees_with_list},
+    {"OctreeThatRaysFromOutsideMiss", PlantedBug::kOctreeRayFromInside, compare_octrees_with_list},
+    {"OctreeWithUnpaddedPlanes", PlantedBug::kOctreeRayUnpadded, compare_octrees_with_list},
+    {"OctreeThatFollowsShortRaysToTheBorder", PlantedBug::kOctreeRayToBorder, octree_short_ray_fault},
+    {"OctreeThatLeavesOutWhatIsAsFar", PlantedBug::kOctreeNearestStrict, compare_octrees_with_list},
     {"SceneWithAStaleSnapshot", PlantedBug::kStaleSnapshot, compare_scenes_with_model},
     {"SceneWithAGhostAfterAMove", PlantedBug::kGhostAfterMove, compare_scenes_with_model},
     {"SceneThatShowsHalfOfSeveralMessages", PlantedBug::kHalfGroup, compare_scenes_with_model},

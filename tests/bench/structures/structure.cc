@@ -7,6 +7,7 @@
 #include "core/base/check.h"
 #include "core/index/bvh/bvh.h"
 #include "core/index/list/list_index.h"
+#include "core/index/octree/octree.h"
 #include "core/index/queries/nearest_values.h"
 #include "tests/support/object_grid.h"
 
@@ -101,6 +102,13 @@ test::ObjectGrid make_hash_grid(const std::vector<Object>& boxes) {
   return grid;
 }
 
+template <CutValues cut>
+Octree<Object> make_octree(const std::vector<Object>& boxes) {
+  OctreeOptions options;
+  options.cut = cut;
+  return Octree<Object>::build(boxes, options);
+}
+
 template <class Index, Index (*make)(const std::vector<Object>&)>
 NamedStructure named(const char* name) {
   return {name, [] { return std::make_unique<StructureOf<Index, make>>(); }};
@@ -128,7 +136,9 @@ const char* name_of(QueryName query) {
 
 std::vector<NamedStructure> structures() {
   return {named<ListIndex<Object>, make_list>("list"), named<Bvh<Object>, make_bvh>("bvh"),
-          named<test::ObjectGrid, make_hash_grid>("hash_grid")};
+          named<test::ObjectGrid, make_hash_grid>("hash_grid"),
+          named<Octree<Object>, make_octree<CutValues::kInLeaves>>("octree"),
+          named<Octree<Object>, make_octree<CutValues::kAtNode>>("octree_at_node")};
 }
 
 }  // namespace locus::bench::structures

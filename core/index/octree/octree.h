@@ -1,0 +1,324 @@
+// Octree: divides space at the middle of the extent of the values, on any one, two or three axes at once, for values of
+// any size and of uneven density. Divided on one axis it is an interval tree, on two a quadtree.
+//
+// insert() and remove() never divide or join nodes, so the tree degrades when its values change much: a leaf grows by
+// every value that is inserted into its part of space. rebuild() makes the tree that build() would make. A tree that
+// was built of no values is one leaf, until rebuild().
+//
+// Threads: const members may run concurrently; insert, remove and rebuild need exclusive use.
+// Invariants: Planes divide a part of space into closed parts. A value lies below a plane if its bounds begin at or
+// below the plane, and above if they end above the plane. A value that is on both sides of a plane lies in the leaves
+// of all parts that it touches or, with CutValues::kAtNode, at the node. The bounds of the tree contain all values.
+// After a build, nodes < 2n and references < 4n for n > 0 values, and no leaf is deeper than the options allow. No
+// visit loses a value. Comparisons with planes are exact, and a query that touches a plane opens both sides. A plane
+// has a padded interval on a ray, as if it were a flat box: the part before it ends at the interval's far value, and
+// the part behind it begins at the near value. If a value's own interval contains t >= 0, so does that of one of the
+// parts in which it lies, because each interval is computed by steps that are monotone in the coordinates and the parts
+// of a node leave no gap. Distances to parts are computed by the same monotone steps as those to the bounds of values.
+// Source: Finkel and Bentley, Quad Trees: A Data Structure for Retrieval on Composite Keys, 1974; Meagher, Geometric
+// Modeling Using Octree Encoding, 1982; Hughes et al., Computer Graphics: Principles and Practice, 3rd ed., 2013,
+// ch. 37.
+#ifndef LOCUS_CORE_INDEX_OCTREE_OCTREE_H_
+#define LOCUS_CORE_INDEX_OCTREE_OCTREE_H_
+
+#include <cmath>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "absl/container/flat_hash_map.h"
+#include "core/base/check.h"
+#include "core/base/planted_bug.h"
+#include "core/index/octree/octree_nodes.h"
+#include "core/index/spatial_index.h"
+
+namespace locus {
+
+template <class V, class T = PrimitiveTraits<V>>
+requires Bounded<V, T>
+class Octree {
+  using S = typename T::Scalar;
+
+ public:
+  using Value = V;
+  using Traits = T;
+
+  // Makes an empty tree.
+  explicit Octree(const OctreeOptions& options = {}) : nodes_(options) {}
+
+  // Builds a tree of `values`. Preconditions: their ids are unique, and their bounds are finite and not empty.
+  // O(n log n) unless their distances differ by many powers of two; at most O(n * depth).
+  static Octree build(std::vector<V> values, const OctreeOptions& options = {}) {
+    Octree tree(options);
+    tree.entries_.reserve(values.size());
+    for (V& value : values) tree.append(std::move(value));
+    tree.rebuild();
+    return tree;
+  }
+
+  // Builds the tree again from its values, with the options of the first build.
+  void rebuild() {
+    close_free_slots();
+    bounds_ = Aabb<S>();
+    std::vector<Aabb<S>> boxes;
+    boxes.reserve(entries_.size());
+    for (const Entry& entry : entries_) {
+      bounds_ = merge(bounds_, entry.bounds);
+      boxes.push_back(entry.bounds);
+    }
+    nodes_.build(boxes);
+    for (Entry& entry : entries_) entry.places = 0;
+    nodes_.for_each_reference([this](uint32_t slot) { ++entries_[slot].places; });
+    LOCUS_DCHECK_CALL(check_invariants());
+  }
+
+  // Inserts a value. Preconditions: those of build(). O(depth + leaves that the value touches).
+  void insert(const V& value) {
+    const uint32_t slot = append(value);
+    Entry& entry = entries_[slot];
+    if (!planted(PlantedBug::kOctreeFixedBounds) || bounds_.empty()) bounds_ = merge(bounds_, entry.bounds);
+    entry.places = nodes_.insert(slot, entry.bounds);
+    LOCUS_DCHECK_CALL(check_value(slot));
+  }
+
+  // Removes the value with the id of `value`. Returns false and changes nothing if the tree has no value with this id.
+  // Searches the leaves that the value touches: O(depth + values in these leaves).
+  bool remove(const V& value) {
+    const auto found = slots_.find(Traits::id(value));
+    if (found == slots_.end()) return false;
+    const uint32_t slot = found->second;
+    slots_.erase(found);
+    nodes_.remove(slot, entries_[slot].bounds);
+    entries_[slot].places = 0;
+    free_.push_back(slot);
+    LOCUS_DCHECK_EQ(entries_.size(), slots_.size() + free_.size());
+    return true;
+  }
+
+  bool contains(const V& value) const { return slots_.contains(Traits::id(value)); }
+  size_t size() const { return slots_.size(); }
+  // Returns a box around all values; after remove() it may be larger than they need, until rebuild().
+  const Aabb<S>& bounds() const { return bounds_; }
+  // Returns the numbers of nodes and references, and the depth. O(1).
+  OctreeShape shape() const { return nodes_.shape(); }
+
+  // Passes candidates to `visitor` leaf by leaf, in the order in which the ray enters the leaves. Only values whose own
+  // bounds the ray enters before the limit are passed.
+  template <RayVisitor<V, T> Visitor>
+  void visit_ray(const SlabRay<S>& slabs, Visitor& visitor, Work& work) const;
+
+  // Passes to `visitor` the values whose own bounds visitor.overlaps() accepts.
+  template <RegionVisitor<V, T> Visitor>
+  void visit_region(Visitor& visitor, Work& work) const;
+
+  // Passes to `visitor` the values whose own bounds have a squared distance of at most visitor.limit() from `point`,
+  // roughly nearest first: the part in which the point lies precedes the other parts of a node.
+  template <PointVisitor<V, T> Visitor>
+  void visit_nearest(const Vec3d& point, Visitor& visitor, Work& work) const;
+
+ private:
+  struct Entry {
+    V value;
+    Aabb<S> bounds;
+    uint32_t places = 0;  // nodes that list the value; 0 in a free slot
+  };
+  using Node = OctreeNode<S>;
+  template <class Pending>
+  using Stack = typename OctreeNodes<S>::template Stack<Pending>;
+  static constexpr size_t kStackSize = OctreeNodes<S>::kStackSize;
+  static constexpr S kInfinity = std::numeric_limits<S>::infinity();
+
+  // Puts the value in a free slot and returns the slot.
+  uint32_t append(V value) {
+    LOCUS_CHECK_LT(slots_.size(), size_t{limits::kMaxBvhValues});
+    const auto slot = free_.empty() ? static_cast<uint32_t>(entries_.size()) : free_.back();
+    const bool added = slots_.try_emplace(Traits::id(value), slot).second;
+    LOCUS_CHECK(added);
+    const Aabb<S> bounds = Traits::bounds(value);
+    if (free_.empty()) {
+      entries_.push_back({std::move(value), bounds});
+    } else {
+      free_.pop_back();
+      entries_[slot] = {std::move(value), bounds};
+    }
+    return slot;
+  }
+
+  // Moves the entries together. The nodes are invalid until the next build.
+  void close_free_slots() {
+    if (free_.empty()) return;
+    std::erase_if(entries_, [](const Entry& entry) { return entry.places == 0; });
+    for (uint32_t slot = 0; slot < entries_.size(); ++slot) slots_[Traits::id(entries_[slot].value)] = slot;
+    free_.clear();
+  }
+
+  // Passes those values of a node to the visitor that `wanted` accepts and that were not passed before. Returns false
+  // if the visitor ends the visit.
+  template <class Wanted, class Visitor>
+  bool pass_values(const Node& node, const Wanted& wanted, Visitor& visitor, PassedValues& passed, Work& work) const {
+    for (const uint32_t slot : node.values) {
+      const Entry& entry = entries_[slot];
+      if (!wanted(entry.bounds)) continue;
+      if (entry.places > 1 && !passed.add(slot) && !planted(PlantedBug::kOctreePassedTwice)) continue;
+      ++work.tests;
+      if (!visitor.visit(entry.value)) return false;
+    }
+    return true;
+  }
+
+  // Checks that exactly the nodes list the value in which it lies. O(depth + values in these nodes).
+  void check_value(uint32_t slot) const {
+    LOCUS_DCHECK_EQ(nodes_.count(slot, entries_[slot].bounds), entries_[slot].places);
+    LOCUS_DCHECK(entries_[slot].places > 0);
+    LOCUS_DCHECK_CALL(check_contained(entries_[slot].bounds));
+    LOCUS_DCHECK_EQ(entries_.size(), slots_.size() + free_.size());
+  }
+  void check_contained(const Aabb<S>& box) const {
+    if (!planted(PlantedBug::kOctreeFixedBounds)) LOCUS_DCHECK(locus::contains(bounds_, box));
+  }
+  // Checks all values, and the limits of nodes and references after a build. O(n * depth).
+  void check_invariants() const {
+    for (uint32_t slot = 0; slot < entries_.size(); ++slot) check_value(slot);
+    const OctreeShape shape = this->shape();
+    LOCUS_DCHECK(entries_.empty() || (shape.nodes < 2 * size() && shape.references < 4 * size()));
+    LOCUS_DCHECK_LE(shape.depth, nodes_.options().max_depth);
+  }
+
+  std::vector<Entry> entries_;
+  absl::flat_hash_map<uint64_t, uint32_t> slots_;  // id of each value to its slot in entries_
+  std::vector<uint32_t> free_;                     // slots of removed values
+  Aabb<S> bounds_;
+  OctreeNodes<S> nodes_;
+};
+
+template <class V, class T>
+requires Bounded<V, T>
+template <RayVisitor<V, T> Visitor>
+void Octree<V, T>::visit_ray(const SlabRay<S>& slabs, Visitor& visitor, Work& work) const {
+  struct Pending {
+    uint32_t node;
+    S near, far;  // interval of the ray in the node's part of space
+  };
+  if (slots_.empty()) return;
+  if (planted(PlantedBug::kOctreeRayFromInside) && !locus::contains(bounds_, slabs.origin())) return;
+  // The interval of a value may begin before the origin, so the limit of parts is not negative.
+  const auto beyond = [&](S near) {
+    return !planted(PlantedBug::kOctreeRayToBorder) && near > std::max(visitor.limit(), S{0});
+  };
+  const auto wanted = [&](const Aabb<S>& bounds) {
+    const Interval<S> interval = slabs.interval(bounds);
+    return interval.near <= interval.far && interval.far >= 0 && interval.near <= visitor.limit();
+  };
+  const S magnitude = planted(PlantedBug::kOctreeRayUnpadded) ? S{0} : locus::magnitude(bounds_);
+  const absl::Span<const int> axes = nodes_.axes();
+  uint32_t backwards = 0;  // the child that a ray enters first if it crosses all planes: the sign bits of the direction
+  for (size_t i = 0; i < axes.size(); ++i) backwards |= uint32_t{std::signbit(slabs.direction()[axes[i]])} << i;
+  PassedValues passed;
+  const Interval<S> whole = slabs.interval(bounds_, magnitude);
+  Stack<Pending> pending = {{0, whole.near, whole.far}};
+  while (!pending.empty()) {
+    const Pending now = pending.back();
+    pending.pop_back();
+    // The limit may have decreased since the push.
+    if (now.near > now.far || now.far < 0 || beyond(now.near)) continue;
+    ++work.nodes;
+    const Node& node = nodes_[now.node];
+    if (!pass_values(node, wanted, visitor, passed, work)) return;
+    if (node.is_leaf()) continue;
+    Interval<S> planes[3];
+    for (size_t i = 0; i < axes.size(); ++i) {
+      Aabb<S> plane = {{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}};
+      plane.min[axes[i]] = plane.max[axes[i]] = node.middle[axes[i]];
+      planes[i] = slabs.interval(plane, magnitude);
+    }
+    for (uint32_t order = nodes_.child_count(); order-- > 0;) {
+      Pending child = {node.first_child + (order ^ backwards), now.near, now.far};
+      for (size_t i = 0; i < axes.size(); ++i) {
+        const bool behind = ((order >> i) & 1) != 0;
+        if (behind) child.near = std::max(child.near, planes[i].near);
+        if (!behind) child.far = std::min(child.far, planes[i].far);
+      }
+      if (child.near <= child.far && child.far >= 0 && !beyond(child.near)) pending.push_back(child);
+    }
+    LOCUS_DCHECK_LE(pending.size(), kStackSize);
+  }
+}
+
+template <class V, class T>
+requires Bounded<V, T>
+template <RegionVisitor<V, T> Visitor>
+void Octree<V, T>::visit_region(Visitor& visitor, Work& work) const {
+  const Aabb<S> box = visitor.bounds();
+  if (!overlaps(box, bounds_)) return;
+  const auto wanted = [&](const Aabb<S>& bounds) { return visitor.overlaps(bounds); };
+  const absl::Span<const int> axes = nodes_.axes();
+  PassedValues passed;
+  Stack<uint32_t> pending = {0};
+  while (!pending.empty()) {
+    const Node& node = nodes_[pending.back()];
+    pending.pop_back();
+    ++work.nodes;
+    if (!pass_values(node, wanted, visitor, passed, work)) return;
+    if (node.is_leaf()) continue;
+    uint32_t below = 0, above = 0;  // sides of the planes that the region touches
+    for (size_t i = 0; i < axes.size(); ++i) {
+      const S plane = node.middle[axes[i]], low = box.min[axes[i]];
+      if (planted(PlantedBug::kOctreeLowerStrict) ? low < plane : low <= plane) below |= 1u << i;
+      if (box.max[axes[i]] >= plane) above |= 1u << i;
+    }
+    for (uint32_t child = nodes_.child_count(); child-- > 0;) {
+      const uint32_t other = ~child & (nodes_.child_count() - 1);
+      if ((child & ~above) == 0 && (other & ~below) == 0) pending.push_back(node.first_child + child);
+    }
+    LOCUS_DCHECK_LE(pending.size(), kStackSize);
+  }
+}
+
+template <class V, class T>
+requires Bounded<V, T>
+template <PointVisitor<V, T> Visitor>
+void Octree<V, T>::visit_nearest(const Vec3d& point, Visitor& visitor, Work& work) const {
+  struct Pending {
+    uint32_t node;
+    Vec3d gap;  // distance from the point to the node's part of space on each axis; 0 within
+  };
+  if (slots_.empty()) return;
+  const auto beyond = [&](double distance) {
+    return planted(PlantedBug::kOctreeNearestStrict) ? distance >= visitor.limit() : distance > visitor.limit();
+  };
+  const auto wanted = [&](const Aabb<S>& bounds) {
+    return squared_distance(point, to_double(bounds)) <= visitor.limit();
+  };
+  const absl::Span<const int> axes = nodes_.axes();
+  PassedValues passed;
+  const Aabbd whole = to_double(bounds_);
+  Stack<Pending> pending = {{0, max(max(whole.min - point, point - whole.max), Vec3d{})}};
+  while (!pending.empty()) {
+    const Pending now = pending.back();
+    pending.pop_back();
+    if (beyond(squared_length(now.gap))) continue;
+    ++work.nodes;
+    const Node& node = nodes_[now.node];
+    if (!pass_values(node, wanted, visitor, passed, work)) return;
+    if (node.is_leaf()) continue;
+    uint32_t nearest = 0;  // number of the child on whose sides of the planes the point lies
+    Vec3d gaps;            // distances to the planes
+    for (size_t i = 0; i < axes.size(); ++i) {
+      const double offset = point[axes[i]] - double{node.middle[axes[i]]};
+      nearest |= uint32_t{offset > 0} << i;
+      gaps[axes[i]] = std::abs(offset);
+    }
+    for (uint32_t order = nodes_.child_count(); order-- > 0;) {
+      Pending child = {node.first_child + (order ^ nearest), now.gap};
+      for (size_t i = 0; i < axes.size(); ++i) {
+        if (((order >> i) & 1) != 0) child.gap[axes[i]] = std::max(child.gap[axes[i]], gaps[axes[i]]);
+      }
+      if (!beyond(squared_length(child.gap))) pending.push_back(child);
+    }
+    LOCUS_DCHECK_LE(pending.size(), kStackSize);
+  }
+}
+
+}  // namespace locus
+
+#endif  // LOCUS_CORE_INDEX_OCTREE_OCTREE_H_
