@@ -36,6 +36,7 @@ inline constexpr uint32_t kMaxBvhBins = 64;
 inline constexpr uint32_t kMaxKdDepth = 64;  // max levels below the root of a kd tree; sets the sizes of stacks
 inline constexpr uint32_t kMaxBspDepth = 64;  // max planes above a leaf of a bsp tree; sizes the stacks of visits
 inline constexpr uint32_t kMaxOctreeDepth = 64;      // max levels below the root of an octree
+inline constexpr uint32_t kMaxGridCells = 1u << 26;  // max cells of a finite grid, with its power-of-two strides
 
 inline constexpr uint32_t kMaxUpdateItems = 1u << 20;  // items per update batch
 inline constexpr uint32_t kMaxUpdateLists = 65536;     // lists (inserts, moves, relabels and so on) per request

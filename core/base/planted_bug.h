@@ -114,6 +114,19 @@ enum class PlantedBug {
   kOctreeRayUnpadded,    // planes are not padded for the coordinates of the tree when they are tested with rays
   kOctreeRayToBorder,    // a ray is followed beyond its limit
   kOctreeNearestStrict,  // a nearest query does not search parts exactly as far as its limit
+  // The finite grid:
+  kGridForgetsMinimum,   // cells of a region are counted from zero, not from the minimum corner of the grid
+  kGridWrongAxis,        // a ray looks up its cells with y in place of z
+  kGridSignedDirection,  // cells are ordered for rays as if all components of the direction were positive
+  kGridClippedToCell,   // a ray tests a value only within the interval of the ray in the value's cell, without a margin
+  kGridAccumulatedT,    // the distances at which a ray enters cells are accumulated from cell to cell
+  kGridDiagonalStep,    // a ray that crosses several borders at once skips the cells that it only touches
+  kGridRayToBorder,     // a ray is followed beyond its limit
+  kGridRayFromInside,   // a ray that starts outside the bounds of the grid finds nothing in the cells
+  kGridPassedTwice,     // a value that lies in several cells is passed from each of them
+  kGridReferenceLeft,   // a removed value stays in all of its cells but one
+  kGridClampedOutside,  // values outside the bounds of the grid lie in the nearest cells
+  kGridNearestStrict,   // a nearest query does not search cells exactly as far as its limit
   // Access control:
   kRightLeftOut,         // a grant of any right to a scene grants every right to it
   kSceneLeftOut,         // a grant for some scenes grants its rights to every scene

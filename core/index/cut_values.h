@@ -18,11 +18,11 @@ enum class CutValues : uint8_t { kInLeaves, kAtNode };
 // The caller must not ask for values that lie in one leaf: they cost nothing. One object per visit; one thread.
 class PassedValues {
  public:
-  // Returns true for the first call with this number of a value.
-  bool add(uint32_t number) { return passed_.insert(number).second; }
+  // Returns true for the first call with this number or id of a value.
+  bool add(uint64_t number) { return passed_.insert(number).second; }
 
  private:
-  absl::flat_hash_set<uint32_t> passed_;  // allocates no memory until the first value is added
+  absl::flat_hash_set<uint64_t> passed_;  // allocates no memory until the first value is added
 };
 
 }  // namespace locus

@@ -14,6 +14,7 @@
 #include "tests/support/crossing_trials.h"
 #include "tests/support/door_lockstep.h"
 #include "tests/support/edge_on_cases.h"
+#include "tests/support/finite_grid_comparison.h"
 #include "tests/support/grid_comparison.h"
 #include "tests/support/kernel_trials.h"
 #include "tests/support/kind_trials.h"
@@ -77,6 +78,8 @@ std::string compare_moving_grids_with_list() {
 }
 
 std::string compare_octrees_with_list() { return search_octrees(scaled_count(100), scaled_count(200)); }
+
+std::string compare_finite_grids_with_list() { return search_all_finite_grids(scaled_count(50), scaled_count(150)); }
 
 std::string compare_scenes_with_model() { return search_scene_lockstep(scaled_count(20), 60); }
 
@@ -184,6 +187,18 @@ constexpr Trial kTrials[] = {
     {"OctreeWithUnpaddedPlanes", PlantedBug::kOctreeRayUnpadded, compare_octrees_with_list},
     {"OctreeThatFollowsShortRaysToTheBorder", PlantedBug::kOctreeRayToBorder, octree_short_ray_fault},
     {"OctreeThatLeavesOutWhatIsAsFar", PlantedBug::kOctreeNearestStrict, compare_octrees_with_list},
+    {"CellsCountedFromZero", PlantedBug::kGridForgetsMinimum, compare_finite_grids_with_list},
+    {"CellsOfRaysWithTheWrongAxis", PlantedBug::kGridWrongAxis, compare_finite_grids_with_list},
+    {"CellsInTheOrderOfPositiveDirections", PlantedBug::kGridSignedDirection, compare_finite_grids_with_list},
+    {"CellsThatClipTheTestsOfTheirValues", PlantedBug::kGridClippedToCell, compare_finite_grids_with_list},
+    {"CellsAtAccumulatedDistances", PlantedBug::kGridAccumulatedT, long_row_difference},
+    {"CellsOnlyTouchedAreSkipped", PlantedBug::kGridDiagonalStep, compare_finite_grids_with_list},
+    {"CellsOfShortRaysUpToTheBorder", PlantedBug::kGridRayToBorder, grid_short_ray_fault},
+    {"CellsThatRaysFromOutsideMiss", PlantedBug::kGridRayFromInside, compare_finite_grids_with_list},
+    {"CellsThatPassAValueTwice", PlantedBug::kGridPassedTwice, compare_finite_grids_with_list},
+    {"CellsThatKeepARemovedValue", PlantedBug::kGridReferenceLeft, compare_finite_grids_with_list},
+    {"CellsWithValuesFromOutside", PlantedBug::kGridClampedOutside, compare_finite_grids_with_list},
+    {"CellsThatLeaveOutWhatIsAsFar", PlantedBug::kGridNearestStrict, compare_finite_grids_with_list},
     {"SceneWithAStaleSnapshot", PlantedBug::kStaleSnapshot, compare_scenes_with_model},
     {"SceneWithAGhostAfterAMove", PlantedBug::kGhostAfterMove, compare_scenes_with_model},
     {"SceneThatShowsHalfOfSeveralMessages", PlantedBug::kHalfGroup, compare_scenes_with_model},

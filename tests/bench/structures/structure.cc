@@ -6,6 +6,7 @@
 
 #include "core/base/check.h"
 #include "core/index/bvh/bvh.h"
+#include "core/index/grid/grid.h"
 #include "core/index/list/list_index.h"
 #include "core/index/octree/octree.h"
 #include "core/index/queries/nearest_values.h"
@@ -109,6 +110,13 @@ Octree<Object> make_octree(const std::vector<Object>& boxes) {
   return Octree<Object>::build(boxes, options);
 }
 
+template <GridOrder order>
+Grid<Object> make_grid(const std::vector<Object>& boxes) {
+  GridOptions options;
+  options.order = order;
+  return Grid<Object>::build(boxes, options);
+}
+
 template <class Index, Index (*make)(const std::vector<Object>&)>
 NamedStructure named(const char* name) {
   return {name, [] { return std::make_unique<StructureOf<Index, make>>(); }};
@@ -135,8 +143,11 @@ const char* name_of(QueryName query) {
 }
 
 std::vector<NamedStructure> structures() {
-  return {named<ListIndex<Object>, make_list>("list"), named<Bvh<Object>, make_bvh>("bvh"),
+  return {named<ListIndex<Object>, make_list>("list"),
+          named<Bvh<Object>, make_bvh>("bvh"),
           named<test::ObjectGrid, make_hash_grid>("hash_grid"),
+          named<Grid<Object>, make_grid<GridOrder::kXMajor>>("grid"),
+          named<Grid<Object>, make_grid<GridOrder::kMorton>>("grid_morton"),
           named<Octree<Object>, make_octree<CutValues::kInLeaves>>("octree"),
           named<Octree<Object>, make_octree<CutValues::kAtNode>>("octree_at_node")};
 }
