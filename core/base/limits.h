@@ -33,9 +33,9 @@ inline constexpr uint32_t kMaxPendingChanges = 64;   // queued static changes (o
 inline constexpr uint32_t kMaxBvhValues = kMaxMeshTriangles;
 inline constexpr uint32_t kMaxBvhDepth = 64;  // max levels of nodes; sets the size of the traversal stack
 inline constexpr uint32_t kMaxBvhBins = 64;
-inline constexpr uint32_t kMaxKdDepth = 64;  // max levels below the root of a kd tree; sets the sizes of stacks
-inline constexpr uint32_t kMaxBspDepth = 64;  // max planes above a leaf of a bsp tree; sizes the stacks of visits
-inline constexpr uint32_t kMaxOctreeDepth = 64;      // max levels below the root of an octree
+inline constexpr uint32_t kMaxKdDepth = 64;      // max levels below the root of a kd tree; sets the sizes of stacks
+inline constexpr uint32_t kMaxBspDepth = 64;     // max planes above a leaf of a bsp tree; sizes the stacks of visits
+inline constexpr uint32_t kMaxOctreeDepth = 64;  // max levels below the root of an octree
 inline constexpr uint32_t kMaxGridCells = 1u << 26;  // max cells of a finite grid, with its power-of-two strides
 
 inline constexpr uint32_t kMaxUpdateItems = 1u << 20;  // items per update batch

@@ -96,8 +96,6 @@ enum class PlantedBug {
   kKdRayToBorder,    // a ray is followed beyond its limit
   kKdNearestStrict,  // a nearest query does not search regions exactly as far as its limit
   kKdPointsStrict,   // boxes and balls of points do not search the side of a plane that they just touch
-  // Indexes that divide space by planes:
-  kPaddedRayThin,   // rays are compared with planes without the pad of the slab test
   // Indexes that divide space by planes, and trees of balls:
   kPaddedRayThin,   // rays are compared with planes and balls without the pad of the slab test
   kBspPassedTwice,  // a value that lies in several leaves is passed in each of them

@@ -27,8 +27,8 @@
 #include "tests/support/rewind_lockstep.h"
 #include "tests/support/scene_lockstep.h"
 #include "tests/support/scene_search.h"
-#include "tests/support/structure_comparison.h"
 #include "tests/support/sphere_tree_trials.h"
+#include "tests/support/structure_comparison.h"
 #include "tests/support/sweep_trials.h"
 
 namespace locus::test {
