@@ -11,6 +11,7 @@
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_GRID_BLOCK_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_GRID_BLOCK_H_
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstddef>
@@ -129,6 +130,14 @@ class GridBlock {
   [[gnu::always_inline]] void prefetch_target(uint32_t slot) const {
     for (int axis = 0; axis < 3; ++axis) __builtin_prefetch(&column(axis)[slot], 1);
     prefetch_value(slot);
+  }
+
+  // Prefetches the handles that find_near() reads for the slots from `begin` to `end` - 1, which may be larger than
+  // count().
+  [[gnu::always_inline]] void prefetch_handles(uint32_t begin, uint32_t end) const {
+    const uint32_t first = begin < kLanes ? 0 : begin - kLanes, last = std::min(end + kLanes, stride_);
+    for (uint32_t slot = first; slot < last; slot += 2 * kLanes) __builtin_prefetch(&handles_[slot]);
+    if (first < last) __builtin_prefetch(&handles_[last - 1]);
   }
 
   // Pointers to the columns of a block for reading. A loop can keep these pointers in registers.

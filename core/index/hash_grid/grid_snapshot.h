@@ -129,6 +129,13 @@ class GridSnapshot {
   // the value in this snapshot is close to its slot in the other snapshot.
   GridRef find_like(const GridRef& value) const;
 
+  // Returns the version of the brick `other`, of another snapshot of the same grid, in this snapshot. Returns null if
+  // this snapshot has no such brick, or if the version is the same. Another brick may have taken its index.
+  const internal::Brick* version_of(const internal::Brick& other) const {
+    const internal::Brick* const brick = other.index < bricks_.size() ? bricks_[other.index].get() : nullptr;
+    return brick == &other ? nullptr : brick;
+  }
+
   // Returns bounds of the values of a brick; `brick` is GridRef::brick() of one of them. O(1).
   GridBrickBounds brick_bounds(uint32_t brick) const;
 

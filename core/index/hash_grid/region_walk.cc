@@ -28,6 +28,8 @@ void RegionSteps::find_bricks(const GridRegion& region) {
         LOCUS_DCHECK_LT(part_count_, kMaxBricks);
         brick.prefetch_head();
         parts_[part_count_].brick = &brick;
+        parts_[part_count_].later = region.later == nullptr ? nullptr : region.later->version_of(brick);
+        if (parts_[part_count_].later != nullptr) parts_[part_count_].later->prefetch_head();
         parts_[part_count_++].cells = cells;
       });
   cells_ = work.cells;
@@ -45,6 +47,7 @@ void RegionSteps::find_blocks() {
       __builtin_prefetch(&sorted.offsets()[layer + (1 << (2 * kBrickBits))]);
     }
     if (part.brick->recent_count != 0) __builtin_prefetch(part.brick->recent.get());
+    if (part.later != nullptr) part.later->prefetch_blocks();
   }
 }
 
@@ -54,6 +57,11 @@ void RegionSteps::find_rows() {
     BrickPart& part = parts_[i];
     part.rows = rows_of(*part.brick, part.cells);
     prefetch_rows(part.rows);
+    if (part.later != nullptr) {
+      const GridBlock& later = *part.later->sorted;
+      for (uint32_t row = 0; row < part.rows.count; ++row)
+        later.prefetch_handles(part.rows.begin[row], part.rows.end[row]);
+    }
     if (part.brick->recent_count == 0) continue;
     for (int column = 0; column < 4; ++column)
       prefetch(part.brick->recent->column(column), part.brick->recent_count * sizeof(float));
@@ -66,6 +74,25 @@ void RegionSteps::find_values() {
     cull(BallCull(*region_.ball));
   else
     cull(BoxCull(region_.bounds));
+  prefetch_later_values();
+}
+
+// Prefetches the later versions of the found values that are near their present slots.
+void RegionSteps::prefetch_later_values() const {
+  if (!is_small_ || region_.later == nullptr) return;
+  uint32_t next = 0;
+  for (uint32_t i = 0; i < part_count_; ++i) {
+    const BrickPart& part = parts_[i];
+    if (part.later != nullptr) {
+      const GridBlock& sorted = *part.brick->sorted;
+      const GridBlock& later = *part.later->sorted;
+      for (; next < part.sorted_end; ++next) {
+        const uint32_t slot = later.find_near(sorted.handle(slots_[next]), slots_[next]);
+        if (slot < later.count()) later.prefetch_entry(slot);
+      }
+    }
+    next = part.recent_end;
+  }
 }
 
 template <class CullOf>

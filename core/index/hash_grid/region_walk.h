@@ -25,6 +25,9 @@ struct GridRegion {
   const GridSnapshot* grid = nullptr;
   Aabbd bounds;
   std::optional<Balld> ball;
+  // Snapshot in which the visitor looks up each value with find_like(); null if there is none. A walk prefetches the
+  // memory for these lookups.
+  const GridSnapshot* later = nullptr;
 
   // Calls GridSnapshot::visit_ball() if `ball` is set, otherwise GridSnapshot::visit_region().
   template <class Visit>
@@ -55,6 +58,7 @@ class RegionSteps {
 
   struct BrickPart {
     const Brick* brick;
+    const Brick* later;  // version of the brick in GridRegion::later; null if there is none, or if it is the same
     KeyRange cells;
     GridRows rows;
     // Ends of two ranges in slots_: the found slots of the sorted block, then the found slots of the log.
@@ -63,6 +67,7 @@ class RegionSteps {
 
   template <class CullOf>
   void cull(const CullOf& cull_of);
+  void prefetch_later_values() const;
 
   GridRegion region_;
   bool is_small_ = false;  // true if all bricks and values of the region fit the arrays below

@@ -35,7 +35,7 @@ GridRegion SceneAtTime::region(const Aabbd& bounds, const std::optional<Balld>& 
   const double bound = planted(PlantedBug::kRewindReach) ? 0 : displacement_bound_;
   std::optional<Balld> near = ball;
   if (near) near->radius += bound;
-  return {&at_->grid(), grown(bounds, bound), near};
+  return {&at_->grid(), grown(bounds, bound), near, &next_->grid()};
 }
 
 Shape SceneAtTime::shape_between(const GridRef& object) const {

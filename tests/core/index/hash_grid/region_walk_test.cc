@@ -90,6 +90,22 @@ TEST(RegionWalkTest, EveryRegionIsVisitedLikeASeparateVisit) {
   }
 }
 
+// A later snapshot may have more, fewer or no bricks, and its bricks may have other values.
+TEST(RegionWalkTest, ALaterSnapshotChangesNoVisit) {
+  Random random(9);
+  const GridSnapshot grid = crowd(random);
+  const GridSnapshot later[] = {grid, crowd(random), HashGrid().snapshot()};
+  std::vector<GridRegion> regions = regions_in(grid, random, 200);
+  for (const GridSnapshot& other : later) {
+    for (GridRegion& region : regions) region.later = &other;
+    RegionWalk walk(0, regions.size(), [&](size_t i) { return regions[i]; });
+    for (size_t i = 0; i < regions.size(); ++i) {
+      const Visited own = visited_by([&](Work& work, const auto& visit) { regions[i].visit(work, visit); });
+      expect_same(visited_by([&](Work& work, const auto& visit) { walk.visit(work, visit); }), own, i);
+    }
+  }
+}
+
 TEST(RegionWalkTest, AWalkFromTheMiddleVisitsUpToItsEnd) {
   Random random(6);
   const GridSnapshot grid = crowd(random);
