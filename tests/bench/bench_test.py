@@ -51,8 +51,9 @@ LOG |= {(f"writers/8/{size}", "one_writer") for size in (16, 256, 4096)}
 LOG |= {("mesh/2M", "built")}
 REDIS = {("moves/10k", "redis"), ("ball/10k", "redis")}
 HAS_REDIS = any(shutil.which(name) for name in ("redis-server", "redis-check-rdb"))
-STRUCTURES = {"bvh", "hash_grid", "grid", "grid_morton", "octree", "octree_at_node"}
-CHANGEABLE_STRUCTURES = {"hash_grid", "grid", "grid_morton", "octree", "octree_at_node"}
+CHANGEABLE_STRUCTURES = {"hash_grid", "grid", "grid_morton", "kd_tree", "kd_tree_at_node", "octree", "octree_at_node",
+                         "bsp_tree"}
+STRUCTURES = CHANGEABLE_STRUCTURES | {"bvh", "sphere_tree"}
 STRUCTURE_QUERIES = ("ray", "ray_short", "any", "ball", "box", "nearest")
 STRUCTURE_SCENES = {"uniform": ("1e3", "1e4"), **{name: ("1e3",) for name in ("hub", "city1", "city100", "giant")}}
 

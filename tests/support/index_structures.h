@@ -11,9 +11,13 @@
 #include <vector>
 
 #include "core/base/check.h"
+#include "core/index/bsp_tree/bsp_tree.h"
 #include "core/index/bvh/bvh.h"
+#include "core/index/grid/grid.h"
 #include "core/index/kd_tree/kd_tree.h"
 #include "core/index/list/list_index.h"
+#include "core/index/octree/octree.h"
+#include "core/index/sphere_tree/sphere_tree.h"
 #include "tests/support/object_grid.h"
 
 namespace locus::test {
@@ -59,6 +63,51 @@ struct KdTreeStructure {
     options.cut = cut;
     options.leaf_size = 2;  // the scenes of tests are small
     return Index::build(values, options);
+  }
+};
+
+// `axes` has bit 0 for x, bit 1 for y and bit 2 for z.
+template <class V, int axes, CutValues cut>
+struct OctreeStructure {
+  using Index = Octree<V>;
+  static Index make(const std::vector<V>& values) {
+    OctreeOptions options;
+    options.axes = {.x = (axes & 1) != 0, .y = (axes & 2) != 0, .z = (axes & 4) != 0};
+    options.cut = cut;
+    options.leaf_size = 2;
+    return Index::build(values, options);
+  }
+};
+
+template <class V, BspPlanes planes, CutValues cut>
+struct BspTreeStructure {
+  using Index = BspTree<V>;
+  static Index make(const std::vector<V>& values) {
+    BspTreeOptions options;
+    options.planes = planes;
+    options.cut = cut;
+    options.leaf_size = 2;
+    return Index::build(values, options);
+  }
+};
+
+template <class V, GridOrder order, class Cell = GridList<V, PrimitiveTraits<V>>>
+struct FiniteGridStructure {
+  using Index = Grid<V, PrimitiveTraits<V>, Cell>;
+  static Index make(const std::vector<V>& values) {
+    GridOptions options;
+    options.order = order;
+    return Index::build(values, options);
+  }
+};
+
+template <class V>
+struct SphereTreeStructure {
+  using Index = SphereTree<V>;
+  static Index make(const std::vector<V>& values) {
+    absl::StatusOr<Index> tree = Index::build(values);
+    LOCUS_CHECK(tree.ok());
+    return *std::move(tree);
   }
 };
 
@@ -112,12 +161,27 @@ template <class V>
 using KdTreesAtNodeOf = StructureList<KdTreeAtNode<V, KdSplit::kMiddle>, KdTreeAtNode<V, KdSplit::kMean>,
                                       KdTreeAtNode<V, KdSplit::kMedian>, KdTreeAtNode<V, KdSplit::kSah>>;
 
+template <class V>
+using OctreesOf = StructureList<OctreeStructure<V, 7, CutValues::kInLeaves>, OctreeStructure<V, 7, CutValues::kAtNode>,
+                                OctreeStructure<V, 3, CutValues::kInLeaves>, OctreeStructure<V, 4, CutValues::kAtNode>>;
+template <class V>
+using BspTreesOf = StructureList<BspTreeStructure<V, BspPlanes::kBest, CutValues::kInLeaves>,
+                                 BspTreeStructure<V, BspPlanes::kBest, CutValues::kAtNode>>;
+template <class V>
+using FiniteGridsOf =
+    StructureList<FiniteGridStructure<V, GridOrder::kXMajor>, FiniteGridStructure<V, GridOrder::kMorton>,
+                  FiniteGridStructure<V, GridOrder::kXMajor, BspTree<V>>>;
+
 // Structures of values of type V. One line for each family.
 template <class V>
 using StructuresOf = Joined<StructureList<ListStructure<V>>,  //
                             StructureList<BvhStructure<V>>,   //
                             KdTreesInLeavesOf<V>,             //
-                            KdTreesAtNodeOf<V>>;
+                            KdTreesAtNodeOf<V>,               //
+                            OctreesOf<V>,                     //
+                            BspTreesOf<V>,                    //
+                            FiniteGridsOf<V>,                 //
+                            StructureList<SphereTreeStructure<V>>>;
 
 using ObjectStructures = Joined<StructuresOf<Object>, StructureList<GridStructure>>;
 using AllStructures = Joined<StructuresOf<Triangle>, ObjectStructures>;

@@ -17,7 +17,7 @@ namespace locus::test {
 // Returns a violation of the limits of an index that has just been built of `count` values; empty if there is none.
 template <class Index>
 std::string shape_fault(const Index& index, size_t count) {
-  if constexpr (requires { index.shape(); }) {
+  if constexpr (requires { index.shape().nodes; }) {
     const auto shape = index.shape();
     if (count > 0 && shape.nodes >= 2 * count) return absl::StrCat(shape.nodes, " nodes for ", count, " values");
     if (count > 0 && shape.references >= 4 * count)

@@ -91,23 +91,30 @@ ListIndex<Object> make_list(const std::vector<Object>& boxes) {
   return list;
 }
 
-Bvh<Object> make_bvh(const std::vector<Object>& boxes) {
-  absl::StatusOr<Bvh<Object>> tree = Bvh<Object>::build(boxes);
+// For trees whose build can fail.
+template <class Tree>
+Tree make_tree(const std::vector<Object>& boxes) {
+  absl::StatusOr<Tree> tree = Tree::build(boxes);
   LOCUS_CHECK(tree.ok());
   return *std::move(tree);
+}
+
+template <class Index>
+Index make_index(const std::vector<Object>& boxes) {
+  return Index::build(boxes);
+}
+
+template <class Index, class IndexOptions>
+Index make_at_node(const std::vector<Object>& boxes) {
+  IndexOptions options;
+  options.cut = CutValues::kAtNode;
+  return Index::build(boxes, options);
 }
 
 test::ObjectGrid make_hash_grid(const std::vector<Object>& boxes) {
   test::ObjectGrid grid;
   grid.apply({}, boxes);
   return grid;
-}
-
-template <CutValues cut>
-Octree<Object> make_octree(const std::vector<Object>& boxes) {
-  OctreeOptions options;
-  options.cut = cut;
-  return Octree<Object>::build(boxes, options);
 }
 
 template <GridOrder order>
@@ -143,13 +150,20 @@ const char* name_of(QueryName query) {
 }
 
 std::vector<NamedStructure> structures() {
+  using Kd = KdTree<Object>;
+  using Oct = Octree<Object>;
+  using Bsp = BspTree<Object>;
   return {named<ListIndex<Object>, make_list>("list"),
-          named<Bvh<Object>, make_bvh>("bvh"),
+          named<Bvh<Object>, make_tree<Bvh<Object>>>("bvh"),
           named<test::ObjectGrid, make_hash_grid>("hash_grid"),
           named<Grid<Object>, make_grid<GridOrder::kXMajor>>("grid"),
           named<Grid<Object>, make_grid<GridOrder::kMorton>>("grid_morton"),
-          named<Octree<Object>, make_octree<CutValues::kInLeaves>>("octree"),
-          named<Octree<Object>, make_octree<CutValues::kAtNode>>("octree_at_node")};
+          named<Kd, make_index<Kd>>("kd_tree"),
+          named<Kd, make_at_node<Kd, KdTreeOptions>>("kd_tree_at_node"),
+          named<Oct, make_index<Oct>>("octree"),
+          named<Oct, make_at_node<Oct, OctreeOptions>>("octree_at_node"),
+          named<Bsp, make_index<Bsp>>("bsp_tree"),
+          named<SphereTree<Object>, make_tree<SphereTree<Object>>>("sphere_tree")};
 }
 
 }  // namespace locus::bench::structures
