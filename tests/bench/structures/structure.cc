@@ -5,11 +5,14 @@
 #include <utility>
 
 #include "core/base/check.h"
+#include "core/index/bsp_tree/bsp_tree.h"
 #include "core/index/bvh/bvh.h"
 #include "core/index/grid/grid.h"
+#include "core/index/kd_tree/kd_tree.h"
 #include "core/index/list/list_index.h"
 #include "core/index/octree/octree.h"
 #include "core/index/queries/nearest_values.h"
+#include "core/index/sphere_tree/sphere_tree.h"
 #include "tests/support/object_grid.h"
 
 namespace locus::bench::structures {
