@@ -4,6 +4,7 @@
 #define LOCUS_TESTS_SUPPORT_BSP_TRIALS_H_
 
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <string>
 #include <vector>
@@ -37,17 +38,31 @@ inline std::string excess(const BspTreeShape& now, size_t size, const BspTreeOpt
   return now.depth > options.max_depth ? "depth " + std::to_string(now.depth) : "";
 }
 
-// Compares trees that were built of all values.
+// Compares a tree that was built of all values with the options.
+template <Primitive V>
+std::string built_bsp_difference(const TestScene<V>& scene, const BspTreeOptions& options) {
+  const BspTree<V> tree = BspTree<V>::build(scene.values, options);
+  std::string what = excess(tree.shape(), tree.size(), options);
+  if (what.empty()) what = first_difference(tree, scene);
+  return what.empty() ? "" : label(options) + what;
+}
+
+// Compares trees that were built with each of the options.
 template <Primitive V>
 std::string bsp_difference(const TestScene<V>& scene) {
-  const auto list = make_list(scene.values);
-  for (const BspTreeOptions& options : kBspTrials) {
-    const BspTree<V> tree = BspTree<V>::build(scene.values, options);
-    if (const std::string what = excess(tree.shape(), tree.size(), options); !what.empty())
-      return scene.name + ", " + label(options) + what;
-    if (const std::string what = IndexJudge(tree, list).difference(scene); !what.empty()) return label(options) + what;
-  }
+  for (const BspTreeOptions& options : kBspTrials)
+    if (const std::string what = built_bsp_difference(scene, options); !what.empty()) return what;
   return "";
+}
+
+// Compares two trees, one with each treatment of cut values; the number of values selects the other options.
+template <Primitive V>
+std::string bsp_treatment_difference(const TestScene<V>& scene) {
+  constexpr size_t kHalf = std::size(kBspTrials) / 2;
+  static_assert(kBspTrials[kHalf - 1].cut != kBspTrials[kHalf].cut);
+  const size_t turn = scene.values.size() % kHalf;
+  const std::string what = built_bsp_difference(scene, kBspTrials[turn]);
+  return what.empty() ? built_bsp_difference(scene, kBspTrials[kHalf + turn]) : what;
 }
 
 // Compares trees that were built of a third of the values; the other values were inserted, all but every fourth value

@@ -13,7 +13,7 @@ using ValueTypes = ::testing::Types<Triangle, Object>;
 TYPED_TEST_SUITE(BspTreeEqualsListTest, ValueTypes);
 
 TYPED_TEST(BspTreeEqualsListTest, OnRandomScenes) {
-  EXPECT_EQ(search_all_scenes<TypeParam>(scaled_count(10'000), 0, bsp_difference<TypeParam>), "");
+  EXPECT_EQ(search_all_scenes<TypeParam>(scaled_count(10'000), 0, bsp_treatment_difference<TypeParam>), "");
 }
 
 TYPED_TEST(BspTreeEqualsListTest, OnAdversarialScenes) {
