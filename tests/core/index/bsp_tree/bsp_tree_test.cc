@@ -20,7 +20,7 @@ static_assert(MutableSpatialIndex<BspTree<Triangle>>);
 static_assert(MutableSpatialIndex<BspTree<Object>>);
 static_assert(Planar<Triangle> && !Planar<Object>);
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kNoLimit = std::numeric_limits<double>::infinity();
 
 Object box_at(Id id, Vec3d center, float half = 0.25f) {
   Object object;
@@ -100,7 +100,7 @@ TEST(BspTreeTest, AnEmptyTreeAnswersNothingAndHasOneCell) {
     const BspTree<Object> tree = BspTree<Object>::build({}, options);
     EXPECT_EQ(tree.size(), 0u);
     EXPECT_EQ(tree.shape().nodes, 1u);
-    EXPECT_FALSE(any_ray(tree, ObjectRay({{}, {1, 0, 0}}), kInfinity));
+    EXPECT_FALSE(any_ray(tree, ObjectRay({{}, {1, 0, 0}}), kNoLimit));
     EXPECT_TRUE(ids_in_box(tree, {}, 1e9).empty());
     EXPECT_TRUE(tree.cell_of_leaf(tree.leaf_of({})).empty());
   }
@@ -200,7 +200,7 @@ TEST(BspTreeDeathTest, InsertOfAPresentIdIsAProgrammerError) {
 }
 
 TEST(BspTreeDeathTest, BoundsWithoutEndAreAProgrammerError) {
-  EXPECT_DEATH(BspTree<Object>::build({box_at(1, {kInfinity, 0, 0})}), "check failed");
+  EXPECT_DEATH(BspTree<Object>::build({box_at(1, {kNoLimit, 0, 0})}), "check failed");
 }
 
 TEST(BspTreeTest, HubAndCountryAreFoundAlike) {
@@ -325,7 +325,7 @@ TEST(BspTreeTest, RaysPassLeavesNearToFar) {
   for (Id id = 1; id <= 64; ++id) boxes.push_back(box_at(id, {10.0 * static_cast<double>(id), 0, 0}));
   const BspTree<Object> tree = BspTree<Object>::build(boxes, {.leaf_size = 1});
   Object hit;
-  double t = kInfinity;
+  double t = kNoLimit;
   Work work;
   ASSERT_TRUE(first_ray(tree, ObjectRay({{}, {1, 0, 0}}), hit, t, &work));
   EXPECT_EQ(hit.id, 1u);

@@ -8,7 +8,7 @@ namespace locus::test {
 namespace {
 
 constexpr Plane kHorizontal = {{0, 0, 1}, -2};  // z = 2, front above
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 
 TEST(PlaneSidesTest, ABoxThatTouchesThePlaneLiesOnBothSides) {
   for (const Aabbd& box : {Aabbd{{0, 0, 1}, {1, 1, 2}}, Aabbd{{0, 0, 2}, {1, 1, 3}}, Aabbd{{0, 0, 2}, {1, 1, 2}}})
@@ -25,7 +25,8 @@ TEST(PlaneSidesTest, ABoxBeyondThePlaneLiesOnOneSide) {
 }
 
 TEST(PlaneSidesTest, ARegionWithoutEndLiesOnBothSides) {
-  EXPECT_TRUE(sides_of(kHorizontal, {{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}}).both());
+  EXPECT_TRUE(
+      sides_of(kHorizontal, {{-kUnbounded, -kUnbounded, -kUnbounded}, {kUnbounded, kUnbounded, kUnbounded}}).both());
 }
 
 // A point of a box is computed with other roundings than the corners of the box, and still lies on a side of the box.
@@ -82,7 +83,7 @@ TEST(PlaneSidesTest, AnExactRayOfLengthZeroHasOneSide) {
 TEST(PlaneSidesTest, TheSpansOfAPaddedRayOverlapByThePad) {
   const PaddedRay ray(SlabRay<double>({{0, 0, 0}, {0, 0, 4}}, kObjectPad), 8.0);
   ASSERT_GT(ray.pad(), 0);
-  const SideSpans spans = padded_spans(kHorizontal, ray, {0, kInfinity});
+  const SideSpans spans = padded_spans(kHorizontal, ray, {0, kUnbounded});
   EXPECT_FALSE(spans.front_first);
   EXPECT_DOUBLE_EQ(spans.front.begin, 2 - ray.pad());
   EXPECT_DOUBLE_EQ(spans.back.end, 2 + ray.pad());

@@ -15,10 +15,10 @@ namespace {
 static_assert(SpatialIndex<SphereTree<Triangle>>);
 static_assert(SpatialIndex<SphereTree<Object>>);
 
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr float kNoLimitf = std::numeric_limits<float>::infinity();
 
 template <class V>
-SphereTree<V> build(std::vector<V> values) {
+SphereTree<V> sphere_tree(std::vector<V> values) {
   absl::StatusOr<SphereTree<V>> tree = SphereTree<V>::build(std::move(values));
   EXPECT_TRUE(tree.ok()) << tree.status();
   return tree.ok() ? *std::move(tree) : SphereTree<V>();
@@ -39,10 +39,10 @@ std::vector<Object> uniform_balls(size_t count, uint64_t seed) {
 }
 
 TEST(SphereTreeTest, AnEmptyTreeAnswersNothing) {
-  for (const SphereTree<Triangle>& tree : {SphereTree<Triangle>(), build<Triangle>({})}) {
+  for (const SphereTree<Triangle>& tree : {SphereTree<Triangle>(), sphere_tree<Triangle>({})}) {
     EXPECT_EQ(tree.size(), 0u);
     EXPECT_EQ(tree.shape().nodes, 0u);
-    EXPECT_FALSE(any_ray(tree, TriangleRay({0, 0, 0}, {1, 0, 0}), kInfinity));
+    EXPECT_FALSE(any_ray(tree, TriangleRay({0, 0, 0}, {1, 0, 0}), kNoLimitf));
     std::vector<Triangle> found;
     conservative_ball(tree, {{0, 0, 0}, 1e9f}, found);
     EXPECT_TRUE(found.empty());
@@ -54,7 +54,7 @@ TEST(SphereTreeTest, BoundsThatAreNotFiniteAndWrongOptionsAreRefused) {
   BvhOptions options;
   options.bins = 1;
   EXPECT_EQ(SphereTree<Triangle>::build(triangles, options).status().code(), absl::StatusCode::kInvalidArgument);
-  triangles[5].b.y = kInfinity;
+  triangles[5].b.y = kNoLimitf;
   EXPECT_EQ(SphereTree<Triangle>::build(triangles).status().code(), absl::StatusCode::kInvalidArgument);
 }
 
@@ -66,7 +66,7 @@ TEST(SphereTreeTest, ACancelledBuildIsAnError) {
 }
 
 TEST(SphereTreeTest, EachValueIsInOneLeafAndTheTreeIsFlat) {
-  const SphereTree<Object> tree = build(uniform_balls(10'000, 1));
+  const SphereTree<Object> tree = sphere_tree(uniform_balls(10'000, 1));
   EXPECT_EQ(tree.shape().references, 10'000u);
   EXPECT_LT(tree.shape().nodes, 20'000u);
   EXPECT_LT(tree.shape().depth, 24u);
@@ -75,7 +75,7 @@ TEST(SphereTreeTest, EachValueIsInOneLeafAndTheTreeIsFlat) {
 TEST(SphereTreeTest, ManyEqualValuesStayWithinTheLimitOfDepth) {
   std::vector<Object> balls = uniform_balls(100'000, 1);
   for (Object& ball : balls) ball.shape.position = {1, 2, 3};
-  const SphereTree<Object> tree = build(balls);
+  const SphereTree<Object> tree = sphere_tree(balls);
   EXPECT_LE(tree.shape().depth, limits::kMaxBvhDepth);
   std::vector<Object> found;
   ball_overlap(tree, {{1, 2, 3}, 0}, found);
@@ -92,7 +92,7 @@ TEST(SphereTreeTest, HubAndCountryAndNeighboursOneUlpApartAreFoundAlike) {
       balls[i].shape.position.x = std::nextafter(balls[i].shape.position.x, 1e9);
     }
   }
-  const SphereTree<Object> tree = build(balls);
+  const SphereTree<Object> tree = sphere_tree(balls);
   const ListIndex<Object> list = make_list(balls);
   const IndexJudge judge(tree, list);
   for (uint64_t i = 0; i < 100; ++i) {
@@ -104,7 +104,7 @@ TEST(SphereTreeTest, HubAndCountryAndNeighboursOneUlpApartAreFoundAlike) {
 }
 
 TEST(SphereTreeTest, AVisitEndsWhenTheVisitorHasEnough) {
-  const SphereTree<Object> tree = build(uniform_balls(1'000, 1));
+  const SphereTree<Object> tree = sphere_tree(uniform_balls(1'000, 1));
   struct First {
     int visits = 0;
     double limit() const { return std::numeric_limits<double>::infinity(); }
@@ -123,7 +123,7 @@ TEST(SphereTreeTest, AVisitEndsWhenTheVisitorHasEnough) {
 // ceilings are a little above the ratios of the current trees.
 TEST(SphereTreeTest, TheWorkIsAFewTimesThatOfATreeOfBoxes) {
   const std::vector<Object> balls = uniform_balls(20'000, 1);
-  const SphereTree<Object> spheres = build(balls);
+  const SphereTree<Object> spheres = sphere_tree(balls);
   const absl::StatusOr<Bvh<Object>> boxes = Bvh<Object>::build(balls);
   ASSERT_TRUE(boxes.ok());
   Random random(2);
@@ -142,7 +142,7 @@ TEST(SphereTreeTest, TheWorkIsAFewTimesThatOfATreeOfBoxes) {
 TEST(SphereTreeTest, TheWorkOfSmallQueriesHardlyGrows) {
   const auto work_of = [](size_t count) {
     const std::vector<Object> balls = uniform_balls(count, 7);
-    const SphereTree<Object> tree = build(balls);
+    const SphereTree<Object> tree = sphere_tree(balls);
     Work work;
     Random random(1);
     for (int i = 0; i < 500; ++i) {
