@@ -2,6 +2,8 @@
 #include "core/base/limits.h"
 #include "core/base/sanitized_build.h"
 #include "server/observability/process_figures.h"
+#include "tests/support/kept_daemon.h"
+#include "tests/support/memory_log.h"
 #include "tests/support/rpc_test.h"
 
 namespace locus::test {
@@ -205,6 +207,33 @@ TEST_F(ContinuesRpcTest, AStreamThatEndsLeavesNothing) {
   open();
   EXPECT_EQ(applied(insert_balls(7, 7)).revision(), 1u);
   EXPECT_EQ(get("world").objects(), 1u);
+}
+
+TEST_F(ContinuesRpcTest, ADrainAmongTheMessagesLeavesNothing) {
+  MemoryLog log;
+  {
+    RunningServer server(test_config(), &log);
+    create_scene(server.stubs(), "world");
+    grpc::ClientContext context;
+    set_timeout(context);
+    const auto stream = server.stubs().updates->StreamUpdates(&context);
+    v1::StreamUpdatesRequest request;
+    request.set_scene("world");
+    v1::StreamUpdatesResponse response;
+    *request.mutable_batch() = insert_balls(1, 2);
+    ASSERT_TRUE(stream->Write(request) && stream->Read(&response));
+    EXPECT_EQ(response.ack().applied(), 2u);
+    *request.mutable_batch() = continuing(insert_balls(3, 6));
+    ASSERT_TRUE(stream->Write(request) && stream->Read(&response));
+    EXPECT_TRUE(response.ack().pending());
+    server.server().drain(std::chrono::seconds(60));
+    EXPECT_FALSE(stream->Read(&response));
+    expect_refused(stream->Finish(), {grpc::StatusCode::UNAVAILABLE, v1::REASON_DRAINING, ""});
+  }
+  MemoryLog kept(log.crash());
+  RunningServer again(test_config(), &kept);
+  EXPECT_EQ(get_scene(again.stubs(), "world").objects(), 2u);
+  EXPECT_EQ(get_scene(again.stubs(), "world").revision(), 1u);
 }
 
 TEST_F(ContinuesRpcTest, ADeletedSceneLeavesNothingAlsoIfItIsCreatedAgain) {

@@ -197,6 +197,46 @@ TEST_F(QuotaRpcTest, QueriesRefusedForTheirWorkUseNoQuotaOfQueries) {
   EXPECT_TRUE(status.ok()) << status.error_message();
 }
 
+// The quota is checked for all messages together, when the last one has arrived.
+TEST_F(QuotaRpcTest, NothingOfARevisionOfSeveralMessagesShowsIfTogetherTheyExceedTheQuotaOfObjects) {
+  set_quotas("quota token:maker objects=10\n");
+  ASSERT_TRUE(create("a").ok());
+  ASSERT_TRUE(apply(insert_balls(1, 6)).ok());
+  grpc::ClientContext context;
+  as(context, "maker");
+  const auto stream = running_->stubs().updates->StreamUpdates(&context);
+  const auto send = [&](const v1::UpdateBatch& batch, bool continues) {
+    v1::StreamUpdatesRequest request;
+    request.set_scene("a");
+    *request.mutable_batch() = batch;
+    request.mutable_batch()->set_continues(continues);
+    v1::StreamUpdatesResponse response;
+    EXPECT_TRUE(stream->Write(request) && stream->Read(&response));
+    return response;
+  };
+  const auto scene = [&] {
+    grpc::ClientContext asking;
+    as(asking, "maker");
+    v1::GetSceneRequest request;
+    request.set_name("a");
+    v1::GetSceneResponse response;
+    EXPECT_TRUE(running_->stubs().scenes->GetScene(&asking, request, &response).ok());
+    return response.scene();
+  };
+  EXPECT_TRUE(send(insert_balls(7, 8), true).ack().pending());
+  EXPECT_TRUE(send(insert_balls(9, 10), true).ack().pending());
+  const v1::StreamUpdatesResponse refused = send(insert_balls(11, 11), false);
+  EXPECT_EQ(refused.error().code(), grpc::StatusCode::RESOURCE_EXHAUSTED) << refused.ShortDebugString();
+  EXPECT_EQ(refused.error().limit(), "objects");
+  EXPECT_EQ(scene().objects(), 6u);
+  EXPECT_EQ(scene().revision(), 1u);
+  EXPECT_TRUE(send(insert_balls(7, 8), true).ack().pending());
+  EXPECT_EQ(send(insert_balls(9, 10), false).ack().applied(), 4u);
+  EXPECT_EQ(scene().objects(), 10u);
+  stream->WritesDone();
+  EXPECT_TRUE(stream->Finish().ok());
+}
+
 TEST_F(QuotaRpcTest, ObjectsCountForTheCreatorOfTheirSceneWhoeverInsertsThem) {
   set_quotas("quota token:maker objects=10\n");
   ASSERT_TRUE(create("a").ok());

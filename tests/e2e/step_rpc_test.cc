@@ -7,6 +7,7 @@
 #include <thread>
 #include <vector>
 
+#include "tests/support/kept_daemon.h"
 #include "tests/support/memory_log.h"
 #include "tests/support/random.h"
 #include "tests/support/rpc_test.h"
@@ -470,6 +471,95 @@ TEST_F(StepRpcTest, QueriesSeeAnUpdateThatTheUpdateQueueApplies) {
   }
   stream->WritesDone();
   EXPECT_TRUE(stream->Finish().ok());
+}
+
+TEST_F(StepRpcTest, AStepOnADeletedSceneIsRefusedAndTheStreamServesTheNextScene) {
+  grpc::ClientContext context;
+  set_timeout(context);
+  const auto stream = stubs().queries->StreamQueries(&context);
+  const auto send = [&](uint64_t sequence, const v1::UpdateBatch& update) {
+    v1::StreamQueriesResponse response;
+    EXPECT_TRUE(stream->Write(message(sequence, lookup(1), update)) && stream->Read(&response));
+    EXPECT_EQ(response.sequence(), sequence);
+    return response;
+  };
+  EXPECT_EQ(send(1, move_to(1, 50)).ack().revision(), 2u);
+  ASSERT_TRUE(remove("world").ok());
+  const Refused not_found{grpc::StatusCode::NOT_FOUND, v1::REASON_NOT_FOUND, "scene"};
+  const v1::StreamQueriesResponse refused = send(2, move_to(1, 60));
+  expect_error(refused.error(), not_found);
+  EXPECT_FALSE(refused.has_ack());
+  v1::StepResponse response;
+  expect_refused(step(move_to(1, 60), lookup(1), &response), not_found);
+  ASSERT_TRUE(create("world").ok());
+  EXPECT_EQ(send(3, insert_balls(1, 1)).ack().revision(), 1u);
+  stream->WritesDone();
+  EXPECT_TRUE(stream->Finish().ok());
+}
+
+// The update of the step is applied before the scene is deleted, so its ack is in the answer.
+TEST_F(StepRpcTest, ADeletionOfTheSceneEndsTheWaitForALaterRevisionWithTheAck) {
+  std::thread caller([&] {
+    v1::QueryBatch later = lookup(2);
+    later.mutable_view()->set_at_least(99);
+    v1::StepResponse response;
+    const grpc::Status status = step(move_to(2, 50), later, &response);
+    EXPECT_TRUE(status.ok()) << status.error_message();
+    EXPECT_EQ(response.ack().revision(), 2u);
+    EXPECT_EQ(response.error().code(), grpc::StatusCode::NOT_FOUND) << response.ShortDebugString();
+  });
+  while (get("world").revision() < 2) {
+  }
+  EXPECT_TRUE(remove("world").ok());
+  caller.join();
+}
+
+// The updates of the steps wait for the log, and become one revision.
+TEST_F(StepRpcTest, StepsWhoseUpdatesBecomeOneRevisionSeeTheirUpdates) {
+  constexpr uint64_t kSteps = 10;
+  MemoryLog log;
+  RunningServer durable(test_config(), &log);
+  v1::SceneSpec spec;
+  spec.set_durability(v1::DURABILITY_LOCAL);
+  spec.set_overload(v1::OVERLOAD_POLICY_LATEST_WINS);
+  test::create_scene(durable.stubs(), "world", spec);
+  const auto step_on = [&](const v1::UpdateBatch& update, const v1::QueryBatch& queries) {
+    v1::StepRequest request;
+    request.set_scene("world");
+    *request.mutable_update() = update;
+    *request.mutable_queries() = queries;
+    v1::StepResponse response;
+    const grpc::Status status = call(*durable.stubs().queries, &v1::QueryService::Stub::Step, request, &response);
+    EXPECT_TRUE(status.ok()) << status.error_message();
+    return response;
+  };
+  const auto waiting = [&] {
+    v1::GetServerResponse server;
+    EXPECT_TRUE(
+        call(*durable.stubs().server, &v1::ServerService::Stub::GetServer, v1::GetServerRequest(), &server).ok());
+    for (const v1::Limit& limit : server.limits())
+      if (limit.name() == "waiting_updates") return limit.used();
+    return -1.0;
+  };
+  EXPECT_EQ(step_on(insert_balls(1, kSteps), {}).ack().revision(), 1u);
+  log.hold();
+  std::thread first([&] { EXPECT_EQ(step_on(move_to(1, 7), {}).ack().revision(), 2u); });
+  log.wait_for_writer();
+  std::vector<std::thread> callers;
+  for (uint64_t id = 1; id <= kSteps; ++id)
+    callers.emplace_back([&, id] {
+      const v1::StepResponse response = step_on(move_to(id, 100.0 + static_cast<double>(id)), lookup(id));
+      EXPECT_EQ(response.ack().revision(), 3u);
+      EXPECT_EQ(response.ack().applied(), 1u);
+      EXPECT_EQ(response.result().revision(), 3u);
+      ASSERT_EQ(response.result().blocks_size(), 1) << response.ShortDebugString();
+      EXPECT_EQ(response.result().blocks(0).positions(0), 100.0 + static_cast<double>(id));
+    });
+  while (waiting() < static_cast<double>(kSteps)) std::this_thread::yield();
+  log.release();
+  first.join();
+  for (std::thread& caller : callers) caller.join();
+  EXPECT_EQ(get_scene(durable.stubs(), "world").revision(), 3u);
 }
 
 }  // namespace
