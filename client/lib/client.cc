@@ -242,6 +242,11 @@ absl::StatusOr<std::vector<v1::Scene>> Client::list_scenes(const std::map<std::s
   return scenes;
 }
 
+absl::StatusOr<v1::UpdateSceneResponse> Client::update_scene(const v1::UpdateSceneRequest& request) const {
+  return call(*connection_->scenes, connection_->once(request.name()), request,
+              &v1::SceneService::StubInterface::UpdateScene);
+}
+
 absl::Status Client::delete_scene(const v1::DeleteSceneRequest& request) const {
   return call(*connection_->scenes, connection_->once(request.name()), request,
               &v1::SceneService::StubInterface::DeleteScene)

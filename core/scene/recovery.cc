@@ -170,7 +170,8 @@ absl::StatusOr<SceneWriter> read_snapshot(const UpdateLog& log, SceneKey key, co
     return meshes(mesh, bounds == mesh_bounds.end() ? nullptr : &bounds->second);
   });
   if (!state.ok()) return named("snapshot", state.status());
-  absl::StatusOr<SceneWriter> writer = SceneWriter::restore(*std::move(state), spec.winding, spec.history);
+  absl::StatusOr<SceneWriter> writer =
+      SceneWriter::restore(*std::move(state), spec.winding, spec.history, spec.cell_size);
   if (!writer.ok()) return named("snapshot", writer.status());
   return writer;
 }

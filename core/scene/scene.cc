@@ -106,8 +106,10 @@ Scene::Scene(std::string name, SceneSpec spec, SceneWriter writer, const SceneLo
       spec_(std::move(spec)),
       writer_(std::move(writer)),
       journal_(log),
+      settings_{spec_.labels, spec_.cell_size},
       pins_(std::make_shared<ReaderTracker>(spec_.pinned_bytes)) {
   LOCUS_CHECK_NE(writer_.epoch(), uint64_t{0});
+  if (spec_.cell_size != 0) writer_.fix_cell_size(spec_.cell_size);
   latest_ = writer_.published();  // NOLINT(cppcoreguidelines-prefer-member-initializer): writer_ must have an epoch
   recent_.push_back(latest_);
   leases_ = std::make_shared<const std::vector<Lease>>(writer_.leases());

@@ -55,6 +55,20 @@ constexpr AckLevel ack_level(Durability durability) {
   return durability == Durability::kMemory ? AckLevel::kMemory : AckLevel::kLocal;
 }
 
+// Limits of SceneSpec::cell_size.
+inline constexpr double kMinCellSize = 0x1p-20, kMaxCellSize = 0x1p31;
+
+// Settings of a scene that can be changed.
+struct SceneSettings {
+  std::map<std::string, std::string> labels;
+  double cell_size = 0;  // see SceneSpec
+};
+// Values of the settings to change.
+struct SettingsChange {
+  std::optional<std::map<std::string, std::string>> labels;
+  std::optional<double> cell_size;
+};
+
 struct SceneSpec {
   std::map<std::string, std::string> labels;
   Winding winding = Winding::kCounterClockwise;
@@ -68,6 +82,9 @@ struct SceneSpec {
   // Seconds after which a mesh that the scene has used is deleted if no scene uses it any more; 0: never. See
   // Registry::make_collectable().
   uint32_t mesh_grace_s = 0;
+  // Edge of the base cells of the objects' grid, a power of two from kMinCellSize to kMaxCellSize; 0: the grid chooses
+  // the size. Affects only cost.
+  double cell_size = 0;
 };
 
 // Revision that a caller requests. kLatest requests the latest revision and ignores `revision`. kAtLeast requests
@@ -111,7 +128,13 @@ class Scene {
   Scene(std::string name, SceneSpec spec, SceneWriter writer, const SceneLog& log);
 
   const std::string& name() const { return name_; }
+  // Returns the specification of which the scene was made; settings() has the labels and the cell size of now.
   const SceneSpec& spec() const { return spec_; }
+  SceneSettings settings() const LOCUS_EXCLUDES(mutex_);
+  // Changes settings, and logs them. Makes no revision. Waits for a batch that is being applied. If it returns an
+  // error, which is that of the log or NOT_FOUND for a closed scene, nothing has changed. O(objects) if the cell size
+  // changes.
+  absl::StatusOr<SceneSettings> change_settings(const SettingsChange& change) LOCUS_EXCLUDES(writer_mutex_, mutex_);
 
   using Deadline = std::chrono::steady_clock::time_point;
 
@@ -344,6 +367,7 @@ class Scene {
   // Meshes of pending changes and of ExpectedMeshes, with the number of their placements, which is not 0.
   absl::flat_hash_map<const StaticMesh*, uint64_t> meshes_to_place_ LOCUS_GUARDED_BY(mutex_);
   std::string last_build_error_ LOCUS_GUARDED_BY(mutex_);
+  SceneSettings settings_ LOCUS_GUARDED_BY(mutex_);  // changed only under writer_mutex_
   uint64_t joined_updates_ LOCUS_GUARDED_BY(mutex_) = 0;
   LeaseList leases_ LOCUS_GUARDED_BY(mutex_);                   // never null
   uint64_t lease_changes_ LOCUS_GUARDED_BY(writer_mutex_) = 0;  // SceneWriter::lease_changes() of leases_

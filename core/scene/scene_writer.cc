@@ -33,8 +33,10 @@ void SceneWriter::check_invariants() const {
   LOCUS_CHECK(coalesced_moves_.empty() || defer_snapshots());
 }
 
-absl::StatusOr<SceneWriter> SceneWriter::restore(SceneState state, Winding winding, const HistoryOptions& history) {
+absl::StatusOr<SceneWriter> SceneWriter::restore(SceneState state, Winding winding, const HistoryOptions& history,
+                                                 double cell_size) {
   SceneWriter writer(state.epoch, winding, std::move(state.statics), limits::kMaxObjects, history);
+  if (cell_size != 0) writer.fix_cell_size(cell_size);
   if (!writer.objects_.fill(std::move(state.objects), state.cell_size))
     return absl::DataLossError("two objects have the same id");
   for (const Instance& instance : writer.statics_->tree().values())

@@ -33,9 +33,13 @@ class SceneWriter {
   SceneWriter(uint64_t epoch, Winding winding, std::shared_ptr<const StaticSet> statics,
               size_t max_objects = limits::kMaxObjects, const HistoryOptions& history = {});
 
-  // Returns a writer that continues from `state`. Returns DATA_LOSS if an id occurs twice in `state`, or if an expiry
-  // or a lease names an object that `state` does not have.
-  static absl::StatusOr<SceneWriter> restore(SceneState state, Winding winding, const HistoryOptions& history);
+  // Returns a writer that continues from `state`. `cell_size` is an argument of fix_cell_size(). Returns DATA_LOSS if
+  // an id occurs twice in `state`, or if an expiry or a lease names an object that `state` does not have.
+  static absl::StatusOr<SceneWriter> restore(SceneState state, Winding winding, const HistoryOptions& history,
+                                             double cell_size = 0);
+
+  // Fixes the cell size of the objects' grid; 0 lets the grid choose it. Makes no revision, since no answer changes.
+  void fix_cell_size(double cell_size) { objects_.fix_cell_size(cell_size); }
 
   // The ack of a batch that was applied before, or nullopt if the batch is new.
   using Admission = std::optional<UpdateAck>;

@@ -25,8 +25,17 @@ void read_labels(ByteReader& reader, SceneSpec& spec) {
 
 // Returns the kind of the encoded specification: the oldest kind that contains all of its values.
 BytesKind kind_of(const SceneSpec& spec) {
+  if (spec.cell_size != 0) return BytesKind::kSizedSpec;
   if (spec.idle_ttl_s != 0 || spec.mesh_grace_s != 0) return BytesKind::kLimitedSpec;
   return spec.creator.empty() ? BytesKind::kSceneSpec : BytesKind::kOwnedSpec;
+}
+
+bool has_lifetimes(BytesKind kind) { return kind == BytesKind::kLimitedSpec || kind == BytesKind::kSizedSpec; }
+
+void read_cell_size(ByteReader& reader, SceneSpec& spec) {
+  spec.cell_size = reader.real("the cell size");
+  if (!(spec.cell_size >= kMinCellSize && spec.cell_size <= kMaxCellSize))
+    reader.fail("the cell size", "is out of range");
 }
 
 void read_lifetimes(ByteReader& reader, SceneSpec& spec) {
@@ -56,7 +65,8 @@ std::string encode_spec(const SceneSpec& spec) {
     writer.text(value);
   }
   if (kind != BytesKind::kSceneSpec) writer.text(spec.creator);
-  if (kind == BytesKind::kLimitedSpec) writer.pair(spec.idle_ttl_s, spec.mesh_grace_s);
+  if (has_lifetimes(kind)) writer.pair(spec.idle_ttl_s, spec.mesh_grace_s);
+  if (kind == BytesKind::kSizedSpec) writer.number(spec.cell_size);
   return bytes;
 }
 
@@ -65,7 +75,7 @@ absl::StatusOr<SceneSpec> decode_spec(absl::string_view bytes) {
   ByteReader reader(aligned.bytes());
   SceneSpec spec;
   const BytesKind kind = read_kind(reader);
-  if (kind != BytesKind::kSceneSpec && kind != BytesKind::kOwnedSpec && kind != BytesKind::kLimitedSpec)
+  if (kind != BytesKind::kSceneSpec && kind != BytesKind::kOwnedSpec && !has_lifetimes(kind))
     reader.fail("the kind of a specification", "is not known");
   spec.winding = read_enum(reader, Winding::kClockwise, "the winding");
   spec.history.ticks = static_cast<uint32_t>(reader.number_upto(limits::kMaxHistoryTicks, "the ticks of the history"));
@@ -75,7 +85,8 @@ absl::StatusOr<SceneSpec> decode_spec(absl::string_view bytes) {
   spec.durability = read_enum(reader, Durability::kMemory, "the durability");
   read_labels(reader, spec);
   if (kind != BytesKind::kSceneSpec) spec.creator = std::string(reader.text(limits::kMaxCreatorLength, "the creator"));
-  if (kind == BytesKind::kLimitedSpec) read_lifetimes(reader, spec);
+  if (has_lifetimes(kind)) read_lifetimes(reader, spec);
+  if (kind == BytesKind::kSizedSpec) read_cell_size(reader, spec);
   reader.end("a specification");
   if (!reader.good()) return reader.status();
   return spec;

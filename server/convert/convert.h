@@ -47,6 +47,12 @@ absl::StatusOr<SceneSpec> to_spec(const v1::SceneSpec& spec);
 // Converts a change of instances. Looks the meshes up in `registry`, and shares their ownership. Returns the error of
 // check_mesh_name() or Registry::find_mesh(), with the field of the mesh's name.
 absl::StatusOr<StaticChange> to_change(const v1::ChangeInstancesRequest& request, const Registry& registry);
+// Converts the cell size in the field `field`: 0, or a size that is rounded up to a power of two. Returns
+// INVALID_ARGUMENT, NOT_FINITE or OUT_OF_RANGE, for any other number.
+absl::StatusOr<double> to_cell_size(double size, absl::string_view field);
+// Converts the settings that a request changes. Returns INVALID_ARGUMENT, which names the field, for a setting that
+// cannot be changed, for a value that `fields` does not name, and for a field that this server does not know.
+absl::StatusOr<SettingsChange> to_settings(const v1::UpdateSceneRequest& request);
 absl::Status check_labels(const google::protobuf::Map<std::string, std::string>& labels, const std::string& field);
 // Returns the description of a scene. `summary` is the summary of this scene.
 v1::Scene to_proto(const Scene& scene, const SceneSummary& summary);

@@ -1,3 +1,9 @@
+#include <google/protobuf/message.h>
+#include <google/protobuf/unknown_field_set.h>
+
+#include <cmath>
+
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "core/base/limits.h"
 #include "core/base/names.h"
@@ -11,9 +17,10 @@ namespace {
 // Upper bound of the size in bytes of the protobuf tag and length of a mesh part.
 constexpr size_t kPartFrameBytes = 4;
 
-v1::SceneSpec spec_to_proto(const SceneSpec& spec) {
+v1::SceneSpec spec_to_proto(const SceneSpec& spec, const SceneSettings& settings) {
   v1::SceneSpec out;
-  for (const auto& [key, value] : spec.labels) (*out.mutable_labels())[key] = value;
+  for (const auto& [key, value] : settings.labels) (*out.mutable_labels())[key] = value;
+  out.set_cell_size(settings.cell_size);
   out.set_history_ticks(spec.history.ticks);
   out.set_history_bytes(spec.history.bytes);
   out.set_idle_ttl_s(spec.idle_ttl_s);
@@ -133,6 +140,47 @@ absl::Status check_labels(const google::protobuf::Map<std::string, std::string>&
   return absl::OkStatus();
 }
 
+absl::StatusOr<double> to_cell_size(double size, absl::string_view field) {
+  if (!std::isfinite(size)) return refuse_argument(Reason::kNotFinite, field, {}, "a cell size is a number");
+  if (size == 0) return 0.0;
+  if (size < kMinCellSize || size > kMaxCellSize)
+    return refuse_argument(Reason::kOutOfRange, field, {},
+                           absl::StrCat("a cell size is 0, which lets the server choose, or ", kMinCellSize, " to ",
+                                        kMaxCellSize, ", not ", size));
+  int exponent = 0;
+  const double fraction = std::frexp(size, &exponent);  // 0.5 <= fraction < 1
+  return std::ldexp(1.0, fraction == 0.5 ? exponent - 1 : exponent);
+}
+
+absl::StatusOr<SettingsChange> to_settings(const v1::UpdateSceneRequest& request) {
+  const auto& unknown = request.GetReflection()->GetUnknownFields(request);
+  if (!unknown.empty())
+    return refuse_argument(Reason::kMalformed, absl::StrCat("field ", unknown.field(0).number()), {},
+                           "this server knows no such setting; cell_size and labels can be changed");
+  if (request.fields().empty())
+    return refuse_argument(Reason::kMalformed, "fields", {}, "name what to change: cell_size, labels or both");
+  SettingsChange change;
+  for (int i = 0; i < request.fields_size(); ++i) {
+    const std::string& field = request.fields(i);
+    if (field == "labels") {
+      RETURN_IF_ERROR(check_labels(request.labels(), "labels"));
+      change.labels.emplace(request.labels().begin(), request.labels().end());
+    } else if (field == "cell_size") {
+      ASSIGN_OR_RETURN(change.cell_size, to_cell_size(request.cell_size(), "cell_size"));
+    } else {
+      return refuse_argument(Reason::kMalformed, "fields", static_cast<uint32_t>(i),
+                             absl::StrCat("'", absl::CHexEscape(field.substr(0, limits::kMaxNameLength)),
+                                          "' cannot be changed after the scene was created; cell_size and labels can"));
+    }
+  }
+  const absl::string_view unnamed = request.cell_size() != 0 && !change.cell_size ? "cell_size"
+                                    : !request.labels().empty() && !change.labels ? "labels"
+                                                                                  : "";
+  if (!unnamed.empty())
+    return refuse_argument(Reason::kMalformed, unnamed, {}, "a new value needs its name in `fields`");
+  return change;
+}
+
 absl::StatusOr<SceneSpec> to_spec(const v1::SceneSpec& spec) {
   RETURN_IF_ERROR(check_served(spec));
   RETURN_IF_ERROR(check_labels(spec.labels(), "spec.labels"));
@@ -140,6 +188,7 @@ absl::StatusOr<SceneSpec> to_spec(const v1::SceneSpec& spec) {
   RETURN_IF_ERROR(check_lifetime(spec.idle_ttl_s(), "spec.idle_ttl_s", "idle_ttl_s"));
   RETURN_IF_ERROR(check_lifetime(spec.mesh_grace_s(), "spec.mesh_grace_s", "mesh_grace_s"));
   SceneSpec out;
+  ASSIGN_OR_RETURN(out.cell_size, to_cell_size(spec.cell_size(), "spec.cell_size"));
   out.history = history;
   out.idle_ttl_s = spec.idle_ttl_s();
   out.mesh_grace_s = spec.mesh_grace_s();
@@ -154,7 +203,7 @@ v1::Scene to_proto(const Scene& scene, const SceneSummary& summary) {
   const SceneStatus status = scene.status();
   v1::Scene out;
   out.set_name(scene.name());
-  *out.mutable_spec() = spec_to_proto(scene.spec());
+  *out.mutable_spec() = spec_to_proto(scene.spec(), scene.settings());
   const bool local = scene.log_key() != 0 && scene.spec().durability == Durability::kLocal;
   out.mutable_spec()->set_durability(local ? v1::DURABILITY_LOCAL : v1::DURABILITY_MEMORY);
   out.set_state(status.pending_changes > 0 ? v1::SCENE_STATE_BUILDING : v1::SCENE_STATE_READY);

@@ -38,6 +38,7 @@ enum class Rpc : uint8_t {
   kGetScene,
   kListScenes,
   kDeleteScene,
+  kUpdateScene,
   kUploadMesh,
   kListMeshes,
   kDeleteMesh,
@@ -50,7 +51,7 @@ enum class Rpc : uint8_t {
   kStreamQueries,
   kStep,
 };
-inline constexpr size_t kRpcs = 18;
+inline constexpr size_t kRpcs = 19;
 // Returns the rpc's name in the protocol, such as "StreamQueries".
 absl::string_view rpc_name(Rpc rpc);
 

@@ -101,6 +101,8 @@ const std::vector<WireLimit> kRequestLimits = {
     {"locus.v1.UploadMeshRequest.parts", "parts", "mesh_parts", limits::kMaxMeshParts},
     {"locus.v1.SceneSpec.labels", "spec.labels", "labels", limits::kMaxLabels},
     {"locus.v1.ListScenesRequest.labels", "labels", "labels", limits::kMaxLabels},
+    {"locus.v1.UpdateSceneRequest.fields", "fields", "fields", limits::kMaxLabels},
+    {"locus.v1.UpdateSceneRequest.labels", "labels", "labels", limits::kMaxLabels},
 };
 
 }  // namespace

@@ -60,6 +60,7 @@ inline constexpr std::array kRpcRights = std::to_array<RpcRight>({
     {"/locus.v1.SceneService/GetScene", Need::kSceneRight, Right::kRead, SceneField::kName},
     {"/locus.v1.SceneService/ListScenes", Need::kListed, Right::kRead},
     {"/locus.v1.SceneService/DeleteScene", Need::kSceneRight, Right::kAdmin, SceneField::kName},
+    {"/locus.v1.SceneService/UpdateScene", Need::kSceneRight, Right::kAdmin, SceneField::kName},
     {"/locus.v1.SceneService/UploadMesh", Need::kServerRight, Right::kMeshes},
     {"/locus.v1.SceneService/ListMeshes", Need::kServerRight, Right::kMeshes},
     {"/locus.v1.SceneService/DeleteMesh", Need::kServerRight, Right::kMeshes},

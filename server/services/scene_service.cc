@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "core/base/limits.h"
 #include "core/base/names.h"
 #include "core/base/status_macros.h"
@@ -40,9 +41,11 @@ absl::Status check_page_token(const absl::Status& name_status) {
 }
 
 bool has_labels(const Scene& scene, const google::protobuf::Map<std::string, std::string>& labels) {
+  if (labels.empty()) return true;
+  const SceneSettings settings = scene.settings();
   for (const auto& [key, value] : labels) {
-    const auto label = scene.spec().labels.find(key);
-    if (label == scene.spec().labels.end() || label->second != value) return false;
+    const auto label = settings.labels.find(key);
+    if (label == settings.labels.end() || label->second != value) return false;
   }
   return true;
 }
@@ -216,6 +219,19 @@ absl::Status get_scene(const Caller& caller, Host& host, const v1::GetSceneReque
   return absl::OkStatus();
 }
 
+absl::Status update_scene(const Caller& caller, Host& host, const v1::UpdateSceneRequest& request,
+                          v1::UpdateSceneResponse& response) {
+  caller.set_subject(request.name());
+  ASSIGN_OR_RETURN(const UsedScene scene, use_scene(host, caller, request.name(), "name"));
+  RETURN_IF_ERROR(check_work(caller));
+  ASSIGN_OR_RETURN(const SettingsChange change, to_settings(request));
+  ASSIGN_OR_RETURN(const SceneSettings settings, scene->change_settings(change));
+  response.set_cell_size(settings.cell_size);
+  response.mutable_labels()->insert(settings.labels.begin(), settings.labels.end());
+  log(LogLevel::kInfo, "scene updated", {{"scene", request.name()}, {"fields", absl::StrJoin(request.fields(), ",")}});
+  return absl::OkStatus();
+}
+
 absl::Status delete_mesh(const Caller& caller, Host& host, const v1::DeleteMeshRequest& request) {
   RETURN_IF_ERROR(check_mesh_name(request.mesh(), "mesh"));
   caller.set_subject(request.mesh());
@@ -264,6 +280,13 @@ Body list_body(Host& host) {
 Body delete_body(Host& host) {
   return unary_body<v1::DeleteSceneRequest, v1::DeleteSceneResponse>(
       [&host](const Caller& caller, const auto& request, auto&) { return delete_scene(caller, host, request); });
+}
+
+Body update_body(Host& host) {
+  return unary_body<v1::UpdateSceneRequest, v1::UpdateSceneResponse>(
+      [&host](const Caller& caller, const auto& request, auto& response) {
+        return update_scene(caller, host, request, response);
+      });
 }
 
 Body list_meshes_body(Host& host) {
@@ -327,6 +350,7 @@ std::vector<BlockingMethod> scene_methods(Host& host) {
       method("GetScene", Rpc::kGetScene, get_body(host)),
       method("ListScenes", Rpc::kListScenes, list_body(host)),
       change("DeleteScene", Rpc::kDeleteScene, delete_body(host)),
+      change("UpdateScene", Rpc::kUpdateScene, update_body(host)),
       change("UploadMesh", Rpc::kUploadMesh,
              [&host](const Caller& caller, MessageStream& stream) { return upload_mesh(host, caller, stream); }),
       method("ListMeshes", Rpc::kListMeshes, list_meshes_body(host)),

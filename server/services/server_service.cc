@@ -159,13 +159,14 @@ void get_server(Host& host, const Caller& caller, v1::GetServerResponse& respons
   const bool shows_use = caller.may(Right::kMetrics, "") || caller.administers_all();
   response.set_version(kVersion);
   response.set_instruction_set(std::string(instruction_set()));
-  for (const absl::string_view feature :
-       {"after_t",      "anchors",   "as_of",       "backup",        "balls",
-        "boxes",        "by_list",   "capsules",    "cells",         "compounds",
-        "contains",     "continues", "count_only",  "download_mesh", "durability_local",
-        "expire_ticks", "frustums",  "history",     "idle_ttl",      "latest_wins",
-        "leases",       "lookup",    "mesh_grace",  "nearest",       "pairs",
-        "rays",         "sight",     "static_from", "step",          "sweeps"})
+  for (const absl::string_view feature : {"after_t",      "anchors",    "as_of",         "backup",
+                                          "balls",        "boxes",      "by_list",       "capsules",
+                                          "cell_size",    "cells",      "compounds",     "contains",
+                                          "continues",    "count_only", "download_mesh", "durability_local",
+                                          "expire_ticks", "frustums",   "history",       "idle_ttl",
+                                          "latest_wins",  "leases",     "lookup",        "mesh_grace",
+                                          "nearest",      "pairs",      "rays",          "sight",
+                                          "static_from",  "step",       "sweeps"})
     if (serves(host, feature)) response.add_features(std::string(feature));
   for (const NamedLimit& limit : limits_of(host)) {
     v1::Limit* out = response.add_limits();

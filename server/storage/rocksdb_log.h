@@ -17,6 +17,7 @@
 #include <thread>
 #include <vector>
 
+#include "absl/functional/function_ref.h"
 #include "absl/status/statusor.h"
 #include "core/base/mutex.h"
 #include "core/scene/log/update_log.h"
@@ -50,6 +51,7 @@ class RocksdbLog final : public UpdateLog {
                                         ChunkSource state) override LOCUS_EXCLUDES(catalogue_mutex_);
   absl::Status delete_scene(SceneKey scene) override LOCUS_EXCLUDES(catalogue_mutex_);
   absl::Status restart_scene(SceneKey scene, uint64_t epoch) override LOCUS_EXCLUDES(catalogue_mutex_);
+  absl::Status set_scene_spec(SceneKey scene, absl::string_view spec) override LOCUS_EXCLUDES(catalogue_mutex_);
 
   absl::StatusOr<uint64_t> append(SceneKey scene, absl::Span<const LogEntry> entries, AckLevel level) override;
   absl::Status read(SceneKey scene, uint64_t from, RecordSink sink) const override LOCUS_EXCLUDES(catalogue_mutex_);
@@ -91,6 +93,8 @@ class RocksdbLog final : public UpdateLog {
   // Adds the rows of `change` to `batch`, writes the batch and syncs it.
   absl::Status commit(const CatalogueChange& change, rocksdb::WriteBatch& batch) LOCUS_REQUIRES(catalogue_mutex_);
   absl::StatusOr<SceneRow> row_of(SceneKey scene) const LOCUS_REQUIRES(catalogue_mutex_);
+  // Commits the row of a scene that `change` has changed.
+  absl::Status change_row(SceneKey scene, absl::FunctionRef<void(SceneRow&)> change) LOCUS_EXCLUDES(catalogue_mutex_);
   uint64_t row_checksum_of(SceneKey scene) const LOCUS_REQUIRES(catalogue_mutex_);
   absl::StatusOr<uint64_t> running_checksum_at(const SceneRow& row, uint64_t sequence) const;
   // Commits `snapshot`, which includes the records up to `sequence`. Deletes these records and the scene's previous

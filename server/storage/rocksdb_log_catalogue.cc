@@ -172,11 +172,20 @@ absl::Status RocksdbLog::delete_scene(SceneKey key) {
 }
 
 absl::Status RocksdbLog::restart_scene(SceneKey key, uint64_t epoch) {
+  return change_row(key, [epoch](SceneRow& row) { row.epoch = epoch; });
+}
+
+absl::Status RocksdbLog::set_scene_spec(SceneKey key, absl::string_view spec) {
+  RETURN_IF_ERROR(check_free_space("the settings of a scene", spec.size()));
+  return change_row(key, [spec](SceneRow& row) { row.spec = std::string(spec); });
+}
+
+absl::Status RocksdbLog::change_row(SceneKey key, absl::FunctionRef<void(SceneRow&)> change) {
   ASSIGN_OR_RETURN(const SceneLogStatePtr log_state, scenes_.find(key));
   MutexLock writing(log_state->writing);
   MutexLock lock(catalogue_mutex_);
   ASSIGN_OR_RETURN(SceneRow row, row_of(key));
-  row.epoch = epoch;
+  change(row);
   rocksdb::WriteBatch batch;
   RETURN_IF_ERROR(commit(change_of(row), batch));
   scenes_.set_row(*log_state, row, row_checksum_of(key), catalogue_.totals());

@@ -8,14 +8,23 @@ namespace locus::test {
 namespace {
 
 constexpr std::array kMethods = {
-    "/locus.v1.ServerService/GetServer",     "/locus.v1.ServerService/GetQuotas",
-    "/locus.v1.SceneService/CreateScene",    "/locus.v1.SceneService/GetScene",
-    "/locus.v1.SceneService/ListScenes",     "/locus.v1.SceneService/DeleteScene",
-    "/locus.v1.SceneService/UploadMesh",     "/locus.v1.SceneService/ListMeshes",
-    "/locus.v1.SceneService/DeleteMesh",     "/locus.v1.SceneService/ChangeInstances",
-    "/locus.v1.SceneService/DumpScene",      "/locus.v1.UpdateService/ApplyUpdates",
-    "/locus.v1.UpdateService/StreamUpdates", "/locus.v1.QueryService/Query",
-    "/locus.v1.QueryService/StreamQueries",  "/locus.v1.QueryService/Step",
+    "/locus.v1.ServerService/GetServer",
+    "/locus.v1.ServerService/GetQuotas",
+    "/locus.v1.SceneService/CreateScene",
+    "/locus.v1.SceneService/GetScene",
+    "/locus.v1.SceneService/ListScenes",
+    "/locus.v1.SceneService/DeleteScene",
+    "/locus.v1.SceneService/UpdateScene",
+    "/locus.v1.SceneService/UploadMesh",
+    "/locus.v1.SceneService/ListMeshes",
+    "/locus.v1.SceneService/DeleteMesh",
+    "/locus.v1.SceneService/ChangeInstances",
+    "/locus.v1.SceneService/DumpScene",
+    "/locus.v1.UpdateService/ApplyUpdates",
+    "/locus.v1.UpdateService/StreamUpdates",
+    "/locus.v1.QueryService/Query",
+    "/locus.v1.QueryService/StreamQueries",
+    "/locus.v1.QueryService/Step",
 };
 
 // Deadline of a call, far above the time of any call that is answered. A call can wait for a revision that is never

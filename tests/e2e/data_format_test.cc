@@ -130,7 +130,7 @@ class DataFormatTest : public ::testing::Test {
     make_a_snapshot_due("brief");
     apply_together("brief", {"inserts { ids: [4, 5] positions: [7, 8, 9] point {} expire_ticks: [2, 9] }",
                              "writer: 8 batch: 2 tick: 13 moves { ids: 2 positions: [2, 2, 2] } remove_ids: 78"});
-    create("rigs", "idle_ttl_s: 31536000 mesh_grace_s: 31536000");
+    create("rigs", "idle_ttl_s: 31536000 mesh_grace_s: 31536000 cell_size: 3");
     apply("rigs", R"(writer: 9 batch: 1 lease_ms: 86400000 tick: 1
                      inserts { ids: [1, 2] positions: [1, 2, 3, 4, 5, 6] compound {
                        parts { positions: [0, 0, 0, 0, 1, 0] ball { radii: [0.5, 0.25] } layers: [1, 2] }
@@ -160,6 +160,10 @@ class DataFormatTest : public ::testing::Test {
                       instance_relabels { ids: 9223372036938661890 layers: 0 tags: 8 })");
     apply("twin", R"(inserts { ids: [1] positions: [1, 2, 3] ball { radii: 2 } })");
     apply("quick", R"(inserts { ids: [1, 2] positions: [1, 2, 3, 4, 5, 6] point {} })");
+    v1::UpdateSceneRequest update;
+    EXPECT_TRUE(google::protobuf::TextFormat::ParseFromString(
+        R"(name: "twin" fields: ["cell_size", "labels"] cell_size: 0.5 labels { key: "level" value: "8" })", &update));
+    call(*daemon_.stubs().scenes, &v1::SceneService::Stub::UpdateScene, update);
   }
 
   std::string first_instance() {
@@ -250,7 +254,7 @@ TEST_F(DataFormatTest, TheSampleOfThisFormatHoldsWhatIsWrittenIntoANewDirectory)
     copy_sample(daemon_.directory(), std::filesystem::path(folder) / "data");
     std::ofstream(std::filesystem::path(folder) / "holds.txt") << holds;
   } else {
-    EXPECT_EQ(without_epochs(holds), without_epochs(text_of((samples() / "format-5" / "holds.txt").string())));
+    EXPECT_EQ(without_epochs(holds), without_epochs(text_of((samples() / "format-6" / "holds.txt").string())));
   }
 }
 

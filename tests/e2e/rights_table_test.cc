@@ -77,6 +77,7 @@ constexpr std::array kRows = std::to_array<RpcRow>({
     {"/locus.v1.SceneService/GetScene", kReads},
     {"/locus.v1.SceneService/ListScenes", kKnown},
     {"/locus.v1.SceneService/DeleteScene", kDeletes},
+    {"/locus.v1.SceneService/UpdateScene", kDeletes},
     {"/locus.v1.SceneService/UploadMesh", kMeshes},
     {"/locus.v1.SceneService/ListMeshes", kMeshes},
     {"/locus.v1.SceneService/DeleteMesh", kMeshes},

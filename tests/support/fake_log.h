@@ -30,6 +30,7 @@ class FakeLog final : public UpdateLog {
   }
   absl::Status delete_scene(SceneKey) override { return absl::OkStatus(); }
   absl::Status restart_scene(SceneKey, uint64_t) override { return refusal(); }
+  absl::Status set_scene_spec(SceneKey, absl::string_view) override { return refusal(); }
   absl::StatusOr<uint64_t> append(SceneKey, absl::Span<const LogEntry>, AckLevel) override { return refusal(); }
   absl::Status read(SceneKey, uint64_t, RecordSink) const override { return refusal(); }
   absl::StatusOr<uint64_t> latest(SceneKey) const override { return refusal(); }

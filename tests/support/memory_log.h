@@ -130,6 +130,13 @@ class MemoryLog : public UpdateLog {
     return absl::OkStatus();
   }
 
+  absl::Status set_scene_spec(SceneKey key, absl::string_view spec) override {
+    const MutexLock lock(mutex_);
+    if (!failure_.ok()) return failure_;
+    kept_.scenes.at(key).spec = std::string(spec);
+    return absl::OkStatus();
+  }
+
   absl::StatusOr<uint64_t> append(SceneKey key, absl::Span<const LogEntry> entries, AckLevel level) override {
     LOCUS_CHECK(!entries.empty());
     std::vector<Record> records;

@@ -22,6 +22,8 @@ class ObjectGrid {
     return replaced;
   }
   void insert(const Object& object) { apply({}, {&object, 1}); }
+  void fix_cell_size(double cell_size) { store_.fix_cell_size(cell_size); }
+  double cell_size() const { return set_.grid().cell_size(); }
   bool remove(const Object& object) {
     const bool removed = store_.remove(object);
     set_ = store_.snapshot();

@@ -28,7 +28,15 @@ struct CreateOptions {
   v1::OverloadPolicy overload = v1::OVERLOAD_POLICY_UNSPECIFIED;
   uint32_t idle_ttl_s = 0;
   uint32_t mesh_grace_s = 0;
+  double cell_size = 0;
   bool if_absent = false;
+};
+
+struct UpdateOptions {
+  std::string name;
+  std::optional<double> cell_size;
+  std::vector<std::string> labels;
+  bool no_labels = false;
 };
 
 struct ListOptions {
@@ -78,6 +86,15 @@ std::string limit_name(v1::HistoryLimit limit) {
   return absl::AsciiStrToLower(absl::StripPrefix(v1::HistoryLimit_Name(limit), "HISTORY_LIMIT_"));
 }
 
+// Returns labels in ascending order.
+template <class Labels>
+Json labels_json(const Labels& labels) {
+  Json json = Json::object();
+  const std::map<std::string, std::string> sorted(labels.begin(), labels.end());
+  for (const auto& [key, value] : sorted) json[key] = value;
+  return json;
+}
+
 Json corner_of(bool present, const v1::Vec3d& corner) {
   return present ? doubles_json({corner.x(), corner.y(), corner.z()}) : Json();
 }
@@ -106,10 +123,8 @@ Report description_of(const v1::Scene& scene) {
   report.head["pinned_bytes"] = scene.pinned_bytes();
   report.head["pending_changes"] = scene.pending_changes();
   if (!scene.last_build_error().empty()) report.head["last_build_error"] = scene.last_build_error();
-  Json labels = Json::object();
-  const std::map<std::string, std::string> sorted(scene.spec().labels().begin(), scene.spec().labels().end());
-  for (const auto& [key, value] : sorted) labels[key] = value;
-  if (!labels.empty()) report.head["labels"] = std::move(labels);
+  if (scene.spec().cell_size() != 0) report.head["cell_size"] = scene.spec().cell_size();
+  if (!scene.spec().labels().empty()) report.head["labels"] = labels_json(scene.spec().labels());
   return report;
 }
 
@@ -125,6 +140,7 @@ absl::Status create(const CreateOptions& options, Context& context) {
   request.mutable_spec()->set_overload(options.overload);
   request.mutable_spec()->set_idle_ttl_s(options.idle_ttl_s);
   request.mutable_spec()->set_mesh_grace_s(options.mesh_grace_s);
+  request.mutable_spec()->set_cell_size(options.cell_size);
   request.mutable_spec()->mutable_labels()->insert(labels.begin(), labels.end());
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());
   ASSIGN_OR_RETURN(const v1::Scene scene, client->create_scene(request));
@@ -154,6 +170,30 @@ absl::Status describe_scene(const DescribeOptions& options, Context& context) {
   return absl::OkStatus();
 }
 
+absl::Status update_scene(const UpdateOptions& options, Context& context) {
+  if (options.no_labels && !options.labels.empty()) return usage_error("give --label or --no-labels, not both");
+  ASSIGN_OR_RETURN(const auto labels, parse_labels(options.labels));
+  v1::UpdateSceneRequest request;
+  request.set_name(options.name);
+  if (options.cell_size) {
+    request.add_fields("cell_size");
+    request.set_cell_size(*options.cell_size);
+  }
+  if (options.no_labels || !labels.empty()) {
+    request.add_fields("labels");
+    request.mutable_labels()->insert(labels.begin(), labels.end());
+  }
+  if (request.fields().empty()) return usage_error("give --cell-size, --label or --no-labels");
+  ASSIGN_OR_RETURN(client::Client* const client, context.connect());
+  ASSIGN_OR_RETURN(const v1::UpdateSceneResponse updated, client->update_scene(request));
+  Report report;
+  report.head["updated"] = options.name;
+  report.head["cell_size"] = updated.cell_size();
+  report.head["labels"] = labels_json(updated.labels());
+  context.acknowledge(report, absl::StrCat("updated ", options.name));
+  return absl::OkStatus();
+}
+
 absl::Status delete_scene(const DeleteOptions& options, Context& context) {
   v1::DeleteSceneRequest request;
   request.set_name(options.name);
@@ -176,6 +216,7 @@ void add_create(CLI::App& parent, Context& context) {
   locus scene create arena --if-absent --label map=delta --label mode=ctf
   locus scene create arena --history-ticks 64 --overload latest-wins
   locus scene create match-17 --idle-ttl-s 600 --mesh-grace-s 60
+  locus scene create swarm --cell-size 2
   locus scene create arena-copy --static-from arena)");
   command.add_option("NAME", options->name, "Lower case letters, digits, - _ and ., at most 63")->required();
   command.add_flag("--if-absent", options->if_absent, "Accept a scene of that name as it is");
@@ -204,7 +245,31 @@ void add_create(CLI::App& parent, Context& context) {
       .add_option("--mesh-grace-s", options->mesh_grace_s,
                   "Delete a mesh of the scene so many seconds after its last use in any scene [0: never]")
       ->type_name("SECONDS");
+  command
+      .add_option("--cell-size", options->cell_size,
+                  "Edge of the cells of the objects' grid, rounded up to a power of two [0: the server chooses]")
+      ->type_name("SIZE");
   run_when_chosen(command, options, context, create);
+}
+
+void add_update(CLI::App& parent, Context& context) {
+  const auto options = std::make_shared<UpdateOptions>();
+  CLI::App& command = *parent.add_subcommand("update", "Change the cell size or the labels of a scene");
+  command.footer(R"(Examples:
+  locus scene update arena --cell-size 4
+  locus scene update arena --cell-size 0
+  locus scene update arena --label map=delta --label mode=ctf
+
+No answer changes, so there is no new revision. After a change of the cell size, each batch of updates refiles a few
+thousand objects. The given labels replace all labels.)");
+  add_scene_argument(command, options->name);
+  command
+      .add_option("--cell-size", options->cell_size,
+                  "Edge of the cells of the objects' grid, rounded up to a power of two; 0: the server chooses")
+      ->type_name("SIZE");
+  add_repeatable(command, "--label", options->labels, "KEY=VALUE", "A label; all others are removed");
+  command.add_flag("--no-labels", options->no_labels, "Remove all labels");
+  run_or_check_when_chosen(command, options, context, update_scene);
 }
 
 void add_list(CLI::App& parent, Context& context) {
@@ -241,12 +306,13 @@ void add_delete(CLI::App& parent, Context& context) {
 }  // namespace
 
 void add_scene_command(CLI::App& parent, Context& context) {
-  CLI::App& command = *parent.add_subcommand("scene", "Create, list, describe and delete scenes");
+  CLI::App& command = *parent.add_subcommand("scene", "Create, list, describe, change and delete scenes");
   command.footer("Examples:\n  locus scene create arena\n  locus scene list\n  locus scene delete arena");
   command.require_subcommand(1);
   add_create(command, context);
   add_list(command, context);
   add_describe(command, context);
+  add_update(command, context);
   add_delete(command, context);
 }
 

@@ -112,6 +112,11 @@ int get_scene(lua_State* state) {
 
 int list_scenes(lua_State* state) { return push_list(state, value_or_raise(state, client_at(state).list_scenes())); }
 
+int update_scene(lua_State* state) {
+  const auto request = message_argument<v1::UpdateSceneRequest>(state, 2);
+  return push_answer(state, value_or_raise(state, client_at(state).update_scene(request)));
+}
+
 int delete_scene(lua_State* state) {
   const auto request = message_argument<v1::DeleteSceneRequest>(state, 2);
   check_or_raise(state, client_at(state).delete_scene(request));
@@ -438,6 +443,7 @@ void create_server_metatable(lua_State* state) {
                               {"create_scene", create_scene},
                               {"get_scene", get_scene},
                               {"list_scenes", list_scenes},
+                              {"update_scene", update_scene},
                               {"delete_scene", delete_scene},
                               {"upload_mesh", upload_mesh},
                               {"list_meshes", list_meshes},

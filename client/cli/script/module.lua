@@ -37,6 +37,15 @@ function Scene:create(spec) return self.server:create_scene{ name = self.name, s
 function Scene:delete(options)
   return self.server:delete_scene{ name = self.name, if_present = options and options.if_present }
 end
+-- Changes settings of the scene: cell_size and labels, which replace all labels.
+function Scene:update(settings)
+  local request = { name = self.name, fields = {} }
+  for name, value in pairs(settings) do
+    request.fields[#request.fields + 1] = name
+    request[name] = value
+  end
+  return self.server:update_scene(request)
+end
 function Scene:describe() return self.server:get_scene(self.name) end
 function Scene:apply(batch) return self.server:apply(self.name, batch) end
 function Scene:query(batch) return self.server:query(self.name, batch) end

@@ -119,7 +119,7 @@ class Client:
     def create_scene(self, name: str, *, if_absent: bool = False, labels: Optional[Mapping[str, str]] = None,
                      winding: Winding = Winding.UNSPECIFIED, static_from: str = "", history_ticks: int = 0,
                      history_bytes: int = 0, overload: OverloadPolicy = OverloadPolicy.UNSPECIFIED,
-                     idle_ttl_s: int = 0, mesh_grace_s: int = 0) -> Scene:
+                     idle_ttl_s: int = 0, mesh_grace_s: int = 0, cell_size: float = 0) -> Scene:
         """Creates an empty scene, or one that starts with the instances of `static_from`.
 
         `history_ticks`: number of past ticks that can be queried; `history_bytes`: maximum memory of the history, 0 =
@@ -129,6 +129,8 @@ class Client:
         `idle_ttl_s`: the scene is deleted after this number of seconds without a query, an update, a change of
         instances or an open stream; 0 = never. `mesh_grace_s`: a mesh that the scene used is deleted this number of
         seconds after no scene uses it any more; 0 = never.
+        `cell_size`: edge of the cells of the objects' grid, rounded up to a power of two; 0 = the server chooses it. It
+        affects only the cost of queries and updates.
         `if_absent`: returns an existing scene of this name unchanged instead of failing with ALREADY_EXISTS.
         """
         rpc = _rpc("Scene", "CreateScene")
@@ -141,6 +143,7 @@ class Client:
         request.spec.overload = overload
         request.spec.idle_ttl_s = idle_ttl_s
         request.spec.mesh_grace_s = mesh_grace_s
+        request.spec.cell_size = cell_size
         return Scene.of(self._unary(rpc, request, scene=name).scene)
 
     def scene(self, name: str) -> Scene:
@@ -152,6 +155,21 @@ class Client:
         """Returns all scenes that have these labels, ascending by name."""
         pages = self._pages(_rpc("Scene", "ListScenes"), labels=labels or {})
         return [Scene.of(scene) for page in pages for scene in page.scenes]
+
+    def update_scene(self, name: str, *, cell_size: Optional[float] = None,
+                     labels: Optional[Mapping[str, str]] = None) -> None:
+        """Changes settings of a scene; None leaves a setting as it is. Makes no revision, since no answer changes.
+
+        `cell_size`: that of create_scene(); objects are refiled a few thousand with each update. `labels`: replace all
+        labels of the scene.
+        """
+        rpc = _rpc("Scene", "UpdateScene")
+        request = rpc.request(name=name, labels=labels or {}, cell_size=cell_size or 0)
+        if cell_size is not None:
+            request.fields.append("cell_size")
+        if labels is not None:
+            request.fields.append("labels")
+        self._unary(rpc, request, scene=name)
 
     def delete_scene(self, name: str, *, if_present: bool = False) -> None:
         """Deletes a scene with its objects and instances; meshes stay."""

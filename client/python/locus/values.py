@@ -67,7 +67,7 @@ class Scene(Revision):
     history. At present the history contains `recorded_ticks` ticks, the first of which is `oldest_tick`, and takes
     `history_bytes` bytes. `forgotten_ticks` ticks were dropped early for lack of memory. `mesh_bytes` is the memory of
     the placed meshes, which scenes share, and `recent_bytes` at most that of recent revisions. `idle_ttl_s` and
-    `mesh_grace_s` are those of Client.create_scene(); 0 = never.
+    `mesh_grace_s` are those of Client.create_scene(); 0 = never. `cell_size` is 0 if the server chooses it.
     """
 
     name: str
@@ -92,6 +92,7 @@ class Scene(Revision):
     forgotten_ticks: int = 0
     idle_ttl_s: int = 0
     mesh_grace_s: int = 0
+    cell_size: float = 0
 
     @classmethod
     def of(cls, message: Any) -> "Scene":
@@ -104,7 +105,7 @@ class Scene(Revision):
                    message.last_build_error, dict(message.spec.labels), Winding(message.spec.winding), bounds,
                    message.spec.history_ticks, message.oldest_tick, message.recorded_ticks, message.history_bytes,
                    OverloadPolicy(message.spec.overload), message.mesh_bytes, message.recent_bytes,
-                   message.forgotten_ticks, message.spec.idle_ttl_s, message.spec.mesh_grace_s)
+                   message.forgotten_ticks, message.spec.idle_ttl_s, message.spec.mesh_grace_s, message.spec.cell_size)
 
 
 @dataclasses.dataclass(frozen=True)

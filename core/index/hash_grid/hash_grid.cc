@@ -395,7 +395,8 @@ size_t HashGrid::apply(const GridBatch& batch) {
   if (size_ == 0 && batch.inserted.size() >= first_choice_) {
     internal::EvenSample sample(batch.inserted.size());
     for (const GridItem& item : batch.inserted) sample.offer(item.entry.position, 2.0 * double{item.reach});
-    const int base = internal::choose_cell_exponent(sample.values(), batch.inserted.size());
+    const int base = has_fixed_size_ ? density_.base_exponent()
+                                     : internal::choose_cell_exponent(sample.values(), batch.inserted.size());
     estimate_density(batch.inserted, base, sample.bounds());
     size_at_choice_ = batch.inserted.size();
     changes_since_choice_ = 0;
@@ -404,15 +405,33 @@ size_t HashGrid::apply(const GridBatch& batch) {
   arrivals_since_count_ += batch.removed.size();
   const size_t changes = batch.removed.size() + batch.moves.moves.size() + batch.inserted.size();
   changes_since_choice_ += changes;
-  if (stale_bricks_.empty() && choice_is_stale()) choose_cell_size();
+  if (stale_bricks_.empty() && !has_fixed_size_ && choice_is_stale()) choose_cell_size();
   if (stale_bricks_.empty() && density_is_stale()) count_density();
   if (!stale_bricks_.empty()) refile(std::max(changes, kRefiledPerBatch));
   return replaced_bytes_;
 }
 
+void HashGrid::fix_cell_size(double cell_size) {
+  has_fixed_size_ = cell_size > 0;
+  // 0 makes the choice of an unfixed size stale. A fixed size counts as chosen, so that the density is counted.
+  size_at_choice_ = has_fixed_size_ ? std::max<size_t>(size_, 1) : 0;
+  if (!has_fixed_size_) return;
+  const int exponent = internal::exponent_covering(cell_size, internal::kMinCellExponent, internal::kMaxBaseExponent);
+  if (exponent == density_.base_exponent()) return;
+  Aabbd bounds;
+  for (const std::unique_ptr<Level>& level : levels_) bounds = merge(bounds, level->bounds);
+  if (size_ == 0) {
+    density_ = DensityMap(exponent);
+  } else {
+    change_base(exponent, bounds);
+  }
+}
+
 void HashGrid::fill(absl::Span<const GridItem> items, double cell_size) {
   LOCUS_CHECK_EQ(size_, 0u);
-  const int base = internal::exponent_covering(cell_size, internal::kMinCellExponent, internal::kMaxBaseExponent);
+  const int base = has_fixed_size_
+                       ? density_.base_exponent()
+                       : internal::exponent_covering(cell_size, internal::kMinCellExponent, internal::kMaxBaseExponent);
   density_ = DensityMap(base);
   if (items.size() >= first_choice_) {
     size_at_choice_ = items.size();
@@ -450,8 +469,11 @@ void HashGrid::choose_cell_size() {
   if (similar_size && internal::cell_exponent_fits(sample.values(), size_, base)) return;
   size_at_choice_ = size_;
   const int exponent = internal::choose_cell_exponent(sample.values(), size_);
-  if (exponent == base) return;
-  internal::DensityCount count(exponent, sample.bounds());
+  if (exponent != base) change_base(exponent, sample.bounds());
+}
+
+void HashGrid::change_base(int exponent, const Aabbd& bounds) {
+  internal::DensityCount count(exponent, bounds);
   const size_t stride = values_per_sample(size_);
   size_t index = 0;
   for_each([&](const GridRef& value) {
@@ -503,6 +525,7 @@ void HashGrid::measure_levels() {
 // order is descending, because refile() removes bricks from the end of stale_bricks_.
 void HashGrid::start_refiling(DensityMap density) {
   const bool same_base = density.base_exponent() == density_.base_exponent();
+  if (!same_base) stale_bricks_.clear();  // all bricks are added below
   for (uint32_t brick = 0; brick < brick_info_.size(); ++brick) {
     if (bricks_[brick] == nullptr) continue;
     const BrickGeometry& geometry = brick_info_[brick].geometry;

@@ -11,7 +11,8 @@
 // After each value has changed 64 times on average, the grid also checks whether the size still fits. If the size
 // changes, the grid moves the values to the new cells. To bound the time of a batch, each batch moves about 8,000 of
 // the values or, if it has more changes than that, as many values as it has changes. Until all values have moved,
-// levels of the old and the new size exist side by side.
+// levels of the old and the new size exist side by side. fix_cell_size() chooses the size in the grid's place; the
+// values move in the same steps.
 //
 // The base cell fits the places where most values are. Where values are much sparser, they are stored on a coarser
 // level (density_map.h). The grid counts the values of all bricks again, in one step of O(bricks), after one value in
@@ -71,8 +72,13 @@ class HashGrid {
   // or O(values of the brick).
   size_t apply(const GridBatch& batch);
 
+  // Fixes the size of the base cell: `cell_size`, rounded up to a power of two between 2^-20 and 2^31. 0 ends this: the
+  // next batch chooses a size. Values move to other cells only with the batches that follow. O(values) if the size
+  // changes.
+  void fix_cell_size(double cell_size);
+
   // Fills an empty grid with `items`. `cell_size` is the cell_size() of another grid that held the same values. The
-  // grid uses this size until the rules at the top of this file require another choice.
+  // grid uses this size, unless its size is fixed, until the rules at the top of this file require another choice.
   void fill(absl::Span<const GridItem> items, double cell_size);
 
   // Calls visit(GridRef) for each value, until visit() returns false. O(size).
@@ -151,6 +157,8 @@ class HashGrid {
   internal::BrickPtr next_version(size_t touched);
   bool choice_is_stale() const;
   void choose_cell_size();
+  // Begins to use base cells of 2^exponent, where `bounds` are those of a sample of the values.
+  void change_base(int exponent, const Aabbd& bounds);
   void start_refiling(internal::DensityMap density);
   void estimate_density(absl::Span<const GridItem> items, int base_exponent, const Aabbd& bounds);
   bool density_is_stale() const;
@@ -164,6 +172,7 @@ class HashGrid {
 
   internal::DensityMap density_;       // has the exponent of the base level
   bool density_is_estimated_ = false;  // true if density_ was made from a sample
+  bool has_fixed_size_ = false;        // see fix_cell_size()
   size_t first_choice_;
   double min_brick_values_;
   size_t size_at_choice_ = 0;

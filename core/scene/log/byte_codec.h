@@ -187,6 +187,7 @@ enum class BytesKind : uint32_t {
   kSceneSpec = 0x5053'534c,
   kOwnedSpec = 0x534f'534c,
   kLimitedSpec = 0x534c'534c,  // a specification with lifetimes
+  kSizedSpec = 0x535a'534c,    // a specification with lifetimes and a cell size
   kStateHeader = 0x4854'534c,
   kExtendedHeader = 0x4858'534c,  // like kStateHeader; also counts expiries and leases
   kStateWriters = 0x5754'534c,

@@ -85,6 +85,10 @@ absl::Status SceneJournal::append(AckLevel level) {
   return status;
 }
 
+absl::Status SceneJournal::set_spec(absl::string_view spec) {
+  return on() ? log_.log->set_scene_spec(log_.key, spec) : absl::OkStatus();
+}
+
 absl::Status SceneJournal::remove() { return on() ? log_.log->delete_scene(log_.key) : absl::OkStatus(); }
 
 LogPosition SceneJournal::position() const {

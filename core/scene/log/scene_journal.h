@@ -51,6 +51,8 @@ class SceneJournal {
   // need the deleted mesh.
   absl::Status append_change(uint64_t epoch, const StaticChange& change, absl::Span<const Id> placed)
       LOCUS_EXCLUDES(mutex_);
+  // Replaces the encoded specification of the scene.
+  absl::Status set_spec(absl::string_view spec);
   // Deletes the scene from the log.
   absl::Status remove();
 

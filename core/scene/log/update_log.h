@@ -101,6 +101,8 @@ class UpdateLog {
   // Starts a new epoch for the records that follow. Required in two cases: acknowledged records may have been lost, or
   // the scene is a copy and its original may have appended further records.
   virtual absl::Status restart_scene(SceneKey scene, uint64_t epoch) = 0;
+  // Replaces the encoded SceneSpec of a scene; its records and its snapshot stay.
+  virtual absl::Status set_scene_spec(SceneKey scene, absl::string_view spec) = 0;
 
   // Appends records in order, all or none, with one sync if `level` requires it; one sync may serve several scenes that
   // append at the same time. Preconditions: the entries have the scene's epoch (FAILED_PRECONDITION otherwise), and

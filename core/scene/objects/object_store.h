@@ -43,6 +43,9 @@ class ObjectStore {
   // Returns the displacement of objects since start_tick(); an empty Displacement if lifetimes are not tracked.
   Displacement displacement() { return moves_ == nullptr ? Displacement() : moves_->displacement(); }
 
+  // Fixes the size of the grid's base cells; 0 lets the grid choose it: see HashGrid::fix_cell_size().
+  void fix_cell_size(double cell_size) { grid_.fix_cell_size(cell_size); }
+
   size_t size() const { return grid_.size(); }
   std::optional<Object> find(Id id) const;
   bool contains(const Object& object) const { return handle(object.id) != kNoHandle; }

@@ -1,16 +1,17 @@
-// Format 5 of the keys and values in RocksDB; FORMAT.md in this folder describes every byte. Each value ends with a
+// Format 6 of the keys and values in RocksDB; FORMAT.md in this folder describes every byte. Each value ends with a
 // checksum over key and value, which reveals a value under a wrong key. Free functions on plain data; any thread.
 //
 // A mesh has a content (vertices and triangles), stored once for all names of equal content, and parts (named ranges of
 // triangles), stored for each name. Snapshots, contents and parts are stored as chunks; a random content id in their
 // keys identifies each list of chunks.
 //
-// Formats 1 to 4 can be read, too. The mesh rows of format 1 have no `parts`: the chunks of the content include the
+// Formats 1 to 5 can be read, too. The mesh rows of format 1 have no `parts`: the chunks of the content include the
 // parts. In formats 1 and 2 no scene and no mesh has a creator. Up to format 3, no record moves instances (LSBI, see
 // core/scene/log/FORMAT.md), and no record and no snapshot has the bounds of meshes (LSEC, LSEI). Up to format 4,
 // no record and no snapshot has compounds, expiries, leases or batches of several messages (LSBX, LSBG, LSXH, LSWM,
-// LSTC, LSTK, LSTE, LSTL), no specification has lifetimes (LSLS), and no mesh row has `grace_s`. Opening a directory of
-// an older format sets its format number to 5 and leaves all rows unchanged.
+// LSTC, LSTK, LSTE, LSTL), no specification has lifetimes (LSLS), and no mesh row has `grace_s`. Up to format 5, no
+// specification has a cell size (LSZS). Opening a directory of an older format sets its format number to 6 and leaves
+// all rows unchanged.
 //
 // Column families, the fields of their keys, and the value under each key (`scene` is a SceneKey, `id` a content id):
 // meta      "format"; "catalogue"; 's' scene: a scene; 'm' name: a mesh; 'c' sha256: a mesh's content; 'p' scene id:
@@ -36,7 +37,7 @@
 
 namespace locus::server {
 
-inline constexpr uint32_t kFormat = 5;
+inline constexpr uint32_t kFormat = 6;
 inline constexpr uint32_t kOldestFormat = 1;
 inline constexpr absl::string_view kFormatKey = "format";
 inline constexpr absl::string_view kCatalogueKey = "catalogue";

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "core/base/limits.h"
 #include "tests/support/damaged_bytes.h"
 #include "tests/support/test_scale.h"
@@ -66,6 +68,25 @@ TEST(SpecCodecTest, LifetimesRoundTripWithAndWithoutACreator) {
     ASSERT_TRUE(decoded.ok()) << decoded.status();
     EXPECT_EQ(decoded->idle_ttl_s, 0u);
     EXPECT_EQ(decoded->mesh_grace_s, limits::kMaxLifetimeSeconds);
+  }
+}
+
+TEST(SpecCodecTest, ACellSizeRoundTripsAndOneOutOfRangeIsDamage) {
+  SceneSpec spec = full_spec();
+  spec.mesh_grace_s = 7;
+  for (const double size : {kMinCellSize, 4.0, kMaxCellSize}) {
+    spec.cell_size = size;
+    const std::string bytes = encode_spec(spec);
+    EXPECT_EQ(bytes.substr(0, 4), "LSZS");
+    const absl::StatusOr<SceneSpec> decoded = decode_spec(bytes);
+    ASSERT_TRUE(decoded.ok()) << decoded.status();
+    EXPECT_EQ(decoded->cell_size, size);
+    EXPECT_EQ(decoded->mesh_grace_s, 7u);
+    EXPECT_EQ(decoded->creator, spec.creator);
+  }
+  for (const double size : {-1.0, kMaxCellSize * 2, std::numeric_limits<double>::quiet_NaN()}) {
+    spec.cell_size = size;
+    EXPECT_EQ(decode_spec(encode_spec(spec)).status().code(), absl::StatusCode::kDataLoss) << size;
   }
 }
 

@@ -43,7 +43,8 @@ TEST(RightsTest, ChangesNeedMoreThanReading) {
   for (const char* const path : {"/locus.v1.UpdateService/ApplyUpdates", "/locus.v1.UpdateService/StreamUpdates",
                                  "/locus.v1.SceneService/ChangeInstances"})
     EXPECT_EQ(right_of(path)->right, Right::kUpdate) << path;
-  for (const char* const path : {"/locus.v1.SceneService/CreateScene", "/locus.v1.SceneService/DeleteScene"})
+  for (const char* const path : {"/locus.v1.SceneService/CreateScene", "/locus.v1.SceneService/UpdateScene",
+                                 "/locus.v1.SceneService/DeleteScene"})
     EXPECT_EQ(right_of(path)->right, Right::kAdmin) << path;
   EXPECT_TRUE(right_of("/locus.v1.SceneService/CreateScene")->reads_static_from);
 }

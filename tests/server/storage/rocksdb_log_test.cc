@@ -208,6 +208,17 @@ TEST_F(RocksdbLogTest, RestartedSceneAcceptsOnlyRecordsOfTheNewEpoch) {
   expect_records(scene, 1, 3);
 }
 
+TEST_F(RocksdbLogTest, AnotherSpecificationOfASceneIsStored) {
+  const SceneKey scene = create("a", 1);
+  append(scene, 2);
+  ASSERT_EQ(log_->set_scene_spec(scene, "another"), absl::OkStatus());
+  append(scene, 1);
+  EXPECT_EQ(log_->set_scene_spec(scene + 1, "none").code(), absl::StatusCode::kNotFound);
+  open();
+  EXPECT_EQ(find_stored(*log_, "a")->spec, "another");
+  expect_records(scene, 1, 3);
+}
+
 TEST_F(RocksdbLogTest, MeshIsStoredOnceAndDeletedWithItsLastName) {
   const std::vector<std::string> content = {"some", "content"};
   ASSERT_EQ(add_mesh("a", 1, content), absl::OkStatus());

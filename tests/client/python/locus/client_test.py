@@ -39,7 +39,12 @@ class ClientTest(DaemonTest):
         self.assertEqual(raised.exception.code, grpc.StatusCode.NOT_FOUND)
 
     def test_scenes_are_created_described_listed_and_deleted(self):
-        made = self.client.create_scene("hall", labels={"map": "hall", "mode": "duel"})
+        made = self.client.create_scene("hall", labels={"map": "hall", "mode": "duel"}, cell_size=3)
+        self.assertEqual(made.cell_size, 4)
+        self.client.update_scene("hall", cell_size=0.3)
+        self.client.update_scene("hall", labels={"map": "hall"})
+        updated = self.client.scene("hall")
+        self.assertEqual((updated.cell_size, updated.labels, updated.revision), (0.5, {"map": "hall"}, 0))
         self.assertEqual((made.name, made.revision, made.objects, made.bounds), ("hall", 0, 0, None))
         self.client.apply("hall", UpdateBatch(tick=4).insert_boxes(1, [1, 2, 3], [1, 1, 1]))
         hall = self.client.scene("hall")
