@@ -221,11 +221,14 @@ absl::StatusOr<v1::Scene> Client::create_scene(const v1::CreateSceneRequest& req
   return std::move(*response.mutable_scene());
 }
 
-absl::StatusOr<v1::Scene> Client::get_scene(absl::string_view name) const {
+absl::StatusOr<v1::GetSceneResponse> Client::describe_scene(absl::string_view name) const {
   v1::GetSceneRequest request;
   request.set_name(std::string(name));
-  ASSIGN_OR_RETURN(v1::GetSceneResponse response, call(*connection_->scenes, connection_->repeatable(name), request,
-                                                       &v1::SceneService::StubInterface::GetScene));
+  return call(*connection_->scenes, connection_->repeatable(name), request, &v1::SceneService::StubInterface::GetScene);
+}
+
+absl::StatusOr<v1::Scene> Client::get_scene(absl::string_view name) const {
+  ASSIGN_OR_RETURN(v1::GetSceneResponse response, describe_scene(name));
   return std::move(*response.mutable_scene());
 }
 

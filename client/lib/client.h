@@ -96,10 +96,12 @@ class Client {
   // UNIMPLEMENTED if the server has no data directory.
   absl::StatusOr<BackupSize> backup(BackupSink& sink) const;
 
-  // Create, read, list, change and delete scenes. get_scene() and list_scenes() are retried; the others are not.
+  // Create, read, list, change and delete scenes. Reading and listing are retried; the others are not.
   // list_scenes() reads all pages and returns every scene that has all of `labels`.
   absl::StatusOr<v1::Scene> create_scene(const v1::CreateSceneRequest& request) const;
   absl::StatusOr<v1::Scene> get_scene(absl::string_view name) const;
+  // Returns the scene, the sizes of its structures, and what queries have cost.
+  absl::StatusOr<v1::GetSceneResponse> describe_scene(absl::string_view name) const;
   absl::StatusOr<std::vector<v1::Scene>> list_scenes(const std::map<std::string, std::string>& labels = {}) const;
   absl::StatusOr<v1::UpdateSceneResponse> update_scene(const v1::UpdateSceneRequest& request) const;
   absl::Status delete_scene(const v1::DeleteSceneRequest& request) const;

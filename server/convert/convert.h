@@ -56,6 +56,7 @@ absl::StatusOr<SettingsChange> to_settings(const v1::UpdateSceneRequest& request
 absl::Status check_labels(const google::protobuf::Map<std::string, std::string>& labels, const std::string& field);
 // Returns the description of a scene. `summary` is the summary of this scene.
 v1::Scene to_proto(const Scene& scene, const SceneSummary& summary);
+v1::Source to_proto(Source source);
 // Maximum size in bytes of the parts in the description of a mesh, so that every client accepts a reply that contains
 // one description.
 inline constexpr size_t kMaxDescribedPartBytes = 3'800'000;

@@ -233,6 +233,18 @@ v1::Scene to_proto(const Scene& scene, const SceneSummary& summary) {
   return out;
 }
 
+v1::Source to_proto(Source source) {
+  switch (source) {
+    case Source::kBoth:
+      return v1::SOURCE_BOTH;
+    case Source::kStatic:
+      return v1::SOURCE_STATIC;
+    case Source::kDynamic:
+      return v1::SOURCE_DYNAMIC;
+  }
+  return v1::SOURCE_UNSPECIFIED;
+}
+
 v1::Mesh to_proto(const Registry::NamedMesh& mesh, size_t first_part, size_t max_part_bytes) {
   v1::Mesh out;
   out.set_name(mesh.name);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <tuple>
 
 #include "core/base/check.h"
 
@@ -53,9 +54,9 @@ struct KindOf {
 };
 
 // Returns the number of tests of one query by list. A query of pairs tests all values for each value.
-double tests_of(const QueryBlock& block, CostEstimates::ListValues values) {
+double tests_of(CostKind kind, CostEstimates::ListValues values) {
   const auto tests = static_cast<double>(values);
-  return std::holds_alternative<PairColumns>(block.kind) ? tests * tests : tests;
+  return kind == CostKind::kPairs ? tests * tests : tests;
 }
 
 // Returns the number of units of the block's cost: its queries or, for sight, its segments.
@@ -77,10 +78,16 @@ double nanoseconds_of(uint64_t entry) { return std::bit_cast<float>(static_cast<
 
 CostKind cost_kind(const QueryBlock& block) { return std::visit(KindOf(), block.kind); }
 
-CostEstimates::Slot CostEstimates::slot_of(uint64_t scene, const QueryBlock& block, bool by_list) {
-  const uint64_t kind =
-      static_cast<uint64_t>(cost_kind(block)) * 8 + static_cast<uint64_t>(block.source) * 2 + (by_list ? 1 : 0);
-  const uint64_t hash = mix(mix(scene) + kind);
+absl::string_view cost_kind_name(CostKind kind) {
+  static constexpr std::array<absl::string_view, 15> kNames = {
+      "rays_first", "rays_any", "rays_all", "balls", "boxes",    "nearest", "lookup", "lookup_groups",
+      "capsules",   "sweeps",   "frustums", "sight", "contains", "pairs",   "cells"};
+  return kNames[static_cast<size_t>(kind)];
+}
+
+CostEstimates::Slot CostEstimates::slot_of(uint64_t scene, CostKind kind, Source source, bool by_list) {
+  const uint64_t sort = static_cast<uint64_t>(kind) * 8 + static_cast<uint64_t>(source) * 2 + (by_list ? 1 : 0);
+  const uint64_t hash = mix(mix(scene) + sort);
   return {hash % kEntries, static_cast<uint32_t>(hash >> 32) | 1u};
 }
 
@@ -101,7 +108,7 @@ double CostEstimates::nanoseconds_a_query(uint64_t scene, const QueryBlock& bloc
   const Slot slot = slot_of(scene, block, values != 0);
   const uint64_t entry = entries_[find(slot)].load(std::memory_order_relaxed);
   const bool known = tag_of(entry) == slot.tag;
-  if (values != 0) return tests_of(block, values) * (known ? nanoseconds_of(entry) : kFirstGuessOfTest);
+  if (values != 0) return tests_of(cost_kind(block), values) * (known ? nanoseconds_of(entry) : kFirstGuessOfTest);
   return known ? nanoseconds_of(entry) : kFirstGuess[static_cast<size_t>(cost_kind(block))];
 }
 
@@ -112,20 +119,50 @@ uint64_t CostEstimates::nanoseconds(uint64_t scene, const QueryBatch& batch, Lis
   return static_cast<uint64_t>(std::min(sum, kMax));
 }
 
-void CostEstimates::learn(uint64_t scene, const QueryBlock& block, uint64_t nanoseconds, ListValues values) {
+void CostEstimates::learn(uint64_t scene, const QueryBlock& block, uint64_t nanoseconds, ListValues values,
+                          uint64_t work) {
   const double queries = units_of(block);
   if (queries == 0) return;
-  const double a_query = static_cast<double>(nanoseconds) / queries;
-  const double seen =
-      values == 0 ? std::clamp(a_query, kMin, kMax) : std::clamp(a_query / tests_of(block, values), kMinOfTest, kMax);
+  const double units = values == 0 ? queries : queries * tests_of(cost_kind(block), values);
+  const double seen = std::clamp(static_cast<double>(nanoseconds) / units, values == 0 ? kMin : kMinOfTest, kMax);
   const Slot slot = slot_of(scene, block, values != 0);
-  std::atomic<uint64_t>& at = entries_[find(slot)];
+  const size_t index = find(slot);
+  std::atomic<uint64_t>& at = entries_[index];
   uint64_t before = at.load(std::memory_order_relaxed);
   const double weight = std::clamp(queries / kForgetQueries, kMinWeight, kMaxWeight);
   const double known = nanoseconds_of(before);
   const double now = tag_of(before) == slot.tag ? known + (seen - known) * weight : seen;
   LOCUS_DCHECK(kMinOfTest / 2 <= now && now <= 2 * kMax);
   at.compare_exchange_strong(before, packed(slot.tag, now), std::memory_order_relaxed);
+  const uint64_t last = works_[index].load(std::memory_order_relaxed);
+  const double worked = static_cast<double>(work) / units, past = nanoseconds_of(last);
+  const double mean = tag_of(last) == slot.tag ? past + (worked - past) * weight : worked;
+  works_[index].store(packed(slot.tag, mean), std::memory_order_relaxed);
+}
+
+std::vector<KindCost> CostEstimates::learned(uint64_t scene, ListValues values) const {
+  std::vector<KindCost> costs;
+  for (size_t kind = 0; kind < kFirstGuess.size(); ++kind) {
+    for (const Source source : {Source::kBoth, Source::kStatic, Source::kDynamic}) {
+      for (const bool by_list : {false, true}) {
+        KindCost cost{static_cast<CostKind>(kind), source, by_list, 0, 0};
+        const Slot slot = slot_of(scene, cost.kind, source, by_list);
+        const size_t index = find(slot);
+        const uint64_t entry = entries_[index].load(std::memory_order_relaxed);
+        const uint64_t work = works_[index].load(std::memory_order_relaxed);
+        if (tag_of(entry) != slot.tag) continue;
+        const double units = by_list ? tests_of(cost.kind, values) : 1;
+        cost.nanoseconds = units * nanoseconds_of(entry);
+        if (tag_of(work) == slot.tag) cost.work = units * nanoseconds_of(work);
+        costs.push_back(cost);
+      }
+    }
+  }
+  const auto order = [](const KindCost& cost) {
+    return std::tuple(cost_kind_name(cost.kind), cost.source, cost.by_list);
+  };
+  std::sort(costs.begin(), costs.end(), [&](const KindCost& a, const KindCost& b) { return order(a) < order(b); });
+  return costs;
 }
 
 }  // namespace locus::server

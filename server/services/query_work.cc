@@ -88,11 +88,7 @@ double QueryWork::queries() const {
   return queries;
 }
 
-CostEstimates::ListValues QueryWork::list_values() const {
-  if (!message_->by_list()) return 0;
-  const SceneSnapshot& snapshot = **pin_;
-  return 1 + snapshot.statics->triangle_count() + snapshot.objects.size();
-}
+CostEstimates::ListValues QueryWork::list_values() const { return message_->by_list() ? tested_by_list(**pin_) : 0; }
 
 void QueryWork::cancel() {
   slot_.caller().give_back_quota(QuotaKind::kQueries, queries());
@@ -248,7 +244,8 @@ void QueryWork::finished(bool) {
 }
 
 void QueryWork::learn(const QueryBlock& block, const QueryCost& cost) {
-  host_.costs.learn((*pin_)->epoch, block, cost.nanoseconds, list_values());
+  const uint64_t work = cost.work.nodes + cost.work.cells + cost.work.tests;
+  host_.costs.learn((*pin_)->epoch, block, cost.nanoseconds, list_values(), work);
   host_.metrics.record_block(block_kind(block), query_count(block), cost.nanoseconds, cost.work);
 }
 

@@ -55,6 +55,11 @@ class UsedScene {
   ScenePtr scene_;
 };
 
+// Returns the number of values that a query by list tests; never 0.
+inline uint64_t tested_by_list(const SceneSnapshot& snapshot) {
+  return 1 + snapshot.statics->triangle_count() + snapshot.objects.size();
+}
+
 // Returns the scene that find_scene() returns, for a call that uses it.
 absl::StatusOr<UsedScene> use_scene(const Host& host, const Caller& caller, const std::string& name,
                                     absl::string_view field);

@@ -21,7 +21,7 @@ absl::Status change_instances(Host& host, const Caller& caller, const v1::Change
 absl::Status check_work(const Caller& caller);
 
 // Returns the description of a scene, with the number of its pending changes. If the scene has changed since its last
-// description, waits for a turn of Host::scene_visits, visits all objects and charges the caller for the visit.
+// description, waits for a turn of Host::scene_visits, computes the bounds and charges the caller for the work.
 v1::Scene describe(Host& host, const Caller& caller, const Scene& scene);
 
 // Serves one UploadMesh call: collects a mesh from the pieces of a stream, checks it against the announced counts and

@@ -211,11 +211,41 @@ absl::Status create_scene(const Caller& caller, Host& host, const v1::CreateScen
   return absl::OkStatus();
 }
 
+v1::SceneDescription describe_structures(Host& host, const Scene& scene) {
+  const SnapshotPtr snapshot = scene.latest();
+  const SceneStructures sizes = structures_of(*snapshot);
+  const double fixed_cell_size = scene.settings().cell_size;
+  v1::SceneDescription description;
+  v1::Structure& statics = *description.mutable_statics();
+  statics.set_kind(v1::STRUCTURE_KIND_BVH);
+  statics.set_values(snapshot->statics->size());
+  statics.set_levels(sizes.static_levels);
+  statics.set_nodes(sizes.static_nodes);
+  statics.set_bytes(sizes.static_bytes);
+  v1::Structure& objects = *description.mutable_objects();
+  objects.set_kind(v1::STRUCTURE_KIND_HASH_GRID);
+  objects.set_values(snapshot->objects.size());
+  objects.set_levels(sizes.object_levels);
+  objects.set_bricks(sizes.object_bricks);
+  objects.set_cell_size(fixed_cell_size != 0 ? fixed_cell_size : sizes.cell_size);
+  objects.set_bytes(sizes.object_bytes);
+  for (const KindCost& cost : host.costs.learned(snapshot->epoch, tested_by_list(*snapshot))) {
+    v1::LearnedCost& learned = *description.add_costs();
+    learned.set_kind(std::string(cost_kind_name(cost.kind)));
+    learned.set_source(to_proto(cost.source));
+    learned.set_nanoseconds(cost.nanoseconds);
+    learned.set_work(cost.work);
+    learned.set_by_list(cost.by_list);
+  }
+  return description;
+}
+
 absl::Status get_scene(const Caller& caller, Host& host, const v1::GetSceneRequest& request,
                        v1::GetSceneResponse& response) {
   ASSIGN_OR_RETURN(const ScenePtr scene, find_scene(host, caller, request.name(), "name"));
   RETURN_IF_ERROR(check_work(caller));
   *response.mutable_scene() = describe(host, caller, *scene);
+  *response.mutable_description() = describe_structures(host, *scene);
   return absl::OkStatus();
 }
 
@@ -333,7 +363,7 @@ v1::Scene describe(Host& host, const Caller& caller, const Scene& scene) {
     summary = scene.known_summary();  // another call may have computed it meanwhile
     if (!summary) {
       summary = scene.summary();
-      caller.charge_quota(QuotaKind::kWork, static_cast<double>(summary->objects));
+      caller.charge_quota(QuotaKind::kWork, static_cast<double>(summary->work));
     }
   }
   v1::Scene out = to_proto(scene, *summary);

@@ -114,6 +114,58 @@ TEST_F(UpdateSceneRpcTest, WrongRequestsAreRefusedByNameAndChangeNothing) {
   expect_refused(update(nowhere), {grpc::StatusCode::NOT_FOUND, v1::REASON_NOT_FOUND, "scene"});
 }
 
+class SceneDescriptionRpcTest : public UpdateSceneRpcTest {
+ protected:
+  v1::SceneDescription description() {
+    v1::GetSceneRequest request;
+    request.set_name("world");
+    v1::GetSceneResponse response;
+    EXPECT_TRUE(call(*stubs().scenes, &v1::SceneService::Stub::GetScene, request, &response).ok());
+    return response.description();
+  }
+};
+
+TEST_F(SceneDescriptionRpcTest, StructuresAreDescribed) {
+  EXPECT_EQ(description().statics().kind(), v1::STRUCTURE_KIND_BVH);
+  EXPECT_EQ(description().objects().kind(), v1::STRUCTURE_KIND_HASH_GRID);
+  EXPECT_EQ(description().statics().nodes(), 0u);
+  ASSERT_TRUE(upload({whole_mesh("cube")}).ok());
+  ASSERT_TRUE(change(place_one("cube", 100)).ok());
+  ASSERT_TRUE(apply(insert_balls(1000, 3999)).ok());
+  const v1::SceneDescription found = description();
+  EXPECT_EQ(found.statics().values(), 1u);
+  EXPECT_GE(found.statics().nodes(), 1u);
+  EXPECT_GE(found.statics().levels(), 1u);
+  EXPECT_GT(found.statics().bytes(), 12 * sizeof(float) * 9);
+  EXPECT_EQ(found.objects().values(), 3000u);
+  EXPECT_GT(found.objects().bricks(), 10u);
+  EXPECT_GE(found.objects().levels(), 1u);
+  EXPECT_GT(found.objects().cell_size(), 0);
+  EXPECT_GT(found.objects().bytes(), 3000 * sizeof(double) * 3);
+  ASSERT_TRUE(update(change_of({"cell_size"}, 256)).ok());
+  EXPECT_EQ(description().objects().cell_size(), 256);
+}
+
+TEST_F(SceneDescriptionRpcTest, CostsOfQueriesAreLearned) {
+  ASSERT_TRUE(apply(insert_balls(1, 300)).ok());
+  EXPECT_EQ(description().costs_size(), 0);
+  v1::QueryBatch batch = ray_along_x();
+  ASSERT_TRUE(query(batch).ok());
+  batch.set_by_list(true);
+  ASSERT_TRUE(query(batch).ok());
+  const v1::SceneDescription found = description();
+  ASSERT_EQ(found.costs_size(), 2) << found.ShortDebugString();
+  for (const v1::LearnedCost& cost : found.costs()) {
+    EXPECT_EQ(cost.kind(), "rays_first");
+    EXPECT_EQ(cost.source(), v1::SOURCE_BOTH);
+    EXPECT_GT(cost.nanoseconds(), 0);
+  }
+  EXPECT_FALSE(found.costs(0).by_list());
+  EXPECT_LT(found.costs(0).work(), 300);
+  EXPECT_TRUE(found.costs(1).by_list());
+  EXPECT_NEAR(found.costs(1).work(), 300, 2) << "every object is tested";
+}
+
 TEST(UpdateSceneRestartTest, SettingsSurviveARestart) {
   KeptDaemon daemon;
   daemon.start();

@@ -1,3 +1,4 @@
+#include <cmath>
 #include <map>
 #include <memory>
 #include <string>
@@ -128,6 +129,27 @@ Report description_of(const v1::Scene& scene) {
   return report;
 }
 
+// Adds the structures and the learned costs. Servers of earlier versions send none.
+void add_structures(const v1::SceneDescription& description, Report& report) {
+  const v1::Structure &statics = description.statics(), &objects = description.objects();
+  report.head["static_structure"] = {{"kind", "bvh"},
+                                     {"values", statics.values()},
+                                     {"levels", statics.levels()},
+                                     {"nodes", statics.nodes()},
+                                     {"bytes", statics.bytes()}};
+  report.head["object_structure"] = {
+      {"kind", "hash_grid"},        {"values", objects.values()},       {"levels", objects.levels()},
+      {"bricks", objects.bricks()}, {"cell_size", objects.cell_size()}, {"bytes", objects.bytes()}};
+  report.head["costs"] = Json::array();
+  for (const v1::LearnedCost& cost : description.costs())
+    report.head["costs"].push_back(
+        {{"kind", cost.kind()},
+         {"source", absl::AsciiStrToLower(absl::StripPrefix(v1::Source_Name(cost.source()), "SOURCE_"))},
+         {"by_list", cost.by_list()},
+         {"ns", std::round(cost.nanoseconds() * 10) / 10},
+         {"work", std::round(cost.work() * 10) / 10}});
+}
+
 absl::Status create(const CreateOptions& options, Context& context) {
   ASSIGN_OR_RETURN(const auto labels, parse_labels(options.labels));
   v1::CreateSceneRequest request;
@@ -165,8 +187,10 @@ absl::Status list_scenes(const ListOptions& options, Context& context) {
 
 absl::Status describe_scene(const DescribeOptions& options, Context& context) {
   ASSIGN_OR_RETURN(client::Client* const client, context.connect());
-  ASSIGN_OR_RETURN(const v1::Scene scene, client->get_scene(options.name));
-  context.write(description_of(scene));
+  ASSIGN_OR_RETURN(const v1::GetSceneResponse got, client->describe_scene(options.name));
+  Report report = description_of(got.scene());
+  if (got.has_description()) add_structures(got.description(), report);
+  context.write(report);
   return absl::OkStatus();
 }
 
@@ -286,10 +310,12 @@ void add_list(CLI::App& parent, Context& context) {
 void add_describe(CLI::App& parent, Context& context) {
   const auto options = std::make_shared<DescribeOptions>();
   CLI::App& command = *parent.add_subcommand("describe", "Show everything about a scene");
+  command.alias("get");
   command.footer(
       "Of the history, limited_by says why it does not reach further back: ticks (as asked for), bytes (more ticks\n"
       "did not fit into --history-bytes), memory (the server was short of it), began or restored.\n"
-      "Examples:\n  locus scene describe arena\n  locus -o json scene describe arena");
+      "costs are those of queries, by kind: nanoseconds and work (nodes, cells and tests) of one query.\n"
+      "Examples:\n  locus scene get arena\n  locus -o json scene get arena\n  locus scene describe arena");
   add_scene_argument(command, options->name);
   run_when_chosen(command, options, context, describe_scene);
 }

@@ -145,6 +145,8 @@ class Bvh {
   const Aabb<S>& bounds() const { return bounds_; }
   // Returns the number of all nodes, including those in blocks. O(blocks).
   size_t node_count() const;
+  // Returns the number of nodes on the longest way from the root to a value. O(nodes).
+  uint32_t depth() const;
   // Returns the size in bytes of the tree. O(blocks).
   size_t bytes() const { return unshared_bytes(Bvh()); }
   // Returns the size in bytes of the parts that this tree does not share with `other`. O(blocks).
@@ -296,6 +298,30 @@ const {
   size_t count = nodes_.size();
   for (const BvhBlockSlot<V, T>& slot : blocks_) count += slot.block->nodes.size();
   return count;
+}
+
+template <class V, class T>
+requires Bounded<V, T> uint32_t Bvh<V, T>::depth()
+const {
+  // Children follow their parents, so one pass from the end has the depths of the children of each node.
+  const auto depth_of = [](const std::vector<BvhNode<S>>& nodes, const auto& depth_of_leaf) {
+    std::vector<uint32_t> depths(nodes.size());
+    for (size_t index = nodes.size(); index-- > 0;) {
+      const BvhNode<S>& node = nodes[index];
+      uint32_t deepest = 0;
+      for (uint32_t slot = 0; slot < node.child_count; ++slot) {
+        const BvhChild& child = node.children[slot];
+        deepest = std::max(deepest, child.is_leaf() ? depth_of_leaf(child) : depths[child.first]);
+      }
+      depths[index] = deepest + 1;
+    }
+    return depths.empty() ? 0 : depths.front();
+  };
+  const auto of_block = [&](uint32_t block) {
+    return depth_of(blocks_[block].block->nodes, [](const BvhChild&) { return 0u; });
+  };
+  if (nodes_.empty()) return blocks_.empty() ? 0 : of_block(0);
+  return depth_of(nodes_, [&](const BvhChild& child) { return of_block(child.first); });
 }
 
 template <class V, class T>

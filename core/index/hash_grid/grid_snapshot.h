@@ -79,6 +79,9 @@ class GridSnapshot {
   size_t size() const { return size_; }
   // Returns the cell edge of the base level.
   double cell_size() const { return cell_size_; }
+  // Return the number of levels, and the number of bricks of all levels. O(levels).
+  size_t level_count() const { return levels_.size(); }
+  size_t brick_count() const;
 
   // Calls visit(GridRef) for every value whose bounds overlap `region`, and for some other values near the region. Ends
   // if visit() returns false.
@@ -202,6 +205,12 @@ class GridSnapshot {
   size_t size_ = 0;
   double cell_size_ = 0;
 };
+
+inline size_t GridSnapshot::brick_count() const {
+  size_t bricks = 0;
+  for (const internal::GridLevel& level : levels_) bricks += level.table->size();
+  return bricks;
+}
 
 inline const internal::Brick* GridSnapshot::find_brick(const internal::GridLevel& level,
                                                        const internal::GridKey& key) const {

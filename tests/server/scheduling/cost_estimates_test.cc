@@ -93,6 +93,29 @@ TEST_F(CostEstimatesTest, QueriesByListCostEveryValue) {
   EXPECT_NEAR(static_cast<double>(costs_->nanoseconds(1, batch, 1'000)), 300'000, 1'000);
 }
 
+TEST_F(CostEstimatesTest, LearnedCostsAreListedByKindSourceAndList) {
+  EXPECT_TRUE(costs_->learned(1, 100).empty());
+  costs_->learn(1, rays(1000, RayMode::kAny, Source::kStatic), 70'000, 0, 12'000);
+  costs_->learn(1, rays(1000, RayMode::kAny), 90'000, 0, 20'000);
+  costs_->learn(1, rays(10, RayMode::kAny), 10 * 300, 100, 10 * 100);
+  costs_->learn(1, balls(100), 50'000, 0, 700);
+  costs_->learn(2, balls(100), 50'000, 0, 700);
+  const std::vector<KindCost> learned = costs_->learned(1, 1'000);
+  ASSERT_EQ(learned.size(), 4u);
+  EXPECT_EQ(cost_kind_name(learned[0].kind), "balls");
+  EXPECT_NEAR(learned[0].nanoseconds, 500, 0.1);
+  EXPECT_NEAR(learned[0].work, 7, 0.01);
+  EXPECT_EQ(cost_kind_name(learned[1].kind), "rays_any");
+  EXPECT_FALSE(learned[1].by_list);
+  EXPECT_TRUE(learned[2].by_list);
+  EXPECT_NEAR(learned[2].nanoseconds, 3'000, 1) << "the scene has ten times as many values now";
+  EXPECT_NEAR(learned[2].work, 1'000, 1);
+  EXPECT_EQ(learned[3].source, Source::kStatic);
+  EXPECT_NEAR(learned[3].work, 12, 0.01);
+  costs_->learn(1, balls(2048), 2048 * 500, 0, 2048 * 9);
+  EXPECT_NEAR(costs_->learned(1, 1'000)[0].work, 8, 0.01) << "the mean moves to the new measurement";
+}
+
 TEST_F(CostEstimatesTest, PairsByListTestEachValueForEachValue) {
   const QueryBlock pairs = block_of(PairColumns());
   costs_->learn(1, pairs, 2'000'000, 1'000);

@@ -122,6 +122,21 @@ TEST_F(SceneSummaryTest, BoundsVisitFewOfManyObjects) {
   EXPECT_LT(visits, kCount / 20);
 }
 
+TEST_F(SceneSummaryTest, TheStructuresOfASceneAreMeasured) {
+  const SceneStructures empty = structures_of(*scene_.latest());
+  EXPECT_EQ(empty.static_levels, 0u);
+  EXPECT_EQ(empty.static_nodes, 0u);
+  EXPECT_EQ(empty.object_levels, 0u);
+  EXPECT_EQ(empty.object_bricks, 0u);
+  ASSERT_TRUE(scene_.apply(with(points({1, 2}, {0, 0, 0, 5000, 0, 0}))).ok());
+  const SceneStructures sizes = structures_of(*scene_.latest());
+  const GridStatistics grid = scene_.latest()->objects.statistics();
+  EXPECT_EQ(sizes.object_levels, grid.levels);
+  EXPECT_EQ(sizes.object_bricks, grid.bricks);
+  EXPECT_GT(sizes.object_bytes, 0u);
+  EXPECT_EQ(sizes.cell_size, scene_.latest()->objects.grid().cell_size());
+}
+
 TEST_F(SceneSummaryTest, ASummaryIsKnownUntilTheNextRevision) {
   EXPECT_FALSE(scene_.known_summary().has_value());
   EXPECT_EQ(scene_.summary().revision, 0u);
