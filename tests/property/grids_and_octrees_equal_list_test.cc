@@ -12,7 +12,7 @@ TEST(GridsAndOctreesEqualListTest, Grids) {
   EXPECT_EQ(search_all_finite_grids(scaled_count(200), scaled_count(200)), "");
 }
 
-TEST(GridsAndOctreesEqualListTest, Octrees) { EXPECT_EQ(search_octrees(scaled_count(200), scaled_count(200)), ""); }
+TEST(GridsAndOctreesEqualListTest, Octrees) { EXPECT_EQ(search_octrees(scaled_count(100), scaled_count(100)), ""); }
 
 TEST(LongGridsAndOctreesEqualListTest, Grids) {
   EXPECT_EQ(search_all_finite_grids(scaled_count(10'000), scaled_count(1'200)), "");

@@ -77,9 +77,9 @@ std::string compare_moving_grids_with_list() {
   return search_grid_scenes(scaled_count(40), any_adversarial_scene, moving_grid_difference);
 }
 
-std::string compare_octrees_with_list() { return search_octrees(scaled_count(100), scaled_count(200)); }
+std::string compare_octrees_with_list() { return search_octrees(scaled_count(20), scaled_count(60)); }
 
-std::string compare_finite_grids_with_list() { return search_all_finite_grids(scaled_count(50), scaled_count(150)); }
+std::string compare_finite_grids_with_list() { return search_all_finite_grids(scaled_count(20), scaled_count(60)); }
 
 std::string compare_scenes_with_model() { return search_scene_lockstep(scaled_count(20), 60); }
 
