@@ -14,7 +14,7 @@ namespace locus::test {
 
 // Returns a value with the bounds center - half to center + half, if that is possible for its type.
 template <class V>
-V value_at(Vec3d center, Vec3d half, uint32_t id) {
+V value_filling(Vec3d center, Vec3d half, uint32_t id) {
   if constexpr (std::same_as<V, Triangle>) {
     const Vec3f low = to_float(center - half), high = to_float(center + half);
     return {low, high, {low.x, high.y, low.z}, id};
@@ -59,7 +59,7 @@ std::string drift_difference(Index& index, uint64_t changes, const TestScene<typ
   for (uint32_t change = 0; change < changes; ++change) {
     if (values.size() < 50 || (values.size() < 150 && random.chance(0.5))) {
       const Vec3d center = random.vector(4 + static_cast<double>(change) / 500);
-      values.push_back(value_at<V>(center, random.positive_vector(1), change + 1));
+      values.push_back(value_filling<V>(center, random.positive_vector(1), change + 1));
       index.insert(values.back());
       list.insert(values.back());
     } else {

@@ -81,7 +81,7 @@ inline std::string long_row_difference() {
   scene.name = "long row of cells";
   for (uint32_t i = 0; i < 40; ++i) {
     const double x = 0.1 * (500 * i + 3);
-    scene.values.push_back(value_at<Triangle>({x, 0.05, 0.05}, {0, 0.05, 0.05}, i + 1));
+    scene.values.push_back(value_filling<Triangle>({x, 0.05, 0.05}, {0, 0.05, 0.05}, i + 1));
     scene.values.back().c = {static_cast<float>(x), 0.1f, 0};
     scene.rays.emplace_back(Vec3d{x - 30, 0.05, 0.04}, Vec3d{1, 1e-7, 0});
     scene.rays.emplace_back(Vec3d{x + 40, 0.05, 0.04}, Vec3d{-1, 0, 1e-7});
@@ -97,7 +97,7 @@ inline std::string grid_short_ray_fault() {
   GridOptions options;
   options.bounds = {{0, 0, 0}, {64, 64, 64}};
   options.cell_size = 1;
-  const auto grid = Grid<Object>::build({value_at<Object>({60, 2, 2}, {0.1, 0.1, 0.1}, 1)}, options);
+  const auto grid = Grid<Object>::build({value_filling<Object>({60, 2, 2}, {0.1, 0.1, 0.1}, 1)}, options);
   const ObjectRay ray(Rayd{{0.5, 0.5, 0.5}, {1, 0.01, 0.02}});
   Work short_work, long_work;
   any_ray(grid, ray, 2, &short_work);

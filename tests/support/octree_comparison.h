@@ -67,7 +67,7 @@ inline std::string octree_short_ray_fault() {
   std::vector<Object> boxes;
   for (int i = 0; i < 4096; ++i) {
     const Vec3d center = {double(i % 16), double(i / 16 % 16), double(i / 256)};
-    boxes.push_back(value_at<Object>(center, {0.1, 0.1, 0.1}, static_cast<uint32_t>(i + 1)));
+    boxes.push_back(value_filling<Object>(center, {0.1, 0.1, 0.1}, static_cast<uint32_t>(i + 1)));
   }
   const auto tree = Octree<Object>::build(boxes);
   const ObjectRay ray(Rayd{{0.5, 0.5, 0.5}, {1, 0.01, 0.02}});

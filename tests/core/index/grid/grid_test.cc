@@ -16,10 +16,12 @@ static_assert(MutableSpatialIndex<Grid<Object>>);
 static_assert(MutableSpatialIndex<GridOfTrees<Object>>);
 static_assert(SpatialIndex<GridOfBvhs<Object>> && !MutableSpatialIndex<GridOfBvhs<Object>>);
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kBoundless = std::numeric_limits<double>::infinity();
 constexpr GridOrder kBothOrders[] = {GridOrder::kXMajor, GridOrder::kMorton};
 
-Object box_at(Vec3d center, double half, uint32_t id) { return value_at<Object>(center, {half, half, half}, id); }
+Object crate_at(Vec3d center, double half, uint32_t id) {
+  return value_filling<Object>(center, {half, half, half}, id);
+}
 
 // Returns options for cells of 1 m between the origin and `size`.
 GridOptions unit_cells(Vec3d size, GridOrder order = GridOrder::kXMajor) {
@@ -31,7 +33,7 @@ GridOptions unit_cells(Vec3d size, GridOrder order = GridOrder::kXMajor) {
 }
 
 template <class Index>
-std::vector<Id> ids_in_box(const Index& index, Vec3d center, Vec3d half) {
+std::vector<Id> grid_ids(const Index& index, Vec3d center, Vec3d half) {
   std::vector<Object> found;
   box_overlap(index, {center, half, {}}, found);
   std::vector<Id> ids;
@@ -68,10 +70,10 @@ TEST(GridTest, AnEmptyGridAnswersNothing) {
   for (const GridOptions& options : {GridOptions(), unit_cells({4, 4, 4})}) {
     const Grid<Object> grid(options);
     EXPECT_EQ(grid.size(), 0u);
-    EXPECT_FALSE(any_ray(grid, ObjectRay(Rayd{{0, 0, 0}, {1, 0, 0}}), kInfinity));
-    EXPECT_THAT(ids_in_box(grid, {0, 0, 0}, {9, 9, 9}), ::testing::IsEmpty());
+    EXPECT_FALSE(any_ray(grid, ObjectRay(Rayd{{0, 0, 0}, {1, 0, 0}}), kBoundless));
+    EXPECT_THAT(grid_ids(grid, {0, 0, 0}, {9, 9, 9}), ::testing::IsEmpty());
     std::vector<ValueAt<Object>> nearest;
-    nearest_values(grid, {0, 0, 0}, kInfinity, 3, nearest);
+    nearest_values(grid, {0, 0, 0}, kBoundless, 3, nearest);
     EXPECT_TRUE(nearest.empty());
   }
   EXPECT_EQ(Grid<Object>::build({}).size(), 0u);
@@ -106,21 +108,22 @@ TEST(GridTest, CellsAreDoubledUntilTheyAreFewEnough) {
 TEST(GridTest, ValuesOnABorderAreFoundOnceFromAllSides) {
   for (const GridOrder order : kBothOrders) {
     const std::vector<Object> values = {
-        value_at<Object>({1, 0.5, 0.5}, {0, 0.4, 0.4}, 1),    // X, a wall on the border of two cells
-        value_at<Object>({2, 1.5, 1.5}, {0.7, 0.7, 0.7}, 2),  // Y, in several cells
-        value_at<Object>({2, 2, 2}, {}, 3),                   // at a corner of eight cells
+        value_filling<Object>({1, 0.5, 0.5}, {0, 0.4, 0.4}, 1),    // X, a wall on the border of two cells
+        value_filling<Object>({2, 1.5, 1.5}, {0.7, 0.7, 0.7}, 2),  // Y, in several cells
+        value_filling<Object>({2, 2, 2}, {}, 3),                   // at a corner of eight cells
     };
     const auto grid = Grid<Object>::build(values, unit_cells({4, 4, 4}, order));
     EXPECT_EQ(grid.shape().outside, 0u);
     EXPECT_GT(grid.shape().references, 9u);
-    EXPECT_THAT(ids_in_box(grid, {0.5, 0.5, 0.5}, {0.5, 0.2, 0.2}), ::testing::ElementsAre(1u));
-    EXPECT_THAT(ids_in_box(grid, {1.25, 0.5, 0.5}, {0.25, 0.2, 0.2}), ::testing::ElementsAre(1u));
-    EXPECT_THAT(ids_in_box(grid, {2, 2, 2}, {2, 2, 2}), ::testing::UnorderedElementsAre(1u, 2u, 3u));
+    EXPECT_THAT(grid_ids(grid, {0.5, 0.5, 0.5}, {0.5, 0.2, 0.2}), ::testing::ElementsAre(1u));
+    EXPECT_THAT(grid_ids(grid, {1.25, 0.5, 0.5}, {0.25, 0.2, 0.2}), ::testing::ElementsAre(1u));
+    EXPECT_THAT(grid_ids(grid, {2, 2, 2}, {2, 2, 2}), ::testing::UnorderedElementsAre(1u, 2u, 3u));
     for (const Vec3d side : lattice_directions())
-      EXPECT_THAT(ids_in_box(grid, Vec3d{2, 2, 2} + side * 0.5, abs(side) * 0.5), ::testing::Contains(3u));
+      EXPECT_THAT(grid_ids(grid, Vec3d{2, 2, 2} + side * 0.5, abs(side) * 0.5), ::testing::Contains(3u));
     for (const double sign : {1.0, -1.0}) {
       std::vector<RayHit<Object>> hits;
-      all_rays(grid, ObjectRay(Rayd{{2 - 9 * sign, 0.55, 0.55}, {sign, sign * 0.02, sign * 0.02}}), kInfinity, 9, hits);
+      all_rays(grid, ObjectRay(Rayd{{2 - 9 * sign, 0.55, 0.55}, {sign, sign * 0.02, sign * 0.02}}), kBoundless, 9,
+               hits);
       EXPECT_THAT(hits, ::testing::Contains(::testing::Field(&RayHit<Object>::value, values[0])));
     }
   }
@@ -132,11 +135,11 @@ TEST(GridTest, AShortRayLooksUpOnlyTheCellsNearIt) { EXPECT_EQ(grid_short_ray_fa
 
 TEST(GridTest, ARayEndsBeforeTheCellsBehindItsFirstHit) {
   std::vector<Object> values;
-  for (uint32_t i = 0; i < 64; ++i) values.push_back(box_at({i + 0.5, 0.5, 0.5}, 0.3, i + 1));
+  for (uint32_t i = 0; i < 64; ++i) values.push_back(crate_at({i + 0.5, 0.5, 0.5}, 0.3, i + 1));
   const auto grid = Grid<Object>::build(values, unit_cells({64, 1, 1}));
   for (const double sign : {1.0, -1.0}) {
     Object first;
-    double distance = kInfinity;
+    double distance = kBoundless;
     Work work;
     const ObjectRay ray(Rayd{{32 - 50 * sign, 0.5, 0.5}, {sign, 0, 0}});
     ASSERT_TRUE(first_ray(grid, ray, first, distance, &work));
@@ -148,7 +151,7 @@ TEST(GridTest, ARayEndsBeforeTheCellsBehindItsFirstHit) {
 
 TEST(GridTest, ComponentsOfMinusZeroLoseNoHit) {
   std::vector<Object> values;
-  for (uint32_t i = 0; i < 27; ++i) values.push_back(box_at({i % 3 + 0.5, i / 3 % 3 + 0.5, i / 9 + 0.5}, 0.4, i + 1));
+  for (uint32_t i = 0; i < 27; ++i) values.push_back(crate_at({i % 3 + 0.5, i / 3 % 3 + 0.5, i / 9 + 0.5}, 0.4, i + 1));
   const auto grid = Grid<Object>::build(values, unit_cells({3, 3, 3}));
   for (const double zero : {0.0, -0.0}) {
     for (int axis = 0; axis < 3; ++axis) {
@@ -167,46 +170,47 @@ TEST(GridTest, ComponentsOfMinusZeroLoseNoHit) {
 }
 
 TEST(GridTest, ARayAlongABorderFindsTheValuesOnBothSides) {
-  const std::vector<Object> values = {
-      value_at<Object>({1.5, 0.5, 0.5}, {0.5, 0.5, 0.5}, 1), value_at<Object>({1.5, 1.5, 0.5}, {0.5, 0.5, 0.5}, 2),
-      value_at<Object>({1.5, 0.5, 1.5}, {0.5, 0.5, 0.5}, 3), value_at<Object>({1.5, 1.5, 1.5}, {0.5, 0.5, 0.5}, 4)};
+  const std::vector<Object> values = {value_filling<Object>({1.5, 0.5, 0.5}, {0.5, 0.5, 0.5}, 1),
+                                      value_filling<Object>({1.5, 1.5, 0.5}, {0.5, 0.5, 0.5}, 2),
+                                      value_filling<Object>({1.5, 0.5, 1.5}, {0.5, 0.5, 0.5}, 3),
+                                      value_filling<Object>({1.5, 1.5, 1.5}, {0.5, 0.5, 0.5}, 4)};
   const auto grid = Grid<Object>::build(values, unit_cells({4, 4, 4}));
   std::vector<RayHit<Object>> hits;
-  all_rays(grid, ObjectRay(Rayd{{-3, 1, 1}, {1, 0, 0}}), kInfinity, 9, hits);
+  all_rays(grid, ObjectRay(Rayd{{-3, 1, 1}, {1, 0, 0}}), kBoundless, 9, hits);
   EXPECT_EQ(hits.size(), 4u);
 }
 
 TEST(GridTest, ValuesOutsideTheBoundsAreInOneList) {
-  auto grid = Grid<Object>::build({box_at({1, 1, 1}, 0.3, 1), box_at({-5, 1, 1}, 0.3, 2)}, unit_cells({4, 4, 4}));
-  grid.insert(box_at({1e8, -1e7, 3}, 1, 3));
-  grid.insert(box_at({4, 2, 2}, 0.1, 4));
+  auto grid = Grid<Object>::build({crate_at({1, 1, 1}, 0.3, 1), crate_at({-5, 1, 1}, 0.3, 2)}, unit_cells({4, 4, 4}));
+  grid.insert(crate_at({1e8, -1e7, 3}, 1, 3));
+  grid.insert(crate_at({4, 2, 2}, 0.1, 4));
   EXPECT_EQ(grid.shape().outside, 3u);
-  EXPECT_THAT(ids_in_box(grid, {1e8, -1e7, 3}, {2, 2, 2}), ::testing::ElementsAre(3u));
-  EXPECT_THAT(ids_in_box(grid, {4.05, 2, 2}, {0.01, 2, 2}), ::testing::ElementsAre(4u));
-  EXPECT_TRUE(any_ray(grid, ObjectRay(Rayd{{-5, 1, -9}, {0, 0, 1}}), kInfinity));
+  EXPECT_THAT(grid_ids(grid, {1e8, -1e7, 3}, {2, 2, 2}), ::testing::ElementsAre(3u));
+  EXPECT_THAT(grid_ids(grid, {4.05, 2, 2}, {0.01, 2, 2}), ::testing::ElementsAre(4u));
+  EXPECT_TRUE(any_ray(grid, ObjectRay(Rayd{{-5, 1, -9}, {0, 0, 1}}), kBoundless));
   std::vector<ValueAt<Object>> nearest;
-  nearest_values(grid, {-9, 1, 1}, kInfinity, 2, nearest);
+  nearest_values(grid, {-9, 1, 1}, kBoundless, 2, nearest);
   ASSERT_EQ(nearest.size(), 2u);
   EXPECT_EQ(nearest[0].value.id, 2u);
-  EXPECT_TRUE(grid.remove(box_at({-5, 1, 1}, 0.3, 2)));
-  EXPECT_FALSE(grid.remove(box_at({-5, 1, 1}, 0.3, 2)));
+  EXPECT_TRUE(grid.remove(crate_at({-5, 1, 1}, 0.3, 2)));
+  EXPECT_FALSE(grid.remove(crate_at({-5, 1, 1}, 0.3, 2)));
   EXPECT_EQ(grid.shape().outside, 2u);
 }
 
 TEST(GridTest, ValuesInTooManyCellsAreOutsideTheCells) {
   GridOptions options = unit_cells({8, 8, 8});
   options.max_cells_per_value = 27;
-  const auto grid = Grid<Object>::build({box_at({4.5, 4.5, 4.5}, 1, 1), box_at({4.5, 4.5, 4.5}, 2, 2)}, options);
+  const auto grid = Grid<Object>::build({crate_at({4.5, 4.5, 4.5}, 1, 1), crate_at({4.5, 4.5, 4.5}, 2, 2)}, options);
   EXPECT_EQ(grid.shape().references, 27u + 1);
   EXPECT_EQ(grid.shape().outside, 1u);
-  EXPECT_THAT(ids_in_box(grid, {4.5, 4.5, 4.5}, {0.1, 0.1, 0.1}), ::testing::UnorderedElementsAre(1u, 2u));
+  EXPECT_THAT(grid_ids(grid, {4.5, 4.5, 4.5}, {0.1, 0.1, 0.1}), ::testing::UnorderedElementsAre(1u, 2u));
 }
 
 TEST(GridTest, AHubInAWideCountryAnswersAsTheList) {
   Random random(7);
   std::vector<Object> values;
   for (uint32_t i = 0; i < 2'000; ++i)
-    values.push_back(box_at(random.vector(i % 20 == 0 ? 1e4 : 1), i % 20 == 0 ? 10 : 0.01, i + 1));
+    values.push_back(crate_at(random.vector(i % 20 == 0 ? 1e4 : 1), i % 20 == 0 ? 10 : 0.01, i + 1));
   for (const double size : {0.1, 1e3}) {
     const TestScene<Object> scene = scene_around(values, size, random);
     EXPECT_EQ(grid_difference_with<Grid<Object>>(scene, GridOptions()), "");
@@ -219,8 +223,8 @@ TEST(GridTest, ValuesOneStepApartAnswerAsTheList) {
   std::vector<Object> values;
   for (uint32_t i = 0; i < 40; i += 2) {
     const double border = i / 4;
-    values.push_back(value_at<Object>({border, 1, 1}, {}, i + 1));
-    values.push_back(value_at<Object>({std::nextafter(border, i % 4 == 0 ? 99 : -99), 1, 1}, {}, i + 2));
+    values.push_back(value_filling<Object>({border, 1, 1}, {}, i + 1));
+    values.push_back(value_filling<Object>({std::nextafter(border, i % 4 == 0 ? 99 : -99), 1, 1}, {}, i + 2));
   }
   for (const GridOrder order : kBothOrders) {
     const TestScene<Object> scene = scene_around(values, 0.5, random);
@@ -231,16 +235,16 @@ TEST(GridTest, ValuesOneStepApartAnswerAsTheList) {
 
 TEST(GridTest, AHundredThousandEqualValuesAreAnsweredInOrder) {
   std::vector<Object> boxes;
-  for (uint32_t i = 0; i < 100'000; ++i) boxes.push_back(box_at({1, 2, 3}, 0.5, i + 1));
+  for (uint32_t i = 0; i < 100'000; ++i) boxes.push_back(crate_at({1, 2, 3}, 0.5, i + 1));
   const auto grid = Grid<Object>::build(boxes);
   EXPECT_LE(grid.shape().references, 8 * boxes.size());
   Object first;
-  double distance = kInfinity;
+  double distance = kBoundless;
   ASSERT_TRUE(first_ray(grid, ObjectRay(Rayd{{1, 2, -9}, {0, 0, 1}}), first, distance));
   EXPECT_EQ(first.id, 1u);
-  EXPECT_EQ(ids_in_box(grid, {1, 2, 3}, {0.1, 0.1, 0.1}).size(), boxes.size());
+  EXPECT_EQ(grid_ids(grid, {1, 2, 3}, {0.1, 0.1, 0.1}).size(), boxes.size());
   std::vector<ValueAt<Object>> nearest;
-  nearest_values(grid, {9, 9, 9}, kInfinity, 2, nearest);
+  nearest_values(grid, {9, 9, 9}, kBoundless, 2, nearest);
   ASSERT_EQ(nearest.size(), 2u);
   EXPECT_EQ(nearest[1].value.id, 2u);
 }
@@ -263,7 +267,7 @@ TEST(GridTest, TenThousandRandomInsertsAndRemovesLeaveNoGhost) {
 TEST(GridTest, ATicksGridIsAllocatedInItsArena) {
   std::vector<Object> values;
   for (uint32_t i = 0; i < 1'000; ++i)
-    values.push_back(box_at({i % 10 + 0.5, i / 10 % 10 + 0.5, i / 100 + 0.5}, 0.6, i + 1));
+    values.push_back(crate_at({i % 10 + 0.5, i / 10 % 10 + 0.5, i / 100 + 0.5}, 0.6, i + 1));
   for (int tick = 0; tick < 3; ++tick) {
     std::pmr::monotonic_buffer_resource arena(size_t{1} << 20, std::pmr::new_delete_resource());
     GridOptions options = unit_cells({10, 10, 10});
@@ -274,16 +278,16 @@ TEST(GridTest, ATicksGridIsAllocatedInItsArena) {
     const auto again = Grid<Object>::build(values, options);
     std::pmr::set_default_resource(usual);
     EXPECT_EQ(again.size(), values.size());
-    EXPECT_EQ(ids_in_box(again, {5, 5, 5}, {0.2, 0.2, 0.2}).size(), 8u);
-    EXPECT_EQ(ids_in_box(grid, {5, 5, 5}, {0.2, 0.2, 0.2}).size(), 8u);
+    EXPECT_EQ(grid_ids(again, {5, 5, 5}, {0.2, 0.2, 0.2}).size(), 8u);
+    EXPECT_EQ(grid_ids(grid, {5, 5, 5}, {0.2, 0.2, 0.2}).size(), 8u);
   }
 }
 
 TEST(GridTest, AVisitEndsWhenTheVisitorHasEnough) {
   const auto grid = Grid<Object>::build(
-      {box_at({1, 1, 1}, 0.6, 1), box_at({1, 1, 1}, 0.6, 2), box_at({-9, 1, 1}, 1, 3)}, unit_cells({4, 4, 4}));
+      {crate_at({1, 1, 1}, 0.6, 1), crate_at({1, 1, 1}, 0.6, 2), crate_at({-9, 1, 1}, 1, 3)}, unit_cells({4, 4, 4}));
   Work work;
-  EXPECT_TRUE(any_ray(grid, ObjectRay(Rayd{{-2, 1, 1}, {1, 0, 0}}), kInfinity, &work));
+  EXPECT_TRUE(any_ray(grid, ObjectRay(Rayd{{-2, 1, 1}, {1, 0, 0}}), kBoundless, &work));
   EXPECT_EQ(work.tests, 1u);
 }
 

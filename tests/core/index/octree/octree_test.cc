@@ -12,21 +12,21 @@ namespace {
 static_assert(MutableSpatialIndex<Octree<Triangle>>);
 static_assert(MutableSpatialIndex<Octree<Object>>);
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kEndless = std::numeric_limits<double>::infinity();
 constexpr CutValues kBothPlaces[] = {CutValues::kInLeaves, CutValues::kAtNode};
 
-Object box_at(Vec3d center, double half, uint32_t id) { return value_at<Object>(center, {half, half, half}, id); }
+Object cube_at(Vec3d center, double half, uint32_t id) { return value_filling<Object>(center, {half, half, half}, id); }
 
 std::vector<Object> cubes_on_a_lattice(int side, double half) {
   std::vector<Object> cubes;
   for (int i = 0; i < side * side * side; ++i) {
     const Vec3d center = {double(i % side), double(i / side % side), double(i / (side * side))};
-    cubes.push_back(box_at(center, half, static_cast<uint32_t>(i + 1)));
+    cubes.push_back(cube_at(center, half, static_cast<uint32_t>(i + 1)));
   }
   return cubes;
 }
 
-std::vector<Id> ids_of(const std::vector<Object>& objects) {
+std::vector<Id> octree_ids(const std::vector<Object>& objects) {
   std::vector<Id> ids;
   for (const Object& object : objects) ids.push_back(object.id);
   return ids;
@@ -41,12 +41,12 @@ TEST(OctreeTest, AnEmptyTreeAnswersNothing) {
     const Octree<Object> tree(octree_options(7, cut));
     EXPECT_EQ(tree.size(), 0u);
     EXPECT_TRUE(tree.bounds().empty());
-    EXPECT_FALSE(any_ray(tree, ObjectRay(Rayd{{0, 0, 0}, {1, 0, 0}}), kInfinity));
+    EXPECT_FALSE(any_ray(tree, ObjectRay(Rayd{{0, 0, 0}, {1, 0, 0}}), kEndless));
     std::vector<Object> found;
     ball_overlap(tree, {{0, 0, 0}, 1e9}, found);
     EXPECT_TRUE(found.empty());
     std::vector<ValueAt<Object>> nearest;
-    nearest_values(tree, {0, 0, 0}, kInfinity, 3, nearest);
+    nearest_values(tree, {0, 0, 0}, kEndless, 3, nearest);
     EXPECT_TRUE(nearest.empty());
   }
 }
@@ -67,7 +67,7 @@ TEST(OctreeTest, ValuesThatAPlaneCutsLieInAllPartsOrAtTheNode) {
   OctreeOptions options;
   options.max_depth = 1;
   std::vector<Object> cubes = cubes_on_a_lattice(4, 0.1);
-  cubes.push_back(box_at({1.5, 1.5, 1.5}, 0.1, 65));
+  cubes.push_back(cube_at({1.5, 1.5, 1.5}, 0.1, 65));
   const auto in_leaves = Octree<Object>::build(cubes, options);
   EXPECT_EQ(in_leaves.shape().references, 64u + 8);
   options.cut = CutValues::kAtNode;
@@ -77,10 +77,10 @@ TEST(OctreeTest, ValuesThatAPlaneCutsLieInAllPartsOrAtTheNode) {
 
 TEST(OctreeTest, AValueOnAPlaneIsFoundFromBothSides) {
   for (const CutValues cut : kBothPlaces) {
-    std::vector<Object> points = {value_at<Object>({-4, -4, -4}, {}, 1), value_at<Object>({4, 4, 4}, {}, 2)};
+    std::vector<Object> points = {value_filling<Object>({-4, -4, -4}, {}, 1), value_filling<Object>({4, 4, 4}, {}, 2)};
     for (uint32_t id = 3; id < 30; ++id)
       points.push_back(
-          value_at<Object>(to_double(to_float(Vec3d{id % 3 - 1.0, id / 3 % 3 - 1.0, id / 9 - 2.0})), {}, id));
+          value_filling<Object>(to_double(to_float(Vec3d{id % 3 - 1.0, id / 3 % 3 - 1.0, id / 9 - 2.0})), {}, id));
     const auto tree = Octree<Object>::build(points, octree_options(7, cut));
     ASSERT_GT(tree.shape().depth, 0u);
     for (const Object& point : points) {
@@ -88,7 +88,7 @@ TEST(OctreeTest, AValueOnAPlaneIsFoundFromBothSides) {
         std::vector<Object> found;
         const Vec3d half = abs(side) * 0.5;
         box_overlap(tree, {point.shape.position + side * 0.5, half, {}}, found);
-        EXPECT_THAT(ids_of(found), ::testing::Contains(point.id));
+        EXPECT_THAT(octree_ids(found), ::testing::Contains(point.id));
       }
     }
   }
@@ -96,7 +96,8 @@ TEST(OctreeTest, AValueOnAPlaneIsFoundFromBothSides) {
 
 TEST(OctreeTest, TwoValuesOneStepApartAreSeparated) {
   const double next = std::nextafter(1.0, 2.0);
-  const std::vector<Object> points = {value_at<Object>({1, 1, 1}, {}, 1), value_at<Object>({next, 1, 1}, {}, 2)};
+  const std::vector<Object> points = {value_filling<Object>({1, 1, 1}, {}, 1),
+                                      value_filling<Object>({next, 1, 1}, {}, 2)};
   for (const CutValues cut : kBothPlaces) {
     OctreeOptions options = octree_options(1, cut);
     options.leaf_size = 1;
@@ -105,7 +106,7 @@ TEST(OctreeTest, TwoValuesOneStepApartAreSeparated) {
     for (const Object& point : points) {
       std::vector<Object> found;
       ball_overlap(tree, {point.shape.position, 0}, found);
-      EXPECT_THAT(ids_of(found), ::testing::ElementsAre(point.id));
+      EXPECT_THAT(octree_ids(found), ::testing::ElementsAre(point.id));
     }
   }
 }
@@ -113,12 +114,12 @@ TEST(OctreeTest, TwoValuesOneStepApartAreSeparated) {
 TEST(OctreeTest, AHundredThousandEqualValuesLieInOneLeaf) {
   for (const CutValues cut : kBothPlaces) {
     std::vector<Object> boxes;
-    for (uint32_t i = 0; i < 100'000; ++i) boxes.push_back(box_at({1, 2, 3}, 0.5, i + 1));
+    for (uint32_t i = 0; i < 100'000; ++i) boxes.push_back(cube_at({1, 2, 3}, 0.5, i + 1));
     const auto tree = Octree<Object>::build(boxes, octree_options(7, cut));
     EXPECT_EQ(tree.shape().nodes, 1u);
     EXPECT_EQ(tree.shape().references, boxes.size());
     Object first;
-    double distance = kInfinity;
+    double distance = kEndless;
     ASSERT_TRUE(first_ray(tree, ObjectRay(Rayd{{1, 2, -9}, {0, 0, 1}}), first, distance));
     EXPECT_EQ(first.id, 1u);
   }
@@ -129,7 +130,7 @@ TEST(OctreeTest, AHubInAWideCountryIsDividedAsWell) {
   TestScene<Object> scene;
   for (uint32_t i = 0; i < 2'000; ++i) {
     const bool far = i % 20 == 0;
-    scene.values.push_back(box_at(random.vector(far ? 1e6 : 1), far ? 100 : 0.01, i + 1));
+    scene.values.push_back(cube_at(random.vector(far ? 1e6 : 1), far ? 100 : 0.01, i + 1));
   }
   SceneSketch sketch{"hub and country", {}, {}, {}, {}};
   for (const Object& object : scene.values) sketch.placements.push_back({object.shape.position, {}, {}});
@@ -152,7 +153,7 @@ TEST(OctreeTest, NodesAndReferencesAndDepthStayWithinTheirLimits) {
   for (const double size : {0.01, 0.5, 4.0}) {
     for (const CutValues cut : kBothPlaces) {
       std::vector<Object> boxes;
-      for (uint32_t i = 0; i < 3'000; ++i) boxes.push_back(box_at(random.vector(i % 2 == 0 ? 1 : 100), size, i + 1));
+      for (uint32_t i = 0; i < 3'000; ++i) boxes.push_back(cube_at(random.vector(i % 2 == 0 ? 1 : 100), size, i + 1));
       OctreeOptions options = octree_options(7, cut);
       for (const uint32_t depth : {0u, 3u, 32u, limits::kMaxOctreeDepth}) {
         options.max_depth = depth;
@@ -165,13 +166,13 @@ TEST(OctreeTest, NodesAndReferencesAndDepthStayWithinTheirLimits) {
 TEST(OctreeTest, ValuesFarOutsideTheFirstBoundsAreFound) {
   for (const CutValues cut : kBothPlaces) {
     auto tree = Octree<Object>::build(cubes_on_a_lattice(3, 0.1), octree_options(7, cut));
-    tree.insert(box_at({1e8, -1e7, 3}, 1, 100));
+    tree.insert(cube_at({1e8, -1e7, 3}, 1, 100));
     std::vector<Object> found;
     ball_overlap(tree, {{1e8, -1e7, 3}, 1}, found);
-    EXPECT_THAT(ids_of(found), ::testing::ElementsAre(100u));
-    EXPECT_TRUE(any_ray(tree, ObjectRay(Rayd{{1e8, -1e7, -1e6}, {0, 0, 1}}), kInfinity));
+    EXPECT_THAT(octree_ids(found), ::testing::ElementsAre(100u));
+    EXPECT_TRUE(any_ray(tree, ObjectRay(Rayd{{1e8, -1e7, -1e6}, {0, 0, 1}}), kEndless));
     std::vector<ValueAt<Object>> nearest;
-    nearest_values(tree, {2e8, 0, 0}, kInfinity, 1, nearest);
+    nearest_values(tree, {2e8, 0, 0}, kEndless, 1, nearest);
     ASSERT_EQ(nearest.size(), 1u);
     EXPECT_EQ(nearest[0].value.id, 100u);
   }
@@ -210,7 +211,7 @@ TEST(OctreeTest, AFirstHitEndsTheVisitOfPartsBehindIt) {
   const auto tree = Octree<Object>::build(cubes_on_a_lattice(16, 0.1));
   for (const double x : {-50.0, 50.0}) {
     Object first;
-    double distance = kInfinity;
+    double distance = kEndless;
     Work work;
     ASSERT_TRUE(first_ray(tree, ObjectRay(Rayd{{x, 5, 5}, {-x, 0, 0}}), first, distance, &work));
     EXPECT_EQ(first.shape.position.x, x < 0 ? 0 : 15);
@@ -238,7 +239,7 @@ TEST(OctreeTest, ComponentsOfMinusZeroLoseNoHit) {
 TEST(OctreeTest, AVisitEndsWhenTheVisitorHasEnough) {
   const auto tree = Octree<Object>::build(cubes_on_a_lattice(4, 0.6));
   Work work;
-  EXPECT_TRUE(any_ray(tree, ObjectRay(Rayd{{-9, 1, 1}, {1, 0, 0}}), kInfinity, &work));
+  EXPECT_TRUE(any_ray(tree, ObjectRay(Rayd{{-9, 1, 1}, {1, 0, 0}}), kEndless, &work));
   EXPECT_EQ(work.tests, 1u);
 }
 
