@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -34,6 +35,7 @@ class NearestVisitor {
     distance_ = *t;
     limit_ = ray_.to_scaled(*t);
     best_ = value;
+    best_id_ = Traits::id(value);
     return true;
   }
 
@@ -44,13 +46,14 @@ class NearestVisitor {
 
  private:
   bool wins(S t, const V& value) const {
-    return t < distance_ || (t == distance_ && best_ && Traits::id(value) < Traits::id(*best_));
+    return t < distance_ || (t == distance_ && best_ && Traits::id(value) < best_id_);
   }
 
   const typename Traits::RayQuery& ray_;
   S distance_;
   S limit_;
   std::optional<V> best_;
+  uint64_t best_id_ = 0;  // id of best_; GCC warns that the id in the optional may be uninitialised
 };
 
 // Collector that checks for any hit at a distance strictly less than `distance`. Ends the visit at the first hit found.
