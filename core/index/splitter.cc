@@ -12,7 +12,7 @@ namespace {
 using limits::kMaxBvhBins;
 
 // Maximum number of references in a range that is sorted instead of binned.
-constexpr size_t kMaxSorted = 32;
+constexpr size_t kMaxOrdered = 32;
 // Number of references processed between two checks of the cancel flag.
 constexpr size_t kReferencesBetweenChecks = 1u << 16;
 // Cost of a reference relative to the cost of a block. This cost distinguishes cuts whose parts need equally many
@@ -102,7 +102,7 @@ void find_cheapest_cut(const Bins<S>& bins, size_t axis, uint32_t bin_count, uin
   }
 }
 
-// Orders of up to kMaxSorted references by their centres, one order for each axis. References with equal centres keep
+// Orders of up to kMaxOrdered references by their centres, one order for each axis. References with equal centres keep
 // their relative order.
 template <class S>
 class Orders {
@@ -110,8 +110,8 @@ class Orders {
   // Computes the rank of each reference on each axis, which is the number of references before it in sorted order. All
   // pairs of references are compared, on all axes together and without a branch.
   explicit Orders(BoxReferences<S> references) {
-    LOCUS_DCHECK_LE(references.size(), kMaxSorted);
-    std::array<Quad<S>, kMaxSorted> centers, ranks;
+    LOCUS_DCHECK_LE(references.size(), kMaxOrdered);
+    std::array<Quad<S>, kMaxOrdered> centers, ranks;
     for (size_t i = 0; i < references.size(); ++i) {
       const Quad<S> center = references[i].center();
       Quad<S> rank = Quad<S>::splat(0);
@@ -132,13 +132,13 @@ class Orders {
   size_t at(size_t axis, size_t rank) const { return order_[axis][rank]; }
 
   void apply(size_t axis, BoxReferences<S> references) const {
-    std::array<BoxReference<S>, kMaxSorted> ordered;
+    std::array<BoxReference<S>, kMaxOrdered> ordered;
     for (size_t i = 0; i < references.size(); ++i) ordered[i] = references[at(axis, i)];
     std::copy_n(ordered.begin(), references.size(), references.begin());
   }
 
  private:
-  std::array<std::array<uint8_t, kMaxSorted>, 3> order_;
+  std::array<std::array<uint8_t, kMaxOrdered>, 3> order_;
 };
 
 // Sweeps the references, sorted along one axis, from both sides. Replaces `best` by the cheapest cut if this cut costs
@@ -147,7 +147,7 @@ class Orders {
 template <class S>
 void find_cheapest_cut(BoxReferences<S> references, const Orders<S>& orders, size_t axis, Split<S>& best) {
   const size_t count = references.size();
-  std::array<S, kMaxSorted> right_cost;
+  std::array<S, kMaxOrdered> right_cost;
   QuadBox<S> sum = QuadBox<S>::empty();
   for (size_t i = count - 1; i > 0; --i) {
     sum.add(references[orders.at(axis, i)].box());
@@ -279,7 +279,7 @@ Halves<S> Splitter<S>::split(BoxReferences<S> references, const Extent<S>& exten
   const auto count = static_cast<uint32_t>(references.size());
   LOCUS_DCHECK_LT(kBvhLeafSize, count);
   LOCUS_DCHECK_LE(balanced_levels(count), levels + 1);
-  Halves<S> halves = count <= kMaxSorted ? split_sorted(references) : split_binned(references, extent, options_);
+  Halves<S> halves = count <= kMaxOrdered ? split_sorted(references) : split_binned(references, extent, options_);
   const bool found = halves.left_count != 0;
   if (!found || balanced_levels(std::max(halves.left_count, count - halves.left_count)) > levels)
     halves = halve(references, extent.centers);

@@ -13,7 +13,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::UnorderedElementsAre;
 
-constexpr double kEndless = std::numeric_limits<double>::infinity();
+constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 
 ObjectRay along_x() { return ObjectRay(Rayd{{0, 0, 0}, {1, 0, 0}}); }
 
@@ -25,13 +25,13 @@ class IndexQueriesTest : public ::testing::Test {
 };
 TYPED_TEST_SUITE(IndexQueriesTest, TypesOf<ObjectStructures>);
 
-std::vector<Id> found_ids(const std::vector<Object>& objects) {
+std::vector<Id> ids_found(const std::vector<Object>& objects) {
   std::vector<Id> ids;
   for (const Object& object : objects) ids.push_back(object.id);
   return ids;
 }
 
-std::vector<Id> found_ids(const std::vector<RayHit<Object>>& hits) {
+std::vector<Id> ids_found(const std::vector<RayHit<Object>>& hits) {
   std::vector<Id> ids;
   for (const RayHit<Object>& hit : hits) ids.push_back(hit.value.id);
   return ids;
@@ -69,7 +69,7 @@ TYPED_TEST(IndexQueriesTest, FirstRayWithAHitAtOrBeyondTheDistanceChangesNeither
 TYPED_TEST(IndexQueriesTest, FirstRayAcceptsAHitJustBeforeTheDistance) {
   const auto index = this->make({ball_object(1, {10, 0, 0})});
   Object value;
-  double distance = std::nextafter(9.0, kEndless);
+  double distance = std::nextafter(9.0, kUnlimited);
   EXPECT_TRUE(first_ray(index, along_x(), value, distance));
   EXPECT_EQ(distance, 9);
 }
@@ -79,7 +79,7 @@ TYPED_TEST(IndexQueriesTest, TheLowerIdWinsATie) {
   for (const Id id : {40, 12, 7, 33, 21, 8, 9, 10, 11, 13, 14, 15}) objects.push_back(ball_object(id, {10, 0, 0}));
   const auto index = this->make(objects);
   Object value;
-  double distance = kEndless;
+  double distance = kUnlimited;
   EXPECT_TRUE(first_ray(index, along_x(), value, distance));
   EXPECT_EQ(value.id, 7u);
 }
@@ -87,16 +87,16 @@ TYPED_TEST(IndexQueriesTest, TheLowerIdWinsATie) {
 TYPED_TEST(IndexQueriesTest, AnyRayIsStrictAtTheDistance) {
   const auto index = this->make({ball_object(1, {10, 0, 0}), ball_object(2, {50, 0, 0})});
   EXPECT_FALSE(any_ray(index, along_x(), 9));
-  EXPECT_TRUE(any_ray(index, along_x(), std::nextafter(9.0, kEndless)));
-  EXPECT_FALSE(any_ray(this->make({}), along_x(), kEndless));
+  EXPECT_TRUE(any_ray(index, along_x(), std::nextafter(9.0, kUnlimited)));
+  EXPECT_FALSE(any_ray(this->make({}), along_x(), kUnlimited));
 }
 
 TYPED_TEST(IndexQueriesTest, AllRaysSortByDistanceThenId) {
   const auto index = this->make({ball_object(9, {30, 0, 0}), ball_object(2, {10, 0, 0}), ball_object(5, {20, 0, 0}),
                                  ball_object(1, {30, 0, 0}), ball_object(8, {10, 0, 0})});
   std::vector<RayHit<Object>> hits;
-  all_rays(index, along_x(), kEndless, 100, hits);
-  EXPECT_THAT(found_ids(hits), ElementsAre(2, 8, 5, 1, 9));
+  all_rays(index, along_x(), kUnlimited, 100, hits);
+  EXPECT_THAT(ids_found(hits), ElementsAre(2, 8, 5, 1, 9));
   EXPECT_EQ(hits[2].distance, 19);
 }
 
@@ -105,9 +105,9 @@ TYPED_TEST(IndexQueriesTest, AllRaysReturnTheNearestHits) {
                                  ball_object(1, {30, 0, 0}), ball_object(8, {10, 0, 0})});
   for (size_t max_hits = 0; max_hits <= 5; ++max_hits) {
     std::vector<RayHit<Object>> hits;
-    all_rays(index, along_x(), kEndless, max_hits, hits);
+    all_rays(index, along_x(), kUnlimited, max_hits, hits);
     const std::vector<Id> expected = {2, 8, 5, 1, 9};
-    EXPECT_EQ(found_ids(hits), std::vector<Id>(expected.begin(), expected.begin() + static_cast<ptrdiff_t>(max_hits)));
+    EXPECT_EQ(ids_found(hits), std::vector<Id>(expected.begin(), expected.begin() + static_cast<ptrdiff_t>(max_hits)));
   }
 }
 
@@ -115,7 +115,7 @@ TYPED_TEST(IndexQueriesTest, AllRaysAreStrictAtTheDistance) {
   const auto index = this->make({ball_object(1, {10, 0, 0}), ball_object(2, {20, 0, 0})});
   std::vector<RayHit<Object>> hits;
   all_rays(index, along_x(), 19, 100, hits);
-  EXPECT_THAT(found_ids(hits), ElementsAre(1));
+  EXPECT_THAT(ids_found(hits), ElementsAre(1));
 }
 
 TYPED_TEST(IndexQueriesTest, ResultsAreAppendedAndNeverOverwritten) {
@@ -123,10 +123,10 @@ TYPED_TEST(IndexQueriesTest, ResultsAreAppendedAndNeverOverwritten) {
   // The given vector contains a hit that is farther than every hit of the ray, so that a sort of the whole vector would
   // move it.
   std::vector<RayHit<Object>> hits = {{1e9, ball_object(77, {0, 0, 0})}};
-  all_rays(index, along_x(), kEndless, 1, hits);
-  EXPECT_THAT(found_ids(hits), ElementsAre(77, 1));
-  all_rays(index, along_x(), kEndless, 2, hits);
-  EXPECT_THAT(found_ids(hits), ElementsAre(77, 1, 1, 2));
+  all_rays(index, along_x(), kUnlimited, 1, hits);
+  EXPECT_THAT(ids_found(hits), ElementsAre(77, 1));
+  all_rays(index, along_x(), kUnlimited, 2, hits);
+  EXPECT_THAT(ids_found(hits), ElementsAre(77, 1, 1, 2));
 
   std::vector<Object> values = {ball_object(77, {0, 0, 0})};
   ball_overlap(index, {{10, 0, 0}, 1}, values);
@@ -134,7 +134,7 @@ TYPED_TEST(IndexQueriesTest, ResultsAreAppendedAndNeverOverwritten) {
   conservative_ball(index, {{10, 0, 0}, 1}, values);
   conservative_box(index, {{20, 0, 0}, {1, 1, 1}, {}}, values);
   conservative_ray(index, along_x(), 15, values);
-  EXPECT_THAT(found_ids(values), ElementsAre(77, 1, 2, 1, 2, 1));
+  EXPECT_THAT(ids_found(values), ElementsAre(77, 1, 2, 1, 2, 1));
 }
 
 TYPED_TEST(IndexQueriesTest, TouchingCountsAsOverlap) {
@@ -142,11 +142,11 @@ TYPED_TEST(IndexQueriesTest, TouchingCountsAsOverlap) {
   std::vector<Object> values;
   ball_overlap(index, {{13, 0, 0}, 2}, values);
   box_overlap(index, {{7, 0, 0}, {2, 0, 0}, {}}, values);
-  EXPECT_THAT(found_ids(values), ElementsAre(1, 1));
+  EXPECT_THAT(ids_found(values), ElementsAre(1, 1));
   values.clear();
   ball_overlap(index, {{13, 0, 0}, 1.999}, values);
   box_overlap(index, {{7, 0, 0}, {1.999, 0, 0}, {}}, values);
-  EXPECT_THAT(found_ids(values), ElementsAre());
+  EXPECT_THAT(ids_found(values), ElementsAre());
 }
 
 TYPED_TEST(IndexQueriesTest, ConservativeQueriesDecideByBounds) {
@@ -159,13 +159,13 @@ TYPED_TEST(IndexQueriesTest, ConservativeQueriesDecideByBounds) {
   std::vector<RayHit<Object>> hits;
   ball_overlap(index, ball, exact);
   box_overlap(index, box, exact);
-  all_rays(index, ray, kEndless, 9, hits);
+  all_rays(index, ray, kUnlimited, 9, hits);
   EXPECT_TRUE(exact.empty());
   EXPECT_TRUE(hits.empty());
   conservative_ball(index, ball, conservative);
   conservative_box(index, box, conservative);
-  conservative_ray(index, ray, kEndless, conservative);
-  EXPECT_THAT(found_ids(conservative), ElementsAre(1, 1, 1));
+  conservative_ray(index, ray, kUnlimited, conservative);
+  EXPECT_THAT(ids_found(conservative), ElementsAre(1, 1, 1));
 }
 
 TYPED_TEST(IndexQueriesTest, WorkIsAddedToTheCallersCounter) {
@@ -173,7 +173,7 @@ TYPED_TEST(IndexQueriesTest, WorkIsAddedToTheCallersCounter) {
   Work work;
   work.tests = 100;
   std::vector<RayHit<Object>> hits;
-  all_rays(index, along_x(), kEndless, 9, hits, &work);
+  all_rays(index, along_x(), kUnlimited, 9, hits, &work);
   EXPECT_EQ(work.tests, 102u);
   std::vector<Object> values;
   ball_overlap(index, {{0, 0, 0}, 100}, values, &work);
@@ -186,14 +186,14 @@ TYPED_TEST(IndexQueriesTest, TheNearerHitOfASecondIndexIsNotSkippedAfterAHitInTh
   const auto statics = this->make({ball_object(1, {50, 0, 0})});
   const auto dynamics = this->make({ball_object(2, {10, 0, 0})});
   Object joined;
-  double joined_distance = kEndless;
+  double joined_distance = kUnlimited;
   const bool hit =
       first_ray(statics, along_x(), joined, joined_distance) || first_ray(dynamics, along_x(), joined, joined_distance);
   ASSERT_TRUE(hit);
   ASSERT_EQ(joined.id, 1u) << "joined calls no longer skip the second index";
 
   Object value;
-  double distance = kEndless;
+  double distance = kUnlimited;
   EXPECT_TRUE(first_ray_of(along_x(), value, distance, nullptr, statics, dynamics));
   EXPECT_EQ(value.id, 2u);
   EXPECT_EQ(distance, 9);
@@ -206,7 +206,7 @@ TYPED_TEST(IndexQueriesTest, FirstRayOfSeveralIndicesDoesNotDependOnTheirOrder) 
   const auto none = this->make({});
   const auto check = [](const auto&... indices) {
     Object value;
-    double distance = kEndless;
+    double distance = kUnlimited;
     EXPECT_TRUE(first_ray_of(along_x(), value, distance, nullptr, indices...));
     EXPECT_EQ(value.id, 2u);
     EXPECT_EQ(distance, 9);
@@ -221,10 +221,10 @@ TEST(IndexQueriesOfTwoStructuresTest, FirstRayOfAListAndATreeReturnsTheNearerHit
   list.insert(ball_object(5, {10, 0, 0}));
   const Bvh<Object> tree = *Bvh<Object>::build({ball_object(4, {10, 0, 0}), ball_object(6, {9, 0, 0})});
   Object value;
-  double distance = kEndless;
+  double distance = kUnlimited;
   EXPECT_TRUE(first_ray_of(along_x(), value, distance, nullptr, list, tree));
   EXPECT_EQ(value.id, 6u);
-  distance = kEndless;
+  distance = kUnlimited;
   const Bvh<Object> tied = *Bvh<Object>::build({ball_object(4, {10, 0, 0}), ball_object(6, {10, 0, 0})});
   EXPECT_TRUE(first_ray_of(along_x(), value, distance, nullptr, list, tied));
   EXPECT_EQ(value.id, 4u);
