@@ -13,7 +13,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::UnorderedElementsAre;
 
-constexpr double kUnlimited = std::numeric_limits<double>::infinity();
+constexpr double kNoEnd = std::numeric_limits<double>::infinity();
 
 ObjectRay along_x() { return ObjectRay(Rayd{{0, 0, 0}, {1, 0, 0}}); }
 
@@ -69,7 +69,7 @@ TYPED_TEST(IndexQueriesTest, FirstRayWithAHitAtOrBeyondTheDistanceChangesNeither
 TYPED_TEST(IndexQueriesTest, FirstRayAcceptsAHitJustBeforeTheDistance) {
   const auto index = this->make({ball_object(1, {10, 0, 0})});
   Object value;
-  double distance = std::nextafter(9.0, kUnlimited);
+  double distance = std::nextafter(9.0, kNoEnd);
   EXPECT_TRUE(first_ray(index, along_x(), value, distance));
   EXPECT_EQ(distance, 9);
 }
@@ -79,7 +79,7 @@ TYPED_TEST(IndexQueriesTest, TheLowerIdWinsATie) {
   for (const Id id : {40, 12, 7, 33, 21, 8, 9, 10, 11, 13, 14, 15}) objects.push_back(ball_object(id, {10, 0, 0}));
   const auto index = this->make(objects);
   Object value;
-  double distance = kUnlimited;
+  double distance = kNoEnd;
   EXPECT_TRUE(first_ray(index, along_x(), value, distance));
   EXPECT_EQ(value.id, 7u);
 }
@@ -87,15 +87,15 @@ TYPED_TEST(IndexQueriesTest, TheLowerIdWinsATie) {
 TYPED_TEST(IndexQueriesTest, AnyRayIsStrictAtTheDistance) {
   const auto index = this->make({ball_object(1, {10, 0, 0}), ball_object(2, {50, 0, 0})});
   EXPECT_FALSE(any_ray(index, along_x(), 9));
-  EXPECT_TRUE(any_ray(index, along_x(), std::nextafter(9.0, kUnlimited)));
-  EXPECT_FALSE(any_ray(this->make({}), along_x(), kUnlimited));
+  EXPECT_TRUE(any_ray(index, along_x(), std::nextafter(9.0, kNoEnd)));
+  EXPECT_FALSE(any_ray(this->make({}), along_x(), kNoEnd));
 }
 
 TYPED_TEST(IndexQueriesTest, AllRaysSortByDistanceThenId) {
   const auto index = this->make({ball_object(9, {30, 0, 0}), ball_object(2, {10, 0, 0}), ball_object(5, {20, 0, 0}),
                                  ball_object(1, {30, 0, 0}), ball_object(8, {10, 0, 0})});
   std::vector<RayHit<Object>> hits;
-  all_rays(index, along_x(), kUnlimited, 100, hits);
+  all_rays(index, along_x(), kNoEnd, 100, hits);
   EXPECT_THAT(ids_found(hits), ElementsAre(2, 8, 5, 1, 9));
   EXPECT_EQ(hits[2].distance, 19);
 }
@@ -105,7 +105,7 @@ TYPED_TEST(IndexQueriesTest, AllRaysReturnTheNearestHits) {
                                  ball_object(1, {30, 0, 0}), ball_object(8, {10, 0, 0})});
   for (size_t max_hits = 0; max_hits <= 5; ++max_hits) {
     std::vector<RayHit<Object>> hits;
-    all_rays(index, along_x(), kUnlimited, max_hits, hits);
+    all_rays(index, along_x(), kNoEnd, max_hits, hits);
     const std::vector<Id> expected = {2, 8, 5, 1, 9};
     EXPECT_EQ(ids_found(hits), std::vector<Id>(expected.begin(), expected.begin() + static_cast<ptrdiff_t>(max_hits)));
   }
@@ -123,9 +123,9 @@ TYPED_TEST(IndexQueriesTest, ResultsAreAppendedAndNeverOverwritten) {
   // The given vector contains a hit that is farther than every hit of the ray, so that a sort of the whole vector would
   // move it.
   std::vector<RayHit<Object>> hits = {{1e9, ball_object(77, {0, 0, 0})}};
-  all_rays(index, along_x(), kUnlimited, 1, hits);
+  all_rays(index, along_x(), kNoEnd, 1, hits);
   EXPECT_THAT(ids_found(hits), ElementsAre(77, 1));
-  all_rays(index, along_x(), kUnlimited, 2, hits);
+  all_rays(index, along_x(), kNoEnd, 2, hits);
   EXPECT_THAT(ids_found(hits), ElementsAre(77, 1, 1, 2));
 
   std::vector<Object> values = {ball_object(77, {0, 0, 0})};
@@ -159,12 +159,12 @@ TYPED_TEST(IndexQueriesTest, ConservativeQueriesDecideByBounds) {
   std::vector<RayHit<Object>> hits;
   ball_overlap(index, ball, exact);
   box_overlap(index, box, exact);
-  all_rays(index, ray, kUnlimited, 9, hits);
+  all_rays(index, ray, kNoEnd, 9, hits);
   EXPECT_TRUE(exact.empty());
   EXPECT_TRUE(hits.empty());
   conservative_ball(index, ball, conservative);
   conservative_box(index, box, conservative);
-  conservative_ray(index, ray, kUnlimited, conservative);
+  conservative_ray(index, ray, kNoEnd, conservative);
   EXPECT_THAT(ids_found(conservative), ElementsAre(1, 1, 1));
 }
 
@@ -173,7 +173,7 @@ TYPED_TEST(IndexQueriesTest, WorkIsAddedToTheCallersCounter) {
   Work work;
   work.tests = 100;
   std::vector<RayHit<Object>> hits;
-  all_rays(index, along_x(), kUnlimited, 9, hits, &work);
+  all_rays(index, along_x(), kNoEnd, 9, hits, &work);
   EXPECT_EQ(work.tests, 102u);
   std::vector<Object> values;
   ball_overlap(index, {{0, 0, 0}, 100}, values, &work);
@@ -186,14 +186,14 @@ TYPED_TEST(IndexQueriesTest, TheNearerHitOfASecondIndexIsNotSkippedAfterAHitInTh
   const auto statics = this->make({ball_object(1, {50, 0, 0})});
   const auto dynamics = this->make({ball_object(2, {10, 0, 0})});
   Object joined;
-  double joined_distance = kUnlimited;
+  double joined_distance = kNoEnd;
   const bool hit =
       first_ray(statics, along_x(), joined, joined_distance) || first_ray(dynamics, along_x(), joined, joined_distance);
   ASSERT_TRUE(hit);
   ASSERT_EQ(joined.id, 1u) << "joined calls no longer skip the second index";
 
   Object value;
-  double distance = kUnlimited;
+  double distance = kNoEnd;
   EXPECT_TRUE(first_ray_of(along_x(), value, distance, nullptr, statics, dynamics));
   EXPECT_EQ(value.id, 2u);
   EXPECT_EQ(distance, 9);
@@ -206,7 +206,7 @@ TYPED_TEST(IndexQueriesTest, FirstRayOfSeveralIndicesDoesNotDependOnTheirOrder) 
   const auto none = this->make({});
   const auto check = [](const auto&... indices) {
     Object value;
-    double distance = kUnlimited;
+    double distance = kNoEnd;
     EXPECT_TRUE(first_ray_of(along_x(), value, distance, nullptr, indices...));
     EXPECT_EQ(value.id, 2u);
     EXPECT_EQ(distance, 9);
@@ -221,10 +221,10 @@ TEST(IndexQueriesOfTwoStructuresTest, FirstRayOfAListAndATreeReturnsTheNearerHit
   list.insert(ball_object(5, {10, 0, 0}));
   const Bvh<Object> tree = *Bvh<Object>::build({ball_object(4, {10, 0, 0}), ball_object(6, {9, 0, 0})});
   Object value;
-  double distance = kUnlimited;
+  double distance = kNoEnd;
   EXPECT_TRUE(first_ray_of(along_x(), value, distance, nullptr, list, tree));
   EXPECT_EQ(value.id, 6u);
-  distance = kUnlimited;
+  distance = kNoEnd;
   const Bvh<Object> tied = *Bvh<Object>::build({ball_object(4, {10, 0, 0}), ball_object(6, {10, 0, 0})});
   EXPECT_TRUE(first_ray_of(along_x(), value, distance, nullptr, list, tied));
   EXPECT_EQ(value.id, 4u);
