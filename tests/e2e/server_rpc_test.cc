@@ -29,11 +29,12 @@ TEST_F(ServerRpcTest, TheServerReportsItsVersionAndFeatures) {
   const v1::GetServerResponse server = get_server(stubs());
   EXPECT_EQ(server.version(), LOCUS_VERSION);
   EXPECT_EQ(server.instruction_set(), instruction_set());
-  EXPECT_THAT(server.features(),
-              ::testing::ElementsAre("after_t", "anchors", "as_of", "balls", "boxes", "capsules", "cells", "compounds",
-                                     "contains", "continues", "count_only", "download_mesh", "expire_ticks", "frustums",
-                                     "history", "idle_ttl", "latest_wins", "leases", "lookup", "mesh_grace", "nearest",
-                                     "pairs", "rays", "sight", "static_from", "step", "sweeps"));
+  EXPECT_THAT(
+      server.features(),
+      ::testing::ElementsAre("after_t", "anchors", "as_of", "balls", "boxes", "by_list", "capsules", "cell_size",
+                             "cells", "compounds", "contains", "continues", "count_only", "download_mesh",
+                             "expire_ticks", "frustums", "history", "idle_ttl", "latest_wins", "leases", "lookup",
+                             "mesh_grace", "nearest", "pairs", "rays", "sight", "static_from", "step", "sweeps"));
 }
 
 TEST_F(ServerRpcTest, AServerThatWasStartedInsecureSaysSo) {
