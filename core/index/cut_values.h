@@ -1,5 +1,5 @@
-// How structures that divide space by planes store the values that a plane cuts, and how a visit passes each of them
-// once.
+// Option for the place of values that a dividing plane cuts, and the set by which a visit passes each of them once.
+// Used by structures that divide space.
 #ifndef LOCUS_CORE_INDEX_CUT_VALUES_H_
 #define LOCUS_CORE_INDEX_CUT_VALUES_H_
 

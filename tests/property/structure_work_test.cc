@@ -11,7 +11,12 @@ namespace {
 
 // Structures whose work for a small query may grow by at most the power 0.20 of the number of values. Trees with
 // CutValues::kAtNode and the list are not among them.
-using FastStructures = Joined<StructureList<BvhStructure<Object>, GridStructure>, KdTreesInLeavesOf<Object>>;
+using FastStructures =
+    Joined<StructureList<BvhStructure<Object>, GridStructure>, KdTreesInLeavesOf<Object>,
+           StructureList<OctreeStructure<Object, 7, CutValues::kInLeaves>,
+                         BspTreeStructure<Object, BspPlanes::kBest, CutValues::kInLeaves>,
+                         FiniteGridStructure<Object, GridOrder::kXMajor>,
+                         FiniteGridStructure<Object, GridOrder::kMorton>, SphereTreeStructure<Object>>>;
 
 template <class Structure>
 class StructureWorkTest : public ::testing::Test {};

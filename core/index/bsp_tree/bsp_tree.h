@@ -147,7 +147,7 @@ class BspTree {
   // those that no plane cuts. Precondition: has_cell(leaf).
   template <class Fn>
   void for_each_in_leaf(CellNumber leaf, const Fn& fn) const {
-    for (const uint32_t slot : space()[space().node_of(leaf)].references) fn(values_[slot].value);
+    for (const uint32_t slot : space()[space().node_of(leaf)].references) fn(values_.entries()[slot].value);
   }
 
   // Calls fn(leaf, begin, end) for the leaves along the ray, from 0 to ray.t_max, with the range of t in the leaf's
@@ -177,24 +177,14 @@ class BspTree {
   }
 
  private:
-  using Entry = typename BspValues<V, T>::Entry;
   static constexpr double kEndless = std::numeric_limits<double>::infinity();
 
   const BspSpace& space() const { return values_.space(); }
 
-  // Passes the values of a node whose bounds are accepted. Adds the values of the node to work.cells, and those that
-  // are passed to work.tests. Returns false if the visitor has ended the visit.
   template <class Accepts, class Visitor>
   bool pass(const BspNode& node, const Accepts& accepts, PassedValues& passed, Visitor& visitor, Work& work) const {
-    work.cells += node.references.size();
-    for (const uint32_t slot : node.references) {
-      const Entry& entry = values_[slot];
-      if (!accepts(entry.bounds)) continue;
-      if (entry.homes > 1 && !planted(PlantedBug::kBspPassedTwice) && !passed.add(slot)) continue;
-      ++work.tests;
-      if (!visitor.visit(entry.value)) return false;
-    }
-    return true;
+    const PassEach each = planted(PlantedBug::kBspPassedTwice) ? PassEach::kAtEveryNode : PassEach::kOnce;
+    return values_.entries().pass(node.references, accepts, visitor, passed, work, each);
   }
 
   BspValues<V, T> values_;

@@ -8,12 +8,12 @@
 #include <utility>
 #include <vector>
 
-#include "absl/container/flat_hash_map.h"
 #include "core/base/check.h"
 #include "core/base/planted_bug.h"
 #include "core/index/bsp_tree/bsp_space.h"
 #include "core/index/bsp_tree/plane_choice.h"
 #include "core/index/cut_values.h"
+#include "core/index/filed_values.h"
 #include "core/index/spatial_index.h"
 
 namespace locus {
@@ -36,7 +36,7 @@ struct BspTreeShape {
   uint32_t depth = 0;     // largest number of planes above a leaf
 };
 
-// Invariants: each value is listed at `homes` nodes, those that homes_of() returns for its bounds; after rebuild(),
+// Invariants: each value is listed at `places` nodes, those that homes_of() returns for its bounds; after rebuild(),
 // there are fewer than two nodes and four references for each value.
 template <class V, class Traits>
 requires Bounded<V, Traits>
@@ -44,11 +44,7 @@ class BspValues {
   using S = typename Traits::Scalar;
 
  public:
-  struct Entry {
-    V value;
-    Aabb<S> bounds;
-    uint32_t homes;  // number of nodes that list the value; 0 for a free entry
-  };
+  using Entry = typename FiledValues<V, Traits>::Entry;
 
   explicit BspValues(const BspTreeOptions& options) : options_(options) {
     LOCUS_CHECK_LT(0u, options_.leaf_size);
@@ -67,7 +63,7 @@ class BspValues {
     const uint32_t slot = add_entry(value);
     Entry& entry = entries_[slot];
     const std::vector<uint32_t> homes = homes_of(to_double(entry.bounds));
-    entry.homes = static_cast<uint32_t>(homes.size());
+    entry.places = static_cast<uint32_t>(homes.size());
     references_ += homes.size();
     for (const uint32_t home : homes) space_[home].references.push_back(slot);
     divide_full(homes);
@@ -77,28 +73,24 @@ class BspValues {
   }
 
   bool remove(const V& value) {
-    const auto found = slots_.find(Traits::id(value));
-    if (found == slots_.end()) return false;
-    const uint32_t slot = found->second;
-    slots_.erase(found);
-    const std::vector<uint32_t> homes = homes_of(to_double(entries_[slot].bounds));
+    const std::optional<uint32_t> slot = entries_.remove(value);
+    if (!slot) return false;
+    const std::vector<uint32_t> homes = homes_of(to_double(entries_[*slot].bounds));
     for (const uint32_t home : homes) {
-      erase_reference(home, slot);
+      erase_slot(space_[home].references, *slot);
       if (planted(PlantedBug::kBspRemoveOnce)) break;
     }
     references_ -= homes.size();
-    entries_[slot].homes = 0;
-    free_slots_.push_back(slot);
     for (const uint32_t home : homes) join_empty(home);
     if (space_.node_count() > 64 && space_.node_count() >= 4 * size()) rebuild();
     LOCUS_DCHECK_CALL(check_invariants());
     return true;
   }
 
-  bool contains(const V& value) const { return slots_.contains(Traits::id(value)); }
-  size_t size() const { return slots_.size(); }
+  bool contains(const V& value) const { return entries_.contains(value); }
+  size_t size() const { return entries_.size(); }
   const BspSpace& space() const { return space_; }
-  const Entry& operator[](uint32_t slot) const { return entries_[slot]; }
+  const FiledValues<V, Traits>& entries() const { return entries_; }
   // Returns an upper bound of the |coordinates| of all bounds.
   S magnitude() const { return magnitude_; }
   BspTreeShape shape() const { return {space_.node_count(), references_, space_.depth()}; }
@@ -107,18 +99,8 @@ class BspValues {
   static constexpr size_t kOfferedPlanes = 8;  // maximum number of values whose planes are tried for one leaf
 
   uint32_t add_entry(V value) {
-    const Aabb<S> bounds = Traits::bounds(value);
-    LOCUS_CHECK(!bounds.empty() && is_finite(bounds.min) && is_finite(bounds.max));
-    magnitude_ = std::max(magnitude_, locus::magnitude(bounds));
-    const uint32_t slot = free_slots_.empty() ? static_cast<uint32_t>(entries_.size()) : free_slots_.back();
-    const bool added = slots_.try_emplace(Traits::id(value), slot).second;
-    LOCUS_CHECK(added);
-    if (free_slots_.empty()) {
-      entries_.push_back({std::move(value), bounds, 0});
-    } else {
-      free_slots_.pop_back();
-      entries_[slot] = {std::move(value), bounds, 0};
-    }
+    const uint32_t slot = entries_.add(std::move(value));
+    magnitude_ = std::max(magnitude_, locus::magnitude(entries_[slot].bounds));
     return slot;
   }
 
@@ -194,19 +176,11 @@ class BspValues {
       if (sides.front) space_[child].references.push_back(slot);
       if (sides.back) space_[child + 1].references.push_back(slot);
       if (sides.both()) {
-        ++entries_[slot].homes;
+        ++entries_[slot].places;
         ++references_;
       }
     }
     return child;
-  }
-
-  void erase_reference(uint32_t node, uint32_t slot) {
-    std::vector<uint32_t>& references = space_[node].references;
-    const auto found = std::find(references.begin(), references.end(), slot);
-    LOCUS_DCHECK(found != references.end());
-    *found = references.back();
-    references.pop_back();
   }
 
   // Joins the node with its neighbour, and so on upwards, as long as both are leaves with few values.
@@ -222,7 +196,7 @@ class BspValues {
         if (std::find(front.references.begin(), front.references.end(), slot) == front.references.end()) {
           references.push_back(slot);
         } else {
-          --entries_[slot].homes;
+          --entries_[slot].places;
           --references_;
         }
       }
@@ -239,9 +213,8 @@ class BspValues {
     too_deep_ = false;
     BspNode& root = space_[BspNode::kRoot];
     root.limit = options_.leaf_size;
-    for (const auto& [id, slot] : slots_) root.references.push_back(slot);
-    std::sort(root.references.begin(), root.references.end());
-    for (const uint32_t slot : root.references) entries_[slot].homes = 1;
+    root.references = entries_.slots();
+    for (const uint32_t slot : root.references) entries_[slot].places = 1;
     references_ = size();
     divide_full({BspNode::kRoot});
     built_size_ = size();
@@ -249,10 +222,7 @@ class BspValues {
     LOCUS_DCHECK_CALL(check_built());
   }
 
-  void check_invariants() const {
-    LOCUS_DCHECK_EQ(entries_.size(), slots_.size() + free_slots_.size());
-    LOCUS_DCHECK_LE(slots_.size(), references_);
-  }
+  void check_invariants() const { LOCUS_DCHECK_LE(size(), references_); }
 
   // Verifies, in debug builds, the limits of a tree that was just built, and that each value is listed at the nodes
   // that homes_of() returns. O(n * depth).
@@ -261,9 +231,9 @@ class BspValues {
     LOCUS_DCHECK(now.nodes == 1 || now.nodes < 2 * size());
     LOCUS_DCHECK(size() == 0 || now.references < 4 * size());
     LOCUS_DCHECK_LE(now.depth, size_t{options_.max_depth});
-    for (const auto& [id, slot] : slots_) {
+    for (const uint32_t slot : entries_.slots()) {
       const std::vector<uint32_t> homes = homes_of(to_double(entries_[slot].bounds));
-      LOCUS_DCHECK_EQ(homes.size(), size_t{entries_[slot].homes});
+      LOCUS_DCHECK_EQ(homes.size(), size_t{entries_[slot].places});
       for (const uint32_t home : homes) {
         const std::vector<uint32_t>& listed = space_[home].references;
         LOCUS_DCHECK(std::find(listed.begin(), listed.end(), slot) != listed.end());
@@ -273,9 +243,7 @@ class BspValues {
 
   BspTreeOptions options_;
   BspSpace space_;
-  std::vector<Entry> entries_;
-  std::vector<uint32_t> free_slots_;
-  absl::flat_hash_map<uint64_t, uint32_t> slots_;  // slot of each id in entries_
+  FiledValues<V, Traits> entries_;
   S magnitude_ = 0;
   size_t references_ = 0;
   size_t built_size_ = 0, built_references_ = 0;  // when the tree was last built

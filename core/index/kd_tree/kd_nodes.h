@@ -5,11 +5,13 @@
 
 #include <algorithm>
 #include <numeric>
+#include <utility>
 #include <vector>
 
 #include "absl/container/inlined_vector.h"
 #include "core/base/check.h"
 #include "core/base/planted_bug.h"
+#include "core/index/filed_values.h"
 #include "core/index/kd_tree/kd_split.h"
 
 namespace locus {
@@ -78,31 +80,13 @@ class KdNodes {
     return places;
   }
 
-  // Removes `slot` from the nodes that list it. Returns true.
-  bool remove(uint32_t slot, const Aabb<S>& bounds) {
-    size_t places = count(slot, bounds);
-    if (planted(PlantedBug::kKdReferenceLeft) && places > 1) --places;
-    const bool complete = places == count(slot, bounds);
+  // Removes `slot` from the nodes that list it.
+  void remove(uint32_t slot, const Aabb<S>& bounds) {
+    bool first = true;
     for_each_place(bounds, [&](uint32_t node) {
-      if (places == 0) return;
-      --places;
-      std::vector<uint32_t>& values = nodes_[node].values;
-      const auto found = std::find(values.begin(), values.end(), slot);
-      LOCUS_DCHECK(found != values.end());
-      *found = values.back();
-      values.pop_back();
+      if (planted(PlantedBug::kKdReferenceLeft) && !std::exchange(first, false)) return;
+      erase_slot(nodes_[node].values, slot);
       --references_;
-    });
-    return complete;
-  }
-
-  // Replaces the slot of a value in all nodes that list it.
-  void renumber(uint32_t from, uint32_t to, const Aabb<S>& bounds) {
-    for_each_place(bounds, [&](uint32_t node) {
-      std::vector<uint32_t>& values = nodes_[node].values;
-      const auto found = std::find(values.begin(), values.end(), from);
-      LOCUS_DCHECK(found != values.end());
-      *found = to;
     });
   }
 

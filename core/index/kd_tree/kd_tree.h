@@ -21,13 +21,14 @@
 #define LOCUS_CORE_INDEX_KD_TREE_KD_TREE_H_
 
 #include <cstdint>
+#include <optional>
 #include <utility>
 #include <vector>
 
-#include "absl/container/flat_hash_map.h"
 #include "absl/container/inlined_vector.h"
 #include "core/base/check.h"
 #include "core/base/planted_bug.h"
+#include "core/index/filed_values.h"
 #include "core/index/kd_tree/kd_nodes.h"
 #include "core/index/spatial_index.h"
 
@@ -49,59 +50,48 @@ class KdTree {
   // O(n log n) if the planes divide the values evenly.
   static KdTree build(std::vector<V> values, const KdTreeOptions& options = {}) {
     KdTree tree(options);
-    tree.entries_.reserve(values.size());
-    for (V& value : values) tree.append(std::move(value));
+    tree.values_.reserve(values.size());
+    for (V& value : values) tree.values_.add(std::move(value));
     tree.rebuild();
     return tree;
   }
 
   // Builds the tree again from its values, with the options of the first build.
   void rebuild() {
+    values_.close_gaps();
     bounds_ = Aabb<S>();
-    std::vector<KdValue<S>> values;
-    values.reserve(entries_.size());
-    for (const Entry& entry : entries_) {
+    std::vector<KdValue<S>> boxes;
+    boxes.reserve(size());
+    for (uint32_t slot = 0; slot < size(); ++slot) {
+      Entry& entry = values_[slot];
+      entry.places = 0;
       bounds_ = merge(bounds_, entry.bounds);
-      values.push_back({entry.bounds, Traits::position(entry.value)});
+      boxes.push_back({entry.bounds, Traits::position(entry.value)});
     }
-    nodes_.build(values);
-    for (Entry& entry : entries_) entry.places = 0;
-    nodes_.for_each_reference([this](uint32_t slot) { ++entries_[slot].places; });
+    nodes_.build(boxes);
+    nodes_.for_each_reference([this](uint32_t slot) { ++values_[slot].places; });
     LOCUS_DCHECK_CALL(check_invariants());
   }
 
   // Inserts a value. Preconditions: those of build(). O(depth + leaves that the value touches).
   void insert(const V& value) {
-    append(value);
-    Entry& entry = entries_.back();
-    const auto slot = static_cast<uint32_t>(entries_.size() - 1);
-    if (!planted(PlantedBug::kKdFixedBounds) || slot == 0) bounds_ = merge(bounds_, entry.bounds);
+    const uint32_t slot = values_.add(value);
+    Entry& entry = values_[slot];
+    if (!planted(PlantedBug::kKdFixedBounds) || bounds_.empty()) bounds_ = merge(bounds_, entry.bounds);
     entry.places = nodes_.insert(slot, entry.bounds);
     LOCUS_DCHECK_CALL(check_value(slot));
   }
 
   // Removes the value with the id of `value`. Returns false and changes nothing if the tree has no value with this id.
-  // Searches the leaves that the value touches, and those that the last inserted value touches, whose slot changes:
-  // O(depth + values in these leaves).
+  // Searches the leaves that the value touches: O(depth + values in these leaves).
   bool remove(const V& value) {
-    const auto found = slots_.find(Traits::id(value));
-    if (found == slots_.end()) return false;
-    const uint32_t slot = found->second, last = static_cast<uint32_t>(entries_.size() - 1);
-    slots_.erase(found);
-    const bool complete = nodes_.remove(slot, entries_[slot].bounds);
-    if (!complete) return true;  // only with PlantedBug::kKdReferenceLeft
-    if (slot != last) {
-      nodes_.renumber(last, slot, entries_[last].bounds);
-      entries_[slot] = std::move(entries_[last]);
-      slots_[Traits::id(entries_[slot].value)] = slot;
-    }
-    entries_.pop_back();
-    if (slot < entries_.size()) LOCUS_DCHECK_CALL(check_value(slot));
-    return true;
+    const std::optional<uint32_t> slot = values_.remove(value);
+    if (slot) nodes_.remove(*slot, values_[*slot].bounds);
+    return slot.has_value();
   }
 
-  bool contains(const V& value) const { return slots_.contains(Traits::id(value)); }
-  size_t size() const { return slots_.size(); }
+  bool contains(const V& value) const { return values_.contains(value); }
+  size_t size() const { return values_.size(); }
   // Returns the box around all values; after remove() it may be larger, until rebuild().
   const Aabb<S>& bounds() const { return bounds_; }
   // Returns the numbers of nodes and references, and the depth. O(nodes).
@@ -122,55 +112,31 @@ class KdTree {
   void visit_nearest(const Vec3d& point, Visitor& visitor, Work& work) const;
 
  private:
-  struct Entry {
-    V value;
-    Aabb<S> bounds;
-    uint32_t places = 0;  // nodes that list the value
-  };
+  using Entry = typename FiledValues<V, T>::Entry;
   using Node = KdNode<S>;
   template <class Pending>
   using Stack = absl::InlinedVector<Pending, limits::kMaxKdDepth + 1>;  // one pending child for each level
 
-  void append(V value) {
-    LOCUS_CHECK_LT(entries_.size(), size_t{limits::kMaxBvhValues});
-    const bool added = slots_.try_emplace(Traits::id(value), static_cast<uint32_t>(entries_.size())).second;
-    LOCUS_CHECK(added);
-    const Aabb<S> bounds = Traits::bounds(value);
-    entries_.push_back({std::move(value), bounds});
-  }
-
-  // Passes those values of a node to the visitor that `wanted` accepts and that were not passed before. Returns false
-  // if the visitor ends the visit. Adds the values of the node to work.cells, and those passed to work.tests.
   template <class Wanted, class Visitor>
   bool pass_values(const Node& node, const Wanted& wanted, Visitor& visitor, PassedValues& passed, Work& work) const {
-    for (const uint32_t slot : node.values) {
-      ++work.cells;
-      const Entry& entry = entries_[slot];
-      if (!wanted(entry.bounds)) continue;
-      if (entry.places > 1 && !passed.add(slot) && !planted(PlantedBug::kKdPassedTwice)) continue;
-      ++work.tests;
-      if (!visitor.visit(entry.value)) return false;
-    }
-    return true;
+    const PassEach each = planted(PlantedBug::kKdPassedTwice) ? PassEach::kAtEveryNode : PassEach::kOnce;
+    return values_.pass(node.values, wanted, visitor, passed, work, each);
   }
 
   // Checks that exactly the nodes list the value in which it lies. O(depth + values in these nodes).
   void check_value(uint32_t slot) const {
-    LOCUS_DCHECK_EQ(nodes_.count(slot, entries_[slot].bounds), entries_[slot].places);
-    LOCUS_DCHECK(contains_box(bounds_, entries_[slot].bounds));
-    LOCUS_DCHECK_EQ(entries_.size(), slots_.size());
+    LOCUS_DCHECK_EQ(nodes_.count(slot, values_[slot].bounds), values_[slot].places);
+    LOCUS_DCHECK(locus::contains(bounds_, values_[slot].bounds));
   }
-  static bool contains_box(const Aabb<S>& outer, const Aabb<S>& inner) { return locus::contains(outer, inner); }
   // Checks all values, and the limits of nodes and references after a build. O(n * depth).
   void check_invariants() const {
-    for (uint32_t slot = 0; slot < entries_.size(); ++slot) check_value(slot);
+    for (const uint32_t slot : values_.slots()) check_value(slot);
     const KdShape shape = this->shape();
-    LOCUS_DCHECK(entries_.empty() || (shape.nodes < 2 * size() && shape.references < 4 * size()));
+    LOCUS_DCHECK(size() == 0 || (shape.nodes < 2 * size() && shape.references < 4 * size()));
     LOCUS_DCHECK_LE(shape.depth, nodes_.options().max_depth);
   }
 
-  std::vector<Entry> entries_;
-  absl::flat_hash_map<uint64_t, uint32_t> slots_;  // id of each value to its slot in entries_
+  FiledValues<V, T> values_;
   Aabb<S> bounds_;
   KdNodes<S> nodes_;
 };
@@ -183,7 +149,7 @@ void KdTree<V, T>::visit_ray(const SlabRay<S>& slabs, Visitor& visitor, Work& wo
     uint32_t node;
     S near, far;  // interval of the ray in the node's part of space
   };
-  if (entries_.empty()) return;
+  if (size() == 0) return;
   if (planted(PlantedBug::kKdRayFromInside) && !locus::contains(bounds_, slabs.origin())) return;
   // A value with its own interval before the origin may lie in parts after the origin, so the limit of parts is not
   // negative.
@@ -256,7 +222,7 @@ void KdTree<V, T>::visit_nearest(const Vec3d& point, Visitor& visitor, Work& wor
     uint32_t node;
     Vec3d gap;  // distance from the point to the node's part of space on each axis; 0 within
   };
-  if (entries_.empty()) return;
+  if (size() == 0) return;
   const auto beyond = [&](double distance) {
     return planted(PlantedBug::kKdNearestStrict) ? distance >= visitor.limit() : distance > visitor.limit();
   };

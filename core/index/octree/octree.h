@@ -23,12 +23,13 @@
 
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <utility>
 #include <vector>
 
-#include "absl/container/flat_hash_map.h"
 #include "core/base/check.h"
 #include "core/base/planted_bug.h"
+#include "core/index/filed_values.h"
 #include "core/index/octree/octree_nodes.h"
 #include "core/index/spatial_index.h"
 
@@ -50,32 +51,33 @@ class Octree {
   // O(n log n) unless their distances differ by many powers of two; at most O(n * depth).
   static Octree build(std::vector<V> values, const OctreeOptions& options = {}) {
     Octree tree(options);
-    tree.entries_.reserve(values.size());
-    for (V& value : values) tree.append(std::move(value));
+    tree.values_.reserve(values.size());
+    for (V& value : values) tree.values_.add(std::move(value));
     tree.rebuild();
     return tree;
   }
 
   // Builds the tree again from its values, with the options of the first build.
   void rebuild() {
-    close_free_slots();
+    values_.close_gaps();
     bounds_ = Aabb<S>();
     std::vector<Aabb<S>> boxes;
-    boxes.reserve(entries_.size());
-    for (const Entry& entry : entries_) {
+    boxes.reserve(size());
+    for (uint32_t slot = 0; slot < size(); ++slot) {
+      Entry& entry = values_[slot];
+      entry.places = 0;
       bounds_ = merge(bounds_, entry.bounds);
       boxes.push_back(entry.bounds);
     }
     nodes_.build(boxes);
-    for (Entry& entry : entries_) entry.places = 0;
-    nodes_.for_each_reference([this](uint32_t slot) { ++entries_[slot].places; });
+    nodes_.for_each_reference([this](uint32_t slot) { ++values_[slot].places; });
     LOCUS_DCHECK_CALL(check_invariants());
   }
 
   // Inserts a value. Preconditions: those of build(). O(depth + leaves that the value touches).
   void insert(const V& value) {
-    const uint32_t slot = append(value);
-    Entry& entry = entries_[slot];
+    const uint32_t slot = values_.add(value);
+    Entry& entry = values_[slot];
     if (!planted(PlantedBug::kOctreeFixedBounds) || bounds_.empty()) bounds_ = merge(bounds_, entry.bounds);
     entry.places = nodes_.insert(slot, entry.bounds);
     LOCUS_DCHECK_CALL(check_value(slot));
@@ -84,19 +86,13 @@ class Octree {
   // Removes the value with the id of `value`. Returns false and changes nothing if the tree has no value with this id.
   // Searches the leaves that the value touches: O(depth + values in these leaves).
   bool remove(const V& value) {
-    const auto found = slots_.find(Traits::id(value));
-    if (found == slots_.end()) return false;
-    const uint32_t slot = found->second;
-    slots_.erase(found);
-    nodes_.remove(slot, entries_[slot].bounds);
-    entries_[slot].places = 0;
-    free_.push_back(slot);
-    LOCUS_DCHECK_EQ(entries_.size(), slots_.size() + free_.size());
-    return true;
+    const std::optional<uint32_t> slot = values_.remove(value);
+    if (slot) nodes_.remove(*slot, values_[*slot].bounds);
+    return slot.has_value();
   }
 
-  bool contains(const V& value) const { return slots_.contains(Traits::id(value)); }
-  size_t size() const { return slots_.size(); }
+  bool contains(const V& value) const { return values_.contains(value); }
+  size_t size() const { return values_.size(); }
   // Returns a box around all values; after remove() it may be larger than they need, until rebuild().
   const Aabb<S>& bounds() const { return bounds_; }
   // Returns the numbers of nodes and references, and the depth. O(1).
@@ -117,76 +113,37 @@ class Octree {
   void visit_nearest(const Vec3d& point, Visitor& visitor, Work& work) const;
 
  private:
-  struct Entry {
-    V value;
-    Aabb<S> bounds;
-    uint32_t places = 0;  // nodes that list the value; 0 in a free slot
-  };
+  using Entry = typename FiledValues<V, T>::Entry;
   using Node = OctreeNode<S>;
   template <class Pending>
   using Stack = typename OctreeNodes<S>::template Stack<Pending>;
   static constexpr size_t kStackSize = OctreeNodes<S>::kStackSize;
   static constexpr S kInfinity = std::numeric_limits<S>::infinity();
 
-  // Puts the value in a free slot and returns the slot.
-  uint32_t append(V value) {
-    LOCUS_CHECK_LT(slots_.size(), size_t{limits::kMaxBvhValues});
-    const auto slot = free_.empty() ? static_cast<uint32_t>(entries_.size()) : free_.back();
-    const bool added = slots_.try_emplace(Traits::id(value), slot).second;
-    LOCUS_CHECK(added);
-    const Aabb<S> bounds = Traits::bounds(value);
-    if (free_.empty()) {
-      entries_.push_back({std::move(value), bounds});
-    } else {
-      free_.pop_back();
-      entries_[slot] = {std::move(value), bounds};
-    }
-    return slot;
-  }
-
-  // Moves the entries together. The nodes are invalid until the next build.
-  void close_free_slots() {
-    if (free_.empty()) return;
-    std::erase_if(entries_, [](const Entry& entry) { return entry.places == 0; });
-    for (uint32_t slot = 0; slot < entries_.size(); ++slot) slots_[Traits::id(entries_[slot].value)] = slot;
-    free_.clear();
-  }
-
-  // Passes those values of a node to the visitor that `wanted` accepts and that were not passed before. Returns false
-  // if the visitor ends the visit.
   template <class Wanted, class Visitor>
   bool pass_values(const Node& node, const Wanted& wanted, Visitor& visitor, PassedValues& passed, Work& work) const {
-    for (const uint32_t slot : node.values) {
-      const Entry& entry = entries_[slot];
-      if (!wanted(entry.bounds)) continue;
-      if (entry.places > 1 && !passed.add(slot) && !planted(PlantedBug::kOctreePassedTwice)) continue;
-      ++work.tests;
-      if (!visitor.visit(entry.value)) return false;
-    }
-    return true;
+    const PassEach each = planted(PlantedBug::kOctreePassedTwice) ? PassEach::kAtEveryNode : PassEach::kOnce;
+    return values_.pass(node.values, wanted, visitor, passed, work, each);
   }
 
   // Checks that exactly the nodes list the value in which it lies. O(depth + values in these nodes).
   void check_value(uint32_t slot) const {
-    LOCUS_DCHECK_EQ(nodes_.count(slot, entries_[slot].bounds), entries_[slot].places);
-    LOCUS_DCHECK(entries_[slot].places > 0);
-    LOCUS_DCHECK_CALL(check_contained(entries_[slot].bounds));
-    LOCUS_DCHECK_EQ(entries_.size(), slots_.size() + free_.size());
+    LOCUS_DCHECK_EQ(nodes_.count(slot, values_[slot].bounds), values_[slot].places);
+    LOCUS_DCHECK(values_[slot].places > 0);
+    LOCUS_DCHECK_CALL(check_contained(values_[slot].bounds));
   }
   void check_contained(const Aabb<S>& box) const {
     if (!planted(PlantedBug::kOctreeFixedBounds)) LOCUS_DCHECK(locus::contains(bounds_, box));
   }
   // Checks all values, and the limits of nodes and references after a build. O(n * depth).
   void check_invariants() const {
-    for (uint32_t slot = 0; slot < entries_.size(); ++slot) check_value(slot);
+    for (const uint32_t slot : values_.slots()) check_value(slot);
     const OctreeShape shape = this->shape();
-    LOCUS_DCHECK(entries_.empty() || (shape.nodes < 2 * size() && shape.references < 4 * size()));
+    LOCUS_DCHECK(size() == 0 || (shape.nodes < 2 * size() && shape.references < 4 * size()));
     LOCUS_DCHECK_LE(shape.depth, nodes_.options().max_depth);
   }
 
-  std::vector<Entry> entries_;
-  absl::flat_hash_map<uint64_t, uint32_t> slots_;  // id of each value to its slot in entries_
-  std::vector<uint32_t> free_;                     // slots of removed values
+  FiledValues<V, T> values_;
   Aabb<S> bounds_;
   OctreeNodes<S> nodes_;
 };
@@ -199,7 +156,7 @@ void Octree<V, T>::visit_ray(const SlabRay<S>& slabs, Visitor& visitor, Work& wo
     uint32_t node;
     S near, far;  // interval of the ray in the node's part of space
   };
-  if (slots_.empty()) return;
+  if (size() == 0) return;
   if (planted(PlantedBug::kOctreeRayFromInside) && !locus::contains(bounds_, slabs.origin())) return;
   // The interval of a value may begin before the origin, so the limit of parts is not negative.
   const auto beyond = [&](S near) {
@@ -282,7 +239,7 @@ void Octree<V, T>::visit_nearest(const Vec3d& point, Visitor& visitor, Work& wor
     uint32_t node;
     Vec3d gap;  // distance from the point to the node's part of space on each axis; 0 within
   };
-  if (slots_.empty()) return;
+  if (size() == 0) return;
   const auto beyond = [&](double distance) {
     return planted(PlantedBug::kOctreeNearestStrict) ? distance >= visitor.limit() : distance > visitor.limit();
   };

@@ -15,6 +15,7 @@
 #include "core/base/planted_bug.h"
 #include "core/geometry/aabb.h"
 #include "core/index/cut_values.h"
+#include "core/index/filed_values.h"
 
 namespace locus {
 
@@ -104,11 +105,7 @@ class OctreeNodes {
     bool first = true;
     for_each_place(bounds, [&](uint32_t node) {
       if (planted(PlantedBug::kOctreeReferenceLeft) && !std::exchange(first, false)) return;
-      std::vector<uint32_t>& values = nodes_[node].values;
-      const auto found = std::find(values.begin(), values.end(), slot);
-      LOCUS_DCHECK(found != values.end());
-      *found = values.back();
-      values.pop_back();
+      erase_slot(nodes_[node].values, slot);
       --references_;
     });
   }
