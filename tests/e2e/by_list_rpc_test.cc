@@ -1,5 +1,5 @@
 // Queries by list (QueryBatch.by_list): the bytes of the answers are those of queries by the structures.
-#include "tests/support/rpc_test.h"
+#include "tests/support/row_of_balls.h"
 
 namespace locus::test {
 namespace {
@@ -7,23 +7,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-// Scene with balls 1 to 4 of radius 1 at x = 3, 6, 9, 12, and a cube, instance 100, from x = 9 to 11.
-class ByListRpcTest : public RpcTest {
- protected:
-  void SetUp() override {
-    RpcTest::SetUp();
-    ASSERT_TRUE(upload({whole_mesh("cube")}).ok());
-    ASSERT_TRUE(change(place_one("cube", 100)).ok());
-    ASSERT_TRUE(apply(insert_balls(1, 4)).ok());
-  }
-
-  v1::QueryResult ask(const v1::QueryBatch& batch) {
-    v1::QueryResult result;
-    const grpc::Status status = query(batch, &result);
-    EXPECT_TRUE(status.ok()) << status.error_message();
-    return result;
-  }
-};
+using ByListRpcTest = RowOfBallsTest;
 
 v1::QueryBlock ball_at(float x, float radius) {
   v1::QueryBlock block;

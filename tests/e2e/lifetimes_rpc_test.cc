@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <functional>
 #include <map>
+#include <memory>
 #include <random>
 #include <set>
 #include <thread>
@@ -203,60 +204,58 @@ TEST_F(LifetimesRpcTest, TheObjectsOfASilentWriterGoAsOneRevision) {
   EXPECT_EQ(get("world").objects(), 2u) << "a repeated batch is not applied again";
 }
 
+// Stream of writer 7, which has inserted one ball with a lease. Writer 8, whose lease is as long and began later, has
+// inserted two.
+class LeasedStreamTest : public LifetimesRpcTest {
+ protected:
+  void SetUp() override {
+    LifetimesRpcTest::SetUp();
+    constexpr uint32_t kLength = 2000;
+    set_timeout(context_);
+    stream_ = stubs().updates->StreamUpdates(&context_);
+    request_.set_scene("world");
+    *request_.mutable_batch() = leased(insert_balls(1, 1), 7, 1, kLength);
+    ASSERT_TRUE(send());
+    ASSERT_TRUE(apply(leased(insert_balls(2, 3), 8, 1, kLength)).ok());
+  }
+  // Sends request_ and reads response_. Returns whether both succeeded.
+  bool send() { return stream_->Write(request_) && stream_->Read(&response_); }
+
+  grpc::ClientContext context_;
+  std::unique_ptr<grpc::ClientReaderWriter<v1::StreamUpdatesRequest, v1::StreamUpdatesResponse>> stream_;
+  v1::StreamUpdatesRequest request_;
+  v1::StreamUpdatesResponse response_;
+};
+
 // The lease of writer 7 is renewed until that of writer 8, which is as long and began later, has ended.
-TEST_F(LifetimesRpcTest, BatchesOnAStreamRenewALease) {
-  constexpr uint32_t kLength = 2000;
-  grpc::ClientContext context;
-  set_timeout(context);
-  const auto stream = stubs().updates->StreamUpdates(&context);
-  v1::StreamUpdatesRequest request;
-  request.set_scene("world");
-  *request.mutable_batch() = leased(insert_balls(1, 1), 7, 1, kLength);
-  v1::StreamUpdatesResponse response;
-  ASSERT_TRUE(stream->Write(request));
-  ASSERT_TRUE(stream->Read(&response));
-  ASSERT_TRUE(apply(leased(insert_balls(2, 3), 8, 1, kLength)).ok());
+TEST_F(LeasedStreamTest, BatchesOnAStreamRenewALease) {
   for (uint64_t number = 2; get("world").objects() == 3; ++number) {
-    *request.mutable_batch() = leased({}, 7, number, 0);
-    ASSERT_TRUE(stream->Write(request));
-    ASSERT_TRUE(stream->Read(&response));
-    ASSERT_FALSE(response.has_error()) << response.ShortDebugString();
+    *request_.mutable_batch() = leased({}, 7, number, 0);
+    ASSERT_TRUE(send());
+    ASSERT_FALSE(response_.has_error()) << response_.ShortDebugString();
   }
   EXPECT_EQ(get("world").objects(), 1u) << "the objects of writer 8 are gone";
-  stream->WritesDone();
-  EXPECT_TRUE(stream->Finish().ok());
+  stream_->WritesDone();
+  EXPECT_TRUE(stream_->Finish().ok());
   while (get("world").objects() > 0) std::this_thread::sleep_for(std::chrono::milliseconds(10));
 }
 
 // A writer that sends one revision as many messages is not silent. The lease of writer 8 is as long and began later.
-TEST_F(LifetimesRpcTest, HeldMessagesOnAStreamRenewTheLeaseOfItsWriter) {
-  constexpr uint32_t kLength = 2000;
-  grpc::ClientContext context;
-  set_timeout(context);
-  const auto stream = stubs().updates->StreamUpdates(&context);
-  v1::StreamUpdatesRequest request;
-  request.set_scene("world");
-  *request.mutable_batch() = leased(insert_balls(1, 1), 7, 1, kLength);
-  v1::StreamUpdatesResponse response;
-  ASSERT_TRUE(stream->Write(request));
-  ASSERT_TRUE(stream->Read(&response));
-  ASSERT_TRUE(apply(leased(insert_balls(2, 3), 8, 1, kLength)).ok());
+TEST_F(LeasedStreamTest, HeldMessagesOnAStreamRenewTheLeaseOfItsWriter) {
   while (get("world").objects() == 3) {
-    request.mutable_batch()->Clear();
-    request.mutable_batch()->set_continues(true);
-    ASSERT_TRUE(stream->Write(request));
-    ASSERT_TRUE(stream->Read(&response));
-    ASSERT_TRUE(response.ack().pending()) << response.ShortDebugString();
+    request_.mutable_batch()->Clear();
+    request_.mutable_batch()->set_continues(true);
+    ASSERT_TRUE(send());
+    ASSERT_TRUE(response_.ack().pending()) << response_.ShortDebugString();
     std::this_thread::sleep_for(std::chrono::milliseconds(10));  // at most 4,095 messages may be held
   }
   EXPECT_EQ(get("world").objects(), 1u) << "the objects of writer 8 are gone";
-  *request.mutable_batch() = leased(insert_balls(4, 5), 7, 2, 0);
-  ASSERT_TRUE(stream->Write(request));
-  ASSERT_TRUE(stream->Read(&response));
-  EXPECT_EQ(response.ack().applied(), 2u) << response.ShortDebugString();
+  *request_.mutable_batch() = leased(insert_balls(4, 5), 7, 2, 0);
+  ASSERT_TRUE(send());
+  EXPECT_EQ(response_.ack().applied(), 2u) << response_.ShortDebugString();
   EXPECT_EQ(get("world").objects(), 3u);
-  stream->WritesDone();
-  EXPECT_TRUE(stream->Finish().ok());
+  stream_->WritesDone();
+  EXPECT_TRUE(stream_->Finish().ok());
 }
 
 TEST_F(LifetimesRpcTest, WrongLeasesAreRefused) {

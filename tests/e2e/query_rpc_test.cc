@@ -4,7 +4,7 @@
 #include <set>
 
 #include "core/base/limits.h"
-#include "tests/support/rpc_test.h"
+#include "tests/support/row_of_balls.h"
 
 namespace locus::test {
 namespace {
@@ -15,23 +15,8 @@ using ::testing::IsEmpty;
 const float kNan = std::numeric_limits<float>::quiet_NaN();
 const float kInfinity = std::numeric_limits<float>::infinity();
 
-// Scene with balls 1 to 4 of radius 1 at x = 3, 6, 9, 12, and a cube, instance 100, from x = 9 to 11.
-class QueryRpcTest : public RpcTest {
+class QueryRpcTest : public RowOfBallsTest {
  protected:
-  void SetUp() override {
-    RpcTest::SetUp();
-    ASSERT_TRUE(upload({whole_mesh("cube")}).ok());
-    ASSERT_TRUE(change(place_one("cube", 100)).ok());
-    ASSERT_TRUE(apply(insert_balls(1, 4)).ok());
-  }
-
-  v1::QueryResult ask(const v1::QueryBatch& batch) {
-    v1::QueryResult result;
-    const grpc::Status status = query(batch, &result);
-    EXPECT_TRUE(status.ok()) << status.error_message();
-    return result;
-  }
-
   void expect_query_refused(const v1::QueryBatch& batch, const Refused& expected) {
     const std::string before = dump();
     expect_refused(query(batch), expected);
