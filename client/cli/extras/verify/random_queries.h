@@ -17,7 +17,7 @@ class RandomQueries {
  public:
   // Maximum number of objects for which next() also asks for pairs: by list, one query of pairs tests each object
   // against each other object.
-  static constexpr uint64_t kMaxPairedObjects = 3000;
+  static constexpr uint64_t kMaxPairedObjects = 300;  // --help names it
 
   RandomQueries(const v1::Scene& scene, uint64_t seed);
 
