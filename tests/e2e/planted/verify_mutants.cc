@@ -8,6 +8,9 @@ namespace {
 
 using ::testing::HasSubstr;
 
+// No more than verify asks about pairs of.
+constexpr uint64_t kObjects = 300;
+
 struct Planted {
   const char* name;
   PlantedBug bug;
@@ -22,10 +25,10 @@ class PlantedVerifyTest : public RpcTest, public ::testing::WithParamInterface<P
     run({"generate", "city", "--triangles", "2000", "--seed", "1", "--scene", "world"});
     v1::UpdateBatch batch;
     v1::Insert* insert = batch.add_inserts();
-    for (uint64_t id = 1; id <= 500; ++id) {
+    for (uint64_t id = 1; id <= kObjects; ++id) {
       const auto n = static_cast<double>(id);
       insert->add_ids(id);
-      for (const double at : {3 * n - 700, static_cast<double>(id % 7), static_cast<double>(id % 40) - 20})
+      for (const double at : {4 * n - 600, static_cast<double>(id % 7), static_cast<double>(id % 40) - 20})
         insert->add_positions_f64(at);
     }
     insert->mutable_ball()->add_radii(1.5f);
