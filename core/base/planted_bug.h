@@ -85,12 +85,13 @@ enum class PlantedBug {
   kRegionEdgeScale,   // edges are not scaled up, so that products of their components may underflow
   kRegionRange,       // boxes and blocks so small that products of coordinates underflow are tested in float
   kRegionTurnedNode,  // boxes of nodes are tested against a rotated box without a pad
+  // Trees that divide space by planes across the axes:
+  kPlaneTreePassedTwice,    // a value that lies in several leaves is passed from each of them
+  kPlaneTreeReferenceLeft,  // a removed value stays in all of its leaves but one
+  kPlaneTreeFixedBounds,    // a value that is inserted outside the bounds of the tree does not widen them
   // The kd tree:
   kKdLowerStrict,    // a region that begins exactly at a dividing plane is not searched below the plane
   kKdAxisByTurns,    // a node divides values on any axis, but keeps the axis of its level
-  kKdPassedTwice,    // a value that lies in several leaves is passed from each of them
-  kKdReferenceLeft,  // a removed value stays in one of its several leaves
-  kKdFixedBounds,    // a value that is inserted outside the bounds of the tree does not widen them
   kKdRayFromInside,  // a ray that starts outside the bounds of the tree finds nothing
   kKdRayUnpadded,    // regions are not padded for their own coordinates when they are tested with rays
   kKdRayToBorder,    // a ray is followed beyond its limit
@@ -105,9 +106,6 @@ enum class PlantedBug {
   kSphereCenters,   // a ball contains the centres of the values' bounds, but not the bounds
   // The octree:
   kOctreeLowerStrict,    // a region that begins exactly at a dividing plane is not searched below the plane
-  kOctreePassedTwice,    // a value that lies in several leaves is passed from each of them
-  kOctreeReferenceLeft,  // a removed value stays in all of its leaves but one
-  kOctreeFixedBounds,    // a value that is inserted outside the bounds of the tree does not widen them
   kOctreeRayFromInside,  // a ray that starts outside the bounds of the tree finds nothing
   kOctreeRayUnpadded,    // planes are not padded for the coordinates of the tree when they are tested with rays
   kOctreeRayToBorder,    // a ray is followed beyond its limit

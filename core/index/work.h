@@ -9,7 +9,7 @@ namespace locus {
 
 struct Work {
   uint64_t nodes = 0;  // tree nodes opened
-  uint64_t cells = 0;  // grid bricks looked up, plus rows of values scanned in them; bounds compared in lists of nodes
+  uint64_t cells = 0;  // grid bricks looked up, plus rows of values scanned in them; bounds compared in lists
   uint64_t tests = 0;  // values tested: passed to a visitor, or tested by a vector kernel or as a pair
 
   Work& operator+=(const Work& other) {

@@ -30,12 +30,12 @@ template <SpatialIndex Index>
 class IndexJudge {
  public:
   using Value = typename Index::Value;
-  using Traits = PrimitiveTraits<Value>;
-  using S = ScalarOf<Value>;
-  using Hits = std::vector<RayHit<Value>>;
+  using Traits = typename Index::Traits;
+  using S = typename Traits::Scalar;
+  using Hits = std::vector<RayHit<Value, Traits>>;
 
   // Borrows both arguments, which must hold the same values.
-  IndexJudge(const Index& index, const ListIndex<Value>& oracle) : index_(index), oracle_(oracle) {}
+  IndexJudge(const Index& index, const ListIndex<Value, Traits>& oracle) : index_(index), oracle_(oracle) {}
 
   std::string difference(const TestScene<Value>& scene) const {
     if (index_.size() != oracle_.size()) return "the sizes differ";
@@ -83,14 +83,14 @@ class IndexJudge {
   // next smaller double.
   std::string point_difference(const Vec3d& point) const {
     constexpr double kInfinity = std::numeric_limits<double>::infinity();
-    std::vector<ValueAt<Value>> all;
+    std::vector<ValueAt<Value, Traits>> all;
     nearest_values(oracle_, point, kInfinity, oracle_.size(), all);
     std::vector<double> distances = {kInfinity};
     if (const size_t i = all.size() / 3; i < all.size())
       distances.insert(distances.end(), {all[i].distance, std::nextafter(all[i].distance, 0.0)});
     for (const double distance : distances) {
       for (const size_t count : {size_t{1}, std::min<size_t>(oracle_.size(), 200)}) {
-        std::vector<ValueAt<Value>> got, expected;
+        std::vector<ValueAt<Value, Traits>> got, expected;
         nearest_values(index_, point, distance, count, got);
         nearest_values(oracle_, point, distance, count, expected);
         if (std::string what = nearest_difference(got, expected); !what.empty())
@@ -217,8 +217,8 @@ class IndexJudge {
     return "";
   }
 
-  static std::string nearest_difference(const std::vector<ValueAt<Value>>& got,
-                                        const std::vector<ValueAt<Value>>& expected) {
+  static std::string nearest_difference(const std::vector<ValueAt<Value, Traits>>& got,
+                                        const std::vector<ValueAt<Value, Traits>>& expected) {
     if (got.size() != expected.size()) return text(got.size(), " values, but the list says ", expected.size());
     for (size_t i = 0; i < got.size(); ++i) {
       const auto id = Traits::id(got[i].value), expected_id = Traits::id(expected[i].value);
@@ -264,7 +264,7 @@ class IndexJudge {
   }
 
   const Index& index_;
-  const ListIndex<Value>& oracle_;
+  const ListIndex<Value, Traits>& oracle_;
 };
 
 // Returns the first difference between `index` and the list of the same values over all queries of `scene`; empty if

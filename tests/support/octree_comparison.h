@@ -16,7 +16,7 @@ namespace locus::test {
 // Returns a violation of the limits of a tree that has just been built; empty if there is none.
 template <class V>
 std::string octree_shape_fault(const Octree<V>& tree, uint32_t max_depth) {
-  const OctreeShape shape = tree.shape();
+  const PlaneTreeShape shape = tree.shape();
   if (tree.size() > 0 && shape.nodes >= 2 * tree.size()) return absl::StrCat(shape.nodes, " nodes");
   if (tree.size() > 0 && shape.references >= 4 * tree.size()) return absl::StrCat(shape.references, " references");
   if (shape.depth > max_depth) return absl::StrCat(shape.depth, " levels");

@@ -77,6 +77,7 @@ class GridList {
   template <class Visitor, class Wanted>
   void visit_wanted(Visitor& visitor, Work& work, const Wanted& wanted) const {
     for (const Entry& entry : entries_) {
+      ++work.cells;
       if (!wanted(entry.bounds)) continue;
       ++work.tests;
       if (!visitor.visit(entry.value)) return;

@@ -1,18 +1,17 @@
-// Nodes of a kd tree: they know the bounds of values and list the values by slot numbers, so that this code does not
-// depend on the type of the values. One thread at a time; const members may run concurrently.
+// Nodes of a kd tree, and how they are divided. One thread at a time; const members may run concurrently.
 #ifndef LOCUS_CORE_INDEX_KD_TREE_KD_NODES_H_
 #define LOCUS_CORE_INDEX_KD_TREE_KD_NODES_H_
 
 #include <algorithm>
-#include <numeric>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "absl/container/inlined_vector.h"
 #include "core/base/check.h"
 #include "core/base/planted_bug.h"
-#include "core/index/filed_values.h"
 #include "core/index/kd_tree/kd_split.h"
+#include "core/index/plane_nodes.h"
 
 namespace locus {
 
@@ -38,82 +37,21 @@ Aabb<S> half_space(const KdNode<S>& node, KdSide side) {
   return box;
 }
 
-// Size of a tree. A reference is one entry of a value in the list of a node.
-struct KdShape {
-  size_t nodes;
-  size_t references;
-  uint32_t depth;  // levels below the root
-};
-
 template <class S>
-class KdNodes {
+class KdNodes : public PlaneNodes<S, KdNode<S>, KdNodes<S>> {
  public:
-  explicit KdNodes(const KdTreeOptions& options) : options_(options), nodes_(1) {
+  explicit KdNodes(const KdTreeOptions& options) : options_(options) {
     LOCUS_CHECK(options.leaf_size > 0);
     LOCUS_CHECK_LE(options.max_depth, limits::kMaxKdDepth);
   }
 
   const KdTreeOptions& options() const { return options_; }
-  const KdNode<S>& operator[](uint32_t node) const { return nodes_[node]; }
-
-  // Builds the nodes of `values`, whose slots are 0, 1, 2, ... Divides the nodes level by level, so that the limits of
-  // nodes and references leave the levels equally deep.
-  void build(absl::Span<const KdValue<S>> values) {
-    nodes_.assign(1, KdNode<S>());
-    nodes_[0].values.resize(values.size());
-    std::iota(nodes_[0].values.begin(), nodes_[0].values.end(), uint32_t{0});
-    references_ = values.size();
-    depth_ = 0;
-    constexpr S kInfinity = std::numeric_limits<S>::infinity();
-    std::vector<Part> parts = {{{{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}}, 0}};
-    for (uint32_t node = 0; node < nodes_.size(); ++node) divide(node, values, parts);
-  }
-
-  // Lists `slot` in the nodes in which a value with `bounds` lies. Returns the number of these nodes.
-  uint32_t insert(uint32_t slot, const Aabb<S>& bounds) {
-    uint32_t places = 0;
-    for_each_place(bounds, [&](uint32_t node) {
-      nodes_[node].values.push_back(slot);
-      ++places;
-    });
-    references_ += places;
-    return places;
-  }
-
-  // Removes `slot` from the nodes that list it.
-  void remove(uint32_t slot, const Aabb<S>& bounds) {
-    bool first = true;
-    for_each_place(bounds, [&](uint32_t node) {
-      if (planted(PlantedBug::kKdReferenceLeft) && !std::exchange(first, false)) return;
-      erase_slot(nodes_[node].values, slot);
-      --references_;
-    });
-  }
-
-  // Returns the number of the nodes in which a value with `bounds` lies and that list `slot`.
-  size_t count(uint32_t slot, const Aabb<S>& bounds) const {
-    size_t places = 0;
-    for_each_place(bounds, [&](uint32_t node) {
-      const std::vector<uint32_t>& values = nodes_[node].values;
-      places += std::find(values.begin(), values.end(), slot) != values.end() ? 1 : 0;
-    });
-    return places;
-  }
-
-  template <class Fn>
-  void for_each_reference(const Fn& fn) const {
-    for (const KdNode<S>& node : nodes_)
-      for (const uint32_t slot : node.values) fn(slot);
-  }
-
-  KdShape shape() const { return {nodes_.size(), references_, depth_}; }
 
  private:
-  // Part of space that a node divides, while the tree is built.
-  struct Part {
-    Aabb<S> box;
-    uint32_t depth;
-  };
+  using Base = PlaneNodes<S, KdNode<S>, KdNodes<S>>;
+  friend Base;
+  using Base::depth_, Base::nodes_, Base::references_;
+  using typename Base::Part;
 
   struct Division {
     std::vector<uint32_t> below, above, at_node;
@@ -138,13 +76,13 @@ class KdNodes {
   }
 
   // Divides a node that has more values than a leaf may have, unless no plane separates any of them.
-  void divide(uint32_t node, absl::Span<const KdValue<S>> values, std::vector<Part>& parts) {
+  void divide(uint32_t node, absl::Span<const PlacedBounds<S>> values, std::vector<Part>& parts) {
     const Part part = parts[node];
     const std::vector<uint32_t>& slots = nodes_[node].values;
     depth_ = std::max(depth_, part.depth);
     if (slots.size() <= options_.leaf_size || part.depth >= options_.max_depth) return;
     if (nodes_.size() + 2 >= 2 * values.size()) return;
-    std::vector<KdValue<S>> inside;
+    std::vector<PlacedBounds<S>> inside;
     inside.reserve(slots.size());
     Aabb<S> box;
     for (const uint32_t slot : slots) {
@@ -170,7 +108,8 @@ class KdNodes {
     return extent.x >= extent.y && extent.x >= extent.z ? 0 : extent.y >= extent.z ? 1 : 2;
   }
 
-  Division divided(const std::vector<uint32_t>& slots, absl::Span<const KdValue<S>> values, int axis, S plane) const {
+  Division divided(const std::vector<uint32_t>& slots, absl::Span<const PlacedBounds<S>> values, int axis,
+                   S plane) const {
     Division division;
     for (const uint32_t slot : slots) {
       const Aabb<S>& bounds = values[slot].bounds;
@@ -211,9 +150,6 @@ class KdNodes {
   }
 
   KdTreeOptions options_;
-  std::vector<KdNode<S>> nodes_;  // the root, then pairs of children in the order of their parents
-  size_t references_ = 0;
-  uint32_t depth_ = 0;
 };
 
 }  // namespace locus

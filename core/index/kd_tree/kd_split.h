@@ -13,6 +13,7 @@
 #include "core/base/limits.h"
 #include "core/geometry/aabb.h"
 #include "core/index/cut_values.h"
+#include "core/index/plane_nodes.h"
 
 namespace locus {
 
@@ -38,23 +39,16 @@ struct KdTreeOptions {
   uint32_t max_depth = limits::kMaxKdDepth;  // max levels below the root, at most limits::kMaxKdDepth
 };
 
-// Values of a node as a split sees them: one element for each value.
-template <class S>
-struct KdValue {
-  Aabb<S> bounds;  // clipped to the box around the part of space that the node divides
-  Vec3<S> position;
-};
-
 namespace internal {
 
 inline constexpr int kKdBins = 32;
 
 // Returns the median of the positions; null if all are equal. Of two equal halves, the upper one is above the plane.
 template <class S>
-std::optional<S> kd_median(absl::Span<const KdValue<S>> values, int axis) {
+std::optional<S> kd_median(absl::Span<const PlacedBounds<S>> values, int axis) {
   std::vector<S> positions;
   positions.reserve(values.size());
-  for (const KdValue<S>& value : values) positions.push_back(value.position[axis]);
+  for (const PlacedBounds<S>& value : values) positions.push_back(value.position[axis]);
   const S highest = *std::max_element(positions.begin(), positions.end());
   const auto middle = positions.begin() + static_cast<ptrdiff_t>((positions.size() - 1) / 2);
   std::nth_element(positions.begin(), middle, positions.end());
@@ -69,11 +63,11 @@ std::optional<S> kd_median(absl::Span<const KdValue<S>> values, int axis) {
 // undivided node. Only evenly spaced planes are compared (Popov et al., Experiences with Streaming Construction of SAH
 // KD-Trees, 2006), so that the cost is linear in the number of values.
 template <class S>
-std::optional<S> kd_sah(absl::Span<const KdValue<S>> values, int axis, const Aabb<S>& box, CutValues cut) {
+std::optional<S> kd_sah(absl::Span<const PlacedBounds<S>> values, int axis, const Aabb<S>& box, CutValues cut) {
   const S low = box.min[axis], step = (box.max[axis] - low) / kKdBins;
   const auto bin = [&](S x) { return static_cast<int>(std::clamp((x - low) / step, S{0}, S{kKdBins - 1})); };
   size_t begins[kKdBins] = {}, ends[kKdBins] = {};
-  for (const KdValue<S>& value : values) {
+  for (const PlacedBounds<S>& value : values) {
     ++begins[bin(value.bounds.min[axis])];
     ++ends[bin(value.bounds.max[axis])];
   }
@@ -108,7 +102,7 @@ std::optional<S> kd_sah(absl::Span<const KdValue<S>> values, int axis, const Aab
 // `box` is the box around their bounds. The plane need not separate any values, and it may lie outside `box`. Source of
 // kSah: MacDonald and Booth, Heuristics for Ray Tracing Using Space Subdivision, 1990.
 template <class S>
-std::optional<S> kd_plane(KdSplit split, absl::Span<const KdValue<S>> values, int axis, const Aabb<S>& box,
+std::optional<S> kd_plane(KdSplit split, absl::Span<const PlacedBounds<S>> values, int axis, const Aabb<S>& box,
                           CutValues cut) {
   if (!(box.min[axis] < box.max[axis])) return std::nullopt;
   switch (split) {
@@ -116,7 +110,7 @@ std::optional<S> kd_plane(KdSplit split, absl::Span<const KdValue<S>> values, in
       return box.min[axis] / 2 + box.max[axis] / 2;
     case KdSplit::kMean: {
       double sum = 0;
-      for (const KdValue<S>& value : values) sum += double{value.position[axis]};
+      for (const PlacedBounds<S>& value : values) sum += double{value.position[axis]};
       return static_cast<S>(sum / static_cast<double>(values.size()));
     }
     case KdSplit::kMedian:

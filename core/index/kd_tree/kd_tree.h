@@ -1,10 +1,6 @@
 // kd tree: divides space by planes perpendicular to the axes, for values of any size. The options choose the axis and
 // the position of each plane, and where the values lie that a plane cuts.
 //
-// insert() and remove() never divide or join nodes, so the tree degrades when its values change much: a leaf grows by
-// every value that is inserted into its part of space. rebuild() makes the tree that build() would make. A tree that
-// was built of no values is one leaf, until rebuild().
-//
 // Threads: const members may run concurrently; insert, remove and rebuild need exclusive use.
 // Invariants: A plane divides a part of space into two closed parts. A value lies below the plane if its bounds begin
 // at or below the plane, and above if they end above the plane; a value on both sides lies in the leaves of both or,
@@ -21,81 +17,38 @@
 #define LOCUS_CORE_INDEX_KD_TREE_KD_TREE_H_
 
 #include <cstdint>
-#include <optional>
 #include <utility>
 #include <vector>
 
 #include "absl/container/inlined_vector.h"
 #include "core/base/check.h"
 #include "core/base/planted_bug.h"
-#include "core/index/filed_values.h"
+#include "core/index/cut_values.h"
 #include "core/index/kd_tree/kd_nodes.h"
+#include "core/index/plane_tree.h"
 #include "core/index/spatial_index.h"
 
 namespace locus {
 
 template <class V, class T = PrimitiveTraits<V>>
 requires Bounded<V, T>
-class KdTree {
+class KdTree : public PlaneTree<V, T, KdNodes<typename T::Scalar>> {
   using S = typename T::Scalar;
+  using Base = PlaneTree<V, T, KdNodes<S>>;
 
  public:
-  using Value = V;
-  using Traits = T;
+  using Base::size, Base::bounds;
 
   // Makes an empty tree.
-  explicit KdTree(const KdTreeOptions& options = {}) : nodes_(options) {}
+  explicit KdTree(const KdTreeOptions& options = {}) : Base(options) {}
 
   // Builds a tree of `values`. Preconditions: their ids are unique, and their bounds are finite and not empty.
   // O(n log n) if the planes divide the values evenly.
   static KdTree build(std::vector<V> values, const KdTreeOptions& options = {}) {
     KdTree tree(options);
-    tree.values_.reserve(values.size());
-    for (V& value : values) tree.values_.add(std::move(value));
-    tree.rebuild();
+    tree.fill(std::move(values));
     return tree;
   }
-
-  // Builds the tree again from its values, with the options of the first build.
-  void rebuild() {
-    values_.close_gaps();
-    bounds_ = Aabb<S>();
-    std::vector<KdValue<S>> boxes;
-    boxes.reserve(size());
-    for (uint32_t slot = 0; slot < size(); ++slot) {
-      Entry& entry = values_[slot];
-      entry.places = 0;
-      bounds_ = merge(bounds_, entry.bounds);
-      boxes.push_back({entry.bounds, Traits::position(entry.value)});
-    }
-    nodes_.build(boxes);
-    nodes_.for_each_reference([this](uint32_t slot) { ++values_[slot].places; });
-    LOCUS_DCHECK_CALL(check_invariants());
-  }
-
-  // Inserts a value. Preconditions: those of build(). O(depth + leaves that the value touches).
-  void insert(const V& value) {
-    const uint32_t slot = values_.add(value);
-    Entry& entry = values_[slot];
-    if (!planted(PlantedBug::kKdFixedBounds) || bounds_.empty()) bounds_ = merge(bounds_, entry.bounds);
-    entry.places = nodes_.insert(slot, entry.bounds);
-    LOCUS_DCHECK_CALL(check_value(slot));
-  }
-
-  // Removes the value with the id of `value`. Returns false and changes nothing if the tree has no value with this id.
-  // Searches the leaves that the value touches: O(depth + values in these leaves).
-  bool remove(const V& value) {
-    const std::optional<uint32_t> slot = values_.remove(value);
-    if (slot) nodes_.remove(*slot, values_[*slot].bounds);
-    return slot.has_value();
-  }
-
-  bool contains(const V& value) const { return values_.contains(value); }
-  size_t size() const { return values_.size(); }
-  // Returns the box around all values; after remove() it may be larger, until rebuild().
-  const Aabb<S>& bounds() const { return bounds_; }
-  // Returns the numbers of nodes and references, and the depth. O(nodes).
-  KdShape shape() const { return nodes_.shape(); }
 
   // Passes candidates to `visitor` leaf by leaf, in the order in which the ray enters the leaves. Only values whose own
   // bounds the ray enters before the limit are passed.
@@ -112,33 +65,10 @@ class KdTree {
   void visit_nearest(const Vec3d& point, Visitor& visitor, Work& work) const;
 
  private:
-  using Entry = typename FiledValues<V, T>::Entry;
+  using Base::nodes, Base::pass_values;
   using Node = KdNode<S>;
   template <class Pending>
   using Stack = absl::InlinedVector<Pending, limits::kMaxKdDepth + 1>;  // one pending child for each level
-
-  template <class Wanted, class Visitor>
-  bool pass_values(const Node& node, const Wanted& wanted, Visitor& visitor, PassedValues& passed, Work& work) const {
-    const PassEach each = planted(PlantedBug::kKdPassedTwice) ? PassEach::kAtEveryNode : PassEach::kOnce;
-    return values_.pass(node.values, wanted, visitor, passed, work, each);
-  }
-
-  // Checks that exactly the nodes list the value in which it lies. O(depth + values in these nodes).
-  void check_value(uint32_t slot) const {
-    LOCUS_DCHECK_EQ(nodes_.count(slot, values_[slot].bounds), values_[slot].places);
-    LOCUS_DCHECK(locus::contains(bounds_, values_[slot].bounds));
-  }
-  // Checks all values, and the limits of nodes and references after a build. O(n * depth).
-  void check_invariants() const {
-    for (const uint32_t slot : values_.slots()) check_value(slot);
-    const KdShape shape = this->shape();
-    LOCUS_DCHECK(size() == 0 || (shape.nodes < 2 * size() && shape.references < 4 * size()));
-    LOCUS_DCHECK_LE(shape.depth, nodes_.options().max_depth);
-  }
-
-  FiledValues<V, T> values_;
-  Aabb<S> bounds_;
-  KdNodes<S> nodes_;
 };
 
 template <class V, class T>
@@ -150,7 +80,7 @@ void KdTree<V, T>::visit_ray(const SlabRay<S>& slabs, Visitor& visitor, Work& wo
     S near, far;  // interval of the ray in the node's part of space
   };
   if (size() == 0) return;
-  if (planted(PlantedBug::kKdRayFromInside) && !locus::contains(bounds_, slabs.origin())) return;
+  if (planted(PlantedBug::kKdRayFromInside) && !locus::contains(bounds(), slabs.origin())) return;
   // A value with its own interval before the origin may lie in parts after the origin, so the limit of parts is not
   // negative.
   const auto beyond = [&](S near) {
@@ -158,12 +88,12 @@ void KdTree<V, T>::visit_ray(const SlabRay<S>& slabs, Visitor& visitor, Work& wo
     const S limit = std::max(visitor.limit(), S{0});
     return planted(PlantedBug::kStrictTie) ? near >= limit : near > limit;
   };
-  const auto wanted = [&](const Aabb<S>& bounds) {
-    const Interval<S> interval = slabs.interval(bounds);
+  const auto wanted = [&](const Aabb<S>& own) {
+    const Interval<S> interval = slabs.interval(own);
     return interval.near <= interval.far && interval.far >= 0 && interval.near <= visitor.limit();
   };
-  const S magnitude = planted(PlantedBug::kKdRayUnpadded) ? S{0} : locus::magnitude(bounds_);
-  const Interval<S> whole = slabs.interval(bounds_, magnitude);
+  const S magnitude = planted(PlantedBug::kKdRayUnpadded) ? S{0} : locus::magnitude(bounds());
+  const Interval<S> whole = slabs.interval(bounds(), magnitude);
   PassedValues passed;
   Stack<Pending> pending;
   const auto push = [&](uint32_t node, S near, S far) {
@@ -175,7 +105,7 @@ void KdTree<V, T>::visit_ray(const SlabRay<S>& slabs, Visitor& visitor, Work& wo
     pending.pop_back();
     if (beyond(now.near)) continue;  // the limit may have decreased since the push
     ++work.nodes;
-    const Node& node = nodes_[now.node];
+    const Node& node = nodes()[now.node];
     if (!pass_values(node, wanted, visitor, passed, work)) return;
     if (node.is_leaf()) continue;
     const Interval<S> below = slabs.interval(half_space(node, KdSide::kBelow), magnitude);
@@ -198,12 +128,12 @@ requires Bounded<V, T>
 template <RegionVisitor<V, T> Visitor>
 void KdTree<V, T>::visit_region(Visitor& visitor, Work& work) const {
   const Aabb<S> box = visitor.bounds();
-  if (!overlaps(box, bounds_)) return;
-  const auto wanted = [&](const Aabb<S>& bounds) { return visitor.overlaps(bounds); };
+  if (!overlaps(box, bounds())) return;
+  const auto wanted = [&](const Aabb<S>& own) { return visitor.overlaps(own); };
   PassedValues passed;
   Stack<uint32_t> pending = {0};
   while (!pending.empty()) {
-    const Node& node = nodes_[pending.back()];
+    const Node& node = nodes()[pending.back()];
     pending.pop_back();
     ++work.nodes;
     if (!pass_values(node, wanted, visitor, passed, work)) return;
@@ -226,18 +156,16 @@ void KdTree<V, T>::visit_nearest(const Vec3d& point, Visitor& visitor, Work& wor
   const auto beyond = [&](double distance) {
     return planted(PlantedBug::kKdNearestStrict) ? distance >= visitor.limit() : distance > visitor.limit();
   };
-  const auto wanted = [&](const Aabb<S>& bounds) {
-    return squared_distance(point, to_double(bounds)) <= visitor.limit();
-  };
+  const auto wanted = [&](const Aabb<S>& own) { return squared_distance(point, to_double(own)) <= visitor.limit(); };
   PassedValues passed;
-  const Aabbd whole = to_double(bounds_);
+  const Aabbd whole = to_double(bounds());
   Stack<Pending> pending = {{0, max(max(whole.min - point, point - whole.max), Vec3d{})}};
   while (!pending.empty()) {
     const Pending now = pending.back();
     pending.pop_back();
     if (beyond(squared_length(now.gap))) continue;
     ++work.nodes;
-    const Node& node = nodes_[now.node];
+    const Node& node = nodes()[now.node];
     if (!pass_values(node, wanted, visitor, passed, work)) return;
     if (node.is_leaf()) continue;
     const double offset = point[node.axis] - double{node.plane};

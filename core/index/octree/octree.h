@@ -1,10 +1,6 @@
 // Octree: divides space at the middle of the extent of the values, on any one, two or three axes at once, for values of
 // any size and of uneven density. Divided on one axis it is an interval tree, on two a quadtree.
 //
-// insert() and remove() never divide or join nodes, so the tree degrades when its values change much: a leaf grows by
-// every value that is inserted into its part of space. rebuild() makes the tree that build() would make. A tree that
-// was built of no values is one leaf, until rebuild().
-//
 // Threads: const members may run concurrently; insert, remove and rebuild need exclusive use.
 // Invariants: Planes divide a part of space into closed parts. A value lies below a plane if its bounds begin at or
 // below the plane, and above if they end above the plane. A value that is on both sides of a plane lies in the leaves
@@ -23,80 +19,37 @@
 
 #include <cmath>
 #include <cstdint>
-#include <optional>
 #include <utility>
 #include <vector>
 
 #include "core/base/check.h"
 #include "core/base/planted_bug.h"
-#include "core/index/filed_values.h"
+#include "core/index/cut_values.h"
 #include "core/index/octree/octree_nodes.h"
+#include "core/index/plane_tree.h"
 #include "core/index/spatial_index.h"
 
 namespace locus {
 
 template <class V, class T = PrimitiveTraits<V>>
 requires Bounded<V, T>
-class Octree {
+class Octree : public PlaneTree<V, T, OctreeNodes<typename T::Scalar>> {
   using S = typename T::Scalar;
+  using Base = PlaneTree<V, T, OctreeNodes<S>>;
 
  public:
-  using Value = V;
-  using Traits = T;
+  using Base::size, Base::bounds;
 
   // Makes an empty tree.
-  explicit Octree(const OctreeOptions& options = {}) : nodes_(options) {}
+  explicit Octree(const OctreeOptions& options = {}) : Base(options) {}
 
   // Builds a tree of `values`. Preconditions: their ids are unique, and their bounds are finite and not empty.
   // O(n log n) unless their distances differ by many powers of two; at most O(n * depth).
   static Octree build(std::vector<V> values, const OctreeOptions& options = {}) {
     Octree tree(options);
-    tree.values_.reserve(values.size());
-    for (V& value : values) tree.values_.add(std::move(value));
-    tree.rebuild();
+    tree.fill(std::move(values));
     return tree;
   }
-
-  // Builds the tree again from its values, with the options of the first build.
-  void rebuild() {
-    values_.close_gaps();
-    bounds_ = Aabb<S>();
-    std::vector<Aabb<S>> boxes;
-    boxes.reserve(size());
-    for (uint32_t slot = 0; slot < size(); ++slot) {
-      Entry& entry = values_[slot];
-      entry.places = 0;
-      bounds_ = merge(bounds_, entry.bounds);
-      boxes.push_back(entry.bounds);
-    }
-    nodes_.build(boxes);
-    nodes_.for_each_reference([this](uint32_t slot) { ++values_[slot].places; });
-    LOCUS_DCHECK_CALL(check_invariants());
-  }
-
-  // Inserts a value. Preconditions: those of build(). O(depth + leaves that the value touches).
-  void insert(const V& value) {
-    const uint32_t slot = values_.add(value);
-    Entry& entry = values_[slot];
-    if (!planted(PlantedBug::kOctreeFixedBounds) || bounds_.empty()) bounds_ = merge(bounds_, entry.bounds);
-    entry.places = nodes_.insert(slot, entry.bounds);
-    LOCUS_DCHECK_CALL(check_value(slot));
-  }
-
-  // Removes the value with the id of `value`. Returns false and changes nothing if the tree has no value with this id.
-  // Searches the leaves that the value touches: O(depth + values in these leaves).
-  bool remove(const V& value) {
-    const std::optional<uint32_t> slot = values_.remove(value);
-    if (slot) nodes_.remove(*slot, values_[*slot].bounds);
-    return slot.has_value();
-  }
-
-  bool contains(const V& value) const { return values_.contains(value); }
-  size_t size() const { return values_.size(); }
-  // Returns a box around all values; after remove() it may be larger than they need, until rebuild().
-  const Aabb<S>& bounds() const { return bounds_; }
-  // Returns the numbers of nodes and references, and the depth. O(1).
-  OctreeShape shape() const { return nodes_.shape(); }
 
   // Passes candidates to `visitor` leaf by leaf, in the order in which the ray enters the leaves. Only values whose own
   // bounds the ray enters before the limit are passed.
@@ -113,39 +66,12 @@ class Octree {
   void visit_nearest(const Vec3d& point, Visitor& visitor, Work& work) const;
 
  private:
-  using Entry = typename FiledValues<V, T>::Entry;
+  using Base::nodes, Base::pass_values;
   using Node = OctreeNode<S>;
   template <class Pending>
   using Stack = typename OctreeNodes<S>::template Stack<Pending>;
   static constexpr size_t kStackSize = OctreeNodes<S>::kStackSize;
   static constexpr S kInfinity = std::numeric_limits<S>::infinity();
-
-  template <class Wanted, class Visitor>
-  bool pass_values(const Node& node, const Wanted& wanted, Visitor& visitor, PassedValues& passed, Work& work) const {
-    const PassEach each = planted(PlantedBug::kOctreePassedTwice) ? PassEach::kAtEveryNode : PassEach::kOnce;
-    return values_.pass(node.values, wanted, visitor, passed, work, each);
-  }
-
-  // Checks that exactly the nodes list the value in which it lies. O(depth + values in these nodes).
-  void check_value(uint32_t slot) const {
-    LOCUS_DCHECK_EQ(nodes_.count(slot, values_[slot].bounds), values_[slot].places);
-    LOCUS_DCHECK(values_[slot].places > 0);
-    LOCUS_DCHECK_CALL(check_contained(values_[slot].bounds));
-  }
-  void check_contained(const Aabb<S>& box) const {
-    if (!planted(PlantedBug::kOctreeFixedBounds)) LOCUS_DCHECK(locus::contains(bounds_, box));
-  }
-  // Checks all values, and the limits of nodes and references after a build. O(n * depth).
-  void check_invariants() const {
-    for (const uint32_t slot : values_.slots()) check_value(slot);
-    const OctreeShape shape = this->shape();
-    LOCUS_DCHECK(size() == 0 || (shape.nodes < 2 * size() && shape.references < 4 * size()));
-    LOCUS_DCHECK_LE(shape.depth, nodes_.options().max_depth);
-  }
-
-  FiledValues<V, T> values_;
-  Aabb<S> bounds_;
-  OctreeNodes<S> nodes_;
 };
 
 template <class V, class T>
@@ -157,21 +83,21 @@ void Octree<V, T>::visit_ray(const SlabRay<S>& slabs, Visitor& visitor, Work& wo
     S near, far;  // interval of the ray in the node's part of space
   };
   if (size() == 0) return;
-  if (planted(PlantedBug::kOctreeRayFromInside) && !locus::contains(bounds_, slabs.origin())) return;
+  if (planted(PlantedBug::kOctreeRayFromInside) && !locus::contains(bounds(), slabs.origin())) return;
   // The interval of a value may begin before the origin, so the limit of parts is not negative.
   const auto beyond = [&](S near) {
     return !planted(PlantedBug::kOctreeRayToBorder) && near > std::max(visitor.limit(), S{0});
   };
-  const auto wanted = [&](const Aabb<S>& bounds) {
-    const Interval<S> interval = slabs.interval(bounds);
+  const auto wanted = [&](const Aabb<S>& own) {
+    const Interval<S> interval = slabs.interval(own);
     return interval.near <= interval.far && interval.far >= 0 && interval.near <= visitor.limit();
   };
-  const S magnitude = planted(PlantedBug::kOctreeRayUnpadded) ? S{0} : locus::magnitude(bounds_);
-  const absl::Span<const int> axes = nodes_.axes();
+  const S magnitude = planted(PlantedBug::kOctreeRayUnpadded) ? S{0} : locus::magnitude(bounds());
+  const absl::Span<const int> axes = nodes().axes();
   uint32_t backwards = 0;  // the child that a ray enters first if it crosses all planes: the sign bits of the direction
   for (size_t i = 0; i < axes.size(); ++i) backwards |= uint32_t{std::signbit(slabs.direction()[axes[i]])} << i;
   PassedValues passed;
-  const Interval<S> whole = slabs.interval(bounds_, magnitude);
+  const Interval<S> whole = slabs.interval(bounds(), magnitude);
   Stack<Pending> pending = {{0, whole.near, whole.far}};
   while (!pending.empty()) {
     const Pending now = pending.back();
@@ -179,7 +105,7 @@ void Octree<V, T>::visit_ray(const SlabRay<S>& slabs, Visitor& visitor, Work& wo
     // The limit may have decreased since the push.
     if (now.near > now.far || now.far < 0 || beyond(now.near)) continue;
     ++work.nodes;
-    const Node& node = nodes_[now.node];
+    const Node& node = nodes()[now.node];
     if (!pass_values(node, wanted, visitor, passed, work)) return;
     if (node.is_leaf()) continue;
     Interval<S> planes[3];
@@ -188,7 +114,7 @@ void Octree<V, T>::visit_ray(const SlabRay<S>& slabs, Visitor& visitor, Work& wo
       plane.min[axes[i]] = plane.max[axes[i]] = node.middle[axes[i]];
       planes[i] = slabs.interval(plane, magnitude);
     }
-    for (uint32_t order = nodes_.child_count(); order-- > 0;) {
+    for (uint32_t order = nodes().child_count(); order-- > 0;) {
       Pending child = {node.first_child + (order ^ backwards), now.near, now.far};
       for (size_t i = 0; i < axes.size(); ++i) {
         const bool behind = ((order >> i) & 1) != 0;
@@ -206,13 +132,13 @@ requires Bounded<V, T>
 template <RegionVisitor<V, T> Visitor>
 void Octree<V, T>::visit_region(Visitor& visitor, Work& work) const {
   const Aabb<S> box = visitor.bounds();
-  if (!overlaps(box, bounds_)) return;
-  const auto wanted = [&](const Aabb<S>& bounds) { return visitor.overlaps(bounds); };
-  const absl::Span<const int> axes = nodes_.axes();
+  if (!overlaps(box, bounds())) return;
+  const auto wanted = [&](const Aabb<S>& own) { return visitor.overlaps(own); };
+  const absl::Span<const int> axes = nodes().axes();
   PassedValues passed;
   Stack<uint32_t> pending = {0};
   while (!pending.empty()) {
-    const Node& node = nodes_[pending.back()];
+    const Node& node = nodes()[pending.back()];
     pending.pop_back();
     ++work.nodes;
     if (!pass_values(node, wanted, visitor, passed, work)) return;
@@ -223,8 +149,8 @@ void Octree<V, T>::visit_region(Visitor& visitor, Work& work) const {
       if (planted(PlantedBug::kOctreeLowerStrict) ? low < plane : low <= plane) below |= 1u << i;
       if (box.max[axes[i]] >= plane) above |= 1u << i;
     }
-    for (uint32_t child = nodes_.child_count(); child-- > 0;) {
-      const uint32_t other = ~child & (nodes_.child_count() - 1);
+    for (uint32_t child = nodes().child_count(); child-- > 0;) {
+      const uint32_t other = ~child & (nodes().child_count() - 1);
       if ((child & ~above) == 0 && (other & ~below) == 0) pending.push_back(node.first_child + child);
     }
     LOCUS_DCHECK_LE(pending.size(), kStackSize);
@@ -243,19 +169,17 @@ void Octree<V, T>::visit_nearest(const Vec3d& point, Visitor& visitor, Work& wor
   const auto beyond = [&](double distance) {
     return planted(PlantedBug::kOctreeNearestStrict) ? distance >= visitor.limit() : distance > visitor.limit();
   };
-  const auto wanted = [&](const Aabb<S>& bounds) {
-    return squared_distance(point, to_double(bounds)) <= visitor.limit();
-  };
-  const absl::Span<const int> axes = nodes_.axes();
+  const auto wanted = [&](const Aabb<S>& own) { return squared_distance(point, to_double(own)) <= visitor.limit(); };
+  const absl::Span<const int> axes = nodes().axes();
   PassedValues passed;
-  const Aabbd whole = to_double(bounds_);
+  const Aabbd whole = to_double(bounds());
   Stack<Pending> pending = {{0, max(max(whole.min - point, point - whole.max), Vec3d{})}};
   while (!pending.empty()) {
     const Pending now = pending.back();
     pending.pop_back();
     if (beyond(squared_length(now.gap))) continue;
     ++work.nodes;
-    const Node& node = nodes_[now.node];
+    const Node& node = nodes()[now.node];
     if (!pass_values(node, wanted, visitor, passed, work)) return;
     if (node.is_leaf()) continue;
     uint32_t nearest = 0;  // number of the child on whose sides of the planes the point lies
@@ -265,7 +189,7 @@ void Octree<V, T>::visit_nearest(const Vec3d& point, Visitor& visitor, Work& wor
       nearest |= uint32_t{offset > 0} << i;
       gaps[axes[i]] = std::abs(offset);
     }
-    for (uint32_t order = nodes_.child_count(); order-- > 0;) {
+    for (uint32_t order = nodes().child_count(); order-- > 0;) {
       Pending child = {node.first_child + (order ^ nearest), now.gap};
       for (size_t i = 0; i < axes.size(); ++i) {
         if (((order >> i) & 1) != 0) child.gap[axes[i]] = std::max(child.gap[axes[i]], gaps[axes[i]]);

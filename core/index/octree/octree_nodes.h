@@ -1,10 +1,8 @@
-// Nodes of an octree: they know the bounds of values and list the values by slot numbers, so that this code does not
-// depend on the type of the values. One thread at a time; const members may run concurrently.
+// Nodes of an octree, and how they are divided. One thread at a time; const members may run concurrently.
 #ifndef LOCUS_CORE_INDEX_OCTREE_OCTREE_NODES_H_
 #define LOCUS_CORE_INDEX_OCTREE_OCTREE_NODES_H_
 
 #include <algorithm>
-#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -15,7 +13,7 @@
 #include "core/base/planted_bug.h"
 #include "core/geometry/aabb.h"
 #include "core/index/cut_values.h"
-#include "core/index/filed_values.h"
+#include "core/index/plane_nodes.h"
 
 namespace locus {
 
@@ -43,25 +41,18 @@ struct OctreeNode {
   bool is_leaf() const { return first_child == 0; }
 };
 
-// Size of a tree. A reference is one entry of a value in the list of a node.
-struct OctreeShape {
-  size_t nodes;
-  size_t references;
-  uint32_t depth;  // levels below the root
-};
-
 // The bits of a child's number say on which side of the planes it lies: bit i is set if it is above the plane
 // perpendicular to the i-th of the divided axes. A value is below a plane if its bounds begin at or below the plane,
 // and above if they end above the plane.
 template <class S>
-class OctreeNodes {
+class OctreeNodes : public PlaneNodes<S, OctreeNode<S>, OctreeNodes<S>> {
  public:
   // One pending sibling for each child but one, for each level.
   static constexpr size_t kStackSize = 7 * size_t{limits::kMaxOctreeDepth} + 1;
   template <class Pending>
   using Stack = absl::InlinedVector<Pending, 64>;
 
-  explicit OctreeNodes(const OctreeOptions& options) : options_(options), nodes_(1) {
+  explicit OctreeNodes(const OctreeOptions& options) : options_(options) {
     LOCUS_CHECK(options.leaf_size > 0);
     LOCUS_CHECK_LE(options.max_depth, limits::kMaxOctreeDepth);
     const bool divided[] = {options.axes.x, options.axes.y, options.axes.z};
@@ -72,68 +63,15 @@ class OctreeNodes {
   }
 
   const OctreeOptions& options() const { return options_; }
-  const OctreeNode<S>& operator[](uint32_t node) const { return nodes_[node]; }
   absl::Span<const int> axes() const { return axes_; }
   uint32_t child_count() const { return 1u << axes_.size(); }
 
-  // Builds the nodes of the values with these bounds, whose slots are 0, 1, 2, ... Divides the nodes level by level, so
-  // that the limits of nodes and references leave the levels equally deep.
-  void build(absl::Span<const Aabb<S>> bounds) {
-    nodes_.assign(1, OctreeNode<S>());
-    nodes_[0].values.resize(bounds.size());
-    std::iota(nodes_[0].values.begin(), nodes_[0].values.end(), uint32_t{0});
-    references_ = bounds.size();
-    depth_ = 0;
-    constexpr S kInfinity = std::numeric_limits<S>::infinity();
-    std::vector<Part> parts = {{{{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}}, 0}};
-    for (uint32_t node = 0; node < nodes_.size(); ++node) divide(node, bounds, parts);
-  }
-
-  // Lists `slot` in the nodes in which a value with `bounds` lies. Returns the number of these nodes.
-  uint32_t insert(uint32_t slot, const Aabb<S>& bounds) {
-    uint32_t places = 0;
-    for_each_place(bounds, [&](uint32_t node) {
-      nodes_[node].values.push_back(slot);
-      ++places;
-    });
-    references_ += places;
-    return places;
-  }
-
-  // Removes `slot` from the nodes that list it.
-  void remove(uint32_t slot, const Aabb<S>& bounds) {
-    bool first = true;
-    for_each_place(bounds, [&](uint32_t node) {
-      if (planted(PlantedBug::kOctreeReferenceLeft) && !std::exchange(first, false)) return;
-      erase_slot(nodes_[node].values, slot);
-      --references_;
-    });
-  }
-
-  // Returns the number of the nodes in which a value with `bounds` lies and that list `slot`.
-  size_t count(uint32_t slot, const Aabb<S>& bounds) const {
-    size_t places = 0;
-    for_each_place(bounds, [&](uint32_t node) {
-      const std::vector<uint32_t>& values = nodes_[node].values;
-      places += std::find(values.begin(), values.end(), slot) != values.end() ? 1 : 0;
-    });
-    return places;
-  }
-
-  template <class Fn>
-  void for_each_reference(const Fn& fn) const {
-    for (const OctreeNode<S>& node : nodes_)
-      for (const uint32_t slot : node.values) fn(slot);
-  }
-
-  OctreeShape shape() const { return {nodes_.size(), references_, depth_}; }
-
  private:
-  // Part of space that a node divides, while the tree is built.
-  struct Part {
-    Aabb<S> box;
-    uint32_t depth;
-  };
+  using Base = PlaneNodes<S, OctreeNode<S>, OctreeNodes<S>>;
+  friend Base;
+  using Base::depth_, Base::nodes_, Base::references_;
+  using typename Base::Part;
+
   // Sides of the planes of a node on which a value lies, as sets of bits of the numbers of children.
   struct Sides {
     uint32_t below = 0;
@@ -175,15 +113,17 @@ class OctreeNodes {
 
   // Divides a node that has more values than a leaf may have at the middle of their extent within the node's part of
   // space, unless no plane separates any of them.
-  void divide(uint32_t node, absl::Span<const Aabb<S>> bounds, std::vector<Part>& parts) {
+  void divide(uint32_t node, absl::Span<const PlacedBounds<S>> values, std::vector<Part>& parts) {
     const Part part = parts[node];
     const std::vector<uint32_t>& slots = nodes_[node].values;
     depth_ = std::max(depth_, part.depth);
     if (slots.size() <= options_.leaf_size || part.depth >= options_.max_depth) return;
-    if (nodes_.size() + child_count() >= 2 * bounds.size()) return;
+    if (nodes_.size() + child_count() >= 2 * values.size()) return;
     Aabb<S> box;
-    for (const uint32_t slot : slots)
-      box = merge(box, {max(bounds[slot].min, part.box.min), min(bounds[slot].max, part.box.max)});
+    for (const uint32_t slot : slots) {
+      const Aabb<S>& bounds = values[slot].bounds;
+      box = merge(box, {max(bounds.min, part.box.min), min(bounds.max, part.box.max)});
+    }
     Vec3<S> middle;
     for (int axis = 0; axis < 3; ++axis) {
       middle[axis] = box.min[axis] / 2 + box.max[axis] / 2;
@@ -192,7 +132,7 @@ class OctreeNodes {
     std::vector<std::vector<uint32_t>> children(child_count());
     std::vector<uint32_t> at_node;
     for (const uint32_t slot : slots) {
-      const Sides sides = sides_of(middle, bounds[slot]);
+      const Sides sides = sides_of(middle, values[slot].bounds);
       if ((sides.cut() && options_.cut == CutValues::kAtNode)) {
         at_node.push_back(slot);
         continue;
@@ -201,7 +141,7 @@ class OctreeNodes {
         if (sides.holds(child)) children[child].push_back(slot);
       }
     }
-    if (worthwhile(children, slots.size(), at_node.size(), bounds.size()))
+    if (worthwhile(children, slots.size(), at_node.size(), values.size()))
       apply(node, middle, std::move(children), std::move(at_node), parts);
   }
 
@@ -239,9 +179,6 @@ class OctreeNodes {
 
   OctreeOptions options_;
   absl::InlinedVector<int, 3> axes_;  // the divided axes, ascending
-  std::vector<OctreeNode<S>> nodes_;  // the root, then groups of children in the order of their parents
-  size_t references_ = 0;
-  uint32_t depth_ = 0;
 };
 
 }  // namespace locus

@@ -5,6 +5,8 @@
 
 #include "core/index/queries/index_queries.h"
 #include "core/index/queries/nearest_values.h"
+#include "tests/support/adversarial_scenes.h"
+#include "tests/support/index_judge.h"
 #include "tests/support/random.h"
 #include "tests/support/small_world.h"
 
@@ -82,7 +84,7 @@ TEST(KdTreeTest, NodesReferencesAndDepthKeepTheirLimitsForEveryRule) {
           KdTreeOptions options = kd_options(split, cut);
           options.axis = axis;
           options.max_depth = 12;
-          const KdShape shape = KdTree<Object>::build(kd_boxes(2'000, size, 3), options).shape();
+          const PlaneTreeShape shape = KdTree<Object>::build(kd_boxes(2'000, size, 3), options).shape();
           EXPECT_LT(shape.nodes, 4'000u) << size;
           EXPECT_LT(shape.references, 8'000u) << size;
           EXPECT_LE(shape.depth, 12u) << size;
@@ -193,7 +195,7 @@ TEST(KdTreeTest, RebuildRestoresTheShapeAfterInserts) {
   for (const Object& object : objects) tree.insert(object);
   EXPECT_EQ(tree.shape().nodes, 1u);
   tree.rebuild();
-  const KdShape fresh = KdTree<Object>::build(objects, kd_options(KdSplit::kMedian)).shape();
+  const PlaneTreeShape fresh = KdTree<Object>::build(objects, kd_options(KdSplit::kMedian)).shape();
   EXPECT_EQ(tree.shape().nodes, fresh.nodes);
   EXPECT_EQ(tree.shape().references, fresh.references);
 }
@@ -266,27 +268,19 @@ static_assert(MutableSpatialIndex<KdTree<Triangle, KdCentroidTraits>>);
 
 TEST(KdTreeTest, OneTypeLiesAtItsCentroidInOneTreeAndAtItsLowestCornerInAnother) {
   Random random(3);
-  std::vector<Triangle> triangles;
-  for (uint32_t i = 0; i < 300; ++i) {
-    const Vec3f corner = random.float_vector(10);
-    const Vec3f u = random.float_vector(1), v = random.float_vector(1);
-    triangles.push_back({corner, corner + u, corner + v, i});
-  }
+  const TestScene<Triangle> scene = make_scene<Triangle>(random_scene(random), random);
+  const std::vector<Triangle>& triangles = scene.values;
   const auto at_centroid = KdTree<Triangle, KdCentroidTraits>::build(triangles, kd_options(KdSplit::kMedian));
   const auto at_corner = KdTree<Triangle, KdLowestCornerTraits>::build(triangles, kd_options(KdSplit::kMedian));
   EXPECT_NE(at_centroid.shape().references, at_corner.shape().references) << "the trees do not differ";
-  for (int i = 0; i < 100; ++i) {
-    const Ballf ball = {random.float_vector(10), 2};
-    std::vector<Triangle> first, second;
-    ball_overlap(at_centroid, ball, first);
-    ball_overlap(at_corner, ball, second);
-    EXPECT_THAT(first, ::testing::UnorderedElementsAreArray(second));
-    const TriangleRay ray(random.vector(10), random.unit_vector());
-    Triangle hit, other_hit;
-    float t = 100, other_t = 100;
-    EXPECT_EQ(first_ray(at_centroid, ray, hit, t), first_ray(at_corner, ray, other_hit, other_t));
-    EXPECT_EQ(t, other_t);
+  ListIndex<Triangle, KdCentroidTraits> centroid_list;
+  ListIndex<Triangle, KdLowestCornerTraits> corner_list;
+  for (const Triangle& triangle : triangles) {
+    centroid_list.insert(triangle);
+    corner_list.insert(triangle);
   }
+  EXPECT_EQ(IndexJudge(at_centroid, centroid_list).difference(scene), "");
+  EXPECT_EQ(IndexJudge(at_corner, corner_list).difference(scene), "");
 }
 
 }  // namespace
