@@ -18,6 +18,7 @@ sets:
   container  packages that tests/container.sh needs to build and run the image without a registry or a daemon
   runtime    libraries that locusd and locus need at run time; the image has nothing else
   edge       the front of deploy/edge
+  docs       packages that build the pages of deploy/docs and check their links and spelling
 
   --list    print the names of the packages and do nothing
   --check   print the names of the missing packages; exit 1 if there is one
@@ -49,6 +50,9 @@ runtime_packages="libgrpc++1.51 libprotobuf32 libabsl20220623 libspdlog1.10 liba
   liblua5.4-0 libedit2"
 # The reverse proxy of deploy/edge.
 edge_packages="haproxy"
+# Pages are run by python3-yaml and procps besides the packages of the sets build, python and test.
+docs_packages="mkdocs mkdocs-material python3-yaml python3-pymdownx python3-prometheus-client linkchecker codespell
+  procps protobuf-compiler"
 
 action=install
 packages=
@@ -63,6 +67,7 @@ for argument in "$@"; do
     container) packages="$packages $container_packages" ;;
     runtime) packages="$packages $runtime_packages" ;;
     edge) packages="$packages $edge_packages" ;;
+    docs) packages="$packages $docs_packages" ;;
     --list) action=list ;;
     --check) action=check ;;
     -h | --help) usage; exit 0 ;;

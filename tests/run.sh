@@ -149,7 +149,7 @@ run_suite() {
 }
 
 say "packages"
-sets=(build python test)
+sets=(build python test docs)
 if [ "$bench" = yes ]; then sets+=(bench); fi
 case "$suites" in *asan*) sets+=(clang) ;; esac
 if [ "$long" = yes ]; then sets+=(lint); fi
