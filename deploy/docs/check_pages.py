@@ -54,12 +54,17 @@ def faults_of(pages):
     return faults_of_blocks(pages) + recipes_without_a_test(pages) + pages_without_a_link(pages)
 
 
+def check(folder):
+    """Prints the faults of the pages below a folder; returns the exit code."""
+    faults = faults_of(read_pages(folder))
+    print("".join(fault + "\n" for fault in faults), end="", file=sys.stderr)
+    return 1 if faults else 0
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--pages", required=True)
-    faults = faults_of(read_pages(parser.parse_args().pages))
-    print("".join(fault + "\n" for fault in faults), end="", file=sys.stderr)
-    return 1 if faults else 0
+    return check(parser.parse_args().pages)
 
 
 if __name__ == "__main__":

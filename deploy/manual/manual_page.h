@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "client/cli/command_words.h"
+#include "deploy/manual/page_form.h"
 
 namespace locus::manual {
 
@@ -25,12 +26,12 @@ struct Manual {
 };
 
 struct Page {
-  std::string file;  // "locus-query-ray.1"
-  std::string roff;
+  std::string file;  // "locus-query-ray.1", or "locus-query-ray.md" for the site
+  std::string text;
 };
 
 // Returns the page of the program, followed by the pages of every command below it.
-std::vector<Page> manual_pages(const cli::CommandWords& program, const Manual& manual);
+std::vector<Page> manual_pages(const cli::CommandWords& program, const Manual& manual, Form form = Form::kRoff);
 
 }  // namespace locus::manual
 

@@ -11,7 +11,7 @@
 
 namespace locus::manual {
 
-std::vector<Page> pages_of_locus() {
+std::vector<Page> pages_of_locus(Form form) {
   std::ostringstream nowhere;
   cli::Context context(nowhere, nowhere, cli::Progress::kSilent);
   CLI::App app;
@@ -38,10 +38,10 @@ std::vector<Page> pages_of_locus() {
                     {"LOCUS_METRICS_ADDRESS", "Where `locus top` reads metrics, if --metrics-address is not given."}},
       .see_also = {"locusd(8)"},
   };
-  return manual_pages(cli::words_of(app), manual);
+  return manual_pages(cli::words_of(app), manual, form);
 }
 
-std::vector<Page> pages_of_locusd() {
+std::vector<Page> pages_of_locusd(Form form) {
   server::ServerConfig config;
   CLI::App app;
   server::build_parser(app, config);
@@ -63,7 +63,7 @@ std::vector<Page> pages_of_locusd() {
     if (name == "help" || name == "version") continue;
     manual.variables.emplace_back(server::environment_variable(name), absl::StrCat("Like --", name, "."));
   }
-  return manual_pages(words, manual);
+  return manual_pages(words, manual, form);
 }
 
 }  // namespace locus::manual

@@ -10,10 +10,10 @@
 namespace locus::manual {
 
 // Returns locus(1) and a page for each of its commands.
-std::vector<Page> pages_of_locus();
+std::vector<Page> pages_of_locus(Form form = Form::kRoff);
 
 // Returns locusd(8) and a page for each of its commands.
-std::vector<Page> pages_of_locusd();
+std::vector<Page> pages_of_locusd(Form form = Form::kRoff);
 
 }  // namespace locus::manual
 

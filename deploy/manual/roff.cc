@@ -52,6 +52,10 @@ RoffPage::RoffPage(const std::string& title, const std::string& section, const s
   absl::StrAppend(&roff_, ".TH ", escaped(title), " ", section, R"( "" ")", escaped(source), "\"\n.nh\n.ad l\n");
 }
 
+std::string RoffPage::reference(const std::string& page, const std::string& section) const {
+  return absl::StrCat(bold(page), "(", section, ")");
+}
+
 RoffPage& RoffPage::heading(const std::string& name) {
   absl::StrAppend(&roff_, ".SH ", escaped(name), "\n");
   return *this;
@@ -91,6 +95,12 @@ RoffPage& RoffPage::synopsis(const std::string& markup, const std::string& rest_
   absl::StrAppend(&roff_, ".HP\n", markup, rest_markup.empty() ? "" : "\n", rest_markup, "\n");
   return *this;
 }
+
+RoffPage& RoffPage::name(const std::string& page, const std::string& summary) {
+  return heading("NAME").text(absl::StrCat(page, " - ", summary));
+}
+
+RoffPage& RoffPage::references(const std::vector<std::string>& pages) { return text(absl::StrJoin(pages, ",\n")); }
 
 RoffPage& RoffPage::literal(const std::vector<std::string>& lines) {
   absl::StrAppend(&roff_, ".RS 2\n.nf\n");

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "deploy/manual/page_form.h"
+
 namespace locus::manual {
 
 // Returns `text` escaped, so that roff prints it unchanged: no part of it is interpreted as a command or an escape
@@ -16,22 +18,26 @@ std::string escaped(const std::string& text);
 std::string bold(const std::string& text);
 std::string italic(const std::string& text);
 
-class RoffPage {
+class RoffPage : public PageForm {
  public:
   // Begins the page. The arguments are plain text.
   RoffPage(const std::string& title, const std::string& section, const std::string& source);
 
-  RoffPage& heading(const std::string& name);
-  // Adds running text; an empty line begins a new paragraph.
-  RoffPage& text(const std::string& plain);
-  // Adds a term and its explanation. `markup` is the term as roff, made by escaped(), bold() or italic(); `plain` is
-  // the explanation as plain text.
-  RoffPage& item(const std::string& markup, const std::string& plain);
-  // Adds a synopsis: `markup`, followed by `rest_markup`. Lines after the first are indented.
-  RoffPage& synopsis(const std::string& markup, const std::string& rest_markup);
-  // Adds lines that are printed unchanged.
-  RoffPage& literal(const std::vector<std::string>& lines);
+  std::string typed(const std::string& text) const override { return bold(text); }
+  std::string variable(const std::string& text) const override { return italic(text); }
+  std::string reference(const std::string& page, const std::string& section) const override;
 
+  RoffPage& name(const std::string& page, const std::string& summary) override;
+  RoffPage& heading(const std::string& name) override;
+  RoffPage& text(const std::string& plain) override;
+  RoffPage& item(const std::string& markup, const std::string& plain) override;
+  // Adds a synopsis. Lines after the first are indented.
+  RoffPage& synopsis(const std::string& markup, const std::string& rest_markup) override;
+  RoffPage& references(const std::vector<std::string>& pages) override;
+  RoffPage& literal(const std::vector<std::string>& lines) override;
+  RoffPage& examples(const std::vector<std::string>& lines) override { return literal(lines); }
+
+  const std::string& written() const override { return roff_; }
   const std::string& roff() const { return roff_; }
 
  private:

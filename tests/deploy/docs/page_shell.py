@@ -92,6 +92,8 @@ class PageShell:
             for process in self.members():
                 os.kill(process, signal.SIGKILL)
             self.shell.wait()
+        self.shell.stdin.close()
+        self.shell.stdout.close()
 
     def members(self):
         """Returns the ids of the processes in the session of the shell."""

@@ -36,23 +36,23 @@ TEST(ManualPageTest, EveryCommandHasAPageOfItsOwn) {
   ASSERT_THAT(pages, SizeIs(2));
   EXPECT_EQ(pages[0].file, "tool.1");
   EXPECT_EQ(pages[1].file, "tool-draw.1");
-  EXPECT_THAT(pages[0].roff, HasSubstr("\\fBtool\\-draw\\fR(1)\nDraw something."));
+  EXPECT_THAT(pages[0].text, HasSubstr("\\fBtool\\-draw\\fR(1)\nDraw something."));
 }
 
 TEST(ManualPageTest, TheSynopsisShowsWhatIsRequired) {
-  EXPECT_THAT(page_of_draw().roff,
+  EXPECT_THAT(page_of_draw().text,
               HasSubstr("\\fBtool draw\\fR\n\\fB\\-\\-out\\fR \\fIFILE\\fR [\\fIOPTION\\fR]... \\fISHAPE\\fR\n"));
 }
 
 TEST(ManualPageTest, OptionsShowTheirValueAndChoices) {
-  const std::string roff = page_of_draw().roff;
+  const std::string roff = page_of_draw().text;
   EXPECT_THAT(roff, HasSubstr("\\fB\\-o\\fR, \\fB\\-\\-out\\fR \\fIFILE\\fR\nWhere to. Required.\n"));
   EXPECT_THAT(roff, HasSubstr("How. One of fast, fine.\n"));
   EXPECT_THAT(roff, Not(HasSubstr("One of ball"))) << "the description names them already";
 }
 
 TEST(ManualPageTest, ExamplesStandApartFromTheOtherNotes) {
-  const std::string roff = page_of_draw().roff;
+  const std::string roff = page_of_draw().text;
   EXPECT_THAT(roff, HasSubstr(".nf\ntool draw ball\ntool draw box \\-\\-out a.png\n.fi"));
   EXPECT_THAT(roff, HasSubstr("Draw something.\n.PP\nIt takes a while.\n.PP\nSee the book.\n"));
 }
@@ -60,19 +60,19 @@ TEST(ManualPageTest, ExamplesStandApartFromTheOtherNotes) {
 TEST(ManualPageTest, IndentedNotesAreKeptLiterally) {
   const cli::CommandWords tool{
       .path = "tool", .description = "Draws.", .footer = "Shapes:\n  ball   round\n  box\nLast."};
-  const std::string roff = manual_pages(tool, {.section = "1", .version = "2.0"}).at(0).roff;
+  const std::string roff = manual_pages(tool, {.section = "1", .version = "2.0"}).at(0).text;
   EXPECT_THAT(roff, HasSubstr("Shapes:\n.RS 2\n.nf\nball   round\nbox\n.fi\n.RE\nLast.\n"));
 }
 
 TEST(ManualPageTest, ADescriptionOfSeveralSentencesIsIndexedByItsFirst) {
   const cli::CommandWords tool{.path = "tool", .description = "Draws balls\nand boxes. Slowly."};
-  const std::string roff = manual_pages(tool, {.section = "1", .version = "2.0"}).at(0).roff;
+  const std::string roff = manual_pages(tool, {.section = "1", .version = "2.0"}).at(0).text;
   EXPECT_THAT(roff, HasSubstr(".SH NAME\ntool \\- Draws balls and boxes\n"));
   EXPECT_THAT(roff, HasSubstr(".SH DESCRIPTION\nDraws balls\nand boxes. Slowly.\n"));
 }
 
 TEST(ManualPageTest, ExitStatusesAndVariablesAreOnEveryPage) {
-  const std::string roff = page_of_draw().roff;
+  const std::string roff = page_of_draw().text;
   EXPECT_THAT(roff, HasSubstr(".SH EXIT STATUS\n.TP\n\\fB0\\fR\nIt went well.\n"));
   EXPECT_THAT(roff, HasSubstr(".SH ENVIRONMENT\n.TP\n\\fBTOOL_HOME\\fR\nWhere it lives.\n"));
   EXPECT_THAT(roff, HasSubstr(".SH SEE ALSO\ntool(1),\ntoold(8)\n"));

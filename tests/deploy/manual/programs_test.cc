@@ -39,7 +39,7 @@ void expect_pages(const cli::CommandWords& command, const std::string& section,
 
 std::map<std::string, std::string> by_file(const std::vector<Page>& pages) {
   std::map<std::string, std::string> map;
-  for (const Page& page : pages) map[page.file] = page.roff;
+  for (const Page& page : pages) map[page.file] = page.text;
   return map;
 }
 
