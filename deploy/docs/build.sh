@@ -37,4 +37,8 @@ cp -r "$top/deploy/docs/pages/." "$pages"
 settings=$pages.yml
 /usr/bin/python3 "$top/deploy/docs/navigation.py" --settings "$top/deploy/docs/mkdocs.yml" --pages "$pages" --site "$site" >"$settings"
 mkdocs build --strict --quiet --clean --config-file "$settings"
+# Removes what only a web server uses, or a developer of the theme. The site map also holds the day of the build, and equal
+# pages are to give equal files.
+rm -f "$site/sitemap.xml" "$site/sitemap.xml.gz" "$site/404.html"
+find "$site" -name '*.map' -delete
 echo "build.sh: $site/index.html"

@@ -10,7 +10,7 @@ def escaped(text):
     """Returns one line escaped; words between backticks stay code."""
     parts = CODE.split(text)
     for at in range(0, len(parts), 2):
-        parts[at] = re.sub(r"[\\*_\[\]{}|#~`]", r"\\\g<0>", re.sub(r"[&<>]", lambda found: ENTITIES[found.group()], parts[at]))
+        parts[at] = re.sub(r"[\\*_\[\]{}|#`]", r"\\\g<0>", re.sub(r"[&<>]", lambda found: ENTITIES[found.group()], parts[at]))
     line = "".join(parts)
     return re.sub(r"^(\d+)([.)] )", r"\1\\\2", re.sub(r"^([+-])( |$)", r"\\\1\2", line))
 

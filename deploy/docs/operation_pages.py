@@ -11,7 +11,6 @@ import daemon
 import markdown
 
 OPTION = re.compile(r"#([a-z0-9-]+) = (.*)")
-METRIC_ROW = re.compile(r"^\| (`.*?`) \| (.*?) \| (.*?) \| (.*) \|$", re.MULTILINE)
 
 
 def read(*path):
@@ -50,11 +49,11 @@ def configuration(source, binaries):
     """Returns the page of options of the daemon's file: comments of the example, and the defaults of the program."""
     defaults = effective_options(binaries)
     text = ("# Configuration of locusd\n\n"
-            "An option is set by a flag (`--max-scenes 10`), an environment variable (`LOCUS_MAX_SCENES=10`) or a line of the file "
-            "that `--config FILE` names (`max-scenes = 10`). The first of the three that is set wins. In the file, `#` begins a "
-            "comment. `locusd config` prints the value of every option and where it comes from; the flags are also listed with "
-            "[locusd](commands/locusd.md). Changes take effect at the next start, except that the contents of the files of "
-            "certificates, tokens, keys and access rules are read again when they change.\n")
+            "An option is set by a flag (`--max-scenes 10`), an environment variable (`LOCUS_MAX_SCENES=10`) or a line of the "
+            "file that `--config FILE` names (`max-scenes = 10`). The first of the three that is set wins. In the file, `#` "
+            "begins a comment. `locusd config` prints the value of every option and where it comes from; the "
+            "flags are also listed with [locusd](commands/locusd.md). Changes take effect at the next start, except that the "
+            "contents of the files of certificates, tokens, keys and access rules are read again when they change.\n")
     for comment, names in paragraphs_of_example(read(source, "deploy/locusd.conf.example")):
         rows = [[f"[`{name}`](#{name}){{#{name}}}", value_cell(OF_THE_MACHINE.get(name, defaults[name])),
                  f"`LOCUS_{name.upper().replace('-', '_')}`"] for name in names]
@@ -72,9 +71,10 @@ def labels_by_metric(readme):
     underscore goes on after locus_scene.
     """
     found = {}
-    for names, labels, unit, _ in METRIC_ROW.findall(readme):
-        for name in re.findall(r"`([\w*]+)`", names):
-            found["locus_scene" + name if name.startswith("_") else name] = (labels.strip(), unit)
+    for line in readme.split("\n"):
+        cells = [cell.strip() for cell in line.strip("|").split("|")]
+        for name in re.findall(r"`([\w*]+)`", cells[0]) if line.startswith("| `") and len(cells) == 4 else ():
+            found["locus_scene" + name if name.startswith("_") else name] = (cells[1], cells[2])
     return found
 
 
@@ -96,8 +96,10 @@ def metrics(source, binaries):
         name = family_name(family)
         labels, unit = known.get(name, known["process_*"] if name.startswith("process_") else ("", ""))
         facts = [family.type, "labels " + ", ".join(f"`{label}`" for label in labels.split(", ")) if labels else "no labels"]
-        facts += [f"unit: {unit.replace(', histogram', '')}"] if unit and not name.startswith("process_") else []
-        text += markdown.definition(f"[`{name}`](#{name}){{#{name}}} {', '.join(facts)}", markdown.markdown_of(family.documentation))
+        of_one = not unit or unit.startswith(("0", "1")) or name.startswith("process_")
+        facts += [] if of_one else ["unit: " + unit.replace(", histogram", "")]
+        term = f"[`{name}`](#{name}){{#{name}}} {', '.join(facts)}"
+        text += markdown.definition(term, markdown.markdown_of(family.documentation))
     return text
 
 
@@ -120,7 +122,7 @@ def errors(source, pages):
     (file,) = [file for file in pages.files if file.name.endswith("errors.proto")]
     text = "# Errors\n\n" + moved(pages.file_comment(file)) + (
         "\nA Reason has the same name everywhere: `REASON_LIMIT` in the protocol is `LIMIT` in the label `reason` of metrics, in "
-        "`locus -o json`, in logs, and as `Reason.LIMIT` in Python.\n")
+        "`locus -o json`, and as `Reason.LIMIT` in Python.\n")
     for name, element in reasons.items():
         short = name.removeprefix("REASON_")
         text += f"\n## {short} {{#{short.lower()}}}\n\n`{name}` = {element.descriptor.number}. {moved(pages.text(element))}"

@@ -32,13 +32,13 @@ class Element:
         self.file, self.parent, self.parts = file, parent, []
 
 
-def dedented(comment):
+def unindented(comment):
     return "\n".join(line.removeprefix(" ") for line in comment.split("\n"))
 
 
 def comments_of(file):
     """Returns the comment of each element by its path in the descriptor."""
-    return {tuple(location.path): dedented(location.leading_comments or location.trailing_comments)
+    return {tuple(location.path): unindented(location.leading_comments or location.trailing_comments)
             for location in file.source_code_info.location if location.leading_comments or location.trailing_comments}
 
 
@@ -150,8 +150,8 @@ class Pages:
 
     def rpc(self, element):
         method = element.descriptor
-        sides = [("stream " if streamed else "") + self.link(name.removeprefix(f".{PACKAGE}."))
-                 for streamed, name in ((method.client_streaming, method.input_type), (method.server_streaming, method.output_type))]
+        types = ((method.client_streaming, method.input_type), (method.server_streaming, method.output_type))
+        sides = [("stream " if streamed else "") + self.link(name.removeprefix(f".{PACKAGE}.")) for streamed, name in types]
         return f"\n### {element.name} {{#{element.name}}}\n\nTakes {sides[0]}, returns {sides[1]}.\n\n{self.text(element)}"
 
     def whole(self, element):
@@ -178,8 +178,8 @@ class Pages:
                  for element in elements if element.kind == "rpc"]
         files = [[f"[{os.path.basename(file.name)}]({page_of(file.name)})", self.first_sentence(self.file_comment(file))]
                  for file in self.files]
-        return (f"# Protocol\n\nThe package `{PACKAGE}`: gRPC services that every client of locus calls. These pages are made from "
-                f"the files in `proto/` and have all {len(self.by_name)} elements.\n\n"
+        return (f"# Protocol\n\nThe package `{PACKAGE}`: gRPC services that every client of locus calls. These pages are made "
+                f"from the files in `proto/` and have all {len(self.by_name)} elements.\n\n"
                 + markdown.table(["call", "what it does"], calls) + "\n" + markdown.table(["file", "content"], files))
 
     def summary(self, element):

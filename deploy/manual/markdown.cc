@@ -9,7 +9,7 @@
 namespace locus::manual {
 
 std::string markdown_escaped(const std::string& text) {
-  constexpr absl::string_view kSpecial = "\\*_<>[]{}#|&~!";
+  constexpr absl::string_view kSpecial = "\\*_<>[]{}#|&!";
   std::string markdown;
   bool code = false;
   for (size_t at = 0; at < text.size(); ++at) {
@@ -102,10 +102,26 @@ MarkdownPage& MarkdownPage::literal(const std::vector<std::string>& lines) {
   return *this;
 }
 
+namespace {
+
+// Returns an example as a line for a shell: an explanation after it, which two blanks or more separate from it, becomes
+// a comment.
+std::string shell_line(const std::string& line) {
+  const size_t begin = line.find_first_not_of(' ');
+  const size_t gap = line.find("  ", begin);
+  const size_t explanation = line.find_first_not_of(' ', gap);
+  if (begin == std::string::npos || gap == std::string::npos || explanation == std::string::npos) return line;
+  return absl::StrCat(line.substr(0, explanation), "# ", line.substr(explanation));
+}
+
+}  // namespace
+
 MarkdownPage& MarkdownPage::examples(const std::vector<std::string>& lines) {
+  std::vector<std::string> shell_lines;
+  for (const std::string& line : lines) shell_lines.push_back(shell_line(line));
   absl::StrAppend(&markdown_,
                   "\n<!-- not run: The scenes and files of these examples do not exist; a test checks that the ",
-                  "command lines are right. -->\n", fenced("sh", lines));
+                  "command lines are right. -->\n", fenced("sh", shell_lines));
   return *this;
 }
 

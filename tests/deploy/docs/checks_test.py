@@ -41,7 +41,8 @@ class BlocksTest(unittest.TestCase):
 
     def test_faults_of_blocks_are_found(self):
         for text, fault in ((block("", "x"), "without a language"), (block("perl", "x"), "unknown language"),
-                            (block("sh", "x", "not run: slow"), "no whole sentence"), (block("console", "x"), "without a command")):
+                            (block("sh", "x", "not run: slow"), "no whole sentence"),
+                            (block("console", "x"), "without a command")):
             (found,) = blocks.faults_of(text)
             self.assertIn(fault, found[1])
         self.assertEqual(blocks.faults_of(block("sh", "x", "not run: It deletes the data directory.")), [])
@@ -54,13 +55,15 @@ class BlocksTest(unittest.TestCase):
 
 class CheckPagesTest(unittest.TestCase):
     def setUp(self):
-        self.pages = {"index.md": "", "cookbook/index.md": "[a](a.md)", "cookbook/a.md": block("sh", "echo a") + block("text", "a")}
+        self.pages = {"index.md": "", "cookbook/index.md": "[a](a.md)",
+                      "cookbook/a.md": block("sh", "echo a") + block("text", "a")}
 
     def test_good_pages_have_no_faults(self):
         self.assertEqual(check_pages.faults_of(self.pages), [])
 
     def test_a_recipe_without_a_test_is_found(self):
-        for recipe in ("Words.\n", block("sh", "echo a"), block("sh", "echo a", "not run: It takes an hour.") + block("text", "a"),
+        for recipe in ("Words.\n", block("sh", "echo a"),
+                       block("sh", "echo a", "not run: It takes an hour.") + block("text", "a"),
                        block("console", "$ true"), block("sh", "echo a") + "Words.\n" + block("text", "a")):
             self.assertEqual(len(check_pages.recipes_without_a_test({**self.pages, "cookbook/a.md": recipe})), 1, recipe)
 
@@ -82,7 +85,8 @@ class NavigationTest(unittest.TestCase):
     def test_pages_have_the_order_of_the_links_in_the_index(self):
         with tempfile.TemporaryDirectory() as folder:
             os.makedirs(os.path.join(folder, "start/inner"))
-            for name, text in (("index.md", ""), ("start/index.md", "[b](b.md) [a](a.md)"), ("start/a.md", ""), ("start/b.md", ""),
+            for name, text in (("index.md", ""), ("start/index.md", "[b](b.md) [a](a.md)"), ("start/a.md", ""),
+                               ("start/b.md", ""),
                                ("start/inner/z.md", ""), ("start/inner/index.md", "")):
                 with open(os.path.join(folder, name), "w", encoding="utf-8") as file:
                     file.write(text)
