@@ -36,7 +36,11 @@ cp -r "$top/deploy/docs/pages/." "$pages"
 # The list of pages is made from the folders. The settings lie beside the pages, because mkdocs resolves folders from there.
 settings=$pages.yml
 /usr/bin/python3 "$top/deploy/docs/navigation.py" --settings "$top/deploy/docs/mkdocs.yml" --pages "$pages" --site "$site" >"$settings"
-mkdocs build --strict --quiet --clean --config-file "$settings"
+# Its messages matter only if it fails.
+if ! mkdocs build --strict --clean --config-file "$settings" >"$pages.log" 2>&1; then
+  grep -v "^INFO" "$pages.log" >&2
+  exit 1
+fi
 # Removes what only a web server uses, or a developer of the theme. The site map also holds the day of the build, and equal
 # pages are to give equal files.
 rm -f "$site/sitemap.xml" "$site/sitemap.xml.gz" "$site/404.html"
