@@ -22,6 +22,11 @@ def free_address():
         return f"127.0.0.1:{probe.getsockname()[1]}"
 
 
+def address_in(port_file):
+    with open(port_file, encoding="utf-8") as file:
+        return "127.0.0.1:" + file.read().strip()
+
+
 class PageShell:
     """A context manager. `options` are those of the page's locusd; None if the page starts its own."""
 
@@ -29,11 +34,12 @@ class PageShell:
         self.binaries, self.options = binaries, options
         self.folder = tempfile.mkdtemp(prefix="page-")
         self.hidden = tempfile.mkdtemp(prefix="page-run-")
+        # A daemon of the page's own gets ports that are free now; that of the runner chooses its ports itself.
         self.address, self.http = free_address(), free_address()
         self.environment = {name: value for name, value in os.environ.items() if not name.startswith("LOCUS_")}
         self.environment.update(
-            PATH=":".join([binaries, CCACHE, "/usr/bin", "/bin", os.environ["PATH"]]), LOCUS_ADDRESS=self.address,
-            LOCUS_METRICS_ADDRESS=self.http, PYTHONPATH=python, PYTHONDONTWRITEBYTECODE="1", HOME=self.hidden, LC_ALL="C.UTF-8")
+            PATH=":".join([binaries, CCACHE, "/usr/bin", "/bin", os.environ["PATH"]]), PYTHONPATH=python,
+            PYTHONDONTWRITEBYTECODE="1", HOME=self.hidden, LC_ALL="C.UTF-8")
         if options is None:
             self.environment.update(LOCUS_LISTEN=self.address, LOCUS_HTTP_LISTEN=self.http)
         if prefix:
@@ -45,6 +51,7 @@ class PageShell:
         try:
             if self.options is not None:
                 self.start_daemon()
+            self.environment.update(LOCUS_ADDRESS=self.address, LOCUS_METRICS_ADDRESS=self.http)
             self.shell = subprocess.Popen(["/bin/bash", "--noprofile", "--norc"], cwd=self.folder, env=self.environment,
                                           stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
                                           start_new_session=True)
@@ -67,17 +74,19 @@ class PageShell:
         shutil.rmtree(self.hidden, ignore_errors=True)
 
     def start_daemon(self):
-        listening = os.path.join(self.hidden, "port")
+        ports = [os.path.join(self.hidden, name) for name in ("port", "http-port")]
         with open(os.path.join(self.hidden, "log"), "w", encoding="utf-8") as log:
             self.daemon = subprocess.Popen(
-                [os.path.join(self.binaries, "locusd"), "--listen", self.address, "--port-file", listening, "--http-listen",
-                 self.http, *self.options], cwd=self.folder, env=self.environment, stdout=log, stderr=log)
+                [os.path.join(self.binaries, "locusd"), "--listen", "127.0.0.1:0", "--port-file", ports[0], "--http-listen",
+                 "127.0.0.1:0", "--http-port-file", ports[1], *self.options], cwd=self.folder, env=self.environment,
+                stdout=log, stderr=log)
         deadline = time.monotonic() + START_SECONDS
-        while not os.path.exists(listening):
+        while not all(map(os.path.exists, ports)):
             if self.daemon.poll() is not None or time.monotonic() > deadline:
                 with open(os.path.join(self.hidden, "log"), encoding="utf-8") as log:
                     raise RuntimeError(f"locusd did not start: {log.read()}")
             time.sleep(0.02)
+        self.address, self.http = map(address_in, ports)
 
     def send(self, line):
         self.shell.stdin.write(line.encode() + b"\n")
