@@ -6,8 +6,11 @@ A mark is an HTML comment directly above a block:
     <!-- file: NAME -->            the block is saved as NAME for later blocks of the page, and not run
     <!-- fails: CODE -->           the last command of the block exits with CODE, and its errors are shown, too
     <!-- daemon: OPTIONS -->       anywhere in a page: options of the page's locusd; `none` if the page starts its own
+
+A line `--8<-- "PATH"` in a page stands for the content of a file of the repository, so that pages show example programs.
 """
 import dataclasses
+import os
 import re
 
 # Languages of blocks that are run, and of blocks that are only read. A block of any other language is an error.
@@ -18,6 +21,8 @@ FENCE = re.compile(r"^([ ]*)(`{3,}|~{3,})[ ]*([^`\n]*)$")
 MARK = re.compile(r"^\s*<!-- (not run|file|fails): (.*?) -->\s*$")
 DAEMON = re.compile(r"^<!-- daemon: (.*?) -->\s*$", re.MULTILINE)
 SENTENCE = re.compile(r"[A-Z].*\S \S+ \S.*\.", re.DOTALL)
+INCLUDE = re.compile(r'^--8<-- "([^"]+)"$', re.MULTILINE)
+TOP = os.path.join(os.path.dirname(os.path.abspath(__file__)), "../..")
 HEREDOC = re.compile(r"<<-?\s*(['\"]?)(\w+)\1")
 
 
@@ -33,6 +38,14 @@ class Block:
     @property
     def is_run(self):
         return self.language in RUN and not {"not run", "file"} & set(self.marks)
+
+
+def included(text):
+    """Returns the text with the content of files in place of the lines that name them."""
+    def content(found):
+        with open(os.path.join(TOP, found.group(1)), encoding="utf-8") as file:
+            return file.read().rstrip("\n")
+    return INCLUDE.sub(content, text)
 
 
 def marks_above(lines, position):
@@ -61,7 +74,8 @@ def blocks_of(text):
         marks, top = marks_above(lines, position)
         follows = last_end is not None and not "".join(lines[last_end + 1:top]).strip()
         words = info.split()
-        blocks.append(Block(words[0] if words else "", "".join(line + "\n" for line in body), position + 1, marks, follows))
+        blocks.append(Block(words[0] if words else "", included("".join(line + "\n" for line in body)), position + 1, marks,
+                            follows))
         position, last_end = end + 1, end
     return blocks
 

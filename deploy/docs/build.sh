@@ -30,6 +30,7 @@ export PYTHONDONTWRITEBYTECODE=1
 rm -rf "$pages"
 mkdir -p "$pages"
 cp -r "$top/deploy/docs/pages/." "$pages"
+/usr/bin/python3 "$top/deploy/docs/include_files.py" --pages "$pages"
 /usr/bin/python3 "$top/deploy/docs/reference.py" --source "$top" --build "$build" --pages "$pages/reference"
 /usr/bin/python3 "$top/deploy/docs/check_pages.py" --pages "$pages"
 [ "$pages_only" = no ] || exit 0
