@@ -12,7 +12,7 @@ sets:
   build      packages for configuring and building locusd and locus
   python     packages for building and using the Python package
   test       packages that tests/run.sh needs in addition to build
-  bench      the libraries and servers that build/release/bin/locus-bench compares with
+  bench      the libraries and servers that build/release/bin/locus-bench compares with, and gnuplot
   clang      the compiler of the asan preset and its sanitizers
   lint       packages that tests/run.sh --long needs in addition to these
   container  packages that tests/container.sh needs to build and run the image without a registry or a daemon
@@ -37,8 +37,8 @@ python_packages="python3 python3-grpcio python3-protobuf"
 # for certificates; the test of deploy/security connects two namespaces with iproute2.
 test_packages="libgtest-dev libgmock-dev ccache clang-format git python3 binutils python3-numpy
   python3-prometheus-client python3-yaml python3-h2 openssl zsh fish mandoc groff-base haproxy iproute2"
-# redis-tools also contains the server, but unlike redis-server it starts no service.
-bench_packages="libembree-dev libbullet-dev libcgal-dev libnanoflann-dev redis-tools"
+# redis-tools also contains the server, but unlike redis-server it starts no service; gnuplot draws the pictures of --plot.
+bench_packages="libembree-dev libbullet-dev libcgal-dev libnanoflann-dev redis-tools gnuplot-nox"
 # The compiler of the asan preset, and the libraries of its sanitizers.
 clang_packages="clang-16 libclang-rt-16-dev"
 lint_packages="clang-tidy mypy"

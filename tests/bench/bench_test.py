@@ -1,16 +1,21 @@
 """Tests of the program locus-bench: python3 bench_test.py PROGRAM PEER..., with the peers built into PROGRAM."""
 
+import glob
 import json
 import math
 import os
+import re
 import shutil
 import subprocess
 import sys
 import tempfile
 import unittest
+from xml.etree import ElementTree
 
 PROGRAM = os.path.abspath(sys.argv[1])
 PEERS = set(sys.argv[2:])
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+COMMITTED_PICTURES = {"structures-growth.svg": "core/index/structures-growth.svg"}  # not beside the page about performance
 FIELDS = {"suite": str, "case": str, "metric": str, "ours": float, "peer": float, "peer_name": str, "ratio": float,
           "spread": float, "results_hash": str}
 MESHES = ("city-2k", "blob-5k")
@@ -58,8 +63,14 @@ STRUCTURE_QUERIES = ("ray", "ray_short", "any", "ball", "box", "nearest")
 STRUCTURE_SCENES = {"uniform": ("1e3", "1e4"), **{name: ("1e3",) for name in ("hub", "city1", "city100", "giant")}}
 
 
-def run(*arguments):
-    return subprocess.run([PROGRAM, *arguments], capture_output=True, text=True, timeout=600)
+def run(*arguments, **environment):
+    return subprocess.run([PROGRAM, *arguments], capture_output=True, text=True, timeout=600,
+                          env={**os.environ, **environment})
+
+
+def drawn_parts(picture):
+    """Returns a picture without what depends on the version of gnuplot."""
+    return re.sub(r"Produced by GNUPLOT[^>]*", "", picture)
 
 
 def expected_cells():
@@ -160,10 +171,56 @@ class BenchTest(unittest.TestCase):
         self.assertNotIn("ray/", answer.stdout)
 
     def test_wrong_use_is_status_2(self):
-        for arguments in ((), ("unknown",), ("static", "--rounds", "2"), ("static", "--filter", "("), ("static", "--nothing")):
+        for arguments in ((), ("unknown",), ("static", "--rounds", "2"), ("static", "--filter", "("), ("static", "--nothing"),
+                          ("--from", "a.json"), ("static", "--from", "a.json", "--plot", "plots")):
             answer = run(*arguments)
             self.assertEqual(answer.returncode, 2, arguments)
             self.assertNotEqual(answer.stderr, "", arguments)
+
+    def test_a_missing_gnuplot_is_status_1_and_its_package_is_named(self):
+        with tempfile.TemporaryDirectory() as folder:
+            answer = run("static", "--quick", "--plot", folder, PATH=folder)
+            self.assertEqual(answer.returncode, 1)
+            self.assertIn("gnuplot-nox", answer.stderr)
+            self.assertEqual(answer.stdout, "")
+            self.assertEqual(os.listdir(folder), [])
+
+    @unittest.skipUnless(shutil.which("gnuplot"), "gnuplot is missing: ./deploy/packages.sh bench")
+    def test_pictures_of_a_run_are_drawn_again_from_its_record(self):
+        with tempfile.TemporaryDirectory() as folder:
+            first, second = (os.path.join(folder, name) for name in ("first", "second"))
+            ran = run("static", "--quick", "--filter", "^ball/2/", "--mesh", "city:500", "--plot", first)
+            self.assertEqual(ran.returncode, 0, ran.stderr)
+            self.assertEqual(set(os.listdir(first)), {"static.json", "static-ratios.svg"})
+            with open(os.path.join(first, "static.json"), encoding="utf-8") as file:
+                record = json.load(file)
+            self.assertEqual(record["arguments"], "static --quick --filter ^ball/2/ --mesh city:500")
+            self.assertRegex(record["date"], r"^\d{4}-\d\d-\d\d$")
+            self.assertRegex(record["machine"], r", \d+ cores?$")
+            self.assertEqual({cell["case"] for cell in record["cells"]}, {"ball/2/city-500"} if PEERS else set())
+            drawn = run("--from", os.path.join(first, "static.json"), "--plot", second)
+            self.assertEqual(drawn.returncode, 0, drawn.stderr)
+            with open(os.path.join(first, "static-ratios.svg"), encoding="utf-8") as one, \
+                    open(os.path.join(second, "static-ratios.svg"), encoding="utf-8") as other:
+                picture = one.read()
+                self.assertEqual(picture, other.read())
+            texts = "".join(ElementTree.fromstring(picture).itertext())
+            for word in ("ball/2/city-500", record["date"], record["machine"], *sorted({c["peer_name"] for c in record["cells"]})):
+                self.assertIn(word, texts)
+
+    @unittest.skipUnless(shutil.which("gnuplot"), "gnuplot is missing: ./deploy/packages.sh bench")
+    def test_committed_pictures_are_those_of_the_committed_records(self):
+        records = sorted(glob.glob(os.path.join(ROOT, "deploy/docs/performance-results/*.json")))
+        self.assertGreaterEqual(len(records), 3)
+        with tempfile.TemporaryDirectory() as folder:
+            drawn = run("--from", *records, "--plot", folder)
+            self.assertEqual(drawn.returncode, 0, drawn.stderr)
+            for name in os.listdir(folder):
+                with open(os.path.join(folder, name), encoding="utf-8") as file:
+                    picture = file.read()
+                committed = COMMITTED_PICTURES.get(name, os.path.join("deploy/docs/pages/performance", name))
+                with open(os.path.join(ROOT, committed), encoding="utf-8") as file:
+                    self.assertEqual(drawn_parts(file.read()), drawn_parts(picture), committed)
 
     def test_a_missing_mesh_is_status_1_and_named(self):
         answer = run("static", "--quick", "--mesh", "/no/such/level.obj")

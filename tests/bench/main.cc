@@ -13,11 +13,14 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "core/base/progress_writer.h"
+#include "core/base/status_macros.h"
 #include "tests/bench/dynamic/dynamic_suite.h"
 #include "tests/bench/frame/race.h"
 #include "tests/bench/frame/report.h"
 #include "tests/bench/frame/suite.h"
 #include "tests/bench/log/log_suite.h"
+#include "tests/bench/plot/drawing.h"
+#include "tests/bench/plot/record.h"
 #include "tests/bench/queries/queries_suite.h"
 #include "tests/bench/serving/serving_suite.h"
 #include "tests/bench/static/static_suite.h"
@@ -53,11 +56,19 @@ constexpr char kExamples[] = R"(Examples:
   locus-bench dynamic --filter '^(move|ball)/(uniform|far)/100k'
   locus-bench serving --filter '^rays/' --rounds 9
   TMPDIR=/mnt/disk locus-bench log
+  locus-bench structures --filter '^(ball|ray)/.*/uniform/' --plot build/plots
+  locus-bench --from build/plots/structures.json --plot build/plots
 
 A MESH is a file that `locus import` reads (FILE, or FILE#ENTRY for a level in a .pk3), or a generated one:
 KIND:TRIANGLES or KIND:TRIANGLES:SEED, where KIND is city, terrain or blob. tests/bench/fetch_levels.sh downloads levels
 of Debian packages.
 Exit codes: 0 ok, 1 failed or results disagree, 2 usage.)";
+
+// Options of the pictures; no suite reads them.
+struct PlotOptions {
+  std::string folder;                // for the record and the pictures; empty = none
+  std::vector<std::string> records;  // files to draw instead of measuring
+};
 
 std::string described_suites() {
   return absl::StrCat("One of: ", absl::StrJoin(suites(), "; ", [](std::string* out, const Suite& suite) {
@@ -65,12 +76,20 @@ std::string described_suites() {
                       }));
 }
 
-void add_options(CLI::App& app, Options& options, std::string& filter, std::string& progress) {
+void add_options(CLI::App& app, Options& options, PlotOptions& plots, std::string& filter, std::string& progress) {
   std::vector<std::string> names;
   for (const Suite& suite : suites()) names.push_back(suite.name);
   app.description("Benchmarks that compare locus with other libraries: ratios, with results that must agree.");
   app.footer(kExamples);
-  app.add_option("SUITE", options.suite, described_suites())->required()->check(CLI::IsMember(names));
+  CLI::Option* const suite = app.add_option("SUITE", options.suite, described_suites())->check(CLI::IsMember(names));
+  CLI::Option* const plot = app.add_option("--plot", plots.folder,
+                                           "Also write pictures of the ratios as SVG to this folder, drawn by gnuplot, "
+                                           "and SUITE.json, from which --from draws them again")
+                                ->type_name("DIR");
+  app.add_option("--from", plots.records, "Measure nothing; draw the pictures of these files; may be repeated")
+      ->type_name("FILE")
+      ->needs(plot)
+      ->excludes(suite);
   app.add_option("--json", options.json, "Also write the cells to this file")->type_name("FILE");
   app.add_flag("--quick", options.quick, "Every case with a small workload, in under 20 s");
   app.add_option("--filter", filter, "Only cases whose names match")->type_name("REGEX");
@@ -105,7 +124,40 @@ ProgressWriter start_progress(const std::string& choice) {
                          .write = [](absl::string_view text) { std::cerr << text << std::flush; }});
 }
 
-int run(const Options& options, const std::string& progress_choice) {
+// Draws the pictures of the record and prints their paths.
+absl::Status draw_and_list(const Record& record, const std::string& gnuplot, const std::string& folder) {
+  ASSIGN_OR_RETURN(const std::vector<std::string> paths, draw(record, gnuplot, folder));
+  for (const std::string& path : paths) std::cout << "wrote " << path << "\n";
+  return absl::OkStatus();
+}
+
+absl::Status draw_records(const PlotOptions& plots) {
+  ASSIGN_OR_RETURN(const std::string gnuplot, find_gnuplot());
+  for (const std::string& path : plots.records) {
+    ASSIGN_OR_RETURN(const Record record, read_record(path));
+    RETURN_IF_ERROR(draw_and_list(record, gnuplot, plots.folder));
+  }
+  return absl::OkStatus();
+}
+
+// Writes the record of the run and its pictures to the folder of --plot.
+absl::Status plot_run(const std::string& folder, const std::string& gnuplot, const std::vector<std::string>& arguments,
+                      const Report& report) {
+  if (report.cells.empty()) return absl::FailedPreconditionError("there is nothing to plot: no case matches --filter");
+  const Record record = {date_of_today(), name_of_machine(), recorded_arguments(arguments), report.cells};
+  RETURN_IF_ERROR(draw_and_list(record, gnuplot, folder));
+  return write_record(record, absl::StrCat(folder, "/", record.cells.front().suite, ".json"));
+}
+
+int run(const Options& options, const PlotOptions& plots, const std::string& progress_choice,
+        const std::vector<std::string>& arguments) {
+  // Find gnuplot first, so that no run is in vain.
+  std::string gnuplot;
+  if (!plots.folder.empty()) {
+    absl::StatusOr<std::string> found = find_gnuplot();
+    if (!found.ok()) return fail(found.status(), 1);
+    gnuplot = *std::move(found);
+  }
   const std::vector<Suite> all = suites();
   const auto suite = std::find_if(all.begin(), all.end(), [&](const Suite& one) { return one.name == options.suite; });
   ProgressWriter writer = start_progress(progress_choice);
@@ -127,6 +179,10 @@ int run(const Options& options, const std::string& progress_choice) {
     const absl::Status written = write_json(report, options.json);
     if (!written.ok()) return fail(written, 1);
   }
+  if (!plots.folder.empty()) {
+    const absl::Status plotted = plot_run(plots.folder, gnuplot, arguments, report);
+    if (!plotted.ok()) return fail(plotted, 1);
+  }
   return exit_status(report);
 }
 
@@ -147,10 +203,11 @@ int main(int argc, char** argv) {
   CLI::App app;
   app.name("locus-bench");
   locus::bench::Options options;
+  locus::bench::PlotOptions plots;
   options.levels = "build/levels";
   std::string filter;
   std::string progress = "auto";
-  locus::bench::add_options(app, options, filter, progress);
+  locus::bench::add_options(app, options, plots, filter, progress);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -159,5 +216,12 @@ int main(int argc, char** argv) {
   const absl::StatusOr<CaseFilter> cases = CaseFilter::create(filter);
   if (!cases.ok()) return locus::bench::fail(cases.status(), 2);
   options.filter = *cases;
-  return locus::bench::run(options, progress);
+  if (!plots.records.empty()) {
+    const absl::Status drawn = locus::bench::draw_records(plots);
+    return drawn.ok() ? 0 : locus::bench::fail(drawn, 1);
+  }
+  if (options.suite.empty()) {
+    return locus::bench::fail(absl::InvalidArgumentError("name a SUITE, or draw a file with --from; see --help"), 2);
+  }
+  return locus::bench::run(options, plots, progress, {argv + 1, argv + argc});
 }

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 #include "core/base/check.h"
 #include "tests/bench/frame/heap.h"
 #include "tests/bench/frame/race.h"
@@ -20,7 +21,15 @@ namespace {
 constexpr uint32_t kLargestList = 100'000;  // above this count, the peer is the bvh
 constexpr uint32_t kFewestForExponent = 1000;
 
-std::string count_name(uint32_t count) { return absl::StrCat("1e", static_cast<int>(std::lround(std::log10(count)))); }
+std::string count_name(uint32_t count) {
+  const int power = static_cast<int>(std::lround(std::log10(count)));
+  return std::lround(std::pow(10, power)) == count ? absl::StrCat("1e", power) : absl::StrCat(count);
+}
+
+// Returns how often the queries are repeated, so that the clock's resolution does not matter.
+size_t passes_of(const std::string& structure, uint32_t count) {
+  return structure == "list" ? std::clamp<size_t>(kLargestList / count, 1, 20) : 20;
+}
 
 // Values of one structure for one query of one scene, by count.
 struct Series {
@@ -36,6 +45,7 @@ class SuiteRun {
     for (const SceneKind kind : kScenes) {
       for (const uint32_t count : counts_of(kind)) run_scene(kind, count);
       add_exponents(kind);
+      note_crossings();
     }
   }
 
@@ -51,7 +61,7 @@ class SuiteRun {
     if (options_.quick)
       return kind == SceneKind::kUniform ? std::vector<uint32_t>{1000, 10'000} : std::vector<uint32_t>{1000};
     if (kind != SceneKind::kUniform) return {1000, 10'000, 100'000};
-    return {100, 1000, 10'000, 100'000, 1'000'000};
+    return {10, 30, 100, 300, 1000, 10'000, 100'000, 1'000'000};
   }
 
   std::string case_name(const std::string& what, const std::string& structure) const {
@@ -137,8 +147,7 @@ class SuiteRun {
       if (hashes[i] != hashes[0])
         report_.disagreements.push_back(
             absl::StrCat(case_name(name_of(query), held[i].name), " differs from ", held[0].name));
-      // Repeat a fast structure, so that the clock's resolution does not matter.
-      const size_t passes = held[i].name == "list" ? 1 : 20;
+      const size_t passes = passes_of(held[i].name, count_);
       contestants.push_back({held[i].name,
                              [&structure, &queries, query, count, passes](size_t) {
                                Work ignored;
@@ -165,6 +174,13 @@ class SuiteRun {
                      [&](const Held& one) { return options_.filter.wants(case_name(name_of(query), one.name)); }))
       return;
     const auto times = race(contestants, 1, options_.rounds, thread_seconds, WarmUp::kDone);
+    if (held[0].name == "list") {
+      for (size_t i = 1; i < held.size(); ++i) {
+        Series& series = ratios_[absl::StrCat(name_of(query), "/", held[i].name)];
+        series.counts.push_back(count_);
+        series.values.push_back(median(round_ratios(times[i], times[0])));
+      }
+    }
     for (size_t i = 1; i < held.size(); ++i) {
       const std::vector<double> ratios = round_ratios(times[i], times[0]);
       Cell cell{.suite = "structures",
@@ -238,6 +254,17 @@ class SuiteRun {
     series_.clear();
   }
 
+  // Notes for how many boxes a structure and the list take the same time, for each query that was timed.
+  void note_crossings() {
+    for (const auto& [name, series] : ratios_) {
+      const double count = crossing_of(series.counts, series.values);
+      if (count > 0)
+        report_.notes.push_back(
+            absl::StrFormat("%s and the list take the same time at %.0f boxes of %s", name, count, scene_));
+    }
+    ratios_.clear();
+  }
+
   const Options& options_;
   const Progress& progress_;
   Report& report_;
@@ -245,6 +272,7 @@ class SuiteRun {
   std::string scene_;
   uint32_t count_ = 0;
   std::map<std::string, Series> series_;  // by QUERY/STRUCTURE
+  std::map<std::string, Series> ratios_;  // by QUERY/STRUCTURE: the list's time divided by the structure's
 };
 
 }  // namespace
@@ -265,6 +293,16 @@ double exponent_of(const std::vector<double>& counts, const std::vector<double>&
   }
   LOCUS_CHECK(squares > 0);
   return products / squares;
+}
+
+double crossing_of(const std::vector<double>& counts, const std::vector<double>& ratios) {
+  LOCUS_CHECK_EQ(counts.size(), ratios.size());
+  for (size_t i = counts.size(); i-- > 1;) {
+    if (ratios[i] < 1 || ratios[i - 1] >= 1) continue;
+    const double share = std::log(1 / ratios[i - 1]) / std::log(ratios[i] / ratios[i - 1]);
+    return counts[i - 1] * std::pow(counts[i] / counts[i - 1], share);
+  }
+  return 0;
 }
 
 absl::Status run_structures_suite(const Options& options, const Progress& progress, Report& report) {

@@ -13,6 +13,10 @@ absl::Status run_structures_suite(const Options& options, const Progress& progre
 // differences: the exponent of the power law that fits best. At least two different counts; all numbers are above zero.
 double exponent_of(const std::vector<double>& counts, const std::vector<double>& values);
 
+// Returns the largest count at which the ratios rise to 1 or above, interpolated on logarithmic axes; 0 if they do so
+// nowhere. Counts are ascending; all numbers are above zero.
+double crossing_of(const std::vector<double>& counts, const std::vector<double>& ratios);
+
 }  // namespace locus::bench::structures
 
 #endif  // LOCUS_TESTS_BENCH_STRUCTURES_STRUCTURES_SUITE_H_

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "tests/bench/structures/structure.h"
 
 namespace locus::bench::structures {
@@ -12,6 +14,14 @@ TEST(StructuresSuiteTest, TheExponentIsThatOfAPowerLaw) {
   EXPECT_NEAR(exponent_of({1e3, 1e4, 1e5}, {5e3, 5e4, 5e5}), 1, 1e-12);
   EXPECT_NEAR(exponent_of({1e3, 1e4, 1e5, 1e6}, {30, 300, 3000, 30'000}), 1, 1e-12);
   EXPECT_NEAR(exponent_of({1, 100}, {1, 10}), 0.5, 1e-12);
+}
+
+TEST(StructuresSuiteTest, TheCrossingIsWhereTheRatioRisesToOne) {
+  EXPECT_NEAR(crossing_of({10, 100, 1000}, {0.5, 2, 8}), std::sqrt(1000), 1e-9);
+  EXPECT_NEAR(crossing_of({10, 100}, {0.5, 1}), 100, 1e-9);
+  EXPECT_EQ(crossing_of({10, 100}, {2, 4}), 0);
+  EXPECT_EQ(crossing_of({10, 100}, {0.2, 0.4}), 0);
+  EXPECT_NEAR(crossing_of({10, 20, 40, 80}, {0.5, 2, 0.5, 2}), 40 * std::sqrt(2), 1e-9);
 }
 
 TEST(StructuresSuiteTest, AllStructuresAnswerAlike) {
