@@ -23,6 +23,8 @@ DASHBOARDS, BIN = sys.argv[1], os.path.abspath(sys.argv[2])
 START_SECONDS = 30
 METRIC = re.compile(r"\b(?:locus|process)_[a-z_]+")
 LABELLED = re.compile(r"\b((?:locus|process)_[a-z_]+)\{([^}]*)\}")
+RUNBOOK = "../docs/pages/operations/alerts.md"
+RUNBOOK_URL = "file:///usr/share/doc/locus-doc/html/operations/alerts.html"
 # Metrics that Prometheus itself provides.
 KNOWN_ELSEWHERE = {"up"}
 
@@ -160,8 +162,23 @@ class DashboardsTest(unittest.TestCase):
     def test_every_alert_says_what_happened_and_what_to_do(self):
         for group in yaml.safe_load(read("alerts.yml"))["groups"]:
             for rule in group["rules"]:
-                self.assertEqual(set(rule["annotations"]), {"summary", "action"}, rule["alert"])
+                self.assertEqual(set(rule["annotations"]), {"summary", "action", "runbook_url"}, rule["alert"])
                 self.assertIn(rule["labels"]["severity"], ("page", "warn"), rule["alert"])
+
+    def test_every_alert_has_a_section_in_the_runbook_and_links_to_it(self):
+        rules = [rule for group in yaml.safe_load(read("alerts.yml"))["groups"] for rule in group["rules"]]
+        sections = re.findall(r"^## (\w+)$", read(RUNBOOK), re.MULTILINE)
+        self.assertEqual(sections, [rule["alert"] for rule in rules])
+        for rule in rules:
+            self.assertEqual(rule["annotations"]["runbook_url"], RUNBOOK_URL + "#" + rule["alert"].lower())
+
+    def test_the_runbook_names_the_severity_of_each_alert_and_only_existing_metrics(self):
+        text = read(RUNBOOK)
+        severities = {rule["alert"]: rule["labels"]["severity"]
+                      for group in yaml.safe_load(read("alerts.yml"))["groups"] for rule in group["rules"]}
+        for section in text.split("\n## ")[1:]:
+            self.assertIn(f"**{severities[section.split()[0]].capitalize()}", section)
+        self.assertLessEqual(set(METRIC.findall(text)), self.names())
 
     def test_the_example_scrapes_the_default_port_and_loads_the_alerts(self):
         example = yaml.safe_load(read("prometheus.yml"))
