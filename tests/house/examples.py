@@ -63,7 +63,7 @@ GOOD_EXAMPLE = {
     **{room + "/README.md": README for room in ("proto", "server", "client", "core", "deploy", "tests")},
     **{path: "content\n" for path in language_rules.PAGES},
     **{path: "content\n" for path in ("README.md", "SECURITY.md", "CMakeLists.txt", "LICENSE", "CMakePresets.json",
-                                      ".ci/run", ".clang-format", ".clang-tidy", ".gitignore")},
+                                      ".ci/run", ".github/CONTRIBUTING.md", ".clang-format", ".clang-tidy", ".gitignore")},
 }
 
 LONG_FUNCTION = "void walk() {\n" + lines(79) + "}\n"
@@ -131,7 +131,8 @@ BAD_EXAMPLES = {
         {"core/base/ids.h": header("core/base/ids.h", "locus").split("\n", 1)[1]},
         {"core/base/ids.h": "// Ids.\n" + header("core/base/ids.h", "locus").split("\n", 1)[1]},
     ],
-    "TopLevelIsClosed": [{"notes.txt": "x\n"}, {"scripts/a.sh": "x\n"}, {"LICENSE": None}],
+    "TopLevelIsClosed": [{"notes.txt": "x\n"}, {"scripts/a.sh": "x\n"}, {".gitlab/a.yml": "x\n"}, {"LICENSE": None},
+                         {".github/CONTRIBUTING.md": None}],
     "RoomsHaveShortReadmes": [{"deploy/README.md": None}, {"core/README.md": "x\n" * 61}, {"README.md": "x\n" * 151},
                               {"core/index/README.md": "x\n" * 61}],
     "PicturesAreFewAndSmall": [{"deploy/other.png": "x"}, {"core/logo.jpg": "x"},

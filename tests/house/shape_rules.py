@@ -11,7 +11,7 @@ MAX_README_LINES = 60
 MAX_ROOT_README_LINES = 150
 ROOMS = ("proto", "server", "client", "core", "deploy", "tests")
 TOP_LEVEL = set(ROOMS) | {"CMakeLists.txt", "README.md", "SECURITY.md", "LICENSE", "CMakePresets.json", ".ci",
-                          ".clang-format", ".clang-tidy", ".gitignore"}
+                          ".github", ".clang-format", ".clang-tidy", ".gitignore"}
 MEASURED_ENDINGS = (".h", ".cc", ".proto", ".py", ".sh", ".txt")
 
 
