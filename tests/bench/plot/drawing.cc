@@ -193,7 +193,7 @@ std::vector<Drawing> growth_drawings(const Record& record) {
   const int lines = (static_cast<int>(count) + columns - 1) / columns;
   const std::string& suite = record.cells.front().suite;
   std::string script = opening(suite, columns * kPanelWidth, 40 + lines * kPanelHeight);
-  absl::StrAppend(&script, "set logscale xy 10\nset format x '%.0s%c'\nset grid\nset key outside right\n",
+  absl::StrAppend(&script, "set logscale xy 10\nset format xy '%.0s%c'\nset grid\nset key outside right\n",
                   "set xlabel 'values'\nset ylabel 'ns a query'\n",
                   absl::StrFormat("set multiplot layout %d,%d title %s\n", lines, columns, quoted(heading_of(record))));
   return {{absl::StrCat(suite, "-growth.svg"), absl::StrCat(script, plots, "unset multiplot\n")}};

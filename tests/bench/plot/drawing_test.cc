@@ -37,7 +37,7 @@ TEST(DrawingTest, RowsAreCasesAndColoursArePeers) {
   EXPECT_EQ(drawings[0].name, "static-ratios.svg");
   EXPECT_THAT(drawings[0].script, HasSubstr("set ytics ('ray/a' 0, 'ball/a' 1)"));
   EXPECT_THAT(drawings[0].script,
-              HasSubstr("$peer0 << END\n2 1.902 2.103 0\nEND\n$peer1 << END\n4 4 4 0\n0.5 0.5 0.5 1\nEND\n"));
+              HasSubstr("$peer0 << END\n2 1.902 2.102 0\nEND\n$peer1 << END\n4 4 4 0\n0.5 0.5 0.5 1\nEND\n"));
   EXPECT_THAT(drawings[0].script, HasSubstr("title 'bullet'"));
 }
 
