@@ -63,7 +63,7 @@ class FormsTest(unittest.TestCase):
         good = {"name": "a", "description": "b", "body": [{"type": "input", "id": "c", "attributes": {"label": "d"}}]}
         self.assertEqual(faults_of(good), [])
         element = good["body"][0]
-        for change in ({"name": ""}, {"titel": "x"}, {"body": []}, {"body": [element, element]},
+        for change in ({"name": ""}, {"heading": "x"}, {"body": []}, {"body": [element, element]},
                        {"body": [{**element, "type": "number"}]}, {"body": [{**element, "attributes": {}}]},
                        {"body": [{**element, "attributes": {"label": "d", "render": "sh"}}]},
                        {"body": [{**element, "required": True}]},
