@@ -16,6 +16,7 @@ sets:
   clang      the compiler of the asan preset and its sanitizers
   lint       packages that tests/run.sh --long needs in addition to these
   container  packages that tests/container.sh needs to build and run the image without a registry or a daemon
+  package    packages that deploy/package.sh and the test of its packages need in addition to build and python
   runtime    libraries that locusd and locus need at run time; the image has nothing else
   edge       the front of deploy/edge
   docs       packages that build the pages of deploy/docs and check their links and spelling
@@ -44,6 +45,10 @@ clang_packages="clang-16 libclang-rt-16-dev"
 lint_packages="clang-tidy mypy"
 # systemd contains systemd-analyze, which checks the unit; iptables and containernetworking-plugins publish ports.
 container_packages="mmdebstrap buildah podman podman-compose runc iptables containernetworking-plugins systemd"
+# Purposes: debhelper, dh-python and dpkg-dev pack; lintian checks the packages, and diffoscope compares two of them;
+# mmdebstrap makes the root they are installed in; runc runs that root with systemd as its first process; systemd contains
+# systemd-analyze, which checks the unit; binutils lists the libraries of programs for deploy/sbom.py.
+package_packages="debhelper dh-python dpkg-dev cmake lintian diffoscope-minimal mmdebstrap runc systemd binutils"
 # The libraries that the programs link directly; apt installs the dependencies of these libraries.
 runtime_packages="libgrpc++1.51 libprotobuf32 libabsl20220623 libspdlog1.10 libassimp5 libzip4 libpng16-16 libssl3 libstdc++6
   libprometheus-cpp-core1.0 zlib1g libcurl4 librocksdb7.8 libxxhash0 librhonabwy1.1 libjansson4 libseccomp2
@@ -65,6 +70,7 @@ for argument in "$@"; do
     clang) packages="$packages $clang_packages" ;;
     lint) packages="$packages $lint_packages" ;;
     container) packages="$packages $container_packages" ;;
+    package) packages="$packages $package_packages" ;;
     runtime) packages="$packages $runtime_packages" ;;
     edge) packages="$packages $edge_packages" ;;
     docs) packages="$packages $docs_packages" ;;
