@@ -47,7 +47,7 @@ name=$(dpkg-parsechangelog --file deploy/debian/changelog --show-field Version)
 mkdir -p "$out"
 out=$(realpath "$out")
 tree=$out/locus-$name
-rm -rf "$tree" "$out"/*.deb "$out"/*.changes "$out"/*.buildinfo "$out"/*.spdx.json
+rm -rf "$tree" "$out"/compile_commands.json "$out"/*.deb "$out"/*.changes "$out"/*.buildinfo "$out"/*.spdx.json
 mkdir "$tree"
 # Lists the files of a clone, with uncommitted changes; an unpacked archive has only such files.
 if git rev-parse --is-inside-work-tree > /dev/null 2>&1; then
@@ -70,6 +70,8 @@ check=()
 # What is compiled already needs no libraries to compile with.
 if [ -n "$from" ]; then check=(--no-check-builddeps); fi
 (cd "$tree" && LOCUS_FROM=$from LOCUS_DOCS=$docs dpkg-buildpackage --build=binary --no-sign ${check[@]+"${check[@]}"})
+# Keeps the compiler's command lines of a build that was compiled here.
+find "$tree" -maxdepth 2 -path '*/obj-*/compile_commands.json' -exec mv -t "$out" {} +
 rm -rf "$tree"
 
 say "contents as SPDX"

@@ -152,6 +152,7 @@ say "packages"
 sets=(build python test docs)
 if [ "$bench" = yes ]; then sets+=(bench); fi
 case "$suites" in *asan*) sets+=(clang) ;; esac
+case "$suites" in *release*) sets+=(package) ;; esac
 if [ "$long" = yes ]; then sets+=(lint); fi
 ./deploy/packages.sh "${sets[@]}" || { fail "install packages"; finish; }
 

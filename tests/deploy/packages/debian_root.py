@@ -122,6 +122,15 @@ def control_groups():
     return found.group(1) if found else None
 
 
+def copy_sources(clone, folder):
+    """Copies the files of a clone, with uncommitted changes, into a new folder."""
+    listed = run("git", "-C", clone, "ls-files", "-z", "--cached", "--others", "--exclude-standard")
+    for name in filter(None, listed.split("\0")):
+        if os.path.exists(os.path.join(clone, name)):
+            os.makedirs(os.path.dirname(os.path.join(folder, name)), exist_ok=True)
+            shutil.copy(os.path.join(clone, name), os.path.join(folder, name))
+
+
 class Machine:
     """A root that has been booted with systemd as its first process."""
 

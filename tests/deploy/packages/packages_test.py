@@ -14,12 +14,13 @@ import json
 import os
 import re
 import shutil
-import subprocess
 import sys
 import tempfile
 import unittest
 
-SKIPPED = 77
+import debian_root
+from debian_root import run
+
 PROGRAMS = {"locusd": "usr/bin/locusd", "locus": "usr/bin/locus"}
 CONTENTS = {
     "locusd": ["etc/default/locusd", "etc/locus/locusd.conf", "lib/systemd/system/locusd.service", "usr/bin/locusd",
@@ -36,14 +37,6 @@ FOLDERS = {"locusd": ("etc/default", "etc/locus", "lib/systemd/system", "usr/bin
            "locus": ("usr/bin", "usr/share/bash-completion", "usr/share/fish", "usr/share/man/man1", "usr/share/zsh"),
            "liblocus-client-dev": ("usr/include/locus", "usr/lib", "usr/share/locus"),
            "python3-locus": ("usr/lib/python3/dist-packages/locus",), "locus-doc": ("usr/share/doc/locus-doc", "usr/share/doc-base")}
-
-
-def run(*command, check=True, **more):
-    done = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-                          timeout=600, check=False, **more)
-    if check and done.returncode != 0:
-        raise AssertionError(f"{' '.join(command)}\nexited with {done.returncode}\n{done.stdout[-8000:]}")
-    return done.stdout
 
 
 def pack(source, out, mask):
@@ -151,12 +144,7 @@ class PackagesTest(unittest.TestCase):
     def test_a_second_packing_elsewhere_and_later_is_equal(self):
         with tempfile.TemporaryDirectory() as folder:
             copy = os.path.join(folder, "another-clone")
-            files = run("git", "-C", OPTIONS.source, "ls-files", "-z", "--cached", "--others", "--exclude-standard")
-            os.makedirs(copy)
-            for name in filter(None, files.split("\0")):
-                if os.path.exists(os.path.join(OPTIONS.source, name)):
-                    os.makedirs(os.path.dirname(os.path.join(copy, name)), exist_ok=True)
-                    shutil.copy(os.path.join(OPTIONS.source, name), os.path.join(copy, name))
+            debian_root.copy_sources(OPTIONS.source, copy)
             second = os.path.join(folder, "second")
             pack(copy, second, "0077")
             # A copy has no build folder, so it has no pages.
@@ -211,5 +199,5 @@ if __name__ == "__main__":
     OPTIONS = options()
     if run(os.path.join(OPTIONS.source, "deploy/packages.sh"), "--check", "package", check=False):
         print("SKIPPED: packages are missing: ./deploy/packages.sh package")
-        sys.exit(SKIPPED)
+        sys.exit(debian_root.SKIPPED)
     unittest.main(argv=sys.argv[:1], verbosity=2)

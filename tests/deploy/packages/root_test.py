@@ -1,6 +1,6 @@
 """Installs the packages in a bare Debian root, as a new user would, up to the first right answers, and removes them:
 
-    python3 root_test.py --packages DIR --work DIR --cache DIR [--compile SOURCE]
+    python3 root_test.py --packages DIR --work DIR --cache DIR [--compile SOURCE] [TEST...]
 
 A root without systemd cannot start a unit, so the test starts locusd by hand with the variables of the unit; upgrade_test.py
 starts it by systemd. --compile also installs the libraries for C++ and builds the programs of tests/e2e/install with them.
@@ -146,6 +146,7 @@ def options():
     for name in ("packages", "work", "cache"):
         parser.add_argument("--" + name, required=True, type=os.path.abspath)
     parser.add_argument("--compile", type=os.path.abspath)
+    parser.add_argument("tests", nargs="*")
     return parser.parse_args()
 
 
@@ -155,4 +156,4 @@ if __name__ == "__main__":
     if REASON:
         print("SKIPPED:", REASON)
         sys.exit(debian_root.SKIPPED)
-    unittest.main(argv=sys.argv[:1], verbosity=2)
+    unittest.main(argv=[sys.argv[0], *OPTIONS.tests], verbosity=2)

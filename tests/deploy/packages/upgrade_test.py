@@ -91,7 +91,7 @@ class UpgradeTest(unittest.TestCase):
 
     def limit(self, name):
         for line in self.machine.run("locus", "-o", "ndjson", "limits").splitlines():
-            if json.loads(line)["limit"] == name:
+            if json.loads(line)["name"] == name:
                 return int(json.loads(line)["value"])
         raise AssertionError("no limit " + name)
 
@@ -138,6 +138,12 @@ class UpgradeTest(unittest.TestCase):
         self.assertEqual(self.machine.run("systemd-analyze", "verify", "--man=no", UNIT), "")
         shown = self.machine.run("systemd-analyze", "security", "--offline=true", "--threshold=11", UNIT)
         print(shown.strip().splitlines()[-1], flush=True)
+
+    def test_reloading_keeps_the_process(self):
+        before = self.main_process()
+        self.machine.run("systemctl", "reload", "locusd")
+        self.assertEqual(self.main_process(), before)
+        self.wait_for_health()
 
     def test_the_daemon_listens_on_loopback_only_and_has_no_rights(self):
         status = self.machine.run("sh", "-c", f"cat /proc/{self.main_process()}/status /proc/net/tcp")

@@ -1,0 +1,122 @@
+"""Compiles the packages twice, in two folders, and compares them with each other and with a finished build:
+
+    python3 compiled_test.py --source DIR --build DIR --work DIR
+
+Each packing compiles everything, and the second one without ccache. The packaged programs must give the bytes that the
+programs of the build give: answers of a demo, and pictures.
+"""
+
+import argparse
+import contextlib
+import filecmp
+import glob
+import os
+import re
+import shutil
+import subprocess
+import time
+import unittest
+
+import debian_root
+
+PICTURES = {"whole": [], "street": ["--eye", "-20,-70,12", "--look-at", "10,0,6", "--fov", "60"],
+            "plan": ["--dir", "0,0,-1", "--ortho", "0", "--cull", "none"]}
+START_SECONDS = 30
+
+
+def pack(name, **environment):
+    clone = os.path.join(OPTIONS.work, name)
+    debian_root.copy_sources(OPTIONS.source, clone)
+    debian_root.run(os.path.join(clone, "deploy/package.sh"), timeout=5400, env=dict(os.environ, **environment))
+    return os.path.join(clone, "build/package")
+
+
+@contextlib.contextmanager
+def daemon(program, folder):
+    """Runs a daemon on a free port of loopback and returns its address."""
+    port_file = os.path.join(folder, "port")
+    process = subprocess.Popen([program, "--listen", "127.0.0.1:0", "--http-listen", "", "--port-file", port_file],
+                               stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        deadline = time.monotonic() + START_SECONDS
+        while not os.path.exists(port_file):
+            if process.poll() is not None or time.monotonic() > deadline:
+                raise RuntimeError(f"{program} did not start")
+            time.sleep(0.05)
+        with open(port_file, encoding="utf-8") as file:
+            yield "127.0.0.1:" + file.read().strip()
+    finally:
+        process.terminate()
+        process.wait(timeout=60)
+
+
+class CompiledTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        shutil.rmtree(OPTIONS.work, ignore_errors=True)
+        cls.first = pack("one/clone")
+        cls.second = pack("another/clone/elsewhere", CCACHE_DISABLE="1", TZ="Asia/Tokyo")
+        cls.programs = os.path.join(OPTIONS.work, "unpacked")
+        for name in ("locusd", "locus"):
+            (path,) = debian_root.newest(cls.first, name)
+            debian_root.run("dpkg-deb", "--extract", path, cls.programs)
+
+    @classmethod
+    def tearDownClass(cls):
+        shutil.rmtree(OPTIONS.work, ignore_errors=True)
+
+    def test_two_builds_are_equal(self):
+        names = sorted(os.path.basename(path) for path in glob.glob(self.first + "/*.deb"))
+        self.assertGreaterEqual(len(names), 4)
+        self.assertEqual(names, sorted(os.path.basename(path) for path in glob.glob(self.second + "/*.deb")))
+        for name in names:
+            one, other = os.path.join(self.first, name), os.path.join(self.second, name)
+            if not filecmp.cmp(one, other, shallow=False):
+                self.fail(debian_root.run("diffoscope", one, other, check=False, timeout=1800))
+
+    def test_flags_that_keep_answers_exact_survive(self):
+        (log,) = glob.glob(os.path.join(OPTIONS.work, "one/clone/build/package/compile_commands.json"))
+        with open(log, encoding="utf-8") as file:
+            commands = [line for line in file if '"command"' in line and "/core/" in line]
+        self.assertGreater(len(commands), 20)
+        for command in commands:
+            for flag in ("-ffp-contract=off", "-fno-tree-slp-vectorize", "-O3", "-DNDEBUG", "-D_FORTIFY_SOURCE=2", "-fstack-protector-strong"):
+                self.assertIn(flag, command)
+            self.assertLess(command.rindex(" -O2 "), command.rindex(" -O3 "))
+
+    def test_packaged_programs_answer_and_draw_as_those_of_the_build(self):
+        packaged = os.path.join(self.programs, "usr/bin")
+        pictures = {}
+        with contextlib.ExitStack() as stack:
+            addresses = {}
+            for name, folder in (("packaged", packaged), ("built", os.path.join(OPTIONS.build, "bin"))):
+                place = os.path.join(OPTIONS.work, name)
+                os.makedirs(place)
+                addresses[name] = stack.enter_context(daemon(os.path.join(folder, "locusd"), place))
+                locus = [os.path.join(folder, "locus"), "-a", addresses[name]]
+                debian_root.run(*locus, "generate", "city", "--triangles", "30000", "--seed", "3", "--scene", "city", "--create")
+                for picture, options in PICTURES.items():
+                    path = os.path.join(place, picture + ".png")
+                    debian_root.run(*locus, "render", "city", path, *options)
+                    with open(path, "rb") as file:
+                        pictures[name, picture] = file.read()
+            shown = debian_root.run(os.path.join(packaged, "locus"), "-a", addresses["packaged"], "demo", "--seconds", "3",
+                                    "--compare", addresses["built"])
+        for picture in PICTURES:
+            self.assertGreater(len(pictures["packaged", picture]), 10000)
+            self.assertEqual(pictures["packaged", picture], pictures["built", picture], picture)
+        rows = [line.split() for line in shown.splitlines() if re.search(r"\s\d+\s+\d+$", line)]
+        self.assertGreaterEqual(len(rows), 5, shown)
+        self.assertEqual({row[-1] for row in rows}, {"0"}, shown)
+
+
+def options():
+    parser = argparse.ArgumentParser(description=__doc__)
+    for name in ("source", "build", "work"):
+        parser.add_argument("--" + name, required=True, type=os.path.abspath)
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    OPTIONS = options()
+    unittest.main(argv=["compiled_test.py"], verbosity=2)
