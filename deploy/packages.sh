@@ -43,8 +43,9 @@ bench_packages="libembree-dev libbullet-dev libcgal-dev libnanoflann-dev redis-t
 # The compiler of the asan preset, and the libraries of its sanitizers.
 clang_packages="clang-16 libclang-rt-16-dev"
 lint_packages="clang-tidy mypy"
-# systemd contains systemd-analyze, which checks the unit; iptables and containernetworking-plugins publish ports.
-container_packages="mmdebstrap buildah podman podman-compose runc iptables containernetworking-plugins systemd"
+# systemd contains systemd-analyze, which checks the unit; iptables and containernetworking-plugins publish ports; catatonit
+# is the first process of a pod.
+container_packages="mmdebstrap buildah podman podman-compose runc iptables containernetworking-plugins systemd catatonit"
 # Purposes: debhelper, dh-python and dpkg-dev pack; lintian checks the packages, and diffoscope compares two of them;
 # mmdebstrap makes the root they are installed in; runc runs that root with systemd as its first process; systemd contains
 # systemd-analyze, which checks the unit; binutils lists the libraries of programs for deploy/sbom.py.

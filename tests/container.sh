@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Builds the image of deploy/Dockerfile and tests a container of it. Needs root, but no registry and no Docker daemon:
 # buildah builds the image on a base made from this machine's Debian sources, and podman runs it. Checks the systemd
-# units and both compose files too, that of deploy/edge with a token through the front. All files are in build/container; the next run uses them again.
+# units, the manifest for Kubernetes, and both compose files too, that of deploy/edge with a token through the front. All
+# files are in build/container; the next run uses them again.
 #
 #   ./tests/container.sh            ends with: N passed, M failed, K skipped
 #   ./tests/container.sh --fresh    first removes the files of earlier runs
@@ -23,16 +24,18 @@ base=localhost/debian:12-slim
 case "${1-}" in
   "") ;;
   --fresh) rm -rf "$store" ;;
-  *) sed -n '2,10s/^# \{0,1\}//p' "$0"; [ "$1" = --help ]; exit ;;
+  *) sed -n '2,11s/^# \{0,1\}//p' "$0"; [ "$1" = --help ]; exit ;;
 esac
 mkdir -p "$store" && : > "$results" && : > "$log" || exit
 
 containers=()
 composed=
+manifest=
 work=$(mktemp -d /tmp/locus-container.XXXXXX) || exit
 
 clean_up() {
   compose_ends
+  kube_ends
   for id in ${containers[@]+"${containers[@]}"}; do podman rm --force --volumes --time 1 "$id"; done
   rm -rf "$work"
 } >> "$log" 2>&1
@@ -240,6 +243,44 @@ edge_refuses() {
   printf '%s\n' "$output"
   [ "$code" != 0 ] && grep -qi -- "$1" <<< "$output"
 }
+# Plays the manifest with its ports on this machine's loopback, because podman publishes container ports. With `again`, the
+# volume claim is left out: podman refuses to make a volume that exists, where Kubernetes keeps it. Sets `id`.
+kube_starts() {
+  manifest=$work/locusd.yaml
+  sed -e "s/containerPort: 7575/&, hostIP: 127.0.0.1, hostPort: $kube_port/" \
+    -e "s/containerPort: 7576/&, hostIP: 127.0.0.1, hostPort: $kube_http_port/" deploy/kubernetes/locusd.yaml > "$manifest"
+  if [ "${1-}" = again ]; then sed -i '1,/^---$/d' "$manifest"; fi
+  podman kube play "$manifest" || return
+  id=$(podman ps --quiet --filter name=locusd-pod-0-locusd) && [ -n "$id" ] || return
+  for _ in $(seq 100); do
+    kube_client health && return
+    sleep 0.2
+  done
+  podman logs "$id"
+  return 1
+}
+# Runs a command of `locus` as a client of the pod.
+kube_client() { podman run --rm --network host --env LOCUS_ADDRESS=127.0.0.1:"$kube_port" --entrypoint locus "$image" "$@"; }
+# Passes if the paths of the manifest's probes answer at the pod's HTTP port.
+kube_probes_pass() {
+  local paths path
+  paths=$(sed -n 's/.*httpGet: {path: \([^,]*\), port: 7576}.*/\1/p' deploy/kubernetes/locusd.yaml)
+  [ "$(wc -w <<< "$paths")" = 2 ] || return
+  for path in $paths; do http_answers "http://127.0.0.1:$kube_http_port$path" || return; done
+}
+http_answers() { /usr/bin/python3 -c 'import sys, urllib.request as r; print(r.urlopen(sys.argv[1], timeout=10).status)' "$1"; }
+kube_is_limited() {
+  [ "$(podman inspect --format '{{.HostConfig.ReadonlyRootfs}} {{.HostConfig.Memory}} {{.HostConfig.NanoCpus}}' "$id")" = \
+    "true 2147483648 2000000000" ]
+}
+kube_deletes() { podman kube down "$manifest" && [ -z "$(podman ps --all --quiet --filter name=locusd-pod-0)" ]; }
+kube_keeps_its_scenes() { kube_client get kept --id 7 | grep -w 7; }
+kube_stores_a_scene() { kube_client scene create kept && kube_client insert kept ball --id 7 --at 0,0,0 --radius 1; }
+kube_ends() {
+  [ -n "$manifest" ] || return 0
+  podman kube down "$manifest"
+  podman volume rm --force locusd-data && manifest=
+}
 # Verifies a systemd unit after replacing its program by /bin/true, because systemd-analyze requires that the program is
 # installed.
 unit_is_correct() {
@@ -303,6 +344,18 @@ edge_port=$(free_port)
 check "compose starts it on this machine's loopback" compose_starts
 check "its HTTP port says that it is ready" http_ready
 check "compose ends it" compose_ends
+kube_port=$(free_port)
+kube_http_port=$(free_port)
+need "podman plays the manifest for Kubernetes" kube_starts
+check "the pod's probes pass" kube_probes_pass
+check "the pod has the limits of compose.yaml" kube_is_limited
+check "the pod has no capability and can gain none" has_no_capability
+check "the pod runs as user 10001" runs_as_nobody_else
+need "the pod stores a scene" kube_stores_a_scene
+check "the pod is deleted" kube_deletes
+need "podman plays the manifest again" kube_starts again
+check "the scene has survived deletion and new start" kube_keeps_its_scenes
+check "the pod and its volume are deleted" kube_ends
 need "image of the front" build_edge_image
 need "certificate, token and right for the front" edge_files
 need "compose starts a daemon behind the front" edge_starts
