@@ -155,9 +155,9 @@ def file_elements(root):
             if os.path.islink(path):
                 continue
             shown = "./" + os.path.relpath(path, root)
+            checksums = [{"algorithm": kind.upper(), "checksumValue": digest(path, kind)} for kind in ("sha1", "sha256")]
             elements.append({"fileName": shown, "SPDXID": spdx_id("File", hashlib.sha1(shown.encode()).hexdigest()),
-                             "checksums": [{"algorithm": kind.upper(), "checksumValue": digest(path, kind)} for kind in ("sha1", "sha256")],
-                             "licenseConcluded": "NOASSERTION", "copyrightText": "NOASSERTION"})
+                             "checksums": checksums, "licenseConcluded": "NOASSERTION", "copyrightText": "NOASSERTION"})
     return elements
 
 
@@ -185,10 +185,11 @@ def document(deb, root):
     with gzip.open(changelog, "rt", encoding="utf-8") as file:
         when = re.search(r"^ -- .*>  (.*)$", file.read(), re.MULTILINE).group(1)
     created = datetime.datetime.strptime(when, "%a, %d %b %Y %H:%M:%S %z").astimezone(datetime.timezone.utc)
+    checksum = digest(deb, "sha256")
     shipped = package_element(name, version, architecture, own_license, supplier="Organization: " + maintainer.split(" <")[0],
-                              packageFileName=os.path.basename(deb), checksums=[{"algorithm": "SHA256", "checksumValue": digest(deb, "sha256")}])
+                              packageFileName=os.path.basename(deb))
     shipped.update(filesAnalyzed=True, packageVerificationCode={"packageVerificationCodeValue": verification_code(files)},
-                   licenseInfoFromFiles=["NOASSERTION"])
+                   checksums=[{"algorithm": "SHA256", "checksumValue": checksum}], licenseInfoFromFiles=["NOASSERTION"])
     packages = [shipped] + [installed_package(other, licenses) for other in sorted(direct | indirect | set(headers))]
     own = shipped["SPDXID"]
     relations = [relation("SPDXRef-DOCUMENT", "DESCRIBES", own)]
@@ -196,11 +197,12 @@ def document(deb, root):
     relations += [relation(own, "DYNAMIC_LINK", spdx_id("Package", other)) for other in sorted(direct)]
     relations += [relation(own, "DEPENDS_ON", spdx_id("Package", other)) for other in sorted(indirect)]
     relations += [relation(own, "STATIC_LINK", spdx_id("Package", other)) for other in headers]
-    return {"spdxVersion": "SPDX-2.3", "dataLicense": "CC0-1.0", "SPDXID": "SPDXRef-DOCUMENT", "name": f"{name}_{version}_{architecture}",
-            "documentNamespace": "urn:uuid:" + str(uuid.uuid5(uuid.NAMESPACE_OID, digest(deb, "sha256"))),
+    return {"spdxVersion": "SPDX-2.3", "dataLicense": "CC0-1.0", "SPDXID": "SPDXRef-DOCUMENT",
+            "name": f"{name}_{version}_{architecture}",
+            "documentNamespace": "urn:uuid:" + str(uuid.uuid5(uuid.NAMESPACE_OID, checksum)),
             "creationInfo": {"created": created.strftime("%Y-%m-%dT%H:%M:%SZ"), "creators": ["Tool: locus-sbom-" + version]},
-            "packages": packages, "files": files, "hasExtractedLicensingInfos": [licenses.extracted[key] for key in sorted(licenses.extracted)],
-            "relationships": relations}
+            "packages": packages, "files": files, "relationships": relations,
+            "hasExtractedLicensingInfos": [licenses.extracted[key] for key in sorted(licenses.extracted)]}
 
 
 def main():

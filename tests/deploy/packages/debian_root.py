@@ -59,7 +59,8 @@ def missing():
 
 def sources():
     """Returns this machine's Debian sources, and no others, as lines of apt."""
-    lines = run("apt-get", "indextargets", "--format", "$(ORIGIN) deb $(REPO_URI) $(RELEASE) $(COMPONENT)", "Created-By: Packages")
+    shown = "$(ORIGIN) deb $(REPO_URI) $(RELEASE) $(COMPONENT)"
+    lines = run("apt-get", "indextargets", "--format", shown, "Created-By: Packages")
     return sorted({line[len("Debian "):] for line in lines.splitlines() if line.startswith("Debian deb ")})
 
 
@@ -139,8 +140,8 @@ class Machine:
         group = os.path.join(control_groups(), f"locus-test-{os.getpid()}")
         os.makedirs(group, exist_ok=True)
         self.group = group
-        boot = 'echo $$ > "$1/cgroup.procs" && exec unshare --mount --propagation private --pid --fork --kill-child --net --uts --ipc ' \
-            '--cgroup bash -c "$3" boot "$2"'
+        boot = 'echo $$ > "$1/cgroup.procs" && exec unshare --mount --propagation private --pid --fork --kill-child --net ' \
+            '--uts --ipc --cgroup bash -c "$3" boot "$2"'
         self.parent = subprocess.Popen(["bash", "-c", boot, "boot", group, folder, BOOT], stdin=subprocess.DEVNULL,
                                        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         self.init = self._first_process()
@@ -161,8 +162,8 @@ class Machine:
         raise RuntimeError("the root did not boot")
 
     def command(self, *words):
-        return ["nsenter", "--target", str(self.init), "--mount", "--uts", "--ipc", "--net", "--pid", "--cgroup", "--root", "--wd=/",
-                *words]
+        return ["nsenter", "--target", str(self.init), "--mount", "--uts", "--ipc", "--net", "--pid", "--cgroup", "--root",
+                "--wd=/", *words]
 
     def run(self, *words, check=True, timeout=120):
         return run(*self.command(*words), check=check, timeout=timeout, env=ENVIRONMENT)

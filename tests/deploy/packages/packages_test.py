@@ -25,18 +25,21 @@ PROGRAMS = {"locusd": "usr/bin/locusd", "locus": "usr/bin/locus"}
 CONTENTS = {
     "locusd": ["etc/default/locusd", "etc/locus/locusd.conf", "lib/systemd/system/locusd.service", "usr/bin/locusd",
                "usr/share/man/man8/locusd.8.gz", "usr/share/man/man8/locusd-check.8.gz"],
-    "locus": ["usr/bin/locus", "usr/share/bash-completion/completions/locus", "usr/share/fish/vendor_completions.d/locus.fish",
-              "usr/share/man/man1/locus-query-ray.1.gz", "usr/share/man/man1/locus.1.gz", "usr/share/zsh/vendor-completions/_locus"],
+    "locus": ["usr/bin/locus", "usr/share/bash-completion/completions/locus",
+              "usr/share/fish/vendor_completions.d/locus.fish", "usr/share/zsh/vendor-completions/_locus",
+              "usr/share/man/man1/locus-query-ray.1.gz", "usr/share/man/man1/locus.1.gz"],
     "liblocus-client-dev": ["usr/include/locus/client/lib/client.h", "usr/include/locus/core/index/bvh/bvh.h",
-                            "usr/include/locus/locus/v1/query_service.grpc.pb.h", "usr/lib/{triplet}/cmake/locus/locusConfig.cmake",
-                            "usr/lib/{triplet}/liblocus_client.a", "usr/lib/{triplet}/pkgconfig/locus-client.pc",
-                            "usr/lib/{triplet}/pkgconfig/locus-index.pc", "usr/share/locus/proto/locus/v1/query_service.proto"],
+                            "usr/include/locus/locus/v1/query_service.grpc.pb.h", "usr/lib/{triplet}/liblocus_client.a",
+                            "usr/lib/{triplet}/cmake/locus/locusConfig.cmake", "usr/lib/{triplet}/pkgconfig/locus-client.pc",
+                            "usr/lib/{triplet}/pkgconfig/locus-index.pc",
+                            "usr/share/locus/proto/locus/v1/query_service.proto"],
     "python3-locus": ["usr/lib/python3/dist-packages/locus/__init__.py", "usr/lib/python3/dist-packages/locus/schema.binpb"],
 }
 FOLDERS = {"locusd": ("etc/default", "etc/locus", "lib/systemd/system", "usr/bin", "usr/share/man/man8"),
            "locus": ("usr/bin", "usr/share/bash-completion", "usr/share/fish", "usr/share/man/man1", "usr/share/zsh"),
            "liblocus-client-dev": ("usr/include/locus", "usr/lib", "usr/share/locus"),
-           "python3-locus": ("usr/lib/python3/dist-packages/locus",), "locus-doc": ("usr/share/doc/locus-doc", "usr/share/doc-base")}
+           "python3-locus": ("usr/lib/python3/dist-packages/locus",),
+           "locus-doc": ("usr/share/doc/locus-doc", "usr/share/doc-base")}
 
 
 def pack(source, out, mask):
@@ -125,12 +128,14 @@ class PackagesTest(unittest.TestCase):
                 self.assertEqual((day, time), self.time_of_the_changelog(), line)
 
     def time_of_the_changelog(self):
-        when = run("dpkg-parsechangelog", "--file", os.path.join(OPTIONS.source, "deploy/debian/changelog"), "--show-field", "Timestamp")
+        changelog = os.path.join(OPTIONS.source, "deploy/debian/changelog")
+        when = run("dpkg-parsechangelog", "--file", changelog, "--show-field", "Timestamp")
         return tuple(run("date", "--date=@" + when.strip(), "+%F %H:%M").split())
 
     def test_lintian_has_nothing_to_say(self):
         (changes,) = glob.glob(self.folder + "/*.changes")
-        shown = run("lintian", "--allow-root", "--pedantic", "--display-info", "--tag-display-limit", "0", "--fail-on", "none", changes)
+        shown = run("lintian", "--allow-root", "--pedantic", "--display-info", "--tag-display-limit", "0", "--fail-on", "none",
+                    changes)
         self.assertEqual(shown, "")
 
     def test_every_exception_from_lintian_is_explained(self):
@@ -182,8 +187,8 @@ class PackagesTest(unittest.TestCase):
             linked = {relation["relatedSpdxElement"].removeprefix("SPDXRef-Package-") for relation in listed["relationships"]
                       if relation["relationshipType"] == "DYNAMIC_LINK"}
             # dpkg-shlibdeps has a name of its own for spdlog, which the package provides.
-            depends = {word.split(" ")[0].removesuffix("-fmt9").replace("+", "-") for word in self.field(package, "Depends").split(", ")}
-            self.assertEqual(linked, depends)
+            depends = {word.split(" ")[0].removesuffix("-fmt9") for word in self.field(package, "Depends").split(", ")}
+            self.assertEqual(linked, {name.replace("+", "-") for name in depends})
             self.assertEqual({entry["licenseDeclared"] for entry in listed["packages"]} & {"NOASSERTION", ""}, set())
             self.assertEqual(listed["packages"][0]["licenseDeclared"], "Apache-2.0")
 

@@ -62,8 +62,8 @@ class RootTest(unittest.TestCase):
         cls.python = cls.with_daemon("python3", "-c", FIRST_RAY)
         cls.seconds = time.monotonic() - began
         cls.new = debian_root.installed(cls.root) - cls.before
-        print(f"bare root to first answers: {cls.seconds:.0f} s, of which apt-get {installed - began:.0f} s; {len(cls.new)} packages, "
-              f"{len(cls.new) - len(OURS)} of them from Debian", flush=True)
+        print(f"bare root to first answers: {cls.seconds:.0f} s, of which apt-get {installed - began:.0f} s; "
+              f"{len(cls.new)} packages, {len(cls.new) - len(OURS)} of them from Debian", flush=True)
 
     @classmethod
     def tearDownClass(cls):
@@ -113,7 +113,8 @@ class RootTest(unittest.TestCase):
         self.inside("apt-get", "remove", "--yes", *OURS)
         kept = {path for path in self.paths() if "locus" in path}
         self.assertNotIn("./usr/bin/locusd", kept)
-        data = {path for path in stored if path.startswith(("./var/lib/locus", "./var/log/locus", "./etc/locus", "./etc/default/locusd"))}
+        folders = ("./var/lib/locus", "./var/log/locus", "./etc/locus", "./etc/default/locusd")
+        data = {path for path in stored if path.startswith(folders)}
         self.assertGreater(len(data), 8)
         self.assertLessEqual(data, kept)
         # The scene is there again when the package is.
