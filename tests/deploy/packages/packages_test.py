@@ -59,6 +59,7 @@ class PackagesTest(unittest.TestCase):
         cls.folder = os.path.join(OPTIONS.out, "packages")
         pack(OPTIONS.source, cls.folder, "0022")
         cls.debs = {os.path.basename(path).split("_")[0]: path for path in glob.glob(cls.folder + "/*.deb")}
+        os.makedirs(os.path.join(OPTIONS.out, "trees"))
         cls.trees = {}
         for name, path in cls.debs.items():
             cls.trees[name] = os.path.join(OPTIONS.out, "trees", name)
