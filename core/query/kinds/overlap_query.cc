@@ -9,6 +9,7 @@
 #include "core/geometry/segment.h"
 #include "core/geometry/sweep.h"
 #include "core/index/regions.h"
+#include "core/query/kinds/object_bounds.h"
 #include "core/query/kinds/object_parts.h"
 #include "core/query/kinds/overlap_contact.h"
 #include "core/query/kinds/placed_triangle.h"
@@ -16,30 +17,6 @@
 
 namespace locus {
 namespace {
-
-// Result of a test that uses only an object's stored position and bounds. kUndecided: the exact shape must be tested.
-enum class Verdict { kOverlaps, kDisjoint, kUndecided };
-
-// Bounds of an object's solid at the time of the query. Let c be the object's position at this time. The solid extends
-// at most `extent` from c and contains the ball of radius `inner_radius` around c. The distance from c to the stored
-// position, `position`, is at most `displacement_bound`, which includes an epsilon for rounding in the exact tests and
-// in the comparisons with these bounds.
-struct ObjectBounds {
-  Vec3d position;
-  double inner_radius;
-  double extent;
-  double displacement_bound;
-};
-
-// Returns the bounds of an object that is at most `displacement_bound` away from its stored position.
-ObjectBounds object_bounds(const GridRef& object, double displacement_bound) {
-  LOCUS_DCHECK_GE(displacement_bound, 0.0);
-  const Vec3d position = object.entry().position;
-  const double extent = object.reach();
-  const double inner_radius = object.entry().kind == ShapeKind::kBall ? extent : 0;
-  const double epsilon = internal::kBoundsGrowth * (max_component(abs(position)) + extent + displacement_bound);
-  return {position, inner_radius, extent, displacement_bound + epsilon};
-}
 
 // Operations on a ball, in world axes and in the mesh axes of an instance, for the templates below.
 struct BallShape {
