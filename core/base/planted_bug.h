@@ -26,6 +26,7 @@ enum class PlantedBug {
   kEdgeOnInDouble,     // nearly edge-on triangles are tested only in double, like all other triangles
   kSparseBrickBounds,  // the bounds of a level of wider cells contain only the centres of its bricks
   kGridBallMargin,     // the float culling of ball queries in the grid omits the error bound
+  kGridInsideMargin,   // the grid decides without an error bound which positions are inside a box or ball
   kNearestLimit,       // a nearest query also prunes boxes at exactly the distance of its farthest result
   kNearestTreePad,     // distances to boxes of triangles are compared in float without the pad
   kWidePlacedBounds,   // world bounds of an instance's triangles are grown by a rounding error of float, not double

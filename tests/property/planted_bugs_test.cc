@@ -177,6 +177,7 @@ constexpr Trial kTrials[] = {
     {"GridThatDropsACell", PlantedBug::kDropCell, compare_grids_with_list},
     {"GridWithForgottenSparseBricks", PlantedBug::kSparseBrickBounds, compare_moving_grids_with_list},
     {"GridThatTrustsFloatWithBalls", PlantedBug::kGridBallMargin, compare_balls_of_grids_with_list},
+    {"GridThatTrustsFloatWithPositions", PlantedBug::kGridInsideMargin, compare_balls_of_grids_with_list},
     {"GridWithTruncatedCellIndices", PlantedBug::kUnsignedCellIndex, compare_grids_with_list},
     {"GridWithAGhostAfterAMove", PlantedBug::kGhostAfterMove, compare_moving_grids_with_list},
     {"OctreeThatForgetsValuesOnItsPlanes", PlantedBug::kOctreeLowerStrict, compare_octrees_with_list},

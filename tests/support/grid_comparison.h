@@ -41,8 +41,9 @@ inline std::string grid_difference(const ObjectScene& scene, Random& random) {
 }
 
 // Tests each ball in three ways: by a visit of the ball alone, in a RegionWalk of all balls, and in a RegionWalk of the
-// balls' bounds only. Each way must find as many objects as a test of all objects finds. Uses the balls of the scene
-// and balls that just touch objects of the scene.
+// balls' bounds only. Each way must find as many objects as a test of all objects finds, and the grid must know only
+// those positions to be inside a ball or box that are inside. Uses the balls of the scene and balls that just touch
+// objects of the scene.
 inline std::string grid_ball_difference(const ObjectScene& scene, Random& random) {
   ObjectGrid grid(random_grid_options(random));
   grid.apply({}, scene.values);
@@ -54,24 +55,34 @@ inline std::string grid_ball_difference(const ObjectScene& scene, Random& random
     balls.push_back({shape.position + toward * (away + reach), away});
   }
   const GridSnapshot snapshot = grid.snapshot().grid();
-  RegionWalk walk(0, balls.size(), [&](size_t i) { return GridRegion{&snapshot, bounds_of(balls[i]), balls[i]}; });
-  RegionWalk wide_walk(0, balls.size(), [&](size_t i) { return GridRegion{&snapshot, bounds_of(balls[i]), {}}; });
+  RegionWalk walk(0, balls.size(), [&](size_t i) {
+    return GridRegion{&snapshot, bounds_of(balls[i]), balls[i], nullptr, Marks::kInside};
+  });
+  RegionWalk wide_walk(0, balls.size(), [&](size_t i) {
+    return GridRegion{&snapshot, bounds_of(balls[i]), {}, nullptr, Marks::kInside};
+  });
   for (const Balld& ball : balls) {
     size_t expected = 0;
     for (const Object& object : scene.values) expected += ball_overlaps(ball, object.shape) ? 1 : 0;
-    const auto found_by = [&ball](const auto& visit_all) {
+    const auto by_ball = [&ball](const GridRef& value) { return ball_overlaps(ball, shape_of(value)); };
+    const auto by_bounds = [&ball](const GridRef& value) { return contains(bounds_of(ball), value.entry().position); };
+    size_t wrongly_inside = 0;
+    const auto found_by = [&](const auto& visit_all, const auto& is_inside) {
       size_t found = 0;
       Work work;
       visit_all(work, [&](const GridRef& value) {
-        found += ball_overlaps(ball, shape_of(value)) ? 1 : 0;
+        found += by_ball(value) ? 1 : 0;
+        wrongly_inside += value.is_inside() && !is_inside(value) ? 1 : 0;
         return true;
       });
       return found;
     };
-    const size_t alone =
-        found_by([&](Work& work, const auto& visit) { snapshot.visit_ball(ball, bounds_of(ball), work, visit); });
-    const size_t walked = found_by([&](Work& work, const auto& visit) { walk.visit(work, visit); });
-    const size_t wide = found_by([&](Work& work, const auto& visit) { wide_walk.visit(work, visit); });
+    const size_t alone = found_by(
+        [&](Work& work, const auto& visit) { snapshot.visit_ball(ball, bounds_of(ball), work, visit, Marks::kInside); },
+        by_ball);
+    const size_t walked = found_by([&](Work& work, const auto& visit) { walk.visit(work, visit); }, by_ball);
+    const size_t wide = found_by([&](Work& work, const auto& visit) { wide_walk.visit(work, visit); }, by_bounds);
+    if (wrongly_inside != 0) return absl::StrCat("the grid takes ", wrongly_inside, " positions outside for inside");
     if (alone != expected || walked != expected || wide != expected)
       return absl::StrCat("a ball finds ", alone, ", in a walk ", walked, ", by its bounds ", wide, " instead of ",
                           expected);

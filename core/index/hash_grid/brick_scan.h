@@ -29,6 +29,10 @@ class GridRef {
       : block_(&block), slot_(slot), brick_(brick) {
     LOCUS_DCHECK_LT(slot, block.count());
   }
+  // Makes the reference of a slot that a kernel has written, marked with kInsideMark or not.
+  static GridRef of_kernel(const internal::GridBlock& block, uint32_t slot, uint32_t brick) {
+    return {block, slot & ~kInsideMark, brick | (slot & kInsideMark)};
+  }
 
   explicit operator bool() const { return block_ != nullptr; }
   const GridEntry& entry() const { return block_->entry(slot_); }
@@ -39,12 +43,15 @@ class GridRef {
   GridItem item() const { return block_->item(slot_); }
   // Return the location of the value: its slot in its block, and the index of its brick.
   uint32_t slot() const { return slot_; }
-  uint32_t brick() const { return brick_; }
+  uint32_t brick() const { return brick_ & ~kInsideMark; }
+  // Returns true if a search with Marks::kInside found the value, and its stored position is surely inside the box or
+  // ball. The position of a value for which this function returns false may be inside as well.
+  bool is_inside() const { return (brick_ & kInsideMark) != 0; }
 
  private:
   const internal::GridBlock* block_ = nullptr;
   uint32_t slot_ = 0;
-  uint32_t brick_ = 0;
+  uint32_t brick_ = 0;  // with kInsideMark if is_inside()
 };
 
 namespace internal {
@@ -75,22 +82,34 @@ inline Aabbd box_around_values(const Brick& brick, double extent) {
 }
 
 // Returns `region` relative to the brick's centre, widened so that float culling keeps every value whose bounds overlap
-// the region.
-inline GridBox cull_box_of(const Brick& brick, const Aabbd& region) {
+// the region. With marks, the inner box is narrowed so that every position strictly inside it is inside the region, by
+// a distance that exceeds the rounding errors of exact tests in double. `growth` is kBoundsGrowth times the magnitude
+// of `region`.
+inline GridBox cull_box_of(const Brick& brick, const Aabbd& region, Marks marks, double growth) {
   const double epsilon = cull_epsilon(brick);
   GridBox box;
   for (int axis = 0; axis < 3; ++axis) {
-    const double low = region.min[axis] - brick.geometry.center[axis] - epsilon;
-    const double high = region.max[axis] - brick.geometry.center[axis] + epsilon;
-    box.low[axis] = static_cast<float>(low - std::abs(low) * double{kCullEpsilon});
-    box.high[axis] = static_cast<float>(high + std::abs(high) * double{kCullEpsilon});
+    const double low = region.min[axis] - brick.geometry.center[axis];
+    const double high = region.max[axis] - brick.geometry.center[axis];
+    const double low_margin = epsilon + std::abs(low) * double{kCullEpsilon};
+    const double high_margin = epsilon + std::abs(high) * double{kCullEpsilon};
+    box.low[axis] = static_cast<float>(low - low_margin);
+    box.high[axis] = static_cast<float>(high + high_margin);
+    if (marks == Marks::kNone) continue;
+    if (planted(PlantedBug::kGridInsideMargin)) {
+      box.inner_low[axis] = static_cast<float>(low);
+      box.inner_high[axis] = static_cast<float>(high);
+    } else {
+      box.inner_low[axis] = static_cast<float>(low + low_margin + growth);
+      box.inner_high[axis] = static_cast<float>(high - high_margin - growth);
+    }
   }
   return box;
 }
 
 // Returns `ball` relative to the brick's centre, widened so that float culling keeps every value that shares a point
-// with the ball.
-inline GridBall cull_ball_of(const Brick& brick, const Balld& ball) {
+// with the ball. With marks, the inner ball is narrowed like the inner box of cull_box_of().
+inline GridBall cull_ball_of(const Brick& brick, const Balld& ball, Marks marks) {
   const Vec3d center = ball.center - brick.geometry.center;
   const double magnitude = max_component(abs(center)) + brick.geometry.edge + ball.radius + brick.max_extent;
   GridBall cull;
@@ -98,9 +117,12 @@ inline GridBall cull_ball_of(const Brick& brick, const Balld& ball) {
   if (planted(PlantedBug::kGridBallMargin))
     return {{cull.center[0], cull.center[1], cull.center[2]}, static_cast<float>(ball.radius)};
   // Rounding in the kernel's differences, squares and sums together changes the distance by less than 4 * 2^-24 of
-  // itself. The widening below, in units of kCullEpsilon = 2^-20, is larger.
-  cull.radius = static_cast<float>((ball.radius + cull_epsilon(brick) + 4 * double{kCullEpsilon} * magnitude) *
-                                   (1 + 2 * double{kCullEpsilon}));
+  // itself. The widening and the narrowing below, in units of kCullEpsilon = 2^-20, are larger.
+  const double epsilon = cull_epsilon(brick) + 4 * double{kCullEpsilon} * magnitude;
+  cull.radius = static_cast<float>((ball.radius + epsilon) * (1 + 2 * double{kCullEpsilon}));
+  if (marks == Marks::kNone) return cull;
+  const double inner = planted(PlantedBug::kGridInsideMargin) ? ball.radius : ball.radius - epsilon;
+  cull.inner_radius = static_cast<float>(std::max(inner, 0.0) * (1 - 2 * double{kCullEpsilon}));
   return cull;
 }
 
@@ -153,28 +175,39 @@ class CullRay {
 };
 
 // Factories of culling functions for a box and for a ball. A factory, called with a brick, returns a function (rows,
-// slots) that runs the kernel on values of the brick. The region or ball must outlive the factory and its functions.
+// slots) that runs the kernel on values of the brick, with marks or without. The region or ball must outlive the
+// factory and its functions.
 class BoxCull {
  public:
-  explicit BoxCull(const Aabbd& region) : region_(&region) {}
+  BoxCull(const Aabbd& region, Marks marks)
+      : region_(&region), marks_(marks), growth_(marks == Marks::kNone ? 0 : kBoundsGrowth * magnitude(region)) {}
   auto operator()(const Brick& brick) const {
-    return [&kernels = active_grid_kernels(), box = cull_box_of(brick, *region_)](
-               const GridRows& rows, uint32_t* slots) { return kernels.cull_box(rows, box, slots); };
+    const GridKernels& kernels = active_grid_kernels();
+    return [run = marks_ == Marks::kNone ? kernels.cull_box : kernels.mark_box,
+            box = cull_box_of(brick, *region_, marks_, growth_)](const GridRows& rows, uint32_t* slots) {
+      return run(rows, box, slots);
+    };
   }
 
  private:
   const Aabbd* region_;
+  Marks marks_;
+  double growth_;
 };
 class BallCull {
  public:
-  explicit BallCull(const Balld& ball) : ball_(&ball) {}
+  BallCull(const Balld& ball, Marks marks) : ball_(&ball), marks_(marks) {}
   auto operator()(const Brick& brick) const {
-    return [&kernels = active_grid_kernels(), ball = cull_ball_of(brick, *ball_)](
-               const GridRows& rows, uint32_t* slots) { return kernels.cull_ball(rows, ball, slots); };
+    const GridKernels& kernels = active_grid_kernels();
+    return [run = marks_ == Marks::kNone ? kernels.cull_ball : kernels.mark_ball,
+            ball = cull_ball_of(brick, *ball_, marks_)](const GridRows& rows, uint32_t* slots) {
+      return run(rows, ball, slots);
+    };
   }
 
  private:
   const Balld* ball_;
+  Marks marks_;
 };
 
 // Returns the rows of consecutive slots that hold the values of `cells` in the sorted block; `cells` is relative to the
@@ -233,8 +266,8 @@ bool for_each_part(const GridRows& rows, const Fn& fn) {
 }
 
 // Calls visit(GridRef) for the values in the rows `all` of `block` that the kernel cull(rows, slots) does not drop:
-// cull() writes their slots and returns their number. `brick` is the index of the brick. Stops and returns false if
-// visit() returns false.
+// cull() writes their slots, marked or not, and returns their number. `brick` is the index of the brick. Stops and
+// returns false if visit() returns false.
 template <class Cull, class Visit>
 bool scan_rows(const GridBlock& block, uint32_t brick, const GridRows& all, Work& work, const Cull& cull,
                const Visit& visit) {
@@ -243,10 +276,10 @@ bool scan_rows(const GridBlock& block, uint32_t brick, const GridRows& all, Work
     const uint32_t kept = cull(rows, slots);
     LOCUS_DCHECK_LE(kept, GridRows::kMaxValues);
     work.cells += rows.count;
-    for (uint32_t i = 0; i < kept; ++i) block.prefetch_entry(slots[i]);
+    for (uint32_t i = 0; i < kept; ++i) block.prefetch_entry(slots[i] & ~kInsideMark);
     for (uint32_t i = 0; i < kept; ++i) {
       ++work.tests;
-      if (!visit(GridRef(block, slots[i], brick))) return false;
+      if (!visit(GridRef::of_kernel(block, slots[i], brick))) return false;
     }
     return true;
   });
@@ -281,7 +314,7 @@ bool scan_recent(const Brick& brick, Work& work, const Cull& cull, const Visit& 
   const uint32_t kept = cull(rows, slots);
   for (uint32_t i = 0; i < kept; ++i) {
     ++work.tests;
-    if (!visit(GridRef(recent, vector_end + slots[i], brick.index))) return false;
+    if (!visit(GridRef::of_kernel(recent, vector_end + slots[i], brick.index))) return false;
   }
   return true;
 }

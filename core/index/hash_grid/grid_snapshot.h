@@ -84,14 +84,16 @@ class GridSnapshot {
   size_t brick_count() const;
 
   // Calls visit(GridRef) for every value whose bounds overlap `region`, and for some other values near the region. Ends
-  // if visit() returns false.
+  // if visit() returns false. With `marks`, GridRef::is_inside() returns true for most values whose positions are
+  // inside.
   template <class Visit>
-  void visit_region(const Aabbd& region, Work& work, const Visit& visit) const;
+  void visit_region(const Aabbd& region, Work& work, const Visit& visit, Marks marks = Marks::kNone) const;
   // Calls visit(GridRef) for every value that shares a point with the ball, and for some other values near the ball.
   // Ends if visit() returns false. `bounds` are the bounds of the ball. Visits fewer values than visit_region(bounds):
   // a value whose bounds overlap `bounds` may still be culled.
   template <class Visit>
-  void visit_ball(const Balld& ball, const Aabbd& bounds, Work& work, const Visit& visit) const;
+  void visit_ball(const Balld& ball, const Aabbd& bounds, Work& work, const Visit& visit,
+                  Marks marks = Marks::kNone) const;
   // Calls fn(brick, cells) for each brick that visit_region(region) would scan; `cells` are the cells to scan, relative
   // to the brick. Returns false, possibly after some calls, if the region may need more than `max_bricks` bricks.
   template <class Fn>
@@ -243,13 +245,14 @@ bool GridSnapshot::for_each_brick(const internal::GridLevel& level, const intern
 }
 
 template <class Visit>
-void GridSnapshot::visit_region(const Aabbd& region, Work& work, const Visit& visit) const {
-  visit_cells(region, work, internal::BoxCull(region), visit);
+void GridSnapshot::visit_region(const Aabbd& region, Work& work, const Visit& visit, Marks marks) const {
+  visit_cells(region, work, internal::BoxCull(region, marks), visit);
 }
 
 template <class Visit>
-void GridSnapshot::visit_ball(const Balld& ball, const Aabbd& bounds, Work& work, const Visit& visit) const {
-  visit_cells(bounds, work, internal::BallCull(ball), visit);
+void GridSnapshot::visit_ball(const Balld& ball, const Aabbd& bounds, Work& work, const Visit& visit,
+                              Marks marks) const {
+  visit_cells(bounds, work, internal::BallCull(ball, marks), visit);
 }
 
 template <class Fn>

@@ -71,9 +71,9 @@ void RegionSteps::find_rows() {
 void RegionSteps::find_values() {
   if (!is_small_) return;
   if (region_.ball)
-    cull(BallCull(*region_.ball));
+    cull(BallCull(*region_.ball, region_.marks));
   else
-    cull(BoxCull(region_.bounds));
+    cull(BoxCull(region_.bounds, region_.marks));
   prefetch_later_values();
 }
 
@@ -87,7 +87,7 @@ void RegionSteps::prefetch_later_values() const {
       const GridBlock& sorted = *part.brick->sorted;
       const GridBlock& later = *part.later->sorted;
       for (; next < part.sorted_end; ++next) {
-        const uint32_t slot = later.find_near(sorted.handle(slots_[next]), slots_[next]);
+        const uint32_t slot = later.find_near(sorted.handle(slots_[next] & ~kInsideMark), slots_[next] & ~kInsideMark);
         if (slot < later.count()) later.prefetch_entry(slot);
       }
     }
@@ -100,7 +100,7 @@ void RegionSteps::cull(const CullOf& cull_of) {
   Work work;
   const auto keep = [this](const GridRef& value) {
     if (slot_count_ == kMaxValues) return false;
-    slots_[slot_count_++] = value.slot();
+    slots_[slot_count_++] = value.slot() | (value.is_inside() ? kInsideMark : 0);
     return true;
   };
   for (uint32_t i = 0; is_small_ && i < part_count_; ++i) {

@@ -28,12 +28,13 @@ struct GridRegion {
   // Snapshot in which the visitor looks up each value with find_like(); null if there is none. A walk prefetches the
   // memory for these lookups.
   const GridSnapshot* later = nullptr;
+  Marks marks = Marks::kNone;  // as in GridSnapshot::visit_region()
 
   // Calls GridSnapshot::visit_ball() if `ball` is set, otherwise GridSnapshot::visit_region().
   template <class Visit>
   void visit(Work& work, const Visit& visit) const {
-    if (ball) return grid->visit_ball(*ball, bounds, work, visit);
-    grid->visit_region(bounds, work, visit);
+    if (ball) return grid->visit_ball(*ball, bounds, work, visit, marks);
+    grid->visit_region(bounds, work, visit, marks);
   }
 };
 
@@ -85,7 +86,7 @@ void RegionSteps::visit(Work& work, const Visit& visit) const {
   const auto visit_up_to = [&](uint32_t end, const GridBlock& block, uint32_t brick) {
     for (; next < end; ++next) {
       ++work.tests;
-      if (!visit(GridRef(block, slots_[next], brick))) return false;
+      if (!visit(GridRef::of_kernel(block, slots_[next], brick))) return false;
     }
     return true;
   };

@@ -19,6 +19,8 @@ namespace locus {
 namespace {
 
 // Operations on a ball, in world axes and in the mesh axes of an instance, for the templates below.
+// is_region_of_search() returns whether the region in which search_region() searches the grid for an EXACT query is the
+// shape itself, so that an object overlaps the shape if its position is inside that region.
 struct BallShape {
   static constexpr bool kHasKernels = true;
   using World = Balld;
@@ -35,6 +37,7 @@ struct BallShape {
   static std::optional<Balld> as_ball(const Balld& ball) { return ball; }
   static bool overlaps_bounds(const Balld& ball, const Aabbd& bounds) { return reaches(ball, bounds); }
   static bool overlaps_object(const Balld& ball, const Shape& shape) { return ball_overlaps(ball, shape); }
+  static bool is_region_of_search(const Balld&) { return true; }
   static Verdict verdict(const Balld& ball, const ObjectBounds& object) {
     const double squared = squared_length(object.position - ball.center);
     const double far = ball.radius + object.extent + object.displacement_bound;
@@ -63,6 +66,7 @@ struct BoxShape {
   static std::optional<Balld> as_ball(const Obbd&) { return std::nullopt; }
   static bool overlaps_bounds(const Obbd& box, const Aabbd& bounds) { return overlaps(bounds_of(box), bounds); }
   static bool overlaps_object(const Obbd& box, const Shape& shape) { return box_overlaps(box, shape); }
+  static bool is_region_of_search(const Obbd& box) { return box.rotation == Rotation(); }
   static Verdict verdict(const Obbd& box, const ObjectBounds& object) {
     // Largest signed distance of the object's position from a side plane of the box; negative inside the box.
     const double outside = max_component(abs(box.rotation.to_local(object.position - box.center)) - box.half);
@@ -93,6 +97,7 @@ struct CapsuleShape {
   static std::optional<Balld> as_ball(const Capsule&) { return std::nullopt; }
   static bool overlaps_bounds(const Capsule& capsule, const Aabbd& bounds) { return reaches(capsule, bounds); }
   static bool overlaps_object(const Capsule& capsule, const Shape& shape) { return capsule_overlaps(capsule, shape); }
+  static bool is_region_of_search(const Capsule&) { return false; }
   static Verdict verdict(const Capsule& capsule, const ObjectBounds& object) {
     const double squared = squared_distance_to_segment(object.position - capsule.center, capsule.half_axis);
     const double epsilon = internal::kBoundsGrowth * extent(capsule);
@@ -144,6 +149,7 @@ struct RegionShape {
   static std::optional<Balld> as_ball(const ConvexRegion&) { return std::nullopt; }
   static bool overlaps_bounds(const ConvexRegion& region, const Aabbd& bounds) { return may_overlap(region, bounds); }
   static bool overlaps_object(const ConvexRegion& region, const Shape& shape) { return region_overlaps(region, shape); }
+  static bool is_region_of_search(const ConvexRegion&) { return false; }
   static Verdict verdict(const ConvexRegion& region, const ObjectBounds& object) {
     return verdict_of(side_of_ball(region, object.position, object.extent, object.displacement_bound));
   }
@@ -178,7 +184,11 @@ GridRegion search_region(const SceneAtTime& moment, const typename Kind::World& 
   // Only an EXACT ball query can restrict the search to the ball. A CONSERVATIVE ball query also finds an object if
   // the ball overlaps only the bounds of the object. Queries of other shapes search the axis-aligned bounds of the
   // shape.
-  return moment.region(region.bounds(), options.precision == Precision::kExact ? Kind::as_ball(shape) : std::nullopt);
+  const bool exact = options.precision == Precision::kExact;
+  GridRegion search = moment.region(region.bounds(), exact ? Kind::as_ball(shape) : std::nullopt);
+  // Between two ticks, the marks would be those of positions in the widened region.
+  if (exact && !moment.between() && Kind::is_region_of_search(shape)) search.marks = Marks::kInside;
+  return search;
 }
 
 // Selects whether the rows of compounds name a part.
@@ -259,6 +269,7 @@ class ObjectRows {
     }
   }
   bool overlaps(const GridRef& object) {
+    if (object.is_inside()) return true;  // see search_region()
     const bool exact = options_.precision == Precision::kExact;
     if (exact) {  // avoids computing the shape of most objects at the time of the query
       const Verdict verdict = verdict_by_bounds(object);

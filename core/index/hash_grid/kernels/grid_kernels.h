@@ -1,11 +1,13 @@
 // Kernels that cull the values of the hash grid in float, eight at a time. The kernels are compiled once per
 // instruction set; GridKernels is the table of the kernels for one instruction set. All other types are plain data. The
-// kernels only cull; their callers apply the exact predicates, in double. Any thread may call the kernels.
+// kernels only cull, and mark the values whose positions are surely inside a box or ball; their callers apply the exact
+// predicates, in double. Any thread may call the kernels.
 //
 // A kernel never drops a value that satisfies the caller's original query, in spite of rounding. For this purpose,
 // callers widen the query by kCullEpsilon times the magnitudes of the query's coordinates and the brick's coordinates.
 // The widening covers the rounding of the columns to float (2^-24 of a coordinate), of the query to float (2^-24), and
-// of the sums, products and fused products of the kernels (each 2^-24 of its result).
+// of the sums, products and fused products of the kernels (each 2^-24 of its result). For the same reason, callers
+// narrow the box or ball inside which positions are marked by as much.
 #ifndef LOCUS_CORE_INDEX_HASH_GRID_KERNELS_GRID_KERNELS_H_
 #define LOCUS_CORE_INDEX_HASH_GRID_KERNELS_GRID_KERNELS_H_
 
@@ -17,6 +19,11 @@ inline constexpr float kCullEpsilon = 0x1p-20f;
 inline constexpr float kDiagonal =
     1.73206f;  // upper bound of sqrt(3): distance from a position to a corner of the bounds, in extents
 inline constexpr uint32_t kMaxSorted = 64;
+// Selects whether a search for a box or ball marks the values whose positions are surely inside.
+enum class Marks : uint8_t { kNone, kInside };
+// Mark of a slot that mark_box() or mark_ball() writes: the position of the value is surely inside the box or ball. A
+// slot without the mark is outside, or so close to the border that float arithmetic cannot decide.
+inline constexpr uint32_t kInsideMark = 1u << 31;
 
 // Rows of one block. A row is a range of consecutive values.
 struct GridRows {
@@ -35,6 +42,8 @@ struct GridRows {
 
 struct GridBox {
   float low[3], high[3];
+  float inner_low[3] = {},
+        inner_high[3] = {};  // for mark_box(): a position strictly between these corners is inside the box
 };
 
 struct GridLine {
@@ -46,6 +55,7 @@ struct GridLine {
 struct GridBall {
   float center[3];
   float radius;
+  float inner_radius = 0;  // for mark_ball(): a position nearer to the centre than this is inside the ball; >= 0
 };
 
 // Shell around a point: the values with above < key <= up_to. The key of a value is the squared distance of its bounds
@@ -65,6 +75,10 @@ struct GridKernels {
   uint32_t (*cull_box)(const GridRows& rows, const GridBox& box, uint32_t* slots);
   uint32_t (*cull_line)(const GridRows& rows, const GridLine& line, uint32_t* slots);
   uint32_t (*cull_ball)(const GridRows& rows, const GridBall& ball, uint32_t* slots);
+  // Keep the same values as cull_box() and cull_ball(), and add kInsideMark to the slots of those whose positions are
+  // inside the inner box or ball.
+  uint32_t (*mark_box)(const GridRows& rows, const GridBox& box, uint32_t* slots);
+  uint32_t (*mark_ball)(const GridRows& rows, const GridBall& ball, uint32_t* slots);
   // Writes to `slots`, in increasing order within each row, the slots of the values in the shell, and writes the keys
   // of these values to `keys`. Returns the number of these values. A key never exceeds the exact squared distance. Both
   // arrays have room for kMaxValues elements and one vector of eight more.

@@ -66,15 +66,24 @@ struct LanesOfMasks {
 constexpr LanesOfMasks kLanesOfMasks;
 #endif
 
-// Writes the slots of the lanes in the mask `kept`, one after the other; lane 0 is slot `slot`. May overwrite the first
-// eight elements of `slots`, even if the mask has fewer lanes.
-inline void write_slots(uint32_t kept, uint32_t slot, uint32_t* slots) {
+// Writes the slots of the lanes in the mask `kept`, one after the other; lane 0 is slot `slot`. With kMarks, marks the
+// lanes that are set in `inside`. May overwrite the first eight elements of `slots`, even if the mask has fewer lanes.
+template <Marks kMarks>
+inline void write_slots(uint32_t kept, uint32_t slot, Lanes inside, uint32_t* slots) {
 #ifdef __AVX2__
   const __m256i lanes = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(static_cast<int64_t>(kLanesOfMasks.lanes[kept])));
-  const __m256i found = _mm256_add_epi32(lanes, _mm256_set1_epi32(static_cast<int32_t>(slot)));
+  __m256i found = _mm256_add_epi32(lanes, _mm256_set1_epi32(static_cast<int32_t>(slot)));
+  if constexpr (kMarks == Marks::kInside) {
+    const __m256i marks = _mm256_slli_epi32(reinterpret_cast<__m256i>(inside), 31);
+    found = _mm256_or_si256(found, _mm256_permutevar8x32_epi32(marks, lanes));
+  }
   std::memcpy(slots, &found, sizeof(found));
 #else
-  for (; kept != 0; kept &= kept - 1) *slots++ = slot + static_cast<uint32_t>(__builtin_ctz(kept));
+  const uint32_t marks = kMarks == Marks::kInside ? bits_of(inside) : 0;
+  for (; kept != 0; kept &= kept - 1) {
+    const auto lane = static_cast<uint32_t>(__builtin_ctz(kept));
+    *slots++ = (slot + lane) | marks >> lane << 31;
+  }
 #endif
 }
 
@@ -121,29 +130,39 @@ struct RowVectors {
   uint32_t lanes[kMax];
 };
 
-// Writes the slots of those values that are in the rows, are live, and are accepted by keep(). keep(slot) returns a
-// mask with one bit for each of the eight values from `slot` on. Returns the number of written slots.
-template <class Keep>
+// Writes the slots of those values that are in the rows, are live, and are accepted by keep(). keep(slot, inside)
+// returns a mask with one bit for each of the eight values from `slot` on and, with kMarks, sets the lanes of `inside`
+// that write_slots() marks. Returns the number of written slots.
+template <Marks kMarks, class Keep>
 inline uint32_t collect(const GridRows& rows, uint32_t* slots, const Keep& keep) {
   uint32_t count = 0;
   for (uint32_t row = 0; row < rows.count; ++row) {
     const uint32_t end = rows.end[row];
     for (uint32_t slot = rows.begin[row]; slot < end; slot += kLanes) {
-      uint32_t kept = keep(slot);
+      Lanes inside{};
+      uint32_t kept = keep(slot, inside);
       if (end - slot < kLanes) kept &= (1u << (end - slot)) - 1;
       if (rows.dead != nullptr) kept &= ~dead_bits(rows.dead, slot);
-      write_slots(kept, slot, slots + count);
+      write_slots<kMarks>(kept, slot, inside, slots + count);
       count += static_cast<uint32_t>(__builtin_popcount(kept));
     }
   }
   return count;
 }
 
+template <Marks kMarks>
 uint32_t cull_box(const GridRows& rows, const GridBox& box, uint32_t* slots) {
   const Floats low_x = splat(box.low[0]), low_y = splat(box.low[1]), low_z = splat(box.low[2]);
   const Floats high_x = splat(box.high[0]), high_y = splat(box.high[1]), high_z = splat(box.high[2]);
-  return collect(rows, slots, [&](uint32_t slot) {
+  [[maybe_unused]] const Floats inner_low_x = splat(box.inner_low[0]), inner_low_y = splat(box.inner_low[1]),
+                                inner_low_z = splat(box.inner_low[2]);
+  [[maybe_unused]] const Floats inner_high_x = splat(box.inner_high[0]), inner_high_y = splat(box.inner_high[1]),
+                                inner_high_z = splat(box.inner_high[2]);
+  return collect<kMarks>(rows, slots, [&](uint32_t slot, [[maybe_unused]] Lanes& inside) {
     const Floats x = load(rows.x + slot), y = load(rows.y + slot), z = load(rows.z + slot);
+    if constexpr (kMarks == Marks::kInside)
+      inside = (x > inner_low_x) & (x < inner_high_x) & (y > inner_low_y) & (y < inner_high_y) & (z > inner_low_z) &
+               (z < inner_high_z);
     const Floats extent = load(rows.extent + slot);
     const Lanes in_x = (x + extent >= low_x) & (x - extent <= high_x);
     const Lanes in_y = (y + extent >= low_y) & (y - extent <= high_y);
@@ -152,14 +171,18 @@ uint32_t cull_box(const GridRows& rows, const GridBox& box, uint32_t* slots) {
   });
 }
 
+template <Marks kMarks>
 uint32_t cull_ball(const GridRows& rows, const GridBall& ball, uint32_t* slots) {
   const Floats center_x = splat(ball.center[0]), center_y = splat(ball.center[1]), center_z = splat(ball.center[2]);
   const Floats radius = splat(ball.radius);
-  return collect(rows, slots, [&](uint32_t slot) {
+  [[maybe_unused]] const Floats inner = splat(ball.inner_radius * ball.inner_radius);
+  return collect<kMarks>(rows, slots, [&](uint32_t slot, [[maybe_unused]] Lanes& inside) {
     const Floats x = load(rows.x + slot) - center_x, y = load(rows.y + slot) - center_y;
     const Floats z = load(rows.z + slot) - center_z;
     const Floats extent = load(rows.extent + slot) + radius;
-    return bits_of(x * x + y * y + z * z <= extent * extent);
+    const Floats squared = x * x + y * y + z * z;
+    if constexpr (kMarks == Marks::kInside) inside = squared < inner;
+    return bits_of(squared <= extent * extent);
   });
 }
 
@@ -168,7 +191,7 @@ uint32_t cull_line(const GridRows& rows, const GridLine& line, uint32_t* slots) 
   const Floats toward_x = splat(line.direction[0]), toward_y = splat(line.direction[1]),
                toward_z = splat(line.direction[2]);
   const Floats radius = splat(line.radius), from = splat(line.from), to = splat(line.to);
-  return collect(rows, slots, [&](uint32_t slot) {
+  return collect<Marks::kNone>(rows, slots, [&](uint32_t slot, Lanes&) {
     const Floats x = load(rows.x + slot) - point_x, y = load(rows.y + slot) - point_y;
     const Floats z = load(rows.z + slot) - point_z;
     const Floats along = x * toward_x + y * toward_y + z * toward_z;

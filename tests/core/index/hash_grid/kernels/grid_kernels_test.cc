@@ -46,9 +46,10 @@ class GridKernelsTest : public ::testing::TestWithParam<std::string> {
   void TearDown() override { ASSERT_TRUE(use_instruction_set("").ok()); }
 
   // Runs the kernel run(rows, slots) on random rows and compares the slots that it keeps with keep(slot): 1 = must be
-  // kept, 0 = may be kept, -1 = must not be kept.
-  template <class Run, class Keep>
-  static void expect_kept(Columns4& columns, Random& random, const Run& run, const Keep& keep) {
+  // kept, 0 = may be kept, -1 = must not be kept. Compares the marks of the kept slots with inside(slot) in the same
+  // way.
+  template <class Run, class Keep, class Inside>
+  static void expect_kept(Columns4& columns, Random& random, const Run& run, const Keep& keep, const Inside& inside) {
     for (int round = 0; round < 200; ++round) {
       GridRows rows = columns.rows();
       std::set<uint32_t> live;
@@ -68,6 +69,11 @@ class GridKernelsTest : public ::testing::TestWithParam<std::string> {
       }
       uint32_t slots[GridRows::kMaxValues + 8];
       const uint32_t count = run(rows, slots);
+      for (uint32_t* slot = slots; slot != slots + count; ++slot) {
+        const int is_inside = inside(*slot & ~kInsideMark);
+        ASSERT_TRUE((*slot & kInsideMark) != 0 ? is_inside >= 0 : is_inside <= 0) << *slot;
+        *slot &= ~kInsideMark;
+      }
       ASSERT_TRUE(std::is_sorted(slots, slots + count));
       const std::set<uint32_t> kept(slots, slots + count);
       ASSERT_EQ(kept.size(), count);
@@ -84,33 +90,49 @@ int verdict(double distance, double extent) {
   return distance <= extent - kEpsilon ? 1 : distance > extent + kEpsilon ? -1 : 0;
 }
 
-TEST_P(GridKernelsTest, CullBoxKeepsTheValuesThatMeetTheBox) {
+// Verdict on the marks of a kernel that marks no slots.
+int never(uint32_t) { return -1; }
+
+TEST_P(GridKernelsTest, CullBoxKeepsTheValuesThatMeetTheBoxAndMarkBoxMarksThoseInside) {
   Random random(1);
   Columns4 columns = random_columns(300, random);
-  const GridBox box{{-3, -2, 0}, {4, 5, 1}};
-  const auto keep = [&](uint32_t slot) {
+  const GridBox box{{-3, -2, 0}, {4, 5, 1}, {-2, -1, 0.25f}, {3, 4, 0.75f}};
+  // Returns the largest signed distance of the position of a value from a side of a box.
+  const auto outside = [&](uint32_t slot, const float* low, const float* high) {
     double worst = -1e9;
     const double at[] = {columns.x[slot], columns.y[slot], columns.z[slot]};
     for (int axis = 0; axis < 3; ++axis)
-      worst = std::max({worst, double{box.low[axis]} - at[axis], at[axis] - double{box.high[axis]}});
-    return verdict(worst, columns.extent[slot]);
+      worst = std::max({worst, double{low[axis]} - at[axis], at[axis] - double{high[axis]}});
+    return worst;
   };
+  const auto keep = [&](uint32_t slot) { return verdict(outside(slot, box.low, box.high), columns.extent[slot]); };
   expect_kept(
       columns, random,
-      [&](const GridRows& rows, uint32_t* slots) { return active_grid_kernels().cull_box(rows, box, slots); }, keep);
+      [&](const GridRows& rows, uint32_t* slots) { return active_grid_kernels().cull_box(rows, box, slots); }, keep,
+      never);
+  expect_kept(
+      columns, random,
+      [&](const GridRows& rows, uint32_t* slots) { return active_grid_kernels().mark_box(rows, box, slots); }, keep,
+      [&](uint32_t slot) { return verdict(outside(slot, box.inner_low, box.inner_high), 0); });
 }
 
-TEST_P(GridKernelsTest, CullBallKeepsTheValuesThatMeetTheBall) {
+TEST_P(GridKernelsTest, CullBallKeepsTheValuesThatMeetTheBallAndMarkBallMarksThoseInside) {
   Random random(2);
   Columns4 columns = random_columns(300, random);
-  const GridBall ball{{1, -2, 3}, 4};
-  const auto keep = [&](uint32_t slot) {
+  const GridBall ball{{1, -2, 3}, 4, 3};
+  const auto distance = [&](uint32_t slot) {
     const double x = columns.x[slot] - 1.0, y = columns.y[slot] + 2.0, z = columns.z[slot] - 3.0;
-    return verdict(std::sqrt(x * x + y * y + z * z), 4.0 + columns.extent[slot]);
+    return std::sqrt(x * x + y * y + z * z);
   };
+  const auto keep = [&](uint32_t slot) { return verdict(distance(slot), 4.0 + columns.extent[slot]); };
   expect_kept(
       columns, random,
-      [&](const GridRows& rows, uint32_t* slots) { return active_grid_kernels().cull_ball(rows, ball, slots); }, keep);
+      [&](const GridRows& rows, uint32_t* slots) { return active_grid_kernels().cull_ball(rows, ball, slots); }, keep,
+      never);
+  expect_kept(
+      columns, random,
+      [&](const GridRows& rows, uint32_t* slots) { return active_grid_kernels().mark_ball(rows, ball, slots); }, keep,
+      [&](uint32_t slot) { return verdict(distance(slot), 3); });
 }
 
 TEST_P(GridKernelsTest, CullLineKeepsTheValuesThatMeetThePartOfTheLine) {
@@ -127,8 +149,8 @@ TEST_P(GridKernelsTest, CullLineKeepsTheValuesThatMeetThePartOfTheLine) {
     };
     expect_kept(
         columns, random,
-        [&](const GridRows& rows, uint32_t* slots) { return active_grid_kernels().cull_line(rows, line, slots); },
-        keep);
+        [&](const GridRows& rows, uint32_t* slots) { return active_grid_kernels().cull_line(rows, line, slots); }, keep,
+        never);
   }
 }
 
@@ -153,7 +175,7 @@ TEST_P(GridKernelsTest, CollectNearReturnsTheValuesOfTheShellAndTheirKeys) {
     for (uint32_t i = 0; i < count; ++i) EXPECT_NEAR(double{keys[i]}, key_of(slots[i]), 1e-4);
     return count;
   };
-  expect_kept(columns, random, run, keep);
+  expect_kept(columns, random, run, keep, never);
 }
 
 TEST_P(GridKernelsTest, CollectNearAcceptsLongAndEmptyRows) {
