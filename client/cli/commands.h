@@ -29,6 +29,7 @@ void add_demo_command(CLI::App& parent, Context& context);
 void add_call_command(CLI::App& parent, Context& context);
 void add_run_command(CLI::App& parent, Context& context);
 void add_shell_command(CLI::App& parent, Context& context);
+void add_tune_command(CLI::App& parent, Context& context);
 void add_verify_command(CLI::App& parent, Context& context);
 void add_wait_command(CLI::App& parent, Context& context);
 void add_bench_command(CLI::App& parent, Context& context);

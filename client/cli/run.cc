@@ -168,6 +168,7 @@ void build_cli(CLI::App& app, Context& context) {
   add_call_command(app, context);
   add_version_command(app, context);
   add_completion_command(app, context);
+  add_tune_command(app, context);
   add_verify_command(app, context);
   add_wait_command(app, context);
 }

@@ -66,6 +66,10 @@ ALLOWED = {
     "client/cli/extras/completion": ["client/cli"],
     "client/cli/extras/top": ["client/cli", "client/lib", "core/base"],
     "client/cli/extras/verify": ["client/cli/levels/generate", "client/lib"],
+    # The structures of the library are timed in the command line, on a scene's own values.
+    "client/cli/extras/tune/structures": ["core/index/*", "core/geometry", "core/base"],
+    "client/cli/extras/tune": ["client/cli", "client/cli/extras/tune/structures", "client/cli/extras/verify",
+                               "client/cli/levels/generate", "client/cli/rows", "client/lib", "core/geometry", "core/base"],
     "client/cli/extras/render": ["client/cli", "client/lib", "core/geometry", "core/base"],
     "client/cli/backup": ["client/cli", "client/lib", "core/base"],
     "client/cli/script": ["client/cli", "client/lib", "core/base"],

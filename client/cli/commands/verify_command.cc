@@ -1,20 +1,16 @@
 #include <algorithm>
 #include <chrono>
-#include <fstream>
 #include <functional>
 #include <map>
 #include <memory>
 #include <optional>
-#include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "absl/strings/ascii.h"
-#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
-#include "client/cli/choices.h"
 #include "client/cli/commands.h"
+#include "client/cli/commands/query_input.h"
 #include "client/cli/default_scene.h"
 #include "client/cli/extras/verify/answer_comparison.h"
 #include "client/cli/extras/verify/random_queries.h"
@@ -31,8 +27,6 @@ using Clock = std::chrono::steady_clock;
 constexpr double kDefaultSeconds = 10, kMaxSeconds = 86400;
 // Deadline of a call if --timeout is not given: a batch by list may take long.
 constexpr double kCallSeconds = 600;
-// Rows of the input in one batch. A query by list may take milliseconds.
-constexpr const char* kRowsInBatch = "64";
 // Time that a batch of random queries should take by list, and the limits of the number of its queries.
 constexpr double kBatchSeconds = 0.5;
 constexpr uint32_t kMaxQueries = 256;
@@ -46,12 +40,6 @@ struct VerifyOptions {
   std::optional<double> seconds;
   uint64_t seed = 1;
 };
-
-// Returns the name of a block's kind, such as "balls".
-std::string kind_name(const v1::QueryBlock& block) {
-  const auto* const field = v1::QueryBlock::descriptor()->FindFieldByNumber(static_cast<int>(block.kind_case()));
-  return field == nullptr ? "none" : field->name();
-}
 
 // Asks each batch twice at one revision, by the structures and by list, and compares the bytes of the answers.
 class Verifier {
@@ -161,68 +149,19 @@ absl::Status verify_random(const VerifyOptions& options, const client::Client& c
   return absl::OkStatus();
 }
 
-// Returns the kind of query whose rows have the columns of `line`, the first line of an input; empty if no kind does.
-// Columns that several kinds have mean the first of them: sweep before capsule, nearest before cell and contains.
-std::string kind_of_columns(const std::string& line) {
-  std::set<std::string> words;
-  std::string word;
-  for (const char c : line + " ") {
-    if (absl::ascii_isalpha(static_cast<unsigned char>(c)) || c == '_') {
-      word += c;
-    } else if (!word.empty()) {
-      words.insert(std::exchange(word, ""));
-    }
-  }
-  constexpr std::pair<const char*, const char*> kKinds[] = {
-      {"view", "frustum"},     {"viewer", "sight"}, {"dir", "ray"},    {"way", "sweep"},       {"half", "box"},
-      {"half_extents", "box"}, {"radius", "ball"},  {"at", "nearest"}, {"position", "nearest"}};
-  for (const auto& [column, kind] : kKinds)
-    if (words.count(column) != 0) return kind;
-  return "";
-}
-
-absl::StatusOr<std::string> kind_of_input(const VerifyOptions& options) {
-  if (!options.kind.empty()) return options.kind;
-  if (*options.queries == "-") return usage_error("rows from standard input need --kind");
-  std::ifstream file(*options.queries);
-  std::string line;
-  while (line.empty() && std::getline(file, line)) {
-  }
-  if (!file && line.empty()) return absl::NotFoundError(absl::StrCat(*options.queries, ": no rows can be read"));
-  std::string kind = kind_of_columns(line);
-  if (kind.empty())
-    return usage_error(absl::StrCat(*options.queries, ": no kind of query has these columns; give --kind"));
-  return kind;
-}
-
-// Verifies the rows of an input: runs the line `locus query KIND SCENE` on it, whose batches are verified instead of
-// answered.
+// Verifies the rows of an input.
 absl::Status verify_input(const VerifyOptions& options, Verifier& verifier, Context& context) {
-  ASSIGN_OR_RETURN(const std::string kind, kind_of_input(options));
-  const bool is_csv = absl::EndsWithIgnoreCase(*options.queries, ".csv");
-  std::vector<std::string> words = {"query",          kind,      options.scene, is_csv ? "--from-csv" : "--from-ndjson",
-                                    *options.queries, "--batch", kRowsInBatch};
-  std::reverse(words.begin(), words.end());
-  CLI::App app;
-  add_query_command(app, context);
   bool is_over = false;
-  context.set_batch_sink([&](v1::QueryBatch batch, const std::string& lines) {
-    if (verifier.is_over()) {
-      is_over = true;
-      return absl::CancelledError("the time is over");
-    }
-    return verifier.verify(std::move(batch), lines);
-  });
-  try {
-    app.parse(std::move(words));
-  } catch (const CLI::ParseError& error) {
-    context.finish(usage_error(error.what()));
-  }
-  context.set_batch_sink(nullptr);
-  if (is_over) return absl::OkStatus();
-  RETURN_IF_ERROR(context.outcome());
-  if (verifier.queries() == 0) return absl::InvalidArgumentError(absl::StrCat(*options.queries, ": there are no rows"));
-  return absl::OkStatus();
+  const QueryInput input = {*options.queries, options.kind};
+  const absl::Status status =
+      for_each_query_batch(input, options.scene, context, [&](v1::QueryBatch batch, const std::string& lines) {
+        if (verifier.is_over()) {
+          is_over = true;
+          return absl::CancelledError("the time is over");
+        }
+        return verifier.verify(std::move(batch), lines);
+      });
+  return is_over ? absl::OkStatus() : status;
 }
 
 // Servers without by_list ignore it, so that their answers would always be equal.
@@ -275,11 +214,7 @@ columns name it: dir a ray, radius a ball, half a box, way a sweep, viewer sight
   add_scene_argument(command, options->scene);
   command.add_option("--queries", options->queries, "Rows to ask; - is standard input [random queries of all kinds]")
       ->type_name("FILE");
-  const std::vector<std::string> kinds = {"ray",     "ball",     "box",   "capsule", "sweep",
-                                          "frustum", "contains", "sight", "nearest", "cell"};
-  command.add_option("--kind", options->kind, "Kind of the rows, as in `locus query KIND` [known by the columns]")
-      ->type_name("KIND")
-      ->check(choices(kinds));
+  add_input_kind_option(command, options->kind);
   command
       .add_option("--seconds", options->seconds, "How long at most [10; with --queries until all rows are verified]")
       ->type_name("SECONDS")

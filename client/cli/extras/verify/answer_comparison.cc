@@ -106,6 +106,12 @@ AnswerDifference difference_of(const v1::QueryBlock& asked, const v1::BlockResul
 
 }  // namespace
 
+std::string kind_name(const v1::QueryBlock& block) {
+  const FieldDescriptor* const field =
+      v1::QueryBlock::descriptor()->FindFieldByNumber(static_cast<int>(block.kind_case()));
+  return field == nullptr ? "none" : field->name();
+}
+
 size_t query_count(const v1::QueryBlock& block) {
   const auto triples = [](const auto& column) { return static_cast<size_t>(column.size()) / 3; };
   switch (block.kind_case()) {

@@ -1,4 +1,5 @@
-// Comparison of two answers to the same batch, byte for byte. For `locus verify`. Functions without state.
+// Comparison of two answers to the same batch, byte for byte, and the kinds and numbers of a batch's queries. For
+// `locus verify` and `locus tune`. Functions without state.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_VERIFY_ANSWER_COMPARISON_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_VERIFY_ANSWER_COMPARISON_H_
 
@@ -9,6 +10,9 @@
 #include "client/lib/client.h"
 
 namespace locus::cli {
+
+// Returns the name of a block's kind, such as "balls"; "none" if it has none.
+std::string kind_name(const v1::QueryBlock& block);
 
 // Returns the number of queries of a block.
 size_t query_count(const v1::QueryBlock& block);
