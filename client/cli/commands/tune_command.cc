@@ -24,7 +24,7 @@ namespace locus::cli {
 namespace {
 
 // Deadline of a call if --timeout is not given: a batch of heavy queries, or of many inserts, may take long.
-constexpr double kCallSeconds = 600;
+constexpr double kTuneCallSeconds = 600;
 constexpr uint64_t kMaxBatchBytes = 16u << 20;
 constexpr uint64_t kSampledObjects = 4096;  // around which queries are made
 
@@ -70,6 +70,13 @@ class Tune {
       : options_(options), context_(context), progress_(start_progress(context)) {}
 
   absl::Status run() {
+    const absl::Status status = run_to_end();
+    if (status.ok() || !signal_.is_cancelled()) return status;
+    return absl::CancelledError("interrupted; the scratch scenes were deleted, and nothing was changed");
+  }
+
+ private:
+  absl::Status run_to_end() {
     RETURN_IF_ERROR(read_queries());
     ASSIGN_OR_RETURN(client_, context_.connect());
     ASSIGN_OR_RETURN(const v1::GetServerResponse server, client_->get_server());
@@ -80,10 +87,12 @@ class Tune {
     RETURN_IF_ERROR(objects_.dump(*client_, options_.scene, batch_bytes(server), progress_));
     RETURN_IF_ERROR(make_queries());
     if (has_objects()) RETURN_IF_ERROR(tune_cell_size());
-    return options_.structures ? time_structures() : absl::OkStatus();
+    if (options_.structures) RETURN_IF_ERROR(time_structures());
+    progress_.hide();
+    write();
+    return absl::OkStatus();
   }
 
- private:
   bool has_objects() const { return scene_.scene().objects() > 0; }
 
   // Reads the queries before anything is asked of the server.
@@ -132,17 +141,14 @@ class Tune {
     ASSIGN_OR_RETURN(const std::unique_ptr<client::Client> cleaner, context_.open_connection());
     ASSIGN_OR_RETURN(const CellTuningResult result,
                      tune_cells(*client_, *cleaner, scene_, objects_, queries_, cell_options(), progress_));
-    progress_.hide();
-    Report report = cell_report(options_.scene, result);
-    report.head["revision"] = objects_.revision();
-    report.head["queries"] = queries_.added();
-    std::string sentence = advice(options_.scene, result);
-    if (options_.apply && !result.choice.leave_it) {
-      RETURN_IF_ERROR(apply(result.choice.cell_size));
-      sentence += "; it was set";
-    }
-    if (options_.apply) report.head["applied"] = !result.choice.leave_it;
-    write(report, {sentence});
+    cells_ = cell_report(options_.scene, result);
+    cells_.head["revision"] = objects_.revision();
+    cells_.head["queries"] = queries_.added();
+    advice_.push_back(advice(options_.scene, result));
+    if (options_.apply) cells_.head["applied"] = !result.choice.leave_it;
+    if (!options_.apply || result.choice.leave_it) return absl::OkStatus();
+    RETURN_IF_ERROR(apply(result.choice.cell_size));
+    advice_.back() += "; it was set";
     return absl::OkStatus();
   }
 
@@ -174,10 +180,8 @@ class Tune {
                        time_triangles(triangles, queries, options, family_progress("triangles")));
       tables.push_back({"triangles", triangles.size(), std::move(figures)});
     }
-    progress_.hide();
-    std::vector<std::string> sentences;
-    for (const StructureTable& table : tables) sentences.push_back(best_sentence(table));
-    write(structure_report(options_.scene, tables), sentences);
+    for (const StructureTable& table : tables) best_.push_back(best_sentence(table));
+    structures_ = structure_report(options_.scene, tables);
     return absl::OkStatus();
   }
 
@@ -189,16 +193,33 @@ class Tune {
     };
   }
 
-  // A table shows the sentences below its rows, instead of the head, and the other formats in the head.
-  void write(Report report, const std::vector<std::string>& sentences) {
+  // Writes a table below which are its sentences.
+  void write_table(Report report, const std::vector<std::string>& sentences) {
+    report.head = Json::object();
+    context_.write(report);
+    for (const std::string& sentence : sentences) context_.out() << sentence << '\n';
+  }
+
+  // Writes the tables one after another, and in other formats one report.
+  void write() {
     if (context_.format() == Format::kTable) {
-      report.head = Json::object();
-    } else {
-      report.head["advice"] = sentences.size() == 1 ? Json(sentences.front()) : Json(sentences);
+      if (!advice_.empty()) write_table(cells_, advice_);
+      if (!advice_.empty() && !best_.empty()) context_.out() << '\n';
+      if (!best_.empty()) write_table(structures_, best_);
+      return;
+    }
+    Report report = cells_;
+    report.rows_name = "sizes";
+    report.head["advice"] = advice_.empty() ? Json(nullptr) : Json(advice_.front());
+    if (!best_.empty()) {
+      report.head.update(structures_.head);
+      if (context_.format() == Format::kJson) {
+        report.head["structures"] = structures_.rows;
+      } else {
+        report.rows.insert(report.rows.end(), structures_.rows.begin(), structures_.rows.end());
+      }
     }
     context_.write(report);
-    if (context_.format() != Format::kTable) return;
-    for (const std::string& sentence : sentences) context_.out() << sentence << '\n';
   }
 
   const TuneOptions& options_;
@@ -209,11 +230,13 @@ class Tune {
   QuerySet queries_;
   v1::GetSceneResponse scene_;
   ObjectBatches objects_;
+  Report cells_, structures_;
+  std::vector<std::string> advice_, best_;  // sentences below the two tables; none = no table
 };
 
 absl::Status tune(const TuneOptions& options, Context& context) {
   RETURN_IF_ERROR(check(options));
-  if (!context.options().timeout_seconds) context.options().timeout_seconds = kCallSeconds;
+  if (!context.options().timeout_seconds) context.options().timeout_seconds = kTuneCallSeconds;
   return Tune(options, context).run();
 }
 

@@ -1,6 +1,6 @@
 // Ctrl-C (SIGINT), SIGTERM and SIGHUP while a command has something to clean up: instead of ending the process, the
-// signals call a function until the object is destroyed, so that calls in progress can be cancelled. Where SIGINT is
-// blocked, as in the shell, whoever waits for it takes it instead. One object at a time.
+// signals call a function until the object is destroyed, so that calls in progress can be cancelled. The shell, which
+// blocks SIGINT, still handles it itself. One object at a time.
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_TUNE_CANCEL_ON_SIGNAL_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_TUNE_CANCEL_ON_SIGNAL_H_
 

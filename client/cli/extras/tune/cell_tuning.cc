@@ -208,7 +208,7 @@ absl::StatusOr<CellTuningResult> tune_cells(const client::Client& work, const cl
                                             const v1::GetSceneResponse& scene, const ObjectBatches& objects,
                                             const QuerySet& queries, const CellTuningOptions& options,
                                             ProgressWriter& progress) {
-  LOCUS_CHECK_GT(objects.objects(), 0u);
+  LOCUS_CHECK_NE(objects.objects(), 0u);
   return CellTuning(work, cleaner, scene, objects, queries, options, progress).run();
 }
 

@@ -11,7 +11,7 @@
 
 namespace locus::cli {
 
-// What the scratch scenes that exist at the same time need.
+// Needs of the scratch scenes that exist at the same time.
 struct ScratchNeed {
   uint64_t scenes = 0;
   uint64_t objects = 0;  // of all scenes together

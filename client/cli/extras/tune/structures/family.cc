@@ -23,10 +23,8 @@
 #include "core/index/queries/nearest_values.h"
 #include "core/index/sphere_tree/sphere_tree.h"
 
-namespace locus {
-
 template <>
-struct PrimitiveTraits<cli::PlacedShape> {
+struct locus::PrimitiveTraits<locus::cli::PlacedShape> {
   using Scalar = double;
   using RayQuery = ObjectRay;
   using BallQuery = Balld;
@@ -46,7 +44,7 @@ struct PrimitiveTraits<cli::PlacedShape> {
   }
 };
 
-namespace cli {
+namespace locus::cli {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -272,5 +270,4 @@ std::map<std::string, std::string> best_structures(absl::Span<const StructureFig
   return best;
 }
 
-}  // namespace cli
-}  // namespace locus
+}  // namespace locus::cli

@@ -3,6 +3,7 @@
 #ifndef LOCUS_CLIENT_CLI_EXTRAS_TUNE_STRUCTURES_HASH_GRID_INDEX_H_
 #define LOCUS_CLIENT_CLI_EXTRAS_TUNE_STRUCTURES_HASH_GRID_INDEX_H_
 
+#include <cmath>
 #include <cstdint>
 #include <utility>
 #include <vector>
@@ -27,7 +28,7 @@ class HashGridIndex {
       items[i].entry.id = i + 1;
       items[i].handle = i;
       // Half of the diagonal, rounded up to float.
-      items[i].reach = static_cast<float>(norm(high - low) * (0.5 * (1 + 0x1p-22)));
+      items[i].reach = static_cast<float>(std::sqrt(dot(high - low, high - low)) * (0.5 * (1 + 0x1p-22)));
     }
     grid_.apply({{}, {}, items});
     snapshot_ = grid_.snapshot();
