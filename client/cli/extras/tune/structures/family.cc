@@ -1,6 +1,7 @@
 #include "client/cli/extras/tune/structures/family.h"
 
 #include <malloc.h>
+#include <time.h>
 
 #include <algorithm>
 #include <chrono>
@@ -47,7 +48,23 @@ struct locus::PrimitiveTraits<locus::cli::PlacedShape> {
 namespace locus::cli {
 namespace {
 
-using Clock = std::chrono::steady_clock;
+// Clock of the processor time of this thread, which other programs disturb less than the time of day.
+struct ThreadClock {
+  using rep = int64_t;
+  using period = std::nano;
+  using duration = std::chrono::nanoseconds;
+  using time_point = std::chrono::time_point<ThreadClock>;
+  static constexpr bool is_steady = true;
+
+  static time_point now() {
+    timespec time = {};
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+    return time_point(std::chrono::seconds(time.tv_sec) + std::chrono::nanoseconds(time.tv_nsec));
+  }
+};
+
+// Queries between two readings of the clock, which takes about as long as a fast query.
+constexpr size_t kQueriesBetweenReadings = 16;
 
 constexpr const char* kKinds[] = {"rays", "balls", "boxes", "nearest"};
 
@@ -188,7 +205,7 @@ std::vector<Named<V>> family() {
 // Asks queries of one kind, from the first on, for up to `milliseconds`. Returns nanoseconds a query.
 template <class V>
 double time_kind(Contestant<V>& contestant, size_t kind, const QueriesOf<V>& queries, double milliseconds) {
-  const Clock::time_point begin = Clock::now();
+  const ThreadClock::time_point begin = ThreadClock::now();
   const auto limit = std::chrono::duration<double, std::milli>(milliseconds);
   size_t asked = 0;
   // The results are used, so that no query is optimised away.
@@ -196,8 +213,8 @@ double time_kind(Contestant<V>& contestant, size_t kind, const QueriesOf<V>& que
   do {
     results = results + contestant.answer(kind, queries, asked % queries.count(kind));
     ++asked;
-  } while (asked < queries.count(kind) && Clock::now() - begin < limit);
-  return std::chrono::duration<double, std::nano>(Clock::now() - begin).count() / static_cast<double>(asked);
+  } while (asked < queries.count(kind) && (asked % kQueriesBetweenReadings != 0 || ThreadClock::now() - begin < limit));
+  return std::chrono::duration<double, std::nano>(ThreadClock::now() - begin).count() / static_cast<double>(asked);
 }
 
 double middle(std::vector<double> values) {
@@ -219,9 +236,9 @@ absl::StatusOr<std::vector<StructureFigures>> time_values(const std::vector<V>& 
   for (Named<V>& one : all) {
     RETURN_IF_ERROR(progress(done++, total));
     const uint64_t before = heap_bytes();
-    const Clock::time_point begin = Clock::now();
+    const ThreadClock::time_point begin = ThreadClock::now();
     one.contestant->build(values);
-    one.figures.build_ms = std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
+    one.figures.build_ms = std::chrono::duration<double, std::milli>(ThreadClock::now() - begin).count();
     one.figures.bytes = heap_bytes() - std::min(before, heap_bytes());
   }
   for (int round = 0; round <= options.rounds; ++round) {  // the first is not counted

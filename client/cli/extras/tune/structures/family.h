@@ -50,7 +50,7 @@ struct StructureFigures {
 
 struct FamilyOptions {
   int rounds = 5;
-  // Maximum time of a structure and kind in one round; at least one query is asked.
+  // Maximum processor time of a structure and kind in one round; at least 16 queries are asked if there are so many.
   double milliseconds = 10;
 };
 
@@ -58,8 +58,9 @@ struct FamilyOptions {
 using FamilyProgress = std::function<absl::Status(uint64_t done, uint64_t total)>;
 
 // Build each structure and time the queries in turns: in every round, each structure answers each kind; the median of
-// the rounds counts. The structures are list, bvh, hash_grid, grid, kd_tree, octree, bsp_tree and sphere_tree, each
-// with its default options. Return the error of `progress`. Precondition: `values` is not empty.
+// the rounds counts. Times are processor times of this thread. The structures are list, bvh, hash_grid, grid, kd_tree,
+// octree, bsp_tree and sphere_tree, each with its default options. Return the error of `progress`. Precondition:
+// `values` is not empty.
 absl::StatusOr<std::vector<StructureFigures>> time_shapes(const std::vector<PlacedShape>& values,
                                                           const FamilyQueries& queries, const FamilyOptions& options,
                                                           const FamilyProgress& progress);
