@@ -58,6 +58,8 @@ HAS_REDIS = any(shutil.which(name) for name in ("redis-server", "redis-check-rdb
 CHANGEABLE_STRUCTURES = {"hash_grid", "grid", "grid_morton", "kd_tree", "kd_tree_at_node", "octree", "octree_at_node",
                          "bsp_tree"}
 STRUCTURES = CHANGEABLE_STRUCTURES | {"bvh", "sphere_tree"}
+TUNING = {(f"{case}/{scene}/1k/from_chosen", peer) for case, peer in (("named", "best_of_sweep"), ("promise", "promised"))
+          for scene in ("uniform", "hub60", "mixed", "balls100", "level")}
 STRUCTURE_QUERIES = ("ray", "ray_short", "any", "ball", "box", "nearest")
 STRUCTURE_SCENES = {"uniform": ("1e3", "1e4"), **{name: ("1e3",) for name in ("hub", "city1", "city100", "giant")}}
 
@@ -292,6 +294,22 @@ class LogTest(SuiteRun, unittest.TestCase):
 
     def test_the_required_ratio_is_noted_beside_the_measured_one(self):
         self.assertRegex(self.answer.stdout, r"note: commit/256 beside append: .* required 0\.800")
+
+
+class TuningTest(SuiteRun, unittest.TestCase):
+    SUITE = "tuning"
+
+    def expected(self):
+        return TUNING
+
+    def test_the_required_ratios_are_noted_beside_the_measured_ones(self):
+        for case in ("named", "promise"):
+            self.assertRegex(self.answer.stdout, rf"note: {case}/uniform/1k/from_chosen beside .* required 0\.833")
+
+    def test_no_named_size_is_better_than_the_best_of_the_sweep(self):
+        for cell in self.cells:
+            if cell["case"].startswith("named/"):
+                self.assertLessEqual(cell["ratio"], 1, cell)
 
 
 class StructuresTest(SuiteRun, unittest.TestCase):

@@ -25,6 +25,7 @@
 #include "tests/bench/serving/serving_suite.h"
 #include "tests/bench/static/static_suite.h"
 #include "tests/bench/structures/structures_suite.h"
+#include "tests/bench/tuning/tuning_suite.h"
 
 namespace locus::bench {
 namespace {
@@ -43,6 +44,8 @@ std::vector<Suite> suites() {
        serving::run_serving_suite},
       {"structures", "every structure of the index on the same boxes, compared with a list",
        structures::run_structures_suite},
+      {"tuning", "the cell size that locus tune names, compared with the best of a sweep over all sizes",
+       tuning::run_tuning_suite},
       {"log", "update batches on their way to the disk, compared with appending to a file", log::run_log_suite},
   };
 }
