@@ -54,7 +54,7 @@ constexpr TuningCase kTuningCases[] = {{"uniform", dynamic::Kind::kUniform, Kind
 // only have the first.
 constexpr double kPresentSizes[] = {0, 0.5, 1024};
 
-// Smallest and largest size of the full sweep.
+// Smallest and largest size of the sweep. Quick runs measure every fourth power of two.
 constexpr double kSmallest = 0.125, kLargest = 8192;
 
 class TuningRun {
@@ -98,11 +98,9 @@ class TuningRun {
                      around_objects(daemon_->client(), "tuned", one.kinds, one.radius, options_.quick ? 128 : 1024));
     ASSIGN_OR_RETURN(files_, write_rows(queries, folder_.file("")));
     batches_ = batches_of(queries);
-    progress_(absl::StrCat("all cell sizes of ", one.name));
-    ASSIGN_OR_RETURN(const json sweep, tune(swept_words()));
     for (const double present : presents()) {
       progress_(absl::StrCat(one.name, ": locus tune ", case_name("from", one, present)));
-      RETURN_IF_ERROR(tune_from(one, present, sweep));
+      RETURN_IF_ERROR(tune_from(one, present));
     }
     return absl::OkStatus();
   }
@@ -160,9 +158,10 @@ class TuningRun {
     return report;
   }
 
-  static std::vector<std::string> swept_words() {
-    std::string sizes;
-    for (double size = kSmallest; size <= kLargest; size *= 2) absl::StrAppend(&sizes, sizes.empty() ? "" : ",", size);
+  // Returns the option that measures all sizes, of which `named` is one.
+  std::vector<std::string> swept_words(double named) const {
+    std::string sizes = absl::StrCat(named);
+    for (double size = kSmallest; size <= kLargest; size *= options_.quick ? 16 : 2) absl::StrAppend(&sizes, ",", size);
     return {"--sizes", sizes};
   }
 
@@ -182,7 +181,7 @@ class TuningRun {
     return absl::OkStatus();
   }
 
-  absl::Status tune_from(const TuningCase& one, double present, const json& sweep) {
+  absl::Status tune_from(const TuningCase& one, double present) {
     for (const char* scene : {"tuned", "untuned"}) RETURN_IF_ERROR(set_cell_size(scene, present));
     ASSIGN_OR_RETURN(const json report, tune({"--apply"}));
     RETURN_IF_ERROR(settle("tuned"));
@@ -192,6 +191,8 @@ class TuningRun {
     const double promised = applied ? 1 - report["gain_percent"].get<double>() / 100 : 1;
     ASSIGN_OR_RETURN(const v1::GetSceneResponse tuned, daemon_->client().describe_scene("tuned"));
     const double size = tuned.description().objects().cell_size();
+    progress_(absl::StrCat("all cell sizes of ", one.name));
+    ASSIGN_OR_RETURN(const json sweep, tune(swept_words(size)));
     ASSIGN_OR_RETURN(const double named_time, swept_time(sweep, size));
     double best_time = std::numeric_limits<double>::infinity();
     for (const json& row : sweep["sizes"]) best_time = std::min(best_time, row["time"].get<double>());
@@ -222,7 +223,7 @@ class TuningRun {
     return absl::OkStatus();
   }
 
-  // Returns the time of a cell size in the sweep, relative to that of the scene before.
+  // Returns the time of a cell size in the sweep.
   static absl::StatusOr<double> swept_time(const json& sweep, double size) {
     for (const json& row : sweep["sizes"])
       if (row["cell_size"].get<double>() == size) return row["time"].get<double>();
