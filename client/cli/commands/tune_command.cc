@@ -266,7 +266,8 @@ Rows are those of `locus query KIND`, and their kind is known as by `locus verif
   add_input_kind_option(command, options->kind);
   command.add_option("--sizes", options->sizes, "Cell sizes to measure, powers of two [a search around the present]")
       ->type_name("SIZE,...")
-      ->delimiter(',');
+      ->delimiter(',')
+      ->allow_extra_args(false);
   command.add_option("--rounds", options->rounds, "Rounds whose median counts [7]")
       ->type_name("N")
       ->check(CLI::Range(1, 1000).description(""));

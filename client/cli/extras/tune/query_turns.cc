@@ -11,7 +11,8 @@
 namespace locus::cli {
 namespace {
 
-constexpr double kTurnNanoseconds = 2e7;
+// Cost of a turn: at least, by repeats, and at most, by leaving out batches.
+constexpr double kMinTurnNanoseconds = 2e7, kMaxTurnNanoseconds = 2e8;
 constexpr double kMaxRepeats = 200;
 
 // Costs of one turn, summed over its queries.
@@ -22,18 +23,34 @@ struct TurnCost {
 };
 using TurnCosts = std::map<std::string, TurnCost>;
 
-absl::StatusOr<TurnCosts> turn(const client::Client& client, const std::string& scene, const QuerySet& queries,
-                               int repeats) {
+// Batches that are asked in every turn, and how often.
+struct TurnPlan {
+  std::vector<const QuerySet::Entry*> entries;
+  int repeats = 1;
+};
+
+// Returns every `stride`-th batch of each kind.
+std::vector<const QuerySet::Entry*> thinned(const QuerySet& queries, size_t stride) {
+  std::vector<const QuerySet::Entry*> entries;
+  std::map<std::string, size_t> passed;
+  for (const QuerySet::Entry& entry : queries.batches()) {
+    const std::string kind = entry.batch.blocks().empty() ? "none" : kind_name(entry.batch.blocks(0));
+    if (passed[kind]++ % stride == 0) entries.push_back(&entry);
+  }
+  return entries;
+}
+
+absl::StatusOr<TurnCosts> turn(const client::Client& client, const std::string& scene, const TurnPlan& plan) {
   TurnCosts costs;
-  for (int i = 0; i < repeats; ++i) {
-    for (const auto& [batch, place] : queries.batches()) {
-      const absl::StatusOr<v1::QueryResult> answer = client.query(scene, batch);
-      if (!answer.ok()) return with_place(answer.status(), place);
-      const v1::QueryResult& result = *answer;
-      if (result.blocks_size() != batch.blocks_size())
+  for (int i = 0; i < plan.repeats; ++i) {
+    for (const QuerySet::Entry* const entry : plan.entries) {
+      const v1::QueryBatch& batch = entry->batch;
+      const absl::StatusOr<v1::QueryResult> result = client.query(scene, batch);
+      if (!result.ok()) return with_place(result.status(), entry->place);
+      if (result->blocks_size() != batch.blocks_size())
         return absl::DataLossError("an answer does not have one result for each block");
       for (int block = 0; block < batch.blocks_size(); ++block) {
-        const v1::Work& work = result.blocks(block).work();
+        const v1::Work& work = result->blocks(block).work();
         TurnCost& cost = costs[kind_name(batch.blocks(block))];
         cost.nanoseconds += static_cast<double>(work.nanoseconds());
         cost.work += static_cast<double>(work.nodes() + work.cells() + work.tests());
@@ -44,11 +61,29 @@ absl::StatusOr<TurnCosts> turn(const client::Client& client, const std::string& 
   return costs;
 }
 
-// Returns the number of times to ask the batches in a turn, if asking them once costs `once`.
-int repeats_for(const TurnCosts& once) {
-  double nanoseconds = 1;
-  for (const auto& [kind, cost] : once) nanoseconds += cost.nanoseconds;
-  return static_cast<int>(std::clamp(std::ceil(kTurnNanoseconds / nanoseconds), 1.0, kMaxRepeats));
+double nanoseconds_of(const TurnCosts& costs) {
+  double sum = 1;
+  for (const auto& [kind, cost] : costs) sum += cost.nanoseconds;
+  return sum;
+}
+
+// Asks every scene once, as a warm-up, and returns the plan for all turns: the slowest scene needs no more than
+// kMaxTurnNanoseconds, if one batch of each kind does not, and the fastest at least kMinTurnNanoseconds.
+absl::StatusOr<TurnPlan> warm_up(const client::Client& client, const std::vector<std::string>& scenes,
+                                 const QuerySet& queries) {
+  size_t stride = 1;
+  TurnPlan plan = {thinned(queries, stride)};
+  double fastest = kMinTurnNanoseconds;
+  for (const std::string& scene : scenes) {
+    ASSIGN_OR_RETURN(const TurnCosts costs, turn(client, scene, plan));
+    const double nanoseconds = nanoseconds_of(costs);
+    fastest = std::min(fastest, nanoseconds);
+    if (nanoseconds <= kMaxTurnNanoseconds) continue;
+    stride *= static_cast<size_t>(std::ceil(nanoseconds / kMaxTurnNanoseconds));
+    plan.entries = thinned(queries, stride);
+  }
+  if (stride == 1) plan.repeats = static_cast<int>(std::min(std::ceil(kMinTurnNanoseconds / fastest), kMaxRepeats));
+  return plan;
 }
 
 }  // namespace
@@ -65,14 +100,10 @@ absl::StatusOr<std::vector<KindCosts>> ask_in_turns(const client::Client& client
                                                     int rounds, const std::function<void(int done)>& on_round) {
   std::vector<std::map<std::string, std::vector<double>>> nanoseconds(scenes.size());
   std::vector<KindCosts> costs(scenes.size());
-  int repeats = 1;
-  for (int round = 0; round <= rounds; ++round) {
+  ASSIGN_OR_RETURN(const TurnPlan plan, warm_up(client, scenes, queries));
+  for (int round = 1; round <= rounds; ++round) {
     for (size_t i = 0; i < scenes.size(); ++i) {
-      ASSIGN_OR_RETURN(const TurnCosts turned, turn(client, scenes[i], queries, repeats));
-      if (round == 0) {
-        if (i == 0) repeats = repeats_for(turned);
-        continue;
-      }
+      ASSIGN_OR_RETURN(const TurnCosts turned, turn(client, scenes[i], plan));
       for (const auto& [kind, cost] : turned) {
         if (cost.queries == 0) continue;
         nanoseconds[i][kind].push_back(cost.nanoseconds / cost.queries);

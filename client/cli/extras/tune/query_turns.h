@@ -19,9 +19,9 @@ namespace locus::cli {
 // Cost of a query by kind.
 using KindCosts = std::map<std::string, KindCost>;
 
-// Returns the costs of the queries at each scene, in the order of `scenes`. A first round is not counted. Each turn
-// asks the batches often enough that the server needs about 20 ms. `on_round` is called after each round with their
-// number. The error of a refused batch names the place that it is from.
+// Returns the costs of the queries at each scene, in the order of `scenes`. A first round is not counted; it determines
+// how many of the batches are asked in a turn, and how often, so that a turn is long enough to measure and none takes
+// long. `on_round` is called after each round with their number. The error of a refused batch names its place.
 absl::StatusOr<std::vector<KindCosts>> ask_in_turns(const client::Client& client,
                                                     const std::vector<std::string>& scenes, const QuerySet& queries,
                                                     int rounds, const std::function<void(int done)>& on_round);

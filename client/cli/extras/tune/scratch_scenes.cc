@@ -55,6 +55,7 @@ absl::StatusOr<ScratchScene> ScratchScenes::make(double cell_size, const ObjectB
   RETURN_IF_ERROR(fill(request.name(), objects, scratch));
   ASSIGN_OR_RETURN(const v1::GetSceneResponse got, work_.describe_scene(request.name()));
   scratch.cell_size = got.description().objects().cell_size();
+  if (scratch.cell_size <= 0) return absl::DataLossError("the server does not tell the cell size of a scene");
   scratch.bytes = got.description().objects().bytes();
   return scratch;
 }
