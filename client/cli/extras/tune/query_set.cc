@@ -129,7 +129,7 @@ void QuerySet::add(v1::QueryBatch batch, const std::string& place) {
   for (const v1::QueryBlock& block : batch.blocks()) added_ += query_count(block);
   if (offered_++ % stride_ != 0) return;
   if (batches_.size() == kMaxBatches) {  // keeps every second batch from now on
-    for (size_t i = 0; i < kMaxBatches / 2; ++i) batches_[i] = std::move(batches_[2 * i]);
+    for (size_t i = 1; i < kMaxBatches / 2; ++i) batches_[i] = std::move(batches_[2 * i]);
     batches_.resize(kMaxBatches / 2);
     stride_ *= 2;
   }
