@@ -83,11 +83,12 @@ class TuningRun {
     return absl::StrCat(what, "/", one.name, "/", dynamic::name_of_count(count_), "/from_", from);
   }
 
+  bool wanted(const TuningCase& one, double present) const {
+    return options_.filter.wants(case_name("named", one, present)) ||
+           options_.filter.wants(case_name("promise", one, present));
+  }
   bool wanted(const TuningCase& one) const {
-    return std::any_of(presents().begin(), presents().end(), [&](double present) {
-      return options_.filter.wants(case_name("named", one, present)) ||
-             options_.filter.wants(case_name("promise", one, present));
-    });
+    return std::any_of(presents().begin(), presents().end(), [&](double present) { return wanted(one, present); });
   }
 
   absl::Status run_case(const TuningCase& one) {
@@ -99,6 +100,7 @@ class TuningRun {
     ASSIGN_OR_RETURN(files_, write_rows(queries, folder_.file("")));
     batches_ = batches_of(queries);
     for (const double present : presents()) {
+      if (!wanted(one, present)) continue;
       progress_(absl::StrCat(one.name, ": locus tune ", case_name("from", one, present)));
       RETURN_IF_ERROR(tune_from(one, present));
     }
