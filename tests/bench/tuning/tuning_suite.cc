@@ -36,7 +36,7 @@ constexpr double kProgramSeconds = 600;
 // The named size may take this part longer than the best, and the promised time may be off by it.
 constexpr double kTolerance = 0.2;
 constexpr size_t kTicksBefore = 3;
-constexpr uint64_t kEmptyBatches = 200;  // after a change of the cell size: each refiles a few thousand objects
+constexpr uint64_t kSettlingBatches = 20;  // after a change of the cell size: each refiles a few thousand objects
 
 // A scene, its queries and the cell size that it has before it is tuned.
 struct TuningCase {
@@ -176,10 +176,24 @@ class TuningRun {
     return settle(scene);
   }
 
-  // Sends batches that only refile objects.
+  // Moves an object to and fro, since each batch that changes something refiles some objects.
   absl::Status settle(const std::string& scene) {
-    for (uint64_t i = 0; i < kEmptyBatches; ++i)
-      RETURN_IF_ERROR(daemon_->client().apply(scene, v1::UpdateBatch()).status());
+    v1::UpdateBatch batch;
+    v1::DumpSceneRequest request;
+    request.set_scene(scene);
+    RETURN_IF_ERROR(daemon_->client().dump(request, [&batch](const v1::DumpSceneResponse& message) {
+      if (message.objects().empty() || !batch.moves().empty()) return absl::OkStatus();
+      const v1::Insert& run = message.objects(0);
+      v1::Move& move = *batch.add_moves();
+      move.add_ids(run.ids(0));
+      for (int axis = 0; axis < 3; ++axis) move.add_positions_f64(run.positions_f64(axis));
+      return absl::OkStatus();
+    }));
+    const double x = batch.moves(0).positions_f64(0);
+    for (uint64_t i = 0; i < kSettlingBatches; ++i) {
+      batch.mutable_moves(0)->set_positions_f64(0, i % 2 == 0 ? x + 1 : x);
+      RETURN_IF_ERROR(daemon_->client().apply(scene, batch).status());
+    }
     return absl::OkStatus();
   }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/base/check.h"
 #include "core/base/limits.h"
 #include "core/base/status_macros.h"
 
@@ -42,6 +43,19 @@ absl::Status ObjectBatches::dump(const client::Client& client, const std::string
     progress.update(objects_);
     return absl::OkStatus();
   });
+}
+
+v1::UpdateBatch ObjectBatches::move_first(bool away) const {
+  LOCUS_CHECK_NE(objects_, 0u);
+  const v1::Insert& first = batches_.front().inserts(0);
+  v1::UpdateBatch batch;
+  v1::Move& move = *batch.add_moves();
+  move.add_ids(first.ids(0));
+  const double x = first.positions_f64(0);
+  move.add_positions_f64(away ? x + (x > 0 ? -1 : 1) : x);
+  move.add_positions_f64(first.positions_f64(1));
+  move.add_positions_f64(first.positions_f64(2));
+  return batch;
 }
 
 std::vector<std::array<double, 3>> ObjectBatches::positions(uint64_t count) const {

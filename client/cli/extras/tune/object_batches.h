@@ -26,6 +26,9 @@ class ObjectBatches {
   const std::vector<v1::Placement>& instances() const { return instances_; }
   uint64_t objects() const { return objects_; }
   uint64_t revision() const { return revision_; }
+  // Returns a batch that moves the first object by 1 along x or, if not `away`, back to its place. Precondition: there
+  // is an object.
+  v1::UpdateBatch move_first(bool away) const;
   // Returns the positions of up to `count` objects, evenly spaced in the order of ids.
   std::vector<std::array<double, 3>> positions(uint64_t count) const;
 

@@ -67,9 +67,13 @@ absl::Status ScratchScenes::fill(const std::string& name, const ObjectBatches& o
     RETURN_IF_ERROR(refused_items(ack));
   }
   scratch.build_ms = std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
-  // A scene that was filled by several batches may still have objects in cells of an earlier choice.
-  const uint64_t more = objects.batches().size() < 2 ? 0 : objects.objects() / kRefiledPerBatch + 1;
-  for (uint64_t i = 0; i < more; ++i) RETURN_IF_ERROR(work_.apply(name, v1::UpdateBatch()).status());
+  // A scene that was filled by several batches may still have objects in cells of an earlier choice. Each batch that
+  // changes something moves some of them, so an object is moved to and fro.
+  const uint64_t more = objects.batches().size() < 2 ? 0 : 2 * (objects.objects() / kRefiledPerBatch / 2 + 1);
+  for (uint64_t i = 0; i < more; ++i) {
+    ASSIGN_OR_RETURN(const v1::UpdateAck ack, work_.apply(name, objects.move_first(i % 2 == 0)));
+    RETURN_IF_ERROR(refused_items(ack));
+  }
   return absl::OkStatus();
 }
 
