@@ -52,7 +52,9 @@ bool DensityMap::differs(const DensityMap& before, const GridKey& key, int expon
 void DensityCount::Node::add_child(const GridKey& key, double child_values) {
   values += child_values;
   max_of_child = std::max(max_of_child, child_values);
-  children |= uint64_t{1} << index_in_brick(key);
+  const uint64_t child = uint64_t{1} << index_in_brick(key);
+  children |= child;
+  nodes |= child;
 }
 
 bool DensityCount::Node::is_dense(double min_brick_values) const {
@@ -104,7 +106,8 @@ void DensityCount::add(Vec3d position, double values) {
 DensityMap DensityCount::map(double min_brick_values, const DensityMap* before) {
   DensityMap result(base_);
   const bool was_sparse = before != nullptr && before->has_sparse_regions();
-  size_t sparse_nodes = 0;
+  size_t sparse_nodes = 0,
+         coarse_cells = 0;  // coarse_cells: cells above the finest nodes with values but without nodes
   for (size_t level = 0; level < counts_.size(); ++level) {
     const int exponent = base_ + kStep * static_cast<int>(level);
     DensityMap::Nodes dense;
@@ -113,6 +116,7 @@ DensityMap DensityCount::map(double min_brick_values, const DensityMap* before) 
       const bool is_dense = level != 0 && node.is_dense(was_dense ? min_brick_values / 2 : min_brick_values);
       if (is_dense) dense.insert(key);
       if (!is_dense && level == 1) ++sparse_nodes;
+      if (level > 1) coarse_cells += static_cast<size_t>(std::popcount(node.children & ~node.nodes));
       if (level + 1 == counts_.size()) continue;
       Node& parent = counts_[level + 1][ancestor(key, kStep)];
       parent.add_child(key, node.values);
@@ -121,8 +125,9 @@ DensityMap DensityCount::map(double min_brick_values, const DensityMap* before) 
     if (level != 0) result.dense_.push_back(std::move(dense));
   }
   const double share = kMinSparseShare * (was_sparse ? 0.5 : 1);
-  if (counts_.size() < 2 || static_cast<double>(sparse_nodes) <= share * static_cast<double>(counts_[1].size()))
-    return DensityMap(base_);
+  if (counts_.size() < 2) return DensityMap(base_);
+  const auto finest = static_cast<double>(counts_[1].size() + coarse_cells);
+  if (static_cast<double>(sparse_nodes + coarse_cells) <= share * finest) return DensityMap(base_);
   result.top_ = top_;
   return result;
 }

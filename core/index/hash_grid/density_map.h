@@ -27,7 +27,7 @@ namespace locus::internal {
 
 // The map of a grid has sparse regions only if this share of the finest nodes is sparse. Otherwise, for example if only
 // nodes at the edge of a uniform world are sparse, wider cells would save less than a further level costs. The share is
-// half as large for a grid that already has sparse regions.
+// half as large for a grid that already has sparse regions. Cells whose values are all stored in wider ones are sparse.
 inline constexpr double kMinSparseShare = 1.0 / 4;
 
 inline constexpr double kCrowd = 8;
@@ -79,6 +79,7 @@ class DensityCount {
     double values = 0;
     double max_of_child = 0;  // largest number of values of one child
     uint64_t children = 0;    // one bit for each child that has values, numbered as by index_in_brick()
+    uint64_t nodes = 0;       // those of them that are nodes; the values of the others are stored on this node's level
     bool has_dense_child = false;
 
     void add_child(const GridKey& key, double child_values);

@@ -1,6 +1,7 @@
 // A fixed cell size of the hash grid: values move to cells of another size in steps, and no answer changes.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <set>
 
 #include "core/index/hash_grid/hash_grid.h"
@@ -53,6 +54,35 @@ TEST(HashGridFixedSizeTest, ValuesMoveToTheNewCellsAFewThousandPerBatch) {
   EXPECT_GT(steps, 3u) << "40,000 values take several batches";
   EXPECT_LT(grid.statistics().bricks, bricks / 4);
   EXPECT_EQ(ids_near(grid, {10, 20, 30}, 100), near);
+}
+
+// Values that lie far apart in cells of the fixed size belong in wider cells, of which the map of densities must not
+// conclude that all is dense: then each batch would move all values to narrow cells or back.
+TEST(HashGridFixedSizeTest, ValuesThatAreSparseInCellsOfTheFixedSizeStayInWiderCells) {
+  Random random(3);
+  std::vector<Object> objects = crowd(10'000, 250, 3);
+  for (Object& object : objects) object.shape.radius = static_cast<float>(0.125 * std::exp2(7 * random.unit()));
+  ObjectGrid built;
+  built.fix_cell_size(0.5);
+  built.apply({}, objects);
+  const size_t bricks = built.statistics().bricks;
+  EXPECT_LT(bricks, objects.size() / 50);
+
+  ObjectGrid changed;
+  changed.apply({}, objects);
+  ASSERT_GT(changed.cell_size(), 8) << "the fixed size is not far from the chosen one";
+  changed.fix_cell_size(0.5);
+  ObjectGrid grown;
+  grown.fix_cell_size(0.5);
+  for (size_t begin = 0; begin < objects.size(); begin += 1'000)
+    grown.apply({}, absl::MakeConstSpan(objects).subspan(begin, 1'000));
+  for (ObjectGrid* const grid : {&changed, &grown}) {
+    for (int i = 0; i < 5; ++i) grid->apply({}, {});
+    for (int i = 0; i < 5; ++i) {
+      EXPECT_LE(grid->statistics().bricks, 2 * bricks);
+      grid->apply({&objects[0], 1}, {&objects[0], 1});
+    }
+  }
 }
 
 TEST(HashGridFixedSizeTest, ASizeIsRoundedUpAndKeptUntilItIsChosenAgain) {
