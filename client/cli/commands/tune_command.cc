@@ -251,7 +251,8 @@ void add_tune_command(CLI::App& parent, Context& context) {
 queries in turns, and deletes them, also after an error or Ctrl-C. Times are processor times that the server measures, so
 the way to the server does not count. The scene itself is only read, unless --apply is given and 10 % or more are gained.
 Without --queries, rays, balls, boxes and nearest queries are made around the objects, and each kind counts alike. Moves
-are not measured: very small cells make them dearer.
+are not measured: very small cells make them dearer. Objects get cells of a new size with the next batches of updates, a few
+thousand with each.
 Examples:
   locus tune arena
   locus tune arena --queries rays.csv --queries balls.ndjson --apply

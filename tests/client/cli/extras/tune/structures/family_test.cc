@@ -77,7 +77,9 @@ TEST(FamilyTest, EveryStructureHasTimesOfTheAskedKinds) {
                 UnorderedElementsAre(Pair("balls", ::testing::Gt(0)), Pair("nearest", ::testing::Gt(0)),
                                      Pair("rays", ::testing::Gt(0))));
     // Allocators of sanitizers do not count.
-    if (mallinfo2().uordblks > 0) EXPECT_GT(one.bytes, 300u * sizeof(Shape)) << one.name;
+    if (mallinfo2().uordblks > 0) {
+      EXPECT_GT(one.bytes, 300u * sizeof(Shape)) << one.name;
+    }
   }
   EXPECT_THAT(names, ElementsAre("list", "bvh", "hash_grid", "grid", "kd_tree", "octree", "bsp_tree", "sphere_tree"));
   EXPECT_EQ(time_triangles(lattice(), some_queries(), {.rounds = 1}, go_on)->size(), 8u);
