@@ -2,7 +2,7 @@
 # Packs locus for Debian 12: locusd, locus, liblocus-client-dev, python3-locus and, if deploy/docs has been built,
 # locus-doc. Each package gets a list of what it ships and links (SPDX) beside it.
 #
-#   ./deploy/package.sh                        compiles everything (25 minutes on two cores) and packs it
+#   ./deploy/package.sh                        compiles everything, which takes long, and packs it
 #   ./deploy/package.sh --from build/release   packs a finished build; needs no compiler
 #
 #   --out DIR          folder of the packages (default: build/package); its packages are replaced
@@ -50,7 +50,7 @@ tree=$out/locus-$name
 rm -rf "$tree" "$out"/compile_commands.json "$out"/*.deb "$out"/*.changes "$out"/*.buildinfo "$out"/*.spdx.json
 mkdir "$tree"
 # Lists the files of a clone, with uncommitted changes; an unpacked archive has only such files.
-if git rev-parse --is-inside-work-tree > /dev/null 2>&1; then
+if [ "$(git rev-parse --show-toplevel 2> /dev/null)" = "$PWD" ]; then
   git ls-files -z --cached --others --exclude-standard
 else
   find . \( -path ./build -o -path ./.git \) -prune -o -type f -print0

@@ -149,10 +149,10 @@ run_suite() {
 }
 
 say "packages"
-sets=(build python test docs)
+sets=(build python test)
 if [ "$bench" = yes ]; then sets+=(bench); fi
 case "$suites" in *asan*) sets+=(clang) ;; esac
-case "$suites" in *release*) sets+=(package) ;; esac
+case "$suites" in *release*) sets+=(package docs) ;; esac
 if [ "$long" = yes ]; then sets+=(lint); fi
 ./deploy/packages.sh "${sets[@]}" || { fail "install packages"; finish; }
 

@@ -1,4 +1,4 @@
-"""What the reference of the built site lacks. Each function gets the pages (site.py) and the truth from a program, and
+"""Gaps in the reference of the built site. Each function gets the pages (site_pages.py) and the truth from a program, and
 returns what is missing or wrong.
 """
 import os

@@ -14,7 +14,8 @@ import time
 SKIPPED = 77
 CACHE_DAYS = 14
 BOOT_SECONDS = 60
-ENVIRONMENT = {"PATH": "/usr/sbin:/usr/bin:/sbin:/bin", "HOME": "/tmp", "LC_ALL": "C.UTF-8", "DEBIAN_FRONTEND": "noninteractive"}
+ENVIRONMENT = {"PATH": "/usr/sbin:/usr/bin:/sbin:/bin", "HOME": "/tmp", "LC_ALL": "C.UTF-8", "DEBIAN_FRONTEND": "noninteractive",
+               **{name: os.environ[name] for name in ("http_proxy", "https_proxy", "no_proxy") if name in os.environ}}
 # Makes a root the whole view of a new machine: its own processes, network (loopback only), devices and control groups.
 BOOT = r"""
 set -eu
@@ -38,7 +39,8 @@ exec env -i container=other PATH=/usr/sbin:/usr/bin:/sbin:/bin /lib/systemd/syst
 
 
 def run(*command, check=True, timeout=600, **more):
-    """Runs a command and returns its output, both streams together."""
+    """Runs a command in the locale C.UTF-8 and returns its output, both streams together."""
+    more.setdefault("env", dict(os.environ, LC_ALL="C.UTF-8"))
     done = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
                           timeout=timeout, check=False, **more)
     if check and done.returncode != 0:
@@ -54,6 +56,8 @@ def missing():
         return "mmdebstrap is not installed: ./deploy/packages.sh package"
     if subprocess.run(["unshare", "--net", "--mount", "--pid", "--fork", "true"], capture_output=True, check=False).returncode:
         return "namespaces cannot be made"
+    if not all(line.startswith("deb http://") for line in sources() or [""]):
+        return "apt does not fetch packages of Debian by http: run apt-get update"
     return None
 
 
@@ -75,9 +79,10 @@ def archive(cache, *packages):
         with open(lists, "w", encoding="utf-8") as file:
             file.write("\n".join(sources()) + "\n")
         more = [f"--include={','.join(packages)}"] if packages else []
-        run("mmdebstrap", "--quiet", "--variant=minbase", *more, "bookworm", path + ".new", lists)
+        new = path.removesuffix(".tar") + ".new.tar"  # mmdebstrap makes a folder if the name does not end with .tar
+        run("mmdebstrap", "--quiet", "--variant=minbase", *more, "bookworm", new, lists)
         os.remove(lists)
-        os.rename(path + ".new", path)
+        os.rename(new, path)
     return path
 
 

@@ -34,6 +34,7 @@ CONTENTS = {
                             "usr/lib/{triplet}/pkgconfig/locus-index.pc",
                             "usr/share/locus/proto/locus/v1/query_service.proto"],
     "python3-locus": ["usr/lib/python3/dist-packages/locus/__init__.py", "usr/lib/python3/dist-packages/locus/schema.binpb"],
+    "locus-doc": ["usr/share/doc/locus-doc/html/index.html", "usr/share/doc/locus-doc/html/operations/alerts.html"],
 }
 FOLDERS = {"locusd": ("etc/default", "etc/locus", "lib/systemd/system", "usr/bin", "usr/share/man/man8"),
            "locus": ("usr/bin", "usr/share/bash-completion", "usr/share/fish", "usr/share/man/man1", "usr/share/zsh"),
@@ -45,7 +46,7 @@ FOLDERS = {"locusd": ("etc/default", "etc/locus", "lib/systemd/system", "usr/bin
 def pack(source, out, mask):
     """Packs with an umask; the sources are those of a folder that may be a copy of the clone."""
     run("bash", "-c", 'umask "$1" && shift && exec "$@"', "bash", mask, os.path.join(source, "deploy/package.sh"),
-        "--from", OPTIONS.build, "--out", out)
+        "--from", OPTIONS.build, "--docs", OPTIONS.out + "/site", "--out", out)
 
 
 def files_below(folder):
@@ -57,6 +58,8 @@ class PackagesTest(unittest.TestCase):
     def setUpClass(cls):
         shutil.rmtree(OPTIONS.out, ignore_errors=True)
         cls.folder = os.path.join(OPTIONS.out, "packages")
+        run(os.path.join(OPTIONS.source, "deploy/docs/build.sh"), "--build", OPTIONS.build, "--site", OPTIONS.out + "/site",
+            "--pages", OPTIONS.out + "/pages")
         pack(OPTIONS.source, cls.folder, "0022")
         cls.debs = {os.path.basename(path).split("_")[0]: path for path in glob.glob(cls.folder + "/*.deb")}
         os.makedirs(os.path.join(OPTIONS.out, "trees"))
@@ -75,8 +78,7 @@ class PackagesTest(unittest.TestCase):
             return json.load(file)
 
     def test_every_package_is_there(self):
-        # locus-doc is packed where the documentation was built.
-        self.assertEqual(set(self.debs) - {"locus-doc"}, set(CONTENTS))
+        self.assertEqual(set(self.debs), set(CONTENTS))
 
     def test_each_package_has_its_files_in_debians_folders(self):
         for package, tree in self.trees.items():
@@ -112,7 +114,8 @@ class PackagesTest(unittest.TestCase):
             self.assertRegex(symbols, r"__\w+_chk@")
 
     def test_no_file_names_the_folders_of_the_build(self):
-        words = [OPTIONS.build.encode(), (OPTIONS.source + "/").encode()]
+        rooms = ("core", "server", "client", "proto", "tests", "deploy")
+        words = [OPTIONS.build.encode(), *(f"{OPTIONS.source}/{room}/".encode() for room in rooms)]
         for package, tree in self.trees.items():
             for path in files_below(tree):
                 with open(os.path.join(tree, path), "rb") as file:
@@ -153,9 +156,8 @@ class PackagesTest(unittest.TestCase):
             debian_root.copy_sources(OPTIONS.source, copy)
             second = os.path.join(folder, "second")
             pack(copy, second, "0077")
-            # A copy has no build folder, so it has no pages.
-            names = [os.path.basename(path) for package, path in self.debs.items() if package != "locus-doc"]
-            self.assertGreaterEqual(len(names), 4)
+            names = [os.path.basename(path) for path in self.debs.values()]
+            self.assertEqual(len(names), 5)
             for name in names:
                 if not filecmp.cmp(os.path.join(self.folder, name), os.path.join(second, name), shallow=False):
                     self.fail(run("diffoscope", os.path.join(self.folder, name), os.path.join(second, name), check=False))
