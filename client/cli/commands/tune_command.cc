@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -71,23 +72,30 @@ class Tune {
 
   absl::Status run() {
     const absl::Status status = run_to_end();
-    if (status.ok() || !signal_.is_cancelled()) return status;
-    return absl::CancelledError("interrupted; the scratch scenes were deleted, and nothing was changed");
+    if (status.ok() || !is_cancelled()) return status;
+    return absl::CancelledError(absl::StrCat("interrupted; the scratch scenes were deleted, and ",
+                                             is_setting_ ? "the cell size may have been set" : "nothing was changed"));
   }
 
  private:
   absl::Status run_to_end() {
     RETURN_IF_ERROR(read_queries());
     ASSIGN_OR_RETURN(client_, context_.connect());
+    // Not before, because nothing cancels the reading of a file.
+    signal_.emplace([this] { context_.cancel_calls(); });
     ASSIGN_OR_RETURN(const v1::GetServerResponse server, client_->get_server());
     RETURN_IF_ERROR(check_served(server, *client_));
     ASSIGN_OR_RETURN(scene_, client_->describe_scene(options_.scene));
     RETURN_IF_ERROR(check_scene());
     if (has_objects()) RETURN_IF_ERROR(check_room(server));
     RETURN_IF_ERROR(objects_.dump(*client_, options_.scene, batch_bytes(server), progress_));
+    if (has_objects() && objects_.objects() == 0)
+      return absl::FailedPreconditionError(
+          absl::StrCat("scene ", options_.scene, " has lost all its objects meanwhile"));
     RETURN_IF_ERROR(make_queries());
     if (has_objects()) RETURN_IF_ERROR(tune_cell_size());
     if (options_.structures) RETURN_IF_ERROR(time_structures());
+    RETURN_IF_ERROR(apply());
     progress_.hide();
     write();
     return absl::OkStatus();
@@ -146,19 +154,24 @@ class Tune {
     cells_.head["queries"] = queries_.added();
     advice_.push_back(advice(options_.scene, result));
     if (options_.apply) cells_.head["applied"] = !result.choice.leave_it;
-    if (!options_.apply || result.choice.leave_it) return absl::OkStatus();
-    RETURN_IF_ERROR(apply(result.choice.cell_size));
+    if (!result.choice.leave_it) better_size_ = result.choice.cell_size;
+    return absl::OkStatus();
+  }
+
+  // Sets the named cell size, as the last step, so that nothing is changed if a step before fails.
+  absl::Status apply() {
+    if (!options_.apply || !better_size_) return absl::OkStatus();
+    is_setting_ = true;
+    v1::UpdateSceneRequest request;
+    request.set_name(options_.scene);
+    request.add_fields("cell_size");
+    request.set_cell_size(*better_size_);
+    RETURN_IF_ERROR(client_->update_scene(request).status());
     advice_.back() += "; it was set";
     return absl::OkStatus();
   }
 
-  absl::Status apply(double cell_size) const {
-    v1::UpdateSceneRequest request;
-    request.set_name(options_.scene);
-    request.add_fields("cell_size");
-    request.set_cell_size(cell_size);
-    return client_->update_scene(request).status();
-  }
+  bool is_cancelled() const { return signal_ && signal_->is_cancelled(); }
 
   absl::Status time_structures() {
     const v1::Vec3d &low = scene_.scene().min(), &high = scene_.scene().max();
@@ -189,7 +202,7 @@ class Tune {
     progress_.begin({.action = "timing", .subject = absl::StrCat("structures of ", values), .unit = "steps"});
     return [this](uint64_t done, uint64_t total) {
       progress_.update(done, total);
-      return signal_.is_cancelled() ? absl::CancelledError("interrupted") : absl::OkStatus();
+      return is_cancelled() ? absl::CancelledError("interrupted") : absl::OkStatus();
     };
   }
 
@@ -225,11 +238,13 @@ class Tune {
   const TuneOptions& options_;
   Context& context_;
   ProgressWriter progress_;
-  CancelOnSignal signal_{[this] { context_.cancel_calls(); }};
+  std::optional<CancelOnSignal> signal_;
   client::Client* client_ = nullptr;
   QuerySet queries_;
   v1::GetSceneResponse scene_;
   ObjectBatches objects_;
+  std::optional<double> better_size_;  // none: leave it
+  bool is_setting_ = false;
   Report cells_, structures_;
   std::vector<std::string> advice_, best_;  // sentences below the two tables; none = no table
 };

@@ -248,7 +248,7 @@ TEST_F(TuneTest, ScratchScenesSayWhatTheyAreAndExpire) {
     const v1::SceneSpec spec = get(name).spec();
     EXPECT_EQ(spec.labels().at("made-by"), "locus tune");
     EXPECT_EQ(spec.labels().at("scratch-of"), "world");
-    EXPECT_EQ(spec.idle_ttl_s(), 600u);
+    EXPECT_EQ(spec.idle_ttl_s(), 3600u);
     EXPECT_EQ(spec.history_ticks(), 0u);
     break;
   }

@@ -47,12 +47,17 @@ std::vector<int> next_exponents(const std::map<int, double>& times, int present)
 }
 
 SizeChoice choose_size(absl::Span<const SizeFigures> figures, double setting) {
-  LOCUS_CHECK(!figures.empty());
-  const auto faster = [](const SizeFigures& a, const SizeFigures& b) { return a.relative < b.relative; };
+  const auto faster = [](const SizeFigures& a, const SizeFigures& b) {
+    return a.is_confirmed != b.is_confirmed ? a.is_confirmed : a.relative < b.relative;
+  };
   const auto best = std::min_element(figures.begin(), figures.end(), faster);
+  LOCUS_CHECK(best != figures.end() && best->is_confirmed);
+  const auto is_worth_it = [](const SizeFigures& one) { return 100 * (1 - one.relative) >= kMinGainPercent; };
   auto named = best;
-  for (auto one = figures.begin(); one != figures.end(); ++one)
-    if (one->setting == 0 && one->relative <= best->relative * (1 + kChosenAllowance)) named = one;
+  for (auto one = figures.begin(); one != figures.end(); ++one) {
+    if (one->setting != 0 || !one->is_confirmed || one->relative > best->relative * (1 + kChosenAllowance)) continue;
+    if (one->is_present || is_worth_it(*one) || !is_worth_it(*best)) named = one;
+  }
   SizeChoice choice;
   choice.index = static_cast<size_t>(named - figures.begin());
   const bool chosen_anew = named->setting == 0 && setting == 0 && !named->is_present;

@@ -31,7 +31,8 @@ struct SizeFigures {
   double build_ms = 0;
   uint64_t bytes = 0;
   std::map<std::string, KindCost> kinds;
-  double relative = 1;  // time of all queries, relative to the present cell size
+  double relative = 1;       // time of all queries, relative to the present cell size
+  bool is_confirmed = true;  // whether the time is one of a second measurement, so that it is not the luck of the best
 };
 
 // Weight of one query by kind: the number of queries if the user gave them, so that their mix counts. Otherwise the
@@ -57,10 +58,10 @@ struct SizeChoice {
   bool leave_it = true;     // whether the gain is too small for a change
 };
 
-// Returns the choice among the figures, which contain those of the present cell size. Prefers the size that the server
-// chooses to one that is better by up to kChosenAllowance, because the server adapts it. `setting` is the scene's
-// SceneSpec.cell_size: if it is 0, the server would not choose anew, so a size that it chooses now is named as a fixed
-// size. Precondition: `figures` is not empty.
+// Returns the choice among the confirmed figures, which contain those of the present cell size. Prefers the size that
+// the server chooses to one that is better by up to kChosenAllowance, because the server adapts it, unless only the
+// other one is worth a change. `setting` is the scene's SceneSpec.cell_size: if it is 0, the server would not choose
+// anew, so a size that it chooses now is named as a fixed size. Precondition: a figure is confirmed.
 SizeChoice choose_size(absl::Span<const SizeFigures> figures, double setting);
 
 }  // namespace locus::cli

@@ -66,6 +66,7 @@ class CellTuning {
     candidate.figures.cell_size = scratch.cell_size;
     candidate.figures.build_ms = scratch.build_ms;
     candidate.figures.bytes = scratch.bytes;
+    candidate.figures.is_confirmed = false;
     candidates_.push_back(std::move(candidate));
     return candidates_.size() - 1;
   }
@@ -116,12 +117,14 @@ class CellTuning {
     return remove_others();
   }
 
-  // Measures the best size and the server's choice again, which removes the luck of the best.
+  // Measures the best size and the server's choice again, which removes the luck of the best. Only these are named.
   absl::Status confirm() {
     std::vector<size_t> group = {present_};
     for (const size_t index : {best(), size_t{0}})
       if (std::find(group.begin(), group.end(), index) == group.end()) group.push_back(index);
-    return group.size() == 1 ? absl::OkStatus() : measure(group, 2 * options_.rounds);
+    if (group.size() > 1) RETURN_IF_ERROR(measure(group, 2 * options_.rounds));
+    for (const size_t index : group) candidates_[index].figures.is_confirmed = true;
+    return absl::OkStatus();
   }
 
   std::vector<size_t> made() const {

@@ -73,16 +73,20 @@ absl::StatusOr<TurnPlan> warm_up(const client::Client& client, const std::vector
                                  const QuerySet& queries) {
   size_t stride = 1;
   TurnPlan plan = {thinned(queries, stride)};
-  double fastest = kMinTurnNanoseconds;
+  double fastest = kMinTurnNanoseconds, slowest = 1;
   for (const std::string& scene : scenes) {
     ASSIGN_OR_RETURN(const TurnCosts costs, turn(client, scene, plan));
     const double nanoseconds = nanoseconds_of(costs);
     fastest = std::min(fastest, nanoseconds);
+    slowest = std::max(slowest, nanoseconds);
     if (nanoseconds <= kMaxTurnNanoseconds) continue;
     stride *= static_cast<size_t>(std::ceil(nanoseconds / kMaxTurnNanoseconds));
     plan.entries = thinned(queries, stride);
   }
-  if (stride == 1) plan.repeats = static_cast<int>(std::min(std::ceil(kMinTurnNanoseconds / fastest), kMaxRepeats));
+  if (stride == 1) {
+    const double wanted = std::min(std::ceil(kMinTurnNanoseconds / fastest), kMaxRepeats);
+    plan.repeats = static_cast<int>(std::clamp(std::floor(kMaxTurnNanoseconds / slowest), 1.0, wanted));
+  }
   return plan;
 }
 

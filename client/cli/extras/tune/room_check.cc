@@ -9,6 +9,9 @@
 namespace locus::cli {
 namespace {
 
+// Share of the memory limit up to which a server accepts inserts: one in so many parts is kept from them.
+constexpr double kPartsOfMemory = 8;
+
 // Whole numbers, since a double prints with six digits.
 absl::Status check(const ScratchNeed& need, const std::string& name, uint64_t needed, double available, double limit) {
   if (static_cast<double>(needed) <= available) return absl::OkStatus();
@@ -25,7 +28,7 @@ absl::Status check_room(const ScratchNeed& need, const v1::GetServerResponse& se
   for (const v1::Limit& limit : server.limits()) {
     const double available = limit.value() - limit.used();
     if (limit.name() == "memory_bytes")
-      RETURN_IF_ERROR(check(need, limit.name(), need.bytes, available, limit.value()));
+      RETURN_IF_ERROR(check(need, limit.name(), need.bytes, available - limit.value() / kPartsOfMemory, limit.value()));
     if (limit.name() == "scenes") RETURN_IF_ERROR(check(need, limit.name(), need.scenes, available, limit.value()));
   }
   for (const v1::IdentityQuotas& identity : quotas) {

@@ -14,7 +14,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr uint32_t kIdleSeconds = 600;
+// Longer than a scene is left alone while others are built and measured.
+constexpr uint32_t kIdleSeconds = 3600;
 constexpr int kDeleteAttempts = 3;
 // Values that a scene moves to other cells with each batch after its density was counted again.
 constexpr uint64_t kRefiledPerBatch = 8192;

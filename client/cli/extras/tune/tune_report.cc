@@ -13,6 +13,9 @@ namespace {
 
 Json with_decimals(double number, int decimals) { return Json::parse(absl::StrFormat("%.*f", decimals, number)); }
 
+// Returns all digits of a cell size, so that the server does not round it up to the next power of two.
+std::string exact(double cell_size) { return absl::StrFormat("%.17g", cell_size); }
+
 int percent(double value) { return static_cast<int>(std::lround(value)); }
 
 }  // namespace
@@ -20,13 +23,14 @@ int percent(double value) { return static_cast<int>(std::lround(value)); }
 std::string advice(const std::string& scene, const CellTuningResult& result) {
   const SizeChoice& choice = result.choice;
   const SizeFigures& named = result.figures[choice.index];
-  const std::string size = named.setting == 0 ? absl::StrCat("the size that the server chooses, ", named.cell_size)
-                                              : absl::StrCat(named.cell_size);
+  const std::string size = named.setting == 0
+                               ? absl::StrCat("the size that the server chooses, ", exact(named.cell_size))
+                               : exact(named.cell_size);
   if (!choice.leave_it)
-    return absl::StrCat("set it: `locus scene update ", scene, " --cell-size ", choice.cell_size,
+    return absl::StrCat("set it: `locus scene update ", scene, " --cell-size ", exact(choice.cell_size),
                         "` makes these queries take ", percent(choice.gain_percent), " % less time");
   if (named.is_present || choice.gain_percent <= 0)
-    return absl::StrCat("leave it: no other cell size makes these queries faster");
+    return "leave it: no other cell size makes these queries clearly faster";
   return absl::StrCat("leave it: the best cell size, ", size, ", would save only ", percent(choice.gain_percent),
                       " % of the time");
 }

@@ -38,6 +38,20 @@ TEST(CellChoiceTest, AGainBelowTenPercentIsLeft) {
   EXPECT_FALSE(choose_size(enough, 0).leave_it);
 }
 
+TEST(CellChoiceTest, OnlyAConfirmedSizeIsNamed) {
+  SizeFigures lucky = figures_of(4, 0.5);
+  lucky.is_confirmed = false;
+  const SizeFigures figures[] = {lucky, figures_of(8, 0.8), figures_of(64, 1, true)};
+  EXPECT_EQ(choose_size(figures, 64).cell_size, 8);
+}
+
+TEST(CellChoiceTest, TheServersChoiceIsNotPreferredIfOnlyTheOtherSizeIsWorthAChange) {
+  const SizeFigures figures[] = {figures_of(64, 1, true), figures_of(0, 0.92), figures_of(4, 0.88)};
+  const SizeChoice choice = choose_size(figures, 64);
+  EXPECT_EQ(choice.cell_size, 4);
+  EXPECT_FALSE(choice.leave_it);
+}
+
 TEST(CellChoiceTest, ThePresentSizeIsLeftIfAllOthersAreSlower) {
   const SizeFigures figures[] = {figures_of(2, 1, true), figures_of(0, 1.5), figures_of(4, 1.2)};
   const SizeChoice choice = choose_size(figures, 2);

@@ -34,7 +34,7 @@ TEST(RoomCheckTest, MemoryThatDoesNotSufficeIsNamedWithBothFigures) {
   const absl::Status refused = check_room(kNeed, server_with("memory_bytes", 3e9, 2e9), {});
   EXPECT_TRUE(absl::IsResourceExhausted(refused));
   EXPECT_THAT(refused.message(), HasSubstr("6 scratch scenes"));
-  EXPECT_THAT(refused.message(), HasSubstr("need 1234567890 of memory_bytes, but only 1000000000 of 3000000000"));
+  EXPECT_THAT(refused.message(), HasSubstr("need 1234567890 of memory_bytes, but only 625000000 of 3000000000"));
 }
 
 TEST(RoomCheckTest, UsedMemoryAboveTheLimitLeavesNone) {
