@@ -48,8 +48,10 @@ def run(*command, check=True, timeout=600, **more):
     return done.stdout
 
 
-def missing():
-    """Returns why roots cannot be made here, or None."""
+def missing(packages):
+    """Returns why the packages of a folder cannot be tried in roots here, or None."""
+    if not glob.glob(os.path.join(packages, "*.deb")):
+        return "nothing was packed: ./deploy/packages.sh package docs"
     if os.geteuid() != 0:
         return "making a root needs root rights"
     if shutil.which("mmdebstrap") is None:

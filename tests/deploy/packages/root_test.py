@@ -151,7 +151,7 @@ def options():
 
 if __name__ == "__main__":
     OPTIONS = options()
-    REASON = debian_root.missing()
+    REASON = debian_root.missing(OPTIONS.packages)
     if REASON:
         print("SKIPPED:", REASON)
         sys.exit(debian_root.SKIPPED)

@@ -176,7 +176,9 @@ def options():
 
 if __name__ == "__main__":
     OPTIONS = options()
-    REASON = debian_root.missing() or (None if debian_root.control_groups() else "control groups of version 2 are not mounted")
+    REASON = debian_root.missing(OPTIONS.packages)
+    if not REASON and not debian_root.control_groups():
+        REASON = "control groups of version 2 are not mounted"
     if REASON:
         print("SKIPPED:", REASON)
         sys.exit(debian_root.SKIPPED)

@@ -2,8 +2,7 @@
 #include <sstream>
 
 #include "client/cli/run.h"
-#include "tests/support/cli_outcome.h"
-#include "tests/support/rpc_test.h"
+#include "tests/support/cli_test.h"
 
 namespace locus::test {
 namespace {
@@ -12,24 +11,7 @@ using cli::Json;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-class BenchTest : public RpcTest {
- protected:
-  Outcome run(const std::vector<std::string>& arguments) { return run_cli(running_.address(), arguments); }
-
-  Json json_of(std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), {"-o", "json"});
-    const Outcome outcome = run(arguments);
-    EXPECT_EQ(outcome.code, cli::ExitCode::kOk) << outcome.err;
-    return Json::parse(outcome.out, nullptr, /*allow_exceptions=*/false);
-  }
-
-  std::vector<std::string> scenes() {
-    std::vector<std::string> names;
-    const Json list = json_of({"scene", "list"});
-    for (const Json& scene : list["scenes"]) names.push_back(scene["name"]);
-    return names;
-  }
-};
+class BenchTest : public CliTest {};
 
 TEST_F(BenchTest, EveryKindIsMeasuredInASceneOfItsOwn) {
   const Json answer = json_of({"bench", "--seconds", "0.2", "--movers", "500", "--batch", "32", "--connections", "3"});

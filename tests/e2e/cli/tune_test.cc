@@ -11,8 +11,7 @@
 #include "client/cli/run.h"
 #include "tests/support/built_program.h"
 #include "tests/support/child_process.h"
-#include "tests/support/cli_outcome.h"
-#include "tests/support/rpc_test.h"
+#include "tests/support/cli_test.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/text_of.h"
 
@@ -27,23 +26,10 @@ using ::testing::HasSubstr;
 
 constexpr auto kScratchDeadline = std::chrono::seconds(20);
 
-class TuneTestBase : public RpcTest {
+class TuneTestBase : public CliTest {
  protected:
-  explicit TuneTestBase(const server::ServerConfig& config) : RpcTest(config) {}
+  using CliTest::CliTest;
 
-  Outcome run(const std::vector<std::string>& line) { return run_cli(running_.address(), line); }
-  Json json_of(std::vector<std::string> line) {
-    line.insert(line.begin(), {"-o", "json"});
-    const Outcome outcome = run(line);
-    EXPECT_EQ(outcome.code, cli::ExitCode::kOk) << outcome.err;
-    return Json::parse(outcome.out, nullptr, /*allow_exceptions=*/false);
-  }
-  std::vector<std::string> scenes() {
-    std::vector<std::string> names;
-    const Json list = json_of({"scene", "list"});
-    for (const Json& scene : list["scenes"]) names.push_back(scene["name"]);
-    return names;
-  }
   // Returns whether a scratch scene was seen before the deadline.
   bool wait_for_scratch() {
     const auto end = std::chrono::steady_clock::now() + kScratchDeadline;

@@ -4,14 +4,7 @@
 namespace locus {
 
 const GridKernels& grid_kernels_avx2() {
-  static constexpr GridKernels kKernels = {"avx2",
-                                           cull_box<Marks::kNone>,
-                                           cull_line,
-                                           cull_ball<Marks::kNone>,
-                                           cull_box<Marks::kInside>,
-                                           cull_ball<Marks::kInside>,
-                                           collect_near,
-                                           sort_few};
+  static constexpr GridKernels kKernels = kernels_named("avx2");
   return kKernels;
 }
 

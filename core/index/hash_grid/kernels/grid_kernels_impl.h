@@ -246,6 +246,18 @@ void sort_few(int32_t* values, uint32_t count) {
   }
 }
 
+// Returns the kernels of the instruction set for which this file is compiled.
+constexpr GridKernels kernels_named(const char* name) {
+  return {name,
+          cull_box<Marks::kNone>,
+          cull_line,
+          cull_ball<Marks::kNone>,
+          cull_box<Marks::kInside>,
+          cull_ball<Marks::kInside>,
+          collect_near,
+          sort_few};
+}
+
 }  // namespace
 }  // namespace locus
 

@@ -5,14 +5,7 @@
 namespace locus {
 
 const GridKernels& grid_kernels_portable() {
-  static constexpr GridKernels kKernels = {"portable",
-                                           cull_box<Marks::kNone>,
-                                           cull_line,
-                                           cull_ball<Marks::kNone>,
-                                           cull_box<Marks::kInside>,
-                                           cull_ball<Marks::kInside>,
-                                           collect_near,
-                                           sort_few};
+  static constexpr GridKernels kKernels = kernels_named("portable");
   return kKernels;
 }
 
