@@ -125,23 +125,27 @@ class TypicalQueries {
 
 }  // namespace
 
+std::string kind_of(const v1::QueryBatch& batch) {
+  return batch.blocks().empty() ? "none" : std::string(kind_name(batch.blocks(0)));
+}
+
 void QuerySet::add(v1::QueryBatch batch, const std::string& place) {
-  for (const v1::QueryBlock& block : batch.blocks()) added_ += query_count(block);
-  if (offered_++ % stride_ != 0) return;
-  if (batches_.size() == kMaxBatches) {  // keeps every second batch from now on
-    for (size_t i = 1; i < kMaxBatches / 2; ++i) batches_[i] = std::move(batches_[2 * i]);
-    batches_.resize(kMaxBatches / 2);
-    stride_ *= 2;
+  for (const v1::QueryBlock& block : batch.blocks()) {
+    added_ += query_count(block);
+    counts_[std::string(kind_name(block))] += query_count(block);
+  }
+  const std::string kind = kind_of(batch);
+  Kept& kept = kept_[kind];
+  if (kept.offered++ % kept.stride != 0) return;
+  if (kept.batches == kMaxBatches) {  // keeps every second batch from now on
+    size_t passed = 0;
+    std::erase_if(batches_, [&](const Entry& entry) { return kind_of(entry.batch) == kind && passed++ % 2 != 0; });
+    kept.batches /= 2;
+    kept.stride *= 2;
   }
   batch.set_explain(true);
   batches_.push_back({std::move(batch), place});
-}
-
-std::map<std::string, uint64_t> QuerySet::counts() const {
-  std::map<std::string, uint64_t> counts;
-  for (const Entry& entry : batches_)
-    for (const v1::QueryBlock& block : entry.batch.blocks()) counts[kind_name(block)] += query_count(block);
-  return counts;
+  ++kept.batches;
 }
 
 absl::StatusOr<QuerySet> typical_queries(const client::Client& client, const v1::Scene& scene,

@@ -14,8 +14,11 @@
 
 namespace locus::cli {
 
-// Batches with `explain` set. Of more than kMaxBatches batches, evenly spaced ones are kept, so that a long file is
-// represented from its begin to its end.
+// Returns the kind of a batch: that of its first block, or "none".
+std::string kind_of(const v1::QueryBatch& batch);
+
+// Batches with `explain` set. Of more than kMaxBatches batches of one kind, evenly spaced ones are kept, so that a long
+// file is represented from its begin to its end, and a short one beside it as well.
 class QuerySet {
  public:
   static constexpr size_t kMaxBatches = 512;
@@ -30,13 +33,20 @@ class QuerySet {
   const std::vector<Entry>& batches() const { return batches_; }
   // Returns the number of queries that were added.
   uint64_t added() const { return added_; }
-  // Returns the number of queries of each kind in batches().
-  std::map<std::string, uint64_t> counts() const;
+  // Returns the number of queries of each kind that were added.
+  const std::map<std::string, uint64_t>& counts() const { return counts_; }
 
  private:
+  // Batches of one kind.
+  struct Kept {
+    uint64_t offered = 0;
+    uint64_t stride = 1;  // every such batch is kept
+    size_t batches = 0;   // in batches_
+  };
+
   std::vector<Entry> batches_;
-  uint64_t offered_ = 0;  // batches
-  uint64_t stride_ = 1;   // every such batch is kept
+  std::map<std::string, Kept> kept_;
+  std::map<std::string, uint64_t> counts_;
   uint64_t added_ = 0;
 };
 

@@ -34,8 +34,7 @@ std::vector<const QuerySet::Entry*> thinned(const QuerySet& queries, size_t stri
   std::vector<const QuerySet::Entry*> entries;
   std::map<std::string, size_t> passed;
   for (const QuerySet::Entry& entry : queries.batches()) {
-    const std::string kind = entry.batch.blocks().empty() ? "none" : kind_name(entry.batch.blocks(0));
-    if (passed[kind]++ % stride == 0) entries.push_back(&entry);
+    if (passed[kind_of(entry.batch)]++ % stride == 0) entries.push_back(&entry);
   }
   return entries;
 }

@@ -41,6 +41,20 @@ TEST(QuerySetTest, BatchesOfALongInputAreEvenlySpaced) {
   for (size_t i = 0; i < set.batches().size(); ++i) EXPECT_EQ(set.batches()[i].place, absl::StrCat(8 * i));
 }
 
+TEST(QuerySetTest, AShortInputAfterALongOneIsKeptWhole) {
+  QuerySet set;
+  for (size_t i = 0; i < 3 * QuerySet::kMaxBatches; ++i) set.add(one_ball(), "balls.csv");
+  for (int i = 0; i < 3; ++i) {
+    client::QueryBuilder rays;
+    rays.rays().ray({0, 0, 0}, {1, 0, 0});
+    set.add(rays.build(), absl::StrCat("rays.csv:", i));
+  }
+  EXPECT_THAT(set.counts(), ElementsAre(Pair("balls", 3 * QuerySet::kMaxBatches), Pair("rays", 3)));
+  ASSERT_GT(set.batches().size(), 3u);
+  for (size_t i = 0; i < 3; ++i)
+    EXPECT_EQ(set.batches()[set.batches().size() - 3 + i].place, absl::StrCat("rays.csv:", i));
+}
+
 TEST(QueryTurnsTest, TheMedianIsTheMiddleValue) {
   EXPECT_EQ(median({5}), 5);
   EXPECT_EQ(median({9, 1, 2}), 2);
