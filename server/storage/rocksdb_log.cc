@@ -10,7 +10,7 @@
 #include "rocksdb/utilities/checkpoint.h"
 #include "server/storage/rocksdb/errors.h"
 #include "server/storage/rocksdb/reading.h"
-#include "server/storage/rocksdb/row_codec.h"
+#include "server/storage/rows/row_codec.h"
 
 namespace locus::server {
 namespace {

@@ -10,8 +10,8 @@
 #include "core/base/status_macros.h"
 #include "server/storage/rocksdb/errors.h"
 #include "server/storage/rocksdb/reading.h"
-#include "server/storage/rocksdb/row_codec.h"
 #include "server/storage/rocksdb_log.h"
+#include "server/storage/rows/row_codec.h"
 
 namespace locus::server {
 namespace {
@@ -85,7 +85,7 @@ absl::StatusOr<ChunkList> RocksdbLog::put_chunks(rocksdb::ColumnFamilyHandle* fa
     if (*chunk) {
       const std::string key = chunk_key(prefix, static_cast<uint32_t>(list.chunks));
       const std::string value = with_checksum(key, **chunk);
-      list.add(value);
+      add_chunk(list, value);
       LOCUS_CHECK(batch.Put(family, key, value).ok());
     }
     if (*chunk && batch.GetDataSize() < kChunkBatchBytes) continue;

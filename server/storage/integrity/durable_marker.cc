@@ -6,8 +6,8 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/check.h"
 #include "server/storage/rocksdb/errors.h"
-#include "server/storage/rocksdb/row_codec.h"
 #include "server/storage/rocksdb/rows.h"
+#include "server/storage/rows/row_codec.h"
 
 namespace locus::server {
 namespace {

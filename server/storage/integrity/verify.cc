@@ -9,7 +9,7 @@
 #include "core/base/status_macros.h"
 #include "server/storage/rocksdb/errors.h"
 #include "server/storage/rocksdb/reading.h"
-#include "server/storage/rocksdb/row_codec.h"
+#include "server/storage/rows/row_codec.h"
 
 namespace locus::server {
 namespace {

@@ -6,7 +6,7 @@
 #include "core/base/status_macros.h"
 #include "rocksdb/snapshot.h"
 #include "server/storage/rocksdb/errors.h"
-#include "server/storage/rocksdb/row_codec.h"
+#include "server/storage/rows/row_codec.h"
 
 namespace locus::server {
 namespace {
@@ -116,7 +116,7 @@ absl::Status read_chunks(const Database& database, rocksdb::ColumnFamilyHandle* 
     if (!read.ok()) return read_error(absl::StrCat("reading chunk ", found.chunks), read);
     const std::optional<absl::string_view> bytes = verified(key, view_of(value));
     if (!bytes) return damaged(absl::StrCat("chunk ", found.chunks, " does not match its checksum"));
-    found.add(view_of(value));
+    add_chunk(found, view_of(value));
     RETURN_IF_ERROR(sink(*bytes));
     value.Reset();
   }

@@ -1,16 +1,13 @@
 #include "server/storage/rocksdb/rows.h"
 
-#include <xxhash.h>
-
 #include <algorithm>
 
 #include "core/base/check.h"
-#include "server/storage/rocksdb/row_codec.h"
+#include "server/storage/rows/row_codec.h"
 
 namespace locus::server {
 namespace {
 
-constexpr uint8_t kRecordFormat = 1;
 constexpr size_t kChecksumBytes = 8;
 constexpr size_t kContentRowBytes = 4 * 8;
 
@@ -22,17 +19,6 @@ absl::string_view view_of(const Sha256& sha256) {
 
 }  // namespace
 
-uint64_t checksum(absl::string_view bytes, uint64_t seed) {
-  return XXH3_64bits_withSeed(bytes.data(), bytes.size(), seed);
-}
-
-void ChunkList::add(absl::string_view chunk_value) {
-  LOCUS_DCHECK_LE(kChecksumBytes, chunk_value.size());
-  ++chunks;
-  bytes += chunk_value.size() - kChecksumBytes;
-  digest = checksum(chunk_value.substr(chunk_value.size() - kChecksumBytes), digest);
-}
-
 std::string scene_key(SceneKey scene) { return RowWriter().u8(kSceneTag).big_u64(scene).take(); }
 std::string mesh_key(absl::string_view name) { return tagged(kMeshTag, name); }
 std::string content_key(const Sha256& sha256) { return tagged(kContentTag, view_of(sha256)); }
@@ -42,7 +28,6 @@ std::string pending_snapshot_key(SceneKey scene, uint64_t content_id) {
 std::string pending_mesh_key(const Sha256& sha256, uint64_t content_id) {
   return RowWriter().u8(kPendingMeshTag).bytes(view_of(sha256)).big_u64(content_id).take();
 }
-std::string log_key(SceneKey scene, uint64_t sequence) { return RowWriter().big_u64(scene).big_u64(sequence).take(); }
 
 std::string end_of(std::string prefix) {
   while (!prefix.empty() && prefix.back() == '\xff') prefix.pop_back();
@@ -77,6 +62,11 @@ std::optional<absl::string_view> verified(absl::string_view key, absl::string_vi
 
 uint64_t stored_checksum(absl::string_view value) {
   return value.size() < kChecksumBytes ? 0 : RowReader(value.substr(value.size() - kChecksumBytes)).u64();
+}
+
+void add_chunk(ChunkList& list, absl::string_view value) {
+  LOCUS_DCHECK_LE(kChecksumBytes, value.size());
+  list.add(value.size() - kChecksumBytes, stored_checksum(value));
 }
 
 std::string encode(const ContentRow& row) {
@@ -152,17 +142,6 @@ std::optional<CatalogueRow> decode_catalogue(absl::string_view bytes) {
   row.scene_sum = in.u64();
   row.mesh_sum = in.u64();
   return in.ended() ? std::optional(row) : std::nullopt;
-}
-
-std::string record_head(const LogEntry& entry) {
-  RowWriter out;
-  out.u8(kRecordFormat).u64(entry.epoch).u64(entry.writer).u64(entry.batch);
-  return out.u32(static_cast<uint32_t>(entry.bytes.size())).take();
-}
-
-uint64_t record_checksum(absl::string_view key, absl::string_view head, absl::string_view bytes,
-                         uint64_t running_checksum) {
-  return checksum(RowWriter().bytes(key).bytes(head).u64(checksum(bytes)).view(), running_checksum);
 }
 
 std::optional<LogEntry> decode_record(absl::string_view value) {

@@ -27,13 +27,13 @@
 #ifndef LOCUS_SERVER_STORAGE_ROCKSDB_ROWS_H_
 #define LOCUS_SERVER_STORAGE_ROCKSDB_ROWS_H_
 
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
 
 #include "absl/strings/string_view.h"
 #include "core/scene/log/update_log.h"
+#include "server/storage/rows/checksums.h"
 
 namespace locus::server {
 
@@ -47,22 +47,6 @@ inline constexpr char kMeshTag = 'm';
 inline constexpr char kContentTag = 'c';
 inline constexpr char kPendingSnapshotTag = 'p';
 inline constexpr char kPendingMeshTag = 'q';
-
-using Sha256 = std::array<uint8_t, 32>;
-
-// Returns the 64-bit XXH3 hash of `bytes`.
-uint64_t checksum(absl::string_view bytes, uint64_t seed = 0);
-
-// Summary of a list of chunks: their number, their size in bytes without checksums, and a hash over their checksums in
-// order.
-struct ChunkList {
-  uint64_t chunks = 0;
-  uint64_t bytes = 0;
-  uint64_t digest = 0;
-
-  void add(absl::string_view chunk_value);
-  bool operator==(const ChunkList&) const = default;
-};
 
 // Content id and summary of the chunks of a snapshot, of a mesh's content, or of the parts of one mesh name.
 struct ContentRow {
@@ -103,7 +87,6 @@ std::string mesh_key(absl::string_view name);
 std::string content_key(const Sha256& sha256);
 std::string pending_snapshot_key(SceneKey scene, uint64_t content_id);
 std::string pending_mesh_key(const Sha256& sha256, uint64_t content_id);
-std::string log_key(SceneKey scene, uint64_t sequence);
 // Returns the exclusive end of the range of keys that begin with `prefix`: the first key after all of them.
 std::string end_of(std::string prefix);
 std::string scene_prefix(SceneKey scene);
@@ -119,6 +102,9 @@ std::optional<absl::string_view> verified(absl::string_view key, absl::string_vi
 // Returns the checksum at the end of `value`, which is its last eight bytes; 0 if the value is shorter.
 uint64_t stored_checksum(absl::string_view value);
 
+// Adds a chunk to `list`; `value` is its stored form.
+void add_chunk(ChunkList& list, absl::string_view value);
+
 std::string encode(const SceneRow& row);
 std::string encode(const CatalogueRow& row);
 std::string encode(const ContentRow& row);
@@ -132,9 +118,6 @@ std::optional<MeshRow> decode_mesh(absl::string_view bytes);
 // are copied only once, into the write batch.
 inline constexpr size_t kRecordHeadBytes = 1 + 8 + 8 + 8 + 4;
 inline constexpr size_t kRecordOverhead = kRecordHeadBytes + 8;
-std::string record_head(const LogEntry& entry);
-uint64_t record_checksum(absl::string_view key, absl::string_view head, absl::string_view bytes,
-                         uint64_t running_checksum);
 // Decodes the value of a record. The result borrows from `value`; no value if `value` is malformed. Does not verify the
 // checksum.
 std::optional<LogEntry> decode_record(absl::string_view value);

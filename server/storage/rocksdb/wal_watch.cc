@@ -1,7 +1,7 @@
 #include "server/storage/rocksdb/wal_watch.h"
 
 #include "server/storage/rocksdb/database.h"
-#include "server/storage/rocksdb/row_codec.h"
+#include "server/storage/rows/row_codec.h"
 
 namespace locus::server {
 namespace {

@@ -4,8 +4,8 @@
 // (core/scene/log/byte_codec.h), whose columns are aligned and read in place; rows are small and packed.
 //
 // Threads: only one thread at a time may use a reader or writer.
-#ifndef LOCUS_SERVER_STORAGE_ROCKSDB_ROW_CODEC_H_
-#define LOCUS_SERVER_STORAGE_ROCKSDB_ROW_CODEC_H_
+#ifndef LOCUS_SERVER_STORAGE_ROWS_ROW_CODEC_H_
+#define LOCUS_SERVER_STORAGE_ROWS_ROW_CODEC_H_
 
 #include <cstdint>
 #include <string>
@@ -96,4 +96,4 @@ class RowReader {
 
 }  // namespace locus::server
 
-#endif  // LOCUS_SERVER_STORAGE_ROCKSDB_ROW_CODEC_H_
+#endif  // LOCUS_SERVER_STORAGE_ROWS_ROW_CODEC_H_
