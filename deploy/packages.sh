@@ -29,7 +29,7 @@ TEXT
 # The compiler and the libraries that find_package and pkg-config look for.
 build_packages="g++ cmake ninja-build pkg-config libgrpc++-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc
   libabsl-dev libspdlog-dev libcli11-dev nlohmann-json3-dev libassimp-dev libzip-dev libpng-dev libssl-dev
-  prometheus-cpp-dev libboost-dev zlib1g-dev libcurl4-openssl-dev librocksdb-dev libxxhash-dev librhonabwy-dev libjansson-dev
+  prometheus-cpp-dev libboost-dev zlib1g-dev libcurl4-openssl-dev librocksdb-dev libpq-dev libxxhash-dev librhonabwy-dev libjansson-dev
   libseccomp-dev liblua5.4-dev libedit-dev"
 python_packages="python3 python3-grpcio python3-protobuf"
 # Purposes: ccache speeds up later builds; binutils provides nm for tests/house; prometheus-client and yaml read the
@@ -52,7 +52,7 @@ container_packages="mmdebstrap buildah podman podman-compose runc iptables conta
 package_packages="debhelper dh-python dpkg-dev cmake lintian diffoscope-minimal mmdebstrap runc systemd binutils"
 # The libraries that the programs link directly; apt installs the dependencies of these libraries.
 runtime_packages="libgrpc++1.51 libprotobuf32 libabsl20220623 libspdlog1.10 libassimp5 libzip4 libpng16-16 libssl3 libstdc++6
-  libprometheus-cpp-core1.0 zlib1g libcurl4 librocksdb7.8 libxxhash0 librhonabwy1.1 libjansson4 libseccomp2
+  libprometheus-cpp-core1.0 zlib1g libcurl4 librocksdb7.8 libpq5 libxxhash0 librhonabwy1.1 libjansson4 libseccomp2
   liblua5.4-0 libedit2"
 # The reverse proxy of deploy/edge.
 edge_packages="haproxy"

@@ -10,6 +10,7 @@
 #include "rocksdb/utilities/checkpoint.h"
 #include "server/storage/rocksdb/errors.h"
 #include "server/storage/rocksdb/reading.h"
+#include "server/storage/rows/refusals.h"
 #include "server/storage/rows/row_codec.h"
 
 namespace locus::server {
@@ -206,10 +207,7 @@ absl::Status RocksdbLog::read(SceneKey key, uint64_t from, RecordSink sink) cons
     ASSIGN_OR_RETURN(SceneRow found, row_of(key));
     row = std::move(found);
   }
-  if (from <= row.snapshot_sequence)
-    return refuse_argument(
-        Reason::kOutOfRange, "from", std::nullopt,
-        absl::StrCat("the records up to ", row.snapshot_sequence, " are in the snapshot: read it instead"));
+  if (from <= row.snapshot_sequence) return refuse_read_before(row.snapshot_sequence);
   if (from > last) return absl::OkStatus();
   ASSIGN_OR_RETURN(const uint64_t running_checksum, running_checksum_at(row, from - 1));
   absl::Status status = read_records(*database_, key, from, last, running_checksum, sink);

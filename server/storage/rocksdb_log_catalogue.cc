@@ -11,6 +11,7 @@
 #include "server/storage/rocksdb/errors.h"
 #include "server/storage/rocksdb/reading.h"
 #include "server/storage/rocksdb_log.h"
+#include "server/storage/rows/refusals.h"
 #include "server/storage/rows/row_codec.h"
 
 namespace locus::server {
@@ -22,19 +23,6 @@ constexpr size_t kChunkBatchBytes = size_t{2} << 20;
 // Minimum total size in bytes of RocksDB's memory tables for which write_snapshot() starts a flush. After the flush
 // RocksDB deletes old log files.
 constexpr uint64_t kBufferedWorthFlushing = uint64_t{8} << 20;
-
-absl::Status already_stored(absl::string_view field, absl::string_view what) {
-  Refusal refusal;
-  refusal.reason = Reason::kAlreadyExists;
-  refusal.field = std::string(field);
-  return refuse(absl::StatusCode::kAlreadyExists, what, refusal);
-}
-
-absl::Status not_stored(absl::string_view what) {
-  Refusal refusal;
-  refusal.reason = Reason::kNotFound;
-  return refuse(absl::StatusCode::kNotFound, what, refusal);
-}
 
 // Returns a random id for the chunks of a snapshot or mesh. Ids are never reused.
 uint64_t new_content_id() {
@@ -60,7 +48,7 @@ absl::Status RocksdbLog::commit(const CatalogueChange& change, rocksdb::WriteBat
 absl::StatusOr<SceneRow> RocksdbLog::row_of(SceneKey scene) const {
   const std::optional<absl::string_view> bytes = catalogue_.find(scene_key(scene));
   std::optional<SceneRow> row = bytes ? decode_scene(*bytes) : std::nullopt;
-  if (!row) return not_stored(absl::StrCat("the log has no scene ", scene, "; it may have been deleted"));
+  if (!row) return scene_not_stored(scene);
   return *std::move(row);
 }
 
@@ -78,9 +66,7 @@ absl::StatusOr<ChunkList> RocksdbLog::put_chunks(rocksdb::ColumnFamilyHandle* fa
   while (status.ok()) {
     const absl::StatusOr<std::optional<std::string>> chunk = source();
     if (!chunk.ok()) status = chunk.status();
-    if (chunk.ok() && *chunk && (*chunk)->size() > kMaxChunkBytes)
-      status = refuse_limit("state", "chunk_bytes", static_cast<double>(kMaxChunkBytes),
-                            static_cast<double>((*chunk)->size()));
+    if (chunk.ok() && *chunk && (*chunk)->size() > kMaxChunkBytes) status = refuse_chunk((*chunk)->size());
     if (!status.ok()) break;
     if (*chunk) {
       const std::string key = chunk_key(prefix, static_cast<uint32_t>(list.chunks));
@@ -130,9 +116,7 @@ absl::StatusOr<SceneKey> RocksdbLog::create_scene(absl::string_view name, absl::
   {
     MutexLock lock(catalogue_mutex_);
     absl::Status status;
-    if (scenes_.has_name(name))
-      status = already_stored("name",
-                              absl::StrCat("a scene '", name, "' is stored already: delete it or choose another name"));
+    if (scenes_.has_name(name)) status = scene_already_stored(name);
     if (status.ok()) {
       CatalogueChange change = change_of(row);
       change.next_scene = next_scene_;
@@ -158,7 +142,7 @@ absl::StatusOr<SceneKey> RocksdbLog::create_scene(absl::string_view name, absl::
 
 absl::Status RocksdbLog::delete_scene(SceneKey key) {
   const SceneLogStatePtr log_state = scenes_.find_any(key);
-  if (log_state == nullptr) return not_stored(absl::StrCat("the log has no scene ", key, "; it may have been deleted"));
+  if (log_state == nullptr) return scene_not_stored(key);
   MutexLock writing(log_state->writing);
   MutexLock lock(catalogue_mutex_);
   rocksdb::WriteBatch batch;
@@ -201,9 +185,7 @@ absl::Status RocksdbLog::write_snapshot(SceneKey key, uint64_t sequence, ChunkSo
     ASSIGN_OR_RETURN(const SceneRow row, row_of(key));
     const uint64_t last = scenes_.last_of(*log_state);
     if (sequence < row.snapshot_sequence || sequence > last)
-      return refuse_argument(Reason::kOutOfRange, "sequence", std::nullopt,
-                             absl::StrCat("the last record of a snapshot must be one from ", row.snapshot_sequence,
-                                          " to ", last, ", not ", sequence));
+      return refuse_snapshot_at(sequence, row.snapshot_sequence, last);
     replaced_id = row.snapshot_id;
   }
   const uint64_t content_id = new_content_id();
@@ -307,10 +289,7 @@ absl::Status RocksdbLog::add_mesh(absl::string_view name, const Sha256& sha256, 
     MutexLock lock(catalogue_mutex_);
     const std::optional<MeshRow> there = mesh_row(name);
     if (there && there->sha256 == sha256) return absl::OkStatus();
-    if (catalogue_.find(mesh_key(name)))
-      return already_stored("name", absl::StrCat("a mesh '", name,
-                                                 "' of other content is stored already: delete it or "
-                                                 "choose another name"));
+    if (catalogue_.find(mesh_key(name))) return mesh_already_stored(name);
     if (const auto row = catalogue_.find(content_key(sha256))) stored = std::string(*row);
     damaged = damaged_contents_.contains(sha256);
   }
@@ -358,7 +337,7 @@ absl::Status RocksdbLog::add_mesh(absl::string_view name, const Sha256& sha256, 
 absl::Status RocksdbLog::delete_mesh(absl::string_view name) {
   MutexLock adding(adding_mesh_);
   MutexLock lock(catalogue_mutex_);
-  if (!catalogue_.find(mesh_key(name))) return not_stored(absl::StrCat("the log has no mesh '", name, "'"));
+  if (!catalogue_.find(mesh_key(name))) return mesh_not_stored(name);
   const MeshRow mesh = mesh_row(name).value_or(MeshRow());
   CatalogueChange change{{{mesh_key(name), std::nullopt}}, 0};
   rocksdb::WriteBatch batch;
@@ -383,7 +362,7 @@ absl::Status RocksdbLog::set_mesh_graces(absl::Span<const std::string> names, ui
   CatalogueChange change;
   for (const std::string& name : names) {
     std::optional<MeshRow> row = mesh_row(name);
-    if (!row) return not_stored(absl::StrCat("the log has no mesh '", name, "'"));
+    if (!row) return mesh_not_stored(name);
     row->grace_s = grace_s;
     change.rows.push_back({mesh_key(name), encode(*row)});
   }
@@ -416,7 +395,7 @@ absl::Status RocksdbLog::read_parts(absl::string_view name, ChunkSink sink) cons
     MutexLock lock(catalogue_mutex_);
     row = mesh_row(name);
   }
-  if (!row) return not_stored(absl::StrCat("the log has no mesh '", name, "'"));
+  if (!row) return mesh_not_stored(name);
   return row->parts ? read_mesh_chunks(row->sha256, *row->parts, sink) : absl::OkStatus();
 }
 

@@ -20,6 +20,10 @@
 
 namespace locus {
 
+// Version of the effect of records: it changes whenever a record of the same bytes would change a scene in another way.
+// Only daemons of equal versions may follow each other, or replay records of each other.
+inline constexpr uint64_t kApplyVersion = 1;
+
 // Append one record to `to`, whose size is a multiple of 8 before and after. Preconditions: the batches have passed
 // check_form(), and the batches of encode_joined() satisfy may_join().
 void encode_batch(const UpdateBatch& batch, std::string& to);

@@ -3,8 +3,10 @@
 // (core/scene/log/record_codec.h), and detects damage of the stored bytes. Implemented in server/storage; the daemon's
 // main() passes it to the scenes.
 //
-// A future replicated log can implement this interface. For this purpose, every record has the epoch of the scene and
-// the writer id and number of its batch, and the durability of an ack is an AckLevel.
+// A log of a cluster implements this interface, too: server/storage/postgres_log.h. Its members that change a scene
+// have one more error, ABORTED: another daemon leads the scene now (this one is fenced), and the caller must stop
+// leading it. For such a log every record has the epoch of the scene and the writer id and number of its batch, and the
+// durability of an ack is an AckLevel.
 //
 // Threads: every member may be called from any thread, but append() for a scene only from one thread at a time. Calls
 // wait for the disk. Errors of all members: RESOURCE_EXHAUSTED if the disk is full, DATA_LOSS naming the damaged item,

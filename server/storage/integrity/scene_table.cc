@@ -2,22 +2,10 @@
 
 #include <algorithm>
 
-#include "absl/strings/str_cat.h"
 #include "core/base/check.h"
-#include "core/base/refusal.h"
+#include "server/storage/rows/refusals.h"
 
 namespace locus::server {
-namespace {
-
-absl::Status not_found(SceneKey scene) {
-  Refusal refusal;
-  refusal.reason = Reason::kNotFound;
-  return refuse(absl::StatusCode::kNotFound, absl::StrCat("the log has no scene ", scene, "; it may have been deleted"),
-                refusal);
-}
-
-}  // namespace
-
 void SceneTable::add(SceneLogStatePtr scene) {
   LOCUS_DCHECK(scene != nullptr);
   MutexLock lock(mutex_);
@@ -27,7 +15,7 @@ void SceneTable::add(SceneLogStatePtr scene) {
 
 absl::StatusOr<SceneLogStatePtr> SceneTable::find(SceneKey scene) const {
   SceneLogStatePtr found = find_any(scene);
-  if (found == nullptr) return not_found(scene);
+  if (found == nullptr) return scene_not_stored(scene);
   if (!found->damage.ok()) return found->damage;
   return found;
 }
@@ -56,14 +44,9 @@ uint64_t SceneTable::last_of(const SceneLogState& scene) const {
 absl::StatusOr<SceneTable::Start> SceneTable::begin_append(SceneLogState& scene, uint64_t epoch,
                                                            uint64_t database_sequence) {
   MutexLock lock(mutex_);
-  if (scene.deleted) return not_found(scene.key);
+  if (scene.deleted) return scene_not_stored(scene.key);
   if (scene.epoch != epoch) {
-    Refusal refusal;
-    refusal.reason = Reason::kSceneRestarted;
-    return refuse(absl::StatusCode::kFailedPrecondition,
-                  absl::StrCat("scene '", scene.name, "' is in epoch ", scene.epoch, ", not ", epoch,
-                               ": load it anew before writing to it"),
-                  refusal);
+    return refuse_epoch(scene.name, scene.epoch, epoch);
   }
   LOCUS_DCHECK(!scene.append_began_at.has_value());
   scene.append_began_at = database_sequence;

@@ -1,0 +1,127 @@
+// One connection to the engine. Statements are sent in a pipeline, so that a transaction of several statements costs
+// one round trip, and every wait has a deadline, because a hung or isolated PostgreSQL accepts statements and never
+// answers. The pipeline and the single-row mode are described in PostgreSQL 15's documentation, chapter "libpq - C
+// Library".
+//
+// If run() fails, `lost()` says what is known: if it is false, the engine refused the transaction and nothing was
+// written; if it is true, the engine may or may not have committed it, now or later. A statement is never cancelled:
+// PostgreSQL would end its wait for the standbys and report the commit as if they had it.
+//
+// Threads: one thread at a time.
+#ifndef LOCUS_SERVER_STORAGE_POSTGRES_CONNECTION_H_
+#define LOCUS_SERVER_STORAGE_POSTGRES_CONNECTION_H_
+
+#include <libpq-fe.h>
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/functional/function_ref.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+#include "server/storage/postgres/engine_address.h"
+#include "server/storage/postgres/parameters.h"
+
+namespace locus::server {
+
+using Deadline = std::chrono::steady_clock::time_point;
+
+// Rows that a statement returned. All columns are bigint, text or bytea, in binary format.
+class Rows {
+ public:
+  explicit Rows(PGresult* result) : result_(result, &PQclear) {}
+
+  size_t size() const { return static_cast<size_t>(PQntuples(result_.get())); }
+  bool empty() const { return size() == 0; }
+  uint64_t number(size_t row, int column) const { return RowReader(bytes(row, column)).big_u64(); }
+  // Returns a text or bytes; they are valid as long as this object.
+  absl::string_view bytes(size_t row, int column) const {
+    const int at = static_cast<int>(row);
+    return {PQgetvalue(result_.get(), at, column), static_cast<size_t>(PQgetlength(result_.get(), at, column))};
+  }
+  bool is_null(size_t row, int column) const { return PQgetisnull(result_.get(), static_cast<int>(row), column) != 0; }
+  // Returns the number of rows that the statement inserted, updated or deleted.
+  uint64_t changed() const;
+
+ private:
+  std::unique_ptr<PGresult, decltype(&PQclear)> result_;
+};
+
+class Connection {
+ public:
+  // Connects. UNAVAILABLE if the host does not answer until `deadline`, refuses the user, or does not accept writes;
+  // the message names the host.
+  static absl::StatusOr<std::unique_ptr<Connection>> open(const EngineAddress& address, size_t host, Deadline deadline);
+
+  size_t host() const { return host_; }
+
+  // Prepares a statement, which run() then sends by its name.
+  absl::Status prepare(const char* name, const char* sql, Deadline deadline);
+
+  // Add a statement to the next run(): its text, or the name of a prepared statement. `parameters` may be dropped when
+  // the call returns.
+  void add(const char* sql, const Parameters& parameters = {});
+  void add_prepared(const char* name, const Parameters& parameters);
+  // Sends the added statements and waits for all results. Unless BEGIN is one of them, or was one of an earlier run,
+  // the statements are one transaction, committed when this call returns OK. Errors: RESOURCE_EXHAUSTED if the engine's
+  // disk or memory is full, DATA_LOSS if the engine found its data damaged, UNAVAILABLE otherwise.
+  absl::Status run(Deadline deadline);
+  // Adds one statement to those that were added, and runs them.
+  absl::Status run(const char* sql, Deadline deadline) {
+    add(sql);
+    return run(deadline);
+  }
+  // Returns the results of the last run() that succeeded, one for each statement.
+  const std::vector<Rows>& results() const { return results_; }
+
+  // Runs one statement and calls `sink` with each row as it arrives, so that memory is needed for one row only.
+  // `patience` is the longest wait for the next row. An error of `sink` is returned, and the connection is no longer
+  // usable.
+  absl::Status stream(const char* sql, const Parameters& parameters, std::chrono::milliseconds patience,
+                      absl::FunctionRef<absl::Status(const Rows&)> sink);
+
+  // Returns whether the outcome of the last run() is unknown; the connection is then no longer usable.
+  bool lost() const { return lost_; }
+  // Returns whether the connection may be used for another transaction. A connection with an open transaction may not:
+  // when it is closed, the engine undoes the transaction.
+  bool in_transaction() const {
+    const PGTransactionStatusType status = PQtransactionStatus(connection_.get());
+    return !lost_ && !broken_ && (status == PQTRANS_INTRANS || status == PQTRANS_INERROR);
+  }
+  bool usable() const { return !lost_ && !broken_ && PQtransactionStatus(connection_.get()) == PQTRANS_IDLE; }
+
+ private:
+  struct Close {
+    void operator()(PGconn* connection) const { PQfinish(connection); }
+  };
+
+  Connection(PGconn* connection, size_t host, std::string name)
+      : connection_(connection), host_(host), name_(std::move(name)) {}
+  static void notice(void* connection, const PGresult* result);
+
+  // Waits until the engine has sent something, or until it takes more of what is sent. Fails at `deadline`.
+  absl::Status wait(Deadline deadline);
+  // Sends everything that was added.
+  absl::Status send(Deadline deadline);
+  // Returns the next result; null at the end of the results of a statement.
+  absl::StatusOr<PGresult*> next(Deadline deadline);
+  absl::Status lose(absl::string_view why);
+  absl::Status error_of(const PGresult* result) const;
+
+  const std::unique_ptr<PGconn, Close> connection_;
+  const size_t host_;
+  const std::string name_;
+  size_t added_ = 0;        // statements added since the last run()
+  absl::Status add_error_;  // error of the first statement that could not be added
+  std::string warning_;     // first warning of the engine during the current run(); empty if there was none
+  std::vector<Rows> results_;
+  bool lost_ = false;
+  bool broken_ = false;
+};
+
+}  // namespace locus::server
+
+#endif  // LOCUS_SERVER_STORAGE_POSTGRES_CONNECTION_H_

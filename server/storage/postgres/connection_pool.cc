@@ -1,0 +1,78 @@
+#include "server/storage/postgres/connection_pool.h"
+
+#include <algorithm>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+
+namespace locus::server {
+
+absl::StatusOr<ConnectionPool::Lease> ConnectionPool::acquire(Deadline deadline) {
+  {
+    MutexLock lock(mutex_);
+    while (in_use_ >= capacity_) {
+      if (!returned_.wait_until(mutex_, deadline) && in_use_ >= capacity_)
+        return absl::UnavailableError(absl::StrCat("all ", capacity_, " connections to the engine are in use"));
+    }
+    ++in_use_;
+    if (!idle_.empty()) {
+      std::unique_ptr<Connection> connection = std::move(idle_.back());
+      idle_.pop_back();
+      return Lease(*this, std::move(connection));
+    }
+  }
+  absl::StatusOr<std::unique_ptr<Connection>> connection = connect(deadline);
+  if (connection.ok()) return Lease(*this, *std::move(connection));
+  MutexLock lock(mutex_);
+  --in_use_;
+  returned_.notify_one();
+  return connection.status();
+}
+
+absl::StatusOr<std::unique_ptr<Connection>> ConnectionPool::connect(Deadline deadline) {
+  size_t first = 0;
+  {
+    MutexLock lock(mutex_);
+    first = host_;
+  }
+  std::vector<std::string> reasons;
+  for (size_t tried = 0; tried < address_.host_count(); ++tried) {
+    const size_t host = (first + tried) % address_.host_count();
+    const Deadline until = std::min(deadline, std::chrono::steady_clock::now() + connect_wait_);
+    absl::StatusOr<std::unique_ptr<Connection>> connection = Connection::open(address_, host, until);
+    absl::Status status = connection.status();
+    if (status.ok()) status = prepare_(**connection, until);
+    if (absl::IsFailedPrecondition(status)) return status;
+    if (!status.ok()) {
+      reasons.emplace_back(status.message());
+      continue;
+    }
+    MutexLock lock(mutex_);
+    host_ = host;
+    return connection;
+  }
+  return absl::UnavailableError(absl::StrCat("no host of the engine accepts writes: ", absl::StrJoin(reasons, "; ")));
+}
+
+void ConnectionPool::give_back(std::unique_ptr<Connection> connection) {
+  std::vector<std::unique_ptr<Connection>> closed;  // closed without the lock
+  MutexLock lock(mutex_);
+  --in_use_;
+  if (connection->lost() && connection->host() == host_) {
+    host_ = (host_ + 1) % address_.host_count();
+    closed.swap(idle_);
+  }
+  if (connection->usable() && connection->host() == host_) {
+    idle_.push_back(std::move(connection));
+  } else {
+    closed.push_back(std::move(connection));
+  }
+  returned_.notify_one();
+}
+
+std::string ConnectionPool::host_name() const {
+  MutexLock lock(mutex_);
+  return address_.host_name(host_);
+}
+
+}  // namespace locus::server

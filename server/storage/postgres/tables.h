@@ -1,0 +1,32 @@
+// The tables of the log in PostgreSQL, and the checks of an engine before its first use. FORMAT.md describes each
+// column. Free functions; one thread at a time for each connection.
+#ifndef LOCUS_SERVER_STORAGE_POSTGRES_TABLES_H_
+#define LOCUS_SERVER_STORAGE_POSTGRES_TABLES_H_
+
+#include "absl/status/status.h"
+#include "server/storage/postgres/connection.h"
+
+namespace locus::server {
+
+inline constexpr uint64_t kTablesFormat = 1;
+
+// Component that guarantees that an acknowledged commit survives the loss of a machine.
+enum class EngineReplication : uint8_t {
+  kStandbys,  // PostgreSQL waits for a synchronous standby
+  kStorage,   // the storage below PostgreSQL is replicated, so PostgreSQL needs no standby
+};
+
+// Checks the settings of the engine. FAILED_PRECONDITION, with the setting to change, if a commit might be acknowledged
+// before a second machine has synced it, if a crash might damage the data, or if the database cannot store every name.
+absl::Status check_engine(Connection& connection, EngineReplication replication, Deadline deadline);
+
+// Creates the tables if the database has none. FAILED_PRECONDITION if their format is newer than kTablesFormat.
+absl::Status prepare_tables(Connection& connection, Deadline deadline);
+
+// Adds a statement that makes the commit of its transaction wait for the standbys, as the commit of a change does. A
+// transaction that only reads does not wait: after a restart of PostgreSQL it may see commits that no standby has.
+void add_barrier(Connection& connection);
+
+}  // namespace locus::server
+
+#endif  // LOCUS_SERVER_STORAGE_POSTGRES_TABLES_H_

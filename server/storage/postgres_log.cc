@@ -1,0 +1,317 @@
+#include "server/storage/postgres_log.h"
+
+#include <algorithm>
+#include <thread>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/check.h"
+#include "core/base/refusal.h"
+#include "core/base/status_macros.h"
+#include "server/storage/rows/refusals.h"
+
+namespace locus::server {
+namespace {
+
+constexpr size_t kAppendConnections = 2;
+constexpr size_t kChangeConnections = 2;
+constexpr auto kBackoff = std::chrono::milliseconds(50);  // pause between two attempts to reach the engine
+
+// A parameter of PostgreSQL is at most 1 GiB long, and the engine needs several times the memory of a statement.
+constexpr uint64_t kMaxAppendBytes = uint64_t{256} << 20;
+
+constexpr const char* kAppendName = "append";
+// Appends one scene's records if this daemon still leads the scene and no record is missing. Inserts no row otherwise.
+constexpr const char* kAppendSql =
+    "WITH moved AS (UPDATE locus.scene_log SET last = $4::bigint, chain = $5::bigint"
+    " WHERE scene = $1::bigint AND token = $2::bigint AND last = $3::bigint RETURNING scene)"
+    " INSERT INTO locus.record (scene, sequence, epoch, writer, batch, chain, bytes)"
+    " SELECT moved.scene, $3::bigint + added.number, $6::bigint, added.writer, added.batch, added.chain, added.bytes"
+    " FROM moved, ROWS FROM (unnest($7::bigint[]), unnest($8::bigint[]), unnest($9::bigint[]), unnest($10::bytea[]))"
+    " WITH ORDINALITY AS added (writer, batch, chain, bytes, number)";
+
+Parameters append_parameters(const Append& append) {
+  std::vector<uint64_t> writers, batches;
+  std::vector<absl::string_view> bytes;
+  for (const LogEntry& entry : append.entries) {
+    writers.push_back(entry.writer);
+    batches.push_back(entry.batch);
+    bytes.push_back(entry.bytes);
+  }
+  Parameters parameters;
+  parameters.number(append.scene).number(append.token).number(append.before);
+  parameters.number(append.before + append.entries.size()).number(append.chains.back());
+  parameters.number(append.entries.front().epoch).numbers(writers).numbers(batches).numbers(append.chains);
+  parameters.list_of_bytes(bytes);
+  return parameters;
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<PostgresLog>> PostgresLog::open(const PostgresOptions& options) {
+  ASSIGN_OR_RETURN(EngineAddress address, EngineAddress::parse(options.url));
+  PostgresOptions named = options;
+  if (named.member.empty()) named.member = absl::StrCat(absl::Hex(random_id(), absl::kZeroPad16));
+  std::unique_ptr<PostgresLog> log(new PostgresLog(named, std::move(address)));
+  RETURN_IF_ERROR(log->list_stored());
+  return log;
+}
+
+PostgresLog::PostgresLog(const PostgresOptions& options, EngineAddress address)
+    : options_(options),
+      appending_(address, kAppendConnections, options.connect_wait,
+                 [replication = options.replication](Connection& connection, Deadline deadline) -> absl::Status {
+                   RETURN_IF_ERROR(check_engine(connection, replication, deadline));
+                   return connection.prepare(kAppendName, kAppendSql, deadline);
+                 }),
+      changing_(std::move(address), kChangeConnections, options.connect_wait,
+                [replication = options.replication](Connection& connection, Deadline deadline) -> absl::Status {
+                  RETURN_IF_ERROR(check_engine(connection, replication, deadline));
+                  return prepare_tables(connection, deadline);
+                }),
+      queue_(kAppendConnections, [this](absl::Span<Append* const> group) { commit_group(group); }) {}
+
+absl::StatusOr<PostgresLog::LedPtr> PostgresLog::led(SceneKey scene) const {
+  MutexLock lock(mutex_);
+  const auto found = led_.find(scene);
+  if (found == led_.end()) return scene_not_stored(scene);
+  return found->second;
+}
+
+absl::StatusOr<ConnectionPool::Lease> PostgresLog::acquire(ConnectionPool& pool, Deadline deadline) {
+  while (true) {
+    absl::StatusOr<ConnectionPool::Lease> lease = pool.acquire(deadline);
+    if (!absl::IsUnavailable(lease.status()) || std::chrono::steady_clock::now() + kBackoff >= deadline) return lease;
+    std::this_thread::sleep_for(kBackoff);
+  }
+}
+
+void PostgresLog::lead(const StoredScene& scene, uint64_t token, uint64_t chain) {
+  auto state = std::make_shared<Led>();
+  state->key = scene.key;
+  state->name = scene.name;
+  {
+    MutexLock writing(state->writing);
+    state->token = token;
+    state->epoch = scene.epoch;
+    state->last = scene.last_sequence;
+    state->chain = chain;
+    state->damage = scene.damage;
+    state->known_last = scene.last_sequence;
+  }
+  MutexLock lock(mutex_);
+  led_[scene.key] = std::move(state);
+}
+
+absl::StatusOr<uint64_t> PostgresLog::append(SceneKey key, absl::Span<const LogEntry> entries, AckLevel) {
+  ASSIGN_OR_RETURN(const LedPtr state, led(key));
+  Led& scene = *state;
+  MutexLock writing(scene.writing);
+  if (entries.empty()) return scene.last;
+  if (!scene.damage.ok()) return scene.damage;
+  if (scene.fenced) return refuse_fenced(scene.name);
+  if (scene.epoch != entries.front().epoch) return refuse_epoch(scene.name, scene.epoch, entries.front().epoch);
+  if (scene.possibly_last != 0) RETURN_IF_ERROR(remove_possibly_written(scene));
+  Append append;
+  append.scene = key;
+  append.token = scene.token;
+  append.before = scene.last;
+  append.entries = entries;
+  std::vector<uint64_t> chains;
+  uint64_t chain = scene.chain;
+  for (const LogEntry& entry : entries) {
+    LOCUS_CHECK_EQ(entry.epoch, entries.front().epoch);
+    append.bytes += entry.bytes.size();
+    chain = chain_after(key, scene.last + chains.size() + 1, entry, chain);
+    chains.push_back(chain);
+  }
+  if (append.bytes > kMaxAppendBytes)
+    return refuse_limit("entries", "record_bytes", static_cast<double>(kMaxAppendBytes),
+                        static_cast<double>(append.bytes));
+  append.chains = chains;
+  queue_.run(append);
+  switch (append.outcome) {
+    case Append::Outcome::kWritten:
+      scene.last += entries.size();
+      scene.chain = chain;
+      scene.known_last = scene.last;
+      return scene.last;
+    case Append::Outcome::kFenced:
+      scene.fenced = true;
+      return refuse_fenced(scene.name);
+    case Append::Outcome::kUnknown:
+      scene.possibly_last = scene.last + entries.size();
+      return append.failure;
+    case Append::Outcome::kNotWritten:
+      return append.failure;
+  }
+  return absl::InternalError("unreachable");
+}
+
+void PostgresLog::commit_group(absl::Span<Append* const> group) const {
+  const Deadline deadline = change_deadline();
+  std::vector<Append*> left(group.begin(), group.end());
+  while (true) {
+    const absl::Status status = send_appends(left, deadline);
+    left.erase(std::remove_if(left.begin(), left.end(),
+                              [](const Append* append) { return append->outcome != Append::Outcome::kNotWritten; }),
+               left.end());
+    if (left.empty()) return;
+    const bool again = status.ok() || absl::IsUnavailable(status);
+    if (!again || std::chrono::steady_clock::now() + kBackoff >= deadline) {
+      for (Append* const append : left)
+        append->failure = status.ok() ? absl::UnavailableError("the engine did not answer in time") : status;
+      return;
+    }
+    if (!status.ok()) std::this_thread::sleep_for(kBackoff);
+  }
+}
+
+absl::Status PostgresLog::send_appends(absl::Span<Append* const> appends, Deadline deadline) const {
+  std::vector<Append*> open;  // appends whose outcome must be found out
+  {
+    ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, acquire(appending_, deadline));
+    for (const Append* const append : appends) lease->add_prepared(kAppendName, append_parameters(*append));
+    const absl::Status status = lease->run(std::min(deadline, answer_deadline()));
+    if (!status.ok() && !lease->lost()) return status;
+    for (size_t i = 0; i < appends.size(); ++i) {
+      if (status.ok() && lease->results()[i].changed() == appends[i]->entries.size()) {
+        appends[i]->outcome = Append::Outcome::kWritten;
+      } else {
+        appends[i]->outcome = Append::Outcome::kUnknown;
+        open.push_back(appends[i]);
+      }
+    }
+  }
+  if (open.empty()) return absl::OkStatus();
+  absl::Status status = resolve(open, deadline);
+  if (!status.ok()) {
+    for (Append* const append : open) append->failure = status;
+  }
+  return status;
+}
+
+absl::Status PostgresLog::resolve(absl::Span<Append* const> appends, Deadline deadline) const {
+  std::vector<uint64_t> keys;
+  for (const Append* const append : appends) keys.push_back(append->scene);
+  while (true) {
+    ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, acquire(appending_, deadline));
+    // The lock waits for a transaction of the lost connection that still waits for the standbys, and the commit of this
+    // transaction waits for them too. A plain read would show what no standby has.
+    lease->add(
+        "SELECT scene, token, last, chain FROM locus.scene_log WHERE scene = ANY($1::bigint[]) ORDER BY scene FOR "
+        "UPDATE",
+        Parameters().numbers(keys));
+    add_barrier(*lease);
+    if (absl::Status status = lease->run(std::min(deadline, answer_deadline())); !status.ok()) {
+      if (std::chrono::steady_clock::now() + kBackoff >= deadline) return status;
+      std::this_thread::sleep_for(kBackoff);
+      continue;
+    }
+    const Rows& found = lease->results()[0];
+    std::map<SceneKey, size_t> row_of;
+    for (size_t row = 0; row < found.size(); ++row) row_of[found.number(row, 0)] = row;
+    for (Append* const append : appends) {
+      const auto row = row_of.find(append->scene);
+      if (row == row_of.end() || found.number(row->second, 1) != append->token) {
+        append->outcome = Append::Outcome::kFenced;
+        continue;
+      }
+      const uint64_t last = found.number(row->second, 2), chain = found.number(row->second, 3);
+      if (last == append->before + append->entries.size() && chain == append->chains.back()) {
+        append->outcome = Append::Outcome::kWritten;
+      } else if (last == append->before) {
+        append->outcome = Append::Outcome::kNotWritten;
+      } else {
+        append->outcome = Append::Outcome::kUnknown;
+        append->failure = absl::DataLossError(
+            absl::StrCat("the log of scene ", append->scene, " ends at record ", last, " instead of ", append->before));
+      }
+    }
+    return absl::OkStatus();
+  }
+}
+
+absl::Status PostgresLog::remove_possibly_written(Led& led) {
+  const uint64_t key = led.key, token = led.token, last = led.last, chain = led.chain, possible = led.possibly_last;
+  // The new token refuses statements of the failed append that arrive only now.
+  const auto remove = [&](Connection& connection) -> absl::Status {
+    connection.add(
+        "UPDATE locus.scene_log SET token = token + 1, last = $3::bigint, chain = $4::bigint"
+        " WHERE scene = $1::bigint AND token = $2::bigint AND last IN ($3::bigint, $5::bigint)",
+        Parameters().number(key).number(token).number(last).number(chain).number(possible));
+    connection.add("DELETE FROM locus.record WHERE scene = $1::bigint AND sequence > $2::bigint",
+                   Parameters().number(key).number(last));
+    RETURN_IF_ERROR(connection.run(answer_deadline()));
+    return connection.results()[0].changed() == 1 ? absl::OkStatus() : refuse_fenced(led.name);
+  };
+  const absl::Status status = transact(remove, [&](Connection& connection) -> absl::StatusOr<bool> {
+    connection.add("SELECT leader, token FROM locus.scene_log WHERE scene = $1::bigint FOR UPDATE",
+                   Parameters().number(key));
+    add_barrier(connection);
+    RETURN_IF_ERROR(connection.run(answer_deadline()));
+    const Rows& found = connection.results()[0];
+    return !found.empty() && found.bytes(0, 0) == options_.member && found.number(0, 1) == token + 1;
+  });
+  if (absl::IsAborted(status)) led.fenced = true;
+  RETURN_IF_ERROR(status);
+  led.possibly_last = 0;
+  led.token = token + 1;
+  return absl::OkStatus();
+}
+
+absl::StatusOr<uint64_t> PostgresLog::latest(SceneKey scene) const {
+  ASSIGN_OR_RETURN(const LedPtr state, led(scene));
+  return state->known_last.load();
+}
+
+absl::Status PostgresLog::read(SceneKey key, uint64_t from, RecordSink sink) const {
+  ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, acquire(changing_, change_deadline()));
+  Connection& connection = *lease;
+  // One snapshot for both statements: a snapshot of the scene written meanwhile may delete the records.
+  connection.add("BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY");
+  connection.add("SELECT " LOCUS_SCENE_COLUMNS
+                 ", l.last, l.chain, r.chain FROM locus.scene s JOIN locus.scene_log l ON l.scene = s.key"
+                 " LEFT JOIN locus.record r ON r.scene = s.key AND r.sequence = $2::bigint WHERE s.key = $1::bigint",
+                 Parameters().number(key).number(from - 1));
+  RETURN_IF_ERROR(connection.run(answer_deadline()));
+  const Rows& found = connection.results()[1];
+  if (found.empty()) return scene_not_stored(key);
+  ASSIGN_OR_RETURN(const StoredSceneRow row, scene_row(found, 0));
+  const uint64_t last = found.number(0, kSceneColumns);
+  const uint64_t last_chain = found.number(0, kSceneColumns + 1);
+  if (from <= row.snapshot_sequence) return refuse_read_before(row.snapshot_sequence);
+  if (from > last) return connection.run("COMMIT", answer_deadline());
+  uint64_t at = from - 1;
+  uint64_t chain = row.snapshot_chain;
+  if (at != row.snapshot_sequence) {
+    if (found.is_null(0, kSceneColumns + 2))
+      return damaged("scene", row.name, absl::StrCat("record ", at, " is missing"));
+    chain = found.number(0, kSceneColumns + 2);
+  }
+  RETURN_IF_ERROR(
+      connection.stream("SELECT sequence, epoch, writer, batch, chain, bytes FROM locus.record"
+                        " WHERE scene = $1::bigint AND sequence BETWEEN $2::bigint AND $3::bigint ORDER BY sequence",
+                        Parameters().number(key).number(from).number(last), options_.append_wait,
+                        [&](const Rows& found_record) -> absl::Status {
+                          LogRecord record;
+                          record.sequence = found_record.number(0, 0);
+                          record.entry.epoch = found_record.number(0, 1);
+                          record.entry.writer = found_record.number(0, 2);
+                          record.entry.batch = found_record.number(0, 3);
+                          record.entry.bytes = found_record.bytes(0, 5);
+                          if (record.sequence != at + 1)
+                            return damaged("scene", row.name, absl::StrCat("record ", at + 1, " is missing"));
+                          at = record.sequence;
+                          chain = chain_after(key, at, record.entry, chain);
+                          if (chain != found_record.number(0, 4))
+                            return damaged("scene", row.name, absl::StrCat("the checksum of record ", at, " is wrong"));
+                          return sink(record);
+                        }));
+  if (at != last) return damaged("scene", row.name, absl::StrCat("record ", at + 1, " is missing"));
+  if (chain != last_chain)
+    return damaged("scene", row.name, absl::StrCat("record ", last, " is not the one that was appended"));
+  return connection.run("COMMIT", answer_deadline());
+}
+
+}  // namespace locus::server

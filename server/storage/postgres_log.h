@@ -1,0 +1,177 @@
+// UpdateLog on a replicated PostgreSQL, which several daemons share. A scene has one leader at a time, which alone may
+// append; its token counts the leaders, and each append names the token, so that a former leader is refused (fenced)
+// from the moment another one has taken over. README.md in this folder describes failures, postgres/FORMAT.md the
+// tables.
+//
+// An acknowledged append is synced by the engine's quorum, whatever its AckLevel. If the connection is lost during an
+// append, nothing is reported until another connection has found out whether it was written, for at most `append_wait`;
+// after that the append fails as UNAVAILABLE, and the scene's next append removes it if it was written after all.
+//
+// In addition to the errors of UpdateLog, members that change a scene return ABORTED if another daemon leads the scene.
+//
+// Threads: any thread may call any member, but append() for a scene only from one thread at a time. There is no thread
+// of its own. Members wait for the engine: at most `append_wait` if it is away, longer only while a snapshot or mesh is
+// sent and the engine makes progress. At most four connections are open.
+#ifndef LOCUS_SERVER_STORAGE_POSTGRES_LOG_H_
+#define LOCUS_SERVER_STORAGE_POSTGRES_LOG_H_
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "absl/functional/function_ref.h"
+#include "absl/status/statusor.h"
+#include "core/base/mutex.h"
+#include "core/scene/log/update_log.h"
+#include "server/storage/postgres/append_queue.h"
+#include "server/storage/postgres/connection_pool.h"
+#include "server/storage/postgres/rows.h"
+#include "server/storage/postgres/tables.h"
+
+namespace locus::server {
+
+struct PostgresOptions {
+  std::string url;     // see EngineAddress::parse()
+  std::string member;  // name by which this daemon leads scenes; empty = a random one
+  EngineReplication replication = EngineReplication::kStandbys;
+
+  std::chrono::milliseconds connect_wait{2'000};  // longest wait for one host to accept a connection
+  std::chrono::milliseconds answer_wait{3'000};   // longest wait for an answer before another host is tried
+  std::chrono::milliseconds append_wait{10'000};  // longest wait for the outcome of a change
+};
+
+class PostgresLog final : public UpdateLog {
+ public:
+  // Connects and creates the tables if the database has none. INVALID_ARGUMENT if the address is malformed;
+  // FAILED_PRECONDITION if the engine acknowledges before a second machine has synced, or if its tables have a newer
+  // format; UNAVAILABLE if no host accepts writes.
+  static absl::StatusOr<std::unique_ptr<PostgresLog>> open(const PostgresOptions& options);
+  PostgresLog(const PostgresLog&) = delete;
+  PostgresLog& operator=(const PostgresLog&) = delete;
+
+  // Leader of a scene, as the engine has it.
+  struct Leader {
+    std::string member;
+    uint64_t token = 0;
+  };
+  absl::StatusOr<Leader> leader_of(SceneKey scene) const;
+  // Makes this daemon the leader of a scene if its token is still `token`, and returns the scene as it now is. All of
+  // its acknowledged records can then be read, and no other daemon can append. ABORTED if another daemon was faster. A
+  // call that fails as UNAVAILABLE may be repeated with the same token.
+  absl::StatusOr<StoredScene> take_over(SceneKey scene, uint64_t token) LOCUS_EXCLUDES(mutex_);
+
+  const std::vector<StoredScene>& stored_scenes() const override { return stored_scenes_; }
+  const std::vector<StoredMesh>& stored_meshes() const override { return stored_meshes_; }
+  absl::Status catalogue_damage() const override { return absl::OkStatus(); }
+  bool closed_in_order() const override { return true; }  // every acknowledged record is synced
+
+  absl::StatusOr<SceneKey> create_scene(absl::string_view name, absl::string_view spec, uint64_t epoch,
+                                        ChunkSource state) override LOCUS_EXCLUDES(mutex_);
+  absl::Status delete_scene(SceneKey scene) override LOCUS_EXCLUDES(mutex_);
+  absl::Status restart_scene(SceneKey scene, uint64_t epoch) override LOCUS_EXCLUDES(mutex_);
+  absl::Status set_scene_spec(SceneKey scene, absl::string_view spec) override LOCUS_EXCLUDES(mutex_);
+
+  absl::StatusOr<uint64_t> append(SceneKey scene, absl::Span<const LogEntry> entries, AckLevel level) override
+      LOCUS_EXCLUDES(mutex_);
+  absl::Status read(SceneKey scene, uint64_t from, RecordSink sink) const override;
+  absl::StatusOr<uint64_t> latest(SceneKey scene) const override LOCUS_EXCLUDES(mutex_);
+
+  absl::Status write_snapshot(SceneKey scene, uint64_t sequence, ChunkSource state) override LOCUS_EXCLUDES(mutex_);
+  absl::Status read_snapshot(SceneKey scene, ChunkSink sink) const override;
+
+  absl::Status add_mesh(absl::string_view name, const std::array<uint8_t, 32>& sha256, ChunkSource content,
+                        ChunkSource parts) override LOCUS_EXCLUDES(mutex_);
+  absl::Status delete_mesh(absl::string_view name) override;
+  absl::Status set_mesh_graces(absl::Span<const std::string> names, uint32_t grace_s) override;
+  absl::Status read_mesh(const std::array<uint8_t, 32>& sha256, ChunkSink sink) const override LOCUS_EXCLUDES(mutex_);
+  absl::Status read_parts(absl::string_view name, ChunkSink sink) const override;
+  // The topologies of trees are not stored: they can be computed, and each daemon would send them all through the
+  // engine.
+  void store_topology(const std::array<uint8_t, 32>&, absl::string_view) override {}
+  std::optional<std::string> read_topology(const std::array<uint8_t, 32>&) const override { return std::nullopt; }
+
+  // Refuses: the engine has its own programs for backups, which copy the scenes of all daemons.
+  absl::Status back_up(const std::string& path) override;
+
+ private:
+  // A scene that this daemon leads, or led.
+  struct Led {
+    SceneKey key = 0;
+    std::string name;
+    Mutex writing;  // held during a whole append or change of the scene's row
+    uint64_t token LOCUS_GUARDED_BY(writing) = 0;
+    uint64_t epoch LOCUS_GUARDED_BY(writing) = 0;
+    uint64_t last LOCUS_GUARDED_BY(writing) = 0;   // sequence number of the last record
+    uint64_t chain LOCUS_GUARDED_BY(writing) = 0;  // running checksum after it
+    // Sequence number of the last record of a failed append whose outcome is unknown; 0 if there is none. The next
+    // append removes the records up to it.
+    uint64_t possibly_last LOCUS_GUARDED_BY(writing) = 0;
+    bool fenced LOCUS_GUARDED_BY(writing) = false;
+    absl::Status damage LOCUS_GUARDED_BY(writing);  // not OK: the scene can only be deleted
+    std::atomic<uint64_t> known_last = 0;           // equals `last`, for readers that do not wait for an append
+  };
+  using LedPtr = std::shared_ptr<Led>;
+  using Change = absl::FunctionRef<absl::Status(Connection&)>;
+  using WasDone = absl::FunctionRef<absl::StatusOr<bool>(Connection&)>;
+
+  PostgresLog(const PostgresOptions& options, EngineAddress address);
+  absl::Status list_stored();
+
+  absl::StatusOr<LedPtr> led(SceneKey scene) const LOCUS_EXCLUDES(mutex_);
+  void lead(const StoredScene& scene, uint64_t token, uint64_t chain) LOCUS_EXCLUDES(mutex_);
+
+  // Returns a connection; tries again while the engine is away, until the deadline.
+  static absl::StatusOr<ConnectionPool::Lease> acquire(ConnectionPool& pool, Deadline deadline);
+  Deadline answer_deadline() const { return std::chrono::steady_clock::now() + options_.answer_wait; }
+  Deadline change_deadline() const { return std::chrono::steady_clock::now() + options_.append_wait; }
+
+  // Runs `change` in a transaction and commits it. If the outcome of the commit is unknown, asks `was_done` on other
+  // connections until one has answered; UNAVAILABLE if none has answered until the deadline.
+  absl::Status transact(Change change, WasDone was_done) const;
+  // Locks the row of the scene's log in the open transaction and checks that this daemon leads the scene: ABORTED
+  // otherwise.
+  absl::Status guard(Connection& connection, Led& led) const LOCUS_REQUIRES(led.writing);
+  absl::Status send_row(Connection& connection, const StoredSceneRow& row) const;
+  // Changes the row of a scene that this daemon leads.
+  absl::Status change_row(SceneKey scene, absl::FunctionRef<void(StoredSceneRow&)> change) LOCUS_EXCLUDES(mutex_);
+
+  void commit_group(absl::Span<Append* const> group) const;
+  // Sends the appends in one transaction and sets their outcomes. Those that stay kNotWritten may be sent again.
+  absl::Status send_appends(absl::Span<Append* const> appends, Deadline deadline) const;
+  // Finds out on another connection which of the appends were written. Their outcomes stay kUnknown after an error.
+  absl::Status resolve(absl::Span<Append* const> appends, Deadline deadline) const;
+  // Removes the records of a failed append if they were written after all, under a new token.
+  absl::Status remove_possibly_written(Led& led) LOCUS_REQUIRES(led.writing);
+
+  // Sends the chunks that `source` returns, each by `sql`, whose parameters are `owner` (if it is not 0), `id`, the
+  // number of the chunk, its checksum and its bytes.
+  absl::StatusOr<ChunkList> send_chunks(Connection& connection, const char* sql, uint64_t owner, uint64_t id,
+                                        ChunkSource source) const;
+  // Reads the chunks that `sql` returns and compares them with `expected`. DATA_LOSS if they differ; `kind` and `name`
+  // are those of damaged().
+  absl::Status read_chunks(Connection& connection, const char* sql, const Parameters& parameters, uint64_t id,
+                           const ChunkList& expected, absl::string_view kind, absl::string_view name,
+                           ChunkSink sink) const;
+
+  const PostgresOptions options_;
+  mutable ConnectionPool appending_;  // connections for appends
+  mutable ConnectionPool changing_;   // connections for everything else, which may take long
+  AppendQueue queue_;
+  std::vector<StoredScene> stored_scenes_;
+  std::vector<StoredMesh> stored_meshes_;
+
+  mutable Mutex mutex_;
+  std::map<SceneKey, LedPtr> led_ LOCUS_GUARDED_BY(mutex_);
+  // Hashes of mesh contents that read_mesh() found damaged. The next add_mesh() of such a content stores it again.
+  mutable std::set<Sha256> damaged_contents_ LOCUS_GUARDED_BY(mutex_);
+};
+
+}  // namespace locus::server
+
+#endif  // LOCUS_SERVER_STORAGE_POSTGRES_LOG_H_

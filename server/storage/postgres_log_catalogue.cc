@@ -1,0 +1,394 @@
+// Members of PostgresLog that change the catalogue (the rows of scenes and meshes), or write and read the chunks of
+// snapshots and meshes.
+#include <algorithm>
+#include <thread>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/check.h"
+#include "core/base/status_macros.h"
+#include "core/scene/log/record_codec.h"
+#include "server/storage/postgres_log.h"
+#include "server/storage/rows/refusals.h"
+
+namespace locus::server {
+namespace {
+
+constexpr auto kBetweenAttempts = std::chrono::milliseconds(50);
+constexpr uint64_t kChunkRunBytes = uint64_t{4} << 20;  // size of chunks from which they are sent
+
+constexpr const char* kSnapshotChunkSql =
+    "INSERT INTO locus.snapshot_chunk (scene, snapshot, number, checksum, bytes)"
+    " VALUES ($1::bigint, $2::bigint, $3::bigint, $4::bigint, $5::bytea)";
+
+StoredScene stored_scene(const Rows& rows, size_t row) {
+  StoredScene stored;
+  stored.key = rows.number(row, 0);
+  stored.name = std::string(rows.bytes(row, 1));
+  const absl::StatusOr<StoredSceneRow> found = scene_row(rows, row);
+  stored.damage = found.status();
+  if (found.ok()) {
+    stored.spec = found->spec;
+    stored.epoch = found->epoch;
+    stored.snapshot_sequence = found->snapshot_sequence;
+  }
+  stored.last_sequence = rows.number(row, kSceneColumns);
+  stored.log_bytes = rows.number(row, kSceneColumns + 1);
+  return stored;
+}
+
+// Begins a statement that returns the columns which stored_scene() reads.
+#define LOCUS_STORED_SCENES                                                               \
+  "SELECT " LOCUS_SCENE_COLUMNS                                                           \
+  ", l.last, (SELECT coalesce(sum(octet_length(r.bytes)), 0)::bigint FROM locus.record r" \
+  " WHERE r.scene = s.key), l.chain FROM locus.scene s JOIN locus.scene_log l ON l.scene = s.key "
+
+}  // namespace
+
+absl::Status PostgresLog::list_stored() {
+  ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, acquire(changing_, change_deadline()));
+  lease->add(LOCUS_STORED_SCENES "ORDER BY s.name COLLATE \"C\"");
+  lease->add("SELECT " LOCUS_MESH_COLUMNS " FROM locus.mesh m ORDER BY m.name COLLATE \"C\"");
+  add_barrier(*lease);
+  RETURN_IF_ERROR(lease->run(change_deadline()));
+  const Rows& scenes = lease->results()[0];
+  for (size_t row = 0; row < scenes.size(); ++row) stored_scenes_.push_back(stored_scene(scenes, row));
+  const Rows& meshes = lease->results()[1];
+  for (size_t row = 0; row < meshes.size(); ++row) {
+    const absl::StatusOr<StoredMeshRow> found = mesh_row(meshes, row);
+    StoredMesh& stored = stored_meshes_.emplace_back();
+    stored.name = std::string(meshes.bytes(row, 0));
+    stored.damage = found.status();
+    if (!found.ok()) continue;
+    stored.sha256 = found->sha256;
+    stored.grace_s = found->grace_s;
+  }
+  return absl::OkStatus();
+}
+
+absl::Status PostgresLog::transact(Change change, WasDone was_done) const {
+  const Deadline deadline = change_deadline();
+  absl::Status status;
+  while (true) {
+    ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, acquire(changing_, deadline));
+    // A connection that was idle may have been closed by the engine, which shows only now.
+    status = lease->run("BEGIN", std::min(deadline, answer_deadline()));
+    if (!status.ok() && std::chrono::steady_clock::now() + kBetweenAttempts < deadline) continue;
+    if (status.ok()) status = change(*lease);
+    if (!status.ok()) {
+      if (lease->in_transaction()) lease->run("ROLLBACK", answer_deadline()).IgnoreError();
+      return status;
+    }
+    status = lease->run("COMMIT", answer_deadline());
+    if (!lease->lost()) return status;
+    break;
+  }
+  while (std::chrono::steady_clock::now() + kBetweenAttempts < deadline) {
+    std::this_thread::sleep_for(kBetweenAttempts);
+    absl::StatusOr<ConnectionPool::Lease> lease = acquire(changing_, deadline);
+    if (!lease.ok()) break;
+    const absl::StatusOr<bool> done = was_done(**lease);
+    if (!done.ok()) continue;
+    return *done ? absl::OkStatus()
+                 : absl::UnavailableError(absl::StrCat("the engine undid the change: ", status.message()));
+  }
+  return absl::UnavailableError(absl::StrCat("the engine may or may not have stored the change: ", status.message()));
+}
+
+absl::Status PostgresLog::guard(Connection& connection, Led& led) const {
+  connection.add("SELECT token FROM locus.scene_log WHERE scene = $1::bigint FOR UPDATE", Parameters().number(led.key));
+  RETURN_IF_ERROR(connection.run(answer_deadline()));
+  const Rows& found = connection.results()[0];
+  if (found.empty()) return scene_not_stored(led.key);
+  if (found.number(0, 0) == led.token && !led.fenced) return absl::OkStatus();
+  led.fenced = true;
+  return refuse_fenced(led.name);
+}
+
+absl::StatusOr<PostgresLog::Leader> PostgresLog::leader_of(SceneKey scene) const {
+  ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, acquire(changing_, change_deadline()));
+  lease->add("SELECT leader, token FROM locus.scene_log WHERE scene = $1::bigint", Parameters().number(scene));
+  add_barrier(*lease);
+  RETURN_IF_ERROR(lease->run(answer_deadline()));
+  const Rows& found = lease->results()[0];
+  if (found.empty()) return scene_not_stored(scene);
+  return Leader{std::string(found.bytes(0, 0)), found.number(0, 1)};
+}
+
+absl::StatusOr<StoredScene> PostgresLog::take_over(SceneKey scene, uint64_t token) {
+  const auto take = [&](Connection& connection) -> absl::Status {
+    connection.add(
+        "UPDATE locus.scene_log SET leader = $3::text, token = token + 1 WHERE scene = $1::bigint AND token = "
+        "$2::bigint",
+        Parameters().number(scene).number(token).text(options_.member));
+    RETURN_IF_ERROR(connection.run(answer_deadline()));
+    return connection.results()[0].changed() == 1
+               ? absl::OkStatus()
+               : absl::AbortedError(absl::StrCat("scene ", scene, " was deleted, or another daemon leads it"));
+  };
+  // Also finds a takeover of an earlier call whose outcome was unknown.
+  const auto taken = [&](Connection& connection) -> absl::StatusOr<bool> {
+    connection.add("SELECT leader, token FROM locus.scene_log WHERE scene = $1::bigint FOR UPDATE",
+                   Parameters().number(scene));
+    add_barrier(connection);
+    RETURN_IF_ERROR(connection.run(answer_deadline()));
+    const Rows& found = connection.results()[0];
+    return !found.empty() && found.bytes(0, 0) == options_.member && found.number(0, 1) == token + 1;
+  };
+  absl::Status status = transact(take, taken);
+  ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, acquire(changing_, change_deadline()));
+  if (absl::IsAborted(status)) {
+    ASSIGN_OR_RETURN(const bool was_taken, taken(*lease));
+    if (was_taken) status = absl::OkStatus();
+  }
+  RETURN_IF_ERROR(status);
+  lease->add(LOCUS_STORED_SCENES "WHERE s.key = $1::bigint", Parameters().number(scene));
+  RETURN_IF_ERROR(lease->run(change_deadline()));
+  const Rows& found = lease->results()[0];
+  if (found.empty()) return scene_not_stored(scene);
+  StoredScene stored = stored_scene(found, 0);
+  lead(stored, token + 1, found.number(0, kSceneColumns + 2));
+  return stored;
+}
+
+absl::StatusOr<ChunkList> PostgresLog::send_chunks(Connection& connection, const char* sql, uint64_t owner, uint64_t id,
+                                                   ChunkSource source) const {
+  ChunkList list;
+  std::vector<std::string> unsent;  // the parameters borrow the bytes of a chunk until it is sent
+  uint64_t bytes = 0;
+  while (true) {
+    ASSIGN_OR_RETURN(std::optional<std::string> chunk, source());
+    if (chunk && chunk->size() > kMaxChunkBytes) return refuse_chunk(chunk->size());
+    if (chunk) {
+      const uint64_t sum = chunk_checksum(id, list.chunks, *chunk);
+      Parameters parameters;
+      if (owner != 0) parameters.number(owner);
+      connection.add(sql, parameters.number(id).number(list.chunks).number(sum).bytes(*chunk));
+      list.add(chunk->size(), sum);
+      bytes += chunk->size();
+    }
+    if (chunk && bytes < kChunkRunBytes) continue;
+    RETURN_IF_ERROR(connection.run(change_deadline()));
+    bytes = 0;
+    if (!chunk) return list;
+  }
+}
+
+absl::Status PostgresLog::read_chunks(Connection& connection, const char* sql, const Parameters& parameters,
+                                      uint64_t id, const ChunkList& expected, absl::string_view kind,
+                                      absl::string_view name, ChunkSink sink) const {
+  ChunkList list;
+  RETURN_IF_ERROR(connection.stream(sql, parameters, options_.append_wait, [&](const Rows& found) -> absl::Status {
+    const absl::string_view bytes = found.bytes(0, 2);
+    const uint64_t sum = chunk_checksum(id, list.chunks, bytes);
+    if (found.number(0, 0) != list.chunks)
+      return damaged(kind, name, absl::StrCat("chunk ", list.chunks, " is missing"));
+    if (found.number(0, 1) != sum)
+      return damaged(kind, name, absl::StrCat("the checksum of chunk ", list.chunks, " is wrong"));
+    list.add(bytes.size(), sum);
+    return sink(bytes);
+  }));
+  return list == expected ? absl::OkStatus() : damaged(kind, name, absl::StrCat("chunk ", list.chunks, " is missing"));
+}
+
+absl::Status PostgresLog::send_row(Connection& connection, const StoredSceneRow& row) const {
+  connection.add(
+      "UPDATE locus.scene SET spec = $2::bytea, epoch = $3::bigint, apply_version = $4::bigint, snapshot = $5::bigint,"
+      " snapshot_sequence = $6::bigint, snapshot_chain = $7::bigint, chunks = $8::bigint, chunk_bytes = $9::bigint,"
+      " digest = $10::bigint, checksum = $11::bigint WHERE key = $1::bigint",
+      Parameters()
+          .number(row.key)
+          .bytes(row.spec)
+          .number(row.epoch)
+          .number(row.apply_version)
+          .number(row.snapshot)
+          .number(row.snapshot_sequence)
+          .number(row.snapshot_chain)
+          .number(row.chunks.chunks)
+          .number(row.chunks.bytes)
+          .number(row.chunks.digest)
+          .number(checksum_of(row)));
+  return connection.run(answer_deadline());
+}
+
+absl::StatusOr<SceneKey> PostgresLog::create_scene(absl::string_view name, absl::string_view spec, uint64_t epoch,
+                                                   ChunkSource state) {
+  StoredSceneRow row;
+  row.name = std::string(name);
+  row.spec = std::string(spec);
+  row.epoch = epoch;
+  row.apply_version = kApplyVersion;
+  row.snapshot = random_id();
+  // Adds a row without a summary of the snapshot, which send_row() then completes. Returns its key; nullopt if the name
+  // is taken. Waits for a transaction that has added the name and is not committed.
+  const auto add_name = [&](Connection& connection) -> absl::StatusOr<std::optional<SceneKey>> {
+    connection.add(
+        "INSERT INTO locus.scene (name, spec, epoch, apply_version, snapshot, snapshot_sequence, snapshot_chain, "
+        "chunks,"
+        " chunk_bytes, digest, checksum) VALUES ($1::text, '', 0, 0, 0, 0, 0, 0, 0, 0, 0)"
+        " ON CONFLICT (name) DO NOTHING RETURNING key",
+        Parameters().text(row.name));
+    RETURN_IF_ERROR(connection.run(answer_deadline()));
+    const Rows& found = connection.results()[0];
+    return found.empty() ? std::nullopt : std::optional(found.number(0, 0));
+  };
+  const auto create = [&](Connection& connection) -> absl::Status {
+    ASSIGN_OR_RETURN(const std::optional<SceneKey> key, add_name(connection));
+    if (!key) return scene_already_stored(name);
+    row.key = *key;
+    row.snapshot_chain = first_chain(row.key);
+    ASSIGN_OR_RETURN(row.chunks, send_chunks(connection, kSnapshotChunkSql, row.key, row.snapshot, state));
+    connection.add(
+        "INSERT INTO locus.scene_log (scene, leader, token, last, chain)"
+        " VALUES ($1::bigint, $2::text, 1, 0, $3::bigint)",
+        Parameters().number(row.key).text(options_.member).number(row.snapshot_chain));
+    return send_row(connection, row);
+  };
+  const auto was_done = [&](Connection& connection) -> absl::StatusOr<bool> {
+    RETURN_IF_ERROR(connection.run("BEGIN", answer_deadline()));
+    ASSIGN_OR_RETURN(const std::optional<SceneKey> added, add_name(connection));
+    if (added) {  // the name was free, so the scene had not been stored
+      RETURN_IF_ERROR(connection.run("ROLLBACK", answer_deadline()));
+      return false;
+    }
+    connection.add("SELECT key FROM locus.scene WHERE key = $1::bigint", Parameters().number(row.key));
+    add_barrier(connection);
+    connection.add("COMMIT");
+    RETURN_IF_ERROR(connection.run(answer_deadline()));
+    return !connection.results()[0].empty();
+  };
+  RETURN_IF_ERROR(transact(create, was_done));
+  StoredScene stored;
+  stored.key = row.key;
+  stored.name = row.name;
+  stored.epoch = epoch;
+  lead(stored, 1, row.snapshot_chain);
+  return row.key;
+}
+
+absl::Status PostgresLog::delete_scene(SceneKey key) {
+  ASSIGN_OR_RETURN(const LedPtr state, led(key));
+  Led& scene = *state;
+  MutexLock writing(scene.writing);
+  const auto remove = [&](Connection& connection) LOCUS_REQUIRES(scene.writing) -> absl::Status {
+    RETURN_IF_ERROR(guard(connection, scene));
+    connection.add("DELETE FROM locus.record WHERE scene = $1::bigint", Parameters().number(key));
+    connection.add("DELETE FROM locus.snapshot_chunk WHERE scene = $1::bigint", Parameters().number(key));
+    connection.add("DELETE FROM locus.scene WHERE key = $1::bigint", Parameters().number(key));
+    return connection.run(change_deadline());
+  };
+  absl::Status status = transact(remove, [&](Connection& connection) -> absl::StatusOr<bool> {
+    connection.add("SELECT key FROM locus.scene WHERE key = $1::bigint FOR UPDATE", Parameters().number(key));
+    add_barrier(connection);
+    RETURN_IF_ERROR(connection.run(answer_deadline()));
+    return connection.results()[0].empty();
+  });
+  if (!status.ok() && !absl::IsNotFound(status)) return status;
+  MutexLock lock(mutex_);
+  led_.erase(key);
+  return status;
+}
+
+absl::Status PostgresLog::change_row(SceneKey key, absl::FunctionRef<void(StoredSceneRow&)> change) {
+  ASSIGN_OR_RETURN(const LedPtr state, led(key));
+  Led& scene = *state;
+  MutexLock writing(scene.writing);
+  StoredSceneRow row;
+  const auto update = [&](Connection& connection) LOCUS_REQUIRES(scene.writing) -> absl::Status {
+    RETURN_IF_ERROR(guard(connection, scene));
+    connection.add("SELECT " LOCUS_SCENE_COLUMNS " FROM locus.scene s WHERE s.key = $1::bigint FOR UPDATE",
+                   Parameters().number(key));
+    RETURN_IF_ERROR(connection.run(answer_deadline()));
+    ASSIGN_OR_RETURN(row, scene_row(connection.results()[0], 0));
+    change(row);
+    return send_row(connection, row);
+  };
+  const auto was_done = [&](Connection& connection) -> absl::StatusOr<bool> {
+    connection.add("SELECT checksum FROM locus.scene WHERE key = $1::bigint FOR UPDATE", Parameters().number(key));
+    add_barrier(connection);
+    RETURN_IF_ERROR(connection.run(answer_deadline()));
+    const Rows& found = connection.results()[0];
+    return !found.empty() && found.number(0, 0) == checksum_of(row);
+  };
+  RETURN_IF_ERROR(transact(update, was_done));
+  scene.epoch = row.epoch;
+  return absl::OkStatus();
+}
+
+absl::Status PostgresLog::restart_scene(SceneKey key, uint64_t epoch) {
+  return change_row(key, [epoch](StoredSceneRow& row) { row.epoch = epoch; });
+}
+
+absl::Status PostgresLog::set_scene_spec(SceneKey key, absl::string_view spec) {
+  return change_row(key, [spec](StoredSceneRow& row) { row.spec = std::string(spec); });
+}
+
+absl::Status PostgresLog::write_snapshot(SceneKey key, uint64_t sequence, ChunkSource state) {
+  ASSIGN_OR_RETURN(const LedPtr led_scene, led(key));
+  Led& scene = *led_scene;
+  const uint64_t id = random_id();
+  const auto write = [&](Connection& connection) -> absl::Status {
+    connection.add("SELECT " LOCUS_SCENE_COLUMNS " FROM locus.scene s WHERE s.key = $1::bigint",
+                   Parameters().number(key));
+    RETURN_IF_ERROR(connection.run(answer_deadline()));
+    if (connection.results()[0].empty()) return scene_not_stored(key);
+    ASSIGN_OR_RETURN(StoredSceneRow row, scene_row(connection.results()[0], 0));
+    if (sequence < row.snapshot_sequence || sequence > scene.known_last)
+      return refuse_snapshot_at(sequence, row.snapshot_sequence, scene.known_last);
+    const uint64_t replaced = row.snapshot;
+    ASSIGN_OR_RETURN(row.chunks, send_chunks(connection, kSnapshotChunkSql, key, id, state));
+    // Appends wait from here on.
+    MutexLock writing(scene.writing);
+    RETURN_IF_ERROR(guard(connection, scene));
+    connection.add(
+        "SELECT s.snapshot, r.chain FROM locus.scene s LEFT JOIN locus.record r ON r.scene = s.key"
+        " AND r.sequence = $2::bigint WHERE s.key = $1::bigint",
+        Parameters().number(key).number(sequence));
+    RETURN_IF_ERROR(connection.run(answer_deadline()));
+    const Rows& found = connection.results()[0];
+    if (found.empty()) return scene_not_stored(key);
+    if (found.number(0, 0) != replaced)
+      return absl::AbortedError(
+          absl::StrCat("another snapshot of scene '", row.name, "' was written at the same time"));
+    if (sequence != row.snapshot_sequence) {
+      if (found.is_null(0, 1)) return damaged("scene", row.name, absl::StrCat("record ", sequence, " is missing"));
+      row.snapshot_chain = found.number(0, 1);
+    }
+    row.snapshot = id;
+    row.snapshot_sequence = sequence;
+    connection.add("DELETE FROM locus.snapshot_chunk WHERE scene = $1::bigint AND snapshot = $2::bigint",
+                   Parameters().number(key).number(replaced));
+    connection.add("DELETE FROM locus.record WHERE scene = $1::bigint AND sequence <= $2::bigint",
+                   Parameters().number(key).number(sequence));
+    return send_row(connection, row);
+  };
+  return transact(write, [&](Connection& connection) -> absl::StatusOr<bool> {
+    connection.add("SELECT snapshot FROM locus.scene WHERE key = $1::bigint FOR UPDATE", Parameters().number(key));
+    add_barrier(connection);
+    RETURN_IF_ERROR(connection.run(answer_deadline()));
+    const Rows& found = connection.results()[0];
+    return !found.empty() && found.number(0, 0) == id;
+  });
+}
+
+absl::Status PostgresLog::read_snapshot(SceneKey key, ChunkSink sink) const {
+  ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, acquire(changing_, change_deadline()));
+  lease->add("BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY");
+  lease->add("SELECT " LOCUS_SCENE_COLUMNS " FROM locus.scene s WHERE s.key = $1::bigint", Parameters().number(key));
+  RETURN_IF_ERROR(lease->run(answer_deadline()));
+  if (lease->results()[1].empty()) return scene_not_stored(key);
+  ASSIGN_OR_RETURN(const StoredSceneRow row, scene_row(lease->results()[1], 0));
+  RETURN_IF_ERROR(read_chunks(*lease,
+                              "SELECT number, checksum, bytes FROM locus.snapshot_chunk"
+                              " WHERE scene = $1::bigint AND snapshot = $2::bigint ORDER BY number",
+                              Parameters().number(key).number(row.snapshot), row.snapshot, row.chunks, "scene",
+                              row.name, sink));
+  return lease->run("COMMIT", answer_deadline());
+}
+
+absl::Status PostgresLog::back_up(const std::string&) {
+  return absl::FailedPreconditionError(
+      "scenes in an engine are backed up with the engine's own programs: use pg_basebackup or pg_dump");
+}
+
+}  // namespace locus::server
