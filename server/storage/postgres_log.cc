@@ -13,8 +13,6 @@
 namespace locus::server {
 namespace {
 
-constexpr size_t kAppendConnections = 2;
-constexpr size_t kChangeConnections = 2;
 constexpr auto kBackoff = std::chrono::milliseconds(50);  // pause between two attempts to reach the engine
 
 // A parameter of PostgreSQL is at most 1 GiB long, and the engine needs several times the memory of a statement.
@@ -59,17 +57,13 @@ absl::StatusOr<std::unique_ptr<PostgresLog>> PostgresLog::open(const PostgresOpt
 
 PostgresLog::PostgresLog(const PostgresOptions& options, EngineAddress address)
     : options_(options),
-      appending_(address, kAppendConnections, options.connect_wait,
-                 [replication = options.replication](Connection& connection, Deadline deadline) -> absl::Status {
-                   RETURN_IF_ERROR(check_engine(connection, replication, deadline));
-                   return connection.prepare(kAppendName, kAppendSql, deadline);
-                 }),
-      changing_(std::move(address), kChangeConnections, options.connect_wait,
-                [replication = options.replication](Connection& connection, Deadline deadline) -> absl::Status {
-                  RETURN_IF_ERROR(check_engine(connection, replication, deadline));
-                  return prepare_tables(connection, deadline);
-                }),
-      queue_(kAppendConnections, [this](absl::Span<Append* const> group) { commit_group(group); }) {}
+      pool_(std::move(address), options.connect_wait,
+            [replication = options.replication](Connection& connection, Deadline deadline) -> absl::Status {
+              RETURN_IF_ERROR(check_engine(connection, replication, deadline));
+              RETURN_IF_ERROR(prepare_tables(connection, deadline));
+              return connection.prepare(kAppendName, kAppendSql, deadline);
+            }),
+      queue_(ConnectionPool::kConnections, [this](absl::Span<Append* const> group) { commit_group(group); }) {}
 
 absl::StatusOr<PostgresLog::LedPtr> PostgresLog::led(SceneKey scene) const {
   MutexLock lock(mutex_);
@@ -78,11 +72,23 @@ absl::StatusOr<PostgresLog::LedPtr> PostgresLog::led(SceneKey scene) const {
   return found->second;
 }
 
-absl::StatusOr<ConnectionPool::Lease> PostgresLog::acquire(ConnectionPool& pool, Deadline deadline) {
+absl::StatusOr<ConnectionPool::Lease> PostgresLog::acquire(ConnectionPool::Use use, Deadline deadline) const {
   while (true) {
-    absl::StatusOr<ConnectionPool::Lease> lease = pool.acquire(deadline);
+    absl::StatusOr<ConnectionPool::Lease> lease = pool_.acquire(use, deadline);
     if (!absl::IsUnavailable(lease.status()) || std::chrono::steady_clock::now() + kBackoff >= deadline) return lease;
     std::this_thread::sleep_for(kBackoff);
+  }
+}
+
+absl::StatusOr<ConnectionPool::Lease> PostgresLog::begin_read() const {
+  const Deadline deadline = change_deadline();
+  while (true) {
+    ASSIGN_OR_RETURN(ConnectionPool::Lease lease, acquire(ConnectionPool::Use::kOther, deadline));
+    add_barrier(*lease);
+    absl::Status status = lease->run(std::min(deadline, answer_deadline()));
+    if (status.ok()) status = lease->run("BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY", answer_deadline());
+    if (status.ok()) return lease;
+    if (!lease->lost() || std::chrono::steady_clock::now() + kBackoff >= deadline) return status;
   }
 }
 
@@ -170,10 +176,17 @@ void PostgresLog::commit_group(absl::Span<Append* const> group) const {
 absl::Status PostgresLog::send_appends(absl::Span<Append* const> appends, Deadline deadline) const {
   std::vector<Append*> open;  // appends whose outcome must be found out
   {
-    ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, acquire(appending_, deadline));
+    ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, acquire(ConnectionPool::Use::kAppend, deadline));
     for (const Append* const append : appends) lease->add_prepared(kAppendName, append_parameters(*append));
-    const absl::Status status = lease->run(std::min(deadline, answer_deadline()));
+    // An operator may switch synchronous replication off at any time, which the engine does not report.
+    const bool check = lease->due_for_check();
+    if (check) add_engine_settings(*lease);
+    absl::Status status = lease->run(std::min(deadline, answer_deadline()));
     if (!status.ok() && !lease->lost()) return status;
+    if (status.ok() && check) {
+      status = check_engine_settings(lease->results().back(), options_.replication);
+      if (!status.ok()) lease->drop();  // the next connection is refused with the same reason
+    }
     for (size_t i = 0; i < appends.size(); ++i) {
       if (status.ok() && lease->results()[i].changed() == appends[i]->entries.size()) {
         appends[i]->outcome = Append::Outcome::kWritten;
@@ -195,7 +208,7 @@ absl::Status PostgresLog::resolve(absl::Span<Append* const> appends, Deadline de
   std::vector<uint64_t> keys;
   for (const Append* const append : appends) keys.push_back(append->scene);
   while (true) {
-    ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, acquire(appending_, deadline));
+    ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, acquire(ConnectionPool::Use::kAppend, deadline));
     // The lock waits for a transaction of the lost connection that still waits for the standbys, and the commit of this
     // transaction waits for them too. A plain read would show what no standby has.
     lease->add(
@@ -266,16 +279,15 @@ absl::StatusOr<uint64_t> PostgresLog::latest(SceneKey scene) const {
 }
 
 absl::Status PostgresLog::read(SceneKey key, uint64_t from, RecordSink sink) const {
-  ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, acquire(changing_, change_deadline()));
+  // One transaction for both statements: a snapshot of the scene that is written meanwhile deletes records.
+  ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, begin_read());
   Connection& connection = *lease;
-  // One snapshot for both statements: a snapshot of the scene written meanwhile may delete the records.
-  connection.add("BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY");
   connection.add("SELECT " LOCUS_SCENE_COLUMNS
                  ", l.last, l.chain, r.chain FROM locus.scene s JOIN locus.scene_log l ON l.scene = s.key"
                  " LEFT JOIN locus.record r ON r.scene = s.key AND r.sequence = $2::bigint WHERE s.key = $1::bigint",
                  Parameters().number(key).number(from - 1));
   RETURN_IF_ERROR(connection.run(answer_deadline()));
-  const Rows& found = connection.results()[1];
+  const Rows& found = connection.results()[0];
   if (found.empty()) return scene_not_stored(key);
   ASSIGN_OR_RETURN(const StoredSceneRow row, scene_row(found, 0));
   const uint64_t last = found.number(0, kSceneColumns);

@@ -127,7 +127,10 @@ class PostgresLog final : public UpdateLog {
   void lead(const StoredScene& scene, uint64_t token, uint64_t chain) LOCUS_EXCLUDES(mutex_);
 
   // Returns a connection; tries again while the engine is away, until the deadline.
-  static absl::StatusOr<ConnectionPool::Lease> acquire(ConnectionPool& pool, Deadline deadline);
+  absl::StatusOr<ConnectionPool::Lease> acquire(ConnectionPool::Use use, Deadline deadline) const;
+  // Returns a connection in a transaction that reads one state of all tables. Tries hosts until one has committed a
+  // barrier, so that the state is not older than this call.
+  absl::StatusOr<ConnectionPool::Lease> begin_read() const;
   Deadline answer_deadline() const { return std::chrono::steady_clock::now() + options_.answer_wait; }
   Deadline change_deadline() const { return std::chrono::steady_clock::now() + options_.append_wait; }
 
@@ -160,8 +163,7 @@ class PostgresLog final : public UpdateLog {
                            ChunkSink sink) const;
 
   const PostgresOptions options_;
-  mutable ConnectionPool appending_;  // connections for appends
-  mutable ConnectionPool changing_;   // connections for everything else, which may take long
+  mutable ConnectionPool pool_;
   AppendQueue queue_;
   std::vector<StoredScene> stored_scenes_;
   std::vector<StoredMesh> stored_meshes_;

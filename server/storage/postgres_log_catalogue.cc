@@ -46,10 +46,10 @@ StoredScene stored_scene(const Rows& rows, size_t row) {
 }  // namespace
 
 absl::Status PostgresLog::list_stored() {
-  ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, acquire(changing_, change_deadline()));
+  ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, begin_read());
   lease->add(LOCUS_STORED_SCENES "ORDER BY s.name COLLATE \"C\"");
   lease->add("SELECT " LOCUS_MESH_COLUMNS " FROM locus.mesh m ORDER BY m.name COLLATE \"C\"");
-  add_barrier(*lease);
+  lease->add("COMMIT");
   RETURN_IF_ERROR(lease->run(change_deadline()));
   const Rows& scenes = lease->results()[0];
   for (size_t row = 0; row < scenes.size(); ++row) stored_scenes_.push_back(stored_scene(scenes, row));
@@ -70,7 +70,7 @@ absl::Status PostgresLog::transact(Change change, WasDone was_done) const {
   const Deadline deadline = change_deadline();
   absl::Status status;
   while (true) {
-    ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, acquire(changing_, deadline));
+    ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, acquire(ConnectionPool::Use::kOther, deadline));
     // A connection that was idle may have been closed by the engine, which shows only now.
     status = lease->run("BEGIN", std::min(deadline, answer_deadline()));
     if (!status.ok() && std::chrono::steady_clock::now() + kBetweenAttempts < deadline) continue;
@@ -85,7 +85,7 @@ absl::Status PostgresLog::transact(Change change, WasDone was_done) const {
   }
   while (std::chrono::steady_clock::now() + kBetweenAttempts < deadline) {
     std::this_thread::sleep_for(kBetweenAttempts);
-    absl::StatusOr<ConnectionPool::Lease> lease = acquire(changing_, deadline);
+    absl::StatusOr<ConnectionPool::Lease> lease = acquire(ConnectionPool::Use::kOther, deadline);
     if (!lease.ok()) break;
     const absl::StatusOr<bool> done = was_done(**lease);
     if (!done.ok()) continue;
@@ -106,9 +106,9 @@ absl::Status PostgresLog::guard(Connection& connection, Led& led) const {
 }
 
 absl::StatusOr<PostgresLog::Leader> PostgresLog::leader_of(SceneKey scene) const {
-  ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, acquire(changing_, change_deadline()));
+  ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, begin_read());
   lease->add("SELECT leader, token FROM locus.scene_log WHERE scene = $1::bigint", Parameters().number(scene));
-  add_barrier(*lease);
+  lease->add("COMMIT");
   RETURN_IF_ERROR(lease->run(answer_deadline()));
   const Rows& found = lease->results()[0];
   if (found.empty()) return scene_not_stored(scene);
@@ -118,13 +118,14 @@ absl::StatusOr<PostgresLog::Leader> PostgresLog::leader_of(SceneKey scene) const
 absl::StatusOr<StoredScene> PostgresLog::take_over(SceneKey scene, uint64_t token) {
   const auto take = [&](Connection& connection) -> absl::Status {
     connection.add(
-        "UPDATE locus.scene_log SET leader = $3::text, token = token + 1 WHERE scene = $1::bigint AND token = "
-        "$2::bigint",
+        "UPDATE locus.scene_log SET leader = $3::text, token = token + 1"
+        " WHERE scene = $1::bigint AND token = $2::bigint",
         Parameters().number(scene).number(token).text(options_.member));
+    connection.add("SELECT scene FROM locus.scene_log WHERE scene = $1::bigint", Parameters().number(scene));
     RETURN_IF_ERROR(connection.run(answer_deadline()));
-    return connection.results()[0].changed() == 1
-               ? absl::OkStatus()
-               : absl::AbortedError(absl::StrCat("scene ", scene, " was deleted, or another daemon leads it"));
+    if (connection.results()[1].empty()) return scene_not_stored(scene);
+    if (connection.results()[0].changed() == 1) return absl::OkStatus();
+    return absl::AbortedError(absl::StrCat("scene ", scene, " has another leader already"));
   };
   // Also finds a takeover of an earlier call whose outcome was unknown.
   const auto taken = [&](Connection& connection) -> absl::StatusOr<bool> {
@@ -136,13 +137,15 @@ absl::StatusOr<StoredScene> PostgresLog::take_over(SceneKey scene, uint64_t toke
     return !found.empty() && found.bytes(0, 0) == options_.member && found.number(0, 1) == token + 1;
   };
   absl::Status status = transact(take, taken);
-  ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, acquire(changing_, change_deadline()));
   if (absl::IsAborted(status)) {
+    ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, acquire(ConnectionPool::Use::kOther, change_deadline()));
     ASSIGN_OR_RETURN(const bool was_taken, taken(*lease));
     if (was_taken) status = absl::OkStatus();
   }
   RETURN_IF_ERROR(status);
+  ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, begin_read());
   lease->add(LOCUS_STORED_SCENES "WHERE s.key = $1::bigint", Parameters().number(scene));
+  lease->add("COMMIT");
   RETURN_IF_ERROR(lease->run(change_deadline()));
   const Rows& found = lease->results()[0];
   if (found.empty()) return scene_not_stored(scene);
@@ -372,12 +375,11 @@ absl::Status PostgresLog::write_snapshot(SceneKey key, uint64_t sequence, ChunkS
 }
 
 absl::Status PostgresLog::read_snapshot(SceneKey key, ChunkSink sink) const {
-  ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, acquire(changing_, change_deadline()));
-  lease->add("BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY");
+  ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, begin_read());
   lease->add("SELECT " LOCUS_SCENE_COLUMNS " FROM locus.scene s WHERE s.key = $1::bigint", Parameters().number(key));
   RETURN_IF_ERROR(lease->run(answer_deadline()));
-  if (lease->results()[1].empty()) return scene_not_stored(key);
-  ASSIGN_OR_RETURN(const StoredSceneRow row, scene_row(lease->results()[1], 0));
+  if (lease->results()[0].empty()) return scene_not_stored(key);
+  ASSIGN_OR_RETURN(const StoredSceneRow row, scene_row(lease->results()[0], 0));
   RETURN_IF_ERROR(read_chunks(*lease,
                               "SELECT number, checksum, bytes FROM locus.snapshot_chunk"
                               " WHERE scene = $1::bigint AND snapshot = $2::bigint ORDER BY number",

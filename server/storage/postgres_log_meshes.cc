@@ -159,12 +159,11 @@ absl::Status PostgresLog::set_mesh_graces(absl::Span<const std::string> names, u
 }
 
 absl::Status PostgresLog::read_mesh(const Sha256& sha256, ChunkSink sink) const {
-  ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, acquire(changing_, change_deadline()));
-  lease->add("BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY");
+  ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, begin_read());
   lease->add("SELECT content, chunks, chunk_bytes, digest FROM locus.mesh_content WHERE sha256 = $1::bytea",
              Parameters().bytes(view_of(sha256)));
   RETURN_IF_ERROR(lease->run(answer_deadline()));
-  const Rows& found = lease->results()[1];
+  const Rows& found = lease->results()[0];
   if (found.empty()) return not_stored("the log has no mesh of this content");
   const uint64_t content = found.number(0, 0);
   const ChunkList list = {found.number(0, 1), found.number(0, 2), found.number(0, 3)};
@@ -179,12 +178,11 @@ absl::Status PostgresLog::read_mesh(const Sha256& sha256, ChunkSink sink) const 
 }
 
 absl::Status PostgresLog::read_parts(absl::string_view name, ChunkSink sink) const {
-  ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, acquire(changing_, change_deadline()));
-  lease->add("BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY");
+  ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, begin_read());
   lease->add("SELECT " LOCUS_MESH_COLUMNS " FROM locus.mesh m WHERE m.name = $1::text", Parameters().text(name));
   RETURN_IF_ERROR(lease->run(answer_deadline()));
-  if (lease->results()[1].empty()) return mesh_not_stored(name);
-  ASSIGN_OR_RETURN(const StoredMeshRow row, mesh_row(lease->results()[1], 0));
+  if (lease->results()[0].empty()) return mesh_not_stored(name);
+  ASSIGN_OR_RETURN(const StoredMeshRow row, mesh_row(lease->results()[0], 0));
   RETURN_IF_ERROR(read_chunks(*lease, kReadMeshChunksSql, Parameters().number(row.content), row.content, row.chunks,
                               "mesh", name, sink));
   return lease->run("COMMIT", answer_deadline());

@@ -85,6 +85,17 @@ class Connection {
 
   // Returns whether the outcome of the last run() is unknown; the connection is then no longer usable.
   bool lost() const { return lost_; }
+  // Makes the connection unusable, although no answer is missing.
+  void drop() { broken_ = true; }
+
+  // Returns whether the engine's settings should be checked again, once a second.
+  bool due_for_check() {
+    const Deadline now = std::chrono::steady_clock::now();
+    if (now < check_at_) return false;
+    check_at_ = now + std::chrono::seconds(1);
+    return true;
+  }
+
   // Returns whether the connection may be used for another transaction. A connection with an open transaction may not:
   // when it is closed, the engine undoes the transaction.
   bool in_transaction() const {
@@ -118,6 +129,7 @@ class Connection {
   absl::Status add_error_;  // error of the first statement that could not be added
   std::string warning_;     // first warning of the engine during the current run(); empty if there was none
   std::vector<Rows> results_;
+  Deadline check_at_ = {};
   bool lost_ = false;
   bool broken_ = false;
 };

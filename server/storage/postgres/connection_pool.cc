@@ -7,25 +7,25 @@
 
 namespace locus::server {
 
-absl::StatusOr<ConnectionPool::Lease> ConnectionPool::acquire(Deadline deadline) {
+absl::StatusOr<ConnectionPool::Lease> ConnectionPool::acquire(Use use, Deadline deadline) {
   {
     MutexLock lock(mutex_);
-    while (in_use_ >= capacity_) {
-      if (!returned_.wait_until(mutex_, deadline) && in_use_ >= capacity_)
-        return absl::UnavailableError(absl::StrCat("all ", capacity_, " connections to the engine are in use"));
+    while (in_use(use) >= kConnections) {
+      if (!returned_.wait_until(mutex_, deadline) && in_use(use) >= kConnections)
+        return absl::UnavailableError(absl::StrCat("all ", kConnections, " connections to the engine are in use"));
     }
-    ++in_use_;
+    ++in_use(use);
     if (!idle_.empty()) {
       std::unique_ptr<Connection> connection = std::move(idle_.back());
       idle_.pop_back();
-      return Lease(*this, std::move(connection));
+      return Lease(*this, use, std::move(connection));
     }
   }
   absl::StatusOr<std::unique_ptr<Connection>> connection = connect(deadline);
-  if (connection.ok()) return Lease(*this, *std::move(connection));
+  if (connection.ok()) return Lease(*this, use, *std::move(connection));
   MutexLock lock(mutex_);
-  --in_use_;
-  returned_.notify_one();
+  --in_use(use);
+  returned_.notify_all();
   return connection.status();
 }
 
@@ -54,10 +54,10 @@ absl::StatusOr<std::unique_ptr<Connection>> ConnectionPool::connect(Deadline dea
   return absl::UnavailableError(absl::StrCat("no host of the engine accepts writes: ", absl::StrJoin(reasons, "; ")));
 }
 
-void ConnectionPool::give_back(std::unique_ptr<Connection> connection) {
+void ConnectionPool::give_back(Use use, std::unique_ptr<Connection> connection) {
   std::vector<std::unique_ptr<Connection>> closed;  // closed without the lock
   MutexLock lock(mutex_);
-  --in_use_;
+  --in_use(use);
   if (connection->lost() && connection->host() == host_) {
     host_ = (host_ + 1) % address_.host_count();
     closed.swap(idle_);
@@ -67,7 +67,7 @@ void ConnectionPool::give_back(std::unique_ptr<Connection> connection) {
   } else {
     closed.push_back(std::move(connection));
   }
-  returned_.notify_one();
+  returned_.notify_all();
 }
 
 std::string ConnectionPool::host_name() const {

@@ -45,12 +45,19 @@ absl::Status refuse_engine(absl::string_view why) { return absl::FailedPrecondit
 
 }  // namespace
 
-absl::Status check_engine(Connection& connection, EngineReplication replication, Deadline deadline) {
+void add_engine_settings(Connection& connection) {
   connection.add(
       "SELECT current_setting('fsync'), current_setting('full_page_writes'), current_setting('synchronous_commit'),"
       " current_setting('synchronous_standby_names'), current_setting('server_encoding')");
+}
+
+absl::Status check_engine(Connection& connection, EngineReplication replication, Deadline deadline) {
+  add_engine_settings(connection);
   RETURN_IF_ERROR(connection.run(deadline));
-  const Rows& found = connection.results()[0];
+  return check_engine_settings(connection.results()[0], replication);
+}
+
+absl::Status check_engine_settings(const Rows& found, EngineReplication replication) {
   const absl::string_view fsync = found.bytes(0, 0), pages = found.bytes(0, 1), commit = found.bytes(0, 2),
                           standbys = found.bytes(0, 3), encoding = found.bytes(0, 4);
   if (fsync != "on")
@@ -93,6 +100,6 @@ absl::Status prepare_tables(Connection& connection, Deadline deadline) {
   return status.ok() ? absl::UnavailableError("the engine's tables were created and deleted again") : status;
 }
 
-void add_barrier(Connection& connection) { connection.add("UPDATE locus.format SET number = number"); }
+void add_barrier(Connection& connection) { connection.add("SELECT number FROM locus.format FOR KEY SHARE"); }
 
 }  // namespace locus::server
