@@ -19,15 +19,6 @@ constexpr auto kBackoff = std::chrono::milliseconds(50);  // pause between two a
 constexpr uint64_t kMaxAppendBytes = uint64_t{256} << 20;
 
 constexpr const char* kAppendName = "append";
-// Appends one scene's records if this daemon still leads the scene and no record is missing. Inserts no row otherwise.
-constexpr const char* kAppendSql =
-    "WITH moved AS (UPDATE locus.scene_log SET last = $4::bigint, chain = $5::bigint"
-    " WHERE scene = $1::bigint AND token = $2::bigint AND last = $3::bigint RETURNING scene)"
-    " INSERT INTO locus.record (scene, sequence, epoch, writer, batch, chain, bytes)"
-    " SELECT moved.scene, $3::bigint + added.number, $6::bigint, added.writer, added.batch, added.chain, added.bytes"
-    " FROM moved, ROWS FROM (unnest($7::bigint[]), unnest($8::bigint[]), unnest($9::bigint[]), unnest($10::bytea[]))"
-    " WITH ORDINALITY AS added (writer, batch, chain, bytes, number)";
-
 Parameters append_parameters(const Append& append) {
   std::vector<uint64_t> writers, batches;
   std::vector<absl::string_view> bytes;
@@ -61,7 +52,7 @@ PostgresLog::PostgresLog(const PostgresOptions& options, EngineAddress address)
             [replication = options.replication](Connection& connection, Deadline deadline) -> absl::Status {
               RETURN_IF_ERROR(check_engine(connection, replication, deadline));
               RETURN_IF_ERROR(prepare_tables(connection, deadline));
-              return connection.prepare(kAppendName, kAppendSql, deadline);
+              return connection.prepare(kAppendName, kAppendStatement, deadline);
             }),
       queue_(ConnectionPool::kConnections, [this](absl::Span<Append* const> group) { commit_group(group); }) {}
 

@@ -53,6 +53,9 @@ SERVING |= {(f"tls/{case}", "plain") for case in ("8192", "16", "handshake", "mu
 LOG = {(f"commit/{size}", peer) for size in (16, 256, 4096) for peer in ("append", "overwrite")}
 LOG |= {(f"writers/8/{size}", "one_writer") for size in (16, 256, 4096)}
 LOG |= {("mesh/2M", "built")}
+CLUSTER = {(f"append/{scenes}/{moves}", "bare") for scenes in (1, 8) for moves in (16, 256, 4096)}
+CLUSTER |= {("scenes/128/16", "8_scenes"), ("quorum/256", "local_disk")}
+HAS_POSTGRES = os.access("/usr/lib/postgresql/15/bin/initdb", os.X_OK)
 REDIS = {("moves/10k", "redis"), ("ball/10k", "redis")}
 HAS_REDIS = any(shutil.which(name) for name in ("redis-server", "redis-check-rdb"))
 CHANGEABLE_STRUCTURES = {"hash_grid", "grid", "grid_morton", "kd_tree", "kd_tree_at_node", "octree", "octree_at_node",
@@ -294,6 +297,19 @@ class LogTest(SuiteRun, unittest.TestCase):
 
     def test_the_required_ratio_is_noted_beside_the_measured_one(self):
         self.assertRegex(self.answer.stdout, r"note: commit/256 beside append: .* required 0\.800")
+
+
+@unittest.skipUnless(HAS_POSTGRES, "PostgreSQL 15 is not installed: deploy/packages.sh test installs it")
+class ClusterTest(SuiteRun, unittest.TestCase):
+    SUITE = "cluster"
+
+    def expected(self):
+        return CLUSTER
+
+    def test_the_required_ratios_are_noted_beside_the_measured_ones(self):
+        for case, peer, bar in (("append/8/256", "bare", "0.800"), ("scenes/128/16", "8_scenes", "2.000"),
+                                ("quorum/256", "local_disk", "0.700")):
+            self.assertRegex(self.answer.stdout, rf"note: {case} beside {peer}: .* required {bar}")
 
 
 class TuningTest(SuiteRun, unittest.TestCase):

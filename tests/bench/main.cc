@@ -14,6 +14,7 @@
 #include "absl/strings/str_join.h"
 #include "core/base/progress_writer.h"
 #include "core/base/status_macros.h"
+#include "tests/bench/cluster/cluster_suite.h"
 #include "tests/bench/dynamic/dynamic_suite.h"
 #include "tests/bench/frame/race.h"
 #include "tests/bench/frame/report.h"
@@ -42,6 +43,8 @@ std::vector<Suite> suites() {
        queries::run_queries_suite},
       {"serving", "a server and its client on the loopback, compared with work in process, plain sockets and Redis",
        serving::run_serving_suite},
+      {"cluster", "appends to a replicated PostgreSQL, compared with a program that only appends",
+       cluster::run_cluster_suite},
       {"structures", "every structure of the index on the same boxes, compared with a list",
        structures::run_structures_suite},
       {"tuning", "the cell size that locus tune names, compared with the best of a sweep over all sizes",

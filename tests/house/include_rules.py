@@ -95,7 +95,7 @@ THIRD_PARTY = {
     "zlib.h": ["server/rpc"],
     "prometheus/": ["server/observability"],
     "rocksdb/": ["server/storage"],
-    "libpq-fe.h": ["server/storage"],
+    "libpq-fe.h": ["server/storage", "tests/bench"],
     "xxhash.h": ["server/storage"],
     "curl/": ["client/cli/extras/top"],
     "CLI/": ["server/config", "client/cli", "deploy/manual"],

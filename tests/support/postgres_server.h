@@ -61,7 +61,7 @@ class PostgresServer {
     Settings arguments = {"-D", data(),
                           "-k", folder_.path(),
                           "-c", "listen_addresses=",
-                          "-c", "max_connections=40",
+                          "-c", "max_connections=200",
                           "-c", "shared_buffers=16MB"};
     for (const std::string& setting : settings_) arguments.insert(arguments.end(), {"-c", setting});
     process_ = as_postgres("postgres", arguments, "log");

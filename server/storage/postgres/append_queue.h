@@ -40,6 +40,17 @@ struct Append {
   bool done = false;
 };
 
+// Statement that appends one scene's records if this daemon still leads the scene and no record is missing; inserts no
+// row otherwise. Parameters: scene, token, last sequence number before and after the append, running checksum after it,
+// epoch; arrays of writers, batch numbers, running checksums and bytes.
+inline constexpr const char* kAppendStatement =
+    "WITH moved AS (UPDATE locus.scene_log SET last = $4::bigint, chain = $5::bigint"
+    " WHERE scene = $1::bigint AND token = $2::bigint AND last = $3::bigint RETURNING scene)"
+    " INSERT INTO locus.record (scene, sequence, epoch, writer, batch, chain, bytes)"
+    " SELECT moved.scene, $3::bigint + added.number, $6::bigint, added.writer, added.batch, added.chain, added.bytes"
+    " FROM moved, ROWS FROM (unnest($7::bigint[]), unnest($8::bigint[]), unnest($9::bigint[]), unnest($10::bytea[]))"
+    " WITH ORDINALITY AS added (writer, batch, chain, bytes, number)";
+
 class AppendQueue {
  public:
   // Function that commits the appends of one group and sets the outcome of each.

@@ -8,21 +8,19 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
-#include "core/scene/log/record_codec.h"
 #include "server/storage/rocksdb_log.h"
-#include "tests/bench/dynamic/world.h"
 #include "tests/bench/frame/bar.h"
 #include "tests/bench/frame/race.h"
 #include "tests/bench/frame/statistics.h"
 #include "tests/bench/frame/temporary_folder.h"
 #include "tests/bench/log/log_run.h"
 #include "tests/bench/log/mesh_case.h"
+#include "tests/bench/log/move_records.h"
 #include "tests/bench/log/raw_file.h"
 
 namespace locus::bench::log {
 namespace {
 
-constexpr uint32_t kObjects = 100'000;
 constexpr uint64_t kEpoch = 1;
 constexpr size_t kWriters = 8;
 
@@ -37,27 +35,6 @@ size_t commits_of(const LogRun& run, const Size& size) { return run.options.quic
 // Returns the number of commits in all rounds, including the warm-up round.
 size_t commits_of_all(const LogRun& run, const Size& size) {
   return commits_of(run, size) * run.chunks() * static_cast<size_t>(run.options.rounds + 1);
-}
-
-// Returns `count` records in the format of a scene's log, each with `moves` moves of objects.
-std::vector<std::string> records_of(size_t moves, size_t count) {
-  dynamic::World world(dynamic::Kind::kUniform, kObjects);
-  std::vector<std::string> records(count);
-  size_t first = kObjects;
-  for (std::string& record : records) {
-    if (first + moves > kObjects) {
-      world.step();
-      first = 0;
-    }
-    MoveColumns columns;
-    columns.ids = world.moves().ids.subspan(first, moves);
-    columns.positions = world.moves().positions.subspan(3 * first, 3 * moves);
-    UpdateBatch batch;
-    batch.moves.push_back(columns);
-    encode_batch(batch, record);
-    first += moves;
-  }
-  return records;
 }
 
 void hash_of(absl::string_view bytes, ResultsHash& hash) {
@@ -116,7 +93,7 @@ absl::Status measure_commits(const LogRun& run, const Size& size) {
   const std::string name = absl::StrCat("commit/", size.moves);
   if (!run.options.filter.wants(name)) return absl::OkStatus();
   run.progress(name);
-  const std::vector<std::string> records = records_of(size.moves, commits_of(run, size));
+  const std::vector<std::string> records = move_records(size.moves, commits_of(run, size));
   const TemporaryFolder folder;
   auto ours = OurLog::create(folder.file("data"), 1);
   if (!ours.ok()) return ours.status();
@@ -165,7 +142,7 @@ absl::Status measure_writers(const LogRun& run, const Size& size) {
   if (!run.options.filter.wants(name)) return absl::OkStatus();
   run.progress(name);
   const std::vector<std::string> records =
-      records_of(size.moves, std::max<size_t>(1, commits_of(run, size) / kWriters));
+      move_records(size.moves, std::max<size_t>(1, commits_of(run, size) / kWriters));
   const TemporaryFolder folder;
   auto ours = OurLog::create(folder.file("data"), kWriters + 1);
   if (!ours.ok()) return ours.status();
