@@ -35,9 +35,11 @@ python_packages="python3 python3-grpcio python3-protobuf"
 # Purposes: ccache speeds up later builds; binutils provides nm for tests/house; prometheus-client and yaml read the
 # metrics, alerts and dashboards; zsh and fish run the completions; groff and mandoc format the manual; tests run
 # haproxy as a plain proxy and as the reverse proxy of deploy/edge; tests/attack uses python3-h2 for HTTP/2 and openssl
-# for certificates; the test of deploy/security connects two namespaces with iproute2.
+# for certificates; the test of deploy/security connects two namespaces with iproute2; tests/cluster starts three nodes of
+# postgresql-15 and writes to them by python3-psycopg2.
 test_packages="libgtest-dev libgmock-dev ccache clang-format git python3 binutils python3-numpy
-  python3-prometheus-client python3-yaml python3-h2 openssl zsh fish mandoc groff-base haproxy iproute2"
+  python3-prometheus-client python3-yaml python3-h2 openssl zsh fish mandoc groff-base haproxy iproute2
+  postgresql-15 python3-psycopg2"
 # redis-tools also contains the server, but unlike redis-server it starts no service; gnuplot draws the pictures of --plot.
 bench_packages="libembree-dev libbullet-dev libcgal-dev libnanoflann-dev redis-tools gnuplot-nox"
 # The compiler of the asan preset, and the libraries of its sanitizers.
@@ -120,4 +122,16 @@ else
 fi
 echo "packages.sh: installing$missing"
 $as_root env DEBIAN_FRONTEND=noninteractive apt-get update -q </dev/null
+# Debian's postgresql-15 makes and starts a database at its first installation, unless a file of createcluster.d
+# (pg_createcluster(1)) forbids it. The tests need the programs only. The file is removed again, so that it does not concern
+# databases that the user installs later.
+no_database=
+case " $missing " in
+  *" postgresql-15 "*)
+    no_database=/etc/postgresql-common/createcluster.d/locus-tests.conf
+    $as_root mkdir -p "${no_database%/*}"
+    echo "create_main_cluster = false" | $as_root tee "$no_database" >/dev/null
+    trap '$as_root rm -f "$no_database"' EXIT
+    ;;
+esac
 $as_root env DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends $missing </dev/null
