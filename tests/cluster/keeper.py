@@ -1,0 +1,211 @@
+"""Process that relays TCP connections of a test, which can be cut or hung, and that ends what the test started.
+
+    python3 keeper.py LIFE_SECONDS
+
+The test starts it as a child (class Keeper) and sends it commands as lines of JSON; each is answered by a line. When its
+input ends, because the test ended in whatever way, also by SIGKILL, or when its life is over, it ends the guarded processes
+and removes the guarded folders. So nothing that a test started outlives the test.
+
+States of a link: `open` forwards all bytes; `cut` resets connections, also new ones, as a refusing firewall does; `hung` keeps
+and accepts connections but forwards nothing, as a machine does that is frozen or behind a broken cable. What a hung link
+accepted is forwarded when it is open again.
+"""
+import asyncio
+import json
+import os
+import shutil
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import threading
+import time
+
+OPEN, CUT, HUNG = "open", "cut", "hung"
+CHUNK = 1 << 16
+STOP_SECONDS = 5
+ANSWER_SECONDS = 30
+RESET = struct.pack("ii", 1, 0)  # SO_LINGER that makes close() reset the connection
+
+
+def started_at(pid):
+    """Returns when a process was started, in clock ticks since boot, or None if there is none. With the id it identifies
+    a process, since ids are used again.
+    """
+    try:
+        with open(f"/proc/{pid}/stat", encoding="utf-8", errors="replace") as file:
+            fields = file.read().rpartition(")")[2].split()
+    except OSError:
+        return None
+    return None if fields[0] == "Z" else int(fields[19])
+
+
+class Link:
+    """A listening port whose connections are forwarded to another port of this machine."""
+
+    def __init__(self, target):
+        self.target, self.state = target, OPEN
+        self.writers, self.passable = set(), asyncio.Event()
+        self.passable.set()
+        self.server = None
+
+    async def listen(self):
+        self.server = await asyncio.start_server(self.serve, "127.0.0.1", 0)
+        return self.server.sockets[0].getsockname()[1]
+
+    def set(self, state):
+        self.state = state
+        if state == HUNG:
+            self.passable.clear()
+        else:
+            self.passable.set()
+        if state == CUT:
+            for writer in list(self.writers):
+                self.reset(writer)
+
+    @staticmethod
+    def reset(writer):
+        sock = writer.get_extra_info("socket")
+        if sock is not None and sock.fileno() >= 0:
+            sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, RESET)
+        writer.transport.abort()
+
+    async def serve(self, reader, writer):
+        self.writers.add(writer)
+        forward = None
+        try:
+            await self.passable.wait()
+            if self.state == CUT:
+                return
+            back, forward = await asyncio.open_connection("127.0.0.1", self.target)
+            self.writers.add(forward)
+            for side in (writer, forward):
+                side.get_extra_info("socket").setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            await asyncio.gather(self.pump(reader, forward), self.pump(back, writer))
+        except OSError:
+            pass
+        finally:
+            for side in filter(None, (writer, forward)):
+                self.writers.discard(side)
+                self.reset(side)
+
+    async def pump(self, reader, writer):
+        while data := await reader.read(CHUNK):
+            await self.passable.wait()
+            if self.state == CUT:
+                raise ConnectionResetError
+            writer.write(data)
+            await writer.drain()
+        await self.passable.wait()
+        if writer.can_write_eof():
+            writer.write_eof()
+
+
+class Service:
+    """The keeper itself: links, and what to end."""
+
+    def __init__(self):
+        self.links, self.guarded, self.folders = {}, {}, []
+
+    async def execute(self, command):
+        """Runs one command. Returns its answer."""
+        what = command["do"]
+        if what == "link":
+            link = Link(command["target"])
+            self.links[command["name"]] = link
+            return {"port": await link.listen()}
+        if what == "set":
+            for name in command["names"]:
+                self.links[name].set(command["state"])
+        elif what == "guard":
+            self.guarded[command["pid"]] = started_at(command["pid"])
+        elif what == "release":
+            self.guarded.pop(command["pid"], None)
+        elif what == "folder":
+            self.folders.append(command["path"])
+        return {}
+
+    async def run(self, life_seconds):
+        reader = asyncio.StreamReader()
+        loop = asyncio.get_running_loop()
+        await loop.connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), sys.stdin)
+        until = time.monotonic() + life_seconds
+        while (left := until - time.monotonic()) > 0:
+            try:
+                line = await asyncio.wait_for(reader.readline(), left)
+            except asyncio.TimeoutError:
+                break
+            if not line:
+                break
+            try:
+                print(json.dumps(await self.execute(json.loads(line))), flush=True)
+            except BrokenPipeError:
+                break
+        self.end()
+
+    def end(self):
+        """Ends guarded processes: quickly but in order first, so that PostgreSQL frees its shared memory, then by force."""
+        alive = {pid: start for pid, start in self.guarded.items() if start is not None and started_at(pid) == start}
+        for number in (signal.SIGCONT, signal.SIGQUIT, signal.SIGKILL):
+            for pid, start in alive.items():
+                if started_at(pid) == start:
+                    os.kill(pid, number)
+            until = time.monotonic() + (STOP_SECONDS if number == signal.SIGQUIT else 0)
+            while time.monotonic() < until and any(started_at(pid) == start for pid, start in alive.items()):
+                time.sleep(0.02)
+        for folder in self.folders:
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+class Keeper:
+    """A running keeper, for the test that started it. Thread-safe."""
+
+    def __init__(self, life_seconds):
+        self._lock = threading.Lock()
+        self._process = subprocess.Popen([sys.executable, "-B", os.path.abspath(__file__), str(life_seconds)], text=True,
+                                         stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True)
+
+    def command(self, **command):
+        with self._lock:
+            self._process.stdin.write(json.dumps(command) + "\n")
+            self._process.stdin.flush()
+            line = self._process.stdout.readline()
+        if not line:
+            raise RuntimeError("the keeper has ended: the life of the test is over")
+        return json.loads(line)
+
+    def link(self, name, target):
+        """Makes a link to a port of this machine. Returns the port at which it listens."""
+        return self.command(do="link", name=name, target=target)["port"]
+
+    def set(self, names, state):
+        self.command(do="set", names=list(names), state=state)
+
+    def guard(self, pid):
+        """Has a process ended when the test ends."""
+        self.command(do="guard", pid=pid)
+
+    def release(self, pid):
+        """Forgets a process that has ended."""
+        self.command(do="release", pid=pid)
+
+    def guard_folder(self, path):
+        """Has a folder removed when the test ends."""
+        self.command(do="folder", path=path)
+
+    def close(self):
+        """Ends everything guarded, and the keeper."""
+        self._process.stdin.close()
+        try:
+            self._process.wait(timeout=ANSWER_SECONDS)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._process.stdout.close()
+
+
+if __name__ == "__main__":
+    for ignored in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):  # the test may be ended by one of them: end after it
+        signal.signal(ignored, signal.SIG_IGN)
+    asyncio.run(Service().run(float(sys.argv[1])))
