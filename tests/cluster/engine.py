@@ -366,12 +366,13 @@ class Engine:
         self.write(os.path.join(node.data, "standby.signal"), "")
 
     def wait_until_replicated(self, seconds=START_SECONDS):
-        """Waits until all standbys receive from the primary and have all that it has."""
+        """Waits until all running standbys receive from the primary and have all that it has now."""
         names = sorted(node.name for node in self.standbys() if node.state == RUNNING)
+        position = wait_for(lambda: self.ask(self.primary, "SELECT pg_current_wal_flush_lsn()"), seconds, "the primary answers")[0][0]
 
         def complete():
             rows = self.ask(self.primary, "SELECT application_name FROM pg_stat_replication WHERE state = 'streaming' AND "
-                            "flush_lsn >= pg_current_wal_flush_lsn()")
+                            "flush_lsn >= %s::pg_lsn", position)
             return sorted(row[0] for row in rows) == names
         wait_for(complete, seconds, f"{names} follow {self.primary}")
 

@@ -1,0 +1,206 @@
+"""Tests of the engine for tests: through faults from a seed no acknowledged record is lost or doubled; without a quorum, or
+without synchronous commit, the same test loses records; and whatever ends the test, nothing of it is left.
+
+    LOCUS_CLUSTER_SEED=7 LOCUS_CLUSTER_SECONDS=300 python3 engine_test.py
+    LOCUS_CLUSTER_PLAN=plan.txt python3 engine_test.py
+
+Exits 77, which counts as skipped, if PostgreSQL or psycopg2 is missing.
+"""
+import os
+import signal
+import subprocess
+import sys
+import time
+import unittest
+
+sys.dont_write_bytecode = True
+HERE = os.path.dirname(os.path.abspath(__file__))
+sys.path.insert(0, HERE)
+
+import append_log  # noqa: E402
+from append_log import Writer, compare  # noqa: E402
+from checker import check  # noqa: E402
+from engine import HUNG, Engine, EngineError, unavailable  # noqa: E402
+from engine_faults import EngineFaults  # noqa: E402
+from fault_plan import ENGINE, Plan, names, run  # noqa: E402
+from history import Recorder  # noqa: E402
+from keeper import end_in_order, started_at  # noqa: E402
+from shrink import report  # noqa: E402
+
+SKIPPED = 77
+SEED = int(os.environ.get("LOCUS_CLUSTER_SEED", "1"))
+SECONDS = float(os.environ.get("LOCUS_CLUSTER_SECONDS", "45"))
+LIFE_SECONDS = 240 + 2 * SECONDS
+MAX_FAULT_SECONDS = 4  # keeps the run short; longer plans are given by LOCUS_CLUSTER_PLAN
+SCENES = ["arena", "lobby", "maze"]
+WRITERS = ["w0", "w1", "w2"]
+
+
+def plan_of_this_run():
+    path = os.environ.get("LOCUS_CLUSTER_PLAN")
+    if path:
+        with open(path, encoding="utf-8") as file:
+            return Plan.parse(file.read())
+    return Plan.make(SEED, SECONDS, names(ENGINE), MAX_FAULT_SECONDS, pause=(0.2, 0.6))
+
+
+def say(text):
+    print(text, file=sys.stderr, flush=True)
+
+
+def start_writers(engine, recorder, steal=0.01):
+    append_log.create_tables(engine, SCENES)
+    writers = [Writer(engine, name, SCENES, recorder, f"{recorder.history.seed} {name}", steal) for name in WRITERS]
+    for writer in writers:
+        writer.start()
+    return writers
+
+
+def wait_for_appends(writers, count):
+    """Waits until the writers have appended `count` more records."""
+    goal = sum(writer.appended for writer in writers) + count
+    until = time.monotonic() + 30
+    while sum(writer.appended for writer in writers) < goal:
+        if time.monotonic() > until:
+            raise AssertionError("the writers do not get on")
+        time.sleep(0.01)
+
+
+class FaultPlanOnEngineTest(unittest.TestCase):
+    def test_no_acknowledged_record_is_lost_or_doubled_by_faults_of_the_engine(self):
+        plan, recorder = plan_of_this_run(), Recorder(SEED)
+        say(str(plan))
+        with Engine(life_seconds=LIFE_SECONDS) as engine:
+            writers = start_writers(engine, recorder)
+            run(plan, EngineFaults(engine, WRITERS).actions(), say)
+            engine.repair()
+            engine.wait_until_writable()
+            wait_for_appends(writers, 30)
+            for writer in writers:
+                writer.stop()
+            result = compare(engine, recorder, SCENES)
+        say(f"{result.acknowledged} records acknowledged, {len(recorder.history.calls)} calls")
+        violations = check(recorder.history)
+        self.assertFalse(violations, report(recorder.history, violations, origin=str(plan)))
+        self.assertEqual((result.lost, result.doubled, result.refused), ([], [], []), str(plan))
+        self.assertGreater(result.acknowledged, 100, str(plan))
+
+
+class LosingEngineTest(unittest.TestCase):
+    """The primary's log stops to reach the standbys, and then the primary is lost with its disk."""
+
+    def lose_primary(self, **options):
+        recorder = Recorder(SEED)
+        with Engine(life_seconds=LIFE_SECONDS, **options) as engine:
+            writers = start_writers(engine, recorder, steal=0)
+            wait_for_appends(writers, 30)
+            engine.set_links(HUNG, sources=[node.name for node in engine.standbys()], nodes=[engine.primary])
+            time.sleep(1)
+            old = engine.primary
+            engine.kill(old)
+            engine.wipe(old)
+            engine.fail_over()
+            engine.heal()
+            engine.rejoin(old)
+            for writer in writers:
+                writer.stop()
+            result = compare(engine, recorder, SCENES)
+        return result, recorder.history
+
+    def test_a_lost_primary_loses_nothing_with_a_quorum(self):
+        result, history = self.lose_primary()
+        self.assertEqual((result.lost, result.doubled, check(history)), ([], [], []))
+
+    def test_a_lost_primary_loses_records_without_a_quorum(self):
+        result, history = self.lose_primary(quorum=False)
+        self.assertTrue(result.lost)
+        self.assertTrue(check(history), "the checker of histories does not see the loss")
+
+    def test_a_lost_primary_loses_records_without_synchronous_commit(self):
+        result, history = self.lose_primary(settings={"synchronous_commit": "off"})
+        self.assertTrue(result.lost)
+        self.assertTrue(check(history), "the checker of histories does not see the loss")
+
+
+class EngineTest(unittest.TestCase):
+    def test_without_standbys_nothing_is_committed_and_the_old_primary_is_copied_anew_after_it_was_wiped(self):
+        with Engine(life_seconds=LIFE_SECONDS) as engine:
+            engine.set_links(HUNG, sources=["n1", "n2"])
+            with self.assertRaises(EngineError):
+                engine.wait_until_writable(2)
+            engine.heal()
+            engine.wait_until_writable()
+            old = engine.primary
+            engine.kill(old)
+            engine.wipe(old)
+            self.assertIn(engine.fail_over(), [node for node in engine.nodes if node is not old])
+            self.assertEqual(engine.rejoin(old), "copied")
+            engine.wait_until_replicated()
+
+    def test_an_old_primary_whose_log_went_its_own_way_is_rewound(self):
+        with Engine(life_seconds=LIFE_SECONDS, quorum=False) as engine:
+            old = engine.primary
+            engine.set_links(HUNG, sources=["n1", "n2"])
+            engine.ask(old, "CREATE TABLE only_here (x int)")
+            engine.kill(old)
+            engine.fail_over()
+            engine.heal()
+            self.assertEqual(engine.rejoin(old), "rewound")
+            engine.wait_until_replicated()
+            self.assertEqual(engine.ask(old, "SELECT to_regclass('only_here')"), [(None,)])
+
+
+# A test that starts an engine, says what it started, and then waits.
+CHILD = f"""
+import sys, time
+sys.path.insert(0, {HERE!r})
+from engine import Engine
+from keeper import end_in_order
+end_in_order()
+with Engine(life_seconds=float(sys.argv[1])) as engine:
+    print(engine.folder, *(node.process.pid for node in engine.nodes), flush=True)
+    if sys.argv[2] == "raise":
+        raise RuntimeError("a test failed")
+    time.sleep(120)
+"""
+
+
+class EndTest(unittest.TestCase):
+    def end(self, how, life_seconds=100):
+        """Starts a test with an engine and ends it in some way. Nothing of it may be left soon after."""
+        child = subprocess.Popen([sys.executable, "-B", "-c", CHILD, str(life_seconds), how], stdout=subprocess.PIPE, text=True,
+                                 stderr=subprocess.DEVNULL)
+        with child.stdout:
+            folder, *pids = child.stdout.readline().split()
+            started = {pid: started_at(pid) for pid in pids}
+            self.assertEqual(len(pids), 3)
+            if how.startswith("SIG"):
+                child.send_signal(getattr(signal, how))
+            if how != "life":
+                child.wait(timeout=60)
+            until = time.monotonic() + 60
+            while os.path.exists(folder) or any(started_at(pid) == start for pid, start in started.items()):
+                self.assertLess(time.monotonic(), until, f"after {how} something is left: {folder} {pids}")
+                time.sleep(0.05)
+            child.kill()
+            child.wait()
+
+    def test_nothing_is_left_after_an_exception(self):
+        self.end("raise")
+
+    def test_nothing_is_left_after_sigterm(self):
+        self.end("SIGTERM")
+
+    def test_nothing_is_left_after_sigkill(self):
+        self.end("SIGKILL")
+
+    def test_nothing_is_left_when_its_life_is_over(self):
+        self.end("life", life_seconds=8)
+
+
+if __name__ == "__main__":
+    if unavailable():
+        print("skipped: " + unavailable())
+        sys.exit(SKIPPED)
+    end_in_order()
+    unittest.main(verbosity=2)
