@@ -254,6 +254,7 @@ class Engine:
         quorum, self.quorum = self.quorum, False
         self.start(first, database="postgres")
         sql.ask(self.dsn(first).replace(f"dbname={DATABASE}", "dbname=postgres"), f"CREATE DATABASE {DATABASE}", seconds=20)
+        self.ask(first, "CREATE TABLE probe (at timestamptz)")
         for node in self.nodes[1:]:
             self.copy_primary(node)
             self.start(node)
@@ -368,7 +369,10 @@ class Engine:
     def wait_until_replicated(self, seconds=START_SECONDS):
         """Waits until all running standbys receive from the primary and have all that it has now."""
         names = sorted(node.name for node in self.standbys() if node.state == RUNNING)
-        position = wait_for(lambda: self.ask(self.primary, "SELECT pg_current_wal_flush_lsn()"), seconds, "the primary answers")[0][0]
+        # A commit that is flushed here, before any standby has it, flushes all commits before it.
+        wait_for(lambda: self.ask(self.primary, "SET synchronous_commit = local; INSERT INTO probe VALUES (now()) RETURNING 1"),
+                 seconds, f"{self.primary} commits")
+        position = self.ask(self.primary, "SELECT pg_current_wal_flush_lsn()")[0][0]
 
         def complete():
             rows = self.ask(self.primary, "SELECT application_name FROM pg_stat_replication WHERE state = 'streaming' AND "
@@ -445,8 +449,7 @@ class Engine:
     def wait_until_writable(self, seconds=START_SECONDS):
         """Waits until the primary commits, which includes an answer of a standby. Returns the seconds that it took."""
         start = time.monotonic()
-        wait_for(lambda: self.ask(self.primary, "CREATE TABLE IF NOT EXISTS probe (at timestamptz); "
-                                  "INSERT INTO probe VALUES (now()) RETURNING 1"), seconds, "the engine takes writes")
+        wait_for(lambda: self.ask(self.primary, "INSERT INTO probe VALUES (now()) RETURNING 1"), seconds, "the engine takes writes")
         return time.monotonic() - start
 
 

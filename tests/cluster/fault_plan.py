@@ -35,7 +35,7 @@ FAULTS = {
                             "show commits that no standby has"),
     "kill-standby": Kind(ENGINE, (1, 4), "SIGKILL to all processes of a standby, which is started again at the end; the other one "
                          "makes the quorum"),
-    "freeze-primary": Kind(ENGINE, (4, 15), "SIGSTOP to the primary while another node is promoted; at the end the old one wakes, "
+    "freeze-primary": Kind(ENGINE, (3, 15), "SIGSTOP to the primary while another node is promoted; at the end the old one wakes, "
                            "still takes itself for the primary for a second, and then joins again"),
     "freeze-standby": Kind(ENGINE, (2, 8), "SIGSTOP to a standby, then SIGCONT"),
     "isolate-primary": Kind(ENGINE, (3, 10), "the primary is cut from the other nodes and hangs for all clients, while another node "

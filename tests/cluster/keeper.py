@@ -11,6 +11,7 @@ and accepts connections but forwards nothing, as a machine does that is frozen o
 accepted is forwarded when it is open again.
 """
 import asyncio
+import contextlib
 import json
 import os
 import shutil
@@ -201,7 +202,8 @@ class Keeper:
 
     def close(self):
         """Ends everything guarded, and the keeper."""
-        self._process.stdin.close()
+        with contextlib.suppress(BrokenPipeError):
+            self._process.stdin.close()
         try:
             self._process.wait(timeout=ANSWER_SECONDS)
         except subprocess.TimeoutExpired:
