@@ -80,7 +80,7 @@ class SceneCheck:
     """Check of one scene."""
 
     def __init__(self, calls, numbers, hidden, findings):
-        self.calls, self.findings = calls, findings
+        self.calls, self.add = calls, findings.add
         shown = [number for number in numbers if number not in hidden]
         self.reads = [number for number in shown if calls[number].kind == READ and calls[number].outcome == OK]
         self.acks = [number for number in shown if calls[number].kind == UPDATE and calls[number].outcome == OK]
@@ -93,7 +93,7 @@ class SceneCheck:
                         key=lambda epoch: min(self.calls[number].begin for number in self.of_epoch(epoch)))
         if len(epochs) > 1 and not may_restart:
             first, second = (self.of_epoch(epoch)[0] for epoch in epochs[:2])
-            self.findings.add("epoch", f"the epochs {epochs[0]} and {epochs[1]} were both answered", first, second)
+            self.add("epoch", f"the epochs {epochs[0]} and {epochs[1]} were both answered", first, second)
         self.check_views()
         self.check_repeats()
         self.check_tokens()
@@ -109,11 +109,11 @@ class SceneCheck:
         for number in self.reads:
             call = self.calls[number]
             if call.view == AT_LEAST and call.revision < call.asked:
-                self.findings.add("at_least", f"#{number} asked for {call.asked} and got {call.revision}", number)
+                self.add("at_least", f"#{number} asked for {call.asked} and got {call.revision}", number)
             if call.view == EXACTLY and call.revision != call.asked:
-                self.findings.add("exactly", f"#{number} asked for {call.asked} and got {call.revision}", number)
+                self.add("exactly", f"#{number} asked for {call.asked} and got {call.revision}", number)
             if call.max_age_ms and call.age_ms is not None and call.age_ms > call.max_age_ms:
-                self.findings.add("max_age", f"#{number} is {call.age_ms} ms old, and allowed {call.max_age_ms}", number)
+                self.add("max_age", f"#{number} is {call.age_ms} ms old, and allowed {call.max_age_ms}", number)
 
     def check_repeats(self):
         """Compares the acks of the attempts of one batch. An ack that the server has no longer has no counts."""
@@ -122,15 +122,15 @@ class SceneCheck:
             acks = [number for number in update.attempts if number in shown]
             firsts = [number for number in acks if not self.calls[number].duplicate]
             if len(firsts) > 1:
-                self.findings.add("once", f"writer {update.writer}, batch {update.batch} was acknowledged as new by " +
-                                  " and ".join(f"#{number}" for number in firsts), *firsts)
+                self.add("once", f"writer {update.writer}, batch {update.batch} was acknowledged as new by " +
+                         " and ".join(f"#{number}" for number in firsts), *firsts)
             whole = [number for number in acks if not (self.calls[number].duplicate and self.calls[number].applied == 0)]
             kept = {number: (self.calls[number].epoch, self.calls[number].revision, self.calls[number].tick,
                              self.calls[number].applied) for number in whole}
             for number in whole[1:]:
                 if kept[number] != kept[whole[0]]:
-                    self.findings.add("same_ack", f"the acks of #{whole[0]} and #{number} (epoch, revision, tick, applied) are "
-                                      f"{kept[whole[0]]} and {kept[number]}", whole[0], number)
+                    self.add("same_ack", f"the acks of #{whole[0]} and #{number} (epoch, revision, tick, applied) are "
+                             f"{kept[whole[0]]} and {kept[number]}", whole[0], number)
 
     def check_tokens(self):
         named = [number for number in self.reads + self.acks + self.tokens if self.calls[number].token is not None]
@@ -144,24 +144,24 @@ class SceneCheck:
             for number in numbers:
                 best = seen.before(self.calls[number].begin)
                 if best and best[0] > self.calls[number].token:
-                    self.findings.add("token", f"{source} named {best[0]} in #{best[1]} and later "
-                                      f"{self.calls[number].token} in #{number}", best[1], number)
+                    self.add("token", f"{source} named {best[0]} in #{best[1]} and later "
+                             f"{self.calls[number].token} in #{number}", best[1], number)
         leaders = {}
         for number in led:
             call = self.calls[number]
             other = leaders.setdefault(call.token, number)
             if call.daemon != self.calls[other].daemon:
-                self.findings.add("token", f"{self.calls[other].daemon} in #{other} and {call.daemon} in #{number} both led "
-                                  f"with token {call.token}", other, number)
+                self.add("token", f"{self.calls[other].daemon} in #{other} and {call.daemon} in #{number} both led "
+                         f"with token {call.token}", other, number)
         self.check_tokens_of_acks(sorted((self.calls[number].epoch, self.calls[number].revision, number) for number in led
                                          if self.calls[number].kind == UPDATE and not self.calls[number].duplicate))
 
     def check_tokens_of_acks(self, acks):
         for (epoch, _, before), (next_epoch, _, after) in zip(acks, acks[1:]):
             if epoch == next_epoch and self.calls[after].token < self.calls[before].token:
-                self.findings.add("token", f"revision {self.calls[before].revision} was made with token "
-                                  f"{self.calls[before].token} (#{before}), and revision {self.calls[after].revision} with token "
-                                  f"{self.calls[after].token} (#{after})", before, after)
+                self.add("token", f"revision {self.calls[before].revision} was made with token "
+                         f"{self.calls[before].token} (#{before}), and revision {self.calls[after].revision} with token "
+                         f"{self.calls[after].token} (#{after})", before, after)
 
     def check_equal_answers(self):
         """Compares what reads at one revision show of one object, and the digests of equal questions."""
@@ -176,16 +176,16 @@ class SceneCheck:
             for key, value in entries:
                 other, seen = first.setdefault(key, (number, value))
                 if seen != value:
-                    self.findings.add("equal", f"at revision {call.revision} {key[2]!r} is {seen!r} for "
-                                      f"{self.calls[other].daemon or 'one read'} (#{other}) and {value!r} for "
-                                      f"{call.daemon or 'another'} (#{number})", other, number)
+                    self.add("equal", f"at revision {call.revision} {key[2]!r} is {seen!r} for "
+                             f"{self.calls[other].daemon or 'one read'} (#{other}) and {value!r} for "
+                             f"{call.daemon or 'another'} (#{number})", other, number)
 
 
 class EpochCheck:
     """Check of one epoch of a scene."""
 
     def __init__(self, scene, epoch, first, only):
-        self.calls, self.findings, self.epoch = scene.calls, scene.findings, epoch
+        self.calls, self.add, self.epoch = scene.calls, scene.add, epoch
         self.reads = [number for number in scene.reads if self.calls[number].epoch == epoch]
         self.acks = [number for number in scene.acks if self.calls[number].epoch == epoch]
         self.known = [update for update in scene.updates if update.epoch == epoch]
@@ -204,8 +204,8 @@ class EpochCheck:
             return
         other = self.applied.setdefault(update.low, update)
         if other is not update and other.shown and update.shown:
-            self.findings.add("unique", f"#{other.attempts[0]} and #{update.attempts[0]} both have revision {update.low}",
-                              *other.attempts, *update.attempts)
+            self.add("unique", f"#{other.attempts[0]} and #{update.attempts[0]} both have revision {update.low}",
+                     *other.attempts, *update.attempts)
 
     def run(self):
         self.bound_doubtful()
@@ -268,12 +268,12 @@ class EpochCheck:
         if low > high:
             sent = update.attempts[0]
             if update.seen and since + 1 > update.high:
-                self.findings.add("once", f"#{sent}, of unknown outcome, had been applied by revision {update.high}, and #{number} "
-                                  f"shows it again at revision {call.revision}, after revision {since} had changed object {item}",
-                                  sent, number, *update.attempts, *self.applied[since].attempts)
+                self.add("once", f"#{sent}, of unknown outcome, had been applied by revision {update.high}, and #{number} "
+                         f"shows it again at revision {call.revision}, after revision {since} had changed object {item}",
+                         sent, number, *update.attempts, *self.applied[since].attempts)
             else:
-                self.findings.add("committed", f"#{number} shows object {item} at revision {call.revision} as #{sent} left it, "
-                                  f"which has revision {update.low} at the earliest", sent, number)
+                self.add("committed", f"#{number} shows object {item} at revision {call.revision} as #{sent} left it, "
+                         f"which has revision {update.low} at the earliest", sent, number)
             return
         update.high, update.low, update.seen = high, low, True
 
@@ -285,14 +285,14 @@ class EpochCheck:
         calls = [number, *(maker.attempts if maker else ())]
         for update in self.makers.get((item, value), ()):
             if update.outcome == FAILED:
-                self.findings.add("failed", f"{text}: that is #{update.attempts[0]}, which was refused", *calls, *update.attempts)
+                self.add("failed", f"{text}: that is #{update.attempts[0]}, which was refused", *calls, *update.attempts)
                 return
             if update.outcome == OK and update.shown and update.low > call.revision:
                 rule = "once" if len(update.attempts) > 1 else "model"
-                self.findings.add(rule, f"{text}: that is #{update.attempts[-1]}, acknowledged at revision {update.low}",
-                                  *calls, *update.attempts)
+                self.add(rule, f"{text}: that is #{update.attempts[-1]}, acknowledged at revision {update.low}",
+                         *calls, *update.attempts)
                 return
-        self.findings.add("model", text, *calls)
+        self.add("model", text, *calls)
 
     def exclude(self, shown):
         """Narrows the bounds of updates of unknown outcome by reads that do not show them: such an update has not been
@@ -309,9 +309,9 @@ class EpochCheck:
                     continue
                 revision, since, number = entries[index]
                 if revision >= update.high:
-                    self.findings.add("model", f"#{number} shows object {item} at revision {revision} as revision {since} left it, "
-                                      f"though #{update.attempts[0]} had been applied by revision {update.high}", number,
-                                      *update.attempts)
+                    self.add("model", f"#{number} shows object {item} at revision {revision} as revision {since} left it, "
+                             f"though #{update.attempts[0]} had been applied by revision {update.high}", number,
+                             *update.attempts)
                 else:
                     update.low = revision + 1
 
@@ -342,20 +342,20 @@ class EpochCheck:
         lost = first_without_place(gaps, [update for update in self.doubtful if update.seen]) if self.only else None
         if lost:
             sent = lost.attempts[0]
-            self.findings.add("dense", f"#{sent} was applied with a revision of {lost.low} to {lost.high}, and other updates have "
-                              "all of them", *lost.attempts)
+            self.add("dense", f"#{sent} was applied with a revision of {lost.low} to {lost.high}, and other updates have "
+                     "all of them", *lost.attempts)
 
     def report_gap(self, gap, highest_read):
         if highest_read[0] >= gap > max(self.applied, default=0):
-            self.findings.add("committed", f"#{highest_read[1]} shows revision {highest_read[0]}, and no update can have made "
-                              f"revision {gap}", highest_read[1])
+            self.add("committed", f"#{highest_read[1]} shows revision {highest_read[0]}, and no update can have made "
+                     f"revision {gap}", highest_read[1])
             return
         after = min(revision for revision in self.applied if revision > gap)
         before = max((revision for revision in self.applied if revision < gap), default=None)
         neighbours = self.applied[after].attempts + (self.applied[before].attempts if before is not None else [])
         repeated = [update.attempts[0] for update in self.known if len(update.attempts) > 1 and update.shown]
         hint = f" (sent several times: {', '.join(f'#{number}' for number in repeated[:MAX_SHOWN])})" if repeated else ""
-        self.findings.add("dense", f"no update can have made revision {gap} of epoch {self.epoch}{hint}", *neighbours)
+        self.add("dense", f"no update can have made revision {gap} of epoch {self.epoch}{hint}", *neighbours)
 
     def check_real_time(self):
         """Sweeps revisions from the highest one, with the earliest end of what has a higher revision."""
@@ -372,8 +372,8 @@ class EpochCheck:
             sent = update.attempts[0]
             if earliest[0] < update.begin:
                 rule = "committed" if self.calls[earliest[1]].kind == READ else "real_time"
-                self.findings.add(rule, f"#{earliest[1]} had ended with revision {earliest[2]} when #{sent}, which has revision "
-                                  f"{revision}, was sent", earliest[1], *update.attempts)
+                self.add(rule, f"#{earliest[1]} had ended with revision {earliest[2]} when #{sent}, which has revision "
+                         f"{revision}, was sent", earliest[1], *update.attempts)
             ack = next(number for number in update.attempts if self.calls[number].end == update.acked)
             earliest = min(earliest, (update.acked, ack, revision), key=lambda entry: entry[0])
 
@@ -387,14 +387,15 @@ class EpochCheck:
             for before, after in zip(acked, acked[1:]):
                 low, high = batches[before], batches[after]
                 if low.low >= high.low and low.changes and high.changes and low.shown and high.shown:
-                    self.findings.add("writers", f"writer {writer} has batch {before} at revision {low.low} (#{low.attempts[0]}) and "
-                                      f"batch {after} at revision {high.low} (#{high.attempts[0]})", *low.attempts, *high.attempts)
-            missing = next((batch for batch in range(1, acked[-1]) if batch not in batches), None) if acked and self.only else None
+                    self.add("writers", f"writer {writer} has batch {before} at revision {low.low} (#{low.attempts[0]}) and "
+                             f"batch {after} at revision {high.low} (#{high.attempts[0]})", *low.attempts, *high.attempts)
+            last = acked[-1] if acked and self.only else 1
+            missing = next((batch for batch in range(1, last) if batch not in batches), None)
             if missing:
                 after = batches[min(batch for batch in acked if batch > missing)]
                 if after.shown:
-                    self.findings.add("writers", f"batch {after.batch} of writer {writer} was applied (#{after.attempts[-1]}) without "
-                                      f"batch {missing}", *after.attempts)
+                    self.add("writers", f"batch {after.batch} of writer {writer} was applied (#{after.attempts[-1]}) without "
+                             f"batch {missing}", *after.attempts)
 
     def check_freshness(self):
         """Checks what reads must see because it was acknowledged before. `exactly` asks for the past, at any age."""
@@ -408,13 +409,13 @@ class EpochCheck:
                 continue
             best = leaders.before(call.begin) if call.leader_only else None
             if best and best[0] > call.revision:
-                self.findings.add("fresh", f"#{number} with leader_only shows revision {call.revision}, and revision {best[0]} had "
-                                  f"been answered before by #{best[1]}", number, best[1])
+                self.add("fresh", f"#{number} with leader_only shows revision {call.revision}, and revision {best[0]} had "
+                         f"been answered before by #{best[1]}", number, best[1])
             best = acks.before(call.begin - call.age_ms * NANOSECONDS_PER_MS) if call.age_ms is not None else None
             if best and best[0] > call.revision:
                 late = (call.begin - self.calls[best[1]].end) / NANOSECONDS_PER_MS
-                self.findings.add("age", f"#{number} shows revision {call.revision} and says age {call.age_ms} ms, and revision "
-                                  f"{best[0]} had been acknowledged {late:.3f} ms before it was asked (#{best[1]})", number, best[1])
+                self.add("age", f"#{number} shows revision {call.revision} and says age {call.age_ms} ms, and revision "
+                         f"{best[0]} had been acknowledged {late:.3f} ms before it was asked (#{best[1]})", number, best[1])
 
     def check_sessions(self):
         clients = collections.defaultdict(list)
@@ -427,5 +428,5 @@ class EpochCheck:
                 call = self.calls[number]
                 best = seen.before(call.begin) if call.kind == READ and call.view != EXACTLY else None
                 if best and best[0] > call.revision:
-                    self.findings.add("session", f"client {process} saw revision {best[0]} in #{best[1]} and then revision "
-                                      f"{call.revision} in #{number}", number, best[1])
+                    self.add("session", f"client {process} saw revision {best[0]} in #{best[1]} and then revision "
+                             f"{call.revision} in #{number}", number, best[1])

@@ -449,7 +449,8 @@ class Engine:
     def wait_until_writable(self, seconds=START_SECONDS):
         """Waits until the primary commits, which includes an answer of a standby. Returns the seconds that it took."""
         start = time.monotonic()
-        wait_for(lambda: self.ask(self.primary, "INSERT INTO probe VALUES (now()) RETURNING 1"), seconds, "the engine takes writes")
+        wait_for(lambda: self.ask(self.primary, "INSERT INTO probe VALUES (now()) RETURNING 1"), seconds,
+                 "the engine takes writes")
         return time.monotonic() - start
 
 

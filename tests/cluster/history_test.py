@@ -71,7 +71,8 @@ class CorrectHistoryTest(unittest.TestCase):
         self.assertEqual(rules(History(calls)), set())
 
     def test_a_batch_that_changes_nothing_makes_no_revision(self):
-        calls = [update(0, 1, 1, {1: (1.0,)}), update(2, 3, 1, {}, writer=4, batch=1), update(4, 5, 2, {1: (2.0,)}, writer=4, batch=2)]
+        calls = [update(0, 1, 1, {1: (1.0,)}), update(2, 3, 1, {}, writer=4, batch=1),
+                 update(4, 5, 2, {1: (2.0,)}, writer=4, batch=2)]
         self.assertEqual(rules(History(calls)), set())
 
     def test_a_duplicate_whose_ack_is_no_longer_stored_passes(self):

@@ -1,6 +1,6 @@
 """Makes a failing history small: hides calls while the same rule stays broken, and prints those that are left."""
 from checker import check
-from history import AT_LEAST, EXACTLY, FAILED, NEVER, OK, READ, TOKEN, UPDATE, History
+from history import AT_LEAST, EXACTLY, NEVER, OK, READ, TOKEN, UPDATE, History
 
 MAX_CHECKS = 400  # bounds the time to shrink a history
 
@@ -94,7 +94,7 @@ def describe(history, numbers):
     for number, call in calls:
         end = "never" if call.end == NEVER else f"{(call.end - start) / 1e6:.3f}"
         lines.append(f"  #{number} {(call.begin - start) / 1e6:.3f} to {end} ms, {call.process} on {call.scene}: "
-                     f"{describe_question(call)} -> {'failed ' + call.error if call.outcome == FAILED else describe_answer(call)}")
+                     f"{describe_question(call)} -> {describe_answer(call)}")
     return lines
 
 
@@ -102,7 +102,8 @@ def report(history, violations, origin=""):
     """Returns a text of the violations of a history: each rule once, with its smallest calls. `origin` says how to run it
     again, for example the fault plan.
     """
-    lines = [f"seed {history.seed}: {len(violations)} violations in {len(history.calls)} calls" + (f"; {origin}" if origin else "")]
+    found = f"{len(violations)} violations in {len(history.calls)} calls"
+    lines = [f"seed {history.seed}: {found}" + (f"; {origin}" if origin else "")]
     told = set()
     for violation in violations:
         if violation.rule in told:
